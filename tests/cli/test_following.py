@@ -4,7 +4,9 @@ import json
 import re
 import socket
 import threading
+from dataclasses import replace
 from pathlib import Path
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -172,6 +174,20 @@ def test_what_is_not_kept_while_moving_is_refused(tmp_path: Path) -> None:
     file = written(tmp_path)
     file.write_text(file.read_text() + '\n[[relaxations]]\nrows = ["z"]\nband = 0.01\n')
     assert "no row is relaxed" in complaint("follow", file)
+    problem = sm.read_problem(written(tmp_path))
+    with pytest.raises(sm.ProblemError, match="nothing is damped: leave 'damping' out"):
+        replanner_of(replace(problem, damping=sm.Damping()))
+
+
+def test_a_clearance_that_is_given_as_collision_is_kept_while_moving(tmp_path: Path) -> None:
+    problem = sm.read_problem(written(tmp_path))
+    apart = sm.Clearance([sm.Box("post", [0.0, -0.6, 0.6], [0.1, 0.1, 1.2])], 0.01)
+    asked = []
+    with patch.object(sm, "Replanner", lambda *given, **_: asked.append(given[3])):
+        replanner_of(replace(problem, collision=apart))
+        replanner_of(problem)
+    assert apart in asked[0]
+    assert not any(isinstance(item, sm.Clearance) for item in asked[1])
 
 
 def test_a_file_without_constraints_is_followed_and_jerks_that_are_asked_for_are_not(

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
+from selfmotion.cli import jobs
 from selfmotion.cli.documents import seams_of_file
 from support.places import ROOT
 from support.shell import complaint, invoke
@@ -148,3 +149,15 @@ def test_bad_targets_are_refused_before_anything_is_planned(table) -> None:
     settings.write_text("[signals]\noff = [1, true]\n")
     said = complaint("job", table, "--out", "frame.src", "--settings", settings)
     assert "event 'on' has no signal" in said
+    said = complaint("job", table, "--out", "frame.yaml", "--settings", settings)
+    assert "--settings has no effect" in said
+
+
+def test_settings_are_of_controllers_files_alone(table, tmp_path, monkeypatch) -> None:
+    """Beside other files they are no reason to write none after all is planned."""
+    told = []
+    monkeypatch.setattr(sm, "write_motion", lambda *_, settings, **__: told.append(settings))
+    settings = sm.ProgramSettings()
+    for name in ("a.yaml", "a.src", "a.script", "a.csv"):
+        jobs.write_program(None, tmp_path / name, settings)
+    assert told == [None, settings, settings, None]

@@ -1,6 +1,7 @@
 """The shell knows what Python knows: each option is the problem that it stands for."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -8,7 +9,7 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.cli.options import relaxation
+from selfmotion.cli.options import relaxation, search_of
 from support.arms import PANDA_HOME
 from support.shell import complaint, invoke
 
@@ -119,7 +120,16 @@ def test_a_plan_is_written_in_any_format(tmp_path: Path, name: str) -> None:
         (("--cost", "Speed"), "--cost is 'Speed', expected NAME or NAME=WEIGHT"),
         (("--cost", "PathLength=1"), "--cost: PathLength has no weight"),
         (("--cost", "JointVelocity=a"), "--cost is 'a', expected numbers"),
-        (("--frame", "0,0,0,0,0,0"), "--frame, --ramp, --seam, --columns, "),
+        (("--frame", "0,0,0,0,0,0"), "--frame is for --path: a shape is one"),
+        (("--corners", "blend"), "--corners is for --path"),
+        (("--corner-tolerance", "0.01"), "--corner-tolerance is for --path"),
+        (("--jump", "0.1"), "--jump is for --path"),
+        (("--rotary-axes", "BC"), "--rotary-axes is for --path"),
+        (("--rotary-center", "0,0,0"), "--rotary-center is for --path"),
+        (("--lock", "a=1", "--lock", "a=2"), "--lock says 'a' twice; say it once"),
+        (("--argument", "a=1", "--argument", "a=2"), "--argument says 'a' twice"),
+        (("--set", "path.radius=1", "--set", "path.radius_mm=2"), "--set says 'path.radius' twice"),
+        (("--clearance", "0.01", "--no-self-collision"), "has no effect beside --obstacles"),
         (("--feed", "0.1", "--duration", "2"), "give the pace by one of --feed and --duration"),
         (("--lock", "a"), "--lock is 'a', expected NAME=VALUE"),
         (("--lock", "a=1"), "lock names joint 'a'"),
@@ -130,8 +140,24 @@ def test_a_plan_is_written_in_any_format(tmp_path: Path, name: str) -> None:
         (("--out", "a.txt"), "--out writes .npz (the plan)"),
     ],
 )
-def test_what_is_wrong_is_one_line(options: tuple[str, str], said: str) -> None:
+def test_what_is_wrong_is_one_line(options: tuple[str, ...], said: str) -> None:
     assert said in complaint("plan", "panda", "--circle", "0.1", *options)
+
+
+def test_a_normal_is_of_a_circle_and_processes_are_of_one_machine() -> None:
+    said = complaint("plan", "panda", "--line", "0.1,0,0", "--normal", "z")
+    assert "--normal is for --circle" in said
+    for command in ("batch", "job"):
+        said = complaint(command, "a.toml", "--workers", "2", "--dask", "127.0.0.1:8786")
+        assert "--workers has no effect beside --dask" in said
+
+
+def test_a_search_of_the_shell_leaves_the_rest_as_the_file_says() -> None:
+    known = sm.Search(starts=7, finalists=2, mode="global", rng=5)
+    assert search_of(None, True, known) == replace(known, compare=True)
+    assert search_of("local", False, known) == replace(known, mode="local")
+    assert search_of("local", False) == sm.Search(mode="local")
+    assert search_of(None, False, known) is None
 
 
 @pytest.mark.parametrize(

@@ -35,6 +35,12 @@ class BatchDisplay(Display):
         self._tenth = tenth
 
 
+def check_cluster(address: str | None, workers: int | None) -> None:
+    """Raise ProblemError where processes of this machine are asked for beside a cluster."""
+    if address is not None and workers is not None:
+        raise sm.ProblemError("--workers has no effect beside --dask, whose workers plan")
+
+
 @contextmanager
 def executor_at(address: str | None) -> Iterator[Executor | None]:
     """Give the executor of a Dask cluster; None without an address.

@@ -45,7 +45,7 @@ def plan(
     rotary_center: options.RotaryCenterOption = None,
     frame: options.FrameOption = None,
     ramp: options.RampOption = None,
-    corners: options.CornersOption = "blend",
+    corners: options.CornersOption = None,
     corner_tolerance: options.CornerToleranceOption = None,
     task: options.PlannedTaskOption = None,
     relax: options.RelaxOption = None,
@@ -82,7 +82,10 @@ def plan(
     job = documents.read(context, problem, settings or [], allow_code, warm_start)
     if job.goal != "parts":
         outputs.check_suffixes([*job.outputs, *(out or [])])
-    asked = {"max_evaluations": max_evaluations, "search": options.search_of(search, compare)}
+    asked = {
+        "max_evaluations": max_evaluations,
+        "search": options.search_of(search, compare, job.search),
+    }
     given = {key: value for key, value in asked.items() if value is not None}
     remarks = job.problem.remarks
     outputs.tell(remarks)
@@ -173,7 +176,7 @@ def check(
     rotary_center: options.RotaryCenterOption = None,
     frame: options.FrameOption = None,
     ramp: options.RampOption = None,
-    corners: options.CheckedCornersOption = None,
+    corners: options.CornersOption = None,
     corner_tolerance: options.CornerToleranceOption = None,
     task: options.CheckedTaskOption = None,
     tool: options.ToolOption = None,

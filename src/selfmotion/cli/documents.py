@@ -58,7 +58,7 @@ class Shell:
     rotary_center: str | None
     frame: str | None
     ramp: float | None
-    corners: str
+    corners: str | None
     corner_tolerance: float | None
     task: str | None
     start: str | None
@@ -141,14 +141,16 @@ class Shell:
     def _path(self, normal: str) -> dict[str, Any]:
         if sum(option is not None for option in (self.path, self.circle, self.line)) != 1:
             raise sm.ProblemError("give the tool motion by one of --path, --circle and --line")
+        if self.normal is not None and self.circle is None:
+            raise sm.ProblemError("--normal is for --circle, and has no effect on another motion")
         if self.path is not None:
             return path_table(self.path, vars(self))
-        of_files = (self.frame, self.ramp, self.seam, self.columns, self.standoff, self.rotary)
-        if self.flip_normals or any(option is not None for option in of_files):
-            raise sm.ProblemError(
-                "--frame, --ramp, --seam, --columns, --standoff, --rotary and --flip-normals are "
-                "for --path; a shape is one, and rests at its ends"
-            )
+        for name in OF_PATH:
+            if name not in _OF_SHAPE and getattr(self, name) not in (None, False):
+                raise sm.ProblemError(
+                    f"--{name.replace('_', '-')} is for --path: a shape is one, and rests at its "
+                    f"ends"
+                )
         if self.feed is not None and self.duration is not None:
             raise sm.ProblemError("give the pace by one of --feed and --duration")
         pace = {"feed": self.feed} if self.feed is not None else {"duration": self.duration or 4.0}
@@ -176,6 +178,11 @@ class Shell:
         if self.closed:
             found.append({"kind": "ClosedPath"})
         if self.obstacles is not None or self.clearance != 0.0 or self.srdf is not None:
+            if self.no_collision:
+                raise sm.ProblemError(
+                    "--no-self-collision has no effect beside --obstacles, --clearance and --srdf, "
+                    "which keep links apart from each other as well; leave out pairs by --srdf"
+                )
             bodies = [] if self.obstacles is None else options.obstacle_tables(self.obstacles)
             clearance = {"kind": "Clearance", "obstacles": bodies, "distance": self.clearance}
             found.append(clearance if self.srdf is None else {**clearance, "srdf": str(self.srdf)})
@@ -187,6 +194,10 @@ OF_PATH = (
     *("feed", "duration", "jump", "seam", "columns", "flip_normals", "standoff", "rotary"),
     *("rotary_axes", "rotary_center", "frame", "ramp", "corners", "corner_tolerance"),
 )
+
+
+# Those that a shape has as well.
+_OF_SHAPE = ("feed", "duration")
 
 
 def path_table(file: Path, typed: Mapping[str, Any]) -> dict[str, Any]:
@@ -294,8 +305,12 @@ def seams_of_file(file: Path, settings: list[str], allow_code: bool) -> sm.SeamJ
 
 
 def _set(document: dict[str, Any], settings: list[str]) -> None:
-    for text in settings:
-        set_key(document, *parse_setting(text))
+    pairs = [parse_setting(text) for text in settings]
+    # The same in another unit is the same.
+    keys = [key.removesuffix("_deg").removesuffix("_mm") for key, _ in pairs]
+    options.refuse_twice("--set", keys)
+    for key, value in pairs:
+        set_key(document, key, value)
 
 
 def _with_settings(

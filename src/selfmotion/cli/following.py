@@ -16,7 +16,7 @@ from rich.table import Table
 import selfmotion as sm
 from selfmotion import realtime
 from selfmotion.basics import Array
-from selfmotion.problem import KEPT
+from selfmotion.problem import KEPT, NO_OVERLAP
 from selfmotion.search import reachable
 
 # What a datagram holds at most, and how long one is waited for at a time [s].
@@ -217,12 +217,16 @@ def replanner_of(problem: sm.Problem, **options: Any) -> sm.Replanner:
         raise sm.ProblemError("while the arm moves one frame follows a path: leave 'also' out")
     if problem.relaxations:
         raise sm.ProblemError("while the arm moves no row is relaxed: leave 'relaxations' out")
+    if problem.damping is not None:
+        raise sm.ProblemError("while the arm moves nothing is damped: leave 'damping' out")
     # Limits of the jerk that nobody wrote, as all problems have them by default, are left to plans.
     asked = [
         item
         for item in problem.constraints
         if item.kept_moving or not any(item is usual for usual in KEPT)
     ]
+    if problem.collision is not NO_OVERLAP and problem.collision is not None:
+        asked.append(problem.collision)
     return sm.Replanner(problem.robot, problem.task, problem.costs, asked, **options)
 
 

@@ -11,7 +11,7 @@ import selfmotion as sm
 from selfmotion import formats
 from selfmotion.cli import documents, json_tables, options, outputs, tables
 from selfmotion.cli.app import NOT_VERIFIED, VERIFIED, app, complain, stages, terminal
-from selfmotion.cli.batch_display import executor_at
+from selfmotion.cli.batch_display import check_cluster, executor_at
 from selfmotion.cli.stage_display import StageDisplay
 
 PROGRAM, PARTS = ".program", ".parts"
@@ -48,6 +48,11 @@ def job(
     wanted = [*(out or []), *([] if html is None else [html])]
     for target in wanted:
         _check(target)
+    check_cluster(dask, workers if workers > 1 else None)
+    if settings is not None and not any(_switches(target) for target in wanted):
+        raise sm.ProblemError(
+            "--settings has no effect: it is of controllers' programs (--out .script, .src, .mod)"
+        )
     work = documents.seams_of_file(file, changes or [], allow_code)
     asked = None if settings is None else sm.read_program_settings(settings)
     if asked is not None or any(_switches(target) for target in wanted):
@@ -107,8 +112,9 @@ def write_program(
 
         write_replay(program, file)
     else:
+        own = settings if _switches(file) else None
         with StageDisplay(stages) as display:
-            sm.write_motion(program, file, settings=settings, progress=display.stage)
+            sm.write_motion(program, file, settings=own, progress=display.stage)
 
 
 def finish_parts(job: sm.Job, out: list[Path], as_json: bool) -> NoReturn:

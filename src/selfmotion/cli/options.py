@@ -1,5 +1,6 @@
 """Options of the commands, and what their texts mean."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -95,14 +96,11 @@ RampOption = Annotated[
     typer.Option(help="Run --path up to its speed from rest, and down again, in so long (s)."),
 ]
 CornersOption = Annotated[
-    Corners,
+    Corners | None,
     typer.Option(
-        help="At kinks of --path: swing through the pose, stop there, or, with --feed, round the "
-        "corner between straight legs."
+        help="At kinks of --path: swing through the pose (blend, the default), stop there, or, "
+        "with --feed, round the corner between straight legs."
     ),
-]
-CheckedCornersOption = Annotated[
-    Corners | None, typer.Option(help="At kinks of --path: as for a plan; blend by default.")
 ]
 CornerToleranceOption = Annotated[
     float | None,
@@ -276,11 +274,14 @@ def relaxation(text: str) -> sm.Relaxation:
     return found
 
 
-def search_of(mode: SearchMode | None, compare: bool) -> sm.Search | None:
-    """Return how to search where the user says something about it."""
+def search_of(
+    mode: SearchMode | None, compare: bool, known: sm.Search | None = None
+) -> sm.Search | None:
+    """Return how to search where the user says something about it, else as is `known`."""
     if mode is None and not compare:
         return None
-    return sm.Search(mode=mode or "auto", compare=compare)
+    search = known or sm.Search()
+    return replace(search, mode=mode or search.mode, compare=compare or search.compare)
 
 
 def numbers(text: str, option: str, count: int | None = None) -> Array:
@@ -297,6 +298,7 @@ def numbers(text: str, option: str, count: int | None = None) -> Array:
 def locks(texts: list[str]) -> dict[str, float]:
     """Return what --lock describes."""
     held = {}
+    refuse_twice("--lock", [text.partition("=")[0] for text in texts])
     for text in texts:
         name, _, value = text.partition("=")
         try:
@@ -311,12 +313,20 @@ def locks(texts: list[str]) -> dict[str, float]:
 def arguments(texts: list[str] | None) -> dict[str, str]:
     """Return what --argument describes."""
     found = {}
+    refuse_twice("--argument", [text.partition("=")[0] for text in texts or []])
     for text in texts or []:
         name, mark, value = text.partition("=")
         if not (name and mark):
             raise sm.RobotError(f"--argument is '{text}', expected NAME=VALUE like prefix=left_")
         found[name] = value
     return found
+
+
+def refuse_twice(option: str, names: list[str]) -> None:
+    """Raise ProblemError where an option says the same thing twice: only the last would count."""
+    twice = next((name for name in names if names.count(name) > 1), None)
+    if twice is not None:
+        raise sm.ProblemError(f"{option} says '{twice}' twice; say it once")
 
 
 def refuse(given: dict[str, Any], file: Path | str, whose: str) -> None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 import selfmotion as sm
-from selfmotion import realtime
+from selfmotion import formats, realtime
 from selfmotion.cli import json_tables, options, outputs, tables
 from selfmotion.cli.app import (
     NOT_VERIFIED,
@@ -18,7 +18,7 @@ from selfmotion.cli.app import (
     stages,
     terminal,
 )
-from selfmotion.cli.batch_display import BatchDisplay, executor_at
+from selfmotion.cli.batch_display import BatchDisplay, check_cluster, executor_at
 from selfmotion.cli.showcase import panda_past_a_box
 from selfmotion.cli.stage_display import StageDisplay
 
@@ -52,7 +52,11 @@ def batch(
     """
     from selfmotion.batch import grid_items, plan_items
 
+    check_cluster(dask, workers)
     several = [grid_items(file, allow_code=allow_code) for file in files]
+    for file in files:
+        if formats.read_document(file).get("outputs"):
+            _told_apart(f"note: {file}: outputs are left out: the plans of a batch go to '{out}'")
     items = [item for each in several for item in each]
     names = [item.name for item in items]
     twice = next((name for name in names if names.count(name) > 1), None)
