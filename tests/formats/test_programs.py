@@ -9,8 +9,10 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 import selfmotion as sm
+from selfmotion import formats
 from selfmotion.basics import Array
 from selfmotion.certificate import KeepsApart
+from selfmotion.cli import exports
 from selfmotion.formats import judged_program, program_miss
 from selfmotion.formats.program_axes import axes_of, tool_from_flange
 from selfmotion.formats.program_files import read_program
@@ -367,7 +369,7 @@ def test_urscript_knows_tool_load_and_outputs(program: sm.Program, tmp_path: Pat
     late = [125.0 * (at + 0.1) for at, _, _ in program.events]
     np.testing.assert_allclose(stream, late, atol=1.0)
     # These arms have eight.
-    beyond = sm.ProgramSettings(signals=dict.fromkeys(SIGNALS, (8, True)))
+    beyond = sm.ProgramSettings(signals={"arc on": (8, True), "arc off": (8, False)})
     with pytest.raises(sm.ProblemError, match="from 0 to 7"):
         sm.write_motion(program, file, settings=beyond)
 
@@ -448,6 +450,9 @@ def test_the_shell_writes_programs_and_confirms_them(program: sm.Program, tmp_pa
     with pytest.raises(sm.ProblemError, match="'arc off' has no signal; nearest: 'arc of'; say"):
         sm.write_motion(program, tmp_path / "b.src", settings=sm.ProgramSettings(signals=signals))
     signals.pop("arc of")
+    alike = {name: (7, True) for name in ("arc on", "arc off")}
+    with pytest.raises(sm.ProblemError, match="'arc on' and 'arc off' both switch 7 to True; one"):
+        sm.write_motion(program, tmp_path / "b.src", settings=sm.ProgramSettings(signals=alike))
     with pytest.raises(sm.ProblemError, match="'arc off' has no signal; say"):
         sm.write_motion(program, tmp_path / "b.src", settings=sm.ProgramSettings(signals=signals))
     (tmp_path / "quiet.toml").write_text('[signals]\n"arc on" = false\n"arc off" = false\n')
@@ -564,7 +569,12 @@ def test_a_file_is_judged_as_a_whole_by_its_job(
         assert not found.verified
         assert said in "; ".join(found.failures), found.failures
         assert all(step.verified for step in found.steps)
+    # Nor does what is switched off stay on.
+    file.write_text(text.replace("= FALSE", "= TRUE").replace(", 0;", ", 1;"))
+    assert "'arc on' and 'arc off' both switch" in judged_program(file, program).verdict
     file.write_text(text)
+    said = judged_program(file, program).verdict
+    assert re.search(r"and the whole; seams within 0\.9\d* mm and \S+ rad of their paths$", said)
     loose = replace(program, specification=replace(program.specification, start=None))
     assert judged_program(file, loose).verified
     wrong = replace(program, missing={"seam 9": "nobody knows"})
@@ -603,3 +613,23 @@ def test_a_table_in_the_urdf_of_an_arm_is_no_wrist(tmp_path: Path) -> None:
     with pytest.raises(sm.ProblemError, match=r"'table_turn' does not carry the tool.*'A6'.*'E1'"):
         axes_of(one, sm.ProgramSettings())
     assert [axis.name for axis in axes_of(cell, sm.ProgramSettings())][-2:] == ["E1", "E2"]
+
+
+def test_what_is_read_back_is_held_in_turns_joints_and_outputs_as_well(
+    program: sm.Program, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = tmp_path / "weld.src"
+    sm.write_motion(program, file, settings=settings("weld.src", 1e-3))
+    assert exports._confirmed(program, file)[0]
+    count, stated, found = program_miss(program, file)
+    for k in range(3):
+        path = list(found.path)
+        path[k] = stated.path[k] + 1e-8
+        off = count, stated, found._replace(path=type(found.path)(*path))
+        monkeypatch.setattr(formats, "program_miss", lambda *_, off=off: off)
+        assert not exports._confirmed(program, file)[0]
+    monkeypatch.undo()
+    file.write_text(file.read_text().replace("= FALSE", "= TRUE"))
+    kept, said = exports._confirmed(program, file)
+    assert not kept
+    assert "both switch '7' to True" in said

@@ -203,14 +203,16 @@ def _confirmed(made: _Made, target: Path) -> tuple[bool, str]:
     told, kept = [], _verified(made)
     for miss, said, where in zip(found, stated, ("off the plan", "in free moves"), strict=True):
         # The file states nine digits.
-        kept &= miss.position <= said.position + 1e-9
+        kept &= all(one <= other + 1e-9 for one, other in zip(miss, said, strict=True))
         if miss.position > 0.0:
             told.append(
                 f"{1e3 * miss.position:.3g} mm and {miss.rotation:.2g} rad {where} "
                 f"({1e3 * said.position:.3g} mm are stated in the file)"
             )
+    switched = formats.misswitched(target, made) if isinstance(made, sm.Program) else ()
+    kept &= not switched
     far = f", between which the tool is at most {', and '.join(told)}" if told else ""
-    return kept, f"read back: {count} targets{far}"
+    return kept, f"read back: {'; '.join((f'{count} targets{far}', *switched))}"
 
 
 def _verified(made: _Made) -> bool:

@@ -19,6 +19,7 @@ from selfmotion.formats.joint_limits import read_joint_limits as read_joint_limi
 from selfmotion.formats.judged_programs import (
     judged_motion as judged_motion,
     judged_program as judged_program,
+    misswitched as misswitched,
     part_of as part_of,
     stated_deviation as stated_deviation,
     what_targets_keep as what_targets_keep,

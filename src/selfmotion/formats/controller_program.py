@@ -3,6 +3,7 @@
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
 from math import ceil
 from pathlib import Path as FilePath
 from typing import NamedTuple
@@ -15,7 +16,7 @@ from selfmotion.formats.program_axes import Axis, axes_of, in_order, tool_from_f
 from selfmotion.formats.program_settings import ProgramSettings, Signal
 from selfmotion.formats.stretches import NO_MISS, Miss, Misses, Stretch, miss_of
 from selfmotion.formats.targets import stretches_of
-from selfmotion.job import Program
+from selfmotion.job import Program, are_opposite
 from selfmotion.motion import Trajectory
 from selfmotion.result import Move, Parts, Plan
 from selfmotion.robot import RobotModel
@@ -179,6 +180,13 @@ def check_signals(seams: Mapping[str, str], settings: ProgramSettings) -> None:
                 f"seam '{seam}': event '{event}' has no signal{nearest(event, spare)}; say in the "
                 f"file of --settings what it switches, [signals] '{event}' = [output, true], or "
                 f"false for a comment only (ProgramSettings(signals=…))"
+            )
+    for one, other in combinations(seams, 2):
+        first = settings.signal(one)
+        if first is not None and first == settings.signal(other) and are_opposite(one, other):
+            raise ProblemError(
+                f"signals: '{one}' and '{other}' both switch {first[0]!r} to {first[1]}; one of "
+                f"them has to be {not first[1]}, or of another output"
             )
 
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from itertools import pairwise
+from itertools import combinations, pairwise
 from pathlib import Path as FilePath
 from typing import NamedTuple
 
@@ -13,7 +13,7 @@ from selfmotion.certificate import Tolerance
 from selfmotion.constraints import Constraint, JointAccelerationLimits, JointJerkLimits
 from selfmotion.formats.controller_program import ControllerProgram, Switch, plain
 from selfmotion.formats.program_files import read_program
-from selfmotion.job import Program
+from selfmotion.job import Program, are_opposite
 from selfmotion.motion import Trajectory
 from selfmotion.result import Move, Piece, elsewhere, gaps
 
@@ -48,10 +48,13 @@ class JudgedProgram(NamedTuple):
     steps : tuple of JudgedStep
     failures : tuple of str
         What speaks against the whole: its ends, its order, its outputs, the job itself.
+    within : Tolerance or None
+        What seams may miss their paths by, where that is not the job's own.
     """
 
     steps: tuple[JudgedStep, ...]
     failures: tuple[str, ...]
+    within: Tolerance | None = None
 
     @property
     def verified(self) -> bool:
@@ -62,10 +65,19 @@ class JudgedProgram(NamedTuple):
     def verdict(self) -> str:
         """One line: verified, or how many steps are not, and what speaks against the whole."""
         if self.verified:
-            return "verified: each step, and the whole"
+            return f"verified: each step, and the whole{self._allowed}"
         count = sum(not step.verified for step in self.steps)
         told = [*([f"{count} of {len(self.steps)} steps"] if count else []), *self.failures]
         return f"not verified: {'; '.join(told)}"
+
+    @property
+    def _allowed(self) -> str:
+        if self.within is None:
+            return ""
+        return (
+            f"; seams within {1e3 * self.within.position:.3g} mm and {self.within.rotation:.2g} "
+            f"rad of their paths"
+        )
 
 
 def judged_program(file: FilePath, job: Program, within: Tolerance | None = None) -> JudgedProgram:
@@ -91,7 +103,18 @@ def judged_program(file: FilePath, job: Program, within: Tolerance | None = None
         *_elsewhere(job, pieces),
         *_otherwise_switched(job, program.switches),
     )
-    return JudgedProgram(steps, failures)
+    return JudgedProgram(steps, failures, within)
+
+
+def misswitched(file: FilePath, job: Program) -> tuple[str, ...]:
+    """Return what of a job's events a controller's program does not switch, or otherwise.
+
+    Raises
+    ------
+    FileFormatError
+        The file cannot be read.
+    """
+    return tuple(_otherwise_switched(job, read_program(file).switches))
 
 
 def judged_motion(motion: Trajectory, job: Program) -> JudgedProgram:
@@ -178,6 +201,9 @@ def _otherwise_switched(job: Program, switches: Sequence[Switch]) -> Iterator[st
                 f"event '{event}' switches '{before.output}' to {before.value} once, and "
                 f"'{switch.output}' to {switch.value} at {switch.at:.4f} s"
             )
+    for (one, first), (other, second) in combinations(known.items(), 2):
+        if first.value is not None and first[1:] == second[1:] and are_opposite(one, other):
+            yield f"events '{one}' and '{other}' both switch '{first.output}' to {first.value}"
 
 
 def what_targets_keep(constraints: Sequence[Constraint]) -> tuple[Constraint, ...]:

@@ -3,6 +3,6 @@
 from selfmotion.job.files import load_program as load_program
 from selfmotion.job.program import Program as Program
 from selfmotion.job.run import plan_job as plan_job
-from selfmotion.job.seam import Seam as Seam
+from selfmotion.job.seam import Seam as Seam, are_opposite as are_opposite
 from selfmotion.job.specification import Specification as Specification
 from selfmotion.job.step import Step as Step

@@ -146,13 +146,18 @@ def _check_switched(events: Sequence[tuple[str, float]], what: str) -> None:
     """Refuse what is switched on and off at once: the one that comes first has no effect."""
     for k, (first, at) in enumerate(events):
         for later, then in events[k + 1 :]:
-            words = (first.lower().split(), later.lower().split())
-            opposite = {each[-1] for each in words if each} == {"on", "off"}
-            if at == then and opposite and words[0][:-1] == words[1][:-1]:
+            if at == then and are_opposite(first, later):
                 raise ProblemError(
                     f"{what}: events '{first}' and '{later}' are both at {at:.6g} s, so that the "
                     f"first has no effect; give them different times (in a table different rows)"
                 )
+
+
+def are_opposite(one: str, other: str) -> bool:
+    """Whether of two events one switches on what the other switches off, by their names."""
+    words = (one.lower().split(), other.lower().split())
+    opposite = {each[-1] for each in words if each} == {"on", "off"}
+    return opposite and words[0][:-1] == words[1][:-1]
 
 
 def one_way(constraint: Constraint) -> bool:
