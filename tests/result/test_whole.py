@@ -162,6 +162,36 @@ def test_parts_that_are_not_judged_by_rest_are_not_verified(plan: sm.Plan) -> No
         assert sm.Parts(problem, (made,)).verified
 
 
+def test_what_was_changed_stays_so_in_another_file(plan: sm.Plan, tmp_path: Path) -> None:
+    robot, start = plan.robot, plan.trajectory.q[0]
+    move = sm.move(robot, start, start + 0.1, constraints=[sm.JointAccelerationLimits(2.0)])
+    for made, load in ((plan, sm.load_plan), (move.require(), sm.load_move)):
+        made.save(tmp_path / "a.npz")
+        arrays = dict(np.load(tmp_path / "a.npz"))
+        np.savez(tmp_path / "a.npz", **{**arrays, "q": arrays["q"] * (1.0 + 1e-12)})
+        changed = load(tmp_path / "a.npz")
+        changed.save(tmp_path / "b.npz")
+        again = load(tmp_path / "b.npz")
+        again.save(tmp_path / "c.npz")
+        for found in (changed, again, load(tmp_path / "c.npz")):
+            with pytest.raises(sm.PlanError, match=r"a\.npz was changed after"):
+                found.require()
+    parts = sm.Parts(plan.problem, (plan,), altered="it was changed")
+    parts.save(tmp_path / "a.parts")
+    assert sm.load_parts(tmp_path / "a.parts").verdict == "not verified: it was changed"
+
+
+def test_motions_are_in_the_robots_order_of_joints(plan: sm.Plan, tmp_path: Path) -> None:
+    """What is joined is joined by columns."""
+    motion, names = plan.trajectory, plan.robot.joint_names
+    other = motion.of_joints(names[::-1])
+    mixed = replace(plan, trajectory=other, initial_trajectory=other)
+    for found in (mixed.trajectory, mixed.initial_trajectory):
+        assert (found.joint_names, found.digest) == (names, motion.digest)
+    assert sm.Parts(plan.problem, (mixed,)).verified
+    assert sm.Move(plan.robot, (), other).motion.digest == motion.digest
+
+
 def test_gaps_are_told_with_joint_amount_unit_and_what_is_allowed(plan: sm.Plan) -> None:
     robot, motion = plan.robot, plan.trajectory
     whole = Piece("'one'", motion)

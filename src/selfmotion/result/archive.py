@@ -56,6 +56,9 @@ class Archive(NamedTuple):
             "history": [_without(iteration, "x") for iteration in history],
             "certificate": dataclasses.asdict(self.certificate),
         }
+        if self.altered:
+            # Another file does not make it what was planned.
+            description["altered"] = self.altered
         arrays = {
             **arrays_of(self.trajectory),
             **arrays_of(self.initial_trajectory, "initial_"),
@@ -80,7 +83,7 @@ class Archive(NamedTuple):
             )
         check_version(file, "plan", description.get("format"), FORMAT)
         written = description.pop("digest", None)
-        altered = ""
+        altered = str(description.get("altered", ""))
         if written != file_digest(description, arrays):
             altered = f"{file.name} was changed after the plan was written: its digest differs"
         try:

@@ -21,6 +21,7 @@ from selfmotion.constraints import Constraint
 from selfmotion.motion import Trajectory
 from selfmotion.problem import arm_and_constraints, describe_arm
 from selfmotion.result.archive import arrays_of, check_version, file_digest, trajectory_of
+from selfmotion.result.joint_order import in_order_of
 from selfmotion.robot import RobotModel
 
 # Raised with every change that older versions cannot read.
@@ -47,6 +48,11 @@ class Move:
     constraints: tuple[Constraint, ...]
     trajectory: Trajectory | None
     reason: str = ""
+
+    def __post_init__(self) -> None:
+        if self.trajectory is not None:
+            motion = in_order_of(self.robot, self.trajectory)
+            object.__setattr__(self, "trajectory", motion)
 
     def __repr__(self) -> str:
         """Return two lines: how long it takes, and the verdict."""
@@ -125,6 +131,9 @@ class Move:
             "joint_names": list(motion.joint_names),
             "findings": [dataclasses.asdict(item) for item in self.findings],
         }
+        if self.reason:
+            # Another file does not make it what was planned.
+            description["reason"] = self.reason
         arrays = arrays_of(motion)
         description["digest"] = file_digest(description, arrays)
         write_archive(as_path(file), description, arrays)
@@ -161,8 +170,10 @@ def load_move(file: str | FilePath, *, known: MutableMapping[str, Any] | None = 
     try:
         robot, constraints = arm_and_constraints(description, {} if known is None else known)
         motion = trajectory_of(arrays, tuple(description["joint_names"]))
-        reason = f"{path.name} was changed after the move was written: its digest differs"
-        move = Move(robot, constraints, motion, reason if altered else "")
+        reason = str(description.get("reason", ""))
+        if altered:
+            reason = f"{path.name} was changed after the move was written: its digest differs"
+        move = Move(robot, constraints, motion, reason)
         # Judged here, where a damaged file can be told from a fault of ours.
         _ = move.findings
     except SelfmotionError as error:

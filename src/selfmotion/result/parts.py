@@ -156,6 +156,7 @@ class Parts:
             "tolerance": asdict(self.tolerance),
             "cuts": list(self.cuts),
             "endings": list(self.endings),
+            **({"altered": self.altered} if self.altered else {}),
         }
         for number, move in enumerate(self.moves, 1):
             if move.trajectory is None:
@@ -181,9 +182,11 @@ def load_parts(file: str | FilePath) -> Parts:
         endings = tuple(map(str, description["endings"]))
         # Files of before say none: then it is the usual one.
         tolerance = Tolerance(**description.get("tolerance", {}))
+        altered = str(description.get("altered", ""))
     except (KeyError, TypeError, ValueError, SelfmotionError) as error:
         raise FileFormatError(f"{path}: are damaged parts: {error!r}") from error
     plans = tuple(item for item in made if isinstance(item, Plan))
     moves = tuple(item for item in made if isinstance(item, Move))
-    altered = f"{path.name} was changed after the parts were written" if changed else ""
+    if changed:
+        altered = f"{path.name} was changed after the parts were written"
     return Parts(problem, plans, moves, cuts, endings, altered, tolerance)

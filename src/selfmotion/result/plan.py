@@ -34,6 +34,7 @@ from selfmotion.motion import Trajectory, column_names
 from selfmotion.path import Path
 from selfmotion.problem.problem import Problem
 from selfmotion.result.archive import Archive
+from selfmotion.result.joint_order import in_order_of
 from selfmotion.result.limits_used import LimitsUsed, limits_used
 from selfmotion.result.report import Report
 from selfmotion.result.reversals import Reversals
@@ -87,10 +88,10 @@ class Plan:
     altered: str = ""
 
     def __post_init__(self) -> None:
-        check = self.certificate
-        motion = self.trajectory
-        if set(motion.joint_names) == set(self.robot.joint_names):
-            motion = motion.of_joints(self.robot.joint_names)
+        # In the robot's order, whichever a file has: what is joined is joined by columns.
+        for name in ("trajectory", "initial_trajectory"):
+            object.__setattr__(self, name, in_order_of(self.robot, getattr(self, name)))
+        check, motion = self.certificate, self.trajectory
         if (check.motion, check.problem) != (motion.digest, self.problem.digest):
             object.__setattr__(self, "certificate", check.of_another())
 
@@ -209,6 +210,7 @@ class Plan:
             self.coefficients,
             self.report,
             self.certificate,
+            self.altered,
         ).write(as_path(file))
 
     def to_csv(self, file: str | FilePath) -> None:
