@@ -20,3 +20,16 @@ def test_motions_are_joined_and_reversed_exactly() -> None:
         np.testing.assert_allclose(whole(t + 1.5, order), other(t, order), atol=1e-12)
         back = reversed_motion(other)(1.5 - t, order)
         np.testing.assert_allclose((-1.0) ** order * back, other(t, order), atol=1e-12)
+
+
+def test_cubics_stay_what_they_are() -> None:
+    rng = np.random.default_rng(1)
+    t = np.linspace(0.0, 1.5, 4)
+    q, qd = rng.normal(size=(7, 2)), rng.normal(size=(7, 2))
+    one, other = (sm.Trajectory(t, q[k : k + 4], qd[k : k + 4], ("a", "b")) for k in (0, 3))
+    whole, times = joined_motions([one, other]), np.linspace(0.0, 1.5, 50)
+    for order in range(2):
+        np.testing.assert_allclose(whole(times, order), one(times, order), atol=1e-12)
+        np.testing.assert_allclose(whole(times + 1.5, order), other(times, order), atol=1e-12)
+        back = reversed_motion(other)(1.5 - times, order)
+        np.testing.assert_allclose((-1.0) ** order * back, other(times, order), atol=1e-12)

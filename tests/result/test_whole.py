@@ -211,6 +211,10 @@ def test_gaps_are_told_with_joint_amount_unit_and_what_is_allowed(plan: sm.Plan)
         (moved(q=back.q, qd=back.qd, qdd=push), "accelerates at 0.002 rad/s² (0.001"),
     ):
         assert said in "; ".join(gaps(robot, [whole, piece]))
+    # Between its samples a cubic among quintics would be another motion.
+    cubic = Piece("'other'", replace(back, qdd=None))
+    assert "'other' states no accelerations" in "; ".join(gaps(robot, [whole, cubic]))
+    assert not list(gaps(robot, [cubic, Piece("'one'", replace(motion, qdd=None))]))
     # But where the tool's own motion accelerates.
     pushed = replace(motion, q=back.q, qd=back.qd, qdd=push)
     assert not list(gaps(robot, [whole, Piece("'feed'", pushed, (True, True))]))

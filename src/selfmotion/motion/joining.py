@@ -12,22 +12,29 @@ def joined_motions(motions: Sequence[Trajectory]) -> Trajectory:
     """Return motions one after the other as one, from t = 0 on.
 
     Each begins in the configuration in which the one before it ends, as fast, and accelerating as
-    much.
+    much. Cubic where all of them are; where some are, these are quintic in the whole, and so not
+    quite the same between their samples.
     """
-    t, tables = [motions[0].t[:1] * 0.0], [[motions[0](motions[0].t[:1], k)] for k in range(3)]
+    orders = _orders(motions)
+    t, tables = [motions[0].t[:1] * 0.0], [[motions[0](motions[0].t[:1], k)] for k in orders]
     for motion in motions:
         t.append(t[-1][-1] + motion.t[1:] - motion.t[0])
         for order, table in enumerate(tables):
             table.append(motion(motion.t[1:], order))
-    q, qd, qdd = (np.concatenate(table) for table in tables)
-    return Trajectory(np.concatenate(t), q, qd, motions[0].joint_names, qdd)
+    q, qd, *faster = (np.concatenate(table) for table in tables)
+    return Trajectory(np.concatenate(t), q, qd, motions[0].joint_names, *faster)
 
 
 def reversed_motion(motion: Trajectory) -> Trajectory:
     """Return a motion backwards in time, from t = 0 on."""
     t = motion.t
-    q, qd, qdd = (motion(t, order)[::-1] for order in range(3))
-    return Trajectory(t[-1] - t[::-1], q, -qd, motion.joint_names, qdd)
+    q, qd, *faster = (motion(t, order)[::-1] for order in _orders([motion]))
+    return Trajectory(t[-1] - t[::-1], q, -qd, motion.joint_names, *faster)
+
+
+def _orders(motions: Sequence[Trajectory]) -> range:
+    """Return which derivatives say what motions are between their samples."""
+    return range(2 if all(motion.qdd is None for motion in motions) else 3)
 
 
 def slowdown_of(motion: Trajectory, limits: Sequence[Array]) -> float:
