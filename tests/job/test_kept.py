@@ -154,6 +154,8 @@ def test_a_program_is_of_the_tool_the_reference_and_the_tolerance_that_were_aske
     other = sm.plan_job(flange, SEAMS, **ASKED)
     mixed = replace(program, steps=other.steps)
     assert "its tool is 'panda_link8', not 'panda_hand_tcp'" in mixed.verdict
+    # Nor where all of it is of that tool.
+    assert "with tool 'panda_link8' is not what was asked" in replace(mixed, robot=flange).verdict
     asked = program.specification
     finer = replace(program, specification=replace(asked, tolerance=sm.Tolerance(1e-9, 1e-9)))
     assert "it is judged within 1e-06 m" in finer.verdict

@@ -29,6 +29,7 @@ from selfmotion.job.seam import Seam
 from selfmotion.job.specification import Specification
 from selfmotion.job.work import Asked, Work, check_can_be_sent
 from selfmotion.problem import KEPT, NO_OVERLAP, check_all_times
+from selfmotion.result import arm_digest
 from selfmotion.robot import RobotModel
 
 
@@ -135,7 +136,13 @@ def plan_job(
         raise PlanError(f"{robot.name}: no seam has a motion:{reasons}")
     program = Builder(ordering, work, ends).program()
     asked_for = Specification(
-        listed, not is_free, ends[0], ends[1], asked.constraints, asked.clearance
+        listed,
+        not is_free,
+        ends[0],
+        ends[1],
+        asked.constraints,
+        asked.clearance,
+        arm=arm_digest(robot),
     )
     return replace(program, specification=asked_for)
 

@@ -14,7 +14,7 @@ from selfmotion.costs import cost_from_dict
 from selfmotion.job.seam import JOB_END, JOB_START, Seam, one_way, reversing
 from selfmotion.job.step import Step
 from selfmotion.path import Path, Reversed
-from selfmotion.result import Asked, Piece, Plan, elsewhere, not_judged_by
+from selfmotion.result import Asked, Piece, Plan, arm_digest, elsewhere, not_judged_by
 from selfmotion.robot import RobotModel
 from selfmotion.task import Relaxation, Task
 
@@ -38,6 +38,9 @@ class Specification:
     clearance : Clearance or None
     tolerance : Tolerance
         What each seam may miss its path by.
+    arm : str
+        What tells the arm with its tool, reference and limits from others (`arm_digest`); "" for
+        any.
     """
 
     seams: tuple[Seam, ...]
@@ -47,6 +50,7 @@ class Specification:
     constraints: tuple[Constraint, ...] = ()
     clearance: Clearance | None = None
     tolerance: Tolerance = USUAL
+    arm: str = ""
 
     @property
     def obstacles(self) -> tuple[Obstacle, ...]:
@@ -57,6 +61,11 @@ class Specification:
         self, robot: RobotModel, steps: Sequence[Step], missing: Mapping[str, str]
     ) -> Iterator[str]:
         """Yield what of it steps do not keep, but for seams that are said to be missing."""
+        if self.arm and self.arm != arm_digest(robot):
+            yield (
+                f"arm '{robot.name}' with tool '{robot.tool}' is not what was asked for, or has "
+                f"another reference, other limits or locked joints"
+            )
         seams = {seam.name: seam for seam in self.seams}
         made = [step.name for step in steps if step.is_seam]
         for name in dict.fromkeys(made):
@@ -138,6 +147,7 @@ class Specification:
             "constraints": [item.to_dict() for item in self.constraints],
             "clearance": None if self.clearance is None else self.clearance.to_dict(),
             "tolerance": asdict(self.tolerance),
+            "arm": self.arm,
         }
 
     @classmethod
@@ -155,6 +165,7 @@ class Specification:
             None if apart is None else restore(Constraint, apart),
             # Files of before say none: then it is the usual one.
             Tolerance(**values.get("tolerance", {})),
+            str(values.get("arm", "")),
         )
 
 

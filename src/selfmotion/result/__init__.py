@@ -3,6 +3,7 @@
 from selfmotion.result.asked import (
     Asked as Asked,
     another_tool as another_tool,
+    arm_digest as arm_digest,
     described as described,
     keeps_as_far as keeps_as_far,
     not_judged_by as not_judged_by,

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from selfmotion.basics import Array, Saved, description_of
+from selfmotion.basics import Array, Saved, description_of, digest_of
 from selfmotion.certificate import USUAL, Tolerance
 from selfmotion.constraints import Clearance, Constraint
 from selfmotion.follow import Follow
@@ -86,6 +86,13 @@ class Asked:
             if found < order:
                 what = " without acceleration" if found else ""
                 yield f"it is not judged by rest{what} at its {end}, which was asked for"
+
+
+def arm_digest(robot: RobotModel) -> str:
+    """Return what tells arms apart, with their tools, reference and limits; see `another_tool`."""
+    limits = [getattr(robot, name) for name, _, _ in _LIMITS]
+    told = (robot.urdf.sha256, robot.joint_names, robot.tools, robot.reference, robot.locked)
+    return digest_of(told, sorted(robot.touching), limits, robot.effort_limit)
 
 
 def another_tool(made: RobotModel, asked: RobotModel) -> Iterator[str]:
