@@ -14,11 +14,11 @@ def test_margins_are_those_of_the_nearest_side() -> None:
     """A cubic from 0 to 0 with speeds ± 4 reaches 1 in the middle."""
     motion = motion_of([[0.0, 0.2, 0.0]] * 2, [[4.0, 0.0, -4.0], [-4.0, 0.0, 4.0]])
     infinite = np.full(3, np.inf)
-    for lower, upper, joint, amount, time in (
-        (-infinite, np.array([1.5, 1.0, np.inf]), 0, 0.5, 0.5),
-        (-infinite, np.array([0.75, 1.0, np.inf]), 0, -0.25, 0.5),
-        (np.array([-np.inf, -np.inf, -0.9]), infinite, 2, -0.1, 0.5),
-        (np.array([-0.3, -0.05, -9.0]), np.array([9.0, 0.3, 9.0]), 1, 0.1, 0.0),
+    for lower, upper, joint, amount, time, limit in (
+        (-infinite, np.array([1.5, 1.0, np.inf]), 0, 0.5, 0.5, 1.5),
+        (-infinite, np.array([0.75, 1.0, np.inf]), 0, -0.25, 0.5, 0.75),
+        (np.array([-np.inf, -np.inf, -0.9]), infinite, 2, -0.1, 0.5, -0.9),
+        (np.array([-0.3, -0.05, -9.0]), np.array([9.0, 0.3, 9.0]), 1, 0.1, 0.0, 0.3),
     ):
         found = JointLimits(0, lower, upper).judge(motion)
         assert found.subject == motion.robot.joint_names[joint]
@@ -29,7 +29,7 @@ def test_margins_are_those_of_the_nearest_side() -> None:
         assert found.time == pytest.approx(time)
         near = f"as near as {amount:.3g} rad to its"
         told = near if amount >= 0 else f"is {-amount:.3g} rad beyond its"
-        assert f"{told} limit at t = {time:.3f} s" in found.text
+        assert f"{told} limit of {limit:g} rad at t = {time:.3f} s" in found.text
     kept = JointLimits(0, np.array([0.0, 0.0, -1.0]), np.array([1.0, 1.0, 0.0])).judge(motion)
     assert (kept.kept, kept.amount) == (True, pytest.approx(0.0, abs=ROUNDING))
 
@@ -44,7 +44,7 @@ def test_shares_of_rates_say_how_much_longer_it_takes(order: int, longer: float)
     found = limits.judge(motion)
     assert (found.subject, found.allowed, found.kept) == (motion.robot.joint_names[1], 1.0, False)
     assert found.amount == pytest.approx(2.0)
-    assert f"{found.amount:.5g} times its limit" in found.text
+    assert f"{found.amount:.5g} times its limit of " in found.text
     assert f"give it {longer:.5g} times the duration" in found.text
     known = ("speeds", "accelerations", "jerks")[order - 1]
     # Not of all joints, so that nothing is said to have been checked.

@@ -261,12 +261,12 @@ def _off_path(
     if not position.value <= tolerance.position:
         failures.append(
             f"'{position.name}' is {position.value:.2e} m off the path at t = {position.time:.3f} "
-            f"s (allowed: {tolerance.position:.0e}){_because(position.time, damped)}"
+            f"s (allowed: {tolerance.position:.3g} m){_because(position.time, damped)}"
         )
     if not rotation.value <= tolerance.rotation:
         failures.append(
             f"'{rotation.name}' is {rotation.value:.2e} rad off the path at t = "
-            f"{rotation.time:.3f} s (allowed: {tolerance.rotation:.0e})"
+            f"{rotation.time:.3f} s (allowed: {tolerance.rotation:.3g} rad)"
             f"{_because(rotation.time, damped)}"
         )
     return tuple(failures)

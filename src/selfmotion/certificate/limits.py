@@ -93,10 +93,12 @@ class JointLimits(Requirement):
                 return jump
         time = float(times[side, joint])
         name = motion.robot.joint_names[int(joint)]
+        unit = motion.robot.unit_of(name) + _POWERS[self.order]
+        limit = float((self.lower, self.upper)[int(side)][int(joint)])
         if self.order:
-            text = _TEXTS[self.order - 1](name, amount, time)
+            text = _rate(name, amount, time, f"{abs(limit):.4g} {unit}", self.order)
         else:
-            text = _position(name, amount, time, motion.robot.unit_of(name))
+            text = _position(name, amount, time, limit, unit)
         factor = 1.0 if kept or not self.order else max(amount, 0.0) ** (1.0 / self.order)
         return Finding(self.name, name, time, amount, allowed, kept, text, self.order > 0, factor)
 
@@ -109,8 +111,9 @@ class JointLimits(Requirement):
             return None
         name, time = motion.robot.joint_names[joint], float(times[joint])
         text = (
-            f"the acceleration of joint '{name}' jumps by {jumps[joint]:.4g} at t = {time:.3f} s, "
-            f"which no limited jerk does: give the motion's accelerations as well, or more samples"
+            f"the acceleration of joint '{name}' jumps by {jumps[joint]:.4g} "
+            f"{motion.robot.unit_of(name)}{_POWERS[2]} at t = {time:.3f} s, which no limited jerk "
+            f"does: give the motion's accelerations as well, or more samples"
         )
         return Finding(self.name, name, time, float(shares[joint]), 1.0, False, text, True, np.inf)
 
@@ -128,33 +131,19 @@ def arm_limits(robot: RobotModel, requirements: Sequence[Requirement]) -> tuple[
     return tuple(item for item in own if item.order not in taken)
 
 
-def _position(name: str, amount: float, time: float, unit: str) -> str:
-    if amount >= 0.0:
-        return (
-            f"joint '{name}' comes as near as {amount:.3g} {unit} to its limit at t = {time:.3f} s"
-        )
-    return f"joint '{name}' is {-amount:.3g} {unit} beyond its limit at t = {time:.3f} s"
+def _position(name: str, amount: float, time: float, limit: float, unit: str) -> str:
+    far = f"comes as near as {amount:.3g} {unit} to" if amount >= 0.0 else ""
+    far = far or f"is {-amount:.3g} {unit} beyond"
+    return f"joint '{name}' {far} its limit of {limit:.4g} {unit} at t = {time:.3f} s"
 
 
-def _velocity(name: str, amount: float, time: float) -> str:
+def _rate(name: str, amount: float, time: float, limit: str, order: int) -> str:
+    verb = ("moves", "accelerates", "jerks")[order - 1]
     return (
-        f"joint '{name}' moves at {amount:.5g} times its limit at t = {time:.3f} s: give it "
-        f"{amount:.5g} times the duration"
+        f"joint '{name}' {verb} at {amount:.5g} times its limit of {limit} at t = {time:.3f} s: "
+        f"give it {max(amount, 0.0) ** (1.0 / order):.5g} times the duration"
     )
 
 
-def _acceleration(name: str, amount: float, time: float) -> str:
-    return (
-        f"joint '{name}' accelerates at {amount:.5g} times its limit at t = {time:.3f} s: give it "
-        f"{max(amount, 0.0) ** 0.5:.5g} times the duration"
-    )
-
-
-def _jerk(name: str, amount: float, time: float) -> str:
-    return (
-        f"joint '{name}' jerks at {amount:.5g} times its limit at t = {time:.3f} s: give it "
-        f"{max(amount, 0.0) ** (1.0 / 3.0):.5g} times the duration"
-    )
-
-
-_TEXTS = (_velocity, _acceleration, _jerk)
+# Units of derivatives.
+_POWERS = ("", "/s", "/s²", "/s³")
