@@ -344,6 +344,19 @@ def test_a_pace_that_runs_backwards_between_its_samples_is_none() -> None:
         Retimed(line, t, [0.0, 1.0, 2.0], [1.0, 1.0, 1.0], [0.0, 60.0, 0.0])
 
 
+@pytest.mark.parametrize(
+    ("t", "sigma"), [([1.0, 2.0], [0.0, 2.0]), ([0.0, 2.0], [0.5, 2.0]), ([0.0, 2.0], [0.0, 2.1])]
+)
+def test_a_pace_begins_with_its_path_and_goes_no_further(
+    t: list[float], sigma: list[float]
+) -> None:
+    """What it leaves out at the start would be left out by who joins it to others."""
+    line = sm.Line(SE3.Identity(), SE3(np.eye(3), np.array([0.1, 0, 0])), 2.0)
+    with pytest.raises(sm.PathError, match="expected from 0 at t = 0 to 2 s at most; take a Sect"):
+        Retimed(line, t, sigma, [0.0, 0.0])
+    assert Retimed(line, [0.0, 3.0], [0.0, 1.5], [0.0, 0.0]).duration == 3.0
+
+
 def test_a_feed_counts_where_a_pace_is_its_own_all_the_way() -> None:
     """One that is its own at each sample, and three times as fast in between, keeps no feed."""
     line = sm.Line(SE3.Identity(), SE3(np.eye(3), np.array([0.1, 0, 0])), 2.0)

@@ -124,6 +124,11 @@ def _path_rows() -> list[Row]:
         ),
         Row(
             area,
+            "Retimed() that leaves out the start",
+            lambda _: sm.Retimed(line(), [0, 2], [0.5, 2], [0, 0]),
+        ),
+        Row(
+            area,
             "Retimed() with rates that make it run backwards",
             lambda _: sm.Retimed(line(), [0, 1, 2], [0, 0.2, 2], [0, 3, 0]),
         ),

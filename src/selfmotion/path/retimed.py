@@ -27,7 +27,7 @@ class Retimed(_Derived, kind="retimed"):
     t : (N,)
         New times [s], increasing from 0.
     sigma : (N,)
-        Original times [s], from 0 to the original's duration.
+        Original times [s], from 0 to the original's duration, or to where the motion ends before.
     rate : (N,)
         dσ/dt ≥ 0.
     bend : (N,), optional
@@ -56,6 +56,13 @@ class Retimed(_Derived, kind="retimed"):
             )
         if not (np.all(np.diff(numbers["t"]) > 0) and np.all(np.diff(numbers["sigma"]) >= 0)):
             raise PathError("retimed path: times must increase and σ must not fall")
+        times, passed, whole = numbers["t"], numbers["sigma"], self._path.duration
+        if times[0] != 0.0 or passed[0] != 0.0 or passed[-1] > (1.0 + _OWN) * whole:
+            raise PathError(
+                f"retimed path: goes from {passed[0]:.6g} to {passed[-1]:.6g} s of the original "
+                f"from t = {times[0]:.6g} s on, expected from 0 at t = 0 to {whole:.6g} s at most; "
+                f"take a Section of it"
+            )
         self._pace = Pace(**numbers)
         back = self._pace.falls_at()
         if back is not None:
