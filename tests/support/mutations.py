@@ -72,7 +72,7 @@ _OTHERS = (
     (".tap", "G0 X0 Y0 Z20\nG99 G83 X10 Y0 Z-5 R2 Q3 F120\nG80\nG0 Z50\nM30\n"),
     (".json", '{"waypoints": [{"position": [0.4, 0, 0.3], "rpy": [3.1, 0, 0]}, {"position": [0.5, '
      '0, 0.3], "rpy": [3.1, 0, 0]}]}'),
-    (".nc", "G28\nG0 X0 Y0 Z0\nG93\nG1 X9 F30\nG18 G2 X19 Z0 I5 K0\n"),
+    (".nc", "G28\nG0 X0 Y0 Z0\nG93\nG1 X9 F30\nG18 G2 X19 Z0 I5 K0 F30\n"),
     (".json", '[{"poses": [{"position": {"x": 0.4, "y": 0, "z": 0.3}, "orientation": {"x": 1, '
      '"y": 0, "z": 0, "w": 0}}, {"position": {"x": 0.5, "y": 0, "z": 0.3}, "orientation": {"x": 1, '
      '"y": 0, "z": 0, "w": 0}}]}]'),

@@ -15,7 +15,7 @@ _STARTING, _NEAR_REST = 0.02, 4.0
 # Costs of joint speed say nothing of accelerations: on few nodes these waver, and under limits of
 # theirs they jump from one to the other where that costs nothing. This share of the duration takes
 # most of both away, and costs some 1e-5 of F at most.
-_EVERYWHERE = 0.005
+_EVERYWHERE = 0.004
 # It is asked for where it is less than this share of F: what accelerates more does so for a reason,
 # beside a singular pose.
 _LITTLE = 0.02
