@@ -76,7 +76,7 @@ DEARER_CHAIN = 1.005
 # Steps of the rough motions.
 ROUGH_STEPS = 12
 # On nodes: steps of Newton's method.
-ROUGH_ROUNDS = 20
+ROUGH_ROUNDS = 30
 # Rough optima on nodes whose costs differ by less than this share are worth the same; by less than
 # the second, they are mirror images.
 ABOUT_AS_GOOD, SAME_TO_DIGITS = 1e-2, 1e-9
