@@ -487,8 +487,6 @@ class _Reader:
     def _arc(self, goal: Array, values: Mapping[str, float]) -> Array:
         """Return points (K, 3) of an arc in its plane, its end the last."""
         machine, start = self.machine, self._at
-        if np.isnan(start).any() or np.isnan(goal).any():
-            raise machine.fault("an arc begins where X, Y or Z is not known yet")
         sense = -1.0 if self._motion == 2 else 1.0
         first, second, normal = self._plane
         plane, offsets = [first, second], ["IJK"[first], "IJK"[second]]

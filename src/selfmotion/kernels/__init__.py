@@ -21,10 +21,8 @@ from selfmotion.kernels.algebra import (
     solve_cholesky as solve_cholesky,
 )
 from selfmotion.kernels.backward import (
-    pull_stage as pull_stage,
     pullback as pullback,
     sensitivities as sensitivities,
-    space_of as space_of,
     space_size as space_size,
 )
 from selfmotion.kernels.contraction import Every as Every, contract_task as contract_task
@@ -41,7 +39,6 @@ from selfmotion.kernels.table import (
     columns as columns,
     path_of as path_of,
     rates_of as rates_of,
-    rows_along as rows_along,
     stage_of as stage_of,
     tip_of as tip_of,
     view as view,

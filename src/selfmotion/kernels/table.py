@@ -150,11 +150,6 @@ def rates_of(table: Array, n: int) -> tuple[Array, Array]:
     return view(table, n, (n,)), view(table, 2 * n, (n,))
 
 
-def rows_along(table: Array, n: int, m: int) -> Array:
-    """Return J of a whole table, as `stage_of` has it."""
-    return view(table, 3 * n + 1, (m, n))
-
-
 @inlined
 def q_of(table: Array, s: int, n: int) -> Array:
     """Return q of stage s, as `stage_of` has it."""

@@ -44,6 +44,7 @@ class NodeGrid:
 
     Attributes
     ----------
+    constraints : tuple of BoundConstraint
     spline : Quintic
     manifolds : Manifolds
     cost : NodeCost
@@ -76,7 +77,7 @@ class NodeGrid:
         self.ends = NodeEnds([item for item in constraints if isinstance(item, BoundEnd)])
         others = [item for item in constraints if not item.equality]
         self.rows = NodeRows(self.spline, others, follows.robot.dof)
-        self._constraints = tuple(constraints)
+        self.constraints = tuple(constraints)
         self._one = t
         r = follows.robot.dof - follows.dimension
         usual = float(np.median(np.diff(t)))
@@ -109,7 +110,7 @@ class NodeGrid:
 
     def without_rows(self) -> "NodeGrid":
         """Return the same with nothing asked but what its ends are."""
-        return self._other(self._one, [item for item in self._constraints if item.equality])
+        return self._other(self._one, [item for item in self.constraints if item.equality])
 
     def copied(self, copies: int) -> "NodeGrid":
         """Return the nodes of so many motions, one after the other, for `Together`.
@@ -129,7 +130,7 @@ class NodeGrid:
         return NodeGrid(
             self.problem,
             t,
-            self._constraints if constraints is None else constraints,
+            self.constraints if constraints is None else constraints,
             free=self.free,
             counts=self.counts,
             calm=calm or self.calm,
@@ -273,12 +274,12 @@ class NodeMotion:
     @cached_property
     def violation(self) -> float:
         """By how much the worst row is beyond its tolerance [units of h]; 0 where all are kept."""
-        return float(np.max(self.h - self.grid.rows.granted(), initial=0.0))
+        return float(np.max(self.h - self.grid.rows.granted, initial=0.0))
 
     def breaks_hard(self) -> bool:
         """Whether a row is beyond its tolerance that is not of a tolerance of the task."""
         rows = self.grid.rows
-        beyond = rows.split(self.h - rows.granted())
+        beyond = rows.split(self.h - rows.granted)
         pairs = zip(rows.constraints, beyond, strict=True)
         return any(
             not np.max(own, initial=0.0) <= 0.0

@@ -66,6 +66,8 @@ _ROUGHLY = 100.0
 # After a full step that promised less than this share of the cost, the next one promises about its
 # square: there is no need to look around for it.
 _LITTLE = 1e-5
+# Steps after which the method is given up: it needs fifteen, forty where limits bind all over.
+_MOST = 80
 
 
 class Step(NamedTuple):
@@ -118,7 +120,7 @@ def minimise(
     prices: Array | None = None,
     *,
     roughly: bool = False,
-    most: int = 60,
+    most: int = _MOST,
 ) -> Optimum:
     """Return the optimum near a motion.
 
@@ -150,9 +152,8 @@ class _Model(NamedTuple):
         ∂F/∂w.
     both : (N, n, 6, 6r)
         ∂y/∂w of both ends of each interval.
-    changes : (N + 1, 3, n, 3r)
-    curved : (N + 1, 3r, 3r)
-        What bends by the nodes' own manifolds.
+    around : Around
+        How the nodes move, to second order along what pulls at them.
     intervals : (N, 6r, 6r)
         What bends by costs.
     rows : LinearRows
@@ -161,8 +162,7 @@ class _Model(NamedTuple):
 
     gradient: Array
     both: Array
-    changes: Array
-    curved: Array
+    around: Around
     intervals: Array
     rows: LinearRows
     border: Border
@@ -283,17 +283,16 @@ class _Solver:
         around = Around.of(motion.charts, motion.nu, motion.alpha, motion.place, force)
         if around is None:
             return None
-        changes = around.changes * grid.scale
-        curved = around.curvature * grid.scale * grid.scale[:, None]
-        both = spline.changes(changes)
+        around = around.scaled(grid.scale)
+        both = spline.changes(around.changes)
         intervals = grid.cost.curvature(motion.samples, motion.partials, both)
         bending = None if wild else grid.rows.bending(motion.checked, prices, both)
         if bending is not None:
             intervals = intervals + bending
-        gradient = _pulled(changes, by_cost)
+        gradient = around.pulled(by_cost)
         gradient.reshape(-1)[grid.held] = 0.0
-        border = grid.ends.border(motion.c, changes, grid.held)
-        return _Model(gradient, both, changes, curved, intervals, rows, border)
+        border = grid.ends.border(motion.c, around.changes, grid.held)
+        return _Model(gradient, both, around, intervals, rows, border)
 
     def _arrived(self) -> bool:
         """Whether the last step says that another one would promise nothing."""
@@ -346,10 +345,10 @@ class _Solver:
         right, intervals = model.gradient, model.intervals
         if prices.size:
             push = model.rows.pulled(self._all(prices + stiff * off))
-            right = right + _pulled(model.changes, grid.spline.scattered(push))
+            right = right + model.around.pulled(grid.spline.scattered(push))
             right.reshape(-1)[grid.held] = 0.0
             intervals = intervals + self._stiffness(model, stiff)
-        solved = self._solved(right, model.curved, intervals, model.border)
+        solved = self._solved(right, model.around.curvature, intervals, model.border)
         if solved is None:
             return None
         step, end_prices = solved
@@ -451,13 +450,6 @@ class _Solver:
         gap = np.abs(motion.h[self._kept] + slacks - elastics).sum() + np.abs(motion.c).sum()
         elastic = self._price * float(elastics.sum())
         return motion.aim + elastic - barrier + self._penalty * float(gap)
-
-
-def _pulled(changes: Array, force: Array) -> Array:
-    """Return Γᵀλ of nodes, (N + 1, 3r), for Γ (N + 1, 3, n, 3r) and λ (N + 1, 3, n)."""
-    count, _, n, size = changes.shape
-    flat = changes.reshape(count, 3 * n, size)
-    return np.asarray((force.reshape(count, 1, 3 * n) @ flat)[:, 0])
 
 
 def _along(both: Array, step: Array) -> Array:

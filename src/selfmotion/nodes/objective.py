@@ -121,16 +121,10 @@ class NodeCost:
         both = zip(self._costs, partials, strict=True)
         return _summed([own for cost, own in both if not cost.is_quadratic])
 
-    def curvature(
-        self,
-        samples: CurveSamples,
-        partials: Sequence[Partials],
-        both: Array,
-        more: Array | None = None,
-    ) -> Array:
+    def curvature(self, samples: CurveSamples, partials: Sequence[Partials], both: Array) -> Array:
         """Return Γᵀ (∂²F) Γ on each interval, by w of its left, then its right node, (N, d, d).
 
-        `both` (N, n, 6, d) are the changes of y; `more` (N, n, 6, 6) what else bends each joint's.
+        `both` (N, n, 6, d) are the changes of y.
         """
         count, n, _, size = both.shape
         found = np.zeros((count, size, size))
@@ -138,8 +132,6 @@ class NodeCost:
             part = slice(first, first + _LOT)
             own = both[part]
             turned = _bent_by(self._forms, part, own)
-            if more is not None:
-                turned += more[part] @ own
             flat = own.reshape(len(own), 6 * n, size)
             found[part] = np.swapaxes(flat, 1, 2) @ turned.reshape(len(own), 6 * n, size)
         if self._bent:
@@ -290,6 +282,16 @@ class Around:
             return None
         cls._by_rates(charts, place, here, force, curvature)
         return cls(changes, curvature)
+
+    def scaled(self, scale: Array) -> "Around":
+        """Return the same by coordinates that are these (3r,) times as small."""
+        return Around(self.changes * scale, self.curvature * scale * scale[:, None])
+
+    def pulled(self, force: Array) -> Array:
+        """Return Γᵀλ of the nodes, (N + 1, 3r), for λ (N + 1, 3, n)."""
+        count, _, n, size = self.changes.shape
+        flat = self.changes.reshape(count, 3 * n, size)
+        return np.asarray((force.reshape(count, 1, 3 * n) @ flat)[:, 0])
 
     @staticmethod
     def _mixed(

@@ -39,6 +39,8 @@ from selfmotion.nodes.spline import (
 _NEAR_LIMIT, _NEAR = -0.3, -0.19
 # Where less than this is left of a limit, it is used up [units of h].
 _USED = 0.01
+# A limit whose control point is this near to it binds there [units of h].
+_BINDS = 1e-3
 # Control points that two intervals share are asked for once: the other counts as kept by this much.
 _SHARED = -1e3
 # What is refined is looked at so often on each interval.
@@ -262,8 +264,9 @@ class NodeRows:
             found.append(Priced(item, own[once].reshape(shape), times, used[once].reshape(shape)))
         return found
 
+    @cached_property
     def granted(self) -> Array:
-        """Return what more h may be and still count as kept, (R,)."""
+        """What more h may be and still count as kept, (R,)."""
         each = [
             np.full(place.stop - place.start, item.tolerance - _granted(item))
             for item, (place, _) in zip(self.constraints, self._places, strict=True)
@@ -303,13 +306,13 @@ class NodeRows:
         """Whether anything but limits is asked."""
         return any(not isinstance(item, BoundLimits) for item in self.constraints)
 
-    def kinks(self, ends: Array, near: float = 1e-3) -> Flags:
+    def kinks(self, ends: Array) -> Flags:
         """Return in or beside which intervals limits of q̈ or jerk begin or end to bind, (N,)."""
         found = np.zeros(self.spline.count, dtype=np.bool_)
         for item in self.constraints:
             if isinstance(item, BoundLimits) and item.order > 1:
                 h = self._limits(item, ends, AT_CONTROLS) - _granted(item)
-                each: Flags = np.asarray(h > -near)
+                each: Flags = np.asarray(h > -_BINDS)
                 each = each.reshape(self.spline.count, CONTROLS[item.order], -1)
                 binds: Flags = np.asarray(each.any(axis=1))
                 found |= (binds & ~each.all(axis=1)).any(axis=1)

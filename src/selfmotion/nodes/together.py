@@ -156,13 +156,14 @@ class Together:
         around = Around.of(motion.charts, motion.nu, motion.alpha, motion.place, force)
         if around is None:
             raise RuntimeError(_LEAVES)
-        changes = around.changes * grid.scale
-        gradient = np.einsum("konw,kon->kw", changes, force)
+        around = around.scaled(grid.scale)
+        gradient = around.pulled(force)
         gradient.reshape(-1)[grid.held] = 0.0
-        intervals = grid.cost.curvature(motion.samples, motion.partials, spline.changes(changes))
+        both = spline.changes(around.changes)
+        intervals = grid.cost.curvature(motion.samples, motion.partials, both)
         intervals[spline.gaps] = 0.0
         matrix = Banded(len(gradient), gradient.shape[1], 1)
-        matrix.add(0, 0, around.curvature * grid.scale * grid.scale[:, None])
+        matrix.add(0, 0, around.curvature)
         matrix.add_pairs(0, intervals)
         matrix.hold(grid.held)
         step, rights = np.zeros((self.count, gradient.size // self.count)), -gradient

@@ -56,7 +56,7 @@ def along_chain(
         broken = motion.broken_between() | _beyond_limits(motion)
         if not broken.any():
             none = np.zeros(len(motion.h))
-            return MotionOnNodes(motion, Status.PRECISION, none, (), None, is_chain=True)
+            return MotionOnNodes(motion, Status.PRECISION, none, is_chain=True)
         finer = Grid(t).halved(np.convolve(broken, np.ones(3), "same") > 0.0)
     return None
 

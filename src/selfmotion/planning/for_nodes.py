@@ -42,7 +42,8 @@ def first_nodes(problem: Problem) -> Array:
     ends = [end for rest, end in zip(problem.rests, (0.0, duration), strict=True) if rest]
     near = np.array([*ends, *problem.follows.edges])[:, None] + duration * np.array(STARTING)
     inside = near[(near > 0.0) & (near < duration)]
-    apart = np.abs(inside[:, None] - t).min(axis=1, initial=np.inf) > 0.5 * duration * 0.01
+    least = 0.5 * duration * min(map(abs, STARTING))
+    apart = np.abs(inside[:, None] - t).min(axis=1, initial=np.inf) > least
     return np.sort(np.concatenate([t, inside[apart]]))
 
 

@@ -18,7 +18,6 @@ from selfmotion.planning.settings import (
     FINER_POWER,
     GIVEN_AWAY,
     MOST_PARTS,
-    MOST_STEPS,
     NEAR_PATH,
     NODE_ROUNDS,
     TOWARDS_MIDDLE,
@@ -137,7 +136,8 @@ class NodeDescent:
         best = first
         for begin in self._beginnings(begun, free):
             if begin is not None:
-                best = min(best, self._minimise(begin, most=FEWER), key=_rank)
+                found = minimise(begin, self._told, roughly=True, most=FEWER)
+                best = min(best, found, key=_rank)
             if self._ended is not None or _keeps(best):
                 break
         return best
@@ -208,17 +208,14 @@ class NodeDescent:
         return None if (parts == 1).all() else _divided(spline.t, parts)
 
     def _minimise(
-        self,
-        motion: NodeMotion,
-        prices: Array | None = None,
-        *,
-        roughly: bool = True,
-        most: int = MOST_STEPS,
+        self, motion: NodeMotion, prices: Array | None = None, *, roughly: bool = True
     ) -> Optimum:
-        return minimise(motion, self._told, prices, roughly=roughly, most=most)
+        return minimise(motion, self._told, prices, roughly=roughly)
 
     def _told(self, step: Step) -> bool:
-        """Note an iteration; return whether to stop."""
+        """Note an iteration, and the motion if it keeps all; return whether to stop."""
+        if _is_kept(step.motion):
+            self.latest = MotionOnNodes.on_the_way(step.motion)
         effort, motion = self._effort, step.motion
         iteration = Iteration(
             x=motion.nu.ravel(),
@@ -229,8 +226,6 @@ class NodeDescent:
             evaluations=effort.counts.evaluations,
         )
         self.history.append(iteration)
-        if _is_kept(motion) and len(motion.h) == len(motion.grid.rows.granted()):
-            self.latest = MotionOnNodes(motion, Status.STOPPED, np.zeros(len(motion.h)), (), None)
         if effort.callback is not None and effort.callback(iteration):
             self._ended = Status.STOPPED
         most = effort.max_evaluations
@@ -241,7 +236,7 @@ class NodeDescent:
     def _standing(self, optimum: Optimum) -> MotionOnNodes:
         # What keeps the conditions, and leads no further, is as good as it gets.
         arrived = optimum.status if optimum.status in _ARRIVED else Status.PRECISION
-        return MotionOnNodes.of(optimum, self._constraints, self._ended or arrived)
+        return MotionOnNodes.of(optimum, self._ended or arrived)
 
 
 def _is_kept(motion: NodeMotion) -> bool:

@@ -1,13 +1,12 @@
 """A motion of nodes that stands: an optimum that keeps the conditions."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from selfmotion.basics import Array, Flags
-from selfmotion.constraints import Binding, BoundConstraint
+from selfmotion.constraints import Binding
 from selfmotion.engine import Evaluation, Priced, active_of
 from selfmotion.motion import Grid, NodeNullMotion, NullMotion
 from selfmotion.nodes import NodeMotion, Optimum
@@ -26,9 +25,10 @@ class MotionOnNodes:
     status : Status
     prices : (R,)
         Of all rows of its conditions.
-    active : tuple of Binding
     remaining : float or None
         What more nodes and another step might still save [cost]; None where that is not known.
+    optimum : Optimum or None
+        What it was found as; None of what is none.
     is_chain : bool
         Whether it is a chain of the global search, which is at its optimum.
     """
@@ -36,22 +36,27 @@ class MotionOnNodes:
     motion: NodeMotion
     status: Status
     prices: Array
-    active: tuple[Binding, ...]
-    remaining: float | None
+    remaining: float | None = None
+    optimum: Optimum | None = None
     is_chain: bool = False
 
     @classmethod
-    def of(
-        cls, optimum: Optimum, constraints: Sequence[BoundConstraint], status: Status
-    ) -> "MotionOnNodes":
+    def of(cls, optimum: Optimum, status: Status) -> "MotionOnNodes":
         """Return what stands at an optimum."""
         motion: NodeMotion = optimum.motion
-        active: tuple[Binding, ...] = ()
-        if optimum.prices.any() or optimum.end_prices.size:
-            active = _binding(optimum, constraints)
         promised = optimum.promised if np.isfinite(optimum.promised) else 0.0
         away = motion.grid.rows.given_away(optimum.prices, motion.curve_ends)
-        return cls(motion, status, optimum.prices, active, promised + float(away.sum()))
+        return cls(motion, status, optimum.prices, promised + float(away.sum()), optimum)
+
+    @classmethod
+    def on_the_way(cls, motion: NodeMotion) -> "MotionOnNodes":
+        """Return what stands where a motion has to do that keeps the conditions."""
+        return cls(motion, Status.STOPPED, np.zeros(len(motion.h)))
+
+    @cached_property
+    def active(self) -> tuple[Binding, ...]:
+        """What kept the optimum from a lower cost."""
+        return () if self.optimum is None else _binding(self.optimum)
 
     @property
     def steps(self) -> int:
@@ -120,13 +125,15 @@ class MotionOnNodes:
         return self.on(Grid(self.motion.grid.t).halved(where).nodes) or self
 
 
-def _binding(optimum: Optimum, constraints: Sequence[BoundConstraint]) -> tuple[Binding, ...]:
+def _binding(optimum: Optimum) -> tuple[Binding, ...]:
     """Return what kept an optimum from a lower cost."""
+    if not (optimum.prices.any() or optimum.end_prices.size):
+        return ()
     motion, grid = optimum.motion, optimum.motion.grid
     inner = iter(grid.rows.priced(optimum.prices, motion.curve_ends))
     ends = grid.ends.by_item(optimum.end_prices)
     each = []
-    for item in constraints:
+    for item in grid.constraints:
         if item.equality:
             own = ends[id(item)][None]
             each.append(Priced(item, own, np.zeros(1), np.ones(own.shape, dtype=np.bool_)))

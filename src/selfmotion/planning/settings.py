@@ -34,9 +34,8 @@ MOST_NODES = 1024
 NODE_ROUNDS = 14
 # What is asked of the ends is met to this [rad, rad/s].
 ENDS_MET = 1e-8
-# Steps of Newton's method: it needs fifteen, forty where limits bind all over; from others than the
-# first beginning, what takes long leads nowhere.
-MOST_STEPS, FEWER = 80, 40
+# Steps of Newton's method from other beginnings than the first: what takes long leads nowhere.
+FEWER = 40
 # Where the motion at x = 0 does not lead to what keeps the conditions: the self-motion goes towards
 # the middle of the limits in such shares of the duration.
 TOWARDS_MIDDLE = (1.0 / 16.0, 1.0 / 64.0, 1.0 / 4.0)

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from selfmotion.basics import FileFormatError, write_atomically
+from selfmotion.basics import FileFormatError, digest_of_file, write_atomically
 from selfmotion.result.archive import OtherVersionError, check_version, file_digest
 from selfmotion.result.move import Move, load_move
 from selfmotion.result.plan import Plan, load_plan
@@ -43,8 +43,7 @@ def write_bundle(
             for number, item in enumerate(made):
                 member = Path(folder, _member(number))
                 item.save(member)
-                digest = hashlib.sha256(member.read_bytes()).hexdigest()
-                members.append({"plan": isinstance(item, Plan), "digest": digest})
+                members.append({"plan": isinstance(item, Plan), "digest": digest_of_file(member)})
                 archive.write(member, member.name)
             whole = {"kind": kind, "version": version, "members": members, **description}
             archive.writestr(_NAME, json.dumps({**whole, "digest": file_digest(whole, {})}))

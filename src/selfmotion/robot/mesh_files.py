@@ -1,6 +1,5 @@
 """Mesh files of a URDF that are missing or cannot be read."""
 
-import hashlib
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Collection
 from pathlib import Path
@@ -9,6 +8,7 @@ from typing import NamedTuple
 import coal
 import numpy as np
 
+from selfmotion.basics import digest_of_file
 from selfmotion.robot.packages import Packages
 from selfmotion.robot.urdf import Urdf
 
@@ -55,7 +55,7 @@ def mesh_digests(urdf: Urdf, tag: str) -> dict[str, str]:
     for mesh in root.iterfind(f"link/{tag}/geometry/mesh"):
         place = _place(urdf, mesh.get("filename", ""))
         if place is not None:
-            found[str(place)] = hashlib.sha256(place.read_bytes()).hexdigest()
+            found[str(place)] = digest_of_file(place)
     return found
 
 
