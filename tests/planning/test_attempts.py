@@ -15,6 +15,8 @@ from selfmotion.optimise import QuasiNewton
 from selfmotion.planning.attempts import ATTEMPTS
 from selfmotion.planning.beginning import Beginning
 from selfmotion.planning.effort import Effort
+from selfmotion.planning.for_nodes import first_nodes
+from selfmotion.planning.nodes import NodeDescent
 from selfmotion.planning.session import Session
 
 Circle = Callable[..., sm.Problem]
@@ -96,3 +98,25 @@ def test_what_costs_more_freely_is_not_optimised_with_limits(
     session.minimize(dearest=free.report.cost * (0.5 if dearer else 2.0))
     assert session.is_hopeless == dearer
     assert dearer or not session.violations
+
+
+def test_what_conditions_did_not_count_for_is_none_that_keeps_them(panda_circle: Circle) -> None:
+    """Who stops on the way to the free optimum is left no motion: it may break limits."""
+    free = sm.plan(panda_circle("position"))
+    fastest = np.abs(free.trajectory.qd).max()
+    limits = [sm.JointVelocityLimits(0.9 * fastest)]
+    problem = dataclasses.replace(panda_circle("position"), constraints=limits)
+    start = np.array(problem.given_start)
+    bound = problem.bind_constraints(start, start)
+    effort = Effort(QuasiNewton(), lambda iteration: True, None, Counts())
+    descent = NodeDescent(problem, effort, bound, free=False)
+    found = descent.near([free.trajectory], first_nodes(problem), dearest=10.0 * free.report.cost)
+    assert descent.history
+    assert found is None
+    assert descent.latest is None
+    # One that does is kept.
+    easy = dataclasses.replace(problem, constraints=[sm.JointVelocityLimits(2.0 * fastest)])
+    bound = easy.bind_constraints(start, start)
+    descent = NodeDescent(easy, effort, bound, free=False)
+    descent.near([free.trajectory], first_nodes(easy))
+    assert descent.latest is not None

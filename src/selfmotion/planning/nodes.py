@@ -129,7 +129,9 @@ class NodeDescent:
 
     def _freely(self, motion: NodeMotion) -> NodeMotion:
         """Return the optimum near a motion of which nothing is asked but what its ends are."""
-        return self._minimise(motion.grid.without_rows().at(motion.centred)).motion
+        alone = motion.grid.without_rows().at(motion.centred)
+        # Whether these keep the conditions is not known.
+        return minimise(alone, self._noted, roughly=True).motion
 
     def _other(self, begun: NodeMotion, first: Optimum, free: NodeMotion | None) -> Optimum:
         """Return the best of the optima from other beginnings, and the first."""
@@ -216,6 +218,10 @@ class NodeDescent:
         """Note an iteration, and the motion if it keeps all; return whether to stop."""
         if _is_kept(step.motion):
             self.latest = MotionOnNodes.on_the_way(step.motion)
+        return self._noted(step)
+
+    def _noted(self, step: Step) -> bool:
+        """Note an iteration; return whether to stop."""
         effort, motion = self._effort, step.motion
         iteration = Iteration(
             x=motion.nu.ravel(),
