@@ -243,6 +243,8 @@ MALFORMED: list[tuple[str, str, str, str]] = [
      "--standoff is along the tool's z axis"),
     ("a.yaml", "{}", "--columns x,y,z", "--columns has no effect"),
     ("a.csv", csv("0.4,0,0", header="x,y,z"), "--rotary head", "--rotary has no effect"),
+    ("a.csv", csv("0.4,0,0", "0.4,0,1e-1", header="x,y,z"),
+     "--duration 3 --corners stop --ramp 0.3", "ramp has no effect on a duration"),
     ("a.step", "", "", "has suffix '.step', expected one of .csv"),
     ("a.npy", "no array", "", "cannot be read as a NumPy array"),
     ("a.json", "{", "", "is not JSON"),
@@ -274,6 +276,13 @@ def test_malformed_files_are_one_line_and_exit_2(
     assert said in line
     if "--frame" not in options:
         assert line.startswith(f"error: {file}: ")
+
+
+@pytest.mark.parametrize("corners", ["blend", "round"])
+def test_an_angle_of_corners_is_of_those_where_the_tool_stops(corners: str, tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text(csv("0.4,0,0", "0.4,0,1e-1", header="x,y,z"))
+    with pytest.raises(sm.FileFormatError, match=f"no effect where corners are '{corners}'"):
+        sm.read_path(tmp_path / "a.csv", feed=0.1, corners=corners, corner_angle=0.5)
 
 
 @pytest.mark.parametrize("shape", [(3,), (2, 5), (2, 3, 3)])

@@ -81,7 +81,7 @@ def path_of_rows(path: FilePath, rows: PoseRows, asked: Pacing) -> Path:
         rows = _stood_off(path, rows, rotations, asked.standoff)
     turns = _quaternions(rotations) if rows.orientation else None
     try:
-        as_choice(asked.corners, "corners", ("blend", "stop", "round"), PathError)
+        _check_corners(asked)
         made = _of_cut(rows, turns, asked) if rows.straight else _of_table(path, rows, turns, asked)
         is_ramped = asked.ramp is not None and asked.duration is None
         found = section_at_rest(made, ramp=asked.ramp or 0.0) if is_ramped else made
@@ -89,6 +89,22 @@ def path_of_rows(path: FilePath, rows: PoseRows, asked: Pacing) -> Path:
     except (PathError, ValueError) as error:
         raise FileFormatError(f"{path}: {error}") from error
     return found.noted((*rows.notes, *made.notes))
+
+
+def _check_corners(asked: Pacing) -> None:
+    """Refuse what corners are not, and what has no effect on them."""
+    as_choice(asked.corners, "corners", ("blend", "stop", "round"), PathError)
+    stops = asked.corners == "stop"
+    if asked.corner_angle is not None and not stops:
+        raise PathError(
+            f"corner_angle has no effect where corners are '{asked.corners}', only where they are "
+            f"'stop'; drop one"
+        )
+    if asked.ramp is not None and asked.duration is not None and stops:
+        raise PathError(
+            "ramp has no effect on a duration where corners are 'stop', whose stretches rest at "
+            "their ends; drop one"
+        )
 
 
 def _of_table(file: FilePath, rows: PoseRows, turns: Array | None, asked: Pacing) -> Path:
