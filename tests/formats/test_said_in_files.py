@@ -159,3 +159,27 @@ def test_a_goal_says_what_is_looked_for() -> None:
         parts.plan()
     with pytest.raises(sm.ProblemError, match="search: has no effect on a motion in parts"):
         dataclasses.replace(parts, search=sm.Search()).in_parts()
+
+
+def test_what_has_no_effect_on_a_goal_is_refused(tmp_path: Path) -> None:
+    robot = robot_named("planar_3r")
+    start = np.array([0.1, 0.9, 0.9])
+    line = sm.Line(robot.pose(start), robot.pose(start + 0.1), 2.0)
+    problem = sm.Problem(robot, line, "planar", start)
+    keep, parts = {"JointVelocity": 1.1}, {"retreat": 0.1}
+    for goal, given, said in (
+        ("best", {"keep": keep}, "keep: has no effect on the best motion"),
+        ("retimed", {"parts": parts}, "parts: has no effect on the retimed motion"),
+        ("fastest", {"parts": parts}, "parts: has no effect on the fastest motion"),
+        ("parts", {"keep": keep}, "keep: has no effect on a motion in parts"),
+    ):
+        job = sm.Job(problem, goal=goal, **given)
+        with pytest.raises(sm.ProblemError, match=said):
+            job.in_parts() if goal == "parts" else job.plan()
+    with pytest.raises(sm.ProblemError, match="goal is 'quick', expected one of"):
+        sm.Job(problem, goal="quick")
+    file = tmp_path / "cell.toml"
+    sm.write_problem(problem, file)
+    file.write_text(file.read_text() + '\n[grid]\n"path.duration" = [3, 4]\n')
+    with pytest.raises(sm.FileFormatError, match="grid: stands for many problems"):
+        sm.read_problem(file)

@@ -89,6 +89,7 @@ def plan(
     given = {key: value for key, value in asked.items() if value is not None}
     remarks = job.problem.remarks
     outputs.tell(remarks)
+    job.check_used(job.goal)
     if job.goal == "parts":
         options.refuse({"from": warm, **given}, "a motion in parts", "its own")
         jobs.finish_parts(job, [*(out or []), *([] if html is None else [html])], as_json)

@@ -54,7 +54,9 @@ def fastest(
     outputs.check_suffixes([*job.outputs, *(out or [])])
     given = dict(zip(("acceleration", "velocity"), _limits(acceleration, velocity), strict=True))
     if keep:
-        given["keep"] = dict(_factor(text) for text in keep)
+        pairs = [_factor(text) for text in keep]
+        options.refuse_twice("--keep", [kind for kind, _ in pairs])
+        given["keep"] = {**(job.keep or {}), **dict(pairs)}
     remarks = job.problem.remarks
     outputs.tell(remarks)
     found = fastest_with_progress(job, deadline=deadline, **given)

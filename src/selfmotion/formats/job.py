@@ -5,15 +5,22 @@ from dataclasses import dataclass
 from pathlib import Path as FilePath
 from typing import Any
 
-from selfmotion.basics import ProblemError
+from selfmotion.basics import ProblemError, as_choice
 from selfmotion.certificate import Tolerance
 from selfmotion.optimise import Optimizer
 from selfmotion.planning import Fastest, Search, fastest, plan, plan_in_parts
 from selfmotion.problem import Problem
 from selfmotion.result import Parts, Plan, retime
 
-# What is looked for; see `Job.goal`.
-GOALS = ("best", "retimed", "fastest", "parts")
+# What is looked for (see `Job.goal`), what has no effect on it, and what it is called.
+_UNUSED = {
+    "best": ("keep", "parts"),
+    "retimed": ("keep", "parts"),
+    "fastest": ("parts", "optimizer", "max_evaluations"),
+    "parts": ("keep", "search", "optimizer", "max_evaluations"),
+}
+GOALS = tuple(_UNUSED)
+_CALLED = {"parts": "a motion in parts"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +56,9 @@ class Job:
     parts: Mapping[str, Any] | None = None
     keep: Mapping[str, float] | None = None
 
+    def __post_init__(self) -> None:
+        as_choice(self.goal, "goal", GOALS)
+
     @property
     def settings(self) -> dict[str, Any]:
         """What `plan` is given besides the problem."""
@@ -61,10 +71,11 @@ class Job:
         Raises
         ------
         ProblemError
-            The goal is a motion in parts.
+            The goal is a motion in parts, or something that is set has no effect on it.
         """
         if self.goal == "parts":
             raise ProblemError("goal: is 'parts', of which there may be several: Job.in_parts()")
+        self.check_used(self.goal)
         if self.goal == "fastest":
             return self.fastest(**options).plan
         found = plan(self.problem, **{**self.settings, **options})
@@ -76,9 +87,9 @@ class Job:
         Raises
         ------
         ProblemError
-            The file has settings of an optimiser, which `fastest` has not.
+            Something that is set has no effect on it: an optimiser, parts.
         """
-        self._refuse(("optimizer", "max_evaluations"), "the fastest motion")
+        self.check_used("fastest")
         asked = {"keep": self.keep, "search": self.search, "tolerance": self.tolerance, **options}
         return fastest(self.problem, **asked)
 
@@ -88,14 +99,16 @@ class Job:
         Raises
         ------
         ProblemError
-            The file has settings of a search or an optimiser, which `plan_in_parts` has not.
+            Something that is set has no effect on it: a search, an optimiser, costs to keep.
         """
-        self._refuse(("search", "optimizer", "max_evaluations"), "a motion in parts")
+        self.check_used("parts")
         given = {**(self.parts or {}), "tolerance": self.tolerance, **options}
         return plan_in_parts(self.problem, **given)
 
-    def _refuse(self, names: tuple[str, ...], what: str) -> None:
-        for name in names:
+    def check_used(self, goal: str) -> None:
+        """Raise ProblemError for what is set and has no effect on a goal."""
+        for name in _UNUSED[goal]:
             if getattr(self, name) is not None:
                 said = {"optimizer": "optimiser"}.get(name, name)
-                raise ProblemError(f"{said}: has no effect on {what}; leave it out")
+                called = _CALLED.get(goal, f"the {goal} motion")
+                raise ProblemError(f"{said}: has no effect on {called}; leave it out")

@@ -58,7 +58,13 @@ def read_job(file: str | FilePath, *, allow_code: bool = False) -> Job:
         file and the key, what was found and what was expected.
     """
     path = as_path(file)
-    return job_of(read_document(path), path, allow_code=allow_code)
+    document = read_document(path)
+    if "grid" in document:
+        raise FileFormatError(
+            f"{path}: grid: stands for many problems, which `selfmotion batch` plans "
+            f"(batch.grid_items); leave it out for one"
+        )
+    return job_of(document, path, allow_code=allow_code)
 
 
 def job_of(
