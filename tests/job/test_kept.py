@@ -164,6 +164,15 @@ def test_a_program_is_of_the_tool_the_reference_and_the_tolerance_that_were_aske
     assert "rad off the path" in program.verdict
 
 
+def test_what_happens_on_a_move_was_asked_for_by_nobody(kept) -> None:
+    _, program = kept
+    far = sm.Box("far", [0.0, 0.0, 3.0], [0.1, 0.1, 0.1])
+    for changes, said in (({"events": (("arc on", 0.1),)}, "arc on"), ({"leaves": (far,)}, "far")):
+        first = replace(program.steps[0], **changes)
+        verdict = replace(program, steps=(first, *program.steps[1:])).verdict
+        assert f"'{first.name}' has '{said}', which nobody asked of a move" in verdict
+
+
 def test_a_seams_own_clearance_is_kept_besides_that_of_the_job() -> None:
     far = sm.Clearance([sm.Box("far", [0.0, 0.8, 0.6], [0.1, 0.1, 1.2])], 0.01)
     post = sm.Clearance([sm.Box("post", [0.0, -0.6, 0.6], [0.1, 0.1, 1.2])], 0.01)

@@ -185,6 +185,9 @@ def _moves(steps: Sequence[Step], seams: Mapping[str, Seam]) -> Iterator[str]:
             yield f"'{step.name}' is between '{before}' and '{after}'"
         if number and step.name == steps[number - 1].name:
             yield f"'{step.name}' is there twice"
+        added = [*(event for event, _ in step.events), *(item.name for item in step.leaves)]
+        if added:
+            yield f"'{step.name}' has '{added[0]}', which nobody asked of a move or a wait"
         may = {name for side in (before, after) if side in seams for name in seams[side].may_meet}
         if not set(step.may_meet) <= may:
             yield f"'{step.name}' may meet more than the seams beside it"
