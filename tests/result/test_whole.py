@@ -89,6 +89,22 @@ def test_everything_that_is_judged_is_in_the_digest_of_a_problem(plan: sm.Plan) 
     digests = [problem.digest, *(item.digest for item in others)]
     assert len(set(digests)) == len(digests)
     assert replace(problem, costs=[sm.JointVelocity(weight=3.0)]).digest == problem.digest
+    assert replace(problem, start=None).digest not in digests
+
+
+def test_a_motion_that_begins_elsewhere_than_at_the_given_start_is_not_verified(
+    plan: sm.Plan,
+) -> None:
+    """The same motion of the tool, in another configuration: what a file with a start judges."""
+    problem = plan.problem
+    other = problem.robot.inverse_kinematics(problem.path.pose(0.0), "planar", [2.0, -1.0, -1.0])
+    assert np.abs(other - problem.start).max() > 0.1
+    made = sm.plan(replace(problem, start=other)).require()
+    said = problem.certify(made.trajectory).verdict
+    assert said.startswith("not verified: it does not begin at the given start: joint 'joint")
+    assert "rad away (1e-05 allowed)" in said
+    assert replace(problem, start=None).certify(made.trajectory).verified
+    assert not replace(made, problem=problem).certificate.verified
 
 
 def test_a_motion_has_one_digest_whatever_made_it() -> None:

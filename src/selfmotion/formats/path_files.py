@@ -89,8 +89,8 @@ def read_path(
       ``G73 G81 G82 G83 G85 G89`` drill holes along Z (``X Y Z R Q P``, ``G98 G99``), until ``G80``.
       Without any ``Z`` it is 0. ``M2 M30`` end it, other ``M`` and ``G4`` are events;
       ``G28 G30 G53`` go to places that are not known, and are passed over with a note; ``G9 G15
-      G40 G43 G49 G50.1 G61 G64 G67 G69``, one of ``G54`` to ``G59``, ``N O S T H D P Q L``, ``%``
-      and comments are passed over
+      G40 G43 G49 G50.1 G61 G64 G67 G69``, one of ``G54`` to ``G59``, ``N O S T H D P Q``, ``%`` and
+      comments are passed over, with a note where ``S`` changes from cut to cut
     - G-code of printers, where lines have ``E``: what extrudes is a cut, what does not a travel.
       ``M82 M83 G92 E`` set what E means; ``retract`` and ``prime`` are events, as are commands
     - APT: ``GOTO FROM GODLTA GOHOME RAPID FEDRAT UNITS TLAXIS``, with ``i,j,k`` the tool's axis,

@@ -167,11 +167,12 @@ class Shelf:
         try:
             files = _written(kept, file)
             found, reason = [self._plan(name) for name in files], str(kept["reason"])
-        except (FileFormatError, KeyError, TypeError, ValueError):
+            # Each begins where it was put.
+            problems = [replace(plan.problem, start=problem.start) for plan in found]
+        except (SelfmotionError, KeyError, TypeError, ValueError):
             return None
-        sound = all(
-            plan.certificate.verified and plan.problem.digest == problem.digest for plan in found
-        )
+        same = all(own.digest == problem.digest for own in problems)
+        sound = same and all(plan.certificate.verified for plan in found)
         return (found, reason) if sound else None
 
     def _plan(self, file: Path) -> Plan:

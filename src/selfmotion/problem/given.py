@@ -38,6 +38,8 @@ _EXAMPLES = {
 }
 # A start nearer to the path than this is on it: far above rounding, far below any tolerance.
 _ON_PATH = 1e-7
+# It is put onto it by as much at most [rad or m].
+START_MISS = 1e-5
 
 
 def check_kinds(problem: object) -> None:

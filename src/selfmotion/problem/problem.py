@@ -38,6 +38,7 @@ from selfmotion.problem.envelopes import asked_envelope, with_own_limits
 from selfmotion.problem.fit import check_fit
 from selfmotion.problem.given import (
     SEQUENCES,
+    START_MISS,
     check_costs,
     check_judged,
     check_kinds,
@@ -360,8 +361,8 @@ class Problem:
     ) -> Certificate:
         """Return the certificate of a motion, by all that the problem asks for; see `certify`.
 
-        And by requirements `besides`. A motion with an `ending` stops before it can rest at the end
-        of the path.
+        And by requirements `besides`, and where it begins if a start is given. A motion with an
+        `ending` stops before it can rest at the end of the path.
         """
         start, end = self.rest_orders
         rests = self._rest(start, 0 if ending else end)
@@ -378,14 +379,30 @@ class Problem:
             ending=ending,
             progress=progress,
         )
-        return replace(certificate, problem=self.digest)
+        elsewhere = () if self.given_start is None else self._elsewhere(trajectory)
+        failures = (*elsewhere, *certificate.failures)
+        return replace(certificate, problem=self.digest, failures=failures)
+
+    def _elsewhere(self, trajectory: Trajectory) -> tuple[str, ...]:
+        """Return that a motion does not begin at the given start, in words."""
+        apart = np.abs(trajectory.of_joints(self.robot.joint_names).q[0] - self.given_start)
+        worst = int(np.argmax(apart))
+        # Written so that NaN is elsewhere.
+        if bool(apart[worst] <= START_MISS):
+            return ()
+        joint = self.robot.joint_names[worst]
+        return (
+            f"it does not begin at the given start: joint '{joint}' is {apart[worst]:.3g} "
+            f"{self.robot.unit_of(joint)} away ({START_MISS:g} allowed); leave the start out, or "
+            f"plan from there",
+        )
 
     @cached_property
     def digest(self) -> str:
         """What tells it from problems whose motions are judged by something else.
 
-        A digest of the arm, of what is followed and how nearly, and of what has to be kept; not of
-        costs, the start and the null motion, which no certificate judges.
+        A digest of the arm, of what is followed and how nearly, from which start, and of what has
+        to be kept; not of costs and the null motion, which no certificate judges.
         """
         robot = self.robot
         arm = (robot.urdf.sha256, robot.joint_names, robot.tools, robot.reference)
@@ -410,6 +427,7 @@ class Problem:
             followed,
             [item.to_dict() for item in self.relaxations],
             [description_of(item) for item in asked],
+            self.given_start,
             self.rest,
         )
 

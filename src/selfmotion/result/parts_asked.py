@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from selfmotion.path import Path, Retimed
-from selfmotion.problem import asked_of_part, at_all_times, times_along
+from selfmotion.problem import START_MISS, asked_of_part, at_all_times, times_along
 from selfmotion.result.asked import Asked, another_tool, follows_at, looked_at, not_judged_by
 from selfmotion.result.joints import Piece, gaps
 from selfmotion.result.plan import Plan
@@ -82,7 +82,7 @@ class PartsAsked:
         if is_first and start is not None:
             apart = float(np.abs(plan.trajectory.q[0] - start).max())
             # What a start given near the path is put onto it by.
-            if not apart <= _START:
+            if not apart <= START_MISS:
                 yield f"it does not begin at the given start: {apart:.3g} {problem.robot.unit_of()}"
 
     def _of_moves(self) -> Iterator[str]:
@@ -112,10 +112,6 @@ class PartsAsked:
         # Where a move was not found, that is told already.
         if len(found) == len(pieces):
             yield from gaps(problem.robot, found)
-
-
-# Starts are put onto their path by as much at most [rad or m].
-_START = 1e-5
 
 
 def _is_part(part: Path, whole: Path, ends: tuple[float, float]) -> bool:
