@@ -24,6 +24,11 @@ def test_a_mesh_that_was_replaced_is_told(tmp_path: Path) -> None:
     plan.save(tmp_path / "plan.npz")
     assert sm.load_plan(tmp_path / "plan.npz").certificate.notes == plan.certificate.notes
     trimesh.creation.box((0.2, 0.1, 0.1)).export(file)
+    # A certificate is none of the same names with other bodies.
+    again = sm.Problem(
+        panda, circle, task="position", start=start, constraints=[sm.Clearance([post])]
+    )
+    assert problem.digest == plan.certificate.problem != again.digest
     loaded = sm.load_plan(tmp_path / "plan.npz")
     assert f"{file} has changed since the plan was made" in loaded.certificate.notes
     assert "has changed" in loaded.certificate.verdict

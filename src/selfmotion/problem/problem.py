@@ -16,6 +16,7 @@ from selfmotion.basics import (
     as_several,
     description_of,
     digest_of,
+    digest_of_file,
     read_only,
     shown,
     silent,
@@ -49,7 +50,7 @@ from selfmotion.problem.knots import smooth_knots
 from selfmotion.problem.remarks import remarks_on
 from selfmotion.problem.rest import arm_rest_orders
 from selfmotion.problem.way import way_of
-from selfmotion.robot import RobotModel
+from selfmotion.robot import RobotModel, mesh_digests
 from selfmotion.task import Damping, DampingLaw, Relaxation, Task, feedback_rate
 
 
@@ -428,8 +429,17 @@ class Problem:
             [item.to_dict() for item in self.relaxations],
             [description_of(item) for item in asked],
             self.given_start,
+            self._mesh_digests(),
             self.rest,
         )
+
+    def _mesh_digests(self) -> dict[str, str]:
+        """Return what the files of all bodies hold that are kept apart: their names are not it."""
+        if not self.asked_envelope.bodies:
+            return {}
+        bodies = (body for item in self._asked for body in item.obstacles)
+        files = {str(file): digest_of_file(file) for body in bodies for file in body.files}
+        return {**mesh_digests(self.robot.urdf, "collision"), **files}
 
     def errors_between(self, trajectory: Trajectory) -> Array:
         """Return the errors of a motion in the middle between samples, (N, 2) [m, rad]."""
