@@ -141,7 +141,16 @@ def test_a_broken_file_is_no_longer_verified(plan: sm.Plan, tmp_path: Path) -> N
     assert not plan.problem.certify(sm.read_motion(file), plan.tolerance).verified
     for change, said in (
         (lambda m: m["points"][3].pop("velocities"), r"points\[3\]: velocities are given for some"),
+        (
+            lambda m: m["points"][3].pop("accelerations"),
+            r"points\[3\]: accelerations are given for some",
+        ),
+        (lambda m: m["points"][3]["accelerations"].pop(), r"points\[3\]: .* and 6 accelerations"),
         (lambda m: m["points"][3]["positions"].pop(), r"points\[3\]: 6 positions"),
+        (
+            lambda m: m.update(multi_dof_joint_trajectory={"points": [{"transforms": []}]}),
+            "moves joints of several coordinates as well",
+        ),
         (lambda m: m.pop("joint_names"), "has no joint_names and points"),
     ):
         broken = load(yaml.dump(message))
@@ -149,6 +158,20 @@ def test_a_broken_file_is_no_longer_verified(plan: sm.Plan, tmp_path: Path) -> N
         file.write_text(yaml.dump(broken))
         with pytest.raises(sm.FileFormatError, match=said):
             sm.read_motion(file)
+
+
+@pytest.mark.parametrize("suffix", ["json", "npz"])
+def test_a_table_that_says_what_is_not_read_is_refused(suffix: str, tmp_path: Path) -> None:
+    """An acceleration that is called otherwise would be one that is not there."""
+    table = {"t": [0, 1], "q": [[0], [1]], "qd": [[0], [0]], "joint_names": ["a"]}
+    table["qddd"] = [[1], [1]]
+    file = tmp_path / f"a.{suffix}"
+    if suffix == "json":
+        file.write_text(json.dumps(table))
+    else:
+        np.savez(file, **table)
+    with pytest.raises(sm.FileFormatError, match="'qddd' is not read; nearest: 'qdd'"):
+        sm.read_motion(file)
 
 
 def test_a_motion_that_begins_or_ends_moving_is_written_nowhere_unforced(tmp_path: Path) -> None:

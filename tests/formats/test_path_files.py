@@ -253,6 +253,12 @@ MALFORMED: list[tuple[str, str, str, str]] = [
     ("a.json", "{}", "", "has no list of poses, expected a nav_msgs/Path"),
     ("a.yaml", "poses: [", "", "is not YAML"),
     ("a.yaml", "poses: []", "", "has no list of poses"),
+    ("a.yaml", f"poses: [{{header: {{frame_id: a}}, pose: {{{_P}, {_Q}}}}}, "
+     f"{{header: {{frame_id: b}}, pose: {{{_P}, {_Q}}}}}]", "",
+     "has poses in frame 'a' and in 'b', expected one"),
+    ("a.yaml", "header: {frame_id: map}\n"
+     f"poses: [{{header: {{frame_id: b}}, pose: {{{_P}, {_Q}}}}}]", "",
+     "has poses in frame 'map' and in 'b'"),
     ("a.yaml", "poses: [3]", "", "poses[0]: position.x is missing or no number"),
     ("a.yaml", f"poses: [{{{_P}, {_Q}}}, {{{_P}}}]", "", "poses[1]: orientation.w is missing"),
     ("a.yaml", f"poses: [{{{_P}, {_Q}}}, {{position: {{x: a, y: 0, z: 0}}, {_Q}}}]", "",

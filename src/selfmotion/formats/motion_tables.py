@@ -8,7 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from selfmotion.basics import FileFormatError, read_arrays, write_bytes, write_csv, write_text
+from selfmotion.basics import (
+    FileFormatError,
+    nearest,
+    read_arrays,
+    write_bytes,
+    write_csv,
+    write_text,
+)
 from selfmotion.formats.samples import MotionSamples
 from selfmotion.motion import Trajectory, column_names
 from selfmotion.robot import RobotModel
@@ -45,6 +52,13 @@ def of_tables(file: Path, tables: Mapping[str, Any]) -> Trajectory:
     missing = [name for name in ("t", "q", "qd", "joint_names") if name not in tables]
     if missing:
         raise FileFormatError(f"{file}: '{missing[0]}' is missing, expected t, q, qd, joint_names")
+    known = ("t", "q", "qd", "qdd", "joint_names")
+    unknown = [name for name in tables if name not in known]
+    if unknown:
+        raise FileFormatError(
+            f"{file}: '{unknown[0]}' is not read{nearest(unknown[0], known)}; expected "
+            f"{', '.join(known)}"
+        )
     try:
         names = tuple(map(str, tables["joint_names"]))
         return Trajectory(tables["t"], tables["q"], tables["qd"], names, tables.get("qdd"))

@@ -348,12 +348,32 @@ def _read_ros(file: FilePath) -> dict[str, PoseRows]:
             f"{file}: holds no message with poses, expected a nav_msgs/Path or "
             f"geometry_msgs/PoseArray, or a list of these"
         )
+    _check_frames(file, messages)
     if len(messages) == 1:
         return {"": _of_message(file, messages[0], "")}
     return {
         f"seam {number}": _of_message(file, message, f"[{number - 1}].")
         for number, message in enumerate(messages, 1)
     }
+
+
+def _check_frames(file: FilePath, messages: Sequence[Any]) -> None:
+    """Refuse poses in different frames: where these are to each other is not known."""
+    frames: dict[str, None] = {}
+    for message in messages:
+        poses = message.get("poses") if isinstance(message, Mapping) else None
+        for item in (message, *(poses if isinstance(poses, list) else ())):
+            header = item.get("header") if isinstance(item, Mapping) else None
+            name = header.get("frame_id") if isinstance(header, Mapping) else None
+            # An empty one is that of the message.
+            if isinstance(name, str) and name.strip("/ "):
+                frames.setdefault(name.strip("/ "))
+    if len(frames) > 1:
+        first, second, *_ = frames
+        raise FileFormatError(
+            f"{file}: has poses in frame '{first}' and in '{second}', expected one: transform them "
+            f"into the same, whose place is told by a frame (--frame)"
+        )
 
 
 def _messages(items: Sequence[Any]) -> Iterator[Any]:

@@ -74,6 +74,12 @@ def trajectory(file: Path, document: Mapping[str, Any]) -> Trajectory:
         # A DisplayTrajectory.
         document = several[0]
     message = document.get("joint_trajectory", document)
+    floating = document.get("multi_dof_joint_trajectory")
+    if isinstance(floating, Mapping) and floating.get("points"):
+        raise FileFormatError(
+            f"{file}: moves joints of several coordinates as well (multi_dof_joint_trajectory), "
+            f"which no arm here has; leave them out"
+        )
     try:
         names, points = tuple(map(str, message["joint_names"])), list(message["points"])
     except (KeyError, TypeError):
@@ -92,16 +98,18 @@ def trajectory(file: Path, document: Mapping[str, Any]) -> Trajectory:
                 f"{file}: points[{k}]: {error}; expected positions, and time_from_start with sec "
                 f"and nanosec (ROS 1: secs and nsecs)"
             ) from error
-        if len(q[-1]) != len(names) or len(qd[-1]) not in (0, len(names)):
+        counts = len(q[-1]), len(qd[-1]), len(qdd[-1])
+        if counts[0] != len(names) or not {*counts[1:]} <= {0, len(names)}:
             raise FileFormatError(
-                f"{file}: points[{k}]: {len(q[-1])} positions and {len(qd[-1])} velocities for "
-                f"{len(names)} joints"
+                f"{file}: points[{k}]: {counts[0]} positions, {counts[1]} velocities and "
+                f"{counts[2]} accelerations for {len(names)} joints"
             )
-        if bool(qd[-1]) != bool(qd[0]):
-            raise FileFormatError(
-                f"{file}: points[{k}]: velocities are given for some points only; give all, or none"
-            )
-    faster = np.array(qdd) if all(len(row) == len(names) for row in qdd) else None
+        for what, given in (("velocities", qd), ("accelerations", qdd)):
+            if bool(given[-1]) != bool(given[0]):
+                raise FileFormatError(
+                    f"{file}: points[{k}]: {what} are given for some points only; give all, or none"
+                )
+    faster = np.array(qdd) if all(qdd) else None
     try:
         if qd and not qd[0]:
             return Trajectory(*_straight(Trajectory(np.array(t), np.array(q), np.array(q), names)))
