@@ -259,3 +259,16 @@ def test_waits_are_told_of_and_what_rests_all_the_time_is_refused(panda: sm.Robo
     still = sm.plan(sm.Problem(panda, sm.Dwell(pose, 1.0), start=PANDA_HOME))
     with pytest.raises(sm.PlanError, match="rests all the time"):
         sm.retime(still, ACCELERATION)
+
+
+def test_windows_of_tolerances_are_where_they_were_on_the_path() -> None:
+    """Up to rounding, not to the steps of the pace: near rest it hardly moves in one."""
+    robot = robot_named("planar_3r")
+    start, window = np.array([0.1, 0.9, 0.9]), np.array([0.05, 1.93])
+    line = sm.Line(robot.pose(start), robot.pose(start + 0.2), 2.0)
+    limits = [sm.JointVelocityLimits(2.0), sm.JointAccelerationLimits(3.0)]
+    relaxed = [sm.Relaxation("x", 0.01, during=tuple(window))]
+    problem = sm.Problem(robot, line, "planar", start, constraints=limits, relaxations=relaxed)
+    faster = sm.retime(sm.plan(problem, max_evaluations=3))
+    passed = faster.path.pace(np.array(faster.problem.relaxations[0].during))
+    np.testing.assert_allclose(passed, window, atol=1e-12)

@@ -215,13 +215,20 @@ def _retimed(plan: Plan, wanted: Sequence[Constraint], pace: Pace) -> Plan:
         replace(item, spans=tuple((float(a), float(b)) for a, b in map(when, np.array(item.spans))))
         for item in plan.report.active
     )
+
+    def passed(times: Array) -> Array:
+        # Ends exactly: a ramp hardly moves there.
+        inner = when(np.clip(times, 0.0, pace.sigma[-1]))
+        late = np.where(times >= pace.sigma[-1], pace.t[-1], inner)
+        return np.where(times <= 0.0, 0.0, late)
+
     # What asks for something of the end asks for it of the whole motion.
     asked = (item.on_part() if plan.report.ending else item for item in old.constraints)
     problem = replace(
         old,
         **old.along(
             lambda path: Retimed(path, pace.t, pace.sigma, pace.rate, pace.bend),
-            lambda times: np.interp(times, pace.sigma, pace.t),
+            passed,
         ),
         constraints=(*(item for item in asked if item is not None), *wanted),
     )
