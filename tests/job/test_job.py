@@ -458,6 +458,7 @@ def test_bad_jobs_are_refused() -> None:
         ([], "no seams"),
         ([seams[0], seams[0]], "there twice"),
         ([replace(seams[0], after=("nobody",))], "no other seam"),
+        ([replace(seams[0], may_meet=("nobody",))], "may meet 'nobody', which no seam leaves"),
         (["seam"], "expected a Seam"),
     ):
         with pytest.raises(sm.ProblemError, match=message):

@@ -16,6 +16,7 @@ from selfmotion.basics import (
     as_path,
     as_several,
     as_whole,
+    nearest,
     shown,
     silent,
 )
@@ -177,6 +178,12 @@ def _check_names(seams: Sequence[Seam]) -> None:
     if again:
         raise ProblemError(f"'{again[0]}' is left by two seams; give each body its own name")
     for seam in seams:
+        for name in seam.may_meet:
+            if name not in left:
+                raise ProblemError(
+                    f"seam '{seam.name}' may meet '{name}', which no seam leaves"
+                    f"{nearest(name, left)}"
+                )
         for name in (*seam.after, *seam.after_any):
             if name not in names or name == seam.name:
                 raise ProblemError(
