@@ -306,6 +306,22 @@ def test_what_extrudes_is_a_cut(relative: bool, tmp_path: Path) -> None:
         read_gcode(written(tmp_path, "b.gcode", text.replace("G92 E0", "G92 X0 E0", 1)))
 
 
+def test_what_a_printer_feeds_by_differences_is_a_cut(tmp_path: Path) -> None:
+    """After G91 E counts by differences, and after G90 as M82 and M83 said."""
+    text = PRINTED.replace("G1 X40 Y30 E2.0", "G91\nG1 Y20 E0.8\nG90")
+    for mode in ("M82", "M83"):
+        text = text.replace("M82", mode)
+        loop = read_gcode(written(tmp_path, "part.gcode", text))["cut 1"]
+        np.testing.assert_allclose(1e3 * loop.positions[:3, :2], [[10, 10], [40, 10], [40, 30]])
+        assert len(loop.positions) == 5
+
+
+def test_another_nozzle_of_a_printer_is_an_event(tmp_path: Path) -> None:
+    text = PRINTED.replace("G1 X40 Y30 E2.0", "T1\nG1 X40 Y30 E2.0")
+    loop = read_gcode(written(tmp_path, "part.gcode", text))["cut 1"]
+    assert (1, "T1") in loop.events
+
+
 ROTARY = "G21 G90 G94\nG0 X-25 Y-6 Z45 {0}0 C0\nG1 Z38 F300\nG1 X-20 {0}-26.5 C-5\nG0 Z60\nM30\n"
 
 

@@ -7,7 +7,8 @@ from selfmotion.formats.cuts import Machine
 
 # Chords of arcs are off by this at most [m].
 _CHORD = 1e-5
-# Both ends of an arc are as far from its centre, but for this [m].
+# Both ends of an arc are as far from its centre, and no farther apart than its circle is wide, but
+# for this [m].
 _ROUND = 2e-4
 # Nearer than this [m] is the same place.
 _SAME = 1e-9
@@ -64,3 +65,35 @@ def arc_points(
     found = found + (heights[0] + (heights[1] - heights[0]) * share) * axis
     found[-1] = goal
     return np.asarray(found)
+
+
+def center_by_radius(
+    machine: Machine, start: Array, goal: Array, radius: float, sense: float
+) -> Array:
+    """Return the centre (2,) of an arc in its plane.
+
+    Parameters
+    ----------
+    machine : Machine
+        Whose line is read.
+    start, goal : (2,)
+    radius : float
+        [m]; below 0 for an arc of more than half a turn.
+    sense : float
+        1 for an arc that goes right-handed, -1 for one that does not.
+
+    Raises
+    ------
+    FileFormatError
+        No such arc joins the ends.
+    """
+    chord = goal - start
+    length = float(np.linalg.norm(chord))
+    if length < _SAME or length > 2.0 * abs(radius) + _ROUND:
+        raise machine.fault(
+            f"no arc of radius {1e3 * radius:.4g} mm joins points {1e3 * length:.4g} mm apart"
+        )
+    height = np.sqrt(max(0.0, radius**2 - 0.25 * length**2))
+    side = sense if radius > 0.0 else -sense
+    normal = np.array([-chord[1], chord[0]]) / length
+    return np.asarray(start + 0.5 * chord + side * height * normal)

@@ -4,25 +4,20 @@ The names are Fanuc's, and Marlin's where material is extruded (E). The tool's t
 """
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path as FilePath
 
 import numpy as np
 
 from selfmotion.basics import Array
-from selfmotion.formats.arcs import arc_points
+from selfmotion.formats.arcs import arc_points, center_by_radius
 from selfmotion.formats.cuts import PRIME, RETRACT, STOPS, Machine, unit_axis
+from selfmotion.formats.gcode_words import bare_line, extrudes, lifts, values_of, words_of
 from selfmotion.formats.holes import Pecks, drill
 from selfmotion.formats.path_rows import PoseRows, Reading
 from selfmotion.formats.rotary import HEAD, Rotary
 
-_WORD = re.compile(r"([A-Z])\s*=?\s*([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+))\s*")
-# What only a control's own language says.
-_MACRO = re.compile(r"#|\[|^\s*N?[0-9]*\s*O\s*<|\b(SUB|CALL|REPEAT|WHILE|IF|ENDSUB|GOTO)\b")
 _INCH, _MM = 25.4e-3, 1e-3
-# A chord may be longer than its circle is wide by so much [m].
-_ROUND = 2e-4
-_LINE = 1000
 # Nearer than this [m] is the same place.
 _SAME = 1e-9
 # A helix goes round so many times at most.
@@ -40,7 +35,6 @@ _REASONS = {
     "G68": "turned frames are not read: let CAM write places in one frame",
     "G68.2": "turned frames are not read: let CAM write places in one frame, after G43.4",
 }
-_HEIDENHAIN = re.compile(r"[0-9]*\s*BEGIN PGM")
 # A wait, a retraction of its own, a look at a bed.
 _STANDING = {"G4", "G10", "G11", "G29"}
 # Zeros of workpieces; a program has one.
@@ -52,17 +46,25 @@ _PLANES = {"G17": (0, 1, 2), "G18": (2, 0, 1), "G19": (1, 2, 0)}
 _DRILLS = {"G73", "G81", "G82", "G83", "G85", "G89"}
 _CYCLES = {"G74", "G76", "G84", "G86", "G87", "G88"}
 _HOME = {"G28", "G30", "G53"}
-# A program of a printer moves and extrudes in one line.
-_EXTRUDES = re.compile(r"G0*[0-3](?![0-9.]).*E[+-]?[0-9.]")
-# A word Z.
-_LIFTS = re.compile(r"Z\s*=?\s*[-+.0-9#\[]")
 # What of a printer's lines is read; all others are commands of its own.
 _MOVES = re.compile(r"[GTNXYZEF][0-9+.-]")
 _MOTIONS = {"G0": 0, "G1": 1, "G2": 2, "G3": 3}
 _ENDS = {"M2", "M30"}
-_UNSEEN = "NSTHDOPQL"
+# Of each group a line says one: controls refuse two (Grbl's error 21, LinuxCNC), and which one
+# holds is not known. Of what drills and what moves the last one holds (Fanuc).
+_GROUPS: tuple[Collection[str], ...] = (
+    _MOTIONS,
+    _DRILLS,
+    _PLANES,
+    _ZEROS,
+    ("G20", "G21"),
+    ("G90", "G91"),
+    ("G90.1", "G91.1"),
+    ("G93", "G94"),
+    ("G98", "G99"),
+    ("M82", "M83"),
+)
 _AXES = "XYZABC"
-_EVERY = _AXES + "IJKRFE" + _UNSEEN
 
 
 def read_gcode(file: FilePath, reading: Reading | None = None) -> Mapping[str, PoseRows]:
@@ -76,29 +78,14 @@ def read_gcode(file: FilePath, reading: Reading | None = None) -> Mapping[str, P
     machine = Machine(file)
     text = machine.text()
     rotary = None if reading is None else reading.rotary
-    reader = _Reader(machine, rotary, prints=_extrudes(text))
-    lines = (line.upper() for line in text.splitlines() if len(line) < _LINE)
-    if not any(_LIFTS.search(_bare(line)) for line in lines):
+    reader = _Reader(machine, rotary, prints=extrudes(text))
+    if not lifts(text):
         reader.stay_flat()
     for number, line in enumerate(text.splitlines(), 1):
         reader.machine.number = number
         if reader.take(line):
             break
     return reader.machine.seams()
-
-
-def _extrudes(text: str) -> bool:
-    """Return whether a program is a printer's."""
-    lines = (re.sub(r"[;(].*", "", line.upper()) for line in text.splitlines() if len(line) < _LINE)
-    return any("E" in line and _EXTRUDES.search(line) for line in lines)
-
-
-def _bare(line: str) -> str:
-    """Return a line without comments: (…), also in each other, ; to its end, and checksums."""
-    text, count = line, 1
-    while count:
-        text, count = re.subn(r"\([^()]*(?:\)|$)", " ", text)
-    return re.sub(r"\*[0-9]+\s*$", "", text.partition(";")[0]).strip()
 
 
 class _Reader:
@@ -129,9 +116,7 @@ class _Reader:
     def take(self, line: str) -> bool:
         """Take a line; return whether the program ends with it."""
         machine = self.machine
-        if len(line) > _LINE:
-            raise machine.fault(f"has {len(line)} characters, expected {_LINE} at most")
-        text = _bare(line.upper()).lstrip("/").strip()
+        text = bare_line(line, machine)
         if self._prints and text and not _MOVES.match(text):
             self._command(text)
             return False
@@ -141,41 +126,16 @@ class _Reader:
             return ended
         if not text:
             return False
-        words, at = list[tuple[str, str]](), 0
-        while at < len(text):
-            found = _WORD.match(text, at)
-            if not found and _MACRO.search(text):
-                raise machine.fault(
-                    f"'{text[:40]}': variables, expressions and subroutines are not read; let CAM "
-                    f"write the program out, or run it in a simulator that does"
-                )
-            if not found and _HEIDENHAIN.match(text):
-                raise machine.fault(
-                    "is in Heidenhain's own language, which is not read: let CAM write ISO G-code, "
-                    "or APT"
-                )
-            if not found:
-                raise machine.unread(f"'{text[at : at + 40]}'")
-            words.append((found[1], found[2]))
-            at = found.end()
+        words = words_of(text, machine)
         codes = [f"{letter}{float(value):g}" for letter, value in words if letter in "GM"]
+        for group in _GROUPS:
+            said = [code for code in codes if code in group]
+            if len(said) > 1:
+                raise machine.fault(f"{said[0]} and {said[1]} are in one line")
         if not _STANDING.isdisjoint(codes):
             self._stand(words, codes)
             return not _ENDS.isdisjoint(codes)
-        values: dict[str, float] = {}
-        for letter, value in words:
-            if letter in "GM":
-                continue
-            if letter not in _EVERY:
-                raise machine.unread(f"word '{letter}{value}'")
-            if letter in values:
-                raise machine.fault(f"word {letter} is there twice")
-            if len(value) > 30:
-                raise machine.fault(f"{letter} has {len(value)} digits; no machine reads them")
-            values[letter] = float(value)
-        moving = [code for code in codes if code in _MOTIONS]
-        if len(moving) > 1:
-            raise machine.fault(f"{moving[0]} and {moving[1]} are in one line")
+        values = values_of(words, machine)
         modes = ("M82", "M83")
         switched = [code for code in codes if code.startswith("M") and code not in modes]
         for code in codes:
@@ -183,6 +143,9 @@ class _Reader:
                 self._mode(code)
         if "R" in values and self._motion < 2 and not self._cycle:
             raise machine.fault("R is read of arcs only (G2, G3)")
+        if self._prints and "T" in values:
+            # A printer changes its nozzle here; other machines wait for M6.
+            machine.happens(f"T{values['T']:g}")
         # What starts does so before the motion of its line, what stops after it. A rapid leaves the
         # cut before: all that its line switches belongs to the next one.
         late = [code for code in switched if self._travels or code in STOPS]
@@ -320,11 +283,15 @@ class _Reader:
         self._fed = values["E"]
 
     def _extruded(self, values: Mapping[str, float]) -> float:
-        """Return how much material a line feeds."""
+        """Return how much material a line feeds: by differences after M83, and after G91, too."""
         if "E" not in values:
             return 0.0
-        fed = values["E"] - (self._fed if self._fed_from_start else 0.0)
-        self._fed = values["E"] if self._fed_from_start else self._fed + fed
+        # So do Marlin and Klipper; G90 leaves what M82 and M83 said (Klipper).
+        if self._fed_from_start and self._absolute:
+            fed, self._fed = values["E"] - self._fed, values["E"]
+        else:
+            fed = values["E"]
+            self._fed += fed
         return fed
 
     @property
@@ -501,7 +468,8 @@ class _Reader:
                 f"say G1"
             )
         if "R" in values:
-            center = self._center(start[plane], goal[plane], self._unit * values["R"], sense)
+            radius = self._unit * values["R"]
+            center = center_by_radius(machine, start[plane], goal[plane], radius, sense)
         else:
             given = np.array([self._unit * values.get(name, 0.0) for name in offsets])
             center = given if self._centers_absolute else start[plane] + given
@@ -519,15 +487,3 @@ class _Reader:
                 f"P of an arc is {turns:g}, expected how often it goes round: 1 to {_TURNS}"
             )
         return int(turns) - 1
-
-    def _center(self, start: Array, goal: Array, radius: float, sense: float) -> Array:
-        chord = goal - start
-        length = float(np.linalg.norm(chord))
-        if length < _SAME or length > 2.0 * abs(radius) + _ROUND:
-            raise self.machine.fault(
-                f"no arc of radius {1e3 * radius:.4g} mm joins points {1e3 * length:.4g} mm apart"
-            )
-        height = np.sqrt(max(0.0, radius**2 - 0.25 * length**2))
-        side = sense if radius > 0.0 else -sense
-        normal = np.array([-chord[1], chord[0]]) / length
-        return np.asarray(start + 0.5 * chord + side * height * normal)
