@@ -112,7 +112,8 @@ def test_what_conditions_did_not_count_for_is_none_that_keeps_them(panda_circle:
     descent = NodeDescent(problem, effort, bound, free=False)
     found = descent.near([free.trajectory], first_nodes(problem), dearest=10.0 * free.report.cost)
     assert descent.history
-    assert found is None
+    assert found is not None
+    assert found.violations
     assert descent.latest is None
     # One that does is kept.
     easy = dataclasses.replace(problem, constraints=[sm.JointVelocityLimits(2.0 * fastest)])

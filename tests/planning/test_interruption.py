@@ -25,10 +25,6 @@ STAGES = (
 )
 
 
-# The same without nodes, up to there.
-HEATS = ("start", "heat 1", "heat 2", "optimising start")
-
-
 def level(x: float, y: float) -> pin.SE3:
     return pin.SE3(np.eye(3), np.array([x, y, 0.0]))
 
@@ -71,22 +67,17 @@ def test_each_stage_is_told_in_order(problem: sm.Problem) -> None:
         assert numbers == [(k, total) for k in range(1, total + 1)]
 
 
-def without_nodes(problem: sm.Problem) -> sm.Problem:
+def published(problem: sm.Problem) -> sm.Problem:
     return dataclasses.replace(problem, null_motion=sm.PolynomialNullMotion())
 
 
-def test_heats_are_told_in_order(problem: sm.Problem) -> None:
-    told: list[str] = []
-    plan(without_nodes(problem), progress=lambda stage, *_: told.append(stage))
-    assert tuple(dict.fromkeys(told))[: len(HEATS)] == HEATS
-
-
-@pytest.mark.parametrize("stage", HEATS)
-def test_an_interruption_of_heats_yields_the_best_so_far(problem: sm.Problem, stage: str) -> None:
-    number = 2 if stage == "start" else 1
-    found = plan(without_nodes(problem), progress=interrupt_at(stage, number))
-    assert found.report.status is sm.Status.INTERRUPTED
-    assert found.certificate.position_error.value < 1e-3
+def test_an_interruption_of_the_published_method_yields_the_best_so_far(
+    problem: sm.Problem,
+) -> None:
+    for stage in ("optimising start", "finer grid", "checking"):
+        found = plan(published(problem), progress=interrupt_at(stage, 1))
+        assert found.report.status is sm.Status.INTERRUPTED
+        assert found.certificate.position_error.value < 1e-3
 
 
 @pytest.mark.parametrize("stage", STAGES)
@@ -105,8 +96,6 @@ def test_an_interruption_at_any_stage_yields_the_best_so_far(
 def test_without_a_motion_an_interruption_is_one(problem: sm.Problem) -> None:
     with pytest.raises(KeyboardInterrupt):
         plan(problem, progress=interrupt_at("rough motions", 1))
-    with pytest.raises(KeyboardInterrupt):
-        plan(without_nodes(problem), progress=interrupt_at("start", 1))
     for stage in STAGES[2:6]:
         with pytest.raises(KeyboardInterrupt):
             plan(problem, search=GLOBAL, progress=interrupt_at(stage, 1))

@@ -24,9 +24,10 @@ def test_carried_motions_follow_the_path_and_unlike_ones_come_first() -> None:
     problem = sm.Problem(robot, line_of(robot, "pose"))
     grid = Grid.aligned(problem.knots, 12)
     starts = start_candidates(problem.follows, 24, np.random.default_rng(0))
-    ranked = most_promising(problem, starts, grid, apart)
-    assert sorted(map(tuple, ranked)) == sorted(map(tuple, starts))
-    motions, arrived = carried(problem.follows, np.array(ranked), grid.nodes)
+    motions, arrived = carried(problem.follows, np.array(starts), grid.nodes)
+    order = most_promising(problem, starts, motions, arrived, grid.nodes, apart)
+    assert sorted(order) == list(range(len(starts)))
+    motions, arrived = motions[order], arrived[order]
     assert arrived.any()
     for motion in motions[arrived]:
         for t, q in zip(grid.nodes, motion, strict=True):
@@ -34,7 +35,7 @@ def test_carried_motions_follow_the_path_and_unlike_ones_come_first() -> None:
     # Where the first one comes that is near one before, only such or impassable ones follow.
     alone = [
         bool(arrived[k]) and bool((apart(motions[k], motions[:k][arrived[:k]]) > ONE_VALLEY).all())
-        for k in range(len(ranked))
+        for k in range(len(order))
     ]
     assert alone == sorted(alone, reverse=True)
     assert alone[0]

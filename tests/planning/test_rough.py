@@ -11,7 +11,7 @@ from selfmotion.engine import Counts
 from selfmotion.optimise import QuasiNewton
 from selfmotion.planning import rough as rough_motions
 from selfmotion.planning.effort import Effort
-from selfmotion.planning.rough import OnNodes
+from selfmotion.planning.rough import Ranking
 from selfmotion.search import start_candidates
 from support.arms import robot_named
 from support.paths import line_of
@@ -44,8 +44,7 @@ def test_ranked_motions_are_on_the_path_and_about_as_dear_as_their_optima(
 ) -> None:
     problem = problem_of(arm, task)
     starts = starts_of(problem)
-    ranking = OnNodes(problem, effort(), told)
-    assert OnNodes.takes(problem, effort(), starts[0])
+    ranking = Ranking(problem, effort(), told)
     assert ranking.ranked == []
     assert ranking.run(starts, 3)
     costs = [motion.cost for motion in ranking.ranked]
@@ -62,41 +61,62 @@ def test_ranked_motions_are_on_the_path_and_about_as_dear_as_their_optima(
     assert free.report.cost == pytest.approx(costs[0], rel=ROUGH)
 
 
-def test_what_nodes_do_not_take_is_ranked_by_heats() -> None:
+def test_costs_of_accelerations_and_conditions_on_ends_are_ranked_one_by_one() -> None:
+    """Few nodes say little of the first, and motions side by side nothing of the second."""
     problem = problem_of("panda", "pose")
-    start = starts_of(problem)[0]
     circle = sm.Circle.around(problem.path.pose(0.0), 0.05, 2.0)
     for other in (
-        replace(problem, null_motion=sm.PolynomialNullMotion()),
+        replace(problem, costs=[sm.JointAcceleration()]),
         replace(problem, path=circle, constraints=[sm.ClosedPath()]),
     ):
-        assert not OnNodes.takes(other, effort(), start)
+        told_of: list[str] = []
+        ranking = Ranking(other, effort(), lambda stage, done, total, to=told_of: to.append(stage))
+        assert ranking.run(starts_of(other), 3)
+        assert set(told_of) == {"start"}
+        assert 1 <= len(ranking.ranked) <= 3
 
 
-def test_where_the_cheapest_break_conditions_nothing_is_ranked() -> None:
-    """They may become better or worse than what keeps them: heats see to conditions."""
+def test_where_the_cheapest_break_conditions_those_come_first_that_keep_them() -> None:
+    """They may become better or worse than what keeps them: a few steps with conditions tell."""
     problem = problem_of("xarm7", "pose")
     starts = starts_of(problem)
-    ranking = OnNodes(problem, effort(), told)
-    ranking.run(starts, 3)
-    speeds = np.abs(ranking.ranked[0].trajectory.qd).max(axis=0)
-    slow = replace(
-        problem, constraints=[sm.JointPositionLimits(), sm.JointVelocityLimits(0.7 * speeds)]
-    )
-    other = OnNodes(slow, effort(), told)
-    assert not other.run(starts, 3)
-    # Whoever interrupts gets the cheapest all the same.
-    assert len(other.ranked) == 1
+    free = Ranking(problem, effort(), told)
+    free.run(starts, 3)
+    speeds = np.abs(free.ranked[0].trajectory.qd).max(axis=0)
+    limits = np.where(np.arange(7) == 3, 0.9 * speeds, np.inf)
+    slow = replace(problem, constraints=[sm.JointPositionLimits(), sm.JointVelocityLimits(limits)])
+    other = Ranking(slow, effort(), told)
+    assert other.run(starts, 3)
+    kept = [motion.violation <= 0.0 for motion in other.ranked]
+    assert kept == sorted(kept, reverse=True)
+    assert kept[0]
+    assert other.ranked[0].cost > free.ranked[0].cost
     # Also bodies that constraints name: where the cheapest motion goes, and far from there.
-    middle = ranking.ranked[0].trajectory
+    middle = free.ranked[0].trajectory
     place = tuple(problem.robot.pose(middle.q[len(middle.q) // 2]).translation)
-    for center, is_ranked in ((place, False), ((2.0, 2.0, 2.0), True)):
+    for center, is_best in ((place, False), ((2.0, 2.0, 2.0), True)):
         ball = sm.Clearance([sm.Sphere("ball", center, 0.1)])
-        among = OnNodes(replace(problem, constraints=[ball]), effort(), told)
-        assert among.run(starts, 3) is is_ranked
+        among = Ranking(replace(problem, constraints=[ball]), effort(), told)
+        assert among.run(starts, 3)
+        same = among.ranked[0].cost == pytest.approx(free.ranked[0].cost, rel=1e-6)
+        assert same is is_best
 
 
-def test_starts_of_which_none_follows_the_path_at_x_0_are_left_to_heats(
+def test_whoever_interrupts_gets_the_cheapest() -> None:
+    problem = problem_of("xarm7", "pose")
+    speeds = [sm.JointVelocityLimits(0.05)]
+
+    def interrupt(stage: str, done: int, total: int) -> None:
+        if stage == "start":
+            raise KeyboardInterrupt
+
+    ranking = Ranking(replace(problem, constraints=speeds), effort(), interrupt)
+    with pytest.raises(KeyboardInterrupt):
+        ranking.run(starts_of(problem), 3)
+    assert len(ranking.ranked) == 1
+
+
+def test_starts_of_which_none_follows_the_path_at_x_0_are_all_optimised(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     problem = problem_of("panda", "pose")
@@ -105,7 +125,7 @@ def test_starts_of_which_none_follows_the_path_at_x_0_are_left_to_heats(
         return np.tile(starts[:, None], (1, len(t), 1)), np.zeros(len(starts), dtype=bool)
 
     monkeypatch.setattr(rough_motions, "carried", nowhere)
-    ranking = OnNodes(problem, effort(), told)
+    ranking = Ranking(problem, effort(), told)
     assert not ranking.run(starts_of(problem), 3)
     assert ranking.ranked == []
     found = sm.plan(problem, search=sm.Search(starts=12))

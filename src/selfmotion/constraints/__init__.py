@@ -1,5 +1,6 @@
 """What a motion must keep: limits, end conditions, closed paths, clearance."""
 
+from selfmotion.constraints.active import Priced as Priced, active_of as active_of
 from selfmotion.constraints.band import Band as Band
 from selfmotion.constraints.base import Constraint as Constraint
 from selfmotion.constraints.binding import Binding as Binding
@@ -24,6 +25,7 @@ from selfmotion.constraints.ends import (
     StartVelocity as StartVelocity,
 )
 from selfmotion.constraints.envelope import Envelope as Envelope
+from selfmotion.constraints.kept import penalty as penalty, violated as violated
 from selfmotion.constraints.limits import (
     BoundLimits as BoundLimits,
     JointAccelerationLimits as JointAccelerationLimits,

@@ -19,10 +19,10 @@ from selfmotion.constraints import (
     BoundConstraint,
     BoundLimits,
     NodeTangents,
+    Priced,
     linearised,
 )
 from selfmotion.costs import Samples
-from selfmotion.engine import Priced
 from selfmotion.follow import Follows
 from selfmotion.motion import Sampling
 from selfmotion.nodes.samples import CurveSamples

@@ -10,7 +10,7 @@ from selfmotion.motion import Grid
 from selfmotion.nodes import NodeGrid, NodeMotion
 from selfmotion.optimise import Status
 from selfmotion.planning.effort import Effort
-from selfmotion.planning.for_nodes import takes
+from selfmotion.planning.for_nodes import is_on_nodes
 from selfmotion.planning.on_nodes import MotionOnNodes
 from selfmotion.planning.settings import CHAIN_ROUNDS, FINER_CHAIN
 from selfmotion.problem import Problem
@@ -35,7 +35,7 @@ def along_chain(
     of few nodes cannot, and Newton's method has no use for second derivatives of kinks. The chain
     is at its optimum already, so that it only needs velocities.
     """
-    if not takes(problem, effort, constraints) or not asks_length(problem):
+    if not is_on_nodes(problem, effort) or not asks_length(problem):
         return None
     if any(item.equality for item in constraints):
         # The search's sequences know nothing of given ends.

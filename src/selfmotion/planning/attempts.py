@@ -208,15 +208,6 @@ def _plan_largest_part(draft: Draft) -> bool:
     return True
 
 
-def _take_other_null_motion(draft: Draft) -> bool:
-    """Take another null motion where one meets more of the constraints."""
-    best = draft.best
-    if best is None or not draft.is_sought or not _may_meet_more(best):
-        return False
-    draft.meet_more(best)
-    return True
-
-
 def _may_meet_more(best: Session) -> bool:
     return bool(best.violations) and not best.is_spent
 
@@ -226,20 +217,6 @@ def _prove(draft: Draft) -> bool:
     if draft.best is None or draft.proved is not None:
         return False
     draft.prove(draft.best)
-    return True
-
-
-def _do_without_nodes(draft: Draft) -> bool:
-    """Optimise once more without nodes, where a limit is passed between them."""
-    best, proved = draft.best, draft.proved
-    if best is None or proved is None or best is not proved.part.session:
-        return False
-    if best.on_nodes is None or best.cut_short or proved.finished.certificate.verified:
-        return False
-    best.leave_nodes()
-    if _may_meet_more(best):
-        draft.meet_more(best)
-    draft.prove(draft.best or best)
     return True
 
 
@@ -275,8 +252,6 @@ ATTEMPTS: tuple[tuple[str, Callable[[Draft], bool]], ...] = (
     ("global search", _search_globally),
     ("more starts", _draw_more_starts),
     ("largest part", _plan_largest_part),
-    ("other null motions", _take_other_null_motion),
     ("finer grids and proof", _prove),
-    ("once more without nodes", _do_without_nodes),
     ("largest part instead", _plan_part_instead),
 )

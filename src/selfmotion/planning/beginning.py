@@ -10,7 +10,6 @@ from selfmotion.engine import (
     Guide,
     Objective,
     StillMotion,
-    rough_still_motion,
     settled_still_motion,
 )
 from selfmotion.motion import Grid, NullMotion
@@ -50,7 +49,6 @@ class Beginning:
         free: bool,
         guide: Guide | None = None,
         grid: Grid | None = None,
-        is_rough: bool = False,
     ) -> "Beginning":
         """Integrate the motion at x = 0 from a start.
 
@@ -66,18 +64,13 @@ class Beginning:
             The null motion that stands for x = 0: where the search found one worth starting from.
         grid : Grid, optional
             To begin with; it is refined until the motion stays near the path.
-        is_rough : bool
-            Whether the motion on that grid will do, however far off the path it is.
 
         Raises
         ------
         BreakdownError
             The motion at x = 0 runs into a singular pose.
         """
-        if is_rough and grid is not None:
-            still, jacobians = rough_still_motion(problem, configuration, grid)
-        else:
-            still, jacobians = settled_still_motion(problem, configuration, guide, grid)
+        still, jacobians = settled_still_motion(problem, configuration, guide, grid)
         effort.counts.jacobians += jacobians
         bound = problem.bind_constraints(configuration, still.end, apart=effort.apart)
         return cls(problem, effort, still, tuple(bound), free)
@@ -93,7 +86,6 @@ class Beginning:
             self.problem,
             self.still,
             free=self.free,
-            constraints=self.constraints,
             counts=self.effort.counts,
             rollout=self.still.rollout,
         )
@@ -107,7 +99,6 @@ class Beginning:
             self.still,
             grid=grid,
             free=self.free,
-            constraints=self.constraints,
             counts=self.effort.counts,
             null_motion=null_motion,
             around=around,

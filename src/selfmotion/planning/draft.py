@@ -9,7 +9,7 @@ import numpy as np
 from selfmotion.basics import Array, BreakdownError, Progress, SelfmotionError
 from selfmotion.certificate import Tolerance
 from selfmotion.engine import Guide
-from selfmotion.motion import Grid
+from selfmotion.motion import Grid, Trajectory
 from selfmotion.optimise import Status
 from selfmotion.planning.beginning import Beginning
 from selfmotion.planning.effort import Effort
@@ -17,7 +17,7 @@ from selfmotion.planning.finish import finish
 from selfmotion.planning.known import Known, Proved
 from selfmotion.planning.largest_part import LargestPart, largest_part, shorter_part
 from selfmotion.planning.refinement import settle_both
-from selfmotion.planning.rough import Ranking, RoughMotion
+from selfmotion.planning.rough import Ranking
 from selfmotion.planning.search import Search
 from selfmotion.planning.session import Session
 from selfmotion.planning.settings import FREE_PART_EVALUATIONS, PART_EVALUATIONS, SHORTER_PARTS
@@ -60,8 +60,8 @@ class Draft:
         Why a search was in vain; what would help.
     waiting : sequence of Session
         Complete motions that are not optimised yet.
-    rankings : list of Ranking
-        Rough motions of starts, by what they were ranked; those of the last one are best.
+    ranking : Ranking or None
+        Rough motions of starts.
     proved : Proved or None
     """
 
@@ -81,7 +81,7 @@ class Draft:
     failure: SelfmotionError | None = None
     notes: list[str] = field(default_factory=list)
     waiting: Sequence[Session] = ()
-    rankings: list[Ranking] = field(default_factory=list)
+    ranking: Ranking | None = None
     proved: Proved | None = None
 
     def __post_init__(self) -> None:
@@ -147,27 +147,19 @@ class Draft:
             return None
         return Session(begun)
 
-    def resumed(self, rough: Sequence[RoughMotion]) -> list[Session]:
-        """Return sessions that begin at rough motions, the best first."""
-        begun = (self.taken_up(motion) for motion in rough)
-        return sorted((one for one in begun if one is not None), key=Session.merit)
-
-    def taken_up(self, motion: RoughMotion) -> Session | None:
+    def taken_up(self, motion: Trajectory) -> Session | None:
         """Return the session that begins at a rough motion; None where it breaks down at once."""
-        trajectory = motion.trajectory
-        session = self.begin(trajectory.q[0], free=True)
+        session = self.begin(motion.q[0], free=True)
         if session is not None:
-            session.resume(trajectory, is_optimum=motion.cost is not None)
+            session.resume(motion)
         return session
 
-    def optimise(
-        self, session: Session, *, chosen: bool = True, evaluations: int | None = None
-    ) -> None:
+    def optimise(self, session: Session, *, chosen: bool = True) -> None:
         """Optimise a session; keep it if it is the best one and may be chosen."""
         # What is only compared with is optimised to the end.
         known = self.dearest if chosen else np.inf
         try:
-            session.minimize(evaluations, dearest=known)
+            session.minimize(known)
         except KeyboardInterrupt:
             session.end(Status.INTERRUPTED)
         self.note(session, chosen=chosen)
@@ -213,16 +205,6 @@ class Draft:
             return bool(self.best.violations) and bool(self.reach().reason)
         failure = self.failure
         return isinstance(failure, BreakdownError) and bool(self.reach(failure.time).reason)
-
-    def meet_more(self, best: Session) -> None:
-        """Let a motion of another null motion be the best where that meets more constraints."""
-        for motion in best.others():
-            other = best.by(motion)
-            if other.cut_short:
-                best.end(other.status)
-            self.best = best = min(best, other, key=lambda one: (bool(one.violations), one.merit()))
-            if not best.violations or best.cut_short:
-                break
 
     def prove(self, best: Session) -> None:
         """Let the best motion be what the plan is made of, on grids that are fine enough."""
@@ -281,8 +263,9 @@ class Draft:
     def interrupted(self) -> None:
         """Make the best that is known the outcome; raise KeyboardInterrupt where nothing is."""
         if self.best is None and not self.waiting:
-            known = (ranking.ranked[:1] for ranking in reversed(self.rankings))
-            self.waiting = self.resumed(next((ranked for ranked in known if ranked), []))
+            ranked = [] if self.ranking is None else self.ranking.ranked[:1]
+            begun = (self.taken_up(motion.trajectory) for motion in ranked)
+            self.waiting = [session for session in begun if session is not None]
         for session in self.waiting if self.best is None else ():
             session.end(Status.INTERRUPTED)
             self.consider(session)

@@ -123,4 +123,4 @@ def _same(problem: Problem, coarse: Trajectory, fine: Trajectory, tolerance: Tol
 def _check(problem: Problem, session: Session, tolerance: Tolerance, ending: str) -> Finished:
     motion = _resolved(problem, session, tolerance)
     certificate = problem.certify(motion.trajectory, tolerance, ending)
-    return Finished(motion, session.rolled.still_evaluation(), certificate)
+    return Finished(motion, session.still_evaluation(), certificate)

@@ -1,11 +1,8 @@
 """Which problems are optimised on nodes, and on how many."""
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from selfmotion.basics import Array
-from selfmotion.constraints import BoundConstraint, BoundEnd
 from selfmotion.motion import FreeNullMotion, Grid
 from selfmotion.nodes import NodeMotion
 from selfmotion.optimise import QuasiNewton
@@ -14,19 +11,17 @@ from selfmotion.planning.settings import FIRST_INTERVALS, MOST_NODES, STARTING
 from selfmotion.problem import Problem
 
 
-def takes(problem: Problem, effort: Effort, constraints: Sequence[BoundConstraint]) -> bool:
-    """Whether a problem is one for nodes.
+def is_published(problem: Problem, effort: Effort) -> bool:
+    """Whether the published method is asked for: by a null motion, an optimiser, or damping."""
+    own = isinstance(problem.null_motion, FreeNullMotion) and effort.optimizer == QuasiNewton()
+    return not own or problem.damping is not None
 
-    Not where the user asks for another null motion or optimiser, the tool leaves the path, nothing
-    is free, or a condition is on the whole motion.
-    """
-    return (
-        isinstance(problem.null_motion, FreeNullMotion)
-        and effort.optimizer == QuasiNewton()
-        and problem.damping is None
-        and problem.follows.redundancy == problem.robot.dof - problem.follows.dimension > 0
-        and all(isinstance(item, BoundEnd) for item in constraints if item.equality)
-    )
+
+def is_on_nodes(problem: Problem, effort: Effort) -> bool:
+    """Whether a problem is optimised on nodes: by default, where there is a self-motion."""
+    follows = problem.follows
+    free = follows.redundancy == problem.robot.dof - follows.dimension > 0
+    return free and not is_published(problem, effort)
 
 
 def most_nodes(problem: Problem) -> int:

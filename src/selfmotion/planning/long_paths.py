@@ -17,7 +17,7 @@ from selfmotion.nodes import NodeMotion
 from selfmotion.optimise import Status
 from selfmotion.path import Section
 from selfmotion.planning.draft import Draft
-from selfmotion.planning.for_nodes import most_nodes, resolves, takes
+from selfmotion.planning.for_nodes import is_on_nodes, most_nodes, resolves
 from selfmotion.planning.nodes import NodeDescent
 from selfmotion.planning.settings import (
     FIRST_NODES,
@@ -34,10 +34,7 @@ from selfmotion.problem import Problem, asked_of_part
 def is_long(draft: Draft) -> bool:
     """Whether the tool's way is many times the arm's reach, and nodes will do for the problem."""
     problem = draft.problem
-    if problem.way_in_reaches <= LONG_WAY:
-        return False
-    middle = problem.robot.dexterous_configuration(problem.asked.task)
-    return takes(problem, draft.effort, problem.bind_constraints(middle, middle))
+    return problem.way_in_reaches > LONG_WAY and is_on_nodes(problem, draft.effort)
 
 
 def keep_to_posture(draft: Draft) -> None:
@@ -74,7 +71,7 @@ def _optimise(draft: Draft, posture: Array, ended: Status | None) -> None:
         found, ended = descent.latest, Status.INTERRUPTED
         if found is None:
             raise
-    if found is None or found.cost >= draft.dearest:
+    if found is None or found.violations or found.cost >= draft.dearest:
         return
     # Of its velocities eq. 4 keeps the self-motion.
     rates, grid = partial(motion.trajectory, order=1), Grid(motion.grid.t)
@@ -101,14 +98,15 @@ def _postures(draft: Draft) -> tuple[list[Array], Status | None]:
         rest=False,
     )
     inner = replace(
-        draft, problem=stretch, best=None, failure=None, waiting=(), rankings=[], attempts=[]
+        draft, problem=stretch, best=None, failure=None, waiting=(), ranking=None, attempts=[]
     )
     try:
         optimise_starts(inner, draft.search.starts, draft.search.finalists)
     except SelfmotionError:
         return [], None
     motions = [] if inner.best is None else [inner.best.motion().trajectory]
-    motions += [motion.trajectory for ranking in inner.rankings for motion in ranking.ranked]
+    ranked = [] if inner.ranking is None else inner.ranking.ranked
+    motions += [motion.trajectory for motion in ranked]
     found: list[Array] = []
     for motion in motions:
         weights = Sampling.trapezoidal(motion.t).weights

@@ -83,9 +83,7 @@ class NodeDescent:
     ) -> MotionOnNodes | None:
         """Return the best motion near the cheapest of some, on nodes at times t (N + 1,).
 
-        Where that breaks conditions, also near the free optimum, and near motions from its start
-        whose self-motion goes towards the middle of the joints' limits. None where there is none
-        that keeps them, or it would cost more than `dearest`.
+        None where none of them can be had on nodes; see `best_near`.
         """
         # Beside a singular pose the path may be out of reach, by next to nothing.
         beside = t.copy()
@@ -106,9 +104,14 @@ class NodeDescent:
     def best_near(
         self, motion: NodeMotion, dearest: float = np.inf, prices: Array | None = None
     ) -> MotionOnNodes | None:
-        """Return the best motion near one of nodes, likewise; `prices` (R,) may be known."""
-        # Of what is infinite there is no curvature; on nodes the tool is never off its path.
-        if not np.isfinite(motion.aim) or motion.grid.cost.depends_on_errors(motion.partials):
+        """Return the best motion near one of nodes; `prices` (R,) of its rows may be known.
+
+        Where that breaks conditions, also near the free optimum, and near motions from its start
+        whose self-motion goes towards the middle of the joints' limits; where all do, the one that
+        does so least. None where the cost there is not finite, or it would cost more than
+        `dearest`.
+        """
+        if not np.isfinite(motion.aim):
             return None
         free = None
         if dearest < np.inf:
@@ -118,14 +121,12 @@ class NodeDescent:
                 self.is_hopeless = True
                 return None
         best = self._minimise(motion, prices)
-        if best.status is Status.GRADIENT:
-            return None
-        if not _keeps(best) and self._ended is None:
+        if not _is_kept(best.motion) and self._ended is None:
             best = self._other(motion, best, free)
-        if not _keeps(best) and self._ended is None:
+        if not _is_kept(best.motion) and self._ended is None:
             # What control points of few nodes cannot keep, the curve may.
             best = self._on_halved(best)
-        return self._standing(best) if _keeps(best) else None
+        return self._standing(best)
 
     def _freely(self, motion: NodeMotion) -> NodeMotion:
         """Return the optimum near a motion of which nothing is asked but what its ends are."""
@@ -140,7 +141,7 @@ class NodeDescent:
             if begin is not None:
                 found = minimise(begin, self._told, roughly=True, most=FEWER)
                 best = min(best, found, key=_rank)
-            if self._ended is not None or _keeps(best):
+            if self._ended is not None or _is_kept(best.motion):
                 break
         return best
 
@@ -166,9 +167,9 @@ class NodeDescent:
         return optimum if motion is None else self._minimise(motion)
 
     def again(self, standing: MotionOnNodes, *, roughly: bool = False) -> MotionOnNodes | None:
-        """Return the optimum near a motion on its nodes."""
+        """Return the optimum near a motion on its nodes; None where that breaks conditions."""
         optimum = self._minimise(standing.motion, standing.prices, roughly=roughly)
-        return self._standing(optimum) if _keeps(optimum) else None
+        return self._standing(optimum) if _is_kept(optimum.motion) else None
 
     def settled(self, standing: MotionOnNodes) -> MotionOnNodes:
         """Return the optimum on nodes so near to each other that more change nothing.
@@ -240,9 +241,11 @@ class NodeDescent:
         return self._ended is not None
 
     def _standing(self, optimum: Optimum) -> MotionOnNodes:
-        # What keeps the conditions, and leads no further, is as good as it gets.
-        arrived = optimum.status if optimum.status in _ARRIVED else Status.PRECISION
-        return MotionOnNodes.of(optimum, self._ended or arrived)
+        status = optimum.status
+        if status not in (*_ARRIVED, Status.GRADIENT):
+            # What keeps the conditions, and leads no further, is as good as it gets.
+            status = Status.PRECISION if _is_kept(optimum.motion) else Status.INFEASIBLE
+        return MotionOnNodes.of(optimum, self._ended or status)
 
 
 def _is_kept(motion: NodeMotion) -> bool:
@@ -251,14 +254,9 @@ def _is_kept(motion: NodeMotion) -> bool:
     return bool(motion.violation <= 0.0 and np.abs(motion.c).max(initial=0.0) <= ENDS_MET)
 
 
-def _keeps(optimum: Optimum) -> bool:
-    """Whether an optimum is one, and keeps all conditions."""
-    return optimum.status is not Status.GRADIENT and _is_kept(optimum.motion)
-
-
 def _rank(optimum: Optimum) -> tuple[bool, float]:
     """Return what sorts optima, the smaller the better: of broken ones by how much."""
-    if _keeps(optimum):
+    if _is_kept(optimum.motion):
         return False, optimum.motion.aim
     return True, optimum.motion.violation
 

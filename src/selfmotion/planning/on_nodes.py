@@ -1,4 +1,4 @@
-"""A motion of nodes that stands: an optimum that keeps the conditions."""
+"""A motion of nodes that stands."""
 
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -6,18 +6,18 @@ from functools import cached_property
 import numpy as np
 
 from selfmotion.basics import Array, Flags
-from selfmotion.constraints import Binding
-from selfmotion.engine import Evaluation, Priced, active_of
+from selfmotion.constraints import Binding, Priced, active_of, penalty, violated
+from selfmotion.engine import Evaluation
 from selfmotion.motion import Grid, NodeNullMotion, NullMotion
 from selfmotion.nodes import NodeMotion, Optimum
 from selfmotion.optimise import Status
-from selfmotion.planning.settings import LEAST_SAVING
+from selfmotion.planning.settings import ENDS_MET, LEAST_SAVING
 from selfmotion.search import BESIDE
 
 
 @dataclass(frozen=True, eq=False)
 class MotionOnNodes:
-    """A motion of nodes that stands: an optimum that keeps the conditions.
+    """A motion of nodes that stands: the best that was found near a start.
 
     Attributes
     ----------
@@ -83,14 +83,24 @@ class MotionOnNodes:
         """Whether the arm does where only the default asks it to, at the nodes and by meshes."""
         return self.motion.grid.problem.keeps_off_itself(self.motion.place.q)
 
-    @property
+    @cached_property
     def violations(self) -> tuple[str, ...]:
-        """None: nothing else stands on nodes."""
-        return ()
+        """See `Standing.violations`."""
+        motion = self.motion
+        ends = np.abs(motion.c).max(initial=0.0)
+        # Written so that NaN is not kept.
+        if motion.violation <= 0.0 and ends <= ENDS_MET:
+            return ()
+        # What control points exceed, the curve may keep.
+        return violated(motion.grid.constraints, motion.checked)
 
     def merit(self) -> float:
-        """Return the cost."""
-        return self.cost
+        """See `Standing.merit`."""
+        motion = self.motion
+        if motion.violation <= 0.0:
+            return self.cost
+        over = penalty(motion.grid.constraints, motion.checked)
+        return self.cost + max(abs(self.cost), 1e-3) * over
 
     def evaluation(self) -> Evaluation:
         """Return the motion with its costs."""

@@ -5,20 +5,24 @@ from dataclasses import replace
 
 import numpy as np
 
-from selfmotion.basics import Array
+from selfmotion.basics import Array, Flags
+from selfmotion.constraints import penalty
 from selfmotion.costs import Samples
-from selfmotion.engine import Conditions
-from selfmotion.motion import Grid, Sampling
+from selfmotion.motion import Sampling
 from selfmotion.planning.apart import Apart, unlike
 from selfmotion.planning.settings import ONE_VALLEY
 from selfmotion.problem import Problem
-from selfmotion.search import carried
 
 
 def most_promising(
-    problem: Problem, starts: Sequence[Array], grid: Grid, apart: Apart
-) -> list[Array]:
-    """Return starts (n,), the best first, and those last that are near a better one.
+    problem: Problem,
+    starts: Sequence[Array],
+    motions: Array,
+    arrived: Flags,
+    t: Array,
+    apart: Apart,
+) -> list[int]:
+    """Return numbers of starts, the best first, and those last that are near a better one.
 
     By what the motions cost that follow the path from them without self-motion, and by how much
     these violate: the start of one that is near a better one moves there by itself. Last of all
@@ -28,24 +32,25 @@ def most_promising(
     ----------
     problem : Problem
     starts : sequence of (n,)
-    grid : Grid
-        At whose nodes to look, few.
+    motions : (K, N, n)
+        The motions from them, at few times t (N,) [s].
+    arrived : (K,)
+        Which of them follow the path to its end.
     apart : callable
         How far motions are from each other.
     """
-    motions, arrived = carried(problem.follows, np.array(starts), grid.nodes)
     merits = np.full(len(starts), np.inf)
-    twists = problem.follows.twists(grid.nodes)
-    sampling = Sampling.trapezoidal(grid.nodes)
+    twists = problem.follows.twists(t)
+    sampling = Sampling.trapezoidal(t)
     for k in np.flatnonzero(arrived):
-        merits[k] = _merit(problem, motions[k], twists, grid, sampling)
+        merits[k] = _merit(problem, motions[k], twists, sampling)
     order = np.argsort(merits, kind="stable")
     followed = order[arrived[order]]
     valleys, slopes = unlike(motions, followed, apart, ONE_VALLEY)
-    return [starts[k] for k in (*valleys, *slopes, *order[~arrived[order]].tolist())]
+    return [*valleys, *slopes, *order[~arrived[order]].tolist()]
 
 
-def _merit(problem: Problem, q: Array, twists: Array, grid: Grid, sampling: Sampling) -> float:
+def _merit(problem: Problem, q: Array, twists: Array, sampling: Sampling) -> float:
     """Return what a motion q (N, n) along the path costs, and more where it violates something.
 
     `twists` (N, m) are those of the path at the grid's nodes, which are the samples.
@@ -60,6 +65,5 @@ def _merit(problem: Problem, q: Array, twists: Array, grid: Grid, sampling: Samp
     samples = replace(still, qd=qd)
     costs = [float(sampling.weights @ cost.value(samples)) for cost in problem.all_costs]
     bound = problem.bind_constraints(q[0], q[-1], apart=False)
-    violated = Conditions(bound, grid).penalty(samples)
     total = sum(costs)
-    return total + max(abs(total), 1e-3) * violated
+    return total + max(abs(total), 1e-3) * penalty(bound, samples)

@@ -1,74 +1,45 @@
 """Rough motions from many starts, and which of them are worth more: on nodes, all at once."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
 from selfmotion.basics import Array, Flags, Ints, Progress
-from selfmotion.motion import Grid, Trajectory
-from selfmotion.nodes import NodeGrid, NodeMotion, Together
+from selfmotion.motion import Grid
+from selfmotion.nodes import NodeGrid, NodeMotion, Together, minimise
 from selfmotion.planning.apart import apart_of, unlike
 from selfmotion.planning.effort import Effort
-from selfmotion.planning.for_nodes import resolves, takes
+from selfmotion.planning.for_nodes import resolves
+from selfmotion.planning.promise import most_promising
 from selfmotion.planning.settings import (
     ABOUT_AS_GOOD,
-    HEATS,
     ONE_VALLEY,
     ROUGH_AGREEMENT,
+    ROUGH_MOTIONS,
     ROUGH_ROUNDS,
     ROUGH_STEPS,
     SAME_OPTIMUM,
     SAME_TO_DIGITS,
+    UNKEPT,
+    WITH_CONDITIONS,
 )
 from selfmotion.problem import Problem
 from selfmotion.search import carried
 
 
-@dataclass(frozen=True, eq=False)
-class RoughMotion:
-    """A rough motion from a start.
-
-    Attributes
-    ----------
-    trajectory : Trajectory
-    cost : float or None
-        F, where it is about what is best near by; None where it is farther from there.
-    """
-
-    trajectory: Trajectory
-    cost: float | None = None
-
-
-class Ranking(Protocol):
-    """Ranks starts by what becomes of them."""
-
-    @property
-    def ranked(self) -> list[RoughMotion]:
-        """The motions that were found so far, the best first."""
-
-    def run(self, starts: Sequence[Array], finalists: int) -> bool:
-        """Leave the best `finalists` of the starts (n,), or fewer where they became the same.
-
-        Returns whether that tells which starts are best.
-        """
-
-
 def rough_grid(problem: Problem) -> Grid:
     """Return the grid of rough motions."""
-    steps = max(ROUGH_STEPS, problem.null_motion.rough.fewest_steps)
     # A path of many waypoints is crossed in strides: what is rough needs not stop at each.
-    knots = problem.knots if len(problem.knots) <= steps else problem.knots[[0, -1]]
-    return Grid.aligned(knots, steps)
+    knots = problem.knots if len(problem.knots) <= ROUGH_STEPS else problem.knots[[0, -1]]
+    return Grid.aligned(knots, ROUGH_STEPS)
 
 
-class OnNodes:
-    """Ranks starts by rough optima on nodes, of all of them at once.
+class Ranking:
+    """Ranks starts by rough optima on nodes.
 
-    Conditions do not count in these: what keeps them all the same is as good as what is dearer, and
-    what does not becomes dearer. Where none of the cheapest keeps them, that says nothing, and
-    nothing is ranked.
+    Of all of them at once first, in which conditions do not count: where the cheapest one keeps
+    them all the same, it is the best. Where none does for sure, a few steps with conditions tell
+    from which of the cheapest ones they can be kept, and what that costs.
 
     Parameters
     ----------
@@ -80,70 +51,94 @@ class OnNodes:
     def __init__(self, problem: Problem, effort: Effort, progress: Progress) -> None:
         self._problem, self._effort, self._progress = problem, effort, progress
         self._apart = apart_of(problem.robot)
+        self._t = rough_grid(problem).nodes
         self._found: Together | None = None
-        self._ranked: list[RoughMotion] = []
-
-    @staticmethod
-    def takes(problem: Problem, effort: Effort, start: Array) -> bool:
-        """Whether problems are for nodes, side by side, and nothing is asked of ends.
-
-        Not where accelerations cost: cubics on few nodes say little of them.
-        """
-        costs, dof = problem.all_costs, problem.robot.dof
-        if not all(cost.is_pointwise and max(cost.curvature(dof), default=0) < 2 for cost in costs):
-            return False
-        bound = problem.bind_constraints(start, start, apart=effort.apart)
-        return not any(item.equality for item in bound) and takes(problem, effort, bound)
+        self._ranked: list[NodeMotion] = []
 
     @property
-    def ranked(self) -> list[RoughMotion]:
-        """See `Ranking`."""
-        if self._ranked or self._found is None:
-            return self._ranked
-        # Interrupted, or none is the best for sure: the cheapest one that keeps all will do.
-        near = (self._motion(self._found, k) for k in _cheapest(self._found))
-        motions = [motion for motion in near if motion is not None]
-        kept = (one for one in motions if one.violation <= 0.0)
-        best = next((one for one in kept if self._clear(one)), next(iter(motions), None))
-        return [] if best is None else [_rough(best)]
+    def ranked(self) -> list[NodeMotion]:
+        """The motions that were found so far, the best first."""
+        if not self._ranked and self._found is not None:
+            # Interrupted: the cheapest one that keeps all will do.
+            near = (self._motion(self._found, k) for k in _cheapest(self._found))
+            motions = [motion for motion in near if motion is not None]
+            kept = (one for one in motions if one.violation <= 0.0)
+            best = next((one for one in kept if self._clear(one)), next(iter(motions), None))
+            return [] if best is None else [best]
+        return self._ranked
 
     def run(self, starts: Sequence[Array], finalists: int) -> bool:
-        """See `Ranking`."""
-        grid, problem = rough_grid(self._problem), self._problem
-        motions, arrived = carried(problem.follows, np.array(starts), grid.nodes)
+        """Leave the best `finalists` of the starts (n,), or fewer where they became the same.
+
+        Returns whether that tells which starts are best.
+        """
+        problem = self._problem
+        motions, arrived = carried(problem.follows, np.array(starts), self._t)
         if not arrived.any():
             return False
-        nodes = self._grid(problem, grid)
+        by_cost = self._is_pointwise()
+        if by_cost:
+            begun = self._freely(motions[arrived], finalists)
+            if begun is None:
+                return False
+        else:
+            order = most_promising(problem, starts, motions, arrived, self._t, self._apart)
+            near = (self._near(motions[k]) for k in order[: max(ROUGH_MOTIONS, finalists)])
+            begun = [motion for motion in near if motion is not None]
+        if not self._ranked:
+            self._ranked = self._with_conditions(begun, finalists, by_cost=by_cost)
+        return bool(self._ranked)
+
+    def _is_pointwise(self) -> bool:
+        """Whether costs can be told of motions side by side, and nothing is asked of ends.
+
+        Not where accelerations cost: few nodes say little of them.
+        """
+        problem, dof = self._problem, self._problem.robot.dof
+        costs = problem.all_costs
+        if not all(cost.is_pointwise and max(cost.curvature(dof), default=0) < 2 for cost in costs):
+            return False
+        q = problem.robot.generic_configurations()[0]
+        return not any(item.equality for item in problem.bind_constraints(q, q, apart=False))
+
+    def _freely(self, motions: Array, finalists: int) -> list[NodeMotion] | None:
+        """Return the rough optima near motions (K, N + 1, n), the cheapest first.
+
+        Those that are the best for sure are ranked. None where none is to be had.
+        """
+        problem = self._problem
+        nodes = self._grid(problem)
         total = 1 + ROUGH_ROUNDS
         self._progress("rough motions", 1, total)
-        found = self._found = Together.near(nodes, motions[arrived])
+        found = self._found = Together.near(nodes, motions)
         soft = problem.softened(float(found.costs.min()))
         if soft is not problem:
-            nodes = self._grid(soft, grid)
-            found = self._found = Together.near(nodes, motions[arrived])
+            found = self._found = Together.near(self._grid(soft), motions)
         alone, near = unlike(found.q, _cheapest(found), self._apart, ONE_VALLEY)
-        which = [*alone, *near][: max(HEATS[0][0], finalists)]
-        if not which or nodes.cost.depends_on_errors(found.motion.partials):
-            return False
+        which = [*alone, *near][: max(ROUGH_MOTIONS, finalists)]
+        if not which:
+            return None
         found = self._found = found.picked(np.array(which, dtype=np.int64))
         for number in range(2, total + 1):
             self._progress("rough motions", number, total)
             if _hopeful(found).any():
                 found = self._found = found.advanced()
         self._ranked = self._decisive(found, finalists)
-        return bool(self._ranked)
+        order = unlike(found.q, _cheapest(found), self._apart, SAME_OPTIMUM)[0]
+        each = [] if self._ranked else [self._motion(found, k) for k in order]
+        return [motion for motion in each if motion is not None]
 
-    def _grid(self, problem: Problem, grid: Grid) -> NodeGrid:
+    def _grid(self, problem: Problem) -> NodeGrid:
         counts = self._effort.counts
-        return NodeGrid(problem, grid.nodes, (), free=True, counts=counts, calm=True)
+        return NodeGrid(problem, self._t, (), free=True, counts=counts, calm=True)
 
-    def _decisive(self, found: Together, finalists: int) -> list[RoughMotion]:
+    def _decisive(self, found: Together, finalists: int) -> list[NodeMotion]:
         """Return the cheapest motion that keeps all, then others about as cheap; or none.
 
         None is the cheapest for sure where it is not at its optimum yet, or the nodes are too few.
         """
-        kept: list[RoughMotion] = []
-        others: list[RoughMotion] = []
+        kept: list[NodeMotion] = []
+        others: list[NodeMotion] = []
         dearest = np.inf
         for k in unlike(found.q, _cheapest(found), self._apart, SAME_OPTIMUM)[0]:
             if found.costs[k] > dearest or len(kept) + len(others) == finalists:
@@ -157,9 +152,9 @@ class OnNodes:
             # What got stuck may become better as well.
             stuck = found.promised[k] > ABOUT_AS_GOOD * abs(motion.cost)
             if stuck or motion.breaks_hard():
-                others.append(_rough(motion))
+                others.append(motion)
             elif self._clear(motion):
-                kept.append(_rough(motion))
+                kept.append(motion)
             else:
                 # An optimum that takes the arm into itself goes on doing that.
                 continue
@@ -167,14 +162,44 @@ class OnNodes:
             dearest = min(dearest, cost + ABOUT_AS_GOOD * abs(cost))
         return [*kept, *others] if kept and not _hopeful(found).any() else []
 
+    def _with_conditions(
+        self, begun: Sequence[NodeMotion], finalists: int, *, by_cost: bool
+    ) -> list[NodeMotion]:
+        """Return the best of what a few steps with conditions make of motions, different ones.
+
+        `by_cost` says that these are optima without conditions, the cheapest first.
+        """
+        found: list[tuple[tuple[bool, float], NodeMotion]] = []
+        for number, motion in enumerate(begun, 1):
+            if by_cost and found and (False, motion.cost) >= found[0][0]:
+                # With conditions they would cost more still.
+                break
+            self._progress("start", number, len(begun))
+            better = minimise(motion, lambda _: False, roughly=True, most=WITH_CONDITIONS).motion
+            found = sorted([*found, (self._rank(better), better)], key=lambda each: each[0])
+            self._ranked = [one for _, one in found]
+        q = np.array([motion.place.q for motion in self._ranked])
+        alone, _ = unlike(q, np.arange(len(q)), self._apart, SAME_OPTIMUM)
+        return [self._ranked[k] for k in alone[:finalists]]
+
+    def _rank(self, motion: NodeMotion) -> tuple[bool, float]:
+        """Return what sorts motions, the best first: what is not kept yet has its price."""
+        cost = motion.cost
+        return not self._clear(motion), cost + UNKEPT * abs(cost) * motion.violation
+
     def _motion(self, found: Together, k: int) -> NodeMotion | None:
         """Return one of the motions, with the conditions that are asked of it."""
-        problem, q = self._problem, found.q[k]
+        return self._near(found.q[k], found.qd[k], found.qdd[k])
+
+    def _near(
+        self, q: Array, qd: Array | None = None, qdd: Array | None = None
+    ) -> NodeMotion | None:
+        """Return the motion nearest to one, with the conditions; by default without self-motion."""
+        problem, still = self._problem, np.zeros_like(q)
         bound = problem.bind_constraints(q[0], q[-1], apart=self._effort.apart)
-        t = found.motion.grid.t[: len(q)]
         counts = self._effort.counts
-        grid = NodeGrid(problem, t, bound, free=True, counts=counts, calm=True)
-        return grid.near(q, found.qd[k], found.qdd[k])
+        grid = NodeGrid(problem, self._t, bound, free=True, counts=counts, calm=True)
+        return grid.near(q, still if qd is None else qd, still if qdd is None else qdd)
 
     def _clear(self, motion: NodeMotion) -> bool:
         return self._problem.keeps_off_itself(motion.place.q)
@@ -195,7 +220,3 @@ def _hopeful(found: Together) -> Flags:
 
 def _same(a: float, b: float | None) -> bool:
     return b is not None and abs(a - b) <= SAME_TO_DIGITS * abs(a)
-
-
-def _rough(motion: NodeMotion) -> RoughMotion:
-    return RoughMotion(motion.trajectory, motion.cost)

@@ -5,10 +5,9 @@ from collections.abc import Callable
 import numpy as np
 
 from selfmotion.basics import NoSequenceError, Progress
-from selfmotion.optimise import Status
 from selfmotion.planning.draft import Draft
 from selfmotion.planning.session import Session
-from selfmotion.planning.settings import DEARER, DEARER_CHAIN, FIRST_EVALUATIONS
+from selfmotion.planning.settings import DEARER, DEARER_CHAIN
 from selfmotion.problem import Problem
 from selfmotion.search import SequenceGuide
 
@@ -34,15 +33,12 @@ def optimise_sequences(draft: Draft, searched: _Searched, *, chosen: bool) -> No
         session.take_chain(guide)
         if begun and begun[0].of_chain and not session.of_chain:
             continue
-        # What happens to it first tells which one is worth the rest.
-        draft.optimise(session, chosen=chosen, evaluations=FIRST_EVALUATIONS)
+        draft.optimise(session, chosen=chosen)
         if draft.is_over:
             return
         begun = sorted([*begun, session], key=Session.score)
     if begun:
         draft.rival = begun[0]
-        if begun[0].status is Status.MAX_EVALUATIONS:
-            draft.optimise(begun[0], chosen=chosen)
 
 
 def _is_hopeless(draft: Draft, guide: SequenceGuide, session: Session, best: Session) -> bool:

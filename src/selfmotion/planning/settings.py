@@ -79,8 +79,10 @@ ROUGH_ROUNDS = 30
 # Rough optima on nodes whose costs differ by less than this share are worth the same; by less than
 # the second, they are mirror images.
 ABOUT_AS_GOOD, SAME_TO_DIGITS = 1e-2, 1e-9
-# Heats: so many starts at most, optimised with so many evaluations of the cost more.
-HEATS = ((16, 5), (4, 8))
+# So many rough motions at most; where conditions count, with so many steps more that know them.
+ROUGH_MOTIONS, WITH_CONDITIONS = 16, 12
+# Where a condition is not kept yet, each unit of it counts as so many times the cost.
+UNKEPT = 10.0
 # Motions at x = 0 that are this near at all times [rad or m] lie in one valley of the cost, as a
 # rule; rough optima this near are the same.
 ONE_VALLEY = 0.6
