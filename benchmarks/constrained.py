@@ -25,8 +25,8 @@ from rich.table import Table
 
 import selfmotion as sm
 from selfmotion.basics import Array
-from selfmotion.engine import Objective, StillMotion, settled_still_motion
 from selfmotion.optimise import inverse_metric
+from selfmotion.paper import Objective, StillMotion, settled_still_motion
 from selfmotion.problem import problem_from_dict, problem_to_dict
 
 DATA = Path(__file__).parent / "data"

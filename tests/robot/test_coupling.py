@@ -10,8 +10,8 @@ import yourdfpy
 import selfmotion as sm
 from selfmotion.basics import Array
 from selfmotion.certificate import deviation
-from selfmotion.engine.start import FixedStart
 from selfmotion.motion import NullMotionTable, PolynomialNullMotion
+from selfmotion.paper.start import FixedStart
 from selfmotion.robot import Dynamics, Energy, ToolRates
 from selfmotion.robot.tree_arrays import JOINT
 from support.arms import Case, central_difference, objective_of, short_line

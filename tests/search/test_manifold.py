@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.engine import carried_bases
 from selfmotion.follow import Follows
+from selfmotion.kernels import carried
+from selfmotion.robot import null_space
 from selfmotion.search import spread
 from selfmotion.search.manifold import Manifold
 from support.arms import robot_named
@@ -67,7 +68,8 @@ def test_bases_are_carried_without_turning() -> None:
     task = sm.Task.POSITION
     q0 = robot.dexterous_configuration(task)
     q = q0 + np.linspace(0.0, 0.5, 40)[:, None]
-    bases = carried_bases(standing(robot, task), q)
+    jacobians = standing(robot, task).jacobians(q)
+    bases = carried(null_space(jacobians[0]), jacobians)
     for here, basis in zip(q, bases, strict=True):
         np.testing.assert_allclose(robot.task_jacobian(here, task) @ basis, 0.0, atol=1e-12)
     # Between neighbours 0.03 rad apart, bases of the same planes turn about as much.

@@ -6,11 +6,9 @@ import numpy as np
 import pinocchio as pin
 
 import selfmotion as sm
-from selfmotion.basics import Array
-from selfmotion.engine import Counts, Objective, Rollout
-from selfmotion.engine.conditions import Conditions
-from selfmotion.engine.start import Start
+from selfmotion.basics import Array, Counts
 from selfmotion.motion import NullMotionTable
+from selfmotion.paper import Objective, Rollout, Start
 
 # Arms with a task each, chosen so that every task and redundancy from 1 to 5 occurs.
 CASES = [
@@ -63,18 +61,9 @@ def objective_of(
     table: NullMotionTable,
     costs: Sequence[sm.Cost],
     start: Start,
-    *,
-    constraints: Sequence[sm.BoundConstraint] = (),
 ) -> Objective:
     """Return an objective of parts, for laws that hold whatever problem they come from."""
-    return Objective(
-        rollout,
-        table,
-        costs,
-        start,
-        Conditions(constraints, rollout.grid),
-        Counts(),
-    )
+    return Objective(rollout, table, costs, start, (), Counts())
 
 
 def central_difference(function: Callable[[Array], float], x: Array, step: float = 1e-6) -> Array:

@@ -3,11 +3,11 @@
 import numpy as np
 
 import selfmotion as sm
-from selfmotion.basics import Array
-from selfmotion.engine import Counts, settled_still_motion
+from selfmotion.basics import Array, Counts
 from selfmotion.motion import Trajectory
 from selfmotion.nodes import NodeGrid, NodeMotion
 from selfmotion.nodes.objective import Around
+from selfmotion.paper import settled_still_motion
 from support.arms import Case
 
 

@@ -3,9 +3,9 @@
 import numpy as np
 
 from selfmotion.basics import Array
-from selfmotion.engine.rollout import Rollout
 from selfmotion.follow import Follows
 from selfmotion.motion import Grid, NullMotionTable
+from selfmotion.paper.rollout import Rollout
 from support.arms import Case
 
 

@@ -10,11 +10,11 @@ import pytest
 import selfmotion as sm
 from selfmotion.basics import Array
 from selfmotion.costs import OffPath
-from selfmotion.engine.rollout import Rollout
-from selfmotion.engine.start import FixedStart
 from selfmotion.follow import Follows
 from selfmotion.motion import NullMotionTable, PolynomialNullMotion
 from selfmotion.motion.grid import Grid
+from selfmotion.paper.rollout import Rollout
+from selfmotion.paper.start import FixedStart
 from selfmotion.task.damping import DampingLaw
 from support.arms import Case, central_difference, objective_of
 from support.rollouts import assert_sensitivities
@@ -126,7 +126,7 @@ def test_damped_pullback_to_the_start_equals_central_differences(case: Case) -> 
         assert rollout.run(q, epsilon) is None
         samples = rollout.samples()
         total = (by_q * samples.q).sum() + (by_qd * samples.qd).sum()
-        return float(total + (by_error * rollout.error).sum())
+        return float(total + (by_error * rollout.samples().error).sum())
 
     differences = central_difference(value, off)
     value(off)

@@ -10,6 +10,7 @@ from selfmotion.basics.arrays import (
     read_only as read_only,
     shown as shown,
 )
+from selfmotion.basics.counts import Counts as Counts
 from selfmotion.basics.digests import (
     digest_of as digest_of,
     digest_of_file as digest_of_file,

@@ -10,11 +10,10 @@ from numba.core import event
 
 import selfmotion as sm
 from selfmotion import realtime
-from selfmotion.basics import read_only
+from selfmotion.basics import Counts, read_only
 from selfmotion.cli.app import app, stages, terminal
 from selfmotion.cli.stage_display import StageDisplay
 from selfmotion.collision.kernels import winding_number
-from selfmotion.engine import Counts
 from selfmotion.job.exchange import improved
 from selfmotion.job.stops import Stops
 from selfmotion.nodes import NodeGrid

@@ -1,12 +1,11 @@
 """From a decision vector to the motion, its cost, and the gradient."""
 
+from selfmotion.basics import Counts as Counts
 from selfmotion.engine.conditions import (
     Conditions as Conditions,
     Priced as Priced,
     active_of as active_of,
 )
-from selfmotion.engine.counts import Counts as Counts
-from selfmotion.engine.evaluation import Evaluation as Evaluation
 from selfmotion.engine.frame import carried_bases as carried_bases, transport as transport
 from selfmotion.engine.objective import Objective as Objective
 from selfmotion.engine.remaining import Remaining as Remaining, finest as finest
@@ -19,3 +18,4 @@ from selfmotion.engine.still import (
     rough_still_motion as rough_still_motion,
     settled_still_motion as settled_still_motion,
 )
+from selfmotion.motion import Evaluation as Evaluation

@@ -4,17 +4,15 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from selfmotion.basics import Array
+from selfmotion.basics import Array, Counts
 from selfmotion.constraints import BoundConstraint, NodeTangents
 from selfmotion.costs import Cost, Samples
 from selfmotion.engine.conditions import Conditions
 from selfmotion.engine.cost_integrals import CostIntegrals
-from selfmotion.engine.counts import Counts
-from selfmotion.engine.evaluation import Evaluation
 from selfmotion.engine.rollout import Rollout
 from selfmotion.engine.start import FixedStart, FreeStart, Start
 from selfmotion.engine.still import StillMotion, null_motion_table
-from selfmotion.motion import Grid, NullMotion, NullMotionTable, Trajectory
+from selfmotion.motion import Evaluation, Grid, NullMotion, NullMotionTable, Trajectory
 from selfmotion.optimise import Residuals, Rows
 from selfmotion.problem import Problem
 

@@ -31,7 +31,11 @@ from selfmotion.kernels.forward import (
     advance as advance,
     at_tip as at_tip,
 )
-from selfmotion.kernels.null_space import factor_damped as factor_damped, transport as transport
+from selfmotion.kernels.null_space import (
+    carried as carried,
+    factor_damped as factor_damped,
+    transport as transport,
+)
 from selfmotion.kernels.start import approach as approach, approach_start as approach_start
 from selfmotion.kernels.table import (
     Stage as Stage,

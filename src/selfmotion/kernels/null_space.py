@@ -7,6 +7,19 @@ from selfmotion.kernels.algebra import cholesky, gram, solve_cholesky
 
 # Steps of the iteration: it converges quadratically once a basis is nearly orthonormal.
 _POLAR = 40
+# Jacobians with a pivot of JJᵀ [m², rad²] below this are taken for singular.
+_SINGULAR = 1e-12
+
+
+def carried(first: Array, jacobians: Array) -> Array:
+    """Return a basis `first` (n, r) of the null space carried along a motion, (N, n, r).
+
+    A discrete parallel transport, see `transport`: continuous whatever the signs and order of the
+    singular vectors of its Jacobians (N, m, n) do.
+    """
+    bases = np.empty((len(jacobians), *first.shape))
+    transport(first, np.ascontiguousarray(jacobians), _SINGULAR, bases)
+    return bases
 
 
 @inlined

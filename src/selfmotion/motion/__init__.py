@@ -1,6 +1,7 @@
 """The nouns of a joint motion over time: grid, trajectory, null motion."""
 
 from selfmotion.motion.columns import column_names as column_names
+from selfmotion.motion.evaluation import Evaluation as Evaluation
 from selfmotion.motion.grid import Grid as Grid
 from selfmotion.motion.joining import (
     joined_motions as joined_motions,

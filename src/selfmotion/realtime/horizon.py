@@ -12,10 +12,10 @@ import numpy as np
 
 from selfmotion.basics import Array
 from selfmotion.costs import Cost, Samples
-from selfmotion.engine import Rollout
 from selfmotion.follow import Follows
 from selfmotion.kernels import transport
 from selfmotion.motion import Grid, NullMotion
+from selfmotion.paper import Rollout
 from selfmotion.path import PathSamples
 from selfmotion.realtime.clear import Surroundings
 from selfmotion.realtime.programme import elastic_step, graded, model_of

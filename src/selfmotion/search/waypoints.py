@@ -1,8 +1,9 @@
 """A path's waypoints as the sampled search knows them: where configurations are, how they move."""
 
 from selfmotion.basics import Array, Flags, Ints
-from selfmotion.engine import carried_bases
 from selfmotion.follow import Follows
+from selfmotion.kernels import carried
+from selfmotion.robot import null_space
 from selfmotion.search.manifold import Manifold
 
 
@@ -36,4 +37,5 @@ class OnPath:
 
         Each turned to the one before.
         """
-        return carried_bases(self._follows, q)
+        jacobians = self._follows.jacobians(q)
+        return carried(null_space(jacobians[0]), jacobians)

@@ -6,9 +6,9 @@ import numpy as np
 
 from selfmotion.baselines import start_of
 from selfmotion.basics import Array
-from selfmotion.engine import Objective, StillMotion
 from selfmotion.motion import Grid
 from selfmotion.optimise import LineSearch, Minimum, QuasiNewton, inverse_metric
+from selfmotion.paper import Objective, StillMotion
 from selfmotion.problem import Problem
 
 

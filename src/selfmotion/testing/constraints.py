@@ -14,9 +14,9 @@ from selfmotion.certificate import (
     Shares,
     Stretch,
 )
-from selfmotion.constraints import Constraint
-from selfmotion.engine import Objective, StillMotion
+from selfmotion.constraints import BoundConstraint, Constraint, linearised
 from selfmotion.motion import Grid, Trajectory
+from selfmotion.paper import Objective, StillMotion
 from selfmotion.problem import Problem
 from selfmotion.robot import RobotModel
 from selfmotion.search import start_candidates
@@ -59,7 +59,7 @@ def check_constraint(constraint: Constraint, problem: Problem) -> None:
     grid = Grid.aligned(problem.knots, _STEPS * max(1, problem.null_motion.fewest_steps // 4))
     still = StillMotion.on(problem, start, grid)
     bound = constraint.bind(problem.follows, still.start, still.end)
-    objective = Objective.of(problem, still, free=True, constraints=[bound])
+    objective = Objective.of(problem, still, free=True)
     requirement = constraint.requirement(robot)
     require(isinstance(requirement, Requirement), f"requirement() returned {requirement!r}")
     rng = np.random.default_rng(1)
@@ -75,24 +75,26 @@ def check_constraint(constraint: Constraint, problem: Problem) -> None:
     require(np.shape(tangents) == shape, told)
     exact = np.tensordot(weights, tangents, weights.ndim)
     require_gradient(weighed, lambda _: exact, x, f"constraint '{bound.name}'")
-    _known_on_demand(objective, bound.name, tangents.reshape(-1, objective.size), x)
+    _known_on_demand(objective, bound, tangents.reshape(-1, objective.size), x)
     _judges_alike(objective, bound, requirement, robot, rng)
     saved(constraint, Constraint)
 
 
-def _known_on_demand(objective: Objective, name: str, table: Array, x: Array) -> None:
+def _known_on_demand(objective: Objective, bound: BoundConstraint, table: Array, x: Array) -> None:
     """Require that derivatives computed as far as they are asked for are those of the table."""
-    objective.conditions(x)
-    rows = objective.condition_rows(x)
+    motion = objective.node_tangents(x)
+    rows, name = linearised(bound, objective.samples(x), motion), f"constraint '{bound.name}'"
+    told = f"{name}: linearised_at() knows {rows.count} conditions, expected {len(table)}"
+    require(rows.count == len(table), told)
     ones, scale = np.ones(objective.size), max(1.0, float(np.abs(table).max(initial=0.0)))
     for found, expected in (
-        (rows.picked(np.arange(len(table))), table),
-        (rows.along(ones), table @ ones),
+        (rows.picked(motion, np.arange(len(table))), table),
+        (rows.along(ones, motion.along(ones)), table @ ones),
     ):
         off = float(np.abs(found - expected).max(initial=0.0))
         require(
             off <= GRADIENT * scale,
-            f"constraint '{name}': linearised_at() is {off:.2e} off what tangents() says",
+            f"{name}: linearised_at() is {off:.2e} off what tangents() says",
         )
 
 

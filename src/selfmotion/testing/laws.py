@@ -7,9 +7,9 @@ import numpy as np
 
 from selfmotion.basics import Array
 from selfmotion.costs import Cost, Samples
-from selfmotion.engine import Objective, StillMotion
 from selfmotion.motion import Grid, NullMotion, PolynomialNullMotion, Sampling
 from selfmotion.optimise import Iteration, Minimum, Optimizer
+from selfmotion.paper import Objective, StillMotion
 from selfmotion.path import Line, Path
 from selfmotion.problem import Problem
 from selfmotion.robot import RobotModel, load_robot

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from selfmotion.basics import Array
-from selfmotion.engine.start import FreeStart
 from selfmotion.follow import Follows
+from selfmotion.paper.start import FreeStart
 from support.arms import robot_named, short_line, start_of
 from support.two_arms import both_arms
 

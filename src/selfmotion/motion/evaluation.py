@@ -1,9 +1,9 @@
-"""What is known of one decision vector."""
+"""What is known of one motion of an objective."""
 
 from dataclasses import dataclass
 
 from selfmotion.basics import Array
-from selfmotion.motion import Trajectory
+from selfmotion.motion.trajectory import Trajectory
 
 
 @dataclass(frozen=True, eq=False)

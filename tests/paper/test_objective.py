@@ -7,12 +7,12 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.basics import Array
-from selfmotion.engine import Objective, StillMotion
-from selfmotion.engine.rollout import Rollout
-from selfmotion.engine.start import FixedStart
 from selfmotion.follow import Follows
 from selfmotion.motion import NullMotionTable, PolynomialNullMotion
 from selfmotion.motion.grid import Grid
+from selfmotion.paper import Objective, StillMotion
+from selfmotion.paper.rollout import Rollout
+from selfmotion.paper.start import FixedStart
 from support.arms import (
     PANDA_HOME,
     Case,

@@ -1,0 +1,306 @@
+"""The published method from one start: what it finds, on grids as fine as the cost asks for."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from selfmotion.basics import Array, BreakdownError, Counts, Flags, read_only
+from selfmotion.constraints import BoundConstraint
+from selfmotion.motion import Evaluation, Grid, NullMotion
+from selfmotion.optimise import (
+    Callback,
+    Function,
+    Iteration,
+    Minimum,
+    Optimizer,
+    QuasiNewton,
+    Status,
+)
+from selfmotion.paper.ends import Eliminated, closed
+from selfmotion.paper.objective import Objective
+from selfmotion.paper.still import MOST_HALVINGS, StillMotion
+from selfmotion.problem import Problem
+
+# Agreement of the cost on a grid and on the halved one.
+_AGREEMENT = 1e-4
+# A cost that rises this much on so many grids in turn has no limit: the path runs past the edge of
+# the workspace between nodes.
+_RISE, _RISES = 1.5, 2
+# Where the way to the optimum leads too far from what the unknowns are made for, so often others
+# are, as long as the cost falls by this share.
+_CHARTS, _FALL = 5, 1e-8
+# After these there is nothing to go on from.
+_OVER = (Status.UNBOUNDED, Status.GRADIENT, Status.INFEASIBLE, Status.MAX_EVALUATIONS)
+
+
+@dataclass(frozen=True, eq=False)
+class Method:
+    """What all solutions from one start have in common; `solve` says what it is made of.
+
+    Attributes
+    ----------
+    problem : Problem
+    still : StillMotion
+    free : bool
+    ends : tuple of BoundConstraint
+    optimizer : Optimizer
+    counts : Counts
+    limit : int or None
+        Of `Counts.evaluations`.
+    callback : callable or None
+    """
+
+    problem: Problem
+    still: StillMotion
+    free: bool
+    ends: tuple[BoundConstraint, ...]
+    optimizer: Optimizer
+    counts: Counts
+    limit: int | None
+    callback: Callback | None
+
+    def on(self, grid: Grid) -> Objective:
+        """Return the objective on a grid."""
+        return Objective.of(
+            self.problem,
+            self.still,
+            grid=grid,
+            free=self.free,
+            ends=self.ends,
+            counts=self.counts,
+        )
+
+    def minimum(
+        self,
+        function: Function,
+        x: Array,
+        inverse_hessian: Array | None,
+        point: Callable[[Array], Array],
+    ) -> tuple[Minimum, tuple[Iteration, ...]]:
+        """Return a function's minimum, and the way to it in decision vectors, as `point` says."""
+        kept: list[Iteration] = []
+
+        def note(iteration: Iteration) -> bool:
+            kept.append(replace(iteration, x=read_only(point(iteration.x))))
+            return self.callback is not None and bool(self.callback(kept[-1]))
+
+        # Of no unknowns any point is the minimum.
+        optimizer = self.optimizer if len(x) else QuasiNewton()
+        found = optimizer.minimize(
+            function, x, inverse_hessian, max_evaluations=self.limit, callback=note
+        )
+        return found, tuple(kept)
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """A motion of the published method on one grid; made by `solve`.
+
+    Attributes
+    ----------
+    method : Method
+    objective : Objective
+        On its grid.
+    x : (size,)
+        The decision vector [z | coefficients].
+    inverse_hessian : (size, size) or None
+        The optimiser's last estimate; None before the first optimisation.
+    status : Status
+        How the last optimisation ended; INFEASIBLE where the ends cannot be met from here.
+    history : tuple of Iteration
+        On all grids so far.
+    """
+
+    method: Method
+    objective: Objective
+    x: Array
+    inverse_hessian: Array | None = None
+    status: Status = Status.STOPPED
+    history: tuple[Iteration, ...] = ()
+
+    @property
+    def null_motion(self) -> NullMotion:
+        """The parameterisation of the null motion."""
+        return self.method.problem.null_motion
+
+    @property
+    def coefficients(self) -> Array:
+        """The null motion's coefficients, (size without z,)."""
+        return self.objective.parts(self.x)[1].copy()
+
+    @property
+    def steps(self) -> int:
+        """Of its grid."""
+        return self.objective.grid.steps
+
+    @cached_property
+    def cost(self) -> float:
+        """F."""
+        return self.objective.value(self.x)
+
+    @cached_property
+    def nodes(self) -> Array:
+        """The motion at the nodes of its grid, (N + 1, n) [rad or m]."""
+        return read_only(self.objective.samples(self.x).q[self.objective.grid.node_stages])
+
+    @cached_property
+    def unmet(self) -> tuple[str, ...]:
+        """What is wrong with each of the ends that is not met."""
+        return self.objective.unmet(self.x)
+
+    def evaluation(self) -> Evaluation:
+        """Return the motion with its costs."""
+        return self.objective.at(self.x)
+
+    def still_evaluation(self) -> Evaluation:
+        """Return the motion at x = 0 on this grid."""
+        return self.objective.at(np.zeros_like(self.x))
+
+    def refined(self, where: Flags | None = None) -> "Solution":
+        """Return it with half the step length, everywhere or for some of the steps (N,).
+
+        With its ends met there, but not optimised anew.
+
+        Raises
+        ------
+        BreakdownError
+            The motion breaks down on that grid.
+        """
+        return self._on(self.method.on(self.objective.grid.halved(where)))
+
+    def again(self) -> "Solution":
+        """Return the optimum on its grid, from here; interrupted, the best so far."""
+        found = self
+        try:
+            for _ in range(_CHARTS):
+                before, found = found.cost, found._optimised()
+                fell = before - found.cost > _FALL * abs(before)
+                # Far from what its unknowns are made for, an elimination may lead no further.
+                if not (self._eliminates and fell and found.status is Status.PRECISION):
+                    break
+        except KeyboardInterrupt:
+            found = replace(found, status=Status.INTERRUPTED)
+        return found
+
+    @property
+    def _eliminates(self) -> bool:
+        return len(self.method.ends) > 0 and len(self.x) > 0
+
+    def _optimised(self) -> "Solution":
+        method, objective, inverse = self.method, self.objective, self.inverse_hessian
+        if self.unmet:
+            return replace(self, status=Status.INFEASIBLE)
+        if not self._eliminates:
+            found, way = method.minimum(objective, self.x, inverse, np.array)
+            x, inverse = np.array(found.x), found.inverse_hessian
+        else:
+            function = Eliminated(objective, self.x)
+            if not function.is_met(np.zeros(function.size)):
+                return replace(self, status=Status.INFEASIBLE)
+            known = None if inverse is None else function.inward(inverse)
+            found, way = method.minimum(function, np.zeros(function.size), known, function.point)
+            x, inverse = function.point(found.x), function.outward(found.x, found.inverse_hessian)
+        history = (*self.history, *way)
+        return replace(self, x=x, inverse_hessian=inverse, status=found.status, history=history)
+
+    def _on(self, objective: Objective) -> "Solution":
+        """Return it by another objective of the same unknowns, with its ends met."""
+        if not np.isfinite(objective.value(self.x)):
+            objective.require_finite(self.x)
+        x = closed(objective, self.x) if self._eliminates else self.x
+        return replace(self, objective=objective, x=x)
+
+
+def solve(
+    problem: Problem,
+    still: StillMotion,
+    *,
+    free: bool = False,
+    ends: Sequence[BoundConstraint] = (),
+    optimizer: Optimizer | None = None,
+    counts: Counts | None = None,
+    most: int | None = None,
+    callback: Callback | None = None,
+    x0: Array | None = None,
+) -> Solution:
+    """Return the optimum of the published method around a motion at x = 0.
+
+    On its grid, then on halved ones, until the cost agrees with that on the grid before.
+
+    Parameters
+    ----------
+    problem : Problem
+        Its null motion and its costs; of its constraints, only what `ends` says.
+    still : StillMotion
+        The motion at x = 0.
+    free : bool
+        Whether the start may move along its self-motion.
+    ends : sequence of BoundConstraint
+        Equalities on the ends of the motion, bound to that at x = 0; they are eliminated.
+    optimizer : Optimizer, optional
+        By default `QuasiNewton`.
+    counts : Counts, optional
+        Where work is added up.
+    most : int, optional
+        Evaluations of F at most.
+    callback : callable, optional
+        Called with each `Iteration`, of decision vectors; returning True stops.
+    x0 : (size,), optional
+        Where to begin; by default, and where that is no motion, at 0.
+
+    Returns
+    -------
+    Solution
+        Also after an interruption from the keyboard, then the best so far.
+
+    Raises
+    ------
+    BreakdownError
+        The motion at x = 0 breaks down.
+    ProblemError
+        A cost has no finite value on the motion that it begins with, or one of the ends is no
+        equality.
+    """
+    counts = Counts() if counts is None else counts
+    limit = None if most is None else counts.evaluations + most
+    own = QuasiNewton() if optimizer is None else optimizer
+    method = Method(problem, still, free, tuple(ends), own, counts, limit, callback)
+    objective = method.on(still.grid)
+    x = np.zeros(objective.size)
+    if x0 is not None and np.isfinite(objective.value(x0)):
+        x = np.array(x0, dtype=np.float64)
+    found = Solution(method, objective, x)
+    try:
+        found = found._on(objective).again()
+        return _settled(found)
+    except KeyboardInterrupt:
+        return replace(found, status=Status.INTERRUPTED)
+
+
+def _settled(found: Solution) -> Solution:
+    """Return the optimum on halved grids, once its cost agrees with that on the one before."""
+    rises, most = 0, found.method.still.grid.steps * 2**MOST_HALVINGS
+    try:
+        while found.steps < most and not (found.status.is_cut_short or found.status in _OVER):
+            finer = found.refined()
+            before, changed = found.cost, _change(found.cost, finer.cost)
+            rises = rises + 1 if finer.cost > _RISE * abs(before) else 0
+            if rises == _RISES:
+                return finer
+            found = finer.again()
+            # The optimum agrees, too: what a coarse grid praises may be no motion on this one.
+            if max(changed, _change(before, found.cost)) <= _AGREEMENT:
+                break
+    except BreakdownError:
+        # On a finer grid there is no such motion: the one that there is stands, to be judged.
+        pass
+    except KeyboardInterrupt:
+        found = replace(found, status=Status.INTERRUPTED)
+    return found
+
+
+def _change(before: float, after: float) -> float:
+    """Return the change of a cost as a share of what it was."""
+    return abs(after - before) / max(abs(before), float(np.finfo(float).tiny))

@@ -1,0 +1,212 @@
+"""Given ends are eliminated: exact gradients, the optimum of other solvers, ends to rounding."""
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize
+
+import selfmotion as sm
+from selfmotion.basics import Array
+from selfmotion.motion import PolynomialNullMotion
+from selfmotion.optimise import inverse_metric
+from selfmotion.paper import Eliminated, FreeStart, Solution, closed, settled_still_motion, solve
+from support.arms import PANDA_HOME, central_difference, robot_named
+
+# Exact gradients against extrapolated differences, relative to the largest entry.
+GRADIENT = 1e-7
+# The optimum against that of SciPy's, relative: both stop where steps gain less than a share of it.
+OPTIMUM = 1e-7
+# Ends are met to this [rad, rad/s, rad/s²].
+CLOSED = 1e-11
+# A few products of well-conditioned matrices.
+ALGEBRA = 1e-9
+
+CLOSED_PATHS = {
+    "closed": [sm.ClosedPath(velocity=False)],
+    "closed in velocity": [sm.ClosedPath()],
+    "at rest": [sm.StartVelocity(), sm.EndVelocity()],
+    "accelerations": [sm.ClosedPath(velocity=False), sm.StartAcceleration(), sm.EndAcceleration()],
+}
+
+
+def problem_of(name: str) -> sm.Problem:
+    """Return the paper's arm there and back, or a Panda on a circle in some rows."""
+    if name == "planar":
+        return sm.sample_problem(duration=2.0)
+    robot = robot_named("panda")
+    circle = sm.Circle.around(robot.pose(PANDA_HOME), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
+    null_motion = PolynomialNullMotion()
+    return sm.Problem(robot, circle, name, PANDA_HOME, null_motion, constraints=(), rest=False)
+
+
+def solved(name: str, asked: list[sm.Constraint], *, free: bool = False, **options) -> Solution:
+    problem = problem_of(name)
+    still, _ = settled_still_motion(problem, np.array(problem.given_start))
+    ends = [item.bind(problem.follows, still.start, still.end) for item in asked]
+    return solve(problem, still, ends=ends, free=free, **options)
+
+
+def eliminated(found: Solution) -> Eliminated:
+    """Return the unknowns around x = 0 on a solution's grid, whose motion misses the ends."""
+    return Eliminated(found.objective, np.zeros_like(found.x))
+
+
+@pytest.mark.parametrize("free", [False, True])
+@pytest.mark.parametrize("asked", CLOSED_PATHS)
+@pytest.mark.parametrize("name", ["planar", "pose", "position"])
+def test_the_gradient_is_that_of_motions_that_meet_the_ends(
+    name: str, asked: str, free: bool
+) -> None:
+    function = eliminated(solved(name, CLOSED_PATHS[asked], free=free, most=1))
+    y = 0.1 * np.random.default_rng(0).normal(size=function.size)
+    exact = function.gradient(y)
+    fine, coarse = (central_difference(function.value, y, step) for step in (1e-4, 2e-4))
+    differences = (4.0 * fine - coarse) / 3.0
+    assert np.abs(exact - differences).max() <= GRADIENT * max(np.abs(differences).max(), 1.0)
+    direction = np.random.default_rng(1).normal(size=function.size)
+    assert function.slope(y, direction) == pytest.approx(float(exact @ direction), rel=ALGEBRA)
+
+
+@pytest.mark.parametrize(
+    ("name", "asked", "free"),
+    [
+        ("planar", "closed", False),
+        ("planar", "closed in velocity", False),
+        ("planar", "closed", True),
+        ("planar", "at rest", False),
+        ("pose", "closed", False),
+        ("pose", "closed in velocity", False),
+        ("pose", "closed", True),
+        ("position", "closed in velocity", False),
+    ],
+)
+def test_the_optimum_is_that_of_another_solver(name: str, asked: str, free: bool) -> None:
+    """SciPy's SLSQP on all unknowns, with the ends as equalities, from x = 0."""
+    found = solved(name, CLOSED_PATHS[asked], free=free)
+    assert found.status is sm.Status.CONVERGED
+    objective = found.objective
+    # In coordinates in which the cost is about as steep in all directions.
+    values, vectors = np.linalg.eigh(inverse_metric(objective.metric(found.x)))
+    scale = vectors * np.sqrt(values)
+    other = minimize(
+        lambda u: objective.value(scale @ u),
+        np.zeros(objective.size),
+        jac=lambda u: scale.T @ objective.gradient(scale @ u),
+        constraints={
+            "type": "eq",
+            "fun": lambda u: objective.misses(scale @ u),
+            "jac": lambda u: objective.miss_tangents(scale @ u) @ scale,
+        },
+        method="SLSQP",
+        options={"ftol": 1e-13, "maxiter": 300},
+    )
+    assert np.abs(objective.misses(scale @ other.x)).max() < 1e-8
+    assert found.cost == pytest.approx(float(other.fun), rel=OPTIMUM)
+    assert np.abs(objective.misses(found.x)).max() <= CLOSED
+
+
+@pytest.mark.parametrize("asked", CLOSED_PATHS)
+@pytest.mark.parametrize("name", ["planar", "pose", "pointing", "position"])
+def test_ends_are_met_to_rounding_on_any_grid(name: str, asked: str) -> None:
+    found = solved(name, CLOSED_PATHS[asked])
+    assert found.unmet == ()
+    finer = found.refined(np.arange(found.steps) % 3 == 0).refined()
+    for solution in (found, finer, finer.again()):
+        assert np.abs(solution.objective.misses(solution.x)).max() <= CLOSED
+    assert finer.steps > 2 * found.steps
+
+
+def test_unknowns_move_along_the_ends_and_are_orthonormal() -> None:
+    found = solved("position", CLOSED_PATHS["closed in velocity"])
+    function = Eliminated(found.objective, found.x)
+    y = np.zeros(function.size)
+    assert function.size == len(found.x) - 8
+    np.testing.assert_allclose(function.point(y), found.x, atol=ALGEBRA)
+    np.testing.assert_allclose(function.metric(y), np.eye(function.size), atol=ALGEBRA)
+    away = 0.1 * np.random.default_rng(2).normal(size=function.size)
+    for place in (y, away):
+        rows = found.objective.miss_tangents(function.point(place))
+        np.testing.assert_allclose(rows @ function.tangent(place), 0.0, atol=ALGEBRA)
+        assert np.abs(found.objective.misses(function.point(place))).max() <= CLOSED
+
+
+def test_an_inverse_hessian_comes_back_from_decision_vectors() -> None:
+    found = solved("position", CLOSED_PATHS["closed in velocity"])
+    function = Eliminated(found.objective, found.x)
+    root = np.random.default_rng(3).normal(size=(function.size, function.size))
+    known = function.outward(np.zeros(function.size), root @ root.T)
+    np.testing.assert_allclose(function.inward(known), root @ root.T, atol=1e-8)
+
+
+def test_a_closed_point_is_the_nearest_in_the_metric() -> None:
+    """To first order: half as far away, the difference to the nearest is a quarter."""
+    found = solved("position", CLOSED_PATHS["closed"])
+    objective, rng, off = found.objective, np.random.default_rng(4), []
+    step = rng.normal(size=objective.size)
+    for size in (1e-2, 5e-3):
+        x = found.x + size * step
+        metric, rows = objective.metric(x), objective.miss_tangents(x)
+        inverse = np.linalg.inv(metric)
+        spread = inverse @ rows.T
+        linear = x - spread @ np.linalg.solve(rows @ spread, objective.misses(x))
+        off.append(np.linalg.norm(closed(objective, x) - linear))
+    assert off[1] < 0.3 * off[0]
+
+
+def test_where_no_motion_meets_the_ends_the_cost_is_infinite() -> None:
+    function = eliminated(solved("pose", CLOSED_PATHS["closed"], free=True, most=1))
+    far = np.full(function.size, 1e4)
+    assert not function.is_met(far)
+    assert function.value(far) == np.inf
+    assert np.isnan(function.gradient(far)).all()
+
+
+def test_ends_that_follow_from_others_change_nothing() -> None:
+    """A motion at rest at both ends has equal velocities there."""
+    asked = [sm.ClosedPath(velocity=False), *CLOSED_PATHS["at rest"]]
+    for name in ("planar", "position"):
+        plain, twice = solved(name, asked), solved(name, [*asked, sm.ClosedPath()])
+        assert twice.status is sm.Status.CONVERGED
+        # What follows does so but for the error of the grid.
+        assert twice.cost == pytest.approx(plain.cost, rel=1e-6)
+        assert twice.unmet == ()
+
+
+def configuration_along(problem: sm.Problem, z: float) -> Array:
+    """Return an end so far along the self-motion."""
+    target = problem.follows.targets(np.zeros(1))[0]
+    found = FreeStart(problem.follows, PANDA_HOME).configuration(np.array([z]), target)
+    assert found is not None
+    return found
+
+
+@pytest.mark.parametrize("z", [-1.5, -0.3, 0.3, 1.5])
+def test_a_given_end_is_reached(z: float) -> None:
+    end = configuration_along(problem_of("pose"), z)
+    found = solved("pose", [sm.EndConfiguration(end)])
+    assert found.status is sm.Status.CONVERGED
+    # What the integration leaves of the path error, put onto the path.
+    np.testing.assert_allclose(found.evaluation().trajectory.q[-1], end, atol=1e-9)
+
+
+def test_ends_that_contradict_each_other_are_named() -> None:
+    end = configuration_along(problem_of("pose"), 0.3)
+    found = solved("pose", [sm.EndConfiguration(end), sm.ClosedPath()])
+    assert found.status is sm.Status.INFEASIBLE
+    assert [text.split(":")[0] for text in found.unmet] == ["end configuration", "closed path"]
+    # The nearest motion is one, all the same.
+    assert np.isfinite(found.refined().again().cost)
+
+
+def test_an_end_that_is_missed_is_named_on_either_side() -> None:
+    objective = solved("pose", CLOSED_PATHS["closed"], most=1).objective
+    signs = set()
+    for seed in range(6):
+        x = 0.05 * np.random.default_rng(seed).normal(size=objective.size)
+        signs.add(float(np.sign(objective.misses(x)[0])))
+        assert objective.unmet(x)[0].startswith("closed path: the configuration at the end")
+    assert signs == {-1.0, 1.0}
+
+
+def test_limits_are_refused() -> None:
+    with pytest.raises(sm.ProblemError, match=r"'joint velocity limits': is an inequality"):
+        solved("pose", [sm.JointVelocityLimits()])
