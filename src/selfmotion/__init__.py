@@ -126,7 +126,6 @@ from selfmotion.motion import (
     NodeNullMotion as NodeNullMotion,
     NullMotion as NullMotion,
     PolynomialNullMotion as PolynomialNullMotion,
-    RefinedNullMotion as RefinedNullMotion,
     Trajectory as Trajectory,
 )
 from selfmotion.optimise import (

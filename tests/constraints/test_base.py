@@ -106,7 +106,7 @@ def test_tangents_equal_central_differences(constraint: str) -> None:
 
 @pytest.mark.parametrize("constraint", CONSTRAINTS)
 def test_rows_on_demand_are_those_of_all_tangents(constraint: str) -> None:
-    """Some, along a direction, and after other motions were looked at."""
+    """Some of them, and after other motions were looked at."""
     made = CONSTRAINTS[constraint](robot_named("panda"))
     objective, bound = objective_with(made, "panda", "pose")
     rng = np.random.default_rng(4)
@@ -120,14 +120,9 @@ def test_rows_on_demand_are_those_of_all_tangents(constraint: str) -> None:
     assert objective.evaluations == count
     objective.samples(x + 0.1)
     assert objective.evaluations == count + 1
-    direction, which = rng.normal(size=objective.size), rng.integers(0, len(expected), 40)
+    which = rng.integers(0, len(expected), 40)
     scale = np.abs(expected).max()
     np.testing.assert_allclose(rows.picked(tangents, which), expected[which], atol=1e-12 * scale)
-    np.testing.assert_allclose(
-        rows.along(direction, tangents.along(direction)),
-        expected @ direction,
-        atol=1e-11 * scale * len(direction),
-    )
 
 
 def test_clearance_rows_equal_central_differences() -> None:
@@ -231,8 +226,7 @@ PRICE = 0.2
 def test_prices_are_what_easing_a_limit_saves(panda_circle: Circle, kind: str) -> None:
     """Against plans with a limit that is a little wider."""
     robot = panda_circle().robot
-    motion = sm.BSplineNullMotion(8)
-    free = sm.plan(panda_circle("position", null_motion=motion))
+    free = sm.plan(panda_circle("position"))
     assert free.report.active == ()
     highest = float(free.trajectory.q[:, 3].max())
 
@@ -242,7 +236,7 @@ def test_prices_are_what_easing_a_limit_saves(panda_circle: Circle, kind: str) -
         limits: tuple[sm.Constraint, ...] = (sm.JointPositionLimits(upper=upper), LIMITS[1])
         if kind == "acceleration":
             limits = (*LIMITS, sm.JointAccelerationLimits(1.0 * (1.0 + 0.02 * eased)))
-        return sm.plan(panda_circle("position", null_motion=motion, constraints=limits))
+        return sm.plan(panda_circle("position", constraints=limits))
 
     tight, wide = limited(0.0), limited(0.2)
     assert tight.certificate.verified

@@ -26,7 +26,6 @@ def test_obstacles_are_avoided_on_the_real_meshes(panda: sm.RobotModel) -> None:
         panda,
         path,
         start=PANDA_HOME,
-        null_motion=sm.BSplineNullMotion(6),
         constraints=(*LIMITS, clearance),
     )
     plan = sm.plan(problem)

@@ -22,9 +22,8 @@ def test_velocity_limits_are_kept_between_samples(panda_circle: Circle) -> None:
     limit = 0.55 * robot.velocity_limit
     without = sm.plan(panda_circle())
     assert (np.abs(without.trajectory.qd) / limit).max() > 1.0
-    motion = sm.BSplineNullMotion(8)
     constraints = (sm.JointPositionLimits(), sm.JointVelocityLimits(limit))
-    plan = sm.plan(panda_circle(null_motion=motion, constraints=constraints))
+    plan = sm.plan(panda_circle(constraints=constraints))
     assert plan.certificate.verified
     t = np.linspace(0, plan.trajectory.duration, 5001)
     assert (np.abs(plan.trajectory(t, 1)) / limit).max() <= 1.0
@@ -36,7 +35,7 @@ def test_position_limits_are_kept_between_samples(panda_circle: Circle) -> None:
     upper = np.array(free.robot.upper)
     upper[1] = free.trajectory.q[:, 1].max() - 0.05
     constraints = (sm.JointPositionLimits(upper=upper), sm.JointVelocityLimits())
-    plan = sm.plan(panda_circle(null_motion=sm.BSplineNullMotion(8), constraints=constraints))
+    plan = sm.plan(panda_circle(constraints=constraints))
     assert plan.certificate.verified
     t = np.linspace(0, plan.trajectory.duration, 5001)
     assert plan.trajectory(t)[:, 1].max() <= upper[1]

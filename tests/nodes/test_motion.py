@@ -3,7 +3,7 @@
 import numpy as np
 
 import selfmotion as sm
-from selfmotion.engine import Counts
+from selfmotion.basics import Counts
 from selfmotion.nodes import NodeGrid
 from support.arms import Case
 from support.nodes import nodes_of, problem_of

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.basics import Array
-from selfmotion.engine import Counts
+from selfmotion.basics import Array, Counts
 from selfmotion.nodes import NodeGrid, Step, Together, minimise
 from support.arms import PANDA_HOME, Case
 from support.nodes import problem_of

@@ -3,7 +3,6 @@
 import numpy as np
 
 import selfmotion as sm
-from selfmotion.optimise import SequentialQuadratic
 from selfmotion.optimise.base import inverse_metric
 
 
@@ -12,7 +11,6 @@ def test_defaults_are_what_is_documented() -> None:
     assert sm.QuasiNewton() == sm.QuasiNewton("fletcher", 1e-8, 200, sm.LineSearch(), 1e8)
     assert sm.QuasiNewton(unbounded=0.5).unbounded == 0.5
     assert sm.QuasiNewton().initial_metric == "gauss-newton"
-    assert SequentialQuadratic() == SequentialQuadratic(1e-7, 200)
 
 
 def test_directions_without_curvature_get_a_share_of_the_largest() -> None:

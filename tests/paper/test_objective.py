@@ -141,3 +141,27 @@ def test_sensitivities_equal_central_differences(case: Case) -> None:
     table = NullMotionTable(functions, None, robot.dof)
     x = 0.1 * np.random.default_rng(9).normal(size=table.size)
     assert_sensitivities(rollout, table, start, x, GRADIENT)
+
+
+def test_a_free_start_is_a_variable_and_a_guide_stands_for_no_null_motion() -> None:
+    robot = robot_named("panda")
+    start = start_of(robot, "pose")
+    problem = sm.Problem(robot, short_line(robot, start), "pose", start, rest=False)
+    steps = Grid.aligned(problem.knots, 12)
+    still = StillMotion.on(problem, start, steps)
+    given, free = (Objective.of(problem, still, free=free) for free in (False, True))
+    assert free.size == given.size + 1
+    zero = np.zeros(given.size)
+    np.testing.assert_array_equal(given.samples(zero).q[steps.node_stages], still.q)
+
+    def guide(t: Array) -> Array:
+        return np.tile(0.3 * np.eye(7)[0], (len(t), 1))
+
+    guided = StillMotion.on(problem, start, steps, guide)
+    assert np.abs(guided.q[-1] - still.q[-1]).max() > 1e-3
+    along = Objective.of(problem, guided)
+    np.testing.assert_array_equal(along.samples(zero).q[steps.node_stages], guided.q)
+    # What is given in its place counts instead.
+    around = np.zeros((len(steps.stage_times), 7))
+    back = Objective.of(problem, guided, around=around)
+    np.testing.assert_array_equal(back.samples(zero).q[steps.node_stages], still.q)

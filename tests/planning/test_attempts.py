@@ -10,7 +10,7 @@ import pinocchio as pin
 import pytest
 
 import selfmotion as sm
-from selfmotion.engine import Counts
+from selfmotion.basics import Counts
 from selfmotion.optimise import QuasiNewton
 from selfmotion.planning.attempts import ATTEMPTS
 from selfmotion.planning.beginning import Beginning

@@ -9,7 +9,7 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.basics import Array
-from selfmotion.engine.rollout import Rollout
+from selfmotion.paper import Rollout
 
 # All stages of a plan from a free start, compared with the global search.
 STAGES = (

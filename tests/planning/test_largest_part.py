@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.engine import Rollout, settled_still_motion
 from selfmotion.follow import Follows
 from selfmotion.motion.grid import Grid
+from selfmotion.paper import Rollout, settled_still_motion
 from selfmotion.replay import write_replay
 from support.arms import robot_named
 

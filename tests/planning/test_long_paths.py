@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.basics import silent
-from selfmotion.engine import Counts
+from selfmotion.basics import Counts, silent
 from selfmotion.optimise import QuasiNewton
 from selfmotion.planning.draft import Draft
 from selfmotion.planning.effort import Effort

@@ -42,9 +42,8 @@ def test_a_cone_lowers_the_cost_and_is_kept(panda_circle: Callable, free: bool) 
 
 
 def test_a_band_is_used_and_a_smaller_one_is_refused(planar: sm.RobotModel) -> None:
-    problem = dataclasses.replace(
-        sm.sample_problem(), relaxations=[sm.Relaxation("y", 0.05)], constraints=()
-    )
+    free = sm.sample_problem(null_motion=sm.FreeNullMotion())
+    problem = dataclasses.replace(free, relaxations=[sm.Relaxation("y", 0.05)], constraints=())
     plan = sm.plan(problem)
     exact = sm.plan(dataclasses.replace(problem, relaxations=()))
     assert plan.certificate.verified, plan.certificate.verdict
@@ -205,3 +204,10 @@ def test_a_part_before_a_window_has_none_of_its_joints(panda: sm.RobotModel) -> 
     np.testing.assert_array_equal(first, start)
     assert guide is not None
     np.testing.assert_array_equal(guide(np.zeros(2)), np.ones((2, 7)))
+
+
+def test_the_published_method_knows_no_tolerances() -> None:
+    """Nothing would keep the tool within its band: said at once."""
+    problem = dataclasses.replace(sm.sample_problem(), relaxations=[sm.Relaxation("y", 0.05)])
+    with pytest.raises(sm.ProblemError, match=r"relaxations: .* leave null_motion out"):
+        sm.plan(problem)

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.basics import Array
-from selfmotion.engine import Counts
+from selfmotion.basics import Array, Counts
 from selfmotion.optimise import QuasiNewton
 from selfmotion.planning import rough as rough_motions
 from selfmotion.planning.effort import Effort

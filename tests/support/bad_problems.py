@@ -162,13 +162,6 @@ def setting_rows() -> list[Row]:
             space=spaces,
         ),
         *bad_values_of(
-            "Null motions",
-            "RefinedNullMotion",
-            sm.RefinedNullMotion,
-            gain=POSITIVE,
-            most={"7": 7, "'8'": "8", "0": 0, "128": 128},
-        ),
-        *bad_values_of(
             "Relaxations",
             "Relaxation",
             lambda **g: sm.Relaxation(**{"rows": "z", **g}),

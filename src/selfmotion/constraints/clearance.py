@@ -195,7 +195,7 @@ class BoundClearance:
 
     def tangents(self, samples: Samples, motion: NodeTangents) -> Array:
         """See `BoundConstraint.tangents`."""
-        return _Pull(self._clearances(samples)).tangents_of(motion)
+        return _Pull(self._clearances(samples)).all(motion)
 
     def linearised_at(self, samples: Samples) -> tuple[tuple[int, int], "_Pull"]:
         """See `linearised`."""
@@ -240,8 +240,8 @@ class _Pull:
 
     clearances: Clearances
 
-    def tangents_of(self, motion: NodeTangents) -> Array:
-        """See `Linear.tangents_of`."""
+    def all(self, motion: NodeTangents) -> Array:
+        """Return the entries of all rows and columns."""
         return self.clearances.along(-self._moved(motion) / _METRE)
 
     def picked(self, motion: NodeTangents, rows: Ints, columns: Ints) -> Array:

@@ -36,10 +36,6 @@ class NodeTangents:
         """The number d of variables."""
         return int(self.q.shape[2])
 
-    def along(self, p: Array) -> "NodeTangents":
-        """Return the tangents by one variable, the length along p (d,)."""
-        return NodeTangents((self.q @ p)[:, :, None], (self.qd @ p)[:, :, None], self.sampling)
-
     def picked(self, order: int, nodes: Ints, joints: Ints) -> Array:
         """Return the tangents of some of the joints at some of the nodes (k,), (k, d)."""
         if order < 2:
@@ -91,11 +87,8 @@ class BoundConstraint(Protocol):
 class Linear(Protocol):
     """How conditions change with the motion of the nodes, at one motion."""
 
-    def tangents_of(self, motion: NodeTangents) -> Array:
-        """Return what `BoundConstraint.tangents` does."""
-
     def picked(self, motion: NodeTangents, rows: Ints, columns: Ints) -> Array:
-        """Return its entries for some rows and columns of h, (k,) each: (k, d)."""
+        """Return the tangents of some rows and columns of h, (k,) each: (k, d)."""
 
 
 class Linearised:
@@ -115,11 +108,6 @@ class Linearised:
     def count(self) -> int:
         """Number C of conditions."""
         return self._shape[0] * self._shape[1]
-
-    def along(self, p: Array, motion: NodeTangents) -> Array:
-        """Return the derivatives (C,) along p (d,), of which `motion` are the tangents."""
-        known = self._known
-        return known @ p if isinstance(known, np.ndarray) else known.tangents_of(motion).ravel()
 
     def picked(self, motion: NodeTangents, which: Ints) -> Array:
         """Return the rows (k, d) of some conditions (k,)."""

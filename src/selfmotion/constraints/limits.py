@@ -247,16 +247,12 @@ class BoundLimits:
 
     def tangents(self, samples: Samples, motion: NodeTangents) -> Array:
         """See `BoundConstraint.tangents`."""
-        return self.tangents_of(motion)
+        above = motion.of_order(self.order)[:, self.joints] / self.scale[:, None]
+        return np.concatenate([above, -above], axis=1)
 
     def linearised_at(self, samples: Samples) -> tuple[tuple[int, int], "BoundLimits"]:
         """See `linearised`."""
         return (len(samples.nodes), 2 * len(self.joints)), self
-
-    def tangents_of(self, motion: NodeTangents) -> Array:
-        """See `Linear.tangents_of`."""
-        above = motion.of_order(self.order)[:, self.joints] / self.scale[:, None]
-        return np.concatenate([above, -above], axis=1)
 
     def picked(self, motion: NodeTangents, rows: Ints, columns: Ints) -> Array:
         """See `Linear.picked`."""

@@ -6,6 +6,7 @@ from selfmotion.costs.base import (
     Partials as Partials,
     weight_matrix as weight_matrix,
 )
+from selfmotion.costs.beyond_limits import BeyondLimits as BeyondLimits
 from selfmotion.costs.dynamics import (
     GravityTorque as GravityTorque,
     KineticEnergy as KineticEnergy,

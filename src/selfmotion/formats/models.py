@@ -47,7 +47,7 @@ from selfmotion.task import SE3, Damping, Relaxation, Task
 
 # Kinds that no file names: what is missing of a plan, a cost that damping adds, functions (which
 # are named by module:attribute).
-_NOT_IN_FILES = {"LostCost", "OffPath", "FunctionCost"}
+_NOT_IN_FILES = {"LostCost", "OffPath", "BeyondLimits", "FunctionCost"}
 _STRICT = ConfigDict(extra="forbid", protected_namespaces=())
 _PLAIN = {bool: Flag, int: Whole, float: Number, str: Text, SE3: Pose}
 

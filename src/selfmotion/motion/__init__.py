@@ -14,7 +14,6 @@ from selfmotion.motion.null_motion import (
     NodeNullMotion as NodeNullMotion,
     NullMotion as NullMotion,
     PolynomialNullMotion as PolynomialNullMotion,
-    RefinedNullMotion as RefinedNullMotion,
 )
 from selfmotion.motion.null_motion_table import NullMotionTable as NullMotionTable
 from selfmotion.motion.sampling import Sampling as Sampling

@@ -2,7 +2,7 @@
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from numpy.polynomial import legendre
@@ -12,17 +12,12 @@ from selfmotion.basics import (
     ProblemError,
     Saved,
     as_choice,
-    as_number,
     as_numbers,
     as_whole,
     shown,
 )
 from selfmotion.motion.windows import resting_window
 
-# Intervals of a spline that is worth its while.
-_FEWEST = 8
-# With more coefficients than this quadratic programmes take seconds.
-_MOST_COEFFICIENTS = 110
 # Polynomials of higher degree than this resolve nothing more and take minutes.
 _HIGHEST = 100
 # So do splines of more intervals.
@@ -38,32 +33,9 @@ class NullMotion(Saved, ABC, family="null motion"):
     ----------
     space : {"null", "joint"}
         ``"null"``: E is (r, K) in a null-space basis; ``"joint"``: E is (n, K), R = I.
-    gain : float
-        Share of the cost that `finer` functions have to save to be worth their while.
     """
 
     space: str = "null"
-    gain: ClassVar[float] = np.inf
-
-    def finer(self, intervals: int, rows: int, rests: bool = False) -> "NullMotion":
-        """Return what to go on with where so many `intervals` pay: by default the same.
-
-        `rows` is r, or n where `space` is "joint"; `rests` says whether the arm begins or ends at
-        rest.
-        """
-        return self
-
-    def detours(self, rows: int) -> tuple["NullMotion", ...]:
-        """Return others to try in turn where conditions cannot be met from x = 0: by default none.
-
-        With too few functions there may be no such motion, with many small steps may get stuck.
-        """
-        return ()
-
-    @property
-    def rough(self) -> "NullMotion":
-        """One of far fewer functions, near whose optimum its own is: by default the same."""
-        return self
 
     @property
     @abstractmethod
@@ -151,16 +123,6 @@ class BSplineNullMotion(NullMotion):
         as_whole(self.intervals, "null motion: intervals", 1, _MOST_INTERVALS)
 
     @property
-    def rough(self) -> "BSplineNullMotion":
-        """See `NullMotion.rough`: of eight intervals, where it has twice as many or more."""
-        few = self.intervals < 2 * _FEWEST
-        return self if few else BSplineNullMotion(_FEWEST, max(self.degree, 3), self.space)
-
-    def detours(self, rows: int) -> tuple[NullMotion, ...]:
-        """See `NullMotion.detours`: one polynomial."""
-        return (PolynomialNullMotion(self.degree, self.space),) if self.intervals > 1 else ()
-
-    @property
     def fewest_steps(self) -> int:
         """See `NullMotion.fewest_steps`: four for each interval."""
         return 4 * self.intervals
@@ -175,29 +137,12 @@ class BSplineNullMotion(NullMotion):
 
 
 @dataclass(frozen=True)
-class RefinedNullMotion(NullMotion):
-    """ε(t) as a cubic to begin with, and as a B-spline where that lowers the cost enough.
+class FreeNullMotion(NullMotion):
+    """Any ε(t): the motion is optimised at nodes, as many as its cost asks for.
 
-    Parameters
-    ----------
-    gain : float
-        Share of the cost that may be left to save, as far as `Report.remaining` tells.
-    most : int, optional
-        Largest number of the spline's intervals: 8, 16, 32 or 64; fewer where the redundancy is
-        so large that they would have more than 110 coefficients. The more there are, the faster
-        an arm starts and stops where it rests, if its cost does not weigh accelerations: by
-        default 16 there, and 64 where it does not rest.
+    Newton's method finds where each node lies on its self-motion; `Report.null_motion` tells which
+    nodes. Where an optimiser of one's own or damping asks for the published method, it is a cubic.
     """
-
-    gain: float = 1e-3  # type: ignore[misc]  # fixed for other kinds
-    most: int | None = None
-
-    def __post_init__(self) -> None:
-        as_number(self.gain, "null motion: gain", above=0.0)
-        if self.most not in (None, _FEWEST, 16, 32, 64):
-            raise ProblemError(
-                f"null motion: most is {shown(self.most)}, expected 8, 16, 32, 64 or None"
-            )
 
     @property
     def fewest_steps(self) -> int:
@@ -207,28 +152,6 @@ class RefinedNullMotion(NullMotion):
     def functions(self, t: Array, duration: float) -> Array:
         """See `NullMotion.functions`: those of the cubic."""
         return PolynomialNullMotion().functions(t, duration)
-
-    def detours(self, rows: int) -> tuple[NullMotion, ...]:
-        """See `NullMotion.detours`: splines of more and more intervals."""
-        return tuple(dict.fromkeys(self.finer(count, rows) for count in (_FEWEST, 2 * _FEWEST)))
-
-    def finer(self, intervals: int, rows: int, rests: bool = False) -> "BSplineNullMotion":
-        """See `NullMotion.finer`: a spline that can be any cubic, of not too many coefficients."""
-        fewer = min(intervals, self.most or (16 if rests else 64))
-        while fewer > _FEWEST and rows * (fewer + 3) > _MOST_COEFFICIENTS:
-            fewer //= 2
-        return BSplineNullMotion(fewer)
-
-
-@dataclass(frozen=True)
-class FreeNullMotion(RefinedNullMotion):
-    """Any ε(t): the motion is optimised at nodes, as many as its cost asks for.
-
-    Newton's method finds where each node lies on its self-motion. Where that does not apply (the
-    tool may leave the path, joint jerks have a cost, the end is given, limits of acceleration bind
-    or bodies are too near), or leads nowhere, it is what `RefinedNullMotion` is.
-    `Report.null_motion` tells what became of it.
-    """
 
 
 @dataclass(frozen=True)

@@ -6,10 +6,9 @@ from functools import cached_property, partial
 
 import numpy as np
 
-from selfmotion.basics import Array, Flags, Ints, read_only
+from selfmotion.basics import Array, Counts, Flags, Ints, read_only
 from selfmotion.constraints import BoundConstraint, BoundEnd
 from selfmotion.costs import Partials
-from selfmotion.engine import Counts
 from selfmotion.motion import Trajectory
 from selfmotion.nodes.charts import Centred, Charts, Manifolds, Place
 from selfmotion.nodes.ends import NodeEnds

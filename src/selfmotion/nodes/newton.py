@@ -55,6 +55,9 @@ _PRICE = 10.0
 _SOLVED, _FALL, _POWER, _CENTRED = 10.0, 0.2, 1.5, 30.0
 # Rows are linear to this [units of h] before a barrier falls, and at the end.
 _ABOUT_MET, _MET = 1e-2, 1e-7
+# Prices are known where a step changes them by no more than this share of all; together they are no
+# less than this share of the cost. Between stiff rows a step promises little, whatever these say.
+_SETTLED, _NO_PRICE = 1e-2, 1e-4
 # Of a row that counts by less than this share of the barrier, the gap does not matter.
 _IDLE = 1e-2
 # What is asked of the ends is met to this [rad, rad/s].
@@ -198,6 +201,7 @@ class _Solver:
             self._begin_with(prices)
         self._penalty, self._promised, self._length, self._shift = 0.0, np.inf, 0.0, 0.0
         self._end_prices = np.zeros(begin.grid.ends.count)
+        self._changing = np.inf if self._prices.size else 0.0
 
     def _begin_with(self, prices: Array) -> None:
         """Begin with known prices of all rows, (R,)."""
@@ -207,6 +211,9 @@ class _Solver:
         slacks = np.maximum(-h, self._barrier / self._prices)
         self._elastics = np.maximum(h + slacks, 0.0) + self._barrier / (self._price - self._prices)
         self._slacks = np.maximum(slacks, self._elastics - h)
+        # Where prices are not those of the rows, as far off as they are.
+        off = float(np.mean(self._slacks * self._prices)) if len(h) else 0.0
+        self._barrier = min(max(self._barrier, off), _FIRST / _KNOWN_FIRST * self._barrier)
 
     @property
     def _h(self) -> Array:
@@ -259,7 +266,8 @@ class _Solver:
             if step is None:
                 return Status.GRADIENT
             last = not self._prices.size or self._barrier <= self._least
-            if last and self._is_there():
+            self._changing = self._share_of(step.prices)
+            if last and self._is_there() and self._changing <= _SETTLED:
                 self._end_prices = step.end_prices
                 return Status.CONVERGED
             if last or not self._is_solved():
@@ -299,11 +307,18 @@ class _Solver:
         promised = self._promised / self._size
         if not (self._length == 1.0 and promised <= _LITTLE and self._barrier <= self._least):
             return False
+        if self._changing > np.sqrt(_SETTLED):
+            return False
         before, self._promised = self._promised, promised**2 * self._size
         if self._is_there():
             return True
         self._promised = before
         return False
+
+    def _share_of(self, step: Array) -> float:
+        """Return how much of all prices a step changes them by."""
+        known = float(self._prices.sum()) + _NO_PRICE * self._size
+        return float(np.abs(step).sum()) / known
 
     def _is_there(self) -> bool:
         """Whether another step would promise nothing, and all is met."""
@@ -348,7 +363,8 @@ class _Solver:
             right = right + model.around.pulled(grid.spline.scattered(push))
             right.reshape(-1)[grid.held] = 0.0
             intervals = intervals + self._stiffness(model, stiff)
-        solved = self._solved(right, model.around.curvature, intervals, model.border)
+        bends = float(np.abs(model.around.curvature).max() + np.abs(model.intervals).max())
+        solved = self._solved(right, model.around.curvature, intervals, model.border, bends)
         if solved is None:
             return None
         step, end_prices = solved
@@ -372,9 +388,13 @@ class _Solver:
         return found if of_points is None else found + of_points
 
     def _solved(
-        self, right: Array, curved: Array, intervals: Array, border: Border
+        self, right: Array, curved: Array, intervals: Array, border: Border, bends: float
     ) -> tuple[Array, Array] | None:
-        """Return the step of the coordinates (N + 1, 3r), and the prices of the ends."""
+        """Return the step of the coordinates (N + 1, 3r), and the prices of the ends.
+
+        `bends` is the largest entry of what bends without stiff rows: beside their entries, what is
+        added to the diagonal would leave no step.
+        """
         count, size = right.shape
         largest = float(np.abs(curved).max() + np.abs(intervals).max())
         diagonals = np.abs(np.diagonal(intervals, axis1=1, axis2=2)).ravel()
@@ -393,7 +413,7 @@ class _Solver:
                     self._shift = shift
                     self._promised = float(-(right.ravel() + border.columns @ prices) @ step)
                     return step.reshape(count, size), prices
-            shift = max(_MORE * shift, _SHIFT * largest, _LESS * self._shift)
+            shift = max(_MORE * shift, _SHIFT * bends, _LESS * self._shift)
         return None
 
     def _move(self, model: _Model, step: _Change) -> Status | None:

@@ -3,14 +3,11 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
-from functools import cached_property
 from typing import Protocol
 
 import numpy as np
-import numpy.typing as npt
 
-from selfmotion.basics import Array, read_only
-from selfmotion.optimise.rows import Rows
+from selfmotion.basics import Array
 
 
 class Function(Protocol):
@@ -31,43 +28,6 @@ class Function(Protocol):
 
     def metric(self, x: Array) -> Array:
         """Return the Gauss-Newton matrix at x, (size, size): what is known of the Hessian."""
-
-
-@dataclass(frozen=True, eq=False)
-class Residuals:
-    """Conditions on x at one point: h ≤ 0, or h = 0 for equalities.
-
-    Attributes
-    ----------
-    h : (C,)
-    tolerance : (C,)
-        What h (|h| for an equality) may be and still count as kept.
-    equality : (C,) of bool
-    """
-
-    h: Array
-    tolerance: Array
-    equality: npt.NDArray[np.bool_]
-
-    @cached_property
-    def excess(self) -> Array:
-        """How far each is violated, in multiples of its tolerance; ≤ 0 where it is kept, (C,)."""
-        return np.asarray(np.where(self.equality, np.abs(self.h), self.h) / self.tolerance)
-
-    @cached_property
-    def worst(self) -> float:
-        """The largest violation in multiples of its tolerance; kept where ≤ 1."""
-        return float(np.max(self.excess, initial=0.0))
-
-
-class ConstrainedFunction(Function, Protocol):
-    """What is minimised, and conditions on it."""
-
-    def conditions(self, x: Array) -> Residuals:
-        """Return h(x), where F is finite."""
-
-    def condition_rows(self, x: Array) -> Rows:
-        """Return ∂h/∂x of C conditions."""
 
 
 class Status(Enum):
@@ -156,9 +116,6 @@ class Minimum:
         The last estimate.
     history : tuple of Iteration
     status : Status
-    multipliers : (C,)
-        λ of the conditions, where there are some: ∇F + Σ λ ∇h = 0, so that F falls by λ for each
-        unit that h may be larger.
     """
 
     x: Array
@@ -166,10 +123,6 @@ class Minimum:
     inverse_hessian: Array
     history: tuple[Iteration, ...]
     status: Status
-    multipliers: Array = ()  # type: ignore[assignment]  # made an array below
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "multipliers", read_only(self.multipliers))
 
 
 class Optimizer(Protocol):

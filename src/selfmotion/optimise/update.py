@@ -1,11 +1,8 @@
-"""What a step teaches of the Hessian: Broyden's family, Fletcher's switch, Powell's damping."""
+"""What a step teaches of the Hessian: Broyden's family, Fletcher's switch."""
 
 import numpy as np
 
 from selfmotion.basics import Array
-
-# Powell's damping: sᵀy is at least this share of sᵀBs.
-_DAMPING = 0.2
 
 
 def renewed(h: Array, s: Array, y: Array, update: str) -> tuple[Array, str]:
@@ -26,17 +23,3 @@ def renewed(h: Array, s: Array, y: Array, update: str) -> tuple[Array, str]:
         v = s / sy - hy / yhy
         h = h + yhy * np.outer(v, v)
     return h, update
-
-
-def damped(y: Array, s: Array, hessian: Array) -> Array:
-    """Return y moved towards Bs so that its curvature along s is a share of that of B at least.
-
-    M. J. D. Powell, "A fast algorithm for nonlinearly constrained optimization calculations", 1978:
-    the Hessian of a Lagrangian need not be positive along s.
-    """
-    bent = hessian @ s
-    curvature, found = float(s @ bent), float(s @ y)
-    if found >= _DAMPING * curvature:
-        return y
-    share = (1.0 - _DAMPING) * curvature / (curvature - found)
-    return np.asarray(share * y + (1.0 - share) * bent)

@@ -184,6 +184,13 @@ class Solution:
             found = replace(found, status=Status.INTERRUPTED)
         return found
 
+    def settled(self) -> "Solution":
+        """Return the optimum on its grid, and on halved ones until the cost agrees."""
+        try:
+            return _settled(self._on(self.objective).again())
+        except KeyboardInterrupt:
+            return replace(self, status=Status.INTERRUPTED)
+
     @property
     def _eliminates(self) -> bool:
         return len(self.method.ends) > 0 and len(self.x) > 0
@@ -271,12 +278,7 @@ def solve(
     x = np.zeros(objective.size)
     if x0 is not None and np.isfinite(objective.value(x0)):
         x = np.array(x0, dtype=np.float64)
-    found = Solution(method, objective, x)
-    try:
-        found = found._on(objective).again()
-        return _settled(found)
-    except KeyboardInterrupt:
-        return replace(found, status=Status.INTERRUPTED)
+    return Solution(method, objective, x).settled()
 
 
 def _settled(found: Solution) -> Solution:

@@ -3,17 +3,22 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from selfmotion.basics import Array
-from selfmotion.constraints import BoundConstraint
-from selfmotion.engine import (
+import numpy as np
+
+from selfmotion.basics import Array, ProblemError
+from selfmotion.constraints import BoundConstraint, BoundEnd
+from selfmotion.motion import FreeNullMotion, Grid, PolynomialNullMotion
+from selfmotion.paper import (
     MOST_HALVINGS,
     Guide,
+    Method,
     Objective,
+    Solution,
     StillMotion,
     settled_still_motion,
 )
-from selfmotion.motion import Grid, NullMotion
 from selfmotion.planning.effort import Effort
+from selfmotion.planning.for_nodes import is_published
 from selfmotion.problem import Problem
 
 
@@ -73,6 +78,7 @@ class Beginning:
         still, jacobians = settled_still_motion(problem, configuration, guide, grid)
         effort.counts.jacobians += jacobians
         bound = problem.bind_constraints(configuration, still.end, apart=effort.apart)
+        _require_known(bound)
         return cls(problem, effort, still, tuple(bound), free)
 
     @property
@@ -80,26 +86,36 @@ class Beginning:
         """Steps beyond which a grid is not refined any more."""
         return int(self.still.grid.steps * 2**MOST_HALVINGS)
 
-    def first(self) -> Objective:
-        """Return the objective on the grid of x = 0, which takes over its rollout."""
-        return Objective.of(
-            self.problem,
+    @property
+    def ends(self) -> tuple[BoundConstraint, ...]:
+        """What is asked of the ends alone."""
+        return tuple(item for item in self.constraints if item.equality)
+
+    def solution(self) -> Solution:
+        """Return the motion at x = 0 as what the published method begins with."""
+        effort, ends, problem = self.effort, self.ends, self.problem
+        if isinstance(problem.null_motion, FreeNullMotion) and is_published(problem, effort):
+            problem = problem.changed(null_motion=PolynomialNullMotion())
+        objective = Objective.of(
+            problem,
             self.still,
             free=self.free,
-            counts=self.effort.counts,
+            ends=ends,
+            counts=effort.counts,
             rollout=self.still.rollout,
         )
-
-    def objective(
-        self, grid: Grid, null_motion: NullMotion, around: Array | None = None
-    ) -> Objective:
-        """Return the objective on a grid, of a null motion around a given one, `around` (S, n)."""
-        return Objective.of(
-            self.problem,
-            self.still,
-            grid=grid,
-            free=self.free,
-            counts=self.effort.counts,
-            null_motion=null_motion,
-            around=around,
+        method = Method(
+            problem, self.still, self.free, ends, effort.optimizer, effort.counts, None, None
         )
+        return Solution(method, objective, np.zeros(objective.size))
+
+
+def _require_known(constraints: Sequence[BoundConstraint]) -> None:
+    """Raise ProblemError for equalities that are none on the ends."""
+    for item in constraints:
+        if item.equality and not isinstance(item, BoundEnd):
+            raise ProblemError(
+                f"constraint '{item.name}': it is an equality, expected h ≤ 0 at all nodes; "
+                f"equalities are asked of the ends alone (ClosedPath, EndConfiguration, …), and "
+                f"others are two-sided bands"
+            )

@@ -3,8 +3,7 @@
 import time
 from dataclasses import dataclass
 
-from selfmotion.basics import Progress, obey_interruption
-from selfmotion.engine import Counts
+from selfmotion.basics import Counts, Progress, obey_interruption
 
 
 @dataclass

@@ -8,9 +8,9 @@ import numpy as np
 
 from selfmotion.basics import Array, BreakdownError, Progress, SelfmotionError
 from selfmotion.certificate import Tolerance
-from selfmotion.engine import Guide
 from selfmotion.motion import Grid, Trajectory
 from selfmotion.optimise import Status
+from selfmotion.paper import Guide
 from selfmotion.planning.beginning import Beginning
 from selfmotion.planning.effort import Effort
 from selfmotion.planning.finish import finish

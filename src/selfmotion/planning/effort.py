@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from selfmotion.engine import Counts
+from selfmotion.basics import Counts
 from selfmotion.optimise import Callback, Optimizer
 
 

@@ -6,9 +6,9 @@ import numpy as np
 
 from selfmotion.basics import Progress
 from selfmotion.certificate import LIMIT_NAMES, Certificate, Tolerance
-from selfmotion.engine import MOST_HALVINGS, Evaluation
-from selfmotion.motion import Trajectory
+from selfmotion.motion import Evaluation, Trajectory
 from selfmotion.optimise import Status
+from selfmotion.paper import MOST_HALVINGS
 from selfmotion.planning.largest_part import LargestPart
 from selfmotion.planning.session import Session
 from selfmotion.planning.settings import FALLS, FINER, RESOLVED, ROUGH_GRIDS

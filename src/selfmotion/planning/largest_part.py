@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from selfmotion.basics import Array, BreakdownError
-from selfmotion.engine import Evaluation, Guide, StillMotion
-from selfmotion.motion import Grid, Sampling
+from selfmotion.motion import Evaluation, Grid, Sampling
 from selfmotion.optimise import Status
+from selfmotion.paper import Guide, StillMotion
 from selfmotion.path import Section
 from selfmotion.planning.beginning import Beginning
 from selfmotion.planning.effort import Effort

@@ -1,6 +1,7 @@
 """The best motion near others, by Newton's method on the nodes, and how fine it has to be."""
 
 from collections.abc import Iterator, Sequence
+from functools import partial
 
 import numpy as np
 
@@ -21,6 +22,7 @@ from selfmotion.planning.settings import (
     NEAR_PATH,
     NODE_ROUNDS,
     TOWARDS_MIDDLE,
+    UNKEPT,
     WANTED_NEAR_PATH,
 )
 from selfmotion.problem import Problem
@@ -135,22 +137,23 @@ class NodeDescent:
         return minimise(alone, self._noted, roughly=True).motion
 
     def _other(self, begun: NodeMotion, first: Optimum, free: NodeMotion | None) -> Optimum:
-        """Return the best of the optima from other beginnings, and the first."""
-        best = first
-        for begin in self._beginnings(begun, free):
+        """Return the best of the optima from other beginnings, the first, and the free one."""
+        open_one = begun.grid.at((free or self._freely(begun)).centred)
+        ends, none = begun.grid.ends.count, np.zeros(len(open_one.h))
+        unbound = Optimum(open_one, none, Status.INFEASIBLE, np.inf, np.zeros(ends))
+        rank = partial(_rank, usual=abs(begun.aim))
+        best = min(first, unbound, key=rank)
+        for begin in (open_one, *self._beginnings(begun)):
             if begin is not None:
                 found = minimise(begin, self._told, roughly=True, most=FEWER)
-                best = min(best, found, key=_rank)
+                best = min(best, found, key=rank)
             if self._ended is not None or _is_kept(best.motion):
                 break
         return best
 
-    def _beginnings(
-        self, begun: NodeMotion, free: NodeMotion | None
-    ) -> Iterator[NodeMotion | None]:
-        """Yield the free optimum, and motions that go towards the middle of the limits."""
+    def _beginnings(self, begun: NodeMotion) -> Iterator[NodeMotion | None]:
+        """Yield motions that go towards the middle of the limits."""
         grid = begun.grid
-        yield grid.at((free or self._freely(begun)).centred)
         if self._free:
             return
         robot, start = self._problem.robot, begun.place.q[0]
@@ -193,6 +196,10 @@ class NodeDescent:
             found = self.again(finer or standing, roughly=not polishes)
             if found is None:
                 break
+            if not found.has_arrived and self._ended is None:
+                # More nodes lead nowhere, and prices on the way say nothing.
+                found = None if polishes else self.again(standing)
+                return found if found is not None and found.has_arrived else standing
             standing, is_rough = found.after(standing.cost), not polishes
         return standing
 
@@ -254,11 +261,16 @@ def _is_kept(motion: NodeMotion) -> bool:
     return bool(motion.violation <= 0.0 and np.abs(motion.c).max(initial=0.0) <= ENDS_MET)
 
 
-def _rank(optimum: Optimum) -> tuple[bool, float]:
-    """Return what sorts optima, the smaller the better: of broken ones by how much."""
-    if _is_kept(optimum.motion):
-        return False, optimum.motion.aim
-    return True, optimum.motion.violation
+def _rank(optimum: Optimum, usual: float) -> tuple[bool, float]:
+    """Return what sorts optima, the smaller the better.
+
+    What is broken counts as so many times what is `usual` for the cost: where nothing can be kept,
+    not at any price.
+    """
+    motion = optimum.motion
+    broken = not _is_kept(motion)
+    unmet = motion.violation + float(np.abs(motion.c).max(initial=0.0))
+    return broken, motion.aim + (UNKEPT * usual * unmet if broken else 0.0)
 
 
 def _aim_of(motion: NodeMotion) -> float:

@@ -7,8 +7,7 @@ import numpy as np
 
 from selfmotion.basics import Array, Flags
 from selfmotion.constraints import Binding, Priced, active_of, penalty, violated
-from selfmotion.engine import Evaluation
-from selfmotion.motion import Grid, NodeNullMotion, NullMotion
+from selfmotion.motion import Evaluation, Grid, NodeNullMotion, NullMotion
 from selfmotion.nodes import NodeMotion, Optimum
 from selfmotion.optimise import Status
 from selfmotion.planning.settings import ENDS_MET, LEAST_SAVING
@@ -57,6 +56,11 @@ class MotionOnNodes:
     def active(self) -> tuple[Binding, ...]:
         """What kept the optimum from a lower cost."""
         return () if self.optimum is None else _binding(self.optimum)
+
+    @property
+    def has_arrived(self) -> bool:
+        """Whether it is an optimum, and no motion on the way to one."""
+        return self.optimum is None or self.optimum.status in (Status.CONVERGED, Status.PRECISION)
 
     @property
     def steps(self) -> int:

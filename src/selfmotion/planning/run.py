@@ -22,6 +22,7 @@ from selfmotion.planning.attempts import go_through
 from selfmotion.planning.deadline import Deadline, TimedCounts
 from selfmotion.planning.draft import Draft
 from selfmotion.planning.effort import Effort
+from selfmotion.planning.for_nodes import is_published
 from selfmotion.planning.gather import gathered
 from selfmotion.planning.known import Known
 from selfmotion.planning.search import Search
@@ -50,8 +51,10 @@ def plan(
     ----------
     problem : Problem
     optimizer : Optimizer, optional
-        By default `QuasiNewton`. It minimises the cost as long as constraints are kept; where
-        they begin to count, `SequentialQuadratic` goes on.
+        Minimises by the published method: over the coefficients of the problem's null motion, a
+        cubic by default, with nothing asked but given ends and closure. By default Newton's method
+        on nodes keeps all constraints, and `QuasiNewton` serves where a null motion or damping
+        asks for the published method.
     search : Search, optional
         How to search where the start is free, and whether to compare with a global search.
     warm_start : Plan, optional
@@ -113,6 +116,11 @@ def plan(
         max_evaluations = DAMPED_EVALUATIONS
     counts = TimedCounts(deadline=clock)
     effort = Effort(optimizer or QuasiNewton(), callback, max_evaluations, counts)
+    if problem.relaxations and is_published(problem, effort):
+        raise ProblemError(
+            "relaxations: the published method keeps nothing but given ends, so that the tool "
+            "would leave its tolerances; leave null_motion out, optimizer and damping too"
+        )
     search, problem = search or Search(), problem.augmented
     if warm_start is not None:
         known = problem.with_own(warm_start.trajectory, warm_start.path)

@@ -1,21 +1,20 @@
 """One start of one problem, optimised: what stands, and how it becomes better."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
-from selfmotion.basics import Flags
-from selfmotion.engine import Counts, Evaluation
-from selfmotion.motion import Trajectory
+from selfmotion.basics import Array, Counts, Flags
+from selfmotion.motion import Evaluation, Trajectory
 from selfmotion.optimise import Iteration, Status
 from selfmotion.planning.along_chain import along_chain
 from selfmotion.planning.beginning import Beginning
 from selfmotion.planning.for_nodes import first_nodes, is_on_nodes, is_published, most_nodes
 from selfmotion.planning.nodes import NodeDescent
 from selfmotion.planning.on_nodes import MotionOnNodes
-from selfmotion.planning.published import minimised, settled
 from selfmotion.planning.standing import PaperMotion, Standing, score
-from selfmotion.planning.warm_start import pace_of, slower
+from selfmotion.planning.warm_start import coefficients_of, pace_of, slower
 from selfmotion.result import Plan
 from selfmotion.search import SequenceGuide
 
@@ -38,7 +37,7 @@ class Session:
     """
 
     def __init__(self, beginning: Beginning) -> None:
-        self.still = PaperMotion.still(beginning)
+        self.still = PaperMotion(beginning, beginning.solution())
         self.history: list[Iteration] = []
         self.is_hopeless = False
         self._found: Standing | None = None
@@ -92,7 +91,8 @@ class Session:
     def still_evaluation(self) -> Evaluation:
         """Return the motion at x = 0, on the grid of what stands where it has one."""
         found = self._found
-        return (found if isinstance(found, PaperMotion) else self.still).still_evaluation()
+        known = found if isinstance(found, PaperMotion) else self.still
+        return known.solution.still_evaluation()
 
     def merit(self) -> float:
         """Return the cost, much larger where constraints are violated: for ranking."""
@@ -135,21 +135,17 @@ class Session:
         if self._ended is not None or self.of_chain:
             return
         if not np.isfinite(self.still.cost):
-            self.still.objective.require_finite(self.still.x)
+            self.still.solution.objective.require_finite(self.still.solution.x)
         if is_published(start.problem, start.effort):
             self._take_published()
         elif is_on_nodes(start.problem, start.effort):
             self._take_nodes(dearest)
 
     def settle(self) -> None:
-        """Go on until finer grids or more nodes save nothing."""
+        """Go on until more nodes save nothing; the published method has done so on its grids."""
         found = self._found
-        if self._ended is not None or self.of_chain:
-            return
-        if isinstance(found, MotionOnNodes):
+        if self._ended is None and isinstance(found, MotionOnNodes) and not found.is_chain:
             self._by_nodes(lambda descent: descent.settled(found))
-        elif isinstance(found, PaperMotion):
-            self._found = settled(found, self.history)
 
     def refine(self, where: Flags | None = None) -> None:
         """Go on with half the step length, everywhere or for some of the steps (N,)."""
@@ -159,12 +155,31 @@ class Session:
             self._found = self._found.refined(where)
 
     def _take_published(self) -> None:
-        """Go to the minimum near the motion by the published method."""
-        found = self._found if isinstance(self._found, PaperMotion) else self.still
-        if self._warm is not None:
-            warm, self._warm = self._warm, None
-            found = found.begun_at(warm)
-        self._found = minimised(found, self.history)
+        """Go to the optimum of the published method."""
+        effort, before = self.beginning.effort, self._found
+        if isinstance(before, PaperMotion):
+            solution = before.solution.again()
+        else:
+            begun, most = self.still.solution, effort.max_evaluations
+            limit = None if most is None else effort.counts.evaluations + most
+            method = replace(begun.method, limit=limit, callback=effort.callback)
+            solution = replace(begun, method=method, x=self._first_coefficients()).settled()
+        self._found = PaperMotion(self.beginning, solution)
+        self.history = list(solution.history)
+        if solution.status is Status.INTERRUPTED:
+            self.end(Status.INTERRUPTED)
+
+    def _first_coefficients(self) -> Array:
+        """Return the decision vector that is nearest to a known plan, if no worse than x = 0."""
+        plan, problem = self._warm, self.beginning.problem
+        objective, none = self.still.solution.objective, self.still.solution.x
+        if plan is None:
+            return none
+        t, pace = objective.grid.stage_times, pace_of(plan, problem)
+        near = coefficients_of(plan.trajectory, pace, problem, t, objective.null_motion)
+        z, _ = objective.parts(none)
+        x = np.concatenate([z, near])
+        return x if objective.value(x) <= self.still.cost else none
 
     def _take_nodes(self, dearest: float) -> None:
         """Go to the optimum on nodes near the motion."""
@@ -187,7 +202,7 @@ class Session:
         self._by_nodes(optimum)
         if self.status is Status.GRADIENT:
             # A gradient that is not finite is named with its time.
-            self.still.objective.gradient(self.still.x)
+            self.still.solution.objective.gradient(self.still.solution.x)
 
     def _by_nodes(self, search: Callable[[NodeDescent], MotionOnNodes | None]) -> None:
         """Let what is found on nodes be what stands, if something is."""

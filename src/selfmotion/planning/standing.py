@@ -6,14 +6,13 @@ from typing import Protocol
 
 import numpy as np
 
-from selfmotion.basics import Array, Flags
+from selfmotion.basics import Array, BreakdownError, Flags
 from selfmotion.constraints import Binding, penalty, violated
-from selfmotion.engine import Evaluation, Objective
-from selfmotion.motion import NodeNullMotion, NullMotion
-from selfmotion.optimise import Minimum, Status
+from selfmotion.costs import Samples
+from selfmotion.motion import Evaluation, NullMotion
+from selfmotion.optimise import Status
+from selfmotion.paper import Solution
 from selfmotion.planning.beginning import Beginning
-from selfmotion.planning.warm_start import coefficients_of, pace_of
-from selfmotion.result import Plan
 
 
 class Standing(Protocol):
@@ -85,33 +84,17 @@ class PaperMotion:
     ----------
     beginning : Beginning
         The start that it begins at.
-    objective : Objective
-        On its grid.
-    x : (size,)
-        The decision vector.
-    null_motion : NullMotion
-    minimum : Minimum or None
-        How the last minimisation ended; None before the first.
+    solution : Solution
     """
 
     beginning: Beginning
-    objective: Objective
-    x: Array
-    null_motion: NullMotion
-    minimum: Minimum | None = None
-
-    @classmethod
-    def still(cls, beginning: Beginning) -> "PaperMotion":
-        """Return the motion at x = 0."""
-        objective = beginning.first()
-        x = np.zeros(objective.size)
-        return cls(beginning, objective, x, beginning.problem.null_motion)
+    solution: Solution
 
     @property
     def status(self) -> Status:
-        """How the last minimisation ended."""
-        if self.minimum is not None:
-            return self.minimum.status
+        """How the optimisation ended."""
+        if self.solution.history:
+            return self.solution.status
         # Without self-motion it is the only one; else nothing better was found.
         free = self.beginning.problem.follows.redundancy > 0
         return Status.INFEASIBLE if free else Status.CONVERGED
@@ -119,7 +102,7 @@ class PaperMotion:
     @cached_property
     def violations(self) -> tuple[str, ...]:
         """See `Standing.violations`."""
-        return violated(self.beginning.constraints, self.objective.samples(self.x))
+        return violated(self.beginning.constraints, self._samples)
 
     @property
     def active(self) -> tuple[Binding, ...]:
@@ -131,63 +114,51 @@ class PaperMotion:
         """Not known."""
 
     @property
+    def null_motion(self) -> NullMotion:
+        """See `Standing.null_motion`."""
+        return self.solution.null_motion
+
+    @property
     def coefficients(self) -> Array:
-        """The null motion's coefficients."""
-        return self.objective.parts(self.x)[1].copy()
+        """See `Standing.coefficients`."""
+        return self.solution.coefficients
 
     @property
     def steps(self) -> int:
-        """Of its grid."""
-        return self.objective.grid.steps
-
-    @property
-    def nodes(self) -> Array:
-        """The motion at the nodes of its grid, (N + 1, n)."""
-        samples = self.objective.samples(self.x)
-        return np.array(samples.q[self.objective.grid.node_stages])
+        """See `Standing.steps`."""
+        return self.solution.steps
 
     @property
     def cost(self) -> float:
         """F."""
-        return sum(self.objective.terms(self.x).values())
+        return self.solution.cost
 
     @cached_property
     def keeps_off_itself(self) -> bool:
-        """Whether the arm does where only the default asks it to, at the nodes and by meshes."""
-        return self.beginning.problem.keeps_off_itself(self.nodes)
+        """See `Standing.keeps_off_itself`."""
+        return self.beginning.problem.keeps_off_itself(self.solution.nodes)
+
+    @property
+    def _samples(self) -> Samples:
+        return self.solution.objective.samples(self.solution.x)
 
     def merit(self) -> float:
         """See `Standing.merit`."""
-        cost = self.objective.value(self.x)
-        if not np.isfinite(cost):
-            return cost
-        over = penalty(self.beginning.constraints, self.objective.samples(self.x))
-        return cost + max(abs(cost), 1e-3) * over
+        if not np.isfinite(self.cost):
+            return np.inf
+        over = penalty(self.beginning.constraints, self._samples)
+        return self.cost + max(abs(self.cost), 1e-3) * over
 
     def evaluation(self) -> Evaluation:
         """Return the motion with its costs."""
-        return self.objective.at(self.x)
-
-    def still_evaluation(self) -> Evaluation:
-        """Return the motion at x = 0 on this grid."""
-        return self.objective.at(np.zeros_like(self.x))
+        return self.solution.evaluation()
 
     def refined(self, where: Flags | None = None) -> "PaperMotion":
-        """Return it with half the step length, everywhere or for some of the steps (N,)."""
-        grid = self.objective.grid.halved(where)
-        return replace(self, objective=self.beginning.objective(grid, self.null_motion))
+        """Return it with half the step length, everywhere or for some of the steps (N,).
 
-    def begun_at(self, plan: Plan) -> "PaperMotion":
-        """Return the one whose null motion is that of a plan of such a problem, if no worse."""
-        motion, known = self.null_motion, plan.report.null_motion
-        if plan.problem.null_motion == motion and not isinstance(known, NodeNullMotion | None):
-            motion = known
-        grid = self.objective.grid.with_steps(max(motion.fewest_steps, plan.report.steps))
-        pace, t = pace_of(plan, self.beginning.problem), grid.stage_times
-        objective = self.beginning.objective(grid, motion)
-        table, problem = objective.null_motion, self.beginning.problem
-        x = coefficients_of(plan.trajectory, pace, problem, t, table)
-        z, _ = objective.parts(np.zeros(objective.size))
-        x = np.concatenate([z, x])
-        other = replace(self, x=x, objective=objective, null_motion=motion)
-        return other if other.merit() <= self.merit() else self
+        As it is where it breaks down on that grid.
+        """
+        try:
+            return replace(self, solution=self.solution.refined(where))
+        except BreakdownError:
+            return self

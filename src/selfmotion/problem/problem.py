@@ -30,7 +30,7 @@ from selfmotion.certificate import (
     errors_between,
 )
 from selfmotion.constraints import BoundConstraint, Clearance, Constraint, Envelope
-from selfmotion.costs import Cost, JointVelocity, OffPath
+from selfmotion.costs import BeyondLimits, Cost, JointVelocity, OffPath
 from selfmotion.follow import Follow, Follows
 from selfmotion.motion import NullMotion, Trajectory, fading_window
 from selfmotion.path import Path
@@ -52,6 +52,10 @@ from selfmotion.problem.rest import arm_rest_orders
 from selfmotion.problem.way import way_of
 from selfmotion.robot import RobotModel, mesh_digests
 from selfmotion.task import Damping, DampingLaw, Relaxation, Task, feedback_rate
+
+# Joints of a damped motion are held within their limits by springs of this stiffness, in shares of
+# a limit of speed or radians.
+_BEYOND_LIMITS = 1e4
 
 
 class _TaskField:
@@ -237,12 +241,14 @@ class Problem:
 
     @cached_property
     def all_costs(self) -> tuple[Cost, ...]:
-        """The costs, with that of being off the path where the problem is damped."""
+        """The costs; with those of being off the path and beyond limits where it is damped."""
         if self.damping is None or self.damping_law is None:
             return tuple(self.costs)
         rate = feedback_rate(self.path.duration)
         weight = self.damping.path_weight * (rate / self.damping_law.threshold) ** 2
-        return (*self.costs, OffPath(float(weight), self.follows.dimension))
+        asked = self.envelope
+        limits = BeyondLimits(_BEYOND_LIMITS, asked.lower, asked.upper, asked.speed)
+        return (*self.costs, OffPath(float(weight), self.follows.dimension), limits)
 
     @cached_property
     def own_collision(self) -> Clearance | None:

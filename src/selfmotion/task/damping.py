@@ -22,6 +22,10 @@ class Damping:
     1988) and S. Chiaverini, B. Siciliano and O. Egeland (IEEE Trans. Control Systems Technology 2,
     1994) have it.
 
+    A damped motion is optimised by the published method, which keeps no constraints but given ends:
+    a term "joint limits passed" of the cost keeps joints within limits of position and speed where
+    that can be. The certificate judges everything.
+
     All three parameters are relative to something of the arm's and the path's own, so that one
     default suits arms of any size.
 

@@ -86,16 +86,11 @@ def _known_on_demand(objective: Objective, bound: BoundConstraint, table: Array,
     rows, name = linearised(bound, objective.samples(x), motion), f"constraint '{bound.name}'"
     told = f"{name}: linearised_at() knows {rows.count} conditions, expected {len(table)}"
     require(rows.count == len(table), told)
-    ones, scale = np.ones(objective.size), max(1.0, float(np.abs(table).max(initial=0.0)))
-    for found, expected in (
-        (rows.picked(motion, np.arange(len(table))), table),
-        (rows.along(ones, motion.along(ones)), table @ ones),
-    ):
-        off = float(np.abs(found - expected).max(initial=0.0))
-        require(
-            off <= GRADIENT * scale,
-            f"{name}: linearised_at() is {off:.2e} off what tangents() says",
-        )
+    scale = max(1.0, float(np.abs(table).max(initial=0.0)))
+    found = rows.picked(motion, np.arange(len(table)))
+    off = float(np.abs(found - table).max(initial=0.0))
+    told = f"{name}: linearised_at() is {off:.2e} off what tangents() says"
+    require(off <= GRADIENT * scale, told)
 
 
 def _judges_alike(

@@ -1,4 +1,4 @@
-"""What the engine makes of constraints: one list of numbers, prices, words, and a penalty."""
+"""What is kept of constraints, in words and as one number; what binds; rows on demand."""
 
 from dataclasses import dataclass
 from types import SimpleNamespace
@@ -8,13 +8,18 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.basics import Array, ProblemError
-from selfmotion.constraints import NodeTangents
+from selfmotion.constraints import (
+    NodeTangents,
+    Priced,
+    active_of,
+    linearised,
+    penalty,
+    violated,
+)
 from selfmotion.costs import Samples
-from selfmotion.engine import Objective, StillMotion
-from selfmotion.engine.conditions import Conditions
-from selfmotion.engine.rollout import Rollout
 from selfmotion.follow import Follows
 from selfmotion.motion.grid import Grid
+from selfmotion.paper import Rollout
 from selfmotion.task import Task
 from selfmotion.testing import check_constraint
 from support.arms import robot_named, short_line, start_of
@@ -63,60 +68,44 @@ def table(grid: Grid, columns: int = 2) -> Array:
     return np.zeros((len(grid.nodes), columns))
 
 
-def test_conditions_stand_one_after_another(grid: Grid, samples: Samples) -> None:
-    first, second = Given("first", table(grid) - 2.0), Given("second", np.ones((1, 3)), True, 0.5)
-    both = Conditions([first, second], grid)
-    at = both.residuals(samples)
-    count = 2 * len(grid.nodes)
-    np.testing.assert_array_equal(at.h, [*[-2.0] * count, *[1.0] * 3])
-    np.testing.assert_array_equal(at.tolerance, [*[1e-3] * count, *[0.5] * 3])
-    np.testing.assert_array_equal(at.equality, [*[False] * count, *[True] * 3])
-    motion = NodeTangents(np.zeros((len(grid.nodes), 7, 4)), np.zeros((1, 7, 4)), grid.sampling)
-    rows, expected = both.rows(samples, motion), np.outer(at.h, [1.0, 2.0, 3.0, 4.0])
-    every = np.arange(len(at.h))
-    np.testing.assert_array_equal(rows.picked(every), expected)
-    np.testing.assert_array_equal(rows.picked(every[::-2]), expected[::-2])
-    np.testing.assert_array_equal(rows.along(np.array([1.0, 0.0, 0.0, -1.0])), -3.0 * at.h)
-    assert both.has_equalities
-    assert not Conditions([first], grid).has_equalities
-    none = Conditions([], grid)
-    assert none.residuals(samples).h.shape == (0,)
-    assert none.rows(samples, motion).picked(every[:0]).shape == (0, 4)
-    assert none.rows(samples, motion).along(np.ones(4)).shape == (0,)
-    assert none.penalty(samples) == 0.0
-
-
 @pytest.mark.parametrize("equality", [False, True])
 @pytest.mark.parametrize("size", [0.01, 0.02, -0.01, 1.0])
 def test_the_penalty_is_the_square_over_the_motion(
     grid: Grid, samples: Samples, size: float, equality: bool
 ) -> None:
     """10 ∫ Σ h² dt / 2e-3, but at most 10 for each constraint, whatever their number."""
-    violated = abs(size) if equality else max(size, 0.0)
+    beyond = abs(size) if equality else max(size, 0.0)
     h = table(grid)
     h[:, 1] = size
     # Nodes need not be evenly apart.
     uneven = np.array([0.0, 0.3, 0.4, DURATION])
     for nodes in (grid, Grid.aligned(uneven, 4)):
+        looked = SimpleNamespace(sampling=nodes.sampling)
         item = Given("it", np.resize(h, (len(nodes.nodes), 2)), equality)
-        expected = 10.0 * min(1.0, DURATION * violated**2 / 2e-3)
-        assert Conditions([item], nodes).penalty(samples) == pytest.approx(expected)
-        assert Conditions([item, item], nodes).penalty(samples) == pytest.approx(2.0 * expected)
+        expected = 10.0 * min(1.0, DURATION * beyond**2 / 2e-3)
+        assert penalty([item], looked) == pytest.approx(expected)
+        assert penalty([item, item], looked) == pytest.approx(2.0 * expected)
     end = Given("end", np.array([[size]]), equality)
-    expected = 10.0 * min(1.0, violated**2 / 2e-3)
-    assert Conditions([end], grid).penalty(samples) == pytest.approx(expected)
+    expected = 10.0 * min(1.0, beyond**2 / 2e-3)
+    assert penalty([], samples) == 0.0
+    assert penalty([end], samples) == pytest.approx(expected)
 
 
-def test_what_binds_is_priced_where_it_binds(grid: Grid, samples: Samples) -> None:
+def test_what_binds_is_priced_where_it_binds(grid: Grid) -> None:
     """Columns with the same words together, the most expensive first; one free node is no gap."""
     count, times = len(grid.nodes), grid.nodes
     prices = np.zeros((count, 4))
     prices[2:4, 0], prices[5, 2], prices[8:10, 2] = 1.0, 3.0, 1.0
     prices[1, 1] = 0.5
     limits, end = Given("limits", table(grid, 4)), Given("end", np.zeros((1, 2)), True)
-    both = Conditions([limits, end], grid)
-    multipliers = np.concatenate([prices.ravel(), [-20.0, 0.0]])
-    found = both.active(samples, multipliers, 0.25)
+    used = np.ones(prices.shape, dtype=np.bool_)
+    at_end = np.array([[-20.0, 0.0]])
+    both = [
+        Priced(limits, prices, times, used),
+        Priced(end, at_end, times[:1], np.ones((1, 2), dtype=np.bool_)),
+    ]
+    span = times[[0, -1]]
+    found = active_of(both, span, 0.25)
     assert [(item.constraint, item.easing) for item in found] == [
         ("end", "column 0"),
         ("limits", "column 0"),
@@ -126,8 +115,9 @@ def test_what_binds_is_priced_where_it_binds(grid: Grid, samples: Samples) -> No
     assert found[0].spans == ((times[0], times[-1]),)
     assert found[1].spans == ((times[2], times[5]), (times[8], times[9]))
     assert found[2].spans == ((times[1], times[1]),)
-    assert len(both.active(samples, multipliers, 0.26)) == 2
-    assert both.active(samples, np.zeros(len(multipliers)), 1e-9) == ()
+    assert len(active_of(both, span, 0.26)) == 2
+    free = [Priced(limits, 0.0 * prices, times, used)]
+    assert active_of(free, span, 1e-9) == ()
 
 
 @pytest.mark.parametrize("equality", [False, True])
@@ -138,37 +128,13 @@ def test_the_worst_place_is_told_of_what_is_not_kept(
     h[3, 1], h[5, 0] = 2.0, -3.0
     item = Given("it", h, equality)
     place = "row 5, column 0" if equality else "row 3, column 1"
-    assert Conditions([item], grid).violated(samples) == (f"it: {place}",)
+    assert violated([item], samples) == (f"it: {place}",)
     kept = Given("kept", np.full((2, 2), 1e-3), equality)
-    assert Conditions([kept], grid).violated(samples) == ()
+    assert violated([kept], samples) == ()
     beyond = Given("beyond", np.full((2, 2), 1.001e-3), equality)
     broken = Given("broken", np.array([[0.0, np.nan]]), equality)
-    told = Conditions([kept, beyond, broken], grid).violated(samples)
+    told = violated([kept, beyond, broken], samples)
     assert told == ("beyond: row 0, column 0", "broken: row 0, column 1")
-
-
-def test_a_free_start_is_a_variable_and_a_guide_stands_for_no_null_motion() -> None:
-    robot = robot_named("panda")
-    start = start_of(robot, "pose")
-    problem = sm.Problem(robot, short_line(robot, start), Task.POSE, start, rest=False)
-    steps = Grid.aligned(problem.knots, 12)
-    still = StillMotion.on(problem, start, steps)
-    given, free = (Objective.of(problem, still, free=free) for free in (False, True))
-    assert free.size == given.size + 1
-    zero = np.zeros(given.size)
-    np.testing.assert_array_equal(given.samples(zero).q[steps.node_stages], still.q)
-
-    def guide(t: Array) -> Array:
-        return np.tile(0.3 * np.eye(7)[0], (len(t), 1))
-
-    guided = StillMotion.on(problem, start, steps, guide)
-    assert np.abs(guided.q[-1] - still.q[-1]).max() > 1e-3
-    along = Objective.of(problem, guided)
-    np.testing.assert_array_equal(along.samples(zero).q[steps.node_stages], guided.q)
-    # What is given in its place counts instead.
-    around = np.zeros((len(steps.stage_times), 7))
-    back = Objective.of(problem, guided, around=around)
-    np.testing.assert_array_equal(back.samples(zero).q[steps.node_stages], still.q)
 
 
 @pytest.mark.parametrize(
@@ -176,7 +142,6 @@ def test_a_free_start_is_a_variable_and_a_guide_stands_for_no_null_motion() -> N
     [
         (lambda h, d: np.zeros((*h.shape, d - 1)), r"tangents\(\) has shape .* \(4,\) appended"),
         (lambda h, d: np.zeros(h.shape), r"tangents\(\) has shape \(13, 2\)"),
-        (lambda h, d: np.zeros((h.shape[0] - 1, h.shape[1], d)), "of 24 conditions, expected 26"),
     ],
 )
 def test_derivatives_of_another_shape_are_refused_by_name(
@@ -186,23 +151,18 @@ def test_derivatives_of_another_shape_are_refused_by_name(
         def tangents(self, samples: Samples, motion: NodeTangents) -> Array:
             return tangents(self.h, motion.size)
 
-    both = Conditions([Misshapen("mine", table(grid))], grid)
-    both.residuals(samples)
     motion = NodeTangents(np.zeros((13, 7, 4)), np.zeros((13, 7, 4)), grid.sampling)
     with pytest.raises(ProblemError, match=f"constraint 'mine': .*{message}"):
-        both.rows(samples, motion)
+        linearised(Misshapen("mine", table(grid)), samples, motion)
 
 
-@pytest.mark.parametrize("wrong", ["picked", "tangents_of"])
-def test_a_constraint_that_is_wrong_on_demand_does_not_pass(wrong: str) -> None:
+def test_a_constraint_that_is_wrong_on_demand_does_not_pass() -> None:
     """Its tangents are right, but not what programmes are solved with."""
 
     class Mine(sm.JointVelocityLimits):
         def bind(self, follows, start, end):
             own = super().bind(follows, start, end)
-            known = SimpleNamespace(picked=own.picked, tangents_of=own.tangents_of)
-            right = getattr(own, wrong)
-            setattr(known, wrong, lambda *given: -right(*given))
+            known = SimpleNamespace(picked=lambda *given: -own.picked(*given))
             asked = ("name", "equality", "tolerance", "residual", "tangents", "describe")
             bound = SimpleNamespace(**{name: getattr(own, name) for name in asked})
             bound.linearised_at = lambda samples: (own.linearised_at(samples)[0], known)

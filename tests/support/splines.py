@@ -1,0 +1,48 @@
+"""The best spline within limits, by SciPy's SLSQP on the coefficients: it knows no nodes."""
+
+import numpy as np
+from scipy.optimize import minimize
+
+import selfmotion as sm
+from selfmotion.basics import Array
+from selfmotion.motion import Grid
+from selfmotion.paper import Objective, StillMotion
+
+# Conditions that come this near to being broken by x = 0 are asked for.
+NEAR = -0.6
+
+
+def best_spline(problem: sm.Problem, intervals: int = 16, steps: int = 64) -> float:
+    """Return F of the best null motion of so many intervals that keeps its limits at all nodes."""
+    problem = problem.changed(null_motion=sm.BSplineNullMotion(intervals))
+    start = problem.given_start
+    assert start is not None
+    still = StillMotion.on(problem, start, Grid.aligned(problem.knots, steps))
+    objective = Objective.of(problem, still)
+    bound = problem.bind_constraints(still.start, still.end)
+    x0 = np.zeros(objective.size)
+    near = [np.flatnonzero(item.residual(objective.samples(x0)).ravel() > NEAR) for item in bound]
+
+    def kept(x: Array) -> Array:
+        samples = objective.samples(x)
+        rows = zip(bound, near, strict=True)
+        return -np.concatenate([item.residual(samples).ravel()[own] for item, own in rows])
+
+    def slopes(x: Array) -> Array:
+        samples, motion = objective.samples(x), objective.node_tangents(x)
+        rows = zip(bound, near, strict=True)
+        tables = (
+            item.tangents(samples, motion).reshape(-1, objective.size)[own] for item, own in rows
+        )
+        return -np.concatenate(list(tables))
+
+    found = minimize(
+        objective.value,
+        x0,
+        jac=objective.gradient,
+        constraints=[{"type": "ineq", "fun": kept, "jac": slopes}],
+        method="SLSQP",
+        options={"ftol": 1e-9, "maxiter": 100},
+    )
+    assert kept(found.x).min() > -1e-6, found.message
+    return float(found.fun)
