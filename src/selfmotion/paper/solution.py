@@ -187,9 +187,10 @@ class Solution:
             for _ in range(_CHARTS):
                 before = found
                 found, size = found._optimised(size)
-                fell = before.cost - found.cost > _FALL * abs(found.cost)
                 # Where there is no step, that may be for want of motions that meet the ends.
-                if size is None or found.status not in _STUCK or not fell:
+                if size is None or found.status not in _STUCK:
+                    break
+                if not before.cost - found.cost > _FALL * abs(found.cost):
                     break
         except KeyboardInterrupt:
             return replace(found, status=Status.INTERRUPTED)
