@@ -4,7 +4,6 @@ Read `rollout`, `still`, `start`, `objective`, `ends` and `solution` in this ord
 """
 
 from selfmotion.paper.ends import Eliminated as Eliminated, closed as closed
-from selfmotion.paper.frame import TransportedFrame as TransportedFrame
 from selfmotion.paper.objective import Objective as Objective
 from selfmotion.paper.rollout import Rollout as Rollout
 from selfmotion.paper.solution import Method as Method, Solution as Solution, solve as solve

@@ -1,12 +1,12 @@
 """Conditions on the ends of the motion, eliminated: what is left to minimise is unconstrained.
 
-With H = LLᵀ the inverse of the Gauss-Newton matrix at a reference x̂, and the right singular vectors
-of ∂c/∂x L split into U, those that the conditions c change along, and V, the others,
+With LᵀML = I, where xᵀMx = |z|² + ∫ |ε|² dt of a decision vector, and the right singular vectors of
+∂c/∂x L at a reference x̂ split into U, those that the conditions c change along, and V, the others,
 
     x = x̂ + L (V y + U w),   c(x) = 0,
 
-where Newton's method finds w for a given y. The unknowns y are orthonormal in the metric, and any
-optimiser takes them: by the implicit function theorem, with C = ∂c/∂x at x,
+where Newton's method finds w for a given y. Any optimiser takes the unknowns y: by the implicit
+function theorem, with C = ∂c/∂x at x,
 
     dx/dy = L (V - U (C L U)⁻¹ C L V).
 
@@ -23,8 +23,11 @@ from selfmotion.paper.objective import Objective
 # Conditions are met to this [rad, rad/s, rad/s²]; what rounding on a fine grid leaves is taken for
 # met, too.
 _CLOSED, _MET = 1e-11, 1e-9
-# Steps of Newton's method, how often one may be halved, and how often it goes on along others.
-_STEPS, _HALVINGS, _ROUNDS = 20, 10, 3
+# Steps of Newton's method; how often one may be halved, and how often it goes on along others where
+# a motion is to be brought to the ends. After more steps than the last, the reference is far.
+_STEPS, _HALVINGS, _ROUNDS, _NEAR = 20, 10, 3, 4
+# Functions of the null motion are as good as dependent below this share of the largest.
+_FLAT = 1e-12
 # Combinations of conditions that change this much less than others follow from these.
 _DEPENDENT = 1e-4
 
@@ -32,7 +35,7 @@ _DEPENDENT = 1e-4
 def closed(objective: Objective, x: Array) -> Array:
     """Return a point near `x` that meets the ends, or the nearest to that.
 
-    In the Gauss-Newton metric it is about the nearest one, so that it hardly costs more.
+    It is about the nearest one in the metric M, so that it hardly costs more.
 
     Parameters
     ----------
@@ -41,10 +44,8 @@ def closed(objective: Objective, x: Array) -> Array:
         Its cost is finite.
     """
     for _ in range(_ROUNDS):
-        function = Eliminated(objective, x)
-        y = np.zeros(function.size)
-        x = function.point(y)
-        if function.is_met(y):
+        x, miss, _ = Eliminated(objective, x).newton(x, _HALVINGS)
+        if miss < _MET:
             break
     return x
 
@@ -63,7 +64,7 @@ class Eliminated:
 
     def __init__(self, objective: Objective, reference: Array) -> None:
         self._objective, self._reference = objective, reference
-        values, vectors = np.linalg.eigh(inverse_metric(objective.metric(reference)))
+        values, vectors = np.linalg.eigh(inverse_metric(_metric(objective), _FLAT))
         root, inward = vectors * np.sqrt(values), (vectors / np.sqrt(values)).T
         rows = objective.miss_tangents(reference) @ root
         sizes = np.linalg.norm(rows, axis=1, keepdims=True)
@@ -74,9 +75,9 @@ class Eliminated:
         self._inward = right[rank:] @ inward
         # From conditions to what independent combinations say of them.
         self._counted = sizes * (left[:, :rank] @ left[:, :rank].T) / sizes.T
-        # The last y, its x, and how much that misses the ends.
+        # The last y, its x, how much that misses the ends, and the steps that it took.
         self._at: Array | None = None
-        self._x, self._miss = reference, np.inf
+        self._x, self._miss, self._taken = reference, np.inf, 0
 
     @property
     def size(self) -> int:
@@ -92,7 +93,7 @@ class Eliminated:
         """Return x at y, (size of x,), or the nearest to it that Newton's method came to."""
         if self._at is None or not np.array_equal(self._at, y):
             self._at = None
-            self._x, self._miss = self._newton(self._reference + self._along @ y)
+            self._x, self._miss, self._taken = self.newton(self._reference + self._along @ y)
             self._at = y.copy()
         return self._x
 
@@ -100,6 +101,10 @@ class Eliminated:
         """Return whether Newton's method arrived."""
         self.point(y)
         return self._miss < _MET
+
+    def where(self, y: Array) -> tuple[Array, bool]:
+        """Return x at y, and whether another reference would be better from there."""
+        return self.point(y), self._taken > _NEAR
 
     def value(self, y: Array) -> float:
         """See `Function.value`."""
@@ -123,7 +128,7 @@ class Eliminated:
     def tangent(self, y: Array) -> Array:
         """Return dx/dy, (size of x, size)."""
         rows = self._rows(self.point(y))
-        responses = _least_squares(rows @ self._across, rows @ self._along)
+        responses = np.linalg.lstsq(rows @ self._across, rows @ self._along)[0]
         return np.asarray(self._along - self._across @ responses)
 
     def inward(self, inverse_hessian: Array) -> Array:
@@ -135,28 +140,29 @@ class Eliminated:
         tangent = self.tangent(y)
         return np.asarray(tangent @ inverse_hessian @ tangent.T)
 
-    def _newton(self, x: Array) -> tuple[Array, float]:
-        """Return where Newton's method gets to along U, and by how much that misses the ends."""
-        missed = self._missed(x)
-        for _ in range(_STEPS):
-            # Infinite where there is no motion.
-            if _size(missed) < _CLOSED or not np.all(np.isfinite(missed)):
-                break
+    def newton(self, x: Array, halvings: int = 1) -> tuple[Array, float, int]:
+        """Return where Newton's method gets to along U, how much that misses the ends, and steps.
+
+        The miss is infinite where there is no motion.
+        """
+        missed, taken = self._missed(x), 0
+        while taken < _STEPS and _CLOSED <= _size(missed) < np.inf:
             # A motion that hardly holds together has derivatives beyond all numbers.
             with np.errstate(over="ignore", invalid="ignore"):
                 table = self._rows(x) @ self._across
             if not np.all(np.isfinite(table)):
                 break
-            step = -self._across @ _least_squares(table, missed)
-            for halving in range(_HALVINGS):
+            step = -self._across @ np.linalg.lstsq(table, missed)[0]
+            for halving in range(halvings):
                 nearer = x + 0.5**halving * step
                 left = self._missed(nearer)
-                if _size(left) < _size(missed):
+                # What hardly comes nearer will not arrive.
+                if _size(left) < (1.0 - 0.5 ** (halving + 1)) * _size(missed):
                     break
             else:
                 break
-            x, missed = nearer, left
-        return x, _size(missed)
+            x, missed, taken = nearer, left, taken + 1
+        return x, _size(missed), taken
 
     def _missed(self, x: Array) -> Array:
         count = len(self._counted)
@@ -168,8 +174,13 @@ class Eliminated:
         return np.asarray(self._counted @ self._objective.miss_tangents(x))
 
 
-def _least_squares(table: Array, right: Array) -> Array:
-    return np.asarray(np.linalg.lstsq(table, right)[0])
+def _metric(objective: Objective) -> Array:
+    """Return M, (size, size); null motions are given in orthonormal bases."""
+    functions, first = objective.null_motion.functions, objective.start.size
+    inner = functions.T @ (objective.grid.weights[:, None] * functions)
+    metric = np.eye(objective.size)
+    metric[first:, first:] = np.kron(np.eye(objective.null_motion.rows), inner)
+    return metric
 
 
 def _size(missed: Array) -> float:

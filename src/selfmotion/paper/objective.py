@@ -53,8 +53,7 @@ class Objective:
         for item in ends:
             if not item.equality:
                 raise ProblemError(
-                    f"constraint '{item.name}': is an inequality, expected what is asked of the "
-                    f"ends of the motion: the published method keeps nothing else"
+                    f"constraint '{item.name}' is none on the ends: no limits are kept here"
                 )
         self.rollout, self.null_motion, self.start = rollout, null_motion, start
         self.ends, self.counts = tuple(ends), counts

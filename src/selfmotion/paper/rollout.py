@@ -3,7 +3,7 @@
 import numpy as np
 
 from selfmotion import kernels
-from selfmotion.basics import Array
+from selfmotion.basics import Array, Ints
 from selfmotion.costs import Samples, TipSamples
 from selfmotion.follow import Follows
 from selfmotion.motion import Grid
@@ -111,32 +111,28 @@ class Rollout:
         q, qd = run.q[here], run.qd[here]
         if self.damped:
             return self.grid.nodes, q, qd
-        wrong = np.concatenate(
-            [
-                item.task.select_along(tip.error[here, :, None], tip.rotation[here])
-                for item, tip in zip(self.follows.items, self._tips, strict=True)
-            ],
-            axis=1,
-        )
-        nearer = q + _correction(run.task_jacobian[here], wrong)
+        nearer = q + _correction(run.task_jacobian[here], self._wrong(self._tips, here))
         for i, stage in enumerate(here):
             self._node_table[0] = self._table[stage]
             node.q[0] = nearer[i]
             for _ in range(_POLISHING_STEPS):
                 if self._advance(self._node_table, node.q, 0.0) is not None:
                     break
-                left = np.concatenate(
-                    [
-                        item.task.select(tip.error[0, :, None], tip.rotation[0])
-                        for item, tip in zip(self.follows.items, self._node_tips, strict=True)
-                    ]
-                )
+                left = self._wrong(self._node_tips, np.zeros(1, dtype=np.intp))
                 q[i], qd[i] = node.q[0], node.qd[0]
                 if np.abs(left).max() < _POLISHED:
                     break
-                node.q[0] += _correction(node.task_jacobian[0], left)
+                node.q[0] += _correction(node.task_jacobian, left)[0]
         self.jacobian_evaluations += len(here)
         return self.grid.nodes, q, qd
+
+    def _wrong(self, tips: list[kernels.Tip], stages: Ints) -> Array:
+        """Return the pose errors in the prescribed rows at some stages (K,), (K, m, 1)."""
+        parts = [
+            item.task.select_along(tip.error[stages, :, None], tip.rotation[stages])
+            for item, tip in zip(self.follows.items, tips, strict=True)
+        ]
+        return np.concatenate(parts, axis=1)
 
     def sensitivities(self, epsilon_matrix: Array, start_matrix: Array) -> tuple[Array, Array]:
         """Return ∂q/∂x and ∂q̇/∂x at the stages of the last run, (S, n, d) each.

@@ -28,10 +28,11 @@ _AGREEMENT = 1e-4
 # A cost that rises this much on so many grids in turn has no limit: the path runs past the edge of
 # the workspace between nodes.
 _RISE, _RISES = 1.5, 2
-# Where the way to the optimum leads too far from what the unknowns are made for, so often others
-# are, as long as the cost falls by this share.
-_CHARTS, _FALL = 5, 1e-8
-# After these there is nothing to go on from.
+# Where the way to the optimum leads too far from what the unknowns are made for, others are, so
+# often at most, as long as the cost falls by this share with each.
+_CHARTS, _FALL = 200, 1e-6
+# What a search may end by for want of other unknowns; and after what there is none to go on from.
+_STUCK = (Status.PRECISION, Status.GRADIENT)
 _OVER = (Status.UNBOUNDED, Status.GRADIENT, Status.INFEASIBLE, Status.MAX_EVALUATIONS)
 
 
@@ -64,12 +65,7 @@ class Method:
     def on(self, grid: Grid) -> Objective:
         """Return the objective on a grid."""
         return Objective.of(
-            self.problem,
-            self.still,
-            grid=grid,
-            free=self.free,
-            ends=self.ends,
-            counts=self.counts,
+            self.problem, self.still, grid=grid, free=self.free, ends=self.ends, counts=self.counts
         )
 
     def minimum(
@@ -77,21 +73,33 @@ class Method:
         function: Function,
         x: Array,
         inverse_hessian: Array | None,
-        point: Callable[[Array], Array],
-    ) -> tuple[Minimum, tuple[Iteration, ...]]:
-        """Return a function's minimum, and the way to it in decision vectors, as `point` says."""
-        kept: list[Iteration] = []
+        where: Callable[[Array], tuple[Array, bool]] = lambda x: (x, False),
+        known: bool = False,
+    ) -> tuple[Minimum, list[Iteration], bool]:
+        """Return a function's minimum, the way there in decision vectors, and whether it goes on.
+
+        `where` returns these, and whether other unknowns would be better from there; `known` says
+        that the callback was told the start.
+        """
+        way: list[Iteration] = []
+        goes_on = False
 
         def note(iteration: Iteration) -> bool:
-            kept.append(replace(iteration, x=read_only(point(iteration.x))))
-            return self.callback is not None and bool(self.callback(kept[-1]))
+            nonlocal goes_on
+            point, is_far = where(iteration.x)
+            way.append(replace(iteration, x=read_only(point)))
+            if known and len(way) == 1:
+                return False
+            asked = self.callback is not None and bool(self.callback(way[-1]))
+            goes_on = is_far and not asked
+            return is_far or asked
 
         # Of no unknowns any point is the minimum.
         optimizer = self.optimizer if len(x) else QuasiNewton()
         found = optimizer.minimize(
             function, x, inverse_hessian, max_evaluations=self.limit, callback=note
         )
-        return found, tuple(kept)
+        return found, way[known:], goes_on
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,16 +180,20 @@ class Solution:
 
     def again(self) -> "Solution":
         """Return the optimum on its grid, from here; interrupted, the best so far."""
-        found = self
+        if self.unmet:
+            return replace(self, status=Status.INFEASIBLE)
+        found, size = self, None
         try:
             for _ in range(_CHARTS):
-                before, found = found.cost, found._optimised()
-                fell = before - found.cost > _FALL * abs(before)
-                # Far from what its unknowns are made for, an elimination may lead no further.
-                if not (self._eliminates and fell and found.status is Status.PRECISION):
+                before = found
+                found, size = found._optimised(size)
+                # Where there is no step, that may be for want of motions that meet the ends.
+                if size is None or found.status not in _STUCK:
+                    break
+                if not before.cost - found.cost > _FALL * abs(found.cost):
                     break
         except KeyboardInterrupt:
-            found = replace(found, status=Status.INTERRUPTED)
+            return replace(found, status=Status.INTERRUPTED)
         return found
 
     def settled(self) -> "Solution":
@@ -191,32 +203,39 @@ class Solution:
         except KeyboardInterrupt:
             return replace(self, status=Status.INTERRUPTED)
 
-    @property
-    def _eliminates(self) -> bool:
-        return len(self.method.ends) > 0 and len(self.x) > 0
+    def _optimised(self, before: int | None) -> tuple["Solution", int | None]:
+        """Return the optimum as far as the unknowns lead, and their number; None for x itself.
 
-    def _optimised(self) -> "Solution":
+        `before` is the number of those that led here: the callback knows the start then.
+        """
         method, objective, inverse = self.method, self.objective, self.inverse_hessian
-        if self.unmet:
-            return replace(self, status=Status.INFEASIBLE)
-        if not self._eliminates:
-            found, way = method.minimum(objective, self.x, inverse, np.array)
-            x, inverse = np.array(found.x), found.inverse_hessian
-        else:
+        size = None
+        if objective.ends and len(self.x):
             function = Eliminated(objective, self.x)
-            if not function.is_met(np.zeros(function.size)):
-                return replace(self, status=Status.INFEASIBLE)
-            known = None if inverse is None else function.inward(inverse)
-            found, way = method.minimum(function, np.zeros(function.size), known, function.point)
+            size, y = function.size, np.zeros(function.size)
+            if before not in (None, size):
+                # Conditions follow from each other here that do not elsewhere.
+                return self, None
+            if not function.is_met(y):
+                return replace(self, status=Status.INFEASIBLE), None
+            inverse = None if inverse is None else function.inward(inverse)
+            found, way, left = method.minimum(
+                function, y, inverse, function.where, before is not None
+            )
             x, inverse = function.point(found.x), function.outward(found.x, found.inverse_hessian)
+        else:
+            found, way, left = method.minimum(objective, self.x, inverse)
+            x, inverse = np.array(found.x), found.inverse_hessian
+        status = Status.PRECISION if left else found.status
         history = (*self.history, *way)
-        return replace(self, x=x, inverse_hessian=inverse, status=found.status, history=history)
+        better = replace(self, x=x, inverse_hessian=inverse, status=status, history=history)
+        return better, size
 
     def _on(self, objective: Objective) -> "Solution":
         """Return it by another objective of the same unknowns, with its ends met."""
         if not np.isfinite(objective.value(self.x)):
             objective.require_finite(self.x)
-        x = closed(objective, self.x) if self._eliminates else self.x
+        x = closed(objective, self.x) if objective.ends and len(self.x) else self.x
         return replace(self, objective=objective, x=x)
 
 

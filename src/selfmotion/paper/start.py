@@ -1,7 +1,5 @@
 """The start configuration: given, or free to move along its self-motion."""
 
-from typing import Protocol
-
 import numpy as np
 
 from selfmotion import kernels
@@ -13,25 +11,8 @@ from selfmotion.follow import Follows
 _STEPS, _ARRIVED = 20, 1e-9
 
 
-class Start(Protocol):
-    """q(0) as a function of `size` decision variables z and of the tips' first poses."""
-
-    @property
-    def size(self) -> int:
-        """Number of decision variables."""
-
-    def configuration(self, z: Array, target: Array) -> Array | None:
-        """Return q(0) (n,), or None where no configuration belongs to z and the poses.
-
-        These are as `Follows.targets` has them, (12 F,).
-        """
-
-    def tangent(self) -> Array:
-        """Return ∂q(0)/∂z at the last q(0), (n, size)."""
-
-
 class FixedStart:
-    """A given start configuration."""
+    """A given start configuration: q(0) as a function of no variables."""
 
     size = 0
 
@@ -39,11 +20,11 @@ class FixedStart:
         self._q = q
 
     def configuration(self, z: Array, target: Array) -> Array:
-        """See `Start.configuration`."""
+        """Return q(0), (n,)."""
         return self._q
 
     def tangent(self) -> Array:
-        """See `Start.tangent`."""
+        """Return ∂q(0)/∂z, (n, 0)."""
         return np.zeros((len(self._q), 0))
 
 
@@ -69,11 +50,14 @@ class FreeStart:
 
     @property
     def size(self) -> int:
-        """See `Start.size`: the redundancy r."""
+        """Number of decision variables z: the redundancy r."""
         return int(self._null.shape[1])
 
     def configuration(self, z: Array, target: Array) -> Array | None:
-        """See `Start.configuration`."""
+        """Return q(0) (n,), or None where no configuration belongs to z and the tips' first poses.
+
+        These are as `Follows.targets` has them, (12 F,).
+        """
         q, layout = self._reference + self._null @ z, self._follows.layout
         for _ in range(_STEPS):
             wrong = kernels.approach_start(q, *self._tips.at(q), target, layout, *self._chart, z)
@@ -86,7 +70,7 @@ class FreeStart:
         return None
 
     def tangent(self) -> Array:
-        """See `Start.tangent`: [J; N0ᵀ]⁻¹ [0; I]."""
+        """Return ∂q(0)/∂z at the last q(0), [J; N0ᵀ]⁻¹ [0; I], (n, size)."""
         items, m = self._follows.items, self._follows.dimension
         jacobians, rotations, _ = self._tips.at(self._at)
         rows = [
@@ -95,3 +79,6 @@ class FreeStart:
         ]
         right = np.vstack([np.zeros((m, self.size)), np.eye(self.size)])
         return np.asarray(np.linalg.solve(np.vstack([*rows, self._null.T]), right))
+
+
+Start = FixedStart | FreeStart

@@ -7,10 +7,11 @@ from functools import cached_property, partial
 import numpy as np
 
 from selfmotion.basics import Array, BreakdownError
+from selfmotion.kernels import carried
 from selfmotion.motion import Grid, NullMotion, NullMotionTable
-from selfmotion.paper.frame import TransportedFrame
 from selfmotion.paper.rollout import Rollout
 from selfmotion.problem import Problem
+from selfmotion.robot import null_space
 
 Guide = Callable[[Array], Array]
 """t (S,) → a null motion (S, n) that stands for x = 0."""
@@ -124,14 +125,21 @@ class StillMotion:
         return min(times) if times else None
 
     def frame(self, t: Array) -> Array:
-        """Return the null space along this motion at times t (S,), transported, (S, n, r)."""
+        """Return a basis of the null space along this motion at times t (S,), (S, n, r).
+
+        At the nodes carried along, so that it does not turn inside the null space; between them the
+        entries follow a cubic spline.
+        """
         n = self.problem.robot.dof
         none = n == self.problem.follows.dimension
-        return np.zeros((len(t), n, 0)) if none else self._transported(t)
+        return np.zeros((len(t), n, 0)) if none else np.asarray(self._frame(t))
 
     @cached_property
-    def _transported(self) -> TransportedFrame:
-        return TransportedFrame(self.grid.nodes, self.jacobians)
+    def _frame(self) -> Callable[[Array], Array]:
+        from scipy.interpolate import CubicSpline
+
+        bases = carried(null_space(self.jacobians[0]), self.jacobians)
+        return CubicSpline(self.grid.nodes, bases)
 
 
 def null_motion_table(
