@@ -31,7 +31,7 @@ bench: $(READY)  ## the figures of the README's performance table
 bench-constrained: $(READY)  ## problems whose constraints bind, against an earlier revision
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python benchmarks/constrained.py
 
-bench-remaining: $(READY)  ## what plans say is left to save, against splines of 64 intervals
+bench-remaining: $(READY)  ## the default null motion against splines of 64 intervals
 	OMP_NUM_THREADS=1 $(BIN)/python benchmarks/remaining.py
 
 bench-batch: $(READY)  ## two processes against one, and what a plan costs besides planning

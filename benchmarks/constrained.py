@@ -13,6 +13,7 @@ import json
 import subprocess
 import time
 import warnings
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Annotated, Any
@@ -68,7 +69,11 @@ def problem(seed: int, number: int) -> tuple[str, sm.Problem]:
     else:
         named = {"named": arm}
         values = {**stored[number], "robot": named}
+        # By default; an arm without bodies may not be asked.
+        values.pop("collision", None)
         made = problem_from_dict(values, {json.dumps(named): robot})
+    # What the constraints were made from is not what is planned with.
+    made = replace(made, null_motion=sm.FreeNullMotion())
     start = "" if made.given_start is not None else ", free start"
     return f"{number:02d} {arm} {task}, {kind}{start}", made
 

@@ -95,7 +95,7 @@ def test_a_plan_can_start_from_another(tmp_path: Path) -> None:
         "plan", "panda", "--line", "0,0.05,0", "--from", tmp_path / "plan.npz", "--out", out
     )
     assert code == 0
-    np.testing.assert_array_equal(sm.load_plan(out).trajectory.q[0], first.trajectory.q[0])
+    np.testing.assert_allclose(sm.load_plan(out).trajectory.q[0], first.trajectory.q[0])
 
 
 def test_anything_of_a_problem_file_can_be_set(tmp_path: Path) -> None:

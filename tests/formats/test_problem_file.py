@@ -48,7 +48,7 @@ def test_a_file_says_what_python_says(job: sm.Job) -> None:
         panda,
         circle,
         start=PANDA_HOME,
-        null_motion=sm.PolynomialNullMotion(3),
+        null_motion=sm.FreeNullMotion(),
         costs=[sm.JointVelocity(), sm.InverseManipulability(0.001)],
         constraints=[
             sm.JointPositionLimits(),

@@ -51,7 +51,8 @@ def test_a_plan_planned_anew_is_itself(name: str, plans: dict[str, sm.Plan]) -> 
     assert again.report.cost == pytest.approx(plan.report.cost, rel=AGREEMENT)
     assert again.report.evaluations <= plan.report.evaluations
     if name != "closed":  # which takes Newton steps to end as it began, on each grid
-        assert again.report.evaluations <= FEW
+        # The published method looks at x = 0 on its own grid.
+        assert again.report.evaluations <= FEW + (name == "paper")
     assert type(again.report.null_motion) is type(plan.report.null_motion)
     miss = again.trajectory(plan.trajectory.t) - plan.trajectory.q
     assert np.abs(miss).max() < 1e-3

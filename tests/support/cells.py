@@ -19,8 +19,7 @@ normal = [1, 0, 0]
 duration = 4
 
 [null_motion]
-kind = "PolynomialNullMotion"
-degree = 3
+kind = "FreeNullMotion"
 
 [[costs]]
 kind = "JointVelocity"

@@ -224,7 +224,10 @@ def test_a_damped_plan_survives_the_disk(overreach: sm.Plan, tmp_path: Path) -> 
 def test_damping_that_never_acts_leaves_the_plan(planar: sm.RobotModel) -> None:
     # The same null motion for both: what is left to save decides how far one is refined.
     cubic = sm.PolynomialNullMotion()
-    problem = dataclasses.replace(touching(planar, 4.9), null_motion=cubic)
+    problem = touching(planar, 4.9)
+    # A turn away from the limits, where nothing holds either of them.
+    start = np.array(problem.given_start) + [0.0, 0.0, 2.0 * np.pi]
+    problem = dataclasses.replace(problem, null_motion=cubic, start=start)
     damped = sm.plan(problem)
     plain = sm.plan(dataclasses.replace(problem, damping=None))
     assert damped.certificate.verified

@@ -56,7 +56,7 @@ def plan(
     lock: options.LockOption = None,
     argument: options.ArgumentOption = None,
     packages: options.PackagesOption = None,
-    degree: options.DegreeOption = 3,
+    degree: options.DegreeOption = None,
     mu: options.MuOption = 0.0,
     cost: options.CostOption = None,
     velocity: options.VelocityOption = None,

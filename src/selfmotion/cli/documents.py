@@ -67,7 +67,7 @@ class Shell:
     lock: list[str]
     argument: list[str]
     packages: list[Path]
-    degree: int
+    degree: int | None
     mu: float
     cost: list[str]
     velocity: str | None
@@ -112,13 +112,14 @@ class Shell:
             "task": task,
             "start": self._start(warm_start),
             "path": self._path(normal),
-            "null_motion": {"kind": "PolynomialNullMotion", "degree": self.degree},
             "costs": self._costs(),
             "constraints": self._constraints(),
             "relaxations": [_relaxation(text) for text in self.relax],
             "damping": self.damped,
             "collision": not self.no_collision,
         }
+        if self.degree is not None:
+            table["null_motion"] = {"kind": "PolynomialNullMotion", "degree": self.degree}
         if self.joint_limits is not None:
             table["joint_limits"] = str(self.joint_limits)
         if arguments:

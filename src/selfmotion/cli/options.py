@@ -134,7 +134,13 @@ ReferenceOption = Annotated[
     str | None,
     typer.Option(help="Link in whose frame the path is given, where it moves: a part on a table."),
 ]
-DegreeOption = Annotated[int, typer.Option(help="Degree of the null motion's polynomial.")]
+DegreeOption = Annotated[
+    int | None,
+    typer.Option(
+        help="The published method, with a null motion that is a polynomial of this degree: it "
+        "keeps no constraints but closure. By default any null motion is."
+    ),
+]
 MuOption = Annotated[
     float, typer.Option(help="Weight of 1/det(JJᵀ), the distance from singular poses.")
 ]

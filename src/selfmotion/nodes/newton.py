@@ -57,7 +57,7 @@ _SOLVED, _FALL, _POWER, _CENTRED = 10.0, 0.2, 1.5, 30.0
 _ABOUT_MET, _MET = 1e-2, 1e-7
 # Prices are known where a step changes them by no more than this share of all; together they are no
 # less than this share of the cost. Between stiff rows a step promises little, whatever these say.
-_SETTLED, _NO_PRICE = 1e-2, 1e-4
+_SETTLED, _NO_PRICE = 1e-2, 1e-3
 # Of a row that counts by less than this share of the barrier, the gap does not matter.
 _IDLE = 1e-2
 # What is asked of the ends is met to this [rad, rad/s].

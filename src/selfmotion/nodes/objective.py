@@ -112,10 +112,6 @@ class NodeCost:
             found += stiffness @ (ends @ weight)
         return found
 
-    def depends_on_errors(self, partials: Sequence[Partials]) -> bool:
-        """Whether a cost weighs how far the tool is off its path: on nodes it never is."""
-        return any(part.error is not None for part in partials)
-
     def _of_bent(self, partials: Sequence[Partials]) -> Partials:
         """Return the derivatives of all costs that are no quadratic forms."""
         both = zip(self._costs, partials, strict=True)

@@ -16,7 +16,6 @@ from selfmotion.planning.effort import Effort
 from selfmotion.planning.finish import finish
 from selfmotion.planning.known import Known, Proved
 from selfmotion.planning.largest_part import LargestPart, largest_part, shorter_part
-from selfmotion.planning.refinement import settle_both
 from selfmotion.planning.rough import Ranking
 from selfmotion.planning.search import Search
 from selfmotion.planning.session import Session
@@ -208,7 +207,7 @@ class Draft:
 
     def prove(self, best: Session) -> None:
         """Let the best motion be what the plan is made of, on grids that are fine enough."""
-        rival_cost = settle_both(best, self.rival, self.progress)
+        rival_cost = _settle_both(best, self.rival, self.progress)
         self.proved = self._proved(LargestPart(self.problem, best, ""), rival_cost)
 
     def is_free_by_meshes(self) -> bool:
@@ -240,7 +239,7 @@ class Draft:
         found = largest_part(self.problem, known, effort)
         if found is None:
             return False
-        settle_both(found.session, None, self.progress)
+        _settle_both(found.session, None, self.progress)
         self.proved = self._proved(found)
         for _ in range(SHORTER_PARTS):
             # Besides that it ends, nothing should be wrong with it.
@@ -249,7 +248,7 @@ class Draft:
             if (shorter := shorter_part(self.problem, found, effort)) is None:
                 break
             found = shorter
-            settle_both(found.session, None, self.progress)
+            _settle_both(found.session, None, self.progress)
             proved = self._proved(found)
             if len(proved.finished.certificate.failures) < 2:
                 self.proved = proved
@@ -272,3 +271,21 @@ class Draft:
         if self.best is None:
             raise KeyboardInterrupt
         self.best.end(Status.INTERRUPTED)
+
+
+def _settle_both(best: Session, rival: Session | None, progress: Progress) -> float | None:
+    """Settle a motion, and what it is compared with; return what the latter costs, if it will do.
+
+    An interruption ends both as they are.
+    """
+    try:
+        progress("finer grid", 1, 1)
+        best.settle()
+        if rival is not None and rival is not best and not best.cut_short:
+            rival.settle()
+            if rival.cut_short:
+                best.end(rival.status)
+            return None if rival.violations else rival.standing.cost
+    except KeyboardInterrupt:
+        best.end(Status.INTERRUPTED)
+    return None

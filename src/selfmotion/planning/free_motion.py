@@ -30,6 +30,7 @@ from selfmotion.planning.settings import (
     MOVE_DEADLINE,
     MOVE_MARGIN,
     RETREATS,
+    ROUNDING,
     SHORTEST_PACED,
     SLOWER_FACTOR,
     SLOWER_TRIES,
@@ -163,7 +164,7 @@ class FreeMotions:
         asked, beyond = self.asked, []
         for joint, name in enumerate(self.robot.joint_names):
             over = max(asked.lower[joint] - q[joint], q[joint] - asked.upper[joint])
-            if over > 0.0:
+            if over > ROUNDING:
                 beyond.append(f"joint '{name}' is {over:.3g} beyond its limit")
         if beyond:
             return "; ".join(beyond)

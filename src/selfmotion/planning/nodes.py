@@ -196,7 +196,8 @@ class NodeDescent:
             found = self.again(finer or standing, roughly=not polishes)
             if found is None:
                 break
-            if not found.has_arrived and self._ended is None:
+            gains = standing.cost - found.cost > GIVEN_AWAY * abs(standing.cost)
+            if not (found.has_arrived or gains) and self._ended is None:
                 # More nodes lead nowhere, and prices on the way say nothing.
                 found = None if polishes else self.again(standing)
                 return found if found is not None and found.has_arrived else standing

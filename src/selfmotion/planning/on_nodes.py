@@ -54,8 +54,8 @@ class MotionOnNodes:
 
     @cached_property
     def active(self) -> tuple[Binding, ...]:
-        """What kept the optimum from a lower cost."""
-        return () if self.optimum is None else _binding(self.optimum)
+        """What kept the optimum from a lower cost; on the way to one, prices say nothing."""
+        return _binding(self.optimum) if self.optimum is not None and self.has_arrived else ()
 
     @property
     def has_arrived(self) -> bool:

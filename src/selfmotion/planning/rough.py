@@ -189,7 +189,20 @@ class Ranking:
 
     def _motion(self, found: Together, k: int) -> NodeMotion | None:
         """Return one of the motions, with the conditions that are asked of it."""
-        return self._near(found.q[k], found.qd[k], found.qdd[k])
+        return self._near(self._turned_inside(found.q[k]), found.qd[k], found.qdd[k])
+
+    def _turned_inside(self, q: Array) -> Array:
+        """Return a motion (N + 1, n) with joints beyond their limits turned back by whole turns.
+
+        What knows no limits may have gone there, and the tool is where it was.
+        """
+        robot = self._problem.robot
+        lowest, highest = q.min(axis=0), q.max(axis=0)
+        limited = robot.is_revolute & np.isfinite(robot.lower) & np.isfinite(robot.upper)
+        beyond = limited & ((highest > robot.upper) | (lowest < robot.lower))
+        middle, whole = np.zeros(robot.dof), 2.0 * np.pi
+        middle[beyond] = 0.5 * (robot.lower + robot.upper - lowest - highest)[beyond]
+        return np.asarray(q + whole * np.round(middle / whole))
 
     def _near(
         self, q: Array, qd: Array | None = None, qdd: Array | None = None

@@ -5,10 +5,8 @@ bench-starts` (free starts against the best of everything tried) and `make suite
 """
 
 # --- grids: how fine a motion is computed (session, finish)
-# Agreement of the cost on a grid and on the halved one, at which the coarser optimum stands; and at
-# which it tells what null motion is wanted.
-COST_AGREEMENT = 1e-4
-# And at which a rough motion tells what its start is worth.
+# Agreement of the cost on few nodes and on twice as many, at which a rough motion tells what its
+# start is worth.
 ROUGH_AGREEMENT = 1e-2
 # Intervals of the first nodes, and so many for each time that the tool goes as far as the arm
 # reaches.
@@ -21,13 +19,6 @@ STARTING = (-0.03, -0.01, 0.01, 0.03)
 NEAR_PATH, WANTED_NEAR_PATH, FINER_POWER, MOST_PARTS = 2e-7, 1e-7, 0.25, 4.0
 # What control points give away of the cost, or what finer nodes save, is nothing [share].
 GIVEN_AWAY = 3e-5
-# A grid on which the motion at x = 0 costs this much more or less will do for a rough null motion.
-ALIKE = 0.05
-# While a null motion is chosen, this share of the steps that it should have will do.
-THINNER = 2
-# A cost that rises this much on so many grids in turn has no limit.
-RISE = 1.5
-RISES = 2
 # Nodes of Newton's method: at most so many for each stretch of the path on which it is smooth.
 MOST_NODES = 1024
 # More of them are put in so often, at most.
@@ -59,15 +50,13 @@ STRETCH_WAY = 2.0
 # Nodes to begin with; the cost on them is right to this share.
 FIRST_NODES, LONG_AGREEMENT = 64, 1e-2
 
-# --- starts and sequences (candidates, heats)
+# --- starts and sequences (rough, starts, sequences)
 # Where nothing else leads to a motion that keeps the constraints, this many times more are tried.
 SECOND_EFFORT = 4
 # The shortest chain of a sequence becomes a motion of so many times its waypoints, with more where
 # it does not keep the conditions between them, so often.
 FINER_CHAIN = 3
 CHAIN_ROUNDS = 4
-# Evaluations of the cost with which each sequence is optimised at first; only the best goes on.
-FIRST_EVALUATIONS = 16
 # Sequences are not worth refining when dearer by this factor than one that keeps all constraints.
 DEARER = 1.25
 # The same where that is the chain of a sequence itself, on which optimising gains next to nothing.
@@ -87,8 +76,6 @@ UNKEPT = 10.0
 # rule; rough optima this near are the same.
 ONE_VALLEY = 0.6
 SAME_OPTIMUM = 0.1
-# A rough optimum that costs more than this many times the best is not worth the rest.
-HOPELESS = 2.0
 # Evaluations of the cost that a damped motion may take, and each of many on parts of the path.
 DAMPED_EVALUATIONS = 400
 PART_EVALUATIONS = 150
@@ -134,6 +121,8 @@ RETREAT_SPEED = 0.1
 BRIEFEST_RETREAT = 0.5
 
 # --- free motions (moves, ways, rounding)
+# What is beyond a limit by no more than this is within it to rounding, as the certificate has it.
+ROUNDING = 1e-12
 # After so many seconds a move counts as not found.
 MOVE_DEADLINE = 10.0
 # Shares of the limits that are used; and the acceleration where nobody limits it: up to full speed
@@ -196,9 +185,6 @@ BRANCH_TRIES = 4
 BRANCH_EVALUATIONS = 60
 SAME_ENDS = 0.2
 
-# --- what is left to save
-# It is estimated on so many steps at most: what it takes in memory grows with them.
-MOST_ESTIMATED = 2048
 
 # --- the fastest motion
 # After so many seconds the best so far has to do.

@@ -20,6 +20,7 @@ from selfmotion.planning.settings import (
     LEG_RANGE,
     LEG_STEP,
     MISSED,
+    ROUNDING,
     SHORTCUTS,
     SPREAD,
     TURN_STEP,
@@ -56,7 +57,8 @@ class Room:
     def free(self, q: Array) -> npt.NDArray[np.bool_]:
         """Return which configurations (K, n) are allowed, (K,)."""
         asked = self.asked
-        allowed = np.asarray(((q >= asked.lower) & (q <= asked.upper)).all(axis=1))
+        inside = (q >= asked.lower - ROUNDING) & (q <= asked.upper + ROUNDING)
+        allowed = np.asarray(inside.all(axis=1))
         if asked.quantities:
             allowed &= asked.admits(q)
         for model, far in asked.bodies:
