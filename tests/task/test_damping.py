@@ -226,7 +226,7 @@ def test_damping_that_never_acts_leaves_the_plan(planar: sm.RobotModel) -> None:
     cubic = sm.PolynomialNullMotion()
     problem = touching(planar, 4.9)
     # A turn away from the limits, where nothing holds either of them.
-    start = np.array(problem.given_start) + [0.0, 0.0, 2.0 * np.pi]
+    start = np.add(problem.given_start, [0.0, 0.0, 2.0 * np.pi])
     problem = dataclasses.replace(problem, null_motion=cubic, start=start)
     damped = sm.plan(problem)
     plain = sm.plan(dataclasses.replace(problem, damping=None))

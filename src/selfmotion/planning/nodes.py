@@ -130,6 +130,13 @@ class NodeDescent:
             best = self._on_halved(best)
         return self._standing(best)
 
+    def with_more(self, known: MotionOnNodes) -> MotionOnNodes | None:
+        """Return the best motion near one of which less was asked, the rest after that; or None."""
+        motion = self.grid(known.motion.grid.t).at(known.motion.centred)
+        more = len(motion.h) - len(known.prices)
+        found = self.best_near(motion, prices=np.append(known.prices, np.zeros(more)))
+        return None if found is None or found.violations else found
+
     def _freely(self, motion: NodeMotion) -> NodeMotion:
         """Return the optimum near a motion of which nothing is asked but what its ends are."""
         alone = motion.grid.without_rows().at(motion.centred)

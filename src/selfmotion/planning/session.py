@@ -1,11 +1,12 @@
 """One start of one problem, optimised: what stands, and how it becomes better."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from selfmotion.basics import Array, Counts, Flags
+from selfmotion.constraints import BoundConstraint
 from selfmotion.motion import Evaluation, Trajectory
 from selfmotion.optimise import Iteration, Status
 from selfmotion.planning.along_chain import along_chain
@@ -145,7 +146,7 @@ class Session:
         """Go on until more nodes save nothing; the published method has done so on its grids."""
         found = self._found
         if self._ended is None and isinstance(found, MotionOnNodes) and not found.is_chain:
-            self._by_nodes(lambda descent: descent.settled(found))
+            self._by_nodes(lambda descent: descent.settled(found), self.beginning.constraints)
 
     def refine(self, where: Flags | None = None) -> None:
         """Go on with half the step length, everywhere or for some of the steps (N,)."""
@@ -199,15 +200,32 @@ class Session:
                     t = np.unique(np.append(own.t, start.problem.knots))
             return descent.near(motions, t, dearest)
 
-        self._by_nodes(optimum)
+        self._by_nodes(optimum, start.constraints)
+        self._keep_off_itself()
         if self.status is Status.GRADIENT:
             # A gradient that is not finite is named with its time.
             self.still.solution.objective.gradient(self.still.solution.x)
 
-    def _by_nodes(self, search: Callable[[NodeDescent], MotionOnNodes | None]) -> None:
+    def _keep_off_itself(self) -> None:
+        """Ask that of an optimum too that takes the arm into itself: few do."""
+        found, start = self._found, self.beginning
+        met = isinstance(found, MotionOnNodes) and not (found.violations or found.keeps_off_itself)
+        if not isinstance(found, MotionOnNodes) or not met or self._ended is not None:
+            return
+        first = found.motion.place.q[:1]
+        if start.effort.apart or not (start.free or start.problem.keeps_off_itself(first)):
+            return
+        asked = start.problem.bind_constraints(start.still.start, start.still.end, apart=True)
+        self._by_nodes(lambda descent: descent.with_more(found), asked)
+
+    def _by_nodes(
+        self,
+        search: Callable[[NodeDescent], MotionOnNodes | None],
+        constraints: Sequence[BoundConstraint],
+    ) -> None:
         """Let what is found on nodes be what stands, if something is."""
         start = self.beginning
-        descent = NodeDescent(start.problem, start.effort, start.constraints, free=start.free)
+        descent = NodeDescent(start.problem, start.effort, constraints, free=start.free)
         try:
             found = search(descent)
         except KeyboardInterrupt:
