@@ -62,7 +62,11 @@ MALFORMED = [
     ("duration = 4", 'duration = "4 s"', "path.duration: is '4 s', expected a number"),
     ("duration = 4", "", "path: has neither, expected either duration or feed"),
     ("duration = 4", "duration = 4\nfeed = 0.1", "path: has duration and feed, expected either"),
-    ("degree = 3", "degree = 3.5", "null_motion.degree: is 3.5, expected a whole number"),
+    (
+        'kind = "FreeNullMotion"',
+        'kind = "PolynomialNullMotion"\ndegree = 3.5',
+        "null_motion.degree: is 3.5, expected a whole number",
+    ),
     ('"JointVelocity"', '"JointSpeed"', "costs[0]: kind is 'JointSpeed', expected one of: "),
     ('"JointVelocity"', '"own:Cost"', "costs[0].kind: 'own:Cost' is code, which is run only"),
     ("mu = 0.001", "mu = -1", "cost 'inverse manipulability': mu is -1, expected"),

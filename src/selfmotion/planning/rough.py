@@ -201,7 +201,8 @@ class Ranking:
         limited = robot.is_revolute & np.isfinite(robot.lower) & np.isfinite(robot.upper)
         beyond = limited & ((highest > robot.upper) | (lowest < robot.lower))
         middle, whole = np.zeros(robot.dof), 2.0 * np.pi
-        middle[beyond] = 0.5 * (robot.lower + robot.upper - lowest - highest)[beyond]
+        lower, upper = robot.lower[beyond], robot.upper[beyond]
+        middle[beyond] = 0.5 * (lower + upper - lowest[beyond] - highest[beyond])
         return np.asarray(q + whole * np.round(middle / whole))
 
     def _near(
