@@ -18,7 +18,7 @@ STARTING = (-0.03, -0.01, 0.01, 0.03)
 # many parts.
 NEAR_PATH, WANTED_NEAR_PATH, FINER_POWER, MOST_PARTS = 2e-7, 1e-7, 0.25, 4.0
 # What control points give away of the cost, or what finer nodes save, is nothing [share].
-GIVEN_AWAY = 3e-5
+GIVEN_AWAY = 1e-4
 # Nodes of Newton's method: at most so many for each stretch of the path on which it is smooth.
 MOST_NODES = 1024
 # More of them are put in so often, at most.
