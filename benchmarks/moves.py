@@ -11,12 +11,9 @@ import time
 import numpy as np
 
 import selfmotion as sm
-from selfmotion.planning import FreeMotions
-from selfmotion.planning.rounding import rounded
-from selfmotion.planning.settings import MOVE_MARGIN
-from selfmotion.planning.ways import Room
 from selfmotion.problem import KEPT
 from selfmotion.task import SE3
+from selfmotion.transfer import FreeMotions, Room, rounded
 
 # Distance kept [m]; seconds in which a move should be found; looks at each that is found.
 APART, IN_TIME, LOOKS = 5e-3, 2.0, 4000
@@ -93,7 +90,7 @@ def peer_best(free: FreeMotions, first: np.ndarray, last: np.ndarray, tries: int
     from ompl import base, geometric, util
 
     util.setLogLevel(util.LogLevel.LOG_NONE)
-    room, n = Room(free.asked, free.robot, MOVE_MARGIN), len(first)
+    room, n = Room(free.asked, free.robot), len(first)
     lower, upper = free.asked.arm(free.robot).finite_limits()
     space = base.RealVectorStateSpace(n)
     bounds = base.RealVectorBounds(n)

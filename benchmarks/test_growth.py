@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
+from engine import Measured, objective_on
 from problems import chain
 
-from engine import Measured, objective_on
 from selfmotion import kernels
 
 

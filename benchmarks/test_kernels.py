@@ -9,9 +9,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from problems import circle
-
 from engine import Measured, objective_on, pinocchio_loop
+from problems import circle
 
 
 @pytest.fixture(scope="module")

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from engine import objective_on
 from problems import circle, suite_path
 
 import selfmotion as sm
-from engine import objective_on
 from selfmotion.study.published import (
     PublishedFunction,
     published_null_motion,

@@ -161,7 +161,6 @@ from selfmotion.planning import (
     Fastest as Fastest,
     Search as Search,
     fastest as fastest,
-    move as move,
     plan as plan,
     plan_in_parts as plan_in_parts,
 )
@@ -190,6 +189,7 @@ from selfmotion.robot import (
     load_robot as load_robot,
 )
 from selfmotion.task import Damping as Damping, Relaxation as Relaxation, Task as Task
+from selfmotion.transfer import move as move
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

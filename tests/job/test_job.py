@@ -12,8 +12,8 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.job import Step, work
-from selfmotion.planning import FreeMotions
 from selfmotion.task import SE3
+from selfmotion.transfer import FreeMotions
 from support.arms import robot_named
 
 DOWN = np.diag([1.0, -1.0, -1.0])

@@ -11,9 +11,9 @@ from selfmotion.job.order import EXACT, best_round
 from selfmotion.job.seam import Seam, backwards_plan
 from selfmotion.job.stops import Before, Round, Stops
 from selfmotion.job.work import Work
-from selfmotion.planning import FreeMotions
 from selfmotion.problem import Problem
 from selfmotion.result import Plan
+from selfmotion.transfer import FreeMotions
 
 # So often motions are added that begin where the seam before ends, at most: of few seams and of
 # many.

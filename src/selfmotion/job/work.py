@@ -21,7 +21,7 @@ from selfmotion.constraints import Clearance, Constraint
 from selfmotion.costs import FunctionCost
 from selfmotion.job.files import Shelf
 from selfmotion.job.seam import Seam, backwards
-from selfmotion.planning import FreeMotions, branches, from_start, near_start
+from selfmotion.planning import branches, from_start, near_start
 from selfmotion.problem import (
     Problem,
     arm_and_constraints,
@@ -31,6 +31,7 @@ from selfmotion.problem import (
 )
 from selfmotion.result import Made, Move, Plan, load_move, load_plan
 from selfmotion.robot import RobotModel
+from selfmotion.transfer import FreeMotions
 
 # Clearances that are remembered: of a seam, and of the moves around it.
 _REMEMBERED = 8

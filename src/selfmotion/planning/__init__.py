@@ -6,8 +6,6 @@ from selfmotion.planning.branches import (
     near_start as near_start,
 )
 from selfmotion.planning.fastest import Fastest as Fastest, fastest as fastest
-from selfmotion.planning.free_motion import FreeMotions as FreeMotions
-from selfmotion.planning.free_move import move as move
 from selfmotion.planning.parts import plan_in_parts as plan_in_parts
 from selfmotion.planning.run import plan as plan
 from selfmotion.planning.search import Search as Search

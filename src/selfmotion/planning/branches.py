@@ -12,13 +12,12 @@ from selfmotion.planning.settings import (
     BRANCH_EVALUATIONS,
     BRANCH_STARTS,
     BRANCH_TRIES,
-    MOVE_MARGIN,
     SAME_ENDS,
 )
-from selfmotion.planning.ways import Room
 from selfmotion.problem import Problem
 from selfmotion.result import Plan
 from selfmotion.search import start_candidates
+from selfmotion.transfer import Room
 
 
 def branches(
@@ -105,7 +104,7 @@ def near_start(problem: Problem, q: Array) -> Array | None:
 
 
 def _room(problem: Problem) -> Room:
-    return Room(problem.envelope, problem.robot, MOVE_MARGIN)
+    return Room(problem.envelope, problem.robot)
 
 
 def _spread(problem: Problem, rng: np.random.Generator) -> list[Array]:

@@ -8,12 +8,12 @@ from selfmotion.basics import Array, Progress, SelfmotionError
 from selfmotion.costs import JointVelocity
 from selfmotion.motion import Trajectory, joined_motions, reversed_motion
 from selfmotion.path import Line
-from selfmotion.planning.free_motion import FreeMotions
 from selfmotion.planning.run import plan
 from selfmotion.planning.settings import BRIEFEST_RETREAT, RETREAT_SPEED
 from selfmotion.problem import Problem, at_all_times
 from selfmotion.result import Move
 from selfmotion.task import SE3
+from selfmotion.transfer import FreeMotions
 
 
 @dataclass(frozen=True, eq=False)

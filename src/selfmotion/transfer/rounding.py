@@ -10,8 +10,8 @@ import numpy as np
 
 from selfmotion.basics import Array
 from selfmotion.motion import Trajectory
-from selfmotion.planning.settings import FINE_STEP, FINEST, FIRST_POINTS, PATH_SAMPLES
-from selfmotion.planning.ways import Room
+from selfmotion.transfer.settings import FINE_STEP, FINEST, FIRST_POINTS, PATH_SAMPLES
+from selfmotion.transfer.ways import Room
 
 _DEGREE = 3
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.planning import FreeMotions
+from selfmotion.transfer import FreeMotions
 from support.arms import robot_named
 from support.oracle import Judge
 from support.own_kinematics import Arm

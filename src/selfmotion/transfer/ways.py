@@ -14,19 +14,20 @@ import numpy.typing as npt
 
 from selfmotion.basics import Array, Ints
 from selfmotion.constraints import Envelope
-from selfmotion.planning.settings import (
+from selfmotion.robot import RobotModel
+from selfmotion.transfer.settings import (
     AROUND_MIDDLE,
     FIRST_LOT,
     LEG_RANGE,
     LEG_STEP,
     MISSED,
+    MOVE_MARGIN,
     ROUNDING,
     SHORTCUTS,
     SPREAD,
     TURN_STEP,
     WAYS,
 )
-from selfmotion.robot import RobotModel
 
 # Samples keep this share of the range from a limit.
 _INSIDE = 1e-6
@@ -51,7 +52,7 @@ class Room:
 
     asked: Envelope
     robot: RobotModel
-    margin: float
+    margin: float = MOVE_MARGIN
     finer: float = 1.0
 
     def free(self, q: Array) -> npt.NDArray[np.bool_]:

@@ -18,12 +18,12 @@ from selfmotion.basics import (
     silent,
 )
 from selfmotion.constraints import Clearance, Constraint
-from selfmotion.planning.free_motion import FreeMotions, is_pose
-from selfmotion.planning.settings import MOVE_DEADLINE
 from selfmotion.problem import KEPT, NO_OVERLAP, check_all_times
 from selfmotion.result import Move
 from selfmotion.robot import RobotModel
 from selfmotion.task import SE3, Task
+from selfmotion.transfer.free_motion import FreeMotions, is_pose
+from selfmotion.transfer.settings import MOVE_DEADLINE
 
 
 def move(

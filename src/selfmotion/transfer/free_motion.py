@@ -22,8 +22,13 @@ from selfmotion.constraints import Constraint, Envelope
 from selfmotion.follow import Follows
 from selfmotion.motion import Trajectory, slowdown_of
 from selfmotion.path import Dwell
-from selfmotion.planning.rounding import rounded
-from selfmotion.planning.settings import (
+from selfmotion.problem import at_all_times, envelope_of
+from selfmotion.result import Ends, Move, PaceLimits, along, fastest_pace, quantities_of_pace
+from selfmotion.robot import RobotModel
+from selfmotion.search import start_candidates
+from selfmotion.task import SE3, Task
+from selfmotion.transfer.rounding import rounded
+from selfmotion.transfer.settings import (
     BRIEFEST_MOVE,
     END_CONFIGURATIONS,
     FINER_LOOKS,
@@ -43,12 +48,7 @@ from selfmotion.planning.settings import (
     USUAL_SPEED,
     WIDER,
 )
-from selfmotion.planning.ways import Room, find_way, shortened, straight_way
-from selfmotion.problem import at_all_times, envelope_of
-from selfmotion.result import Ends, Move, PaceLimits, along, fastest_pace, quantities_of_pace
-from selfmotion.robot import RobotModel
-from selfmotion.search import start_candidates
-from selfmotion.task import SE3, Task
+from selfmotion.transfer.ways import Room, find_way, shortened, straight_way
 
 # Roundings that a motion may add up to.
 _ROUNDINGS = 16.0
@@ -84,7 +84,7 @@ class FreeMotions:
             return self.robot.configuration(end)[None]
         arm = self.asked.arm(self.robot)
         follows = Follows.of(arm, Dwell(end, 1.0), task)
-        room = Room(self.asked, self.robot, MOVE_MARGIN)
+        room = Room(self.asked, self.robot)
         found = np.array(start_candidates(follows, END_CONFIGURATIONS, self._rng, room.free))
         free = found[room.free(found)]
         if not len(free):
