@@ -121,3 +121,19 @@ def test_what_conditions_did_not_count_for_is_none_that_keeps_them(panda_circle:
     descent = NodeDescent(easy, effort, bound, free=False)
     descent.near([free.trajectory], first_nodes(easy))
     assert descent.latest is not None
+
+
+def test_an_optimum_that_takes_the_arm_into_itself_goes_on_at_once(panda: sm.RobotModel) -> None:
+    """With its bodies kept apart, and nothing is tried again."""
+    rng = np.random.default_rng(1000)
+    lower, upper = panda.finite_limits()
+    start = lower + (upper - lower) * rng.uniform(0.1, 0.9, panda.dof)
+    moves = np.cumsum(rng.uniform(-0.5, 0.5, (3, panda.dof)), axis=0)
+    poses = [panda.pose(q) for q in (start, *np.clip(start + moves, lower, upper))]
+    problem = sm.Problem(panda, sm.Waypoints.from_poses(np.linspace(0, 4, 4), poses), start=start)
+    careless = sm.plan(dataclasses.replace(problem, collision=None))
+    assert not problem.keeps_off_itself(careless.trajectory.q)
+    plan = sm.plan(problem)
+    assert plan.certificate.verified, plan.certificate.verdict
+    assert names_of(plan) == ["given start", "finer grids and proof"]
+    assert plan.report.cost > careless.report.cost

@@ -209,11 +209,11 @@ class Session:
     def _keep_off_itself(self) -> None:
         """Ask that of an optimum too that takes the arm into itself: few do."""
         found, start = self._found, self.beginning
-        met = isinstance(found, MotionOnNodes) and not (found.violations or found.keeps_off_itself)
-        if not isinstance(found, MotionOnNodes) or not met or self._ended is not None:
+        if not isinstance(found, MotionOnNodes) or found.violations or found.keeps_off_itself:
             return
-        first = found.motion.place.q[:1]
-        if start.effort.apart or not (start.free or start.problem.keeps_off_itself(first)):
+        # Of a given start in which it meets itself, nothing else begins.
+        kept = start.free or start.problem.keeps_off_itself(found.motion.place.q[:1])
+        if self._ended is not None or start.effort.apart or not kept:
             return
         asked = start.problem.bind_constraints(start.still.start, start.still.end, apart=True)
         self._by_nodes(lambda descent: descent.with_more(found), asked)
