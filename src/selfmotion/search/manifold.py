@@ -102,16 +102,18 @@ class Manifold:
         self, q: Array, targets: Array, still: Flags, steps: int, most: Array | float = np.inf
     ) -> tuple[Array, Flags]:
         """Return what Newton's method makes of q (K, n), no |q| more than `most` besides limits."""
-        found, arrived = np.array(q), np.zeros(len(q), dtype=bool)
-        lower, upper = self._limits
+        found, arrived = np.array(q, order="C"), np.zeros(len(q), dtype=bool)
+        # In one order of memory: each is a kernel of its own.
+        sides = np.maximum(self._limits[0], -most), np.minimum(self._limits[1], most)
+        lower, upper = (np.array(np.broadcast_to(side, q.shape), order="C") for side in sides)
         projection.project_all(
             found,
             targets,
             self.chains,
             self.layout,
-            np.array(np.broadcast_to(np.maximum(lower, -most), q.shape)),
-            np.array(np.broadcast_to(np.minimum(upper, most), q.shape)),
-            still,
+            lower,
+            upper,
+            np.array(still, order="C"),
             LONGEST_CORRECTION,
             steps,
             arrived,
