@@ -103,6 +103,10 @@ def test_what_no_cubic_near_x_0_keeps_is_kept() -> None:
     problem = sm.Problem(robot, path, start=start)
     cubic = sm.plan(replace(problem, null_motion=sm.PolynomialNullMotion()))
     assert not cubic.certificate.verified
+    assert "the published method keeps nothing but given ends" in cubic.report.message
+    # What is not asked of it is not searched for.
+    assert [attempt.name for attempt in cubic.report.attempts][0] == "given start"
+    assert len(cubic.report.attempts) == 2
     assert sm.plan(problem).certificate.verified
 
 

@@ -14,6 +14,7 @@ from selfmotion.paper import Guide
 from selfmotion.planning.beginning import Beginning
 from selfmotion.planning.effort import Effort
 from selfmotion.planning.finish import finish
+from selfmotion.planning.for_nodes import is_published
 from selfmotion.planning.known import Known, Proved
 from selfmotion.planning.largest_part import LargestPart, largest_part, shorter_part
 from selfmotion.planning.rough import Ranking
@@ -120,8 +121,13 @@ class Draft:
 
     @property
     def is_unmet(self) -> bool:
-        """Whether no motion is known yet that keeps all constraints."""
-        return self.best is None or bool(self.best.violations)
+        """Whether no motion is known yet that keeps all constraints that are asked of it."""
+        return self.best is None or (bool(self.best.violations) and not self.is_published)
+
+    @property
+    def is_published(self) -> bool:
+        """Whether the published method is asked for: it keeps nothing but given ends."""
+        return is_published(self.problem, self.effort)
 
     def begin(
         self,

@@ -44,7 +44,12 @@ def gathered(draft: Draft, deadline: Deadline) -> Plan:
         history=tuple(session.history),
         status=status_of(session.status, check),
         message=message_of(
-            session.status, session.violations, check, ending=part.ending, notes=draft.notes
+            session.status,
+            session.violations,
+            check,
+            ending=part.ending,
+            notes=draft.notes,
+            published=draft.is_published,
         ),
         seconds=time.perf_counter() - draft.began,
         gap=_gap(draft, proved),
@@ -96,6 +101,7 @@ def message_of(
     *,
     ending: str = "",
     notes: Sequence[str] = (),
+    published: bool = False,
 ) -> str:
     """Return in words how the optimisation ended, and what came of it."""
     said = status.message
@@ -105,10 +111,15 @@ def message_of(
             f"the motion passes a singular pose near t = {least.time:.4g} s (smallest singular "
             f"value {least.value:.2g}), next to which its cost cannot be lowered"
         )
-    parts = [said] if status.is_cut_short or not violations else []
+    parts = [said] if status.is_cut_short or published or not violations else []
     if violations and certificate.verified:
         # Such as the clearance of bodies, whose convex hulls are planned with.
         parts.append(f"what planning fell short of is kept by the motion: {'; '.join(violations)}")
+    elif violations and published:
+        parts.append(
+            f"the published method keeps nothing but given ends, and this is not kept: "
+            f"{'; '.join(violations)}; without null_motion, optimizer and damping it is asked for"
+        )
     elif violations:
         parts.append(f"not all constraints could be met: {'; '.join(violations)}")
     if certificate.failures and not (violations or ending):
