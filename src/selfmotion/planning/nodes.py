@@ -1,12 +1,13 @@
 """The best motion near others, by Newton's method on the nodes, and how fine it has to be."""
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
 from selfmotion.basics import Array, Ints
-from selfmotion.constraints import BoundConstraint
+from selfmotion.constraints import BoundClearance, BoundConstraint
 from selfmotion.motion import Grid, Trajectory
 from selfmotion.nodes import NodeGrid, NodeMotion, Optimum, Step, minimise
 from selfmotion.optimise import Iteration, Status
@@ -15,6 +16,7 @@ from selfmotion.planning.for_nodes import most_nodes
 from selfmotion.planning.on_nodes import MotionOnNodes
 from selfmotion.planning.settings import (
     ENDS_MET,
+    FARTHER_APART,
     FEWER,
     FINER_POWER,
     GIVEN_AWAY,
@@ -202,7 +204,7 @@ class NodeDescent:
                 break
             found = self.again(finer or standing, roughly=not polishes)
             if found is None:
-                break
+                return self._farther_apart(standing) or standing
             gains = standing.cost - found.cost > GIVEN_AWAY * abs(standing.cost)
             if not (found.has_arrived or gains) and self._ended is None:
                 # More nodes lead nowhere, and prices on the way say nothing.
@@ -210,6 +212,31 @@ class NodeDescent:
                 return found if found is not None and found.has_arrived else standing
             standing, is_rough = found.after(standing.cost), not polishes
         return standing
+
+    def _farther_apart(self, standing: MotionOnNodes) -> MotionOnNodes | None:
+        """Return a motion on its nodes that keeps between them what it breaks there; or None.
+
+        Beside corners of bodies more nodes may lead nowhere: on these, bodies are kept farther
+        apart at the points.
+        """
+        if self._ended is not None or not standing.motion.broken_between().any():
+            return None
+        grid = standing.motion.grid
+        for far in FARTHER_APART:
+            asked = [
+                replace(item, distance=item.distance + far, _last=[])
+                if isinstance(item, BoundClearance)
+                else item
+                for item in grid.constraints
+            ]
+            wider = NodeGrid(
+                self._problem, grid.t, asked, free=grid.free, counts=grid.counts, calm=grid.calm
+            )
+            optimum = self._minimise(wider.at(standing.motion.centred))
+            found = replace(optimum, motion=grid.at(optimum.motion.centred))
+            if _is_kept(found.motion) and not found.motion.broken_between().any():
+                return self._standing(found)
+        return None
 
     def _finer(self, standing: MotionOnNodes) -> Array | None:
         """Return times of nodes near enough to each other, or None where these are."""

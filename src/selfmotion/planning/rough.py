@@ -76,17 +76,18 @@ class Ranking:
         motions, arrived = carried(problem.follows, np.array(starts), self._t)
         if not arrived.any():
             return False
-        by_cost = self._is_pointwise()
-        if by_cost:
-            begun = self._freely(motions[arrived], finalists)
-            if begun is None:
+        free: list[NodeMotion] = []
+        if self._is_pointwise():
+            optima = self._freely(motions[arrived], finalists)
+            if optima is None:
                 return False
-        else:
+            free = optima
+        if not self._ranked:
+            # Optima lie where nothing was asked: what keeps everything may begin elsewhere.
             order = most_promising(problem, starts, motions, arrived, self._t, self._apart)
             near = (self._near(motions[k]) for k in order[: max(ROUGH_MOTIONS, finalists)])
             begun = [motion for motion in near if motion is not None]
-        if not self._ranked:
-            self._ranked = self._with_conditions(begun, finalists, by_cost=by_cost)
+            self._ranked = self._with_conditions(free, begun, finalists)
         return bool(self._ranked)
 
     def _is_pointwise(self) -> bool:
@@ -163,18 +164,22 @@ class Ranking:
         return [*kept, *others] if kept and not _hopeful(found).any() else []
 
     def _with_conditions(
-        self, begun: Sequence[NodeMotion], finalists: int, *, by_cost: bool
+        self, free: Sequence[NodeMotion], others: Sequence[NodeMotion], finalists: int
     ) -> list[NodeMotion]:
         """Return the best of what a few steps with conditions make of motions, different ones.
 
-        `by_cost` says that these are optima without conditions, the cheapest first.
+        Of optima without conditions, the cheapest first; and of others where none of these keeps
+        everything.
         """
         found: list[tuple[tuple[bool, float], NodeMotion]] = []
-        for number, motion in enumerate(begun, 1):
-            if by_cost and found and (False, motion.cost) >= found[0][0]:
-                # With conditions they would cost more still.
+        total = len(free) + len(others)
+        for number, motion in enumerate([*free, *others], 1):
+            if free and number > len(free) and found and found[0][1].violation <= 0.0:
                 break
-            self._progress("start", number, len(begun))
+            if number <= len(free) and found and (False, motion.cost) >= found[0][0]:
+                # With conditions it would cost more still.
+                continue
+            self._progress("start", number, total)
             better = minimise(motion, lambda _: False, roughly=True, most=WITH_CONDITIONS).motion
             found = sorted([*found, (self._rank(better), better)], key=lambda each: each[0])
             self._ranked = [one for _, one in found]

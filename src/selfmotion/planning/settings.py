@@ -23,6 +23,9 @@ GIVEN_AWAY = 1e-4
 MOST_NODES = 1024
 # More of them are put in so often, at most.
 NODE_ROUNDS = 14
+# Where nodes keep bodies apart and the motion between them does not, they are kept so much farther
+# apart at the points [m].
+FARTHER_APART = (5e-4, 1e-3, 2e-3)
 # What is asked of the ends is met to this [rad, rad/s].
 ENDS_MET = 1e-8
 # Steps of Newton's method from other beginnings than the first: what takes long leads nowhere.
