@@ -170,12 +170,14 @@ class Ranking:
         `by_cost` says that these are optima without conditions, the cheapest first.
         """
         found: list[tuple[tuple[bool, float], NodeMotion]] = []
+        # It is a long way from where there is no self-motion.
+        most = WITH_CONDITIONS if by_cost else ROUGH_ROUNDS
         for number, motion in enumerate(begun, 1):
             if by_cost and found and (False, motion.cost) >= found[0][0]:
                 # With conditions they would cost more still.
                 break
             self._progress("start", number, len(begun))
-            better = minimise(motion, lambda _: False, roughly=True, most=WITH_CONDITIONS).motion
+            better = minimise(motion, lambda _: False, roughly=True, most=most).motion
             found = sorted([*found, (self._rank(better), better)], key=lambda each: each[0])
             self._ranked = [one for _, one in found]
         q = np.array([motion.place.q for motion in self._ranked])
