@@ -87,9 +87,9 @@ class Part(NamedTuple):
 PARTS = (
     Part(
         "rollout",
-        ("engine/rollout.py",),
+        ("paper/rollout.py",),
         (
-            "engine/test_rollout.py -k 'planar_3r or breakdown or broke or polish'",
+            "paper/test_rollout.py -k 'planar_3r or breakdown or broke or polish'",
             "motion/test_null_motion.py -k planar_3r",
             "task/test_damping.py -k planar_3r",
         ),
@@ -101,18 +101,18 @@ PARTS = (
         ("kernels/*.py",),
         (
             "kernels",
-            "engine/test_rollout.py -k 'planar_3r or breakdown or broke or polish'",
-            "engine/test_objective.py -k 'planar_3r and sensitivities'",
+            "paper/test_rollout.py -k 'planar_3r or breakdown or broke or polish'",
+            "paper/test_objective.py -k 'planar_3r and sensitivities'",
         ),
         compiled=False,
     ),
     Part(
         "objective",
-        ("engine/objective.py", "engine/cost_integrals.py", "engine/conditions.py"),
+        ("paper/objective.py", "paper/cost_integrals.py", "constraints/kept.py"),
         (
-            "engine/test_conditions.py",
+            "constraints/test_kept.py",
             "constraints/test_base.py -k 'equality or finite or rows'",
-            "engine/test_objective.py -k 'metric or gradient_equals and (planar_3r or panda-pose)'",
+            "paper/test_objective.py -k 'metric or gradient_equals and (planar_3r or panda-pose)'",
         ),
     ),
     Part(

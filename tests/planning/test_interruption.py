@@ -149,6 +149,37 @@ def test_a_callback_stops_all_starts(problem: sm.Problem) -> None:
     assert found.report.cost < costs[0]
 
 
+@pytest.mark.parametrize("asked", ["length", "acceleration", "too slow"])
+def test_a_callback_that_stops_is_asked_no_more_and_is_told_of(
+    problem: sm.Problem, asked: str
+) -> None:
+    """Wherever it stops: also where what is found then is worse than what there was."""
+    if asked == "acceleration":
+        problem = dataclasses.replace(problem, costs=[sm.JointAcceleration()])
+    elif asked == "too slow":
+        start = problem.robot.inverse_kinematics(problem.path.pose(0.0), "planar", rng=0)
+        limits = [sm.JointVelocityLimits(0.2)]
+        problem = dataclasses.replace(problem, start=start, constraints=limits)
+    search = None if problem.given_start is not None else sm.Search(starts=6, finalists=3)
+
+    def stopped_at(most: float) -> tuple[sm.Plan, int]:
+        calls = 0
+
+        def stop(_: sm.Iteration) -> bool:
+            nonlocal calls
+            calls += 1
+            return calls >= most
+
+        return sm.plan(problem, search=search, callback=stop), calls
+
+    _, total = stopped_at(np.inf)
+    for most in np.unique(np.linspace(1, total, 20).astype(int)):
+        found, calls = stopped_at(most)
+        assert calls == most
+        assert found.report.status is sm.Status.STOPPED
+        assert found.certificate.position_error.value < 1e-3
+
+
 def test_an_interruption_of_a_given_start(problem: sm.Problem) -> None:
     start = problem.robot.inverse_kinematics(problem.path.pose(0.0), "planar", rng=0)
     given = dataclasses.replace(problem, start=start)

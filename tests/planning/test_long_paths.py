@@ -1,5 +1,7 @@
 """Paths many times as long as the arm: a loop costs what it costs, however many there are."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -133,3 +135,30 @@ def test_an_interruption_of_newtons_method_keeps_the_best_so_far(planar: sm.Robo
     assert plan.report.status.value == "interrupted"
     assert plan.certificate.verified
     assert plan.report.cost <= whole[0] * (1.0 + ENDS)
+
+
+@pytest.mark.parametrize("stops", [False, True])
+def test_who_wants_no_more_among_the_postures_of_a_stretch_waits_for_nothing(
+    planar: sm.RobotModel, stops: bool
+) -> None:
+    """Also where the motion in such a posture is worse than what there is."""
+    problem = loops(planar, 8, start=True)
+    slow = [problem.constraints[0], sm.JointVelocityLimits(0.3)]
+    problem = dataclasses.replace(problem, constraints=slow)
+    stages: list[str] = []
+    asked: list[str] = []
+
+    def progress(stage: str, done: int, total: int) -> None:
+        stages.append(stage)
+        if stage == "optimising start" and not stops:
+            raise KeyboardInterrupt
+
+    def stop(_: sm.Iteration) -> bool:
+        asked.append(stages[-1] if stages else "")
+        return asked[-1] == "optimising start"
+
+    found = sm.plan(problem, progress=progress, callback=stop)
+    assert found.report.status is (sm.Status.STOPPED if stops else sm.Status.INTERRUPTED)
+    assert asked.count("optimising start") == stops
+    assert asked[-1] == ("optimising start" if stops else "")
+    assert stages[-1] == "checking"

@@ -129,3 +129,24 @@ def test_starts_of_which_none_follows_the_path_at_x_0_are_all_optimised(
     assert ranking.ranked == []
     found = sm.plan(problem, search=sm.Search(starts=12))
     assert found.certificate.verified
+
+
+def test_costs_of_accelerations_are_ranked_by_what_becomes_of_them() -> None:
+    """A few steps from where there is no self-motion tell nothing: they took a start at 7."""
+    arm = sm.load_robot("ur5")
+    place = np.array([0.844, -0.204, -0.206])
+    way = np.array(
+        [
+            [0.0, 0.0, 0.0],
+            [-0.005, -0.006, 0.018],
+            [-0.076, 0.01, -0.02],
+            [-0.054, 0.052, -0.053],
+            [-0.09, 0.047, -0.076],
+            [-0.144, 0.036, -0.026],
+        ]
+    )
+    path = sm.Waypoints(np.linspace(0.0, 2.0, len(way)), place + way)
+    limits = [sm.JointVelocityLimits(), sm.JointAccelerationLimits(3.78)]
+    costs = [sm.JointAcceleration()]
+    plan = sm.plan(sm.Problem(arm, path, "position", costs=costs, constraints=limits)).require()
+    assert plan.report.cost < 2.0

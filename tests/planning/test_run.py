@@ -11,6 +11,7 @@ import selfmotion as sm
 from selfmotion.certificate import Certificate, Extreme
 from selfmotion.optimise import Status
 from selfmotion.planning.gather import message_of, status_of
+from selfmotion.planning.nodes import NodeDescent
 
 
 @pytest.fixture(scope="module")
@@ -195,3 +196,13 @@ def test_a_free_start_is_no_dearer_than_a_good_given_one() -> None:
         assert free.certificate.verified
         # Rough optima that differ by less are not told apart.
         assert free.report.cost <= 1.01 * given.report.cost
+
+
+def test_what_is_verified_is_not_said_to_contradict(
+    panda_circle: Callable[[str], sm.Problem], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where nodes lead nowhere the motion at x = 0 stands, and may keep all."""
+    monkeypatch.setattr(NodeDescent, "near", lambda *_: None)
+    report = sm.plan(panda_circle("position")).require().report
+    assert report.status is Status.PRECISION
+    assert report.message == Status.PRECISION.message

@@ -39,6 +39,8 @@ _FLAT = 2.5e-5
 # One that is not positive definite gets this share of its largest entry on the diagonal, or a
 # third of what the last one needed; then more by this factor, again and again.
 _SHIFT, _LESS, _MORE = 1e-6, 1.0 / 3.0, 8.0
+# Or this share of the largest entry of all, where nothing else bends.
+_LEAST_SHIFT = 1e-18
 # Nodes go no further than this in one step [rad or m]; one that would go beyond that is none of a
 # matrix that says something.
 _FARTHEST, _TRUSTED = 0.5, 5.0
@@ -413,7 +415,7 @@ class _Solver:
                     self._shift = shift
                     self._promised = float(-(right.ravel() + border.columns @ prices) @ step)
                     return step.reshape(count, size), prices
-            shift = max(_MORE * shift, _SHIFT * bends, _LESS * self._shift)
+            shift = max(_MORE * shift, _SHIFT * bends, _LESS * self._shift, _LEAST_SHIFT * largest)
         return None
 
     def _move(self, model: _Model, step: _Change) -> Status | None:

@@ -13,7 +13,7 @@ class Effort:
     Attributes
     ----------
     optimizer : Optimizer
-        Minimises as long as conditions are kept.
+        Of the published method.
     callback : callable or None
         Called with each `Iteration`.
     max_evaluations : int or None

@@ -31,6 +31,7 @@ def gathered(draft: Draft, deadline: Deadline) -> Plan:
     if deadline.passed and session.status is Status.INTERRUPTED:
         session.end(Status.DEADLINE)
     counts, standing, check = session.counts, session.standing, finished.certificate
+    status = status_of(session.status, check)
     report = Report(
         cost=motion.cost,
         initial_cost=still.cost,
@@ -42,9 +43,9 @@ def gathered(draft: Draft, deadline: Deadline) -> Plan:
         steps=len(motion.trajectory.t) - 1,
         iterations=sum(iteration.step > 0.0 for iteration in session.history),
         history=tuple(session.history),
-        status=status_of(session.status, check),
+        status=status,
         message=message_of(
-            session.status,
+            status,
             session.violations,
             check,
             ending=part.ending,

@@ -48,10 +48,23 @@ def keep_to_posture(draft: Draft) -> None:
         _optimise(draft, posture, ended)
         if draft.is_over:
             break
+    if ended is not None:
+        _end(draft, ended)
+
+
+def _end(draft: Draft, ended: Status) -> None:
+    """Let what stands be it, where the user wants no more; KeyboardInterrupt where nothing does."""
+    if draft.best is not None:
+        draft.best.end(ended)
+    elif ended is Status.INTERRUPTED:
+        raise KeyboardInterrupt
 
 
 def _optimise(draft: Draft, posture: Array, ended: Status | None) -> None:
-    """Consider the best motion near one in a posture (n,), if it keeps the conditions."""
+    """Consider the best motion near one in a posture (n,), if it keeps the conditions.
+
+    Where the user wants no more, it has to do where there is no other.
+    """
     problem, start = draft.problem, draft.problem.given_start
     if start is None:
         try:
@@ -71,7 +84,12 @@ def _optimise(draft: Draft, posture: Array, ended: Status | None) -> None:
         found, ended = descent.latest, Status.INTERRUPTED
         if found is None:
             raise
-    if found is None or found.violations or found.cost >= draft.dearest:
+    if descent.is_stopped:
+        ended = Status.STOPPED
+    will_do = found is not None and not found.violations and found.cost < draft.dearest
+    if found is None or not (will_do or (ended is not None and draft.best is None)):
+        if ended is not None:
+            _end(draft, ended)
         return
     # Of its velocities eq. 4 keeps the self-motion.
     rates, grid = partial(motion.trajectory, order=1), Grid(motion.grid.t)

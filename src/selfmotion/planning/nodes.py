@@ -69,6 +69,11 @@ class NodeDescent:
         self.is_hopeless = False
         self._ended: Status | None = None
 
+    @property
+    def is_stopped(self) -> bool:
+        """Whether the callback asked to stop: also where no motion that is found says so."""
+        return self._ended is Status.STOPPED
+
     def end(self, status: Status) -> None:
         """Take motions as they are; there is no time for better ones."""
         self._ended = status
@@ -120,7 +125,8 @@ class NodeDescent:
         free = None
         if dearest < np.inf:
             free = self._freely(motion)
-            if free.cost >= dearest:
+            # On the way to an optimum, what it costs says nothing.
+            if self._ended is None and free.cost >= dearest:
                 # With conditions it would cost more still.
                 self.is_hopeless = True
                 return None
@@ -275,7 +281,9 @@ class NodeDescent:
             evaluations=effort.counts.evaluations,
         )
         self.history.append(iteration)
-        if effort.callback is not None and effort.callback(iteration):
+        # Who has asked to stop is asked no more.
+        asked = effort.callback if self._ended is None else None
+        if asked is not None and asked(iteration):
             self._ended = Status.STOPPED
         most = effort.max_evaluations
         if most is not None and effort.counts.evaluations >= self._first + most:

@@ -180,7 +180,9 @@ class Ranking:
                 # With conditions it would cost more still.
                 continue
             self._progress("start", number, total)
-            better = minimise(motion, lambda _: False, roughly=True, most=WITH_CONDITIONS).motion
+            # It is a long way from where there is no self-motion.
+            most = WITH_CONDITIONS if number <= len(free) else ROUGH_ROUNDS
+            better = minimise(motion, lambda _: False, roughly=True, most=most).motion
             found = sorted([*found, (self._rank(better), better)], key=lambda each: each[0])
             self._ranked = [one for _, one in found]
         q = np.array([motion.place.q for motion in self._ranked])

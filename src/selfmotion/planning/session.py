@@ -233,6 +233,9 @@ class Session:
                 raise
             found = descent.latest
             self._ended = Status.INTERRUPTED
+        if descent.is_stopped:
+            # A motion that was better before it stands as it was, and does not say so.
+            self._ended = Status.STOPPED
         self.history += descent.history
         self.is_hopeless = descent.is_hopeless
         self._found = found or self._found

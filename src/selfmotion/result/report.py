@@ -112,9 +112,9 @@ class Report:
     null_motion : NullMotion or None
         The parameterisation that the plan's coefficients are of; None for other works' methods.
     remaining : float or None
-        An estimate of what any other null motion could still take off F, the constraints kept: of
-        nodes what their distance and another step leave; else by the quadratic model of F around
-        the plan in a spline of up to 64 intervals. None where there is none to be had.
+        An estimate of what any other null motion could still take off F, the constraints kept:
+        what the nodes' distance and another step leave. None of the published method, which knows
+        no other null motion.
     attempts : tuple of Attempt
         What was tried, in order; empty for other works' methods.
     """
