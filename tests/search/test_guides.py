@@ -5,7 +5,7 @@ import pinocchio as pin
 import pytest
 
 import selfmotion as sm
-from selfmotion.search import shortest_along
+from selfmotion.search import carried, shortest_along
 from selfmotion.search.guides import search_times
 from support.stretching import DURATION, rounded_problem, stretching
 
@@ -49,3 +49,20 @@ def test_a_chain_passes_beside_a_pose_that_rounding_puts_out_of_reach() -> None:
     assert t[16] < where[16] < t[17]
     for time, here in zip(where, q, strict=True):
         assert problem.follows.only.miss(problem.path.pose(float(time)), here)[0] < 1e-9
+
+
+def test_chains_beside_bodies_are_shortened_with_virtual_joints(panda: sm.RobotModel) -> None:
+    """These come after the arm's own, and move no bodies."""
+    start = panda.dexterous_configuration()
+    path = sm.Circle.around(panda.pose(start), 0.1, 4.0, normal=(1.0, 0.0, 0.0))
+    # Beside the forearm, near enough to be watched.
+    ball = sm.Clearance([sm.Sphere("ball", (0.2, 0.25, 0.6), 0.05)], 0.01)
+    problem = sm.Problem(
+        panda, path, constraints=[ball], relaxations=[sm.Relaxation("rz", 0.3, during=(1.0, 2.0))]
+    ).augmented
+    t = np.linspace(0.0, 4.0, 9)
+    motions, arrived = carried(problem.follows, problem.at(t[:1], start[None]), t)
+    assert arrived.all()
+    found = shortest_along(problem, t, motions[0], t, (1.0, 0.3))
+    assert found is not None
+    assert found[1].shape == motions[0].shape

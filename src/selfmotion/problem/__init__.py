@@ -3,6 +3,7 @@
 from selfmotion.problem.defaults import KEPT as KEPT, NO_OVERLAP as NO_OVERLAP
 from selfmotion.problem.envelopes import envelope_of as envelope_of
 from selfmotion.problem.given import START_MISS as START_MISS
+from selfmotion.problem.of_arm import BodiesOfArm as BodiesOfArm
 from selfmotion.problem.paper_problem import sample_problem as sample_problem
 from selfmotion.problem.parts import (
     asked_of_part as asked_of_part,

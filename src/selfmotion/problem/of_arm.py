@@ -175,6 +175,11 @@ class BodiesOfArm:
         self._model, self._dof = model, model.robot.dof
 
     @property
+    def own(self) -> CollisionModel:
+        """The bodies by the arm's own joints, which come first."""
+        return self._model
+
+    @property
     def is_all_convex(self) -> bool:
         """See `CollisionModel.is_all_convex`."""
         return self._model.is_all_convex

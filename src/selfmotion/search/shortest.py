@@ -15,6 +15,7 @@ import numpy as np
 from selfmotion.basics import Array, Flags, Ints
 from selfmotion.collision import ClearanceModel, CollisionModel
 from selfmotion.optimise import Banded
+from selfmotion.problem import BodiesOfArm
 from selfmotion.search.nodes import Admissible
 from selfmotion.search.settings import (
     AT_LIMIT,
@@ -142,10 +143,14 @@ class Shortest:
         watched = np.flatnonzero(self._watched)
         found = [(watched[:0], np.empty(0), np.empty((0, q.shape[1])))]
         for model, wanted in self._smooth_models() if len(watched) else ():
-            now = model.clearances(q[watched])
+            # Virtual joints come after the arm's own, and move no bodies.
+            own = model.robot.dof
+            now = model.clearances(np.ascontiguousarray(q[watched, :own]))
             lack = wanted - now.values[now.rows, now.columns]
             near = lack > 0.0
-            found.append((watched[now.rows[near]], lack[near], now.slopes[near]))
+            slopes = np.zeros((int(near.sum()), q.shape[1]))
+            slopes[:, :own] = now.slopes[near]
+            found.append((watched[now.rows[near]], lack[near], slopes))
         rows, lacks, slopes = (np.concatenate(parts) for parts in zip(*found, strict=True))
         return rows, lacks, slopes
 
@@ -231,7 +236,8 @@ def _least(bases: Array, slope: Array, own: Array, between: Array, state: _State
     return np.asarray(np.einsum("wnd,wd->wn", bases, moves.reshape(count, size)))
 
 
-def _smooth(model: CollisionModel, distance: float) -> tuple[ClearanceModel, float]:
+def _smooth(model: CollisionModel | BodiesOfArm, distance: float) -> tuple[ClearanceModel, float]:
     """Return the distances that have slopes, and what is wanted of them [m]."""
     wanted = distance + NEAR_BODIES
-    return ClearanceModel(model, wanted, width=_LEVELLED), wanted
+    own = model.own if isinstance(model, BodiesOfArm) else model
+    return ClearanceModel(own, wanted, width=_LEVELLED), wanted
