@@ -193,3 +193,13 @@ def test_windows_of_relaxations_stay_where_they_are_on_the_path() -> None:
         np.testing.assert_allclose(
             found.plan.path.pose(new).translation, line.pose(old).translation, atol=NEAR
         )
+
+
+def test_a_pace_that_no_smooth_one_is_near_ends_the_rounds() -> None:
+    """The quintic through it would turn back: what was found by then is the motion."""
+    panda = robot_named("panda")
+    start = panda.dexterous_configuration()
+    circle = sm.Circle.around(panda.pose(start), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
+    found = sm.fastest(sm.Problem(panda, circle, "position", start))
+    assert found.plan.certificate.verified
+    assert found.duration <= found.pseudo_inverse

@@ -124,3 +124,5 @@ def test_where_nothing_can_be_met_the_verdict_says_by_how_much() -> None:
         plan = too_fast(motion)
         assert not plan.certificate.verified
         assert "2 times its limit" in plan.certificate.verdict
+        # What cannot be kept is not paid for.
+        assert plan.report.cost <= plan.report.initial_cost

@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from selfmotion.basics import (
     Array,
+    PathError,
     PlanError,
     Progress,
     as_number,
@@ -235,7 +236,12 @@ class _Rounds:
             before = self._duration
             weighted = self._kept.weighted(costs, weight * self._duration) if weight else ()
             asked = replace(self._free, costs=(use, *weighted))
-            planned = options.plan(_at_pace(asked, pace), self.longest)
+            try:
+                paced = _at_pace(asked, pace)
+            except PathError:
+                # No pace as smooth as the path is near the one found: that one stands.
+                return
+            planned = options.plan(paced, self.longest)
             self.verdict = planned.certificate.verdict
             if planned.certificate.on_path and not planned.report.ending:
                 found = self._taken("rounds", planned)

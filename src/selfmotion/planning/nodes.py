@@ -135,7 +135,8 @@ class NodeDescent:
             best = self._other(motion, best, free)
         if not _is_kept(best.motion) and self._ended is None:
             # What control points of few nodes cannot keep, the curve may.
-            best = self._on_halved(best)
+            rank = partial(_rank, usual=abs(motion.aim))
+            best = min(best, self._on_halved(best), key=rank)
         return self._standing(best)
 
     def with_more(self, known: MotionOnNodes) -> MotionOnNodes | None:
@@ -304,7 +305,7 @@ def _is_kept(motion: NodeMotion) -> bool:
     return bool(motion.violation <= 0.0 and np.abs(motion.c).max(initial=0.0) <= ENDS_MET)
 
 
-def _rank(optimum: Optimum, usual: float) -> tuple[bool, float]:
+def _rank(optimum: Optimum, usual: float) -> tuple[bool, bool, float]:
     """Return what sorts optima, the smaller the better.
 
     What is broken counts as so many times what is `usual` for the cost: where nothing can be kept,
@@ -313,7 +314,8 @@ def _rank(optimum: Optimum, usual: float) -> tuple[bool, float]:
     motion = optimum.motion
     broken = not _is_kept(motion)
     unmet = motion.violation + float(np.abs(motion.c).max(initial=0.0))
-    return broken, motion.aim + (UNKEPT * usual * unmet if broken else 0.0)
+    price = UNKEPT * usual
+    return broken, broken and motion.aim > price, motion.aim + (price * unmet if broken else 0.0)
 
 
 def _aim_of(motion: NodeMotion) -> float:
