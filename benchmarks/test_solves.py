@@ -24,7 +24,7 @@ PROBLEMS = {
     "panda circle, position": lambda: circle("panda", "position"),
     "panda circle, pointing": lambda: circle("panda", "pointing"),
     "xarm7 circle, pose": lambda: circle("xarm7", "pose"),
-    "panda 200 waypoints": lambda: suite_path("panda__1cube", null_motion=sm.BSplineNullMotion(12)),
+    "panda 200 waypoints": lambda: suite_path("panda__1cube"),
 }
 
 
