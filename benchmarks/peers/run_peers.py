@@ -49,7 +49,6 @@ def main() -> int:
     rows = [
         *ours(bare, "default, limits of position only"),
         *ours(whole, "default, maker's limits, rest, self-collision"),
-        ours(replace(whole, null_motion=sm.BSplineNullMotion(24)), "spline of 24 intervals")[1],
     ]
     for program, packages in PEERS.items():
         python = environment(program.split("_")[0], packages)
