@@ -130,9 +130,15 @@ class NodeDescent:
                 # With conditions it would cost more still.
                 self.is_hopeless = True
                 return None
-        best = self._minimise(motion, prices)
+        # What takes long is seldom kept in the end: other beginnings come before the rest of it.
+        best = minimise(motion, self._told, prices, roughly=True, most=FEWER)
+        first = best
         if not _is_kept(best.motion) and self._ended is None:
             best = self._other(motion, best, free)
+        unfinished = first.status is Status.MAX_ITERATIONS and self._ended is None
+        if unfinished and (best is first or not _is_kept(best.motion)):
+            rest = self._minimise(first.motion, first.prices if best is first else None)
+            best = min(best, rest, key=partial(_rank, usual=abs(motion.aim)))
         if not _is_kept(best.motion) and self._ended is None:
             # What control points of few nodes cannot keep, the curve may.
             rank = partial(_rank, usual=abs(motion.aim))

@@ -28,8 +28,8 @@ NODE_ROUNDS = 14
 FARTHER_APART = (5e-4, 1e-3, 2e-3)
 # What is asked of the ends is met to this [rad, rad/s].
 ENDS_MET = 1e-8
-# Steps of Newton's method from other beginnings than the first: what takes long leads nowhere.
-FEWER = 40
+# Steps of Newton's method from each of several beginnings: what takes longer mostly leads nowhere.
+FEWER = 25
 # Where the motion at x = 0 does not lead to what keeps the conditions: the self-motion goes towards
 # the middle of the limits in such shares of the duration.
 TOWARDS_MIDDLE = (1.0 / 16.0, 1.0 / 64.0, 1.0 / 4.0)
