@@ -202,6 +202,11 @@ class NodeDescent:
         The curve is on its path between them, control points give hardly anything away, and what
         is asked at points holds between them.
         """
+        found = self._resolved(standing)
+        return self._farther_apart(found) or found
+
+    def _resolved(self, standing: MotionOnNodes) -> MotionOnNodes:
+        """Return the optimum on nodes so near to each other that more change nothing, if it may."""
         before, most, is_rough = np.inf, most_nodes(self._problem), True
         for _ in range(NODE_ROUNDS):
             if self._ended is not None:
@@ -217,7 +222,7 @@ class NodeDescent:
                 break
             found = self.again(finer or standing, roughly=not polishes)
             if found is None:
-                return self._farther_apart(standing) or standing
+                break
             gains = standing.cost - found.cost > GIVEN_AWAY * abs(standing.cost)
             if not (found.has_arrived or gains) and self._ended is None:
                 # More nodes lead nowhere, and prices on the way say nothing.
