@@ -3,6 +3,7 @@
 import dataclasses
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -279,6 +280,55 @@ class ElbowBand(sm.Constraint, kind="elbow band"):
 class Lazy:
     def minimize(self, function: sm.Function, x0: Array, *_: object, **__: object) -> sm.Minimum:
         return sm.Minimum(x0, function.value(x0), np.eye(len(x0)), (), sm.Status.CONVERGED)
+
+
+class Silent:
+    """Finds the minimum, and tells nothing of the way."""
+
+    def minimize(self, function: sm.Function, x0: Array, *given: Any, **options: Any) -> sm.Minimum:
+        options["callback"] = None
+        found = sm.QuasiNewton().minimize(function, x0, *given, **options)
+        return dataclasses.replace(found, history=())
+
+
+def test_an_optimiser_need_not_tell_of_its_way(problem: sm.Problem) -> None:
+    told, untold = (sm.plan(problem, optimizer=one) for one in (sm.QuasiNewton(), Silent()))
+    assert untold.report.status is told.report.status is sm.Status.CONVERGED
+    assert untold.report.cost == pytest.approx(told.report.cost, rel=1e-6)
+
+
+@dataclass(frozen=True)
+class OneNumber(SlowNodes):
+    """One number for the whole motion, where one for each node is expected."""
+
+    def residual(self, samples: sm.Samples) -> Array:
+        return np.asarray(super().residual(samples).max(axis=0, keepdims=True))
+
+
+@dataclass(frozen=True)
+class AsOne(SlowElbow, kind="as one"):
+    equality: bool = False
+
+    def bind(self, follows: Follows, start: Array, end: Array) -> OneNumber:
+        return OneNumber(self.limit, equality=self.equality)
+
+
+@pytest.mark.parametrize(
+    ("equality", "message"),
+    [
+        (False, r"its residual has shape \(1, 1\), expected a row for each of \d+ nodes"),
+        (True, "it is an equality, expected h ≤ 0 at all nodes"),
+    ],
+)
+def test_conditions_that_nodes_cannot_ask_are_refused_by_name(
+    problem: sm.Problem, equality: bool, message: str
+) -> None:
+    asked = dataclasses.replace(
+        problem, null_motion=sm.FreeNullMotion(), constraints=[AsOne(0.3, equality)]
+    )
+    for start in (problem.given_start, None):
+        with pytest.raises(sm.ProblemError, match=f"constraint 'slow elbow': {message}"):
+            sm.plan(dataclasses.replace(asked, start=start))
 
 
 def test_checkers_refuse_what_is_wrong(problem: sm.Problem) -> None:

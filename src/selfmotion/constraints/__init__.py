@@ -25,7 +25,11 @@ from selfmotion.constraints.ends import (
     StartVelocity as StartVelocity,
 )
 from selfmotion.constraints.envelope import Envelope as Envelope
-from selfmotion.constraints.kept import penalty as penalty, violated as violated
+from selfmotion.constraints.kept import (
+    penalised as penalised,
+    penalty as penalty,
+    violated as violated,
+)
 from selfmotion.constraints.limits import (
     BoundLimits as BoundLimits,
     JointAccelerationLimits as JointAccelerationLimits,

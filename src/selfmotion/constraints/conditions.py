@@ -75,7 +75,7 @@ class BoundConstraint(Protocol):
         """What h (|h| for an equality) may be and still count as kept."""
 
     def residual(self, samples: Samples) -> Array:
-        """Return h: (N + 1, C) for conditions at every node, (1, C) for conditions on the whole."""
+        """Return h: (N + 1, C) for conditions at every node, (1, C) for those on the ends."""
 
     def tangents(self, samples: Samples, motion: NodeTangents) -> Array:
         """Return ∂h/∂x for d variables: h's shape with d appended."""

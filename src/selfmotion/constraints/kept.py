@@ -26,6 +26,11 @@ def violated(constraints: Sequence[BoundConstraint], samples: Samples) -> tuple[
     return tuple(messages)
 
 
+def penalised(cost: float, constraints: Sequence[BoundConstraint], samples: Samples) -> float:
+    """Return a cost, much larger where constraints are violated: for ranking motions."""
+    return cost + max(abs(cost), 1e-3) * penalty(constraints, samples)
+
+
 def penalty(constraints: Sequence[BoundConstraint], samples: Samples) -> float:
     """Return up to 10 for each constraint that is violated, 0 where all are kept."""
     steps, total = np.diff(samples.sampling.node_times), 0.0

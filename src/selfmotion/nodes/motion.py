@@ -109,7 +109,11 @@ class NodeGrid:
 
     def without_rows(self) -> "NodeGrid":
         """Return the same with nothing asked but what its ends are."""
-        return self._other(self._one, [item for item in self.constraints if item.equality])
+        return self.asking([item for item in self.constraints if item.equality])
+
+    def asking(self, constraints: Sequence[BoundConstraint]) -> "NodeGrid":
+        """Return the same nodes, asked for other constraints."""
+        return self._other(self._one, constraints)
 
     def copied(self, copies: int) -> "NodeGrid":
         """Return the nodes of so many motions, one after the other, for `Together`.

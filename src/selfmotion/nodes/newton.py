@@ -36,8 +36,8 @@ _SHARE, _SHORTEST = 1e-4, 1e-7
 # this share of its usual entry, over the square of the number of nodes, more on the diagonal: above
 # what differences leave there, and below what slow motions cost.
 _FLAT = 2.5e-5
-# One that is not positive definite gets this share of its largest entry on the diagonal, or a
-# third of what the last one needed; then more by this factor, again and again.
+# One that is not positive definite gets this share of its largest entry without rows on the
+# diagonal, or a third of what the last one needed; then more by this factor, again and again.
 _SHIFT, _LESS, _MORE = 1e-6, 1.0 / 3.0, 8.0
 # Or this share of the largest entry of all, where nothing else bends.
 _LEAST_SHIFT = 1e-18
@@ -365,8 +365,7 @@ class _Solver:
             right = right + model.around.pulled(grid.spline.scattered(push))
             right.reshape(-1)[grid.held] = 0.0
             intervals = intervals + self._stiffness(model, stiff)
-        bends = float(np.abs(model.around.curvature).max() + np.abs(model.intervals).max())
-        solved = self._solved(right, model.around.curvature, intervals, model.border, bends)
+        solved = self._solved(right, model, intervals)
         if solved is None:
             return None
         step, end_prices = solved
@@ -389,14 +388,12 @@ class _Solver:
         of_points = model.rows.squared_points(weights, both)
         return found if of_points is None else found + of_points
 
-    def _solved(
-        self, right: Array, curved: Array, intervals: Array, border: Border, bends: float
-    ) -> tuple[Array, Array] | None:
+    def _solved(self, right: Array, model: _Model, intervals: Array) -> tuple[Array, Array] | None:
         """Return the step of the coordinates (N + 1, 3r), and the prices of the ends.
 
-        `bends` is the largest entry of what bends without stiff rows: beside their entries, what is
-        added to the diagonal would leave no step.
+        `intervals` (N, 6r, 6r) are those of the model with what its rows make stiff.
         """
+        curved, border = model.around.curvature, model.border
         count, size = right.shape
         largest = float(np.abs(curved).max() + np.abs(intervals).max())
         diagonals = np.abs(np.diagonal(intervals, axis1=1, axis2=2)).ravel()
@@ -415,6 +412,8 @@ class _Solver:
                     self._shift = shift
                     self._promised = float(-(right.ravel() + border.columns @ prices) @ step)
                     return step.reshape(count, size), prices
+            # Beside entries of stiff rows, what is added to the diagonal would leave no step.
+            bends = float(np.abs(curved).max() + np.abs(model.intervals).max())
             shift = max(_MORE * shift, _SHIFT * bends, _LESS * self._shift, _LEAST_SHIFT * largest)
         return None
 

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from selfmotion.basics import Array, Flags, Ints
+from selfmotion.basics import Array, Flags, Ints, ProblemError
 from selfmotion.constraints import (
     BoundClearance,
     BoundConstraint,
@@ -158,6 +158,12 @@ class NodeRows:
                     h[:-1, -1] = _SHARED
             else:
                 h = item.residual(samples)
+                if len(h) != len(self.spline.points.t):
+                    raise ProblemError(
+                        f"constraint '{item.name}': its residual has shape {h.shape}, expected a "
+                        f"row for each of {len(self.spline.points.t)} nodes; what is asked of the "
+                        f"whole motion is asked at each of them"
+                    )
                 self._columns[number] = h.shape[1]
             found.append((h - _granted(item)).ravel())
         return np.concatenate(found)

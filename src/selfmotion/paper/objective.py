@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from selfmotion.basics import Array, BreakdownError, Counts, ProblemError
-from selfmotion.constraints import BoundConstraint, NodeTangents, linearised
+from selfmotion.constraints import BoundConstraint, NodeTangents, linearised, violated
 from selfmotion.costs import Cost, Samples
 from selfmotion.motion import Evaluation, Grid, NullMotion, NullMotionTable, Trajectory
 from selfmotion.paper.cost_integrals import CostIntegrals
@@ -235,15 +235,7 @@ class Objective:
 
     def unmet(self, x: Array) -> tuple[str, ...]:
         """Return what is wrong at x for each of the ends that it misses, beyond its tolerance."""
-        samples, messages = self.samples(x), []
-        for item in self.ends:
-            miss = np.abs(item.residual(samples))
-            # Written so that NaN is missed.
-            if not np.max(miss, initial=0.0) <= item.tolerance:
-                row, column = np.unravel_index(int(np.argmax(miss)), miss.shape)
-                text = item.describe(samples, int(row), int(column))
-                messages.append(f"{item.name}: {text}")
-        return tuple(messages)
+        return violated(self.ends, self.samples(x))
 
     def metric(self, x: Array) -> Array:
         """Return the Gauss-Newton matrix of quadratic costs, (size, size).

@@ -134,6 +134,14 @@ class Rollout:
         ]
         return np.concatenate(parts, axis=1)
 
+    @property
+    def _last_run(
+        self,
+    ) -> tuple[Array, Ints, float, kernels.Law | None, kernels.Every | None, Array]:
+        """What the kernels that differentiate the last run are given of it."""
+        columns = self.follows.every_column(self._at.q)
+        return self._table, self.follows.layout, self._gain, self._law, columns, self._space
+
     def sensitivities(self, epsilon_matrix: Array, start_matrix: Array) -> tuple[Array, Array]:
         """Return ∂q/∂x and ∂q̇/∂x at the stages of the last run, (S, n, d) each.
 
@@ -147,12 +155,7 @@ class Rollout:
         epsilon_matrix = np.ascontiguousarray(epsilon_matrix)
         by_q, by_qd = np.empty_like(epsilon_matrix), np.empty_like(epsilon_matrix)
         kernels.sensitivities(
-            self._table,
-            self.follows.layout,
-            self._gain,
-            self._law,
-            self.follows.every_column(self._at.q),
-            self._space,
+            *self._last_run,
             np.zeros((len(self._tips), 6)),
             epsilon_matrix,
             np.ascontiguousarray(start_matrix),
@@ -241,12 +244,7 @@ class Rollout:
             np.ascontiguousarray(q_cotangent),
             np.ascontiguousarray(qd_cotangent),
             self._by_tip(error_cotangent),
-            self._table,
-            self.follows.layout,
-            self._gain,
-            self._law,
-            self.follows.every_column(self._at.q),
-            self._space,
+            *self._last_run,
             epsilon_gradient,
             start_gradient,
         )

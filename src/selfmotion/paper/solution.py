@@ -129,6 +129,11 @@ class Solution:
     history: tuple[Iteration, ...] = ()
 
     @property
+    def is_optimised(self) -> bool:
+        """Whether an optimisation has ended, however it did: it need not tell of its way."""
+        return self.inverse_hessian is not None or self.status is not Status.STOPPED
+
+    @property
     def null_motion(self) -> NullMotion:
         """The parameterisation of the null motion."""
         return self.method.problem.null_motion

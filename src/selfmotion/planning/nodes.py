@@ -131,17 +131,16 @@ class NodeDescent:
                 self.is_hopeless = True
                 return None
         # What takes long is seldom kept in the end: other beginnings come before the rest of it.
-        best = minimise(motion, self._told, prices, roughly=True, most=FEWER)
-        first = best
+        first = best = minimise(motion, self._told, prices, roughly=True, most=FEWER)
+        rank = partial(_rank, usual=abs(motion.aim))
         if not _is_kept(best.motion) and self._ended is None:
             best = self._other(motion, best, free)
         unfinished = first.status is Status.MAX_ITERATIONS and self._ended is None
         if unfinished and (best is first or not _is_kept(best.motion)):
             rest = self._minimise(first.motion, first.prices if best is first else None)
-            best = min(best, rest, key=partial(_rank, usual=abs(motion.aim)))
+            best = min(best, rest, key=rank)
         if not _is_kept(best.motion) and self._ended is None:
             # What control points of few nodes cannot keep, the curve may.
-            rank = partial(_rank, usual=abs(motion.aim))
             best = min(best, self._on_halved(best), key=rank)
         return self._standing(best)
 
@@ -247,10 +246,7 @@ class NodeDescent:
                 else item
                 for item in grid.constraints
             ]
-            wider = NodeGrid(
-                self._problem, grid.t, asked, free=grid.free, counts=grid.counts, calm=grid.calm
-            )
-            optimum = self._minimise(wider.at(standing.motion.centred))
+            optimum = self._minimise(grid.asking(asked).at(standing.motion.centred))
             found = replace(optimum, motion=grid.at(optimum.motion.centred))
             if _is_kept(found.motion) and not found.motion.broken_between().any():
                 return self._standing(found)

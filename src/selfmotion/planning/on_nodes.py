@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 
 from selfmotion.basics import Array, Flags
-from selfmotion.constraints import Binding, Priced, active_of, penalty, violated
+from selfmotion.constraints import Binding, Priced, active_of, penalised, violated
 from selfmotion.motion import Evaluation, Grid, NodeNullMotion, NullMotion
 from selfmotion.nodes import NodeMotion, Optimum
 from selfmotion.optimise import Status
@@ -103,8 +103,7 @@ class MotionOnNodes:
         motion = self.motion
         if motion.violation <= 0.0:
             return self.cost
-        over = penalty(motion.grid.constraints, motion.checked)
-        return self.cost + max(abs(self.cost), 1e-3) * over
+        return penalised(self.cost, motion.grid.constraints, motion.checked)
 
     def evaluation(self) -> Evaluation:
         """Return the motion with its costs."""

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from selfmotion.basics import Array, Flags
-from selfmotion.constraints import penalty
+from selfmotion.constraints import penalised
 from selfmotion.costs import Samples
 from selfmotion.motion import Sampling
 from selfmotion.planning.apart import Apart, unlike
@@ -65,5 +65,4 @@ def _merit(problem: Problem, q: Array, twists: Array, sampling: Sampling) -> flo
     samples = replace(still, qd=qd)
     costs = [float(sampling.weights @ cost.value(samples)) for cost in problem.all_costs]
     bound = problem.bind_constraints(q[0], q[-1], apart=False)
-    total = sum(costs)
-    return total + max(abs(total), 1e-3) * penalty(bound, samples)
+    return penalised(sum(costs), bound, samples)

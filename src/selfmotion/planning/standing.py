@@ -7,7 +7,7 @@ from typing import Protocol
 import numpy as np
 
 from selfmotion.basics import Array, BreakdownError, Flags
-from selfmotion.constraints import Binding, penalty, violated
+from selfmotion.constraints import Binding, penalised, violated
 from selfmotion.costs import Samples
 from selfmotion.motion import Evaluation, NullMotion
 from selfmotion.optimise import Status
@@ -93,7 +93,7 @@ class PaperMotion:
     @property
     def status(self) -> Status:
         """How the optimisation ended."""
-        if self.solution.history:
+        if self.solution.is_optimised:
             return self.solution.status
         # Without self-motion it is the only one; else nothing better was found.
         free = self.beginning.problem.follows.redundancy > 0
@@ -146,8 +146,7 @@ class PaperMotion:
         """See `Standing.merit`."""
         if not np.isfinite(self.cost):
             return np.inf
-        over = penalty(self.beginning.constraints, self._samples)
-        return self.cost + max(abs(self.cost), 1e-3) * over
+        return penalised(self.cost, self.beginning.constraints, self._samples)
 
     def evaluation(self) -> Evaluation:
         """Return the motion with its costs."""
