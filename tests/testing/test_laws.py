@@ -297,6 +297,16 @@ def test_an_optimiser_need_not_tell_of_its_way(problem: sm.Problem) -> None:
     assert untold.report.cost == pytest.approx(told.report.cost, rel=1e-6)
 
 
+class Nowhere:
+    def minimize(self, function: sm.Function, x0: Array, *_: object, **__: object) -> sm.Minimum:
+        return sm.Minimum(np.nan * x0, 0.0, np.eye(len(x0)), (), sm.Status.CONVERGED)
+
+
+def test_an_optimiser_that_ends_nowhere_is_named(problem: sm.Problem) -> None:
+    with pytest.raises(sm.ProblemError, match=r"optimizer: Nowhere returned x = .*nan.*, expected"):
+        sm.plan(problem, optimizer=Nowhere())
+
+
 @dataclass(frozen=True)
 class OneNumber(SlowNodes):
     """One number for the whole motion, where one for each node is expected."""

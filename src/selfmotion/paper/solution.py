@@ -6,7 +6,15 @@ from functools import cached_property
 
 import numpy as np
 
-from selfmotion.basics import Array, BreakdownError, Counts, Flags, read_only
+from selfmotion.basics import (
+    Array,
+    BreakdownError,
+    Counts,
+    Flags,
+    ProblemError,
+    read_only,
+    shown,
+)
 from selfmotion.constraints import BoundConstraint
 from selfmotion.motion import Evaluation, Grid, NullMotion
 from selfmotion.optimise import (
@@ -99,6 +107,11 @@ class Method:
         found = optimizer.minimize(
             function, x, inverse_hessian, max_evaluations=self.limit, callback=note
         )
+        if np.shape(found.x) != x.shape or not np.all(np.isfinite(found.x)):
+            raise ProblemError(
+                f"optimizer: {type(optimizer).__name__} returned x = {shown(found.x)}, expected "
+                f"{len(x)} finite numbers; selfmotion.testing.check_optimizer checks an optimiser"
+            )
         return found, way[known:], goes_on
 
 
@@ -291,8 +304,8 @@ def solve(
     BreakdownError
         The motion at x = 0 breaks down.
     ProblemError
-        A cost has no finite value on the motion that it begins with, or one of the ends is no
-        equality.
+        A cost has no finite value on the motion that it begins with, one of the ends is no
+        equality, or an optimiser of one's own returns no decision vector.
     """
     counts = Counts() if counts is None else counts
     limit = None if most is None else counts.evaluations + most
