@@ -132,7 +132,7 @@ class NodeDescent:
                 return None
         # What takes long is seldom kept in the end: other beginnings come before the rest of it.
         first = best = minimise(motion, self._told, prices, roughly=True, most=FEWER)
-        rank = partial(_rank, usual=abs(motion.aim))
+        rank = partial(_rank, begun=motion)
         if not _is_kept(best.motion) and self._ended is None:
             best = self._other(motion, best, free)
         unfinished = first.status is Status.MAX_ITERATIONS and self._ended is None
@@ -162,7 +162,7 @@ class NodeDescent:
         open_one = begun.grid.at((free or self._freely(begun)).centred)
         ends, none = begun.grid.ends.count, np.zeros(len(open_one.h))
         unbound = Optimum(open_one, none, Status.INFEASIBLE, np.inf, np.zeros(ends))
-        rank = partial(_rank, usual=abs(begun.aim))
+        rank = partial(_rank, begun=begun)
         best = min(first, unbound, key=rank)
         for begin in (open_one, *self._beginnings(begun)):
             if begin is not None:
@@ -312,17 +312,22 @@ def _is_kept(motion: NodeMotion) -> bool:
     return bool(motion.violation <= 0.0 and np.abs(motion.c).max(initial=0.0) <= ENDS_MET)
 
 
-def _rank(optimum: Optimum, usual: float) -> tuple[bool, bool, float]:
+def _rank(optimum: Optimum, begun: NodeMotion) -> tuple[bool, bool, float]:
     """Return what sorts optima, the smaller the better.
 
-    What is broken counts as so many times what is `usual` for the cost: where nothing can be kept,
-    not at any price.
+    What is broken counts as so many times the cost of the motion that all `begun` with, for a unit
+    or for all that this one breaks: where nothing can be kept, not at any price.
     """
-    motion = optimum.motion
-    broken = not _is_kept(motion)
-    unmet = motion.violation + float(np.abs(motion.c).max(initial=0.0))
-    price = UNKEPT * usual
-    return broken, broken and motion.aim > price, motion.aim + (price * unmet if broken else 0.0)
+    motion, most = optimum.motion, UNKEPT * abs(begun.aim)
+    if _is_kept(motion):
+        return False, False, motion.aim
+    of_all = min(1.0, _unmet(begun)) or 1.0
+    return True, motion.aim > most, motion.aim + most * _unmet(motion) / of_all
+
+
+def _unmet(motion: NodeMotion) -> float:
+    """Return by how much conditions are broken."""
+    return motion.violation + float(np.abs(motion.c).max(initial=0.0))
 
 
 def _aim_of(motion: NodeMotion) -> float:
