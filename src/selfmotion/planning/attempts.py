@@ -37,7 +37,7 @@ def go_through(draft: Draft) -> None:
             tried = True
         if tried:
             seconds = time.perf_counter() - began
-            draft.attempts.append(Attempt(draft.again + name, *_outcome(draft), seconds))
+            draft.attempts.append(Attempt(name, *_outcome(draft), seconds))
 
 
 def _outcome(draft: Draft) -> tuple[str, float | None]:
@@ -48,8 +48,10 @@ def _outcome(draft: Draft) -> tuple[str, float | None]:
         return "; ".join(text for text in parts if text), proved.finished.motion.cost
     if best is not None:
         wrong = "; ".join(best.violations)
-        said = f"not all constraints are met: {wrong}" if wrong else "all constraints are met"
-        return said, best.standing.cost
+        if wrong:
+            return f"not all constraints are met: {wrong}", best.standing.cost
+        itself = "" if best.standing.keeps_off_itself else ", but the arm meets itself"
+        return f"all constraints are met{itself}", best.standing.cost
     if draft.failure is not None:
         return str(draft.failure), None
     return draft.blocked.reason if draft.blocked else "nothing is in the way", None
@@ -58,7 +60,7 @@ def _outcome(draft: Draft) -> tuple[str, float | None]:
 def _look(draft: Draft) -> bool:
     """Look whether the arm can be at some single poses at all, where nothing is known yet."""
     known = draft.known
-    if not draft.is_free or known.poses or known.plan is not None or known.guide is not None:
+    if not draft.is_free or known.plan is not None or known.guide is not None:
         return False
     blocked = draft.blocked = looked_at(draft.problem, draft.search)
     if blocked is not None:

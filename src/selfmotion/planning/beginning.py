@@ -1,7 +1,7 @@
 """Where the optimisation of one start begins: at the motion x = 0."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -80,6 +80,12 @@ class Beginning:
         bound = problem.bind_constraints(configuration, still.end, apart=effort.apart)
         _require_known(bound)
         return cls(problem, effort, still, tuple(bound), free)
+
+    def kept_apart(self) -> "Beginning":
+        """Return it where the arm has to keep off itself, too."""
+        effort, still = replace(self.effort, apart=True), self.still
+        bound = self.problem.bind_constraints(still.start, still.end)
+        return replace(self, effort=effort, constraints=bound)
 
     @property
     def most_steps(self) -> int:

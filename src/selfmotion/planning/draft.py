@@ -40,8 +40,6 @@ class Draft:
     tolerance : Tolerance
     progress : Progress
     known : Known
-    again : str
-        What is done differently where the list is gone through once more; "" the first time.
     attempts : list of Attempt
         What was tried, in order.
     began : float
@@ -71,7 +69,6 @@ class Draft:
     tolerance: Tolerance
     progress: Progress
     known: Known
-    again: str = ""
     attempts: list[Attempt] = field(default_factory=list)
     began: float = field(default_factory=time.perf_counter)
     blocked: Obstruction | None = None
@@ -122,7 +119,10 @@ class Draft:
     @property
     def is_unmet(self) -> bool:
         """Whether no motion is known yet that keeps all constraints that are asked of it."""
-        return self.best is None or (bool(self.best.violations) and not self.is_published)
+        best = self.best
+        if best is None or self.is_published:
+            return best is None
+        return bool(best.violations) or not best.standing.keeps_off_itself
 
     @property
     def is_published(self) -> bool:
@@ -182,6 +182,9 @@ class Draft:
             return
         if chosen:
             self.consider(session)
+        if session.violations and session.beginning.effort.apart:
+            # Others are asked at once to keep the arm off itself.
+            self.effort = session.beginning.effort
         if session.cut_short and self.best is not None:
             self.best.end(session.status)
 

@@ -43,6 +43,9 @@ def finish(
         try:
             progress("checking", 1, 1)
             finished = _check(problem, session, tolerance, part.ending)
+            if _meets_itself(problem, finished.certificate) and session.keep_off_itself():
+                session.settle()
+                continue
             rough = _rough(problem, finished, session)
             roughs += rough
             # Where no evaluations are left, finer grids change nothing.
@@ -87,6 +90,12 @@ def _resolved(problem: Problem, session: Session, tolerance: Tolerance) -> Evalu
         session.refine((errors > RESOLVED).any(axis=1))
         motion = session.motion()
     return motion
+
+
+def _meets_itself(problem: Problem, certificate: Certificate) -> bool:
+    """Whether nothing else is wrong than that the arm meets itself, which only the default asks."""
+    asked = problem.own_collision is not None and len(certificate.failures) == 1
+    return asked and not certificate.findings[-1].kept
 
 
 def _rough(problem: Problem, finished: Finished, session: Session) -> bool:

@@ -18,13 +18,10 @@ class Known:
         Of this problem or of one like it: tried first; where its motion will do, nothing else is.
     guide : SequenceGuide or None
         Likewise a motion that a search over the whole path has found.
-    poses : bool
-        Whether single poses were looked at already, and nothing was found in the way.
     """
 
     plan: Plan | None = None
     guide: SequenceGuide | None = None
-    poses: bool = False
 
 
 @dataclass(frozen=True, eq=False)

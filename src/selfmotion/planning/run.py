@@ -7,7 +7,6 @@ from selfmotion.basics import (
     PlanError,
     ProblemError,
     Progress,
-    SelfmotionError,
     as_number,
     as_whole,
     held_interruption,
@@ -160,75 +159,15 @@ def plan_along(
 
 def _planned(draft: Draft, clock: Deadline) -> Plan:
     """Return the plan, told of an interruption that came when all was done."""
-    found = _once_or_again(draft, clock)
-    return told_of(found, Status.INTERRUPTED) if was_interrupted() else found
-
-
-def _once_or_again(draft: Draft, clock: Deadline) -> Plan:
-    """Return the plan; of the same list gone through again where the arm meets itself."""
     go_through(draft)
     found = gathered(draft, clock)
-    # Few motions take an arm into itself: the others need not wait for distances. What breaks
-    # something else as well would do so all the more where one thing more is asked.
-    alone = _overlaps(found) and len(found.certificate.failures) == 1
-    if not alone or draft.blocked is not None or found.report.status.is_cut_short:
-        return found
-    apart = replace(draft.effort, apart=True)
-    again = [("apart from itself", apart, draft.search)]
-    if draft.is_free and draft.search.mode == "auto":
-        # Hulls that overlap by themselves tell the optimiser nothing; nodes of the search are free.
-        whole = replace(draft.search, mode="global")
-        again += [("global", draft.effort, whole), ("global, apart from itself", apart, whole)]
-    known = replace(draft.known, poses=True)
-    for how, effort, search in again:
-        tried = list(found.report.attempts)
-        another = Draft(
-            draft.problem,
-            effort,
-            search,
-            draft.tolerance,
-            draft.progress,
-            known,
-            again=f"{how}: ",
-            attempts=tried,
-            began=draft.began,
-        )
-        try:
-            go_through(another)
-            rival = gathered(another, clock)
-        except SelfmotionError:
-            return replace(found, report=replace(found.report, attempts=tuple(tried)))
-        except KeyboardInterrupt:
-            return told_of(found, Status.DEADLINE if clock.passed else Status.INTERRUPTED)
-        if rival.report.status.is_cut_short:
-            return _better(found, rival)
-        found = rival
-        if not _overlaps(found):
-            return found
-    return found
-
-
-def _better(before: Plan, cut_short: Plan) -> Plan:
-    """Return the one of which less is wrong, then the cheaper; its report says what cut it."""
-    if _standing(cut_short) < _standing(before):
-        return cut_short
-    return told_of(before, cut_short.report.status)
+    return told_of(found, Status.INTERRUPTED) if was_interrupted() else found
 
 
 def told_of(plan: Plan, status: Status) -> Plan:
     """Return a plan whose report says what kept another one from being tried to the end."""
     message = f"{status.message}; before: {plan.report.message}"
     return replace(plan, report=replace(plan.report, status=status, message=message))
-
-
-def _standing(plan: Plan) -> tuple[int, float]:
-    return len(plan.certificate.failures), plan.report.cost
-
-
-def _overlaps(plan: Plan) -> bool:
-    """Whether the arm meets itself where only the default asks it not to."""
-    asked = plan.problem.own_collision is not None
-    return asked and not plan.certificate.findings[-1].kept
 
 
 def _check(problem: Problem, search: Search | None, max_evaluations: int | None) -> None:

@@ -201,22 +201,33 @@ class Session:
             return descent.near(motions, t, dearest)
 
         self._by_nodes(optimum, start.constraints)
-        self._keep_off_itself()
+        found = self._found
+        if isinstance(found, MotionOnNodes) and not found.keeps_off_itself:
+            self.keep_off_itself()
         if self.status is Status.GRADIENT:
             # A gradient that is not finite is named with its time.
             self.still.solution.objective.gradient(self.still.solution.x)
 
-    def _keep_off_itself(self) -> None:
-        """Ask that of an optimum too that takes the arm into itself: few do."""
+    def keep_off_itself(self) -> bool:
+        """Ask that of an optimum that takes the arm into itself; return whether there is a new one.
+
+        Few do, so that the others need not wait for distances.
+        """
         found, start = self._found, self.beginning
-        if not isinstance(found, MotionOnNodes) or found.violations or found.keeps_off_itself:
-            return
+        if not isinstance(found, MotionOnNodes) or found.violations:
+            return False
         # Of a given start in which it meets itself, nothing else begins.
         kept = start.free or start.problem.keeps_off_itself(found.motion.place.q[:1])
-        if self._ended is not None or start.effort.apart or not kept:
-            return
-        asked = start.problem.bind_constraints(start.still.start, start.still.end, apart=True)
-        self._by_nodes(lambda descent: descent.with_more(found), asked)
+        if self._ended is not None or start.effort.apart or found.is_chain or not kept:
+            return False
+        self.still = replace(self.still, beginning=start.kept_apart())
+
+        def optimum(descent: NodeDescent) -> MotionOnNodes | None:
+            first = self._known or self.still.evaluation().trajectory
+            return descent.with_more(found) or descent.near([first], found.motion.grid.t)
+
+        self._by_nodes(optimum, self.beginning.constraints)
+        return self._found is not found
 
     def _by_nodes(
         self,
