@@ -2,6 +2,8 @@
 
 import errno
 import importlib.util
+import subprocess
+import sys
 from pathlib import Path
 from types import FunctionType
 from typing import Any
@@ -9,6 +11,8 @@ from typing import Any
 import numba
 import pytest
 from numba.core import caching
+
+from selfmotion.basics import jit
 
 SOURCE = """
 from selfmotion.basics.jit import kernel
@@ -53,6 +57,29 @@ def test_a_full_disk_ends_no_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 
     monkeypatch.setattr(module.twice._cache._cache_file, "save", full)
     assert module.twice(1.5) == 3.0
+
+
+def test_of_two_processes_one_compiles_and_the_other_waits(tmp_path: Path) -> None:
+    (tmp_path / "kernels_of_a_test.py").write_text(SOURCE)
+    told = "import kernels_of_a_test as k; k.twice(1.5); print(k.twice.stats.cache_hits.total())"
+    both = [
+        subprocess.Popen([sys.executable, "-c", told], cwd=tmp_path, stdout=subprocess.PIPE)
+        for _ in range(2)
+    ]
+    hits = sorted(int(one.communicate(timeout=60.0)[0]) for one in both)
+    assert hits == [0, 1]
+
+
+def test_another_process_compiles_where_it_can(monkeypatch: pytest.MonkeyPatch) -> None:
+    started: list[list[str]] = []
+    monkeypatch.setattr(jit.subprocess, "Popen", lambda command, **_: started.append(command))
+    for count in (1, 2):
+        monkeypatch.setattr(jit.os, "cpu_count", lambda count=count: count)
+        jit.companion(jit.FIRST_WORKS)
+    assert [command[-2:] for command in started] == [["selfmotion.warm", "first"]]
+    monkeypatch.setattr(jit, "_IS_ALONE", True)
+    assert jit.companion(jit.ALL_WORKS) is None
+    assert len(started) == 1
 
 
 def test_where_nothing_can_be_written_each_process_compiles(

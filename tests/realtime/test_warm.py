@@ -9,8 +9,8 @@ from numba.core import event
 
 import selfmotion as sm
 from selfmotion import realtime
-from selfmotion.cli.warm_up import Compiled
 from selfmotion.realtime import Replanner
+from selfmotion.warm import Compiled
 from support.arms import PANDA_HOME
 from support.loops import closed_loop
 

@@ -59,7 +59,15 @@ from selfmotion.basics.interruption import (
     obeying as obeying,
     was_interrupted as was_interrupted,
 )
-from selfmotion.basics.jit import called as called, inlined as inlined, kernel as kernel
+from selfmotion.basics.jit import (
+    ALL_WORKS as ALL_WORKS,
+    FIRST_WORKS as FIRST_WORKS,
+    called as called,
+    companion as companion,
+    compile_alone as compile_alone,
+    inlined as inlined,
+    kernel as kernel,
+)
 from selfmotion.basics.names import nearest as nearest
 from selfmotion.basics.progress import Progress as Progress, silent as silent
 from selfmotion.basics.saved import (

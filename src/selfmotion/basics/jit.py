@@ -1,8 +1,16 @@
-"""Compiling the numerical kernels with numba: once per machine, announced when it happens."""
+"""Compiling the numerical kernels with numba: once per machine, announced when it happens.
+
+No two processes compile the same kernel: the second waits for what the first one keeps. So a
+companion, a process that begins with the largest kernels, takes about half of the work.
+"""
 
 import contextlib
+import os
+import subprocess
 import sys
-from collections.abc import Callable
+import threading
+from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
@@ -23,6 +31,10 @@ class _Announcement(event.Listener):  # type: ignore[misc]  # numba ships no typ
             self._said = True
             sys.stderr.write("selfmotion: compiling numerical kernels, once per machine …\n")
             sys.stderr.flush()
+            other = companion(FIRST_WORKS)
+            if other is not None:
+                # Who ends is waited for, by nobody else.
+                threading.Thread(target=other.communicate, daemon=True).start()
 
     def on_end(self, event: Any) -> None:
         pass
@@ -52,8 +64,9 @@ def _forgive(compiled: Any) -> None:
     """Let a cache that is damaged, or on a full disk, cost time instead of the run."""
     cache = compiled._cache
     load, save = cache.load_overload, cache.save_overload
+    turn = contextlib.ExitStack()
 
-    def load_or_compile(*given: Any) -> Any:
+    def load_if_possible(*given: Any) -> Any:
         # A garbled file raises whatever unpickling it meets.
         try:
             return load(*given)
@@ -62,11 +75,71 @@ def _forgive(compiled: Any) -> None:
                 cache.flush()
             return None
 
+    def load_or_compile(*given: Any) -> Any:
+        found = load_if_possible(*given)
+        if found is None:
+            # After an interruption it is this one's turn still.
+            turn.close()
+            turn.enter_context(_turn(cache))
+            found = load_if_possible(*given)
+        if found is not None:
+            turn.close()
+        return found
+
     def save_if_possible(*given: Any) -> None:
-        with contextlib.suppress(OSError):
+        with turn, contextlib.suppress(OSError):
             save(*given)
 
     cache.load_overload, cache.save_overload = load_or_compile, save_if_possible
+
+
+@contextlib.contextmanager
+def _turn(cache: Any) -> Iterator[None]:
+    """Wait until no other process compiles the same kernel; a turn ends with its process."""
+    with contextlib.ExitStack() as opened:
+        if sys.platform != "win32":
+            import fcntl
+
+            # Where there are no locks, both compile.
+            with contextlib.suppress(OSError):
+                cache._impl.locator.ensure_cache_path()
+                file = opened.enter_context(open(cache._cache_file._index_path + ".lock", "w"))
+                fcntl.flock(file, fcntl.LOCK_EX)
+        yield
+
+
+FIRST_WORKS, ALL_WORKS = "first", "all"
+_IS_ALONE = False
+
+
+def companion(works: str) -> "subprocess.Popen[str] | None":
+    """Let another process compile kernels, at the same time; it prints how many.
+
+    Those of `FIRST_WORKS` or `ALL_WORKS`, see `selfmotion.warm`. None where there is no other
+    processor, or where nothing is kept that another process compiles.
+    """
+    if _IS_ALONE or os.cpu_count() == 1 or numba.config.DISABLE_JIT or not sys.executable:
+        return None
+    package = str(Path(__file__).parents[2])
+    paths = [package, *filter(None, [os.environ.get("PYTHONPATH")])]
+    try:
+        return subprocess.Popen(
+            [sys.executable, "-P", "-m", "selfmotion.warm", works],
+            env={**os.environ, "PYTHONPATH": os.pathsep.join(paths)},
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            text=True,
+        )
+    except OSError:
+        return None
+
+
+def compile_alone() -> None:
+    """Start no other process when something is compiled, and say nothing of it."""
+    global _IS_ALONE
+    _IS_ALONE = True
+    event.unregister("numba:compile", _announcement)
 
 
 def inlined(function: _Function) -> _Function:
@@ -94,4 +167,5 @@ def _callable(function: _Function, *, forced: bool) -> _Function:
     return made
 
 
-event.register("numba:compile", _Announcement())
+_announcement = _Announcement()
+event.register("numba:compile", _announcement)
