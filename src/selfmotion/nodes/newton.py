@@ -296,7 +296,7 @@ class _Solver:
         around = around.scaled(grid.scale)
         both = spline.changes(around.changes)
         intervals = grid.cost.curvature(motion.samples, motion.partials, both)
-        bending = None if wild else grid.rows.bending(motion.checked, prices, both)
+        bending = grid.rows.bending(motion.checked, prices, both)
         if bending is not None:
             intervals = intervals + bending
         gradient = around.pulled(by_cost)
@@ -412,9 +412,11 @@ class _Solver:
                     self._shift = shift
                     self._promised = float(-(right.ravel() + border.columns @ prices) @ step)
                     return step.reshape(count, size), prices
-            # Beside entries of stiff rows, what is added to the diagonal would leave no step.
-            bends = float(np.abs(curved).max() + np.abs(model.intervals).max())
-            shift = max(_MORE * shift, _SHIFT * bends, _LESS * self._shift, _LEAST_SHIFT * largest)
+            shift = max(_MORE * shift, _LESS * self._shift, _LEAST_SHIFT * largest)
+            if solved is None:
+                # Beside entries of stiff rows, what is added to the diagonal would leave no step.
+                bends = float(np.abs(curved).max() + np.abs(model.intervals).max())
+                shift = max(shift, _SHIFT * bends)
         return None
 
     def _move(self, model: _Model, step: _Change) -> Status | None:

@@ -159,7 +159,8 @@ class AugmentedProblem(Problem):
         bands = [item for item in self.asked.relaxations if np.isfinite(item.band)]
         for item in bands:
             of_row = RowWithinBand.of_row(item, self.follows)
-            found.append(of_row or WithinBand.of(item, self.follows))
+            several = WithinBand.of(item, self.follows), RowWithinBand.of_each(item, self.follows)
+            found += several if of_row is None else [of_row]
         pinned = any(item.pins[1] for item in self.asked.constraints)
         given = any(item.fixed_end(self.asked.robot) is not None for item in self.asked.constraints)
         if pinned and not given:

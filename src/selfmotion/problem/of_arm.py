@@ -283,6 +283,28 @@ class RowWithinBand(BoundLimits):
             margin=_margin(item),
         )
 
+    @classmethod
+    def of_each(cls, item: Relaxation, follows: AugmentedFollows) -> "RowWithinBand":
+        """Return limits of each of the joints of a relaxation's rows, which its band implies.
+
+        Near its path the length of several rows has no slope: only limits tell a step how far the
+        band goes.
+        """
+        bounds = follows.limits_within(item, item.band)
+        joints = np.flatnonzero(np.isfinite(bounds))
+        return cls(
+            name=f"relaxation {item.name}, each row",
+            order=0,
+            joints=joints,
+            joint_names=tuple(follows.robot.joint_names[k] for k in joints),
+            units=("rad" if item.angular else "m",) * len(joints),
+            lower=-bounds[joints],
+            upper=bounds[joints],
+            scale=bounds[joints],
+            # None: the band itself binds first.
+            margin=0.0,
+        )
+
     def easing(self, column: int) -> tuple[float, str]:
         """See `easing_of`: 2 % of the band."""
         return 0.02, f"2 % more room for the deviation {self.name.removeprefix('relaxation ')}"
