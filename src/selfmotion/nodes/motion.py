@@ -108,8 +108,10 @@ class NodeGrid:
         return found
 
     def without_rows(self) -> "NodeGrid":
-        """Return the same with nothing asked but what its ends are."""
-        return self.asking([item for item in self.constraints if item.equality])
+        """Return the same with nothing asked but what its ends are, and what counts at once."""
+        return self.asking(
+            [item for item in self.constraints if item.equality or _counts_at_once(item)]
+        )
 
     def asking(self, constraints: Sequence[BoundConstraint]) -> "NodeGrid":
         """Return the same nodes, asked for other constraints."""
@@ -285,9 +287,7 @@ class NodeMotion:
         beyond = rows.split(self.h - rows.granted)
         pairs = zip(rows.constraints, beyond, strict=True)
         return any(
-            not np.max(own, initial=0.0) <= 0.0
-            for item, own in pairs
-            if not getattr(item, "counts_at_once", False)
+            not np.max(own, initial=0.0) <= 0.0 for item, own in pairs if not _counts_at_once(item)
         )
 
     def would_be_calm(self) -> bool:
@@ -334,3 +334,8 @@ class NodeMotion:
         # What is nearly a basis will do for charts to begin with, and turns as those around it do.
         last = np.searchsorted(self.grid.t, grid.t, side="right") - 1
         return grid.around(Charts(grid.manifolds, q, self.charts.bases[last]), qd, qdd)
+
+
+def _counts_at_once(item: BoundConstraint) -> bool:
+    """Whether a constraint is what a tolerance is: a joint that it leaves free has no cost."""
+    return bool(getattr(item, "counts_at_once", False))

@@ -126,7 +126,7 @@ class NodeDescent:
         if dearest < np.inf:
             free = self._freely(motion)
             # On the way to an optimum, what it costs says nothing.
-            if self._ended is None and free.cost >= dearest:
+            if free.status in _ARRIVED and free.motion.cost >= dearest:
                 # With conditions it would cost more still.
                 self.is_hopeless = True
                 return None
@@ -151,15 +151,15 @@ class NodeDescent:
         found = self.best_near(motion, prices=np.append(known.prices, np.zeros(more)))
         return None if found is None or found.violations else found
 
-    def _freely(self, motion: NodeMotion) -> NodeMotion:
-        """Return the optimum near a motion of which nothing is asked but what its ends are."""
+    def _freely(self, motion: NodeMotion) -> Optimum:
+        """Return the optimum near a motion of which nothing is asked but ends and tolerances."""
         alone = motion.grid.without_rows().at(motion.centred)
         # Whether these keep the conditions is not known.
-        return minimise(alone, self._noted, roughly=True).motion
+        return minimise(alone, self._noted, roughly=True)
 
-    def _other(self, begun: NodeMotion, first: Optimum, free: NodeMotion | None) -> Optimum:
+    def _other(self, begun: NodeMotion, first: Optimum, free: Optimum | None) -> Optimum:
         """Return the best of the optima from other beginnings, the first, and the free one."""
-        open_one = begun.grid.at((free or self._freely(begun)).centred)
+        open_one = begun.grid.at((free or self._freely(begun)).motion.centred)
         ends, none = begun.grid.ends.count, np.zeros(len(open_one.h))
         unbound = Optimum(open_one, none, Status.INFEASIBLE, np.inf, np.zeros(ends))
         rank = partial(_rank, begun=begun)

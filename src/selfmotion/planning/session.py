@@ -202,7 +202,8 @@ class Session:
 
         self._by_nodes(optimum, start.constraints)
         found = self._found
-        if isinstance(found, MotionOnNodes) and not found.keeps_off_itself:
+        # One that costs more already is none to take either way.
+        if found is not None and found.cost < dearest and not found.keeps_off_itself:
             self.keep_off_itself()
         if self.status is Status.GRADIENT:
             # A gradient that is not finite is named with its time.
