@@ -14,7 +14,8 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.formats import read_document
+from selfmotion.formats import json_schema, read_document
+from selfmotion.formats.seam_job import SHARED
 from selfmotion.problem import problem_to_dict
 from selfmotion.task import SE3
 from support.arms import PANDA_HOME, robot_named
@@ -379,3 +380,17 @@ def test_each_key_of_a_file_matters(name: str, is_job: bool, tmp_path: Path) -> 
             table = table[key]
         table[last] = other_than(table[last])
         assert said(changed, tmp_path, is_job) != base, where
+
+
+def test_a_job_refuses_the_keys_of_a_problem_that_no_seam_has(tmp_path: Path) -> None:
+    """Such as damping, a search, or files to write."""
+    source = ROOT / "examples" / "frame.toml"
+    document = tomllib.loads(source.read_text())
+    (tmp_path / "seams.csv").write_bytes((ROOT / "examples" / "seams.csv").read_bytes())
+    lost = set(json_schema()["properties"]) - {*SHARED, "job", "seams"}
+    assert {"damping", "search", "outputs", "tolerance", "path"} <= lost
+    for key in lost:
+        file = tmp_path / "job.json"
+        file.write_text(json.dumps(document | {key: True}))
+        with pytest.raises(sm.FileFormatError, match=rf"{key}\b"):
+            sm.read_seam_job(file)

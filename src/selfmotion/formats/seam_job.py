@@ -21,7 +21,8 @@ from selfmotion.path import Path, Placed
 from selfmotion.problem import NO_OVERLAP, Problem
 from selfmotion.robot import RobotModel
 
-# Keys of a job, of a seam besides those of a problem, and of seams in one table.
+# Keys of what seams share, of a job, of a seam besides those of a problem, of seams in one table.
+SHARED = ("robot", NAME, "task", "costs", "constraints", "joint_limits", "relaxations", "collision")
 JOB = ("start", "end", "order", "branches", "seconds_per_cost", "deadline", "rng")
 SEAM = ("name", "either_way", "after", "after_any", "wait", "events", "leaves", "may_meet")
 OF_PROBLEM = ("path", "task", "costs", "constraints", "relaxations")
@@ -114,6 +115,12 @@ def seam_job_of(
             f"{file}: expected seams, a list [[seams]] or a table [seams] with a file, and no path "
             f"beside them"
         )
+    for key in shared:
+        if key not in SHARED:
+            raise FileFormatError(
+                f"{file}: {key}: has no effect on a job{nearest(key, SHARED)}; leave it out; what "
+                f"holds for all seams is {', '.join(SHARED)}; the rest is of [job], or of a seam"
+            )
     if not isinstance(shared.get(NAME, {}), Mapping):
         raise FileFormatError(f"{file}: {NAME}: expected a table [{NAME}]")
     reader = _Reader(file, shared, allow_code, {})
