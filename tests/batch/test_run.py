@@ -400,7 +400,7 @@ def test_of_each_file_some_combination_has_to_be_verified() -> None:
 
 
 def test_a_mesh_that_changed_is_planned_anew_in_any_process(tmp_path: Path) -> None:
-    """In one that has its bodies made before as well; a row that lies is measured again."""
+    """In one that has its bodies made before as well; so is what a row lies about."""
     panda = robot_named("panda")
     line = sm.Line(panda.pose(PANDA_HOME), panda.pose(PANDA_HOME + 0.05), 2.0)
     part, out = tmp_path / "part.stl", tmp_path / "out"
@@ -422,8 +422,73 @@ def test_a_mesh_that_changed_is_planned_anew_in_any_process(tmp_path: Path) -> N
     values = json.loads(said.read_text())
     said.write_text(json.dumps(values | {"verified": True, "verdict": "verified"}))
     found, resumed = row()
-    assert (found.verified, resumed) == (False, 1)
+    assert (found.verified, resumed) == (False, 0)
     # Another file in the place of its plan is not its plan.
     other = sm.plan(sm.Problem(panda, line, "position", PANDA_HOME, collision=None))
     other.save(out / "plans" / "plan-0.npz")
     assert (row()[0].verified, row()[1]) == (False, 1)
+
+
+def test_what_a_batch_is_given_is_used_or_refused_by_name(tmp_path: Path) -> None:
+    problem = sm.sample_problem()
+    bad: list[tuple[dict[str, Any], str]] = [
+        ({"workers": 0}, "workers is 0, expected a whole number ≥ 1"),
+        ({"workers": 2, "executor": InPlace()}, "workers: has no effect where an executor"),
+        ({"executor": 5}, "executor is 5, expected one of concurrent"),
+        ({"replays": -1}, "replays is -1"),
+        ({"progress": 5}, "progress is 5, expected a function"),
+        ({"deadline": 3.0}, "deadline: is no option of a batch; expected search, "),
+        ({"problems": [sm.Job(problem)], "tolerance": 1e-3}, "tolerance: has no effect: each"),
+        ({"problems": problem}, "expected a list of problems"),
+    ]
+    for given, told in bad:
+        with pytest.raises(sm.ProblemError, match=told):
+            sm.plan_many(**{"problems": [problem], "out": tmp_path, **given})
+    with pytest.raises(sm.FileFormatError, match="file is 5"):
+        sm.plan_many([], out=5)  # type: ignore[arg-type]
+    (row,) = sm.plan_many([sm.Job(problem, parts={"ramp": 0.1})], InPlace(), out=tmp_path).rows
+    assert row.error == "parts: has no effect on the best motion; leave it out"
+
+
+def test_a_row_that_was_changed_or_renamed_is_not_believed(tmp_path: Path) -> None:
+    """Neither its words, its name nor what is no row at all: all is planned again."""
+    # Said at once, without a plan.
+    twice = 2 * [sm.Job(sm.sample_problem(), parts={"ramp": 0.1})]
+    before = [row.error for row in sm.plan_many(twice, InPlace(), out=tmp_path).rows]
+    assert all(before)
+    file, other = (tmp_path / "rows" / f"plan-{k}.json" for k in range(2))
+    sound = file.read_text()
+    row = json.loads(sound)
+    changes = [{**row, "name": 5}, {**row, "error": [1]}, {**row, "error": "no way"}, [row], 5]
+    for text in (*map(json.dumps, changes), other.read_text(), "{}", ""):
+        file.write_text(text)
+        again = sm.plan_many(twice, InPlace(), out=tmp_path)
+        assert ([row.error for row in again.rows], again.resumed) == (before, 1)
+        assert file.read_text() != text
+
+
+def test_settings_are_told_apart_by_what_they_hold() -> None:
+    """Not by where they are in memory, which is another place tomorrow."""
+
+    def key(**settings: Any) -> str:
+        return run.problem_items([sm.sample_problem()], settings)[0].key
+
+    def search(seed: int) -> sm.Search:
+        return sm.Search(rng=np.random.default_rng(seed))
+
+    class Own(sm.QuasiNewton):
+        """Of one's own; where it is comes after its digits."""
+
+        def __repr__(self) -> str:
+            return object.__repr__(self)
+
+    keys = [
+        key(),
+        key(search=search(1)),
+        key(search=search(2)),
+        key(optimizer=Own(max_iterations=3)),
+        key(optimizer=Own(max_iterations=4)),
+    ]
+    assert len(set(keys)) == len(keys)
+    assert key(search=search(1)) == keys[1]
+    assert key(optimizer=Own(max_iterations=3)) == keys[3]

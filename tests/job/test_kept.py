@@ -89,9 +89,11 @@ def loosened(folder: Path) -> None:
 
 
 def given_up(folder: Path) -> None:
-    """Say of each move that there is none, as another job did."""
+    """Say of each move that there is none, as another job did, or of each seam."""
     for file in folder.glob("move*.json"):
-        file.write_text(json.dumps({"kept": "another", "trouble": "not found"}))
+        file.write_text(json.dumps(json.loads(file.read_text()) | {"trouble": "not found"}))
+    for file in folder.glob("seam*.json"):
+        file.write_text(json.dumps(json.loads(file.read_text()) | {"digests": []}))
 
 
 def lied(folder: Path) -> None:
@@ -137,6 +139,14 @@ def test_another_plan_of_the_same_problem_is_not_what_was_kept(kept, tmp_path: P
     assert shelf.plans(files[0], plan.problem) is not None
     swapped(tmp_path, "nearby")
     assert [shelf.plans(file, plan.problem) for file in files] == [None, None]
+    # Nor where all of one is put in the place of the other, by its name.
+    swapped(tmp_path, "nearby")
+    (archive, _), said = sorted(tmp_path.glob("*.npz")), files[1].read_text()
+    shutil.copy(archive, archive.with_name(archive.name.replace(".a.", ".b.")))
+    assert shelf.plans(files[0], plan.problem) is not None
+    files[1].write_text(files[0].read_text().replace("nearby-one.a", "nearby-one.b"))
+    assert files[1].read_text() != said
+    assert shelf.plans(files[1], plan.problem) is None
 
 
 def test_another_version_plans_again(kept, tmp_path: Path, monkeypatch) -> None:

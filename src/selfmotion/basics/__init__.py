@@ -44,12 +44,14 @@ from selfmotion.basics.files import (
 )
 from selfmotion.basics.inputs import (
     TURN as TURN,
+    as_called as as_called,
     as_choice as as_choice,
     as_flag as as_flag,
     as_number as as_number,
     as_numbers as as_numbers,
     as_several as as_several,
     as_whole as as_whole,
+    check_executor as check_executor,
     is_number as is_number,
     random_numbers as random_numbers,
 )

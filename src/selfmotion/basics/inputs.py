@@ -1,6 +1,7 @@
 """What users give, made into numbers, or refused in one sentence that says what was given."""
 
 from abc import ABCMeta
+from collections.abc import Callable
 from typing import Any, TypeVar
 
 import numpy as np
@@ -9,6 +10,7 @@ from selfmotion.basics.arrays import Array, is_ragged, plain_numbers, read_only,
 from selfmotion.basics.errors import ProblemError
 
 _Kind = TypeVar("_Kind")
+_Called = TypeVar("_Called", bound=Callable[..., Any])
 
 # A larger angle [rad] can only be meant in degrees.
 TURN = 2.0 * np.pi + 1e-6
@@ -108,6 +110,21 @@ def as_flag(value: Any, what: str, error: type[Exception] = ProblemError) -> boo
     if not isinstance(value, bool | np.bool_):
         raise error(f"{what} is {shown(value)}, expected True or False")
     return bool(value)
+
+
+def as_called(value: _Called, what: str) -> _Called:
+    """Return `value`, which can be called; ProblemError otherwise, which calls it `what`."""
+    if not callable(value):
+        raise ProblemError(f"{what} is {shown(value)}, expected a function")
+    return value
+
+
+def check_executor(value: Any) -> None:
+    """Raise ProblemError for what is neither an executor nor None."""
+    if value is not None and not callable(getattr(value, "submit", None)):
+        raise ProblemError(
+            f"executor is {shown(value)}, expected one of concurrent.futures, or None"
+        )
 
 
 def as_choice(

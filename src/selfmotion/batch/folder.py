@@ -17,7 +17,7 @@ from selfmotion.batch.held import is_made_for
 from selfmotion.batch.items import Item
 from selfmotion.batch.maps import labels, maps
 from selfmotion.batch.row import Row, measured
-from selfmotion.result import load_plan
+from selfmotion.result import load_plan, read_kept, write_kept
 
 
 class Folder:
@@ -44,11 +44,10 @@ class Folder:
         written with the row, or not of what is asked, it is planned again.
         """
         name = item.name
-        file = self._row_file(name)
-        if not file.is_file():
+        values = read_kept(self._row_file(name))
+        if values is None:
             return None
         try:
-            values = json.loads(file.read_text(encoding="utf-8"))
             row = Row(file=self.plan_file(name), **values)
             if row.key != item.key or row.fault:
                 return None
@@ -70,7 +69,7 @@ class Folder:
             write_bytes(row.file, archive)
             row = replace(row, digest=hashlib.sha256(archive).hexdigest())
         values = {k: v for k, v in dataclasses.asdict(row).items() if k != "file"}
-        write_text(self._row_file(row.name), json.dumps(values) + "\n")
+        write_kept(self._row_file(row.name), values)
         return row
 
     def write_tables(self, rows: Sequence[Row], replays: int) -> None:

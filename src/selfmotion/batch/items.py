@@ -10,7 +10,10 @@ from selfmotion.basics import FileFormatError, ProblemError, SelfmotionError
 from selfmotion.costs import FunctionCost
 from selfmotion.formats import Job, grid_documents, job_of, read_document
 from selfmotion.problem import Problem, problem_to_dict
-from selfmotion.result import files_of, key_of, own_modules
+from selfmotion.result import files_of, key_of, own_modules, told
+
+# What `plan` may be given besides each problem.
+OPTIONS = ("search", "optimizer", "tolerance", "max_evaluations")
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +56,7 @@ class Item:
         problem = problem_to_dict(job.problem)
         # A class in a script that is run is known to processes that begin with it alone.
         modules = [name for name in own_modules(problem) if name != "__main__"]
-        options = {**job.settings, "goal": job.goal, "keep": job.keep}
+        options = {**job.settings, "goal": job.goal, "keep": job.keep, "parts": job.parts}
         files = files_of(job.problem.robot, job.problem.all_constraints, {})
         return {"problem": problem, "options": options, "modules": modules, "files": files}
 
@@ -68,7 +71,7 @@ class Item:
             task = self.task
         except SelfmotionError as error:
             return f"error: {error}"
-        return key_of((task["problem"], repr(task["options"])), task["files"])
+        return key_of((task["problem"], told(task["options"])), task["files"])
 
 
 def grid_items(file: Path, *, allow_code: bool = False) -> list[Item]:
@@ -99,6 +102,11 @@ def grid_items(file: Path, *, allow_code: bool = False) -> list[Item]:
 
 def problem_items(problems: list[Problem | Job], options: Mapping[str, Any]) -> list[Item]:
     """Return an item for each problem; ProblemError for what is none."""
+    for name in options:
+        if name not in OPTIONS:
+            raise ProblemError(f"{name}: is no option of a batch; expected {', '.join(OPTIONS)}")
+        if problems and all(isinstance(given, Job) for given in problems):
+            raise ProblemError(f"{name}: has no effect: each problem is a Job, which says its own")
     digits = len(str(max(len(problems) - 1, 0)))
     items = []
     for k, given in enumerate(problems):

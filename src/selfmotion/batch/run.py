@@ -10,7 +10,17 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from selfmotion.basics import PlanError, SelfmotionError, silent
+from selfmotion.basics import (
+    PlanError,
+    ProblemError,
+    SelfmotionError,
+    as_called,
+    as_path,
+    as_whole,
+    check_executor,
+    shown,
+    silent,
+)
 from selfmotion.batch.folder import Folder
 from selfmotion.batch.items import Item, problem_items
 from selfmotion.batch.row import Row
@@ -96,6 +106,7 @@ def plan_many(
     Parameters
     ----------
     problems : iterable of Problem or Job
+        Files that a job would write are left out: plans go to the folder.
     executor : concurrent.futures.Executor, optional
         Where to run: for example ``distributed.Client(address).get_executor()``, or mpi4py's
         ``MPIPoolExecutor()``. selfmotion must be installed there. By default processes on this
@@ -103,7 +114,7 @@ def plan_many(
     out : path
         The folder.
     workers : int, optional
-        How many processes, by default one for each core.
+        How many processes on this machine, by default one for each core.
     replays : int
         Of how many of the best plans to write a replay.
     progress : callable, optional
@@ -119,10 +130,12 @@ def plan_many(
     Raises
     ------
     ProblemError
-        An item is no problem.
+        An item is no problem, or an argument is not what it should be, or has no effect.
     PlanError
         The executor that was given broke; what was finished by then is in the folder.
     """
+    if not isinstance(problems, Iterable):
+        raise ProblemError(f"problems are {shown(problems)}, expected a list of problems")
     items = problem_items(list(problems), options)
     return plan_items(items, executor, out=out, workers=workers, replays=replays, progress=progress)
 
@@ -137,7 +150,14 @@ def plan_items(
     progress: Callable[[BatchProgress], object] = silent,
 ) -> Batch:
     """Plan items as `plan_many` plans problems."""
-    folder = Folder(Path(out))
+    check_executor(executor)
+    as_called(progress, "progress")
+    replays = as_whole(replays, "replays", 0, 10**9)
+    if workers is not None:
+        workers = as_whole(workers, "workers", 1, 10**6)
+        if executor is not None:
+            raise ProblemError("workers: has no effect where an executor is given; leave it out")
+    folder = Folder(as_path(out))
     run = _Run(folder, items, progress)
     pending = deque(items)
     if executor is not None:

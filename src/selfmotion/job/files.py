@@ -1,6 +1,5 @@
 """Programs as files, and what a job has finished so far."""
 
-import json
 import math
 import re
 from collections.abc import Callable, Mapping, MutableMapping, Sequence
@@ -16,7 +15,6 @@ from selfmotion.basics import (
     SelfmotionError,
     as_path,
     digest_of_file,
-    write_text,
 )
 from selfmotion.certificate import Tolerance
 from selfmotion.collision import obstacle_from_dict
@@ -35,7 +33,9 @@ from selfmotion.result import (
     load_plan,
     not_judged_by,
     read_bundle,
+    read_kept,
     write_bundle,
+    write_kept,
 )
 from selfmotion.robot import RobotModel
 
@@ -161,7 +161,7 @@ class Shelf:
 
         None for nothing kept.
         """
-        kept = self._read(file)
+        kept = None if file is None else read_kept(file)
         if file is None or kept is None:
             return None
         try:
@@ -195,7 +195,7 @@ class Shelf:
 
         None for nothing kept.
         """
-        kept = self._read(file)
+        kept = None if file is None else read_kept(file)
         if file is None or kept is None:
             return None
         try:
@@ -221,17 +221,6 @@ class Shelf:
             move.save(archive)
         _write(file, count, {"trouble": "" if count else move.trouble})
 
-    def _read(self, file: Path | None) -> dict[str, Any] | None:
-        if file is None or not file.exists():
-            return None
-        try:
-            found = json.loads(file.read_text(encoding="utf-8"))
-        except (OSError, ValueError):
-            return None
-        # One that was kept under another name is of other work.
-        own = isinstance(found, dict) and found.get("kept") == file.stem
-        return found if own else None
-
 
 def _archives(file: Path, count: int) -> list[Path]:
     """Return where so many plans or moves of one piece of work are."""
@@ -239,9 +228,9 @@ def _archives(file: Path, count: int) -> list[Path]:
 
 
 def _write(file: Path, count: int, values: Mapping[str, Any]) -> None:
-    """Write what is known of a piece of work, last: its key, and the digest of each archive."""
+    """Write what is known of a piece of work, last: also the digest of each archive."""
     digests = [digest_of_file(archive) for archive in _archives(file, count)]
-    write_text(file, json.dumps({"kept": file.stem, "digests": digests, **values}))
+    write_kept(file, {"digests": digests, **values})
 
 
 def _written(kept: Mapping[str, Any], file: Path) -> list[Path]:

@@ -11,11 +11,13 @@ from selfmotion.basics import (
     PlanError,
     ProblemError,
     Progress,
+    as_called,
     as_choice,
     as_number,
     as_path,
     as_several,
     as_whole,
+    check_executor,
     nearest,
     shown,
     silent,
@@ -123,6 +125,8 @@ def plan_job(
         as_number(deadline, "deadline", above=0.0),
         as_whole(rng, "rng", 0, 2**63),
     )
+    check_executor(executor)
+    as_called(progress, "progress")
     is_free = as_choice(order, "order", ("free", "given")) == "free"
     if folder is not None or executor is not None:
         for seam in listed:

@@ -20,6 +20,9 @@ from selfmotion.result.kept import (
     files_of as files_of,
     key_of as key_of,
     own_modules as own_modules,
+    read_kept as read_kept,
+    told as told,
+    write_kept as write_kept,
 )
 from selfmotion.result.limits_used import (
     LimitsUsed as LimitsUsed,

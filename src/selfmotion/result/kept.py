@@ -1,11 +1,14 @@
 """What finished work is kept under: a digest of all that decides what comes of it."""
 
+import json
 import sys
 from collections.abc import Iterator, Mapping, MutableMapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from selfmotion.basics import Saved, digest_of, digest_of_file, version
+import numpy as np
+
+from selfmotion.basics import Saved, digest_of, digest_of_file, version, write_text
 from selfmotion.collision import Obstacle
 from selfmotion.constraints import Clearance, Constraint
 from selfmotion.robot import RobotModel, mesh_digests
@@ -18,6 +21,23 @@ def key_of(asked: Any, files: Any) -> str:
     another one made is made again.
     """
     return digest_of(version(), asked, files, _code_of(asked))
+
+
+def write_kept(file: Path, values: Mapping[str, Any]) -> None:
+    """Write what is known of finished work, with its own name and a digest of it; atomically."""
+    known = {"kept": file.stem, **values}
+    write_text(file, json.dumps({**known, "whole": digest_of(known)}) + "\n")
+
+
+def read_kept(file: Path) -> dict[str, Any] | None:
+    """Return what `write_kept` wrote to this very file; None where it is anything else."""
+    try:
+        found: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
+        whole = found.pop("whole")
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        return None
+    own = whole == digest_of(found) and found.pop("kept") == file.stem
+    return found if own else None
 
 
 def own_modules(asked: Any) -> list[str]:
@@ -66,8 +86,28 @@ def _named(value: Any) -> Iterator[str]:
 
 def _code_of(asked: Any) -> dict[str, str]:
     """Return the digests of the files in which the user's own classes are that values name."""
-    files = {name: getattr(sys.modules.get(name), "__file__", None) for name in own_modules(asked)}
-    return {name: digest_of_file(Path(file)) for name, file in files.items() if file}
+    return {name: _code_in(name) for name in own_modules(asked)}
+
+
+def _code_in(module: str) -> str:
+    file = getattr(sys.modules.get(module), "__file__", None)
+    return digest_of_file(Path(file)) if file else ""
+
+
+def told(value: Any) -> Any:
+    """Return a setting as what tells it from others: what it holds, and the code of whose it is."""
+    if isinstance(value, Mapping):
+        return {name: told(item) for name, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [told(item) for item in value]
+    if isinstance(value, np.random.Generator):
+        return told(value.bit_generator.state)
+    if value is None or isinstance(value, bool | int | float | str | np.ndarray | np.generic):
+        return value
+    kind = value if hasattr(value, "__qualname__") else type(value)
+    code = "" if _is_ours(kind) else _code_in(kind.__module__)
+    held = {} if kind is value else told(getattr(value, "__dict__", repr(value)))
+    return [f"{kind.__module__}.{kind.__qualname__}", code, held]
 
 
 def files_of(
