@@ -1,5 +1,6 @@
 """Problems whose parts do not fit together, and settings of planning that are none."""
 
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -214,8 +215,21 @@ def setting_rows() -> list[Row]:
                 "Search (the class)": sm.Search,
                 "Search() where the start is given": sm.Search(),
             },
-            optimizer={"'bfgs'": "bfgs", "QuasiNewton (the class)": sm.QuasiNewton},
+            optimizer={
+                "'bfgs'": "bfgs",
+                "QuasiNewton (the class)": sm.QuasiNewton,
+                "one that returns 3": SimpleNamespace(minimize=lambda *a, **g: 3),
+            },
+            callback={"5": 5},
+            progress={"5": 5},
             max_evaluations={k: v for k, v in {**WHOLE, "0": 0}.items() if v is not None},
+        ),
+        *bad_values_of(
+            "Planning",
+            "plan_in_parts",
+            lambda **g: sm.plan_in_parts(sm.sample_problem(), **g),
+            axis={"(0, 0, 1), without a retreat": (0, 0, 1)},
+            progress={"5": 5},
         ),
         *bad_values_of(
             "Planning",

@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
 
+from selfmotion.basics.inputs import as_called
 from selfmotion.basics.progress import Progress
 
 
@@ -68,7 +69,8 @@ def was_interrupted() -> bool:
 
 
 def obeying(progress: Progress) -> Progress:
-    """Return a progress that obeys Ctrl-C, too."""
+    """Return a progress that obeys Ctrl-C, too; ProblemError for what cannot be called."""
+    as_called(progress, "progress")
 
     def told(stage: str, done: int, total: int) -> None:
         progress(stage, done, total)

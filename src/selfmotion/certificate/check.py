@@ -8,6 +8,7 @@ from selfmotion.basics import (
     Array,
     ProblemError,
     Progress,
+    as_called,
     as_several,
     shown,
     silent,
@@ -87,6 +88,7 @@ def certify(
         The task prescribes orientations, but the path has none.
     """
     _check_arguments(robot, path, trajectory, ending)
+    as_called(progress, "progress")
     tolerance, task = Tolerance.of(tolerance), Task.of(task)
     follows = Follows.of(robot, path, task, as_several(also, "also", Follow))
     for item in follows.items:

@@ -11,6 +11,7 @@ from selfmotion.basics import (
     PlanError,
     ProblemError,
     Progress,
+    as_called,
     as_flag,
     as_path,
     shown,
@@ -96,6 +97,7 @@ def write_motion(
         raise ProblemError(f"plan is {shown(plan)}, expected a Plan, Parts, a Move or a Program")
     if not (settings is None or isinstance(settings, ProgramSettings)):
         raise ProblemError(f"settings are {shown(settings)}, expected ProgramSettings")
+    as_called(progress, "progress")
     path = as_path(file)
     name = form_of(path, form)
     check_verified(plan, path, as_flag(force, "force"))

@@ -107,9 +107,14 @@ class Method:
         found = optimizer.minimize(
             function, x, inverse_hessian, max_evaluations=self.limit, callback=note
         )
-        if np.shape(found.x) != x.shape or not np.all(np.isfinite(found.x)):
+        what = f"x = {shown(found.x)}" if isinstance(found, Minimum) else shown(found)
+        if (
+            not isinstance(found, Minimum)
+            or np.shape(found.x) != x.shape
+            or not np.all(np.isfinite(found.x))
+        ):
             raise ProblemError(
-                f"optimizer: {type(optimizer).__name__} returned x = {shown(found.x)}, expected "
+                f"optimizer: {type(optimizer).__name__} returned {what}, expected a Minimum of "
                 f"{len(x)} finite numbers; selfmotion.testing.check_optimizer checks an optimiser"
             )
         return found, way[known:], goes_on

@@ -3,7 +3,7 @@
 import time
 from dataclasses import dataclass
 
-from selfmotion.basics import Counts, Progress, obey_interruption
+from selfmotion.basics import Counts, Progress, as_called, obey_interruption
 
 
 @dataclass
@@ -37,7 +37,8 @@ class Deadline:
             raise KeyboardInterrupt
 
     def telling(self, progress: Progress) -> Progress:
-        """Return a progress that looks at the clock as well."""
+        """Return a progress that looks at the clock as well; ProblemError for no function."""
+        as_called(progress, "progress")
 
         def told(stage: str, done: int, total: int) -> None:
             progress(stage, done, total)

@@ -26,12 +26,15 @@ from selfmotion.problem import Problem, check_problem
 from selfmotion.result import Parts, Plan
 from selfmotion.search import Stretch, Stretches, has_curves
 
+# Where the tool leaves the path to, in its own axes.
+_BACK = (0.0, 0.0, -1.0)
+
 
 def plan_in_parts(
     problem: Problem,
     *,
     retreat: float = 0.0,
-    axis: npt.ArrayLike = (0.0, 0.0, -1.0),
+    axis: npt.ArrayLike | None = None,
     ramp: float = 0.5,
     rng: np.random.Generator | int = 0,
     tolerance: Tolerance | None = None,
@@ -58,7 +61,7 @@ def plan_in_parts(
     retreat : float
         How far the tool leaves the path along `axis` before each move, and from how far it comes
         back [m]; by default the move begins on the path.
-    axis : (3,)
+    axis : (3,), optional
         Where to, in tool axes: by default back along the tool's z axis.
     ramp : float
         How long the tool takes to come to rest at a cut, and to be up to speed again [s].
@@ -141,7 +144,7 @@ def _best_of(planner: PartPlanner, stretches: Stretches, chains: list[Stretch]) 
     return best
 
 
-def _checked(problem: Problem, retreat: float, axis: npt.ArrayLike) -> Retreat | None:
+def _checked(problem: Problem, retreat: float, axis: npt.ArrayLike | None) -> Retreat | None:
     check_problem(problem)
     if problem.damping is not None:
         raise ProblemError(
@@ -159,9 +162,12 @@ def _checked(problem: Problem, retreat: float, axis: npt.ArrayLike) -> Retreat |
             f"for parts; choose one with fewer rows, or call plan"
         )
     length = as_number(retreat, "retreat", least=0.0)
-    direction = as_numbers(axis, "axis", "three finite numbers", (3,))
+    given = _BACK if axis is None else axis
+    direction = as_numbers(given, "axis", "three finite numbers", (3,))
     if not np.any(direction):
         raise ProblemError("axis is zero, expected a direction in tool axes")
+    if axis is not None and length == 0.0:
+        raise ProblemError("axis has no effect without a retreat; give retreat=, or leave it out")
     return Retreat(length, direction / np.linalg.norm(direction)) if length > 0.0 else None
 
 

@@ -7,6 +7,7 @@ from selfmotion.basics import (
     PlanError,
     ProblemError,
     Progress,
+    as_called,
     as_number,
     as_whole,
     held_interruption,
@@ -108,6 +109,8 @@ def plan(
     is_one = callable(getattr(optimizer, "minimize", None)) and not isinstance(optimizer, type)
     if optimizer is not None and not is_one:
         raise ProblemError(f"optimizer is {shown(optimizer)}, expected one such as QuasiNewton()")
+    if callback is not None:
+        as_called(callback, "callback")
     clock = Deadline(inf)
     if deadline is not None:
         clock = Deadline.after(as_number(deadline, "deadline", above=0.0))
