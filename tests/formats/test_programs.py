@@ -356,7 +356,7 @@ def test_a_program_of_a_plan_is_verified_as_it_is_written(
 
 def test_urscript_knows_tool_load_and_outputs(program: sm.Program, tmp_path: Path) -> None:
     file = tmp_path / "weld.script"
-    sm.write_motion(program, file, settings=settings("weld.src"))
+    sm.write_motion(program, file, settings=settings("weld.src").streamed)
     lines = file.read_text().splitlines()
     head = [line for line in lines if "servoj(" not in line]
     assert any(line.startswith("  set_tcp(p[0.0") for line in head)
@@ -400,6 +400,20 @@ def test_other_axes_are_in_mm_and_counted_apart(tmp_path: Path) -> None:
         asked = sm.ProgramSettings(axes=wrong)
         with pytest.raises(sm.ProblemError, match=said):
             sm.write_motion(move, tmp_path / "lift.src", settings=asked)
+
+
+def test_settings_that_have_no_effect_are_refused_by_name(
+    program: sm.Program, tmp_path: Path
+) -> None:
+    with pytest.raises(sm.ProblemError, match="center: has no effect without a mass"):
+        sm.ProgramSettings(center=(0.0, 0.1, 0.0))
+    asked = settings("a.src")
+    axes = {name: f"A{k}" for k, name in enumerate(program.robot.joint_names, 1)}
+    for given in ({"axes": axes}, {"deviation": sm.Tolerance(1e-3, 1e-3)}):
+        other = replace(asked, **given)
+        with pytest.raises(sm.ProblemError, match="axes have no effect on URScript"):
+            sm.write_motion(program, tmp_path / "a.script", settings=other)
+        assert other.streamed == asked.streamed
 
 
 def test_what_is_not_verified_is_written_only_when_forced(

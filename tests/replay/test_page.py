@@ -8,6 +8,7 @@ import re
 import numpy as np
 import pytest
 
+import selfmotion as sm
 from selfmotion.basics.errors import FileFormatError, ProblemError
 from selfmotion.replay import notebook_html, replay_html, write_replay
 from support.replay_plans import arm_plan, planar_plan
@@ -95,6 +96,15 @@ def test_refusals_name_what_is_wrong():
         replay_html([plan, arm_plan("panda")])
     with pytest.raises(ProblemError, match="1 labels for 2 plans"):
         replay_html([plan, plan], labels=["a"])
+    for wrong, said in (
+        ({"labels": [1]}, "labels: 1, expected a text"),
+        ({"triads": -1}, "triads"),
+    ):
+        with pytest.raises(ProblemError, match=said):
+            replay_html(plan, **wrong)
+    for none in (5, [5]):
+        with pytest.raises(ProblemError, match="a replay is of 5, expected plans"):
+            replay_html(none)
 
 
 def test_triads_at_chosen_times():
@@ -102,3 +112,6 @@ def test_triads_at_chosen_times():
     at_times = replay_html(plan, triads=np.array([0.0, 0.5]))
     assert at_times == replay_html(plan, triads=[0.0, 0.5])
     assert at_times != replay_html(plan, triads=[0.0, 0.7])
+    # Of a whole none, unless they are asked for.
+    move = sm.Move(plan.robot, (), plan.trajectory)
+    assert replay_html(move) == replay_html(move, triads=0) != replay_html(move, triads=3)

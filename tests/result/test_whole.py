@@ -105,6 +105,10 @@ def test_a_motion_that_begins_elsewhere_than_at_the_given_start_is_not_verified(
     assert "rad away (1e-05 allowed)" in said
     assert replace(problem, start=None).certify(made.trajectory).verified
     assert not replace(made, problem=problem).certificate.verified
+    free = replace(made, problem=replace(problem, start=None))
+    parts = sm.Parts(problem, (replace(free, certificate=free.check()),))
+    assert "part 1: it does not begin where it was asked to: joint 'joint" in parts.verdict
+    assert "rad away (1e-05 allowed); plan it again, from there" in parts.verdict
 
 
 def test_a_motion_has_one_digest_whatever_made_it() -> None:

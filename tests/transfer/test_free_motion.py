@@ -137,6 +137,8 @@ def test_what_is_not_found_is_said_and_no_more() -> None:
     met = sm.move(panda, first, HOME + turned(0.0, 1.2, 0.5), clearance=clearance)
     assert "the last configuration is not allowed" in met.trouble
     assert "box 0" in met.trouble
+    far = sm.move(panda, HOME, HOME + turned(9.0, 0.0, 0.0)).trouble
+    assert "joint 'panda_joint1' is at 9 rad (-2.8973 to 2.8973 allowed); give one" in far
     with pytest.raises(sm.PlanError, match="not allowed"):
         met.require()
     beyond = sm.move(panda, HOME, np.full(7, 9.0))

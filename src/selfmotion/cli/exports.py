@@ -80,6 +80,8 @@ def export(
     _check_verified(made, force, as_json)
     _tell_followers(made.robot, out, form)
     verdicts: dict[str, str] = {}
+    # Which what is only of these is said for.
+    programs = any(_is_program(target, form) for target in out)
     sound = True
     for target in out:
         given: dict[str, Any] = {"form": form, "force": force}
@@ -90,6 +92,8 @@ def export(
             together = sm.write_parts(made, target, **given)
         with StageDisplay(stages) as display:
             own = asked if _is_of_controller(target, form) else None
+            if own is not None and not _is_program(target, form) and programs:
+                own = own.streamed
             sm.write_motion(made, target, settings=own, progress=display.stage, **given)
         kept, verdicts[str(target)] = _read_back(made, target, form, rate)
         sound &= kept

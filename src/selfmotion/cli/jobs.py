@@ -70,12 +70,15 @@ def job(
         complain(f"stopped; what is finished is in '{kept}': run again to go on")
         raise typer.Exit(NOT_VERIFIED) from None
     _show(program, as_json, remarks)
+    # What is only of programs of targets is said for these, where there are some.
+    has_targets = any(target.suffix.lower() in formats.PROGRAMS for target in wanted)
     for target in wanted:
         unsound = outputs.left_out(program)
         if unsound and outputs.is_motion(target) and not _is_timetable(target):
             outputs.tell_left_out(target, terminal, unsound, quiet=as_json)
             continue
-        write_program(program, target, asked)
+        streamed = asked is not None and has_targets and target.suffix.lower() == ".script"
+        write_program(program, target, asked.streamed if asked and streamed else asked)
         if not as_json:
             terminal.print(f"wrote {target}", markup=False, soft_wrap=True)
     raise typer.Exit(VERIFIED if program.verified else NOT_VERIFIED)

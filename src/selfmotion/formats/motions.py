@@ -75,8 +75,8 @@ def write_motion(
     form : str, optional
         By default the one that has the file's suffix.
     settings : ProgramSettings, optional
-        Of a controller's program (``urscript``, ``krl``, ``rapid``): axes, outputs, tool, load,
-        approach. Of ``krl`` and ``rapid`` it also bounds how far the controller, which passes
+        Of a controller's program (``urscript``, ``krl``, ``rapid``): outputs, tool, load, approach.
+        Of ``krl`` and ``rapid`` also axes, and it bounds how far the controller, which passes
         targets, may be off the motion; there are as many as that takes, and a `rate` has no effect.
     force : bool
         Whether a motion that is not verified, or begins or ends moving, is written all the same.
@@ -108,7 +108,13 @@ def write_motion(
         write_program(plan, path, name, settings or ProgramSettings(), progress)
         return
     if name == "urscript":
-        _write_stream(path, plan, STREAM if rate is None else rate, settings or ProgramSettings())
+        asked = settings or ProgramSettings()
+        if asked != asked.streamed:
+            raise ProblemError(
+                f"{path}: settings: deviation, move_deviation and axes have no effect on URScript, "
+                f"which has all joints in their order at each period; leave them out"
+            )
+        _write_stream(path, plan, STREAM if rate is None else rate, asked)
         return
     if settings is not None:
         raise ProblemError(f"{path}: settings have no effect: they are of controllers' programs")

@@ -111,8 +111,15 @@ class ProgramSettings:
                 f"{_FARTHEST:g}: in m, or center_mm in files"
             )
         object.__setattr__(self, "center", tuple(center.tolist()))
+        if self.mass is None and center.any():
+            raise ProblemError("center: has no effect without a mass; give mass as well")
         approach = as_number(self.approach, "approach", above=0.0, most=1.0)
         object.__setattr__(self, "approach", approach)
+
+    @property
+    def streamed(self) -> "ProgramSettings":
+        """What is of URScript, which has all joints in their order at each of its periods."""
+        return dataclasses.replace(self, deviation=_DEVIATION, move_deviation=None, axes=None)
 
     def signal(self, event: str) -> Signal | None:
         """Return what an event switches, None for nothing; KeyError where nothing is said of it."""

@@ -12,9 +12,18 @@ from pathlib import Path
 from string import Template
 from typing import Any
 
+import numpy as np
 import numpy.typing as npt
 
-from selfmotion.basics import ProblemError, as_path, write_text
+from selfmotion.basics import (
+    Array,
+    ProblemError,
+    as_numbers,
+    as_path,
+    as_whole,
+    shown as told,
+    write_text,
+)
 from selfmotion.job import Program
 from selfmotion.replay.content import page_content
 from selfmotion.replay.facts import describe
@@ -25,7 +34,7 @@ from selfmotion.result import Move, Parts, Plan
 
 # What a page can show.
 Shown = Plan | Sequence[Plan] | Program | Parts | Move
-_TRIADS = 7
+_TRIADS, _MOST_TRIADS = 7, 1000
 _VIEWER = "meshcat/viewer/dist/main.min.js"
 _SCRIPTS = ("payload.js", "stage.js", "plots.js", "page.js")
 
@@ -36,7 +45,7 @@ def replay_html(
     title: str | None = None,
     labels: Sequence[str] | None = None,
     description: str | None = None,
-    triads: int | npt.ArrayLike = _TRIADS,
+    triads: int | npt.ArrayLike | None = None,
 ) -> str:
     """Return a page that replays plans: complete, offline, the same bytes for the same plans.
 
@@ -55,11 +64,12 @@ def replay_html(
         What the page shows, in words. Default: arm, task, cost and verdict.
     triads : int or array of float
         Where the tool's axes are drawn: how many, evenly spaced in time, or at which times [s].
+        Default: 7 of each plan, none of what has several steps.
 
     Raises
     ------
     ProblemError
-        No plan, plans of different robots, or not one label per plan.
+        No plan, plans of different robots, or an argument that is not what it should be.
     RobotError
         A visual of the robot cannot be read.
     """
@@ -71,7 +81,7 @@ def replay_html(
         shown,
         names,
         payload,
-        triads=triads if whole is None else 0,
+        triads=_TRIADS * (whole is None) if triads is None else _checked(triads),
         whole=whole,
     )
     obstacles = shown[0].obstacles if whole is None else whole.obstacles
@@ -116,6 +126,11 @@ def _as_list(plans: Any) -> list[Plan]:
     shown = list(plans) if isinstance(plans, Sequence) else [plans]
     if not shown:
         raise ProblemError("a replay needs at least one plan")
+    for plan in shown:
+        if not isinstance(plan, Plan):
+            raise ProblemError(
+                f"a replay is of {told(plan)}, expected plans, or one Program, Parts or Move"
+            )
     first = shown[0].robot
     for plan in shown[1:]:
         same = plan.robot.urdf.sha256 == first.urdf.sha256
@@ -132,7 +147,17 @@ def _labels(plans: list[Plan], labels: Sequence[str] | None) -> list[str]:
         return ["plan"] if len(plans) == 1 else [f"Plan {chr(65 + k)}" for k in range(len(plans))]
     if len(labels) != len(plans):
         raise ProblemError(f"{len(labels)} labels for {len(plans)} plans; give one for each")
+    for label in labels:
+        if not isinstance(label, str):
+            raise ProblemError(f"labels: {told(label)}, expected a text for each plan")
     return list(labels)
+
+
+def _checked(triads: int | npt.ArrayLike) -> int | Array:
+    """Return a number of triads, or their times [s]."""
+    if isinstance(triads, int):
+        return as_whole(triads, "triads", 0, _MOST_TRIADS)
+    return np.atleast_1d(as_numbers(triads, "triads", "how many, or times [s]"))
 
 
 def _assemble(title: str, description: str, payload: str, picture: str) -> str:

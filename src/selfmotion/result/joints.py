@@ -107,7 +107,8 @@ def elsewhere(
         joint, verb = robot.joint_names[worst], "end" if end else "begin"
         yield (
             f"{piece.name} does not {verb} where it was asked to: joint '{joint}' is "
-            f"{apart[worst]:.3g} {robot.unit_of(joint)} away ({allowed:g} allowed)"
+            f"{apart[worst]:.3g} {robot.unit_of(joint)} away ({allowed:g} allowed); plan it again, "
+            f"{'to' if end else 'from'} there"
         )
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from selfmotion.path import Path, Retimed
 from selfmotion.problem import START_MISS, asked_of_part, at_all_times, times_along
 from selfmotion.result.asked import Asked, another_tool, follows_at, looked_at, not_judged_by
-from selfmotion.result.joints import Piece, gaps
+from selfmotion.result.joints import Piece, elsewhere, gaps
 from selfmotion.result.plan import Plan
 
 if TYPE_CHECKING:
@@ -80,10 +80,9 @@ class PartsAsked:
         yield from asked.failures(plan)
         start = problem.given_start
         if is_first and start is not None:
-            apart = float(np.abs(plan.trajectory.q[0] - start).max())
             # What a start given near the path is put onto it by.
-            if not apart <= START_MISS:
-                yield f"it does not begin at the given start: {apart:.3g} {problem.robot.unit_of()}"
+            first = Piece("it", plan.trajectory)
+            yield from elsewhere(problem.robot, first, 0, start, START_MISS)
 
     def _of_moves(self) -> Iterator[str]:
         parts, problem = self._parts, self._problem

@@ -40,7 +40,8 @@ def remedies(poses: SinglePoses, t: float, times: Array) -> list[str]:
     joint = least_excess(poses, t)
     if joint is not None:
         name, excess = joint
-        found.append(f"joint '{name}' going {excess:.3g} beyond its limit")
+        unit = poses.problem.asked.robot.unit_of(name)
+        found.append(f"joint '{name}' going {excess:.3g} {unit} beyond its limit")
     return found
 
 

@@ -163,11 +163,14 @@ class FreeMotions:
         """Return what forbids a configuration (n,), in words."""
         asked, beyond = self.asked, []
         for joint, name in enumerate(self.robot.joint_names):
-            over = max(asked.lower[joint] - q[joint], q[joint] - asked.upper[joint])
-            if over > ROUNDING:
-                beyond.append(f"joint '{name}' is {over:.3g} beyond its limit")
+            low, high = asked.lower[joint], asked.upper[joint]
+            if max(low - q[joint], q[joint] - high) > ROUNDING:
+                beyond.append(
+                    f"joint '{name}' is at {q[joint]:.5g} {self.robot.unit_of(name)} "
+                    f"({low:.5g} to {high:.5g} allowed)"
+                )
         if beyond:
-            return "; ".join(beyond)
+            return f"{'; '.join(beyond)}; give one within the limits"
         for model, far in asked.bodies:
             near = model.distance(q)
             if near.value < far:
