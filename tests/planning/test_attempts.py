@@ -11,7 +11,6 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.basics import Counts
-from selfmotion.optimise import QuasiNewton
 from selfmotion.planning.attempts import ATTEMPTS
 from selfmotion.planning.beginning import Beginning
 from selfmotion.planning.effort import Effort
@@ -93,7 +92,7 @@ def test_what_costs_more_freely_is_not_optimised_with_limits(
     fastest = np.abs(free.trajectory.qd).max()
     limits = [sm.JointVelocityLimits(0.9 * fastest)]
     problem = dataclasses.replace(panda_circle("position"), constraints=limits)
-    effort = Effort(QuasiNewton(), None, None, Counts())
+    effort = Effort(None, None, None, Counts())
     session = Session(Beginning.of(problem, effort, problem.given_start, free=False))
     session.minimize(dearest=free.report.cost * (0.5 if dearer else 2.0))
     assert session.is_hopeless == dearer
@@ -108,7 +107,7 @@ def test_what_conditions_did_not_count_for_is_none_that_keeps_them(panda_circle:
     problem = dataclasses.replace(panda_circle("position"), constraints=limits)
     start = np.array(problem.given_start)
     bound = problem.bind_constraints(start, start)
-    effort = Effort(QuasiNewton(), lambda iteration: True, None, Counts())
+    effort = Effort(None, lambda iteration: True, None, Counts())
     descent = NodeDescent(problem, effort, bound, free=False)
     found = descent.near([free.trajectory], first_nodes(problem), dearest=10.0 * free.report.cost)
     assert descent.history

@@ -7,7 +7,6 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.basics import Counts, silent
-from selfmotion.optimise import QuasiNewton
 from selfmotion.planning.draft import Draft
 from selfmotion.planning.effort import Effort
 from selfmotion.planning.known import Known
@@ -37,7 +36,7 @@ def loops(planar: sm.RobotModel, count: int, start: bool = False) -> sm.Problem:
 
 
 def draft_of(problem: sm.Problem) -> Draft:
-    effort = Effort(QuasiNewton(), None, None, Counts())
+    effort = Effort(None, None, None, Counts())
     return Draft(problem, effort, sm.Search(), sm.Tolerance(), silent, Known())
 
 

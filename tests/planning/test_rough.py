@@ -7,7 +7,6 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.basics import Array, Counts
-from selfmotion.optimise import QuasiNewton
 from selfmotion.planning import rough as rough_motions
 from selfmotion.planning.effort import Effort
 from selfmotion.planning.rough import Ranking
@@ -21,7 +20,7 @@ ARMS = (("xarm7", "pose"), ("xarm7", "position"), ("ur5", "pointing"))
 
 
 def effort() -> Effort:
-    return Effort(QuasiNewton(), None, None, Counts())
+    return Effort(None, None, None, Counts())
 
 
 def told(stage: str, done: int, total: int) -> None:

@@ -1,7 +1,9 @@
 """Plans: the paper's numbers, the accuracy promised, and what is said of what falls short."""
 
 import dataclasses
+import re
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,6 +14,7 @@ from selfmotion.certificate import Certificate, Extreme
 from selfmotion.optimise import Status
 from selfmotion.planning.gather import message_of, status_of
 from selfmotion.planning.nodes import NodeDescent
+from support.arms import robot_named
 
 # Share of the cost that finer nodes may still save.
 LEFT = 2e-4
@@ -228,3 +231,27 @@ def test_little_is_left_to_save_and_that_is_said(
     saved = plan.report.cost - spline.report.cost
     assert saved <= plan.report.remaining + 1e-6 * plan.report.cost
     assert spline.report.remaining is None
+
+
+def short_line(**given: Any) -> sm.Problem:
+    arm, start = robot_named("planar_3r"), np.array([0.1, 0.9, 0.9])
+    path = sm.Line(arm.pose(start), arm.pose(start + 0.1), 1.0)
+    return sm.Problem(arm, path, "planar", start, **given)
+
+
+def test_an_optimiser_that_is_given_is_used_whatever_its_settings() -> None:
+    """Also where these are the usual ones, or where it counts as empty."""
+
+    class Empty(sm.QuasiNewton):
+        def __len__(self) -> int:
+            return 0
+
+    for own in (sm.QuasiNewton(), Empty()):
+        plan = sm.plan(short_line(), optimizer=own)
+        assert isinstance(plan.report.null_motion, sm.PolynomialNullMotion)
+
+
+def test_what_falls_short_is_told_with_its_unit_and_what_was_allowed() -> None:
+    plan = sm.plan(short_line(constraints=[sm.JointVelocityLimits(0.01)]))
+    told = r"speed of joint 'joint\d' is \S+ rad/s at t = \S+ s, limit -?0\.01 rad/s"
+    assert re.search(told, plan.report.message)

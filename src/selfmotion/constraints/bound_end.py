@@ -52,4 +52,8 @@ class BoundEnd:
         goal = "that of the start" if self.target is None else "the one asked for"
         miss = np.abs(self.residual(samples)).max()
         where = "end" if self.row else "start"
-        return f"the {quantity} at the {where} is {miss:.3g} (rad or m, per s) away from {goal}"
+        unit = ("rad or m", "rad/s or m/s", "rad/s² or m/s²")[order]
+        return (
+            f"the {quantity} at the {where} is {miss:.3g} {unit} away from {goal} "
+            f"({self.tolerance:g} allowed)"
+        )

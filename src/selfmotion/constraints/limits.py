@@ -17,6 +17,7 @@ from selfmotion.follow import Follows
 from selfmotion.robot import RobotModel, check_radians
 
 _QUANTITIES = ("position", "speed", "acceleration", "jerk")
+_POWERS = ("", "/s", "/s²", "/s³")
 _RATES = ("position", "velocity", "acceleration", "jerk")
 
 
@@ -274,7 +275,8 @@ class BoundLimits:
         joint = column % len(self.joints)
         value = motion_of_order(samples, self.order)[row, self.joints[joint]]
         limit = self.upper[joint] if column < len(self.joints) else self.lower[joint]
+        unit = self.units[joint] + _POWERS[self.order]
         return (
-            f"{_QUANTITIES[self.order]} of joint '{self.joint_names[joint]}' is {value:.4g} at t = "
-            f"{samples.sampling.node_times[row]:.3f} s, limit {limit:.4g}"
+            f"{_QUANTITIES[self.order]} of joint '{self.joint_names[joint]}' is {value:.4g} {unit} "
+            f"at t = {samples.sampling.node_times[row]:.3f} s, limit {limit:.4g} {unit}"
         )

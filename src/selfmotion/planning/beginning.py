@@ -8,6 +8,7 @@ import numpy as np
 from selfmotion.basics import Array, ProblemError
 from selfmotion.constraints import BoundConstraint, BoundEnd
 from selfmotion.motion import FreeNullMotion, Grid, PolynomialNullMotion
+from selfmotion.optimise import QuasiNewton
 from selfmotion.paper import (
     MOST_HALVINGS,
     Guide,
@@ -110,9 +111,8 @@ class Beginning:
             counts=effort.counts,
             rollout=self.still.rollout,
         )
-        method = Method(
-            problem, self.still, self.free, ends, effort.optimizer, effort.counts, None, None
-        )
+        own = QuasiNewton() if effort.optimizer is None else effort.optimizer
+        method = Method(problem, self.still, self.free, ends, own, effort.counts, None, None)
         return Solution(method, objective, np.zeros(objective.size))
 
 

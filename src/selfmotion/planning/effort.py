@@ -12,8 +12,8 @@ class Effort:
 
     Attributes
     ----------
-    optimizer : Optimizer
-        Of the published method.
+    optimizer : Optimizer or None
+        Of the published method, where one is asked for.
     callback : callable or None
         Called with each `Iteration`.
     max_evaluations : int or None
@@ -24,7 +24,7 @@ class Effort:
         Whether the optimisation keeps the arm apart from itself where only the default asks for it.
     """
 
-    optimizer: Optimizer
+    optimizer: Optimizer | None
     callback: Callback | None
     max_evaluations: int | None
     counts: Counts

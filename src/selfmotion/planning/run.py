@@ -17,7 +17,7 @@ from selfmotion.basics import (
     was_interrupted,
 )
 from selfmotion.certificate import Tolerance
-from selfmotion.optimise import Callback, Optimizer, QuasiNewton, Status
+from selfmotion.optimise import Callback, Optimizer, Status
 from selfmotion.planning.attempts import go_through
 from selfmotion.planning.deadline import Deadline, TimedCounts
 from selfmotion.planning.draft import Draft
@@ -117,7 +117,7 @@ def plan(
     if problem.damping is not None and max_evaluations is None:
         max_evaluations = DAMPED_EVALUATIONS
     counts = TimedCounts(deadline=clock)
-    effort = Effort(optimizer or QuasiNewton(), callback, max_evaluations, counts)
+    effort = Effort(optimizer, callback, max_evaluations, counts)
     if problem.relaxations and is_published(problem, effort):
         raise ProblemError(
             "relaxations: the published method keeps nothing but given ends, so that the tool "
@@ -152,7 +152,7 @@ def plan_along(
 ) -> Plan:
     """Plan as `plan` does, but try a motion first that is known, near which there should be one."""
     clock = Deadline(inf)
-    effort = Effort(QuasiNewton(), None, None, TimedCounts(deadline=clock))
+    effort = Effort(None, None, None, TimedCounts(deadline=clock))
     problem, chain = problem.augmented, guide.sequence
     guide = SequenceGuide(replace(chain, q=problem.at(chain.t, chain.q)))
     draft = Draft(problem, effort, Search(), tolerance, progress, Known(guide=guide))
