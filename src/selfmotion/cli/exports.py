@@ -67,16 +67,17 @@ def export(
     asked = None if settings is None else sm.read_program_settings(settings)
     made: _Made
     if file.suffix == jobs.PROGRAM:
-        options.refuse({"parts": parts or None}, file, "a program's motion is")
         made = sm.load_program(file)
     elif file.suffix == jobs.PARTS:
-        options.refuse({"parts": parts or None}, file, "the motion of parts is")
         made = sm.load_parts(file)
     elif is_move(file):
-        options.refuse({"parts": parts or None}, file, "a move is")
         made = sm.load_move(file)
     else:
         made = sm.load_plan(file)
+    if parts and not isinstance(made, sm.Plan):
+        raise sm.ProblemError(
+            f"{file}: --parts is of a cell's plan, which this is not; leave it out"
+        )
     _check_verified(made, force, as_json)
     _tell_followers(made.robot, out, form)
     verdicts: dict[str, str] = {}
