@@ -210,6 +210,15 @@ def test_the_reason_says_what_is_not_as_asked(program, ordered) -> None:
 
     assert "'seam 0' was asked for, and is neither" in verdict(ordered, steps=ordered.steps[:-3])
     assert "rests 0 s, not 0.5 s" in verdict(ordered, steps=ordered.steps[:-1])
+    # Nor longer, or where nobody asked for it.
+    *steps, wait = ordered.steps
+    still = wait.motion
+    longer = sm.Trajectory(100.0 * still.t, still.q, still.qd, still.joint_names, still.qdd)
+    waits = [*steps, replace(wait, made=replace(wait.made, trajectory=longer))]
+    assert "rests 50 s, not 0.5 s" in verdict(ordered, steps=waits)
+    asked = ordered.specification
+    none = replace(asked, seams=[replace(seam, wait=0.0) for seam in asked.seams])
+    assert "'seam 0' the arm rests 0.5 s, not 0 s" in verdict(ordered, specification=none)
     assert "does not begin where it was asked" in verdict(program, steps=program.steps[1:])
     asked = ordered.specification
     assert asked is not None
@@ -385,6 +394,11 @@ def test_a_program_begins_and_ends_at_rest() -> None:
     panda = robot_named("panda")
     ends = SE3(DOWN, np.array([0.4, 0.0, 0.3])), SE3(DOWN, np.array([0.45, 0.0, 0.3]))
     moving = sm.Line(*ends, 1.0, time_law="constant")
+    turning = sm.TwistPath(ends[0], lambda t: np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.2]), 1.0)
+    with pytest.raises(sm.ProblemError, match=r"begins at 0 m/s and 0\.2 rad/s, expected rest"):
+        sm.Seam("turn", turning)
+    # What the task leaves free need not rest.
+    sm.Seam("turn", turning, "position")
     with pytest.raises(sm.ProblemError, match=r"'hurry': its path begins at 0\.05 m/s"):
         sm.Seam("hurry", moving, "pointing")
     plan = sm.plan(sm.Problem(panda, moving, "pointing")).require()

@@ -19,7 +19,7 @@ from selfmotion.constraints import Constraint
 from selfmotion.costs import Cost
 from selfmotion.motion import NodeNullMotion, NullMotion, reversed_motion
 from selfmotion.path import STILL, Path, Reversed
-from selfmotion.problem import Problem
+from selfmotion.problem import Problem, rest_orders
 from selfmotion.result import Plan
 from selfmotion.task import Relaxation, Task
 
@@ -120,12 +120,15 @@ class Seam:
 
     def _check_rest(self, what: str) -> None:
         """Raise ProblemError where the tool moves at an end."""
-        for time, said in ((0.0, "begins"), (self.path.duration, "ends")):
-            speed = float(np.linalg.norm(self.path.twist(time)[:3]))
-            if speed > STILL:
+        orders = rest_orders(self.path, Task.of(self.task))
+        times = (0.0, self.path.duration)
+        for time, said, order in zip(times, ("begins", "ends"), orders, strict=True):
+            speed, turning = map(float, np.linalg.norm(self.path.twist(time).reshape(2, 3), axis=1))
+            # Turning that the task leaves free is not asked of the arm.
+            if speed > STILL or order == 0:
                 raise ProblemError(
-                    f"{what}: its path {said} at {speed:.3g} m/s, expected rest: "
-                    f"time_law='minimum_jerk', Feed(path, …), or section_at_rest(path)"
+                    f"{what}: its path {said} at {speed:.3g} m/s and {turning:.3g} rad/s, expected "
+                    f"rest: time_law='minimum_jerk', Feed(path, …), or section_at_rest(path)"
                 )
 
     def _checked_events(self, what: str) -> tuple[tuple[str, float], ...]:
