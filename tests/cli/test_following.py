@@ -131,10 +131,12 @@ def test_a_path_that_leaves_the_reach_is_told_before_the_arm_moves(
     file, told = written(tmp_path), list[str]()
     assert out_of_reach(sm.read_problem(file)) == ""
     file.write_text(file.read_text().replace("radius = 0.05", "radius = 0.9"))
+    file.write_text("goal = 'fastest'\nmax_evaluations = 9\n" + file.read_text())
     monkeypatch.setattr(runs, "_told_apart", told.append)
     # An address that is none ends it before anything moves.
     assert "expected host:port" in complaint("follow", file, "--listen", "nowhere")
-    (note,) = told
+    left, note = told
+    assert left.endswith("goal, max_evaluations: of plans, and left out while the arm moves")
     assert re.match(r"note: from t = [0-9.]+ s on the pose is out of reach", note)
 
 

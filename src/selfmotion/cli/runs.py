@@ -25,6 +25,12 @@ from selfmotion.cli.stage_display import StageDisplay
 if TYPE_CHECKING:
     from selfmotion.batch import Item
 
+# Keys of problem files that are about a whole plan.
+_OF_PLANS = (
+    *("null_motion", "rest", "goal", "keep", "parts", "search", "optimiser", "tolerance"),
+    *("max_evaluations", "outputs"),
+)
+
 
 @app.command(epilog="Example: selfmotion batch cell.toml --workers 2 --out out/batch")
 def batch(
@@ -169,6 +175,9 @@ def follow(
     from selfmotion.cli import following
 
     problem = sm.read_problem(file, allow_code=allow_code)
+    left = [key for key in formats.read_document(file) if key in _OF_PLANS]
+    if left:
+        _told_apart(f"note: {file}: {', '.join(left)}: of plans, and left out while the arm moves")
     asked = {"horizon": horizon, "period": period, "cycle": cycle, "latency": latency}
     replanner = following.replanner_of(problem, **asked)
     # The arm goes as far as it can; better to know before it moves.
