@@ -91,6 +91,16 @@ def _mirrored(motion: sm.Trajectory) -> sm.Trajectory:
     return replace(motion, qd=-10.0 * motion.qd)
 
 
+def test_a_given_start_is_kept_where_the_plan_begins_elsewhere(
+    problems: dict[str, sm.Problem], plans: dict[str, sm.Plan]
+) -> None:
+    asked, known = problems["position"], plans["free start"]
+    assert np.abs(known.trajectory.q[0] - asked.start).max() > 0.1
+    found = sm.plan(asked, warm_start=known).require()
+    np.testing.assert_allclose(found.trajectory.q[0], asked.start, atol=1e-9)
+    assert found.report.cost <= found.report.initial_cost
+
+
 def test_what_is_no_plan_of_the_arm_is_refused(plans: dict[str, sm.Plan]) -> None:
     plan = plans["pose"]
     with pytest.raises(sm.ProblemError, match=r"warm_start is 'plan.npz', expected a Plan"):

@@ -15,7 +15,7 @@ from selfmotion.planning.for_nodes import first_nodes, is_on_nodes, is_published
 from selfmotion.planning.nodes import NodeDescent
 from selfmotion.planning.on_nodes import MotionOnNodes
 from selfmotion.planning.standing import PaperMotion, Standing, score
-from selfmotion.planning.warm_start import coefficients_of, pace_of, slower
+from selfmotion.planning.warm_start import coefficients_of, moved_to, pace_of, slower
 from selfmotion.result import Plan
 from selfmotion.search import SequenceGuide
 
@@ -194,6 +194,8 @@ class Session:
             motions = [known]
             if warm is not None and warm.trajectory.t[-1] == warm.path.duration:
                 own = slower(warm.trajectory, pace_of(warm, start.problem))
+                if not start.free:
+                    own = moved_to(own, start.still.start)
                 motions = [own, known]
                 if len(own.t) <= most_nodes(start.problem):
                     # Its nodes are where such a motion needs them.

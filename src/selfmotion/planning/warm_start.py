@@ -60,6 +60,12 @@ def slower(trajectory: Trajectory, pace: float) -> Trajectory:
     return Trajectory(t, trajectory.q, qd, trajectory.joint_names, qdd)
 
 
+def moved_to(trajectory: Trajectory, start: Array) -> Trajectory:
+    """Return the same motion from another start (n,); where it is off the path, it is put there."""
+    q = trajectory.q + (start - trajectory.q[0])
+    return Trajectory(trajectory.t, q, trajectory.qd, trajectory.joint_names, trajectory.qdd)
+
+
 def coefficients_of(
     trajectory: Trajectory, pace: float, problem: Problem, t: Array, table: NullMotionTable
 ) -> Array:
