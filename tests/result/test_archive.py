@@ -67,6 +67,29 @@ def test_continuous_joints_and_locks_survive(tmp_path: Path) -> None:
         np.testing.assert_array_equal(loaded.pose(start).homogeneous, robot.pose(start).homogeneous)
 
 
+@pytest.mark.parametrize(
+    ("name", "share"),
+    [("velocity_limit", 1e-3), ("lower", 0.9), ("effort_limit", 0.5), ("jerk_limit", 0.5)],
+)
+def test_limits_that_an_arm_was_given_survive(
+    plan: sm.Plan, name: str, share: float, tmp_path: Path
+) -> None:
+    """What is not verified within them is not when it is read, and no problem file has them."""
+    limit = np.where(np.isfinite(getattr(plan.robot, name)), getattr(plan.robot, name), 10.0)
+    robot = dataclasses.replace(plan.robot, **{name: share * limit})
+    problem = dataclasses.replace(plan.problem, robot=robot)
+    other = dataclasses.replace(plan, problem=problem)
+    other = dataclasses.replace(other, certificate=other.check())
+    other.save(tmp_path / "plan.npz")
+    loaded = sm.load_plan(tmp_path / "plan.npz")
+    np.testing.assert_array_equal(getattr(loaded.robot, name), share * limit)
+    assert loaded.problem.digest == problem.digest != plan.problem.digest
+    assert loaded.certificate.verified == other.certificate.verified
+    assert loaded.certificate.verified == (name in ("lower", "effort_limit"))
+    with pytest.raises(sm.ProblemError, match=f"its {name} is another than it is loaded with"):
+        sm.write_problem(problem, tmp_path / "problem.toml")
+
+
 def test_csv_has_every_digit(plan: sm.Plan, tmp_path: Path) -> None:
     plan.to_csv(tmp_path / "plan.csv")
     lines = (tmp_path / "plan.csv").read_text().splitlines()

@@ -13,6 +13,7 @@ from selfmotion.formats.job import Job
 from selfmotion.optimise import QuasiNewton
 from selfmotion.problem import Problem, check_problem, problem_to_dict
 from selfmotion.robot import (
+    LIMITS,
     NAMED_ARMS,
     NAMED_PARTS,
     TOOL_JOINT,
@@ -104,7 +105,7 @@ def _robot(robot: RobotModel) -> dict[str, Any]:
         table["bodies"] = mounting.bodies
     _check_frames(robot)
     if robot.urdf.parts:
-        _check_unchanged(robot, mounting.tool)
+        _check_unchanged(robot, tools)
         table["parts"] = {part.name: _part(part) for part in robot.urdf.parts}
         table["lock"] = dict(robot.locked)
         return table
@@ -118,18 +119,33 @@ def _robot(robot: RobotModel) -> dict[str, Any]:
             f"{robot.name}: its URDF is not (or no longer) in the file '{source}', which a problem "
             f"file could name; write `robot.urdf.text` to a .urdf file and load it from there"
         )
+    lock, reference, packages = robot.locked, robot.reference, robot.urdf.packages
+    named_by = named or source
+    _check_limits(robot, load_robot(named_by, tools, lock, reference=reference, packages=packages))
     if mounting.base is not None:
         table["base"] = {"position": mounting.base[0], "rpy": mounting.base[1]}
     table["lock"] = dict(robot.locked)
     return table
 
 
-def _check_unchanged(robot: RobotModel, tool: str) -> None:
+def _check_limits(robot: RobotModel, known: RobotModel) -> None:
+    """Refuse an arm that was given other limits than it is loaded with."""
+    for name in (*LIMITS, "acceleration_limit", "jerk_limit"):
+        if not np.array_equal(getattr(robot, name), getattr(known, name)):
+            raise ProblemError(
+                f"{robot.name}: its {name} is another than it is loaded with, which a problem file "
+                f"cannot carry; ask for limits by constraints (JointVelocityLimits, …)"
+            )
+
+
+def _check_unchanged(robot: RobotModel, tools: list[str]) -> None:
     """Refuse a cell whose parts' files are no longer those that it was made of."""
     given = robot.urdf.parts
     now = load_robot(
         {part.name: part.source for part in given},
-        tool,
+        tools,
+        robot.locked,
+        reference=robot.reference,
         base={part.name: part.base for part in given if part.base is not None},
         on={part.name: part.on for part in given if part.on is not None},
         arguments={part.name: part.arguments for part in given},
@@ -140,6 +156,7 @@ def _check_unchanged(robot: RobotModel, tool: str) -> None:
             f"{robot.name}: the files of its parts have changed since it was loaded, so that a "
             f"problem file would name another cell; load it anew"
         )
+    _check_limits(robot, now)
 
 
 def _check_frames(robot: RobotModel) -> None:

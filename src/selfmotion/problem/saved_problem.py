@@ -15,7 +15,7 @@ from selfmotion.motion import NullMotion
 from selfmotion.path import Path
 from selfmotion.problem.defaults import NO_OVERLAP
 from selfmotion.problem.problem import Problem
-from selfmotion.robot import RobotModel, rebuild_robot
+from selfmotion.robot import LIMITS, RobotModel, rebuild_robot
 from selfmotion.task import Damping, Relaxation, Task
 
 
@@ -89,6 +89,7 @@ def _robot_to_dict(robot: RobotModel) -> dict[str, Any]:
         "touching": [list(pair) for pair in robot.touching],
         "acceleration_limit": robot.acceleration_limit.tolist(),
         "jerk_limit": robot.jerk_limit.tolist(),
+        "limits": {name: getattr(robot, name).tolist() for name in LIMITS},
     }
 
 

@@ -27,7 +27,7 @@ from selfmotion.robot.dynamics import (
 )
 from selfmotion.robot.loading import load_robot as load_robot
 from selfmotion.robot.mesh_files import mesh_digests as mesh_digests
-from selfmotion.robot.model import RobotModel as RobotModel
+from selfmotion.robot.model import LIMITS as LIMITS, RobotModel as RobotModel
 from selfmotion.robot.mounting import (
     CarriedBody as CarriedBody,
     Mounting as Mounting,

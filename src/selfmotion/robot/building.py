@@ -11,7 +11,7 @@ from selfmotion.basics import RobotError, as_number, nearest, read_only
 from selfmotion.robot.coupling import Follower, coupling_of, follower_of, tighter_limits
 from selfmotion.robot.full_model import full_model, name_links
 from selfmotion.robot.held import locked_configuration
-from selfmotion.robot.model import RobotModel
+from selfmotion.robot.model import LIMITS, RobotModel
 from selfmotion.robot.named import names_of
 from selfmotion.robot.urdf import Urdf, UrdfJoint, parse_urdf
 
@@ -150,8 +150,9 @@ def rebuild_robot(
     acceleration_limit: Sequence[float],
     jerk_limit: Sequence[float],
     reference: str | None = None,
+    limits: Mapping[str, Sequence[float]] | None = None,
 ) -> RobotModel:
-    """Build an arm from what a saved plan carries of it."""
+    """Build an arm from what a saved plan carries of it; files of before say no `limits`."""
     urdf = parse_urdf(text, source=source, package_dirs=tuple(package_dirs))
     # The text has the continuous joints as revolute ones already.
     urdf = urdf.with_continuous(continuous)
@@ -163,12 +164,14 @@ def rebuild_robot(
         for joint in urdf.joints.values()
         if joint.kind in ("revolute", "continuous", "prismatic") and joint.name not in locked
     ]
-    return dataclasses.replace(
-        build_robot(urdf, tools, locked, reference, free),
-        touching=pairs,
-        acceleration_limit=read_only(acceleration_limit),
-        jerk_limit=read_only(jerk_limit),
-    )
+    built = build_robot(urdf, tools, locked, reference, free)
+    own = {} if limits is None else {name: limits[name] for name in LIMITS}
+    own |= {"acceleration_limit": acceleration_limit, "jerk_limit": jerk_limit}
+    given: dict[str, Any] = {name: read_only(values) for name, values in own.items()}
+    for name, values in given.items():
+        if values.shape != (built.dof,):
+            raise RobotError(f"{source}: {name} has shape {values.shape}, expected ({built.dof},)")
+    return dataclasses.replace(built, touching=pairs, **given)
 
 
 def _check_lock(urdf: Urdf, model: Any, lock: Mapping[str, float]) -> None:

@@ -20,6 +20,9 @@ from selfmotion.robot.urdf import Urdf
 from selfmotion.robot.weights import joint_weights, part_weights
 from selfmotion.task import Task
 
+# What of an arm its URDF limits, where nobody gave it other limits.
+LIMITS = ("lower", "upper", "velocity_limit", "effort_limit")
+
 
 @dataclass(frozen=True, eq=False)
 class RobotModel:
