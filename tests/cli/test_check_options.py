@@ -2,6 +2,7 @@
 
 import inspect
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,7 @@ import selfmotion as sm
 from selfmotion.cli import app, commands, documents
 from selfmotion.formats import example_text, job_of
 from support.arms import robot_named
-from support.shell import complaint
+from support.shell import complaint, invoke
 
 
 @pytest.fixture(scope="module")
@@ -47,6 +48,16 @@ def plan(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_what_is_the_plans_own_is_refused(plan: Path, options: list[str]) -> None:
     said = complaint("check", plan, *options)
     assert f"{options[0]} is the plan's own" in said
+
+
+def test_parts_are_judged_anew(plan: Path, tmp_path: Path) -> None:
+    made, file = sm.load_plan(plan), tmp_path / "a.parts"
+    for problem, code in ((made.problem, 0), (replace(made.problem, task="pose"), 1)):
+        sm.Parts(problem, (made,)).save(file)
+        got, shown = invoke("check", file, "--json")
+        assert (got, json.loads(shown)["verified"]) == (code, not code)
+    assert "its task is 'position', not 'pose'" in " ".join(invoke("check", file)[1].split())
+    assert "--tool is the parts' own" in complaint("check", file, "--tool", "x")
 
 
 def test_what_is_not_judged_is_said_in_words_of_the_shell(tmp_path: Path) -> None:

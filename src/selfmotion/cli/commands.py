@@ -203,10 +203,11 @@ def check(
     own: dict[str, Any] = {name.replace("_", "-"): value for name, value in typed.items()}
     own |= {"task": task, "tool": tool, "reference": reference, "lock": lock or None}
     own |= {"argument": argument or None, "packages": packages or None}
-    if file.suffix == jobs.PROGRAM:
+    if file.suffix in (jobs.PROGRAM, jobs.PARTS):
         given = own | {"robot": robot, "degrees": degrees or None, "tolerance": tolerance}
-        options.refuse(given | {"limits": any(judged) or None}, file, "the program's")
-        jobs.check(sm.load_program(file), as_json)
+        whose = "the program's" if file.suffix == jobs.PROGRAM else "the parts'"
+        options.refuse(given | {"limits": any(judged) or None}, file, whose)
+        jobs.check(file, as_json)
     if robot is not None and Path(robot).suffix == jobs.PROGRAM:
         options.refuse(own | {"degrees": degrees or None}, robot, "the program's")
         options.refuse({"limits": any(judged) or None}, robot, "the program's")

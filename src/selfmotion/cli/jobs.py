@@ -131,12 +131,7 @@ def finish_parts(job: sm.Job, out: list[Path], as_json: bool) -> NoReturn:
             )
     with StageDisplay(stages) as display:
         found = job.in_parts(progress=display.stage)
-    if as_json:
-        data = {"verified": found.verified, "verdict": found.verdict, "cuts": list(found.cuts)}
-        data["remarks"] = list(job.problem.remarks)
-        terminal.print_json(data=data)
-    else:
-        terminal.print(repr(found), markup=False, soft_wrap=True)
+    _show_parts(found, as_json, job.problem.remarks)
     for file in wanted:
         unsound = outputs.left_out(found)
         if unsound and outputs.is_motion(file):
@@ -163,7 +158,21 @@ def _show(program: sm.Program, as_json: bool, remarks: Sequence[str] = ()) -> No
         tables.show_program(program, terminal)
 
 
-def check(program: sm.Program, as_json: bool) -> NoReturn:
-    """Print what is known of a program that was read and judged anew, and end."""
-    _show(program, as_json)
-    raise typer.Exit(VERIFIED if program.verified else NOT_VERIFIED)
+def _show_parts(parts: sm.Parts, as_json: bool, remarks: Sequence[str] = ()) -> None:
+    if as_json:
+        data = {"verified": parts.verified, "verdict": parts.verdict, "cuts": list(parts.cuts)}
+        terminal.print_json(data=data | {"remarks": list(remarks)})
+    else:
+        terminal.print(repr(parts), markup=False, soft_wrap=True)
+
+
+def check(file: Path, as_json: bool) -> NoReturn:
+    """Print what is known of a program or of parts, read and judged anew, and end."""
+    made: sm.Program | sm.Parts
+    if file.suffix == PARTS:
+        made = sm.load_parts(file)
+        _show_parts(made, as_json)
+    else:
+        made = sm.load_program(file)
+        _show(made, as_json)
+    raise typer.Exit(VERIFIED if made.verified else NOT_VERIFIED)

@@ -202,8 +202,8 @@ HtmlOption = Annotated[Path | None, typer.Option(help="Write a replay to open in
 CheckedArgument = Annotated[
     Path,
     typer.Argument(
-        help="A plan saved as .npz, a .program, or a motion: .csv (t, a column per joint), .json, "
-        ".yaml (ROS), .src (KUKA), .mod (ABB)."
+        help="A plan saved as .npz, a .program, .parts, or a motion: .csv (t, a column per joint), "
+        ".json, .yaml (ROS), .src (KUKA), .mod (ABB)."
     ),
 ]
 RobotOption = Annotated[
