@@ -1,6 +1,7 @@
 """Joint torques: kept, judged and refused."""
 
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from selfmotion import testing
 from selfmotion.certificate import FinishedMotion
 from selfmotion.robot import Dynamics
 from support.circles import upright_circle
+from support.files_of_people import finger
 
 
 def test_the_constraint_keeps_the_laws(panda: sm.RobotModel) -> None:
@@ -81,3 +83,50 @@ def test_a_payload_that_is_too_heavy_is_refused(panda: sm.RobotModel) -> None:
 
 def _finished(plan: sm.Plan) -> FinishedMotion:
     return FinishedMotion(plan.robot, plan.trajectory)
+
+
+def test_joints_that_mimic_keep_the_limits_of_whatever_turns_them(tmp_path: Path) -> None:
+    """One motor turns all of them, Cᵀτ, or each has its own, τ: no URDF says which."""
+    file = tmp_path / "finger.urdf"
+    file.write_text(finger('lower="-2" upper="2" velocity="2" effort="4"'))
+    robot = sm.load_robot(file, tool="tip")
+    quantity, asked = sm.JointTorqueLimits().quantity(robot), robot.dof + 2
+    assert [column.subject for column in quantity.columns[-2:]] == ["j3", "j4"]
+    np.testing.assert_array_equal(quantity.bounds, [5.0] * robot.dof + [5.0, 4.0])
+    rng = np.random.default_rng(1)
+    motion = rng.uniform(-1.0, 1.0, (3, 6, robot.dof))
+    found = quantity.values(*motion)
+    # The fourth joint goes the other way than the third, which moves both.
+    np.testing.assert_allclose(found[:, 2], found[:, -2] - found[:, -1], atol=1e-12)
+    for k, slopes in enumerate(quantity.derivatives(*motion)):
+        assert slopes.shape == (6, asked, robot.dof)
+        way, step = rng.normal(size=motion[k].shape), 1e-6 * (np.arange(3) == k)[:, None, None]
+        ends = [quantity.values(*(motion + sign * step * way)) for sign in (1.0, -1.0)]
+        by_steps = (ends[0] - ends[1]) / 2e-6
+        np.testing.assert_allclose(slopes @ way[..., None], by_steps[..., None], atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("effort", "said"),
+    [("9", None), ("2.5", "torque of joint 'j4' alone is"), ("0", None)],
+)
+def test_a_joint_that_mimics_is_judged_by_its_own_effort(
+    effort: str, said: str | None, tmp_path: Path
+) -> None:
+    file = tmp_path / "finger.urdf"
+    text = finger(f'lower="-2" upper="2" velocity="2" effort="{effort}"')
+    file.write_text(text.replace('velocity="2" effort="5"', 'velocity="2" effort="30"'))
+    robot = sm.load_robot(file, tool="tip")
+    # Stretched out: what hangs on the fourth joint is at its largest lever.
+    q = np.zeros((2, robot.dof))
+    motion = sm.Trajectory(np.array([0.0, 1.0]), q, q, robot.joint_names, q)
+    # Links 4 and 5 weigh 0.9 and 1 kg, at 0.2 and 0.1 + 0.25 m.
+    weight = 9.81 * (0.9 * 0.2 + 1.0 * 0.35)
+    found = sm.JointTorqueLimits().requirement(robot).judge(FinishedMotion(robot, motion))
+    assert found.kept is (said is None)
+    if said is not None:
+        assert (found.subject, said in found.text) == ("j4", True)
+        assert found.amount == pytest.approx(weight / 2.5, rel=1e-6)
+    # Limits of one's own are of what is asked of the joint that is mimicked.
+    own = sm.JointTorqueLimits(30.0).requirement(robot).judge(FinishedMotion(robot, motion))
+    assert own.kept

@@ -10,10 +10,16 @@ from selfmotion.certificate import Column, Quantity
 from selfmotion.constraints.base import Constraint
 from selfmotion.robot import Dynamics, RobotModel
 
+_WITH = " and of those that mimic it"
+
 
 @dataclass(frozen=True, eq=False)
 class JointTorqueLimits(Constraint):
     """Joint torques stay below limits: gravity, inertia and Coriolis forces, with a payload.
+
+    Of joints that mimic another one motor may turn all, or each its own, which no URDF says. Both
+    are kept: what all of them ask of the joint that they mimic (Cᵀτ) stays below its effort, and
+    what each carries (τ) below its own. Limits of one's own are those of the former alone.
 
     Parameters
     ----------
@@ -40,18 +46,26 @@ class JointTorqueLimits(Constraint):
 
     def quantity(self, robot: RobotModel) -> Quantity:
         """See `Constraint.quantity`."""
-        dynamics = Dynamics(robot, self.payload, self.center, self.inertia)
-        units = ["N" if robot.is_prismatic(name) else "Nm" for name in robot.joint_names]
-        names, limit = zip(robot.joint_names, units, strict=True), self.of(robot)
+        each = self.limit is None
+        dynamics = Dynamics(robot, self.payload, self.center, self.inertia, each=each)
+        limit = self.of(robot)
+        names = [(name, f"torque of joint '{name}'") for name in robot.joint_names]
+        if each and len(robot.coupling.shared):
+            own = [robot.model.names[int(k) + 1] for k in robot.coupling.shared]
+            names = [(name, f"{label}{_WITH * (name in own)}") for name, label in names]
+            names += [(name, f"torque of joint '{name}' alone") for name in own]
+            efforts = np.asarray(robot.model.upperEffortLimit)[robot.coupling.shared]
+            limit = np.append(limit, np.where(efforts > 0.0, efforts, np.inf))
+        units = ["N" if robot.is_prismatic(name) else "Nm" for name, _ in names]
         return Quantity(
             "joint torque limits",
-            [Column(name, f"torque of joint '{name}'", unit) for name, unit in names],
+            [Column(*name, unit) for name, unit in zip(names, units, strict=True)],
             dynamics.torques,
             dynamics.derivatives,
             limit=limit,
             of_pace=True,
             series=lambda stretch: dynamics.series(stretch.chain()),
-            covers=(_covered(limit),),
+            covers=(_covered(self.of(robot)),),
         )
 
     def of(self, robot: RobotModel) -> Array:

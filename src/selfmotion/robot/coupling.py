@@ -61,6 +61,12 @@ class Coupling:
         firsts = [own[self.coordinates[own] == k][0] for k in range(self.dof)]
         return np.array(firsts, dtype=np.int64)
 
+    @cached_property
+    def shared(self) -> Ints:
+        """The joints of the model that have their coordinate together with others."""
+        joints = np.bincount(self.coordinates, minlength=self.dof)
+        return np.flatnonzero(joints[self.coordinates] > 1)
+
     def spread(self, q: Array) -> Array:
         """Return the positions of the model's joints (…, N) at q (…, n)."""
         if self.is_plain:

@@ -23,6 +23,9 @@ class Dynamics:
         Its centre of mass in the tool frame [m].
     inertia : (3, 3), optional
         Its inertia about that centre, along the tool's axes [kg m²]; by default a point mass.
+    each : bool
+        Whether after the torques of the coordinates come those of each joint that has its
+        coordinate together with others (`Coupling.shared`): m numbers instead of n.
 
     Raises
     ------
@@ -36,6 +39,7 @@ class Dynamics:
         payload: float = 0.0,
         center: npt.ArrayLike = (0.0, 0.0, 0.0),
         inertia: npt.ArrayLike | None = None,
+        each: bool = False,
     ) -> None:
         model = robot.model.copy()
         if not has_masses(robot):
@@ -61,13 +65,16 @@ class Dynamics:
         held = pin.Inertia(float(payload), where, turning)
         model.appendBodyToJoint(tool.parentJoint, held, tool.placement)
         self._model, self._data, self._coupling = model, model.createData(), robot.coupling
+        own = np.eye(model.nv)[:, robot.coupling.shared if each else []]
+        # A coordinate moves all of its joints: virtual work.
+        self._sums = np.hstack([robot.coupling.matrix, own])
 
     def torques(self, q: Array, qd: Array, qdd: Array) -> Array:
-        """Return τ for a motion (K, n) each, (K, n) [Nm, or N of prismatic joints]."""
+        """Return τ for a motion (K, n) each, (K, m) [Nm, or N of prismatic joints]."""
         rows = zip(*self._of_joints(q, qd, qdd), strict=True)
         found = [pin.rnea(self._model, self._data, *row).copy() for row in rows]
-        # A coordinate moves all of its joints: virtual work.
-        return self._coupling.gathered(np.array(found).reshape(len(q), -1))
+        torques = np.array(found).reshape(len(q), -1)
+        return torques if self._coupling.is_plain else np.asarray(torques @ self._sums)
 
     def _of_joints(self, q: Array, qd: Array, qdd: Array) -> tuple[Array, Array, Array]:
         """Return a motion (K, n) as that of the model's joints, (K, N)."""
@@ -75,7 +82,7 @@ class Dynamics:
         return coupling.spread(q), coupling.rates(qd), coupling.rates(qdd)
 
     def series(self, chain: ChainSeries) -> Array:
-        """Return the torques' majorants, (n, K + 1, I): Newton's and Euler's equations of them.
+        """Return the torques' majorants, (m, K + 1, I): Newton's and Euler's equations of them.
 
         In world axes: f = m (c̈ - g) and n = d/dt (R I Rᵀ ω) of each body, summed from the tip.
         """
@@ -103,18 +110,22 @@ class Dynamics:
             forces[parent] = forces[parent] + forces[body]
             arm = series.product(chain.steps[body], forces[body])
             moments[parent] = moments[parent] + moments[body] + arm
-        return np.moveaxis(self._coupling.bounds(np.moveaxis(found, 0, -1)), -1, 0)
+        if self._coupling.is_plain:
+            return found
+        return np.moveaxis(np.moveaxis(found, 0, -1) @ np.abs(self._sums), -1, 0)
 
     def derivatives(self, q: Array, qd: Array, qdd: Array) -> tuple[Array, Array, Array]:
-        """Return ∂τ/∂q, ∂τ/∂q̇ and ∂τ/∂q̈ = M, (K, n, n) each."""
+        """Return ∂τ/∂q, ∂τ/∂q̇ and ∂τ/∂q̈ = M, (K, m, n) each."""
         q, qd, qdd = self._of_joints(q, qd, qdd)
         count, n = q.shape
         by_q, by_qd, by_qdd = (np.empty((count, n, n)) for _ in range(3))
         for k in range(count):
             found = pin.computeRNEADerivatives(self._model, self._data, q[k], qd[k], qdd[k])
             by_q[k], by_qd[k], by_qdd[k] = found
-        by_q, by_qd, by_qdd = (_reduced(self._coupling, each) for each in (by_q, by_qd, by_qdd))
-        return by_q, by_qd, by_qdd
+        if self._coupling.is_plain:
+            return by_q, by_qd, by_qdd
+        left, right = self._sums.T, self._coupling.matrix
+        return left @ by_q @ right, left @ by_qd @ right, left @ by_qdd @ right
 
 
 class Energy:
