@@ -333,10 +333,11 @@ def _rotations(file: FilePath, rows: PoseRows) -> Array:
     if not rows.orientation:
         return np.tile(np.eye(3), (len(rows.positions), 1, 1))
     _, rotation = ORIENTATIONS[rows.orientation]
-    found = []
-    for place, values in zip(rows.places, rows.values, strict=True):
+    found = list[Array]()
+    for k, (place, values) in enumerate(zip(rows.places, rows.values, strict=True)):
         try:
-            found.append(rotation(values))
+            again = k > 0 and np.array_equal(values, rows.values[k - 1])
+            found.append(found[-1] if again else rotation(values))
         except (ValueError, PathError) as error:
             raise FileFormatError(f"{file}: {place}: {error}") from error
     return np.array(found)

@@ -106,6 +106,12 @@ class _Measure:
 
     def without_stubs(self, kept: list[int]) -> list[int]:
         """Return these ends but for one of each short leg among long ones, the better one."""
+        lengths = np.linalg.norm(np.diff(self._points[kept], axis=0), axis=1)
+        beside = np.concatenate([[np.inf], lengths, [np.inf]])
+        bounds = np.minimum(_STUB * np.minimum(beside[:-2], beside[2:]), self._tolerance)
+        # Of thousands of chords none is a stub as a rule.
+        if not (lengths < bounds).any():
+            return kept
         found = list(kept)
         k = 0
         while k + 1 < len(found):
@@ -127,18 +133,21 @@ class _Measure:
 
 
 def _leg(points: Array, turns: Array, first: int, last: int, turns_count: bool = True) -> _Leg:
+    if last == first + 1:
+        return _Leg(*np.zeros((4, 0)))
     inner = points[first + 1 : last] - points[first]
     chord = points[last] - points[first]
-    length = float(np.linalg.norm(chord))
+    length = float(np.sqrt(chord @ chord))
     if length > 0.0:
         along = inner @ (chord / length)
         shares = np.clip(along / length, 0.0, 1.0)
     else:
         along = np.zeros(len(inner))
         shares = np.arange(1, len(inner) + 1) / (len(inner) + 1.0)
-    away = np.linalg.norm(inner - shares[:, None] * chord, axis=1)
-    passed = np.maximum.accumulate(np.append(0.0, along))[1:]
-    shares = np.maximum.accumulate(np.append(0.0, shares))[1:]
+    beside = inner - shares[:, None] * chord
+    away = np.sqrt((beside * beside).sum(axis=1))
+    passed = np.maximum(np.maximum.accumulate(along), 0.0)
+    shares = np.maximum.accumulate(shares)
     # Where the tool goes back, it has to turn round where it has come farthest.
     back = _gone_back(along, passed)
     turned = _turned(turns, first, last, shares) if turns_count else np.zeros(len(shares))
@@ -147,15 +156,13 @@ def _leg(points: Array, turns: Array, first: int, last: int, turns_count: bool =
 
 def _gone_back(along: Array, passed: Array) -> Array:
     """Return for each pose by how much the tool goes back from it along a leg before its end."""
-    if not len(along):
-        return along
     rest = np.minimum.accumulate(along[::-1])[::-1]
     return np.where(along >= passed, np.maximum(along - rest, 0.0), 0.0)
 
 
 def _turned(turns: Array, first: int, last: int, shares: Array) -> Array:
     """Return by how much poses are turned otherwise than a leg passes them [rad]."""
-    if not len(shares) or (turns[first : last + 1] == turns[first]).all():
+    if (turns[first : last + 1] == turns[first]).all():
         return np.zeros(len(shares))
     from scipy.spatial.transform import Rotation
 

@@ -215,10 +215,14 @@ class Polyline(Path, kind="polyline"):
         after, share = after[:, None], share[:, None]
         slow, fast = corners.speed_in[k], corners.speed_out[k]
         position = self._points[k] + slow * before + fast * after
-        first = self._rotations[k] * Rotation.from_rotvec(corners.rate_in[k] * before)
-        rotation = first * Rotation.from_rotvec(corners.rate_out[k] * after)
-        turning = self._rotations[k].apply(corners.rate_in[k]) * (1.0 - share)
-        turning += first.apply(corners.rate_out[k]) * share
+        first = rotation = self._rotations[k]
+        turning = np.zeros_like(position)
+        # Products of rotations are by far the dearest part of it.
+        if corners.rate_in.any() or corners.rate_out.any():
+            first = rotation * Rotation.from_rotvec(corners.rate_in[k] * before)
+            turning = rotation.apply(corners.rate_in[k]) * (1.0 - share)
+            turning += first.apply(corners.rate_out[k]) * share
+            rotation = first * Rotation.from_rotvec(corners.rate_out[k] * after)
         twist = np.hstack([slow + (fast - slow) * share, turning])
         return PathSamples(t, position, rotation.as_matrix(), twist)
 
