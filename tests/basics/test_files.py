@@ -1,5 +1,6 @@
 """Files are written whole or not at all."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -31,3 +32,13 @@ def test_a_folder_in_the_way_is_named(plan: sm.Plan, tmp_path: Path) -> None:
     with pytest.raises(sm.FileFormatError, match=r"plan\.npz: cannot be written"):
         plan.save(tmp_path / "plan.npz")
     assert [path.name for path in tmp_path.iterdir()] == ["plan.npz"]
+
+
+def test_a_name_that_no_file_can_have_is_of_none(plan: sm.Plan, tmp_path: Path) -> None:
+    source = replace(plan.robot.urdf, source="n" * 300 + ".urdf")
+    saved = replace(plan, problem=replace(plan.problem, robot=replace(plan.robot, urdf=source)))
+    assert not saved.robot.urdf.has_changed()
+    saved.save(tmp_path / "plan.npz")
+    assert sm.load_plan(tmp_path / "plan.npz").certificate.notes == plan.certificate.notes
+    with pytest.raises(sm.FileFormatError, match="cannot be read"):
+        sm.load_plan("n" * 300 + ".npz")

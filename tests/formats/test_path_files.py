@@ -192,6 +192,7 @@ _P = "position: {x: 0.4, y: 0, z: 0.5}"
 MALFORMED: list[tuple[str, str, str, str]] = [
     ("a.csv", "", "", "is empty, expected a header line"),
     ("a.csv", csv(), "", "has 0 poses, expected at least two"),
+    ("a.csv", csv(header="seam,x,y,z"), "", "has 0 poses, expected at least two"),
     ("a.csv", csv(GOOD[0]), "", "has 1 poses, expected at least two"),
     ("a.csv", changed("1,.4,.1,.5,1,0,0"), "", "line 4 has 7 values, expected 8"),
     ("a.csv", changed("1,.4,.1,.5,1,0,0,0,0"), "", "line 4 has 9 values, expected 8"),

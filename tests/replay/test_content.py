@@ -111,11 +111,15 @@ def test_an_unreadable_mesh_is_refused_by_name():
         read_meshes("/nowhere/hand.dae", "visual 'hand_0'")
 
 
-def test_coal_stands_in_where_trimesh_fails():
+def test_coal_stands_in_where_trimesh_fails(tmp_path):
+    # Ends as files do that were cut to length.
+    odd = tmp_path / "odd.dae"
+    odd.write_text("<COLLADA></COLLADA>" + "\0" * 9)
     item = load_robot("xarm7").geometry(pin.GeometryType.VISUAL).geometryObjects[0]
     (expected,) = read_meshes(item.meshPath, item.name)
     (part,) = read_meshes("/nowhere/base.stl", item.name, item.geometry, 0.5)
-    assert len(part.faces) == len(expected.faces)
+    (other,) = read_meshes(str(odd), item.name, item.geometry, 0.5)
+    assert len(part.faces) == len(other.faces) == len(expected.faces)
     np.testing.assert_allclose(np.ptp(part.vertices, axis=0), 2 * np.ptp(expected.vertices, axis=0))
 
 

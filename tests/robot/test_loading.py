@@ -1,5 +1,6 @@
 """Arms that are loaded, and those that are refused."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -49,7 +50,18 @@ def test_other_arms_are_called_as_their_urdfs_say(tmp_path: Path) -> None:
 
 def test_a_sound_copy_is_accepted(tmp_path: Path) -> None:
     file = tmp_path / "arm.urdf"
-    file.write_text(PLANAR.read_text())
+    text = PLANAR.read_text()
+    file.write_text(text)
+    assert sm.load_robot(file).tool == "tool"
+    # What makers add to the base, which no joint moves, is no other end.
+    root = re.search(r'<link name="(\w+)"', text)[1]
+    file.write_text(
+        text.replace(
+            "</robot>",
+            f'<link name="mark"/><joint name="m" type="fixed"><parent link="{root}"/>'
+            f'<child link="mark"/></joint></robot>',
+        )
+    )
     assert sm.load_robot(file).tool == "tool"
 
 
@@ -58,6 +70,7 @@ def test_a_sound_copy_is_accepted(tmp_path: Path) -> None:
     [
         (lambda: sm.load_robot("pandaa"), "unknown robot 'pandaa'"),
         (lambda: sm.load_robot("nowhere.urdf"), "no such URDF file"),
+        (lambda: sm.load_robot("n" * 300 + ".urdf"), "no such URDF file"),
         (lambda: sm.load_robot("panda", tool="hand"), "no link 'hand'"),
         (lambda: sm.load_robot("panda", lock={"joint9": 0.0}), "'joint9', which is not movable"),
         (

@@ -33,6 +33,8 @@ from selfmotion.basics.errors import (
 )
 from selfmotion.basics.files import (
     as_path as as_path,
+    is_file as is_file,
+    is_folder as is_folder,
     read_archive as read_archive,
     read_arrays as read_arrays,
     text_of as text_of,

@@ -10,6 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from selfmotion.basics.files import is_file
+
 # Of the format of marshal: the last one that writes equal values as equal bytes.
 _PLAIN = 2
 
@@ -27,7 +29,7 @@ def digest_of(*values: Any) -> str:
 
 def digest_of_file(file: Path) -> str:
     """Return the SHA-256 of a file; "" for one that is missing."""
-    return hashlib.sha256(file.read_bytes()).hexdigest() if file.is_file() else ""
+    return hashlib.sha256(file.read_bytes()).hexdigest() if is_file(file) else ""
 
 
 def _plain(value: Any) -> Any:

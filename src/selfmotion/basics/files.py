@@ -22,6 +22,16 @@ _LARGEST = 250_000_000
 _BLANKS = "\t\n\v\f\r\x11\x13\x1a\x1c\x1d\x1e\x1f"
 
 
+def is_file(path: Path) -> bool:
+    """Whether there is a file; of a name that none can have, such as a long one, no."""
+    return os.path.isfile(path)
+
+
+def is_folder(path: Path) -> bool:
+    """Whether there is a folder, as `is_file`."""
+    return os.path.isdir(path)
+
+
 def write_atomically(file: Path, write: Callable[[IO[bytes]], object]) -> None:
     """Let `write` fill a temporary file beside `file`, then put it in place.
 
@@ -103,7 +113,7 @@ def read_archive(file: Path) -> tuple[dict[str, Any], dict[str, Array]]:
     FileFormatError
         The file is missing or is no such archive.
     """
-    if file.exists() and not zipfile.is_zipfile(file):
+    if is_file(file) and not zipfile.is_zipfile(file):
         raise FileFormatError(f"{file}: is no plan written by selfmotion (.npz)")
     arrays = read_arrays(file)
     if _DESCRIPTION not in arrays:

@@ -1,6 +1,7 @@
 """The commands around one plan: parse, call, print."""
 
 import json
+import os
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -126,7 +127,7 @@ def init(
 ) -> None:
     """Write a commented problem file to begin with; of an arm from a file, one that was planned."""
     file = Path(f"{Path(robot).stem}.toml") if out is None else out
-    if file.exists() and not force:
+    if os.path.exists(file) and not force:
         raise sm.FileFormatError(f"{file}: is there already; give --out or --force")
     texts = formats.example_texts(
         robot,

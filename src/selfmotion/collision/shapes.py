@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import coal
 import numpy as np
 
-from selfmotion.basics import Array, CollisionError, as_numbers, read_only, shown
+from selfmotion.basics import Array, CollisionError, as_numbers, is_file, read_only, shown
 from selfmotion.collision.obstacles import Obstacle
 from selfmotion.robot import UrdfShape
 
@@ -165,7 +165,7 @@ class Mesh(Obstacle):
 
     def geometry(self) -> Any:
         """See `Obstacle.geometry`."""
-        if not self.file.is_file():
+        if not is_file(self.file):
             raise CollisionError(f"{self.label}: no such file: {self.file}")
         try:
             found = coal.MeshLoader().load(str(self.file), np.full(3, self.scale))
@@ -184,7 +184,7 @@ class Mesh(Obstacle):
 
     def urdf_shapes(self) -> Sequence[UrdfShape]:
         """See `Obstacle.urdf_shapes`."""
-        if self.file.is_file():
+        if is_file(self.file):
             # An arm carries nothing of that size either.
             self.geometry()
         scale = " ".join([repr(self.scale)] * 3)

@@ -188,6 +188,8 @@ def read_tables(file: FilePath, reading: Reading | None = None) -> dict[str, Pos
     whole = rows_of_table(file, header, table, lines, texts)
     if SEAM not in texts:
         return {"": whole}
+    if not lines:
+        raise FileFormatError(f"{file}: has 0 poses, expected at least two")
     names = texts[SEAM]
     blank = next((line for line, name in zip(lines, names, strict=True) if not name), None)
     if blank is not None:

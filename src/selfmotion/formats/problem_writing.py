@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from selfmotion.basics import FileFormatError, ProblemError, Saved, as_path, shown
+from selfmotion.basics import FileFormatError, ProblemError, Saved, as_path, is_file, shown
 from selfmotion.formats.documents import write_document
 from selfmotion.formats.job import Job
 from selfmotion.optimise import QuasiNewton
@@ -112,7 +112,7 @@ def _robot(robot: RobotModel) -> dict[str, Any]:
     named = next((name for name in names_of(str(source)) if _is_named(robot, name)), None)
     if named is not None:
         table["name"] = named
-    elif source.suffix == ".urdf" and source.is_file() and not robot.urdf.has_changed():
+    elif source.suffix == ".urdf" and is_file(source) and not robot.urdf.has_changed():
         table["file"] = str(source.resolve())
     else:
         raise ProblemError(

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path as FilePath
 from typing import Any
 
-from selfmotion.basics import FileFormatError, SelfmotionError, as_path, nearest, shown
+from selfmotion.basics import FileFormatError, SelfmotionError, as_path, is_file, nearest, shown
 from selfmotion.constraints import Clearance
 from selfmotion.formats.documents import in_si, read_document
 from selfmotion.formats.job import Job
@@ -189,7 +189,7 @@ class _Reader:
         self, path: Mapping[str, Any], where: str
     ) -> tuple[list[tuple[str, float]], bool]:
         file = self._file.parent / str(path.get("file", ""))
-        if not file.is_file():
+        if not is_file(file):
             return [], False
         try:
             rows = one_seam(file, path.get("seam"), Reading.of(file, path))

@@ -195,8 +195,9 @@ def _read_with_trimesh(path: str) -> dict[Color | None, list[_Triangles]]:
     logging.getLogger("trimesh").setLevel(logging.CRITICAL)
     try:
         scene = trimesh.load_scene(path, process=False)
-    except (ValueError, KeyError, TypeError, AttributeError, IndexError, OSError):
-        # trimesh has no error class of its own; coal may still have read the file.
+    # What trimesh reads with have no error class in common, nor has it one of its own.
+    except Exception:
+        # Coal may still have read the file.
         return {}
     parts: dict[Color | None, list[_Triangles]] = {}
     for part in scene.dump():

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pinocchio as pin
 
-from selfmotion.basics import RobotError, nearest
+from selfmotion.basics import RobotError, is_file, nearest
 from selfmotion.robot.mounting import placed
 from selfmotion.robot.urdf import Urdf, UrdfJoint, parse_urdf
 
@@ -107,4 +107,4 @@ def _found(address: str, folders: Iterable[str]) -> Path | None:
     """Return the file of a ``package://`` address in the first folder that has it."""
     scheme, _, place = address.partition("://")
     files = (Path(folder) / place for folder in folders if scheme == "package")
-    return next((file for file in files if file.is_file()), None)
+    return next((file for file in files if is_file(file)), None)

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from selfmotion.basics import RobotError, nearest
+from selfmotion.basics import RobotError, is_file, nearest
 from selfmotion.robot.packages import Packages
 
 # Xacro keeps its state in its modules: one file at a time.
@@ -40,7 +40,7 @@ def expand(path: Path, arguments: Mapping[str, str], packages: Packages) -> str:
     for key, value in arguments.items():
         if not (isinstance(key, str) and isinstance(value, str | int | float)):
             raise RobotError(f"{path}: arguments has {key!r}: {value!r}, expected a text or number")
-    if not path.is_file():
+    if not is_file(path):
         raise RobotError(f"{path}: no such xacro file")
     declared = _Declared(packages)
     declared.read(path)

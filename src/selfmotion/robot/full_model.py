@@ -26,6 +26,9 @@ _terminal = threading.Lock()
 # Meshes that are only drawn are read once, as long as their files are those that were read.
 _drawn = coal.CachedMeshLoader()
 
+# How to go on without bodies; of what is not drawn it is told that it is not.
+_BARE = "; or go on without looking at self-collision: --no-self-collision (collision = false)"
+
 
 def full_model(urdf: Urdf) -> Any:
     """Return the ``pinocchio.Model`` of all joints of a validated URDF.
@@ -70,7 +73,9 @@ def link_geometry(urdf: Urdf, model: Any, kind: pin.GeometryType) -> Any:
             )
         except (ValueError, RuntimeError) as error:
             bad = bad_meshes(urdf, tag)
-            raise RobotError(f"{urdf.source}: {bad[0] if bad else error}") from error
+            raise RobotError(
+                f"{urdf.source}: {bad[0] if bad else error}{_BARE * (not drawn)}"
+            ) from error
     if said:
         raise RobotError(f"{urdf.source}: is not read by Pinocchio: {'; '.join(said[-3:])}")
     return geometry

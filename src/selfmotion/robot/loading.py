@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from selfmotion.basics import RobotError, nearest, read_only, shown
+from selfmotion.basics import RobotError, is_folder, nearest, read_only, shown
 from selfmotion.robot.building import build_robot
 from selfmotion.robot.composing import composed
 from selfmotion.robot.expansion import expand
@@ -119,7 +119,7 @@ def _folders(given: Any) -> tuple[str, ...]:
     if not isinstance(listed, list | tuple):
         raise RobotError(f"packages is {shown(given)}, expected a folder or several")
     for folder in listed:
-        if not isinstance(folder, str | Path) or not Path(folder).is_dir():
+        if not isinstance(folder, str | Path) or not is_folder(Path(folder)):
             raise RobotError(f"packages: {shown(folder)} is no folder")
     return tuple(str(Path(folder).resolve()) for folder in listed)
 
@@ -262,6 +262,10 @@ def _check_no_arguments(given: str, arguments: Mapping[str, Any]) -> None:
 def _only_leaf(urdf: Urdf) -> str:
     parents = {joint.parent for joint in urdf.joints.values()}
     leaves = [link for link in urdf.links if link not in parents]
+    # A frame that stands still, as a base's, is no tool.
+    leaves = [
+        link for link in leaves if any(joint.kind != "fixed" for joint in urdf.chain(link))
+    ] or leaves
     if len(leaves) != 1:
         raise RobotError(
             f"{urdf.source}: has {len(leaves)} end links ({', '.join(leaves)}); "

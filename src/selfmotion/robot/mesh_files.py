@@ -8,7 +8,7 @@ from typing import NamedTuple
 import coal
 import numpy as np
 
-from selfmotion.basics import digest_of_file
+from selfmotion.basics import digest_of_file, is_file
 from selfmotion.robot.packages import Packages
 from selfmotion.robot.urdf import Urdf
 
@@ -63,7 +63,11 @@ def _place(urdf: Urdf, file: str) -> Path | None:
     """Return where a mesh is on this machine, if it is there."""
     scheme, _, rest = file.rpartition("://")
     folders = urdf.package_dirs if scheme in ("package", "model") else ("",)
-    return next((Path(folder, rest) for folder in folders if Path(folder, rest).is_file()), None)
+    return next((Path(folder, rest) for folder in folders if is_file(Path(folder, rest))), None)
+
+
+# Of an address on another machine.
+_ELSEWHERE = " here; name the folder that has its package: --packages DIR (packages=)"
 
 
 def without_meshes(text: str, tag: str, files: Collection[str]) -> str:
@@ -84,7 +88,7 @@ def _fault(urdf: Urdf, file: str) -> str:
     if found is None:
         scheme, _, rest = file.rpartition("://")
         if scheme not in ("package", "model"):
-            return "no such mesh file"
+            return f"no such mesh file{_ELSEWHERE * bool(scheme)}"
         near, name = Packages(Path(urdf.source), urdf.packages), rest.partition("/")[0]
         folder = near.folder(name)
         if folder is not None:

@@ -18,6 +18,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
+from selfmotion.basics import is_file, is_folder
+
 # How many levels below a folder are looked at, below how many folders above a file, and at how many
 # folders in all: a home is larger than any workspace.
 _BELOW, _ABOVE, _MOST = 3, 6, 5000
@@ -51,14 +53,14 @@ class Packages:
         if scheme in ("package", "model"):
             name, _, inside = rest.partition("/")
             places = (folder / inside for folder in self._places(name))
-            return next((place for place in places if place.is_file()), None)
+            return next((place for place in places if is_file(place)), None)
         if scheme not in ("", "file"):
             return None
         path = Path(rest)
         if not path.is_absolute():
             places = (folder / path for folder in self._above)
-            return next((place for place in places if place.is_file()), None)
-        return path if path.is_file() else self._moved(path)
+            return next((place for place in places if is_file(place)), None)
+        return path if is_file(path) else self._moved(path)
 
     def searched(self, name: str) -> str:
         """Return in words where a package was looked for, and what helps."""
@@ -98,7 +100,7 @@ class Packages:
         for folder in self._above:
             yield from (place for place in (folder, folder / name) if _is(place, name))
         for prefix in _folders_of("AMENT_PREFIX_PATH"):
-            if (prefix / "share" / name).is_dir():
+            if is_folder(prefix / "share" / name):
                 yield prefix / "share" / name
         yield from _named(name, _folders_of("ROS_PACKAGE_PATH"))
         yield from _named(name, self._up)
@@ -108,7 +110,7 @@ class Packages:
         for k, name in enumerate(path.parts[1:-1], 1):
             inside = Path(*path.parts[k + 1 :])
             for folder in self._near(name):
-                if (folder / inside).is_file():
+                if is_file(folder / inside):
                     return folder / inside
         return None
 
@@ -127,7 +129,7 @@ def _folders_of(variable: str) -> list[Path]:
 
 def _is(folder: Path, name: str) -> bool:
     """Return whether a folder is the package of that name."""
-    if not folder.is_dir():
+    if not is_folder(folder):
         return False
     said = _package_name(folder)
     return said == name or folder.name == name

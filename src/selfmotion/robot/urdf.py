@@ -16,7 +16,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from selfmotion.basics import RobotError, nearest
+from selfmotion.basics import RobotError, is_file, nearest
 from selfmotion.robot.cosmetic_elements import (
     lacking_inertials,
     mend_cosmetics,
@@ -148,7 +148,7 @@ class Urdf:
     def has_changed(self) -> bool:
         """Whether the file that it was read from is there, and other than it was then."""
         file = Path(self.source)
-        if not file.is_file() or file.suffix == ".xacro":  # whose arguments are not known here
+        if not is_file(file) or file.suffix == ".xacro":  # whose arguments are not known here
             return False
         try:
             return read_urdf(file, self.packages).text != self.bare_text()
@@ -227,7 +227,7 @@ def read_urdf(path: Path, packages: Iterable[str] = ()) -> Urdf:
         The file is missing, is xacro, is not XML, or describes no arm (two parents, a zero axis,
         reversed limits, a negative mass, an unknown joint type, …).
     """
-    if not path.is_file():
+    if not is_file(path):
         raise RobotError(f"{path}: no such URDF file")
     try:
         content = path.read_bytes()

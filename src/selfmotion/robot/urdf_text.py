@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from selfmotion.basics import RobotError
+from selfmotion.basics import RobotError, is_file
 from selfmotion.robot.packages import Packages
 
 # A limit that no motion reaches; Pinocchio wants finite numbers for a revolute joint.
@@ -98,7 +98,7 @@ def make_meshes_absolute(
     for mesh in root.iter("mesh"):
         name = mesh.get("filename", "")
         scheme, mark, rest = name.partition("://")
-        is_there = any(Path(folder, rest).is_file() for folder in folders)
+        is_there = any(is_file(Path(folder, rest)) for folder in folders)
         if mark and scheme in ("package", "model") and is_there:
             continue
         place = packages.place(name)
