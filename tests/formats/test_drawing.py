@@ -12,6 +12,7 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.formats.drawing import read_drawing
+from support.shell import complaint as refused
 
 # What chords may be off curves [m], as the docs say; rounding of a drawing in mm.
 CHORD, ROUNDING = 1e-5, 1e-12
@@ -55,9 +56,26 @@ def test_units_are_those_of_the_drawing(tmp_path: Path, number: int, metres: flo
 
 
 @pytest.mark.parametrize("number", [0, 17])
-def test_a_drawing_without_a_unit_is_refused(tmp_path: Path, number: int) -> None:
-    with pytest.raises(sm.FileFormatError, match=rf"part\.dxf: \$INSUNITS is {number}, .*\(mm\)"):
+def test_a_drawing_without_a_unit_is_refused_until_it_is_said(tmp_path: Path, number: int) -> None:
+    said = rf"part\.dxf: says no unit .*\$INSUNITS is {number}.*unit = 'mm'.* mm, cm, dm"
+    with pytest.raises(sm.FileFormatError, match=said):
         rows_of(tmp_path, lambda s: s.add_line((0, 0), (3, 4)), units=number)
+    for unit, length in (("mm", 0.005), ("in", 5 * 0.0254)):
+        path = sm.read_path(tmp_path / "part.dxf", unit=unit, feed=0.1, jump=2.0)
+        first, last = path.evaluate(np.array([0.0, path.duration])).translation
+        assert np.linalg.norm(last - first) == pytest.approx(length)
+    line = refused("plan", "panda", "--path", tmp_path / "part.dxf", "--feed", "0.1")
+    assert "--unit mm" in line
+
+
+def test_a_unit_that_is_said_counts_more_than_that_of_the_file(tmp_path: Path) -> None:
+    file = drawn(tmp_path / "part.dxf", lambda s: s.add_line((0, 0), (3, 4)), units=6)
+    found = read_drawing(file, unit="mm")
+    assert np.linalg.norm(found["0"].positions[1]) == pytest.approx(5e-3)
+    with pytest.raises(sm.FileFormatError, match=r"unit is 'inch', expected one of: 'mm'"):
+        sm.read_path(file, unit="inch")
+    with pytest.raises(sm.FileFormatError, match=r"slot\.nc: unit has no effect"):
+        sm.read_path("slot.nc", unit="mm")
 
 
 def off_circle(points: np.ndarray, centre: tuple[float, float], radius: float) -> float:

@@ -56,6 +56,7 @@ class Shell:
     rotary: str | None
     rotary_axes: str | None
     rotary_center: str | None
+    unit: str | None
     frame: str | None
     ramp: float | None
     corners: str | None
@@ -193,7 +194,7 @@ class Shell:
 # Options of the shell that say how --path is read; those of `plan` and of `check`.
 OF_PATH = (
     *("feed", "duration", "jump", "seam", "columns", "flip_normals", "standoff", "rotary"),
-    *("rotary_axes", "rotary_center", "frame", "ramp", "corners", "corner_tolerance"),
+    *("rotary_axes", "rotary_center", "unit", "frame", "ramp", "corners", "corner_tolerance"),
 )
 
 
@@ -203,8 +204,8 @@ _OF_SHAPE = ("feed", "duration")
 
 def path_table(file: Path, typed: Mapping[str, Any]) -> dict[str, Any]:
     """Return the table of a path of a file, by the options `OF_PATH` as typed."""
-    names = ("seam", "feed", "duration", "jump", "ramp", "standoff", "rotary", "rotary_axes")
-    given = {name: typed[name] for name in names}
+    names = ("seam", "feed", "duration", "jump", "ramp", "standoff", "rotary", "unit")
+    given = {name: typed[name] for name in (*names, "rotary_axes")}
     given["columns"] = None if typed["columns"] is None else typed["columns"].split(",")
     given["flip_normals"] = typed["flip_normals"] or None
     if typed["rotary_center"] is not None:

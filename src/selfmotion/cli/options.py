@@ -14,6 +14,7 @@ from selfmotion.basics import TURN, Array
 TaskName = Literal["pose", "position", "pointing", "planar", "planar_pose"]
 Corners = Literal["blend", "stop", "round"]
 Rotary = Literal["head", "table"]
+DrawnUnit = Literal["mm", "cm", "dm", "m", "in", "ft"]
 Axis = Literal["x", "y", "z"]
 SearchMode = Literal["auto", "local", "global"]
 
@@ -86,6 +87,10 @@ RotaryAxesOption = Annotated[
 ]
 RotaryCenterOption = Annotated[
     str | None, typer.Option(help="A point x,y,z (m) on the axes of a rotary table.")
+]
+UnitOption = Annotated[
+    DrawnUnit | None,
+    typer.Option(help="Of a drawing (.dxf) that says none, or another than it is drawn in."),
 ]
 FrameOption = Annotated[
     str | None,

@@ -17,9 +17,9 @@ _WORDS = (
     ),
     (r"which needs a feed \[m/s\]; give it", "which needs --feed (m/s)"),
     (r"\bflip_normals\b", "--flip-normals"),
-    (r"\brotary = '(\w+)'", r"--rotary \1"),
+    (r"\b(rotary|unit) = '(\w+)'", r"--\1 \2"),
     (r"\brotary_(axes|center)\b", r"--rotary-\1"),
-    (r"(?<=: )(columns|standoff|rotary|ramp) (?=has|is)", r"--\1 "),
+    (r"(?<=: )(columns|standoff|rotary|ramp|unit) (?=has|is)", r"--\1 "),
     (r"choose another task \(", "choose another --task ("),
     (r"choose a task with fewer rows \(", "take another --task ("),
 )

@@ -16,7 +16,7 @@ import numpy as np
 from selfmotion.basics import Array, FileFormatError, Ints, ProblemError
 from selfmotion.formats.cuts import Cut
 from selfmotion.formats.drawn_entities import DRAWN
-from selfmotion.formats.path_rows import PoseRows, no_such_seam
+from selfmotion.formats.path_rows import DRAWN_UNITS, PoseRows, no_such_seam
 
 # What is written or marked in a drawing, and no stroke.
 _SAID = frozenset(
@@ -30,9 +30,8 @@ _BYTES, _FAR = 50_000_000, 1e3
 _PARTS, _DEEPEST = 100_000, 20
 _NO_DRAWING = "{}: is no DXF drawing: {}; save it as DXF in CAD again (2000 or later)"
 _DWG = re.compile(rb"AC10[0-9]{2}")
-# Metres of a unit by its number in $INSUNITS.
-_UNITS = {1: 25.4e-3, 2: 0.3048, 4: 1e-3, 5: 1e-2, 6: 1.0, 14: 0.1}
-_UNIT_NAMES = "1 (inches), 2 (feet), 4 (mm), 5 (cm), 6 (m) or 14 (dm)"
+# What $INSUNITS means.
+_UNITS = {1: "in", 2: "ft", 4: "mm", 5: "cm", 6: "m", 14: "dm"}
 # What chords may be off a curve, and ends off each other that meet [m].
 _DEVIATION = _MEET = 1e-5
 # What spoilt drawings lead to is as various as the entities that they are in.
@@ -57,10 +56,13 @@ class _Piece(NamedTuple):
     points: Array
 
 
-def read_drawing(file: FilePath, seam: str | None = None) -> Mapping[str, PoseRows]:
+def read_drawing(
+    file: FilePath, seam: str | None = None, unit: str | None = None
+) -> Mapping[str, PoseRows]:
     """Read the strokes of a drawing by the names of their layers; see `read_path`.
 
     Where one seam is asked for, other layers are not looked at: they may hold texts and dimensions.
+    The unit is the drawing's where none is said.
 
     Raises
     ------
@@ -92,11 +94,11 @@ def read_drawing(file: FilePath, seam: str | None = None) -> Mapping[str, PoseRo
         raise
     except spoilt as error:
         raise FileFormatError(_NO_DRAWING.format(file, _line(error))) from error
-    unit = _UNITS.get(drawing.units)
+    unit = unit or _UNITS.get(drawing.units)
     if unit is None:
         raise FileFormatError(
-            f"{file}: $INSUNITS is {drawing.units}, which names no unit; set the unit of the "
-            f"drawing in CAD, expected {_UNIT_NAMES}"
+            f"{file}: says no unit that a path has ($INSUNITS is {drawing.units}); say which it is "
+            f"drawn in: unit = 'mm', expected one of {', '.join(DRAWN_UNITS)}"
         )
     try:
         drawn = list(_drawn(file, drawing))
@@ -117,7 +119,7 @@ def read_drawing(file: FilePath, seam: str | None = None) -> Mapping[str, PoseRo
         if entity.dxftype() in _SAID:
             beside[entity.dxftype()] += 1
         else:
-            layers[layer].extend(_piece(file, layer, place, entity, unit))
+            layers[layer].extend(_piece(file, layer, place, entity, DRAWN_UNITS[unit]))
     strokes = {layer: _strokes(pieces) for layer, pieces in layers.items()}
     found = _named(file, strokes, hidden, beside)
     if not beside:
@@ -201,8 +203,8 @@ def _piece(file: FilePath, layer: str, place: str, entity: Any, unit: float) -> 
         ) from error
     if not np.abs(points).max(initial=0.0) < _FAR:
         raise FileFormatError(
-            f"{file}: layer '{layer}': {place} is more than {_FAR:g} m away; is the unit as "
-            f"$INSUNITS says?"
+            f"{file}: layer '{layer}': {place} is more than {_FAR:g} m away; is it drawn in "
+            f"another unit than $INSUNITS says? (unit = 'mm')"
         )
     if len(points) and np.ptp(points, axis=0).max() > _MEET:
         yield _Piece(place, points)

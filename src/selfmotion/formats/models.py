@@ -130,6 +130,7 @@ _PATH_FILE: _Fields = {
     "rotary": (Text, None),
     "rotary_axes": (Names, None),
     "rotary_center": (Numbers, None),
+    "unit": (Text, None),
     **_BOUNDS,
     **_WOVEN,
 }

@@ -12,6 +12,7 @@ from selfmotion.formats.drawing import read_drawing
 from selfmotion.formats.gcode import read_gcode
 from selfmotion.formats.path_building import JUMP, Pacing, path_of_rows
 from selfmotion.formats.path_rows import (
+    DRAWING,
     PROGRAMS,
     READERS,
     READING,
@@ -29,9 +30,8 @@ _READERS: Mapping[str, Callable[[FilePath, Reading], Mapping[str, PoseRows]]] = 
     **dict.fromkeys(PROGRAMS, read_gcode),
     **dict.fromkeys(CLDATA, lambda file, _: read_cldata(file)),
 }
-_DRAWING = ".dxf"
 # Of files that can be nothing but a path.
-PATH_SUFFIXES = (*TABLES, *PROGRAMS, *CLDATA, _DRAWING)
+PATH_SUFFIXES = (*TABLES, *PROGRAMS, *CLDATA, DRAWING)
 
 
 def read_path(
@@ -56,6 +56,7 @@ def read_path(
     rotary: str | None = None,
     rotary_axes: Sequence[str] | str | None = None,
     rotary_center: npt.ArrayLike | None = None,
+    unit: str | None = None,
 ) -> Path:
     """Read a tool motion through poses.
 
@@ -113,9 +114,9 @@ def read_path(
     ``LINE ARC CIRCLE ELLIPSE SPLINE LWPOLYLINE POLYLINE`` and blocks of them are read, curves as
     chords within 0.01 mm, which are followed as legs of a cut; texts, dimensions, hatches and
     points are passed over with a note, and any other entity is refused by its handle, but not on
-    layers that are off or frozen, nor beside the layer of `seam`. The unit is that of
-    ``$INSUNITS``, and none is refused. The tool's z axis points down, against that of the drawing.
-    A feed has to be given.
+    layers that are off or frozen, nor beside the layer of `seam`. The unit is `unit`, or
+    that of ``$INSUNITS``; none is refused. The tool's z axis points down, against that of the
+    drawing. A feed has to be given.
 
     Parameters
     ----------
@@ -155,6 +156,8 @@ def read_path(
         841); ``["B", "-C"]`` where a positive C turns the table right-handed.
     rotary_center : (3,)
         A point on all of a table's axes, in the program's coordinates [m].
+    unit : {"mm", "cm", "dm", "m", "in", "ft"}, optional
+        Of a drawing that says none, or another one than it is drawn in.
 
     Raises
     ------
@@ -191,6 +194,7 @@ def read_path(
             "rotary": rotary,
             "rotary_axes": rotary_axes,
             "rotary_center": rotary_center,
+            "unit": unit,
         },
     )
     return path_of_rows(path, one_seam(path, seam, reading), asked)
@@ -231,11 +235,11 @@ def _pacing(path: FilePath, options: Mapping[str, Any]) -> Pacing:
 def _read(path: FilePath, seam: str | None, reading: Reading) -> Mapping[str, PoseRows]:
     """Return the rows of a file by the names of its seams, of a drawing those of one layer."""
     suffix = path.suffix.lower()
-    if suffix == _DRAWING:
-        return read_drawing(path, seam)
+    if suffix == DRAWING:
+        return read_drawing(path, seam, reading.unit)
     reader = _READERS.get(suffix)
     if reader is None:
-        known = ", ".join((*_READERS, _DRAWING))
+        known = ", ".join((*_READERS, DRAWING))
         raise FileFormatError(f"{path}: has suffix '{path.suffix}', expected one of {known}")
     return reader(path, reading)
 

@@ -12,6 +12,7 @@ from selfmotion.basics import (
     Array,
     FileFormatError,
     ProblemError,
+    as_choice,
     nearest,
     read_arrays,
     read_rows,
@@ -117,7 +118,10 @@ class PoseRows:
 
 
 # Options of `read_path` that say what a file means.
-READING = ("columns", "rotary", "rotary_axes", "rotary_center")
+READING = ("columns", "rotary", "rotary_axes", "rotary_center", "unit")
+# Metres of the units that a drawing may be said to be in.
+DRAWN_UNITS = {"mm": 1e-3, "cm": 1e-2, "dm": 0.1, "m": 1.0, "in": 25.4e-3, "ft": 0.3048}
+DRAWING = ".dxf"
 
 
 @dataclass(frozen=True)
@@ -130,10 +134,13 @@ class Reading:
         Of a table.
     rotary : Rotary or None
         Of a program of a machine: what its rotary words turn.
+    unit : str or None
+        Of a drawing, whatever it says itself.
     """
 
     columns: tuple[str, ...] | None = None
     rotary: Rotary | None = None
+    unit: str | None = None
 
     @classmethod
     def of(cls, file: FilePath, options: Mapping[str, Any]) -> "Reading":
@@ -150,9 +157,13 @@ class Reading:
             raise FileFormatError(f"{file}: {error}") from error
         if rotary is not None and file.suffix.lower() not in PROGRAMS:
             raise FileFormatError(f"{file}: rotary has no effect: it is no G-code; drop it")
-        columns = options.get("columns")
+        unit, columns = options.get("unit"), options.get("columns")
+        if unit is not None:
+            as_choice(unit, f"{file}: unit", tuple(DRAWN_UNITS), FileFormatError)
+            if file.suffix.lower() != DRAWING:
+                raise FileFormatError(f"{file}: unit has no effect: it is no drawing; drop it")
         if columns is None:
-            return cls(None, rotary)
+            return cls(None, rotary, unit)
         if isinstance(columns, str):
             columns = columns.split(",")
         if not isinstance(columns, list | tuple) or not all(isinstance(x, str) for x in columns):
