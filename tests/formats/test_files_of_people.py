@@ -401,7 +401,9 @@ def test_lists_of_pose_arrays_are_seams(tmp_path: Path) -> None:
         return [{"position": place, "orientation": dict(turned)} for place in places]
 
     arrays = [{"poses": raster(0.0)}, {"poses": raster(0.1)}]
-    for k, document in enumerate((arrays, {"paths": arrays}, [[raster(0.0)], [raster(0.1)]])):
+    jobs = [{"dwell_time": 0, "paths": arrays[:1]}, {"paths": arrays[1:]}]
+    nested = [[raster(0.0)], [raster(0.1)]]
+    for k, document in enumerate((arrays, {"paths": arrays}, nested, jobs)):
         file = written(tmp_path, f"{k}.json", json.dumps(document))
         second = sm.read_path(file, seam="seam 2", feed=0.05)
         np.testing.assert_allclose(second.pose(0.0).translation, [0.4, 0.1, 0.3], atol=ROUNDING)

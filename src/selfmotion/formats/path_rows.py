@@ -349,13 +349,8 @@ _LISTS = ("paths", "rasters", "pose_arrays")
 def _read_ros(file: FilePath) -> dict[str, PoseRows]:
     """Return the poses of a message, or of each of several ones (rasters) as a seam."""
     document = read_values(file)
-    if isinstance(document, list):
-        # Rasters of rasters are one list of strokes.
-        messages = list(_messages(document))
-    else:
-        keys = _LISTS if isinstance(document, Mapping) else ()
-        listed = next((document[key] for key in keys if key in document), None)
-        messages = list(_messages(listed)) if isinstance(listed, list) else [document]
+    # Rasters of rasters are one list of strokes, and so are jobs of them.
+    messages = list(_messages(document if isinstance(document, list) else [document]))
     if not messages:
         raise FileFormatError(
             f"{file}: holds no message with poses, expected a nav_msgs/Path or "
@@ -391,7 +386,11 @@ def _check_frames(file: FilePath, messages: Sequence[Any]) -> None:
 
 def _messages(items: Sequence[Any]) -> Iterator[Any]:
     for item in items:
-        if isinstance(item, list) and item and not _is_pose(item[0]):
+        keys = _LISTS if isinstance(item, Mapping) else ()
+        listed = next((item[key] for key in keys if isinstance(item.get(key), list)), None)
+        if listed is not None:
+            yield from _messages(listed)
+        elif isinstance(item, list) and item and not _is_pose(item[0]):
             yield from _messages(item)
         else:
             yield {"poses": item} if isinstance(item, list) else item
