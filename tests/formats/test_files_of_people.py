@@ -1,6 +1,7 @@
 """Files of paths and motions as people have them: what they say is what is read."""
 
 import json
+import re
 from itertools import pairwise
 from pathlib import Path
 
@@ -99,6 +100,7 @@ def test_a_trajectory_of_a_camera_is_read(tmp_path: Path) -> None:
         ("x,y,z,w,p,r\n", "'w': W,P,R of Fanuc are roll_deg,pitch_deg,yaw_deg here"),
         ("id,x,y,z\n", "unknown column 'id', .*to leave a column out, call it - in columns"),
         ("x\x00,y\n", "is no text: it has a byte 0"),
+        ("G21 G90\nG1 X1 F100\n", "'g21': if this is G-code, call the file .nc or .gcode"),
     ],
 )
 def test_tables_that_lack_or_have_more_say_what_to_do(text: str, said: str, tmp_path: Path) -> None:
@@ -316,6 +318,17 @@ def test_what_a_printer_feeds_by_differences_is_a_cut(tmp_path: Path) -> None:
         assert len(loop.positions) == 5
 
 
+def test_what_extrudes_nothing_on_its_way_cuts_at_its_feed(tmp_path: Path) -> None:
+    """Programs of pumps and beams whose E only retracts."""
+    lines = [
+        re.sub(r" E[0-9.]+", "", line) if "X" in line else line for line in PRINTED.split("\n")
+    ]
+    cuts = read_gcode(written(tmp_path, "part.gcode", "\n".join(lines)))
+    expected = read_gcode(written(tmp_path, "printed.gcode", PRINTED))
+    for found, printed in zip(cuts.values(), expected.values(), strict=True):
+        np.testing.assert_array_equal(found.positions, printed.positions)
+
+
 def test_another_nozzle_of_a_printer_is_an_event(tmp_path: Path) -> None:
     text = PRINTED.replace("G1 X40 Y30 E2.0", "T1\nG1 X40 Y30 E2.0")
     loop = read_gcode(written(tmp_path, "part.gcode", text))["cut 1"]
@@ -361,6 +374,10 @@ def test_rotary_words_without_what_they_turn_are_refused(tmp_path: Path) -> None
     known = {name: sm.read_path(file, rotary="head").pose(0.5).homogeneous for name in ("head",)}
     tip = written(tmp_path, "b.nc", ROTARY.format("B").replace("G94", "G94 G43.4 H1"))
     np.testing.assert_array_equal(sm.read_path(tip).pose(0.5).homogeneous, known["head"])
+    # A way home behind the cut leaves it as it is.
+    home = written(tmp_path, "d.nc", ROTARY.format("B").replace("G0 Z60", "G28 X0 Y0"))
+    found = sm.read_path(home, rotary="head").pose(0.5).homogeneous
+    np.testing.assert_array_equal(found, known["head"])
     # Words of 0 turn nothing.
     assert sm.read_path(written(tmp_path, "c.nc", "G0 X0 Y0 Z0 A0\nG1 X10 F600 A0\n")).duration > 0
     for options, said in (

@@ -78,7 +78,7 @@ def read_gcode(file: FilePath, reading: Reading | None = None) -> Mapping[str, P
     machine = Machine(file)
     text = machine.text()
     rotary = None if reading is None else reading.rotary
-    reader = _Reader(machine, rotary, prints=extrudes(text))
+    reader = _Reader(machine, rotary, *extrudes(text))
     if not lifts(text):
         reader.stay_flat()
     for number, line in enumerate(text.splitlines(), 1):
@@ -91,8 +91,12 @@ def read_gcode(file: FilePath, reading: Reading | None = None) -> Mapping[str, P
 class _Reader:
     """The modes of a machine, and the lines that change them."""
 
-    def __init__(self, machine: Machine, rotary: Rotary | None, prints: bool) -> None:
+    def __init__(
+        self, machine: Machine, rotary: Rotary | None, prints: bool, on_its_way: bool
+    ) -> None:
         self.machine, self._rotary, self._prints = machine, rotary, prints
+        # Where it does not, E tells no cut from a travel.
+        self._extrudes = on_its_way
         self._unit, self._absolute, self._motion = _MM, True, 0
         self._begun = False
         self._turns: dict[str, float] = {}
@@ -372,7 +376,7 @@ class _Reader:
             if name in values:
                 goal[k] = self._unit * values[name] + (0.0 if self._absolute else goal[k])
         axis = self._axis(values, arc)
-        travels = fed <= 0.0 if self._prints else self._motion == 0
+        travels = fed <= 0.0 if self._extrudes else self._motion == 0
         if values.get("L", 1.0) > 1.0:
             raise machine.fault("L repeats the line, which is not read: write its places")
         if "S" in values and not travels:
@@ -427,7 +431,7 @@ class _Reader:
         """Return where a place of the machine is in the part."""
         if self._rotary is None or self._tip:
             return position.copy()
-        return self._rotary.in_part(position, self._turns)
+        return self._rotary.in_part(position.copy(), self._turns)
 
     def _axis(self, values: Mapping[str, float], arc: bool) -> Array:
         """Return the direction from the tip to the holder."""

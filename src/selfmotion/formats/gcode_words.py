@@ -9,8 +9,9 @@ _WORD = re.compile(r"([A-Z])\s*=?\s*([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+))\s*")
 # What only a control's own language says.
 _MACRO = re.compile(r"#|\[|^\s*N?[0-9]*\s*O\s*<|\b(SUB|CALL|REPEAT|WHILE|IF|ENDSUB|GOTO)\b")
 _HEIDENHAIN = re.compile(r"[0-9]*\s*BEGIN PGM")
-# A program of a printer moves and extrudes in one line.
+# What a printer extrudes, and what it extrudes on its way.
 _EXTRUDES = re.compile(r"G0*[0-3](?![0-9.]).*E[+-]?[0-9.]")
+_ON_ITS_WAY = re.compile(r"[XYZ].*E[+-]?[0-9.]|E[+-]?[0-9.].*[XYZ]")
 # A word Z.
 _LIFTS = re.compile(r"Z\s*=?\s*[-+.0-9#\[]")
 _LINE = 1000
@@ -18,10 +19,11 @@ _LINE = 1000
 _LETTERS = "XYZABCIJKRFE" + "NSTHDOPQL"
 
 
-def extrudes(text: str) -> bool:
-    """Return whether a program is a printer's."""
+def extrudes(text: str) -> tuple[bool, bool]:
+    """Return whether a program is a printer's, and whether that extrudes on its way."""
     lines = (re.sub(r"[;(].*", "", line.upper()) for line in text.splitlines() if len(line) < _LINE)
-    return any("E" in line and _EXTRUDES.search(line) for line in lines)
+    found = [line for line in lines if "E" in line and _EXTRUDES.search(line)]
+    return bool(found), any(map(_ON_ITS_WAY.search, found))
 
 
 def lifts(text: str) -> bool:

@@ -53,6 +53,8 @@ _ALSO = {"time": "t", "timestamp": "t"}
 # What other programs call x or qx: pose.position.x, pos_x, px, tx; orientation.x, quat_x.
 _PLACES = re.compile(r"(?:[a-z]+[._])*(?:position|pos|translation)[._]([xyz])|[pt]([xyz])")
 _TURNS = re.compile(r"(?:[a-z]+[._])*(?:orientation|quaternion|quat|q)[._]([wxyz])")
+# The first word of a program.
+_CODE = re.compile(r"[gmn][0-9]+|%")
 _TITLE = re.compile(r"([^\[(]*?)[\s_]*[\[(]([^\])]*)[\])]")
 # Columns of texts: which seam a row is of, and what happens at it.
 SEAM, EVENT = "seam", "event"
@@ -313,6 +315,10 @@ def _meant(file: FilePath, title: str) -> tuple[str, float]:
             f"{file}: column '{name}': of machines i,j,k points out of the part; nx,ny,nz is the "
             f"tool's z axis here, into the part: call them nx,ny,nz, and say flip_normals where "
             f"they point out"
+        )
+    if _CODE.match(title):
+        raise FileFormatError(
+            f"{file}: unknown column '{title}': if this is G-code, call the file .nc or .gcode"
         )
     if name in _MAKERS:
         raise FileFormatError(f"{file}: unknown column '{title}': {_MAKERS[name]}")
