@@ -72,6 +72,8 @@ def test_a_unit_that_is_said_counts_more_than_that_of_the_file(tmp_path: Path) -
     file = drawn(tmp_path / "part.dxf", lambda s: s.add_line((0, 0), (3, 4)), units=6)
     found = read_drawing(file, unit="mm")
     assert np.linalg.norm(found["0"].positions[1]) == pytest.approx(5e-3)
+    with pytest.raises(sm.FileFormatError, match=r"jumps by 5 m .*if \$INSUNITS is wrong"):
+        sm.read_path(file, feed=0.1)
     with pytest.raises(sm.FileFormatError, match=r"unit is 'inch', expected one of: 'mm'"):
         sm.read_path(file, unit="inch")
     with pytest.raises(sm.FileFormatError, match=r"slot\.nc: unit has no effect"):

@@ -8,13 +8,12 @@ from pathlib import Path as FilePath
 import numpy as np
 
 from selfmotion.basics import TURN, Array, FileFormatError, PathError, as_choice
-from selfmotion.formats.path_rows import PoseRows, some_rows
+from selfmotion.formats.path_rows import DRAWING, PoseRows, some_rows
 from selfmotion.formats.poses import ORIENTATIONS
 from selfmotion.path import Feed, Joined, Path, Polyline, Waypoints, merged, section_at_rest
 
 # A coordinate beyond this [m] can only be meant in millimetres.
 _FAR = 50.0
-_METRES = ("metres; say x_mm,y_mm,z_mm if it is millimetres", "metres; are its units as it says?")
 # Poses farther from their predecessor than this [m] are a jump, unless another length is given.
 JUMP = 0.5
 # Rotations by more than this [rad] are a jump, too: their direction would be a guess.
@@ -309,7 +308,7 @@ def _check_rows(file: FilePath, rows: PoseRows) -> None:
             place = rows.places[int(bad[0])]
             raise FileFormatError(f"{file}: {place}: the {what} is not finite; mend or drop it")
     for what, values, bound, remedy in (
-        ("position", rows.positions, _FAR, _METRES[rows.straight]),
+        ("position", rows.positions, _FAR, f"metres; {_units(file, rows)}"),
         ("angle", rows.values, TURN, "radians; say roll_deg,… or rx_deg,… if it is degrees"),
     ):
         if what == "angle" and rows.orientation not in ("rpy", "rotation_vector"):
@@ -348,7 +347,7 @@ def _check_jumps(file: FilePath, rows: PoseRows, rotations: Array, jump: float) 
     cosines = np.einsum("kij,kij->k", rotations[:-1], rotations[1:])
     turns = np.arccos(np.clip(0.5 * (cosines - 1.0), -1.0, 1.0))
     for what, amounts, bound, unit, remedy in (
-        ("jumps by", steps, jump, "m", _remedy(jump, rows.straight)),
+        ("jumps by", steps, jump, "m", _remedy(jump, _units(file, rows))),
         ("turns by", turns, _FLIP, "rad", "which has no clear direction; add poses between"),
     ):
         far = np.flatnonzero(amounts > bound)
@@ -360,16 +359,17 @@ def _check_jumps(file: FilePath, rows: PoseRows, rotations: Array, jump: float) 
             )
 
 
-def _remedy(jump: float, is_cut: bool) -> str:
-    if is_cut:
-        return (
-            f"more than {jump:g} m; give a larger jump if it is meant, or the file's own units "
-            f"(G20, UNITS/INCHES: inches; G21, UNITS/MM: mm; of drawings $INSUNITS)"
-        )
-    return (
-        f"more than {jump:g} m; give a larger jump if it is meant, or name the columns x_mm,… if "
-        f"they are millimetres"
-    )
+def _remedy(jump: float, units: str) -> str:
+    return f"more than {jump:g} m; give a larger jump if it is meant, or {units}"
+
+
+def _units(file: FilePath, rows: PoseRows) -> str:
+    """Return what to do where lengths are in another unit than they are taken for."""
+    if file.suffix.lower() == DRAWING:
+        return "say in which unit it is drawn if $INSUNITS is wrong (unit = 'mm')"
+    if rows.straight:
+        return "mend the file's units (G20, UNITS/INCHES: inches; G21, UNITS/MM: mm)"
+    return "name the columns x_mm,y_mm,z_mm if they are millimetres"
 
 
 def _times(
