@@ -2,9 +2,11 @@
 
 import json
 import re
+from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
 
+import ezdxf
 import numpy as np
 import pytest
 import yaml
@@ -228,6 +230,48 @@ def test_legs_shorter_than_the_tolerance_hardly_count(kind: str, tmp_path: Path)
     legs = list(pairwise(ends))
     away = np.min([_away(places, *leg) for leg in legs], axis=0)
     assert away.max() <= 1.15e-3 if kind == "stub aside" else away.max() <= 1e-3 + 1e-9
+
+
+_CORNER = [(0.0, 0.0), (30.0, 0.0), (30.0, 30.0)]
+_SAME_CORNER = {
+    "stub of 1 nm": [*_CORNER[:2], (30.000001, 0.0), _CORNER[2]],
+    "stub of 1 um before": [_CORNER[0], (29.999, 0.0), *_CORNER[1:]],
+    "stub of 0.1 mm": [*_CORNER[:2], (30.1, 0.0), _CORNER[2]],
+    "a place twice": [*_CORNER[:2], *_CORNER[1:]],
+    "chords": [(k / 5, 0.0) for k in range(151)] + [(30.0, k / 5) for k in range(1, 151)],
+}
+
+
+def apt_through(file: Path, places: list[tuple[float, float]]) -> Path:
+    words = [f"GOTO/{x:.7f},{y:.7f},0" for x, y in places]
+    file.write_text("\n".join(["UNITS/MM", "FEDRAT/1800,MMPM", "RAPID", *words, "FINI\n"]))
+    return file
+
+
+def drawing_through(file: Path, places: list[tuple[float, float]]) -> Path:
+    drawing = ezdxf.new("R2010", units=4)
+    for begin, end in pairwise(places):
+        drawing.modelspace().add_line(begin, end)
+    drawing.saveas(file)
+    return file
+
+
+@pytest.mark.parametrize("kind", _SAME_CORNER)
+@pytest.mark.parametrize("write", [apt_through, drawing_through])
+def test_short_legs_hardly_count_in_apt_and_drawings(
+    write: Callable[[Path, list[tuple[float, float]]], Path], kind: str, tmp_path: Path
+) -> None:
+    def path(places: list[tuple[float, float]], corners: str = "round") -> sm.Path:
+        file = write(tmp_path / f"a.{'apt' if write is apt_through else 'dxf'}", places)
+        return sm.read_path(file, feed=0.03, corners=corners)
+
+    found = path(_SAME_CORNER[kind])
+    assert found.duration == pytest.approx(path(_CORNER).duration, rel=ALIKE)
+    assert found.duration <= path(_SAME_CORNER[kind], "stop").duration
+    places = found.samples(np.linspace(0.0, found.duration, 501)).translation
+    ends = 1e-3 * np.array([(*place, 0.0) for place in _CORNER])
+    away = np.min([_away(places, *leg) for leg in pairwise(ends)], axis=0)
+    assert away.max() <= 1e-3 + ROUNDING
 
 
 def _away(places: np.ndarray, begin: np.ndarray, end: np.ndarray) -> np.ndarray:
