@@ -172,6 +172,13 @@ def test_normals_that_seem_to_point_out_are_told(
         asked = ["job", str(job), "--set", f"seams.flip_normals={setting}"]
         printed = CliRunner().invoke(app, asked).output
         assert ("seam 'left' are out of reach as read, and in reach with" in printed) == is_told
+    listed = tmp_path / "listed.toml"
+    listed.write_text(
+        'task = "pointing"\nrobot.name = "panda"\n[[seams]]\nname = "right"\n'
+        'path = { kind = "file", file = "a.csv", feed = 0.05 }\n'
+    )
+    printed = CliRunner().invoke(app, ["job", str(listed)]).output
+    assert "seam 'right' are out of reach as read, and in reach with" in printed
     asked = ["plan", "panda", "--path", file, "--task", "pointing", "--feed", "0.05"]
     said = "out of reach as read, and in reach with --flip-normals"
     for more, is_told in (([], True), (["--flip-normals"], False)):

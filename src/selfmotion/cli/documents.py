@@ -341,19 +341,18 @@ def _tell_flip(document: dict[str, Any], file: Path | None, job: sm.Job) -> None
 
 
 def _tell_flip_of_seams(document: dict[str, Any], file: Path, job: sm.SeamJob) -> None:
-    """Print the same of a job's first seam, where all of them are of one file."""
-    seams = document.get("seams")
-    if not (isinstance(seams, dict) and job.seams):
-        return
-    first = job.seams[0]
-    table = file.parent / str(seams.get("file"))
-    if not has_normals(table, {**seams, "seam": first.name}):
+    """Print the same of a job's first seam."""
+    seams, first = document["seams"], job.seams[0]
+    listed = isinstance(seams, list)
+    path = seams[0].get("path") if listed else {**seams, "seam": first.name}
+    if not (isinstance(path, dict) and has_normals(file.parent / str(path.get("file")), path)):
         return
     if _is_in_reach(job.robot, first.path, sm.Task(first.task)):
         return
-    other = seam_job_of({**document, "seams": _flipped(seams)}, file)
+    turned = [{**seams[0], "path": _flipped(path)}, *seams[1:]] if listed else _flipped(seams)
+    other = seam_job_of({**document, "seams": turned}, file)
     if _is_in_reach(other.robot, other.seams[0].path, sm.Task(first.task)):
-        _say_flip(f"seam '{first.name}'", seams)
+        _say_flip(f"seam '{first.name}'", path)
 
 
 def _flipped(table: dict[str, Any]) -> dict[str, Any]:
