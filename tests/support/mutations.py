@@ -73,6 +73,10 @@ _OTHERS = (
     (".json", '{"waypoints": [{"position": [0.4, 0, 0.3], "rpy": [3.1, 0, 0]}, {"position": [0.5, '
      '0, 0.3], "rpy": [3.1, 0, 0]}]}'),
     (".nc", "G28\nG0 X0 Y0 Z0\nG93\nG1 X9 F30\nG18 G2 X19 Z0 I5 K0 F30\n"),
+    (".nc", "G28\nG43.4\nG1 F800 X0 Y0 Z9 B30 C0\nG1 X9 Y1 B25 C5\nG1 X9 Y9 B20\nG1 E-1\nG28 X0\n"),
+    (".yaml", "- dwell: 0\n  paths:\n  - header: {frame_id: 0}\n    poses:\n"
+     + "".join(f"    - {{position: {{x: 0.4, y: {y}, z: 0.3}}, orientation: {{x: 1, y: 0, z: 0, w: "
+               "0}}\n" for y in (0, 0.1, 0.2))),
     (".json", '[{"poses": [{"position": {"x": 0.4, "y": 0, "z": 0.3}, "orientation": {"x": 1, '
      '"y": 0, "z": 0, "w": 0}}, {"position": {"x": 0.5, "y": 0, "z": 0.3}, "orientation": {"x": 1, '
      '"y": 0, "z": 0, "w": 0}}]}]'),
@@ -87,6 +91,10 @@ points:
 
 def _others(file: Path) -> object:
     return sm.read_path(file, feed=0.05, corners="round")
+
+
+def _drawn_in_mm(file: Path) -> object:
+    return sm.read_path(file, feed=0.05, unit="mm")
 
 
 def _expanded(file: Path) -> object:
@@ -104,6 +112,7 @@ def good_files() -> tuple[Good, ...]:
         Good("URDF", ".urdf", _URDF, sm.load_robot),
         *(Good(_kind(suffix), suffix, content, _path) for suffix, content in _paths()),
         *(Good("others' files", suffix, text.encode(), _others) for suffix, text in _OTHERS),
+        Good("others' files", ".dxf", _drawing(unit=0), _drawn_in_mm),
         Good("xacro", ".xacro", with_arguments_text().encode(), _expanded),
         Good("URDF", ".urdf", finger().encode(), lambda file: sm.load_robot(file, tool="tip")),
         Good("motion", ".yaml", _POINTS, sm.read_motion),
@@ -389,7 +398,7 @@ def _paths() -> list[tuple[str, bytes]]:
     return found
 
 
-def _drawing() -> bytes:
+def _drawing(unit: int = 4) -> bytes:
     """Return a drawing of one stroke: a line, an arc, a polyline with a bulge, a spline."""
     entities = [
         "LINE 10 0 20 0 30 0 11 40 21 0 31 0",
@@ -398,7 +407,8 @@ def _drawing() -> bytes:
         "SPLINE 70 8 71 3 72 8 73 4 74 0 40 0 40 0 40 0 40 0 40 1 40 1 40 1 40 1 "
         "10 50 20 30 30 0 10 50 20 40 30 0 10 60 20 50 30 5 10 70 20 50 30 5",
     ]
-    said = "0 SECTION 2 HEADER 9 $ACADVER 1 AC1015 9 $INSUNITS 70 4 0 ENDSEC 0 SECTION 2 ENTITIES "
+    said = f"0 SECTION 2 HEADER 9 $ACADVER 1 AC1015 9 $INSUNITS 70 {unit} 0 ENDSEC 0 SECTION 2 "
+    said += "ENTITIES "
     for k, text in enumerate(entities):
         kind, _, rest = text.partition(" ")
         classes = {"LWPOLYLINE": "AcDbPolyline", "ARC": "AcDbCircle"}

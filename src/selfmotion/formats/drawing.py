@@ -143,7 +143,10 @@ def _drawn(file: FilePath, drawing: Any) -> Iterator[tuple[str | None, str, Any]
             yield layer, place if depth == 0 else f"{entity.dxftype()} in {place}", entity
             continue
         if entity.block() is None:
-            raise FileFormatError(f"{file}: {place} puts a block that the drawing does not have")
+            raise FileFormatError(
+                f"{file}: layer '{layer}': {place} puts a block that the drawing does not have; "
+                f"delete it in CAD, or switch its layer off"
+            )
         inner = list[tuple[str | None, str, Any, int]]()
         for one in entity.multi_insert() if entity.mcount > 1 else [entity]:
             for part in one.virtual_entities():
@@ -199,7 +202,8 @@ def _piece(file: FilePath, layer: str, place: str, entity: Any, unit: float) -> 
         points = unit * np.array(draw(entity, _DEVIATION / unit), dtype=np.float64).reshape(-1, 3)
     except (DXFError, *_SPOILT) as error:
         raise FileFormatError(
-            f"{file}: layer '{layer}': {place} cannot be drawn: {_line(error)}"
+            f"{file}: layer '{layer}': {place} cannot be drawn: {_line(error)}; "
+            f"mend or delete it in CAD, or switch its layer off"
         ) from error
     if not np.abs(points).max(initial=0.0) < _FAR:
         raise FileFormatError(
