@@ -429,6 +429,17 @@ def test_rotary_words_without_what_they_turn_are_refused(tmp_path: Path) -> None
     home = written(tmp_path, "d.nc", ROTARY.format("B").replace("G0 Z60", "G28 X0 Y0"))
     found = sm.read_path(home, rotary="head").pose(0.5).homogeneous
     np.testing.assert_array_equal(found, known["head"])
+    # A table under tool centre point control turns as the head, or the other way.
+    table = sm.read_path(file, rotary="head", rotary_axes="BC").pose(0.5).homogeneous
+    np.testing.assert_allclose(table, known["head"], atol=1e-12)
+    mirrored = ROTARY.format("B").replace("B-26.5 C-5", "B26.5 C5")
+    other = sm.read_path(written(tmp_path, "e.nc", mirrored), rotary="head", rotary_axes="-B,-C")
+    np.testing.assert_allclose(other.pose(0.5).homogeneous, known["head"], atol=1e-12)
+    file = written(tmp_path, "f.nc", ROTARY.format("A"))
+    for options in ({"rotary": "head"}, {"rotary": "table", "rotary_center": [0, 0, 0]}):
+        with pytest.raises(sm.FileFormatError, match=r"A turns.* none of rotary_axes \(B, C"):
+            sm.read_path(file, rotary_axes="BC", **options)
+    file = tmp_path / "a.nc"
     # Words of 0 turn nothing.
     assert sm.read_path(written(tmp_path, "c.nc", "G0 X0 Y0 Z0 A0\nG1 X10 F600 A0\n")).duration > 0
     for options, said in (
@@ -437,7 +448,7 @@ def test_rotary_words_without_what_they_turn_are_refused(tmp_path: Path) -> None
         ({"rotary": "table", "rotary_center": [0, 0, 0]}, "rotary_axes is None"),
         ({"rotary": "table", "rotary_center": [0, 0, 0], "rotary_axes": "BD"}, "'BD', expected"),
         ({"rotary_axes": "BC"}, "are of rotary = 'table'"),
-        ({"rotary": "head", "rotary_axes": "BC"}, "are of a table; drop them"),
+        ({"rotary": "head", "rotary_center": [0, 0, 0]}, "is of a table whose positions are"),
     ):
         with pytest.raises(sm.FileFormatError, match=said):
             sm.read_path(file, **options)

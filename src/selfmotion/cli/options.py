@@ -82,7 +82,7 @@ RotaryAxesOption = Annotated[
     str | None,
     typer.Option(
         help="Axes of a rotary table from the machine to the part: BC, AC, or B,-C where C turns "
-        "the table right-handed."
+        "the table right-handed; with --rotary head under tool centre point control."
     ),
 ]
 RotaryCenterOption = Annotated[

@@ -453,7 +453,14 @@ class _Reader:
                 f"rotary = 'table' with rotary_axes (BC, AC) and rotary_center, or 'head' where "
                 f"they are those of the tip in the part (as after G43.4)"
             )
-        return (self._rotary or Rotary(HEAD)).rotation(self._turns)[:, 2]
+        rotary = self._rotary or Rotary(HEAD)
+        known = [name for name, _ in rotary.axes] or "ABC"
+        other = next((name for name in turned if name not in known), None)
+        if other is not None:
+            raise self.machine.fault(
+                f"{other} turns, which is none of rotary_axes ({', '.join(known)}): name all"
+            )
+        return rotary.rotation(self._turns)[:, 2]
 
     def _arc(self, goal: Array, values: Mapping[str, float]) -> Array:
         """Return points (K, 3) of an arc in its plane, its end the last."""

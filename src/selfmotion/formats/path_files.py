@@ -153,7 +153,8 @@ def read_path(
     rotary_axes : str or sequence of str
         A table's axes, from the machine to the part: ``"BC"`` for a C axis on a B axis, ``"AC"``,
         or one. Positive words move the tool right-handed about the axis relative to the part (ISO
-        841); ``["B", "-C"]`` where a positive C turns the table right-handed.
+        841); ``["B", "-C"]`` where a positive C turns the table right-handed. With ``rotary =
+        "head"`` the axes of a table under tool centre point control.
     rotary_center : (3,)
         A point on all of a table's axes, in the program's coordinates [m].
     unit : {"mm", "cm", "dm", "m", "in", "ft"}, optional

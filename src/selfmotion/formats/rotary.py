@@ -21,13 +21,14 @@ class Rotary:
     Parameters
     ----------
     kind : {"head", "table"}
-        With ``"head"`` positions are those of the tip in the part, and A, B, C turn the tool.
+        With ``"head"`` positions are those of the tip in the part, and A, B, C turn the tool; or
+        a table under tool centre point control, which turns the part instead.
         With ``"table"`` they are those of the machine, in which the table has turned the part.
     axes : tuple of (str, float)
         Of a table, from the machine to the part, with their signs: ``("B", 1.0), ("C", 1.0)`` for a
-        C axis on a B axis. By ISO 841 a positive word moves the tool right-handed about the axis,
-        relative to the part: the table itself turns the other way. -1 for a table that turns
-        right-handed.
+        C axis on a B axis; none for Rz(C) Ry(B) Rx(A). By ISO 841 a positive word moves the tool
+        right-handed about the axis, relative to the part: the table itself turns the other way. -1
+        for a table that turns right-handed.
     center : (3,)
         A point on all axes, in the program's coordinates at A = B = C = 0 [m].
     """
@@ -48,9 +49,9 @@ class Rotary:
         if kind not in (HEAD, TABLE):
             raise ValueError(f"rotary is {shown(kind)}, expected 'head' or 'table'")
         if kind == HEAD:
-            if axes is not None or center is not None:
-                raise ValueError("rotary_axes and rotary_center are of a table; drop them")
-            return cls(HEAD)
+            if center is not None:
+                raise ValueError("rotary_center is of a table whose positions are the machine's")
+            return cls(HEAD) if axes is None else cls(HEAD, _axes_of(axes))
         if center is None:
             raise ValueError("rotary_center is missing: a point on the table's axes [x, y, z] (m)")
         where = as_numbers(center, "rotary_center", "three numbers", (3,))
@@ -58,7 +59,7 @@ class Rotary:
 
     def rotation(self, turns: Mapping[str, float]) -> Array:
         """Return what turns the machine's directions into the part's (3, 3), at angles [rad]."""
-        if self.kind == HEAD:
+        if not self.axes:
             return _about("C", turns) @ _about("B", turns) @ _about("A", turns)
         found = np.eye(3)
         for axis, sign in self.axes:
