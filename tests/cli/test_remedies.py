@@ -1,10 +1,14 @@
 """What the shell says is in its own words: options, not arguments of Python."""
 
+import io
 from pathlib import Path
 
+import numpy as np
 import pytest
+from rich.console import Console
 
 import selfmotion as sm
+from selfmotion.cli.tables import show_certificate
 from support.shell import complaint, invoke
 
 TABLE = "x,y,z\n0.4,0,0.4\n0.5,0,0.4\n"
@@ -58,3 +62,16 @@ def test_a_circle_of_a_planar_arm_lies_in_its_plane(tmp_path: Path) -> None:
     assert plan.problem.task is sm.Task.PLANAR
     heights = [plan.path.pose(t).translation[2] for t in (0.0, 1.0, 2.0)]
     assert max(heights) - min(heights) < 1e-12
+
+
+def test_a_feed_that_is_not_reached_says_how_the_shell_allows_less(tmp_path: Path) -> None:
+    """Cuts of real programs are shorter than what a run-up takes."""
+    cut = tmp_path / "cut.nc"
+    cut.write_text("G21 G90\nG0 X400 Y0 Z400\nG1 X401 F6000\nG1 X402\nG0 Z420\nM30\n")
+    robot, path = sm.load_robot("panda"), sm.read_path(cut)
+    still = sm.Trajectory(np.array([0.0, path.duration]), *np.zeros((2, 2, 7)), robot.joint_names)
+    found = sm.Problem(robot, path, "position").certify(still)
+    assert "or allow it more (within=)" in found.verdict
+    file = io.StringIO()
+    show_certificate(found, {}, robot, Console(file=file, width=400))
+    assert "or allow it more (--set path.within=0.5)" in file.getvalue()

@@ -16,6 +16,7 @@ _WORDS = (
         r"so that --\1 has no effect; drop it",
     ),
     (r"which needs a feed \[m/s\]; give it", "which needs --feed (m/s)"),
+    (r"\(within=\)", "(--set path.within=0.5)"),
     (r"\bflip_normals\b", "--flip-normals"),
     (r"\b(rotary|unit) = '(\w+)'", r"--\1 \2"),
     (r"\brotary_(axes|center)\b", r"--rotary-\1"),

@@ -14,6 +14,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from selfmotion.certificate import LIMIT_NAMES, Certificate, Extreme
+from selfmotion.cli.remedies import in_shell
 from selfmotion.job import Program
 from selfmotion.result import Gap, Plan, Report
 from selfmotion.robot import RobotModel
@@ -153,7 +154,8 @@ def show_certificate(
         console.print(remark, style="dim", markup=False, soft_wrap=not console.is_terminal)
     style = "green" if certificate.verified else "bold red"
     # One line of a log; words are kept whole on a terminal.
-    console.print(certificate.verdict, style=style, markup=False, soft_wrap=not console.is_terminal)
+    verdict = in_shell(certificate.verdict)
+    console.print(verdict, style=style, markup=False, soft_wrap=not console.is_terminal)
 
 
 def _in_mm(near: Extreme | None) -> Extreme | None:

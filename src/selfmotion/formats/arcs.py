@@ -38,7 +38,9 @@ def arc_points(
         The ends are not as far from the axis as each other, or the arc is too large.
     """
     if np.isnan(start).any() or np.isnan(goal).any():
-        raise machine.fault("an arc begins where X, Y or Z is not known yet")
+        raise machine.fault(
+            "an arc begins where X, Y or Z is not known yet: give X, Y and Z in a rapid before"
+        )
     axis = axis / np.linalg.norm(axis)
     heights = (start - center) @ axis, (goal - center) @ axis
     arms = start - center - heights[0] * axis, goal - center - heights[1] * axis
