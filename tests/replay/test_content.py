@@ -3,6 +3,7 @@
 import base64
 import gzip
 import json
+import re
 import struct
 from dataclasses import replace
 
@@ -11,6 +12,7 @@ import collada
 import numpy as np
 import pinocchio as pin
 import pytest
+import yourdfpy
 
 import selfmotion as sm
 from selfmotion.basics.errors import RobotError
@@ -22,6 +24,7 @@ from selfmotion.replay.meshes import make_mesh, read_meshes
 from selfmotion.replay.motion import curves, key_frames
 from selfmotion.replay.payload import Payload, face_codes, grid_codes
 from selfmotion.robot import NAMED_ARMS, load_robot
+from support.files_of_people import finger
 from support.replay_plans import arm_plan, planar_plan
 
 CUBE = np.array([[x, y, z] for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)])
@@ -228,3 +231,29 @@ def test_colors_span_the_scale():
     np.testing.assert_allclose(255 * colors[0], [0x44, 0x01, 0x54])
     np.testing.assert_array_equal(colors[0], colors[1])
     np.testing.assert_array_equal(colors[2], colors[3])
+
+
+def test_joints_that_mimic_move_what_is_drawn_of_them(tmp_path):
+    """Each link's visual is where yourdfpy puts the link, by the node that carries it."""
+    bar = (
+        '<visual><origin xyz="0.05 0 0"/><geometry><box size="0.1 0.02 0.02"/></geometry></visual>'
+    )
+    file = tmp_path / "finger.urdf"
+    file.write_text(re.sub(r'(<link name="l\d">)', rf"\1{bar}", finger()))
+    robot = load_robot(file, tool="side")
+    start = np.array([0.3, 0.4, 0.5, 0.2])
+    path = sm.Line(robot.pose(start), robot.pose(start), 1.0)
+    plan = sm.plan(sm.Problem(robot, path, "position", start))
+    content = page_content([plan], ["a"], Payload(), triads=3)
+    assert content["movers"] == ["j1", "j2", "j3", "j4", "j5"]
+    assert [joint["name"] for joint in content["joints"]] == ["j1", "j2", "j3", "j5"]
+    poses = key_frames(robot, plan.trajectory).transforms(0)
+    other = yourdfpy.URDF.load(str(file), load_meshes=False)
+    other.update_cfg(dict(zip(robot.joint_names, plan.trajectory(0.0), strict=True)))
+    for visual in bake(robot, Payload()).visuals:
+        node = content["links"][visual.link].split("/")[-2]
+        assert (node == "base") == (visual.joint < 0)
+        carried = np.eye(4) if visual.joint < 0 else poses[content["movers"].index(node)]
+        wanted = other.get_transform(visual.link)[:3, 3]
+        wanted = wanted + 0.05 * other.get_transform(visual.link)[:3, 0]
+        np.testing.assert_allclose((carried @ visual.matrix)[:3, 3], wanted, atol=1e-6)

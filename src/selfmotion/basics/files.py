@@ -113,7 +113,7 @@ def read_archive(file: Path) -> tuple[dict[str, Any], dict[str, Array]]:
     FileFormatError
         The file is missing or is no such archive.
     """
-    if is_file(file) and not zipfile.is_zipfile(file):
+    if os.path.exists(file) and not zipfile.is_zipfile(file):
         raise FileFormatError(f"{file}: is no plan written by selfmotion (.npz)")
     arrays = read_arrays(file)
     if _DESCRIPTION not in arrays:

@@ -107,6 +107,8 @@ def page_content(
         ],
         "meshes": arm.meshes,
         "joints": _joints(plans[0]),
+        # What is drawn moves with the model's joints: those that mimic others are among them.
+        "movers": [links.joint_name(robot, k) for k in range(robot.model.nv)],
         "layers": _layers(motions),
         "scale": {**scale, "colors": shapes.COLOR_SCALE},
         "ellipsoidSize": _ELLIPSOID_LENGTH * box.radius / longest,
@@ -264,7 +266,6 @@ def _joints(plan: Plan) -> list[Json]:
     return [
         {
             "name": name,
-            "node": links.joint_name(robot, k),
             "unit": "m" if robot.is_prismatic(name) else "rad",
             "lower": _finite(robot.lower[k]),
             "upper": _finite(robot.upper[k]),

@@ -166,8 +166,8 @@ def _box(low: Array, high: Array, matrix: Array) -> Array:
 
 
 def joint_name(robot: RobotModel, joint: int) -> str:
-    """Return the name of the node that moves with joint `joint`; -1 is the fixed base."""
-    return safe(robot.joint_names[joint]) if joint >= 0 else "base"
+    """Return the name of the node that moves with joint `joint` of the model; -1 is the base."""
+    return safe(robot.model.names[joint + 1]) if joint >= 0 else "base"
 
 
 def link_node(robot: RobotModel, visual: Visual) -> str:

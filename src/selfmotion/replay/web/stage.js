@@ -82,15 +82,16 @@ class Stage {
   // The plan's links and its ghost's move with meshcat's own animation, last of all commands.
   load(plan) {
     const clips = [];
-    const add = (root, frames) => this.content.joints.forEach((joint, k) => clips.push({
-      path: `${root}/${joint.node}`,
-      clip: { fps: 1, name: joint.name, tracks: tracks(frames, k, this.content.joints.length) },
+    const { movers } = this.content;
+    const add = (root, frames) => movers.forEach((node, k) => clips.push({
+      path: `${root}/${node}`,
+      clip: { fps: 1, name: node, tracks: tracks(frames, k, movers.length) },
     }));
     // What rides on a part moves as the joint that carries it.
     const riders = [...plan.tips.filter((tip) => tip.carrier >= 0), ...plan.riders];
     for (const { root, carrier } of riders) {
       clips.push({ path: root, clip: {
-        fps: 1, name: root, tracks: tracks(plan.frames, carrier, this.content.joints.length) } });
+        fps: 1, name: root, tracks: tracks(plan.frames, carrier, movers.length) } });
     }
     add(`${ROOT}/robot`, plan.frames);
     add(`${ROOT}/ghost`, plan.ghost);
