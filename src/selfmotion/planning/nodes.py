@@ -20,6 +20,7 @@ from selfmotion.planning.settings import (
     FEWER,
     FINER_POWER,
     GIVEN_AWAY,
+    KEPT_FIRST,
     MOST_PARTS,
     NEAR_PATH,
     NODE_ROUNDS,
@@ -130,6 +131,11 @@ class NodeDescent:
                 # With conditions it would cost more still.
                 self.is_hopeless = True
                 return None
+        if prices is None and not _is_kept(motion):
+            # One that breaks nothing is at its optimum before this one breaks nothing.
+            most = KEPT_FIRST * abs(motion.aim)
+            tried = (begin for begin in self._beginnings(motion) if begin and begin.aim <= most)
+            motion = next(filter(_is_kept, tried), motion)
         # What takes long is seldom kept in the end: other beginnings come before the rest of it.
         first = best = minimise(motion, self._told, prices, roughly=True, most=FEWER)
         rank = partial(_rank, begun=motion)
