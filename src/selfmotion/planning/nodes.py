@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial
+from itertools import chain
 
 import numpy as np
 
@@ -15,12 +16,15 @@ from selfmotion.planning.effort import Effort
 from selfmotion.planning.for_nodes import most_nodes
 from selfmotion.planning.on_nodes import MotionOnNodes
 from selfmotion.planning.settings import (
+    ASIDE,
+    ASIDE_AFTER,
     ENDS_MET,
     FARTHER_APART,
     FEWER,
     FINER_POWER,
     GIVEN_AWAY,
     KEPT_FIRST,
+    MOST_ASIDE,
     MOST_PARTS,
     NEAR_PATH,
     NODE_ROUNDS,
@@ -170,7 +174,7 @@ class NodeDescent:
         unbound = Optimum(open_one, none, Status.INFEASIBLE, np.inf, np.zeros(ends))
         rank = partial(_rank, begun=begun)
         best = min(first, unbound, key=rank)
-        for begin in (open_one, *self._beginnings(begun)):
+        for begin in chain([open_one], self._beginnings(begun), self._aside(begun)):
             if begin is not None:
                 found = minimise(begin, self._told, roughly=True, most=FEWER)
                 best = min(best, found, key=rank)
@@ -189,6 +193,20 @@ class NodeDescent:
         middle[limited] = 0.5 * (robot.lower[limited] + robot.upper[limited])
         for share in TOWARDS_MIDDLE:
             yield grid.motion_towards(start, middle, share * self._problem.path.duration)
+
+    def _aside(self, begun: NodeMotion) -> Iterator[NodeMotion]:
+        """Yield motions that go to either side along their self-motion, what breaks least first.
+
+        Past bodies there are several ways, and no step leads from one to another.
+        """
+        if self._free:
+            return
+        grid, start = begun.grid, begun.place.q[0]
+        time = ASIDE_AFTER * self._problem.path.duration
+        goals = [start + far * way for way in begun.charts.bases[0].T for far in ASIDE]
+        found = [grid.motion_towards(start, goal, time) for goal in goals]
+        rank = partial(_rank_of, begun=begun)
+        yield from sorted((motion for motion in found if motion), key=rank)[:MOST_ASIDE]
 
     def _on_halved(self, optimum: Optimum) -> Optimum:
         """Return the optimum on twice as many nodes, or what there is."""
@@ -324,7 +342,12 @@ def _rank(optimum: Optimum, begun: NodeMotion) -> tuple[bool, bool, float]:
     What is broken counts as so many times the cost of the motion that all `begun` with, for a unit
     or for all that this one breaks: where nothing can be kept, not at any price.
     """
-    motion, most = optimum.motion, UNKEPT * abs(begun.aim)
+    return _rank_of(optimum.motion, begun)
+
+
+def _rank_of(motion: NodeMotion, begun: NodeMotion) -> tuple[bool, bool, float]:
+    """Return what sorts motions; see `_rank`."""
+    most = UNKEPT * abs(begun.aim)
     if _is_kept(motion):
         return False, False, motion.aim
     of_all = min(1.0, _unmet(begun)) or 1.0

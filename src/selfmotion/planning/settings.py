@@ -33,8 +33,12 @@ FEWER = 25
 # Where the motion at x = 0 does not lead to what keeps the conditions: the self-motion goes towards
 # the middle of the limits in such shares of the duration.
 TOWARDS_MIDDLE = (1.0 / 16.0, 1.0 / 64.0, 1.0 / 4.0)
-# One of these that breaks nothing comes before the motion at x = 0, where that breaks something and
-# it costs no more than so many times as much: what costs more leads past bodies on the wrong side.
+# And to either side of the start by so much along its self-motion, after this share of the
+# duration; so many of these at most.
+ASIDE, ASIDE_AFTER, MOST_ASIDE = (0.4, -0.4, 0.8, -0.8), 1.0 / 4.0, 4
+# One towards the middle that breaks nothing comes before the motion at x = 0, where that breaks
+# something and it costs no more than so many times as much: what costs more leads past bodies on
+# the wrong side.
 KEPT_FIRST = 1.5
 # What would save less than this share of the cost does not bind.
 LEAST_SAVING = 1e-6
