@@ -73,6 +73,8 @@ _ROUGHLY = 100.0
 _LITTLE = 1e-5
 # Steps after which the method is given up: it needs fifteen, forty where limits bind all over.
 _MOST = 80
+# Or where in so many what is broken most has not fallen below this share of itself.
+_STALE, _FALLS = 25, 0.9
 
 
 class Step(NamedTuple):
@@ -141,10 +143,16 @@ def minimise(
         Iterations.
     """
     solver = _Solver(begin, prices, roughly=roughly)
+    least, since = np.inf, 0
     for _ in range(most):
         status = solver.advance(told)
         if status is not None:
             return solver.optimum(status)
+        broken, since = solver.motion.violation, since + 1
+        if broken < _FALLS * least or broken <= 0.0:
+            least, since = broken, 0
+        if since >= _STALE:
+            return solver.optimum(Status.INFEASIBLE)
     return solver.optimum(Status.MAX_ITERATIONS)
 
 
