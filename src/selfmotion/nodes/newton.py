@@ -73,7 +73,7 @@ _ROUGHLY = 100.0
 _LITTLE = 1e-5
 # Steps after which the method is given up: it needs fifteen, forty where limits bind all over.
 _MOST = 80
-# Or where in so many what is broken most has not fallen below this share of itself.
+# Or where in so many what is broken most, by more than _WILD, has not fallen below this share.
 _STALE, _FALLS = 25, 0.9
 
 
@@ -149,7 +149,7 @@ def minimise(
         if status is not None:
             return solver.optimum(status)
         broken, since = solver.motion.violation, since + 1
-        if broken < _FALLS * least or broken <= 0.0:
+        if broken < _FALLS * least or broken <= _WILD:
             least, since = broken, 0
         if since >= _STALE:
             return solver.optimum(Status.INFEASIBLE)
