@@ -74,7 +74,7 @@ _LITTLE = 1e-5
 # Steps after which the method is given up: it needs fifteen, forty where limits bind all over.
 _MOST = 80
 # Or where in so many what is broken most, by more than _WILD, has not fallen below this share.
-_STALE, _FALLS = 25, 0.9
+_STALE, _FALLS = 40, 0.9
 
 
 class Step(NamedTuple):
