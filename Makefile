@@ -54,7 +54,7 @@ bench-fastest: $(READY)  ## 60 paces against linear programmes; the fastest moti
 	$(BIN)/python benchmarks/paces.py --jerk 100
 	$(BIN)/python benchmarks/fastest.py
 
-bench-feeds: $(READY)  ## 200 random feeds: kept where verified, and possible ones named elsewhere
+bench-feeds: $(READY)  ## 200 random feeds: refused before planning where no arm has them, kept where verified
 	$(BIN)/python benchmarks/feeds.py
 
 bench-moves: $(READY)  ## 100 transfers among boxes, some against 50 tries of OMPL

@@ -19,6 +19,7 @@ from selfmotion.baselines import (
 from selfmotion.basics import (
     BreakdownError as BreakdownError,
     CollisionError as CollisionError,
+    FeedError as FeedError,
     FileFormatError as FileFormatError,
     InverseKinematicsError as InverseKinematicsError,
     NoSequenceError as NoSequenceError,

@@ -59,6 +59,13 @@ def table(tmp_path: Path) -> Path:
     return file
 
 
+def test_a_feed_that_no_arm_has_is_refused_before_anything_is_planned(table, tmp_path) -> None:
+    line = complaint("job", table, "--set", "seams.feed=2.0", "--folder", tmp_path / "kept")
+    assert line.startswith("error: seam 'left': the feed of 2 m/s is reached up to")
+    assert "run-up and run-down: ask for" in line
+    assert not (tmp_path / "kept").exists()
+
+
 def test_a_column_of_a_table_tells_the_seams(table) -> None:
     job = sm.read_seam_job(table)
     assert [seam.name for seam in job.seams] == ["left", "right", "front", "back"]

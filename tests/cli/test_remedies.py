@@ -8,6 +8,7 @@ import pytest
 from rich.console import Console
 
 import selfmotion as sm
+from selfmotion.cli.remedies import in_shell
 from selfmotion.cli.tables import show_certificate
 from support.shell import complaint, invoke
 
@@ -71,7 +72,9 @@ def test_a_feed_that_is_not_reached_says_how_the_shell_allows_less(tmp_path: Pat
     robot, path = sm.load_robot("panda"), sm.read_path(cut)
     still = sm.Trajectory(np.array([0.0, path.duration]), *np.zeros((2, 2, 7)), robot.joint_names)
     found = sm.Problem(robot, path, "position").certify(still)
-    assert "or allow it more (within=)" in found.verdict
+    assert "or allow it more (within=" in found.verdict
     file = io.StringIO()
     show_certificate(found, {}, robot, Console(file=file, width=400))
-    assert "or allow it more (--set path.within=0.5)" in file.getvalue()
+    assert "or allow it more (--set path.within=0." in file.getvalue()
+    seam = "seam 'cut': ask for 0.1 m/s, or allow it more (within=0.5)"
+    assert in_shell(seam) == seam

@@ -5,6 +5,7 @@
     SelfmotionError
     ├── RobotError                a URDF, frame, joint or configuration that cannot be used
     ├── PathError                 a tool motion that is malformed or not followable as given
+    │   └── FeedError             a feed that no motion along the path has, whatever the arm
     ├── ProblemError              robot, path, task and start do not fit together
     │   ├── RedundancyError       no self-motion is left by the task
     │   └── StartError            the start configuration is off the path
@@ -52,6 +53,26 @@ class RobotError(SelfmotionError):
 
 class PathError(SelfmotionError):
     """A tool motion that is malformed or cannot be followed as given."""
+
+
+class FeedError(PathError):
+    """A feed that no motion along the path has, whatever the arm.
+
+    Attributes
+    ----------
+    asked : float
+        [m/s].
+    possible : float or None
+        The feed that can be had instead [m/s]; None where none was found.
+    time : float
+        Where the tool is slowest, by the time of the path [s].
+    """
+
+    def __init__(self, message: str, *, asked: float, possible: float | None, time: float) -> None:
+        super().__init__(message)
+        self.asked = asked
+        self.possible = possible
+        self.time = time
 
 
 class ProblemError(SelfmotionError):

@@ -14,12 +14,10 @@ from selfmotion.certificate.findings import Finding
 from selfmotion.certificate.path_error import smooth_between
 from selfmotion.certificate.requirement import FinishedMotion, Requirement
 from selfmotion.follow import BoundFollow
-from selfmotion.path import FeedKept, Path, path_series
+from selfmotion.path import FeedKept, FeedPossible, Path, path_series
 
 # Shares of the room that is left are interpolated this well at least.
 _FINE = 1e-3
-# Times that are told are alike up to this [s].
-_SAME = 1e-3
 # A feed that is asked for no longer than this, as a share of the duration, is asked for nowhere.
 _INSTANT = 1e-9
 # Where a path leaves nothing over, this is what is left [m/s].
@@ -60,15 +58,10 @@ class FeedReached(Requirement):
     def judge(self, motion: FinishedMotion) -> Finding:
         """See `Requirement.judge`: the slowest speed where the feed counts."""
         found, allowed = self.found, (1.0 - self.found.within) * self.found.asked
-        text = f"{self._named(found.time)} is reached up to {found.reached:.4g} m/s"
         if not found.kept:
-            slow = f"for {found.slower:.3g} s, " if found.slower else ""
-            text = (
-                f"{text}, but {slow}at t = {found.time:.3f} s it is {found.slowest:.4g} m/s, held "
-                f"by {found.held_by}: ask for {_reached(found):g} m/s, or allow it "
-                f"more (within=)"
-            )
+            text = FeedPossible(found).text(self.follow.path)
             return self._found(found.time, allowed, False, text)
+        text = f"{self._named(found.time)} is reached up to {found.reached:.4g} m/s"
         pace = self._pace(motion)
         if pace.off is not None:
             return self._found(pace.off, allowed, False, self._lost(pace.off))
@@ -140,13 +133,7 @@ class FeedReached(Requirement):
         return time, allowed, False, text
 
     def _named(self, time: float) -> str:
-        """Return the feed in words, and from when to when it is asked for near a time."""
-        during = self.found.during
-        first, last = during[int(np.argmin(np.abs(during - time).min(axis=1)))]
-        ends = 0.0, self.follow.path.duration
-        whole = len(during) == 1 and np.allclose((first, last), ends, rtol=0.0, atol=_SAME)
-        stretch = "" if whole else f" from t = {first:.3f} to {last:.3f} s"
-        return f"the feed of {self.found.asked:g} m/s{stretch}"
+        return self.found.named(time, self.follow.path.duration)
 
 
 class _OwnPace(NamedTuple):
@@ -278,32 +265,23 @@ class _Along(Bounded):
 def possible_feeds(feeds: Sequence[FeedReached], findings: Sequence[Finding]) -> tuple[str, ...]:
     """Return which feeds a motion could have whose arm is too slow for those that were asked for.
 
-    Nothing where something else is wrong, too, but feeds that the path itself does not keep; or no
-    feed was asked for.
+    Nothing where something else is wrong, too, the path itself does not keep a feed, or none was
+    asked for.
     """
-    unkept = [item for item in feeds if not item.found.kept]
-    # Those of the feeds are the last.
-    by_path = [*[False] * (len(findings) - len(feeds)), *(not item.found.kept for item in feeds)]
-    pairs = zip(findings, by_path, strict=True)
-    broken = [item for item, of_path in pairs if not (item.kept or of_path)]
+    broken = [item for item in findings if not item.kept]
     factor = max((item.factor for item in broken), default=1.0)
-    if not (feeds and 1.0 < factor < np.inf and all(item.of_pace for item in broken)):
+    kept = all(item.found.kept for item in feeds)
+    if not (feeds and kept and 1.0 < factor < np.inf and all(item.of_pace for item in broken)):
         return ()
-    asked = sorted({_reached(item.found) for item in feeds})
+    asked = sorted({item.found.asked for item in feeds})
     feed = _rounded_down(asked[-1] / factor)
     slower = asked[-1] / feed
     slowest = f"feeds of {asked[0] / slower:.3g} to" if len(asked) > 1 else "a feed of"
-    first = f"ask for {', '.join(f'{each:g}' for each in asked)} m/s, then " if unkept else ""
     return (
         f"the arm keeps its limits at {slowest} {feed:g} m/s, accelerations of the path "
         f"being {slower**2:.3g} times smaller and its smoothing {slower:.3g} times longer: "
-        f"{first}Feed.slower({_rounded_up(slower)})",
+        f"Feed.slower({_rounded_up(slower)})",
     )
-
-
-def _reached(found: FeedKept) -> float:
-    """Return the feed that a path keeps, or that it would if it was asked for [m/s]."""
-    return found.asked if found.kept else _rounded_down(found.slowest)
 
 
 def _rounded_up(factor: float) -> str:

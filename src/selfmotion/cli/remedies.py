@@ -17,6 +17,7 @@ _WORDS = (
     ),
     (r"which needs a feed \[m/s\]; give it", "which needs --feed (m/s)"),
     (r"\(within=\)", "(--set path.within=0.5)"),
+    (r"\((acceleration|turn_acceleration|turn_rate|within)=([0-9.e+]+)\)", r"(--set path.\1=\2)"),
     (r"\bflip_normals\b", "--flip-normals"),
     (r"\b(rotary|unit) = '(\w+)'", r"--\1 \2"),
     (r"\brotary_(axes|center)\b", r"--rotary-\1"),
@@ -24,8 +25,8 @@ _WORDS = (
     (r"choose another task \(", "choose another --task ("),
     (r"choose a task with fewer rows \(", "take another --task ("),
 )
-# Such a message is about a key of the file, and advises what can be written there.
-_OF_PROBLEM_FILE = re.compile(r"^\S+\.(toml|json): ")
+# Such a message is about a key of the file, or of a seam in it, and says what can be written there.
+_OF_PROBLEM_FILE = re.compile(r"^(\S+\.(toml|json): |seam ')")
 
 
 def in_shell(message: str) -> str:

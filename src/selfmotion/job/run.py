@@ -31,7 +31,7 @@ from selfmotion.job.program import Program
 from selfmotion.job.seam import Seam
 from selfmotion.job.specification import Specification
 from selfmotion.job.work import Asked, Work, check_can_be_sent
-from selfmotion.problem import KEPT, NO_OVERLAP, check_all_times
+from selfmotion.problem import KEPT, NO_OVERLAP, check_all_times, check_feeds
 from selfmotion.result import arm_digest
 from selfmotion.robot import RobotModel
 
@@ -106,6 +106,8 @@ def plan_job(
 
     Raises
     ------
+    FeedError
+        A seam asks for a feed that its path cannot have; before anything is planned.
     PlanError
         No seam has a motion.
     ProblemError
@@ -127,6 +129,8 @@ def plan_job(
     )
     check_executor(executor)
     as_called(progress, "progress")
+    for seam in listed:
+        check_feeds(f"seam '{seam.name}'", [seam.path], [*asked.constraints, *seam.constraints])
     is_free = as_choice(order, "order", ("free", "given")) == "free"
     if folder is not None or executor is not None:
         for seam in listed:

@@ -11,6 +11,7 @@ from selfmotion.path.base import (
 )
 from selfmotion.path.feed import Feed as Feed
 from selfmotion.path.feed_kept import FeedKept as FeedKept
+from selfmotion.path.feed_possible import FeedPossible as FeedPossible
 from selfmotion.path.joined import Dwell as Dwell, Joined as Joined, with_leads as with_leads
 from selfmotion.path.merging import merged as merged
 from selfmotion.path.pace import Pace as Pace, times_when as times_when

@@ -1,6 +1,6 @@
 """A path at a constant feed."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from functools import cached_property
 from typing import Any
 
@@ -247,6 +247,20 @@ class Feed(_Derived, kind="feed"):
         near = [np.searchsorted(t, t + side * 1.5 * window) for side in (-1, 1)]
         counts = before[near[1]] == before[near[0]]
         return np.clip(t, 0.0, self.duration), counts, held, np.concatenate(asked)
+
+    @property
+    def limits(self) -> Mapping[str, float]:
+        """Turn rate, accelerations and smoothing, by their names, and the fastest feed."""
+        return self._limits
+
+    def changed(self, feeds: Mapping[float, float], **limits: float) -> "Feed":
+        """Return the same with other feeds in place of some [m/s], and other limits by name."""
+        asked = self._asked.copy()
+        for old, new in feeds.items():
+            asked[self._asked[:, 1] == old, 1] = new
+        changed = {**self._limits, **limits, "feed": float(asked[0, 1])}
+        stretches = asked if len(asked) > 1 else None
+        return Feed(self._path, **changed, within=self._within, stretches=stretches)
 
     def slower(self, factor: float) -> "Feed":
         """Return the same motion, taking `factor` times as long.

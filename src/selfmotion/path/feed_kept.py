@@ -10,7 +10,10 @@ import numpy as np
 from selfmotion.basics import Array, Flags, Ints
 
 if TYPE_CHECKING:
-    from selfmotion.path.base import Path
+    from selfmotion.path.feed import Feed
+
+# Times that are told are alike up to this [s].
+_SAME = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,7 +39,7 @@ class FeedKept:
         When the feed counts.
     causes : (K,)
         What holds the tool at each time, in words.
-    path : Path
+    path : Feed
         The one at this feed, whatever was made of it since: its own speed between these times.
     own : (K,)
         The times on that path [s].
@@ -52,7 +55,7 @@ class FeedKept:
     lasts: Array = field(repr=False)
     counts: Flags = field(repr=False)
     causes: tuple[str, ...] = field(repr=False)
-    path: "Path" = field(repr=False)
+    path: "Feed" = field(repr=False)
     own: Array = field(repr=False)
     rows: Ints = field(repr=False)
 
@@ -81,6 +84,14 @@ class FeedKept:
     def held_by(self) -> str:
         """What holds it where it is slowest."""
         return self.causes[self._worst] if self.counts[self._worst] else "run-up and run-down"
+
+    def named(self, time: float, duration: float) -> str:
+        """Return the feed in words, and when on a path it is asked for near a time [s]."""
+        first, last = self.during[int(np.argmin(np.abs(self.during - time).min(axis=1)))]
+        ends = 0.0, duration
+        whole = len(self.during) == 1 and np.allclose((first, last), ends, rtol=0.0, atol=_SAME)
+        stretch = "" if whole else f" from t = {first:.3f} to {last:.3f} s"
+        return f"the feed of {self.asked:g} m/s{stretch}"
 
     @property
     def kept(self) -> bool:

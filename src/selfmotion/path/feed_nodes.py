@@ -138,6 +138,8 @@ class FeedNodes:
         """Return nodes, and where the turn rate begins or ends to hold the tool: a kink of σ(λ)."""
         turns = self._turns(sigma)
         (cells,) = np.nonzero(turns[:-1] != turns[1:])
+        if not len(cells):
+            return sigma
         early, late, before = sigma[cells], sigma[cells + 1], turns[cells]
         for _ in range(_HALVINGS):
             middle = 0.5 * (early + late)

@@ -168,7 +168,7 @@ def times_when(
     reached: Callable[[Array], Array], wanted: Array, early: Array, late: Array
 ) -> Array:
     """Return when a function that does not fall reaches values (K,), between times (K,) each."""
-    for _ in range(_HALVINGS):
+    for _ in range(_HALVINGS if len(wanted) else 0):
         middle = 0.5 * (early + late)
         before = reached(middle) < wanted
         early, late = np.where(before, middle, early), np.where(before, late, middle)

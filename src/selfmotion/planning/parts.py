@@ -22,7 +22,7 @@ from selfmotion.planning.part_planner import PartPlanner
 from selfmotion.planning.run import plan
 from selfmotion.planning.search import Search
 from selfmotion.planning.settings import ATTEMPTS, MISSED_CUTS
-from selfmotion.problem import Problem, check_problem
+from selfmotion.problem import Problem, check_feeds_of, check_problem
 from selfmotion.result import Parts, Plan
 from selfmotion.search import Stretch, Stretches, has_curves
 
@@ -80,6 +80,8 @@ def plan_in_parts(
 
     Raises
     ------
+    FeedError
+        The path asks for a feed that it cannot have, whatever the arm; before anything is searched.
     NoSequenceError
         No parts, however many, follow the path: some pose of it is out of reach, beyond limits or
         blocked in every configuration, or its neighbours are beyond the step limits. Tells when
@@ -91,6 +93,7 @@ def plan_in_parts(
     retreats = _checked(problem, retreat, axis)
     ramp = as_number(ramp, "ramp", above=0.0)
     random_numbers(rng)
+    check_feeds_of(problem)
     tolerance = Tolerance.of(tolerance)
     with held_interruption():
         return _parts(problem, retreats, ramp, rng, tolerance, obeying(progress))

@@ -28,7 +28,7 @@ from selfmotion.planning.known import Known
 from selfmotion.planning.search import Search
 from selfmotion.planning.settings import DAMPED_EVALUATIONS
 from selfmotion.planning.warm_start import check_warm_start
-from selfmotion.problem import Problem, check_problem
+from selfmotion.problem import Problem, check_feeds_of, check_problem
 from selfmotion.result import Plan
 from selfmotion.search import SequenceGuide
 
@@ -94,6 +94,8 @@ def plan(
         the path is worth a plan.
     InverseKinematicsError
         The start is free and no configuration reaches the start of the path.
+    FeedError
+        The path asks for a feed that it cannot have, whatever the arm; before anything is planned.
     NoSequenceError
         The global search finds that no motion follows the path; says where it ends and why.
     PlanError
@@ -111,6 +113,7 @@ def plan(
         raise ProblemError(f"optimizer is {shown(optimizer)}, expected one such as QuasiNewton()")
     if callback is not None:
         as_called(callback, "callback")
+    check_feeds_of(problem)
     clock = Deadline(inf)
     if deadline is not None:
         clock = Deadline.after(as_number(deadline, "deadline", above=0.0))

@@ -2,6 +2,7 @@
 
 from selfmotion.problem.defaults import KEPT as KEPT, NO_OVERLAP as NO_OVERLAP
 from selfmotion.problem.envelopes import envelope_of as envelope_of
+from selfmotion.problem.feeds import check_feeds as check_feeds
 from selfmotion.problem.given import START_MISS as START_MISS
 from selfmotion.problem.of_arm import BodiesOfArm as BodiesOfArm
 from selfmotion.problem.paper_problem import sample_problem as sample_problem
@@ -11,7 +12,11 @@ from selfmotion.problem.parts import (
     check_all_times as check_all_times,
     times_along as times_along,
 )
-from selfmotion.problem.problem import Problem as Problem, check_problem as check_problem
+from selfmotion.problem.problem import (
+    Problem as Problem,
+    check_feeds_of as check_feeds_of,
+    check_problem as check_problem,
+)
 from selfmotion.problem.rest import arm_rest_orders as arm_rest_orders, rest_orders as rest_orders
 from selfmotion.problem.saved_problem import (
     arm_and_constraints as arm_and_constraints,

@@ -36,6 +36,7 @@ from selfmotion.motion import NullMotion, Trajectory, fading_window
 from selfmotion.path import Path
 from selfmotion.problem.defaults import ANY_NULL_MOTION, KEPT, NO_OVERLAP, USUAL_COSTS
 from selfmotion.problem.envelopes import asked_envelope, with_own_limits
+from selfmotion.problem.feeds import check_feeds
 from selfmotion.problem.fit import check_fit
 from selfmotion.problem.given import (
     SEQUENCES,
@@ -474,6 +475,12 @@ class Problem:
 
 # What help() shows of a field that is a descriptor.
 Problem.__init__.__annotations__["task"] = Task | str
+
+
+def check_feeds_of(problem: Problem) -> None:
+    """Refuse feeds that no motion has; see `check_feeds`."""
+    paths = [item.path for item in problem.follows.items]
+    check_feeds(problem.robot.name, paths, problem.constraints)
 
 
 def check_problem(problem: object) -> None:
