@@ -1,11 +1,14 @@
 """Nothing is discarded for what cannot be written; results are there for programs."""
 
+import io
 import json
 from pathlib import Path
 
 import pytest
+from rich.console import Console
 
 import selfmotion as sm
+from selfmotion.cli.outputs import tell_large
 from support.shell import invoke
 
 
@@ -31,3 +34,20 @@ def test_results_are_there_for_programs(tmp_path: Path) -> None:
     found = json.loads(printed)
     assert found["linear_miss"]["rate"] > 0.0
     assert "read back" in found["written"][str(motion)]
+
+
+def test_a_large_file_of_text_proposes_a_bag(tmp_path: Path) -> None:
+    small, large, bag = (tmp_path / name for name in ("small.yaml", "large.yaml", "large.mcap"))
+    small.write_bytes(b" " * 10_000_000)
+    large.write_bytes(b" " * 10_600_000)
+    bag.write_bytes(b" " * 10_600_000)
+    for file, said in ((small, False), (large, True), (bag, False)):
+        told = io.StringIO()
+        tell_large(file, Console(file=told, width=400), given_rate=True)
+        assert (told.getvalue() != "") is said
+    plain, rated = io.StringIO(), io.StringIO()
+    tell_large(large, Console(file=plain, width=400))
+    tell_large(large, Console(file=rated, width=400), given_rate=True)
+    assert plain.getvalue().endswith(f"about a third, --out {bag}\n")
+    assert "has 11 MB" in plain.getvalue()
+    assert ("--rate" in plain.getvalue(), "without --rate" in rated.getvalue()) == (False, True)

@@ -17,6 +17,8 @@ import yaml
 
 import selfmotion as sm
 from selfmotion.basics import Array
+from selfmotion.formats import ros
+from selfmotion.formats.samples import MotionSamples
 from support.arms import robot_named
 from support.shell import complaint, invoke
 
@@ -130,6 +132,24 @@ def test_what_is_written_is_the_motion(
     again = sm.read_motion(file)
     assert plan.problem.certify(again, plan.tolerance).verified
     np.testing.assert_array_equal(again.q, q)
+
+
+@pytest.mark.parametrize("form", ["ros", "moveit"])
+def test_messages_are_yaml_as_others_read_it(plan: sm.Plan, form: str) -> None:
+    """Small numbers, too, which Python writes without a point, and names that are no text."""
+    samples = MotionSamples.of(plan.trajectory, 50.0)
+    q = samples.q.copy()
+    q[1], q[2] = 1e-5, -3e-300
+    q[3] = np.pi * 1e20
+    names = ("on", "1e5", 'a "b": c', *samples.joint_names[3:])
+    samples = replace(samples, q=q, joint_names=names)
+    text, message = {
+        "ros": (ros.trajectory_yaml(samples), ros.joint_trajectory(samples)),
+        "moveit": (ros.robot_yaml(samples), ros.robot_trajectory(samples)),
+    }[form]
+    assert yaml.safe_load(text) == message
+    # What a plain list of Python says is text for others.
+    assert yaml.safe_load("[1e-05]") == ["1e-05"]
 
 
 def test_a_broken_file_is_no_longer_verified(plan: sm.Plan, tmp_path: Path) -> None:
@@ -317,7 +337,6 @@ def test_plans_side_by_side(saved: Path, tmp_path: Path) -> None:
 @pytest.mark.parametrize("rate", [None, 20.0, 100.0])
 def test_what_straight_lines_between_samples_cost(plan: sm.Plan, rate: float | None) -> None:
     from selfmotion.formats import linear_miss
-    from selfmotion.formats.samples import MotionSamples
 
     miss = linear_miss(plan, rate)
     samples = MotionSamples.of(plan.trajectory, rate)
@@ -437,7 +456,6 @@ def test_programs_have_no_parts_and_other_files_beside_them_do(
 def test_straight_lines_are_judged_at_every_hand(carried: sm.Plan) -> None:
     """The hand that only holds on is off as well, and may be the one that is off most."""
     from selfmotion.formats import linear_miss
-    from selfmotion.formats.samples import MotionSamples
 
     samples = MotionSamples.of(carried.trajectory, 10.0)
     middles = 0.5 * (samples.t[1:] + samples.t[:-1])

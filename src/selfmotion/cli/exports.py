@@ -9,7 +9,7 @@ import typer
 
 import selfmotion as sm
 from selfmotion import formats
-from selfmotion.cli import jobs, options
+from selfmotion.cli import jobs, options, outputs
 from selfmotion.cli.app import NOT_VERIFIED, VERIFIED, app, stages, terminal
 from selfmotion.cli.stage_display import StageDisplay
 from selfmotion.result import is_move
@@ -17,9 +17,7 @@ from selfmotion.result import is_move
 _Made = sm.Plan | sm.Parts | sm.Move | sm.Program
 
 
-@app.command(
-    epilog="Example: selfmotion export plan.npz --out motion.yaml --rate 500; or: --out weld.src"
-)
+@app.command(epilog="Example: selfmotion export plan.npz --out motion.yaml; or: --out weld.src")
 def export(
     file: Annotated[
         Path, typer.Argument(help="A plan or a move saved as .npz, a .program or .parts.")
@@ -32,7 +30,10 @@ def export(
         ),
     ],
     rate: Annotated[
-        float | None, typer.Option(help="Samples per second; by default the plan's own.")
+        float | None,
+        typer.Option(
+            help="Samples per second; by default the plan's own: few, joined by quintics."
+        ),
     ] = None,
     form: Annotated[
         str | None,
@@ -243,6 +244,7 @@ def _finish(
         raise typer.Exit(VERIFIED if sound else NOT_VERIFIED)
     for name, verdict in verdicts.items():
         terminal.print(f"wrote {name}{verdict and '; '}{verdict}", markup=False, soft_wrap=True)
+        outputs.tell_large(Path(name), terminal, given_rate=rate is not None)
     if miss is not None:
         terminal.print(
             f"joined by straight lines, the samples stay within {miss.position:.2g} m and "

@@ -81,6 +81,7 @@ def job(
         write_program(program, target, asked.streamed if asked and streamed else asked)
         if not as_json:
             terminal.print(f"wrote {target}", markup=False, soft_wrap=True)
+            outputs.tell_large(target, terminal)
     raise typer.Exit(VERIFIED if program.verified else NOT_VERIFIED)
 
 
@@ -147,6 +148,7 @@ def finish_parts(job: sm.Job, out: list[Path], as_json: bool) -> NoReturn:
             sm.write_motion(found, file)
         if not as_json:
             terminal.print(f"wrote {file}", markup=False, soft_wrap=True)
+            outputs.tell_large(file, terminal)
     raise typer.Exit(VERIFIED if found.verified else NOT_VERIFIED)
 
 

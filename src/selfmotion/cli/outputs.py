@@ -13,6 +13,9 @@ from selfmotion import formats
 from selfmotion.cli import json_tables, tables
 from selfmotion.cli.app import NOT_VERIFIED, VERIFIED, stages, terminal
 
+# Text of more than so many bytes is better a bag.
+_TEXT, _LARGE = (".yaml", ".yml", ".json"), 10_000_000
+
 
 def write(
     result: sm.Plan, out: list[Path], html: Path | None, console: Console, *, quiet: bool = False
@@ -42,6 +45,7 @@ def write(
     for file in written:
         if not quiet:
             console.print(f"wrote {file}", markup=False, soft_wrap=True)
+            tell_large(file, console)
     if faults:
         kept = next(file for file in written if file.suffix == ".npz")
         raise sm.FileFormatError(f"{'; '.join(faults)}; the plan is in {kept}")
@@ -91,6 +95,18 @@ def tell_left_out(file: Path, console: Console, reason: str, *, quiet: bool) -> 
     if not quiet:
         console.print(
             f"{file} is not written: {reason}; `selfmotion export --force` writes it",
+            markup=False,
+            soft_wrap=True,
+        )
+
+
+def tell_large(file: Path, console: Console, *, given_rate: bool = False) -> None:
+    """Say what is smaller than a large file of text; nothing where it is not large."""
+    if file.suffix.lower() in _TEXT and file.is_file() and file.stat().st_size > _LARGE:
+        fewer = "without --rate it has only those samples that the motion takes; " * given_rate
+        console.print(
+            f"{file} has {file.stat().st_size / 1e6:.0f} MB: {fewer}a ROS 2 bag takes about a "
+            f"third, --out {file.with_suffix('.mcap')}",
             markup=False,
             soft_wrap=True,
         )

@@ -71,7 +71,8 @@ def write_motion(
     plan : Plan, Parts, Move or Program
     file : path
     rate : float, optional
-        Samples per second; by default those of the plan (URScript: 125).
+        Samples per second; by default those of the plan: few, whose quintics are its motion, as
+        controllers of ROS 2 join them (URScript: 125).
     form : str, optional
         By default the one that has the file's suffix.
     settings : ProgramSettings, optional
@@ -219,17 +220,26 @@ def _in_radians(motion: Trajectory, degrees: bool) -> Trajectory:
 
 
 def _write_ros(file: Path, motion: MotionSamples, robot: RobotModel, rate: float | None) -> None:
-    _write_yaml(file, ros.joint_trajectory(motion))
+    _write_message(file, motion, ros.joint_trajectory, ros.trajectory_yaml)
 
 
 def _write_moveit(file: Path, motion: MotionSamples, robot: RobotModel, rate: float | None) -> None:
-    _write_yaml(file, ros.robot_trajectory(motion))
+    _write_message(file, motion, ros.robot_trajectory, ros.robot_yaml)
 
 
-def _write_yaml(file: Path, message: Mapping[str, Any]) -> None:
-    if file.suffix not in (".yaml", ".yml", ".json"):
-        raise FileFormatError(f"{file}: messages are written as .yaml or .json")
-    write_document(file, message)
+def _write_message(
+    file: Path,
+    motion: MotionSamples,
+    message: Callable[[MotionSamples], Mapping[str, Any]],
+    as_yaml: Callable[[MotionSamples], str],
+) -> None:
+    match file.suffix:
+        case ".json":
+            write_document(file, message(motion))
+        case ".yaml" | ".yml":
+            write_text(file, as_yaml(motion))
+        case _:
+            raise FileFormatError(f"{file}: messages are written as .yaml or .json")
 
 
 def _write_bag(file: Path, motion: MotionSamples, robot: RobotModel, rate: float | None) -> None:

@@ -4,8 +4,11 @@ Their definitions: https://github.com/ros2/common_interfaces (trajectory_msgs/ms
 https://github.com/moveit/moveit_msgs (msg/RobotTrajectory.msg).
 """
 
+import json
+import re
 from collections.abc import Mapping
 from pathlib import Path
+from textwrap import indent
 from typing import Any
 
 import numpy as np
@@ -19,28 +22,58 @@ _NANO = 1_000_000_000
 _REST = 1e-6
 # Where positions are joined by straight lines, a corner takes this share of the time to the next.
 _CORNER = 1e-3
+# Numbers such as 1e-05, which YAML 1.1 takes for text: it wants 1.0e-05.
+_NO_POINT = re.compile(r"(?<=[ \[-])(\d)(?=e)")
 
 
 def joint_trajectory(motion: MotionSamples) -> dict[str, Any]:
     """Return a JointTrajectory; its stamp is 0, which means: at once."""
-    points = []
+    points = [
+        {
+            "positions": q,
+            "velocities": qd,
+            "accelerations": qdd,
+            "effort": [],
+            "time_from_start": {"sec": sec, "nanosec": nanosec},
+        }
+        for q, qd, qdd, sec, nanosec in zip(*_columns(motion), strict=True)
+    ]
+    return {"header": _header(), "joint_names": list(motion.joint_names), "points": points}
+
+
+def _columns(motion: MotionSamples) -> tuple[list[Any], ...]:
+    """Return positions, velocities, accelerations, seconds and nanoseconds of all points."""
     rates = motion.qd.copy()
     for row in (0, -1):
         # Controllers want a 0 there, and refuse 1e-7.
         if np.abs(rates[row]).max() <= _REST:
             rates[row] = 0.0
-    for t, q, qd, qdd in zip(motion.t, motion.q, rates, motion.qdd, strict=True):
-        sec, nanosec = divmod(round(float(t) * _NANO), _NANO)
-        points.append(
-            {
-                "positions": q.tolist(),
-                "velocities": qd.tolist(),
-                "accelerations": qdd.tolist(),
-                "effort": [],
-                "time_from_start": {"sec": sec, "nanosec": nanosec},
-            }
-        )
-    return {"header": _header(), "joint_names": list(motion.joint_names), "points": points}
+    times = np.divmod(np.round(motion.t * _NANO).astype(np.int64), _NANO)
+    return tuple(values.tolist() for values in (motion.q, rates, motion.qdd, *times))
+
+
+def trajectory_yaml(motion: MotionSamples) -> str:
+    """Return a JointTrajectory as YAML, as a general writer of YAML has it, which takes far longer.
+
+    A list of numbers in Python is one in YAML, but for exponents without a point.
+    """
+    names = json.dumps(list(motion.joint_names))
+    head = "header:\n  stamp: {sec: 0, nanosec: 0}\n  frame_id: ''\n"
+    points = "".join(
+        f"- positions: {q}\n  velocities: {qd}\n  accelerations: {qdd}\n  effort: []\n"
+        f"  time_from_start: {{sec: {sec}, nanosec: {nanosec}}}\n"
+        for q, qd, qdd, sec, nanosec in zip(*_columns(motion), strict=True)
+    )
+    return f"{head}joint_names: {names}\npoints:\n" + _NO_POINT.sub(r"\1.0", points)
+
+
+def robot_yaml(motion: MotionSamples) -> str:
+    """Return a RobotTrajectory as YAML; see `trajectory_yaml`."""
+    floating = "  header:\n    stamp: {sec: 0, nanosec: 0}\n    frame_id: ''\n"
+    return (
+        f"joint_trajectory:\n{indent(trajectory_yaml(motion), '  ')}"
+        f"multi_dof_joint_trajectory:\n{floating}  joint_names: []\n  points: []\n"
+    )
 
 
 def robot_trajectory(motion: MotionSamples) -> dict[str, Any]:
