@@ -30,8 +30,9 @@ STEP, MISSED = 1e-4, 2e-3
 CORNER = 0.03
 # A feed that is larger by this than the named one is not kept.
 NEAR = 1.07
-# A smooth pace takes so many windows of smoothing more.
-WINDOWS = 2.0
+# A smooth pace takes so many windows of smoothing more, and counts from a node of the path on: that
+# is at most such a share of the path away.
+WINDOWS, NODES = 2.0, 2e-3
 
 
 def random_paths(seed: int) -> Iterator[tuple[sm.RobotModel, sm.Feed, np.ndarray]]:
@@ -94,6 +95,7 @@ def path_keeps(feed: sm.Feed, corners: np.ndarray) -> bool:
     speed, along = steps / np.diff(t), np.cumsum(steps)
     limits = feed.limits
     run_up = feed.feed**2 / limits["acceleration"] + WINDOWS * limits["smoothing"] * feed.feed
+    run_up += NODES * along[-1]
     away = (along > run_up) & (along[-1] - along > run_up)
     for corner in corners:
         away &= np.linalg.norm(places[1:] - corner, axis=1) > CORNER + run_up

@@ -76,5 +76,6 @@ def test_a_feed_that_is_not_reached_says_how_the_shell_allows_less(tmp_path: Pat
     file = io.StringIO()
     show_certificate(found, {}, robot, Console(file=file, width=400))
     assert "or allow it more (--set path.within=0." in file.getvalue()
+    assert in_shell("without it (Feed.original)") == "without it (a duration in its place)"
     seam = "seam 'cut': ask for 0.1 m/s, or allow it more (within=0.5)"
     assert in_shell(seam) == seam

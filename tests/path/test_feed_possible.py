@@ -133,3 +133,16 @@ def test_a_feed_that_the_tool_may_not_have_is_refused() -> None:
     allowed = sm.Feed(line(0.3), error.value.possible)
     found = sm.plan(problem(allowed, constraints=[sm.ToolLimits(speed=0.15)]))
     assert found.certificate.verified, found.certificate.verdict
+
+
+def test_what_is_possible_for_the_slowest_seam_is_for_all() -> None:
+    panda = robot_named("panda")
+    placed = {
+        f"{length:g} m": sm.Placed(sm.Feed(line(length), 1.5), panda.pose(PANDA_HOME))
+        for length in (0.4, 0.1, 0.2)
+    }
+    seams = [sm.Seam(name, path, "position") for name, path in placed.items()]
+    with pytest.raises(sm.FeedError, match=r"^seam '0\.1 m'") as error:
+        sm.plan_job(panda, seams)
+    for path in placed.values():
+        assert path.original.changed({1.5: error.value.possible}).feeds[0].kept

@@ -16,6 +16,7 @@ _WORDS = (
         r"so that --\1 has no effect; drop it",
     ),
     (r"which needs a feed \[m/s\]; give it", "which needs --feed (m/s)"),
+    (r"\(Feed\.original\)", "(a duration in its place)"),
     (r"\(within=\)", "(--set path.within=0.5)"),
     (r"\((acceleration|turn_acceleration|turn_rate|within)=([0-9.e+]+)\)", r"(--set path.\1=\2)"),
     (r"\bflip_normals\b", "--flip-normals"),

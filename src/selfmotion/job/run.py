@@ -1,5 +1,6 @@
 """From seams to a program."""
 
+import math
 from collections.abc import Sequence
 from concurrent.futures import Executor
 from dataclasses import replace
@@ -107,7 +108,8 @@ def plan_job(
     Raises
     ------
     FeedError
-        A seam asks for a feed that its path cannot have; before anything is planned.
+        A seam asks for a feed that its path cannot have; before anything is planned. Of several
+        the slowest one is told: where all ask for one feed, what is possible there is for all.
     PlanError
         No seam has a motion.
     ProblemError
@@ -129,7 +131,7 @@ def plan_job(
     )
     check_executor(executor)
     as_called(progress, "progress")
-    for seam in listed:
+    for seam in sorted(listed, key=_slowest):
         check_feeds(f"seam '{seam.name}'", [seam.path], [*asked.constraints, *seam.constraints])
     is_free = as_choice(order, "order", ("free", "given")) == "free"
     if folder is not None or executor is not None:
@@ -154,6 +156,11 @@ def plan_job(
         arm=arm_digest(robot),
     )
     return replace(program, specification=asked_for)
+
+
+def _slowest(seam: Seam) -> float:
+    """Return how fast a seam is where it does not keep its feed [m/s]; inf where it does."""
+    return min((found.slowest for found in seam.path.feeds if not found.kept), default=math.inf)
 
 
 def _checked_constraints(constraints: Sequence[Constraint]) -> tuple[Constraint, ...]:

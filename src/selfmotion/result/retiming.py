@@ -169,8 +169,8 @@ def check_no_feed(problem: Problem) -> None:
     if feeds:
         raise ProblemError(
             f"{problem.robot.name}: the path asks for a feed of {feeds[0].asked:g} m/s, which a "
-            f"faster pace does not keep; plan along the path without it (Feed.original), or ask "
-            f"for a faster feed"
+            f"faster pace does not keep; make strokes that keep a feed seams of a job, whose moves "
+            f"take the least time, or plan without it (Feed.original)"
         )
 
 
