@@ -1,4 +1,4 @@
-"""Runs the benchmarks and prints the table that the README shows: `make bench`."""
+"""Runs the benchmarks and prints the table of the page on performance: `make bench`."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from rich.table import Table
 
 HERE = Path(__file__).parent
 OUT = HERE.parent / "out"
-# Between these the README has the table; the site shows it from there.
+# Between these the page has the table.
 BEGIN, END = "<!-- --8<-- [start:bench] -->", "<!-- --8<-- [end:bench] -->"
 
 
@@ -34,7 +34,7 @@ def main() -> int:
     rows = figures(json.loads(raw.read_text()))
     lines = ["| figure | measured |", "| --- | --- |", *(f"| {a} | {b} |" for a, b in rows)]
     (OUT / "bench.md").write_text("\n".join(lines) + "\n")
-    _put_into_readme(lines)
+    _put_into_page(lines)
     table = Table("figure", "measured", box=box.SIMPLE_HEAD)
     for row in rows:
         table.add_row(*row)
@@ -42,12 +42,12 @@ def main() -> int:
     return 0
 
 
-def _put_into_readme(lines: list[str]) -> None:
-    readme = HERE.parent / "README.md"
-    before, rest = readme.read_text().split(BEGIN)
+def _put_into_page(lines: list[str]) -> None:
+    page = HERE.parent / "docs" / "pages" / "performance.md"
+    before, rest = page.read_text().split(BEGIN)
     after = rest.split(END)[1]
     table = "\n".join(lines)
-    readme.write_text(f"{before}{BEGIN}\n{table}\n{END}{after}")
+    page.write_text(f"{before}{BEGIN}\n{table}\n{END}{after}")
 
 
 def figures(report: dict[str, Any]) -> list[tuple[str, str]]:

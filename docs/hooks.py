@@ -14,12 +14,13 @@ import shown
 from mathml import MathMl
 
 DOCS = Path(__file__).parent
-# Made by `make arms`, `make errors` and `pictures.py`, and read on their own as well.
+# Made by `make arms`, `make errors`, `pictures.py` and `two_motions.py`; read on their own as well.
 BESIDE = (
     "arms.md",
     "chains.md",
     "errors.md",
     "replay.png",
+    "two_motions.png",
     *(f"arms/{f.name}" for f in DOCS.glob("arms/*")),
 )
 GALLERY = (
@@ -41,7 +42,7 @@ PLAYED = {
 
 
 def on_config(config: MkDocsConfig) -> MkDocsConfig:
-    """Let equations be written, and README's tables be shown."""
+    """Let equations be written, and pages take sections of files of the repository."""
     config.markdown_extensions.append(MathMl())  # type: ignore[arg-type]  # as Markdown takes it
     config.mdx_configs["pymdownx.snippets"]["base_path"] = [str(DOCS.parent)]
     return config

@@ -1,4 +1,4 @@
-"""Draw the pictures of the README and of `docs` from real replays: ``python docs/pictures.py``.
+"""Draw the pictures of `docs` from real replays: ``python docs/pictures.py``.
 
 Needs a Chromium browser. Takes about a minute.
 """
@@ -24,7 +24,7 @@ def plan_of(name: str) -> sm.Plan:
 
 
 def main() -> None:
-    """Draw README's picture, then one of every named arm."""
+    """Draw a replay's page, then every named arm."""
     shown = ("trace", "triads", "ghost")
     size = (1200, 900)
     plan = sm.plan(panda_past_a_box())

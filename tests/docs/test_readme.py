@@ -6,10 +6,14 @@ from pathlib import Path
 
 import pytest
 import shown
+import two_motions
 
+import selfmotion as sm
 from support.places import ROOT
 
 README = (ROOT / "README.md").read_text()
+PERFORMANCE = (ROOT / "docs" / "pages" / "performance.md").read_text()
+PACKAGES = (ROOT / "docs" / "pages" / "about.md").read_text()
 
 
 PAGES = [
@@ -19,7 +23,7 @@ PAGES = [
 
 
 # All that is not run: it installs, or takes minutes.
-NOT_RUN = {"make demo", "make test", "pip install ."}
+NOT_RUN = {"make demo", "make test", "make docs", "pip install ."}
 
 
 def blocks(page: str) -> list[tuple[str, str, str]]:
@@ -120,9 +124,31 @@ def test_first_steps_are_five_commands() -> None:
 
 
 def test_performance_table_is_there() -> None:
-    table = README.split("[start:bench]")[1].split("[end:bench]")[0]
+    table = PERFORMANCE.split("[start:bench]")[1].split("[end:bench]")[0]
     assert "| machine |" in table
     assert "rollout + exact gradient" in table
+
+
+def test_the_readme_is_short() -> None:
+    assert len(README.splitlines()) <= 150
+
+
+def test_figures_of_the_readme_are_those_of_the_page() -> None:
+    """Each number that it measured is on the page, in the words of the command that gives it."""
+    rows = re.findall(r"^\| .+ \| (.+) \| `(make [\w-]+)` \|$", README, re.MULTILINE)
+    assert len(rows) >= 8
+    for measured, command in rows:
+        assert command in PERFORMANCE, command
+        for number in re.findall(r"\d[\d.,]*\d|\d", measured):
+            assert re.search(rf"(?<![\d.]){re.escape(number)}(?![\d])", PERFORMANCE), number
+
+
+def test_the_picture_is_of_what_the_readme_says() -> None:
+    problem = two_motions.seam()
+    for plan in (sm.plan_by(problem, sm.PseudoInverse()), sm.plan(problem)):
+        assert f"at {100.0 * two_motions.shares(plan).max():.0f} %" in README
+        assert f"at cost {plan.report.cost:.2f}" in README
+    assert plan.certificate.verified
 
 
 def test_every_named_file_exists() -> None:
@@ -136,4 +162,4 @@ def test_runtime_packages_are_explained() -> None:
     block = re.search(r"\ndependencies = \[(.*?)\]", text, re.DOTALL)
     assert block is not None
     for name in re.findall(r'"([a-z-]+)>=', block.group(1)):
-        assert re.search(rf"\| .*\b{name}\b.* \|", README), name
+        assert re.search(rf"\| .*\b{name}\b.* \|", PACKAGES), name

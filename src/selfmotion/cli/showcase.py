@@ -1,4 +1,4 @@
-"""What the demo plans, and the README shows."""
+"""What the demo plans."""
 
 import numpy as np
 

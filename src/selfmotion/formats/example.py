@@ -119,7 +119,7 @@ feed_mm = 50
 
 """
 _REST = """\
-# [null_motion]        # by default any at all, as good as can be found; or one of few numbers:
+# [null_motion]        # by default unrestricted; or one with few coefficients:
 # kind = "PolynomialNullMotion"
 # degree = 3
 
