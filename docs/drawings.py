@@ -61,7 +61,7 @@ def self_motion() -> str:
 def speeds(plan: sm.Plan) -> str:
     """Draw the joint speeds of the paper's example, without and with self-motion."""
     figure = Figure(figsize=_SIZE, layout="constrained")
-    motions = {"x = 0": plan.initial_trajectory, "optimised": plan.trajectory}
+    motions = {"minimum-norm": plan.initial_trajectory, "optimised": plan.trajectory}
     for axes, (name, motion) in zip(
         figure.subplots(1, 2, sharey=True), motions.items(), strict=True
     ):

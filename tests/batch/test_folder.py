@@ -16,4 +16,4 @@ def test_what_ends_early_has_no_cost_to_compare(tmp_path: Path) -> None:
         first, last = csv.DictReader(stream)
     assert (first["name"], first["cost"]) == ("whole", "2")
     assert (last["name"], last["cost"]) == ("part", "ends at t = 1.16 s")
-    assert last["without self-motion"] == ""
+    assert last["minimum-norm motion"] == ""

@@ -21,7 +21,7 @@ def test_stages_are_shown_in_terminals_and_logs(terminal: bool) -> None:
     # News stay on a terminal as well, where stages are a bar that is gone at the end.
     assert any(line.endswith("no motion passes t = 2 s") for line in lines)
     if not terminal:
-        assert lines == ["start (of 24)", "no motion passes t = 2 s", "checking"]
+        assert lines == ["start 1 of 24", "no motion passes t = 2 s", "checking"]
 
 
 def test_long_stages_say_how_long_they_will_last(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -38,7 +38,7 @@ def test_long_stages_say_how_long_they_will_last(monkeypatch: pytest.MonkeyPatch
             now[0] += 0.05
         display._progress.refresh()
     # Three of ten took 1.5 s, so that seven will take 3.5.
-    assert "long 4 of 10, about 4 s left" in shown.getvalue()
+    assert "long 4 of 10, 2 s so far, about 4 s to go" in shown.getvalue()
     assert "short 4 of 10 " in shown.getvalue()
 
 

@@ -8,6 +8,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 from rich.console import Console
 
@@ -52,21 +53,53 @@ def test_tables_fit_narrow_terminals_and_logs(tmp_path: Path, columns: int | Non
 @pytest.mark.parametrize(
     ("amount", "allowed", "kept", "told"),
     [
-        (0.015, 0.0147, True, "at least"),
-        (0.014, 0.0147, False, "at least"),
-        (0.0, 1e-6, True, "at most"),
-        (0.1, 1e-6, False, "at most"),
+        (0.015, 0.0147, True, "at least 0.0147"),
+        (0.014, 0.0147, False, "at least 0.0147"),
+        (0.0, 1e-6, True, "1e-06 allowed"),
+        (0.1, 1e-6, False, "1e-06 allowed"),
     ],
 )
 def test_a_limit_is_told_with_its_side(
     amount: float, allowed: float, kept: bool, told: str
 ) -> None:
     """A feed that is kept, above what it has to be at least, does not read as a violation."""
-    found = sm.Finding("feed", "path", 1.0, amount, allowed, kept, "")
+    found = sm.Finding("feed", "path", 1.0, amount, allowed, kept, "", unit="m/s")
     plan = sm.plan(sm.sample_problem())
     certificate, page = plan.certificate, io.StringIO()
     only = dataclasses.replace(certificate, findings=(*certificate.findings, found))
     tables.show_certificate(only, {}, plan.robot, Console(file=page, width=120))
     # Its joints turn, all of them.
     assert "rad or m" not in page.getvalue()
-    assert f"feed ({told}: {allowed:.4g})" in page.getvalue()
+    (line,) = (line for line in page.getvalue().splitlines() if f"feed ({told})" in line)
+    assert f" {amount:.4g} m/s " in line
+
+
+@pytest.mark.parametrize(
+    ("unit", "amount", "allowed", "told"),
+    [
+        ("rad/s²", 0.0075, 1e-3, "acceleration at rest (0.001 allowed)"),
+        ("rad/s", 2e-5, 1e-6, "speed at rest (1e-06 allowed)"),
+    ],
+)
+def test_what_moves_at_rest_is_told_with_its_unit(
+    unit: str, amount: float, allowed: float, told: str
+) -> None:
+    plan, page = sm.plan(sm.sample_problem()), io.StringIO()
+    found = sm.Finding("rest", "joint1", 0.0, amount, allowed, False, "", unit=unit)
+    findings = (*plan.certificate.findings, found)
+    only = dataclasses.replace(plan.certificate, findings=findings)
+    tables.show_certificate(only, {}, plan.robot, Console(file=page, width=120))
+    (line,) = (line for line in page.getvalue().splitlines() if told in line)
+    assert f" {amount:.4g} {unit} " in line
+
+
+def test_the_unit_of_what_is_found_is_the_joints() -> None:
+    """From the requirement itself: q̇ and q̈ at an end, of a hinge."""
+    arm = sm.load_robot("planar_3r")
+    q, none = np.zeros((2, 3)), np.zeros((2, 3))
+    for qd, qdd, unit in ((none + 0.1, none, "rad/s"), (none, none + 0.1, "rad/s²")):
+        motion = sm.Trajectory(np.array([0.0, 1.0]), q, qd, arm.joint_names, qdd)
+        line = sm.Line(arm.pose(q[0]), arm.pose(q[0]), 1.0)
+        found = sm.Problem(arm, line, "planar").certify(motion).findings
+        (rest,) = (item for item in found if item.requirement == "rest")
+        assert rest.unit == unit

@@ -264,7 +264,7 @@ def test_prices_are_saved_and_shown(panda_circle: Circle, tmp_path) -> None:
     show(plan, console)
     text = console.export_text()
     assert "2 % more acceleration for joint 'panda_joint" in text
-    assert "constraints that bind" in text
+    assert "active constraints" in text
 
 
 def test_what_is_not_finite_is_named_with_its_time(panda_circle: Circle) -> None:

@@ -67,7 +67,7 @@ def test_a_part_is_an_attempt_with_a_reason(planar: sm.RobotModel) -> None:
 
 def test_what_is_interrupted_is_an_attempt(panda_circle: Circle) -> None:
     def progress(stage: str, done: int, total: int) -> None:
-        if stage == "finer grid":
+        if stage == "refining":
             raise KeyboardInterrupt
 
     plan = sm.plan(panda_circle(), progress=progress)

@@ -13,14 +13,14 @@ from selfmotion.paper import Rollout
 
 # All stages of a plan from a free start, compared with the global search.
 STAGES = (
-    "rough motions",
+    "screening start",
     "optimising start",
     "search: self-motions at waypoint",
-    "search: what is free at waypoint",
-    "search: shortening sequence",
-    "search: shortening finalist",
+    "search: sampling waypoint",
+    "search: optimising sequence",
+    "search: optimising finalist",
     "refining sequence",
-    "finer grid",
+    "refining",
     "checking",
 )
 
@@ -74,7 +74,7 @@ def published(problem: sm.Problem) -> sm.Problem:
 def test_an_interruption_of_the_published_method_yields_the_best_so_far(
     problem: sm.Problem,
 ) -> None:
-    for stage in ("optimising start", "finer grid", "checking"):
+    for stage in ("optimising start", "refining", "checking"):
         found = plan(published(problem), progress=interrupt_at(stage, 1))
         assert found.report.status is sm.Status.INTERRUPTED
         assert found.certificate.position_error.value < 1e-3
@@ -85,7 +85,7 @@ def test_an_interruption_at_any_stage_yields_the_best_so_far(
     problem: sm.Problem, stage: str
 ) -> None:
     # The first start may be the only one that is worth optimising.
-    alone = ("optimising start", "finer grid", "checking")
+    alone = ("optimising start", "refining", "checking")
     number = 1 if stage in alone else 2
     found = plan(problem, progress=interrupt_at(stage, number))
     assert found.report.status is sm.Status.INTERRUPTED
@@ -95,7 +95,7 @@ def test_an_interruption_at_any_stage_yields_the_best_so_far(
 
 def test_without_a_motion_an_interruption_is_one(problem: sm.Problem) -> None:
     with pytest.raises(KeyboardInterrupt):
-        plan(problem, progress=interrupt_at("rough motions", 1))
+        plan(problem, progress=interrupt_at("screening start", 1))
     for stage in STAGES[2:6]:
         with pytest.raises(KeyboardInterrupt):
             plan(problem, search=GLOBAL, progress=interrupt_at(stage, 1))

@@ -83,7 +83,7 @@ def test_short_paths_and_other_null_motions_go_the_usual_way(planar: sm.RobotMod
 
 
 @pytest.mark.parametrize(
-    ("stage", "whole"), [("optimising start", False), ("posture", False), ("finer grid", True)]
+    ("stage", "whole"), [("optimising start", False), ("posture", False), ("refining", True)]
 )
 def test_an_interruption_is_obeyed_on_the_stretch_too(
     planar: sm.RobotModel, stage: str, whole: bool

@@ -50,4 +50,4 @@ def test_a_rod_between_the_prongs_of_a_fork(tmp_path: Path, gap: float, verified
     assert ("proof on meshes" in names) == verified
     if verified:
         assert names[-1] == "proof on meshes"
-        assert "what planning fell short of is kept by the motion" in plan.report.message
+        assert "violated by the optimiser's bounds, kept by the motion" in plan.report.message

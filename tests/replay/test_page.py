@@ -44,7 +44,7 @@ def test_a_shared_file_explains_itself(page):
     assert "<title>planar_3r, planar task</title>" in page
     description = re.search(r'name="description" content="([^"]*)"', page)[1]
     assert "3 joints follow a tool motion of 2 s" in description
-    assert " % below that without self-motion" in description
+    assert " % below that of the minimum-norm motion" in description
     assert "verified" in description
 
 

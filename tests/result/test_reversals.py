@@ -29,7 +29,7 @@ def test_a_swing_turns_round_where_it_is_farthest(turns: int) -> None:
     np.testing.assert_allclose(found.times["swings"], expected, atol=NEAR)
     assert not len(found.times["goes"])
     assert found.count == turns - 1
-    assert str(found) == {0: "never", 1: "once: swings 1", 6: "6 times: swings 6"}[turns - 1]
+    assert str(found) == {0: "0", 1: "1 (swings 1)", 6: "6 (swings 6)"}[turns - 1]
 
 
 def test_trembling_is_no_turning() -> None:

@@ -78,7 +78,7 @@ class Folder:
         planned = [row for row in ranked if not row.error]
         links = {row.name: self._replay(row, k < replays) for k, row in enumerate(planned)}
         keys = list(dict.fromkeys(key for row in rows for key in row.settings))
-        said = ["verified", "reason", "cost", "without self-motion", "margin", "clearance"]
+        said = ["verified", "reason", "cost", "minimum-norm motion", "margin", "clearance"]
         said += ["duration", "seconds", "plan", "replay", "verdict"]
         lines = [self._cells(k, row, keys, links) for k, row in enumerate(ranked, 1)]
         write_text(self.path / "table.csv", _csv([["rank", "name", *keys, *said], *lines]))
@@ -145,7 +145,7 @@ a:hover rect{{opacity:.85}}
 # Columns whose cells are one word or number each.
 _WHOLE = {
     "rank",
-    "without self-motion",
+    "minimum-norm motion",
     "margin",
     "clearance",
     "duration",

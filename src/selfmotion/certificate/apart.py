@@ -54,7 +54,8 @@ class KeepsApart(Requirement):
                 f"{-stuck.value * 1e3:.2f} mm into each other: if they are meant to be there, give "
                 f"disabled= the pair, or srdf= a file with {srdf_line(stuck.first, stuck.second)}"
             )
-            return Finding(self.name, names, time, stuck.value, self.distance, False, text)
+            near = stuck.value
+            return Finding(self.name, names, time, near, self.distance, False, text, unit="m")
         found = closest_at_all_times(self.model, motion.trajectory, self.distance)
         text = self._told(found)
         if found.open_until is not None:
@@ -66,8 +67,9 @@ class KeepsApart(Requirement):
         kept = found.open_until is None and bool(found.closest.value >= self.distance)
         if not kept:
             text += self._of_start(motion.trajectory)
+        near = found.closest.value
         return Finding(
-            self.name, found.names, found.time, found.closest.value, self.distance, kept, text
+            self.name, found.names, found.time, near, self.distance, kept, text, unit="m"
         )
 
     def approaches(self, motion: FinishedMotion) -> dict[str, Extreme]:

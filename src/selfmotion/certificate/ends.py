@@ -97,7 +97,8 @@ class AtRest(Requirement):
             f"with rest=True"
         )
         time = float(motion.trajectory.t[row])
-        return Finding(self.name, joint, time, amount, allowed, bool(amount <= allowed), text)
+        kept = bool(amount <= allowed)
+        return Finding(self.name, joint, time, amount, allowed, kept, text, unit=unit)
 
 
 @dataclass(frozen=True)
@@ -130,4 +131,4 @@ def _miss(
         f"({allowed:g} allowed)"
     )
     time = float(motion.trajectory.t[row])
-    return Finding(name, joint, time, amount, allowed, bool(amount <= allowed), text)
+    return Finding(name, joint, time, amount, allowed, bool(amount <= allowed), text, unit=unit)

@@ -72,7 +72,9 @@ class FeedReached(Requirement):
 
     def _found(self, time: float, allowed: float, kept: bool, text: str) -> Finding:
         slowest = self.found.slowest
-        return Finding(self.name, "path", time, slowest, allowed, kept, text, at_least=True)
+        return Finding(
+            self.name, "path", time, slowest, allowed, kept, text, at_least=True, unit="m/s"
+        )
 
     def _pace(self, motion: FinishedMotion) -> "_OwnPace":
         """Return what is known of the path's own speed, at all times."""

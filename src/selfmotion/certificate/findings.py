@@ -91,6 +91,8 @@ class Finding:
         kept, inf where that is not known.
     at_least : bool
         Whether no less than what is allowed has to be found, rather than no more.
+    unit : str
+        Of both, such as "rad/s²"; "" of shares.
     """
 
     requirement: str
@@ -103,6 +105,7 @@ class Finding:
     of_pace: bool = False
     factor: float = 1.0
     at_least: bool = False
+    unit: str = ""
 
     @property
     def extreme(self) -> Extreme:

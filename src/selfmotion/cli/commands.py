@@ -121,7 +121,8 @@ def init(
     packages: options.PackagesOption = None,
     job: Annotated[bool, typer.Option("--job", help="Of many seams: selfmotion job FILE.")] = False,
     positioner: Annotated[
-        bool, typer.Option("--positioner", help="Of a cell: a table that tilts and turns as well.")
+        bool,
+        typer.Option("--positioner", help="Write a cell that has a table that tilts and turns."),
     ] = False,
     no_collision: options.NoCollisionOption = False,
     force: Annotated[bool, typer.Option("--force", help="Overwrite a file.")] = False,

@@ -37,19 +37,19 @@ def export(
     ] = None,
     form: Annotated[
         str | None,
-        typer.Option("--format", help=f"Whatever the suffix: {', '.join(formats.FORMS)}."),
+        typer.Option("--format", help=f"Format, whatever the suffix: {', '.join(formats.FORMS)}."),
     ] = None,
     parts: Annotated[
         bool,
         typer.Option(
             "--parts",
-            help="Of a cell a file for each part as well (none of programs).",
+            help="For a cell: also a file for each part (not of programs).",
         ),
     ] = False,
     settings: options.SettingsOption = None,
     force: Annotated[
         bool,
-        typer.Option("--force", help="Write one that is not verified, or moves at an end, too."),
+        typer.Option("--force", help="Write it even if it is not verified, or moves at an end."),
     ] = False,
     as_json: options.JsonOption = False,
 ) -> None:

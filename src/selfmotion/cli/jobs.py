@@ -31,7 +31,7 @@ def job(
     html: options.HtmlOption = None,
     folder: Annotated[
         Path | None,
-        typer.Option(help="Keeps what is finished; a job that was stopped goes on there."),
+        typer.Option(help="Folder for finished work; a job that was stopped resumes from it."),
     ] = None,
     workers: Annotated[int, typer.Option(min=1, help="Processes.")] = 1,
     dask: Annotated[

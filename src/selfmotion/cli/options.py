@@ -147,7 +147,7 @@ DegreeOption = Annotated[
     ),
 ]
 MuOption = Annotated[
-    float, typer.Option(help="Weight of 1/det(JJᵀ), the distance from singular poses.")
+    float, typer.Option(help="Weight of the cost 1/det(JJᵀ), which keeps off singular poses.")
 ]
 CostOption = Annotated[
     list[str] | None,
@@ -157,10 +157,10 @@ CostOption = Annotated[
     ),
 ]
 ClosedOption = Annotated[
-    bool, typer.Option("--closed", help="End as it began, in position and velocity.")
+    bool, typer.Option("--closed", help="End in the configuration and velocity of the start.")
 ]
 NoCollisionOption = Annotated[
-    bool, typer.Option("--no-self-collision", help="Do not look at self-collision.")
+    bool, typer.Option("--no-self-collision", help="Do not check self-collision.")
 ]
 SetOption = Annotated[
     list[str] | None,
@@ -171,7 +171,7 @@ SetOption = Annotated[
 SettingsOption = Annotated[
     Path | None,
     typer.Option(
-        help="File with what a controller's program says besides: deviation, axes, signals, "
+        help="File with settings of a controller's program: deviation, axes, signals, "
         "flange, mass, center, approach (TOML)."
     ),
 ]
@@ -180,7 +180,9 @@ AllowCodeOption = Annotated[
 ]
 DampedOption = Annotated[
     bool,
-    typer.Option("--damped", help="Go through singular poses, at the price of the path there."),
+    typer.Option(
+        "--damped", help="Damp the inverse near singular poses; there the tool may leave its path."
+    ),
 ]
 LimitOption = Annotated[
     int | None, typer.Option(help="Limit on cost evaluations while optimising.")
@@ -193,7 +195,10 @@ SearchOption = Annotated[
     ),
 ]
 CompareOption = Annotated[
-    bool, typer.Option("--compare", help="Tell the distance from the global optimum.")
+    bool,
+    typer.Option(
+        "--compare", help="Report how far the plan is from the best motion of the global search."
+    ),
 ]
 OutOption = Annotated[
     list[Path] | None,
@@ -261,7 +266,7 @@ SrdfOption = Annotated[
 ToleranceOption = Annotated[
     float | None,
     typer.Option(
-        help="What the path may be missed by (m and rad); 1e-6 by default, or the plan's."
+        help="Allowed deviation from the path (m and rad); 1e-6 by default, or the plan's."
     ),
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print the outcome as JSON.")]

@@ -32,11 +32,13 @@ def fastest(
     acceleration: options.AccelerationOption = None,
     velocity: options.VelocityOption = None,
     deadline: Annotated[
-        float, typer.Option(help="After so many seconds the best so far has to do.")
+        float, typer.Option(help="Stop after so many seconds, with the best so far.")
     ] = 60.0,
     keep: Annotated[
         list[str] | None,
-        typer.Option(metavar="KIND=FACTOR", help="A cost may be so many times the best one's."),
+        typer.Option(
+            metavar="KIND=FACTOR", help="Most that a cost may be, as a multiple of its optimum."
+        ),
     ] = None,
     settings: options.SetOption = None,
     allow_code: options.AllowCodeOption = False,
@@ -62,8 +64,8 @@ def fastest(
     found = fastest_with_progress(job, deadline=deadline, **given)
     if not as_json:
         stages.print(
-            f"{found.duration:.4g} s; best by its costs and then retimed: {_time(found.retimed)}, "
-            f"without self-motion: {_time(found.pseudo_inverse)}; {found.status.message}",
+            f"{found.duration:.4g} s; lowest cost, retimed: {_time(found.retimed)}, "
+            f"minimum-norm motion retimed: {_time(found.pseudo_inverse)}; {found.status.message}",
             markup=False,
             soft_wrap=True,
         )
@@ -71,7 +73,7 @@ def fastest(
 
 
 def _time(seconds: float) -> str:
-    return f"{seconds:.4g} s" if math.isfinite(seconds) else "keeps not all that is asked"
+    return f"{seconds:.4g} s" if math.isfinite(seconds) else "violates a constraint at any pace"
 
 
 def _factor(text: str) -> tuple[str, float]:

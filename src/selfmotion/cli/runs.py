@@ -38,7 +38,7 @@ def batch(
         list[Path], typer.Argument(help=r"Problem files; of a \[grid], all combinations.")
     ],
     out: Annotated[
-        Path, typer.Option(help="Folder for plans and tables; a run that was killed goes on there.")
+        Path, typer.Option(help="Folder for plans and tables; a run that was killed resumes there.")
     ] = Path("out/batch"),
     workers: Annotated[
         int | None, typer.Option(min=1, help="Processes; by default one for each core.")
@@ -157,10 +157,12 @@ def follow(
     cycle: Annotated[float, typer.Option(help="Between set-points (s).", min=1e-4)] = 1e-3,
     latency: Annotated[
         float,
-        typer.Option(help="From a state's measurement until its segment is obeyed (s).", min=0.0),
+        typer.Option(
+            help="From a state's measurement until the arm follows its segment (s).", min=0.0
+        ),
     ] = 0.0,
     silence: Annotated[
-        float, typer.Option(help="End without a state for so long (s).", min=0.1)
+        float, typer.Option(help="Stop if no state comes for so long (s).", min=0.1)
     ] = 5.0,
     seconds: Annotated[float, typer.Option(help="End after so long (s).", min=0.1)] = float("inf"),
     allow_code: options.AllowCodeOption = False,

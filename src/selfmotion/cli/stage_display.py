@@ -83,11 +83,12 @@ class StageDisplay(Display):
         if stage != self._stage:
             self._stage, self._cost, self._began = stage, "", time.monotonic()
             if not self._console.is_terminal:
-                self._console.print(f"{stage} (of {total})" if total > 1 else stage, markup=False)
+                self._console.print(f"{stage} 1 of {total}" if total > 1 else stage, markup=False)
         self._count = f" {done} of {total}" if total > 1 else ""
         spent = time.monotonic() - self._began
         left = spent * (total - done + 1) / (done - 1) if done > 1 else 0.0
-        self._left = f", about {left:.0f} s left" if spent + left > _WORTH_SAYING else ""
+        told = f", {spent:.0f} s so far, about {left:.0f} s to go"
+        self._left = told if spent + left > _WORTH_SAYING else ""
         self._progress.update(self._bar, completed=done - 1, total=total if total > 1 else None)
         self._describe()
 

@@ -13,7 +13,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from selfmotion.certificate import LIMIT_NAMES, Certificate, Extreme
+from selfmotion.certificate import LIMIT_NAMES, Certificate, Extreme, Finding
 from selfmotion.cli.remedies import in_shell
 from selfmotion.job import Program
 from selfmotion.result import Gap, Plan, Report
@@ -38,11 +38,11 @@ def console() -> Console:
 
 
 def show(plan: Plan, console: Console) -> None:
-    """Print the cost of x = 0 against the plan, the work done, and the certificate."""
+    """Print what the minimum-norm motion and the plan cost, the work done, and the certificate."""
     report = plan.report
     table = _table(f"{plan.robot.name}, task {plan.task.value}")
     table.add_column("cost")
-    table.add_column("without self-motion", justify="right")
+    table.add_column("minimum-norm motion", justify="right")
     table.add_column("plan", justify="right")
     table.add_column("change", justify="right")
     for name in report.terms:
@@ -61,7 +61,7 @@ def show(plan: Plan, console: Console) -> None:
         console.print(_tried(report))
     if report.remaining is not None and report.cost:
         share = 100.0 * report.remaining / abs(report.cost)
-        console.print(f"any other null motion could save about {share:.2g} % (estimate)")
+        console.print(f"further saving possible: about {share:.2g} % (estimate)")
     if report.active:
         console.print(_prices(report))
     if report.gap is not None:
@@ -70,7 +70,7 @@ def show(plan: Plan, console: Console) -> None:
     if plan.limits_used.busy > _SELDOM:
         told = f"{plan.trajectory.duration:.4g} s; limits used fully {plan.limits_used}"
         console.print(told, markup=False, soft_wrap=not console.is_terminal)
-    console.print(f"joints turn round: {plan.reversals}", markup=False)
+    console.print(f"joint reversals: {plan.reversals}", markup=False)
 
 
 # A look at single poses, starts, and the proof: what more was tried is told.
@@ -79,9 +79,9 @@ _USUAL_ATTEMPTS = 3
 
 def _tried(report: Report) -> Table:
     """Return a line for each attempt at the plan."""
-    table = _table("what was tried")
-    table.add_column("attempt")
-    table.add_column("what stood after it", overflow="fold")
+    table = _table("strategies tried")
+    table.add_column("strategy")
+    table.add_column("result", overflow="fold")
     table.add_column("cost", justify="right", no_wrap=True)
     table.add_column("s", justify="right", no_wrap=True)
     before = None
@@ -90,7 +90,7 @@ def _tried(report: Report) -> Table:
         stood = (item.outcome, item.cost)
         first, *more = item.outcome.split("; ")
         outcome = f"{first}; and {len(more)} more" if more else first
-        outcome = "as before" if stood == before else outcome
+        outcome = "no change" if stood == before else outcome
         table.add_row(escape(item.name), escape(outcome), cost, f"{item.seconds:.2f}")
         before = stood
     return table
@@ -136,19 +136,14 @@ def show_certificate(
     shown = {"clearance", *LIMIT_NAMES}
     for finding in certificate.findings:
         if finding.requirement not in shown:
-            name, value = finding.requirement, _SHARE.format(finding.amount)
-            if finding.allowed != 1.0:
-                above = finding.at_least or finding.kept == (finding.amount > finding.allowed)
-                side = "at least" if above else "at most"
-                name = f"{finding.requirement} ({side}: {finding.allowed:.4g})"
-                value = f"{finding.amount:.4g}"
             time = f"{finding.time:.3f} s"
-            table.add_row(escape(name), value, time, escape(finding.subject))
+            table.add_row(*map(escape, _found(finding)), time, escape(finding.subject))
     for worst in certificate.deviations:
         unit = "rad" if "r" in worst.name else "m"
         value, time = f"{worst.value:.4g} {unit}", f"{worst.time:.3f} s"
         table.add_row(f"relaxed {worst.name}", value, time, "off the path, as allowed")
-    table.add_row("from end to start", f"{certificate.closure:.4g} {robot.unit_of()}", "", "")
+    closure = f"{certificate.closure:.4g} {robot.unit_of()}"
+    table.add_row("joint distance, end to start", closure, "", "")
     console.print(table)
     for remark in certificate.remarks:
         console.print(remark, style="dim", markup=False, soft_wrap=not console.is_terminal)
@@ -156,6 +151,18 @@ def show_certificate(
     # One line of a log; words are kept whole on a terminal.
     verdict = in_shell(certificate.verdict)
     console.print(verdict, style=style, markup=False, soft_wrap=not console.is_terminal)
+
+
+def _found(finding: Finding) -> tuple[str, str]:
+    """Return what was found, with what is allowed, and the value."""
+    name, allowed = finding.requirement, finding.allowed
+    if allowed == 1.0 and not finding.unit:
+        return name, _SHARE.format(finding.amount)
+    if name == "rest":
+        name = "acceleration at rest" if finding.unit.endswith("²") else "speed at rest"
+    above = finding.at_least or finding.kept == (finding.amount > allowed)
+    asked = f"at least {allowed:.4g}" if above else f"{allowed:.4g} allowed"
+    return f"{name} ({asked})", f"{finding.amount:.4g} {finding.unit}".strip()
 
 
 def _in_mm(near: Extreme | None) -> Extreme | None:
@@ -342,11 +349,11 @@ def _distance(gap: Gap) -> str:
 
 
 def _prices(report: Report) -> Table:
-    """Return what each binding constraint costs."""
-    table = _table("constraints that bind")
-    table.add_column("with")
-    table.add_column("the cost would fall by", justify="right")
-    table.add_column("binds at")
+    """Return what each active constraint costs, by its multipliers."""
+    table = _table("active constraints")
+    table.add_column("if you allow")
+    table.add_column("the cost falls by about", justify="right")
+    table.add_column("active at")
     for item in report.active:
         share = f"{100.0 * item.saving / abs(report.cost):.3g} %" if report.cost else ""
         spans = ", ".join(f"{a:.2f} s" if a == b else f"{a:.2f}-{b:.2f} s" for a, b in item.spans)

@@ -63,8 +63,8 @@ _MESSAGES = {
     Status.MAX_EVALUATIONS: "the limit on evaluations was reached; raise max_evaluations to go on",
     Status.UNBOUNDED: "the coefficients grow without bound: the cost has no minimum; add a "
     "JointVelocity cost",
-    Status.INFEASIBLE: "no step brings the conditions nearer: they contradict each other or are "
-    "out of reach from here; allow more (limits, null motion), or start elsewhere",
+    Status.INFEASIBLE: "no step reduces the violation: the constraints contradict each other or "
+    "cannot be satisfied from here; relax limits or the null motion, or choose another start",
     Status.GRADIENT: "the cost does not change as its gradient says: it has a kink here, or, of a "
     "cost of one's own, the gradient is wrong (selfmotion.testing.check_cost tells)",
     Status.STOPPED: "the callback asked to stop",

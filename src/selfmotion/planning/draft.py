@@ -202,7 +202,7 @@ class Draft:
             if known.reason:
                 return known
         if suspect not in self._reaches:
-            self.progress("reach", 1, 1)
+            self.progress("checking reach", 1, 1)
             rng = np.random.default_rng(self.search.rng)
             self._reaches[suspect] = reachable(self.problem, self.search.starts, rng, suspect)
         return self._reaches[suspect]
@@ -244,7 +244,7 @@ class Draft:
             most = FREE_PART_EVALUATIONS if self.is_free else PART_EVALUATIONS
             effort = replace(effort, max_evaluations=most)
         known = self.reach(suspect)
-        self.progress("largest part", 1, 1)
+        self.progress("longest part that can be followed", 1, 1)
         found = largest_part(self.problem, known, effort)
         if found is None:
             return False
@@ -288,7 +288,7 @@ def _settle_both(best: Session, rival: Session | None, progress: Progress) -> fl
     An interruption ends both as they are.
     """
     try:
-        progress("finer grid", 1, 1)
+        progress("refining", 1, 1)
         best.settle()
         if rival is not None and rival is not best and not best.cut_short:
             rival.settle()

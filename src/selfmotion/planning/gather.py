@@ -115,7 +115,9 @@ def message_of(
     parts = [said] if status.is_cut_short or published or not violations else []
     if violations and certificate.verified:
         # Such as the clearance of bodies, whose convex hulls are planned with.
-        parts.append(f"what planning fell short of is kept by the motion: {'; '.join(violations)}")
+        parts.append(
+            f"violated by the optimiser's bounds, kept by the motion: {'; '.join(violations)}"
+        )
     elif violations and published:
         parts.append(
             f"the published method keeps nothing but given ends, and this is not kept: "

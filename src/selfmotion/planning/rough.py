@@ -110,7 +110,7 @@ class Ranking:
         problem = self._problem
         nodes = self._grid(problem)
         total = 1 + ROUGH_ROUNDS
-        self._progress("rough motions", 1, total)
+        self._progress("screening start", 1, total)
         found = self._found = Together.near(nodes, motions)
         soft = problem.softened(float(found.costs.min()))
         if soft is not problem:
@@ -121,7 +121,7 @@ class Ranking:
             return None
         found = self._found = found.picked(np.array(which, dtype=np.int64))
         for number in range(2, total + 1):
-            self._progress("rough motions", number, total)
+            self._progress("screening start", number, total)
             if _hopeful(found).any():
                 found = self._found = found.advanced()
         self._ranked = self._decisive(found, finalists)

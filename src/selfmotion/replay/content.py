@@ -15,7 +15,7 @@ from selfmotion.result import Plan
 
 # What can be shown and hidden: with its key, and whether it is shown at first.
 _LAYERS = [
-    {"name": "ghost", "label": "x = 0 motion", "key": "g", "on": False},
+    {"name": "ghost", "label": "minimum-norm motion", "key": "g", "on": False},
     {"name": "trace", "label": "tool path", "key": "t", "on": True},
     {"name": "triads", "label": "tool axes", "key": "a", "on": True},
     {"name": "ellipsoid", "label": "velocity ellipsoid", "key": "e", "on": False},
@@ -53,7 +53,7 @@ class _Tip:
 
 
 class _Motion:
-    """A plan, sampled: the motion itself and x = 0."""
+    """A plan, sampled: the motion itself and the minimum-norm motion."""
 
     def __init__(self, plan: Plan, whole: Whole | None) -> None:
         robot = plan.robot
@@ -122,7 +122,7 @@ def page_content(
 
 
 def _layers(motions: list[_Motion]) -> list[Json]:
-    """Return what can be shown and hidden; of several steps there is no motion at x = 0."""
+    """Return what can be shown and hidden; of several steps there is no minimum-norm motion."""
     kept = [item for item in _LAYERS if item["name"] != "ghost" or motions[0].whole is None]
     return [*kept, _PAIR_LAYER] if any(motion.clearance for motion in motions) else kept
 

@@ -19,7 +19,7 @@ def facts(plan: Plan) -> dict[str, Cell]:
     rows: dict[str, Cell] = {"verdict": (certificate.verdict, "")}
     rows["cost"] = _compared(report.cost, report.initial_cost)
     if report.remaining is not None:
-        rows["left to save, estimate"] = (f"{report.remaining:.2g}", _share(report))
+        rows["further saving possible, estimate"] = (f"{report.remaining:.2g}", _share(report))
     for name, value in report.terms.items():
         rows[f"cost term: {name}"] = _compared(value, report.initial_terms.get(name))
     rows["position error, worst"] = _extreme(certificate.position_error, "m")
@@ -42,12 +42,12 @@ def facts(plan: Plan) -> dict[str, Cell]:
     rows["speed, most"] = _extreme(replace(fastest, value=100.0 * fastest.value), "% of its limit")
     used, *which = str(plan.limits_used).split(": ", 1)
     rows["limits used fully"] = (used, "".join(which))
-    turns, *which = str(plan.reversals).split(": ", 1)
-    rows["joints turn round"] = (turns, "".join(which))
+    turns, *which = str(plan.reversals).split(" ", 1)
+    rows["joint reversals"] = (turns, "".join(which).strip("()"))
     for name, near in plan.approaches.items():
         rows[f"closest to {name}"] = _extreme(replace(near, value=1e3 * near.value), "mm")
     rows["smallest singular value"] = _extreme(certificate.smallest_singular_value, "")
-    rows["from end to start"] = (f"{certificate.closure:.3g} {robot.unit_of()}", "")
+    rows["joint distance, end to start"] = (f"{certificate.closure:.3g} {robot.unit_of()}", "")
     rows["checked at"] = (f"{certificate.samples} times", "by forward kinematics")
     rows["duration"] = (f"{plan.trajectory.duration:.4g} s", "")
     tasks = " and ".join(item.task.value for item in follows.items)
@@ -77,12 +77,12 @@ def describe(plan: Plan) -> str:
     saved = ""
     if report.initial_cost:
         change = report.cost / report.initial_cost - 1.0
-        saved = ", as without self-motion"
+        saved = ", that of the minimum-norm motion"
         if abs(change) >= _ALIKE:
             side = "below" if change <= 0 else "above"
-            saved = f", {abs(100 * change):.1f} % {side} that without self-motion"
+            saved = f", {abs(100 * change):.1f} % {side} that of the minimum-norm motion"
         if change > 5e-4 and plan.problem.all_constraints:
-            saved += ", which is not held to its constraints"
+            saved += ", which ignores the constraints"
     items = plan.problem.follows.items
     what = "a tool motion" if len(items) == 1 else f"{len(items)} tool motions"
     tasks = " and ".join(f"'{item.task.value}'" for item in items)
@@ -95,13 +95,13 @@ def describe(plan: Plan) -> str:
 
 def _share(report: Report) -> str:
     left = report.remaining
-    return (
-        f"{100 * left / abs(report.cost):.2g} % by any null motion" if left and report.cost else ""
-    )
+    if not left or not report.cost:
+        return ""
+    return f"{100 * left / abs(report.cost):.2g} % with any null motion"
 
 
 def _compared(value: float, start: float | None) -> Cell:
-    return f"{value:.6g}", "" if start is None else f"x = 0: {start:.6g}"
+    return f"{value:.6g}", "" if start is None else f"minimum-norm: {start:.6g}"
 
 
 def _extreme(extreme: Extreme, unit: str) -> Cell:

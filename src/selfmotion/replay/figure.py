@@ -40,7 +40,7 @@ def figure(plan: Plan) -> "Figure":
     _per_joint(velocities, shown.t, shown.qd, robot.joint_names, -limit, limit)
     velocities.set_ylabel(f"q̇ [{unit.replace('rad', 'rad/s').replace('m', 'm/s')}]")
     manipulability.plot(shown.t, shown.manipulability, label="plan")
-    manipulability.plot(start.t, start.manipulability, ":", label="x = 0")
+    manipulability.plot(start.t, start.manipulability, ":", label="minimum-norm")
     manipulability.set(ylabel="manipulability √det(JJᵀ)", ylim=(0, None), xlabel="t [s]")
     manipulability.legend(fontsize="x-small")
     _errors(errors, shown, plan)

@@ -49,8 +49,7 @@ class Reversals:
         """Return how many times, and which joints do, those first that do most often."""
         order = sorted(self.times, key=lambda name: -len(self.times[name]))
         turning = [f"{name} {len(self.times[name])}" for name in order if len(self.times[name])]
-        told = f"{self.count} times" if self.count != 1 else "once"
-        return f"{told}: {', '.join(turning)}" if turning else "never"
+        return f"{self.count} ({', '.join(turning)})" if turning else "0"
 
 
 def _turns(motion: Trajectory, number: int, t: Array, speed: Array) -> Array:

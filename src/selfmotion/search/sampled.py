@@ -147,7 +147,7 @@ def sampled_sequences(
         rough = [connected(layers, chain, turning) for chain in found]
         shortest = Shortest(waypoints, bounds, largest_step, measure.weights)
         for number, q in enumerate(rough):
-            progress("search: shortening sequence", number + 1, len(rough))
+            progress("search: optimising sequence", number + 1, len(rough))
             rough[number] = shortest.near(q, SMOOTHINGS[:1])
         # Length among the samples says little of that of the shortest chain near, this says much.
         rough = [item.q for item in ranked(t, rough, turning, weights, measure)[:count]]
@@ -158,7 +158,7 @@ def sampled_sequences(
         found = diverse_chains(layers, chains, largest_step, turning, count, measure)
         rough = [connected(layers, chain, turning) for chain in found]
     for number, q in enumerate(rough):
-        progress("search: shortening sequence", number + 1, len(rough))
+        progress("search: optimising sequence", number + 1, len(rough))
         rough[number] = _shortened(waypoints, bounds, q, largest_step, measure)
     return ranked(t, rough, turning, weights, measure)
 
@@ -180,7 +180,7 @@ def _layers(
     turning = bounds.turning
     layers, cost = [_sorted(smooth[0][bounds.keep(smooth[0])])], np.empty(0)
     for i in range(1, waypoints.count):
-        progress("search: what is free at waypoint", i + 1, waypoints.count)
+        progress("search: sampling waypoint", i + 1, waypoints.count)
         before = layers[-1]
         cost = np.zeros(len(before)) if i == 1 else cost
         parents = _spread_out(before[np.isfinite(cost)], cost[np.isfinite(cost)], PARENTS)

@@ -176,8 +176,8 @@ def best_sequences(
     rough, turning, measure = _rough_motions(layers, steps, times, count, measure)
     # All of them roughly, to see which are worth the rest.
     for stage, spacings, kept in (
-        ("search: shortening sequence", ROUGHLY, len(rough)),
-        ("search: shortening finalist", FINELY, count),
+        ("search: optimising sequence", ROUGHLY, len(rough)),
+        ("search: optimising finalist", FINELY, count),
     ):
         del rough[kept:]
         for number, q in enumerate(rough):
@@ -251,7 +251,7 @@ def _free_samples(
     found: list[Array] = []
     before = np.empty((0, motion.robot.dof))
     for number, (target, here) in enumerate(zip(x, curves, strict=True), 1):
-        progress("search: what is free at waypoint", number, len(x))
+        progress("search: sampling waypoint", number, len(x))
         carried, arrived = motion.project_all(before, target)
         before = place_nodes(motion, target, here, carried[arrived], bounds, SPACING)
         found.append(before)

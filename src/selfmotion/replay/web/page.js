@@ -326,7 +326,7 @@ function plotSpecs({ joints }, { curves, start, clearance, steps }) {
     low: low(joint) ?? NaN, high: high(joint) ?? NaN }));
   const both = (name) => [
     { name: "plan", values: curves[name], color: COLORS[0] },
-    ...(steps.length ? [] : [{ name: "x = 0", values: start[name], color: COLORS[1], start: true }])];
+    ...(steps.length ? [] : [{ name: "minimum-norm", values: start[name], color: COLORS[1], start: true }])];
   const errors = [
     ...("position" in curves ? [{ name: "position [m]", values: curves.position, color: COLORS[0] }] : []),
     ...("rotation" in curves ? [{ name: "rotation [rad]", values: curves.rotation, color: COLORS[3] }] : [])];
