@@ -1,22 +1,23 @@
-"""What a constraint that binds costs."""
+"""What an active constraint costs."""
 
 from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
 class Binding:
-    """A constraint that keeps the plan from a lower cost, with its price.
+    """An active constraint: one that keeps the plan from a lower cost.
 
     Attributes
     ----------
     constraint : str
         Its name.
     easing : str
-        What asking for a little less would be, in words, with the joint or the pair.
+        A small relaxation of it in words, with the joint or the pair.
     saving : float
-        What that would take off F, to first order: the multipliers' sum times the amount.
+        What that relaxation would take off F, to first order: the sum of the Lagrange multipliers
+        times its amount.
     spans : tuple of (float, float)
-        First and last time [s] of each stretch on which it binds.
+        First and last time [s] of each stretch on which it is active.
     """
 
     constraint: str

@@ -52,8 +52,8 @@ class Fastest:
     plan : Plan
         The motion, from rest to rest.
     pseudo_inverse : float
-        Time of the motion x = 0 at its fastest [s]; inf where that keeps other limits at no pace,
-        or there was no time to find out.
+        Time of the minimum-norm motion at its fastest [s]; inf if that violates other limits at any
+        pace, or if there was no time to find out.
     retimed : float
         Likewise of the motion that is best by the problem's own costs.
     times : tuple of float
@@ -87,10 +87,10 @@ def fastest(
 ) -> Fastest:
     """Return the fastest motion along the problem's path, whatever its own pace and costs.
 
-    The motion that is best by the problem's costs, and that of x = 0, each at its fastest pace
-    (`retime`), are begun with. Then in turn the null motion minimises what is used of the limits at
-    the pace found so far (`LimitUse`), and the pace is the fastest for that joint path; rounds go
-    on while they gain. The best motion is returned: it is never slower than those begun with.
+    It begins with the motion that is best by the problem's costs and with the minimum-norm motion,
+    each at its fastest pace (`retime`). Then in turn the null motion minimises what is used of the
+    limits at the pace found so far (`LimitUse`), and the pace is the fastest for that joint path;
+    rounds go on while they gain. The best motion is returned: never slower than the first two.
 
     Parameters
     ----------

@@ -58,10 +58,11 @@ def plan(
     search : Search, optional
         How to search where the start is free, and whether to compare with a global search.
     warm_start : Plan, optional
-        A plan of this problem or of one like it, whose null motion is begun with, unless x = 0 is
-        better. Where the start is free, its start too; others are tried only if that falls short.
+        A plan of this problem or of one like it: its null motion is the initial guess, unless the
+        minimum-norm motion is better. Where the start is free, its start too; others are tried only
+        if that falls short.
     tolerance : Tolerance, optional
-        What the motion may miss the path by, between samples as well. The number of steps
+        Allowed deviation from the path, between samples as well. The number of steps
         follows from it.
     max_evaluations : int, optional
         Limit on evaluations of the cost while optimising one start; the finished motion is
@@ -69,8 +70,9 @@ def plan(
         the path (30 where the start is free), where limits of joint speed often cannot be met and
         trying would take minutes.
     deadline : float, optional
-        After so many seconds the best so far has to do: no worse than x = 0, or what the search
-        began with. It is judged like any other plan, which takes some time more.
+        After so many seconds planning stops with the best motion so far: no worse than the
+        minimum-norm motion, or than what the search began with. It is then judged like any other
+        plan, which takes some more time.
     callback : callable, optional
         Called with each `Iteration`; returning True stops, keeping the best so far.
     progress : callable, optional
@@ -90,8 +92,8 @@ def plan(
     Raises
     ------
     BreakdownError
-        The motion at x = 0 runs into a singular pose, from every start, so early that no part of
-        the path is worth a plan.
+        The minimum-norm motion runs into a singular pose, from every start, so early that no part
+        of the path is worth a plan.
     InverseKinematicsError
         The start is free and no configuration reaches the start of the path.
     FeedError

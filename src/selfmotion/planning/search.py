@@ -19,8 +19,8 @@ class Search:
         So many at most: for redundancy 1 along all self-motions of the first pose, else what
         Newton's method finds from twice as many seeds.
     finalists : int
-        How many starts are optimised to the end, at most: those of the best rough motions on few
-        nodes. As many as `starts` leave the rough ones out.
+        How many starts are optimised to the end, at most: those with the best rough optima on few
+        nodes. With as many as `starts`, starts are not screened.
     mode : {"auto", "local", "global"}
         Optimise from many starts (local), or from the best sequences over all self-motions: sampled
         evenly where the redundancy is 1 (`best_sequences`), at random where it is more

@@ -66,7 +66,7 @@ class Plan:
     trajectory : Trajectory
         The motion; shorter than the path where the arm cannot follow it to the end.
     initial_trajectory : Trajectory
-        The motion without self-motion (x = 0), for comparison.
+        The minimum-norm motion (q̇ = J⁺ẋ), for comparison.
     coefficients : (size,)
         x, the null motion's coefficients.
     report : Report

@@ -85,7 +85,7 @@ class Report:
     Attributes
     ----------
     cost, initial_cost : float
-        F of the plan, and of the motion without self-motion (x = 0).
+        F of the plan, and of the minimum-norm motion (q̇ = J⁺ẋ).
     terms, initial_terms : dict
         What each cost contributes to them.
     evaluations, gradient_evaluations : int
@@ -108,7 +108,7 @@ class Report:
     ending : str
         Why the motion ends before its path does; "" where it does not.
     active : tuple of Binding
-        The constraints that bind, the most expensive first.
+        The active constraints, the most expensive first.
     null_motion : NullMotion or None
         The parameterisation that the plan's coefficients are of; None for other works' methods.
     remaining : float or None
@@ -116,7 +116,7 @@ class Report:
         what the nodes' distance and another step leave. None of the published method, which knows
         no other null motion.
     attempts : tuple of Attempt
-        What was tried, in order; empty for other works' methods.
+        The strategies that were tried, in order; empty for other works' methods.
     """
 
     cost: float
