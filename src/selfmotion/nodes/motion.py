@@ -281,13 +281,13 @@ class NodeMotion:
         """By how much the worst row is beyond its tolerance [units of h]; 0 where all are kept."""
         return float(np.max(self.h - self.grid.rows.granted, initial=0.0))
 
-    def breaks_hard(self) -> bool:
-        """Whether a row is beyond its tolerance that is not of a tolerance of the task."""
+    def breaks_hard(self, most: float = 0.0) -> bool:
+        """Whether a row is beyond its tolerance by more than that, other than of a tolerance."""
         rows = self.grid.rows
         beyond = rows.split(self.h - rows.granted)
         pairs = zip(rows.constraints, beyond, strict=True)
         return any(
-            not np.max(own, initial=0.0) <= 0.0 for item, own in pairs if not _counts_at_once(item)
+            not np.max(own, initial=0.0) <= most for item, own in pairs if not _counts_at_once(item)
         )
 
     def would_be_calm(self) -> bool:

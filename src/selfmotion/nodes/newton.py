@@ -304,7 +304,9 @@ class _Solver:
         around = around.scaled(grid.scale)
         both = spline.changes(around.changes)
         intervals = grid.cost.curvature(motion.samples, motion.partials, both)
-        bending = grid.rows.bending(motion.checked, prices, both)
+        # Rows of tolerances bend as they do, however far they are broken; not past others.
+        apart = wild and motion.breaks_hard(_WILD)
+        bending = None if apart else grid.rows.bending(motion.checked, prices, both)
         if bending is not None:
             intervals = intervals + bending
         gradient = around.pulled(by_cost)
