@@ -119,10 +119,7 @@ class Draft:
     @property
     def is_unmet(self) -> bool:
         """Whether no motion is known yet that keeps all constraints that are asked of it."""
-        best = self.best
-        if best is None or self.is_published:
-            return best is None
-        return bool(best.violations) or not best.standing.keeps_off_itself
+        return self.best is None or not (self.is_published or _will_do(self.best))
 
     @property
     def is_published(self) -> bool:
@@ -173,8 +170,7 @@ class Draft:
     def dearest(self) -> float:
         """What a motion costs that is known and will do; inf where there is none."""
         best = self.best
-        will_do = best is not None and not best.violations and best.standing.keeps_off_itself
-        return best.standing.cost if best is not None and will_do else np.inf
+        return best.standing.cost if best is not None and _will_do(best) else np.inf
 
     def note(self, session: Session, *, chosen: bool = True) -> None:
         """Keep what came of a session, if it may be `chosen`."""
@@ -280,6 +276,11 @@ class Draft:
         if self.best is None:
             raise KeyboardInterrupt
         self.best.end(Status.INTERRUPTED)
+
+
+def _will_do(session: Session) -> bool:
+    """Whether what stands keeps all constraints, and keeps the arm off itself."""
+    return not session.violations and session.standing.keeps_off_itself
 
 
 def _settle_both(best: Session, rival: Session | None, progress: Progress) -> float | None:
