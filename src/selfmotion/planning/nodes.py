@@ -281,8 +281,10 @@ class NodeDescent:
         motion = standing.motion
         grid, spline = motion.grid, motion.grid.spline
         errors = self._problem.errors_between(motion.trajectory).max(axis=1)
-        parts = np.ceil((errors / WANTED_NEAR_PATH) ** FINER_POWER - 1e-9)
-        parts = np.clip(np.where(errors <= NEAR_PATH, 1.0, parts), 1.0, MOST_PARTS).astype(int)
+        # Where one is too far apart, so is what is nearly so: on the next nodes it would be.
+        wanted = WANTED_NEAR_PATH if errors.max() > NEAR_PATH else NEAR_PATH
+        parts = np.ceil((errors / wanted) ** FINER_POWER - 1e-9)
+        parts = np.clip(parts, 1.0, MOST_PARTS).astype(int)
         away = grid.rows.given_away(standing.prices, motion.curve_ends)
         least = GIVEN_AWAY * abs(motion.aim)
         if away.sum() > least:
