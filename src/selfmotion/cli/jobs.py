@@ -33,6 +33,14 @@ def job(
         Path | None,
         typer.Option(help="Folder for finished work; a job that was stopped resumes from it."),
     ] = None,
+    before: Annotated[
+        Path | None,
+        typer.Option(
+            "--from",
+            help="An earlier .program of this job, or of one like it: what did not change is kept, "
+            "the rest begins at its motions.",
+        ),
+    ] = None,
     workers: Annotated[int, typer.Option(min=1, help="Processes.")] = 1,
     dask: Annotated[
         str | None, typer.Option(help="Or the address of a Dask scheduler, host:port.")
@@ -54,6 +62,7 @@ def job(
             "--settings has no effect: it is of controllers' programs (--out .script, .src, .mod)"
         )
     work = documents.seams_of_file(file, changes or [], allow_code)
+    earlier = None if before is None else sm.load_program(before)
     asked = None if settings is None else sm.read_program_settings(settings)
     if asked is not None or any(_switches(target) for target in wanted):
         # Before anything is planned.
@@ -65,7 +74,12 @@ def job(
     here: Any = processes(workers) if workers > 1 else nullcontext()
     try:
         with executor_at(dask) as cluster, here as pool, StageDisplay(stages) as display:
-            program = work.plan(folder=kept, executor=cluster or pool, progress=display.stage)
+            program = work.plan(
+                folder=kept,
+                executor=cluster or pool,
+                warm_start=earlier,
+                progress=display.stage,
+            )
     except KeyboardInterrupt:
         complain(f"stopped; what is finished is in '{kept}': run again to go on")
         raise typer.Exit(NOT_VERIFIED) from None

@@ -205,12 +205,7 @@ class Shelf:
             found = load_move(archive, known=self._known)
         except (FileFormatError, KeyError, TypeError, ValueError):
             return None
-        if not found.verified or any(another_tool(found.robot, missing.robot)):
-            return None
-        if any(not_judged_by(found.constraints, missing.constraints, None)):
-            return None
-        apart = float(np.abs(found.motion.q[[0, -1]] - ends).max())
-        return found if apart <= _JOINED else None
+        return found if leads(found, missing, ends) else None
 
     def keep_move(self, file: Path | None, move: Move) -> None:
         """Keep a move, or why there is none."""
@@ -220,6 +215,15 @@ class Shelf:
         for archive in _archives(file, count):
             move.save(archive)
         _write(file, count, {"trouble": "" if count else move.trouble})
+
+
+def leads(found: Move, missing: Move, ends: Array) -> bool:
+    """Whether a move is verified for what is asked of a `missing` one, between ends (2, n)."""
+    if not found.verified or any(another_tool(found.robot, missing.robot)):
+        return False
+    if any(not_judged_by(found.constraints, missing.constraints, None)):
+        return False
+    return float(np.abs(found.motion.q[[0, -1]] - ends).max()) <= _JOINED
 
 
 def _archives(file: Path, count: int) -> list[Path]:

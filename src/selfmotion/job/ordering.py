@@ -102,12 +102,22 @@ class Ordering:
         # The seams that plans cannot come after.
         self._too_late: dict[Plan, set[int]] = {}
         self.problems: list[Problem] = [asked.problem(seam) for seam in self.seams]
-        found = work.branches(list(zip(self.seams, self.problems, strict=True)))
-        for number, (plans, reason) in enumerate(found):
+        # What is begun at an earlier program's motions stays near to them.
+        known = work.earlier
+        before = [None if known is None else known.plan_of(seam) for seam in self.seams]
+        self._begun = {number for number, one in enumerate(before) if one is not None}
+        wanted = [
+            (seam, problem, None)
+            if one is None
+            else (seam, asked.problem(seam, turned=one[1]), one[0])
+            for seam, problem, one in zip(self.seams, self.problems, before, strict=True)
+        ]
+        for number, (plans, reason) in enumerate(work.like_before(wanted)):
+            one = before[number]
             if not plans:
                 self.missing[self.seams[number].name] = reason
             for plan in plans:
-                self.add(number, plan)
+                self.add(number, plan, one is not None and one[1])
         self._drop_what_hangs()
         if self.states:
             self._add_alike()
@@ -277,7 +287,7 @@ class Ordering:
         What is near to the same configuration is near to each other.
         """
         here = self.states[0].ends[0] if self._ends[0] is None else self._ends[0]
-        made = self.made
+        made = [seam for seam in self.made if seam not in self._begun]
         plans = self._work.nearby([(self.seams[k], self.problems[k], here) for k in made])
         for seam, found in zip(made, plans, strict=True):
             known = [state for state in self.states if state.seam == seam]
@@ -297,7 +307,9 @@ class Ordering:
                 here = self.states[state]
                 before = self._ends[0] if number == 0 else self.states[states[number - 1]].ends[1]
                 pair = (states[number - 1] if number else None, state)
-                if before is None or pair in tried or self.seconds(before, here.ends[0]) <= _SHORT:
+                if before is None or pair in tried or here.seam in self._begun:
+                    continue
+                if self.seconds(before, here.ends[0]) <= _SHORT:
                     continue
                 tried.add(pair)
                 seam = self.seams[here.seam]

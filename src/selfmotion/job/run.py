@@ -26,6 +26,7 @@ from selfmotion.basics import (
 from selfmotion.certificate import Tolerance
 from selfmotion.constraints import Clearance, Constraint
 from selfmotion.job.building import Builder
+from selfmotion.job.earlier import Earlier, check_earlier
 from selfmotion.job.files import Shelf
 from selfmotion.job.ordering import Ordering
 from selfmotion.job.program import Program
@@ -51,6 +52,7 @@ def plan_job(
     deadline: float = 10.0,
     folder: str | Path | None = None,
     executor: Executor | None = None,
+    warm_start: Program | None = None,
     rng: int = 0,
     progress: Progress = silent,
 ) -> Program:
@@ -94,6 +96,10 @@ def plan_job(
     executor : Executor, optional
         Plans seams and moves at the same time; any of `concurrent.futures`, or a Dask client's. The
         program is the same.
+    warm_start : Program, optional
+        An earlier program of this job, or of one like it, as when a part was moved: seams and moves
+        that did not change are kept, others begin at its motions, in its order where it made the
+        same seams. Where no verified program comes of that, all is planned anew.
     rng : int
         Seed of all random numbers.
     progress : callable, optional
@@ -140,12 +146,6 @@ def plan_job(
     ends = tuple(None if q is None else robot.configuration(q) for q in (start, end))
     price = as_number(seconds_per_cost, "seconds_per_cost", least=0.0)
     shelf = Shelf(None if folder is None else as_path(folder), Tolerance(), {})
-    work = Work(asked, shelf, executor, progress)
-    ordering = Ordering(listed, work, ends, price, is_free)
-    if not ordering.states:
-        reasons = "".join(f"\n  '{name}': {why}" for name, why in ordering.missing.items())
-        raise PlanError(f"{robot.name}: no seam has a motion:{reasons}")
-    program = Builder(ordering, work, ends).program()
     asked_for = Specification(
         listed,
         not is_free,
@@ -155,7 +155,23 @@ def plan_job(
         asked.clearance,
         arm=arm_digest(robot),
     )
-    return replace(program, specification=asked_for)
+    if warm_start is not None:
+        check_earlier(warm_start, robot)
+        earlier = Earlier(warm_start)
+        work = Work(asked, shelf, executor, progress, earlier)
+        as_before = earlier.order_of(listed) if is_free else None
+        ordering = Ordering(as_before or listed, work, ends, price, is_free and not as_before)
+        if ordering.states:
+            program = Builder(ordering, work, ends).program()
+            program = replace(program, specification=asked_for)
+            if program.verified:
+                return program
+    work = Work(asked, shelf, executor, progress)
+    ordering = Ordering(listed, work, ends, price, is_free)
+    if not ordering.states:
+        reasons = "".join(f"\n  '{name}': {why}" for name, why in ordering.missing.items())
+        raise PlanError(f"{robot.name}: no seam has a motion:{reasons}")
+    return replace(Builder(ordering, work, ends).program(), specification=asked_for)
 
 
 def _slowest(seam: Seam) -> float:

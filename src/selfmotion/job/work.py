@@ -16,12 +16,13 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from selfmotion.basics import Array, ProblemError, Progress, one_blas_thread
+from selfmotion.basics import Array, ProblemError, Progress, digest_of, one_blas_thread
 from selfmotion.constraints import Clearance, Constraint
 from selfmotion.costs import FunctionCost
-from selfmotion.job.files import Shelf
+from selfmotion.job.earlier import Earlier, way_along
+from selfmotion.job.files import Shelf, leads
 from selfmotion.job.seam import Seam, backwards
-from selfmotion.planning import branches, from_start, near_start
+from selfmotion.planning import branches, from_start, like_before, near_start
 from selfmotion.problem import (
     Problem,
     arm_and_constraints,
@@ -113,13 +114,32 @@ class Work:
     executor : Executor or None
         None does all here.
     progress : Progress
+    earlier : Earlier, optional
+        Where ways of moves begin.
     """
 
     def __init__(
-        self, asked: Asked, shelf: Shelf, executor: Executor | None, progress: Progress
+        self,
+        asked: Asked,
+        shelf: Shelf,
+        executor: Executor | None,
+        progress: Progress,
+        earlier: Earlier | None = None,
     ) -> None:
         self.asked, self._shelf, self._executor = asked, shelf, executor
-        self.tell = progress
+        self.tell, self.earlier = progress, earlier
+
+    def like_before(
+        self, wanted: Sequence[tuple[Seam, Problem, Plan | None]]
+    ) -> list[tuple[list[Plan], str]]:
+        """Return the verified plan of each problem that begins at the motion of another one.
+
+        Where there is none, or no other one, `branches` of it.
+        """
+        tasks = self._branches([(seam, problem) for seam, problem, _ in wanted])
+        likes = [{} if plan is None else {"like": plan} for _, _, plan in wanted]
+        both = zip(tasks, likes, strict=True)
+        return self._plans([{**task, **like} for task, like in both], "seam")
 
     def branches(
         self, wanted: Sequence[tuple[Seam, Problem]], allowed: Problem | None = None
@@ -128,7 +148,13 @@ class Work:
 
         Their starts keep clear of all that is asked by what is `allowed`, where something is.
         """
-        tasks: list[_Task] = [
+        tasks = self._branches(wanted, allowed)
+        return self._plans(tasks, "seam" if allowed is None else "other ways")
+
+    def _branches(
+        self, wanted: Sequence[tuple[Seam, Problem]], allowed: Problem | None = None
+    ) -> list[_Task]:
+        return [
             {
                 "problem": problem,
                 "name": seam.name,
@@ -138,7 +164,6 @@ class Work:
             }
             for seam, problem in wanted
         ]
-        return self._plans(tasks, "seam" if allowed is None else "other ways")
 
     def nearby(self, wanted: Sequence[tuple[Seam, Problem, Array]]) -> list[list[Plan]]:
         """Return the plans that begin as near as may be to configurations (n,), none or one."""
@@ -150,21 +175,27 @@ class Work:
 
     def moves(self, wanted: Sequence[tuple[Array, Array, Sequence[Any]]]) -> list[Move]:
         """Return moves from configurations (n,) to others, with what stands there each time."""
-        tasks: list[_Task] = []
+        tasks, before = list[_Task](), list[Move | None]()
         for first, last, standing in wanted:
             ends = np.stack([first, last])
+            known = None if self.earlier is None else self.earlier.move_like(ends)
+            before.append(known)
             tasks.append(
                 {
                     "arm": (self.asked.robot, self.asked.of_moves(standing)),
                     "ends": ends,
                     "seconds": self.asked.deadline,
                     "seed": [self.asked.seed, _number(ends.tobytes())],
+                    **({} if known is None else {"way": way_along(known.motion, ends)}),
                 }
             )
         shelf = self._shelf
         files = [shelf.file("move", partial(_move_asked, task), *task["arm"]) for task in tasks]
-        both = zip(files, tasks, strict=True)
-        kept = [shelf.move(file, _missing(task, ""), task["ends"]) for file, task in both]
+        kept = list[Move | None]()
+        for file, task, known in zip(files, tasks, before, strict=True):
+            missing = _missing(task, "")
+            same = known is not None and leads(known, missing, task["ends"])
+            kept.append(known if same else shelf.move(file, missing, task["ends"]))
         return self._finished("move", "move", tasks, files, kept, shelf.keep_move)
 
     def _plans(self, tasks: Sequence[_Task], stage: str) -> list[tuple[list[Plan], str]]:
@@ -232,7 +263,8 @@ class Work:
             files = self._shelf.files(*task["arm"])
             return self._executor.submit(_move_there, {**_move_asked(task), "files": files})
         files = self._shelf.files(self.asked.robot, _constraints_of(task))
-        return self._executor.submit(_plans_there, {**_plans_asked(task), "files": files})
+        like = {"like": _packed(task["like"])} if "like" in task else {}
+        return self._executor.submit(_plans_there, {**_plans_asked(task), **like, "files": files})
 
 
 def check_can_be_sent(costs: Sequence[Any]) -> None:
@@ -258,6 +290,10 @@ def _number(data: bytes) -> int:
 def _plans_here(task: _Task) -> tuple[list[Plan], str]:
     problem = task["problem"]
     with one_blas_thread():
+        if "like" in task:
+            made = like_before(problem, task["like"])
+            if made is not None:
+                return [made], ""
         if "near" not in task:
             generator = np.random.default_rng(task["seed"])
             return branches(problem, task["count"], generator, task.get("allowed"))
@@ -274,7 +310,7 @@ def _move_here(task: _Task) -> Move:
     generator = np.random.default_rng(task["seed"])
     with one_blas_thread():
         free = FreeMotions(robot, constraints, generator)
-        return free.between(first, last, task["seconds"])
+        return free.between(first, last, task["seconds"], task.get("way"))
 
 
 def _missing(task: _Task, trouble: str) -> Move:
@@ -284,7 +320,11 @@ def _missing(task: _Task, trouble: str) -> Move:
 
 def _plans_asked(task: _Task) -> dict[str, Any]:
     problems = [name for name in ("problem", "allowed") if name in task]
-    return {**task, **{name: problem_to_dict(task[name]) for name in problems}}
+    asked = {**task, **{name: problem_to_dict(task[name]) for name in problems}}
+    if "like" in task:
+        motion = task["like"].trajectory
+        asked["like"] = digest_of(motion.t, motion.q)
+    return asked
 
 
 def _move_asked(task: _Task) -> dict[str, Any]:
@@ -299,7 +339,9 @@ def _plans_there(task: _Task) -> tuple[list[bytes], str]:
     """Do a task in another process: plans as the bytes of their files."""
     known = _made.of(task["files"])
     problems = [name for name in ("problem", "allowed") if name in task]
-    made = {name: problem_from_dict(task[name], known) for name in problems}
+    made: dict[str, Any] = {name: problem_from_dict(task[name], known) for name in problems}
+    if "like" in task:
+        made["like"] = _unpacked(task["like"], load_plan, known)
     found, reason = _plans_here({**task, **made})
     return [_packed(plan) for plan in found], reason
 

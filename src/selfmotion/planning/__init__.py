@@ -3,6 +3,7 @@
 from selfmotion.planning.branches import (
     branches as branches,
     from_start as from_start,
+    like_before as like_before,
     near_start as near_start,
 )
 from selfmotion.planning.fastest import Fastest as Fastest, fastest as fastest

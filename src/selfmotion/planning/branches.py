@@ -72,10 +72,28 @@ def branches(
     return [], reason or made.certificate.verdict
 
 
-def from_start(problem: Problem, start: Array) -> tuple[Plan | None, str]:
-    """Return the verified plan from a start (n,), or None and why there is none."""
+def like_before(problem: Problem, before: Plan) -> Plan | None:
+    """Return the verified plan that begins at the motion of another one, or None.
+
+    That of the same problem is taken as it is.
+    """
+    same = replace(before.problem, start=problem.start).digest == problem.digest
+    if same and before.certificate.verified:
+        return before
+    start = near_start(problem, before.trajectory.q[0])
+    return None if start is None else from_start(problem, start, before)[0]
+
+
+def from_start(
+    problem: Problem, start: Array, before: Plan | None = None
+) -> tuple[Plan | None, str]:
+    """Return the verified plan from a start (n,), or None and why there is none.
+
+    It may begin at the motion of one `before`.
+    """
+    given = replace(problem, start=start)
     try:
-        made = _whole(plan(replace(problem, start=start), max_evaluations=BRANCH_EVALUATIONS))
+        made = _whole(plan(given, warm_start=before, max_evaluations=BRANCH_EVALUATIONS))
     except SelfmotionError as error:
         return None, str(error)
     if made.certificate.verified:

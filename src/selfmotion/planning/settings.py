@@ -14,8 +14,8 @@ FIRST_INTERVALS = 16
 # More of them where self-motions start and stop: as shares of the duration from there.
 STARTING = (-0.03, -0.01, 0.01, 0.03)
 # Between its nodes a motion may be off its path by this [m, rad]. Where it is by more, intervals
-# are divided so that it is by that, as the error falls with their third power or more; at most into so
-# many parts.
+# are divided so that it is by that, as the error falls with their third power or more; at most into
+# so many parts.
 NEAR_PATH, WANTED_NEAR_PATH, FINER_POWER, MOST_PARTS = 2e-7, 1e-7, 0.3, 8.0
 # What control points give away of the cost, or what finer nodes save, is nothing [share].
 GIVEN_AWAY = 1e-4

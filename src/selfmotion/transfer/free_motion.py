@@ -4,6 +4,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -97,9 +98,18 @@ class FreeMotions:
             )
         return free
 
-    def between(self, first: Array, last: Array, seconds: float = MOVE_DEADLINE) -> Move:
-        """Return the move from a configuration (n,) to another one, or why there is none."""
-        return self.through([first[None], last[None]], seconds)
+    def between(
+        self,
+        first: Array,
+        last: Array,
+        seconds: float = MOVE_DEADLINE,
+        known: Array | None = None,
+    ) -> Move:
+        """Return the move from a configuration (n,) to another one, or why there is none.
+
+        A way between them (m, n) may be `known`: it is taken where it is free and no straight leg.
+        """
+        return self.through([first[None], last[None]], seconds, known)
 
     def time_of(self, first: Array, last: Array) -> Array:
         """Return what straight moves (K, n) → (K, n) would take by the limits, at least [s]."""
@@ -111,8 +121,11 @@ class FreeMotions:
         times = np.where(far > limits.speed * ramp, far / limits.speed + ramp, short)
         return np.asarray(times.max(axis=-1))
 
-    def through(self, ends: Sequence[Array], seconds: float) -> Move:
-        """Return the move through one of several configurations (k, n) each, in this order."""
+    def through(self, ends: Sequence[Array], seconds: float, known: Array | None = None) -> Move:
+        """Return the move through one of several configurations (k, n) each, in this order.
+
+        A way from the first to the last one may be `known`; see `between`.
+        """
         self._progress("move", 1, 1)
         blocked = self._blocked(ends)
         if blocked:
@@ -123,7 +136,7 @@ class FreeMotions:
         worst, margin, finer = "", MOVE_MARGIN, 1.0
         for _ in range(TRIES_OF_MOVE):
             room = Room(self.asked, self.robot, margin, finer)
-            way = self._way(room, ends, began + seconds)
+            way = self._known_way(room, ends, known) or self._way(room, ends, began + seconds)
             if way is None:
                 break
             path = rounded(room, *way)
@@ -178,6 +191,18 @@ class FreeMotions:
                 return f"{near.first} and {near.second} {apart}"
         names = ", ".join(item.name for item in asked.quantities)
         return f"it leaves what is asked of {names}"
+
+    def _known_way(
+        self, room: Room, ends: Sequence[Array], known: Array | None
+    ) -> tuple[Array, list[int]] | None:
+        """Return a way that is known (m, n), where it is free and nothing is straight."""
+        if known is None or straight_way(room, ends[0], ends[-1]) is not None:
+            return None
+        # On limits, the ends are put inside them.
+        known = np.concatenate([ends[0], known[1:-1], ends[-1]])
+        if not all(room.is_open(*leg) for leg in pairwise(known)):
+            return None
+        return shortened(room, known, self._rng), []
 
     def _way(self, room: Room, ends: Sequence[Array], end: float) -> tuple[Array, list[int]] | None:
         """Return a way (m, n) through all ends, and where on it the inner ones are."""
