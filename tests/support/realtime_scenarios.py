@@ -112,6 +112,8 @@ def run(seed: int, task: str, robot: sm.RobotModel, replanner: Replanner) -> Out
             if recovering and (miss > NEAR or not segment.follows):
                 disturbed_until = t
             outcome.flags[segment.flag] = outcome.flags.get(segment.flag, 0) + 1
+            if segment.flag is not Flag.PLANNED and not segment.reasons:
+                outcome.faults.append(f"{segment.flag.value} for no reason at {t:.2f} s")
         arm.run(replanner.period)
         goal = path.pose(min(arm.t, path.duration))
         miss = sm.Task.of(task).miss(goal, robot.pose(arm.q))[0]

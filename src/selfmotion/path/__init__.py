@@ -5,9 +5,11 @@ from selfmotion.path.base import (
     Path as Path,
     PathSamples as PathSamples,
     PathSeries as PathSeries,
+    check_duration as check_duration,
     check_oriented as check_oriented,
     path_pose as path_pose,
     path_series as path_series,
+    rotations_about as rotations_about,
 )
 from selfmotion.path.feed import Feed as Feed
 from selfmotion.path.feed_kept import FeedKept as FeedKept

@@ -2,6 +2,7 @@
 
 from selfmotion.realtime.conveyed import Conveyed as Conveyed
 from selfmotion.realtime.loop import State as State, follow as follow
+from selfmotion.realtime.moving_pose import MovingPose as MovingPose
 from selfmotion.realtime.reference import Approach as Approach
 from selfmotion.realtime.replanner import Replanner as Replanner
 from selfmotion.realtime.segment import Flag as Flag, Segment as Segment

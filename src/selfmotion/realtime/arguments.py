@@ -7,6 +7,7 @@ import numpy as np
 
 from selfmotion.basics import (
     Array,
+    PathError,
     ProblemError,
     RobotError,
     as_numbers,
@@ -18,6 +19,7 @@ from selfmotion.constraints import Constraint
 from selfmotion.costs import Cost
 from selfmotion.follow import Follows
 from selfmotion.motion import NullMotion
+from selfmotion.realtime.moving_pose import MovingPose
 from selfmotion.realtime.reference import Approach
 from selfmotion.robot import RobotModel
 from selfmotion.task import Task
@@ -67,6 +69,31 @@ def as_measured(values: Any, dof: int) -> Array:
     """Return a measured state (n,) as it is, or NaN where it is no numbers at all."""
     numbers = plain_numbers(values)
     return np.full(dof, np.nan) if numbers is None else numbers
+
+
+def as_seen(
+    path: object, target: Any, twist: Any, seen: float, reasons: list[str]
+) -> MovingPose | None:
+    """Return the motion of a target as it was seen; None where it is none, and add the reason.
+
+    A camera that sees nothing, or what is not finite, must not leave the arm without a command.
+
+    Raises
+    ------
+    ProblemError
+        There is a path, too, or no target.
+    """
+    if path is not None or target is None:
+        named = "path and target" if path is not None else "twist and seen"
+        raise ProblemError(
+            f"{named}: a target moves by its twist from when it was seen, in place of a path; "
+            f"give target= with them, and no path"
+        )
+    try:
+        return MovingPose(target, np.zeros(6) if twist is None else twist, seen)
+    except PathError as error:
+        reasons.append(f"the target is of no use: {error}")
+        return None
 
 
 def in_null_space(motion: NullMotion) -> NullMotion:

@@ -22,17 +22,22 @@ class State:
         When it was measured [s].
     q, qd : (n,)
         Measured positions and velocities [rad or m, and per s].
-    path : Path
+    path : Path, optional
         The tool's motion, as it is known by now.
     obstacles : mapping
         Where obstacles are by now: name → pose.
+    target, twist, seen : optional
+        In place of a path; see `Replanner.step`.
     """
 
     t: float
     q: npt.ArrayLike
     qd: npt.ArrayLike
-    path: Path
+    path: Path | None = None
     obstacles: Mapping[str, SE3] = field(default_factory=dict)
+    target: SE3 | npt.ArrayLike | None = None
+    twist: npt.ArrayLike | None = None
+    seen: float | None = None
 
 
 def follow(
@@ -71,6 +76,16 @@ def follow(
     while (state := read()) is not None:
         if not isinstance(state, State):
             raise ProblemError(f"read() returned {type(state).__name__}, expected State or None")
-        write(replanner.step(state.t + lead, state.q, state.qd, state.path, state.obstacles))
+        segment = replanner.step(
+            state.t + lead,
+            state.q,
+            state.qd,
+            state.path,
+            state.obstacles,
+            target=state.target,
+            twist=state.twist,
+            seen=state.seen,
+        )
+        write(segment)
         count += 1
     return count

@@ -16,6 +16,7 @@ from selfmotion.realtime.arguments import (
     as_asked,
     as_begun,
     as_measured,
+    as_seen,
     check_kinds,
     in_null_space,
 )
@@ -153,10 +154,18 @@ class Replanner:
         t: float,
         q: npt.ArrayLike,
         qd: npt.ArrayLike,
-        path: Path,
+        path: Path | None = None,
         obstacles: Mapping[str, SE3] | None = None,
+        *,
+        target: SE3 | npt.ArrayLike | None = None,
+        twist: npt.ArrayLike | None = None,
+        seen: float | None = None,
     ) -> Segment:
         """Return the motion to command from `t` on.
+
+        What the tool is to do is a `path`, or a `target` as a camera sees it. A target may come at
+        its own rate: where neither is given, the last one goes on, for as long as the replanner's
+        `patience`; then the arm is brought to rest.
 
         Parameters
         ----------
@@ -166,12 +175,19 @@ class Replanner:
         q, qd : (n,)
             Measured state [rad or m, per s]: at the first step, where the command begins. Later
             ones tell where the arm is at ``t - latency``; numbers that are not finite are left out.
-        path : Path
+        path : Path, optional
             The tool's motion, at the time of `t`; another one at each step, if need be. Before it
             begins and after it ends, it rests.
         obstacles : mapping, optional
             Where obstacles of the `Clearance` are by now: name → pose in the world, or in the
             frame of the link that carries it.
+        target : SE3 or (4, 4), optional
+            Where the tool is to be [m], world axes; it moves on by `twist`.
+        twist : (6,), optional
+            How the target moves: velocity of its origin [m/s] and angular velocity [rad/s], world
+            axes. By default it rests.
+        seen : float, optional
+            When the target was seen, on the clock of `t` [s]; by default at `t`.
 
         Returns
         -------
@@ -183,18 +199,23 @@ class Replanner:
         StartError
             The first state is not one from which the arm can stop within its limits.
         ProblemError
-            `t` lies before the last step, or an obstacle is not known.
+            `t` lies before the last step, an obstacle is not known, or there are both a path and a
+            target.
         """
+        t, reasons = as_number(t, "t"), list[str]()
+        if target is not None or twist is not None or seen is not None:
+            path = as_seen(path, target, twist, t if seen is None else seen, reasons)
         with one_blas_thread():
-            return self._step(as_number(t, "t"), q, qd, path, obstacles or {})
+            return self._step(t, q, qd, path, obstacles or {}, reasons)
 
     def _step(
         self,
         t: float,
         q: npt.ArrayLike,
         qd: npt.ArrayLike,
-        path: Path,
+        path: Path | None,
         obstacles: Mapping[str, SE3],
+        reasons: list[str],
     ) -> Segment:
         dof = self.robot.dof
         if not self._begun:
@@ -202,7 +223,6 @@ class Replanner:
         q, qd = as_measured(q, dof), as_measured(qd, dof)
         commands = self._commands
         passed = commands.go_on(t)
-        reasons: list[str] = []
         if self._around is not None:
             self._around.move(obstacles)
         moving = self._measure(q, passed, reasons)
