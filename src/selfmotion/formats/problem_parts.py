@@ -11,7 +11,6 @@ from selfmotion.basics import (
     Array,
     FileFormatError,
     ProblemError,
-    RobotError,
     restore,
 )
 from selfmotion.collision import Mesh, obstacle_from_dict
@@ -27,7 +26,7 @@ from selfmotion.path import (
     Weave,
     with_leads,
 )
-from selfmotion.robot import NAMED_ARMS, RobotModel
+from selfmotion.robot import RobotModel
 from selfmotion.task import Task
 
 if TYPE_CHECKING:
@@ -155,13 +154,7 @@ def start_of(given: Any, robot: RobotModel, task: Task) -> Array | None:
         return None
     if given == "dexterous":
         return robot.dexterous_configuration(task)
-    if given != "home":
-        return robot.configuration(given)
-    for arm in NAMED_ARMS.values():
-        if arm.home is not None and robot.urdf.source.endswith(arm.urdf):
-            return robot.configuration(np.array(arm.home))
-    homes = ", ".join(name for name, arm in NAMED_ARMS.items() if arm.home is not None)
-    raise RobotError(f"is 'home', which is known of {homes} only; give numbers, or 'dexterous'")
+    return robot.home if given == "home" else robot.configuration(given)
 
 
 def _restored(values: Mapping[str, Any]) -> Path:

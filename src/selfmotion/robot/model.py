@@ -15,6 +15,7 @@ from selfmotion.robot.coupling import Coupling
 from selfmotion.robot.freedom import can_follow, most_dexterous, redundancy
 from selfmotion.robot.geometry import readable_visuals, reduced_geometry, stand_in
 from selfmotion.robot.inverse import solved
+from selfmotion.robot.named import home_of
 from selfmotion.robot.tree_arrays import TreeArrays, tree_arrays
 from selfmotion.robot.urdf import Urdf
 from selfmotion.robot.weights import joint_weights, part_weights
@@ -169,6 +170,19 @@ class RobotModel:
             No joint belongs to a part of that name, nor has the name.
         """
         return part_weights(self, weights)
+
+    @property
+    def home(self) -> Array:
+        """The configuration (n,) that the arm's maker calls ready [rad or m].
+
+        In a cell that of each part; tables and rails are at zero, or at their limit nearest to it.
+
+        Raises
+        ------
+        RobotError
+            It is not known of a part.
+        """
+        return home_of(self.urdf, self.joint_names, self.lower, self.upper)
 
     def configuration(self, q: npt.ArrayLike) -> Array:
         """Return `q` as a float64 vector of n finite numbers.

@@ -2,14 +2,14 @@
 
 import dataclasses
 import importlib.metadata
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from selfmotion.basics import RobotError
+from selfmotion.basics import Array, RobotError
 from selfmotion.robot.urdf import Urdf, read_urdf
 
 
@@ -36,6 +36,9 @@ class NamedArm:
     touching: tuple[tuple[str, str], ...] = ()
 
 
+# Upright, as `initial_positions.yaml` of Universal Robots' ROS 2 description has it.
+_UPRIGHT = (0.0, -np.pi / 2, 0.0, -np.pi / 2, 0.0, 0.0)
+
 NAMED_ARMS: Mapping[str, NamedArm] = {
     "planar_3r": NamedArm("planar_3r.urdf", "tool"),
     "panda": NamedArm(
@@ -43,7 +46,8 @@ NAMED_ARMS: Mapping[str, NamedArm] = {
         "panda_hand_tcp",
         home=(0.0, -np.pi / 4, 0.0, -3 * np.pi / 4, 0.0, np.pi / 2, np.pi / 4),
     ),
-    "xarm7": NamedArm("xarm_description/urdf/xarm7.urdf", "link_eef"),
+    # As in UFACTORY's semantic description, which comes with the URDF.
+    "xarm7": NamedArm("xarm_description/urdf/xarm7.urdf", "link_eef", home=7 * (0.0,)),
     "baxter": NamedArm(
         "baxter_description/urdf/baxter.urdf",
         "left_gripper",
@@ -58,11 +62,14 @@ NAMED_ARMS: Mapping[str, NamedArm] = {
         "r_gripper_tool_frame",
         touching=(("r_shoulder_pan_link", "r_upper_arm_link"),),
     ),
-    "ur5": NamedArm("ur_description/urdf/ur5_robot.urdf", "tool0"),
-    "ur10": NamedArm("ur_description/urdf/ur10_robot.urdf", "tool0"),
+    "ur5": NamedArm("ur_description/urdf/ur5_robot.urdf", "tool0", home=_UPRIGHT),
+    "ur10": NamedArm("ur_description/urdf/ur10_robot.urdf", "tool0", home=_UPRIGHT),
     "kinova": NamedArm("kinova_description/robots/kinova.urdf", "j2s6s200_end_effector"),
     "z1": NamedArm("z1_description/urdf/z1.urdf", "gripperStator"),
 }
+
+# Tables, rails and hands have no more joints than this: home, they are at zero.
+_OF_A_TABLE = 3
 
 # What arms work with, known by name like these.
 NAMED_PARTS: Mapping[str, NamedArm] = {"positioner": NamedArm("positioner.urdf", "plate")}
@@ -83,6 +90,26 @@ def published(name: str) -> Mapping[str, Any]:
 def names_of(source: str) -> list[str]:
     """Return the names of arms whose URDF is the file that another one came from."""
     return [name for name, arm in NAMED_ARMS.items() if source.endswith(arm.urdf)]
+
+
+def home_of(urdf: Urdf, joints: Sequence[str], lower: Array, upper: Array) -> Array:
+    """Return the configuration (n,) that makers call ready; see `RobotModel.home`."""
+    q = np.clip(np.zeros(len(joints)), lower, upper)
+    parts = {part.name: part.source for part in urdf.parts} or {"": urdf.source}
+    for part, source in parts.items():
+        own = [k for k, name in enumerate(joints) if not part or name.startswith(f"{part}/")]
+        known = [source] if part and source in NAMED_ARMS else names_of(source)
+        homes = [NAMED_ARMS[name].home for name in known]
+        found = next((home for home in homes if home is not None and len(home) == len(own)), None)
+        if found is not None:
+            q[own] = found
+        elif not part or len(own) > _OF_A_TABLE:
+            told = f"part '{part}'" if part else "this arm"
+            all_known = ", ".join(name for name, arm in NAMED_ARMS.items() if arm.home is not None)
+            raise RobotError(
+                f"what is home is not known of {told}, only of {all_known}; give a configuration"
+            )
+    return q
 
 
 def read_named(arm: NamedArm) -> Urdf:
