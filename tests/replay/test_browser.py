@@ -256,7 +256,7 @@ def test_a_joint_singled_out_shows_its_limits(pages):
 def test_plans_share_a_page(open_page, files):
     page = open_page(files["two"])
     second = planar_plan(mu=30.0)
-    assert page.locator("#choice button").count() == 2
+    assert page.locator("#choice button:not(#sides)").count() == 2
     page.locator("#choice button").nth(1).click()
     page.evaluate("viewer.animator.seek(1.3)")
     assert largest_difference(page_poses(page), second, 1.3) < 1e-4
@@ -485,3 +485,111 @@ def test_the_policy_stops_foreign_code(open_page, files, tmp_path):
     assert page.evaluate("window.foreign") is None
     with pytest.raises(AssertionError):
         assert_quiet(page)
+
+
+TIP = """() => {
+  viewer.scene.updateMatrixWorld(true);
+  const inverse = viewer.scene.matrixWorld.clone().invert();
+  const { object } = viewer.scene_tree.find(["selfmotion", "robot", "panda_joint7"]);
+  return inverse.multiply(object.matrixWorld).toArray();
+}"""
+# Between the times at which self-motions are known the tool is off by this at most [m, rad].
+BETWEEN = 1e-3
+
+
+def test_the_arm_moves_along_its_self_motion_and_the_tool_stays(pages):
+    page = pages["panda"]
+    page.evaluate("replay.seek(1.3)")
+    before = page_poses(page)
+    tip = np.array(page.evaluate(TIP))
+    for step in (-7.0, -0.4, 4.5, 10.0):
+        page.evaluate("step => replay.turn(step)", step)
+        assert np.abs(np.array(page.evaluate(TIP)) - tip).max() < BETWEEN
+        moved = page_poses(page)
+        far = max(np.abs(moved[name] - pose).max() for name, pose in before.items())
+        assert far > 1e-2
+        # Of a posture of which nobody has measured it no distance is told.
+        assert not page.locator("#pair").is_visible()
+    page.evaluate("replay.seek(1.3)")
+    assert largest_difference(page_poses(page), arm_plan("panda"), 1.3) < 1e-4
+    assert_quiet(page)
+
+
+def test_two_plans_move_side_by_side_on_one_clock(open_page, files):
+    page = open_page(files["two"])
+    page.locator("#sides").click()
+    page.evaluate("replay.seek(1.3)")
+    places = page.evaluate("""replay.sides.map(([stage, number]) => {
+      const { viewer } = stage;
+      viewer.scene.updateMatrixWorld(true);
+      const inverse = viewer.scene.matrixWorld.clone().invert();
+      return [number, stage.content.movers.map((name) => inverse.clone().multiply(
+        viewer.scene_tree.find(["selfmotion", "robot", name]).object.matrixWorld).toArray())];
+    })""")
+    for (number, shown), plan in zip(places, (planar_plan(), planar_plan(mu=30.0)), strict=True):
+        poses = [np.reshape(matrix, (4, 4)).T for matrix in shown]
+        named = dict(zip(plan.robot.joint_names, poses, strict=True))
+        assert largest_difference(named, plan, 1.3) < 1e-4, number
+    labels = page.locator("[data-label]").evaluate_all("all => all.map((one) => one.dataset.label)")
+    assert labels == ["Plan A", "Plan B"]
+    # Both are seen from where one of them is turned to.
+    page.locator("#camera").select_option("1,0,0.15")
+    eyes = page.evaluate("replay.sides.map(([stage]) => stage.viewer.camera.position.toArray())")
+    np.testing.assert_allclose(*eyes)
+    page.locator("#sides").click()
+    assert page.locator("#beside").is_hidden()
+    assert_quiet(page)
+
+
+def test_the_address_leads_to_a_time_and_a_plan(open_page, files):
+    page = open_page(files["two"])
+    page.evaluate("replay.choose(1); replay.seek(0.75)")
+    assert page.url.endswith("#t=0.750&plan=2")
+    again = page.context.new_page()
+    again.seen = Seen(again)
+    again.goto(page.url)
+    again.wait_for_selector("html[data-replay=ready]", timeout=60_000)
+    assert again.locator("#clock").inner_text().startswith("0.75 /")
+    assert again.evaluate("replay.number") == 1
+    assert_quiet(again)
+
+
+def test_bodies_frames_and_names_are_shown_when_asked_for(pages):
+    page = pages["panda"]
+    shown = """() => viewer.scene_tree.find(["selfmotion", "bodies"]).object.visible"""
+    assert not page.evaluate(shown)
+    for key in ("b", "n", "f"):
+        page.keyboard.press(key)
+    page.evaluate("viewer.render()")
+    assert page.evaluate(shown)
+    assert page.evaluate("replay.stage.axes.every(({ visible }) => visible)")
+    assert "panda_link4" in page.locator(".names span").all_inner_texts()
+    # The bodies move with their links.
+    page.evaluate("replay.seek(2.0)")
+    apart = page.evaluate("""() => {
+      viewer.scene.updateMatrixWorld(true);
+      const node = (part) => viewer.scene_tree.find(["selfmotion", part, "panda_joint5"]);
+      const at = (part) => node(part).object.matrixWorld.toArray();
+      const [one, other] = [at("robot"), at("bodies")];
+      return Math.max(...one.map((value, k) => Math.abs(value - other[k])));
+    }""")
+    assert apart == 0.0
+    for key in ("b", "n", "f"):
+        page.keyboard.press(key)
+    assert page.locator(".names span").count() == 0
+    assert_quiet(page)
+
+
+def test_the_view_goes_along_with_the_tool(pages):
+    page = pages["panda"]
+    page.evaluate("replay.seek(0.0)")
+    page.keyboard.press("v")
+    target = "viewer.controls.target.toArray()"
+    tool = "replay.stage.toolAt(replay.plan.ellipsoid, replay.now).toArray()"
+    began = [np.array(page.evaluate(what)) for what in (target, tool)]
+    page.evaluate("replay.seek(2.0)")
+    ended = [np.array(page.evaluate(what)) for what in (target, tool)]
+    np.testing.assert_allclose(ended[0] - began[0], ended[1] - began[1], atol=1e-9)
+    assert np.abs(ended[1] - began[1]).max() > 1e-2
+    page.keyboard.press("v")
+    page.keyboard.press("r")

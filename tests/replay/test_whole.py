@@ -7,6 +7,8 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.replay import replay_html, shapes
+from selfmotion.replay.motion import curves
+from selfmotion.replay.payload import Payload
 from selfmotion.replay.whole import Whole
 from support.replay_plans import two_seams
 
@@ -51,9 +53,35 @@ def test_seams_are_drawn_thicker_than_moves(program, monkeypatch) -> None:
 
     monkeypatch.setattr(shapes, "tube", recorded)
     replay_html(program)
-    whole, seams = drawn[:-2], drawn[-2:]
-    assert [length for _, length in seams] == pytest.approx([0.1, 0.1], abs=1e-3)
-    assert max(radius for radius, _ in whole) < 0.6 * min(radius for radius, _ in seams)
+    thick = max(radius for radius, _ in drawn)
+    seams = [length for radius, length in drawn if radius == thick]
+    moves = [radius for radius, _ in drawn if radius < thick]
+    assert seams == pytest.approx([0.1, 0.1], abs=1e-3)
+    assert len(moves) == sum(not step.is_seam for step in program.steps)
+    assert max(moves) < 0.6 * thick
+
+
+def test_moves_are_drawn_in_the_world_and_seams_where_they_are_carried() -> None:
+    """On a table that turns, a move is no coil."""
+    table = np.eye(4)
+    table[0, 3] = 0.55
+    cell = sm.load_robot(
+        {"arm": "panda", "table": "positioner"},
+        base={"table": table},
+        tool="arm/panda_hand_tcp",
+        reference="table/plate",
+    )
+    first, last = cell.home.copy(), cell.home.copy()
+    first[-1], last[-1] = -1.5, 1.5
+    move = sm.move(cell, first, last, clearance=None).require()
+    whole = Whole.of(move)
+    shown = curves(whole.plan, whole.plan.trajectory, points=whole.points)
+    # The arm hardly moves in the world, while the plate turns by 3 rad below it.
+    assert np.ptp(shown.tool_in_world, axis=0).max() < 1e-6
+    assert np.ptp(shown.tool, axis=0).max() > 0.1
+    payload = Payload()
+    drawn = whole.commands("/plan/tip0", "/plan/moves", payload, shown, (0.005, 0.002))
+    assert drawn == []
 
 
 def test_what_happens_is_on_the_path_in_the_order_of_time() -> None:

@@ -311,6 +311,7 @@ def replay(
     if png is not None:
         written.append(render_png(first, html.with_suffix(".png"), t=png))
     if gif is not None:
-        written.append(render_gif(first, gif))
+        with StageDisplay(stages) as display:
+            written.append(render_gif(first, gif, progress=display.stage))
     for file in written:
         terminal.print(f"wrote {file}", markup=False, soft_wrap=True)

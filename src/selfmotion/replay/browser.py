@@ -11,7 +11,14 @@ from typing import IO, Any
 
 import numpy as np
 
-from selfmotion.basics import RenderError, as_path, write_atomically, write_bytes
+from selfmotion.basics import (
+    Progress,
+    RenderError,
+    as_path,
+    silent,
+    write_atomically,
+    write_bytes,
+)
 from selfmotion.replay.page import Shown, replay_html
 
 _BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
@@ -44,7 +51,8 @@ def render_png(
     size : (int, int)
         Width and height [pixels].
     layers : sequence of str
-        What is shown beside the arm: of ``ghost``, ``trace``, ``triads``, ``ellipsoid``.
+        What is shown beside the arm: of ``ghost``, ``trace``, ``triads``, ``ellipsoid``,
+        ``frames``, ``names``, ``bodies``.
     whole_page : bool
         Draw the page with plots and controls, as tall as it is, instead of the scene alone.
     dark : bool
@@ -75,11 +83,13 @@ def render_gif(
     frames_per_second: int = 20,
     layers: Sequence[str] = LAYERS,
     dark: bool = False,
+    progress: Progress = silent,
     **options: Any,
 ) -> Path:
     """Draw the first plan's motion, in real time, as an animated GIF that repeats.
 
-    Parameters and errors are those of `render_png`.
+    Parameters and errors are those of `render_png`; `progress` is told of each picture, as in
+    `plan`.
     """
     from PIL import Image
 
@@ -87,7 +97,10 @@ def render_gif(
     with _opened(replay_html(plans, **options), size, layers, False, dark) as page:
         duration = float(page.evaluate("replay.duration"))
         count = max(2, round(duration * frames_per_second) + 1)
-        shots = [_shot(page, float(t), False) for t in np.linspace(0.0, duration, count)]
+        shots = []
+        for number, t in enumerate(np.linspace(0.0, duration, count).tolist(), 1):
+            progress("picture", number, count)
+            shots.append(_shot(page, t, False))
     frames = [Image.open(io.BytesIO(shot)).convert("RGB") for shot in shots]
     # One palette for all frames: a palette for each makes plain surfaces shimmer.
     palette = frames[count // 2].quantize(colors=255)

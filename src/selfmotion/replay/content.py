@@ -10,6 +10,7 @@ from selfmotion.replay.clearance import ClearanceCurve, clearance_curve
 from selfmotion.replay.facts import describe, table
 from selfmotion.replay.motion import Curves, KeyFrames, curves, key_frames, torque_limits
 from selfmotion.replay.payload import Json, Payload
+from selfmotion.replay.self_motion import SelfMotion, self_motion
 from selfmotion.replay.whole import Whole
 from selfmotion.result import Plan
 
@@ -19,7 +20,10 @@ _LAYERS = [
     {"name": "trace", "label": "tool path", "key": "t", "on": True},
     {"name": "triads", "label": "tool axes", "key": "a", "on": True},
     {"name": "ellipsoid", "label": "velocity ellipsoid", "key": "e", "on": False},
+    {"name": "frames", "label": "joint frames", "key": "f", "on": False},
+    {"name": "names", "label": "names", "key": "n", "on": False},
 ]
+_BODIES_LAYER = {"name": "bodies", "label": "collision bodies", "key": "b", "on": False}
 _PAIR_LAYER = {"name": "pair", "label": "closest pair", "key": "c", "on": True}
 
 # Sizes of what is drawn, relative to half the diagonal of the scene.
@@ -28,6 +32,7 @@ _TRACE_RADIUS = 0.005
 _THIN = 0.4
 _TRIAD_LENGTH = 0.09
 _ELLIPSOID_LENGTH = 0.3
+_FRAME_LENGTH = 0.12
 
 
 class _Tip:
@@ -66,6 +71,7 @@ class _Motion:
         models = [model for model, _ in plan.problem.envelope.bodies]
         grows = whole is not None and whole.grows
         self.clearance = None if grows else clearance_curve(plan.trajectory, models)
+        self.self_motion = None if whole else self_motion(plan.problem, plan.trajectory)
 
 
 def page_content(
@@ -104,6 +110,7 @@ def page_content(
             *links.arm_commands(robot, arm),
             *links.ghost_commands(robot, arm),
             scene.ellipsoid_command(),
+            *obstacles.body_commands(robot, payload),
         ],
         "meshes": arm.meshes,
         "joints": _joints(plans[0]),
@@ -112,6 +119,7 @@ def page_content(
         "layers": _layers(motions),
         "scale": {**scale, "colors": shapes.COLOR_SCALE},
         "ellipsoidSize": _ELLIPSOID_LENGTH * box.radius / longest,
+        "frameSize": _FRAME_LENGTH * box.radius,
         "links": {visual.link: links.link_node(robot, visual) for visual in arm.visuals},
         "plans": [
             _plan(motion, name, f"/selfmotion/plan{k}", payload, scale, triads, box.radius)
@@ -124,7 +132,10 @@ def page_content(
 def _layers(motions: list[_Motion]) -> list[Json]:
     """Return what can be shown and hidden; of several steps there is no minimum-norm motion."""
     kept = [item for item in _LAYERS if item["name"] != "ghost" or motions[0].whole is None]
-    return [*kept, _PAIR_LAYER] if any(motion.clearance for motion in motions) else kept
+    has_bodies = motions[0].plan.robot.urdf.has_collisions
+    bodies = [_BODIES_LAYER] if has_bodies else []
+    pair = [_PAIR_LAYER] if any(motion.clearance for motion in motions) else []
+    return [*kept, *bodies, *pair]
 
 
 def _facts(plans: list[Plan], whole: Whole | None) -> list[Json]:
@@ -173,13 +184,18 @@ def _plan(
         "events": [] if whole is None else whole.happenings(),
         "root": root,
         "tips": [
-            {"root": f"{root}/tip{f}", "carrier": tip.carrier} for f, tip in enumerate(motion.tips)
+            *(
+                {"root": f"{root}/tip{f}", "carrier": tip.carrier}
+                for f, tip in enumerate(motion.tips)
+            ),
+            *([] if whole is None else [{"root": f"{root}/moves", "carrier": -1}]),
         ],
         "duration": motion.plan.trajectory.duration,
         "verdict": motion.plan.certificate.verdict if whole is None else whole.verdict,
         "verified": bool((motion.plan.certificate if whole is None else whole).verified),
         "frames": _packed(motion.frames, payload),
         "ghost": _packed(motion.ghost, payload),
+        "selfMotion": _self_motion(motion.self_motion, payload),
         "curves": _curves(motion.plan, shown, payload),
         "start": _curves(motion.plan, motion.start, payload),
         "ellipsoid": {
@@ -195,34 +211,32 @@ def _plan(
             *(
                 command
                 for f, tip in enumerate(motion.tips)
-                for command in _traces(
-                    f"{root}/tip{f}",
-                    payload,
-                    tip,
-                    scale,
-                    times,
-                    size,
-                    1.0 if whole is None else _THIN,
-                )
-            ),
-            *(
-                []
-                if whole is None
-                else whole.commands(f"{root}/tip0", payload, shown, _TRACE_RADIUS * size)
+                for command in _traces(f"{root}/tip{f}", payload, tip, scale, times, size, whole)
             ),
         ],
     }
 
 
 def _traces(
-    root: str, payload: Payload, tip: _Tip, scale: Json, times: Array, size: float, width: float
+    root: str,
+    payload: Payload,
+    tip: _Tip,
+    scale: Json,
+    times: Array,
+    size: float,
+    whole: Whole | None,
 ) -> list[Json]:
-    """Return the commands for the traces of a tip, below the node `root` of what carries them."""
-    look = (scale, width * _TRACE_RADIUS * size)
-    return [
-        *scene.trace_commands(root, payload, tip.shown, tip.start, tip.target, *look),
-        scene.triad_command(root, payload, tip.shown, times, _TRIAD_LENGTH * size),
-    ]
+    """Return the commands for the traces of a tip, below the node `root` of what carries them.
+
+    Of a whole the seams are where they are carried, and the moves in the world beside it.
+    """
+    radius = _TRACE_RADIUS * size
+    axes = scene.triad_command(root, payload, tip.shown, times, _TRIAD_LENGTH * size)
+    if whole is None:
+        traces = (tip.shown, tip.start, tip.target, scale, radius)
+        return [*scene.trace_commands(root, payload, *traces), axes]
+    moves = f"{root.rsplit('/', 1)[0]}/moves"
+    return [*whole.commands(root, moves, payload, tip.shown, (radius, _THIN * radius)), axes]
 
 
 def _packed(frames: KeyFrames, payload: Payload) -> Json:
@@ -230,6 +244,18 @@ def _packed(frames: KeyFrames, payload: Payload) -> Json:
         "t": payload.array(frames.t, "f8"),
         "position": payload.array(frames.position),
         "quaternion": payload.array(frames.quaternion),
+    }
+
+
+def _self_motion(found: SelfMotion | None, payload: Payload) -> Json | None:
+    if found is None:
+        return None
+    return {
+        "joint": found.joint,
+        "t": payload.array(found.frames[0].t),
+        "position": payload.array(np.stack([one.position for one in found.frames])),
+        "quaternion": payload.array(np.stack([one.quaternion for one in found.frames])),
+        "steps": len(found.frames),
     }
 
 

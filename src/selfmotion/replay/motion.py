@@ -83,7 +83,12 @@ def _joined(a: KeyFrames, b: KeyFrames) -> KeyFrames:
 
 
 def _poses(robot: RobotModel, trajectory: Trajectory, times: Array) -> KeyFrames:
-    poses = robot.joint_poses(trajectory(_clock(trajectory, times)))
+    return poses_of(robot, trajectory(_clock(trajectory, times)), times)
+
+
+def poses_of(robot: RobotModel, q: Array, times: Array) -> KeyFrames:
+    """Return the poses of the links at configurations (K, n) of so many times (K,) [s]."""
+    poses = robot.joint_poses(q)
     return KeyFrames(times, poses[..., :3], poses[..., 3:])
 
 

@@ -1,4 +1,4 @@
-"""Obstacles as commands for the viewer: in the world, or on the links that carry them."""
+"""Bodies as commands for the viewer: obstacles, and what of the links may not meet anything."""
 
 import itertools
 from collections.abc import Sequence
@@ -14,10 +14,11 @@ from selfmotion.collision import (
     Obstacle,
     Solid,
     Sphere,
+    link_bodies,
     place_of,
 )
 from selfmotion.replay import three
-from selfmotion.replay.links import safe
+from selfmotion.replay.links import joint_name, safe
 from selfmotion.replay.meshes import read_meshes
 from selfmotion.replay.payload import Json, Payload
 from selfmotion.replay.scene import triangles
@@ -25,6 +26,8 @@ from selfmotion.robot import RobotModel
 
 # Of what stands around, the part that is worked on, and what the arm carries.
 _AROUND, _PART, _CARRIED = (0.80, 0.62, 0.42), (0.47, 0.66, 0.56), (0.36, 0.48, 0.70)
+# The links' own, seen through.
+BODIES, _BODY_COLOR, _BODY_OPACITY = "/selfmotion/bodies", (0.05, 0.62, 0.58), 0.35
 # What the part of a problem file is called.
 _WORKPIECE = "workpiece"
 
@@ -105,3 +108,17 @@ def _obstacle(item: Obstacle, robot: RobotModel, payload: Payload) -> list[tuple
             meshes = read_meshes(str(item.file), item.label)
             return [(triangles(payload, mesh.vertices, mesh.faces), scaled) for mesh in meshes]
     return [(triangles(payload, *Solid(item.geometry(), item.label).surface()), matrix)]
+
+
+def body_commands(robot: RobotModel, payload: Payload) -> list[Json]:
+    """Return the commands that draw what of the links may not meet anything below `BODIES`."""
+    look = three.ghostly(_BODY_COLOR, _BODY_OPACITY)
+    return [
+        three.set_object(
+            f"{BODIES}/{joint_name(robot, body.joint - 1)}/{safe(body.link)}_{number}",
+            triangles(payload, *body.solid.surface()),
+            look,
+            body.place.homogeneous,
+        )
+        for number, body in enumerate(link_bodies(robot))
+    ]

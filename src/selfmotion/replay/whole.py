@@ -26,6 +26,7 @@ from selfmotion.task import Task
 _POINTS, _BRIEF, _MOST_POINTS = 25, 0.5, 6001
 # Colours of seams, by turns: those of the page's plots.
 _COLORS = ((66, 105, 208), (232, 135, 30), (60, 169, 81), (224, 80, 140), (164, 99, 242))
+_MOVE = (138, 145, 156)
 # Steps that are told to take longest.
 _LONGEST = 3
 
@@ -123,21 +124,33 @@ class Whole:
             "moves": (f"{moved:.4g} s", f"longest: {told}" if told else ""),
         }
 
-    def commands(self, root: str, payload: Payload, shown: Curves, radius: float) -> list[Json]:
-        """Return the commands that draw each seam in a colour of its own, below a node."""
-        found, number = list[Json](), 0
-        for mark in self.marks:
-            if not mark.is_seam:
-                continue
+    def commands(
+        self,
+        root: str,
+        moves: str,
+        payload: Payload,
+        shown: Curves,
+        radii: tuple[float, float],
+    ) -> list[Json]:
+        """Return the commands that draw each seam in a colour of its own, and moves thinly.
+
+        Seams are below the node `root` of what carries them; moves, which nothing does, in the
+        world, below another one.
+        """
+        radius, thin = radii
+        found, seams, in_world = list[Json](), 0, shown.tool_in_world
+        for number, mark in enumerate(self.marks):
             within = (shown.t >= mark.begin) & (shown.t <= mark.end)
-            points = shown.tool[within]
+            points = (shown.tool if mark.is_seam else in_world)[within]
             kept = shapes.distinct(points, 0.5 * radius)
             if len(kept) > 1:
-                drawn = scene.triangles(payload, *shapes.tube(points[kept], 1.5 * radius))
-                color = tuple(part / 255.0 for part in _COLORS[number % len(_COLORS)])
-                look = three.material(color, roughness=0.8)
-                found.append(three.set_object(f"{root}/trace/seam{number}", drawn, look))
-            number += 1
+                wide = 1.5 * radius if mark.is_seam else thin
+                drawn = scene.triangles(payload, *shapes.tube(points[kept], wide))
+                node = f"{root}/trace/seam{seams}" if mark.is_seam else f"{moves}/trace/{number}"
+                color = _COLORS[seams % len(_COLORS)] if mark.is_seam else _MOVE
+                look = three.material([part / 255.0 for part in color], roughness=0.8)
+                found.append(three.set_object(node, drawn, look))
+            seams += mark.is_seam
         return [*found, *self._beads(root, payload, shown, radius)]
 
     def _beads(self, root: str, payload: Payload, shown: Curves, radius: float) -> list[Json]:

@@ -16,6 +16,7 @@ class Page {
     this.layers = Object.fromEntries(content.layers.map(({ name, on }) => [name, on]));
     this.now = 0;
     this.playing = false;
+    this.aside = 0;
     this.plots = [];
     this.marks = [];
     this.makeChoice();
@@ -24,9 +25,19 @@ class Page {
     this.makeTable();
     this.connect();
     stage?.onRender((time) => this.follow(time));
-    this.choose(0);
+    const asked = new URLSearchParams(location.hash.slice(1));
+    const plan = Number(asked.get("plan") ?? 1) - 1;
+    this.choose(this.content.plans[plan] ? plan : 0);
     const still = matchMedia("(prefers-reduced-motion: reduce)").matches;
-    if (stage && !still) this.play();
+    if (asked.has("t")) this.seek(Number(asked.get("t")) || 0);
+    else if (stage && !still) this.play();
+  }
+
+  // The stages that are shown, each with the number of its plan.
+  get sides() {
+    if (!this.stage) return [];
+    const next = (this.number + 1) % this.content.plans.length;
+    return [[this.stage, this.number], ...(this.other ? [[this.other, next]] : [])];
   }
 
   get duration() { return this.plan.duration; }
@@ -39,11 +50,20 @@ class Page {
     get("description").textContent = this.plan.description.replace(this.plan.verdict, "").trim();
     get("verdict").textContent = this.plan.verdict;
     get("verdict").classList.toggle("verified", this.plan.verified);
-    [...get("choice").children].forEach((button, k) => button.setAttribute("aria-pressed", k === number));
+    [...get("choice").children].slice(0, this.content.plans.length).forEach(
+      (button, k) => button.setAttribute("aria-pressed", k === number));
     for (const cell of document.querySelectorAll("[data-plan]")) {
       cell.classList.toggle("shown", this.content.plans.length > 1 && Number(cell.dataset.plan) === number);
     }
-    this.stage?.load(this.plan);
+    for (const [stage, k] of this.sides) this.loadTo(stage, k);
+    get("aside").value = this.aside = 0;
+    const { selfMotion } = this.plan;
+    get("selfmotion").hidden = !this.stage || !selfMotion;
+    if (selfMotion) {
+      const far = (selfMotion.steps - 1) / 2;
+      Object.assign(get("aside"), { min: -far, max: far });
+      get("selfmotion").title = `Moves the arm where it stops, while its tool stays: turns ${selfMotion.joint}`;
+    }
     this.applyLayers();
     this.makePlots();
     this.makeSteps();
@@ -55,8 +75,24 @@ class Page {
 
   seek(time) {
     this.now = Math.min(Math.max(time, 0), this.duration);
-    if (this.stage) this.stage.seek(this.now);
+    get("aside").value = this.aside = 0;
+    // A shorter plan waits at its end for a longer one beside it.
+    for (const [stage, k] of this.sides) stage.seek(Math.min(this.now, this.content.plans[k].duration));
     this.follow(this.now);
+    if (!this.playing) this.link();
+  }
+
+  // The address leads to the time and the plan that are shown.
+  link() {
+    if (!location.protocol.startsWith("http") && location.protocol !== "file:") return;
+    const plan = this.content.plans.length > 1 ? `&plan=${this.number + 1}` : "";
+    history.replaceState(null, "", `#t=${this.now.toFixed(3)}${plan}`);
+  }
+
+  loadTo(stage, k) {
+    const plan = this.content.plans[k];
+    stage.load(plan);
+    stage.element.dataset.label = this.other ? plan.label : "";
   }
 
   follow(time) {
@@ -69,13 +105,21 @@ class Page {
     this.showPair(time);
     this.showStep(time);
     this.showLast(time);
-    if (this.layers.ellipsoid) this.stage?.stretch(this.plan.ellipsoid, time, this.content.ellipsoidSize);
+    for (const [stage, k] of this.sides) this.showOn(stage, this.content.plans[k], time);
+  }
+
+  // What follows the tool and the links.
+  showOn(stage, plan, time) {
+    if (this.layers.ellipsoid) stage.stretch(plan.ellipsoid, time, this.content.ellipsoidSize);
+    if (this.aside && plan.selfMotion) stage.place(plan, time, this.aside + (plan.selfMotion.steps - 1) / 2);
+    stage.accompany(get("follow").checked ? stage.toolAt(plan.ellipsoid, time) : undefined);
+    stage.label(this.layers.names ? { ...this.content.links, ...plan.obstacles } : {});
   }
 
   // The closest pair at the sample nearest in time: by name, and tinted in the scene.
   showPair(time) {
     const { clearance } = this.plan;
-    const shown = clearance !== null && this.layers.pair;
+    const shown = clearance !== null && this.layers.pair && !this.aside;
     get("pair").hidden = !shown;
     if (!shown) {
       this.stage?.mark([], {});
@@ -100,14 +144,16 @@ class Page {
       if (!this.playing) return;
       const next = this.now + ((now - last) / 1000) * Number(get("speed").value);
       last = now;
+      const [begin, end] = this.repeated();
       // Rest a moment at the end, then begin again.
-      if (next < this.duration) {
+      if (next < end) {
         this.seek(next);
-      } else if (this.now < this.duration) {
-        this.seek(this.duration);
+      } else if (this.now < end) {
+        this.seek(end);
         last += 700;
-      } else if (next > this.duration) {
-        this.seek(0);
+        if (get("repeat").value === "no") this.pause();
+      } else if (next > end) {
+        this.seek(begin);
       }
       requestAnimationFrame(step);
     };
@@ -117,6 +163,13 @@ class Page {
   pause() {
     this.playing = false;
     this.drawPlay();
+    this.link();
+  }
+
+  // From when to when it plays, again and again: all, or the step in which it is.
+  repeated() {
+    const step = this.plan.steps.findLast(({ begin }) => begin <= this.now - MOMENT) ?? this.plan.steps[0];
+    return get("repeat").value === "step" && step ? [step.begin, Math.min(step.end, this.duration)] : [0, this.duration];
   }
 
   toggle() {
@@ -134,7 +187,12 @@ class Page {
     this.drawPlay();
     get("play").addEventListener("click", () => this.toggle());
     get("time").addEventListener("input", (event) => { this.pause(); this.seek(Number(event.target.value)); });
-    get("home").addEventListener("click", () => this.stage?.frame());
+    get("home").addEventListener("click", () => this.look(""));
+    get("camera").addEventListener("change", () => this.look(get("camera").value));
+    get("follow").addEventListener("change", () => this.follow(this.now));
+    get("before").addEventListener("click", () => this.jump(-1));
+    get("after").addEventListener("click", () => this.jump(1));
+    get("aside").addEventListener("input", () => this.turn(Number(get("aside").value)));
     get("download").addEventListener("click", () => this.download());
     document.addEventListener("keydown", (event) => this.key(event));
     const letters = this.content.layers.map(({ key, label }) => [key, label]);
@@ -143,6 +201,48 @@ class Page {
       kbd.textContent = key;
       return [" · ", kbd, ` ${label}`];
     }));
+  }
+
+  look(direction) {
+    get("camera").value = direction;
+    for (const [stage] of this.sides) stage.frame(direction ? unit(direction.split(",").map(Number)) : undefined);
+  }
+
+  // Move the arm along its self-motion, where it stands.
+  turn(step) {
+    if (this.playing) this.pause();
+    this.aside = step;
+    // Of these postures nobody has measured it.
+    get("pair").hidden = true;
+    this.stage?.mark([], {});
+    for (const [stage, k] of this.sides) {
+      const { selfMotion } = this.content.plans[k];
+      if (selfMotion) stage.place(this.content.plans[k], this.now, step + (selfMotion.steps - 1) / 2);
+      stage.label(this.layers.names ? { ...this.content.links, ...this.content.plans[k].obstacles } : {});
+    }
+  }
+
+  // Two plans side by side, on one clock and seen from one place.
+  setBeside(on) {
+    get("beside").hidden = !on;
+    get("views").classList.toggle("two", on);
+    if (on && !this.second) {
+      this.second = new Stage(get("beside"), this.content);
+      const [one, other] = [this.stage, this.second].map((stage) => stage.viewer);
+      for (const [from, to] of [[one, other], [other, one]]) {
+        from.controls.addEventListener("change", () => {
+          to.camera.position.copy(from.camera.position);
+          to.camera.quaternion.copy(from.camera.quaternion);
+          to.controls.target.copy(from.controls.target);
+          to.set_dirty();
+        });
+      }
+    }
+    this.other = on ? this.second : undefined;
+    get("sides").setAttribute("aria-pressed", on);
+    this.choose(this.number);
+    for (const [stage] of this.sides) stage.resize();
+    this.look(get("camera").value);
   }
 
   // A table of the motion as it is shown: times and joint positions.
@@ -169,7 +269,8 @@ class Page {
       ArrowRight: () => { this.pause(); this.seek(this.now + step); },
       Home: () => { this.pause(); this.seek(0); },
       End: () => { this.pause(); this.seek(this.duration); },
-      r: () => this.stage?.frame(),
+      r: () => this.look(""),
+      v: () => { get("follow").checked = !get("follow").checked; this.follow(this.now); },
       ",": () => this.jump(-1),
       ".": () => this.jump(1),
     };
@@ -187,11 +288,16 @@ class Page {
       const button = element(get("choice"), "button", { type: "button", title: `Key ${k + 1}` }, plan.label);
       button.addEventListener("click", () => this.choose(k));
     });
+    if (this.content.plans.length < 2 || !this.stage) return;
+    const both = element(get("choice"), "button", {
+      type: "button", id: "sides", "aria-pressed": false, title: "Two plans on one clock" }, "side by side");
+    both.addEventListener("click", () => this.setBeside(!this.other));
   }
 
   makeLegend() {
     const { low, high, colors } = this.content.scale;
-    get("legend").hidden = !this.stage;
+    // Of several steps traces have the colours of their seams.
+    get("legend").hidden = !this.stage || this.content.plans[0].steps.length > 0;
     get("scale").style.background = `linear-gradient(to right, ${colors.join(", ")})`;
     const [from, to] = get("range").children;
     from.textContent = format(low);
@@ -217,18 +323,24 @@ class Page {
 
   applyLayers() {
     this.showPair(this.now);
-    if (!this.stage) return;
-    const { ghost = false, trace, triads, ellipsoid } = this.layers;
-    this.stage.show("/selfmotion/ghost", ghost);
-    this.stage.show("/selfmotion/ellipsoid", ellipsoid);
+    for (const [stage, number] of this.sides) this.applyLayersTo(stage, number);
+    for (const [stage, k] of this.sides) this.showOn(stage, this.content.plans[k], this.now);
+  }
+
+  applyLayersTo(stage, number) {
+    const { ghost = false, trace, triads, ellipsoid, bodies = false, frames } = this.layers;
+    stage.show("/selfmotion/ghost", ghost);
+    stage.show("/selfmotion/ellipsoid", ellipsoid);
+    stage.show("/selfmotion/bodies", bodies);
+    for (const axes of stage.axes) axes.visible = frames;
     this.content.plans.forEach((plan, k) => {
-      const shown = k === this.number;
-      this.stage.show(`${plan.root}/obstacles`, shown);
+      const shown = k === number;
+      stage.show(`${plan.root}/obstacles`, shown);
       for (const { root } of plan.tips) {
-        this.stage.show(`${root}/prescribed`, shown && trace);
-        this.stage.show(`${root}/trace`, shown && trace);
-        this.stage.show(`${root}/start`, shown && trace && ghost);
-        this.stage.show(`${root}/triads`, shown && triads);
+        stage.show(`${root}/prescribed`, shown && trace);
+        stage.show(`${root}/trace`, shown && trace);
+        stage.show(`${root}/start`, shown && trace && ghost);
+        stage.show(`${root}/triads`, shown && triads);
       }
     });
   }
@@ -267,7 +379,8 @@ class Page {
   makeMarks() {
     const seams = this.plan.steps.filter(({ color }) => color).map((step) => ({ ...step, t: step.begin }));
     this.marks = [...seams, ...this.plan.events];
-    get("marks").hidden = get("markkeys").hidden = this.marks.length === 0;
+    get("marks").hidden = get("markkeys").hidden = get("leaps").hidden = this.marks.length === 0;
+    get("repeat").querySelector("[value=step]").hidden = this.plan.steps.length < 2;
     get("last").hidden = this.plan.events.length === 0;
     get("marks").replaceChildren();
     for (const { t, end, name, color } of this.marks) {
@@ -312,6 +425,11 @@ class Page {
       });
     }
   }
+}
+
+function unit(vector) {
+  const length = Math.hypot(...vector);
+  return vector.map((value) => value / length);
 }
 
 // Column k of a table stored row by row.

@@ -48,7 +48,10 @@ class Stage {
     this.viewer.set_3d_pane_size = () => resize(element.clientWidth, element.clientHeight);
     this.turned = false;
     this.marked = [];
+    this.kept = new Map();
     new ResizeObserver(() => this.resize()).observe(element);
+    this.names = element.appendChild(document.createElement("div"));
+    this.names.className = "names";
     const meshes = content.meshes.map(decodeMesh);
     for (const command of content.commands) this.run(command, meshes);
     for (const plan of content.plans) for (const command of plan.commands) this.run(command, meshes);
@@ -61,14 +64,23 @@ class Stage {
     for (const path of [`${ROOT}/robot`, `${ROOT}/stage/sun`, ...solid]) {
       this.find(path).traverse((object) => { object.castShadow = true; });
     }
+    this.axes = content.movers.map((node) => {
+      const axes = new MeshCat.THREE.AxesHelper(content.frameSize);
+      axes.visible = false;
+      // Seen through what is around it, as a frame in a link is.
+      axes.material.depthTest = false;
+      axes.renderOrder = 1;
+      this.find(`${ROOT}/robot/${node}`).add(axes);
+      return axes;
+    });
     this.frame();
   }
 
+  // The page's commands stay as they are: another stage runs them, too.
   run(command, meshes) {
-    if (command.object?.geometries) {
-      command.object.geometries = command.object.geometries.map((g) => expandGeometry(g, meshes));
-    }
-    this.viewer.handle_command(command);
+    const { object } = command;
+    const geometries = object?.geometries?.map((g) => expandGeometry(g, meshes));
+    this.viewer.handle_command(geometries ? { ...command, object: { ...object, geometries } } : command);
   }
 
   find(path) {
@@ -81,6 +93,7 @@ class Stage {
 
   // The plan's links and its ghost's move with meshcat's own animation, last of all commands.
   load(plan) {
+    this.back();
     const clips = [];
     const { movers } = this.content;
     const add = (root, frames) => movers.forEach((node, k) => clips.push({
@@ -95,6 +108,7 @@ class Stage {
     }
     add(`${ROOT}/robot`, plan.frames);
     add(`${ROOT}/ghost`, plan.ghost);
+    if (this.content.layers.some(({ name }) => name === "bodies")) add(`${ROOT}/bodies`, plan.frames);
     this.viewer.handle_command({
       type: "set_animation", animations: clips, options: { play: true, repetitions: 1 } });
     this.viewer.animator.pause();
@@ -115,8 +129,87 @@ class Stage {
   }
 
   seek(time) {
+    this.back();
     this.viewer.animator.seek(time);
     this.viewer.animator.display_progress(time);
+  }
+
+  // Where the tool is, in meshcat's axes with y up.
+  toolAt({ tool, t }, time) {
+    const place = Math.min(time / t[t.length - 1], 1) * (t.length - 1);
+    const k = Math.min(Math.floor(place), t.length - 2);
+    const [x, y, z] = [0, 1, 2].map((i) => tool[3 * k + i] + (place - k) * (tool[3 * k + 3 + i] - tool[3 * k + i]));
+    return new MeshCat.THREE.Vector3(x, z, -y);
+  }
+
+  // Go along with a point; the first one only tells where it is.
+  accompany(point) {
+    if (point && this.seen) {
+      const way = point.clone().sub(this.seen);
+      this.viewer.camera.position.add(way);
+      this.viewer.controls.target.add(way);
+      this.viewer.controls.update();
+    }
+    this.seen = point;
+  }
+
+  // Put the links where a self-motion has them: tables of poses by step, time and joint.
+  place(plan, time, step) {
+    const { THREE } = MeshCat;
+    const { t, position, quaternion, steps } = plan.selfMotion;
+    const { movers } = this.content;
+    const at = (value, count) => {
+      const k = Math.min(Math.max(Math.floor(value), 0), count - 2);
+      return [k, value - k];
+    };
+    const [row, ahead] = at((time / t[t.length - 1]) * (t.length - 1), t.length);
+    const [side, over] = at(step, steps);
+    const cells = [[0, 0], [0, 1], [1, 0], [1, 1]].map(([i, j]) =>
+      [((side + i) * t.length + row + j) * movers.length, (i ? over : 1 - over) * (j ? ahead : 1 - ahead)]);
+    movers.forEach((node, joint) => {
+      const place = new THREE.Vector3();
+      const turn = new THREE.Vector4(0, 0, 0, 0);
+      for (const [cell, weight] of cells) {
+        place.addScaledVector(new THREE.Vector3().fromArray(position, 3 * (cell + joint)), weight);
+        const one = new THREE.Vector4().fromArray(quaternion, 4 * (cell + joint));
+        turn.addScaledVector(one, one.dot(turn) < 0 ? -weight : weight);
+      }
+      turn.normalize();
+      const moved = [`${ROOT}/robot/${node}`, `${ROOT}/bodies/${node}`,
+        ...plan.riders.filter(({ carrier }) => carrier === joint).map(({ root }) => root)];
+      for (const object of moved.map((path) => this.find(path))) {
+        if (!this.kept.has(object)) this.kept.set(object, [object.position.clone(), object.quaternion.clone()]);
+        object.position.copy(place);
+        object.quaternion.set(turn.x, turn.y, turn.z, turn.w);
+      }
+    });
+    this.viewer.set_dirty();
+  }
+
+  // Put the links back: the animator writes nothing that it holds to be where it put it.
+  back() {
+    for (const [object, [place, turn]] of this.kept) {
+      object.position.copy(place);
+      object.quaternion.copy(turn);
+    }
+    this.kept.clear();
+  }
+
+  // Write the names of bodies where they are.
+  label(paths) {
+    const { THREE } = MeshCat;
+    const { camera } = this.viewer;
+    const wide = this.element.clientWidth, high = this.element.clientHeight;
+    this.names.replaceChildren(...Object.entries(paths).flatMap(([name, path]) => {
+      const box = new THREE.Box3().setFromObject(this.find(path));
+      if (box.isEmpty()) return [];
+      const seen = box.getCenter(new THREE.Vector3()).project(camera);
+      if (seen.z > 1) return [];
+      const text = document.createElement("span");
+      text.textContent = name;
+      text.style.transform = `translate(${(0.5 + seen.x / 2) * wide}px, ${(0.5 - seen.y / 2) * high}px) translate(-50%, -50%)`;
+      return [text];
+    }));
   }
 
   // Place the tool's ellipsoid: a symmetric matrix per sample, interpolated between samples.
@@ -152,9 +245,10 @@ class Stage {
   }
 
   // Stand just far enough away that the moving arm and its path fill the window.
-  frame() {
+  frame(direction = this.content.camera.direction) {
     const { THREE } = MeshCat;
-    const { points, direction } = this.content.camera;
+    const { points } = this.content.camera;
+    this.seen = undefined;
     // meshcat's camera lives in axes with y up.
     const upright = ([x, y, z]) => new THREE.Vector3(x, z, -y);
     const toEye = upright(direction);
