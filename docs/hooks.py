@@ -33,6 +33,7 @@ PLAYED = {
     "obstacles": "weld_corner",
     "closed": "closed_loop",
     "start": "ur5_pointing",
+    "replay": "rail",
     "limits": "painting",
     "job": "weld_frame",
     "parts": "in_parts",
