@@ -6,6 +6,8 @@ import numpy as np
 
 from selfmotion.basics import Array, Progress, SelfmotionError, silent
 from selfmotion.optimise import Status
+from selfmotion.planning.posture import wound_back
+from selfmotion.planning.rough import rough_grid
 from selfmotion.planning.run import plan
 from selfmotion.planning.search import Search
 from selfmotion.planning.settings import (
@@ -16,7 +18,7 @@ from selfmotion.planning.settings import (
 )
 from selfmotion.problem import Problem
 from selfmotion.result import Plan
-from selfmotion.search import start_candidates
+from selfmotion.search import carried, start_candidates
 from selfmotion.transfer import Room
 
 
@@ -137,6 +139,10 @@ def _spread(problem: Problem, rng: np.random.Generator) -> list[Array]:
     starts = starts[room.free(starts)]
     if not len(starts):
         return []
+    # A wrist need not begin a whole turn away from where people expect it.
+    motions, arrived = carried(follows, starts, rough_grid(problem).nodes)
+    back = np.array([wound_back(robot, motion)[0] for motion in motions])
+    starts = np.where((arrived & room.free(back))[:, None], back, starts)
     apart = np.abs(starts[:, None] - starts) @ robot.joint_weights
     lower, upper = robot.finite_limits()
     order = [int(np.argmin(np.abs(starts - 0.5 * (lower + upper)) @ robot.joint_weights))]

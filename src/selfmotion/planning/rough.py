@@ -10,9 +10,11 @@ from selfmotion.nodes import NodeGrid, NodeMotion, Together, minimise
 from selfmotion.planning.apart import apart_of, unlike
 from selfmotion.planning.effort import Effort
 from selfmotion.planning.for_nodes import resolves
+from selfmotion.planning.posture import far_from_usual, wound_back
 from selfmotion.planning.promise import most_promising
 from selfmotion.planning.settings import (
     ABOUT_AS_GOOD,
+    AS_CHEAP,
     ONE_VALLEY,
     ROUGH_AGREEMENT,
     ROUGH_MOTIONS,
@@ -125,7 +127,7 @@ class Ranking:
             if _hopeful(found).any():
                 found = self._found = found.advanced()
         self._ranked = self._decisive(found, finalists)
-        order = unlike(found.q, _cheapest(found), self._apart, SAME_OPTIMUM)[0]
+        order = unlike(found.q, self._expected(found), self._apart, SAME_OPTIMUM)[0]
         each = [] if self._ranked else [self._motion(found, k) for k in order]
         return [motion for motion in each if motion is not None]
 
@@ -141,7 +143,7 @@ class Ranking:
         kept: list[NodeMotion] = []
         others: list[NodeMotion] = []
         dearest = np.inf
-        for k in unlike(found.q, _cheapest(found), self._apart, SAME_OPTIMUM)[0]:
+        for k in unlike(found.q, self._expected(found), self._apart, SAME_OPTIMUM)[0]:
             if found.costs[k] > dearest or len(kept) + len(others) == finalists:
                 break
             motion = self._motion(found, k)
@@ -195,22 +197,38 @@ class Ranking:
         return not self._clear(motion), cost + UNKEPT * abs(cost) * motion.violation
 
     def _motion(self, found: Together, k: int) -> NodeMotion | None:
-        """Return one of the motions, with the conditions that are asked of it."""
-        return self._near(self._turned_inside(found.q[k]), found.qd[k], found.qdd[k])
+        """Return one of the motions, with the conditions that are asked of it.
+
+        Its joints are turned by whole turns to where people expect them. What knows no limits may
+        have gone far beyond them, and the tool is where it was.
+        """
+        q = found.q[k]
+        motion = self._near(wound_back(self._problem.robot, q), found.qd[k], found.qdd[k])
+        # Costs may know one turn from another.
+        if motion is not None and motion.cost <= (1.0 + SAME_TO_DIGITS) * found.costs[k]:
+            return motion
+        return self._near(self._turned_inside(q), found.qd[k], found.qdd[k])
+
+    def _expected(self, found: Together) -> Ints:
+        """Return the numbers of motions, the cheapest first; of about as cheap ones the usual."""
+        order = _cheapest(found)
+        if not order.size:
+            return order
+        robot, costs = self._problem.robot, found.costs[order]
+        # Each motion belongs with the cheapest one that is about as cheap.
+        group, first = np.zeros(len(order), dtype=np.int64), 0
+        for k in range(1, len(order)):
+            if costs[k] - costs[first] > AS_CHEAP * abs(costs[first]):
+                first = k
+            group[k] = first
+        far = far_from_usual(robot, np.array([wound_back(robot, found.q[k]) for k in order]))
+        return np.asarray(order[np.lexsort((far, group))])
 
     def _turned_inside(self, q: Array) -> Array:
-        """Return a motion (N + 1, n) with joints beyond their limits turned back by whole turns.
-
-        What knows no limits may have gone there, and the tool is where it was.
-        """
+        """Return a motion (N + 1, n) with joints beyond their limits turned back by whole turns."""
         robot = self._problem.robot
-        lowest, highest = q.min(axis=0), q.max(axis=0)
-        limited = robot.is_revolute & np.isfinite(robot.lower) & np.isfinite(robot.upper)
-        beyond = limited & ((highest > robot.upper) | (lowest < robot.lower))
-        middle, whole = np.zeros(robot.dof), 2.0 * np.pi
-        lower, upper = robot.lower[beyond], robot.upper[beyond]
-        middle[beyond] = 0.5 * (lower + upper - lowest[beyond] - highest[beyond])
-        return np.asarray(q + whole * np.round(middle / whole))
+        beyond = ((q > robot.upper) | (q < robot.lower)).any(axis=0)
+        return np.where(beyond, wound_back(robot, q), q)
 
     def _near(
         self, q: Array, qd: Array | None = None, qdd: Array | None = None

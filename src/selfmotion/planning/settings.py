@@ -78,6 +78,8 @@ ROUGH_ROUNDS = 30
 # Rough optima on nodes whose costs differ by less than this share are worth the same; by less than
 # the second, they are mirror images.
 ABOUT_AS_GOOD, SAME_TO_DIGITS = 1e-2, 1e-9
+# Of those that differ by less than this, the one nearest to home comes first [share].
+AS_CHEAP = 1e-4
 # So many rough motions at most; where conditions count, with so many steps more that know them.
 ROUGH_MOTIONS, WITH_CONDITIONS = 16, 12
 # Where a condition is not kept yet, each unit of it counts as so many times the cost.
