@@ -28,7 +28,7 @@ FAR, TURNED = 0.05, np.radians(5.0)
 SIZE, ABOVE = (0.2, 0.2, 0.16), 0.02
 
 
-def job(number: int, place: SE3) -> tuple[sm.RobotModel, list[sm.Seam], sm.Clearance]:
+def job(number: int, place: SE3) -> tuple[sm.RobotModel, list[sm.Seam], sm.constraints.Clearance]:
     """Return an arm, seams on a block at a place, and what stands there."""
     rng = np.random.default_rng([17, number])
     robot = sm.load_robot(ARMS[number % len(ARMS)])
@@ -37,11 +37,13 @@ def job(number: int, place: SE3) -> tuple[sm.RobotModel, list[sm.Seam], sm.Clear
     for k in range(int(rng.integers(2, 5))):
         ends = rng.uniform(-0.1, 0.1, (2, 2))
         poses = [place * SE3(down, np.array([*end, 0.5 * SIZE[2] + ABOVE])) for end in ends]
-        line = sm.Line(poses[0], poses[1], float(rng.uniform(2.0, 4.0)), time_law="minimum_jerk")
+        line = sm.paths.Line(
+            poses[0], poses[1], float(rng.uniform(2.0, 4.0)), time_law="minimum_jerk"
+        )
         seams.append(sm.Seam(f"seam {k}", line, "pointing", either_way=bool(rng.integers(2))))
-    post = sm.Cylinder("post", [0.55, float(rng.uniform(0.3, 0.4)), 0.3], 0.03, 0.6)
-    block = sm.Box("block", place, SIZE)
-    return robot, seams, sm.Clearance((block, post), distance=0.003)
+    post = sm.obstacles.Cylinder("post", [0.55, float(rng.uniform(0.3, 0.4)), 0.3], 0.03, 0.6)
+    block = sm.obstacles.Box("block", place, SIZE)
+    return robot, seams, sm.constraints.Clearance((block, post), distance=0.003)
 
 
 def placed(number: int, moved: bool) -> SE3:

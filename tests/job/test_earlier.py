@@ -22,7 +22,7 @@ def seams(shift: float = 0.0, count: int = 3) -> list[sm.Seam]:
     found = []
     for k, y in enumerate(np.linspace(-0.2, 0.2, 3)[:count]):
         ends = [SE3(DOWN, np.array([x, y + shift, 0.3])) for x in (0.4, 0.5)]
-        found.append(sm.Seam(f"seam {k}", sm.Line(*ends, 1.0), "pointing"))
+        found.append(sm.Seam(f"seam {k}", sm.paths.Line(*ends, 1.0), "pointing"))
     return found
 
 
@@ -118,8 +118,12 @@ def test_a_way_that_is_known_is_taken_where_it_is_free(monkeypatch) -> None:
     # Between these the straight leg goes through the post.
     aside = np.array([0.8, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
     first, last = HOME + aside, HOME - aside
-    post = sm.Cylinder("post", [0.35, 0.0, 0.5], 0.04, 1.0)
-    asked = [sm.JointPositionLimits(), sm.JointVelocityLimits(), sm.Clearance((post,))]
+    post = sm.obstacles.Cylinder("post", [0.35, 0.0, 0.5], 0.04, 1.0)
+    asked = [
+        sm.constraints.JointPositionLimits(),
+        sm.constraints.JointVelocityLimits(),
+        sm.constraints.Clearance((post,)),
+    ]
     free = FreeMotions(panda, asked, np.random.default_rng(0))
     # Back, round behind the post, and out again.
     back = np.array([0.0, -0.8, 0.0, 0.0, 0.0, 0.0, 0.0])
@@ -143,9 +147,11 @@ def test_a_way_that_is_known_is_taken_where_it_is_free(monkeypatch) -> None:
 @pytest.mark.parametrize("given", ["job.program", None])
 def test_what_is_no_program_of_the_arm_is_refused(program, given) -> None:
     if given is not None:
-        with pytest.raises(sm.ProblemError, match="expected a Program; load_program reads one"):
+        with pytest.raises(
+            sm.errors.ProblemError, match="expected a Program; load_program reads one"
+        ):
             planned_again(given, seams())
         return
     xarm = robot_named("xarm7")
-    with pytest.raises(sm.ProblemError, match="warm_start: its joints are panda_joint1"):
+    with pytest.raises(sm.errors.ProblemError, match="warm_start: its joints are panda_joint1"):
         sm.plan_job(xarm, seams(), warm_start=program)

@@ -45,7 +45,7 @@ def test_the_nearest_of_mirror_images_is_taken() -> None:
     here = arm.pose(arm.home + np.array([0.3, 0.6, -1.2, 0.2, -1.4, 0.1]))
     end = here.copy()
     end.translation = here.translation + np.array([0.0, 0.15, 0.05])
-    plan = sm.plan(sm.Problem(arm, sm.Line(here, end, 3.0), "pointing")).require()
+    plan = sm.plan(sm.Problem(arm, sm.paths.Line(here, end, 3.0), "pointing")).require()
     q = plan.trajectory.q
     assert np.abs(q[:, 3:] - arm.home[3:]).max() < np.pi
     # None of its joints could be a turn nearer.

@@ -90,9 +90,9 @@ def test_a_path_and_a_target_at_once_are_refused(panda: sm.RobotModel) -> None:
     home = panda.pose(PANDA_HOME)
     replanner = Replanner(panda)
     for given in (
-        {"path": sm.Dwell(home, 1.0), "target": home},
+        {"path": sm.paths.Dwell(home, 1.0), "target": home},
         {"twist": TWIST},
-        {"path": sm.Dwell(home, 1.0), "seen": 0.0},
+        {"path": sm.paths.Dwell(home, 1.0), "seen": 0.0},
     ):
-        with pytest.raises(sm.ProblemError, match="give target= with them, and no path"):
+        with pytest.raises(sm.errors.ProblemError, match="give target= with them, and no path"):
             replanner.step(0.0, PANDA_HOME, np.zeros(7), **given)

@@ -13,7 +13,7 @@ def test_home_is_within_limits_and_meets_nothing(name: str) -> None:
     robot = sm.load_robot(name)
     np.testing.assert_array_equal(robot.home, sm.NAMED_ARMS[name].home)
     assert np.all((robot.lower <= robot.home) & (robot.home <= robot.upper))
-    assert sm.CollisionModel(robot).worst(robot.home[None]).value > 0.0
+    assert sm.obstacles.CollisionModel(robot).worst(robot.home[None]).value > 0.0
 
 
 def test_home_of_a_cell_is_that_of_its_parts() -> None:
@@ -30,7 +30,9 @@ def test_home_of_a_cell_is_that_of_its_parts() -> None:
 
 
 def test_who_has_no_home_is_told_so() -> None:
-    with pytest.raises(sm.RobotError, match="what is home is not known of this arm, only of panda"):
+    with pytest.raises(
+        sm.errors.RobotError, match="what is home is not known of this arm, only of panda"
+    ):
         _ = sm.load_robot("kinova").home
     pair = sm.load_robot(
         {"left": "panda", "right": "kinova"},
@@ -38,5 +40,5 @@ def test_who_has_no_home_is_told_so() -> None:
         tool="left/panda_hand_tcp",
         reference="right/j2s6s200_end_effector",
     )
-    with pytest.raises(sm.RobotError, match="of part 'right'"):
+    with pytest.raises(sm.errors.RobotError, match="of part 'right'"):
         _ = pair.home

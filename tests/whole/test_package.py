@@ -4,8 +4,10 @@ import inspect
 import subprocess
 import sys
 
+import pytest
+
 import selfmotion as sm
-from support.doors import named
+from support.doors import of, offered
 
 
 def test_import_leaves_the_heavy_and_optional_packages_alone() -> None:
@@ -22,17 +24,37 @@ def test_import_leaves_the_heavy_and_optional_packages_alone() -> None:
     assert result.stdout.strip() == "[]"
 
 
+# What a first script needs is found in one look.
+FEW = 70
+
+
 def test_every_exported_name_exists_and_is_documented() -> None:
-    offered = named(sm)
-    assert len(set(offered)) == len(offered) > 100
-    for name in offered:
-        assert getattr(sm, name).__doc__, name
+    names = offered(sm)
+    assert len(set(names)) == len(names) > 100
+    for name in names:
+        assert of(sm, name).__doc__, name
+
+
+def test_the_top_level_is_short_and_nothing_is_there_twice() -> None:
+    assert len(sm.__all__) <= FEW
+    assert set(sm.__all__) <= set(dir(sm))
+    spaced = [name.split(".")[1] for name in offered(sm) if "." in name]
+    assert not set(spaced) & set(sm.__all__)
+    assert len(set(spaced)) == len(spaced)
+
+
+def test_what_has_moved_is_found_for_one_version_more() -> None:
+    with pytest.warns(DeprecationWarning, match=r"sm\.Circle is sm\.paths\.Circle now"):
+        moved = sm.Circle
+    assert moved is sm.paths.Circle
+    with pytest.raises(AttributeError, match="has no attribute 'Circel'"):
+        _ = sm.Circel
 
 
 def test_signatures_show_what_one_would_type() -> None:
     """In help(): no factories, functions or addresses, of anything public."""
-    for name in named(sm):
-        found = getattr(sm, name)
+    for name in offered(sm):
+        found = of(sm, name)
         members = vars(found) if inspect.isclass(found) else {}
         public = [getattr(found, key) for key in members if not key.startswith("_")]
         for item in [found, *public]:

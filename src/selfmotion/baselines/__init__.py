@@ -9,3 +9,13 @@ from selfmotion.baselines.local import (
     GradientProjection as GradientProjection,
     PseudoInverse as PseudoInverse,
 )
+
+__all__ = [
+    "DampedLeastSquares",
+    "ExtendedJacobian",
+    "GradientProjection",
+    "LagrangianOptimum",
+    "Method",
+    "Motion",
+    "PseudoInverse",
+]

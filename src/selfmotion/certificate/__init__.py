@@ -39,3 +39,12 @@ from selfmotion.certificate.verdict import (
     Certificate as Certificate,
     allowed_text as allowed_text,
 )
+
+__all__ = [
+    "Column",
+    "Extreme",
+    "Finding",
+    "FinishedMotion",
+    "Quantity",
+    "Requirement",
+]

@@ -40,3 +40,26 @@ from selfmotion.constraints.limits import (
 from selfmotion.constraints.tilt import Tilt as Tilt
 from selfmotion.constraints.tool import ToolLimits as ToolLimits
 from selfmotion.constraints.torque import JointTorqueLimits as JointTorqueLimits
+
+__all__ = [
+    "Band",
+    "Binding",
+    "BoundConstraint",
+    "Clearance",
+    "ClosedPath",
+    "Constraint",
+    "EndAcceleration",
+    "EndConfiguration",
+    "EndVelocity",
+    "Envelope",
+    "JointAccelerationLimits",
+    "JointJerkLimits",
+    "JointPositionLimits",
+    "JointTorqueLimits",
+    "JointVelocityLimits",
+    "NodeTangents",
+    "StartAcceleration",
+    "StartVelocity",
+    "Tilt",
+    "ToolLimits",
+]

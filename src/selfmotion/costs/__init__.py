@@ -40,3 +40,25 @@ from selfmotion.costs.samples import (
 )
 from selfmotion.costs.scaled import Scaled as Scaled
 from selfmotion.costs.towards import Towards as Towards
+
+__all__ = [
+    "Cost",
+    "DirectionalManipulability",
+    "FunctionCost",
+    "GravityTorque",
+    "InverseManipulability",
+    "JointAcceleration",
+    "JointJerk",
+    "JointLimitDistance",
+    "JointReversals",
+    "JointVelocity",
+    "KineticEnergy",
+    "LimitUse",
+    "Manipulability",
+    "Partials",
+    "PathLength",
+    "Posture",
+    "Samples",
+    "SmallestSingularValue",
+    "Towards",
+]

@@ -6,3 +6,8 @@ from selfmotion.job.run import plan_job as plan_job
 from selfmotion.job.seam import Seam as Seam, are_opposite as are_opposite
 from selfmotion.job.specification import Specification as Specification
 from selfmotion.job.step import Step as Step
+
+__all__ = [
+    "Specification",
+    "Step",
+]

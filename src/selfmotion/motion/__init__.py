@@ -22,3 +22,10 @@ from selfmotion.motion.windows import (
     fading_window as fading_window,
     resting_window as resting_window,
 )
+
+__all__ = [
+    "BSplineNullMotion",
+    "FreeNullMotion",
+    "NodeNullMotion",
+    "NullMotion",
+]

@@ -14,3 +14,12 @@ from selfmotion.optimise.blocks import Banded as Banded
 from selfmotion.optimise.line_search import LineSearch as LineSearch
 from selfmotion.optimise.quadratic import minimize_quadratic as minimize_quadratic
 from selfmotion.optimise.quasi_newton import QuasiNewton as QuasiNewton
+
+__all__ = [
+    "Function",
+    "Iteration",
+    "LineSearch",
+    "Minimum",
+    "Optimizer",
+    "Status",
+]

@@ -46,3 +46,9 @@ from selfmotion.result.retiming import (
     slowdown as slowdown,
 )
 from selfmotion.result.reversals import Reversals as Reversals
+
+__all__ = [
+    "Attempt",
+    "Gap",
+    "LimitsUsed",
+]

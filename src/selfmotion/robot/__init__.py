@@ -53,3 +53,10 @@ from selfmotion.robot.urdf import (
     UrdfPart as UrdfPart,
 )
 from selfmotion.robot.weights import mean_lever as mean_lever
+
+__all__ = [
+    "Coordinate",
+    "FrameCoordinate",
+    "JointCoordinate",
+    "SwivelAngle",
+]

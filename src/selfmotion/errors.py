@@ -1,0 +1,33 @@
+"""What can go wrong: every error is a `SelfmotionError`, and says what to do."""
+
+from selfmotion.basics import (
+    BreakdownError,
+    CollisionError,
+    FeedError,
+    FileFormatError,
+    InverseKinematicsError,
+    NoSequenceError,
+    PathError,
+    PlanError,
+    ProblemError,
+    RedundancyError,
+    RenderError,
+    RobotError,
+    StartError,
+)
+
+__all__ = [
+    "BreakdownError",
+    "CollisionError",
+    "FeedError",
+    "FileFormatError",
+    "InverseKinematicsError",
+    "NoSequenceError",
+    "PathError",
+    "PlanError",
+    "ProblemError",
+    "RedundancyError",
+    "RenderError",
+    "RobotError",
+    "StartError",
+]

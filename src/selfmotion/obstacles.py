@@ -1,0 +1,21 @@
+"""Bodies that stand around or ride along, and what measures their distances."""
+
+from selfmotion.collision import (
+    Box,
+    Capsule,
+    CollisionModel,
+    Cylinder,
+    Mesh,
+    Obstacle,
+    Sphere,
+)
+
+__all__ = [
+    "Box",
+    "Capsule",
+    "CollisionModel",
+    "Cylinder",
+    "Mesh",
+    "Obstacle",
+    "Sphere",
+]

@@ -1,0 +1,43 @@
+"""Tool motions over time: where the tool is to be, and how fast."""
+
+from selfmotion.path import (
+    Circle,
+    Dwell,
+    Feed,
+    Joined,
+    Line,
+    Path,
+    PathSamples,
+    Placed,
+    Polyline,
+    Retimed,
+    Reversed,
+    Section,
+    Spiral,
+    TwistPath,
+    Waypoints,
+    Weave,
+    section_at_rest,
+    with_leads,
+)
+
+__all__ = [
+    "Circle",
+    "Dwell",
+    "Feed",
+    "Joined",
+    "Line",
+    "Path",
+    "PathSamples",
+    "Placed",
+    "Polyline",
+    "Retimed",
+    "Reversed",
+    "Section",
+    "Spiral",
+    "TwistPath",
+    "Waypoints",
+    "Weave",
+    "section_at_rest",
+    "with_leads",
+]
