@@ -131,7 +131,7 @@ def good_files() -> tuple[Good, ...]:
         ends = np.zeros(3), np.array([0.4, 0.3, -0.5])
         move = sm.move(arm, *ends, constraints=limits, clearance=None)
         for suffix in (".src", ".mod"):
-            sm.write_motion(move, folder / f"motion{suffix}")
+            sm.write_motion(move, folder / f"motion{suffix}", settings=sm.ProgramSettings(mass=1.0))
             content = (folder / f"motion{suffix}").read_bytes()
             found.append(Good("program", suffix, content, sm.read_motion))
         for suffix in (".toml", ".json"):

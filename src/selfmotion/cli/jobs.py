@@ -9,7 +9,7 @@ import typer
 
 import selfmotion as sm
 from selfmotion import formats
-from selfmotion.cli import documents, json_tables, options, outputs, tables
+from selfmotion.cli import documents, json_tables, options, outputs, program_options, tables
 from selfmotion.cli.app import NOT_VERIFIED, VERIFIED, app, complain, stages, terminal
 from selfmotion.cli.batch_display import check_cluster, executor_at
 from selfmotion.cli.stage_display import StageDisplay
@@ -37,7 +37,7 @@ def job(
     dask: Annotated[
         str | None, typer.Option(help="Or the address of a Dask scheduler, host:port.")
     ] = None,
-    settings: options.SettingsOption = None,
+    settings: program_options.SettingsOption = None,
     changes: options.SetOption = None,
     allow_code: options.AllowCodeOption = False,
     as_json: options.JsonOption = False,
@@ -59,6 +59,10 @@ def job(
         # Before anything is planned.
         happens = {event: seam.name for seam in work.seams for event, _ in seam.events}
         formats.check_signals(happens, asked or sm.ProgramSettings())
+        for target in wanted:
+            if target.suffix.lower() in formats.PROGRAMS:
+                form = formats.PROGRAMS[target.suffix.lower()]
+                formats.check_controller(work.robot, form, asked or sm.ProgramSettings())
     remarks = work.remarks
     outputs.tell(remarks)
     kept = folder or Path("out") / f"{file.stem}.job"

@@ -4,26 +4,37 @@ After ABB's Technical reference manual, RAPID Instructions, Functions and Data t
 3HAC050917-001): ``MoveAbsJ`` of a ``jointtarget``, whose external axes are 9E9 where there are none
 and whose unit is degrees or mm, with ``\T``, the time in seconds that the motion to it takes, in
 place of its speed. ``fine`` is a stop, ``z1`` a zone in which corners are rounded, at most from the
-middle of one motion to that of the next. Outputs are set by ``SetDO``: where the arm rests when it
-rests, and where it moves when it enters the zone of its target.
+middle of one motion to that of the next. Tool poses are ``MoveL`` of a ``robtarget`` in the work
+object ``wobjdata``, whose ``confdata`` says in which configuration the arm is; ``ConfL \Off`` has
+the controller go on in the one that it is in, as a shifted work object may need other numbers.
+Outputs are set by ``SetDO``: where the arm rests when it rests, and where it moves when it enters
+the zone of its target.
 """
 
 from collections.abc import Sequence
 from pathlib import Path as FilePath
 
+import numpy as np
+
 from selfmotion.basics import ProblemError, write_text
+from selfmotion.formats.arm_configurations import confdata
 from selfmotion.formats.controller_program import (
     ControllerProgram,
     Draft,
     head,
     module_name,
     plain,
+    with_begins,
 )
+from selfmotion.formats.pose_numbers import rapid_numbers, rapid_pose
+from selfmotion.formats.pose_stretches import PoseStretch
 from selfmotion.formats.program_axes import written
-from selfmotion.formats.program_lines import ProgramReader, Row
+from selfmotion.formats.program_lines import ProgramReader
 from selfmotion.formats.program_settings import AXES
+from selfmotion.formats.read_stretches import Pose, pose_of_values
 from selfmotion.formats.stretches import Stretch
 from selfmotion.formats.thinning import TIME_DIGITS
+from selfmotion.robot import RobotModel
 from selfmotion.task import SE3, Quaternion
 
 # Characters in a name, those of the procedure included.
@@ -43,10 +54,10 @@ _WORDS = (
 _PROCEDURE = "_run"
 # What stands for an axis that is not there, and from where on numbers mean that.
 _ABSENT, _ABSENT_FROM = "9E9", 8.9e9
+# How a time takes the place of a speed.
+_TIME = "\\T:="
 # The fastest approach [mm/s, °/s].
 _FASTEST, _TURNING = 500.0, 100.0
-# Without a load a flange carries this [kg], at this height [mm]: that of tool0.
-_BARE = 0.001, 0.001
 
 
 def write_rapid(file: FilePath, draft: Draft) -> None:
@@ -59,15 +70,21 @@ def write_rapid(file: FilePath, draft: Draft) -> None:
     lines = [
         f"MODULE {name}",
         *(f"  ! {line}" for line in head(draft)),
+        *(f"  ! {line}" for line in _unknown(draft)),
         f"  TASK PERS tooldata {name}_t := {_tool(draft)};",
+        *_work(draft, name),
         f"  CONST speeddata {name}_v := [{speed}];",
         "",
         f"  PROC {name}{_PROCEDURE}()",
-        f"    MoveAbsJ {_target(program.stretches[0], 0, program)}\\NoEOffs, "
-        f"{name}_v, fine, {name}_t;",
+        *([] if draft.frames is None else ["    ConfL \\Off;"]),
+        _slowly(draft, program.stretches[0], name, by_axes=True),
     ]
-    for stretch in program.stretches:
-        lines += ["", f"    ! step: {plain(stretch.name)}", *_moves(draft, stretch, name)]
+    for stretch, begun in with_begins(program.stretches):
+        lines += ["", f"    ! step: {plain(stretch.name)}"]
+        if begun is not None:
+            by_axes = not isinstance(begun, PoseStretch)
+            lines.append(_slowly(draft, begun, name, by_axes=by_axes))
+        lines += _moves(draft, stretch, name)
     write_text(file, "\n".join([*lines, "  ENDPROC", "ENDMODULE", ""]))
 
 
@@ -85,12 +102,70 @@ def _moves(draft: Draft, stretch: Stretch, name: str) -> list[str]:
         elif k:
             zone = "fine" if k == last else "z1"
             seconds = _seconds(stretch.t[k] - stretch.t[k - 1])
-            lines.append(
-                f"    MoveAbsJ {_target(stretch, k, draft.program)}\\NoEOffs, "
-                f"v100\\T:={seconds}, {zone}, {name}_t;"
-            )
+            lines.append(f"    {_motion(draft, stretch, k, name, f'v100{_TIME}{seconds}, {zone}')}")
         lines += [f"    {_event(draft, item.name)}" for item in stretch.events if item.target == k]
     return lines
+
+
+def _motion(draft: Draft, stretch: Stretch, k: int, name: str, speed_and_zone: str) -> str:
+    """Return the motion to a target of a stretch: linear to a pose, by the axes to joints."""
+    if isinstance(stretch, PoseStretch):
+        target = _robtarget(draft, stretch, k)
+        return f"MoveL {target}, {speed_and_zone}, {name}_t\\WObj:={name}_w;"
+    target = _target(stretch, k, draft.program)
+    return f"MoveAbsJ {target}\\NoEOffs, {speed_and_zone}, {name}_t;"
+
+
+def _slowly(draft: Draft, stretch: Stretch, name: str, *, by_axes: bool) -> str:
+    """Return the slow motion to where a stretch begins."""
+    way = Stretch(stretch.name, stretch.t, stretch.q) if by_axes else stretch
+    return f"    {_motion(draft, way, 0, name, f'{name}_v, fine')}"
+
+
+def _robtarget(draft: Draft, stretch: PoseStretch, k: int) -> str:
+    x, y, z, *turn = rapid_numbers(stretch.places[k], stretch.turns[k])
+    own = stretch.q[k, np.argsort(stretch.order)]
+    *quarters, cfx = confdata(stretch.frames, own)
+    values = written(stretch.q[k], draft.program.axes)
+    known = {axis.name: value for axis, value in zip(draft.program.axes, values, strict=True)}
+    parts = (
+        ", ".join(f"{value:.4f}" for value in (x, y, z)),
+        ", ".join(f"{value:.8f}" for value in turn),
+        ", ".join(str(value) for value in (*quarters, cfx or 0)),
+        ", ".join(known.get(name, _ABSENT) for name in AXES[6:]),
+    )
+    return f"[{', '.join(f'[{part}]' for part in parts)}]"
+
+
+def _unknown(draft: Draft) -> list[str]:
+    """Return what is not known of configurations, in words."""
+    first = next((item for item in draft.program.stretches if isinstance(item, PoseStretch)), None)
+    if first is None or confdata(first.frames, first.q[0, np.argsort(first.order)])[3] is not None:
+        return []
+    return [
+        "cfx is 0 in all targets and means nothing: the wrist axes of this arm do not meet in a",
+        "point, or its zero is not that of ABB's arms. The configuration is that of the begin.",
+    ]
+
+
+def _work(draft: Draft, name: str) -> list[str]:
+    """Return the work object: in the world, or on a mechanical unit that carries it."""
+    frames = draft.frames
+    if frames is None:
+        return []
+    nowhere, place = "[[0, 0, 0], [1, 0, 0, 0]]", _pose(frames.work)
+    if not frames.is_carried:
+        told = f'TRUE, "", {place}, {nowhere}'
+    else:
+        unit = draft.settings.positioner
+        if not isinstance(unit, str):
+            raise ProblemError(
+                f"{draft.robot.name}: an axis carries work object '{frames.name}', and a wobjdata "
+                f'names its mechanical unit; give positioner = "STN1" or what it is called '
+                f"(ProgramSettings(positioner=…))"
+            )
+        told = f'FALSE, "{unit}", {nowhere}, {place}'
+    return [f"  TASK PERS wobjdata {name}_w := [FALSE, {told}];"]
 
 
 def _event(draft: Draft, event: str) -> str:
@@ -117,9 +192,8 @@ def _target(stretch: Stretch, k: int, program: ControllerProgram) -> str:
 
 def _tool(draft: Draft) -> str:
     frame, (x, y, z) = _pose(draft.tool), (1e3 * value for value in draft.settings.center)
-    mass = draft.settings.mass
-    if mass is None:
-        mass, z = _BARE
+    # What is drafted has one.
+    mass = draft.settings.mass or 0.0
     return f"[TRUE, {frame}, [{mass:.4f}, [{x:.4f}, {y:.4f}, {z:.4f}], [1, 0, 0, 0], 0, 0, 0]]"
 
 
@@ -139,37 +213,68 @@ class RapidReader(ProgramReader):
 
     comment, last = "!", "ENDMODULE"
 
-    def __init__(self, file: FilePath) -> None:
-        super().__init__(file)
-        self._targets: list[list[float]] = []
+    def __init__(self, file: FilePath, robot: RobotModel | None = None) -> None:
+        super().__init__(file, robot)
+        # Targets since the last stop: of one kind, which the first of them decides.
+        self._axes: list[list[float]] = []
+        self._poses: list[Pose] = []
         self._times: list[float] = []
 
     def begin(self, given: Sequence[str]) -> None:
         """Begin the module."""
         self.name, self.state = given[0], "data"
 
+    def tool_is(self, given: Sequence[str]) -> None:
+        """Take the tool in the flange."""
+        self.tool = self._frame(given[0], given[1])
+
+    def work_is(self, given: Sequence[str]) -> None:
+        """Take the work object: user frame and object frame, the first one of a unit its own."""
+        fixed, user, object_ = given[0].upper() == "TRUE", given[1:3], given[3:5]
+        own = self._frame(*object_)
+        self.work = self._frame(*user) * own if fixed else own
+
     def procedure(self, _: Sequence[str]) -> None:
         """Begin its procedure."""
         self.state = "start"
 
     def go(self, given: Sequence[str]) -> None:
-        """Take where the motion begins."""
-        self.at, self.state = self._target(given[0], given[1]), "body"
+        """Take where the motion begins, or where it slowly goes on by axis targets."""
+        self._check_stopped("a slow motion")
+        self.begin_at(self._target(given[0], given[1]))
+        self.state = "body"
+
+    def go_linear(self, given: Sequence[str]) -> None:
+        """Take the pose from which the motion goes on by poses."""
+        self._check_stopped("a slow motion")
+        self.slowly(self._pose(given))
 
     def wait(self, given: Sequence[str]) -> None:
         """Take a rest."""
-        if self._targets:
-            raise self.lines.fault("the arm is to rest where it does not stop: zone is not fine")
+        self._check_stopped("the arm is to rest")
         super().wait(given)
 
     def move(self, given: Sequence[str]) -> None:
-        """Take a target."""
+        """Take an axis target."""
         robot, others, seconds, zone = given
-        self._targets.append(self._target(robot, others))
+        if self._poses:
+            raise self.lines.fault("an axis target after a pose whose zone is not fine")
+        self._axes.append(self._target(robot, others))
         self._times.append(self.lines.duration(seconds))
         if zone.lower() == "fine":
-            self.rows.append(Row(self.lines.step(), [self.at, *self._targets], self._times))
-            self.at, self._targets, self._times = self._targets[-1], [], []
+            self.join(self._axes, self._times)
+            self._axes, self._times = [], []
+
+    def move_linear(self, given: Sequence[str]) -> None:
+        """Take a pose."""
+        *target, seconds, zone = given
+        if self._axes:
+            raise self.lines.fault("a pose after an axis target whose zone is not fine")
+        self._poses.append(self._pose(target))
+        self._times.append(self.lines.duration(seconds))
+        if zone.lower() == "fine":
+            self.follow(self._poses, self._times)
+            self._poses, self._times = [], []
 
     @property
     def clock(self) -> float:
@@ -178,16 +283,48 @@ class RapidReader(ProgramReader):
 
     def leave(self, _: Sequence[str]) -> None:
         """End the procedure."""
-        if self._targets:
+        if self._times:
             raise self.lines.fault("the last target has a zone, expected fine")
         self.state = "left"
 
+    def _check_stopped(self, what: str) -> None:
+        if self._times:
+            raise self.lines.fault(f"{what} where it does not stop: zone is not fine")
+
+    def _frame(self, place: str, turn: str) -> SE3:
+        position, rotation = self._list(place, 3, "trans"), self._list(turn, 4, "rot")
+        if not any(rotation):
+            raise self.lines.fault("the quaternion is zero")
+        w, x, y, z = rotation
+        return pose_of_values([*(1e-3 * value for value in position), x, y, z, w])
+
+    def _pose(self, given: Sequence[str]) -> Pose:
+        place, turn, configuration, others = given
+        self._list(configuration, 4, "robconf")
+        numbers = [*self._list(place, 3, "trans"), *self._list(turn, 4, "rot")]
+        if not any(numbers[3:]):
+            raise self.lines.fault("the quaternion is zero")
+        outer = dict(zip(AXES[6:], self._texts(others, 6, "extax"), strict=True))
+        present = {
+            name: self.lines.coordinate(text)
+            for name, text in outer.items()
+            if not self._is_absent(name, text)
+        }
+        position, rotation = rapid_pose(np.array(numbers))
+        return Pose(position, rotation, self.others_of(present), self.lines.number)
+
+    def _list(self, text: str, count: int, what: str) -> list[float]:
+        return [self.lines.coordinate(item) for item in self._texts(text, count, what)]
+
+    def _texts(self, text: str, count: int, what: str) -> list[str]:
+        values = text.split(",")
+        if len(values) != count:
+            raise self.lines.fault(f"{what} has {len(values)} numbers, expected {count}")
+        return values
+
     def _target(self, robot: str, others: str) -> list[float]:
-        values = [text.split(",") for text in (robot, others)]
-        for found, what in zip(values, ("robax", "extax"), strict=True):
-            if len(found) != 6:
-                raise self.lines.fault(f"{what} has {len(found)} numbers, expected 6")
-        every = dict(zip(AXES, [*values[0], *values[1]], strict=True))
+        own, outer = self._texts(robot, 6, "robax"), self._texts(others, 6, "extax")
+        every = dict(zip(AXES, [*own, *outer], strict=True))
         self.same_axes([name for name, text in every.items() if not self._is_absent(name, text)])
         return [self.lines.coordinate(every[name]) for name in self.present]
 
@@ -198,21 +335,44 @@ class RapidReader(ProgramReader):
 _WORD = r"[A-Z]\w{0,31}"
 _LIST = r"\[([^\[\]]*)\]"
 _TARGET = rf"\[ ?{_LIST} ?, ?{_LIST} ?\]"
+_POSE = rf"\[ ?{_LIST} ?, ?{_LIST} ?, ?{_LIST} ?, ?{_LIST} ?\]"
+_FRAME = rf"\[ ?{_LIST} ?, ?{_LIST} ?\]"
+_TIMED = rf"{_WORD} ?\\T ?:= ?([^,]+), ?(fine|z[0-9]{{1,3}})"
 RapidReader.grammar = (
     (("before",), rf"MODULE ({_WORD})", RapidReader.begin),
-    (("data",), rf"(?:TASK )?PERS tooldata {_WORD} ?:= ?\[[^;!]*\];", RapidReader.skip),
+    (
+        ("data",),
+        rf"(?:TASK )?PERS tooldata {_WORD} ?:= ?\[ ?TRUE ?, ?{_FRAME}[^;!]*\];",
+        RapidReader.tool_is,
+    ),
+    (
+        ("data",),
+        rf"(?:TASK )?PERS wobjdata {_WORD} ?:= ?\[ ?FALSE ?, ?(TRUE|FALSE) ?, ?\"\w*\" ?, ?"
+        rf"{_FRAME} ?, ?{_FRAME} ?\];",
+        RapidReader.work_is,
+    ),
     (("data",), rf"CONST speeddata {_WORD} ?:= ?\[[^;!\[\]]*\];", RapidReader.skip),
     (("data",), rf"PROC {_WORD} ?\( ?\)", RapidReader.procedure),
+    (("start", "body"), r"ConfL ?\\ ?(?:On|Off) ?;", RapidReader.skip),
     (
-        ("start",),
+        ("start", "body"),
         rf"MoveAbsJ {_TARGET} ?\\NoEOffs ?, ?{_WORD} ?, ?fine ?, ?{_WORD} ?;",
         RapidReader.go,
     ),
     (
         ("body",),
-        rf"MoveAbsJ {_TARGET} ?\\NoEOffs ?, ?{_WORD} ?\\T ?:= ?([^,]+), ?"
-        rf"(fine|z[0-9]{{1,3}}) ?, ?{_WORD} ?;",
+        rf"MoveAbsJ {_TARGET} ?\\NoEOffs ?, ?{_TIMED} ?, ?{_WORD} ?;",
         RapidReader.move,
+    ),
+    (
+        ("body",),
+        rf"MoveL {_POSE} ?, ?{_WORD} ?, ?fine ?, ?{_WORD} ?\\WObj ?:= ?{_WORD} ?;",
+        RapidReader.go_linear,
+    ),
+    (
+        ("body",),
+        rf"MoveL {_POSE} ?, ?{_TIMED} ?, ?{_WORD} ?\\WObj ?:= ?{_WORD} ?;",
+        RapidReader.move_linear,
     ),
     (("body",), r"WaitTime ([^;\s]+) ?;", RapidReader.wait),
     (("body",), rf"SetDO ({_WORD}) ?, ?([01]) ?;", RapidReader.switch),
