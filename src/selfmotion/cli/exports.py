@@ -93,11 +93,15 @@ def export(
     verdicts: dict[str, str] = {}
     # Which what is only of these is said for.
     programs = any(_is_program(target, form, asked) for target in out)
+    messages = any(_is_message(target, form) for target in out)
+    coarsest = None
+    if messages and rate is None and isinstance(made, sm.Plan):
+        coarsest = formats.coarsest_rate(made)
     sound = True
     for target in out:
         given: dict[str, Any] = {"form": form, "force": force}
         if not _is_program(target, form, asked):
-            given["rate"] = rate
+            given["rate"] = coarsest if rate is None and _is_message(target, form) else rate
         together: dict[str, Path] = {}
         if parts and isinstance(made, sm.Plan) and not _is_program(target, form, asked):
             together = sm.write_parts(made, target, **given)
@@ -114,7 +118,21 @@ def export(
             if _is_readable(target, form) and isinstance(made, sm.Plan):
                 kept, verdicts[names] = _judged(made, sm.read_parts(together))
                 sound &= kept
-    _finish(made, rate, verdicts, sound, as_json)
+    streamed = [target for target in out if not _is_program(target, form, asked)]
+    if all(_is_message(target, form) for target in streamed):
+        rate = coarsest if rate is None else rate
+    if coarsest is not None and not as_json:
+        terminal.print(
+            f"at {coarsest:g} Hz: the coarsest rate at which straight lines between samples keep "
+            f"the plan's tolerance",
+            markup=False,
+            soft_wrap=True,
+        )
+    _finish(made, rate, verdicts, sound, as_json, sampled=bool(streamed))
+
+
+def _is_message(target: Path, form: str | None) -> bool:
+    return (form or formats.SUFFIXES.get(target.suffix.lower())) in formats.MESSAGES
 
 
 def _tell_followers(robot: sm.RobotModel, out: list[Path], form: str | None) -> None:
@@ -251,10 +269,15 @@ def _judged(plan: sm.Plan, motion: sm.Trajectory) -> tuple[bool, str]:
 
 
 def _finish(
-    made: _Made, rate: float | None, verdicts: dict[str, str], sound: bool, as_json: bool
+    made: _Made,
+    rate: float | None,
+    verdicts: dict[str, str],
+    sound: bool,
+    as_json: bool,
+    *,
+    sampled: bool,
 ) -> NoReturn:
     """Print what was written, and end."""
-    sampled = [name for name in verdicts if Path(name).suffix.lower() not in formats.PROGRAMS]
     miss = None
     if sampled and isinstance(made, sm.Plan):
         miss = formats.linear_miss(made, rate)

@@ -32,6 +32,7 @@ from selfmotion.formats.judged_programs import (
 from selfmotion.formats.motion_parts import read_parts as read_parts, write_parts as write_parts
 from selfmotion.formats.motions import (
     FORMS as FORMS,
+    MESSAGES as MESSAGES,
     READABLE as READABLE,
     SUFFIXES as SUFFIXES,
     read_motion as read_motion,
@@ -70,7 +71,11 @@ from selfmotion.formats.program_settings import (
     ProgramSettings as ProgramSettings,
     read_program_settings as read_program_settings,
 )
-from selfmotion.formats.samples import LinearMiss as LinearMiss, linear_miss as linear_miss
+from selfmotion.formats.samples import (
+    LinearMiss as LinearMiss,
+    coarsest_rate as coarsest_rate,
+    linear_miss as linear_miss,
+)
 from selfmotion.formats.seam_job import (
     SeamJob as SeamJob,
     read_seam_job as read_seam_job,

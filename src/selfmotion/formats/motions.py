@@ -34,7 +34,7 @@ from selfmotion.formats.moving_ends import check_ends
 from selfmotion.formats.mujoco import keyframes
 from selfmotion.formats.program_files import PROGRAMS, READ_PROGRAMS, read_program, write_program
 from selfmotion.formats.program_settings import ProgramSettings
-from selfmotion.formats.samples import MotionSamples, for_cubics
+from selfmotion.formats.samples import MotionSamples, coarsest_rate, for_cubics
 from selfmotion.formats.urscript import script
 from selfmotion.job import Program
 from selfmotion.motion import Trajectory
@@ -75,7 +75,8 @@ def write_motion(
     file : path
     rate : float, optional
         Samples per second; by default those of the plan: few, whose quintics are its motion, as
-        controllers of ROS 2 join them (URScript: 125).
+        controllers of ROS 2 join them (URScript: 125). Messages of ROS have the coarsest rate at
+        which straight lines keep the plan's tolerance, where that is fewer.
     form : str, optional
         By default the one that has the file's suffix.
     settings : ProgramSettings, optional
@@ -125,6 +126,8 @@ def write_motion(
     motion = plan.motion if isinstance(plan, Move) else plan.trajectory
     if name == "bag" and rate is None:
         motion = for_cubics(motion)
+    if name in MESSAGES and rate is None and isinstance(plan, Plan):
+        rate = coarsest_rate(plan)
     WRITERS[name](path, MotionSamples.of(motion, rate), plan.robot, rate)
 
 
@@ -287,6 +290,8 @@ def _write_stream(
     write_text(file, script(plan.robot, joints, q, rate, settings, events))
 
 
+# What is written as messages of ROS, in texts.
+MESSAGES = ("ros", "moveit")
 # Samples per second of a stream to an arm of Universal Robots.
 STREAM = 125.0
 _Writer = Callable[[Path, MotionSamples, RobotModel, float | None], None]

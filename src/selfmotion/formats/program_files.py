@@ -5,10 +5,12 @@ from pathlib import Path as FilePath
 
 from selfmotion.basics import FileFormatError, Progress, silent
 from selfmotion.formats.controller_program import ControllerProgram, Draft, drafted
-from selfmotion.formats.krl import KrlReader, write_krl
+from selfmotion.formats.krl import write_krl
+from selfmotion.formats.krl_reader import KrlReader
 from selfmotion.formats.program_lines import ProgramReader
 from selfmotion.formats.program_settings import ProgramSettings
-from selfmotion.formats.rapid import RapidReader, write_rapid
+from selfmotion.formats.rapid import write_rapid
+from selfmotion.formats.rapid_reader import RapidReader
 from selfmotion.formats.stretches import Misses
 from selfmotion.formats.urscript_poses import UrscriptReader, write_urscript
 from selfmotion.job import Program
