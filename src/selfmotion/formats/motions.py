@@ -200,6 +200,8 @@ def read_motion(
         The file cannot be read, or is no motion; what is missing is named.
     """
     path = as_path(file)
+    if not (robot is None or isinstance(robot, RobotModel)):
+        raise ProblemError(f"robot is {shown(robot)}, expected a RobotModel")
     if path.suffix.lower() in READ_PROGRAMS:
         if degrees:
             raise FileFormatError(f"{path}: is in degrees by itself; drop degrees")
