@@ -114,10 +114,12 @@ from selfmotion.formats import (
     write_problem as write_problem,
 )
 from selfmotion.job import (
+    FeedFound as FeedFound,
     Program as Program,
     Seam as Seam,
     Specification as Specification,
     Step as Step,
+    highest_feed as highest_feed,
     load_program as load_program,
     plan_job as plan_job,
 )
@@ -152,11 +154,13 @@ from selfmotion.path import (
     Reversed as Reversed,
     Section as Section,
     Spiral as Spiral,
+    Stroke as Stroke,
     TwistPath as TwistPath,
     Waypoints as Waypoints,
     Weave as Weave,
     section_at_rest as section_at_rest,
     with_leads as with_leads,
+    with_run_ups as with_run_ups,
 )
 from selfmotion.planning import (
     Fastest as Fastest,

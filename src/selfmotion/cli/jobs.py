@@ -73,6 +73,10 @@ def job(
     except KeyboardInterrupt:
         complain(f"stopped; what is finished is in '{kept}': run again to go on")
         raise typer.Exit(NOT_VERIFIED) from None
+    if work.at_feed is not None and not as_json:
+        feeds = [feed.asked for plan in program.plans.values() for feed in plan.path.feeds]
+        text = f"feed: {max(feeds):g} m/s, the highest that was found at which all seams are kept"
+        terminal.print(text, markup=False, soft_wrap=True)
     _show(program, as_json, remarks)
     # What is only of programs of targets is said for these, where there are some.
     has_targets = any(target.suffix.lower() in formats.PROGRAMS for target in wanted)
