@@ -27,7 +27,7 @@ def job(number: int, place: SE3) -> tuple[sm.RobotModel, list[sm.Seam], dict]:
     rng = np.random.default_rng(number)
     robot = sm.load_robot(("panda", "ur5")[number % 2])
     count = int(rng.integers(5, 9))
-    first = rng.uniform([-0.12, -0.25, 0.0], [0.12, 0.25, 0.15], (count, 3))
+    first = rng.uniform([-0.1, -0.2, 0.0], [0.1, 0.2, 0.15], (count, 3))
     last = first + rng.uniform(-0.08, 0.08, first.shape)
     seams = []
     for k, (begin, end) in enumerate(zip(first, last, strict=True)):
@@ -36,7 +36,7 @@ def job(number: int, place: SE3) -> tuple[sm.RobotModel, list[sm.Seam], dict]:
         seams.append(sm.Seam(f"seam {k}", line, "pointing"))
     posts = [
         sm.Box(f"post {k}", [0.5, side, 0.2], [0.04, 0.04, 0.4])
-        for k, side in enumerate((-0.42, 0.42))
+        for k, side in enumerate((-0.45, 0.45))
     ]
     asked = {
         "clearance": sm.Clearance(posts, 0.01),
