@@ -116,6 +116,7 @@ def _path_rows() -> list[Row]:
             "with_leads() of a path that begins at speed",
             lambda _: sm.with_leads(sm.Line(POSE, _moved(), 2.0, time_law="constant"), 0.05, 1.0),
         ),
+        Row(area, "with_run_ups(Line)", lambda _: sm.with_run_ups(line())),
         *bad_values_of(
             area,
             "Retimed",
@@ -168,6 +169,13 @@ def _dropped_rows() -> list[Row]:
             "plan_job(constraints=[EndConfiguration(…)])",
             lambda _: sm.plan_job(panda, [seam], constraints=[end]),
         ),
+        Row(
+            "Planning",
+            "plan_job(begin_with='a.program')",
+            lambda _: sm.plan_job(panda, [seam], begin_with="a.program"),
+        ),
+        Row("Planning", "highest_feed(0.3)", lambda _: sm.highest_feed(0.3)),
+        Row("Planning", "highest_feed(most=30)", lambda _: sm.highest_feed(print, 30.0)),
         Row(
             "Planning", "fastest() along a Feed", lambda _: sm.fastest(_panda(fed, task="position"))
         ),

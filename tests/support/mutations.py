@@ -8,7 +8,7 @@ import tempfile
 import zipfile
 import zlib
 from collections.abc import Callable
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -134,6 +134,7 @@ def good_files() -> tuple[Good, ...]:
             sm.write_motion(move, folder / f"motion{suffix}", settings=sm.ProgramSettings(mass=1.0))
             content = (folder / f"motion{suffix}").read_bytes()
             found.append(Good("program", suffix, content, sm.read_motion))
+        found += _pose_programs(folder)
         for suffix in (".toml", ".json"):
             sm.write_problem(problem, folder / f"problem{suffix}")
             content = (folder / f"problem{suffix}").read_bytes()
@@ -143,6 +144,21 @@ def good_files() -> tuple[Good, ...]:
         content = (folder / "plan.npz").read_bytes()
         found += [Good("plan", ".npz", content, sm.load_plan)] * 2
     return tuple(found)
+
+
+def _pose_programs(folder: Path) -> list[Good]:
+    """Return linear programs of a short move, whose poses the arm's kinematics have to follow."""
+    ur5 = sm.load_robot("ur5")
+    first = ur5.dexterous_configuration("pointing")
+    move = sm.move(ur5, first, first + 0.05, clearance=None)
+    asked = sm.ProgramSettings(mass=1.0, targets="poses")
+    found = []
+    for suffix in (".src", ".mod", ".script"):
+        sm.write_motion(move, folder / f"poses{suffix}", settings=asked)
+        content = (folder / f"poses{suffix}").read_bytes()
+        read = partial(sm.read_motion, robot=ur5)
+        found.append(Good("program of poses", suffix, content, read))
+    return found
 
 
 def mutated(good: Good, rng: np.random.Generator) -> bytes:

@@ -98,7 +98,8 @@ def job(
         if unsound and outputs.is_motion(target) and not _is_timetable(target):
             outputs.tell_left_out(target, terminal, unsound, quiet=as_json)
             continue
-        streamed = asked is not None and has_targets and target.suffix.lower() == ".script"
+        of_stream = asked is not None and asked.targets == "joints"
+        streamed = of_stream and has_targets and target.suffix.lower() == ".script"
         write_program(program, target, asked.streamed if asked and streamed else asked)
         if not as_json:
             terminal.print(f"wrote {target}", markup=False, soft_wrap=True)
