@@ -33,6 +33,8 @@ from support.played_programs import off, read_poses
 # Newton's method of the judge, and digits, leave this [m, rad].
 ROUNDED = 2e-8
 WITHIN = sm.Tolerance(1e-4, 1e-3)
+# At how many times of a stretch a program is looked at.
+LOOKS = 400
 # How far work objects are shifted along x [m].
 SHIFT = 0.005
 FORMS = (".mod", ".src", ".script")
@@ -143,7 +145,9 @@ def judged(case: Case, form: str, file: Path, rng: np.random.Generator) -> Row |
     axes = {axis.joint: axis.name for axis in program.axes}
     slides = {axis.name: axis.slides for axis in program.axes}
     read = read_poses(file, slides)
-    found = off(case.plan.robot, read, case.plan.trajectory, case.carrier, case.flange, axes)
+    found = off(
+        case.plan.robot, read, case.plan.trajectory, case.carrier, case.flange, axes, (), LOOKS
+    )
     stated = program.miss.path
     wrong = [
         f"{name} {one:.6g} > {other:.6g}"

@@ -252,7 +252,7 @@ def off(
     flange: str,
     axes: dict[str, str],
     moves: tuple[str, ...] = (),
-    looks: int = 400,
+    looks: int = 150,
 ) -> Off:
     """Return how far a program is off a motion, at many times; of seams, not of `moves`."""
     arm = Arm(robot)
