@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from selfmotion.basics import Array, FileFormatError, RobotError
+from selfmotion.basics import Array, FileFormatError, Flags, RobotError
 from selfmotion.formats.pose_stretches import PoseStretch, on_one_side, straight
 from selfmotion.formats.program_axes import Axis, tool_from_flange
 from selfmotion.formats.program_settings import ProgramSettings
@@ -19,8 +19,9 @@ SLOWLY = "slowly"
 # A slow motion to where the arm is already takes no time: digits differ by this [rad or m].
 _THERE = 1e-5
 # How fast slow motions are, where the file was shifted: what is read of them is their way [m/s,
-# rad/s]; how often the joints are followed between two poses, and steps of theirs that are none.
-_SLOW, _BETWEEN, _JUMP = 0.05, 16, 0.5
+# rad/s]; how often the joints are followed between two poses, from which step on one by one, and
+# steps that are none [rad].
+_SLOW, _BETWEEN, _STEP, _JUMP = 0.05, 16, 0.2, 0.5
 
 
 @dataclass
@@ -232,21 +233,42 @@ class Follower:
         return stretch.in_order(order)
 
     def _followed(self, frames: ToolFrames, rows: Array, first: Array, row: PoseRow) -> Array:
-        """Return the robot's joints along poses, each found from the one before."""
+        """Return the robot's joints along poses: from one target to the next at once, if they join.
+
+        Else each found from the one before.
+        """
         found = np.empty((len(rows), len(first)))
         at = np.array(first)
-        for k, pose in enumerate(rows):
-            seed = np.array(at)
-            seed[frames.external] = pose[7:]
-            q, arrived = frames.solved(pose[None, :3], pose[None, 3:7], seed[None])
-            far = np.abs(q[0] - seed)[frames.arm].max()
+        for k in range(0, len(rows), _BETWEEN):
+            block = rows[k : k + _BETWEEN]
+            q, arrived = self._solved(frames, block, at)
+            steps = np.diff(np.vstack([at, q]), axis=0)[:, frames.arm]
+            # The arm may be somewhere else before its first pose: of a shifted work object.
+            if not arrived.all() or np.abs(steps[1 if k == 0 else 0 :]).max(initial=0.0) > _STEP:
+                q = self._one_by_one(frames, block, at, row, k)
+            found[k : k + _BETWEEN] = q
+            at = q[-1]
+        return found
+
+    def _solved(self, frames: ToolFrames, poses: Array, at: Array) -> tuple[Array, Flags]:
+        seeds = np.repeat(at[None], len(poses), axis=0)
+        seeds[:, frames.external] = poses[:, 7:]
+        return frames.solved(poses[:, :3], poses[:, 3:7], seeds)
+
+    def _one_by_one(
+        self, frames: ToolFrames, poses: Array, at: Array, row: PoseRow, first: int
+    ) -> Array:
+        found = np.empty((len(poses), len(at)))
+        for k, pose in enumerate(poses, first):
+            q, arrived = self._solved(frames, pose[None], at)
+            far = np.abs(q[0] - at)[frames.arm].max()
             if not arrived[0] or (far > _JUMP and k):
                 line = row.poses[min(k // _BETWEEN + 1, len(row.poses) - 1)].line
                 raise FileFormatError(
                     f"{self.file}: line {line}: the arm does not follow to this pose: it is out of "
                     f"reach, or singular on the way"
                 )
-            found[k] = at = q[0]
+            found[k - first] = at = q[0]
         return found
 
     def _known(self) -> tuple[ToolFrames, list[int]]:
