@@ -35,7 +35,7 @@ def job(number: int, place: SE3) -> tuple[sm.RobotModel, list[sm.Seam], dict]:
         line = sm.Line(*ends, 2.0, time_law="minimum_jerk")
         seams.append(sm.Seam(f"seam {k}", line, "pointing"))
     posts = [
-        sm.Box(f"post {k}", [0.5, side, 0.2], [0.04, 0.04, 0.4])
+        sm.Box(f"post {k}", [0.5, side, 0.1], [0.04, 0.04, 0.2])
         for k, side in enumerate((-0.45, 0.45))
     ]
     asked = {
