@@ -282,6 +282,19 @@ def test_a_seven_axis_arm_has_joint_targets_and_is_told_why(tmp_path: Path) -> N
         invoke("export", tmp_path / "plan.npz", "--out", tmp_path / "weld.src")
 
 
+def test_an_arm_that_holds_the_part_has_joint_targets(tmp_path: Path) -> None:
+    """Its tool stands still: a pose of it in the hand is no pose of a tool in a work object."""
+    ur5 = sm.load_robot("ur5", tool="base", reference="tool0")
+    start = ur5.dexterous_configuration("pointing")
+    begin = ur5.chain.place(start)
+    line = sm.Line(begin, SE3(begin.rotation, begin.translation + np.array([0.03, 0.0, 0.0])), 1.0)
+    plan = sm.plan(sm.Problem(ur5, line, "pointing", start, collision=None)).require()
+    sm.write_motion(plan, tmp_path / "held.mod", settings=settings("held.mod"))
+    text = (tmp_path / "held.mod").read_text()
+    assert "not all of A1 to A6 of ur5 carry its tool" in text
+    assert "MoveL" not in text
+
+
 def test_through_a_singular_wrist_joints_are_written(abb: sm.RobotModel, tmp_path: Path) -> None:
     """Axis 5 passes zero, where axes 4 and 6 are one: no pose says what they are."""
     first = np.radians([0.0, 10.0, 10.0, 30.0, 40.0, 0.0])

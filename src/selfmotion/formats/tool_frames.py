@@ -114,8 +114,9 @@ class ToolFrames:
         name, arm = self.robot.name, self.arm
         if len(arm) != _JOINTS:
             return f"{name} has {len(arm)} axes A1 to A6, and poses are for arms of six"
-        chain = self.chain.joints.tolist()
-        if not set(arm.tolist()) <= set(chain):
+        carrying = self.robot.chain_to(self.robot.tool).joints.tolist()
+        if not set(arm.tolist()) <= set(carrying):
+            # A tool that stands still, while the arm holds the part, has poses of another kind.
             return f"not all of A1 to A6 of {name} carry its tool"
         between = own_joint(self.robot, self.axes)
         if between:
