@@ -6,7 +6,7 @@ READY := $(VENV)/.ready
 # What is imported by many processes is compiled to bytecode once.
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: demo test lint format bench bench-constrained bench-remaining bench-relaxed bench-batch bench-peers bench-starts bench-places bench-first bench-fastest bench-feeds bench-job bench-again bench-moves bench-raster bench-lifts bench-spirals bench-latency docs errors suite suite-made fuzz fuzz-tasks fuzz-cells fuzz-certificate fuzz-deceptions fuzz-generated fuzz-realtime fuzz-files fuzz-job fuzz-kept fuzz-programs arms mutants memory acceptance distances study clean
+.PHONY: demo test lint format bench bench-constrained bench-remaining bench-relaxed bench-batch bench-peers bench-starts bench-places bench-first bench-fastest bench-feeds bench-job bench-moves bench-raster bench-lifts bench-spirals bench-latency docs errors suite suite-made fuzz fuzz-tasks fuzz-cells fuzz-certificate fuzz-deceptions fuzz-generated fuzz-realtime fuzz-files fuzz-job fuzz-kept fuzz-programs arms mutants memory acceptance distances study clean
 
 demo: $(READY)  ## plan, check and replay the paper's planar arm and a Panda, into out/
 	$(BIN)/selfmotion demo --out out
@@ -56,9 +56,6 @@ bench-fastest: $(READY)  ## 60 paces against linear programmes; the fastest moti
 
 bench-feeds: $(READY)  ## 200 random feeds: refused before planning where no arm has them, kept where verified
 	$(BIN)/python benchmarks/feeds.py
-
-bench-again: $(READY)  ## ten jobs planned again with the part moved by up to 50 mm and 5°
-	OMP_NUM_THREADS=1 $(BIN)/python benchmarks/job_again.py
 
 bench-moves: $(READY)  ## 100 transfers among boxes, some against 50 tries of OMPL
 	$(BIN)/pip install --quiet ompl==2.0.1

@@ -171,8 +171,8 @@ def _dropped_rows() -> list[Row]:
         ),
         Row(
             "Planning",
-            "plan_job(begin_with='a.program')",
-            lambda _: sm.plan_job(panda, [seam], begin_with="a.program"),
+            "plan_job(warm_start='a.program')",
+            lambda _: sm.plan_job(panda, [seam], warm_start="a.program"),
         ),
         Row("Planning", "highest_feed(0.3)", lambda _: sm.highest_feed(0.3)),
         Row("Planning", "highest_feed(most=30)", lambda _: sm.highest_feed(print, 30.0)),

@@ -268,7 +268,7 @@ def test_each_parameter_of_a_job_matters(tmp_path: Path) -> None:
         "seconds_per_cost": 5.0,
         "deadline": 1e-9,
         # Of a program that begins elsewhere, the seam does as well.
-        "begin_with": sm.plan_job(PANDA, [seam("a", -0.05)], branches=1, start=home),
+        "warm_start": sm.plan_job(PANDA, [seam("a", -0.05)], branches=1, start=home),
         "folder": tmp_path,
         "executor": ThreadPoolExecutor(1),
         "rng": 1,

@@ -33,14 +33,6 @@ def job(
         Path | None,
         typer.Option(help="Folder for finished work; a job that was stopped resumes from it."),
     ] = None,
-    begin_with: Annotated[
-        Path | None,
-        typer.Option(
-            "--from",
-            help="The .program of the same seams that was planned before: what did not change is "
-            "kept, what moved begins with its old motion.",
-        ),
-    ] = None,
     workers: Annotated[int, typer.Option(min=1, help="Processes.")] = 1,
     dask: Annotated[
         str | None, typer.Option(help="Or the address of a Dask scheduler, host:port.")
@@ -77,12 +69,7 @@ def job(
     here: Any = processes(workers) if workers > 1 else nullcontext()
     try:
         with executor_at(dask) as cluster, here as pool, StageDisplay(stages) as display:
-            program = work.plan(
-                folder=kept,
-                executor=cluster or pool,
-                progress=display.stage,
-                begin_with=None if begin_with is None else sm.load_program(begin_with),
-            )
+            program = work.plan(folder=kept, executor=cluster or pool, progress=display.stage)
     except KeyboardInterrupt:
         complain(f"stopped; what is finished is in '{kept}': run again to go on")
         raise typer.Exit(NOT_VERIFIED) from None

@@ -29,7 +29,6 @@ from selfmotion.job.building import Builder
 from selfmotion.job.files import Shelf
 from selfmotion.job.ordering import Ordering
 from selfmotion.job.program import Program
-from selfmotion.job.replan import Replanned
 from selfmotion.job.seam import Seam
 from selfmotion.job.specification import Specification
 from selfmotion.job.work import Asked, Work, check_can_be_sent
@@ -50,7 +49,6 @@ def plan_job(
     branches: int = 4,
     seconds_per_cost: float = 0.0,
     deadline: float = 10.0,
-    begin_with: Program | None = None,
     folder: str | Path | None = None,
     executor: Executor | None = None,
     rng: int = 0,
@@ -90,10 +88,6 @@ def plan_job(
     deadline : float
         After so many seconds of the processor a move counts as not found. A move that takes nearly
         as long to find may be found on one machine, or on one day, and not on another.
-    begin_with : Program, optional
-        One of the same seams that was planned before, with the part elsewhere: order and directions
-        stay, what asks for the same is kept, seams begin where they began, and moves look along
-        their old ways first. Where something is not found so, all is planned from nothing.
     folder : path, optional
         Keeps every plan and move there as soon as it is finished; a job that is begun again takes
         what it finds, and ends in the same program.
@@ -146,9 +140,12 @@ def plan_job(
     ends = tuple(None if q is None else robot.configuration(q) for q in (start, end))
     price = as_number(seconds_per_cost, "seconds_per_cost", least=0.0)
     shelf = Shelf(None if folder is None else as_path(folder), Tolerance(), {})
-    if not (begin_with is None or isinstance(begin_with, Program)):
-        raise ProblemError(f"begin_with is {shown(begin_with)}, expected a Program")
     work = Work(asked, shelf, executor, progress)
+    ordering = Ordering(listed, work, ends, price, is_free)
+    if not ordering.states:
+        reasons = "".join(f"\n  '{name}': {why}" for name, why in ordering.missing.items())
+        raise PlanError(f"{robot.name}: no seam has a motion:{reasons}")
+    program = Builder(ordering, work, ends).program()
     asked_for = Specification(
         listed,
         not is_free,
@@ -158,17 +155,7 @@ def plan_job(
         asked.clearance,
         arm=arm_digest(robot),
     )
-    if begin_with is not None:
-        again = Replanned(begin_with, listed, work, ends).program()
-        if again is not None:
-            again = replace(again, specification=asked_for)
-            if again.verified:
-                return again
-    ordering = Ordering(listed, work, ends, price, is_free)
-    if not ordering.states:
-        reasons = "".join(f"\n  '{name}': {why}" for name, why in ordering.missing.items())
-        raise PlanError(f"{robot.name}: no seam has a motion:{reasons}")
-    return replace(Builder(ordering, work, ends).program(), specification=asked_for)
+    return replace(program, specification=asked_for)
 
 
 def _slowest(seam: Seam) -> float:

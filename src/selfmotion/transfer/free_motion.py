@@ -4,7 +4,6 @@ import time
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
-from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -98,18 +97,9 @@ class FreeMotions:
             )
         return free
 
-    def between(
-        self,
-        first: Array,
-        last: Array,
-        seconds: float = MOVE_DEADLINE,
-        guide: Array | None = None,
-    ) -> Move:
-        """Return the move from a configuration (n,) to another one, or why there is none.
-
-        A `guide` (m, n) is a way between them that may be free, tried before others are looked for.
-        """
-        return self.through([first[None], last[None]], seconds, guide)
+    def between(self, first: Array, last: Array, seconds: float = MOVE_DEADLINE) -> Move:
+        """Return the move from a configuration (n,) to another one, or why there is none."""
+        return self.through([first[None], last[None]], seconds)
 
     def time_of(self, first: Array, last: Array) -> Array:
         """Return what straight moves (K, n) → (K, n) would take by the limits, at least [s]."""
@@ -121,7 +111,7 @@ class FreeMotions:
         times = np.where(far > limits.speed * ramp, far / limits.speed + ramp, short)
         return np.asarray(times.max(axis=-1))
 
-    def through(self, ends: Sequence[Array], seconds: float, guide: Array | None = None) -> Move:
+    def through(self, ends: Sequence[Array], seconds: float) -> Move:
         """Return the move through one of several configurations (k, n) each, in this order."""
         self._progress("move", 1, 1)
         blocked = self._blocked(ends)
@@ -133,7 +123,7 @@ class FreeMotions:
         worst, margin, finer = "", MOVE_MARGIN, 1.0
         for _ in range(TRIES_OF_MOVE):
             room = Room(self.asked, self.robot, margin, finer)
-            way = self._guided(room, ends, guide) or self._way(room, ends, began + seconds)
+            way = self._way(room, ends, began + seconds)
             if way is None:
                 break
             path = rounded(room, *way)
@@ -188,19 +178,6 @@ class FreeMotions:
                 return f"{near.first} and {near.second} {apart}"
         names = ", ".join(item.name for item in asked.quantities)
         return f"it leaves what is asked of {names}"
-
-    def _guided(
-        self, room: Room, ends: Sequence[Array], guide: Array | None
-    ) -> tuple[Array, list[int]] | None:
-        """Return a straight way, or else the guide, made shorter; None where that is blocked."""
-        if guide is None:
-            return None
-        direct = straight_way(room, *ends)
-        if direct is not None:
-            return direct, []
-        if all(room.is_open(*leg) for leg in pairwise(guide)):
-            return shortened(room, guide, self._rng), []
-        return None
 
     def _way(self, room: Room, ends: Sequence[Array], end: float) -> tuple[Array, list[int]] | None:
         """Return a way (m, n) through all ends, and where on it the inner ones are."""
