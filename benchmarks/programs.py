@@ -91,7 +91,7 @@ def arms(folder: Path) -> dict[str, tuple[sm.RobotModel, str, str | None, str, b
     }
 
 
-def path_from(first: SE3, rng: np.random.Generator) -> sm.Path:
+def path_from(first: SE3, rng: np.random.Generator) -> sm.paths.Path:
     """Return a line, a circle or a corner that begins at a pose."""
     kind = int(rng.integers(3))
     side = rng.normal(size=3)
@@ -99,13 +99,15 @@ def path_from(first: SE3, rng: np.random.Generator) -> sm.Path:
     seconds = float(rng.uniform(1.5, 4.0))
     if kind == 0:
         last = SE3(first.rotation, first.translation + float(rng.uniform(0.05, 0.2)) * side)
-        return sm.Line(first, last, seconds)
+        return sm.paths.Line(first, last, seconds)
     if kind == 1:
-        return sm.Circle.around(first, float(rng.uniform(0.02, 0.08)), seconds, normal=side)
+        return sm.paths.Circle.around(first, float(rng.uniform(0.02, 0.08)), seconds, normal=side)
     turned = SE3(first.rotation @ exp3(0.3 * rng.normal(size=3)), first.translation + 0.08 * side)
     across = np.cross(side, rng.normal(size=3))
     last = SE3(turned.rotation, turned.translation + 0.08 * across / np.linalg.norm(across))
-    return sm.Joined([sm.Line(first, turned, seconds), sm.Line(turned, last, seconds)])
+    return sm.paths.Joined(
+        [sm.paths.Line(first, turned, seconds), sm.paths.Line(turned, last, seconds)]
+    )
 
 
 def cases(number: int, folder: Path) -> Iterator[tuple[int, Case]]:
@@ -137,8 +139,10 @@ def judged(case: Case, form: str, file: Path, rng: np.random.Generator) -> Row |
     if not case.unit:
         work = SE3(exp3(rng.normal(size=3)), rng.uniform(-0.5, 0.5, 3))
     unit: str | int | None = {".mod": "STN1", ".src": 2}.get(form) if case.unit else None
-    asked = sm.ProgramSettings(WITHIN, mass=2.0, targets="poses", work_object=work, positioner=unit)
-    sm.write_motion(case.plan, file, settings=asked)
+    asked = sm.files.ProgramSettings(
+        WITHIN, mass=2.0, targets="poses", work_object=work, positioner=unit
+    )
+    sm.files.write_motion(case.plan, file, settings=asked)
     program = read_program(file, case.plan.robot)
     if program.remark:
         return None
@@ -157,7 +161,7 @@ def judged(case: Case, form: str, file: Path, rng: np.random.Generator) -> Row |
     wrong += _not_shifted(case, file)
     joints = 0
     if form in PROGRAMS:
-        sm.write_motion(case.plan, file, settings=sm.ProgramSettings(WITHIN, mass=2.0))
+        sm.files.write_motion(case.plan, file, settings=sm.files.ProgramSettings(WITHIN, mass=2.0))
         joints = program_miss(case.plan, file)[0]
     return Row(
         case.kind, form, read.targets, joints, stated.position, found.position, "; ".join(wrong)
@@ -167,7 +171,7 @@ def judged(case: Case, form: str, file: Path, rng: np.random.Generator) -> Row |
 def _not_shifted(case: Case, file: Path) -> list[str]:
     """Return where the motion that is read is not shifted as the work object is."""
     names = case.plan.robot.joint_names
-    before = sm.read_motion(file, robot=case.plan.robot).of_joints(names)
+    before = sm.files.read_motion(file, robot=case.plan.robot).of_joints(names)
     # The work object's first coordinate: of a wobjdata on a unit it is in the second frame.
     frame = r"(\[\[)(-?[\d.]+)(, [^\[\]]*\], \[[^\[\]]*\]\]"
     pattern, scale = {
@@ -183,8 +187,8 @@ def _not_shifted(case: Case, file: Path) -> list[str]:
     )
     file.write_text("\n".join([*lines, ""]))
     try:
-        after = sm.read_motion(file, robot=case.plan.robot).of_joints(names)
-    except sm.FileFormatError as error:
+        after = sm.files.read_motion(file, robot=case.plan.robot).of_joints(names)
+    except sm.errors.FileFormatError as error:
         # At the edge of the workspace, or of a singular pose.
         return [] if "does not follow" in str(error) else [str(error)]
     chain = case.plan.robot.chain_to(case.plan.robot.tool, case.carrier)

@@ -7,7 +7,11 @@ import selfmotion as sm
 LENGTH, PITCH, STROKES, MOST = 0.72, 0.06, 6, 0.8  # m, m, -, m/s
 
 ur10 = sm.load_robot("ur10")
-limits = [sm.JointPositionLimits(), sm.JointVelocityLimits(), sm.JointAccelerationLimits(8.0)]
+limits = [
+    sm.constraints.JointPositionLimits(),
+    sm.constraints.JointVelocityLimits(),
+    sm.constraints.JointAccelerationLimits(8.0),
+]
 # The gun points down, may lean by 15° each way, and turn about its axis as it likes.
 leaning = [sm.Relaxation(("rx", "ry"), band=np.radians(15))]
 
@@ -21,14 +25,14 @@ def pose(x: float, y: float) -> np.ndarray:
 def plan_at(feed: float) -> sm.Program:
     seams = []
     for k, x in enumerate(0.5 + PITCH * np.arange(STROKES)):
-        line = sm.Line(pose(x, -0.5 * LENGTH), pose(x, 0.5 * LENGTH), 1.0)
-        stroke = sm.with_run_ups(sm.Feed(line, feed, acceleration=4.0))
+        line = sm.paths.Line(pose(x, -0.5 * LENGTH), pose(x, 0.5 * LENGTH), 1.0)
+        stroke = sm.paths.with_run_ups(sm.paths.Feed(line, feed, acceleration=4.0))
         gun = [("gun on", stroke.begin), ("gun off", stroke.end)]
         seams.append(sm.Seam(f"stroke {k + 1}", stroke.path, "pointing", leaning, events=gun))
     return sm.plan_job(ur10, seams, branches=1, constraints=limits)
 
 
-found = sm.highest_feed(plan_at, MOST)
+found = sm.paths.highest_feed(plan_at, MOST)
 painting = sum(LENGTH / found.feed for _ in range(STROKES))
 print(f"{found.feed:g} m/s: {found.program.verdict}")
 print(f"{found.program.duration:.2f} s, {painting:.2f} s of it painting")

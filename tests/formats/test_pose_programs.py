@@ -32,9 +32,9 @@ WORK = SE3(exp3(np.array([0.1, -0.2, 0.7])), np.array([0.3, -0.1, 0.2]))
 ROUNDED = 2e-8
 
 
-def settings(name: str, **more: object) -> sm.ProgramSettings:
+def settings(name: str, **more: object) -> sm.files.ProgramSettings:
     signals = NAMED if name.endswith(".mod") else SIGNALS
-    return sm.ProgramSettings(mass=3.0, signals=signals, targets="poses", **more)
+    return sm.files.ProgramSettings(mass=3.0, signals=signals, targets="poses", **more)
 
 
 @pytest.fixture(scope="module")
@@ -53,7 +53,7 @@ def alone(abb: sm.RobotModel) -> sm.Plan:
     start = np.radians([10.0, -20.0, 30.0, 20.0, 60.0, 15.0])
     begin = abb.pose(start)
     end = SE3(begin.rotation, begin.translation + np.array([0.02, 0.15, -0.03]))
-    problem = sm.Problem(abb, sm.Line(begin, end, 3.0), "pointing", start, collision=None)
+    problem = sm.Problem(abb, sm.paths.Line(begin, end, 3.0), "pointing", start, collision=None)
     return sm.plan(problem).require()
 
 
@@ -61,7 +61,7 @@ def alone(abb: sm.RobotModel) -> sm.Plan:
 def on_rail(kuka: sm.RobotModel) -> sm.Plan:
     """A circle of an arm on a rail, which is its redundancy."""
     start = np.append(0.3, np.radians([10.0, -80.0, 100.0, 20.0, 60.0, 15.0]))
-    circle = sm.Circle.around(kuka.pose(start), 0.06, 4.0, normal=(0.0, 0.3, 1.0))
+    circle = sm.paths.Circle.around(kuka.pose(start), 0.06, 4.0, normal=(0.0, 0.3, 1.0))
     return sm.plan(sm.Problem(kuka, circle, "pose", start, collision=None)).require()
 
 
@@ -74,7 +74,7 @@ def turned() -> sm.Plan:
     base = {"table": there}
     cell = sm.load_robot(parts, base=base, tool="arm/tool0", reference="table/plate")
     start = cell.dexterous_configuration("pose")
-    circle = sm.Circle.around(cell.chain.place(start), 0.05, 4.0, normal=(0.0, 0.0, 1.0))
+    circle = sm.paths.Circle.around(cell.chain.place(start), 0.05, 4.0, normal=(0.0, 0.0, 1.0))
     return sm.plan(sm.Problem(cell, circle, "pose", start, collision=None)).require()
 
 
@@ -90,7 +90,7 @@ def program() -> sm.Program:
         begin.translation = first.translation + np.array([0.0, side, 0.0])
         end.translation = begin.translation + np.array([0.0, 0.0, 0.05])
         events = [("arc on", 0.0), ("arc off", 0.7)]
-        path = sm.Line(begin, end, 1.0)
+        path = sm.paths.Line(begin, end, 1.0)
         seams.append(sm.Seam(f"seam {k}", path, "pointing", wait=0.5 * (1 - k), events=events))
     made = sm.plan_job(ur5, seams, start=start, order="given", branches=1, clearance=None)
     return made.require()
@@ -98,7 +98,7 @@ def program() -> sm.Program:
 
 def named(plan: sm.Plan | sm.Program) -> dict[str, str]:
     """Return joint → axis as six axes and external ones are counted."""
-    return {axis.joint: axis.name for axis in axes_of(plan.robot, sm.ProgramSettings())}
+    return {axis.joint: axis.name for axis in axes_of(plan.robot, sm.files.ProgramSettings())}
 
 
 SLIDES = {"E1": True, "E2": False}
@@ -111,7 +111,7 @@ def test_what_controllers_make_of_poses_is_as_near_as_is_stated(
 ) -> None:
     file = tmp_path / name
     within = sm.Tolerance(deviation, 10.0 * deviation)
-    sm.write_motion(alone, file, settings=settings(name, deviation=within, work_object=WORK))
+    sm.files.write_motion(alone, file, settings=settings(name, deviation=within, work_object=WORK))
     count, stated, found = program_miss(alone, file)
     read = read_poses(file, SLIDES)
     flange = alone.robot.urdf.links[-2]
@@ -125,14 +125,14 @@ def test_what_controllers_make_of_poses_is_as_near_as_is_stated(
     assert max(stated.path.position / deviation, stated.path.joint / within.rotation) > 0.5
     joints = replace(settings(name, deviation=within), targets="joints")
     if name != "weld.script":
-        sm.write_motion(alone, file, settings=joints)
+        sm.files.write_motion(alone, file, settings=joints)
         assert 0.5 < count / program_miss(alone, file)[0] < 2.0
 
 
 @pytest.mark.parametrize("name", FILES[:2])
 def test_external_axes_hold_the_redundancy(on_rail: sm.Plan, tmp_path: Path, name: str) -> None:
     file = tmp_path / name
-    sm.write_motion(on_rail, file, settings=settings(name))
+    sm.files.write_motion(on_rail, file, settings=settings(name))
     _, stated, _ = program_miss(on_rail, file)
     read = read_poses(file, SLIDES)
     measured = off(on_rail.robot, read, on_rail.trajectory, None, "flange", named(on_rail))
@@ -148,9 +148,9 @@ def test_a_positioner_carries_its_work_object(
     turned: sm.Plan, tmp_path: Path, name: str, unit: str | int
 ) -> None:
     file = tmp_path / name
-    with pytest.raises(sm.ProblemError, match="give positioner = "):
-        sm.write_motion(turned, file, settings=settings(name))
-    sm.write_motion(turned, file, settings=settings(name, positioner=unit))
+    with pytest.raises(sm.errors.ProblemError, match="give positioner = "):
+        sm.files.write_motion(turned, file, settings=settings(name))
+    sm.files.write_motion(turned, file, settings=settings(name, positioner=unit))
     _, stated, _ = program_miss(turned, file)
     read = read_poses(file, {"E1": False, "E2": False})
     links = "table/plate", "arm/tool0"
@@ -160,9 +160,9 @@ def test_a_positioner_carries_its_work_object(
     text = file.read_text()
     said = '[FALSE, FALSE, "STN1", ' if unit == "STN1" else "EK(MACHINE_DEF[2].ROOT, MACHINE_DEF[2]"
     assert said in text
-    with pytest.raises(sm.FileFormatError, match="whose joints only the robot tells"):
-        sm.read_motion(file)
-    again = sm.read_motion(file, robot=turned.robot).of_joints(turned.robot.joint_names)
+    with pytest.raises(sm.errors.FileFormatError, match="whose joints only the robot tells"):
+        sm.files.read_motion(file)
+    again = sm.files.read_motion(file, robot=turned.robot).of_joints(turned.robot.joint_names)
     within = sm.Tolerance(stated.path.position, max(stated.path.rotation, 1e-5))
     assert turned.problem.certify(again, within).position_error.value <= within.position
 
@@ -171,10 +171,10 @@ def test_a_positioner_carries_its_work_object(
 def test_a_shifted_work_object_shifts_the_motion(alone: sm.Plan, tmp_path: Path, name: str) -> None:
     """By as much, in the world; and it is judged along the path that is shifted with it."""
     file, cell = tmp_path / name, tmp_path / "cell.toml"
-    limits = (sm.JointPositionLimits(), sm.JointVelocityLimits())
+    limits = (sm.constraints.JointPositionLimits(), sm.constraints.JointVelocityLimits())
     problem = replace(alone.problem, constraints=limits)
-    sm.write_problem(problem, cell)
-    sm.write_motion(alone, file, settings=settings(name, work_object=WORK))
+    sm.files.write_problem(problem, cell)
+    sm.files.write_motion(alone, file, settings=settings(name, work_object=WORK))
     text = file.read_text()
     numbers = {
         "weld.mod": (r'(wobjdata .*?TRUE, "", \[\[)(\S+?),', 1e3, 4),
@@ -182,12 +182,12 @@ def test_a_shifted_work_object_shifts_the_motion(alone: sm.Plan, tmp_path: Path,
         "weld.script": (r"(feature = p\[)(\S+?),", 1.0, 9),
     }
     pattern, scale, digits = numbers[name]
-    before = sm.read_motion(file, robot=alone.robot)
+    before = sm.files.read_motion(file, robot=alone.robot)
     file.write_text(
         re.sub(pattern, lambda m: f"{m[1]}{float(m[2]) + 0.03 * scale:.{digits}f},", text)
     )
     assert file.read_text() != text
-    after = sm.read_motion(file, robot=alone.robot)
+    after = sm.files.read_motion(file, robot=alone.robot)
     names, arm = alone.robot.joint_names, Arm(alone.robot)
     here, there = (
         placed(arm, motion.of_joints(names)(np.linspace(0.0, 3.0, 50)), None, "torch")
@@ -204,15 +204,17 @@ def test_a_shifted_work_object_shifts_the_motion(alone: sm.Plan, tmp_path: Path,
     # Somewhere that the arm does not reach it is refused, by the line of the pose.
     away = 2.0 * scale
     file.write_text(re.sub(pattern, lambda m: f"{m[1]}{float(m[2]) + away:.{digits}f},", text))
-    with pytest.raises(sm.FileFormatError, match=r"line \d+: the arm does not follow to this pose"):
-        sm.read_motion(file, robot=alone.robot)
+    with pytest.raises(
+        sm.errors.FileFormatError, match=r"line \d+: the arm does not follow to this pose"
+    ):
+        sm.files.read_motion(file, robot=alone.robot)
 
 
 @pytest.mark.parametrize("name", FILES)
 def test_a_pose_that_was_touched_up_is_judged(alone: sm.Plan, tmp_path: Path, name: str) -> None:
     """One target a little elsewhere, and the file is off by as much."""
     file = tmp_path / name
-    sm.write_motion(alone, file, settings=settings(name))
+    sm.files.write_motion(alone, file, settings=settings(name))
     lines = file.read_text().splitlines()
     where = [k for k, line in enumerate(lines) if re.match(r"\s+(MoveL|SPL|SLIN|movel)\b", line)]
     k = where[len(where) // 2]
@@ -232,7 +234,7 @@ def test_a_job_keeps_its_seams_events_and_waits(
     file, job = tmp_path / name, tmp_path / "a.program"
     program.save(job)
     asked = settings(name, deviation=sm.Tolerance(1e-3, 1e-2))
-    sm.write_motion(program, file, settings=asked)
+    sm.files.write_motion(program, file, settings=asked)
     assert judged_program(file, program).verified, judged_program(file, program).verdict
     _, stated, _ = program_miss(program, file)
     moves = tuple(step.name.replace("→", "->") for step in program.steps if not step.is_seam)
@@ -264,12 +266,12 @@ def test_a_job_keeps_its_seams_events_and_waits(
 
 def test_a_seven_axis_arm_has_joint_targets_and_is_told_why(tmp_path: Path) -> None:
     panda = robot_named("panda")
-    circle = sm.Circle.around(panda.pose(PANDA_HOME), 0.05, 3.0, normal=(1.0, 0.0, 0.0))
+    circle = sm.paths.Circle.around(panda.pose(PANDA_HOME), 0.05, 3.0, normal=(1.0, 0.0, 0.0))
     plan = sm.plan(sm.Problem(panda, circle, start=PANDA_HOME, collision=None)).require()
     plan.save(tmp_path / "plan.npz")
     out = tmp_path / "weld.mod"
     asked = ("export", tmp_path / "plan.npz", "--out", out, "--targets", "poses")
-    with pytest.raises(sm.ProblemError, match=r"mass of what the flange carries.*--mass KG"):
+    with pytest.raises(sm.errors.ProblemError, match=r"mass of what the flange carries.*--mass KG"):
         invoke(*asked)
     code, text = invoke(*asked, "--mass", "2")
     assert code == 0, text
@@ -278,7 +280,9 @@ def test_a_seven_axis_arm_has_joint_targets_and_is_told_why(tmp_path: Path) -> N
     assert why in " ".join(out.read_text().replace("! ..", "").replace("!", "").split())
     assert "MoveAbsJ" in out.read_text()
     assert "MoveL" not in out.read_text()
-    with pytest.raises(sm.ProblemError, match=r"'panda_joint3' is in the arm.*Java \(Sunrise\)"):
+    with pytest.raises(
+        sm.errors.ProblemError, match=r"'panda_joint3' is in the arm.*Java \(Sunrise\)"
+    ):
         invoke("export", tmp_path / "plan.npz", "--out", tmp_path / "weld.src")
 
 
@@ -287,9 +291,11 @@ def test_an_arm_that_holds_the_part_has_joint_targets(tmp_path: Path) -> None:
     ur5 = sm.load_robot("ur5", tool="base", reference="tool0")
     start = ur5.dexterous_configuration("pointing")
     begin = ur5.chain.place(start)
-    line = sm.Line(begin, SE3(begin.rotation, begin.translation + np.array([0.03, 0.0, 0.0])), 1.0)
+    line = sm.paths.Line(
+        begin, SE3(begin.rotation, begin.translation + np.array([0.03, 0.0, 0.0])), 1.0
+    )
     plan = sm.plan(sm.Problem(ur5, line, "pointing", start, collision=None)).require()
-    sm.write_motion(plan, tmp_path / "held.mod", settings=settings("held.mod"))
+    sm.files.write_motion(plan, tmp_path / "held.mod", settings=settings("held.mod"))
     text = (tmp_path / "held.mod").read_text()
     assert "not all of A1 to A6 of ur5 carry its tool" in text
     assert "MoveL" not in text
@@ -301,23 +307,25 @@ def test_through_a_singular_wrist_joints_are_written(abb: sm.RobotModel, tmp_pat
     last = np.radians([10.0, 10.0, 10.0, 30.0, -40.0, 0.0])
     move = sm.move(abb, first, last, clearance=None).require()
     t = move.motion.t
-    straight = sm.Waypoints(
+    straight = sm.paths.Waypoints(
         t,
         [abb.pose(q).translation for q in move.motion.q],
         [np.roll(Quaternion(abb.pose(q).rotation).coeffs(), 1) for q in move.motion.q],
     )
     assert straight.duration > 0.0
-    sm.write_motion(move, tmp_path / "go.mod", settings=settings("go.mod"))
+    sm.files.write_motion(move, tmp_path / "go.mod", settings=settings("go.mod"))
     text = (tmp_path / "go.mod").read_text()
     assert re.search(r"MoveAbsJ .*\\T:=", text)
     assert not re.search(r"MoveL .*\\T:=", text)
-    again = sm.read_motion(tmp_path / "go.mod", robot=abb)
+    again = sm.files.read_motion(tmp_path / "go.mod", robot=abb)
     np.testing.assert_allclose(again.q[-1], last, atol=1e-6)
 
 
 def test_configurations_are_those_of_the_makers(abb: sm.RobotModel, kuka: sm.RobotModel) -> None:
     """Known ones: the home of an IRB 120, KUKA's home; and each of the singularities passed."""
-    frames = ToolFrames.of(abb, axes_of(abb, sm.ProgramSettings()), sm.ProgramSettings())
+    frames = ToolFrames.of(
+        abb, axes_of(abb, sm.files.ProgramSettings()), sm.files.ProgramSettings()
+    )
     for degrees, expected in (
         ((0, 0, 0, 0, 30, 0), (0, 0, 0, 0)),
         ((0, 0, 0, 0, -30, 0), (0, 0, 0, 1)),
@@ -328,7 +336,9 @@ def test_configurations_are_those_of_the_makers(abb: sm.RobotModel, kuka: sm.Rob
         ((0, -60, -100, 0, -30, 0), (0, 0, 0, 7)),
     ):
         assert confdata(frames, np.radians(degrees)) == expected
-    on_rail = ToolFrames.of(kuka, axes_of(kuka, sm.ProgramSettings()), sm.ProgramSettings())
+    on_rail = ToolFrames.of(
+        kuka, axes_of(kuka, sm.files.ProgramSettings()), sm.files.ProgramSettings()
+    )
     for degrees, expected in (
         ((0, -90, 90, 0, 0, 0), (2, 0b000010)),
         ((-1, -90, 90, 0, 10, -1), (2, 0b100011)),
@@ -339,7 +349,7 @@ def test_configurations_are_those_of_the_makers(abb: sm.RobotModel, kuka: sm.Rob
         assert status_and_turn(on_rail, np.append(0.1, np.radians(degrees))) == expected
     # Of these no number is made up.
     ur5 = robot_named("ur5")
-    other = ToolFrames.of(ur5, axes_of(ur5, sm.ProgramSettings()), sm.ProgramSettings())
+    other = ToolFrames.of(ur5, axes_of(ur5, sm.files.ProgramSettings()), sm.files.ProgramSettings())
     q = np.radians([10.0, -60.0, 60.0, -60.0, -80.0, 5.0])
     assert confdata(other, q) == (0, -1, 0, None)
     assert status_and_turn(other, q)[0] is None
@@ -372,16 +382,18 @@ def test_settings_of_poses_say_what_is_wrong(alone: sm.Plan, tmp_path: Path) -> 
         ({"targets": "poses", "positioner": 0}, "its number in MACHINE_DEF"),
         ({"targets": "poses", "work_object": np.zeros((4, 4))}, "work_object: its rotation"),
     ):
-        with pytest.raises(sm.ProblemError, match=said):
-            sm.ProgramSettings(**given)
+        with pytest.raises(sm.errors.ProblemError, match=said):
+            sm.files.ProgramSettings(**given)
     asked = settings("a.mod", work_object="link_3")
-    with pytest.raises(sm.ProblemError, match="'link_3' moves with joint 'a1', which carries"):
-        sm.write_motion(alone, tmp_path / "a.mod", settings=asked)
+    with pytest.raises(
+        sm.errors.ProblemError, match="'link_3' moves with joint 'a1', which carries"
+    ):
+        sm.files.write_motion(alone, tmp_path / "a.mod", settings=asked)
     (tmp_path / "cell.toml").write_text(
         'mass = 2\ntargets = "poses"\n'
         "work_object = { position_mm = [1, 2, 3], rpy_deg = [0, 0, 90] }\n"
     )
-    read = sm.read_program_settings(tmp_path / "cell.toml")
+    read = sm.files.read_program_settings(tmp_path / "cell.toml")
     assert isinstance(read.work_object, SE3)
     np.testing.assert_allclose(read.work_object.translation, [1e-3, 2e-3, 3e-3])
     alone.save(tmp_path / "plan.npz")
@@ -390,9 +402,9 @@ def test_settings_of_poses_say_what_is_wrong(alone: sm.Plan, tmp_path: Path) -> 
     code, text = invoke(*asked, "0.1,0.2,0.3,0,0,1.5707963267948966")
     assert code == 0, text
     assert "$BASE = {X 100.00000, Y 200.00000, Z 300.00000, A 90.00000, B " in out.read_text()
-    with pytest.raises(sm.ProblemError, match="neither the name of a link nor six numbers"):
+    with pytest.raises(sm.errors.ProblemError, match="neither the name of a link nor six numbers"):
         invoke(*asked, "1,2,3")
-    with pytest.raises(sm.ProblemError, match="--targets: of controllers' programs"):
+    with pytest.raises(sm.errors.ProblemError, match="--targets: of controllers' programs"):
         invoke("export", tmp_path / "plan.npz", "--out", tmp_path / "a.csv", "--targets", "poses")
 
 
@@ -413,10 +425,10 @@ def test_what_is_not_meant_is_refused(
     alone: sm.Plan, tmp_path: Path, name: str, old: str, new: str, said: str
 ) -> None:
     file = tmp_path / name
-    sm.write_motion(alone, file, settings=settings(name))
+    sm.files.write_motion(alone, file, settings=settings(name))
     text = file.read_text()
     changed = re.sub(old, lambda _: new, text, count=1 if "LIN" in old or "!" in old else 0)
     assert changed != text
     file.write_text(changed)
-    with pytest.raises(sm.FileFormatError, match=said):
-        sm.read_motion(file, robot=alone.robot)
+    with pytest.raises(sm.errors.FileFormatError, match=said):
+        sm.files.read_motion(file, robot=alone.robot)

@@ -22,21 +22,21 @@ class Tried:
     def __call__(self, feed: float) -> sm.Program:
         self.feeds.append(feed)
         if feed > self.refused:
-            raise sm.FeedError(
+            raise sm.errors.FeedError(
                 "too fast for its bends", asked=feed, possible=self.refused, time=0.0
             )
         missing = {} if feed <= self.kept else {"seam": "the arm is too slow"}
         panda = robot_named("panda")
         still = sm.Trajectory([0.0, 1.0], [HOME] * 2, [0.0 * HOME] * 2, panda.joint_names)
         move = sm.Move(panda, (), still)
-        return sm.Program(panda, (sm.Step("stay", move),), missing)
+        return sm.Program(panda, (sm.job.Step("stay", move),), missing)
 
 
 @pytest.mark.parametrize("kept", [2.9, 0.7, 0.04])
 @pytest.mark.parametrize("accuracy", [0.02, 0.2])
 def test_it_is_as_near_to_one_that_is_not_kept_as_is_asked(kept: float, accuracy: float) -> None:
     tried = Tried(kept)
-    found = sm.highest_feed(tried, accuracy=accuracy)
+    found = sm.paths.highest_feed(tried, accuracy=accuracy)
     assert found.feed <= kept < found.refused <= (1.0 + accuracy) * found.feed * 1.01
     assert found.program.verified
     assert "the arm is too slow" in found.why
@@ -46,15 +46,17 @@ def test_it_is_as_near_to_one_that_is_not_kept_as_is_asked(kept: float, accuracy
 
 def test_what_a_refusal_says_is_possible_is_tried_next() -> None:
     tried = Tried(0.434, refused=0.434)
-    assert sm.highest_feed(tried).feed == 0.434
+    assert sm.paths.highest_feed(tried).feed == 0.434
     assert tried.feeds[:2] == [3.0, 0.434]
-    bounded = sm.highest_feed(Tried(5.0), 1.5)
+    bounded = sm.paths.highest_feed(Tried(5.0), 1.5)
     assert (bounded.feed, bounded.refused, bounded.why) == (1.5, np.inf, "")
-    with pytest.raises(sm.PlanError, match=r"no feed from 0.00\d+ m/s on is kept: .*too slow"):
-        sm.highest_feed(Tried(1e-5))
+    with pytest.raises(
+        sm.errors.PlanError, match=r"no feed from 0.00\d+ m/s on is kept: .*too slow"
+    ):
+        sm.paths.highest_feed(Tried(1e-5))
     for given, said in (({"most": 4.0}, "most is 4"), ({"accuracy": 0.0}, "accuracy is 0")):
-        with pytest.raises(sm.ProblemError, match=said):
-            sm.highest_feed(Tried(1.0), **given)
+        with pytest.raises(sm.errors.ProblemError, match=said):
+            sm.paths.highest_feed(Tried(1.0), **given)
 
 
 JOB = """
@@ -93,7 +95,7 @@ def strokes(folder: Path, feed: str, more: str = "") -> Path:
 
 
 def test_a_job_file_asks_for_run_ups_and_the_highest_feed(tmp_path: Path) -> None:
-    given = sm.read_seam_job(strokes(tmp_path, "0.2"))
+    given = sm.files.read_seam_job(strokes(tmp_path, "0.2"))
     for seam in given.seams:
         (on, begin), (off, end) = seam.events
         assert (on, off) == ("gun on", "gun off")
@@ -112,7 +114,9 @@ def test_a_job_file_asks_for_run_ups_and_the_highest_feed(tmp_path: Path) -> Non
         ("most_feed = 9\n", "most_feed is 9, expected a feed up to 3 m/s"),
         ("weave = { amplitude = 0.002, pitch = 0.01 }\n", "run_up: is of seams with a feed, not"),
     ):
-        with pytest.raises(sm.FileFormatError, match=said):
-            sm.read_seam_job(strokes(tmp_path, '"highest"', more))
-    with pytest.raises(sm.FileFormatError, match="most_feed: has no effect where feed is a number"):
-        sm.read_seam_job(strokes(tmp_path, "0.2", "most_feed = 0.3\n"))
+        with pytest.raises(sm.errors.FileFormatError, match=said):
+            sm.files.read_seam_job(strokes(tmp_path, '"highest"', more))
+    with pytest.raises(
+        sm.errors.FileFormatError, match="most_feed: has no effect where feed is a number"
+    ):
+        sm.files.read_seam_job(strokes(tmp_path, "0.2", "most_feed = 0.3\n"))

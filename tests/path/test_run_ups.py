@@ -10,13 +10,13 @@ from selfmotion.task import SE3, exp3
 SPLINED = 1e-3
 
 
-def stroke(length: float, turned: float = 0.0) -> sm.Line:
+def stroke(length: float, turned: float = 0.0) -> sm.paths.Line:
     first = SE3(exp3(np.array([3.0, 0.2, 0.1])), np.array([0.5, 0.1, 0.2]))
     last = SE3(
         first.rotation @ exp3(np.array([0.0, turned, 0.0])),
         first.translation + length * np.array([0.6, 0.8, 0.0]),
     )
-    return sm.Line(first, last, 1.0)
+    return sm.paths.Line(first, last, 1.0)
 
 
 @pytest.mark.parametrize("feed", [0.05, 0.3, 1.0])
@@ -26,8 +26,8 @@ def test_the_feed_is_kept_from_begin_to_end(
     feed: float, acceleration: float, turned: float
 ) -> None:
     line = stroke(0.72, turned)
-    path = sm.Feed(line, feed, acceleration=acceleration)
-    found = sm.with_run_ups(path)
+    path = sm.paths.Feed(line, feed, acceleration=acceleration)
+    found = sm.paths.with_run_ups(path)
     # Where the stroke begins and ends the tool is where the line does; it rests before and after.
     for time, pose in ((found.begin, line.start), (found.end, line.end)):
         np.testing.assert_allclose(found.path.pose(time).homogeneous, pose.homogeneous, atol=1e-9)
@@ -53,10 +53,10 @@ def test_the_feed_is_kept_from_begin_to_end(
 
 def test_events_bends_and_several_feeds_stay_where_they_are() -> None:
     corners = np.array([[0.4, -0.1, 0.3], [0.5, 0.0, 0.3], [0.4, 0.1, 0.3]])
-    bent = sm.Polyline(corners, np.tile([0.0, 1.0, 0.0, 0.0], (3, 1)), tolerance=2e-3)
+    bent = sm.paths.Polyline(corners, np.tile([0.0, 1.0, 0.0, 0.0], (3, 1)), tolerance=2e-3)
     half = 0.5 * bent.at_constant_speed().duration
-    path = sm.Feed(bent, 0.1, acceleration=2.0, stretches=[[half, 0.2]])
-    found = sm.with_run_ups(path)
+    path = sm.paths.Feed(bent, 0.1, acceleration=2.0, stretches=[[half, 0.2]])
+    found = sm.paths.with_run_ups(path)
     assert found.run_down > found.run_up
     assert found.path.feed == 0.2
     again = found.path.samples(np.array([found.begin, found.end])).translation
@@ -66,12 +66,12 @@ def test_events_bends_and_several_feeds_stay_where_they_are() -> None:
 
 
 def test_what_has_no_feed_has_no_run_up() -> None:
-    with pytest.raises(sm.PathError, match=r"path is Line.*expected a Feed"):
-        sm.with_run_ups(stroke(0.5))
+    with pytest.raises(sm.errors.PathError, match=r"path is Line.*expected a Feed"):
+        sm.paths.with_run_ups(stroke(0.5))
     # A tool that turns far is held by its turn rate, however long it runs up: planning says so.
-    slow = sm.with_run_ups(sm.Feed(stroke(0.5, turned=1.5), 0.9))
+    slow = sm.paths.with_run_ups(sm.paths.Feed(stroke(0.5, turned=1.5), 0.9))
     assert not slow.path.feeds[0].kept
     assert slow.path.feeds[0].held_by == "the turn rate"
     said = r"going on as the path begins the tool turns by 7.5 rad"
-    with pytest.raises(sm.PathError, match=said):
-        sm.with_run_ups(sm.Feed(stroke(0.05, turned=1.5), 0.5))
+    with pytest.raises(sm.errors.PathError, match=said):
+        sm.paths.with_run_ups(sm.paths.Feed(stroke(0.05, turned=1.5), 0.5))

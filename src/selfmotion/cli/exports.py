@@ -59,33 +59,35 @@ def export(
     """Write a plan's motion for controllers and simulators, and check what was written."""
     asked = program_options.program_settings(settings, targets, wobj, mass)
     if rate is not None and all(_is_program(target, form, asked) for target in out):
-        raise sm.ProblemError("--rate has no effect on programs: targets are as many as it takes")
+        raise sm.errors.ProblemError(
+            "--rate has no effect on programs: targets are as many as it takes"
+        )
     if parts and all(_is_program(target, form, asked) for target in out):
-        raise sm.ProblemError(
+        raise sm.errors.ProblemError(
             "--parts has no effect on programs of controllers, which move all joints of a cell; "
             "leave it out, or give a file of another kind as well"
         )
     if settings is not None and not any(_is_of_controller(target, form) for target in out):
-        raise sm.ProblemError(
+        raise sm.errors.ProblemError(
             "--settings has no effect: it is of controllers' programs (.script, .src, .mod)"
         )
     typed = {"targets": targets, "wobj": wobj, "mass": mass}
     if any(typed.values()) and not any(_is_of_controller(target, form) for target in out):
         names = ", ".join(f"--{name}" for name, value in typed.items() if value)
-        raise sm.ProblemError(
+        raise sm.errors.ProblemError(
             f"{names}: of controllers' programs (.script, .src, .mod), of which none is asked for"
         )
     made: _Made
     if file.suffix == jobs.PROGRAM:
         made = sm.load_program(file)
     elif file.suffix == jobs.PARTS:
-        made = sm.load_parts(file)
+        made = sm.files.load_parts(file)
     elif is_move(file):
-        made = sm.load_move(file)
+        made = sm.files.load_move(file)
     else:
         made = sm.load_plan(file)
     if parts and not isinstance(made, sm.Plan):
-        raise sm.ProblemError(
+        raise sm.errors.ProblemError(
             f"{file}: --parts is of a cell's plan, which this is not; leave it out"
         )
     _check_verified(made, force, as_json)
@@ -104,19 +106,19 @@ def export(
             given["rate"] = coarsest if rate is None and _is_message(target, form) else rate
         together: dict[str, Path] = {}
         if parts and isinstance(made, sm.Plan) and not _is_program(target, form, asked):
-            together = sm.write_parts(made, target, **given)
+            together = sm.files.write_parts(made, target, **given)
         with StageDisplay(stages) as display:
             own = asked if _is_of_controller(target, form) else None
             if own is not None and not _is_program(target, form, asked) and programs:
                 own = own.streamed
-            sm.write_motion(made, target, settings=own, progress=display.stage, **given)
+            sm.files.write_motion(made, target, settings=own, progress=display.stage, **given)
         kept, verdicts[str(target)] = _read_back(made, target, form, rate, asked)
         sound &= kept
         if together:
             names = ", ".join(map(str, together.values()))
             verdicts[names] = ""
             if _is_readable(target, form) and isinstance(made, sm.Plan):
-                kept, verdicts[names] = _judged(made, sm.read_parts(together))
+                kept, verdicts[names] = _judged(made, sm.files.read_parts(together))
                 sound &= kept
     streamed = [target for target in out if not _is_program(target, form, asked)]
     if all(_is_message(target, form) for target in streamed):
@@ -166,7 +168,7 @@ def _check_verified(made: _Made, force: bool, as_json: bool) -> None:
     raise typer.Exit(NOT_VERIFIED)
 
 
-def _is_program(target: Path, form: str | None, asked: sm.ProgramSettings | None) -> bool:
+def _is_program(target: Path, form: str | None, asked: sm.files.ProgramSettings | None) -> bool:
     """Whether a file is a program of targets, which has no rate."""
     name = form or formats.SUFFIXES.get(target.suffix.lower())
     linear = asked is not None and asked.targets == "poses"
@@ -189,14 +191,14 @@ def _read_back(
     target: Path,
     form: str | None,
     rate: float | None,
-    asked: sm.ProgramSettings | None,
+    asked: sm.files.ProgramSettings | None,
 ) -> tuple[bool, str]:
     """Return whether what was written is still the motion, and what there is to say."""
     if _is_program(target, form, asked) and target.suffix.lower() in formats.READ_PROGRAMS:
         return _confirmed(made, target)
     if not _is_readable(target, form):
         return _verified(made), ""
-    motion = sm.read_motion(target)
+    motion = sm.files.read_motion(target)
     match made:
         case sm.Plan():
             return _judged(made, motion)

@@ -40,7 +40,7 @@ MassOption = Annotated[
 
 def program_settings(
     file: Path | None, targets: str | None, wobj: str | None, mass: float | None
-) -> sm.ProgramSettings | None:
+) -> sm.files.ProgramSettings | None:
     """Return the settings of controllers' programs: those of a file, and of options; None for none.
 
     Raises
@@ -48,13 +48,13 @@ def program_settings(
     ProblemError
         A work object is neither a name nor six numbers.
     """
-    asked = None if file is None else sm.read_program_settings(file)
+    asked = None if file is None else sm.files.read_program_settings(file)
     given: dict[str, Any] = {} if targets is None else {"targets": targets}
     if mass is not None:
         given["mass"] = mass
     if wobj is not None:
         given["work_object"] = _work_object(wobj)
-    return replace(asked or sm.ProgramSettings(), **given) if given else asked
+    return replace(asked or sm.files.ProgramSettings(), **given) if given else asked
 
 
 def _work_object(text: str) -> str | SE3:
@@ -67,7 +67,7 @@ def _work_object(text: str) -> str | SE3:
     except ValueError:
         values = []
     if len(values) != 6 or not np.isfinite(values).all():
-        raise sm.ProblemError(
+        raise sm.errors.ProblemError(
             f"--wobj: '{text}' is neither the name of a link nor six numbers x,y,z,rx,ry,rz "
             f"[m, rad]"
         )
