@@ -6,7 +6,7 @@ READY := $(VENV)/.ready
 # What is imported by many processes is compiled to bytecode once.
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: demo test lint format bench bench-constrained bench-remaining bench-relaxed bench-batch bench-peers bench-starts bench-places bench-first bench-fastest bench-feeds bench-job bench-moved bench-moves bench-raster bench-lifts bench-spirals bench-latency docs errors suite suite-made fuzz fuzz-tasks fuzz-cells fuzz-certificate fuzz-deceptions fuzz-generated fuzz-realtime fuzz-files fuzz-job fuzz-kept arms mutants memory acceptance distances study clean
+.PHONY: demo test lint format bench bench-constrained bench-remaining bench-relaxed bench-batch bench-peers bench-starts bench-places bench-first bench-fastest bench-feeds bench-job bench-moved bench-moves bench-raster bench-lifts bench-spirals bench-latency docs errors suite suite-made fuzz fuzz-tasks fuzz-cells fuzz-certificate fuzz-deceptions fuzz-generated fuzz-realtime fuzz-files fuzz-job fuzz-kept fuzz-programs arms mutants memory acceptance distances study clean
 
 demo: $(READY)  ## plan, check and replay the paper's planar arm and a Panda, into out/
 	$(BIN)/selfmotion demo --out out
@@ -74,6 +74,9 @@ fuzz-job: $(READY)  ## random jobs that leave posts; one that is killed at 20 ra
 	$(BIN)/python benchmarks/random_jobs.py
 	$(BIN)/python benchmarks/job_killed.py
 	$(BIN)/python benchmarks/job_killed.py --workers 2
+
+fuzz-programs: $(READY)  ## 100 random plans as linear programs, played by kinematics and interpolation of the judge's own
+	OMP_NUM_THREADS=1 $(BIN)/python benchmarks/programs.py
 
 fuzz-kept: $(READY)  ## 50 folders of jobs and 50 of batches, each spoilt in one way and begun again
 	OMP_NUM_THREADS=1 $(BIN)/python benchmarks/kept_folders.py

@@ -33,8 +33,8 @@ GROUPS = {
     "Jobs": (
         "quickstart", "weld_seam", "deburring", "painting", "closed_loop", "ur5_pointing", "rail",
         "weld_corner", "weld_positioner", "weld_torch", "part_in_hand", "two_arms", "own_arm",
-        "relaxed_rows", "in_parts", "weld_frame", "print_frame", "deburr_holes", "retiming",
-        "warm_start",
+        "relaxed_rows", "in_parts", "paint_strokes", "weld_frame", "print_frame", "deburr_holes",
+        "retiming", "warm_start",
     ),
     "To and from other programs": (
         "ros2_handover", "foreign_motion", "placement_map", "dask_cluster",

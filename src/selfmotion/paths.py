@@ -14,11 +14,13 @@ from selfmotion.path import (
     Reversed,
     Section,
     Spiral,
+    Stroke,
     TwistPath,
     Waypoints,
     Weave,
     section_at_rest,
     with_leads,
+    with_run_ups,
 )
 
 __all__ = [
@@ -35,9 +37,11 @@ __all__ = [
     "Reversed",
     "Section",
     "Spiral",
+    "Stroke",
     "TwistPath",
     "Waypoints",
     "Weave",
     "section_at_rest",
     "with_leads",
+    "with_run_ups",
 ]

@@ -65,13 +65,15 @@ def test_what_is_not_judged_is_said_in_words_of_the_shell(tmp_path: Path) -> Non
     job.write_text(example_text("panda", job, job=True))
     motion = tmp_path / "a.csv"
     motion.write_text("t,a\n0,0\n1,0\n")
-    (tmp_path / "fast.script").write_text("def selfmotion():\nend\n")
+    (tmp_path / "fast.script").write_text("def selfmotion():\n  servoj([0, 0], t=0.008)\nend\n")
+    (tmp_path / "keys.xml").write_text("<mujoco/>")
     (tmp_path / "bad.mod").write_text("MODULE bad\n  MoveL p1;\nENDMODULE\n")
     for asked in (("plan", job), ("check", motion, "--robot", job)):
         said = complaint(*asked)
         assert f"{job}: has seams, so that it is a job: `selfmotion job` plans it" in said
     for name, words in (
-        ("fast.script", "is no motion that is read, though it is written: expected .csv,"),
+        ("keys.xml", "is no motion that is read, though it is written: expected .csv,"),
+        ("fast.script", "line 2: a stream of servoj is not read; only programs of linear motions"),
         ("bad.mod", "line 2: 'MoveL p1;' is not read: page 'Files' of the docs lists what is"),
         ("a.doc", "is no motion that is read: expected .csv, "),
     ):

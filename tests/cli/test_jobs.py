@@ -109,9 +109,9 @@ def test_a_job_from_the_shell_is_written_read_and_exported(tmp_path) -> None:
     assert len(sm.files.read_motion(tmp_path / "b.csv").t) == int(program.duration * 100) + 2
     # A single move as well, by a suffix in whichever case.
     move = next(step.made for step in program.steps if isinstance(step.made, sm.Move))
-    saved, written = tmp_path / "go.npz", tmp_path / "GO.SRC"
+    saved, written = tmp_path / "go.npz", tmp_path / "GO.MOD"
     move.save(saved)
-    code, text = invoke("export", saved, "--out", written)
+    code, text = invoke("export", saved, "--out", written, "--mass", "1.5")
     assert code == 0, text
     assert sm.files.read_motion(written).duration == pytest.approx(move.motion.duration, abs=1e-3)
     with pytest.raises(sm.errors.FileFormatError, match="is a move, not a plan"):
@@ -156,6 +156,9 @@ def test_bad_targets_are_refused_before_anything_is_planned(table) -> None:
     settings.write_text("[signals]\noff = [1, true]\n")
     said = complaint("job", table, "--out", "frame.src", "--settings", settings)
     assert "event 'on' has no signal" in said
+    settings.write_text("[signals]\non = [1, true]\noff = [1, false]\n")
+    assert "Java (Sunrise)" in complaint("job", table, "--out", "a.src", "--settings", settings)
+    assert "export --mass KG" in complaint("job", table, "--out", "a.mod", "--settings", settings)
     said = complaint("job", table, "--out", "frame.yaml", "--settings", settings)
     assert "--settings has no effect" in said
 

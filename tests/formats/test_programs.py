@@ -38,6 +38,16 @@ def plan() -> sm.Plan:
 
 
 @pytest.fixture(scope="module")
+def plans(plan: sm.Plan) -> dict[str, sm.Plan]:
+    """A plan for each file: KRL is for arms of six axes, ABB has one of seven."""
+    ur5 = robot_named("ur5")
+    start = ur5.dexterous_configuration("pointing")
+    circle = sm.paths.Circle.around(ur5.pose(start), 0.1, 3.0, normal=(1.0, 0.0, 0.0))
+    problem = sm.Problem(ur5, circle, "pointing", start=start, collision=None)
+    return {".src": sm.plan(problem).require(), ".mod": plan}
+
+
+@pytest.fixture(scope="module")
 def program() -> sm.Program:
     """Two seams of a UR5, with an arc, moves and a wait."""
     ur5 = robot_named("ur5")
@@ -115,14 +125,17 @@ def joined(file: Path, names: tuple[str, ...], seventh: int | None) -> tuple[Arr
 
 
 @pytest.mark.parametrize("name", FILES)
-def test_the_deviation_that_is_stated_holds(plan: sm.Plan, tmp_path: Path, name: str) -> None:
+def test_the_deviation_that_is_stated_holds(
+    plans: dict[str, sm.Plan], tmp_path: Path, name: str
+) -> None:
+    plan = plans[Path(name).suffix]
     file, counts = tmp_path / name, []
     for deviation in (1e-3, 1e-4):
         sm.files.write_motion(plan, file, settings=settings(name, deviation))
         count, stated, found = program_miss(plan, file)
         counts.append(count)
         # KUKA's LBR and ABB's IRB 14000 count the third of seven joints apart.
-        t, q = joined(file, plan.robot.joint_names, seventh=2)
+        t, q = joined(file, plan.robot.joint_names, seventh=2 if plan.robot.dof == 7 else None)
         assert len(t) == count + 1
         assert t[-1] == pytest.approx(plan.trajectory.duration, abs=1e-5)
         times = np.linspace(0.0, 0.999999 * t[-1], 4001)
@@ -141,11 +154,14 @@ def test_the_deviation_that_is_stated_holds(plan: sm.Plan, tmp_path: Path, name:
 
 
 @pytest.mark.parametrize("name", FILES)
-def test_what_is_read_is_what_was_written(plan: sm.Plan, tmp_path: Path, name: str) -> None:
+def test_what_is_read_is_what_was_written(
+    plans: dict[str, sm.Plan], tmp_path: Path, name: str
+) -> None:
+    plan = plans[Path(name).suffix]
     file = tmp_path / name
     sm.files.write_motion(plan, file, settings=settings(name))
     again = sm.files.read_motion(file).of_joints(plan.robot.joint_names)
-    t, q = joined(file, plan.robot.joint_names, seventh=2)
+    t, q = joined(file, plan.robot.joint_names, seventh=2 if plan.robot.dof == 7 else None)
     np.testing.assert_allclose(again.t, t, atol=1e-9)
     np.testing.assert_allclose(again.q, q, atol=1e-12)
     within = sm.Tolerance(2e-4, 2e-3)
@@ -385,7 +401,7 @@ def test_other_axes_are_in_mm_and_counted_apart(tmp_path: Path) -> None:
     first = tiago.dexterous_configuration()
     last = first + np.array([0.1, *[0.2] * 7])
     move = sm.move(tiago, first, last, clearance=None).require()
-    sm.files.write_motion(move, tmp_path / "lift.mod")
+    sm.files.write_motion(move, tmp_path / "lift.mod", settings=sm.files.ProgramSettings(mass=1.0))
     text = (tmp_path / "lift.mod").read_text()
     assert "E2 = torso_lift_joint [mm]" in text
     (begin,) = re.findall(r"MoveAbsJ \[\[.*?\], \[(.*?)\]\]", text)[:1]
@@ -395,8 +411,19 @@ def test_other_axes_are_in_mm_and_counted_apart(tmp_path: Path) -> None:
     np.testing.assert_allclose(again.q[-1], last, atol=1e-6)
     axes = {name: f"A{k}" for k, name in enumerate(tiago.joint_names[1:7], 1)}
     axes |= {tiago.joint_names[7]: "E1", tiago.joint_names[0]: "E3"}
-    sm.files.write_motion(move, tmp_path / "lift.src", settings=sm.files.ProgramSettings(axes=axes))
-    assert "E3" in (tmp_path / "lift.src").read_text()
+    own = sm.files.ProgramSettings(axes=axes, mass=1.0)
+    sm.files.write_motion(move, tmp_path / "lift.mod", settings=own)
+    begin = re.search(r"MoveAbsJ \[\[.*?\], \[(.*?)\]\]", (tmp_path / "lift.mod").read_text())
+    assert begin is not None
+    assert [text == "9E9" for text in begin[1].split(", ")] == [False, True, False, *[True] * 3]
+    # Its last joint but one is in the arm, whichever axis it is called.
+    within = {name: f"A{k}" for k, name in enumerate(tiago.joint_names[2:], 1)}
+    within |= {tiago.joint_names[3]: "E1", tiago.joint_names[1]: "A2"}
+    within |= {tiago.joint_names[0]: "E2"}
+    with pytest.raises(sm.errors.ProblemError, match=r"Java \(Sunrise\)"):
+        sm.files.write_motion(
+            move, tmp_path / "lift.src", settings=sm.files.ProgramSettings(axes=within)
+        )
     for wrong, said in (
         ({"torso_lift_joint": "A1"}, "joint 'arm_1_joint' has no axis"),
         (axes | {"torso_lift_joint": "E1"}, "two joints are axis E1"),
@@ -423,9 +450,9 @@ def test_settings_that_have_no_effect_are_refused_by_name(
 
 
 def test_what_is_not_verified_is_written_only_when_forced(
-    plan: sm.Plan, program: sm.Program, tmp_path: Path
+    plans: dict[str, sm.Plan], program: sm.Program, tmp_path: Path
 ) -> None:
-    broken = replace(plan, altered="somebody changed it")
+    broken = replace(plans[".src"], altered="somebody changed it")
     unmade = replace(program, missing={"third": "out of reach"})
     for made in (broken, unmade):
         for name in (*FILES, "weld.csv"):
@@ -495,16 +522,18 @@ def test_the_shell_writes_programs_and_confirms_them(program: sm.Program, tmp_pa
         invoke(*asked, "--settings", tmp_path / "kuka.toml")
 
 
-def test_lines_that_are_not_written_are_refused_by_number(plan: sm.Plan, tmp_path: Path) -> None:
+def test_lines_that_are_not_written_are_refused_by_number(
+    plans: dict[str, sm.Plan], tmp_path: Path
+) -> None:
     for name, line, said in (
-        ("weld.src", "  LIN {X 0, Y 0, Z 0}", "'LIN {X 0, Y 0, Z 0}' is not read"),
+        ("weld.src", "  CIRC {X 0, Y 0, Z 0}", "'CIRC {X 0, Y 0, Z 0}' is not read"),
         ("weld.src", "    SPTP {A1 0, A1 3}", "axis A1 is there twice|no TIME_BLOCK PART"),
         ("weld.src", "    TIME_BLOCK PART = -1", "there is no target before|above 0"),
         ("weld.mod", "    MoveL p1, v100, fine, tool0;", "'MoveL p1, v100, fine, tool0;'"),
         ("weld.mod", "    WaitTime 1;", "rest where it does not stop"),
     ):
         file = tmp_path / name
-        sm.files.write_motion(plan, file, settings=settings(name))
+        sm.files.write_motion(plans[file.suffix], file, settings=settings(name))
         lines = file.read_text().splitlines()
         at = len(lines) // 2
         while not re.match(r"\s+(SPTP|MoveAbsJ)", lines[at]):
@@ -517,12 +546,14 @@ def test_lines_that_are_not_written_are_refused_by_number(plan: sm.Plan, tmp_pat
             sm.files.read_motion(file)
 
 
-def test_modules_are_called_as_controllers_allow(plan: sm.Plan, tmp_path: Path) -> None:
+def test_modules_are_called_as_controllers_allow(plans: dict[str, sm.Plan], tmp_path: Path) -> None:
     for name in ("2weld.src", "we ld.mod", f"{'w' * 25}.src", f"{'w' * 29}.mod", "wéld.src"):
+        asked = sm.files.ProgramSettings(mass=1.0)
         with pytest.raises(sm.errors.FileFormatError, match="is no name: expected a letter"):
-            sm.files.write_motion(plan, tmp_path / name)
+            sm.files.write_motion(plans[Path(name).suffix], tmp_path / name, settings=asked)
     for name in (f"{'w' * 24}.src", f"{'w' * 28}.mod"):
-        sm.files.write_motion(plan, tmp_path / name)
+        asked = sm.files.ProgramSettings(mass=1.0)
+        sm.files.write_motion(plans[Path(name).suffix], tmp_path / name, settings=asked)
         text = (tmp_path / name).read_text()
         assert max(len(word) for word in re.findall(r"\b[A-Za-z]\w*", text)) <= 32
         assert text.isascii()
@@ -531,8 +562,9 @@ def test_modules_are_called_as_controllers_allow(plan: sm.Plan, tmp_path: Path) 
 
 @pytest.mark.parametrize("apart", [0.0, 1e-9, 1e-6, 2e-5])
 def test_events_near_each_other_and_the_ends_are_all_written(
-    plan: sm.Plan, tmp_path: Path, apart: float
+    plans: dict[str, sm.Plan], tmp_path: Path, apart: float
 ) -> None:
+    plan = plans[".src"]
     last = plan.trajectory.duration
     pairs = ((0.5, 0.5 + apart), (min(apart, 1e-6), last - apart), (0.0, last + 5e-10))
     for number, (on, off) in enumerate(pairs):
@@ -555,9 +587,12 @@ def test_programs_have_the_suffix_of_their_controller(
 
 
 @pytest.mark.parametrize("name", ["for.src", "Loop.src", "test.mod", "proc.mod"])
-def test_words_of_a_language_name_no_module(plan: sm.Plan, tmp_path: Path, name: str) -> None:
+def test_words_of_a_language_name_no_module(
+    plans: dict[str, sm.Plan], tmp_path: Path, name: str
+) -> None:
+    asked = sm.files.ProgramSettings(mass=1.0)
     with pytest.raises(sm.errors.FileFormatError, match="is a word of the controller's language"):
-        sm.files.write_motion(plan, tmp_path / name)
+        sm.files.write_motion(plans[Path(name).suffix], tmp_path / name, settings=asked)
 
 
 def test_the_tool_of_an_arm_in_a_cell_is_that_of_the_arm_alone() -> None:

@@ -46,6 +46,7 @@ OTHERWISE: dict[str, dict[str, str]] = {
     "plan_job": {
         "constraints": "are the tables [[constraints]]",
         "clearance": "is the Clearance among them, or collision",
+        "warm_start": "is of a run, not of a job: job --from",
     },
     "Clearance": {},
     "load_robot": {"urdf": "is name or file, or parts", "package_dirs": "are beside the file"},

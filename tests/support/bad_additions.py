@@ -118,6 +118,7 @@ def _path_rows() -> list[Row]:
                 sm.paths.Line(POSE, _moved(), 2.0, time_law="constant"), 0.05, 1.0
             ),
         ),
+        Row(area, "with_run_ups(Line)", lambda _: sm.paths.with_run_ups(line())),
         *bad_values_of(
             area,
             "Retimed",
@@ -170,6 +171,13 @@ def _dropped_rows() -> list[Row]:
             "plan_job(constraints=[EndConfiguration(…)])",
             lambda _: sm.plan_job(panda, [seam], constraints=[end]),
         ),
+        Row(
+            "Planning",
+            "plan_job(warm_start='a.program')",
+            lambda _: sm.plan_job(panda, [seam], warm_start="a.program"),
+        ),
+        Row("Planning", "highest_feed(0.3)", lambda _: sm.job.highest_feed(0.3)),
+        Row("Planning", "highest_feed(most=30)", lambda _: sm.job.highest_feed(print, 30.0)),
         Row(
             "Planning", "fastest() along a Feed", lambda _: sm.fastest(_panda(fed, task="position"))
         ),

@@ -347,6 +347,19 @@ def setting_rows() -> list[Row]:
             mass={"0": 0, "3200": 3200, "'heavy'": "heavy"},
             center={"[0, 0]": [0, 0], "[0, 0, 80]": [0, 0, 80], "'tip'": "tip"},
             approach={"0": 0, "2": 2},
+            targets={"'lines'": "lines", "None": None},
+            work_object={"'table'": "table"},
+            positioner={"0": 0, "'unit 1'": "unit 1"},
+        ),
+        Row(
+            "Files",
+            "ProgramSettings(targets='poses', work_object=[[1]])",
+            lambda _: sm.files.ProgramSettings(targets="poses", work_object=[[1.0]]),
+        ),
+        Row(
+            "Files",
+            "read_motion('a.mod', robot='ur5')",
+            lambda _: sm.files.read_motion("a.mod", robot="ur5"),
         ),
         *bad_values_of(
             "Files",

@@ -8,7 +8,7 @@ import tempfile
 import zipfile
 import zlib
 from collections.abc import Callable
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -131,9 +131,12 @@ def good_files() -> tuple[Good, ...]:
         ends = np.zeros(3), np.array([0.4, 0.3, -0.5])
         move = sm.move(arm, *ends, constraints=limits, clearance=None)
         for suffix in (".src", ".mod"):
-            sm.files.write_motion(move, folder / f"motion{suffix}")
+            sm.files.write_motion(
+                move, folder / f"motion{suffix}", settings=sm.files.ProgramSettings(mass=1.0)
+            )
             content = (folder / f"motion{suffix}").read_bytes()
             found.append(Good("program", suffix, content, sm.files.read_motion))
+        found += _pose_programs(folder)
         for suffix in (".toml", ".json"):
             sm.files.write_problem(problem, folder / f"problem{suffix}")
             content = (folder / f"problem{suffix}").read_bytes()
@@ -143,6 +146,21 @@ def good_files() -> tuple[Good, ...]:
         content = (folder / "plan.npz").read_bytes()
         found += [Good("plan", ".npz", content, sm.load_plan)] * 2
     return tuple(found)
+
+
+def _pose_programs(folder: Path) -> list[Good]:
+    """Return linear programs of a short move, whose poses the arm's kinematics have to follow."""
+    ur5 = sm.load_robot("ur5")
+    first = ur5.dexterous_configuration("pointing")
+    move = sm.move(ur5, first, first + 0.05, clearance=None)
+    asked = sm.files.ProgramSettings(mass=1.0, targets="poses")
+    found = []
+    for suffix in (".src", ".mod", ".script"):
+        sm.files.write_motion(move, folder / f"poses{suffix}", settings=asked)
+        content = (folder / f"poses{suffix}").read_bytes()
+        read = partial(sm.files.read_motion, robot=ur5)
+        found.append(Good("program of poses", suffix, content, read))
+    return found
 
 
 def mutated(good: Good, rng: np.random.Generator) -> bytes:

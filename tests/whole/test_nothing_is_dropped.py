@@ -269,6 +269,8 @@ def test_each_parameter_of_a_job_matters(tmp_path: Path) -> None:
         "branches": 2,
         "seconds_per_cost": 5.0,
         "deadline": 1e-9,
+        # Of a program that begins elsewhere, the seam does as well.
+        "warm_start": sm.plan_job(PANDA, [seam("a", -0.05)], branches=1, start=home),
         "folder": tmp_path,
         "executor": ThreadPoolExecutor(1),
         "rng": 1,

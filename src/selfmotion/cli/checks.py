@@ -18,12 +18,12 @@ _Near = Mapping[str, Extreme]
 
 
 def read(
-    file: Path, degrees: bool, within: sm.Tolerance | None
+    file: Path, degrees: bool, within: sm.Tolerance | None, robot: sm.RobotModel
 ) -> tuple[sm.Trajectory, sm.Tolerance | None]:
     """Return the motion of a file, and what it may miss its path by: what a program states."""
-    motion = sm.files.read_motion(file, degrees=degrees)
+    motion = sm.files.read_motion(file, degrees=degrees, robot=robot)
     if within is None and is_program(file):
-        within = formats.stated_deviation(file)
+        within = formats.stated_deviation(file, robot)
         if within is not None:
             text = (
                 f"note: judged within the {1e3 * within.position:.3g} mm and {within.rotation:.2g} "
@@ -35,7 +35,7 @@ def read(
 
 def is_program(file: Path) -> bool:
     """Whether a file is a program of a controller."""
-    return file.suffix.lower() in formats.PROGRAMS
+    return file.suffix.lower() in formats.READ_PROGRAMS
 
 
 def of_plan(
@@ -51,20 +51,25 @@ def of_plan(
 
 
 def of_problem(
-    file: str,
-    motion: sm.Trajectory,
+    file: Path,
+    asked: str,
+    degrees: bool,
     within: sm.Tolerance | None,
     judged: tuple[Any, ...],
     progress: Progress,
-    *,
-    of_controller: bool = False,
 ) -> tuple[sm.Certificate, _Near, sm.RobotModel]:
     """Return the same of a motion by all that a problem file asks, and what else is."""
-    job = sm.files.read_job(file)
+    job = sm.files.read_job(asked)
     problem = job.problem
-    if of_controller:
+    motion, within = read(file, degrees, within, problem.robot)
+    if is_program(file):
         kept = formats.what_targets_keep(problem.constraints)
         problem = replace(problem, constraints=kept)
+        program = formats.read_program(file, problem.robot)
+        begin = motion.of_joints(problem.robot.joint_names).q[0]
+        problem = formats.as_shifted(problem, program, begin)
+        if formats.shift_told(program):
+            stages.print(f"note: {formats.shift_told(program)}", markup=False, soft_wrap=True)
     motion = formats.without_followers(motion, problem.robot)
     besides = options.requirements(problem.robot, *judged)
     allowed, robot = within or job.tolerance, problem.robot

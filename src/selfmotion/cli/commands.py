@@ -222,14 +222,8 @@ def check(
             certificate, near, arm = checks.of_plan(file, within, judged, display.stage)
         elif robot is not None and Path(robot).suffix in documents.SUFFIXES:
             options.refuse(own, robot, "the problem's")
-            motion, stated = checks.read(file, degrees, within)
             certificate, near, arm = checks.of_problem(
-                robot,
-                motion,
-                stated,
-                judged,
-                display.stage,
-                of_controller=checks.is_program(file),
+                file, robot, degrees, within, judged, display.stage
             )
         else:
             if robot is None or path is None:
@@ -246,7 +240,7 @@ def check(
                 arguments=options.arguments(argument),
                 packages=packages or (),
             )
-            motion, stated = checks.read(file, degrees, within)
+            motion, stated = checks.read(file, degrees, within, arm)
             motion = formats.without_followers(motion, arm)
             asked = options.requirements(arm, *judged)
             followed = documents.followed(path, context.params, arm)

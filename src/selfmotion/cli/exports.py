@@ -9,7 +9,7 @@ import typer
 
 import selfmotion as sm
 from selfmotion import formats
-from selfmotion.cli import jobs, options, outputs
+from selfmotion.cli import jobs, options, outputs, program_options
 from selfmotion.cli.app import NOT_VERIFIED, VERIFIED, app, stages, terminal
 from selfmotion.cli.stage_display import StageDisplay
 from selfmotion.result import is_move
@@ -46,7 +46,10 @@ def export(
             help="For a cell: also a file for each part (not of programs).",
         ),
     ] = False,
-    settings: options.SettingsOption = None,
+    settings: program_options.SettingsOption = None,
+    targets: program_options.TargetsOption = None,
+    wobj: program_options.WorkObjectOption = None,
+    mass: program_options.MassOption = None,
     force: Annotated[
         bool,
         typer.Option("--force", help="Write it even if it is not verified, or moves at an end."),
@@ -54,11 +57,12 @@ def export(
     as_json: options.JsonOption = False,
 ) -> None:
     """Write a plan's motion for controllers and simulators, and check what was written."""
-    if rate is not None and all(_is_program(target, form) for target in out):
+    asked = program_options.program_settings(settings, targets, wobj, mass)
+    if rate is not None and all(_is_program(target, form, asked) for target in out):
         raise sm.errors.ProblemError(
             "--rate has no effect on programs: targets are as many as it takes"
         )
-    if parts and all(_is_program(target, form) for target in out):
+    if parts and all(_is_program(target, form, asked) for target in out):
         raise sm.errors.ProblemError(
             "--parts has no effect on programs of controllers, which move all joints of a cell; "
             "leave it out, or give a file of another kind as well"
@@ -67,7 +71,12 @@ def export(
         raise sm.errors.ProblemError(
             "--settings has no effect: it is of controllers' programs (.script, .src, .mod)"
         )
-    asked = None if settings is None else sm.files.read_program_settings(settings)
+    typed = {"targets": targets, "wobj": wobj, "mass": mass}
+    if any(typed.values()) and not any(_is_of_controller(target, form) for target in out):
+        names = ", ".join(f"--{name}" for name, value in typed.items() if value)
+        raise sm.errors.ProblemError(
+            f"{names}: of controllers' programs (.script, .src, .mod), of which none is asked for"
+        )
     made: _Made
     if file.suffix == jobs.PROGRAM:
         made = sm.load_program(file)
@@ -85,21 +94,25 @@ def export(
     _tell_followers(made.robot, out, form)
     verdicts: dict[str, str] = {}
     # Which what is only of these is said for.
-    programs = any(_is_program(target, form) for target in out)
+    programs = any(_is_program(target, form, asked) for target in out)
+    messages = any(_is_message(target, form) for target in out)
+    coarsest = None
+    if messages and rate is None and isinstance(made, sm.Plan):
+        coarsest = formats.coarsest_rate(made)
     sound = True
     for target in out:
         given: dict[str, Any] = {"form": form, "force": force}
-        if not _is_program(target, form):
-            given["rate"] = rate
+        if not _is_program(target, form, asked):
+            given["rate"] = coarsest if rate is None and _is_message(target, form) else rate
         together: dict[str, Path] = {}
-        if parts and isinstance(made, sm.Plan) and not _is_program(target, form):
+        if parts and isinstance(made, sm.Plan) and not _is_program(target, form, asked):
             together = sm.files.write_parts(made, target, **given)
         with StageDisplay(stages) as display:
             own = asked if _is_of_controller(target, form) else None
-            if own is not None and not _is_program(target, form) and programs:
+            if own is not None and not _is_program(target, form, asked) and programs:
                 own = own.streamed
             sm.files.write_motion(made, target, settings=own, progress=display.stage, **given)
-        kept, verdicts[str(target)] = _read_back(made, target, form, rate)
+        kept, verdicts[str(target)] = _read_back(made, target, form, rate, asked)
         sound &= kept
         if together:
             names = ", ".join(map(str, together.values()))
@@ -107,7 +120,21 @@ def export(
             if _is_readable(target, form) and isinstance(made, sm.Plan):
                 kept, verdicts[names] = _judged(made, sm.files.read_parts(together))
                 sound &= kept
-    _finish(made, rate, verdicts, sound, as_json)
+    streamed = [target for target in out if not _is_program(target, form, asked)]
+    if all(_is_message(target, form) for target in streamed):
+        rate = coarsest if rate is None else rate
+    if coarsest is not None and not as_json:
+        terminal.print(
+            f"at {coarsest:g} Hz: the coarsest rate at which straight lines between samples keep "
+            f"the plan's tolerance",
+            markup=False,
+            soft_wrap=True,
+        )
+    _finish(made, rate, verdicts, sound, as_json, sampled=bool(streamed))
+
+
+def _is_message(target: Path, form: str | None) -> bool:
+    return (form or formats.SUFFIXES.get(target.suffix.lower())) in formats.MESSAGES
 
 
 def _tell_followers(robot: sm.RobotModel, out: list[Path], form: str | None) -> None:
@@ -141,13 +168,16 @@ def _check_verified(made: _Made, force: bool, as_json: bool) -> None:
     raise typer.Exit(NOT_VERIFIED)
 
 
-def _is_program(target: Path, form: str | None) -> bool:
-    return (form or formats.SUFFIXES.get(target.suffix.lower())) in formats.PROGRAMS.values()
+def _is_program(target: Path, form: str | None, asked: sm.files.ProgramSettings | None) -> bool:
+    """Whether a file is a program of targets, which has no rate."""
+    name = form or formats.SUFFIXES.get(target.suffix.lower())
+    linear = asked is not None and asked.targets == "poses"
+    return name in formats.PROGRAMS.values() or (name == "urscript" and linear)
 
 
 def _is_of_controller(target: Path, form: str | None) -> bool:
     name = form or formats.SUFFIXES.get(target.suffix.lower())
-    return name == "urscript" or _is_program(target, form)
+    return name == "urscript" or name in formats.PROGRAMS.values()
 
 
 def _is_readable(target: Path, form: str | None) -> bool:
@@ -156,9 +186,15 @@ def _is_readable(target: Path, form: str | None) -> bool:
     )
 
 
-def _read_back(made: _Made, target: Path, form: str | None, rate: float | None) -> tuple[bool, str]:
+def _read_back(
+    made: _Made,
+    target: Path,
+    form: str | None,
+    rate: float | None,
+    asked: sm.files.ProgramSettings | None,
+) -> tuple[bool, str]:
     """Return whether what was written is still the motion, and what there is to say."""
-    if _is_program(target, form) and target.suffix.lower() in formats.PROGRAMS:
+    if _is_program(target, form, asked) and target.suffix.lower() in formats.READ_PROGRAMS:
         return _confirmed(made, target)
     if not _is_readable(target, form):
         return _verified(made), ""
@@ -220,7 +256,9 @@ def _confirmed(made: _Made, target: Path) -> tuple[bool, str]:
     switched = formats.misswitched(target, made) if isinstance(made, sm.Program) else ()
     kept &= not switched
     far = f", between which the tool is at most {', and '.join(told)}" if told else ""
-    return kept, f"read back: {'; '.join((f'{count} targets{far}', *switched))}"
+    remark = formats.read_program(target, made.robot).remark
+    why = (f"they are joints, as poses do not keep the motion: {remark}",) if remark else ()
+    return kept, f"read back: {'; '.join((f'{count} targets{far}', *why, *switched))}"
 
 
 def _verified(made: _Made) -> bool:
@@ -233,10 +271,15 @@ def _judged(plan: sm.Plan, motion: sm.Trajectory) -> tuple[bool, str]:
 
 
 def _finish(
-    made: _Made, rate: float | None, verdicts: dict[str, str], sound: bool, as_json: bool
+    made: _Made,
+    rate: float | None,
+    verdicts: dict[str, str],
+    sound: bool,
+    as_json: bool,
+    *,
+    sampled: bool,
 ) -> NoReturn:
     """Print what was written, and end."""
-    sampled = [name for name in verdicts if Path(name).suffix.lower() not in formats.PROGRAMS]
     miss = None
     if sampled and isinstance(made, sm.Plan):
         miss = formats.linear_miss(made, rate)

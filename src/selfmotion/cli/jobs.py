@@ -9,7 +9,7 @@ import typer
 
 import selfmotion as sm
 from selfmotion import formats
-from selfmotion.cli import documents, json_tables, options, outputs, tables
+from selfmotion.cli import documents, json_tables, options, outputs, program_options, tables
 from selfmotion.cli.app import NOT_VERIFIED, VERIFIED, app, complain, stages, terminal
 from selfmotion.cli.batch_display import check_cluster, executor_at
 from selfmotion.cli.stage_display import StageDisplay
@@ -45,7 +45,7 @@ def job(
     dask: Annotated[
         str | None, typer.Option(help="Or the address of a Dask scheduler, host:port.")
     ] = None,
-    settings: options.SettingsOption = None,
+    settings: program_options.SettingsOption = None,
     changes: options.SetOption = None,
     allow_code: options.AllowCodeOption = False,
     as_json: options.JsonOption = False,
@@ -68,6 +68,10 @@ def job(
         # Before anything is planned.
         happens = {event: seam.name for seam in work.seams for event, _ in seam.events}
         formats.check_signals(happens, asked or sm.files.ProgramSettings())
+        for target in wanted:
+            if target.suffix.lower() in formats.PROGRAMS:
+                form = formats.PROGRAMS[target.suffix.lower()]
+                formats.check_controller(work.robot, form, asked or sm.files.ProgramSettings())
     remarks = work.remarks
     outputs.tell(remarks)
     kept = folder or Path("out") / f"{file.stem}.job"
@@ -83,6 +87,10 @@ def job(
     except KeyboardInterrupt:
         complain(f"stopped; what is finished is in '{kept}': run again to go on")
         raise typer.Exit(NOT_VERIFIED) from None
+    if work.at_feed is not None and not as_json:
+        feeds = [feed.asked for plan in program.plans.values() for feed in plan.path.feeds]
+        text = f"feed: {max(feeds):g} m/s, the highest that was found at which all seams are kept"
+        terminal.print(text, markup=False, soft_wrap=True)
     _show(program, as_json, remarks)
     # What is only of programs of targets is said for these, where there are some.
     has_targets = any(target.suffix.lower() in formats.PROGRAMS for target in wanted)
@@ -91,7 +99,8 @@ def job(
         if unsound and outputs.is_motion(target) and not _is_timetable(target):
             outputs.tell_left_out(target, terminal, unsound, quiet=as_json)
             continue
-        streamed = asked is not None and has_targets and target.suffix.lower() == ".script"
+        of_stream = asked is not None and asked.targets == "joints"
+        streamed = of_stream and has_targets and target.suffix.lower() == ".script"
         write_program(program, target, asked.streamed if asked and streamed else asked)
         if not as_json:
             terminal.print(f"wrote {target}", markup=False, soft_wrap=True)

@@ -168,13 +168,6 @@ SetOption = Annotated[
         "--set", help="KEY=VALUE of the problem file, such as path.duration=6. Repeatable."
     ),
 ]
-SettingsOption = Annotated[
-    Path | None,
-    typer.Option(
-        help="File with settings of a controller's program: deviation, axes, signals, "
-        "flange, mass, center, approach (TOML)."
-    ),
-]
 AllowCodeOption = Annotated[
     bool, typer.Option("--allow-code", help="Import what the file names as module:attribute.")
 ]

@@ -2,7 +2,10 @@
 
 from typing import Any
 
-from selfmotion.formats.controller_program import check_signals as check_signals
+from selfmotion.formats.controller_program import (
+    check_controller as check_controller,
+    check_signals as check_signals,
+)
 from selfmotion.formats.documents import (
     in_si as in_si,
     read_document as read_document,
@@ -17,16 +20,19 @@ from selfmotion.formats.followers import (
 from selfmotion.formats.job import Job as Job
 from selfmotion.formats.joint_limits import read_joint_limits as read_joint_limits
 from selfmotion.formats.judged_programs import (
+    as_shifted as as_shifted,
     judged_motion as judged_motion,
     judged_program as judged_program,
     misswitched as misswitched,
     part_of as part_of,
+    shift_told as shift_told,
     stated_deviation as stated_deviation,
     what_targets_keep as what_targets_keep,
 )
 from selfmotion.formats.motion_parts import read_parts as read_parts, write_parts as write_parts
 from selfmotion.formats.motions import (
     FORMS as FORMS,
+    MESSAGES as MESSAGES,
     READABLE as READABLE,
     SUFFIXES as SUFFIXES,
     read_motion as read_motion,
@@ -55,12 +61,21 @@ from selfmotion.formats.problem_parts import obstacle as obstacle, path_of as pa
 from selfmotion.formats.problem_writing import (
     write_problem as write_problem,
 )
-from selfmotion.formats.program_files import PROGRAMS as PROGRAMS, program_miss as program_miss
+from selfmotion.formats.program_files import (
+    PROGRAMS as PROGRAMS,
+    READ_PROGRAMS as READ_PROGRAMS,
+    program_miss as program_miss,
+    read_program as read_program,
+)
 from selfmotion.formats.program_settings import (
     ProgramSettings as ProgramSettings,
     read_program_settings as read_program_settings,
 )
-from selfmotion.formats.samples import LinearMiss as LinearMiss, linear_miss as linear_miss
+from selfmotion.formats.samples import (
+    LinearMiss as LinearMiss,
+    coarsest_rate as coarsest_rate,
+    linear_miss as linear_miss,
+)
 from selfmotion.formats.seam_job import (
     SeamJob as SeamJob,
     read_seam_job as read_seam_job,

@@ -1,8 +1,9 @@
 """A joint motion as programs of robot controllers say it, whichever language they speak."""
 
 import re
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
 from itertools import combinations
 from math import ceil
 from pathlib import Path as FilePath
@@ -12,15 +13,19 @@ import numpy as np
 
 from selfmotion.basics import FileFormatError, ProblemError, Progress, nearest, silent
 from selfmotion.formats.pieces import pieces_of
+from selfmotion.formats.pose_numbers import ROUNDINGS
+from selfmotion.formats.pose_stretches import PoseStretch
+from selfmotion.formats.pose_thinning import NotByPosesError, PoseSpan
 from selfmotion.formats.program_axes import Axis, axes_of, in_order, tool_from_flange
 from selfmotion.formats.program_settings import ProgramSettings, Signal
 from selfmotion.formats.stretches import NO_MISS, Miss, Misses, Stretch, miss_of
 from selfmotion.formats.targets import stretches_of
+from selfmotion.formats.tool_frames import WORLD, ToolFrames, own_joint
 from selfmotion.job import Program, are_opposite
 from selfmotion.motion import Trajectory
 from selfmotion.result import Move, Parts, Plan
 from selfmotion.robot import RobotModel
-from selfmotion.task import SE3
+from selfmotion.task import SE3, Quaternion
 
 
 class Switch(NamedTuple):
@@ -57,6 +62,13 @@ class ControllerProgram:
         How far targets are off the motion, as the file states it.
     switches : tuple of Switch
         What is switched when, in order.
+    shift : SE3 or None
+        By how much the work object is elsewhere than it was planned, in the frame of its carrier;
+        None where it is not.
+    carrier : str
+        The link that the work object is fixed to, or ``"world"``.
+    remark : str
+        Why targets are joints though poses were asked for.
     """
 
     name: str
@@ -64,6 +76,9 @@ class ControllerProgram:
     stretches: tuple[Stretch, ...]
     miss: Misses
     switches: tuple[Switch, ...] = ()
+    shift: SE3 | None = None
+    carrier: str = WORLD
+    remark: str = ""
 
     @property
     def targets(self) -> int:
@@ -79,16 +94,14 @@ class ControllerProgram:
         FileFormatError
             There is none.
         """
-        from scipy.interpolate import CubicSpline
-
         t, q, qd = [np.zeros(1)], [self.stretches[0].q[:1]], [0.0 * self.stretches[0].q[:1]]
         for stretch in self.stretches:
-            rates = 0.0 * stretch.q
+            times, places, rates = stretch.t, stretch.q, 0.0 * stretch.q
             if not stretch.is_rest:
-                rates = CubicSpline(stretch.t, stretch.q, bc_type="clamped")(stretch.t, 1)
+                times, places, rates = stretch.knots()
                 rates[[0, -1]] = 0.0
-            t.append(t[-1][-1] + stretch.t[1:])
-            q.append(stretch.q[1:])
+            t.append(t[-1][-1] + times[1:])
+            q.append(places[1:])
             qd.append(rates[1:])
         names = tuple(axis.joint for axis in self.axes)
         return Trajectory(np.concatenate(t), np.concatenate(q), np.concatenate(qd), names)
@@ -109,7 +122,7 @@ class ControllerProgram:
         order = [names.index(name) for name in known]
         worst, at, k = Misses(NO_MISS, NO_MISS), 0.0, 0
         for stretch in self.stretches:
-            same = replace(stretch, q=stretch.q[:, order])
+            same = stretch.in_order(order)
             piece = pieces[min(k, len(pieces) - 1)]
             found = miss_of(same, piece.motion, piece.chains, piece.motion.t[0] + at)
             both = Misses(NO_MISS, found) if piece.is_move else Misses(found, NO_MISS)
@@ -122,19 +135,22 @@ class ControllerProgram:
         return worst
 
 
+# What a comment begins with that says why targets are joints.
+BECAUSE = "targets are joints, as poses do not keep the motion: "
 # A piece is over where less of it is left than this [s].
 _MOMENT = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
 class Draft:
-    """All that a writer needs: the program, the arm, and what else is said."""
+    """All that a writer needs: the program, the arm, what else is said; frames of tool poses."""
 
     program: ControllerProgram
     robot: RobotModel
     tool: SE3
     settings: ProgramSettings
     verdict: str
+    frames: ToolFrames | None = None
 
     def signal(self, event: str) -> Signal | None:
         """Return what an event switches."""
@@ -144,6 +160,7 @@ class Draft:
 def drafted(
     plan: Plan | Parts | Move | Program,
     name: str,
+    form: str,
     settings: ProgramSettings,
     verdict: str,
     progress: Progress = silent,
@@ -158,17 +175,54 @@ def drafted(
     PlanError
         A move was not found.
     """
+    check_controller(plan.robot, form, settings)
     robot, pieces = plan.robot, pieces_of(plan)
     axes = axes_of(robot, settings)
     check_signals({event: item.name for item in pieces for _, event in item.events}, settings)
     slides = np.array([axis.slides for axis in axes])
-    stretches, miss = stretches_of(
-        pieces, slides, settings.deviation, settings.move_deviation, progress
-    )
+    given = pieces, slides, settings.deviation, settings.move_deviation, progress
+    frames, why = None, ""
+    if settings.targets == "poses":
+        frames = ToolFrames.of(robot, axes, settings).rounded(ROUNDINGS[form])
+        why = frames.undetermined()
+    if frames is not None and not why:
+        try:
+            stretches, miss = stretches_of(*given, partial(PoseSpan.by, frames, ROUNDINGS[form]))
+        except NotByPosesError as error:
+            why = str(error)
+    if frames is None or why:
+        frames = None
+        stretches, miss = stretches_of(*given)
     order = in_order(axes)
-    sorted_ones = tuple(replace(item, q=item.q[:, order]) for item in stretches)
-    program = ControllerProgram(name, tuple(axes[k] for k in order), sorted_ones, miss)
-    return Draft(program, robot, tool_from_flange(robot, settings), settings, verdict)
+    sorted_ones = tuple(item.in_order(order) for item in stretches)
+    ordered = tuple(axes[k] for k in order)
+    stated = Misses(miss.path.stated, miss.moves.stated)
+    program = ControllerProgram(name, ordered, sorted_ones, stated, remark=plain(why))
+    tool = tool_from_flange(robot, settings)
+    return Draft(program, robot, tool, settings, verdict, frames)
+
+
+def check_controller(robot: RobotModel, form: str, settings: ProgramSettings) -> None:
+    """Refuse what a controller has no program for, or what its program has to say and does not.
+
+    Raises
+    ------
+    ProblemError
+        An arm of seven joints as KRL, or no mass for a controller of ABB.
+    """
+    if form == "rapid" and settings.mass is None:
+        raise ProblemError(
+            f"{robot.name}: a tooldata has the mass of what the flange carries, and a controller "
+            f"of ABB moves by it; give export --mass KG, or mass in the file of --settings "
+            f"(ProgramSettings(mass=…))"
+        )
+    joint = own_joint(robot, axes_of(robot, settings)) if form == "krl" else ""
+    if joint:
+        raise ProblemError(
+            f"{robot.name}: joint '{joint}' is in the arm itself: KRL is for arms of six axes with "
+            f"external ones, and KUKA's arms of seven (LBR iiwa) are programmed in Java (Sunrise); "
+            f"write .yaml (ROS 2) or .csv for the driver of such an arm"
+        )
 
 
 def check_signals(seams: Mapping[str, str], settings: ProgramSettings) -> None:
@@ -190,6 +244,22 @@ def check_signals(seams: Mapping[str, str], settings: ProgramSettings) -> None:
             )
 
 
+def with_begins(stretches: Sequence[Stretch]) -> Iterator[tuple[Stretch, Stretch | None]]:
+    """Yield each stretch, and one to whose begin the arm has to go slowly before; else None.
+
+    That is where targets of the other kind follow, poses after joints or joints after poses, rests
+    in between included: where the work object was shifted, the arm is elsewhere by the other ones.
+    A program begins by joints.
+    """
+    by_poses = False
+    for k, stretch in enumerate(stretches):
+        moving = next((item for item in stretches[k:] if not item.is_rest), None)
+        begun = None
+        if moving is not None and by_poses != isinstance(moving, PoseStretch):
+            by_poses, begun = not by_poses, moving
+        yield stretch, begun
+
+
 def head(draft: Draft) -> list[str]:
     """Return the comments at the head of a program, without what marks them as such."""
     program = draft.program
@@ -203,10 +273,37 @@ def head(draft: Draft) -> list[str]:
         *folded(plain(f"axes: {axes}")),
         f"deviation: {_stated(program.miss.path)}",
         *([] if moves == NO_MISS else [f"deviation of moves: {_stated(moves)}"]),
-        "(of the tool from the plan, straight joint lines, rounded corners or a spline",
+        f"(of the tool from the plan, straight {_lines(draft)}, rounded corners or a spline",
         "through the targets, at the times of the plan)",
+        *([f"{BECAUSE}{program.remark}"] if program.remark else []),
+        *_of_poses(draft),
         "Angles are those of the URDF: compare zeros and signs with the controller's.",
     ]
+
+
+def _lines(draft: Draft) -> str:
+    return "joint lines" if draft.frames is None else "lines of the tool"
+
+
+def _of_poses(draft: Draft) -> list[str]:
+    """Return what the head says of the frames of poses; the reader takes it from there."""
+    frames = draft.frames
+    if frames is None:
+        return []
+    place = ", ".join(f"{value:.9f}" for value in pin_values(frames.work))
+    flange = draft.settings.flange or "-"
+    return [
+        f"poses: work object {frames.name} of {frames.carrier}, flange {flange}",
+        f"planned work object: {place}",
+        "(m, and quaternion x, y, z, w, in that frame; shift the work object to shift the motion)",
+        "Poses are reached in the arm's configuration at the begin, by axes.",
+    ]
+
+
+def pin_values(pose: SE3) -> list[float]:
+    """Return a pose as position [m] and quaternion x, y, z, w."""
+    turn = Quaternion(pose.rotation).coeffs()
+    return [float(value) + 0.0 for value in (*pose.translation, *turn)]
 
 
 def _stated(miss: Miss) -> str:

@@ -8,14 +8,29 @@ from typing import NamedTuple
 
 import numpy as np
 
-from selfmotion.basics import FileFormatError
+from selfmotion.basics import Array, FileFormatError
 from selfmotion.certificate import Tolerance
 from selfmotion.constraints import Constraint, JointAccelerationLimits, JointJerkLimits
 from selfmotion.formats.controller_program import ControllerProgram, Switch, plain
+from selfmotion.formats.pose_stretches import PoseStretch
 from selfmotion.formats.program_files import read_program
+from selfmotion.formats.read_stretches import SLOWLY
+from selfmotion.formats.tool_frames import WORLD
 from selfmotion.job import Program, are_opposite
 from selfmotion.motion import Trajectory
+from selfmotion.path import Placed
+from selfmotion.problem import Problem
 from selfmotion.result import Move, Piece, elsewhere, gaps
+from selfmotion.robot import RobotModel
+from selfmotion.task import log3
+
+# Files have so many digits of time [s], and of angles [rad].
+_MOMENT, _LEAST = 1e-4, 1e-6
+# Where a program begins and ends is written to so many digits [rad or m], by poses to fewer; what
+# it switches is switched at a target, as near to its time [s].
+_DIGITS, _OF_POSES, _PROMPT = 1e-6, 1e-5, 1e-3
+# Times as near as this are one [s].
+_INSTANT = 1e-9
 
 
 class JudgedStep(NamedTuple):
@@ -33,9 +48,13 @@ class JudgedStep(NamedTuple):
     verdict: str
 
 
-def stated_deviation(file: FilePath) -> Tolerance | None:
+def stated_deviation(file: FilePath, robot: RobotModel | None = None) -> Tolerance | None:
     """Return how far off its path a program of a controller says it is; None where it does not."""
-    miss = read_program(file).miss.path
+    return _stated(read_program(file, robot))
+
+
+def _stated(program: ControllerProgram) -> Tolerance | None:
+    miss = program.miss.path
     sound = np.isfinite([miss.position, miss.rotation]).all() and miss.position > 0.0
     return Tolerance(miss.position, max(miss.rotation, _LEAST)) if sound else None
 
@@ -50,11 +69,14 @@ class JudgedProgram(NamedTuple):
         What speaks against the whole: its ends, its order, its outputs, the job itself.
     within : Tolerance or None
         What seams may miss their paths by, where that is not the job's own.
+    shifted : str
+        By how much the work object was shifted, in words; empty for not at all.
     """
 
     steps: tuple[JudgedStep, ...]
     failures: tuple[str, ...]
     within: Tolerance | None = None
+    shifted: str = ""
 
     @property
     def verified(self) -> bool:
@@ -65,10 +87,14 @@ class JudgedProgram(NamedTuple):
     def verdict(self) -> str:
         """One line: verified, or how many steps are not, and what speaks against the whole."""
         if self.verified:
-            return f"verified: each step, and the whole{self._allowed}"
+            return f"verified: each step, and the whole{self._allowed}{self._told}"
         count = sum(not step.verified for step in self.steps)
         told = [*([f"{count} of {len(self.steps)} steps"] if count else []), *self.failures]
-        return f"not verified: {'; '.join(told)}"
+        return f"not verified: {'; '.join(told)}{self._told}"
+
+    @property
+    def _told(self) -> str:
+        return f"; {self.shifted}" if self.shifted else ""
 
     @property
     def _allowed(self) -> str:
@@ -86,24 +112,82 @@ def judged_program(file: FilePath, job: Program, within: Tolerance | None = None
     Seams by all that their plans had to keep, at the deviation that the file states; moves by all
     of theirs. Accelerations are the controller's, and not judged. The whole has to begin and end
     where the job does, and to switch what its events say, when they say it: an output or a comment
-    for each, the same for each event of one name, and nothing else.
+    for each, the same for each event of one name, and nothing else. Where the work object was
+    shifted, seams have to be on their paths shifted with it, and the whole begins and ends
+    elsewhere.
 
     Raises
     ------
     FileFormatError
         The file cannot be read, or is of another job.
     """
-    program = read_program(file)
-    within = within or stated_deviation(file)
+    program = read_program(file, job.robot)
+    within = within or _stated(program)
     motions = list(_pieces(file, program, job))
-    steps, pieces = _judged_steps(job, motions, within, what_targets_keep)
+    steps, pieces = _judged_steps(job, motions, within, what_targets_keep, program)
+    # From axis targets to poses there are digits of both, which the arm's kinematics may magnify.
+    digits = _OF_POSES if any(isinstance(s, PoseStretch) for s in program.stretches) else _DIGITS
     failures = (
         *(f"the job itself: {text}" for text in job.failures),
-        *gaps(job.robot, pieces),
-        *_elsewhere(job, pieces),
+        *gaps(job.robot, pieces, digits),
+        *(() if program.shift is not None else _elsewhere(job, pieces, digits)),
         *_otherwise_switched(job, program.switches),
+        *_slowly_gone(program),
     )
-    return JudgedProgram(steps, failures, within)
+    return JudgedProgram(steps, failures, within, shift_told(program))
+
+
+def _slowly_gone(program: ControllerProgram) -> Iterator[str]:
+    """Yield how often the arm goes slowly between joint targets and shifted poses."""
+    count = sum(stretch.name == SLOWLY for stretch in program.stretches)
+    if count:
+        yield (
+            f"{count} times the arm goes slowly from axis targets to shifted poses, or back, which "
+            f"nothing has judged"
+        )
+
+
+def shift_told(program: ControllerProgram) -> str:
+    """Return by how much the work object is elsewhere than planned, in words; empty for not."""
+    if program.shift is None:
+        return ""
+    way = 1e3 * float(np.linalg.norm(program.shift.translation))
+    turn = float(np.degrees(np.linalg.norm(log3(program.shift.rotation))))
+    return (
+        f"the work object is {way:.4g} mm and {turn:.3g}° from where it was planned: judged along "
+        f"the path shifted with it"
+    )
+
+
+def as_shifted(problem: Problem, program: ControllerProgram, begin: Array) -> Problem:
+    """Return a problem whose path is shifted as the work object of a program is.
+
+    Parameters
+    ----------
+    problem : Problem
+    program : ControllerProgram
+    begin : (n,)
+        Where the motion begins.
+
+    Raises
+    ------
+    FileFormatError
+        The path is given in a frame that moves past the work object.
+    """
+    if program.shift is None:
+        return problem
+    robot = problem.robot
+    carrier = None if program.carrier == WORLD else program.carrier
+    between = robot.chain_to(carrier or robot.urdf.root, robot.reference)
+    if len(between.joints) or problem.also:
+        raise FileFormatError(
+            f"its work object is shifted, and the path is given in '{robot.reference or WORLD}', "
+            f"which moves past it: plan anew with the part where it is"
+        )
+    place = between.place(np.zeros(robot.dof))
+    path = Placed(problem.path, place * program.shift * place.inverse())
+    start = None if problem.start is None else begin
+    return replace(problem, path=path, start=start)
 
 
 def misswitched(file: FilePath, job: Program) -> tuple[str, ...]:
@@ -114,7 +198,7 @@ def misswitched(file: FilePath, job: Program) -> tuple[str, ...]:
     FileFormatError
         The file cannot be read.
     """
-    return tuple(_otherwise_switched(job, read_program(file).switches))
+    return tuple(_otherwise_switched(job, read_program(file, job.robot).switches))
 
 
 def judged_motion(motion: Trajectory, job: Program) -> JudgedProgram:
@@ -156,6 +240,7 @@ def _judged_steps(
     motions: Sequence[Trajectory],
     within: Tolerance | None,
     kept: Callable[[Sequence[Constraint]], tuple[Constraint, ...]],
+    program: ControllerProgram | None = None,
 ) -> tuple[tuple[JudgedStep, ...], list[Piece]]:
     """Return what certificates say of the motions of a job's steps, by what of it is `kept`."""
     found, pieces = list[JudgedStep](), list[Piece]()
@@ -166,17 +251,19 @@ def _judged_steps(
             found.append(JudgedStep(step.name, move.verified, move.verdict))
         else:
             problem = replace(made.problem, constraints=kept(made.problem.constraints))
+            if program is not None:
+                problem = as_shifted(problem, program, motion.q[0])
             certificate = problem.certify(motion, within or made.tolerance)
             found.append(JudgedStep(step.name, certificate.verified, certificate.verdict))
         pieces.append(Piece(f"'{step.name}'", motion))
     return tuple(found), pieces
 
 
-def _elsewhere(job: Program, pieces: Sequence[Piece]) -> Iterator[str]:
+def _elsewhere(job: Program, pieces: Sequence[Piece], digits: float = _DIGITS) -> Iterator[str]:
     """Yield where a program does not begin or end as its job does."""
     for end in (0, -1) if pieces else ():
         asked = job.steps[end].motion.q[end]
-        yield from elsewhere(job.robot, pieces[end], end, asked, _DIGITS)
+        yield from elsewhere(job.robot, pieces[end], end, asked, digits)
 
 
 def _otherwise_switched(job: Program, switches: Sequence[Switch]) -> Iterator[str]:
@@ -221,6 +308,9 @@ def _pieces(file: FilePath, program: ControllerProgram, job: Program) -> Iterato
     left = list(program.stretches)
     for step in job.steps:
         taken, seconds = [], 0.0
+        # Slow motions to where a shifted program goes on are none of the job's.
+        while left and left[0].name == SLOWLY:
+            left.pop(0)
         while left and seconds < step.motion.duration - _MOMENT:
             taken.append(left.pop(0))
             seconds += float(taken[-1].t[-1])
@@ -232,12 +322,3 @@ def _pieces(file: FilePath, program: ControllerProgram, job: Program) -> Iterato
         yield replace(program, stretches=tuple(taken)).trajectory.of_joints(names)
     if left:
         raise FileFormatError(f"{file}: goes on with '{left[0].name}' when the job has ended")
-
-
-# Files have so many digits of time [s], and of angles [rad].
-_MOMENT, _LEAST = 1e-4, 1e-6
-# Where a program begins and ends is written to so many digits [rad or m]; what it switches is
-# switched at a target, as near to its time [s].
-_DIGITS, _PROMPT = 1e-6, 1e-3
-# Times as near as this are one [s].
-_INSTANT = 1e-9

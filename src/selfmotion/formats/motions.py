@@ -32,9 +32,9 @@ from selfmotion.formats.motion_tables import (
 )
 from selfmotion.formats.moving_ends import check_ends
 from selfmotion.formats.mujoco import keyframes
-from selfmotion.formats.program_files import PROGRAMS, read_program, write_program
+from selfmotion.formats.program_files import PROGRAMS, READ_PROGRAMS, read_program, write_program
 from selfmotion.formats.program_settings import ProgramSettings
-from selfmotion.formats.samples import MotionSamples, for_cubics
+from selfmotion.formats.samples import MotionSamples, coarsest_rate, for_cubics
 from selfmotion.formats.urscript import script
 from selfmotion.job import Program
 from selfmotion.motion import Trajectory
@@ -66,13 +66,17 @@ def write_motion(
     - ``krl`` (``.src``): KUKA: axis targets with their times in spline blocks
     - ``rapid`` (``.mod``): ABB: axis targets with their times, rounded corners
 
+    With ``settings=ProgramSettings(targets="poses")`` programs of controllers are linear motions to
+    tool poses in a work object, wherever these keep the motion.
+
     Parameters
     ----------
     plan : Plan, Parts, Move or Program
     file : path
     rate : float, optional
         Samples per second; by default those of the plan: few, whose quintics are its motion, as
-        controllers of ROS 2 join them (URScript: 125).
+        controllers of ROS 2 join them (URScript: 125). Messages of ROS have the coarsest rate at
+        which straight lines keep the plan's tolerance, where that is fewer.
     form : str, optional
         By default the one that has the file's suffix.
     settings : ProgramSettings, optional
@@ -103,7 +107,7 @@ def write_motion(
     name = form_of(path, form)
     check_verified(plan, path, as_flag(force, "force"))
     check_ends(plan, path, force)
-    if name in PROGRAMS.values():
+    if name in PROGRAMS.values() or _is_linear(name, settings):
         if rate is not None:
             raise ProblemError(f"{path}: rate has no effect: targets are as many as it takes")
         write_program(plan, path, name, settings or ProgramSettings(), progress)
@@ -122,7 +126,14 @@ def write_motion(
     motion = plan.motion if isinstance(plan, Move) else plan.trajectory
     if name == "bag" and rate is None:
         motion = for_cubics(motion)
+    if name in MESSAGES and rate is None and isinstance(plan, Plan):
+        rate = coarsest_rate(plan)
     WRITERS[name](path, MotionSamples.of(motion, rate), plan.robot, rate)
+
+
+def _is_linear(form: str, settings: ProgramSettings | None) -> bool:
+    """Whether a program of Universal Robots is one of targets, not a stream."""
+    return form == "urscript" and settings is not None and settings.targets == "poses"
 
 
 def check_verified(plan: Plan | Parts | Move | Program, file: Path, force: bool) -> None:
@@ -154,25 +165,34 @@ def form_of(path: Path, form: str | None) -> str:
     return name
 
 
-def read_motion(file: str | Path, *, degrees: bool = False) -> Trajectory:
+def read_motion(
+    file: str | Path, *, degrees: bool = False, robot: RobotModel | None = None
+) -> Trajectory:
     r"""Read a motion that `write_motion`, or something else, wrote.
 
     In the forms ``csv``, ``npz``, ``json``, ``ros``, ``moveit`` and ``bag``, and programs.
     With accelerations where the file has them; see `Trajectory`. With `degrees` all coordinates are
     taken for angles in degrees, in any format.
 
-    Of controllers' programs (``.src``, ``.mod``) those statements are read that `write_motion`
-    writes, with other numbers, spaces and names: any other line is refused, by its number.
+    Of controllers' programs (``.src``, ``.mod``, ``.script``) those statements are read that
+    `write_motion` writes, with other numbers, spaces and names: any other line is refused, by its
+    number.
 
-    - KRL: ``DEF``, ``END``, comments, ``BAS``, ``$BASE``, ``$TOOL``, ``$LOAD``, ``$OUT[n]``,
-      ``PTP {A1 …}``, ``PTP_SPLINE``, ``SPTP {A1 …}``, ``TIME_BLOCK`` with a ``PART`` for each
-      target, ``TRIGGER WHEN PATH = 0 DELAY = 0 DO $OUT[n]``, ``ENDSPLINE``, ``WAIT SEC``
-    - RAPID: ``MODULE``, ``PROC`` without parameters, comments, ``tooldata``, ``speeddata``,
-      ``MoveAbsJ [[…], […]]\NoEOffs`` with ``\T``, ``fine`` or a zone ``z…``, ``SetDO``,
-      ``WaitTime``
+    - KRL: ``DEF``, ``END``, comments, ``BAS``, ``$BASE``, ``$TOOL``, ``$LOAD``, ``$VEL``,
+      ``$OUT[n]``, ``PTP {A1 …}``, ``PTP_SPLINE``, ``SPTP {A1 …}``, ``LIN {X …}``, ``SPLINE``,
+      ``SPL {X …}``, ``SLIN {X …}``, ``TIME_BLOCK`` with a ``PART`` for each target, ``TRIGGER WHEN
+      PATH = 0 DELAY = 0 DO $OUT[n]``, ``ENDSPLINE``, ``WAIT SEC``
+    - RAPID: ``MODULE``, ``PROC`` without parameters, comments, ``tooldata``, ``wobjdata``,
+      ``speeddata``, ``ConfL``, ``MoveAbsJ [[…], […]]\NoEOffs`` and ``MoveL [[…], […], […], […]]``
+      with ``\T``, ``fine`` or a zone ``z…``, ``\WObj``, ``SetDO``, ``WaitTime``
+
+    - URScript: ``def selfmotion():``, comments, ``set_tcp``, ``set_payload``, ``feature = p[…]``,
+      ``movel(pose_trans(feature, p[…]), t=…, r=…)``, ``movej``, ``sleep``,
+      ``set_standard_digital_out``, ``end``
 
     The motion is the cubic spline through their targets, from rest to rest. Comments ``axes: A1 =
-    joint [deg], …``, as they are written, name the joints and say which of them slide.
+    joint [deg], …``, as they are written, name the joints and say which of them slide. Tool poses
+    are those of a `robot`; its joints are followed from where the program begins.
 
     Raises
     ------
@@ -180,10 +200,12 @@ def read_motion(file: str | Path, *, degrees: bool = False) -> Trajectory:
         The file cannot be read, or is no motion; what is missing is named.
     """
     path = as_path(file)
-    if path.suffix.lower() in PROGRAMS:
+    if not (robot is None or isinstance(robot, RobotModel)):
+        raise ProblemError(f"robot is {shown(robot)}, expected a RobotModel")
+    if path.suffix.lower() in READ_PROGRAMS:
         if degrees:
             raise FileFormatError(f"{path}: is in degrees by itself; drop degrees")
-        return _of_program(path)
+        return _of_program(path, robot)
     if path.suffix.lower() == ".csv":
         return Trajectory.from_csv(path, degrees=degrees)
     if path.suffix.lower() == ".npz":
@@ -194,15 +216,15 @@ def read_motion(file: str | Path, *, degrees: bool = False) -> Trajectory:
         written = ", though it is written" if path.suffix.lower() in SUFFIXES else ""
         raise FileFormatError(
             f"{path}: is no motion that is read{written}: expected .csv, .npz, .json, .yaml (ROS), "
-            f".mcap (ROS bag), .src (KUKA) or .mod (ABB)"
+            f".mcap (ROS bag), .src (KUKA), .mod (ABB) or .script (linear URScript)"
         )
     document = read_document(path)
     read = of_tables if "t" in document else ros.trajectory
     return _in_radians(read(path, document), degrees)
 
 
-def _of_program(path: Path) -> Trajectory:
-    program = read_program(path)
+def _of_program(path: Path, robot: RobotModel | None) -> Trajectory:
+    program = read_program(path, robot)
     try:
         return program.trajectory
     # Numbers that no controller holds make splines that none follows.
@@ -270,6 +292,8 @@ def _write_stream(
     write_text(file, script(plan.robot, joints, q, rate, settings, events))
 
 
+# What is written as messages of ROS, in texts.
+MESSAGES = ("ros", "moveit")
 # Samples per second of a stream to an arm of Universal Robots.
 STREAM = 125.0
 _Writer = Callable[[Path, MotionSamples, RobotModel, float | None], None]

@@ -5,20 +5,31 @@ from pathlib import Path as FilePath
 
 from selfmotion.basics import FileFormatError, Progress, silent
 from selfmotion.formats.controller_program import ControllerProgram, Draft, drafted
-from selfmotion.formats.krl import KrlReader, write_krl
+from selfmotion.formats.krl import write_krl
+from selfmotion.formats.krl_reader import KrlReader
 from selfmotion.formats.program_lines import ProgramReader
 from selfmotion.formats.program_settings import ProgramSettings
-from selfmotion.formats.rapid import RapidReader, write_rapid
+from selfmotion.formats.rapid import write_rapid
+from selfmotion.formats.rapid_reader import RapidReader
 from selfmotion.formats.stretches import Misses
+from selfmotion.formats.urscript_poses import UrscriptReader, write_urscript
 from selfmotion.job import Program
 from selfmotion.result import Move, Parts, Plan
+from selfmotion.robot import RobotModel
 
 _WRITERS: Mapping[str, Callable[[FilePath, Draft], None]] = {
     "krl": write_krl,
     "rapid": write_rapid,
+    "urscript": write_urscript,
 }
-_READERS: Mapping[str, type[ProgramReader]] = {".src": KrlReader, ".mod": RapidReader}
+_READERS: Mapping[str, type[ProgramReader]] = {
+    ".src": KrlReader,
+    ".mod": RapidReader,
+    ".script": UrscriptReader,
+}
+# Suffixes of programs of targets; those that are read as such, which linear URScript is as well.
 PROGRAMS = {".src": "krl", ".mod": "rapid"}
+READ_PROGRAMS = tuple(_READERS)
 
 
 def write_program(
@@ -30,18 +41,18 @@ def write_program(
 ) -> None:
     """Write a motion as a program of a controller; see `write_motion`."""
     verdict = plan.certificate.verdict if isinstance(plan, Plan) else plan.verdict
-    _WRITERS[form](file, drafted(plan, file.stem, settings, verdict, progress))
+    _WRITERS[form](file, drafted(plan, file.stem, form, settings, verdict, progress))
 
 
-def read_program(file: FilePath) -> ControllerProgram:
-    """Read a program of a controller, by its suffix.
+def read_program(file: FilePath, robot: RobotModel | None = None) -> ControllerProgram:
+    """Read a program of a controller, by its suffix; tool poses by the robot that moves to them.
 
     Raises
     ------
     FileFormatError
         The file cannot be read, or says what is not read; the line is named.
     """
-    return _READERS[file.suffix.lower()](file).program()
+    return _READERS[file.suffix.lower()](file, robot).program()
 
 
 def program_miss(plan: Plan | Parts | Move | Program, file: FilePath) -> tuple[int, Misses, Misses]:
@@ -52,7 +63,7 @@ def program_miss(plan: Plan | Parts | Move | Program, file: FilePath) -> tuple[i
     FileFormatError
         The file cannot be read, or is of another motion.
     """
-    found = read_program(file)
+    found = read_program(file, plan.robot)
     try:
         return found.targets, found.miss, found.miss_of(plan)
     except FileFormatError as error:

@@ -2,16 +2,26 @@
 
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path as FilePath
 from typing import Any, ClassVar
 
 import numpy as np
 
 from selfmotion.basics import FileFormatError, text_of
-from selfmotion.formats.controller_program import ControllerProgram, Switch
+from selfmotion.formats.controller_program import BECAUSE, ControllerProgram, Switch
 from selfmotion.formats.program_axes import Axis
-from selfmotion.formats.stretches import Miss, Misses, Stretch
+from selfmotion.formats.read_stretches import (
+    Follower,
+    Places,
+    Pose,
+    PoseRow,
+    Row,
+    SlowRow,
+    pose_of_values,
+)
+from selfmotion.formats.stretches import Miss, Misses
+from selfmotion.robot import RobotModel
+from selfmotion.task import SE3
 
 # A file of a controller has less than so many bytes, lines less than so many characters, numbers
 # less than that.
@@ -19,15 +29,6 @@ _BYTES, _LINE, _LARGEST = 50_000_000, 2000, 1e7
 # What comments of events begin with.
 _EVENT = "event: "
 _NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)(E[+-]?[0-9]{1,3})?", re.IGNORECASE)
-
-
-@dataclass
-class Row:
-    """A stretch while it is read: where it begins, its targets [deg or mm], times between [s]."""
-
-    name: str
-    q: list[list[float]]
-    seconds: list[float]
 
 
 class Lines:
@@ -128,19 +129,35 @@ class Lines:
                 return Miss(1e-3 * position, rotation, joint)
         return None
 
+    def places(self, tool: SE3 | None, work: SE3 | None) -> Places:
+        """Return what comments say of the frames of poses, with what the program has of them."""
+        found = Places(tool=tool, work=work)
+        for note in self.notes:
+            said = re.fullmatch(r"poses: work object (\S+) of (\S+), flange (\S+)", note[:400])
+            if said:
+                found.work_name, found.carrier, found.flange = said.groups()
+            planned = re.fullmatch(r"planned work object: ([-+.\d, e]+)", note[:400])
+            if planned:
+                values = [self.number_of(text) for text in planned[1].split(",")]
+                if len(values) == 7 and any(values[3:]):
+                    found.planned = pose_of_values(values)
+        return found
+
     def program(
         self,
         name: str,
         present: Sequence[str],
-        rows: Sequence["Row"],
+        rows: Sequence[Row | PoseRow | SlowRow],
         switches: Sequence[Switch] = (),
+        places: Places | None = None,
+        robot: RobotModel | None = None,
     ) -> ControllerProgram:
         """Return the program of rows of targets, and of what is switched.
 
         Raises
         ------
         FileFormatError
-            Something is missing.
+            Something is missing, or the arm cannot follow.
         """
         if not name:
             raise FileFormatError(f"{self._file}: has no beginning of a program")
@@ -150,15 +167,43 @@ class Lines:
         axes = tuple(Axis(present[k], *said.get(present[k], (present[k], False))) for k in kept)
         if not axes:
             raise FileFormatError(f"{self._file}: has no axes of those that its comments name")
-        stretches = []
+        frames = None
+        if any(_has_poses(row) for row in rows):
+            if robot is None or places is None:
+                raise FileFormatError(
+                    f"{self._file}: has tool poses, whose joints only the robot tells: give it "
+                    f"(read_motion(file, robot=…), check --robot)"
+                )
+            frames = places.frames(robot, axes, self._file)
+        follower = Follower(self._file, axes, frames)
         for row in rows:
-            q = np.array(row.q, dtype=np.float64)[:, kept]
-            scale = [1e-3 if axis.slides else np.pi / 180.0 for axis in axes]
-            t = np.round(np.append(0.0, np.cumsum(row.seconds)), 6)
-            stretches.append(Stretch(row.name, t, q * scale))
-        if not stretches:
+            follower.take(_with_axes(row, kept))
+        if not follower.stretches:
             raise FileFormatError(f"{self._file}: has no targets with times")
-        return ControllerProgram(name, axes, tuple(stretches), self.miss(), tuple(switches))
+        remark = next((note for note in self.notes if note.startswith(BECAUSE)), BECAUSE)
+        return ControllerProgram(
+            name,
+            axes,
+            tuple(follower.stretches),
+            self.miss(),
+            tuple(switches),
+            None if places is None else places.shift,
+            "world" if places is None or frames is None else places.carrier,
+            remark.removeprefix(BECAUSE),
+        )
+
+
+def _has_poses(row: Row | PoseRow | SlowRow) -> bool:
+    return isinstance(row, PoseRow) or (isinstance(row, SlowRow) and isinstance(row.target, Pose))
+
+
+def _with_axes(row: Row | PoseRow | SlowRow, kept: Sequence[int]) -> Row | PoseRow | SlowRow:
+    """Return a row with those of its axes that the robot has."""
+    if isinstance(row, Row):
+        return Row(row.name, [[q[k] for k in kept] for q in row.q], row.seconds)
+    if isinstance(row, SlowRow) and not isinstance(row.target, Pose):
+        return SlowRow([row.target[k] for k in kept])
+    return row
 
 
 def switched(at: float, given: Sequence[str]) -> Switch:
@@ -184,12 +229,17 @@ class ProgramReader:
     grammar: ClassVar[tuple[tuple[tuple[str, ...], str, Any], ...]] = ()
     comment, last = "", ""
 
-    def __init__(self, file: FilePath) -> None:
+    def __init__(self, file: FilePath, robot: RobotModel | None = None) -> None:
         self.lines = Lines(file, self.comment)
+        self.robot = robot
         self.name, self.state = "", "before"
         self.present: list[str] = []
-        self.rows: list[Row] = []
-        self.at: list[float] = []
+        self.rows: list[Row | PoseRow | SlowRow] = []
+        # Where the arm is: by its axes, by a pose, or by both.
+        self.at: list[float] | None = None
+        self.pose_at: Pose | None = None
+        self.tool: SE3 | None = None
+        self.work: SE3 | None = None
         self.switches: list[Switch] = []
 
     def program(self) -> ControllerProgram:
@@ -214,7 +264,9 @@ class ProgramReader:
                 )
         if self.state != "after":
             raise self.lines.fault(f"is the last one, expected {self.last}")
-        return self.lines.program(self.name, self.present, self.rows, self.switches)
+        places = self.lines.places(self.tool, self.work)
+        rows, present = self.rows, self.present
+        return self.lines.program(self.name, present, rows, self.switches, places, self.robot)
 
     @property
     def clock(self) -> float:
@@ -235,7 +287,41 @@ class ProgramReader:
     def wait(self, given: Sequence[str]) -> None:
         """Take a rest."""
         seconds = self.lines.duration(given[0])
-        self.rows.append(Row(self.lines.step(), [self.at, self.at], [seconds]))
+        self.rows.append(Row(self.lines.step(), [], [seconds]))
+
+    def begin_at(self, axes: list[float]) -> None:
+        """Take where the arm begins, or goes slowly before it goes on by axis targets."""
+        self.rows.append(SlowRow(axes))
+        self.at, self.pose_at = axes, None
+
+    def slowly(self, pose: Pose) -> None:
+        """Take a pose that the arm goes to slowly before it goes on by poses."""
+        self.rows.append(SlowRow(pose))
+        self.at, self.pose_at = None, pose
+
+    def follow(self, poses: list[Pose], seconds: list[float]) -> None:
+        """Take a stretch of poses."""
+        if self.pose_at is None:
+            raise self.lines.fault("a pose after axis targets, expected a slow motion there first")
+        self.rows.append(PoseRow(self.lines.step(), [self.pose_at, *poses], seconds))
+        self.at, self.pose_at = None, poses[-1]
+
+    def join(self, targets: list[list[float]], seconds: list[float]) -> None:
+        """Take a stretch of axis targets."""
+        if self.at is None:
+            raise self.lines.fault("axis targets after a pose, expected a slow motion there first")
+        self.rows.append(Row(self.lines.step(), [self.at, *targets], seconds))
+        self.at, self.pose_at = targets[-1], None
+
+    def others_of(self, values: dict[str, float]) -> list[float]:
+        """Return the external axes of a pose, which are those of the axis target before."""
+        asked = [name for name in self.present if name.startswith("E")]
+        if sorted(values) != sorted(asked):
+            raise self.lines.fault(
+                f"has external axes {', '.join(values) or 'none'}, expected "
+                f"{', '.join(asked) or 'none'}"
+            )
+        return [values[name] for name in asked]
 
     def same_axes(self, present: list[str]) -> None:
         """Refuse a target with other axes than those before."""

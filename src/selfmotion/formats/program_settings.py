@@ -20,12 +20,18 @@ from selfmotion.basics import (
 )
 from selfmotion.certificate import Tolerance
 from selfmotion.formats.documents import in_si, read_document
+from selfmotion.formats.poses import pose_of
+from selfmotion.task import SE3, as_pose
 
 # Where an output of a signal is, and what it becomes.
 Signal = tuple[str | int, bool]
 _DEVIATION = Tolerance(1e-4, 1e-3)
 # No arm carries more [kg], nor holds it farther from its flange [m].
 _HEAVIEST, _FARTHEST = 3000.0, 5.0
+# Mechanical units that a KUKA controller has at most.
+_UNITS = 16
+# What targets may be.
+TARGETS = ("joints", "poses")
 AXES = tuple(f"{kind}{number}" for kind in "AE" for number in range(1, 7))
 
 
@@ -53,13 +59,25 @@ class ProgramSettings:
         The link that is the controller's flange, from which it counts the tool's place; by default
         ``flange`` or ``tool0`` where the tool rides on the same link, else that link itself.
     mass : float, optional
-        Of what the flange carries [kg]; by default nothing is said of it, and the controller goes
-        on with the load that it has (ABB: with that of ``tool0``).
+        Of what the flange carries [kg]. ABB's programs need it; in others by default nothing is
+        said of it, and the controller goes on with the load that it has.
     center : (3,)
         Its centre of mass from the flange [m].
     approach : float
         How fast the arm goes to the start: of the fastest that its joints may (KUKA, Universal
         Robots) or of 500 mm/s and 100 °/s (ABB).
+    targets : str
+        ``"joints"``: joint targets; or ``"poses"``: linear motions to tool poses in a work object
+        (``MoveL``, ``SPLINE`` with ``SPL`` and ``SLIN``, ``movel``), which can be shifted and
+        touched up. Where poses do not keep the motion, joint targets are written all the same,
+        and the head of the file says why.
+    work_object : str or SE3, optional
+        What poses are counted in: a link that stands still or that an external axis carries, or a
+        pose [m] in the frame that the controller counts its arm from (link ``base``, else the
+        world). By default the frame that the path is given in.
+    positioner : str or int, optional
+        The mechanical unit that carries the work object: its name (ABB), or its number in
+        ``MACHINE_DEF`` (KUKA).
 
     Raises
     ------
@@ -75,6 +93,9 @@ class ProgramSettings:
     mass: float | None = None
     center: tuple[float, float, float] = (0.0, 0.0, 0.0)
     approach: float = 0.1
+    targets: str = "joints"
+    work_object: str | SE3 | None = None
+    positioner: str | int | None = None
 
     def __post_init__(self) -> None:
         for key in ("deviation", "move_deviation"):
@@ -115,6 +136,25 @@ class ProgramSettings:
             raise ProblemError("center: has no effect without a mass; give mass as well")
         approach = as_number(self.approach, "approach", above=0.0, most=1.0)
         object.__setattr__(self, "approach", approach)
+        self._check_targets()
+
+    def _check_targets(self) -> None:
+        if self.targets not in TARGETS:
+            raise ProblemError(f"targets are {shown(self.targets)}, expected 'joints' or 'poses'")
+        if not (self.work_object is None or isinstance(self.work_object, str)):
+            work = as_pose(self.work_object, "work_object", ProblemError)
+            object.__setattr__(self, "work_object", work)
+        unit = self.positioner
+        named = isinstance(unit, str) and unit.isascii() and unit.isidentifier()
+        numbered = isinstance(unit, int) and not isinstance(unit, bool) and 1 <= unit <= _UNITS
+        if not (unit is None or named or numbered):
+            raise ProblemError(
+                f"positioner is {shown(unit)}, expected the name of a mechanical unit (ABB), or "
+                f"its number in MACHINE_DEF, 1 to {_UNITS} (KUKA)"
+            )
+        for key in ("work_object", "positioner"):
+            if getattr(self, key) is not None and self.targets != "poses":
+                raise ProblemError(f"{key}: has no effect on joint targets; give targets='poses'")
 
     @property
     def streamed(self) -> "ProgramSettings":
@@ -134,7 +174,9 @@ def read_program_settings(file: str | FilePath) -> ProgramSettings:
     """Read the settings of a controller's program: TOML or JSON, keys as in `ProgramSettings`.
 
     ``deviation`` and ``move_deviation`` are tables with ``position`` (or ``position_mm``) and
-    ``rotation`` (or ``rotation_deg``); a signal is a list of an output and true or false.
+    ``rotation`` (or ``rotation_deg``); a signal is a list of an output and true or false; a work
+    object is the name of a link, or a table as poses of problem files are (``position`` or
+    ``position_mm``, and ``rpy_deg`` or another orientation).
 
     Raises
     ------
@@ -159,9 +201,13 @@ def read_program_settings(file: str | FilePath) -> ProgramSettings:
             if not isinstance(given, dict) or set(given) - {"position", "rotation"}:
                 raise ProblemError(f"{key}: expected a table of position and rotation")
             values[key] = Tolerance(**{**dataclasses.asdict(_DEVIATION), **given})
+        if not isinstance(values.get("work_object", ""), str):
+            values["work_object"] = pose_of(values["work_object"])
         return ProgramSettings(**values)
     except SelfmotionError as error:
         raise FileFormatError(f"{path}: {error}") from error
+    except ValueError as error:
+        raise FileFormatError(f"{path}: work_object: {error}") from error
 
 
 def _signal(event: object, given: object) -> Signal | None:

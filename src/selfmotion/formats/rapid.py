@@ -4,23 +4,30 @@ After ABB's Technical reference manual, RAPID Instructions, Functions and Data t
 3HAC050917-001): ``MoveAbsJ`` of a ``jointtarget``, whose external axes are 9E9 where there are none
 and whose unit is degrees or mm, with ``\T``, the time in seconds that the motion to it takes, in
 place of its speed. ``fine`` is a stop, ``z1`` a zone in which corners are rounded, at most from the
-middle of one motion to that of the next. Outputs are set by ``SetDO``: where the arm rests when it
-rests, and where it moves when it enters the zone of its target.
+middle of one motion to that of the next. Tool poses are ``MoveL`` of a ``robtarget`` in the work
+object ``wobjdata``, whose ``confdata`` says in which configuration the arm is; ``ConfL \Off`` has
+the controller go on in the one that it is in, as a shifted work object may need other numbers.
+Outputs are set by ``SetDO``: where the arm rests when it rests, and where it moves when it enters
+the zone of its target.
 """
 
-from collections.abc import Sequence
 from pathlib import Path as FilePath
 
+import numpy as np
+
 from selfmotion.basics import ProblemError, write_text
+from selfmotion.formats.arm_configurations import confdata
 from selfmotion.formats.controller_program import (
     ControllerProgram,
     Draft,
     head,
     module_name,
     plain,
+    with_begins,
 )
+from selfmotion.formats.pose_numbers import rapid_numbers
+from selfmotion.formats.pose_stretches import PoseStretch
 from selfmotion.formats.program_axes import written
-from selfmotion.formats.program_lines import ProgramReader, Row
 from selfmotion.formats.program_settings import AXES
 from selfmotion.formats.stretches import Stretch
 from selfmotion.formats.thinning import TIME_DIGITS
@@ -41,12 +48,12 @@ _WORDS = (
 )
 # fmt: on
 _PROCEDURE = "_run"
-# What stands for an axis that is not there, and from where on numbers mean that.
-_ABSENT, _ABSENT_FROM = "9E9", 8.9e9
+# What stands for an axis that is not there.
+_ABSENT = "9E9"
+# How a time takes the place of a speed.
+_TIME = "\\T:="
 # The fastest approach [mm/s, °/s].
 _FASTEST, _TURNING = 500.0, 100.0
-# Without a load a flange carries this [kg], at this height [mm]: that of tool0.
-_BARE = 0.001, 0.001
 
 
 def write_rapid(file: FilePath, draft: Draft) -> None:
@@ -59,15 +66,21 @@ def write_rapid(file: FilePath, draft: Draft) -> None:
     lines = [
         f"MODULE {name}",
         *(f"  ! {line}" for line in head(draft)),
+        *(f"  ! {line}" for line in _unknown(draft)),
         f"  TASK PERS tooldata {name}_t := {_tool(draft)};",
+        *_work(draft, name),
         f"  CONST speeddata {name}_v := [{speed}];",
         "",
         f"  PROC {name}{_PROCEDURE}()",
-        f"    MoveAbsJ {_target(program.stretches[0], 0, program)}\\NoEOffs, "
-        f"{name}_v, fine, {name}_t;",
+        *([] if draft.frames is None else ["    ConfL \\Off;"]),
+        _slowly(draft, program.stretches[0], name, by_axes=True),
     ]
-    for stretch in program.stretches:
-        lines += ["", f"    ! step: {plain(stretch.name)}", *_moves(draft, stretch, name)]
+    for stretch, begun in with_begins(program.stretches):
+        lines += ["", f"    ! step: {plain(stretch.name)}"]
+        if begun is not None:
+            by_axes = not isinstance(begun, PoseStretch)
+            lines.append(_slowly(draft, begun, name, by_axes=by_axes))
+        lines += _moves(draft, stretch, name)
     write_text(file, "\n".join([*lines, "  ENDPROC", "ENDMODULE", ""]))
 
 
@@ -85,12 +98,70 @@ def _moves(draft: Draft, stretch: Stretch, name: str) -> list[str]:
         elif k:
             zone = "fine" if k == last else "z1"
             seconds = _seconds(stretch.t[k] - stretch.t[k - 1])
-            lines.append(
-                f"    MoveAbsJ {_target(stretch, k, draft.program)}\\NoEOffs, "
-                f"v100\\T:={seconds}, {zone}, {name}_t;"
-            )
+            lines.append(f"    {_motion(draft, stretch, k, name, f'v100{_TIME}{seconds}, {zone}')}")
         lines += [f"    {_event(draft, item.name)}" for item in stretch.events if item.target == k]
     return lines
+
+
+def _motion(draft: Draft, stretch: Stretch, k: int, name: str, speed_and_zone: str) -> str:
+    """Return the motion to a target of a stretch: linear to a pose, by the axes to joints."""
+    if isinstance(stretch, PoseStretch):
+        target = _robtarget(draft, stretch, k)
+        return f"MoveL {target}, {speed_and_zone}, {name}_t\\WObj:={name}_w;"
+    target = _target(stretch, k, draft.program)
+    return f"MoveAbsJ {target}\\NoEOffs, {speed_and_zone}, {name}_t;"
+
+
+def _slowly(draft: Draft, stretch: Stretch, name: str, *, by_axes: bool) -> str:
+    """Return the slow motion to where a stretch begins."""
+    way = Stretch(stretch.name, stretch.t, stretch.q) if by_axes else stretch
+    return f"    {_motion(draft, way, 0, name, f'{name}_v, fine')}"
+
+
+def _robtarget(draft: Draft, stretch: PoseStretch, k: int) -> str:
+    x, y, z, *turn = rapid_numbers(stretch.places[k], stretch.turns[k])
+    own = stretch.q[k, np.argsort(stretch.order)]
+    *quarters, cfx = confdata(stretch.frames, own)
+    values = written(stretch.q[k], draft.program.axes)
+    known = {axis.name: value for axis, value in zip(draft.program.axes, values, strict=True)}
+    parts = (
+        ", ".join(f"{value:.4f}" for value in (x, y, z)),
+        ", ".join(f"{value:.8f}" for value in turn),
+        ", ".join(str(value) for value in (*quarters, cfx or 0)),
+        ", ".join(known.get(name, _ABSENT) for name in AXES[6:]),
+    )
+    return f"[{', '.join(f'[{part}]' for part in parts)}]"
+
+
+def _unknown(draft: Draft) -> list[str]:
+    """Return what is not known of configurations, in words."""
+    first = next((item for item in draft.program.stretches if isinstance(item, PoseStretch)), None)
+    if first is None or confdata(first.frames, first.q[0, np.argsort(first.order)])[3] is not None:
+        return []
+    return [
+        "cfx is 0 in all targets and means nothing: the wrist axes of this arm do not meet in a",
+        "point, or its zero is not that of ABB's arms. The configuration is that of the begin.",
+    ]
+
+
+def _work(draft: Draft, name: str) -> list[str]:
+    """Return the work object: in the world, or on a mechanical unit that carries it."""
+    frames = draft.frames
+    if frames is None:
+        return []
+    nowhere, place = "[[0, 0, 0], [1, 0, 0, 0]]", _pose(frames.work)
+    if not frames.is_carried:
+        told = f'TRUE, "", {place}, {nowhere}'
+    else:
+        unit = draft.settings.positioner
+        if not isinstance(unit, str):
+            raise ProblemError(
+                f"{draft.robot.name}: an axis carries work object '{frames.name}', and a wobjdata "
+                f'names its mechanical unit; give positioner = "STN1" or what it is called '
+                f"(ProgramSettings(positioner=…))"
+            )
+        told = f'FALSE, "{unit}", {nowhere}, {place}'
+    return [f"  TASK PERS wobjdata {name}_w := [FALSE, {told}];"]
 
 
 def _event(draft: Draft, event: str) -> str:
@@ -117,9 +188,8 @@ def _target(stretch: Stretch, k: int, program: ControllerProgram) -> str:
 
 def _tool(draft: Draft) -> str:
     frame, (x, y, z) = _pose(draft.tool), (1e3 * value for value in draft.settings.center)
-    mass = draft.settings.mass
-    if mass is None:
-        mass, z = _BARE
+    # What is drafted has one.
+    mass = draft.settings.mass or 0.0
     return f"[TRUE, {frame}, [{mass:.4f}, [{x:.4f}, {y:.4f}, {z:.4f}], [1, 0, 0, 0], 0, 0, 0]]"
 
 
@@ -132,91 +202,3 @@ def _pose(pose: SE3) -> str:
 
 def _seconds(value: float) -> str:
     return f"{value:.{TIME_DIGITS}f}"
-
-
-class RapidReader(ProgramReader):
-    """Reads a module: what `write_rapid` writes, spaces, names and numbers aside."""
-
-    comment, last = "!", "ENDMODULE"
-
-    def __init__(self, file: FilePath) -> None:
-        super().__init__(file)
-        self._targets: list[list[float]] = []
-        self._times: list[float] = []
-
-    def begin(self, given: Sequence[str]) -> None:
-        """Begin the module."""
-        self.name, self.state = given[0], "data"
-
-    def procedure(self, _: Sequence[str]) -> None:
-        """Begin its procedure."""
-        self.state = "start"
-
-    def go(self, given: Sequence[str]) -> None:
-        """Take where the motion begins."""
-        self.at, self.state = self._target(given[0], given[1]), "body"
-
-    def wait(self, given: Sequence[str]) -> None:
-        """Take a rest."""
-        if self._targets:
-            raise self.lines.fault("the arm is to rest where it does not stop: zone is not fine")
-        super().wait(given)
-
-    def move(self, given: Sequence[str]) -> None:
-        """Take a target."""
-        robot, others, seconds, zone = given
-        self._targets.append(self._target(robot, others))
-        self._times.append(self.lines.duration(seconds))
-        if zone.lower() == "fine":
-            self.rows.append(Row(self.lines.step(), [self.at, *self._targets], self._times))
-            self.at, self._targets, self._times = self._targets[-1], [], []
-
-    @property
-    def clock(self) -> float:
-        """See `ProgramReader.clock`: with the targets since the last stop."""
-        return super().clock + sum(self._times)
-
-    def leave(self, _: Sequence[str]) -> None:
-        """End the procedure."""
-        if self._targets:
-            raise self.lines.fault("the last target has a zone, expected fine")
-        self.state = "left"
-
-    def _target(self, robot: str, others: str) -> list[float]:
-        values = [text.split(",") for text in (robot, others)]
-        for found, what in zip(values, ("robax", "extax"), strict=True):
-            if len(found) != 6:
-                raise self.lines.fault(f"{what} has {len(found)} numbers, expected 6")
-        every = dict(zip(AXES, [*values[0], *values[1]], strict=True))
-        self.same_axes([name for name, text in every.items() if not self._is_absent(name, text)])
-        return [self.lines.coordinate(every[name]) for name in self.present]
-
-    def _is_absent(self, name: str, text: str) -> bool:
-        return name in AXES[6:] and abs(self.lines.number_of(text)) > _ABSENT_FROM
-
-
-_WORD = r"[A-Z]\w{0,31}"
-_LIST = r"\[([^\[\]]*)\]"
-_TARGET = rf"\[ ?{_LIST} ?, ?{_LIST} ?\]"
-RapidReader.grammar = (
-    (("before",), rf"MODULE ({_WORD})", RapidReader.begin),
-    (("data",), rf"(?:TASK )?PERS tooldata {_WORD} ?:= ?\[[^;!]*\];", RapidReader.skip),
-    (("data",), rf"CONST speeddata {_WORD} ?:= ?\[[^;!\[\]]*\];", RapidReader.skip),
-    (("data",), rf"PROC {_WORD} ?\( ?\)", RapidReader.procedure),
-    (
-        ("start",),
-        rf"MoveAbsJ {_TARGET} ?\\NoEOffs ?, ?{_WORD} ?, ?fine ?, ?{_WORD} ?;",
-        RapidReader.go,
-    ),
-    (
-        ("body",),
-        rf"MoveAbsJ {_TARGET} ?\\NoEOffs ?, ?{_WORD} ?\\T ?:= ?([^,]+), ?"
-        rf"(fine|z[0-9]{{1,3}}) ?, ?{_WORD} ?;",
-        RapidReader.move,
-    ),
-    (("body",), r"WaitTime ([^;\s]+) ?;", RapidReader.wait),
-    (("body",), rf"SetDO ({_WORD}) ?, ?([01]) ?;", RapidReader.switch),
-    (("body",), r"! event: (.*)", RapidReader.switch),
-    (("body",), r"ENDPROC", RapidReader.leave),
-    (("left",), r"ENDMODULE", RapidReader.end),
-)

@@ -9,10 +9,11 @@ import numpy as np
 from selfmotion.basics import Array, ProblemError, shown
 from selfmotion.motion import MOST_SAMPLES, Trajectory
 from selfmotion.result import Plan
-from selfmotion.task import Task
 
 # Messages count whole nanoseconds.
 _DIGITS = 9
+# A motion has so many samples at least.
+_FEWEST = 4
 # Where between two samples straight lines are compared with the motion.
 _BETWEEN = (0.25, 0.5, 0.75)
 # Cubics this near to a motion [rad or m] are as good as it; intervals are halved so often for that.
@@ -106,16 +107,35 @@ def linear_miss(plan: Plan, rate: float | None = None) -> LinearMiss:
     misses = np.zeros((len(spans), 2))
     for share in _BETWEEN:
         t = np.minimum(motion.t[0] + samples.t[:-1] + share * spans, motion.t[-1])
-        straight = samples.q[:-1] + share * np.diff(samples.q, axis=0)
-        for k, (line, exact) in enumerate(zip(straight, motion(t), strict=True)):
-            for chain in chains:
-                miss = Task.POSE.miss(chain.place(exact), chain.place(line))
-                misses[k] = np.maximum(misses[k], miss)
+        straight, exact = samples.q[:-1] + share * np.diff(samples.q, axis=0), motion(t)
+        for chain in chains:
+            (_, turned, here), (_, facing, there) = chain.along(straight), chain.along(exact)
+            far = np.linalg.norm(here - there, axis=1)
+            # |R - R'| is 2√2 sin(angle / 2).
+            half = np.linalg.norm(turned - facing, axis=(1, 2)) / np.sqrt(8.0)
+            angle = 2.0 * np.arcsin(np.minimum(half, 1.0))
+            misses = np.maximum(misses, np.stack([far, angle], axis=1))
     # The miss of a line over a span h is that of a parabola: it grows with h².
     share = (misses / [tolerance.position, tolerance.rotation]).max(axis=1)
     needed = float((np.sqrt(share) / spans).max())
     position, rotation = misses.max(axis=0).tolist()
     return LinearMiss(position, rotation, float(np.ceil(needed)))
+
+
+def coarsest_rate(plan: Plan) -> float | None:
+    """Return the lowest whole rate [Hz] at which a plan's samples keep its tolerance.
+
+    Joined by straight lines as well as by quintics, by which the certificate judges them. None
+    where the samples of the plan itself are no more, or nothing coarser is verified.
+    """
+    motion = plan.trajectory
+    rate = max(linear_miss(plan).rate, float(np.ceil(_FEWEST / motion.duration)))
+    if rate * motion.duration >= len(motion.t) - 1:
+        return None
+    samples = MotionSamples.of(motion, rate)
+    coarse = Trajectory(samples.t, samples.q, samples.qd, motion.joint_names, samples.qdd)
+    found = plan.problem.certify(coarse, plan.tolerance, plan.report.ending)
+    return rate if found.verified else None
 
 
 def for_cubics(motion: Trajectory) -> Trajectory:

@@ -6,7 +6,7 @@ from typing import Any
 
 from selfmotion.formats.documents import ANGLES, LENGTHS, is_share
 from selfmotion.formats.models import document_model
-from selfmotion.formats.seam_job import JOB, OF_PROBLEM, OF_TABLE, SEAM
+from selfmotion.formats.seam_job import HIGHEST, JOB, OF_PROBLEM, OF_TABLE, SEAM
 from selfmotion.optimise import QuasiNewton
 
 _MOTION = "ToolMotion"
@@ -78,8 +78,11 @@ def _seams(schema: Mapping[str, Any]) -> dict[str, Any]:
     file = known["file"]["properties"]
     table = {
         **{name: value for name, value in of_all.items() if name not in ("name", "path")},
-        **{name: file[name] for name in OF_TABLE},
+        **{name: file[name] for name in OF_TABLE if name in file},
+        "run_up": _FLAG,
+        "most_feed": _NUMBER,
     }
+    table["feed"] = {"anyOf": [file["feed"], {"const": HIGHEST}]}
     one = {**of_all, "path": _of(_MOTION)}
     entry = _table(one, ["name", "path"])
     return {"anyOf": [{"type": "array", "items": entry, "minItems": 1}, _table(table, ["file"])]}

@@ -1,9 +1,11 @@
 """From a file of many seams to a job."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path as FilePath
 from typing import Any
+
+import numpy as np
 
 from selfmotion.basics import FileFormatError, SelfmotionError, as_path, is_file, nearest, shown
 from selfmotion.constraints import Clearance
@@ -16,8 +18,8 @@ from selfmotion.formats.poses import pose_of
 from selfmotion.formats.problem_file import job_of
 from selfmotion.formats.problem_parts import FEED_BOUNDS, led, obstacle, start_of, woven
 from selfmotion.formats.workpiece import NAME, placed_body, standing
-from selfmotion.job import Program, Seam, plan_job
-from selfmotion.path import Path, Placed
+from selfmotion.job import FASTEST_FEED, Program, Seam, highest_feed, plan_job
+from selfmotion.path import Feed, Path, Placed, with_run_ups
 from selfmotion.problem import NO_OVERLAP, Problem
 from selfmotion.robot import RobotModel
 
@@ -31,7 +33,9 @@ _PACED = (
     *("feed", "duration", "jump", "corners", "tolerance", "corner_angle", "ramp"),
     *("flip_normals", "standoff", *READING, *FEED_BOUNDS),
 )
-OF_TABLE = (*_PLACED, *_PACED)
+# What a feed is called that is looked for, how fast it is at most, and where it counts.
+HIGHEST, _OF_FEED = "highest", ("most_feed", "run_up")
+OF_TABLE = (*_PLACED, *_PACED, *_OF_FEED)
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,11 +48,17 @@ class SeamJob:
     seams : tuple of Seam
     settings : mapping
         What `plan_job` is given besides.
+    at_feed : callable or None
+        Of a file that asks for the highest feed: feed [m/s] → the job at that one.
+    most_feed : float
+        How fast that may be at most [m/s].
     """
 
     robot: RobotModel
     seams: tuple[Seam, ...]
     settings: Mapping[str, Any]
+    at_feed: Callable[[float], "SeamJob"] | None = None
+    most_feed: float = FASTEST_FEED
 
     @property
     def remarks(self) -> tuple[str, ...]:
@@ -73,7 +83,13 @@ class SeamJob:
         return tuple(found.values())
 
     def plan(self, **options: Any) -> Program:
-        """Plan it; `options` are further ones of `plan_job`."""
+        """Plan it; `options` are further ones of `plan_job`. At the highest feed if that is asked.
+
+        See `highest_feed`.
+        """
+        at_feed = self.at_feed
+        if at_feed is not None:
+            return highest_feed(lambda feed: at_feed(feed).plan(**options), self.most_feed).program
         return plan_job(self.robot, self.seams, **{**self.settings, **options})
 
 
@@ -87,7 +103,10 @@ def read_seam_job(file: str | FilePath, *, allow_code: bool = False) -> SeamJob:
     as `read_path` reads them, with a ``feed`` or ``duration``, and what else all of them have. That
     may be a program of a machine tool, whose cuts are seams. Rows with an ``event``, and cuts, are
     made one way only, unless ``either_way = true`` is said: then events are as long after the start
-    from the end on, too, which is at other poses.
+    from the end on, too, which is at other poses. With ``run_up = true`` seams with a feed are made
+    longer at both ends, so that they keep it from begin to end (`with_run_ups`), and ``feed =
+    "highest"`` asks for the highest one at which all are kept (`highest_feed`), up to
+    ``most_feed``.
 
     Parameters
     ----------
@@ -109,6 +128,13 @@ def seam_job_of(
 ) -> SeamJob:
     """Return the job that a document of a file describes. See `read_seam_job`."""
     given, settings = document.get("seams"), document.get("job", {})
+    if isinstance(given, dict) and given.get("feed") == HIGHEST:
+        return _at_highest(document, given, file, allow_code=allow_code)
+    if isinstance(given, dict) and "most_feed" in given:
+        raise FileFormatError(
+            f"{file}: seams: most_feed: has no effect where feed is a number; give feed = "
+            f"'{HIGHEST}', or leave it out"
+        )
     shared = {key: value for key, value in document.items() if key not in ("seams", "job")}
     if "path" in shared or not isinstance(given, dict | list) or not given:
         raise FileFormatError(
@@ -136,6 +162,29 @@ def seam_job_of(
     if apart or whole.problem.collision is not NO_OVERLAP:
         options["clearance"] = clearance
     return SeamJob(whole.problem.robot, tuple(seams), {**options, "constraints": kept})
+
+
+def _at_highest(
+    document: Mapping[str, Any], given: Mapping[str, Any], file: FilePath, *, allow_code: bool
+) -> SeamJob:
+    """Return the job of a document that asks for the highest feed."""
+    most = given.get("most_feed", FASTEST_FEED)
+    if not (isinstance(most, int | float) and 0.0 < most <= FASTEST_FEED):
+        raise FileFormatError(
+            f"{file}: seams: most_feed is {shown(most)}, expected a feed up to {FASTEST_FEED:g} m/s"
+        )
+    rest = {key: value for key, value in given.items() if key != "most_feed"}
+
+    def at_feed(feed: float) -> SeamJob:
+        asked = {**document, "seams": {**rest, "feed": feed}}
+        return seam_job_of(asked, file, allow_code=allow_code)
+
+    slow = at_feed(_SLOW * most)
+    return replace(slow, at_feed=at_feed, most_feed=float(most))
+
+
+# At this share of the highest feed that is tried a file is read first, for all that it says.
+_SLOW = 0.01
 
 
 class _Reader:
@@ -219,11 +268,14 @@ class _Reader:
         switched = any(rows.one_way and rows.events for _, rows in seams.values())
         for name, (path, rows) in seams.items():
             own = {**rest, "name": name}
-            events = _after_lead(times_of_events(path, rows), values.get("leads"))
+            events = times_of_events(path, rows)
             if "weave" in values:
                 path = woven(path, values["weave"])
+            if values.get("run_up"):
+                path, events = _run_up(path, events, f"seams, '{name}'", self._file)
             if "leads" in values:
                 path = led(path, values["leads"])
+                events = _after_lead(events, values["leads"])
             if events:
                 own["events"] = [*events, *rest.get("events", [])]
             if events or rows.one_way:
@@ -307,6 +359,23 @@ class _Reader:
             raise FileFormatError(f"{self._file}: {where}: leaves: expected tables of bodies")
 
 
+def _run_up(
+    path: Path, events: list[tuple[str, float]], where: str, file: FilePath
+) -> tuple[Path, list[tuple[str, float]]]:
+    """Return a path with run-ups, and its events as much later."""
+    if not isinstance(path, Feed):
+        raise FileFormatError(f"{file}: {where}: run_up: is of seams with a feed, not a weave")
+    try:
+        stroke = with_run_ups(path)
+    except SelfmotionError as error:
+        raise FileFormatError(f"{file}: {where}: {error}") from error
+    # When the same places are passed.
+    original = path.pace(np.array([at for _, at in events]))[0] if events else np.zeros(0)
+    first, _ = stroke.path.pace(np.array([stroke.begin]))
+    times = stroke.path.when(first[0] + original) if events else original
+    return stroke.path, [(name, float(at)) for (name, _), at in zip(events, times, strict=True)]
+
+
 def _after_lead(
     events: Sequence[tuple[str, float]], leads: Mapping[str, Any] | None
 ) -> list[tuple[str, float]]:
@@ -323,6 +392,7 @@ _KINDS: Mapping[str, tuple[type, str]] = {
     "file": (str, "the name of a file"),
     "weave": (Mapping, "a table with amplitude and pitch"),
     "leads": (Mapping, "a table with length and duration"),
+    "run_up": (bool, "true or false"),
     **dict.fromkeys(("events", "leaves", "constraints", "costs", "relaxations"), (list, "a list")),
 }
 # A motion that any arm's tool may have, so that what seams share can be read.

@@ -1,7 +1,7 @@
 """Joint targets of a motion from rest to rest, and how far off it they take a controller."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -11,6 +11,8 @@ from selfmotion.certificate import Tolerance
 from selfmotion.motion import Trajectory
 from selfmotion.robot import Chain
 
+# The worst is no more than so many times what is found at times that are so near to each other.
+SURE = 1.02
 # Where between two targets, and how near to each, the error is looked at.
 _BETWEEN = np.array([0.0, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875])
 
@@ -47,6 +49,35 @@ class Stretch:
         """Whether the arm rests all the while."""
         return bool((self.q == self.q[0]).all())
 
+    def in_order(self, order: Sequence[int]) -> "Stretch":
+        """Return the same with coordinates in another order."""
+        return replace(self, q=self.q[:, order])
+
+    def looked_at(self) -> Array:
+        """Return times at targets and between them (K,) [s]."""
+        return finer(self.t, _BETWEEN)
+
+    def ways(self, times: Array) -> list[Array]:
+        """Return joint positions (K, n) at times by each way in which controllers join targets."""
+        return ways(self.t, self.q, times)
+
+    def smooth(self) -> tuple[Array, Array, Array]:
+        """Return times (K,) [s], positions and velocities (K, n) of a spline through the targets.
+
+        It begins and ends at rest.
+        """
+        from scipy.interpolate import CubicSpline
+
+        times = self.looked_at()
+        spline = CubicSpline(self.t, self.q, bc_type="clamped")
+        return times, spline(times), spline(times, 1)
+
+    def knots(self) -> tuple[Array, Array, Array]:
+        """Return as many of these as it takes that cubics through them are the spline."""
+        from scipy.interpolate import CubicSpline
+
+        return self.t, self.q, CubicSpline(self.t, self.q, bc_type="clamped")(self.t, 1)
+
 
 class Miss(NamedTuple):
     """How far targets take a controller off the motion, at the time where it is farthest.
@@ -66,7 +97,12 @@ class Miss(NamedTuple):
     def share(self, allowed: Tolerance) -> float:
         """Return how much of what is allowed it takes: above 1 too much."""
         rotation = max(self.rotation, self.joint) / allowed.rotation
-        return max(self.position / allowed.position, rotation)
+        return SURE * max(self.position / allowed.position, rotation)
+
+    @property
+    def stated(self) -> "Miss":
+        """As files state it: the worst lies between the times that are looked at."""
+        return Miss(SURE * self.position, SURE * self.rotation, SURE * self.joint)
 
 
 class Misses(NamedTuple):
@@ -98,10 +134,10 @@ def miss_of(
     through all targets that begins and ends at rest; at the times of the motion, which holds it to
     its speeds as well.
     """
-    t, q, times = stretch.t, stretch.q, _looked_at(stretch)
+    times = stretch.looked_at()
     exact = motion(np.clip(first + times, motion.t[0], motion.t[-1]))
     worst = NO_MISS
-    for line in ways(t, q, times):
+    for line in stretch.ways(times):
         worst = Miss(*map(max, worst, miss_between(line, exact, chains)))
     return worst
 
@@ -120,19 +156,9 @@ def miss_between(q: Array, exact: Array, chains: Sequence[Chain]) -> Miss:
     return Miss(position, rotation, float(np.abs(q - exact).max()))
 
 
-def _looked_at(stretch: Stretch) -> Array:
-    """Return times at targets and between them (K,) [s]."""
-    t = stretch.t
-    return np.append((t[:-1, None] + _BETWEEN * np.diff(t)[:, None]).ravel(), t[-1])
-
-
-def spline_of(stretch: Stretch) -> tuple[Array, Array, Array]:
-    """Return times (K,) [s], positions and velocities (K, n) of the spline through the targets."""
-    from scipy.interpolate import CubicSpline
-
-    times = _looked_at(stretch)
-    spline = CubicSpline(stretch.t, stretch.q, bc_type="clamped")
-    return times, spline(times), spline(times, 1)
+def finer(t: Array, between: Array) -> Array:
+    """Return times with others between each two, `between` as shares from 0 on."""
+    return np.append((t[:-1, None] + between * np.diff(t)[:, None]).ravel(), t[-1])
 
 
 def ways(t: Array, q: Array, times: Array) -> list[Array]:

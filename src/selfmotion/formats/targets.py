@@ -4,7 +4,7 @@ A motion is cut where the arm rests, be it for an instant: controllers stop ther
 there happens on time. Which targets there are in between says `selfmotion.formats.thinning`.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -12,10 +12,13 @@ import numpy as np
 from selfmotion.basics import Flags, ProblemError, Progress, silent
 from selfmotion.certificate import Tolerance
 from selfmotion.formats.pieces import Piece
-from selfmotion.formats.stretches import NO_MISS, Misses, Stretch
+from selfmotion.formats.pose_thinning import NotByPosesError
+from selfmotion.formats.stretches import NO_MISS, Miss, Misses, Stretch
 from selfmotion.formats.thinning import Span, rests
 from selfmotion.motion import Trajectory
 
+# Makes a span of tool poses of a piece, which joints slide, and when it begins and ends.
+PosedSpans = Callable[[Piece, Flags, float, float], Span]
 # The arm rests where it is as slow as this [rad or m/s] for at least so long [s].
 _REST, _WHILE = 1e-7, 0.02
 # Programs go from rest to rest: this is rest [rad or m/s], and so is such a share of the fastest.
@@ -28,13 +31,17 @@ def stretches_of(
     allowed: Tolerance,
     of_moves: Tolerance | None = None,
     progress: Progress = silent,
+    posed: PosedSpans | None = None,
 ) -> tuple[list[Stretch], Misses]:
     """Return the targets of a motion, as its file has them, and how far they are off it.
 
-    Moves through the air may be off by `of_moves`; by default as far as they keep apart.
+    Moves through the air may be off by `of_moves`; by default as far as they keep apart. With
+    `posed` they are tool poses; those of moves that poses do not keep are joint targets.
 
     Raises
     ------
+    NotByPosesError
+        Poses do not keep a seam.
     ProblemError
         It does not begin and end at rest, or takes more targets than any controller has.
     """
@@ -53,11 +60,29 @@ def stretches_of(
                 )
         within = _allowed(piece, allowed, of_moves)
         for first, last in _moving(motion, [motion.t[0] + at for at, _ in piece.events]):
-            stretch, miss = Span.of(piece, slides, first, last).thinned(within)
+            stretch, miss = _thinned(piece, slides, first, last, within, posed)
             both = Misses(NO_MISS, miss) if piece.is_move else Misses(miss, NO_MISS)
             worst = worst.worse(both)
             found.append(stretch)
     return found, worst
+
+
+def _thinned(
+    piece: Piece,
+    slides: Flags,
+    first: float,
+    last: float,
+    within: Tolerance,
+    posed: PosedSpans | None,
+) -> tuple[Stretch, Miss]:
+    if posed is not None:
+        try:
+            return posed(piece, slides, first, last).thinned(within)
+        except NotByPosesError:
+            # A free move goes through singular configurations where it likes.
+            if not piece.is_move:
+                raise
+    return Span.of(piece, slides, first, last).thinned(within)
 
 
 def _allowed(piece: Piece, allowed: Tolerance, of_moves: Tolerance | None) -> Tolerance:

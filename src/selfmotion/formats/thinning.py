@@ -22,7 +22,6 @@ from selfmotion.formats.stretches import (
     Stretch,
     miss_between,
     miss_of,
-    spline_of,
 )
 from selfmotion.motion import Trajectory
 
@@ -63,13 +62,7 @@ class Span:
     @classmethod
     def of(cls, piece: Piece, slides: Flags, first: float, last: float) -> "Span":
         """Return that of a piece, with the events that are in it."""
-        start, end = float(piece.motion.t[0]), float(piece.motion.t[-1])
-        events = [
-            (start + at, name)
-            for at, name in piece.events
-            if (first == start or first < start + at) and (last == end or start + at <= last)
-        ]
-        return cls(piece, slides, first, last, events)
+        return cls(piece, slides, first, last, events_within(piece, first, last))
 
     def thinned(self, allowed: Tolerance) -> tuple[Stretch, Miss]:
         """Return its targets, and how far they are off.
@@ -147,7 +140,7 @@ class Span:
 
         Where the motion itself does not.
         """
-        times, q, qd = spline_of(stretch)
+        times, q, qd = stretch.smooth()
         motion = self.piece.motion
         t = np.clip(self.first + times, self.first, motion.t[-1])
         exact, rates = motion(t), motion(t, 1)
@@ -167,6 +160,16 @@ class Span:
                     asked = (t > begin) & (t < end)
                     taken = np.maximum(taken, np.where(asked, off / max(room, 1e-12), 0.0))
         return np.asarray(taken[:-1].reshape(len(stretch.t) - 1, -1).max(axis=1) > 1.0)
+
+
+def events_within(piece: Piece, first: float, last: float) -> list[tuple[float, str]]:
+    """Return what happens in a part of a piece, at times of its motion [s]."""
+    start, end = float(piece.motion.t[0]), float(piece.motion.t[-1])
+    return [
+        (start + at, name)
+        for at, name in piece.events
+        if (first == start or first < start + at) and (last == end or start + at <= last)
+    ]
 
 
 def _in_words(piece: Piece, allowed: Tolerance) -> str:

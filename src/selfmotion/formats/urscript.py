@@ -55,15 +55,9 @@ def script(
         The arm has other joints, or an event no output.
     """
     asked = ProgramSettings() if settings is None else settings
-    slides = [name for name in joints if robot.is_prismatic(name)]
-    if len(joints) != _JOINTS or slides:
-        raise ProblemError(
-            f"{robot.name}: URScript is for arms of {_JOINTS} revolute joints, this one has "
-            f"{len(joints)} joints" + (f", of which '{slides[0]}' slides" if slides else "")
-        )
+    check_joints(robot, joints)
     period = repr(1.0 / rate)
     center = ", ".join(f"{value:.6g}" for value in asked.center)
-    speed, push = asked.approach * _FASTEST, asked.approach * _ACCELERATION
     lines = [
         f"# {robot.name}: {len(q)} setpoints, joints {', '.join(joints)} [rad].",
         f"# servoj at {rate:g} Hz (t = {period} s), lookahead_time = {_LOOK_AHEAD} s, "
@@ -73,7 +67,7 @@ def script(
         "def selfmotion():",
         *_tool(robot, joints, asked),
         *([] if asked.mass is None else [f"  set_payload({asked.mass:.6g}, [{center}])"]),
-        f"  movej({_vector(q[0])}, a={push:.4g}, v={speed:.4g})",
+        slow_joints(q[0], asked),
     ]
     late = round(_LOOK_AHEAD * rate)
     switched = {k + late: [name for at, name in events if at == k] for k, _ in events}
@@ -81,11 +75,27 @@ def script(
     held = max([len(q), *(k + 1 for k in switched)])
     for k in range(held):
         row = q[min(k, len(q) - 1)]
-        lines += [f"  {_event(name, asked)}" for name in switched.get(k, ())]
+        lines += [f"  {event_line(name, asked)}" for name in switched.get(k, ())]
         lines.append(
             f"  servoj({_vector(row)}, t={period}, lookahead_time={_LOOK_AHEAD}, gain={_GAIN})"
         )
     return "\n".join([*lines, "  stopj(2.0)", "end", ""])
+
+
+def check_joints(robot: RobotModel, joints: Sequence[str]) -> None:
+    """Refuse joints that are not those of an arm of Universal Robots."""
+    slides = [name for name in joints if robot.is_prismatic(name)]
+    if len(joints) != _JOINTS or slides:
+        raise ProblemError(
+            f"{robot.name}: URScript is for arms of {_JOINTS} revolute joints, this one has "
+            f"{len(joints)} joints" + (f", of which '{slides[0]}' slides" if slides else "")
+        )
+
+
+def slow_joints(q: Array, settings: ProgramSettings) -> str:
+    """Return the line that goes slowly to a configuration (6,)."""
+    speed, push = settings.approach * _FASTEST, settings.approach * _ACCELERATION
+    return f"  movej({_vector(q)}, a={push:.4g}, v={speed:.4g})"
 
 
 def _tool(robot: RobotModel, joints: Sequence[str], settings: ProgramSettings) -> list[str]:
@@ -97,7 +107,8 @@ def _tool(robot: RobotModel, joints: Sequence[str], settings: ProgramSettings) -
     return [f"  set_tcp(p[{', '.join(f'{value + 0.0:.9f}' for value in place)}])"]
 
 
-def _event(event: str, settings: ProgramSettings) -> str:
+def event_line(event: str, settings: ProgramSettings) -> str:
+    """Return what an event switches, or the comment that it is."""
     signal = settings.signal(event)
     if signal is None:
         return f"# event: {' '.join(event.split())}"

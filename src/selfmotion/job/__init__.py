@@ -1,13 +1,15 @@
 """Many seams, one program."""
 
 from selfmotion.job.files import load_program as load_program
+from selfmotion.job.highest_feed import (
+    FASTEST_FEED as FASTEST_FEED,
+    FeedFound as FeedFound,
+    highest_feed as highest_feed,
+)
 from selfmotion.job.program import Program as Program
 from selfmotion.job.run import plan_job as plan_job
 from selfmotion.job.seam import Seam as Seam, are_opposite as are_opposite
 from selfmotion.job.specification import Specification as Specification
 from selfmotion.job.step import Step as Step
 
-__all__ = [
-    "Specification",
-    "Step",
-]
+__all__ = ["FeedFound", "Specification", "Step", "highest_feed"]

@@ -21,6 +21,7 @@ from selfmotion.path.placed import Placed as Placed
 from selfmotion.path.polyline import Polyline as Polyline
 from selfmotion.path.retimed import Retimed as Retimed
 from selfmotion.path.reversed import Reversed as Reversed
+from selfmotion.path.run_ups import Stroke as Stroke, with_run_ups as with_run_ups
 from selfmotion.path.section import Section as Section, section_at_rest as section_at_rest
 from selfmotion.path.shapes import Circle as Circle, Line as Line
 from selfmotion.path.spiral import Spiral as Spiral

@@ -262,6 +262,16 @@ class Feed(_Derived, kind="feed"):
         stretches = asked if len(asked) > 1 else None
         return Feed(self._path, **changed, within=self._within, stretches=stretches)
 
+    def along(self, path: Path, later: float) -> "Feed":
+        """Return the same along a longer path, on which the original begins `later` [s].
+
+        Before it the feed is that of its begin.
+        """
+        asked = self._asked + np.array([later, 0.0])
+        changed = {**self._limits, "feed": float(asked[0, 1])}
+        stretches = asked[1:] if len(asked) > 1 else None
+        return Feed(path, **changed, within=self._within, stretches=stretches)
+
     def slower(self, factor: float) -> "Feed":
         """Return the same motion, taking `factor` times as long.
 

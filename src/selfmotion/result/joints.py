@@ -57,17 +57,18 @@ def _accelerates(problem: Problem, requirements: Sequence[Requirement]) -> tuple
     return start, end
 
 
-def gaps(robot: RobotModel, pieces: Sequence[Piece]) -> Iterator[str]:
+def gaps(robot: RobotModel, pieces: Sequence[Piece], allowed: float = _JOINED) -> Iterator[str]:
     """Yield where from one piece to the next the arm jumps, moves or accelerates.
 
-    Configurations have to agree within 1e-9 rad or m; at both sides the arm has to rest, within
-    1e-6 rad/s or m/s and 1e-3 rad/s² or m/s². All of them have to state accelerations, or none:
-    between the samples of the whole some would be other motions than were judged.
+    Configurations have to agree within what is allowed, by default 1e-9 rad or m; at both sides the
+    arm has to rest, within 1e-6 rad/s or m/s and 1e-3 rad/s² or m/s². All of them have to state
+    accelerations, or none: between the samples of the whole some would be other motions than were
+    judged.
     """
     yield from _mixed(pieces)
     for one, other in pairwise(pieces):
         last, first = one.motion.q[_END], other.motion.q[_START]
-        yield from _jump(robot, one.name, other.name, last, first)
+        yield from _jump(robot, one.name, other.name, last, first, allowed)
         yield from moving_end(robot, one, _END)
         yield from moving_end(robot, other, _START)
 
