@@ -121,6 +121,12 @@ from selfmotion.job import (
     load_program as load_program,
     plan_job as plan_job,
 )
+from selfmotion.margins import (
+    Displacement as Displacement,
+    Margins as Margins,
+    SubjectMargin as SubjectMargin,
+    margin as margin,
+)
 from selfmotion.motion import (
     BSplineNullMotion as BSplineNullMotion,
     FreeNullMotion as FreeNullMotion,

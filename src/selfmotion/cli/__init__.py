@@ -4,6 +4,7 @@ from selfmotion.cli import (
     commands as commands,
     exports as exports,
     jobs as jobs,
+    margins as margins,
     paces as paces,
     runs as runs,
     warm_up as warm_up,

@@ -47,6 +47,7 @@ from selfmotion.robot.tip_places import place_tips as place_tips
 from selfmotion.robot.tool_rates import ToolRates as ToolRates
 from selfmotion.robot.tree_arrays import TreeArrays as TreeArrays
 from selfmotion.robot.urdf import (
+    BASE_JOINT as BASE_JOINT,
     TOOL_JOINT as TOOL_JOINT,
     Urdf as Urdf,
     UrdfJoint as UrdfJoint,

@@ -1,0 +1,71 @@
+"""The commands that say how wrong a cell may be."""
+
+import dataclasses
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import typer
+
+import selfmotion as sm
+from selfmotion.cli import options
+from selfmotion.cli.app import app, terminal
+
+_NAMES = "may be given several times"
+
+
+@app.command(epilog="Example: selfmotion margin plan.npz --tolerance 5e-4 --turn 0.02")
+def margin(
+    file: Annotated[Path, typer.Argument(help="A plan saved as .npz.")],
+    tolerance: Annotated[
+        float | None, typer.Option(help="What the process lets the tool be off its path (m).")
+    ] = None,
+    turn: Annotated[
+        float | None, typer.Option(help="By how much it may be turned (rad); with --tolerance.")
+    ] = None,
+    clearance: Annotated[float, typer.Option(help="What is left between bodies (m).")] = 0.0,
+    part: Annotated[
+        list[str] | None,
+        typer.Option(help=f"A body of the part ({_NAMES}); by default all obstacles there."),
+    ] = None,
+    tool: Annotated[
+        list[str] | None,
+        typer.Option(help=f"A body of the tool ({_NAMES}); by default all on its joint."),
+    ] = None,
+    center: Annotated[
+        str | None,
+        typer.Option(help="What the part turns about: x,y,z (m); by default the path's middle."),
+    ] = None,
+    as_json: options.JsonOption = False,
+) -> None:
+    """Say by how much part, tool and base may be displaced while a plan runs unchanged."""
+    if (tolerance is None) != (turn is None):
+        raise sm.ProblemError("--tolerance and --turn say together what the process allows")
+    within = None if tolerance is None or turn is None else sm.Tolerance(tolerance, turn)
+    about = None if center is None else options.numbers(center, "--center", 3)
+    found = sm.margin(
+        sm.load_plan(file),
+        within,
+        clearance=clearance,
+        part=part or None,
+        tool=tool or None,
+        center=about,
+    )
+    if as_json:
+        terminal.print_json(data=margins_json(found))
+    else:
+        terminal.print(str(found), markup=False, soft_wrap=True)
+
+
+def margins_json(found: sm.Margins) -> dict[str, Any]:
+    """Return margins as JSON-safe values, the sentence first."""
+    return {"sentence": found.sentence, **_plain(dataclasses.asdict(found))}
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _plain(each) for key, each in value.items()}
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    # JSON has no number for what has no time.
+    return None if isinstance(value, float) and np.isnan(value) else value

@@ -1,0 +1,8 @@
+"""How wrong a cell may be: what a program survives."""
+
+from selfmotion.margins.found import (
+    Displacement as Displacement,
+    Margins as Margins,
+    SubjectMargin as SubjectMargin,
+)
+from selfmotion.margins.margin import margin as margin
