@@ -171,7 +171,12 @@ from selfmotion.planning import (
     plan as plan,
     plan_in_parts as plan_in_parts,
 )
-from selfmotion.problem import Problem as Problem, sample_problem as sample_problem
+from selfmotion.problem import (
+    Problem as Problem,
+    calibrated as calibrated,
+    off_nominal as off_nominal,
+    sample_problem as sample_problem,
+)
 from selfmotion.result import (
     Attempt as Attempt,
     Gap as Gap,

@@ -8,8 +8,8 @@ import numpy as np
 import typer
 
 import selfmotion as sm
-from selfmotion.cli import options
-from selfmotion.cli.app import app, terminal
+from selfmotion.cli import checks, options, outputs
+from selfmotion.cli.app import app, plan_with_progress, stages, terminal
 
 _NAMES = "may be given several times"
 
@@ -55,6 +55,29 @@ def margin(
         terminal.print_json(data=margins_json(found))
     else:
         terminal.print(str(found), markup=False, soft_wrap=True)
+
+
+@app.command(epilog="Example: selfmotion calibrate plan.npz ur5_kinematics.yaml --out measured.npz")
+def calibrate(
+    file: Annotated[Path, typer.Argument(help="A plan saved as .npz, for the arm as drawn.")],
+    calibration: Annotated[
+        Path,
+        typer.Argument(help="File that says where the joints of this very arm are; see check."),
+    ],
+    out: options.OutOption = None,
+    html: options.HtmlOption = None,
+    as_json: options.JsonOption = False,
+) -> None:
+    """Say what a plan does on an arm as it was measured, and plan it again for that arm."""
+    outputs.check_suffixes(out or [])
+    planned = sm.load_plan(file)
+    problem = sm.calibrated(planned.problem, calibration)
+    checks.tell_difference(problem.robot, planned.trajectory)
+    judged = checks.on_calibrated(planned.problem, calibration)
+    verdict = judged.certify(planned.trajectory, planned.tolerance, planned.report.ending).verdict
+    stages.print(f"as planned, on the calibrated arm: {verdict}", markup=False, soft_wrap=True)
+    result = plan_with_progress(problem, warm_start=planned, tolerance=planned.tolerance)
+    outputs.finish(result, out or [], html, as_json)
 
 
 def margins_json(found: sm.Margins) -> dict[str, Any]:

@@ -5,6 +5,10 @@ from selfmotion.robot.building import (
     moving_joints as moving_joints,
     rebuild_robot as rebuild_robot,
 )
+from selfmotion.robot.calibration import (
+    calibrated_robot as calibrated_robot,
+    nominal_robot as nominal_robot,
+)
 from selfmotion.robot.chain import (
     WORLD as WORLD,
     Chain as Chain,

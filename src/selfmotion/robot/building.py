@@ -174,6 +174,18 @@ def rebuild_robot(
     return dataclasses.replace(built, touching=pairs, **given)
 
 
+def with_urdf(robot: RobotModel, urdf: Urdf) -> RobotModel:
+    """Return an arm with another URDF of the same links and joints."""
+    free = [
+        joint
+        for joint in urdf.joints.values()
+        if joint.kind in ("revolute", "continuous", "prismatic") and joint.name not in robot.locked
+    ]
+    built = build_robot(urdf, robot.tools, robot.locked, robot.reference, free)
+    kept = {name: getattr(robot, name) for name in (*LIMITS, "acceleration_limit", "jerk_limit")}
+    return dataclasses.replace(built, touching=robot.touching, **kept)
+
+
 def _check_lock(urdf: Urdf, model: Any, lock: Mapping[str, float]) -> None:
     for name, value in lock.items():
         if not isinstance(name, str) or not model.existJointName(name):
