@@ -164,6 +164,12 @@ from selfmotion.path import (
     section_at_rest as section_at_rest,
     with_leads as with_leads,
 )
+from selfmotion.placement import (
+    PlaceMap as PlaceMap,
+    Placement as Placement,
+    Tried as Tried,
+    place as place,
+)
 from selfmotion.planning import (
     Fastest as Fastest,
     Search as Search,

@@ -6,6 +6,7 @@ from selfmotion.cli import (
     jobs as jobs,
     margins as margins,
     paces as paces,
+    placing as placing,
     runs as runs,
     warm_up as warm_up,
 )

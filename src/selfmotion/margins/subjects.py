@@ -10,7 +10,7 @@ from selfmotion.certificate import KeepsApart
 from selfmotion.collision import CollisionModel
 from selfmotion.follow import BoundFollow
 from selfmotion.result import Plan
-from selfmotion.robot import BASE_JOINT
+from selfmotion.robot import BASE_JOINT, root_place
 
 # Intervals on which the way of a tip is bounded.
 _INTERVALS = 1000
@@ -130,9 +130,8 @@ def base_of(plan: Plan) -> Subject:
     """Return the base of the arm, or of the whole cell, in the world."""
     urdf = plan.robot.urdf
     link = urdf.joints[BASE_JOINT].child if BASE_JOINT in urdf.joints else urdf.root
-    _, place = plan.robot.carrier_of(link)
     bodies = tuple(dict.fromkeys(name for model in models_of(plan) for name in model.standing))
-    center = np.array(place.translation)
+    center = root_place(plan.robot)
     about = f"the origin of '{link}'"
     return Subject("base", bodies, 0, center, about, -1.0, _of_paths(plan, 0, center))
 

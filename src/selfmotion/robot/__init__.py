@@ -4,6 +4,8 @@ from selfmotion.robot.angles import check_radians as check_radians
 from selfmotion.robot.building import (
     moving_joints as moving_joints,
     rebuild_robot as rebuild_robot,
+    root_place as root_place,
+    with_moved_base as with_moved_base,
 )
 from selfmotion.robot.calibration import (
     calibrated_robot as calibrated_robot,

@@ -1,0 +1,5 @@
+"""Where to put the part, or the arm."""
+
+from selfmotion.placement.found import PlaceMap as PlaceMap, Placement as Placement
+from selfmotion.placement.place import place as place
+from selfmotion.placement.places import Tried as Tried
