@@ -165,9 +165,13 @@ from selfmotion.path import (
     with_leads as with_leads,
 )
 from selfmotion.placement import (
+    Corner as Corner,
+    Correction as Correction,
+    CorrectionSide as CorrectionSide,
     PlaceMap as PlaceMap,
     Placement as Placement,
     Tried as Tried,
+    correction as correction,
     place as place,
 )
 from selfmotion.planning import (

@@ -10,6 +10,7 @@ import typer
 import selfmotion as sm
 from selfmotion.cli import checks, options, outputs
 from selfmotion.cli.app import app, plan_with_progress, stages, terminal
+from selfmotion.cli.stage_display import StageDisplay
 
 _NAMES = "may be given several times"
 
@@ -36,6 +37,12 @@ def margin(
         str | None,
         typer.Option(help="What the part turns about: x,y,z (m); by default the path's middle."),
     ] = None,
+    corrected: Annotated[
+        bool,
+        typer.Option(
+            "--corrected", help="Say besides how far part and base may be off when planned again."
+        ),
+    ] = False,
     as_json: options.JsonOption = False,
 ) -> None:
     """Say by how much part, tool and base may be displaced while a plan runs unchanged."""
@@ -43,18 +50,28 @@ def margin(
         raise sm.ProblemError("--tolerance and --turn say together what the process allows")
     within = None if tolerance is None or turn is None else sm.Tolerance(tolerance, turn)
     about = None if center is None else options.numbers(center, "--center", 3)
+    plan = sm.load_plan(file)
     found = sm.margin(
-        sm.load_plan(file),
+        plan,
         within,
         clearance=clearance,
         part=part or None,
         tool=tool or None,
         center=about,
     )
+    again = []
+    if corrected:
+        with StageDisplay(stages) as display:
+            again = [
+                sm.correction(plan, of="part", part=part or None, progress=display.stage),
+                sm.correction(plan, of="base", progress=display.stage),
+            ]
     if as_json:
-        terminal.print_json(data=margins_json(found))
-    else:
-        terminal.print(str(found), markup=False, soft_wrap=True)
+        planned = {item.of: _plain(dataclasses.asdict(item)) for item in again}
+        terminal.print_json(data=margins_json(found) | {"corrected": planned})
+        return
+    for told in (found, *again):
+        terminal.print(str(told), markup=False, soft_wrap=True)
 
 
 @app.command(epilog="Example: selfmotion calibrate plan.npz ur5_kinematics.yaml --out measured.npz")
@@ -88,7 +105,9 @@ def margins_json(found: sm.Margins) -> dict[str, Any]:
 def _plain(value: Any) -> Any:
     if isinstance(value, dict):
         return {key: _plain(each) for key, each in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(each) for each in value]
     if isinstance(value, np.ndarray):
         return value.tolist()
-    # JSON has no number for what has no time.
-    return None if isinstance(value, float) and np.isnan(value) else value
+    # JSON has no number for what has no time, or no end.
+    return None if isinstance(value, float) and not np.isfinite(value) else value

@@ -1,5 +1,11 @@
 """Where to put the part, or the arm."""
 
+from selfmotion.placement.corners import (
+    Corner as Corner,
+    Correction as Correction,
+    CorrectionSide as CorrectionSide,
+    correction as correction,
+)
 from selfmotion.placement.found import PlaceMap as PlaceMap, Placement as Placement
 from selfmotion.placement.place import place as place
 from selfmotion.placement.places import Tried as Tried

@@ -49,7 +49,7 @@ class PlaceMap:
 
     def svg(self) -> str:
         """Return it as a picture: a cell for each place, why it fails where the pointer rests."""
-        rows = []
+        rows: list[Row] = []
         for i, high in enumerate(self.up.tolist()):
             for j, far in enumerate(self.across.tolist()):
                 cost, reason = float(self.costs[i, j]), self.reasons[i][j]

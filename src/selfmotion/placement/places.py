@@ -20,7 +20,7 @@ from selfmotion.constraints import Clearance
 from selfmotion.follow import BoundFollow
 from selfmotion.path import Path, Placed
 from selfmotion.planning import Search, plan
-from selfmotion.problem import Problem, problem_from_dict
+from selfmotion.problem import Problem, problem_from_dict, start_on_path
 from selfmotion.result import Plan
 from selfmotion.robot import root_place, with_moved_base
 from selfmotion.task import SE3
@@ -128,6 +128,28 @@ class Places:
             plans.append(found)
             total += found.report.cost
         return Tried(place, total, "", tuple(plans))
+
+    def corrected(self, place: Array, near: Sequence[Plan]) -> Tried:
+        """Plan at a place from plans near by; a start that is given moves onto the path there."""
+        plans: list[Plan] = []
+        for problem, known in zip(self.at(place), near, strict=True):
+            start = known.problem.given_start
+            try:
+                if start is not None:
+                    problem = problem.changed(start=start_on_path(problem.follows, start))
+                found = plan(
+                    problem,
+                    warm_start=known,
+                    search=_NEAR if start is None else None,
+                    deadline=_PATIENCE,
+                    progress=_stop_where_blocked,
+                )
+            except SelfmotionError as error:
+                return Tried(place, np.inf, str(error))
+            if not found.certificate.verified:
+                return Tried(place, np.inf, found.certificate.verdict)
+            plans.append(found)
+        return Tried(place, sum(found.report.cost for found in plans), "", tuple(plans))
 
     def _moved(self, problem: Problem, by: SE3) -> Problem:
         items = problem.follows.items

@@ -45,11 +45,18 @@ def calibrated(problem: Problem, calibration: str | Path | Mapping[str, str | Pa
     start = problem.given_start
     if start is not None:
         follows = Follows.of(robot, problem.path, problem.task, problem.also)
-        start = _onto_path(follows, start)
+        start = start_on_path(follows, start)
     return problem.changed(robot=robot, start="free" if start is None else start)
 
 
-def _onto_path(follows: Follows, start: Array) -> Array:
+def start_on_path(follows: Follows, start: Array) -> Array:
+    """Return the configuration near a start (n,) that is on the path, by steps Δq = J⁺ e.
+
+    Raises
+    ------
+    ProblemError
+        None is near.
+    """
     q = np.array(start)
     for _ in range(_STEPS):
         error = np.concatenate([item.error(0.0, q) for item in follows.items])
@@ -58,8 +65,7 @@ def _onto_path(follows: Follows, start: Array) -> Array:
         q = q + np.linalg.pinv(follows.jacobian(q)) @ error
     raise ProblemError(
         f"{follows.robot.name}: no configuration near the start {shown(start.tolist())} puts the "
-        f"calibrated arm on the path: it is {np.abs(error).max():.2g} m or rad off; leave the "
-        f"start free"
+        f"arm on the path: it is {np.abs(error).max():.2g} m or rad off; leave the start free"
     )
 
 
