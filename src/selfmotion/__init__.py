@@ -123,7 +123,9 @@ from selfmotion.job import (
 )
 from selfmotion.margins import (
     Displacement as Displacement,
+    Margin as Margin,
     Margins as Margins,
+    Shortfall as Shortfall,
     SubjectMargin as SubjectMargin,
     margin as margin,
 )
@@ -165,6 +167,7 @@ from selfmotion.path import (
     with_leads as with_leads,
 )
 from selfmotion.placement import (
+    BoughtMargin as BoughtMargin,
     Corner as Corner,
     Correction as Correction,
     CorrectionSide as CorrectionSide,
@@ -173,6 +176,7 @@ from selfmotion.placement import (
     Tried as Tried,
     correction as correction,
     place as place,
+    plan_with_margin as plan_with_margin,
 )
 from selfmotion.planning import (
     Fastest as Fastest,

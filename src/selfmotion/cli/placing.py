@@ -1,4 +1,4 @@
-"""The command that looks for a place of the part, or of the arm."""
+"""The commands that look for a place, or for a motion that bears another one."""
 
 from contextlib import ExitStack
 from pathlib import Path
@@ -8,8 +8,8 @@ import typer
 
 import selfmotion as sm
 from selfmotion.batch import processes
-from selfmotion.cli import documents, options
-from selfmotion.cli.app import app, stages, terminal
+from selfmotion.cli import documents, options, outputs
+from selfmotion.cli.app import NOT_VERIFIED, VERIFIED, app, stages, terminal
 from selfmotion.cli.stage_display import StageDisplay
 
 _Range = Annotated[str | None, typer.Option(help="From and to how far to move it: low,high (m).")]
@@ -98,6 +98,41 @@ def place(
             else:
                 pictured.figure().savefig(file)
             terminal.print(f"wrote {file}", markup=False, soft_wrap=True)
+
+
+@app.command(
+    "plan-margin",
+    epilog="Example: selfmotion plan-margin cell.toml --position 0.005 --rotation 0.01 --out a.npz",
+)
+def plan_margin(
+    file: Annotated[Path, typer.Argument(help="A problem file.")],
+    position: Annotated[float, typer.Option(help="By how much it may be shifted (m).")] = 0.0,
+    rotation: Annotated[float, typer.Option(help="By how much it may be turned (rad).")] = 0.0,
+    of: Annotated[
+        list[str] | None, typer.Option(help="part (the default), tool or base. Repeatable.")
+    ] = None,
+    part: Annotated[
+        list[str] | None,
+        typer.Option(help="A body of the part (repeatable); by default all obstacles there."),
+    ] = None,
+    out: options.OutOption = None,
+    settings: options.SetOption = None,
+    allow_code: options.AllowCodeOption = False,
+) -> None:
+    """Plan a motion that survives displacements of part, tool or base, and say what that costs."""
+    outputs.check_suffixes(out or [])
+    problem = documents.of_file(file, settings or [], allow_code).problem
+    with StageDisplay(stages) as display:
+        found = sm.plan_with_margin(
+            problem,
+            sm.Margin(position, rotation),
+            of=of or "part",
+            part=part or None,
+            progress=display.stage,
+        )
+    terminal.print(str(found), markup=False, soft_wrap=True)
+    outputs.write(found.plan, out or [], None, terminal, quiet=False)
+    raise typer.Exit(VERIFIED if found.reached else NOT_VERIFIED)
 
 
 def _write(found: sm.Placement, file: Path) -> None:

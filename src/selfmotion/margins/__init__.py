@@ -5,4 +5,9 @@ from selfmotion.margins.found import (
     Margins as Margins,
     SubjectMargin as SubjectMargin,
 )
-from selfmotion.margins.margin import margin as margin
+from selfmotion.margins.margin import (
+    Margin as Margin,
+    Shortfall as Shortfall,
+    margin as margin,
+    shortfalls as shortfalls,
+)

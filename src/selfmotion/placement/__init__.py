@@ -1,5 +1,9 @@
 """Where to put the part, or the arm."""
 
+from selfmotion.placement.bought import (
+    BoughtMargin as BoughtMargin,
+    plan_with_margin as plan_with_margin,
+)
 from selfmotion.placement.corners import (
     Corner as Corner,
     Correction as Correction,

@@ -28,8 +28,8 @@ from selfmotion.task import SE3
 # How motions are looked for where some are known near by, and where none is: among many places a
 # quick 'no' is worth more than the last start.
 _NEAR, _QUICK = Search(1, 1, "local"), Search(16, 2, "local")
-# So long a place is worked at [s].
-_PATIENCE = 2.0
+# So long a place is worked at [s]: near known motions, what comes at all comes in a tenth of that.
+_PATIENCE_NEAR, _PATIENCE = 0.4, 1.0
 # What a place is told by: a shift [m] and roll, pitch and yaw [rad], as URDFs have them.
 COORDINATES = ("x", "y", "z", "roll", "pitch", "yaw")
 # Poses of each path that have to be reached before a place is planned, and tries of each.
@@ -118,7 +118,7 @@ class Places:
                     problem,
                     warm_start=known,
                     search=how,
-                    deadline=_PATIENCE,
+                    deadline=_PATIENCE_NEAR if near else _PATIENCE,
                     progress=_stop_where_blocked,
                 )
             except SelfmotionError as error:

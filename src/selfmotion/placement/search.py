@@ -13,15 +13,15 @@ from selfmotion.basics import Array
 from selfmotion.placement.places import Places, Tried
 
 # Beginnings that are planned, many more if none of these can be; and how many of the best go on.
-_BEGINNINGS, _MOST_BEGINNINGS, _FINALISTS = 8, 64, 2
+_BEGINNINGS, _MOST_BEGINNINGS, _FINALISTS = 16, 64, 3
 # Beginnings nearer to each other than this go on once [share of the box].
 _APART = 0.15
 # Differences are taken over this share of the box.
 _DIFFERENCE = 4e-3
 # Steps, halvings of each, the longest one and the shortest [share of the box].
-_STEPS, _HALVINGS, _LONGEST, _SHORTEST = 12, 5, 0.3, 1e-3
+_STEPS, _HALVINGS, _LONGEST, _SHORTEST = 12, 4, 0.3, 3e-3
 # A step that takes less off the cost is the last one [share].
-_GAIN = 2e-4
+_GAIN = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
