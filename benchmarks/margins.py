@@ -25,8 +25,9 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 from support.displaced import MISSED, Judge, random_displacement, worst_scale
 
 ARMS = (("panda", "pose"), ("xarm7", "pose"), ("ur5", "pointing"))
-# Times that the judge looks at, besides those that a margin names and their neighbours [s].
-LOOKS, NEAR = 60, np.array([-0.02, 0.0, 0.02])
+# Times that the judge looks at, besides those that a margin names and their neighbours [s]; along
+# the worst direction those alone.
+LOOKS, NEAR = 40, np.array([-0.02, 0.0, 0.02])
 # A true margin that is larger than this multiple of the proved one is not looked for.
 MOST = 3.0
 
@@ -114,7 +115,8 @@ def main(
                 found = getattr(subject, kind)
                 if found.direction is None or not max(found.position, found.rotation) > 0.0:
                     continue
-                scale = worst_scale(judge, subject, kind, t, MOST)
+                near = np.clip(found.time + NEAR, 0.0, duration)
+                scale = worst_scale(judge, subject, kind, near, MOST)
                 shares.setdefault((subject.name, kind), []).append(1.0 / scale)
     print(f"{made} displacements on the edge of margins of {count} plans: {len(failures)} failures")
     for failure in failures:

@@ -214,6 +214,7 @@ from selfmotion.robot import (
     SwivelAngle as SwivelAngle,
     load_robot as load_robot,
 )
+from selfmotion.sheet import write_sheet as write_sheet
 from selfmotion.task import Damping as Damping, Relaxation as Relaxation, Task as Task
 from selfmotion.transfer import move as move
 

@@ -46,9 +46,7 @@ def margin(
     as_json: options.JsonOption = False,
 ) -> None:
     """Say by how much part, tool and base may be displaced while a plan runs unchanged."""
-    if (tolerance is None) != (turn is None):
-        raise sm.ProblemError("--tolerance and --turn say together what the process allows")
-    within = None if tolerance is None or turn is None else sm.Tolerance(tolerance, turn)
+    within = _process(tolerance, turn)
     about = None if center is None else options.numbers(center, "--center", 3)
     plan = sm.load_plan(file)
     found = sm.margin(
@@ -95,6 +93,42 @@ def calibrate(
     stages.print(f"as planned, on the calibrated arm: {verdict}", markup=False, soft_wrap=True)
     result = plan_with_progress(problem, warm_start=planned, tolerance=planned.tolerance)
     outputs.finish(result, out or [], html, as_json)
+
+
+@app.command(epilog="Example: selfmotion sheet plan.npz --tolerance 5e-4 --turn 0.02 -o sheet.html")
+def sheet(
+    file: Annotated[Path, typer.Argument(help="A plan saved as .npz.")],
+    out: Annotated[Path, typer.Option("--out", "-o", help="The page to write (.html).")] = Path(
+        "sheet.html"
+    ),
+    tolerance: Annotated[
+        float | None, typer.Option(help="What the process lets the tool be off its path (m).")
+    ] = None,
+    turn: Annotated[
+        float | None, typer.Option(help="By how much it may be turned (rad); with --tolerance.")
+    ] = None,
+    part: Annotated[
+        list[str] | None,
+        typer.Option(help=f"A body of the part ({_NAMES}); by default all obstacles there."),
+    ] = None,
+    title: Annotated[str, typer.Option(help="Of the page; by default arm and task.")] = "",
+) -> None:
+    """Write what a plan does, keeps and survives as one page that prints on A4."""
+    within = _process(tolerance, turn)
+    plan = sm.load_plan(file)
+    bodies = any(what in plan.certificate.covers for what in ("self-collision", "obstacles"))
+    margins = None
+    if plan.certificate.verified and (bodies or within is not None):
+        margins = sm.margin(plan, within, part=part or None)
+    written = sm.write_sheet(plan, out, margins, title=title)
+    terminal.print(f"wrote {written}", markup=False, soft_wrap=True)
+
+
+def _process(tolerance: float | None, turn: float | None) -> sm.Tolerance | None:
+    """Return what a process allows, both numbers or none."""
+    if (tolerance is None) != (turn is None):
+        raise sm.ProblemError("--tolerance and --turn say together what the process allows")
+    return None if tolerance is None or turn is None else sm.Tolerance(tolerance, turn)
 
 
 def margins_json(found: sm.Margins) -> dict[str, Any]:

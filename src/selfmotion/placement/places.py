@@ -29,7 +29,7 @@ from selfmotion.task import SE3
 # quick 'no' is worth more than the last start.
 _NEAR, _QUICK = Search(1, 1, "local"), Search(16, 2, "local")
 # So long a place is worked at [s]: near known motions, what comes at all comes in a tenth of that.
-_PATIENCE_NEAR, _PATIENCE = 0.4, 1.0
+_PATIENCE_NEAR, _PATIENCE = 0.3, 0.6
 # What a place is told by: a shift [m] and roll, pitch and yaw [rad], as URDFs have them.
 COORDINATES = ("x", "y", "z", "roll", "pitch", "yaw")
 # Poses of each path that have to be reached before a place is planned, and tries of each.
