@@ -240,13 +240,14 @@ class DisplacedBodies:
         bounds = self._hulls.lower_bounds(q[None])[0, rows]
         contacts = self._hulls.contacts(q[None], np.zeros(len(rows), dtype=np.int64), rows, bounds)
         places, swapped = self._hulls.place(q), self.model.index[pair, 0] != self._sides[pair, 0]
-        parts = []
+        parts, farthest = [], 0.0
         for piece, normal in zip(rows.tolist(), contacts.normals, strict=True):
             first, second = self._hulls.pairs[piece].tolist()
             one, other = (
                 _outline(self._hulls.bodies[body], places[body], center)
                 for body in ((second, first) if swapped else (first, second))
             )
+            farthest = max(farthest, other.farthest)
             length = float(np.linalg.norm(normal))
             if not length > 0.0:
                 raise CollisionError(
@@ -259,7 +260,7 @@ class DisplacedBodies:
             asked = np.full((1, len(self.pairs)), -np.inf)
             asked[0, pair] = np.inf
             distance = float(self.model.distances(q[None], asked)[0, pair])
-        lever = min(self.levers[pair], self.other_levers(q)[pair])
+        lever = min(float(self.levers[pair]), farthest)
         return Separation(distance, lever, tuple(parts))
 
 

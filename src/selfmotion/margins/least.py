@@ -132,16 +132,13 @@ class _Search:
         times, row = np.unique(middle, return_inverse=True)
         q = self._motion(times)
         quick = self._quick(q, row, open_.pairs, slack)
-        kept: list[tuple[int, float]] = []
+        kept = []
         for k in np.argsort(quick, kind="stable").tolist():
             if quick[k] >= self._goal:
                 self._proved = min(self._proved, float(quick[k]))
-                continue
-            least = self._looked_at(q[row[k]], float(middle[k]), int(open_.pairs[k]), slack[k])
-            kept.append((k, max(least, float(quick[k]))))
-        settled = [scale for _, scale in kept if scale >= self._goal]
-        self._proved = min([self._proved, *settled])
-        rows = np.array([k for k, scale in kept if not scale >= self._goal], dtype=np.int64)
+            elif not self._settles(q[row[k]], float(middle[k]), int(open_.pairs[k]), slack[k]):
+                kept.append(k)
+        rows = np.array(kept, dtype=np.int64)
         left = _Open(open_.early[rows], open_.late[rows], open_.pairs[rows])
         if not self._best.scale > 0.0:
             # Nothing is left to be proved.
@@ -151,27 +148,35 @@ class _Search:
     def _quick(self, q: Array, row: Ints, pairs: Ints, slack: Array) -> Array:
         """Return lower bounds of the scales by boxes around the bodies (I,)."""
         size, bodies = self._size, self._bodies
-        levers = np.minimum([bodies.other_levers(each) for each in q], bodies.levers)
-        rates = size.position + size.rotation * levers
+        rates = np.full((len(q), len(bodies.pairs)), size.position)
+        if size.rotation:
+            others = [bodies.other_levers(each) for each in q]
+            rates += size.rotation * np.minimum(others, bodies.levers)
         apart = bodies.model.hulls.lower_bounds(q) - self._left
         found: Array = (apart[row, pairs] - slack) / np.maximum(rates[row, pairs], 1e-12)
         return np.clip(found, 0.0, self._best.scale)
 
-    def _looked_at(self, q: Array, time: float, pair: int, slack: float) -> float:
-        """Look at a pair at one time; return the scale that is proved around it."""
-        found, size, best = self._bodies.at(q, pair), self._size, self._best.scale
+    def _settles(self, q: Array, time: float, pair: int, slack: float) -> bool:
+        """Look at a pair at one time; return whether enough is proved around it."""
+        found, size = self._bodies.at(q, pair), self._size
 
-        def left(scales: Array, slack: float) -> Array:
+        def left(scales: Array) -> Array:
             least = found.least(scales * size.position, scales * size.rotation)
-            return np.asarray(least - self._left - slack)
+            return np.asarray(least - self._left)
 
-        here = _largest(lambda scales: left(scales, 0.0), best)
-        if here < best:
+        best = self._best.scale
+        # Written so that NaN falls short.
+        if not left(np.array([best]))[0] >= 0.0:
+            here = _largest(left, best)
             angle = here * size.rotation
             near = found.nearest(angle)
             pairs = self._bodies.pairs[pair]
             self._best = Least(here, pairs, time, near.normal, near.moment(angle))
-        return _largest(lambda scales: left(scales, slack), best)
+        goal = self._goal
+        if not left(np.array([goal]))[0] >= slack:
+            return False
+        self._proved = min(self._proved, goal)
+        return True
 
     def found(self, open_: _Open) -> Least:
         """Return what is proved, some intervals being left undecided."""
