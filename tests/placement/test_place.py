@@ -159,7 +159,7 @@ class Bowl(Places):
         super().__init__((), "part", frozenset(), np.zeros(3), ("x", "y"))
         object.__setattr__(self, "edge", edge)
 
-    def tried(self, place, near=(), search=None):  # type: ignore[no-untyped-def]
+    def tried(self, place, near=(), thorough=False):  # type: ignore[no-untyped-def]
         x, y = place
         if x + y > self.edge:  # type: ignore[attr-defined]
             return Tried(place, np.inf, "too far")

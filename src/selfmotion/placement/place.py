@@ -135,7 +135,7 @@ def _planned(places: Places, best: Tried) -> Tried:
     """Return a place with its plans, which may have been made elsewhere."""
     if best.plans:
         return best
-    found = places.tried(best.place)
+    found = places.tried(best.place, thorough=True)
     if not np.isfinite(found.cost):
         raise PlanError(f"place: the best place is not verified here: {found.reason}")
     return found

@@ -33,7 +33,7 @@ _PATIENCE_NEAR, _PATIENCE = 0.3, 0.6
 # What a place is told by: a shift [m] and roll, pitch and yaw [rad], as URDFs have them.
 COORDINATES = ("x", "y", "z", "roll", "pitch", "yaw")
 # Poses of each path that have to be reached before a place is planned, and tries of each.
-_POSES, _TRIES = 5, 4
+_POSES, _TRIES = 5, 20
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,22 +105,22 @@ class Places:
             for problem in self.problems
         ]
 
-    def tried(self, place: Array, near: Sequence[Plan] = (), search: Search | None = None) -> Tried:
-        """Plan at a place; from plans of one `near`, where they are given, or by a search."""
+    def tried(self, place: Array, near: Sequence[Plan] = (), thorough: bool = False) -> Tried:
+        """Plan at a place; from plans of one `near`, where they are given.
+
+        As well as it can be, where it is to be `thorough`; among many places a quick 'no' counts.
+        """
         plans: list[Plan] = []
         total = 0.0
         for k, problem in enumerate(self.at(place)):
             try:
-                if not near:
+                if thorough:
+                    found = plan(problem)
+                elif near:
+                    found = _quickly(problem, near[k], _NEAR, _PATIENCE_NEAR)
+                else:
                     _check_reach(problem)
-                known, how = (near[k], _NEAR) if near else (None, search or _QUICK)
-                found = plan(
-                    problem,
-                    warm_start=known,
-                    search=how,
-                    deadline=_PATIENCE_NEAR if near else _PATIENCE,
-                    progress=_stop_where_blocked,
-                )
+                    found = _quickly(problem, None, _QUICK, _PATIENCE)
             except SelfmotionError as error:
                 return Tried(place, np.inf, str(error))
             if not found.certificate.verified:
@@ -137,13 +137,8 @@ class Places:
             try:
                 if start is not None:
                     problem = problem.changed(start=start_on_path(problem.follows, start))
-                found = plan(
-                    problem,
-                    warm_start=known,
-                    search=_NEAR if start is None else None,
-                    deadline=_PATIENCE,
-                    progress=_stop_where_blocked,
-                )
+                search = _NEAR if start is None else None
+                found = _quickly(problem, known, search, _PATIENCE)
             except SelfmotionError as error:
                 return Tried(place, np.inf, str(error))
             if not found.certificate.verified:
@@ -235,6 +230,17 @@ def restored(values: Mapping[str, Any], known: dict[str, Any]) -> Places:
         frozenset(values["bodies"]),
         np.array(values["center"]),
         tuple(values["names"]),
+    )
+
+
+def _quickly(problem: Problem, known: Plan | None, search: Search | None, patience: float) -> Plan:
+    """Plan, from what is known if anything is, or give up soon."""
+    return plan(
+        problem,
+        warm_start=known,
+        search=search,
+        deadline=patience,
+        progress=_stop_where_blocked,
     )
 
 
