@@ -151,7 +151,12 @@ def test_what_cannot_be_asked_is_refused(plan: sm.Plan) -> None:
 
 
 def test_margins_are_rounded_down() -> None:
-    for size, text in ((0.00999999, "9.99 mm"), (0.0123456, "12.3 mm"), (0.0, "0 mm")):
+    for size, text in (
+        (0.00999999, "9.99 mm"),
+        (0.0123456, "12.3 mm"),
+        (0.9876, "987 mm"),
+        (0.0, "0 mm"),
+    ):
         assert Displacement(size, 0.0, "something").size == text
     assert Displacement(0.0, np.radians(1.23999), "something").size == "1.23°"
     assert Displacement(1.0, 0.0, "").size.startswith("at least")

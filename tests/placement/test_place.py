@@ -140,7 +140,10 @@ def test_only_what_belongs_to_the_part_moves_along() -> None:
     assert walls["wall"].pose.translation[0] == pytest.approx(0.8)
 
 
-def test_several_seams_are_placed_together_and_elsewhere_alike() -> None:
+def test_several_seams_are_placed_together_and_elsewhere_alike(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(search, "_BEGINNINGS", 4)
     first, second = planar(), planar().changed(path=sm.Reversed(planar().path))
     box = {"x": (-0.1, 0.2)}
     together = sm.place([first, second], box)
@@ -181,7 +184,9 @@ def test_downhill_ends_at_the_bottom_or_where_motions_end(edge: float) -> None:
     assert len(chosen) <= search._FINALISTS
 
 
-def test_what_cannot_be_placed_is_refused() -> None:
+def test_what_cannot_be_placed_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(search, "_BEGINNINGS", 2)
+    monkeypatch.setattr(search, "_MOST_BEGINNINGS", 3)
     for given, said in (
         ({"within": {}}, "expected lowest and highest"),
         ({"within": {"up": (0, 1)}}, "no coordinate 'up'"),

@@ -153,7 +153,7 @@ def _down(value: float) -> str:
     if value <= 0.0:
         return "0"
     unit = 10.0 ** (math.floor(math.log10(value)) - 2)
-    return f"{math.floor(value / unit) * unit:.3g}"
+    return f"{math.floor(value / unit) * unit:.6g}"
 
 
 def _named(direction: Array) -> str:
