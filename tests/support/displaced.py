@@ -24,10 +24,12 @@ class Judge:
         self._bodies = robot.geometry(pin.GeometryType.COLLISION)
         self.names = [robot.link_of(x.parentFrame) for x in self._bodies.geometryObjects]
         self.joints = [int(x.parentJoint) for x in self._bodies.geometryObjects]
-        for item in self._bodies.geometryObjects:
-            if hasattr(item.geometry, "buildConvexRepresentation"):
-                item.geometry.buildConvexRepresentation(True)
-                item.geometry = item.geometry.convex
+        # Hulls refer to the meshes that they are of, which have to stay.
+        self._meshes = [item.geometry for item in self._bodies.geometryObjects]
+        for item, mesh in zip(self._bodies.geometryObjects, self._meshes, strict=True):
+            if hasattr(mesh, "buildConvexHull"):
+                mesh.buildConvexHull(True, "Qt")
+                item.geometry = mesh.convex
         for item in plan.obstacles:
             if item.name in self.names:
                 continue
