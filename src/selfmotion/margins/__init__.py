@@ -5,9 +5,9 @@ from selfmotion.margins.found import (
     Margins as Margins,
     SubjectMargin as SubjectMargin,
 )
-from selfmotion.margins.margin import (
+from selfmotion.margins.margin import margin as margin
+from selfmotion.margins.shortfall import (
     Margin as Margin,
     Shortfall as Shortfall,
-    margin as margin,
     shortfalls as shortfalls,
 )
