@@ -1,9 +1,11 @@
 """Distances of bodies that stand elsewhere than planned, by Pinocchio and coal alone.
 
 Nothing here is of the package's collision models: bodies are convex hulls that coal makes of the
-URDF's meshes, placed by Pinocchio, and what is displaced is moved before it is measured.
+URDF's meshes, and these themselves where hulls overlap, placed by Pinocchio; what is displaced is
+moved before it is measured.
 """
 
+import coal
 import numpy as np
 import pinocchio as pin
 
@@ -37,6 +39,7 @@ class Judge:
             if item.frame is not None:
                 joint, link = robot.carrier_of(item.frame)
                 place = link * item.pose
+            self._meshes.append(item.geometry())
             self._bodies.addGeometryObject(
                 pin.GeometryObject(item.name, joint, 0, place, item.geometry())
             )
@@ -80,10 +83,22 @@ class Judge:
                     carrier = self._data.oMi[self.joints[k]]
                     self._places.oMg[k] = carrier * by * carrier.inverse() * place
             pin.computeDistances(self._bodies, self._places)
-            least = min(
-                [least, *(each.min_distance for each in self._places.distanceResults)],
-            )
+            found = [each.min_distance for each in self._places.distanceResults]
+            # Hulls may overlap where the meshes do not.
+            found = [self._of_meshes(k) if x < 0.0 else x for k, x in enumerate(found)]
+            least = min([least, *found])
         return float(least)
+
+    def _of_meshes(self, pair: int) -> float:
+        """Return the distance of the bodies of a pair themselves, where they are placed."""
+        both = self._bodies.collisionPairs[pair]
+        parts = []
+        for k in (both.first, both.second):
+            place = self._places.oMg[k]
+            parts += [self._meshes[k], coal.Transform3s(place.rotation, place.translation)]
+        answer = coal.DistanceResult()
+        coal.distance(*parts, coal.DistanceRequest(), answer)
+        return float(answer.min_distance)
 
     def _joint(self, subject: SubjectMargin) -> int:
         return next(
