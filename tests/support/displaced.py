@@ -98,7 +98,8 @@ class Judge:
             parts += [self._meshes[k], coal.Transform3s(place.rotation, place.translation)]
         answer = coal.DistanceResult()
         coal.distance(*parts, coal.DistanceRequest(), answer)
-        return float(answer.min_distance)
+        # Of meshes that meet coal knows no depth.
+        return float(answer.min_distance) if answer.min_distance > 0.0 else -np.inf
 
     def _joint(self, subject: SubjectMargin) -> int:
         return next(
