@@ -154,12 +154,12 @@ def _row(name: str, file: Path, tool: str, folder: Path | None) -> Row:
 
 
 def _planned(robot: sm.RobotModel, task: str, folder: Path | None) -> str:
-    apart = sm.Clearance(distance=0.0, disabled=_disabled(robot))
+    apart = sm.constraints.Clearance(distance=0.0, disabled=_disabled(robot))
     start = _start(robot, task, apart)
     begin = robot.pose(start)
     end = begin.copy()
     end.translation = begin.translation + _LENGTH * np.array([1.0, 1.0, 0.0]) / np.sqrt(2.0)
-    line = sm.Line(begin, end, _DURATION)
+    line = sm.paths.Line(begin, end, _DURATION)
     plan = sm.plan(sm.Problem(robot, line, task, start, collision=apart))
     if folder is not None:
         replay.write_replay(plan, folder / "replay.html").unlink()
@@ -181,7 +181,7 @@ def _disabled(robot: sm.RobotModel) -> tuple[tuple[str, str], ...]:
     return tuple(pair for pair in listed if set(pair) <= set(robot.urdf.links))
 
 
-def _start(robot: sm.RobotModel, task: str, apart: sm.Clearance) -> Array:
+def _start(robot: sm.RobotModel, task: str, apart: sm.constraints.Clearance) -> Array:
     """Return the configuration that moves the tool best, or one at random without overlaps."""
     best = robot.dexterous_configuration(task)
     if not robot.urdf.has_collisions:

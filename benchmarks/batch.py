@@ -24,7 +24,7 @@ def problems(count):
     start = panda.dexterous_configuration()
     pose = panda.pose(start)
     return [
-        sm.Problem(panda, sm.Circle.around(pose, 0.1, 4.0 + k / count), start=start)
+        sm.Problem(panda, sm.paths.Circle.around(pose, 0.1, 4.0 + k / count), start=start)
         for k in range(count)
     ]
 

@@ -48,7 +48,7 @@ def along_seams(count: int, seed: int) -> Iterator[Scene]:
         yield from found
 
 
-def plain_check(plan: sm.Plan, model: sm.CollisionModel | None) -> tuple[float, ...]:
+def plain_check(plan: sm.Plan, model: sm.obstacles.CollisionModel | None) -> tuple[float, ...]:
     """Return what five times per interval say of errors, limits and clearance."""
     motion, robot = plan.trajectory, plan.robot
     shares = np.arange(5) / 5
@@ -78,10 +78,12 @@ def prices() -> Iterator[tuple[str, float, float]]:
     for name in ARMS:
         robot = sm.load_robot(name)
         start = robot.dexterous_configuration()
-        path = sm.Circle.around(robot.pose(start), 0.08, 6.0, normal=(1.0, 0.0, 0.0))
+        path = sm.paths.Circle.around(robot.pose(start), 0.08, 6.0, normal=(1.0, 0.0, 0.0))
         plan = sm.plan(sm.Problem(robot, path, start=start, task=_task(robot)))
-        box = sm.Box("box", robot.pose(start).translation + np.array([0.0, 0.0, 0.4]), [0.1] * 3)
-        clearance = sm.Clearance([box], 1e-3)
+        box = sm.obstacles.Box(
+            "box", robot.pose(start).translation + np.array([0.0, 0.0, 0.4]), [0.1] * 3
+        )
+        clearance = sm.constraints.Clearance([box], 1e-3)
         model = clearance.model(robot)
         for what, bodies, wanted in (
             (f"{name}, no bodies", None, ()),

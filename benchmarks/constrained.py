@@ -73,7 +73,7 @@ def problem(seed: int, number: int) -> tuple[str, sm.Problem]:
         values.pop("collision", None)
         made = problem_from_dict(values, {json.dumps(named): robot})
     # What the constraints were made from is not what is planned with.
-    made = replace(made, null_motion=sm.FreeNullMotion())
+    made = replace(made, null_motion=sm.motion.FreeNullMotion())
     start = "" if made.given_start is not None else ", free start"
     return f"{number:02d} {arm} {task}, {kind}{start}", made
 
@@ -123,16 +123,23 @@ def _without(robot: sm.RobotModel, task: str, kind: str, rng: np.random.Generato
         normal = rng.normal(size=3)
         normal /= np.linalg.norm(normal)
     radius = float(np.round(rng.uniform(0.08, 0.2), 3))
-    path: sm.Path
+    path: sm.paths.Path
     if kind == "closed" or rng.uniform() < 0.5:
-        path = sm.Circle.around(pose, radius, duration, normal=normal)
+        path = sm.paths.Circle.around(pose, radius, duration, normal=normal)
     else:
         end = pose.copy()
         way = np.cross(normal, rng.normal(size=3))
         end.translation = pose.translation + 2.0 * radius * way / np.linalg.norm(way)
-        path = sm.Line(pose, end, duration)
-    motions = (sm.PolynomialNullMotion(3), sm.PolynomialNullMotion(5), sm.BSplineNullMotion(8))
-    costs = (sm.JointVelocity(), sm.InverseManipulability(float(10 ** rng.uniform(-4.0, -1.5))))
+        path = sm.paths.Line(pose, end, duration)
+    motions = (
+        sm.PolynomialNullMotion(3),
+        sm.PolynomialNullMotion(5),
+        sm.motion.BSplineNullMotion(8),
+    )
+    costs = (
+        sm.costs.JointVelocity(),
+        sm.costs.InverseManipulability(float(10 ** rng.uniform(-4.0, -1.5))),
+    )
     motion = motions[int(rng.integers(3))]
     # Not at rest at the ends: the stored results are of a revision that knew no such thing.
     return sm.Problem(robot, path, task, start, motion, costs, (), rest=False)
@@ -140,20 +147,23 @@ def _without(robot: sm.RobotModel, task: str, kind: str, rng: np.random.Generato
 
 def _constraints(
     kind: str, problem: sm.Problem, still: StillMotion, rng: np.random.Generator
-) -> list[sm.Constraint] | None:
+) -> list[sm.constraints.Constraint] | None:
     """Return constraints that the motion at x = 0 breaks and another one keeps; None for none.
 
     Closed paths and ends at rest come without another one.
     """
     robot = problem.robot
-    limits: list[sm.Constraint] = [sm.JointPositionLimits(), sm.JointVelocityLimits()]
+    limits: list[sm.constraints.Constraint] = [
+        sm.constraints.JointPositionLimits(),
+        sm.constraints.JointVelocityLimits(),
+    ]
     if kind == "closed":
-        return [*limits, sm.ClosedPath()]
+        return [*limits, sm.constraints.ClosedPath()]
     if kind == "at rest":
-        return [*limits, sm.EndVelocity()]
+        return [*limits, sm.constraints.EndVelocity()]
     if kind == "clearance":
         spheres = _sphere(problem, still, rng)
-        return None if spheres is None else [*limits, sm.Clearance(spheres, DISTANCE)]
+        return None if spheres is None else [*limits, sm.constraints.Clearance(spheres, DISTANCE)]
     orders = {"position": (0,), "velocity": (1,), "acceleration": (2,)}.get(kind, (0, 1, 2))
     found = _calmer(problem, still, orders[-1], rng)
     if found is None:
@@ -168,11 +178,11 @@ def _constraints(
         bounds = np.array([float(f"{bound:.3g}") for bound in bounds])
         if order == 0:
             start = still.start
-            limits[0] = sm.JointPositionLimits(start - bounds, start + bounds)
+            limits[0] = sm.constraints.JointPositionLimits(start - bounds, start + bounds)
         elif order == 1:
-            limits[1] = sm.JointVelocityLimits(bounds)
+            limits[1] = sm.constraints.JointVelocityLimits(bounds)
         else:
-            limits.append(sm.JointAccelerationLimits(bounds))
+            limits.append(sm.constraints.JointAccelerationLimits(bounds))
     robot_limits = robot.finite_limits()
     inside = (other[0] > robot_limits[0] + 0.02) & (other[0] < robot_limits[1] - 0.02)
     possible = np.abs(other[1]) < 0.98 * robot.velocity_limit
@@ -231,7 +241,7 @@ def _calmer(
 
 def _sphere(
     problem: sm.Problem, still: StillMotion, rng: np.random.Generator
-) -> tuple[sm.Sphere] | None:
+) -> tuple[sm.obstacles.Sphere] | None:
     """Return a sphere that the motion at x = 0 runs into, and another one does not."""
     robot, objective = problem.robot, Objective.of(problem, still)
     data = robot.model.createData()
@@ -241,8 +251,8 @@ def _sphere(
     for _ in range(TRIES):
         joint = int(rng.integers(2, robot.model.njoints - 1))
         center = np.round(data.oMi[joint].translation + rng.normal(size=3) * 0.5 * NEAR, 3)
-        sphere = sm.Sphere("ball", center, float(np.round(rng.uniform(0.03, 0.08), 3)))
-        model = sm.CollisionModel(robot, (sphere,))
+        sphere = sm.obstacles.Sphere("ball", center, float(np.round(rng.uniform(0.03, 0.08), 3)))
+        model = sm.obstacles.CollisionModel(robot, (sphere,))
         worst = model.worst(still.q).value
         if not (-0.03 < worst < DISTANCE and model.worst(still.q[:1]).value > 2.0 * DISTANCE):
             continue

@@ -24,7 +24,9 @@ def fastest_motions(count: int) -> list[float]:
     while len(shares) < count:
         number += 1
         problem = random_problem(robot, rng)
-        if problem.start is None or any(isinstance(c, sm.Clearance) for c in problem.constraints):
+        if problem.start is None or any(
+            isinstance(c, sm.constraints.Clearance) for c in problem.constraints
+        ):
             continue
         began = time.process_time()
         try:
@@ -53,7 +55,7 @@ def retimed_circles() -> tuple[int, int]:
     for radius in (0.05, 0.1, 0.12):
         for normal in np.eye(3):
             for share in (0.3, 1.0):
-                path = sm.Circle.around(start, radius, 4.0, normal=normal)
+                path = sm.paths.Circle.around(start, radius, 4.0, normal=normal)
                 plan = sm.plan(sm.Problem(robot, path), search=sm.Search(rng=total))
                 retimed = sm.retime(plan, share * robot.acceleration_limit)
                 verified += retimed.certificate.verified

@@ -35,7 +35,7 @@ NEAR = 1.07
 WINDOWS, NODES = 2.0, 2e-3
 
 
-def random_paths(seed: int) -> Iterator[tuple[sm.RobotModel, sm.Feed, np.ndarray]]:
+def random_paths(seed: int) -> Iterator[tuple[sm.RobotModel, sm.paths.Feed, np.ndarray]]:
     """Yield arms, paths at a feed and their corners, for ever."""
     rng = np.random.default_rng(seed)
     robots = [sm.load_robot(name) for name in ARMS]
@@ -48,23 +48,23 @@ def random_paths(seed: int) -> Iterator[tuple[sm.RobotModel, sm.Feed, np.ndarray
         points[0] = pose.translation
         last = pin.SE3(pose.rotation, points[1])
         shapes = (
-            lambda a=pose, b=last: sm.Line(a, b, 1.0),
-            lambda a=pose, s=size: sm.Circle.around(a, s, 1.0, turns=0.8),
-            lambda p=points: sm.Waypoints(np.arange(5.0), p),
-            lambda p=points: sm.Polyline(p, tolerance=0.01),
+            lambda a=pose, b=last: sm.paths.Line(a, b, 1.0),
+            lambda a=pose, s=size: sm.paths.Circle.around(a, s, 1.0, turns=0.8),
+            lambda p=points: sm.paths.Waypoints(np.arange(5.0), p),
+            lambda p=points: sm.paths.Polyline(p, tolerance=0.01),
         )
         feed = np.exp(rng.uniform(np.log(5e-3), 0.0))
         most = np.exp(rng.uniform(np.log(0.5), np.log(20.0)))
         path = shapes[rng.integers(len(shapes))]()
-        corners = points[1:-1] if isinstance(path, sm.Polyline) else np.zeros((0, 3))
+        corners = points[1:-1] if isinstance(path, sm.paths.Polyline) else np.zeros((0, 3))
         bounds = {"acceleration": float(f"{most:.2g}")}
         try:
-            yield robot, sm.Feed(path, float(f"{feed:.2g}"), **bounds), corners
-        except sm.PathError as error:
+            yield robot, sm.paths.Feed(path, float(f"{feed:.2g}"), **bounds), corners
+        except sm.errors.PathError as error:
             print(f"  no path: {error}")
 
 
-def is_kept(plan: sm.Plan, feed: sm.Feed, corners: np.ndarray) -> str:
+def is_kept(plan: sm.Plan, feed: sm.paths.Feed, corners: np.ndarray) -> str:
     """Return what is wrong with the tool's speed, "" for nothing."""
     motion, robot, within = plan.trajectory, plan.robot, 0.02
     t = np.arange(STEP, motion.duration - STEP, max(STEP, motion.duration / 20_000))
@@ -87,7 +87,7 @@ def is_kept(plan: sm.Plan, feed: sm.Feed, corners: np.ndarray) -> str:
     return ""
 
 
-def path_keeps(feed: sm.Feed, corners: np.ndarray) -> bool:
+def path_keeps(feed: sm.paths.Feed, corners: np.ndarray) -> bool:
     """Return whether a path keeps its feed by itself, by differences of its positions."""
     t = np.linspace(0.0, feed.duration, 20_001)
     places = feed.samples(t).translation
@@ -103,7 +103,7 @@ def path_keeps(feed: sm.Feed, corners: np.ndarray) -> bool:
     return bool(speed.max() > enough and not (speed[away] < enough).any())
 
 
-def refusal(feed: sm.Feed, corners: np.ndarray, found: float | None) -> str:
+def refusal(feed: sm.paths.Feed, corners: np.ndarray, found: float | None) -> str:
     """Return what is wrong with one before planning, with the feed it named; "" for nothing."""
     if path_keeps(feed, corners):
         return "refused, but kept by the path"
@@ -115,7 +115,7 @@ def refusal(feed: sm.Feed, corners: np.ndarray, found: float | None) -> str:
     return f"{more.feed:g} m/s is kept, too" * more.feeds[0].kept
 
 
-def possible(feed: sm.Feed, verdict: str) -> sm.Feed | None:
+def possible(feed: sm.paths.Feed, verdict: str) -> sm.paths.Feed | None:
     """Return the feed that a verdict names, None where it names none."""
     if re.search(r"motion ends at|apart at|beyond its limit|off the path", verdict):
         # Also wrong at any feed.
@@ -124,13 +124,13 @@ def possible(feed: sm.Feed, verdict: str) -> sm.Feed | None:
     return feed.slower(float(slower[1])) if slower else None
 
 
-def planned(robot: sm.RobotModel, feed: sm.Feed, corners: np.ndarray) -> tuple[str, str]:
+def planned(robot: sm.RobotModel, feed: sm.paths.Feed, corners: np.ndarray) -> tuple[str, str]:
     """Return how planning a feed ends that was not refused, and what is wrong with that."""
     try:
         plan = sm.plan(sm.Problem(robot, feed, "position"))
-    except (sm.PlanError, sm.NoSequenceError):
+    except (sm.errors.PlanError, sm.errors.NoSequenceError):
         return "no motion at any feed", ""
-    except sm.FeedError as error:
+    except sm.errors.FeedError as error:
         return "refused again", str(error)
     verdict = plan.certificate.verdict
     if plan.certificate.verified:
@@ -161,7 +161,7 @@ def main() -> int:
         try:
             check_feeds(robot.name, [feed], ())
             lasted.append(time.process_time() - before)
-        except sm.FeedError as error:
+        except sm.errors.FeedError as error:
             lasted.append(time.process_time() - before)
             trouble = refusal(feed, corners, error.possible)
             end = "refused before planning, the named feed: "

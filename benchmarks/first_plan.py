@@ -17,7 +17,7 @@ PLAN = """
 import selfmotion as sm
 arm = sm.load_robot("panda")
 home = sm.NAMED_ARMS["panda"].home
-circle = sm.Circle.around(arm.pose(home), 0.1, 4.0)
+circle = sm.paths.Circle.around(arm.pose(home), 0.1, 4.0)
 sm.plan(sm.Problem(arm, circle, "position", START))
 """
 COUNTED = """

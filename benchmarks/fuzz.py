@@ -26,19 +26,19 @@ from selfmotion.basics import Array
 POSITION, ROTATION, CLOSE = 1.1e-6, 1.5e-6, 1e-9
 
 
-def reachable_path(robot: sm.RobotModel, rng: np.random.Generator) -> tuple[str, sm.Path]:
+def reachable_path(robot: sm.RobotModel, rng: np.random.Generator) -> tuple[str, sm.paths.Path]:
     """Return a random path each pose of which (at 12 times) some configuration reaches."""
     while True:
         kind, path = random_path(robot, rng)
         try:
             for t in np.linspace(0.0, path.duration, 12):
                 robot.inverse_kinematics(path.pose(float(t)), rng=0, attempts=30)
-        except sm.InverseKinematicsError:
+        except sm.errors.InverseKinematicsError:
             continue
         return kind, path
 
 
-def random_path(robot: sm.RobotModel, rng: np.random.Generator) -> tuple[str, sm.Path]:
+def random_path(robot: sm.RobotModel, rng: np.random.Generator) -> tuple[str, sm.paths.Path]:
     """Return a line, circle or spline that begins at the pose of a random configuration."""
     lower, upper = robot.finite_limits()
     q = lower + (upper - lower) * rng.uniform(0.15, 0.85, robot.dof)
@@ -47,14 +47,14 @@ def random_path(robot: sm.RobotModel, rng: np.random.Generator) -> tuple[str, sm
     duration = float(rng.uniform(3.0, 6.0))
     if kind == "circle":
         normal = rng.normal(size=3)
-        return kind, sm.Circle.around(pose, rng.uniform(0.03, 0.12), duration, normal=normal)
+        return kind, sm.paths.Circle.around(pose, rng.uniform(0.03, 0.12), duration, normal=normal)
     # Small joint moves keep the poses reachable; their poses need not lie on one joint motion.
     steps = rng.uniform(-0.25, 0.25, (1 if kind == "line" else 4, robot.dof))
     configurations = np.clip(q + np.cumsum(steps, axis=0), lower, upper)
     poses = [pose, *(robot.pose(x) for x in configurations)]
     if kind == "line":
-        return kind, sm.Line(pose, poses[1], duration)
-    return kind, sm.Waypoints.from_poses(np.linspace(0.0, 1.5 * duration, 5), poses)
+        return kind, sm.paths.Line(pose, poses[1], duration)
+    return kind, sm.paths.Waypoints.from_poses(np.linspace(0.0, 1.5 * duration, 5), poses)
 
 
 class Checker:
@@ -64,7 +64,7 @@ class Checker:
         self._oracle = yourdfpy.URDF.load(
             robot.urdf.source, load_meshes=False, build_scene_graph=True
         )
-        self._collision = sm.CollisionModel(robot)
+        self._collision = sm.obstacles.CollisionModel(robot)
         self._robot = robot
 
     def refuses(self, plan: sm.Plan) -> str:
@@ -104,7 +104,11 @@ def main(
     checker, console = Checker(robot), Console()
     outcomes, reasons = Counter[str](), []
     seconds = []
-    constraints = (sm.JointPositionLimits(), sm.JointVelocityLimits(), sm.Clearance((), 1e-3))
+    constraints = (
+        sm.constraints.JointPositionLimits(),
+        sm.constraints.JointVelocityLimits(),
+        sm.constraints.Clearance((), 1e-3),
+    )
     for number in track(range(seed, seed + count), "paths", console=console, transient=True):
         kind, path = reachable_path(robot, np.random.default_rng(number))
         began = time.perf_counter()

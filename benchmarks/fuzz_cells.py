@@ -48,7 +48,9 @@ def misses(plan: sm.Plan) -> list[tuple[float, float]]:
     return found
 
 
-def _missed(task: sm.Task, target: sm.PathSamples, turn: Array, at: Array) -> tuple[float, float]:
+def _missed(
+    task: sm.Task, target: sm.paths.PathSamples, turn: Array, at: Array
+) -> tuple[float, float]:
     linear = task.rows[task.rows < 3]
     position = np.linalg.norm((at - target.translation)[:, linear], axis=1).max(initial=0.0)
     if not task.angular:

@@ -17,7 +17,7 @@ from selfmotion.realtime import Replanner
 from support import realtime_scenarios as scenarios
 
 TASKS = ("pose", "position", "pointing")
-FAR = {"horizon": 8.0, "null_motion": sm.BSplineNullMotion(6), "steps": 24}
+FAR = {"horizon": 8.0, "null_motion": sm.motion.BSplineNullMotion(6), "steps": 24}
 
 
 @cache

@@ -36,7 +36,7 @@ TIMES = 400
 def known_motion(robot: sm.RobotModel, rng: np.random.Generator) -> tuple[Array, Array]:
     """Return times (W,) and configurations (W, n) within the limits, clear of each other."""
     lower, upper = robot.finite_limits()
-    model = sm.CollisionModel(robot)
+    model = sm.obstacles.CollisionModel(robot)
     while True:
         first = lower + (upper - lower) * rng.uniform(0.15, 0.85, robot.dof)
         knots = first + np.cumsum(rng.uniform(-MOVE, MOVE, (KNOTS, robot.dof)), axis=0)
@@ -55,12 +55,12 @@ def problem_of(
     """Return a problem among boxes, and its judge."""
     t, q = known_motion(robot, rng)
     boxes = boxes_around(robot, (), q, rng, count)
-    path = sm.Waypoints.from_poses(t, [robot.pose(x) for x in q])
-    obstacles = [sm.Box(f"box{k}", *box) for k, box in enumerate(boxes)]
+    path = sm.paths.Waypoints.from_poses(t, [robot.pose(x) for x in q])
+    obstacles = [sm.obstacles.Box(f"box{k}", *box) for k, box in enumerate(boxes)]
     constraints = [
-        sm.JointPositionLimits(),
-        sm.JointVelocityLimits(),
-        sm.Clearance(obstacles, CLEARANCE),
+        sm.constraints.JointPositionLimits(),
+        sm.constraints.JointVelocityLimits(),
+        sm.constraints.Clearance(obstacles, CLEARANCE),
     ]
     criteria = {
         "position_m": POSITION,

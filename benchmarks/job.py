@@ -31,14 +31,14 @@ NEARER = 0.1
 def arm() -> sm.RobotModel:
     """Return a Panda that holds a nozzle in its hand, pointing on along the hand's axis."""
     bodies = [
-        sm.Capsule("nozzle", [0.0, 0.0, -0.021], TIP, 0.032),
-        sm.Cylinder("heater", [0.0, 0.0, -0.06], HEATER, 0.04),
+        sm.obstacles.Capsule("nozzle", [0.0, 0.0, -0.021], TIP, 0.032),
+        sm.obstacles.Cylinder("heater", [0.0, 0.0, -0.06], HEATER, 0.04),
     ]
     offset = SE3(np.eye(3), np.array([0.0, 0.0, NOZZLE]))
     return sm.load_robot("panda", "panda_hand_tcp", tool_offset=offset, bodies=bodies)
 
 
-def rod(name: str, first: np.ndarray, last: np.ndarray, radius: float) -> sm.Capsule:
+def rod(name: str, first: np.ndarray, last: np.ndarray, radius: float) -> sm.obstacles.Capsule:
     """Return a stroke, or a piece of it, that stands there."""
     along = last - first
     length = float(np.linalg.norm(along))
@@ -46,7 +46,7 @@ def rod(name: str, first: np.ndarray, last: np.ndarray, radius: float) -> sm.Cap
     x = np.cross(z, np.eye(3)[int(np.argmin(np.abs(z)))])
     x /= np.linalg.norm(x)
     place = SE3(np.stack([x, np.cross(z, x), z], axis=1), 0.5 * (first + last))
-    return sm.Capsule(name, place, radius, length)
+    return sm.obstacles.Capsule(name, place, radius, length)
 
 
 def seams(count: int | None = None, either_way: bool = True) -> list[sm.Seam]:
@@ -84,13 +84,13 @@ def seams(count: int | None = None, either_way: bool = True) -> list[sm.Seam]:
         below = [other for other in ends if int(layers[other]) <= layer - DOWN]
         others = {other for node in pair for other in at[node]} - {stroke}
         is_grounded = not grounded.isdisjoint(pair)
-        line = sm.Line(SE3(down, first), SE3(down, last), 1.0)
+        line = sm.paths.Line(SE3(down, first), SE3(down, last), 1.0)
         found.append(
             sm.Seam(
                 stroke,
-                sm.Feed(line, FEED),
+                sm.paths.Feed(line, FEED),
                 "position",
-                constraints=[sm.Tilt("panda_hand_tcp", within=np.pi / 4)],
+                constraints=[sm.constraints.Tilt("panda_hand_tcp", within=np.pi / 4)],
                 either_way=either_way,
                 after=below,
                 after_any=() if is_grounded else tuple(sorted(others, key=int)),
@@ -123,7 +123,7 @@ def main() -> None:
     program = sm.plan_job(
         robot,
         seams(options.strokes, not options.given),
-        clearance=sm.Clearance(distance=APART),
+        clearance=sm.constraints.Clearance(distance=APART),
         order="given" if options.given else "free",
         branches=2,
         deadline=2.0,

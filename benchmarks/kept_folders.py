@@ -125,13 +125,15 @@ def job(folder: Path, mesh: Path, shift: float) -> tuple[str, str]:
     seams = [
         sm.Seam(
             name,
-            sm.Line(SE3(DOWN, np.array([0.4, y, 0.3])), SE3(DOWN, np.array([0.5, y, 0.3])), 1.0),
+            sm.paths.Line(
+                SE3(DOWN, np.array([0.4, y, 0.3])), SE3(DOWN, np.array([0.5, y, 0.3])), 1.0
+            ),
             "pointing",
             either_way=False,
         )
         for name, y in (("a", shift), ("b", shift - 0.15))
     ]
-    apart = sm.Clearance([sm.Mesh("part", np.zeros(3), str(mesh))], 0.005)
+    apart = sm.constraints.Clearance([sm.obstacles.Mesh("part", np.zeros(3), str(mesh))], 0.005)
     try:
         made = sm.plan_job(PANDA, seams, start=HOME, clearance=apart, branches=1, folder=folder)
     except sm.SelfmotionError as error:
@@ -142,11 +144,13 @@ def job(folder: Path, mesh: Path, shift: float) -> tuple[str, str]:
 
 def batch(folder: Path, mesh: Path, shift: float) -> tuple[str, str]:
     """Return the verdicts of a batch that is begun in a folder, and its motions' digests."""
-    apart = [sm.Clearance([sm.Mesh("part", np.zeros(3), str(mesh))], 0.005)]
+    apart = [sm.constraints.Clearance([sm.obstacles.Mesh("part", np.zeros(3), str(mesh))], 0.005)]
     problems = [
         sm.Problem(
             PANDA,
-            sm.Line(SE3(DOWN, np.array([0.4, y, 0.3])), SE3(DOWN, np.array([0.5, y, 0.3])), 1.0),
+            sm.paths.Line(
+                SE3(DOWN, np.array([0.4, y, 0.3])), SE3(DOWN, np.array([0.5, y, 0.3])), 1.0
+            ),
             "pointing",
             start=PANDA.inverse_kinematics(SE3(DOWN, np.array([0.4, y, 0.3])), "pointing", HOME),
             constraints=apart,

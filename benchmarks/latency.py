@@ -22,8 +22,10 @@ HOME = np.array(sm.NAMED_ARMS["panda"].home)
 
 def obstacle(robot):
     """Return a clearance from a ball beside the arm."""
-    away = sm.Sphere("ball", robot.pose(HOME).translation + np.array([0.0, 0.35, 0.0]), 0.1)
-    return sm.Clearance([away], distance=0.02)
+    away = sm.obstacles.Sphere(
+        "ball", robot.pose(HOME).translation + np.array([0.0, 0.35, 0.0]), 0.1
+    )
+    return sm.constraints.Clearance([away], distance=0.02)
 
 
 class Bare:
@@ -46,12 +48,12 @@ class Bare:
 def timed(robot, task, steps, *, collect, constraints=(), null_motion=None, horizon=2.0, ahead=20):
     """Return wall and processor time of each step [s], and of the bare calls now and then."""
     replanner = Replanner(
-        robot, task, (sm.JointVelocity(),), constraints, horizon, null_motion, steps=ahead
+        robot, task, (sm.costs.JointVelocity(),), constraints, horizon, null_motion, steps=ahead
     )
     warm_up(replanner)
     bare, rng = Bare(robot, replanner), np.random.default_rng(0)
     duration = steps * replanner.period
-    path = sm.Circle.around(
+    path = sm.paths.Circle.around(
         robot.pose(HOME),
         0.1,
         duration,
@@ -93,7 +95,7 @@ def latencies(robot, steps):
         "position": dict(task="position"),
         "position, no collection": dict(task="position", collect=False),
         "position, spline of 6, 8 s": dict(
-            task="position", null_motion=sm.BSplineNullMotion(6), horizon=8.0, ahead=24
+            task="position", null_motion=sm.motion.BSplineNullMotion(6), horizon=8.0, ahead=24
         ),
         "pose, ball that moves": dict(task="pose", constraints=[obstacle(robot)]),
         "position, ball that moves": dict(task="position", constraints=[obstacle(robot)]),
@@ -126,7 +128,7 @@ def closed_loop(robot, task, costs, replanner, path, start):
         q, qd = segment.q[here], segment.qd[here]
     places, rates = np.concatenate(places), np.concatenate(rates)
     times = replanner.cycle * np.arange(len(places))
-    samples = sm.Samples.along(
+    samples = sm.costs.Samples.along(
         sm.Follows.of(robot, path, task), sm.motion.Sampling.trapezoidal(times), places, rates
     )
     return sum(float(samples.weights @ cost.value(samples)) for cost in costs), off
@@ -137,7 +139,7 @@ def losses(robot):
     print("\n| 20 s, cost | pseudo-inverse | full plan | gain | 2 s ahead (tool off) |"
           " 8 s ahead (tool off) |")  # fmt: skip
     print("| --- | --- | --- | --- | --- | --- |")
-    speed, near = sm.JointVelocity(), sm.InverseManipulability(mu=0.02)
+    speed, near = sm.costs.JointVelocity(), sm.costs.InverseManipulability(mu=0.02)
     dexterous = robot.dexterous_configuration()
     cases = [
         ("pose, q̇²", "pose", (speed,), HOME, 0.2, (1, 0, 0)),
@@ -147,10 +149,10 @@ def losses(robot):
         ("position, q̇² + 1/det (the paper's)", "position", (speed, near), HOME, 0.15, (1, 0, 0)),
     ]
     for name, task, costs, start, radius, normal in cases:
-        path = sm.Circle.around(robot.pose(start), radius, 20.0, normal=normal)
+        path = sm.paths.Circle.around(robot.pose(start), radius, 20.0, normal=normal)
         full = sm.plan(sm.Problem(robot, path, task, start, costs=costs, collision=None)).report
         row = []
-        for horizon, motion in ((2.0, None), (8.0, sm.BSplineNullMotion(6))):
+        for horizon, motion in ((2.0, None), (8.0, sm.motion.BSplineNullMotion(6))):
             replanner = Replanner(robot, task, costs, (), horizon, motion, steps=24)
             cost, off = closed_loop(robot, task, costs, replanner, path, start)
             row.append(f"{100 * (cost / full.cost - 1):+.2f} % ({1e3 * off:.2f} mm)")

@@ -32,7 +32,7 @@ EDGE, CLEAR, SPEED = 0.02, 2e-3, 0.8
 PRICES = (0.3, 1.0, 3.0, 10.0, 30.0, 100.0)
 
 
-def known_motion(robot: sm.RobotModel, model: sm.CollisionModel, number: int) -> Array:
+def known_motion(robot: sm.RobotModel, model: sm.obstacles.CollisionModel, number: int) -> Array:
     """Return a random motion (W, n)."""
     rng = np.random.default_rng(number)
     lower, upper = robot.finite_limits()
@@ -82,15 +82,18 @@ def main() -> int:
     robot = sm.load_robot(DATA / "fetch.urdf", tool="gripper_link")
     lift = robot.joint_names.index("torso_lift_joint")
     # Bellows around the lift are in what they hide as they are made.
-    made = [(item.first, item.second) for item in sm.CollisionModel(robot).overlapping]
-    model = sm.CollisionModel(robot, (), made)
-    limits: list[sm.Constraint] = [sm.JointPositionLimits(), sm.JointVelocityLimits()]
-    limits.append(sm.Clearance(distance=0.0, disabled=made))
+    made = [(item.first, item.second) for item in sm.obstacles.CollisionModel(robot).overlapping]
+    model = sm.obstacles.CollisionModel(robot, (), made)
+    limits: list[sm.constraints.Constraint] = [
+        sm.constraints.JointPositionLimits(),
+        sm.constraints.JointVelocityLimits(),
+    ]
+    limits.append(sm.constraints.Clearance(distance=0.0, disabled=made))
     found, seconds = 0, []
     for number in range(count):
         known = known_motion(robot, model, number)
         poses = [robot.pose(q) for q in known]
-        path = sm.Waypoints.from_poses(np.linspace(0.0, DURATION, WAYPOINTS), poses)
+        path = sm.paths.Waypoints.from_poses(np.linspace(0.0, DURATION, WAYPOINTS), poses)
         began = time.process_time()
         try:
             plan = sm.plan(sm.Problem(robot, path, constraints=limits, rest=False))

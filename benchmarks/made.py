@@ -46,7 +46,7 @@ def joint_motion(
     lower, upper = robot.finite_limits()
     size, knots = rng.uniform(0.3, 1.2), int(rng.integers(4, 8))
     largest = STEP_SHARE * np.radians(CRITERIA["joint_step_deg"])
-    model = sm.CollisionModel(robot, (), disabled)
+    model = sm.obstacles.CollisionModel(robot, (), disabled)
     while True:
         first = lower + (upper - lower) * rng.uniform(0.05, 0.95, robot.dof)
         moves = np.cumsum(rng.uniform(-size, size, (knots, robot.dof)), axis=0)
@@ -68,7 +68,9 @@ def boxes_around(
             break
         center = np.array([*rng.uniform(-0.8, 0.8, 2), rng.uniform(0.05, 1.1)])
         size = rng.uniform(0.05, 0.3, 3)
-        model = sm.CollisionModel(robot, [sm.Box("box", center, size)], disabled)
+        model = sm.obstacles.CollisionModel(
+            robot, [sm.obstacles.Box("box", center, size)], disabled
+        )
         if model.worst(q[::4]).value < NEAR and model.worst(q).value > CLEAR:
             found.append((center, size))
     return found

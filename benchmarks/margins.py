@@ -38,25 +38,29 @@ def random_plan(rng: np.random.Generator, arms: list[tuple[sm.RobotModel, str]])
     lower, upper = robot.finite_limits()
     start = lower + (upper - lower) * rng.uniform(0.25, 0.75, robot.dof)
     pose, seconds = robot.pose(start), float(rng.uniform(2.0, 5.0))
-    path: sm.Path
+    path: sm.paths.Path
     if rng.random() < 0.5:
         end = pose.copy()
         end.translation = pose.translation + rng.normal(0.0, 0.1, 3)
-        path = sm.Line(pose, end, seconds)
+        path = sm.paths.Line(pose, end, seconds)
     else:
         radius = float(rng.uniform(0.03, 0.12))
-        path = sm.Circle.around(pose, radius, seconds, normal=rng.normal(size=3))
-    bodies: list[sm.Obstacle] = []
+        path = sm.paths.Circle.around(pose, radius, seconds, normal=rng.normal(size=3))
+    bodies: list[sm.obstacles.Obstacle] = []
     for number in range(int(rng.integers(1, 4))):
         away = rng.normal(size=3)
         place = pose.translation + rng.uniform(0.15, 0.4) * away / np.linalg.norm(away)
         kind, size = rng.integers(4), rng.uniform(0.03, 0.15)
         bodies.append(
             (
-                sm.Sphere(f"body{number}", place, float(size)),
-                sm.Box(f"body{number}", place, rng.uniform(0.05, 0.5, 3)),
-                sm.Cylinder(f"body{number}", place, float(size), float(rng.uniform(0.1, 0.4))),
-                sm.Capsule(f"body{number}", place, float(size), float(rng.uniform(0.1, 0.4))),
+                sm.obstacles.Sphere(f"body{number}", place, float(size)),
+                sm.obstacles.Box(f"body{number}", place, rng.uniform(0.05, 0.5, 3)),
+                sm.obstacles.Cylinder(
+                    f"body{number}", place, float(size), float(rng.uniform(0.1, 0.4))
+                ),
+                sm.obstacles.Capsule(
+                    f"body{number}", place, float(size), float(rng.uniform(0.1, 0.4))
+                ),
             )[kind]
         )
     try:
@@ -66,9 +70,9 @@ def random_plan(rng: np.random.Generator, arms: list[tuple[sm.RobotModel, str]])
             task,
             start,
             constraints=[
-                sm.JointPositionLimits(),
-                sm.JointVelocityLimits(),
-                sm.Clearance(bodies, float(rng.uniform(2e-3, 2e-2))),
+                sm.constraints.JointPositionLimits(),
+                sm.constraints.JointVelocityLimits(),
+                sm.constraints.Clearance(bodies, float(rng.uniform(2e-3, 2e-2))),
             ],
         )
         plan = sm.plan(problem, deadline=2.0)

@@ -41,14 +41,14 @@ def arms() -> dict[str, sm.RobotModel]:
 
 def transfer(
     robot: sm.RobotModel, rng: np.random.Generator
-) -> tuple[sm.Clearance, np.ndarray, np.ndarray] | None:
+) -> tuple[sm.constraints.Clearance, np.ndarray, np.ndarray] | None:
     """Return boxes and two configurations that a free walk connects; None for an unlucky draw."""
     boxes = []
     for k in range(5):
         angle, far = rng.uniform(-np.pi, np.pi), rng.uniform(0.35, 0.8)
         place = [far * np.cos(angle), far * np.sin(angle), rng.uniform(0.1, 0.9)]
-        boxes.append(sm.Box(f"box {k}", place, rng.uniform(0.08, 0.3, 3)))
-    clearance = sm.Clearance(boxes, APART)
+        boxes.append(sm.obstacles.Box(f"box {k}", place, rng.uniform(0.08, 0.3, 3)))
+    clearance = sm.constraints.Clearance(boxes, APART)
     free = FreeMotions(robot, [*KEPT, clearance], rng)
     room = Room(free.asked, robot, 2e-3)
     lower, upper = free.asked.arm(robot).finite_limits()
@@ -68,7 +68,9 @@ def transfer(
     return (clearance, first, q) if np.abs(q - first).max() > 1.0 else None
 
 
-def is_wrong(move: sm.Move, clearance: sm.Clearance, first: np.ndarray, last: np.ndarray) -> bool:
+def is_wrong(
+    move: sm.Move, clearance: sm.constraints.Clearance, first: np.ndarray, last: np.ndarray
+) -> bool:
     """Whether a verified move is not what it should be, by samples."""
     motion, robot = move.motion, move.robot
     t = np.linspace(motion.t[0], motion.t[-1], LOOKS)

@@ -34,9 +34,9 @@ def planned_lines(count: int) -> Iterator[tuple[str, Trajectory]]:
     robot, rng = sm.load_robot("panda"), np.random.default_rng(3)
     while count:
         problem = random_problem(robot, rng)
-        if not isinstance(problem.path, sm.Line):
+        if not isinstance(problem.path, sm.paths.Line):
             continue
-        only = (sm.JointPositionLimits(),)
+        only = (sm.constraints.JointPositionLimits(),)
         try:
             found = sm.plan(
                 sm.Problem(robot, problem.path, "pose", problem.start, constraints=only)
@@ -66,9 +66,9 @@ def cornered(count: int) -> Iterator[tuple[str, Trajectory]]:
         else:
             steps = rng.normal(0.0, 0.06, (int(rng.integers(3, 8)), 3))
             points = pose.translation + np.vstack([np.zeros(3), np.cumsum(steps, axis=0)])
-        only = (sm.JointPositionLimits(),)
+        only = (sm.constraints.JointPositionLimits(),)
         try:
-            path = sm.Feed(sm.Polyline(points, tolerance=rng.uniform(1e-3, 5e-3)), 0.1)
+            path = sm.paths.Feed(sm.paths.Polyline(points, tolerance=rng.uniform(1e-3, 5e-3)), 0.1)
             found = sm.plan(sm.Problem(robot, path, "position", start, constraints=only))
         except sm.SelfmotionError:
             continue

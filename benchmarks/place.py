@@ -36,12 +36,12 @@ def random_problem(rng: np.random.Generator) -> sm.Problem:
         end = pose.copy()
         way = rng.normal(size=3) * [1.0, 1.0, 0.2]
         end.translation = pose.translation + rng.uniform(0.1, 0.3) * way / np.linalg.norm(way)
-        seam = sm.Line(pose, end, float(rng.uniform(3.0, 6.0)))
+        seam = sm.paths.Line(pose, end, float(rng.uniform(3.0, 6.0)))
         middle = 0.5 * (pose.translation + end.translation)
-        block = sm.Box("block", middle - [0.0, 0.0, 0.15], [0.15, 0.15, 0.05])
-        wall = sm.Box("wall", [middle[0] + 0.35, 0.0, middle[2]], [0.02, 1.0, 0.4])
-        limits = [sm.JointPositionLimits(), sm.JointVelocityLimits()]
-        clear = sm.Clearance([block, wall], 5e-3)
+        block = sm.obstacles.Box("block", middle - [0.0, 0.0, 0.15], [0.15, 0.15, 0.05])
+        wall = sm.obstacles.Box("wall", [middle[0] + 0.35, 0.0, middle[2]], [0.02, 1.0, 0.4])
+        limits = [sm.constraints.JointPositionLimits(), sm.constraints.JointVelocityLimits()]
+        clear = sm.constraints.Clearance([block, wall], 5e-3)
         problem = sm.Problem(robot, seam, task, constraints=[*limits, clear])
         try:
             if sm.plan(problem, deadline=5.0).certificate.verified:

@@ -77,15 +77,15 @@ def part_at(robot: sm.RobotModel, rng: np.random.Generator) -> pin.SE3:
     return pin.SE3(pin.utils.rotate("z", rng.uniform(-np.pi, np.pi)) @ tilt, position)
 
 
-def bodies(part: pin.SE3, rng: np.random.Generator) -> list[sm.Obstacle]:
+def bodies(part: pin.SE3, rng: np.random.Generator) -> list[sm.obstacles.Obstacle]:
     """Return what stands at a part: a plate under the seam, and a post beside it."""
     side, along = rng.choice([-1.0, 1.0]) * rng.uniform(0.06, 0.2), rng.uniform(-0.2, 0.2)
     high = rng.uniform(0.05, 0.4)
     plate = part * pin.SE3(np.eye(3), np.array([0.0, 0.0, -0.03]))
     post = part * pin.SE3(np.eye(3), np.array([along, side, 0.5 * high]))
     return [
-        sm.Box("plate", plate, [0.5, 0.3, 0.04]),
-        sm.Box("post", post, [0.05, 0.05, high]),
+        sm.obstacles.Box("plate", plate, [0.5, 0.3, 0.04]),
+        sm.obstacles.Box("post", post, [0.05, 0.05, high]),
     ]
 
 
@@ -96,10 +96,13 @@ def place(number: int) -> sm.Problem:
     robot = sm.load_robot(name)
     part = part_at(robot, rng)
     poses = [part * pose for pose in seam(rng)]
-    path = sm.Waypoints.from_poses(np.linspace(0.0, DURATION, len(poses)), poses)
-    constraints: list[sm.Constraint] = [sm.JointPositionLimits(), sm.JointVelocityLimits()]
+    path = sm.paths.Waypoints.from_poses(np.linspace(0.0, DURATION, len(poses)), poses)
+    constraints: list[sm.constraints.Constraint] = [
+        sm.constraints.JointPositionLimits(),
+        sm.constraints.JointVelocityLimits(),
+    ]
     if number // 6 % 2:
-        constraints.append(sm.Clearance(bodies(part, rng), CLEARANCE))
+        constraints.append(sm.constraints.Clearance(bodies(part, rng), CLEARANCE))
     relaxed = number // 3 % 2
     relaxations = [
         sm.Relaxation(("rx", "ry"), float(CONE)),

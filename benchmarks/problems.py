@@ -19,7 +19,7 @@ def circle(name: str, task: str, **options: object) -> sm.Problem:
     """Return the problem of an arm on a vertical circle of 0.15 m in 4 s."""
     robot = sm.load_robot(name)
     start = PANDA_HOME if name == "panda" else robot.dexterous_configuration(task)
-    path = sm.Circle.around(robot.pose(start), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
+    path = sm.paths.Circle.around(robot.pose(start), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
     return sm.Problem(robot, path, task, start, **options)
 
 
@@ -27,7 +27,7 @@ def suite_path(name: str, **options: object) -> sm.Problem:
     """Return a Panda problem of `data`, without its obstacles."""
     description = json.loads((DATA / name / "problem.json").read_text())
     robot = sm.load_robot("panda", tool=description["tip_frame"])
-    path = sm.Waypoints.from_csv(DATA / name / "path.csv")
+    path = sm.paths.Waypoints.from_csv(DATA / name / "path.csv")
     # The start that the peers are given, too.
     start = robot.inverse_kinematics(path.pose(0.0), seed=[0, -0.5, 0, -2, 0, 1.6, 0.8])
     return sm.Problem(robot, path, start=start, **options)

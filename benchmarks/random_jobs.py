@@ -35,9 +35,9 @@ def seams(number: int) -> list[sm.Seam]:
         if rng.uniform() < LEAVES:
             near = int(rng.integers(len(first)))
             place = 0.5 * (first[near] + last[near]) + rng.uniform(-0.12, 0.12, 3)
-            leaves = [sm.Box(f"post {k}", place, rng.uniform(0.02, 0.1, 3))]
+            leaves = [sm.obstacles.Box(f"post {k}", place, rng.uniform(0.02, 0.1, 3))]
         after = [f"seam {rng.integers(k)}"] if k and rng.uniform() < AFTER else []
-        line = sm.Line(SE3(down, begin), SE3(down, end), 2.0, time_law="minimum_jerk")
+        line = sm.paths.Line(SE3(down, begin), SE3(down, end), 2.0, time_law="minimum_jerk")
         found.append(sm.Seam(f"seam {k}", line, "pointing", leaves=leaves, after=after))
     return found
 
@@ -47,11 +47,11 @@ def wrong(program: sm.Program, asked: list[sm.Seam]) -> str:
     names = {seam.name: seam for seam in asked}
     if sorted([*program.order, *program.missing]) != sorted(names):
         return "seams are lost, or made twice"
-    standing: list[sm.Obstacle] = []
+    standing: list[sm.obstacles.Obstacle] = []
     made: set[str] = set()
     for step in program.steps:
         motion = step.motion
-        model = sm.CollisionModel(program.robot, tuple(standing))
+        model = sm.obstacles.CollisionModel(program.robot, tuple(standing))
         times = np.linspace(motion.t[0], motion.t[-1], LOOKS)
         least = model.worst(motion(times))
         if least.value < -ROUNDING:

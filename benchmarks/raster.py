@@ -46,7 +46,9 @@ def rasters() -> dict[str, sm.Problem]:
     return {
         name: sm.Problem(
             sm.load_robot(arm),
-            sm.Feed(sm.Polyline(places, down, tolerance=ROUNDED), FEED, acceleration=ACCELERATION),
+            sm.paths.Feed(
+                sm.paths.Polyline(places, down, tolerance=ROUNDED), FEED, acceleration=ACCELERATION
+            ),
             task,
         )
         for name, (arm, task, places) in cases.items()

@@ -47,15 +47,15 @@ def problem(number: int) -> tuple[str, sm.Problem]:
     normal = rng.normal(size=3)
     normal /= np.linalg.norm(normal)
     size = float(np.round(rng.uniform(0.04, 0.15), 3))
-    path: sm.Path
+    path: sm.paths.Path
     if rng.uniform() < 0.5:
-        path = sm.Circle.around(pose, size, duration, normal=normal)
+        path = sm.paths.Circle.around(pose, size, duration, normal=normal)
     else:
         end = pose.copy()
         end.translation = pose.translation + 2.0 * size * normal
-        path = sm.Line(pose, end, duration)
-    limits = [sm.JointPositionLimits(), sm.JointVelocityLimits()]
-    cost = [sm.JointVelocity(), sm.JointAcceleration()][int(rng.uniform() < 0.2)]
+        path = sm.paths.Line(pose, end, duration)
+    limits = [sm.constraints.JointPositionLimits(), sm.constraints.JointVelocityLimits()]
+    cost = [sm.costs.JointVelocity(), sm.costs.JointAcceleration()][int(rng.uniform() < 0.2)]
     asked = sm.Problem(
         robot,
         path,

@@ -26,10 +26,10 @@ import selfmotion as sm
 SEED, KINDS, COUNT = 7, ("free", "at rest"), 40
 
 
-def finest(problem: sm.Problem) -> sm.NullMotion:
+def finest(problem: sm.Problem) -> sm.motion.NullMotion:
     """Return the spline of 64 intervals; of 32 where the arm has so many self-motions."""
     many = problem.robot.redundancy(problem.task) > 2
-    return sm.BSplineNullMotion(32 if many else 64)
+    return sm.motion.BSplineNullMotion(32 if many else 64)
 
 
 def problems(seed: int) -> Iterator[tuple[str, sm.Problem]]:
@@ -41,7 +41,10 @@ def problems(seed: int) -> Iterator[tuple[str, sm.Problem]]:
         kind = KINDS[number % len(KINDS)]
         name = f"{name.split(',')[0]}, {kind}"
         options: dict[str, Any] = {"constraints": (), "rest": kind == "at rest"}
-        yield name, replace(problem, collision=None, null_motion=sm.FreeNullMotion(), **options)
+        yield (
+            name,
+            replace(problem, collision=None, null_motion=sm.motion.FreeNullMotion(), **options),
+        )
 
 
 def planned(problem: sm.Problem, **options: Any) -> tuple[sm.Plan, float]:

@@ -27,7 +27,9 @@ def spiral(loops: int, waypoints: int) -> sm.Problem:
     angle, radius = 2.0 * np.pi * loops * share, np.interp(share, (0.0, 1.0), RADII)
     flat = np.zeros_like(share)
     around = np.stack([radius * np.cos(angle), radius * np.sin(angle), flat], axis=1)
-    return sm.Problem(panda, sm.Waypoints(PERIOD * loops * share, middle + around), "position")
+    return sm.Problem(
+        panda, sm.paths.Waypoints(PERIOD * loops * share, middle + around), "position"
+    )
 
 
 def main() -> int:

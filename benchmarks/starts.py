@@ -42,17 +42,21 @@ def random_problem(number: int) -> sm.Problem:
             break
     if rng.integers(2):
         normal = rng.normal(size=3)
-        path: sm.Path = sm.Circle.around(pose, rng.uniform(0.03, 0.12), 4.0, normal=normal)
+        path: sm.paths.Path = sm.paths.Circle.around(
+            pose, rng.uniform(0.03, 0.12), 4.0, normal=normal
+        )
     else:
         moves = np.cumsum(rng.uniform(-0.25, 0.25, (3, robot.dof)), axis=0)
         poses = [pose, *(robot.pose(x) for x in np.clip(q + moves, lower, upper))]
-        path = sm.Waypoints.from_poses(np.linspace(0.0, 4.0, 4), poses)
+        path = sm.paths.Waypoints.from_poses(np.linspace(0.0, 4.0, 4), poses)
     share = SHARES[number // len(ARMS) % len(SHARES)]
-    costs: list[sm.Cost] = [sm.JointVelocity()]
+    costs: list[sm.costs.Cost] = [sm.costs.JointVelocity()]
     if share:
         # μ such that the term costs about its share of a usual motion's speed, at a dexterous pose.
         best = robot.task_jacobian(robot.dexterous_configuration(task), sm.Task.of(task))
-        costs.append(sm.InverseManipulability(share * 0.1 * float(np.linalg.det(best @ best.T))))
+        costs.append(
+            sm.costs.InverseManipulability(share * 0.1 * float(np.linalg.det(best @ best.T)))
+        )
     return sm.Problem(robot, path, task, costs=costs)
 
 

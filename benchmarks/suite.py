@@ -48,9 +48,9 @@ class PathProblem:
 
     name: str
     robot: sm.RobotModel
-    path: sm.Waypoints
+    path: sm.paths.Waypoints
     task: str
-    obstacles: tuple[sm.Box, ...]
+    obstacles: tuple[sm.obstacles.Box, ...]
     disabled: tuple[tuple[str, str], ...]
     criteria: dict[str, Any]
     reference: tuple[float | None, float | None]
@@ -100,9 +100,9 @@ def load(folder: Path) -> PathProblem:
     return PathProblem(
         description["name"],
         robot,
-        sm.Waypoints.from_csv(folder / "path.csv"),
+        sm.paths.Waypoints.from_csv(folder / "path.csv"),
         "pose" if free_axis is None else "pointing",
-        tuple(sm.Box(f"box{k}", pose, size) for k, (size, pose) in enumerate(boxes)),
+        tuple(sm.obstacles.Box(f"box{k}", pose, size) for k, (size, pose) in enumerate(boxes)),
         (*disabled, *judge.neighbours),
         criteria,
         tuple(description.get(f"reference_path_length_{unit}") for unit in ("rad", "m")),
@@ -153,22 +153,24 @@ def plan(
     slower = max(1.0, float((largest / step / robot.velocity_limit).max()))
     times = slower * path.waypoint_times
     poses = [path.pose(float(t)) for t in path.waypoint_times]
-    constraints: list[sm.Constraint] = [
-        sm.JointPositionLimits(robot.lower + EDGE, robot.upper - EDGE),
-        sm.JointVelocityLimits(largest / (slower * step)),
+    constraints: list[sm.constraints.Constraint] = [
+        sm.constraints.JointPositionLimits(robot.lower + EDGE, robot.upper - EDGE),
+        sm.constraints.JointVelocityLimits(largest / (slower * step)),
     ]
     if criteria["collision_free"]:
-        constraints.append(sm.Clearance(problem.obstacles, CLEARANCE, disabled=problem.disabled))
+        constraints.append(
+            sm.constraints.Clearance(problem.obstacles, CLEARANCE, disabled=problem.disabled)
+        )
     weights = [metre if robot.is_prismatic(name) else 1.0 for name in robot.joint_names]
-    length = sm.PathLength(smoothing=0.005 / slower, joint_weights=weights)
+    length = sm.costs.PathLength(smoothing=0.005 / slower, joint_weights=weights)
     asked = sm.Problem(
         robot,
-        sm.Waypoints.from_poses(times, poses),
+        sm.paths.Waypoints.from_poses(times, poses),
         problem.task,
         costs=[length],
         constraints=constraints,
     )
-    for null_motion in (asked.null_motion, sm.BSplineNullMotion(INTERVALS)):
+    for null_motion in (asked.null_motion, sm.motion.BSplineNullMotion(INTERVALS)):
         found = sm.plan(
             replace(asked, null_motion=null_motion),
             search=sm.Search(mode="global", rng=seed),

@@ -28,7 +28,7 @@ PROBLEMS = {
 }
 
 
-def evaluations_until(history: tuple[sm.Iteration, ...], cost: float) -> int:
+def evaluations_until(history: tuple[sm.optimise.Iteration, ...], cost: float) -> int:
     """Return the evaluations after which the cost was reached, on the first grid."""
     return next((i.evaluations for i in history if i.cost <= cost), -1)
 
@@ -101,7 +101,7 @@ def test_our_optimiser(benchmark: Any, name: str) -> None:
 
     cost, evaluations = benchmark(solve)
     fresh = objective_on(PROBLEMS[name](), 64)
-    tight = sm.QuasiNewton(tolerance=1e-14, line_search=sm.LineSearch(sigma=0.1))
+    tight = sm.QuasiNewton(tolerance=1e-14, line_search=sm.optimise.LineSearch(sigma=0.1))
     found = tight.minimize(fresh, x, inverse_metric(fresh.metric(x)))
     fresh = objective_on(PROBLEMS[name](), 64)
     history = sm.QuasiNewton().minimize(fresh, x, inverse_metric(fresh.metric(x))).history
@@ -129,10 +129,10 @@ def test_published_scheme(benchmark: Any, name: str, rtol: float) -> None:
     seconds = time.perf_counter() - began
     goal = plan.report.cost * (1 + 1e-4)
 
-    def solve() -> sm.Iteration:
-        steps: list[sm.Iteration] = []
+    def solve() -> sm.optimise.Iteration:
+        steps: list[sm.optimise.Iteration] = []
 
-        def watch(step: sm.Iteration) -> bool:
+        def watch(step: sm.optimise.Iteration) -> bool:
             steps.append(step)
             return step.cost <= goal
 

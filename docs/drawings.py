@@ -182,7 +182,7 @@ def relaxations(page: "Page") -> str:
 
 
 def _cones(
-    axes: "Axes", band: float, target: sm.PathSamples, places: np.ndarray, turns: np.ndarray
+    axes: "Axes", band: float, target: sm.paths.PathSamples, places: np.ndarray, turns: np.ndarray
 ) -> None:
     """Draw the cones of allowed axes along a path in the plane of y and z, and the tool's axes."""
     length, steps = 0.09, np.linalg.norm(np.diff(target.translation, axis=0), axis=1)
@@ -208,9 +208,9 @@ def limits(page: "Page") -> str:
     robot, motion = plan.robot, curves(plan, plan.trajectory)
     asked = {type(item): item for item in plan.problem.constraints}
     used = {
-        "speed": (motion.qd, asked[sm.JointVelocityLimits], _BLUE),
-        "acceleration": (motion.qdd, asked[sm.JointAccelerationLimits], _ORANGE),
-        "torque": (motion.torque, asked[sm.JointTorqueLimits], _GREEN),
+        "speed": (motion.qd, asked[sm.constraints.JointVelocityLimits], _BLUE),
+        "acceleration": (motion.qdd, asked[sm.constraints.JointAccelerationLimits], _ORANGE),
+        "torque": (motion.torque, asked[sm.constraints.JointTorqueLimits], _GREEN),
     }
     figure = Figure(figsize=(_NARROW, 4.2), layout="constrained")
     axes, rows = figure.subplots(), np.arange(robot.dof)
@@ -251,7 +251,7 @@ def retiming(page: "Page") -> str:
 def cam(page: "Page") -> str:
     """Draw a drawing as it is, and the tool's way along it."""
     plan = sm.load_plan(page.folder / "bracket.npz")
-    rows = sm.read_path(page.folder / "bracket.dxf", feed=0.03, seam="weld", tolerance=1e-6)
+    rows = sm.files.read_path(page.folder / "bracket.dxf", feed=0.03, seam="weld", tolerance=1e-6)
     drawn = rows.samples(np.linspace(0.0, rows.duration, 600)).translation
     _, places, _ = _tool(plan)
     shown = places - np.array([0.45, -0.1, 0.3])
@@ -268,7 +268,7 @@ def cam(page: "Page") -> str:
 def controllers(page: "Page") -> str:
     """Draw the targets of a program along the plan, and how far off it lines between them are."""
     plan = sm.load_plan(page.folder / "seam.npz")
-    program = sm.read_motion(page.folder / "seam.src")
+    program = sm.files.read_motion(page.folder / "seam.src")
     t, places, _ = _tool(plan)
     lines = np.stack([np.interp(t, program.t, each) for each in program.q.T], axis=1)
     _, _, joined = plan.robot.chain.along(lines)

@@ -19,7 +19,7 @@ def plan_of(name: str) -> sm.Plan:
     robot = sm.load_robot(name)
     task = sm.Task.POSE if robot.dof > 6 else sm.Task.POSITION
     start = robot.dexterous_configuration(task)
-    path = sm.Circle.around(robot.pose(start), 0.06, 4.0, normal=(1.0, 0.0, 0.0))
+    path = sm.paths.Circle.around(robot.pose(start), 0.06, 4.0, normal=(1.0, 0.0, 0.0))
     return sm.plan(sm.Problem(robot, path, task, start))
 
 

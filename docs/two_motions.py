@@ -38,13 +38,13 @@ def seam() -> sm.Problem:
     last[1, 3] = -0.35
     near = [-1.712, -0.645, 1.987, -0.935, 0.099, 1.053, -0.433]
     start = panda.inverse_kinematics(first, "pose", seed=near)
-    return sm.Problem(panda, sm.Line(first, last, DURATION), start=start)
+    return sm.Problem(panda, sm.paths.Line(first, last, DURATION), start=start)
 
 
 def main() -> None:
     """Plan both, and draw them side by side."""
     problem = seam()
-    motions = (sm.plan_by(problem, sm.PseudoInverse()), sm.plan(problem).require())
+    motions = (sm.plan_by(problem, sm.baselines.PseudoInverse()), sm.plan(problem).require())
     figure = Figure(figsize=(10.0, 8.2), dpi=100, facecolor="white")
     FigureCanvasAgg(figure)
     grid = figure.add_gridspec(

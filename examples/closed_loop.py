@@ -6,15 +6,19 @@ import selfmotion as sm
 
 panda = sm.load_robot("panda")
 home = np.array(sm.NAMED_ARMS["panda"].home)
-circle = sm.Circle.around(panda.pose(home), radius=0.15, duration=5.0, normal=(1, 0, 0))
+circle = sm.paths.Circle.around(panda.pose(home), radius=0.15, duration=5.0, normal=(1, 0, 0))
 problem = sm.Problem(
     panda,
     circle,
     task="pointing",
     start=home,
-    constraints=[sm.JointPositionLimits(), sm.JointVelocityLimits(), sm.ClosedPath()],
+    constraints=[
+        sm.constraints.JointPositionLimits(),
+        sm.constraints.JointVelocityLimits(),
+        sm.constraints.ClosedPath(),
+    ],
 )
-tracked = sm.plan_by(problem, sm.PseudoInverse())
+tracked = sm.plan_by(problem, sm.baselines.PseudoInverse())
 plan = sm.plan(problem).require()
 for name, each in {"pseudo-inverse": tracked, "plan": plan}.items():
     drift = np.abs(each.trajectory.q[-1] - each.trajectory.q[0]).max()

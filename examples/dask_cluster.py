@@ -13,7 +13,7 @@ def problems() -> list[sm.Problem]:
     start = panda.dexterous_configuration()
     radii = (0.05, 0.08, 0.11, 0.14)
     return [
-        sm.Problem(panda, sm.Circle.around(panda.pose(start), radius, 4.0), start=start)
+        sm.Problem(panda, sm.paths.Circle.around(panda.pose(start), radius, 4.0), start=start)
         for radius in radii
     ]
 

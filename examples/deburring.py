@@ -16,7 +16,7 @@ for offset in offsets:
     pose = corner.copy()
     pose.translation = corner.translation + offset
     poses.append(pose)
-edge = sm.section_at_rest(sm.Waypoints.from_poses(t, poses, corners="stop"), ramp=0.4)
+edge = sm.paths.section_at_rest(sm.paths.Waypoints.from_poses(t, poses, corners="stop"), ramp=0.4)
 
 tilts = {
     "tool square to the edge": [],

@@ -8,7 +8,7 @@ import selfmotion as sm
 
 panda = sm.load_robot("panda")
 start = panda.dexterous_configuration()
-circle = sm.Circle.around(panda.pose(start), radius=0.15, duration=4.0, normal=(1, 0, 0))
+circle = sm.paths.Circle.around(panda.pose(start), radius=0.15, duration=4.0, normal=(1, 0, 0))
 
 # What many programs do: inverse kinematics from point to point, each from the one before.
 t = np.linspace(0.0, 4.0, 21)
@@ -21,7 +21,7 @@ file = Path("out") / "motion.csv"
 file.parent.mkdir(exist_ok=True)
 file.write_text("\n".join(rows) + "\n")
 
-motion = sm.read_motion(file)
+motion = sm.files.read_motion(file)
 for tolerance in (1e-6, 1e-3):
     certificate = sm.certify(panda, circle, "pose", motion, sm.Tolerance(tolerance, tolerance))
     print(f"to {1e3 * tolerance:g} mm: {certificate.verdict}")

@@ -14,12 +14,12 @@ turned = np.arctan2(first[1], first[0]) + angle
 round_and_round = np.hypot(*first[:2]) * np.stack([np.cos(turned), np.sin(turned), 0 * turned], 1)
 problem = sm.Problem(
     arm,
-    sm.Waypoints(2.0 * angle, round_and_round),
+    sm.paths.Waypoints(2.0 * angle, round_and_round),
     task="planar",
     constraints=[
-        sm.JointPositionLimits(lower, upper),
-        sm.JointVelocityLimits(2.0),
-        sm.JointAccelerationLimits(10.0),
+        sm.constraints.JointPositionLimits(lower, upper),
+        sm.constraints.JointVelocityLimits(2.0),
+        sm.constraints.JointAccelerationLimits(10.0),
     ],
 )
 parts = sm.plan_in_parts(problem).require()

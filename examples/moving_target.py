@@ -20,7 +20,7 @@ BALL = np.array([-0.15, 0.19, 0.61])
 class Part:
     """A part that the conveyor carries along y, and takes back: a circle is drawn on it."""
 
-    circle = sm.Circle.around(panda.pose(START), 0.05, 100.0, normal=(0, 0, 1), turns=20)
+    circle = sm.paths.Circle.around(panda.pose(START), 0.05, 100.0, normal=(0, 0, 1), turns=20)
 
     def path(self, t):
         """Where the part is, and how fast: what a camera would tell."""
@@ -39,8 +39,12 @@ class Part:
 
 
 constraints = [
-    *(sm.JointPositionLimits(), sm.JointVelocityLimits(), sm.JointAccelerationLimits()),
-    sm.Clearance([sm.Sphere("ball", BALL, 0.06)], distance=0.005),
+    *(
+        sm.constraints.JointPositionLimits(),
+        sm.constraints.JointVelocityLimits(),
+        sm.constraints.JointAccelerationLimits(),
+    ),
+    sm.constraints.Clearance([sm.obstacles.Sphere("ball", BALL, 0.06)], distance=0.005),
 ]
 # Plans anew every 10 ms, from where the arm is.
 replanner = realtime.Replanner(panda, "pose", constraints=constraints, horizon=2.0)

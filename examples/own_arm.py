@@ -16,12 +16,12 @@ for task in sm.Task:
         print(f"  task '{task.value}' leaves {arm.redundancy(task)} degrees of self-motion")
 
 start = arm.dexterous_configuration("planar")
-circle = sm.Circle.around(arm.pose(start), radius=0.3, duration=3.0, normal=(0, 0, 1))
+circle = sm.paths.Circle.around(arm.pose(start), radius=0.3, duration=3.0, normal=(0, 0, 1))
 plan = sm.plan(sm.Problem(arm, circle, task="planar", start=start)).require()
 print(plan.certificate.verdict)
 
 held = sm.load_robot(URDF, tool="tool", lock={"joint2": 0.5})
 try:
     sm.Problem(held, circle, task="planar")
-except sm.RedundancyError as error:
+except sm.errors.RedundancyError as error:
     print(f"with joint2 held: {error}")

@@ -16,14 +16,14 @@ SUM = np.array([0.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0])
 
 
 @dataclass(frozen=True)
-class SumBand(sm.Constraint):
+class SumBand(sm.constraints.Constraint):
     """lower ≤ q2 + q3 ≤ upper [rad]."""
 
     lower: float
     upper: float
 
     def quantity(self, robot):
-        return sm.Quantity.between(
+        return sm.certificate.Quantity.between(
             "q2 + q3",
             self.lower,
             self.upper,
@@ -36,7 +36,7 @@ class SumBand(sm.Constraint):
 
 panda = sm.load_robot("panda")
 home = np.array(sm.NAMED_ARMS["panda"].home)
-circle = sm.Circle.around(panda.pose(home), radius=0.15, duration=4.0, normal=(1, 0, 0))
+circle = sm.paths.Circle.around(panda.pose(home), radius=0.15, duration=4.0, normal=(1, 0, 0))
 free = sm.plan(sm.Problem(panda, circle, task="position", start=home))
 total = free.trajectory.q @ SUM
 print(f"without the constraint q2 + q3 goes from {total.min():.3f} to {total.max():.3f} rad")
@@ -47,7 +47,7 @@ problem = sm.Problem(
     circle,
     task="position",
     start=home,
-    constraints=[sm.JointPositionLimits(), sm.JointVelocityLimits(), band],
+    constraints=[sm.constraints.JointPositionLimits(), sm.constraints.JointVelocityLimits(), band],
 )
 check_constraint(band, problem)
 plan = sm.plan(problem).require()

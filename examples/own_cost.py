@@ -14,7 +14,7 @@ def elbow_down(qd, q, t):
 
 
 @dataclass(frozen=True)
-class ElbowDown(sm.Cost):
+class ElbowDown(sm.costs.Cost):
     """G = μ (1 - cos q3), with its gradient: faster, and saved with a plan."""
 
     mu: float = 5.0
@@ -26,7 +26,7 @@ class ElbowDown(sm.Cost):
     def gradient(self, samples):
         by_q = np.zeros_like(samples.q)
         by_q[:, 2] = self.mu * np.sin(samples.q[:, 2])
-        return sm.Partials(q=by_q)
+        return sm.costs.Partials(q=by_q)
 
 
 check_cost(ElbowDown())
@@ -34,9 +34,9 @@ panda = sm.load_robot("panda")
 start = panda.dexterous_configuration()
 line_end = panda.pose(start)
 line_end.translation = line_end.translation + np.array([0.0, 0.1, -0.05])
-line = sm.Line(panda.pose(start), line_end, 3.0)
-for cost in (sm.FunctionCost(elbow_down, name="elbow"), ElbowDown()):
-    problem = sm.Problem(panda, line, start=start, costs=[sm.JointVelocity(), cost])
+line = sm.paths.Line(panda.pose(start), line_end, 3.0)
+for cost in (sm.costs.FunctionCost(elbow_down, name="elbow"), ElbowDown()):
+    problem = sm.Problem(panda, line, start=start, costs=[sm.costs.JointVelocity(), cost])
     plan = sm.plan(problem).require()
     for name, before in plan.report.initial_terms.items():
         print(f"{name}: {before:.4f} → {plan.report.terms[name]:.4f}")

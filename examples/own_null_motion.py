@@ -9,7 +9,7 @@ from selfmotion.testing import check_null_motion
 
 
 @dataclass(frozen=True)
-class Sines(sm.NullMotion):
+class Sines(sm.motion.NullMotion):
     """φ_k(t) = sin(k π t / T), k = 1 … count."""
 
     count: int = 4
@@ -25,7 +25,7 @@ class Sines(sm.NullMotion):
 check_null_motion(Sines())
 panda = sm.load_robot("panda")
 home = np.array(sm.NAMED_ARMS["panda"].home)
-circle = sm.Circle.around(panda.pose(home), radius=0.15, duration=4.0, normal=(1, 0, 0))
+circle = sm.paths.Circle.around(panda.pose(home), radius=0.15, duration=4.0, normal=(1, 0, 0))
 for name, motion in {"cubic": sm.PolynomialNullMotion(), "sines": Sines()}.items():
     plan = sm.plan(sm.Problem(panda, circle, "position", home, motion)).require()
     speed = np.abs(plan.trajectory.qd[[0, -1]]).max()

@@ -10,7 +10,7 @@ import selfmotion as sm
 
 
 @dataclass(frozen=True, eq=False)
-class Cone(sm.Obstacle):
+class Cone(sm.obstacles.Obstacle):
     """A solid cone along the pose's z axis, half its height at the pose."""
 
     shape: ClassVar[str] = "cone"
@@ -24,18 +24,18 @@ class Cone(sm.Obstacle):
 
 panda = sm.load_robot("panda")
 home = np.array(sm.NAMED_ARMS["panda"].home)
-circle = sm.Circle.around(panda.pose(home), radius=0.15, duration=4.0, normal=(1, 0, 0))
+circle = sm.paths.Circle.around(panda.pose(home), radius=0.15, duration=4.0, normal=(1, 0, 0))
 cone = Cone("cone", [0.0, 0.15, 0.6], radius=0.08, height=0.3)
 free = sm.plan(sm.Problem(panda, circle, task="position", start=home))
-found = sm.CollisionModel(panda, [cone]).worst(free.trajectory.q)
+found = sm.obstacles.CollisionModel(panda, [cone]).worst(free.trajectory.q)
 print(f"without it: '{found.first}' and '{found.second}', {1e3 * found.value:.1f} mm")
-limits = [sm.JointPositionLimits(), sm.JointVelocityLimits()]
+limits = [sm.constraints.JointPositionLimits(), sm.constraints.JointVelocityLimits()]
 problem = sm.Problem(
     panda,
     circle,
     task="position",
     start=home,
-    constraints=[*limits, sm.Clearance([cone], distance=0.01)],
+    constraints=[*limits, sm.constraints.Clearance([cone], distance=0.01)],
 )
 plan = sm.plan(problem).require()
 print(f"with it: {plan.certificate.verdict}")

@@ -10,7 +10,7 @@ from selfmotion.testing import check_optimizer
 
 
 class ScipyBfgs:
-    """`scipy.optimize.minimize` behind the protocol `selfmotion.Optimizer`."""
+    """`scipy.optimize.minimize` behind the protocol `selfmotion.optimise.Optimizer`."""
 
     def minimize(
         self,
@@ -31,11 +31,11 @@ class ScipyBfgs:
                 best[:] = [x.copy(), cost]
             size = float(np.linalg.norm(gradient))
             step = float(bool(history))
-            history.append(sm.Iteration(x, cost, size, "bfgs", step, function.evaluations))
+            history.append(sm.optimise.Iteration(x, cost, size, "bfgs", step, function.evaluations))
             if callback is not None and callback(history[-1]):
-                stopped[0] = sm.Status.STOPPED
+                stopped[0] = sm.optimise.Status.STOPPED
             elif max_evaluations is not None and function.evaluations >= max_evaluations:
-                stopped[0] = sm.Status.MAX_EVALUATIONS
+                stopped[0] = sm.optimise.Status.MAX_EVALUATIONS
             if stopped[0]:
                 raise StopIteration
 
@@ -47,8 +47,8 @@ class ScipyBfgs:
         options = {"hess_inv0": 0.5 * (inverse_hessian + inverse_hessian.T), "gtol": 1e-6}
         with contextlib.suppress(StopIteration):
             minimize(value_and_gradient, x0, jac=True, method="BFGS", options=options)
-        status = stopped[0] or sm.Status.CONVERGED
-        return sm.Minimum(best[0], best[1], inverse_hessian, tuple(history), status)
+        status = stopped[0] or sm.optimise.Status.CONVERGED
+        return sm.optimise.Minimum(best[0], best[1], inverse_hessian, tuple(history), status)
 
 
 check_optimizer(ScipyBfgs())

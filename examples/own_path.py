@@ -10,7 +10,7 @@ from selfmotion.testing import check_path
 
 
 @dataclass(frozen=True, eq=False)
-class Helix(sm.Path, kind="helix"):
+class Helix(sm.paths.Path, kind="helix"):
     """A helix about a vertical axis, from rest to rest, the tool's orientation kept."""
 
     start: np.ndarray  # pose of the tool at t = 0, (4, 4)
@@ -31,7 +31,7 @@ class Helix(sm.Path, kind="helix"):
         slope = [-angle * np.sin(phase), angle * np.cos(phase), np.zeros_like(t)]
         velocity = self.radius * np.stack(slope, axis=1)
         velocity[:, 2] = self.rise
-        return sm.PathSamples(
+        return sm.paths.PathSamples(
             t,
             translation=pose[:3, 3] + offset,
             rotation=np.tile(pose[:3, :3], (len(t), 1, 1)),

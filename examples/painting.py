@@ -24,7 +24,9 @@ for point in points:
     pose = middle.copy()
     pose.translation = point
     poses.append(pose)
-lanes = sm.section_at_rest(sm.Waypoints.from_poses(times, poses, corners="stop"), ramp=0.4)
+lanes = sm.paths.section_at_rest(
+    sm.paths.Waypoints.from_poses(times, poses, corners="stop"), ramp=0.4
+)
 
 for task in ("pose", "pointing"):
     problem = sm.Problem(xarm, lanes, task=task)

@@ -15,7 +15,7 @@ def problem_at(x: float, y: float) -> sm.Problem:
     """Return the seam, planned for an arm that stands at (x, y)."""
     panda = sm.load_robot("panda", base=[[1, 0, 0, x], [0, 1, 0, y], [0, 0, 1, 0], [0, 0, 0, 1]])
     home = sm.load_robot("panda").pose(sm.NAMED_ARMS["panda"].home)
-    seam = sm.Circle.around(home, radius=0.12, duration=4.0)
+    seam = sm.paths.Circle.around(home, radius=0.12, duration=4.0)
     start = panda.inverse_kinematics(home, "pose", seed=sm.NAMED_ARMS["panda"].home)
     return sm.Problem(panda, seam, "pose", start)
 

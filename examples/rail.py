@@ -28,10 +28,10 @@ begin = np.concatenate([[-0.5], sm.NAMED_ARMS["panda"].home])
 first = cell.pose(begin)
 last = first.copy()
 last.translation = first.translation + np.array([0.0, 1.2, 0.0])
-seam = sm.Line(first, last, duration=8.0)
+seam = sm.paths.Line(first, last, duration=8.0)
 # A metre of the rail is to count as 3 rad of a joint.
 weights = [3.0**2] + [1.0] * 7
-problem = sm.Problem(cell, seam, start=begin, costs=[sm.JointVelocity(weight=weights)])
+problem = sm.Problem(cell, seam, start=begin, costs=[sm.costs.JointVelocity(weight=weights)])
 plan = sm.plan(problem).require()
 slide = plan.trajectory.q[:, 0]
 print(f"cost {plan.report.initial_cost:.4f} → {plan.report.cost:.4f}")

@@ -4,7 +4,7 @@ import selfmotion as sm
 
 panda = sm.load_robot("panda")
 start = panda.dexterous_configuration()
-circle = sm.Circle.around(panda.pose(start), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
+circle = sm.paths.Circle.around(panda.pose(start), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
 
 variants = {
     "the whole pose": [],

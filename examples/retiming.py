@@ -6,7 +6,7 @@ import selfmotion as sm
 
 panda = sm.load_robot("panda")
 start = panda.dexterous_configuration()
-circle = sm.Circle.around(panda.pose(start), radius=0.15, duration=6.0, normal=(1, 0, 0))
+circle = sm.paths.Circle.around(panda.pose(start), radius=0.15, duration=6.0, normal=(1, 0, 0))
 plan = sm.plan(sm.Problem(panda, circle, task="position", start=start)).require()
 fast = sm.retime(plan, acceleration=5.0)
 for name, each in {"planned": plan, "retimed": fast}.items():

@@ -10,10 +10,10 @@ import selfmotion as sm
 problem = sm.sample_problem()
 ours = sm.plan(problem)
 plans = {
-    "pseudo-inverse": sm.plan_by(problem, sm.PseudoInverse()),
-    "gradient projection": sm.plan_by(problem, sm.GradientProjection(gain=1.25)),
+    "pseudo-inverse": sm.plan_by(problem, sm.baselines.PseudoInverse()),
+    "gradient projection": sm.plan_by(problem, sm.baselines.GradientProjection(gain=1.25)),
     "ours, 4 coefficients": ours,
-    "Lagrangian optimum": sm.plan_by(problem, sm.LagrangianOptimum(ours)),
+    "Lagrangian optimum": sm.plan_by(problem, sm.baselines.LagrangianOptimum(ours)),
 }
 figure = Figure(figsize=(6, 4), layout="constrained")
 axes = figure.subplots()

@@ -19,7 +19,7 @@ cell = sm.load_robot(
 # The bar is 0.4 m long; both hands hold it from above.
 first = pin.SE3(np.diag([1.0, -1.0, -1.0]), np.array([0.45, 0.2, 0.3]))
 grasp = pin.SE3(np.eye(3), np.array([0.0, 0.4, 0.0]))
-circle = sm.Circle.around(first, radius=0.15, duration=6.0, normal=(0, 1, 0))
+circle = sm.paths.Circle.around(first, radius=0.15, duration=6.0, normal=(0, 1, 0))
 problem = sm.Problem(
     cell,
     [sm.Follow(circle, tool=LEFT), sm.Follow(grasp, tool=RIGHT, reference=LEFT)],

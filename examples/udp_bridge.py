@@ -71,7 +71,7 @@ class FakeController(threading.Thread):
 
 panda = sm.load_robot("panda")
 start = np.array(sm.NAMED_ARMS["panda"].home)
-path = sm.Circle.around(panda.pose(start), 0.1, 10.0, normal=(1, 0, 0))
+path = sm.paths.Circle.around(panda.pose(start), 0.1, 10.0, normal=(1, 0, 0))
 replanner = realtime.Replanner(panda, "pose")
 realtime.warm_up(replanner)
 controller = FakeController(start, replanner.period)

@@ -9,10 +9,10 @@ c = np.sqrt(0.5)
 torch = [[c, 0, c, 0.1], [0, 1, 0, 0], [-c, 0, c, 0.1], [0, 0, 0, 1]]
 ur5 = sm.load_robot("ur5", tool_offset=torch)
 start = ur5.dexterous_configuration("pointing")
-circle = sm.Circle.around(ur5.pose(start), radius=0.06, duration=4.0)
+circle = sm.paths.Circle.around(ur5.pose(start), radius=0.06, duration=4.0)
 try:
     sm.Problem(ur5, circle)
-except sm.RedundancyError as error:
+except sm.errors.RedundancyError as error:
     print(error)
 
 for name, configuration in {"from this start": start, "from the best one": None}.items():

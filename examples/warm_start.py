@@ -8,7 +8,7 @@ import selfmotion as sm
 
 panda = sm.load_robot("panda")
 start = panda.dexterous_configuration()
-circle = sm.Circle.around(panda.pose(start), radius=0.15, duration=4.0, normal=(1, 0, 0))
+circle = sm.paths.Circle.around(panda.pose(start), radius=0.15, duration=4.0, normal=(1, 0, 0))
 problem = sm.Problem(panda, circle, task="position")  # the start is free: many are tried
 plan = sm.plan(problem).require()
 print(f"first: cost {plan.report.cost:.4f} in {plan.report.evaluations} evaluations")
@@ -17,7 +17,7 @@ shift = np.eye(4)
 shift[:3, 3] = [0.0, 0.02, -0.01]
 for name, path in {
     "the same": circle,
-    "20 mm beside": sm.Placed(circle, shift),
+    "20 mm beside": sm.paths.Placed(circle, shift),
     "in 6 s": replace(circle, duration=6.0),
 }.items():
     again = sm.plan(replace(problem, path=path), warm_start=plan).require()

@@ -11,8 +11,8 @@ HERE = Path(__file__).parent
 
 # Twelve bars of 40 mm, as a CAD system wrote them: one closed mesh, all of it hollow.
 place = pin.SE3(np.eye(3), np.array([0.30, -0.25, 0.02]))
-frame = sm.Mesh("frame", place, HERE / "frame.stl")
-torch = sm.Cylinder("torch", [0.0, 0.0, 0.165], 0.01, 0.13, frame="panda_hand")
+frame = sm.obstacles.Mesh("frame", place, HERE / "frame.stl")
+torch = sm.obstacles.Cylinder("torch", [0.0, 0.0, 0.165], 0.01, 0.13, frame="panda_hand")
 panda = sm.load_robot("panda", tool_offset=pin.SE3(np.eye(3), np.array([0.0, 0.0, 0.15])))
 
 # Round the foot of an upright bar, seen from within the frame: 4 mm off, 45 degrees downwards.
@@ -21,16 +21,18 @@ across = np.array([-np.sqrt(0.5), np.sqrt(0.5), 0.0])
 turn = np.column_stack([across, np.cross(along, across), along])
 corners = np.array([[0.46, 0.395, 0.04], [0.46, 0.36, 0.04], [0.495, 0.36, 0.04]]) - 0.004 * along
 turns = np.tile(pin.Quaternion(turn).coeffs()[[3, 0, 1, 2]], (3, 1))
-seam = sm.Placed(sm.Feed(sm.Polyline(corners, turns, tolerance=1e-3), 0.01), place)
+seam = sm.paths.Placed(
+    sm.paths.Feed(sm.paths.Polyline(corners, turns, tolerance=1e-3), 0.01), place
+)
 
 problem = sm.Problem(
     panda,
     seam,
     task="pointing",
     constraints=[
-        sm.JointPositionLimits(),
-        sm.JointVelocityLimits(),
-        sm.Clearance([frame, torch], distance=2e-3),
+        sm.constraints.JointPositionLimits(),
+        sm.constraints.JointVelocityLimits(),
+        sm.constraints.Clearance([frame, torch], distance=2e-3),
     ],
 )
 plan = sm.plan(problem).require()

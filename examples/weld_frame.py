@@ -23,7 +23,7 @@ def corner(angle: float, radius: float) -> pin.SE3:
 seams = []
 for k, angle in enumerate(np.radians([45, 135, 225, 315])):
     for part, (near, far) in enumerate([(0.08, 0.11), (0.11, 0.14), (0.14, 0.17)]):
-        line = sm.Line(corner(angle, near), corner(angle, far), 3.0)
+        line = sm.paths.Line(corner(angle, near), corner(angle, far), 3.0)
         # From the inside out, so that the frame does not warp: each after the one before.
         after = [f"corner {k}, {part - 1}"] if part else []
         events = [("arc on", 0.0), ("arc off", 3.0)]

@@ -15,18 +15,18 @@ print(f"{cell.dof} joints: {', '.join(cell.joint_names)}")
 
 # A ring on the plate, in the plate's own frame: the torch points down onto it.
 down = pin.SE3(np.diag([1.0, -1.0, -1.0]), np.array([0.1, 0.0, 0.03]))
-ring = sm.Circle.around(down, radius=0.1, duration=12.0, normal=(0, 0, 1))
+ring = sm.paths.Circle.around(down, radius=0.1, duration=12.0, normal=(0, 0, 1))
 problem = sm.Problem(
     cell,
     ring,
     task="pointing",  # turning about the torch is free
     # The table is heavy: a radian of it counts as four of the arm.
-    costs=[sm.JointVelocity(cell.part_weights({"table": 16.0}))],
+    costs=[sm.costs.JointVelocity(cell.part_weights({"table": 16.0}))],
     constraints=[
-        sm.JointPositionLimits(),
-        sm.JointVelocityLimits(),
+        sm.constraints.JointPositionLimits(),
+        sm.constraints.JointVelocityLimits(),
         # The weld pool lies flat: the plate's normal stays within 10 degrees of upwards.
-        sm.Tilt("table/plate", "z", within=np.radians(10.0), towards=(0, 0, 1)),
+        sm.constraints.Tilt("table/plate", "z", within=np.radians(10.0), towards=(0, 0, 1)),
     ],
 )
 plan = sm.plan(problem).require()

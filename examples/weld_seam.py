@@ -13,14 +13,14 @@ panda = sm.load_robot("panda", tool_offset=torch)
 
 # The seam is drawn on the workpiece; the workpiece stands here. Run up to 40 mm/s and down again.
 workpiece = [[1, 0, 0, 0.45], [0, 1, 0, -0.1], [0, 0, 1, 0.35], [0, 0, 0, 1]]
-seam = sm.read_path(HERE / "seam.csv", feed=0.04)
-path = sm.section_at_rest(sm.Placed(seam, workpiece), ramp=0.5)
+seam = sm.files.read_path(HERE / "seam.csv", feed=0.04)
+path = sm.paths.section_at_rest(sm.paths.Placed(seam, workpiece), ramp=0.5)
 
 problem = sm.Problem(
     panda,
     path,
     task="pointing",
-    costs=[sm.JointVelocity(), sm.InverseManipulability(mu=0.01)],
+    costs=[sm.costs.JointVelocity(), sm.costs.InverseManipulability(mu=0.01)],
 )
 plan = sm.plan(problem, search=sm.Search(starts=12, finalists=2)).require()
 print(f"{path.duration:.2f} s, cost {plan.report.initial_cost:.4f} → {plan.report.cost:.4f}")
@@ -28,4 +28,4 @@ print(plan.certificate.verdict)
 margin = plan.certificate.limit_margin
 print(f"nearest to a joint limit: {margin.name}, {margin.value:.2f} rad at {margin.time:.2f} s")
 plan.save(OUT / "seam.npz")
-sm.write_motion(plan, OUT / "seam.csv", rate=250)
+sm.files.write_motion(plan, OUT / "seam.csv", rate=250)

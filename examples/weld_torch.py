@@ -10,9 +10,11 @@ import selfmotion as sm
 bent = pin.rpy.rpyToMatrix(0.0, np.radians(40.0), 0.0)
 elbow = np.array([0.0, 0.0, 0.28])
 torch = [
-    sm.Box("gun", [0.0, 0.0, 0.08], [0.08, 0.08, 0.16]),
-    sm.Cylinder("neck", [0.0, 0.0, 0.22], radius=0.015, length=0.12),
-    sm.Cylinder("nozzle", pin.SE3(bent, elbow + 0.05 * bent[:, 2]), radius=0.012, length=0.1),
+    sm.obstacles.Box("gun", [0.0, 0.0, 0.08], [0.08, 0.08, 0.16]),
+    sm.obstacles.Cylinder("neck", [0.0, 0.0, 0.22], radius=0.015, length=0.12),
+    sm.obstacles.Cylinder(
+        "nozzle", pin.SE3(bent, elbow + 0.05 * bent[:, 2]), radius=0.012, length=0.1
+    ),
 ]
 cell = sm.load_robot(
     {"arm": "ur10", "table": "positioner"},
@@ -25,26 +27,26 @@ cell = sm.load_robot(
 
 # The part is clamped to the plate, and moves with it.
 part = [
-    sm.Cylinder("tube", [0.0, 0.0, 0.09], radius=0.08, length=0.16, frame="table/plate"),
-    sm.Box("clamp", [0.19, 0.0, 0.035], [0.06, 0.06, 0.05], frame="table/plate"),
+    sm.obstacles.Cylinder("tube", [0.0, 0.0, 0.09], radius=0.08, length=0.16, frame="table/plate"),
+    sm.obstacles.Box("clamp", [0.19, 0.0, 0.035], [0.06, 0.06, 0.05], frame="table/plate"),
 ]
 
 # The seam goes round the foot of the tube; the torch points into the corner at 45 degrees.
 angle, same = np.linspace(0.0, 2.0 * np.pi, 25), np.ones(25)
 seam = np.stack([0.081 * np.cos(angle), 0.081 * np.sin(angle), 0.011 * same], axis=1)
 turns = Rotation.from_euler("ZY", np.stack([angle, np.radians(-135.0) * same], axis=1))
-path = sm.Feed(sm.Waypoints(angle, seam, turns.as_quat(scalar_first=True)), 0.04)
+path = sm.paths.Feed(sm.paths.Waypoints(angle, seam, turns.as_quat(scalar_first=True)), 0.04)
 
 problem = sm.Problem(
     cell,
     path,
     task="pointing",  # turning about the wire is free
     constraints=[
-        sm.JointPositionLimits(),
-        sm.JointVelocityLimits(),
+        sm.constraints.JointPositionLimits(),
+        sm.constraints.JointVelocityLimits(),
         # The wire points downwards within 50 degrees: the weld pool stays where it is.
-        sm.Tilt("arm/tool0_offset", "z", within=np.radians(50.0)),
-        sm.Clearance(part, distance=2e-3),
+        sm.constraints.Tilt("arm/tool0_offset", "z", within=np.radians(50.0)),
+        sm.constraints.Clearance(part, distance=2e-3),
     ],
 )
 plan = sm.plan(problem).require()

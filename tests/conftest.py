@@ -23,7 +23,7 @@ def robot(request: pytest.FixtureRequest) -> sm.RobotModel:
 
 
 @pytest.fixture(params=CASES, ids=lambda case: "-".join(case))
-def case(request: pytest.FixtureRequest) -> tuple[sm.RobotModel, sm.Task, Array, sm.Path]:
+def case(request: pytest.FixtureRequest) -> tuple[sm.RobotModel, sm.Task, Array, sm.paths.Path]:
     """Each arm with its task, a start and a short path."""
     name, task = request.param
     arm = robot_named(name)
@@ -44,7 +44,7 @@ def planar() -> sm.RobotModel:
 @pytest.fixture
 def panda_circle(panda: sm.RobotModel) -> Callable[[str], sm.Problem]:
     """Return a maker of the problem: Panda on a vertical circle of 0.15 m in 4 s."""
-    path = sm.Circle.around(panda.pose(PANDA_HOME), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
+    path = sm.paths.Circle.around(panda.pose(PANDA_HOME), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
     return lambda task="pose", **options: sm.Problem(panda, path, task, PANDA_HOME, **options)
 
 

@@ -121,7 +121,7 @@ def bar() -> list[dict[str, str]]:
     cell = sm.load_robot({"left": "panda", "right": "panda"}, base=stands, tool=HANDS)
     first = pin.SE3(np.diag([1.0, -1.0, -1.0]), np.array([0.45, 0.2, 0.3]))
     grasp = pin.SE3(np.eye(3), np.array([0.0, 0.4, 0.0]))
-    circle = sm.Circle.around(first, radius=0.15, duration=6.0, normal=(0, 1, 0))
+    circle = sm.paths.Circle.around(first, radius=0.15, duration=6.0, normal=(0, 1, 0))
     follows = [
         sm.Follow(circle, tool=HANDS[0]),
         sm.Follow(grasp, tool=HANDS[1], reference=HANDS[0]),
@@ -156,7 +156,7 @@ def bar_row(
     tool: str,
     settings: str,
     cell: sm.RobotModel,
-    circle: sm.Path,
+    circle: sm.paths.Path,
     grasp: Any,
     t: Array,
     q: Array,

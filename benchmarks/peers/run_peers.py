@@ -39,13 +39,15 @@ def main() -> int:
     argparse.ArgumentParser(description=__doc__).parse_args()
     OUT.mkdir(parents=True, exist_ok=True)
     robot = sm.load_robot("panda", tool="panda_hand")
-    path = sm.Waypoints.from_csv(HERE.parent / "data" / "panda__1cube" / "path.csv")
+    path = sm.paths.Waypoints.from_csv(HERE.parent / "data" / "panda__1cube" / "path.csv")
     start = robot.inverse_kinematics(path.pose(0.0), seed=[0, -0.5, 0, -2, 0, 1.6, 0.8])
     given = OUT / "given.json"
     given.write_text(json.dumps({"start": start.tolist(), "urdf": robot.urdf.source}))
     whole = sm.Problem(robot, path, start=start)
     # As the peers have it: no bodies, no rest, the URDF's limits of position alone.
-    bare = replace(whole, constraints=(sm.JointPositionLimits(),), rest=False, collision=None)
+    bare = replace(
+        whole, constraints=(sm.constraints.JointPositionLimits(),), rest=False, collision=None
+    )
     rows = [
         *ours(bare, "default, limits of position only"),
         *ours(whole, "default, maker's limits, rest, self-collision"),
@@ -106,7 +108,9 @@ def ours(problem: sm.Problem, settings: str) -> list[dict[str, object]]:
     ]  # fmt: skip
 
 
-def judged(robot: sm.RobotModel, path: sm.Waypoints, item: dict[str, Any]) -> dict[str, object]:
+def judged(
+    robot: sm.RobotModel, path: sm.paths.Waypoints, item: dict[str, Any]
+) -> dict[str, object]:
     """Measure a motion by its joints at the waypoints, and straight lines of them in between.
 
     The cost is Σ ½ |Δq|²/Δt [rad²/s]; how far the hand is off the path is told at the waypoints

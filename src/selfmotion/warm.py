@@ -49,8 +49,8 @@ def small_works() -> Iterator[tuple[str, Callable[[], object]]]:
     arm = sm.load_robot("panda")
     home = np.array(sm.NAMED_ARMS["panda"].home)
     place, size = np.array([0.5, 0.4, 0.3]), np.array([0.1, 0.1, 0.6])
-    circle = sm.Circle.around(arm.pose(home), 0.05, 4.0)
-    box = sm.Clearance((sm.Box("post", place, size),), 0.01)
+    circle = sm.paths.Circle.around(arm.pose(home), 0.05, 4.0)
+    box = sm.constraints.Clearance((sm.obstacles.Box("post", place, size),), 0.01)
     alone = sm.Problem(arm, circle, "position", home, collision=None)
 
     def plan(problem: sm.Problem, **options: Any) -> Callable[[], object]:
@@ -67,23 +67,23 @@ def small_works() -> Iterator[tuple[str, Callable[[], object]]]:
     yield "a free start", plan(free)
     yield "the paper's arm", plan(sm.sample_problem())
     yield "bodies", plan(replace(given, constraints=[box]))
-    torque = sm.JointTorqueLimits()
+    torque = sm.constraints.JointTorqueLimits()
     yield "meshes", lambda: winding_number(np.zeros((1, 3, 3)), np.zeros(3))
-    model = sm.CollisionModel(arm, box.obstacles)
+    model = sm.obstacles.CollisionModel(arm, box.obstacles)
     yield "distances", lambda: model.worst(read_only(np.stack([home, home + 0.1])))
     yield "torques", plan(replace(given, constraints=[*given.constraints, torque]))
-    tool = sm.ToolLimits(speed=0.2, acceleration=5.0)
+    tool = sm.constraints.ToolLimits(speed=0.2, acceleration=5.0)
     yield "the tool", plan(replace(given, constraints=[*given.constraints, tool]))
-    yield "singular poses", plan(replace(given, costs=[sm.InverseManipulability(0.01)]))
+    yield "singular poses", plan(replace(given, costs=[sm.costs.InverseManipulability(0.01)]))
     yield "paces", lambda: sm.retime(sm.plan(given))
-    yield "accelerations", plan(replace(given, costs=[sm.JointAcceleration()]))
+    yield "accelerations", plan(replace(given, costs=[sm.costs.JointAcceleration()]))
     yield (
         "relaxed rows",
         plan(replace(given, task="pose", relaxations=[sm.Relaxation(("rx", "ry"), 0.1)])),
     )
     tilted = replace(free, task="pose", relaxations=[sm.Relaxation(("rx", "ry"), 0.1)])
     yield "relaxed rows from anywhere", plan(tilted)
-    away = sm.Line(arm.pose(home), _far(arm.pose(home)), 2.0)
+    away = sm.paths.Line(arm.pose(home), _far(arm.pose(home)), 2.0)
     yield "what is out of reach", lambda: _refused(replace(tilted, path=away))
     yield "damping", plan(replace(given, damping=sm.Damping()))
     yield "a global search", plan(free, search=sm.Search(mode="global"))
@@ -126,7 +126,7 @@ def _carried() -> sm.Problem:
     last = first.copy()
     last[0, 3] += 0.05
     carried: Any = [
-        sm.Follow(sm.Line(first, last, 2.0), tool=left),
+        sm.Follow(sm.paths.Line(first, last, 2.0), tool=left),
         sm.Follow(grasp, tool=right, reference=left),
     ]
     return sm.Problem(cell, carried)

@@ -11,7 +11,7 @@ from selfmotion.replay import write_replay
 
 
 def test_plans_by_a_method_are_plans_like_any(tmp_path: Path) -> None:
-    found = sm.plan_by(sm.sample_problem(), sm.PseudoInverse())
+    found = sm.plan_by(sm.sample_problem(), sm.baselines.PseudoInverse())
     assert write_replay(found, tmp_path / "replay.html").is_file()
     file = tmp_path / "plan.npz"
     found.save(file)
@@ -23,11 +23,11 @@ def test_plans_by_a_method_are_plans_like_any(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("method", "message"),
     [
-        (lambda: sm.DampedLeastSquares(0.0), "damping is 0.0"),
-        (lambda: sm.DampedLeastSquares(0.1, -1.0), "threshold is -1.0"),
-        (lambda: sm.GradientProjection(gain=-1.0), "gain is -1.0"),
+        (lambda: sm.baselines.DampedLeastSquares(0.0), "damping is 0.0"),
+        (lambda: sm.baselines.DampedLeastSquares(0.1, -1.0), "threshold is -1.0"),
+        (lambda: sm.baselines.GradientProjection(gain=-1.0), "gain is -1.0"),
     ],
 )
 def test_bad_parameters(method: Callable[[], object], message: str) -> None:
-    with pytest.raises(sm.ProblemError, match=message):
+    with pytest.raises(sm.errors.ProblemError, match=message):
         method()

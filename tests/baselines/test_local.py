@@ -13,7 +13,7 @@ Circle = Callable[..., sm.Problem]
 
 def test_pseudo_inverse_is_x_0(ours: sm.Plan) -> None:
     """Two integrators, one of fixed steps and one of controlled error, on the same equation."""
-    found = sm.plan_by(sm.sample_problem(), sm.PseudoInverse())
+    found = sm.plan_by(sm.sample_problem(), sm.baselines.PseudoInverse())
     assert found.certificate.verified
     assert found.report.cost == pytest.approx(ours.report.initial_cost, rel=1e-6)
     assert found.report.cost == pytest.approx(15.500547, abs=1e-5)
@@ -21,8 +21,8 @@ def test_pseudo_inverse_is_x_0(ours: sm.Plan) -> None:
 
 def test_gradient_projection_climbs(panda_circle: Circle) -> None:
     problem = panda_circle("position", rest=False)
-    still = sm.plan_by(problem, sm.PseudoInverse())
-    moving = sm.plan_by(problem, sm.GradientProjection(gain=1.0))
+    still = sm.plan_by(problem, sm.baselines.PseudoInverse())
+    moving = sm.plan_by(problem, sm.baselines.GradientProjection(gain=1.0))
     end = still.trajectory.q[-1], moving.trajectory.q[-1]
     w = [np.prod(np.linalg.svd(problem.robot.task_jacobian(q, problem.task))[1]) for q in end]
     assert w[1] > w[0]
@@ -32,17 +32,17 @@ def test_gradient_projection_climbs(panda_circle: Circle) -> None:
 def test_gradient_projection_tunes_its_gain() -> None:
     """The tuned gain is no worse than others, and better than none."""
     problem = sm.sample_problem()
-    tuned = sm.plan_by(problem, sm.GradientProjection())
+    tuned = sm.plan_by(problem, sm.baselines.GradientProjection())
     assert tuned.report.cost < 0.75 * tuned.report.initial_cost
     for gain in (0.5, 1.0, 2.0):
-        fixed = sm.plan_by(problem, sm.GradientProjection(gain=gain))
+        fixed = sm.plan_by(problem, sm.baselines.GradientProjection(gain=gain))
         assert tuned.report.cost <= fixed.report.cost + 1e-6
 
 
 def test_pose_gradient_is_that_of_the_cost(panda: sm.RobotModel, panda_circle: Circle) -> None:
     problem = panda_circle("pose")
     q = problem.given_start
-    found = pose_gradient(problem, sm.Manipulability(), 0.0, q)
+    found = pose_gradient(problem, sm.costs.Manipulability(), 0.0, q)
 
     def negative_w(q: np.ndarray) -> float:
         jacobian = panda.task_jacobian(q, problem.task)
@@ -54,9 +54,9 @@ def test_pose_gradient_is_that_of_the_cost(panda: sm.RobotModel, panda_circle: C
 
 
 def test_damping_costs_path_and_certificates_say_so() -> None:
-    found = sm.plan_by(sm.sample_problem(), sm.DampedLeastSquares(0.3))
+    found = sm.plan_by(sm.sample_problem(), sm.baselines.DampedLeastSquares(0.3))
     assert not found.certificate.verified
     assert found.certificate.position_error.value > 1e-3
     assert "off the path" in found.certificate.verdict
-    far = sm.plan_by(sm.sample_problem(), sm.DampedLeastSquares(0.3, threshold=1e-6))
+    far = sm.plan_by(sm.sample_problem(), sm.baselines.DampedLeastSquares(0.3, threshold=1e-6))
     assert far.certificate.verified

@@ -29,7 +29,7 @@ def test_failed_writes_leave_the_old_file_and_nothing_else(tmp_path: Path) -> No
 
 def test_a_folder_in_the_way_is_named(plan: sm.Plan, tmp_path: Path) -> None:
     (tmp_path / "plan.npz").mkdir()
-    with pytest.raises(sm.FileFormatError, match=r"plan\.npz: cannot be written"):
+    with pytest.raises(sm.errors.FileFormatError, match=r"plan\.npz: cannot be written"):
         plan.save(tmp_path / "plan.npz")
     assert [path.name for path in tmp_path.iterdir()] == ["plan.npz"]
 
@@ -40,5 +40,5 @@ def test_a_name_that_no_file_can_have_is_of_none(plan: sm.Plan, tmp_path: Path) 
     assert not saved.robot.urdf.has_changed()
     saved.save(tmp_path / "plan.npz")
     assert sm.load_plan(tmp_path / "plan.npz").certificate.notes == plan.certificate.notes
-    with pytest.raises(sm.FileFormatError, match="cannot be read"):
+    with pytest.raises(sm.errors.FileFormatError, match="cannot be read"):
         sm.load_plan("n" * 300 + ".npz")

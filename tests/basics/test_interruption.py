@@ -48,7 +48,7 @@ def pressed(times: int, error: Exception | None = None) -> list[str]:
                 told.append("went on")
             if error is not None:
                 raise error
-    except (KeyboardInterrupt, sm.ProblemError) as ended:
+    except (KeyboardInterrupt, sm.errors.ProblemError) as ended:
         told.append(type(ended).__name__)
     return told
 
@@ -62,7 +62,7 @@ def test_the_second_time_it_is_obeyed_at_once() -> None:
 
 
 def test_an_error_goes_before_it() -> None:
-    assert pressed(1, sm.ProblemError("first")) == ["went on", "ProblemError"]
+    assert pressed(1, sm.errors.ProblemError("first")) == ["went on", "ProblemError"]
     assert not was_interrupted()
 
 
@@ -92,8 +92,11 @@ def test_a_search_for_the_fastest_ends_with_the_best_so_far(
 ) -> None:
     """Or without any, as an interruption does: never as a fault of a compiled call."""
     start = np.array([0.3, 0.8, 0.6])
-    circle = sm.Circle.around(planar.pose(start), 0.4, 2.0)
-    limits = [sm.JointVelocityLimits(np.full(3, 2.0)), sm.JointAccelerationLimits(np.full(3, 8.0))]
+    circle = sm.paths.Circle.around(planar.pose(start), 0.4, 2.0)
+    limits = [
+        sm.constraints.JointVelocityLimits(np.full(3, 2.0)),
+        sm.constraints.JointAccelerationLimits(np.full(3, 8.0)),
+    ]
     problem = sm.Problem(planar, circle, "planar", start, constraints=limits)
     timer = threading.Timer(moment, press)
     found = None

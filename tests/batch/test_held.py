@@ -17,14 +17,14 @@ from selfmotion.task import SE3
 from support.arms import robot_named
 
 
-def toward(seconds: float, far: float = 0.3) -> sm.Path:
+def toward(seconds: float, far: float = 0.3) -> sm.paths.Path:
     first = robot_named("planar_3r").pose([0.1, 0.9, 0.9])
-    return sm.Line(first, SE3(first.rotation, first.translation - [far, 0.0, 0.0]), seconds)
+    return sm.paths.Line(first, SE3(first.rotation, first.translation - [far, 0.0, 0.0]), seconds)
 
 
 @pytest.fixture(scope="module")
 def plan() -> sm.Plan:
-    limits = [sm.JointVelocityLimits(2.0), sm.JointAccelerationLimits(3.0)]
+    limits = [sm.constraints.JointVelocityLimits(2.0), sm.constraints.JointAccelerationLimits(3.0)]
     robot, start = robot_named("planar_3r"), np.array([0.1, 0.9, 0.9])
     windows = [sm.Relaxation("y", 0.01, during=(0.5, 1.0))]
     problem = sm.Problem(
@@ -36,15 +36,15 @@ def plan() -> sm.Plan:
 def test_a_plan_is_made_for_its_own_job_only(plan: sm.Plan) -> None:
     problem = plan.problem
     faster = sm.retime(plan).require()
-    assert is_made_for(plan, sm.Job(problem))
-    assert is_made_for(faster, sm.Job(problem, goal="retimed"))
-    assert not is_made_for(faster, sm.Job(problem))
-    slower = [*problem.constraints, sm.JointVelocityLimits(1.0)]
+    assert is_made_for(plan, sm.files.Job(problem))
+    assert is_made_for(faster, sm.files.Job(problem, goal="retimed"))
+    assert not is_made_for(faster, sm.files.Job(problem))
+    slower = [*problem.constraints, sm.constraints.JointVelocityLimits(1.0)]
     others = [
-        sm.Job(problem, tolerance=sm.Tolerance(1e-9, 1e-9)),
-        sm.Job(replace(problem, path=toward(2.0, 0.31))),
-        sm.Job(replace(problem, constraints=slower)),
-        sm.Job(replace(problem, relaxations=[])),
+        sm.files.Job(problem, tolerance=sm.Tolerance(1e-9, 1e-9)),
+        sm.files.Job(replace(problem, path=toward(2.0, 0.31))),
+        sm.files.Job(replace(problem, constraints=slower)),
+        sm.files.Job(replace(problem, relaxations=[])),
     ]
     for job in others:
         assert not is_made_for(plan, job)

@@ -200,7 +200,9 @@ def test_a_problem_that_kills_its_worker_is_found_out(
 
 
 def test_an_executor_that_breaks_leaves_what_was_done(grid: Path, tmp_path: Path) -> None:
-    with pytest.raises(sm.PlanError, match=r"broke after 5 of 6 problems; .*: run again to go on"):
+    with pytest.raises(
+        sm.errors.PlanError, match=r"broke after 5 of 6 problems; .*: run again to go on"
+    ):
         plan_items(grid_items(grid), InPlace(breaks_at=4), out=tmp_path)
     assert plan_items(grid_items(grid), InPlace(), out=tmp_path).resumed == 5
 
@@ -229,38 +231,40 @@ def test_a_problem_that_changed_is_planned_anew(grid: Path, tmp_path: Path) -> N
 
 def test_bad_problems_do_not_stop_the_rest(tmp_path: Path) -> None:
     panda = robot_named("panda")
-    circle = sm.Circle.around(panda.pose(PANDA_HOME), 0.05, 3.0)
+    circle = sm.paths.Circle.around(panda.pose(PANDA_HOME), 0.05, 3.0)
     good = sm.Problem(panda, circle, start=PANDA_HOME)
     far = panda.pose(PANDA_HOME)
     far.translation = far.translation + 5.0
     problems = [
         good,
-        sm.Job(sm.Problem(panda, sm.Circle.around(far, 0.05, 3.0)), sm.Search(starts=4)),
-        sm.Problem(panda, circle, costs=[sm.FunctionCost(lambda qd, q, t: q[:, 0] ** 2)]),
+        sm.files.Job(
+            sm.Problem(panda, sm.paths.Circle.around(far, 0.05, 3.0)), sm.Search(starts=4)
+        ),
+        sm.Problem(panda, circle, costs=[sm.costs.FunctionCost(lambda qd, q, t: q[:, 0] ** 2)]),
     ]
     batch = sm.plan_many(problems, InPlace(), out=tmp_path)
     assert [bool(row.error) for row in batch.rows] == [False, True, True]
     assert "is a function, which cannot be sent" in batch.rows[2].error
-    with pytest.raises(sm.FileFormatError, match="has no plan"):
+    with pytest.raises(sm.errors.FileFormatError, match="has no plan"):
         batch.rows[1].plan()
-    with pytest.raises(sm.ProblemError, match=r"problems\[0\] is 3"):
+    with pytest.raises(sm.errors.ProblemError, match=r"problems\[0\] is 3"):
         sm.plan_many([3], out=tmp_path)  # type: ignore[list-item]
 
 
 def test_a_fault_of_ones_own_code_is_said_and_tried_again(
     grid: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    real = sm.Job.plan
+    real = sm.files.Job.plan
 
-    def faulty(job: sm.Job, **options: Any) -> sm.Plan:
+    def faulty(job: sm.files.Job, **options: Any) -> sm.Plan:
         if job.problem.path.duration == 4.0:
             raise ZeroDivisionError("own code")
         return real(job, **options)
 
-    monkeypatch.setattr(sm.Job, "plan", faulty)
+    monkeypatch.setattr(sm.files.Job, "plan", faulty)
     batch = plan_items(grid_items(grid), InPlace(), out=tmp_path / "out")
     assert [row.error for row in batch.rows if row.error] == ["ZeroDivisionError: own code"] * 2
-    monkeypatch.setattr(sm.Job, "plan", real)
+    monkeypatch.setattr(sm.files.Job, "plan", real)
     again = plan_items(grid_items(grid), InPlace(), out=tmp_path / "out")
     assert again.resumed == 4
     assert all(not row.error for row in again.rows)
@@ -271,7 +275,7 @@ def test_the_best_is_what_was_asked_for(
     grid: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, goal: str, duration: float
 ) -> None:
     """Who asked for the fastest motion does not want the cheapest, which takes longest."""
-    monkeypatch.setattr(sm.Job, "plan", lambda job, **options: sm.plan(job.problem))
+    monkeypatch.setattr(sm.files.Job, "plan", lambda job, **options: sm.plan(job.problem))
     grid.write_text(f'goal = "{goal}"\n' + GRID.replace("[0, 1]", "[0]"))
     batch = plan_items(grid_items(grid), InPlace(), out=tmp_path / "out")
     assert batch.best is not None
@@ -390,8 +394,8 @@ def test_names_sort_as_they_are_numbered(grid: Path) -> None:
 
 
 def test_of_each_file_some_combination_has_to_be_verified() -> None:
-    def made() -> sm.Job:
-        raise sm.ProblemError("is not planned here")
+    def made() -> sm.files.Job:
+        raise sm.errors.ProblemError("is not planned here")
 
     one, other = ([Item(f"{file}-{k}", made, {}) for k in range(3)] for file in "ab")
     assert is_answered([one, other], {"a-2", "b-0"})
@@ -402,13 +406,17 @@ def test_of_each_file_some_combination_has_to_be_verified() -> None:
 def test_a_mesh_that_changed_is_planned_anew_in_any_process(tmp_path: Path) -> None:
     """In one that has its bodies made before as well; so is what a row lies about."""
     panda = robot_named("panda")
-    line = sm.Line(panda.pose(PANDA_HOME), panda.pose(PANDA_HOME + 0.05), 2.0)
+    line = sm.paths.Line(panda.pose(PANDA_HOME), panda.pose(PANDA_HOME + 0.05), 2.0)
     part, out = tmp_path / "part.stl", tmp_path / "out"
 
     def row() -> tuple[sm.batch.Row, int]:
-        bodies = [sm.Mesh("part", np.zeros(3), str(part))]
+        bodies = [sm.obstacles.Mesh("part", np.zeros(3), str(part))]
         problem = sm.Problem(
-            panda, line, "position", PANDA_HOME, constraints=[sm.Clearance(bodies, 0.01)]
+            panda,
+            line,
+            "position",
+            PANDA_HOME,
+            constraints=[sm.constraints.Clearance(bodies, 0.01)],
         )
         found = sm.batch.plan_many([problem], InPlace(), out=out)
         return found.rows[0], found.resumed
@@ -438,22 +446,27 @@ def test_what_a_batch_is_given_is_used_or_refused_by_name(tmp_path: Path) -> Non
         ({"replays": -1}, "replays is -1"),
         ({"progress": 5}, "progress is 5, expected a function"),
         ({"deadline": 3.0}, "deadline: is no option of a batch; expected search, "),
-        ({"problems": [sm.Job(problem)], "tolerance": 1e-3}, "tolerance: has no effect: each"),
+        (
+            {"problems": [sm.files.Job(problem)], "tolerance": 1e-3},
+            "tolerance: has no effect: each",
+        ),
         ({"problems": problem}, "expected a list of problems"),
     ]
     for given, told in bad:
-        with pytest.raises(sm.ProblemError, match=told):
+        with pytest.raises(sm.errors.ProblemError, match=told):
             sm.plan_many(**{"problems": [problem], "out": tmp_path, **given})
-    with pytest.raises(sm.FileFormatError, match="file is 5"):
+    with pytest.raises(sm.errors.FileFormatError, match="file is 5"):
         sm.plan_many([], out=5)  # type: ignore[arg-type]
-    (row,) = sm.plan_many([sm.Job(problem, parts={"ramp": 0.1})], InPlace(), out=tmp_path).rows
+    (row,) = sm.plan_many(
+        [sm.files.Job(problem, parts={"ramp": 0.1})], InPlace(), out=tmp_path
+    ).rows
     assert row.error == "parts: has no effect on the best motion; leave it out"
 
 
 def test_a_row_that_was_changed_or_renamed_is_not_believed(tmp_path: Path) -> None:
     """Neither its words, its name nor what is no row at all: all is planned again."""
     # Said at once, without a plan.
-    twice = 2 * [sm.Job(sm.sample_problem(), parts={"ramp": 0.1})]
+    twice = 2 * [sm.files.Job(sm.sample_problem(), parts={"ramp": 0.1})]
     before = [row.error for row in sm.plan_many(twice, InPlace(), out=tmp_path).rows]
     assert all(before)
     file, other = (tmp_path / "rows" / f"plan-{k}.json" for k in range(2))

@@ -181,7 +181,7 @@ SUMMED = 1e-7
 @pytest.fixture(scope="module")
 def circle() -> sm.Plan:
     panda = robot_named("panda")
-    path = sm.Circle.around(panda.pose(PANDA_HOME), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
+    path = sm.paths.Circle.around(panda.pose(PANDA_HOME), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
     return sm.plan(sm.Problem(panda, path, start=PANDA_HOME))
 
 
@@ -199,7 +199,7 @@ def test_the_way_is_what_joints_make(circle: sm.Plan) -> None:
 
 
 def test_the_distance_decides_to_the_last_digits(circle: sm.Plan) -> None:
-    model = sm.CollisionModel(circle.robot)
+    model = sm.obstacles.CollisionModel(circle.robot)
     least = model.worst(circle.trajectory(np.linspace(0.0, 4.0, 4001))).value
     kept = closest_at_all_times(model, circle.trajectory, least - 1e-5)
     assert kept.open_until is None
@@ -210,9 +210,11 @@ def test_the_distance_decides_to_the_last_digits(circle: sm.Plan) -> None:
 
 def test_grazing_is_said_to_be_undecided_or_decided(circle: sm.Plan) -> None:
     """Down to the accuracy of distances something has to be said, and never that it is kept."""
-    model = sm.CollisionModel(circle.robot)
+    model = sm.obstacles.CollisionModel(circle.robot)
     least = model.worst(circle.trajectory(np.linspace(0.0, 4.0, 40_001))).value
-    finding = KeepsApart(model, least).judge(sm.FinishedMotion(circle.robot, circle.trajectory))
+    finding = KeepsApart(model, least).judge(
+        sm.certificate.FinishedMotion(circle.robot, circle.trajectory)
+    )
     assert abs(finding.amount - least) < 1e-6
     assert finding.kept or "not decided" in finding.text or finding.amount < least
 
@@ -224,10 +226,10 @@ def test_a_plate_between_samples_is_found(circle: sm.Plan) -> None:
     last = first + np.array([1.2, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
     coarse = sm.Trajectory(t, np.array([first, last]), np.zeros((2, 7)), panda.joint_names)
     inside = panda.pose(coarse(2.0))
-    plate = sm.Box("plate", inside.translation, [0.02, 2e-3, 0.02])
-    model = sm.CollisionModel(panda, [plate])
+    plate = sm.obstacles.Box("plate", inside.translation, [0.02, 2e-3, 0.02])
+    model = sm.obstacles.CollisionModel(panda, [plate])
     assert model.worst(coarse.q).value > 0.0
-    finding = KeepsApart(model, 0.0).judge(sm.FinishedMotion(panda, coarse))
+    finding = KeepsApart(model, 0.0).judge(sm.certificate.FinishedMotion(panda, coarse))
     assert not finding.kept
     assert "plate" in finding.subject
 
@@ -254,11 +256,17 @@ def test_a_motion_into_itself_is_not_verified_and_planned_anew() -> None:
     pose = robot.pose(start)
     end = pose.copy()
     end.translation = pose.translation + rng.uniform(-0.1, 0.1, 3)
-    careless = sm.plan(sm.Problem(robot, sm.Line(pose, end, 3.0), start=start, collision=None))
-    model = sm.CollisionModel(robot)
-    overlap = KeepsApart(model, 0.0).judge(sm.FinishedMotion(robot, careless.trajectory))
+    careless = sm.plan(
+        sm.Problem(robot, sm.paths.Line(pose, end, 3.0), start=start, collision=None)
+    )
+    model = sm.obstacles.CollisionModel(robot)
+    overlap = KeepsApart(model, 0.0).judge(
+        sm.certificate.FinishedMotion(robot, careless.trajectory)
+    )
     assert not overlap.kept
-    plan = sm.plan(dataclasses.replace(careless.problem, collision=sm.Clearance(distance=0.0)))
+    plan = sm.plan(
+        dataclasses.replace(careless.problem, collision=sm.constraints.Clearance(distance=0.0))
+    )
     assert plan.certificate.verified, plan.certificate.verdict
     assert model.worst(plan.trajectory.q).value >= 0.0
 
@@ -270,7 +278,7 @@ def test_an_arm_without_bodies_says_so(planar: sm.RobotModel) -> None:
 
 def test_pairs_left_out_are_listed() -> None:
     robot = robot_named("baxter")
-    remarks = " ".join(KeepsApart(sm.CollisionModel(robot), 0.0).remarks)
+    remarks = " ".join(KeepsApart(sm.obstacles.CollisionModel(robot), 0.0).remarks)
     for first, second in robot.touching:
         assert first in remarks
         assert second in remarks
@@ -283,9 +291,9 @@ def srdf_without(pairs: Iterable[tuple[str, str]]) -> str:
 
 def test_pairs_that_the_srdf_leaves_out_are_listed(tmp_path: Path) -> None:
     robot = robot_named("panda")
-    every = tuple(dict.fromkeys(sm.CollisionModel(robot).pairs))
+    every = tuple(dict.fromkeys(sm.obstacles.CollisionModel(robot).pairs))
     (tmp_path / "one.srdf").write_text(srdf_without(every[:1]))
-    one = sm.Clearance(srdf=tmp_path / "one.srdf").requirement(robot)
+    one = sm.constraints.Clearance(srdf=tmp_path / "one.srdf").requirement(robot)
     assert one.covers == ("self-collision",)
     assert f"left out as asked: {' - '.join(every[0])}" in one.remarks
 
@@ -294,12 +302,12 @@ def test_a_plan_keeps_the_pairs_that_its_srdf_left_out(tmp_path: Path) -> None:
     """Whatever becomes of the SRDF: a plan that is read again is judged by the same pairs."""
     robot = robot_named("panda")
     start = start_of(robot, "pose")
-    pair = sm.CollisionModel(robot).pairs[0]
+    pair = sm.obstacles.CollisionModel(robot).pairs[0]
     (tmp_path / "one.srdf").write_text(srdf_without([pair]))
-    kept = sm.Clearance(srdf=tmp_path / "one.srdf")
+    kept = sm.constraints.Clearance(srdf=tmp_path / "one.srdf")
     plan = sm.plan(sm.Problem(robot, short_line(robot, start), start=start, collision=kept))
     plan.save(tmp_path / "plan.npz")
-    (tmp_path / "one.srdf").write_text(srdf_without(sm.CollisionModel(robot).pairs))
+    (tmp_path / "one.srdf").write_text(srdf_without(sm.obstacles.CollisionModel(robot).pairs))
     again = sm.load_plan(tmp_path / "plan.npz")
     assert again.problem.collision is not None
     assert again.problem.collision.disabled == (pair,)
@@ -307,28 +315,30 @@ def test_a_plan_keeps_the_pairs_that_its_srdf_left_out(tmp_path: Path) -> None:
 
 
 def test_disabled_links_come_in_pairs() -> None:
-    with pytest.raises(sm.ProblemError, match=r"disabled has \('a', 'b', 'c'\), expected pairs"):
-        sm.Clearance(disabled=[("a", "b", "c")])
+    with pytest.raises(
+        sm.errors.ProblemError, match=r"disabled has \('a', 'b', 'c'\), expected pairs"
+    ):
+        sm.constraints.Clearance(disabled=[("a", "b", "c")])
 
 
 def test_where_the_srdf_leaves_out_all_pairs_self_collision_is_not_covered(tmp_path: Path) -> None:
     robot = robot_named("panda")
-    (tmp_path / "all.srdf").write_text(srdf_without(sm.CollisionModel(robot).pairs))
+    (tmp_path / "all.srdf").write_text(srdf_without(sm.obstacles.CollisionModel(robot).pairs))
     start = start_of(robot, "pose")
     line = short_line(robot, start)
-    own = sm.Clearance(srdf=tmp_path / "all.srdf")
+    own = sm.constraints.Clearance(srdf=tmp_path / "all.srdf")
     plan = sm.plan(sm.Problem(robot, line, start=start, collision=own))
     assert "self-collision" in plan.certificate.not_checked
-    assert sm.Clearance(
-        [sm.Sphere("ball", [2.0, 0.0, 0.0], 0.1)], srdf=tmp_path / "all.srdf"
+    assert sm.constraints.Clearance(
+        [sm.obstacles.Sphere("ball", [2.0, 0.0, 0.0], 0.1)], srdf=tmp_path / "all.srdf"
     ).requirement(robot).covers == ("obstacles",)
 
 
 def test_links_that_overlap_from_the_start_are_named_with_the_remedy() -> None:
     robot = dataclasses.replace(robot_named("pr2"), touching=())
     start = start_of(robot, "pose")
-    model = sm.CollisionModel(robot)
-    line = sm.Line(robot.pose(start), robot.pose(start + 1e-3), 1.0)
+    model = sm.obstacles.CollisionModel(robot)
+    line = sm.paths.Line(robot.pose(start), robot.pose(start + 1e-3), 1.0)
     motion = sm.Trajectory(
         np.array([0.0, 1.0]),
         np.array([start, start + 1e-3]),
@@ -346,12 +356,14 @@ def near_bodies(panda: sm.RobotModel) -> sm.Plan:
     start = start_of(panda, "pose")
     at = panda.pose(start).translation
     bodies = [
-        sm.Box("post", at + np.array([0.0, 0.4, 0.0]), [0.1, 0.1, 0.1]),
-        sm.Sphere("ball", at + np.array([0.0, -0.25, 0.1]), 0.05),
-        sm.Cylinder("torch", [0.0, 0.1, 0.05], 0.02, 0.1, frame="panda_hand"),
+        sm.obstacles.Box("post", at + np.array([0.0, 0.4, 0.0]), [0.1, 0.1, 0.1]),
+        sm.obstacles.Sphere("ball", at + np.array([0.0, -0.25, 0.1]), 0.05),
+        sm.obstacles.Cylinder("torch", [0.0, 0.1, 0.05], 0.02, 0.1, frame="panda_hand"),
     ]
     line = short_line(panda, start)
-    return sm.plan(sm.Problem(panda, line, start=start, constraints=[sm.Clearance(bodies)]))
+    return sm.plan(
+        sm.Problem(panda, line, start=start, constraints=[sm.constraints.Clearance(bodies)])
+    )
 
 
 def test_the_closest_approach_of_each_obstacle_is_that_of_dense_samples(

@@ -49,12 +49,12 @@ class Wide:
 
 def kinds(robot: sm.RobotModel, motion: sm.Trajectory) -> dict[str, Bounded]:
     pose = robot.pose(motion.q[0])
-    path = sm.Circle.around(pose, 0.1, float(motion.t[-1]), turns=0.05, turn_tool=True)
+    path = sm.paths.Circle.around(pose, 0.1, float(motion.t[-1]), turns=0.05, turn_tool=True)
     free = (sm.Relaxation("rz", 0.1), sm.Relaxation(("x", "y"), 1e-2, axes="tool"))
     given, pointing = sm.Tolerance(), sm.Task.POINTING
     follow = BoundFollow(robot.chain, path, sm.Task.POSE)
     if robot.reference is not None:
-        limits = sm.ToolLimits(1.0, 1.0, 10.0, 10.0)
+        limits = sm.constraints.ToolLimits(1.0, 1.0, 10.0, 10.0)
         return {
             "relative": _PathErrors(follow, given, ()),
             "relative rates": Shares(limits.quantity(robot)),
@@ -66,13 +66,13 @@ def kinds(robot: sm.RobotModel, motion: sm.Trajectory) -> dict[str, Bounded]:
     } | {
         name: Shares(constraint.quantity(robot))
         for name, constraint in {
-            "joint": sm.Band(sm.JointCoordinate(robot.joint_names[2]), 0.1, 0.5),
-            "height": sm.Band(sm.FrameCoordinate(robot.joint_names[4]), 0.2, 0.5),
-            "swivel": sm.Band(sm.SwivelAngle(), 0.2, 0.5),
-            "torques": sm.JointTorqueLimits(30.0, payload=2.0, center=(0.0, 0.1, 0.1)),
-            "speed": sm.ToolLimits(1.0),
-            "rates": sm.ToolLimits(turn_rate=1.0, turn_acceleration=10.0),
-            "acceleration": sm.ToolLimits(acceleration=10.0),
+            "joint": sm.constraints.Band(sm.robot.JointCoordinate(robot.joint_names[2]), 0.1, 0.5),
+            "height": sm.constraints.Band(sm.robot.FrameCoordinate(robot.joint_names[4]), 0.2, 0.5),
+            "swivel": sm.constraints.Band(sm.robot.SwivelAngle(), 0.2, 0.5),
+            "torques": sm.constraints.JointTorqueLimits(30.0, payload=2.0, center=(0.0, 0.1, 0.1)),
+            "speed": sm.constraints.ToolLimits(1.0),
+            "rates": sm.constraints.ToolLimits(turn_rate=1.0, turn_acceleration=10.0),
+            "acceleration": sm.constraints.ToolLimits(acceleration=10.0),
         }.items()
     }
 
@@ -122,12 +122,12 @@ def _truth(function: Wide, stretch: Stretch) -> Array:
     return np.asarray(function.sizes(values, stretch).max(axis=1))  # type: ignore[operator]
 
 
-def standing(robot: sm.RobotModel) -> tuple[sm.Trajectory, sm.Path]:
+def standing(robot: sm.RobotModel) -> tuple[sm.Trajectory, sm.paths.Path]:
     """An arm that hardly moves, and a path that turns fast a metre beside it."""
     q = robot.dexterous_configuration("pose")
     start = robot.pose(q)
     start.translation += [0.0, 1.0, 0.0]
-    circle = sm.Circle.around(start, 0.1, 20.0, turns=20.0, turn_tool=True)
+    circle = sm.paths.Circle.around(start, 0.1, 20.0, turns=20.0, turn_tool=True)
     t, still = np.linspace(0.0, 20.0, 201), np.zeros((201, robot.dof))
     return sm.Trajectory(t, still + q, still, robot.joint_names, still), circle
 

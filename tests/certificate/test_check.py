@@ -51,7 +51,7 @@ def test_where_damping_acts_is_told_stretch_by_stretch() -> None:
 
 
 def test_what_is_undecided_is_counted() -> None:
-    extreme = sm.Extreme(0.0, 0.0, "tip")
+    extreme = sm.certificate.Extreme(0.0, 0.0, "tip")
 
     def said(count: int) -> tuple[str, ...]:
         open_ = tuple((0.25 * k, 0.25 * k + 0.25) for k in range(1, count + 1))
@@ -72,7 +72,7 @@ def test_a_verdict_names_each_fault_and_what_was_looked_at() -> None:
     """Off the path in place and angle, too short, with limits: and nothing of that when kept."""
     robot = robot_named("panda")
     pose = robot.pose(PANDA_HOME)
-    still = sm.Waypoints.from_poses([0.0, 1.0], [pose, pose])
+    still = sm.paths.Waypoints.from_poses([0.0, 1.0], [pose, pose])
     motion = sm.Trajectory([0.0, 1.0], [PANDA_HOME] * 2, np.zeros((2, 7)), robot.joint_names)
     good = sm.certify(robot, still, "pose", motion)
     assert good.verified
@@ -83,7 +83,7 @@ def test_a_verdict_names_each_fault_and_what_was_looked_at() -> None:
     aside = pose.copy()
     aside.translation = pose.translation + np.array([0.0, 3e-6, 4e-6])
     aside.rotation = pose.rotation @ pin.exp3(np.array([0.0, 0.0, 2e-6]))
-    beside = sm.Waypoints.from_poses([0.0, 2.0], [aside, aside])
+    beside = sm.paths.Waypoints.from_poses([0.0, 2.0], [aside, aside])
     bad = sm.certify(robot, beside, "pose", motion)
     assert bad.position_error.value == pytest.approx(5e-6, rel=1e-3)
     assert bad.rotation_error.value == pytest.approx(2e-6, rel=1e-3)
@@ -111,7 +111,9 @@ def test_a_motion_whose_times_are_rounded_is_judged_by_where_it_ends(
     begin = panda.pose(PANDA_HOME)
     end = begin.copy()
     end.translation = begin.translation + np.array([0.0, speed, 0.0])
-    path = sm.Line(begin, end, 1.0, time_law="constant") if speed else sm.Dwell(begin, 1.0)
+    path = (
+        sm.paths.Line(begin, end, 1.0, time_law="constant") if speed else sm.paths.Dwell(begin, 1.0)
+    )
     q = PANDA_HOME
     motion = sm.Trajectory([0.0, 1.0 + apart], [q, q], np.zeros((2, 7)), panda.joint_names)
     # The arm stands, off the path by the whole way, which is allowed, and some more.
@@ -145,7 +147,7 @@ def test_of_long_motions_fewer_poses_are_looked_at_for_singular_ones(
 
     monkeypatch.setattr(check, "_MOST_POSES", most)
     monkeypatch.setattr(check, "smallest_singular_values", counting)
-    found = sm.certify(robot, sm.Dwell(robot.pose(PANDA_HOME), 2.0), "pose", motion)
+    found = sm.certify(robot, sm.paths.Dwell(robot.pose(PANDA_HOME), 2.0), "pose", motion)
     assert looked == [times]
     assert found.smallest_singular_value.time == 0.0
 
@@ -155,7 +157,7 @@ def test_long_motions_tell_how_far_their_check_is() -> None:
     t = np.linspace(0.0, 10.0, 5001)
     motion = sm.Trajectory(t, np.tile(q, (5001, 1)), np.zeros((5001, 7)), robot.joint_names)
     told: list[tuple[str, int, int]] = []
-    problem = sm.Problem(robot, sm.Dwell(robot.pose(q), 10.0), "position")
+    problem = sm.Problem(robot, sm.paths.Dwell(robot.pose(q), 10.0), "position")
     certificate = problem.certify(motion, progress=lambda *given: told.append(given))
     assert certificate.on_path
     assert told[:3] == [("checking", k, 3) for k in (1, 2, 3)]
@@ -180,7 +182,7 @@ def sample() -> sm.Plan:
 
 
 def test_certificate_equals_an_independent_recomputation(
-    case: tuple[sm.RobotModel, sm.Task, Array, sm.Path],
+    case: tuple[sm.RobotModel, sm.Task, Array, sm.paths.Path],
 ) -> None:
     robot, task, start, path = case
     plan = sm.plan(sm.Problem(robot, path, task, start))
@@ -244,11 +246,11 @@ def test_broken_plans_are_refused(panda_circle: Circle) -> None:
 
 def test_too_fast_plans_are_refused_with_the_factor(panda: sm.RobotModel) -> None:
     start = panda.dexterous_configuration()
-    path = sm.Circle.around(panda.pose(start), 0.15, 0.8, normal=(1, 0, 0))
+    path = sm.paths.Circle.around(panda.pose(start), 0.15, 0.8, normal=(1, 0, 0))
     plan = sm.plan(sm.Problem(panda, path, start=start))
     assert "times its limit" in plan.certificate.verdict
     assert plan.certificate.position_error.value <= 1e-6
-    with pytest.raises(sm.PlanError, match="times the duration"):
+    with pytest.raises(sm.errors.PlanError, match="times the duration"):
         plan.require()
 
 
@@ -258,7 +260,8 @@ def test_verified_plans_pass_require(sample: sm.Plan) -> None:
 
 def test_what_no_slower_motion_mends_is_told_first() -> None:
     fast, near = (
-        sm.Finding(name, "a", 0.0, 2.0, 1.0, False, name) for name in ("speeds", "clearance")
+        sm.certificate.Finding(name, "a", 0.0, 2.0, 1.0, False, name)
+        for name in ("speeds", "clearance")
     )
     fast = dataclasses.replace(fast, of_pace=True, factor=1.5)
     assert list(_told((fast, near))) == ["clearance", "speeds"]

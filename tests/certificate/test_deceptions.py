@@ -26,7 +26,7 @@ def test_a_quintic_that_vanishes_at_five_points_leaves_the_path() -> None:
     motion = hidden(ur5, HOME, 1, 0.02, 0.1)
     t = np.linspace(0.0, 0.1, 5)
     assert np.abs(motion(t) - HOME).max() <= 1e-15
-    found = sm.certify(ur5, sm.Dwell(ur5.pose(HOME), 0.1), "pose", motion)
+    found = sm.certify(ur5, sm.paths.Dwell(ur5.pose(HOME), 0.1), "pose", motion)
     assert not found.verified
     dense = motion(np.linspace(0.0, 0.1, 2001))
     at = ur5.pose(HOME).translation
@@ -34,7 +34,7 @@ def test_a_quintic_that_vanishes_at_five_points_leaves_the_path() -> None:
     # What is broken is told as measured; what a wider tolerance allows is bounded.
     assert found.position_error.value <= 1.2 * worst
     allowed = sm.Tolerance(1.02 * worst, 1.0)
-    wide = sm.certify(ur5, sm.Dwell(ur5.pose(HOME), 0.1), "pose", motion, allowed)
+    wide = sm.certify(ur5, sm.paths.Dwell(ur5.pose(HOME), 0.1), "pose", motion, allowed)
     assert wide.verified
     assert worst <= wide.position_error.value <= 1.02 * worst
 
@@ -47,8 +47,8 @@ def test_a_torque_between_five_points_counts(share: float) -> None:
     needed = np.abs(Dynamics(ur5, 5.0).torques(motion(t), motion(t, 1), motion(t, 2))).max(axis=0)
     limit = np.full(6, 1e3)
     limit[1] = share * needed[1]
-    asked = sm.JointTorqueLimits(limit, payload=5.0).requirement(ur5)
-    assert asked.judge(sm.FinishedMotion(ur5, motion)).kept is (share > 1.0)
+    asked = sm.constraints.JointTorqueLimits(limit, payload=5.0).requirement(ur5)
+    assert asked.judge(sm.certificate.FinishedMotion(ur5, motion)).kept is (share > 1.0)
 
 
 def test_an_elbow_that_flips_between_samples_is_found(tmp_path: Path) -> None:
@@ -64,7 +64,7 @@ def test_an_elbow_that_flips_between_samples_is_found(tmp_path: Path) -> None:
             "</joint>"
         )
     (tmp_path / "srs.urdf").write_text(f'<robot name="srs">{"".join(parts)}</robot>')
-    robot, swivel = sm.load_robot(tmp_path / "srs.urdf"), sm.SwivelAngle()
+    robot, swivel = sm.load_robot(tmp_path / "srs.urdf"), sm.robot.SwivelAngle()
     q = np.tile([0.3, 0.9, 0.4, 0.0, 0.2, 0.5, 0.1], (2, 1))
     qd, qdd = np.zeros((2, 7)), np.zeros((2, 7))
     for bend, flips in ((-5e-5, True), (0.2, False)):
@@ -73,8 +73,8 @@ def test_an_elbow_that_flips_between_samples_is_found(tmp_path: Path) -> None:
             qd[row, 3], qdd[row, 3] = 0.24 * (t - 0.37), 0.24
         motion = sm.Trajectory([0.0, 1.0], q, qd, robot.joint_names, qdd)
         center = float(swivel(robot, motion(np.zeros(1)))[0][0])
-        found = sm.Band(swivel, center, 0.2).requirement(robot)
-        judged = found.judge(sm.FinishedMotion(robot, motion))
+        found = sm.constraints.Band(swivel, center, 0.2).requirement(robot)
+        judged = found.judge(sm.certificate.FinishedMotion(robot, motion))
         t = np.linspace(0.0, 1.0, 20_001)
         away = np.abs(swivel.away(swivel(robot, motion(t))[0], center)).max()
         assert bool(away > 0.2) is flips
@@ -96,7 +96,7 @@ def test_no_polynomial_hides_between_any_points(seed: int) -> None:
     dense = np.linspace(0.0, t[-1], 4001)
     at = ur5.pose(HOME).translation
     worst = max(float(np.linalg.norm(ur5.pose(x).translation - at)) for x in motion(dense))
-    path = sm.Dwell(ur5.pose(HOME), float(t[-1]))
+    path = sm.paths.Dwell(ur5.pose(HOME), float(t[-1]))
     for share, verified in ((1.05, True), (0.99, False)):
         found = sm.certify(ur5, path, "position", motion, sm.Tolerance(share * worst, 1.0))
         assert found.on_path is verified, (found.position_error, worst)

@@ -14,7 +14,7 @@ def test_ends_are_judged_to_a_micrometre(miss: float) -> None:
     q = np.array([[0.1, 0.2, 0.3], [0.4, 0.5, 0.6]])
     motion, kept = motion_of(q, rest), abs(miss) <= 1e-6
     off, far = np.array([0.0, miss, 0.0]), 9.0 * np.ones(3)
-    cases: list[tuple[sm.Requirement, sm.FinishedMotion, float]] = [
+    cases: list[tuple[sm.certificate.Requirement, sm.certificate.FinishedMotion, float]] = [
         (EndState(0, q[1] + off), motion, 1.0),
         (EndState(0, q[0] + off, at_start=True), motion, 0.0),
         (EndState(1, off), motion, 1.0),

@@ -21,16 +21,16 @@ from support.gantries import gantry
 LEFT = _OwnPace(4e-4, None, 0.0199)
 
 
-def saddle(feed: float, **options) -> sm.Feed:
+def saddle(feed: float, **options) -> sm.paths.Feed:
     """The seam of two pipes, 60 and 30 mm in radius."""
     a = np.linspace(0.0, 2.0 * np.pi, 200)
     y = 0.03 * np.sin(a)
     places = np.stack([0.5 + 0.03 * np.cos(a), y, 0.2 + np.sqrt(0.06**2 - y**2)], axis=1)
-    return sm.Feed(sm.Waypoints(a, places), feed, **options)
+    return sm.paths.Feed(sm.paths.Waypoints(a, places), feed, **options)
 
 
 def followed(
-    path: sm.Path,
+    path: sm.paths.Path,
     folder: FilePath,
     hurry: float = 0.0,
     during: tuple[float, float] = (0.0, np.inf),
@@ -49,7 +49,7 @@ def followed(
 
 
 def test_a_feed_of_millimetres_is_refused_at_once() -> None:
-    with pytest.raises(sm.PathError, match=r"10 m/s is faster than any arm.*not mm/s"):
+    with pytest.raises(sm.errors.PathError, match=r"10 m/s is faster than any arm.*not mm/s"):
         saddle(10.0)
 
 
@@ -66,8 +66,8 @@ def test_a_feed_that_is_kept_is_told(feed: float, tmp_path: FilePath) -> None:
     t = np.linspace(0.0, path.duration, 20_001)
     speeds = np.linalg.norm(path.samples(t).twist[:, :3], axis=1)
     assert np.mean(speeds >= 0.98 * feed) >= 0.9
-    waiting = path + sm.Dwell(path.pose(path.duration), 1.0)
-    for placed in (sm.Placed(path, pin.SE3.Identity()), waiting):
+    waiting = path + sm.paths.Dwell(path.pose(path.duration), 1.0)
+    for placed in (sm.paths.Placed(path, pin.SE3.Identity()), waiting):
         assert placed.feeds[0].slowest == found.slowest
 
 
@@ -107,24 +107,26 @@ def test_the_tool_itself_keeps_the_feed(hurry: float, tmp_path: FilePath) -> Non
         assert "kept by the path, but not by 'l3'" in certificate.verdict
 
 
-def of_several_feeds(kind: str) -> tuple[sm.Path, list[float]]:
+def of_several_feeds(kind: str) -> tuple[sm.paths.Path, list[float]]:
     """A path at feeds that change twice, and when."""
     legs = np.array([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.1, 0.1, 0.0], [0.2, 0.1, 0.0]])
     feeds = 0.05, 0.011, 0.02
     if kind == "joined":
         ends = [pin.SE3(np.eye(3), leg) for leg in legs]
         pieces = [
-            sm.Feed(sm.Line(*pair, 1.0), feed)
+            sm.paths.Feed(sm.paths.Line(*pair, 1.0), feed)
             for pair, feed in zip(pairwise(ends), feeds, strict=True)
         ]
-        return sm.Joined(pieces), np.cumsum([0.0, *(item.duration for item in pieces)]).tolist()
+        return sm.paths.Joined(pieces), np.cumsum(
+            [0.0, *(item.duration for item in pieces)]
+        ).tolist()
     through = {
-        "corners": lambda: sm.Polyline(legs, tolerance=2e-3),
-        "spline": lambda: sm.Waypoints(np.arange(4.0), legs),
+        "corners": lambda: sm.paths.Polyline(legs, tolerance=2e-3),
+        "spline": lambda: sm.paths.Waypoints(np.arange(4.0), legs),
     }
     path = through[kind]()
     changes = path.duration * np.array([0.3, 0.7])
-    feed = sm.Feed(path, feeds[0], stretches=np.stack([changes, feeds[1:]], axis=1))
+    feed = sm.paths.Feed(path, feeds[0], stretches=np.stack([changes, feeds[1:]], axis=1))
     return feed, [0.0, *feed.when(changes), feed.duration]
 
 
@@ -156,14 +158,14 @@ def test_each_of_several_feeds_is_judged_where_it_is_asked_for(
 def test_a_section_is_judged_by_the_feeds_in_it(tmp_path: FilePath) -> None:
     path, changes = of_several_feeds("spline")
     first, last = changes[1] + 1.0, changes[3] - 2.0
-    section = sm.Section(path, first, last)
+    section = sm.paths.Section(path, first, last)
     assert [item.asked for item in section.feeds] == [0.011, 0.02]
     assert all(0.0 <= item.time <= section.duration and item.kept for item in section.feeds)
     ends = [0.0, changes[2] - first, section.duration]
     for found, expected in zip(section.feeds, pairwise(ends), strict=True):
         assert found.during.ravel() == pytest.approx(expected, abs=1e-9)
     # Where it runs up no feed counts.
-    assert not sm.Section(path, 0.0, 0.01).feeds
+    assert not sm.paths.Section(path, 0.0, 0.01).feeds
     back = path.feeds[1].timed(lambda t: path.duration - t)
     assert back.during.ravel() == pytest.approx(path.duration - path.feeds[1].during[0, ::-1])
     assert back.slowest == path.feeds[1].slowest
@@ -184,15 +186,15 @@ def test_a_section_at_rest_keeps_its_feed_but_in_its_ramps(
     assert not followed(section, tmp_path, 0.1, (2.0, 3.0)).verified
     # At another pace no feed is kept, and none is claimed.
     t = np.array([0.0, path.duration])
-    other = sm.Retimed(path, 1.5 * t, t, np.full(2, 1.0 / 1.5))
+    other = sm.paths.Retimed(path, 1.5 * t, t, np.full(2, 1.0 / 1.5))
     assert not other.feeds
     assert "feed" not in followed(other, tmp_path).covers
 
 
 def test_each_stretch_of_a_feed_has_to_reach_it() -> None:
-    line = sm.Line(pin.SE3.Identity(), pin.SE3(np.eye(3), np.array([0.5, 0.0, 0.0])), 1.0)
+    line = sm.paths.Line(pin.SE3.Identity(), pin.SE3(np.eye(3), np.array([0.5, 0.0, 0.0])), 1.0)
     stretches = [[0.4, 0.02], [0.6, 0.2], [0.602, 0.02]]
-    found = {item.asked: item for item in sm.Feed(line, 0.2, stretches=stretches).feeds}
+    found = {item.asked: item for item in sm.paths.Feed(line, 0.2, stretches=stretches).feeds}
     assert found[0.02].kept
     assert not found[0.2].kept
     assert found[0.2].held_by == "run-up and run-down"
@@ -200,18 +202,18 @@ def test_each_stretch_of_a_feed_has_to_reach_it() -> None:
 
 
 def test_a_feed_is_proved_where_its_path_has_bounds(tmp_path: FilePath) -> None:
-    class Own(sm.Path):
+    class Own(sm.paths.Path):
         """A line, without saying how large its derivatives are."""
 
         duration = 10.0
         knots = np.array([0.0, 10.0])
 
-        def evaluate(self, t: np.ndarray) -> sm.PathSamples:
+        def evaluate(self, t: np.ndarray) -> sm.paths.PathSamples:
             along = np.outer(t, [0.03, 0.0, 0.0])
             twist = np.tile([0.03, 0.0, 0.0, 0.0, 0.0, 0.0], (len(t), 1))
-            return sm.PathSamples(t, along, np.tile(np.eye(3), (len(t), 1, 1)), twist)
+            return sm.paths.PathSamples(t, along, np.tile(np.eye(3), (len(t), 1, 1)), twist)
 
-    for path, told in ((sm.Feed(Own(), 0.03), 1), (saddle(0.01), 0)):
+    for path, told in ((sm.paths.Feed(Own(), 0.03), 1), (saddle(0.01), 0)):
         certificate = followed(path, tmp_path)
         assert certificate.verified, certificate.verdict
         assert len(certificate.notes) == told
@@ -236,7 +238,7 @@ def test_majorants_of_the_speed_along_a_path_are_above_all_derivatives(tmp_path:
     check_majorants(_Along(follow, LEFT), stretch.some(np.flatnonzero(alone)))
     # The path's own speed, of one that varies: a constant one is rounding alone.
     places = np.array([[0.4, 0.0, 0.4], [0.5, 0.1, 0.4], [0.5, 0.2, 0.5], [0.4, 0.3, 0.5]])
-    free = sm.Waypoints([0.0, 1.0, 1.5, 3.0], places)
+    free = sm.paths.Waypoints([0.0, 1.0, 1.5, 3.0], places)
     own = Stretch(robot, motion, np.stack([free.marks[:-1], free.marks[1:]], axis=1))
     for low in (-0.2, 0.1):
         check_majorants(_Pace(free, low, 0.2), own)
@@ -254,23 +256,23 @@ def test_an_arm_at_rest_keeps_no_feed(tmp_path: FilePath) -> None:
 def test_a_way_too_short_to_run_up_reaches_no_feed() -> None:
     start = pin.SE3.Identity()
     end = pin.SE3(np.eye(3), np.array([0.01, 0.0, 0.0]))
-    (found,) = sm.Feed(sm.Line(start, end, 1.0), 0.5).feeds
+    (found,) = sm.paths.Feed(sm.paths.Line(start, end, 1.0), 0.5).feeds
     assert not found.kept
     assert found.held_by == "run-up and run-down"
 
 
 def test_rounded_corners_and_turning_on_the_spot_do_not_count() -> None:
-    corner = sm.Polyline([[0.0, 0.0, 0.0], [0.3, 0.0, 0.0], [0.3, 0.3, 0.0]], tolerance=2e-3)
-    (found,) = sm.Feed(corner, 0.2).feeds
+    corner = sm.paths.Polyline([[0.0, 0.0, 0.0], [0.3, 0.0, 0.0], [0.3, 0.3, 0.0]], tolerance=2e-3)
+    (found,) = sm.paths.Feed(corner, 0.2).feeds
     assert found.kept
-    t = np.linspace(0.0, sm.Feed(corner, 0.2).duration, 20_001)
-    speeds = np.linalg.norm(sm.Feed(corner, 0.2).samples(t).twist[:, :3], axis=1)
+    t = np.linspace(0.0, sm.paths.Feed(corner, 0.2).duration, 20_001)
+    speeds = np.linalg.norm(sm.paths.Feed(corner, 0.2).samples(t).twist[:, :3], axis=1)
     inner = (t > 1.0) & (t < t[-1] - 1.0)
     # In the corner it is slower indeed.
     assert speeds[inner].min() < 0.9 * 0.2
     turned = np.array([[1.0, 0.0, 0.0, 0.0], [0.9, 0.4, 0.0, 0.0], [0.9, 0.4, 0.0, 0.0]])
-    spot = sm.Polyline([[0.0] * 3, [0.0] * 3, [0.3, 0.0, 0.0]], turned, turn_tolerance=1e-3)
-    assert sm.Feed(spot, 0.05).feeds[0].kept
+    spot = sm.paths.Polyline([[0.0] * 3, [0.0] * 3, [0.3, 0.0, 0.0]], turned, turn_tolerance=1e-3)
+    assert sm.paths.Feed(spot, 0.05).feeds[0].kept
 
 
 @pytest.mark.parametrize("speed", [0.0123, 0.05, 0.0999, 1.0])
@@ -283,7 +285,7 @@ def test_a_feed_that_the_arm_can_keep_is_named() -> None:
     panda = sm.load_robot("panda")
     pose = panda.pose(PANDA_HOME)
     end = pin.SE3(pose.rotation, pose.translation + np.array([0.0, 0.35, 0.0]))
-    fast = sm.Feed(sm.Line(pose, end, 1.0), 2.0, acceleration=60.0)
+    fast = sm.paths.Feed(sm.paths.Line(pose, end, 1.0), 2.0, acceleration=60.0)
     refused = sm.plan(sm.Problem(panda, fast, "position", PANDA_HOME)).certificate
     assert not refused.verified
     named = re.search(r"a feed of ([0-9.]+) m/s.*Feed\.slower\(([0-9.]+)\)", refused.verdict)
@@ -299,11 +301,11 @@ def test_a_feed_is_named_that_both_path_and_arm_keep() -> None:
     """Where bends hold the tool, and the arm is too slow even for what is left of the feed."""
     kinova = sm.load_robot("kinova")
     q = np.array([0.5, 2.6, 1.3, 0.4, 1.2, 0.8])
-    path = sm.Circle.around(kinova.pose(q), 0.2, 1.0, turns=0.5)
-    feed = sm.Feed(path, 1.2, acceleration=8.0)
-    with pytest.raises(sm.FeedError) as error:
+    path = sm.paths.Circle.around(kinova.pose(q), 0.2, 1.0, turns=0.5)
+    feed = sm.paths.Feed(path, 1.2, acceleration=8.0)
+    with pytest.raises(sm.errors.FeedError) as error:
         sm.plan(sm.Problem(kinova, feed, "position", q))
-    possible = sm.Feed(path, error.value.possible, acceleration=8.0)
+    possible = sm.paths.Feed(path, error.value.possible, acceleration=8.0)
     refused = sm.plan(sm.Problem(kinova, possible, "position", q)).certificate
     named = re.search(r"Feed\.slower\(([0-9.]+)\)", refused.verdict)
     assert named is not None, refused.verdict
@@ -317,8 +319,8 @@ def test_a_feed_that_is_asked_for_an_instant_ends_in_a_verdict(brief: float) -> 
     panda = sm.load_robot("panda")
     pose = panda.pose(PANDA_HOME)
     end = pin.SE3(pose.rotation, pose.translation + np.array([0.0, 0.1, 0.0]))
-    line = sm.Line(pose, end, 2.0, time_law="constant")
-    path = sm.Feed(line, 0.05, stretches=[[1.0, 0.02], [1.0 + brief, 0.05]])
+    line = sm.paths.Line(pose, end, 2.0, time_law="constant")
+    path = sm.paths.Feed(line, 0.05, stretches=[[1.0, 0.02], [1.0 + brief, 0.05]])
     assert sm.plan(sm.Problem(panda, path, "position", PANDA_HOME)).certificate.verified
 
 
@@ -339,7 +341,7 @@ HASTY = (
 def test_a_feed_is_proved_between_the_nodes_of_its_path(tmp_path: FilePath) -> None:
     """At its nodes the path keeps it; the tool is five times slower in between, by differences."""
     limits = {"acceleration": 500.0, "turn_acceleration": 5000.0, "smoothing": 0.005}
-    path = sm.Feed(sm.Waypoints(HASTY[0], np.array(HASTY[1])), 0.02, **limits)
+    path = sm.paths.Feed(sm.paths.Waypoints(HASTY[0], np.array(HASTY[1])), 0.02, **limits)
     assert path.feeds[0].kept
     t = np.linspace(0.5, path.duration - 0.5, 200_001)
     places = path.samples(t).translation
@@ -370,8 +372,8 @@ def test_random_paths_keep_what_is_proved_of_their_feeds(tmp_path: FilePath) -> 
         t = np.append(0.0, np.cumsum(rng.exponential(1.0, count) + 0.02))
         steps = rng.normal(0.0, 1.0, (count, 3)) * rng.uniform(0.01, 0.1, (count, 1))
         points = np.array([0.5, 0.0, 0.5]) + np.vstack([np.zeros(3), np.cumsum(steps, axis=0)])
-        path = sm.Feed(
-            sm.Waypoints(t, points),
+        path = sm.paths.Feed(
+            sm.paths.Waypoints(t, points),
             float(rng.uniform(0.01, 0.05)),
             acceleration=float(rng.uniform(0.5, 50.0)),
             smoothing=float(rng.uniform(0.005, 0.05)),
@@ -379,7 +381,7 @@ def test_random_paths_keep_what_is_proved_of_their_feeds(tmp_path: FilePath) -> 
         )
         found = FeedReached(path.feeds[0], Follows.of(robot, path, "position").items[0])
         intervals, counts = path.feeds[0].pieces
-        motion = sm.FinishedMotion(robot, followed_motion(robot, path))
+        motion = sm.certificate.FinishedMotion(robot, followed_motion(robot, path))
         if not found.judge(motion).kept:
             continue
         kept += 1
@@ -391,7 +393,7 @@ def test_random_paths_keep_what_is_proved_of_their_feeds(tmp_path: FilePath) -> 
     assert kept
 
 
-def followed_motion(robot: sm.RobotModel, path: sm.Path) -> sm.Trajectory:
+def followed_motion(robot: sm.RobotModel, path: sm.paths.Path) -> sm.Trajectory:
     """Return the motion of three slides along a path, at its marks and between them."""
     t = np.union1d(path.marks, np.linspace(0.0, path.duration, 2000))
     t = t[np.append(True, np.diff(t) > 1e-7)]
@@ -405,8 +407,10 @@ def test_what_a_weave_moves_along_its_seam_is_told_as_it_is() -> None:
     panda = robot_named("panda")
     start = panda.dexterous_configuration()
     here = panda.pose(start)
-    seam = sm.Feed(sm.Line(here, here * pin.SE3(np.eye(3), np.array([0.05, 0.05, 0.0])), 4.0), 0.02)
-    path = sm.Weave(seam, 2e-3, 1e-3)
+    seam = sm.paths.Feed(
+        sm.paths.Line(here, here * pin.SE3(np.eye(3), np.array([0.05, 0.05, 0.0])), 4.0), 0.02
+    )
+    path = sm.paths.Weave(seam, 2e-3, 1e-3)
     plan = sm.plan(sm.Problem(panda, path, task="position", start=start, constraints=[]))
     t = np.linspace(0.0, path.duration, 20_001)
     tool = np.einsum(

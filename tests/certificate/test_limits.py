@@ -95,8 +95,8 @@ def test_slow_rates_say_how_much_shorter_it_could_take(order: int, power: float)
     ],
 )
 def test_limits_that_cannot_be_kept_are_refused(order: int, lower: float, upper: float) -> None:
-    with pytest.raises(sm.ProblemError, match="expected"):
+    with pytest.raises(sm.errors.ProblemError, match="expected"):
         JointLimits(order, np.full(3, lower), np.full(3, upper))
     assert JointLimits(0, np.zeros(3), np.zeros(3)).order == 0
-    with pytest.raises(sm.ProblemError, match="expected"):
+    with pytest.raises(sm.errors.ProblemError, match="expected"):
         JointLimits(0, np.zeros(3), np.ones(2))

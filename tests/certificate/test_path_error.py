@@ -16,7 +16,7 @@ from support.arms import robot_named
 ROUNDING = 1e-12
 
 
-def errors_of(path: sm.Path, task: sm.Task, robot: sm.RobotModel, *given: Any) -> PathCheck:
+def errors_of(path: sm.paths.Path, task: sm.Task, robot: sm.RobotModel, *given: Any) -> PathCheck:
     return bound_errors(robot, Follows.of(robot, path, task).only, *given)
 
 
@@ -26,17 +26,17 @@ def test_the_error_is_bounded_at_all_times_and_hardly_more() -> None:
     q = robot.dexterous_configuration("planar")
     pose = robot.pose(q)
 
-    class Swinging(sm.Path):
+    class Swinging(sm.paths.Path):
         """Sideways by a tenth of a millimetre, most at 0.8 s."""
 
         duration = 1.0
         knots = np.array([0.0, 1.0])
 
-        def evaluate(self, t: Array) -> sm.PathSamples:
+        def evaluate(self, t: Array) -> sm.paths.PathSamples:
             swing = 1e-4 * np.exp(-((t - 0.8) ** 2) / 0.02)
             twist = np.outer(-swing * 100.0 * (t - 0.8), np.eye(6)[1])
             places = pose.translation + np.outer(swing, [0.0, 1.0, 0.0])
-            return sm.PathSamples(t, places, np.tile(pose.rotation, (len(t), 1, 1)), twist)
+            return sm.paths.PathSamples(t, places, np.tile(pose.rotation, (len(t), 1, 1)), twist)
 
     trajectory = sm.Trajectory([0.0, 1.0], [q, q], np.zeros((2, 3)), robot.joint_names)
 
@@ -73,20 +73,20 @@ def test_no_peak_between_the_points_looked_at_is_missed(angular: bool) -> None:
     pose = robot.pose(q)
     trajectory = sm.Trajectory([0.0, 1.0], [q, q], np.zeros((2, 7)), robot.joint_names)
 
-    class Arched(sm.Path):
+    class Arched(sm.paths.Path):
         duration = 1.0
         knots = np.array([0.0, 1.0])
 
         def __init__(self, top: float) -> None:
             self.top = top
 
-        def evaluate(self, t: Array) -> sm.PathSamples:
+        def evaluate(self, t: Array) -> sm.paths.PathSamples:
             sizes = most * (1.0 - (t - self.top) ** 2)
             motions = np.outer(sizes, np.eye(6)[5 if angular else 1])
             places = [pose * pin.exp6(pin.Motion(motion)) for motion in motions]
             translation = np.array([place.translation for place in places])
             rotation = np.array([place.rotation for place in places])
-            return sm.PathSamples(t, translation, rotation, np.zeros((len(t), 6)))
+            return sm.paths.PathSamples(t, translation, rotation, np.zeros((len(t), 6)))
 
     for top in np.random.default_rng(0).uniform(0.05, 0.95, 40):
         for allowed in (1.0, most * (1.0 - 1e-5)):
@@ -106,7 +106,7 @@ def test_errors_of_every_row_count(row: int, relaxed: tuple[str, str] | None) ->
     robot, size = robot_named("panda"), 1e-4
     q = robot.dexterous_configuration("pose")
     beside = robot.pose(q) * pin.exp6(pin.Motion(size * np.eye(6)[row]))
-    path = sm.Waypoints.from_poses([0.0, 1.0], [beside, beside])
+    path = sm.paths.Waypoints.from_poses([0.0, 1.0], [beside, beside])
     trajectory = sm.Trajectory([0.0, 1.0], [q, q], np.zeros((2, 7)), robot.joint_names)
     bands = [] if relaxed is None else [sm.Relaxation(relaxed[0], 1e-9, axes=relaxed[1])]
     follow = Follows.of(robot, path, sm.Task.POSE).only
@@ -121,7 +121,7 @@ def test_where_any_turn_is_allowed_all_are(relaxed: bool) -> None:
     """Half a turn and beyond, the tool standing and the path turning: bounds end at half a turn."""
     robot = robot_named("panda")
     q = robot.dexterous_configuration("pose")
-    path = sm.Circle.around(robot.pose(q), 0.01, 1.0, turn_tool=True)
+    path = sm.paths.Circle.around(robot.pose(q), 0.01, 1.0, turn_tool=True)
     motion = sm.Trajectory([0.0, 1.0], [q, q], np.zeros((2, 7)), robot.joint_names)
     bands = [sm.Relaxation("rx", 0.1)] if relaxed else []
     for tolerance, kept in ((np.pi, True), (3.0, False)):
@@ -145,7 +145,7 @@ def test_between_samples_however_near_the_arm_may_go_anywhere(gap: float) -> Non
     t, spiked = np.array([0.0, 0.5 - gap, 0.5, 0.5 + gap, 1.0]), np.tile(q, (5, 1))
     spiked[2, 1] += 0.01
     motion = sm.Trajectory(t, spiked, np.zeros((5, 7)), robot.joint_names)
-    path = sm.Dwell(robot.pose(q), 1.0)
+    path = sm.paths.Dwell(robot.pose(q), 1.0)
     found = bound_errors(
         robot, Follows.of(robot, path, sm.Task.POSE).only, motion, sm.Tolerance(), ()
     )
@@ -159,14 +159,14 @@ def test_where_a_path_bends_sharply_a_short_interval_stays_undecided() -> None:
     q = robot.dexterous_configuration("planar")
     pose = robot.pose(q)
 
-    class Bent(sm.Path):
+    class Bent(sm.paths.Path):
         duration = 1.0
 
-        def evaluate(self, t: Array) -> sm.PathSamples:
+        def evaluate(self, t: Array) -> sm.paths.PathSamples:
             swing = 1e-4 * (1.0 - np.abs(t - 1.0 / 3.0))
             places = pose.translation + np.outer(swing, [0.0, 1.0, 0.0])
             turns = np.tile(pose.rotation, (len(t), 1, 1))
-            return sm.PathSamples(t, places, turns, np.zeros((len(t), 6)))
+            return sm.paths.PathSamples(t, places, turns, np.zeros((len(t), 6)))
 
     trajectory = sm.Trajectory([0.0, 1.0], [q, q], np.zeros((2, 3)), robot.joint_names)
     allowed = sm.Tolerance(1e-4 * (1.0 + 1e-9), 1.0)
@@ -185,7 +185,7 @@ def test_errors_between_samples_are_those_of_the_poses(row: int) -> None:
     q = robot.dexterous_configuration("pose")
     pose = robot.pose(q)
     beside = pose * pin.exp6(pin.Motion(offset * np.eye(6)[row]))
-    path = sm.Waypoints.from_poses([0.0, 1.0, 2.0], [pose, pose, beside])
+    path = sm.paths.Waypoints.from_poses([0.0, 1.0, 2.0], [pose, pose, beside])
     problem = sm.Problem(robot, path, start=q)
     still = sm.Trajectory([0.0, 0.5, 2.0], [q] * 3, np.zeros((3, 7)), robot.joint_names)
     errors = problem.errors_between(still)

@@ -20,7 +20,7 @@ def test_the_tools_rates_are_told_with_the_time_they_take(column: int) -> None:
     rates = [2.0 * reach, 2.0, 4.0 * reach, 0.0]
     limit = np.full(4, np.inf)
     limit[column] = rates[column] / 4.0 if column < 3 else 1.0
-    requirement = sm.ToolLimits(*limit.tolist()).requirement(robot)
+    requirement = sm.constraints.ToolLimits(*limit.tolist()).requirement(robot)
     found = requirement.judge(motion)
     names = ("speed", "turn rate", "acceleration", "turn acceleration")
     assert requirement.covers == (f"tool {names[column]}",)
@@ -37,11 +37,11 @@ def test_the_tools_rates_are_told_with_the_time_they_take(column: int) -> None:
 def test_whose_eyes_the_tools_rates_are_seen_with_is_told() -> None:
     """A limit of what a part sees is none of what stands beside both."""
     seen = baxter_with_both_arms("right_gripper")
-    requirement = sm.ToolLimits(speed=0.5).requirement(seen)
+    requirement = sm.constraints.ToolLimits(speed=0.5).requirement(seen)
     assert requirement.covers == ("tool speed seen from 'right_gripper'",)
     q = np.tile(seen.dexterous_configuration("pose"), (2, 1))
     motion = sm.Trajectory([0.0, 1.0], q, 0.0 * q, seen.joint_names)
-    text = requirement.judge(sm.FinishedMotion(seen, motion)).text
+    text = requirement.judge(sm.certificate.FinishedMotion(seen, motion)).text
     assert "speed of the tool 'left_gripper' seen from 'right_gripper' is 0 m/s" in text
 
 
@@ -50,7 +50,7 @@ def test_a_band_is_half_its_width_from_its_middle() -> None:
     name = robot.joint_names[1]
     motion = motion_of([[0.0, 0.2, 0.0], [0.0, 0.5, 0.0]], [[0.0, 0.3, 0.0]] * 2)
     for center, half, share in ((0.1, 0.5, 0.8), (0.1, 0.3, 4.0 / 3.0), (0.7, 1.0, 0.5)):
-        band = sm.Band(sm.JointCoordinate(name), center, half)
+        band = sm.constraints.Band(sm.robot.JointCoordinate(name), center, half)
         found = band.requirement(robot).judge(motion)
         assert found.amount == pytest.approx(share, rel=1e-3)
         assert found.kept is (share <= 1.0)
@@ -59,13 +59,13 @@ def test_a_band_is_half_its_width_from_its_middle() -> None:
 
 def test_what_has_no_limit_is_not_covered_and_said() -> None:
     robot = robot_named("panda")
-    none = sm.JointTorqueLimits(np.full(7, np.inf)).requirement(robot)
+    none = sm.constraints.JointTorqueLimits(np.full(7, np.inf)).requirement(robot)
     assert none.covers == ()
     assert all(name in none.remarks[0] for name in robot.joint_names)
     assert "not limited" in none.remarks[0]
     one = np.full(7, np.inf)
     one[2] = 30.0
-    some = sm.JointTorqueLimits(one).requirement(robot)
+    some = sm.constraints.JointTorqueLimits(one).requirement(robot)
     assert some.covers == ("torques of 1 of 7 joints",)
     assert robot.joint_names[2] not in some.remarks[0]
 
@@ -95,7 +95,7 @@ def test_a_quantity_without_a_majorant_is_judged_as_measured(series: bool) -> No
 
 @pytest.mark.parametrize("limit", [0.0, -1.0, np.nan])
 def test_limits_that_make_no_sense_are_refused(limit: float) -> None:
-    with pytest.raises(sm.ProblemError, match="expected numbers above 0"):
+    with pytest.raises(sm.errors.ProblemError, match="expected numbers above 0"):
         sum_of(True, limit)
 
 
@@ -106,13 +106,18 @@ def test_a_quintic_that_vanishes_where_it_may_be_looked_at_is_caught() -> None:
     q, qd, qdd = np.tile(q0, (2, 1)), np.zeros((2, 6)), np.zeros((2, 6))
     qd[:, 1] = 0.09375 / h
     qdd[:, 1] = [-1.5625 / h**2, 1.5625 / h**2]
-    motion = sm.FinishedMotion(robot, sm.Trajectory([0.0, h], q, qd, robot.joint_names, qdd))
+    motion = sm.certificate.FinishedMotion(
+        robot, sm.Trajectory([0.0, h], q, qd, robot.joint_names, qdd)
+    )
     t = np.linspace(0.0, h, 4001)
-    for coordinate in (sm.JointCoordinate(robot.joint_names[1]), sm.FrameCoordinate("tool0")):
+    for coordinate in (
+        sm.robot.JointCoordinate(robot.joint_names[1]),
+        sm.robot.FrameCoordinate("tool0"),
+    ):
         center = float(coordinate(robot, q0[None])[0][0])
         away = np.abs(coordinate(robot, motion.trajectory(t))[0] - center).max()
         for share in (0.999, 1.001):
-            band = sm.Band(coordinate, center, away * share)
+            band = sm.constraints.Band(coordinate, center, away * share)
             assert band.requirement(robot).judge(motion).kept is (share > 1.0)
 
 
@@ -142,16 +147,18 @@ def test_a_number_between_two_ends_is_kept_up_to_each(name: str) -> None:
         assert found.kept is kept, found.text
         assert QuantityKept(made).remarks == ()
     for wrong in ((0.3, -0.1), (np.nan, 1.0), (0.0, np.inf)):
-        with pytest.raises(sm.ProblemError):
+        with pytest.raises(sm.errors.ProblemError):
             Quantity.between("sum", *wrong, lambda *_: _[0], lambda *_: ())
 
 
-def swung(to: float) -> sm.FinishedMotion:
+def swung(to: float) -> sm.certificate.FinishedMotion:
     """A planar arm whose first two joints add up to a number, in between only."""
     robot = robot_named("planar_3r")
     t, q, qd = np.array([0.0, 0.5, 1.0]), np.zeros((3, 3)), np.zeros((3, 3))
     q[1, :2] = [0.25 * to, 0.75 * to]
-    return sm.FinishedMotion(robot, sm.Trajectory(t, q, qd, robot.joint_names, np.zeros((3, 3))))
+    return sm.certificate.FinishedMotion(
+        robot, sm.Trajectory(t, q, qd, robot.joint_names, np.zeros((3, 3)))
+    )
 
 
 @pytest.mark.parametrize(

@@ -10,11 +10,11 @@ from selfmotion.certificate import LIMIT_NAMES, DampedStretch, Extreme, Finding
 from support.arms import PANDA_HOME, robot_named
 
 
-def still(*requirements: sm.Requirement, **given: object) -> sm.Certificate:
+def still(*requirements: sm.certificate.Requirement, **given: object) -> sm.Certificate:
     """The certificate of a Panda that stands where it should."""
     robot = robot_named("panda")
     motion = sm.Trajectory([0.0, 1.0], [PANDA_HOME] * 2, np.zeros((2, 7)), robot.joint_names)
-    path = sm.Dwell(robot.pose(PANDA_HOME), 1.0)
+    path = sm.paths.Dwell(robot.pose(PANDA_HOME), 1.0)
     return sm.certify(robot, path, "pose", motion, None, requirements, **given)  # type: ignore[arg-type]
 
 

@@ -49,7 +49,7 @@ def test_plan_check_and_replay(tmp_path: Path) -> None:
 def test_plan_through_waypoints(tmp_path: Path) -> None:
     robot = sm.load_robot("panda")
     start = robot.dexterous_configuration()
-    line = sm.Line(robot.pose(start), robot.pose(start + 0.05), 2.0)
+    line = sm.paths.Line(robot.pose(start), robot.pose(start + 0.05), 2.0)
     rows = ["t,x,y,z,qw,qx,qy,qz"]
     for t in np.linspace(0, 2, 9):
         pose = line.pose(t)
@@ -171,16 +171,16 @@ def test_a_log_names_the_stages_and_the_gap(tmp_path: Path) -> None:
 def test_retime_and_fastest(tmp_path: Path) -> None:
     robot = sm.load_robot("panda")
     start = robot.dexterous_configuration()
-    line = sm.Line(robot.pose(start), robot.pose(start + 0.05), 2.0)
+    line = sm.paths.Line(robot.pose(start), robot.pose(start + 0.05), 2.0)
     problem = sm.Problem(robot, line, start=start)
     file, plan, fast = (tmp_path / name for name in ("line.toml", "plan.npz", "fast.npz"))
-    sm.write_problem(problem, file)
+    sm.files.write_problem(problem, file)
     sm.plan(problem).save(plan)
     code, told = invoke("retime", plan, "--acceleration", "8", "--out", fast)
     assert code == 0, told
     assert "limits used fully" in told
     assert sm.load_plan(fast).trajectory.duration < 1.0
-    with pytest.raises(sm.PlanError, match=r"at any pace in 1e-06 s"):
+    with pytest.raises(sm.errors.PlanError, match=r"at any pace in 1e-06 s"):
         invoke("fastest", file, "--deadline", "1e-6")
-    with pytest.raises(sm.ProblemError, match="expected a problem file"):
+    with pytest.raises(sm.errors.ProblemError, match="expected a problem file"):
         invoke("fastest", "panda")

@@ -20,7 +20,7 @@ from support.shell import complaint, invoke
 def plan(tmp_path_factory: pytest.TempPathFactory) -> Path:
     panda = robot_named("panda")
     start = panda.dexterous_configuration()
-    circle = sm.Circle.around(panda.pose(start), radius=0.05, duration=4.0)
+    circle = sm.paths.Circle.around(panda.pose(start), radius=0.05, duration=4.0)
     file = tmp_path_factory.mktemp("check") / "seam.npz"
     sm.plan(sm.Problem(panda, circle, task="position", start=start)).save(file)
     return file
@@ -75,8 +75,8 @@ def test_what_is_not_judged_is_said_in_words_of_the_shell(tmp_path: Path) -> Non
         ("bad.mod", "line 2: 'MoveL p1;' is not read: page 'Files' of the docs lists what is"),
         ("a.doc", "is no motion that is read: expected .csv, "),
     ):
-        with pytest.raises(sm.FileFormatError, match=words):
-            sm.read_motion(tmp_path / name)
+        with pytest.raises(sm.errors.FileFormatError, match=words):
+            sm.files.read_motion(tmp_path / name)
 
 
 @pytest.mark.parametrize(
@@ -197,5 +197,7 @@ def test_six_joints_with_a_window_and_a_free_start_are_planned() -> None:
     end = pose.copy()
     end.translation = pose.translation + np.array([0.05, 0.03, 0.02])
     relaxed = sm.Relaxation("rz", 0.2, during=(0.5, 1.5))
-    plan = sm.plan(sm.Problem(robot, sm.Line(pose, end, 2.0), task="pose", relaxations=[relaxed]))
+    plan = sm.plan(
+        sm.Problem(robot, sm.paths.Line(pose, end, 2.0), task="pose", relaxations=[relaxed])
+    )
     assert plan.certificate.on_path

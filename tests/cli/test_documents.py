@@ -16,9 +16,9 @@ from support.arms import PANDA_HOME
 @pytest.fixture(scope="module")
 def plan() -> sm.Plan:
     panda = sm.load_robot("panda")
-    circle = sm.Circle.around(panda.pose(PANDA_HOME), 0.1, 4.0, normal=(1.0, 0.0, 0.0))
+    circle = sm.paths.Circle.around(panda.pose(PANDA_HOME), 0.1, 4.0, normal=(1.0, 0.0, 0.0))
     t = np.linspace(0.0, 4.0, 41)
-    seam = sm.Waypoints.from_poses(t, [circle.pose(float(time)) for time in t])
+    seam = sm.paths.Waypoints.from_poses(t, [circle.pose(float(time)) for time in t])
     return sm.plan(sm.Problem(panda, seam, start=PANDA_HOME))
 
 
@@ -96,7 +96,7 @@ def test_limits_and_obstacles_of_a_motion(plan: sm.Plan, seam: Path, tmp_path: P
     code, text = invoke(*asked, "--velocity", "0.05,9,9,9,9,9,9")
     assert (code, "joint 'panda_joint1' moves at" in text.replace("\n", " ")) == (1, True)
     hand = plan.robot.pose(plan.trajectory(2.0)).translation
-    box = sm.Box("box", hand, [0.02, 0.02, 0.02])
+    box = sm.obstacles.Box("box", hand, [0.02, 0.02, 0.02])
     (tmp_path / "world.json").write_text(json.dumps([box.to_dict()]))
     code, text = invoke(*asked, "--obstacles", tmp_path / "world.json")
     assert (code, "box overlap by" in text) == (1, True)
@@ -156,7 +156,7 @@ def test_a_changed_file_is_never_verified(plan: sm.Plan, tmp_path: Path) -> None
     for name, changed in cases.items():
         np.savez_compressed(tmp_path / f"{name}.npz", **changed)
         again = sm.load_plan(tmp_path / f"{name}.npz")
-        with pytest.raises(sm.PlanError, match="was changed after the plan was written"):
+        with pytest.raises(sm.errors.PlanError, match="was changed after the plan was written"):
             again.require()
         assert not again.check().verified
         result = CliRunner().invoke(app, ["check", str(tmp_path / f"{name}.npz")])
@@ -170,7 +170,7 @@ def test_a_robot_file_that_changed_is_said(tmp_path: Path) -> None:
     file.write_text(text)
     arm = sm.load_robot(file, tool="tool")
     start = np.array([0.0, 1.0, 1.0])
-    line = sm.Line(arm.pose(start), arm.pose(start + 0.1), 1.0)
+    line = sm.paths.Line(arm.pose(start), arm.pose(start + 0.1), 1.0)
     sm.plan(sm.Problem(arm, line, "planar", start)).save(tmp_path / "plan.npz")
     assert not sm.load_plan(tmp_path / "plan.npz").certificate.notes
     file.write_text(text.replace('xyz="2 0 0"', 'xyz="2.5 0 0"', 1))

@@ -177,19 +177,21 @@ def test_what_is_not_kept_while_moving_is_refused(tmp_path: Path) -> None:
     file.write_text(file.read_text() + '\n[[relaxations]]\nrows = ["z"]\nband = 0.01\n')
     assert "no row is relaxed" in complaint("follow", file)
     problem = sm.read_problem(written(tmp_path))
-    with pytest.raises(sm.ProblemError, match="nothing is damped: leave 'damping' out"):
+    with pytest.raises(sm.errors.ProblemError, match="nothing is damped: leave 'damping' out"):
         replanner_of(replace(problem, damping=sm.Damping()))
 
 
 def test_a_clearance_that_is_given_as_collision_is_kept_while_moving(tmp_path: Path) -> None:
     problem = sm.read_problem(written(tmp_path))
-    apart = sm.Clearance([sm.Box("post", [0.0, -0.6, 0.6], [0.1, 0.1, 1.2])], 0.01)
+    apart = sm.constraints.Clearance(
+        [sm.obstacles.Box("post", [0.0, -0.6, 0.6], [0.1, 0.1, 1.2])], 0.01
+    )
     asked = []
     with patch.object(sm, "Replanner", lambda *given, **_: asked.append(given[3])):
         replanner_of(replace(problem, collision=apart))
         replanner_of(problem)
     assert apart in asked[0]
-    assert not any(isinstance(item, sm.Clearance) for item in asked[1])
+    assert not any(isinstance(item, sm.constraints.Clearance) for item in asked[1])
 
 
 def test_a_file_without_constraints_is_followed_and_jerks_that_are_asked_for_are_not(

@@ -67,7 +67,7 @@ def test_a_feed_that_no_arm_has_is_refused_before_anything_is_planned(table, tmp
 
 
 def test_a_column_of_a_table_tells_the_seams(table) -> None:
-    job = sm.read_seam_job(table)
+    job = sm.files.read_seam_job(table)
     assert [seam.name for seam in job.seams] == ["left", "right", "front", "back"]
     np.testing.assert_allclose(job.seams[0].path.pose(0.0).translation, [0.45, 0.2, 0.3])
     assert job.seams[0].path.feeds[0].asked == 0.05
@@ -100,21 +100,21 @@ def test_a_job_from_the_shell_is_written_read_and_exported(tmp_path) -> None:
         rows = list(csv.DictReader(stream))
     assert {row["kind"] for row in rows} == {"seam", "move", "event"}
     assert "there: on" in {row["name"] for row in rows}
-    motion = sm.read_motion(outs[2])
+    motion = sm.files.read_motion(outs[2])
     np.testing.assert_allclose(motion.q[-1], program.trajectory.q[-1], atol=1e-9)
     code, text = invoke("check", whole, "--json")
     assert json.loads(text)["verified"]
     code, text = invoke("export", whole, "--out", tmp_path / "b.csv", "--rate", "100")
     assert code == 0, text
-    assert len(sm.read_motion(tmp_path / "b.csv").t) == int(program.duration * 100) + 2
+    assert len(sm.files.read_motion(tmp_path / "b.csv").t) == int(program.duration * 100) + 2
     # A single move as well, by a suffix in whichever case.
     move = next(step.made for step in program.steps if isinstance(step.made, sm.Move))
     saved, written = tmp_path / "go.npz", tmp_path / "GO.SRC"
     move.save(saved)
     code, text = invoke("export", saved, "--out", written)
     assert code == 0, text
-    assert sm.read_motion(written).duration == pytest.approx(move.motion.duration, abs=1e-3)
-    with pytest.raises(sm.FileFormatError, match="is a move, not a plan"):
+    assert sm.files.read_motion(written).duration == pytest.approx(move.motion.duration, abs=1e-3)
+    with pytest.raises(sm.errors.FileFormatError, match="is a move, not a plan"):
         sm.load_plan(saved)
 
 
@@ -143,7 +143,7 @@ def test_what_is_wrong_with_a_job_file_is_said_by_key(text, said, tmp_path) -> N
     file = tmp_path / "job.toml"
     file.write_text(JOB + text)
     with pytest.raises(sm.SelfmotionError) as caught:
-        sm.read_seam_job(file).plan()
+        sm.files.read_seam_job(file).plan()
     assert said in str(caught.value)
 
 
@@ -164,7 +164,7 @@ def test_settings_are_of_controllers_files_alone(table, tmp_path, monkeypatch) -
     """Beside other files they are no reason to write none after all is planned."""
     told = []
     monkeypatch.setattr(sm, "write_motion", lambda *_, settings, **__: told.append(settings))
-    settings = sm.ProgramSettings()
+    settings = sm.files.ProgramSettings()
     for name in ("a.yaml", "a.src", "a.script", "a.csv"):
         jobs.write_program(None, tmp_path / name, settings)
     assert told == [None, settings, settings, None]

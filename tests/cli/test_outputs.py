@@ -15,7 +15,7 @@ from support.shell import invoke
 def test_what_cannot_be_written_discards_neither_plan_nor_other_files(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     lost, kept = tmp_path / "file" / "lost.npz", tmp_path / "kept.csv"
-    with pytest.raises(sm.FileFormatError) as raised:
+    with pytest.raises(sm.errors.FileFormatError) as raised:
         invoke("plan", "planar_3r", "--circle", "0.1", "--out", lost, "--out", kept)
     line = str(raised.value)
     assert kept.is_file()

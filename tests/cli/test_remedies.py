@@ -47,7 +47,7 @@ def test_remedies_for_arms_name_options(tmp_path: Path) -> None:
 
 
 def test_problem_files_keep_their_own_words(tmp_path: Path) -> None:
-    sm.write_problem(sm.sample_problem(), tmp_path / "problem.toml")
+    sm.files.write_problem(sm.sample_problem(), tmp_path / "problem.toml")
     text = (tmp_path / "problem.toml").read_text()
     (tmp_path / "problem.toml").write_text(text.replace('task = "planar"', 'task = "pose"'))
     line = complaint("plan", tmp_path / "problem.toml")
@@ -69,7 +69,7 @@ def test_a_feed_that_is_not_reached_says_how_the_shell_allows_less(tmp_path: Pat
     """Cuts of real programs are shorter than what a run-up takes."""
     cut = tmp_path / "cut.nc"
     cut.write_text("G21 G90\nG0 X400 Y0 Z400\nG1 X401 F6000\nG1 X402\nG0 Z420\nM30\n")
-    robot, path = sm.load_robot("panda"), sm.read_path(cut)
+    robot, path = sm.load_robot("panda"), sm.files.read_path(cut)
     still = sm.Trajectory(np.array([0.0, path.duration]), *np.zeros((2, 2, 7)), robot.joint_names)
     found = sm.Problem(robot, path, "position").certify(still)
     assert "or allow it more (within=" in found.verdict

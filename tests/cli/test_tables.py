@@ -63,7 +63,7 @@ def test_a_limit_is_told_with_its_side(
     amount: float, allowed: float, kept: bool, told: str
 ) -> None:
     """A feed that is kept, above what it has to be at least, does not read as a violation."""
-    found = sm.Finding("feed", "path", 1.0, amount, allowed, kept, "", unit="m/s")
+    found = sm.certificate.Finding("feed", "path", 1.0, amount, allowed, kept, "", unit="m/s")
     plan = sm.plan(sm.sample_problem())
     certificate, page = plan.certificate, io.StringIO()
     only = dataclasses.replace(certificate, findings=(*certificate.findings, found))
@@ -85,7 +85,7 @@ def test_what_moves_at_rest_is_told_with_its_unit(
     unit: str, amount: float, allowed: float, told: str
 ) -> None:
     plan, page = sm.plan(sm.sample_problem()), io.StringIO()
-    found = sm.Finding("rest", "joint1", 0.0, amount, allowed, False, "", unit=unit)
+    found = sm.certificate.Finding("rest", "joint1", 0.0, amount, allowed, False, "", unit=unit)
     findings = (*plan.certificate.findings, found)
     only = dataclasses.replace(plan.certificate, findings=findings)
     tables.show_certificate(only, {}, plan.robot, Console(file=page, width=120))
@@ -99,7 +99,7 @@ def test_the_unit_of_what_is_found_is_the_joints() -> None:
     q, none = np.zeros((2, 3)), np.zeros((2, 3))
     for qd, qdd, unit in ((none + 0.1, none, "rad/s"), (none, none + 0.1, "rad/s²")):
         motion = sm.Trajectory(np.array([0.0, 1.0]), q, qd, arm.joint_names, qdd)
-        line = sm.Line(arm.pose(q[0]), arm.pose(q[0]), 1.0)
+        line = sm.paths.Line(arm.pose(q[0]), arm.pose(q[0]), 1.0)
         found = sm.Problem(arm, line, "planar").certify(motion).findings
         (rest,) = (item for item in found if item.requirement == "rest")
         assert rest.unit == unit

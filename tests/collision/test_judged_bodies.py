@@ -55,24 +55,24 @@ def arm(folder: Path, bodies: set[str] | None = None, **options: float) -> sm.Ro
     return sm.load_robot(file, "tcp")
 
 
-def sweep(robot: sm.RobotModel, first: Array, last: Array) -> tuple[sm.Path, sm.Trajectory]:
+def sweep(robot: sm.RobotModel, first: Array, last: Array) -> tuple[sm.paths.Path, sm.Trajectory]:
     t = np.linspace(0.0, 4.0, 60)
     u = t[:, None] / 4.0
     q = first + (last - first) * u**3 * (10.0 - 15.0 * u + 6.0 * u**2)
     qd = (last - first) * 30.0 * (u * (1.0 - u)) ** 2 / 4.0
-    path = sm.Waypoints(t, [robot.pose(each).translation for each in q])
+    path = sm.paths.Waypoints(t, [robot.pose(each).translation for each in q])
     return path, sm.Trajectory(t, q, qd, robot.joint_names)
 
 
 def test_what_is_fixed_across_a_joint_is_judged(tmp_path: Path) -> None:
     """The torch sweeps through the camera; only the two links that the joint joins are no pair."""
     robot = arm(tmp_path)
-    pairs = {frozenset(pair) for pair in sm.CollisionModel(robot).pairs}
+    pairs = {frozenset(pair) for pair in sm.obstacles.CollisionModel(robot).pairs}
     wanted = (("camera", "torch"), ("camera", "l4"), ("l3", "torch"))
     assert {frozenset(pair) for pair in wanted} <= pairs
     assert frozenset(("l3", "l4")) not in pairs
     path, motion = sweep(robot, np.array([0.3, 0.6, -0.9, 2.0]), np.array([0.3, 0.6, -0.9, 2.8]))
-    kept = sm.Clearance(distance=0.0).requirement(robot)
+    kept = sm.constraints.Clearance(distance=0.0).requirement(robot)
     found = sm.certify(robot, path, "planar", motion, 1.0, [kept])
     assert not found.verified
     assert re.search("camera - torch|torch - camera", found.verdict)
@@ -96,9 +96,9 @@ def test_links_that_held_joints_put_into_each_other_are_told(tmp_path: Path) -> 
     for angle, is_kept in ((2.0944, False), (1.0, True)):
         robot = sm.load_robot(file, "l6", lock={"j5": angle, "j6": angle})
         q = np.array([0.3, 0.5, -0.6, 0.7])
-        path = sm.Dwell(robot.pose(q), 1.0)
+        path = sm.paths.Dwell(robot.pose(q), 1.0)
         motion = sm.Trajectory([0.0, 1.0], [q, q], np.zeros((2, 4)), robot.joint_names)
-        kept = sm.Clearance(distance=0.0).requirement(robot)
+        kept = sm.constraints.Clearance(distance=0.0).requirement(robot)
         found = sm.certify(robot, path, "planar", motion, requirements=[kept])
         assert found.verified is is_kept, found.verdict
         assert (
@@ -110,23 +110,25 @@ def test_links_that_held_joints_put_into_each_other_are_told(tmp_path: Path) -> 
 @pytest.mark.parametrize("bodies", [{"base"}, {"l4", "torch"}, set(BOXES)])
 def test_what_no_pair_measures_is_not_covered(tmp_path: Path, bodies: set[str]) -> None:
     robot = arm(tmp_path, bodies)
-    kept = sm.Clearance(distance=0.0).requirement(robot)
+    kept = sm.constraints.Clearance(distance=0.0).requirement(robot)
     assert ("self-collision" in kept.covers) is (len(bodies) > 2)
     assert ("nothing was measured" in " ".join(kept.remarks)) is (len(bodies) <= 2)
-    wall = sm.Box("wall", [9.0, 9.0, 9.0], [0.1] * 3)
+    wall = sm.obstacles.Box("wall", [9.0, 9.0, 9.0], [0.1] * 3)
     if bodies == {"base"}:
-        with pytest.raises(sm.ProblemError, match="no link that moves has collision geometry"):
-            sm.Clearance([wall]).requirement(robot)
+        with pytest.raises(
+            sm.errors.ProblemError, match="no link that moves has collision geometry"
+        ):
+            sm.constraints.Clearance([wall]).requirement(robot)
     else:
-        assert "obstacles" in sm.Clearance([wall]).requirement(robot).covers
+        assert "obstacles" in sm.constraints.Clearance([wall]).requirement(robot).covers
 
 
 def test_what_has_no_limit_is_not_kept(tmp_path: Path) -> None:
     robot = arm(tmp_path, velocity=0.0, effort=0.0)
     q = np.array([0.3, 0.6, -0.9, 1.0])
     motion = sm.Trajectory([0.0, 1.0], [q, q], np.zeros((2, 4)), robot.joint_names)
-    torques = sm.JointTorqueLimits().requirement(robot)
-    path = sm.Dwell(robot.pose(q), 1.0)
+    torques = sm.constraints.JointTorqueLimits().requirement(robot)
+    path = sm.paths.Dwell(robot.pose(q), 1.0)
     found = sm.certify(robot, path, "planar", motion, requirements=[torques])
     assert not {"speeds", "torques"} & set(found.covers)
     assert "speeds" in found.not_checked
@@ -135,9 +137,9 @@ def test_what_has_no_limit_is_not_kept(tmp_path: Path) -> None:
 
 
 def test_nobody_moves_what_was_judged() -> None:
-    box = sm.Box("b", [2.0, 2.0, 2.0], [0.2] * 3)
-    line = sm.Line(pin.SE3.Identity(), pin.SE3(np.eye(3), np.array([0.1, 0.0, 0.0])), 3.0)
-    for pose in (box.pose, line.start, sm.Dwell(box.pose, 1.0).at):
+    box = sm.obstacles.Box("b", [2.0, 2.0, 2.0], [0.2] * 3)
+    line = sm.paths.Line(pin.SE3.Identity(), pin.SE3(np.eye(3), np.array([0.1, 0.0, 0.0])), 3.0)
+    for pose in (box.pose, line.start, sm.paths.Dwell(box.pose, 1.0).at):
         before = pose.homogeneous.copy()
         with pytest.raises(AttributeError):
             pose.translation = np.ones(3)
@@ -158,13 +160,15 @@ def test_a_mesh_in_millimetres_is_refused(tmp_path: Path) -> None:
     post.export(tmp_path / "post.stl")
     panda = robot_named("panda")
     for scale, said in ((1.0, True), (1e-3, False)):
-        mesh = sm.Mesh("post", [0.0] * 3, str(tmp_path / "post.stl"), scale=scale)
+        mesh = sm.obstacles.Mesh("post", [0.0] * 3, str(tmp_path / "post.stl"), scale=scale)
         for use in (
-            lambda mesh: sm.Clearance([mesh]).requirement(panda),
+            lambda mesh: sm.constraints.Clearance([mesh]).requirement(panda),
             lambda mesh: sm.load_robot("panda", bodies=[mesh]),
         ):
             with (
-                pytest.raises(sm.CollisionError, match=r"is 1\.2e\+03 m long: scale = 0\.001")
+                pytest.raises(
+                    sm.errors.CollisionError, match=r"is 1\.2e\+03 m long: scale = 0\.001"
+                )
                 if said
                 else nullcontext()
             ):
@@ -174,8 +178,8 @@ def test_a_mesh_in_millimetres_is_refused(tmp_path: Path) -> None:
 def test_an_obstacle_placed_in_millimetres_gets_a_hint() -> None:
     panda = robot_named("panda")
     for far, said in ((400.0, True), (0.4, False)):
-        post = sm.Box("post", [far, far, 0.6], [0.1, 0.1, 1.2])
-        remarks = sm.Clearance([post]).requirement(panda).remarks
+        post = sm.obstacles.Box("post", [far, far, 0.6], [0.1, 0.1, 1.2])
+        remarks = sm.constraints.Clearance([post]).requirement(panda).remarks
         assert any("millimetres?" in text for text in remarks) is said
 
 
@@ -185,8 +189,8 @@ def test_links_that_mostly_overlap_are_told_before_planning(tmp_path: Path) -> N
     (tmp_path / "long.urdf").write_text(text)
     robot = sm.load_robot(tmp_path / "long.urdf", "tcp")
     q = np.array([0.3, 0.6, -0.9, 1.0])
-    problem = sm.Problem(robot, sm.Dwell(robot.pose(q), 1.0), task="planar", start=q)
-    model = sm.CollisionModel(robot)
+    problem = sm.Problem(robot, sm.paths.Dwell(robot.pose(q), 1.0), task="planar", start=q)
+    model = sm.obstacles.CollisionModel(robot)
     mostly = {frozenset((x.first, x.second)) for x in model.overlapping if x.is_checked}
     assert mostly
     for pair in mostly:
@@ -198,4 +202,4 @@ def test_links_that_mostly_overlap_are_told_before_planning(tmp_path: Path) -> N
         )
     panda = robot_named("panda")
     home = panda.dexterous_configuration()
-    assert sm.Problem(panda, sm.Dwell(panda.pose(home), 1.0), start=home).remarks == ()
+    assert sm.Problem(panda, sm.paths.Dwell(panda.pose(home), 1.0), start=home).remarks == ()

@@ -16,8 +16,8 @@ def test_bands_and_pulls_keep_the_laws(panda: sm.RobotModel, name: str) -> None:
     coordinate = COORDINATES[name]
     value = float(coordinate(panda, PANDA_HOME[None])[0][0])
     problem = small_circle(panda, task="position")
-    testing.check_constraint(sm.Band(coordinate, value + 0.05, 0.1), problem)
-    testing.check_cost(sm.Towards(panda, coordinate, value + 0.3), panda)
+    testing.check_constraint(sm.constraints.Band(coordinate, value + 0.05, 0.1), problem)
+    testing.check_cost(sm.costs.Towards(panda, coordinate, value + 0.3), panda)
 
 
 @pytest.mark.parametrize("name", ["joint", "height", "swivel"])
@@ -26,11 +26,11 @@ def test_a_band_is_kept_and_judged_at_all_times(panda: sm.RobotModel, name: str,
     free = sm.plan(small_circle(panda, task="position"))
     values = coordinate_along(free, coordinate)
     center, reach = float(values[0]), float(np.abs(values - values[0]).max())
-    judged = sm.Band(coordinate, center, 2.0 * reach).requirement(panda)
+    judged = sm.constraints.Band(coordinate, center, 2.0 * reach).requirement(panda)
     found = judged.judge(FinishedMotion(panda, free.trajectory))
     assert 0.5 <= found.amount <= 0.5 * (1.0 + 1e-4)
-    band = sm.Band(coordinate, center, 0.5 * reach)
-    constraints = [sm.JointPositionLimits(), sm.JointVelocityLimits(), band]
+    band = sm.constraints.Band(coordinate, center, 0.5 * reach)
+    constraints = [sm.constraints.JointPositionLimits(), sm.constraints.JointVelocityLimits(), band]
     plan = sm.plan(small_circle(panda, task="position", constraints=constraints))
     assert plan.certificate.verified, plan.certificate.verdict
     assert np.abs(coordinate_along(plan, coordinate) - center).max() <= 0.5 * reach
@@ -41,5 +41,5 @@ def test_a_band_is_kept_and_judged_at_all_times(panda: sm.RobotModel, name: str,
     assert not wrong.findings[-1].kept
     plan.save(tmp_path / "plan.npz")
     assert sm.load_plan(tmp_path / "plan.npz").check().verified
-    sm.write_problem(plan.problem, tmp_path / "cell.toml")
+    sm.files.write_problem(plan.problem, tmp_path / "cell.toml")
     assert sm.read_problem(tmp_path / "cell.toml").constraints[2].center == center

@@ -21,34 +21,34 @@ from support.followed import standing
 Circle = Callable[..., sm.Problem]
 
 
-LIMITS = (sm.JointPositionLimits(), sm.JointVelocityLimits())
+LIMITS = (sm.constraints.JointPositionLimits(), sm.constraints.JointVelocityLimits())
 
 
 # Exact gradients against central differences, relative to the gradient's largest entry.
 GRADIENT = 1e-6
 
 
-def certify_again(plan: sm.Plan, requirements: list[sm.Requirement]) -> sm.Certificate:
+def certify_again(plan: sm.Plan, requirements: list[sm.certificate.Requirement]) -> sm.Certificate:
     """Return a plan's certificate with other requirements."""
     return sm.certify(plan.robot, plan.path, plan.task, plan.trajectory, requirements=requirements)
 
 
 CONSTRAINTS = {
-    "position": lambda r: sm.JointPositionLimits(
+    "position": lambda r: sm.constraints.JointPositionLimits(
         np.full(r.dof, -0.02), np.full(r.dof, 0.02), replace=True
     ),
-    "velocity": lambda r: sm.JointVelocityLimits(np.full(r.dof, 0.02)),
-    "acceleration": lambda r: sm.JointAccelerationLimits(0.05),
-    "end": lambda r: sm.EndConfiguration(np.full(r.dof, 0.3)),
-    "end velocity": lambda r: sm.EndVelocity(),
-    "closed": lambda r: sm.ClosedPath(),
-    "closed in position": lambda r: sm.ClosedPath(velocity=False),
+    "velocity": lambda r: sm.constraints.JointVelocityLimits(np.full(r.dof, 0.02)),
+    "acceleration": lambda r: sm.constraints.JointAccelerationLimits(0.05),
+    "end": lambda r: sm.constraints.EndConfiguration(np.full(r.dof, 0.3)),
+    "end velocity": lambda r: sm.constraints.EndVelocity(),
+    "closed": lambda r: sm.constraints.ClosedPath(),
+    "closed in position": lambda r: sm.constraints.ClosedPath(velocity=False),
 }
 
 
 def objective_with(
-    constraint: sm.Constraint, name: str, task: str
-) -> tuple[Objective, sm.BoundConstraint]:
+    constraint: sm.constraints.Constraint, name: str, task: str
+) -> tuple[Objective, sm.constraints.BoundConstraint]:
     """Return an objective with a free start, and a constraint that is violated."""
     robot, rows = robot_named(name), sm.Task.of(task)
     start = start_of(robot, task)
@@ -61,7 +61,7 @@ def objective_with(
     return Objective.of(problem, still, free=True), bound
 
 
-def rows_of(objective: Objective, bound: sm.BoundConstraint, x: Array) -> Array:
+def rows_of(objective: Objective, bound: sm.constraints.BoundConstraint, x: Array) -> Array:
     """Return the derivatives of all conditions at x, as programmes ask for them."""
     motion = objective.node_tangents(x)
     known = linearised(bound, objective.samples(x), motion)
@@ -128,8 +128,8 @@ def test_rows_on_demand_are_those_of_all_tangents(constraint: str) -> None:
 def test_clearance_rows_equal_central_differences() -> None:
     robot = robot_named("panda")
     pose = robot.pose(start_of(robot, "pose"))
-    box = sm.Box("box", pose.translation + np.array([0.0, 0.0, 0.25]), [0.1, 0.1, 0.1])
-    objective, bound = objective_with(sm.Clearance((box,), 0.1), "panda", "pose")
+    box = sm.obstacles.Box("box", pose.translation + np.array([0.0, 0.0, 0.25]), [0.1, 0.1, 0.1])
+    objective, bound = objective_with(sm.constraints.Clearance((box,), 0.1), "panda", "pose")
     x = 0.01 * np.random.default_rng(3).normal(size=objective.size)
 
     def excess(x: Array) -> Array:
@@ -148,22 +148,28 @@ def test_clearance_rows_equal_central_differences() -> None:
 def test_bad_constraints_are_refused(panda: sm.RobotModel) -> None:
     path = short_line(panda, PANDA_HOME)
     for constraint, message in (
-        (lambda: sm.JointPositionLimits(lower=np.zeros(3)), "one for each of the 7 joints"),
         (
-            lambda: sm.JointPositionLimits(lower=np.full(7, 9.0)),
+            lambda: sm.constraints.JointPositionLimits(lower=np.zeros(3)),
+            "one for each of the 7 joints",
+        ),
+        (
+            lambda: sm.constraints.JointPositionLimits(lower=np.full(7, 9.0)),
             "not below upper",
         ),
-        (lambda: sm.JointVelocityLimits(np.full(7, -1.0)), "expected numbers > 0"),
-        (lambda: sm.JointVelocityLimits(margin=0.0), "margin is 0.0"),
-        (lambda: sm.JointAccelerationLimits([1.0, 2.0, 3.0]), "one for each of the 7 joints"),
-        (lambda: sm.JointAccelerationLimits(np.nan), "expected numbers > 0"),
-        (lambda: sm.EndVelocity([1.0, 2.0, 3.0]), "one for each of the 7 joints"),
-        (lambda: sm.EndConfiguration(PANDA_HOME), "off the end of the path"),
-        (lambda: sm.Clearance(distance=-1.0), "distance is -1.0"),
-        (lambda: sm.Clearance(distance=np.inf), "distance is inf"),
-        (lambda: sm.Clearance(["x"]), "expected Box, Sphere"),
+        (lambda: sm.constraints.JointVelocityLimits(np.full(7, -1.0)), "expected numbers > 0"),
+        (lambda: sm.constraints.JointVelocityLimits(margin=0.0), "margin is 0.0"),
+        (
+            lambda: sm.constraints.JointAccelerationLimits([1.0, 2.0, 3.0]),
+            "one for each of the 7 joints",
+        ),
+        (lambda: sm.constraints.JointAccelerationLimits(np.nan), "expected numbers > 0"),
+        (lambda: sm.constraints.EndVelocity([1.0, 2.0, 3.0]), "one for each of the 7 joints"),
+        (lambda: sm.constraints.EndConfiguration(PANDA_HOME), "off the end of the path"),
+        (lambda: sm.constraints.Clearance(distance=-1.0), "distance is -1.0"),
+        (lambda: sm.constraints.Clearance(distance=np.inf), "distance is inf"),
+        (lambda: sm.constraints.Clearance(["x"]), "expected Box, Sphere"),
     ):
-        with pytest.raises(sm.ProblemError, match=message):
+        with pytest.raises(sm.errors.ProblemError, match=message):
             sm.plan(sm.Problem(panda, path, start=PANDA_HOME, constraints=[constraint()]))
 
 
@@ -172,8 +178,8 @@ def test_of_two_constraints_of_a_kind_both_are_judged(
     panda_circle: Circle, tight_first: bool
 ) -> None:
     """Whatever their order: the loose one does not stand in for the tight one."""
-    tight = sm.JointAccelerationLimits(0.01)
-    loose = sm.JointAccelerationLimits(100.0, replace=True)
+    tight = sm.constraints.JointAccelerationLimits(0.01)
+    loose = sm.constraints.JointAccelerationLimits(100.0, replace=True)
     pair = (tight, loose) if tight_first else (loose, tight)
     free = sm.plan(panda_circle())
     asked = dataclasses.replace(free.problem, constraints=(*LIMITS, *pair))
@@ -184,14 +190,20 @@ def test_of_two_constraints_of_a_kind_both_are_judged(
     assert not check.verified
     assert check.acceleration_ratio is not None
     assert check.acceleration_ratio.value == max(amounts)
-    kept = sm.plan(panda_circle(constraints=(*LIMITS, sm.JointAccelerationLimits(8.0), loose)))
+    kept = sm.plan(
+        panda_circle(constraints=(*LIMITS, sm.constraints.JointAccelerationLimits(8.0), loose))
+    )
     assert kept.certificate.verified, kept.certificate.verdict
 
 
 def test_saved_plans_keep_what_was_required(panda: sm.RobotModel, tmp_path) -> None:
     path = short_line(panda, PANDA_HOME)
-    box = sm.Box("far", np.array([0.0, 0.0, 2.0]), [0.1, 0.1, 0.1])
-    constraints = (*LIMITS, sm.JointAccelerationLimits(20.0), sm.Clearance((box,), 0.001))
+    box = sm.obstacles.Box("far", np.array([0.0, 0.0, 2.0]), [0.1, 0.1, 0.1])
+    constraints = (
+        *LIMITS,
+        sm.constraints.JointAccelerationLimits(20.0),
+        sm.constraints.Clearance((box,), 0.001),
+    )
     plan = sm.plan(sm.Problem(panda, path, start=PANDA_HOME, constraints=constraints))
     assert plan.certificate.verified
     plan.save(tmp_path / "plan.npz")
@@ -202,7 +214,7 @@ def test_saved_plans_keep_what_was_required(panda: sm.RobotModel, tmp_path) -> N
 
 
 def test_broken_motions_fail_what_is_required(panda_circle: Circle) -> None:
-    problem = panda_circle(constraints=(*LIMITS, sm.ClosedPath()))
+    problem = panda_circle(constraints=(*LIMITS, sm.constraints.ClosedPath()))
     plan = sm.plan(problem)
     q: Array = plan.trajectory.q.copy()
     q[-1] += 1e-4
@@ -233,9 +245,12 @@ def test_prices_are_what_easing_a_limit_saves(panda_circle: Circle, kind: str) -
     def limited(eased: float) -> sm.Plan:
         upper = np.array(robot.upper)
         upper[3] = highest - 0.05 + 0.01 * eased
-        limits: tuple[sm.Constraint, ...] = (sm.JointPositionLimits(upper=upper), LIMITS[1])
+        limits: tuple[sm.constraints.Constraint, ...] = (
+            sm.constraints.JointPositionLimits(upper=upper),
+            LIMITS[1],
+        )
         if kind == "acceleration":
-            limits = (*LIMITS, sm.JointAccelerationLimits(1.0 * (1.0 + 0.02 * eased)))
+            limits = (*LIMITS, sm.constraints.JointAccelerationLimits(1.0 * (1.0 + 0.02 * eased)))
         return sm.plan(panda_circle("position", constraints=limits))
 
     tight, wide = limited(0.0), limited(0.2)
@@ -253,7 +268,7 @@ def test_prices_are_what_easing_a_limit_saves(panda_circle: Circle, kind: str) -
 
 
 def test_prices_are_saved_and_shown(panda_circle: Circle, tmp_path) -> None:
-    limits = (*LIMITS, sm.JointAccelerationLimits(1.5), sm.ClosedPath())
+    limits = (*LIMITS, sm.constraints.JointAccelerationLimits(1.5), sm.constraints.ClosedPath())
     plan = sm.plan(panda_circle("position", constraints=limits))
     assert {"closed path", "joint acceleration limits"} <= {
         item.constraint for item in plan.report.active
@@ -273,26 +288,28 @@ def test_what_is_not_finite_is_named_with_its_time(panda_circle: Circle) -> None
     def late(t: Array) -> Array:
         return np.where(t > 2.0, np.nan, 1.0)
 
-    value = sm.FunctionCost(lambda qd, q, t: late(t), lambda qd, q, t: (0 * qd, 0 * q), "late")
-    gradient = sm.FunctionCost(
+    value = sm.costs.FunctionCost(
+        lambda qd, q, t: late(t), lambda qd, q, t: (0 * qd, 0 * q), "late"
+    )
+    gradient = sm.costs.FunctionCost(
         lambda qd, q, t: np.sum(q**2, axis=1),
         lambda qd, q, t: (0 * qd, late(t)[:, None] * q),
         "bad",
     )
-    tight = sm.JointVelocityLimits(0.1)
+    tight = sm.constraints.JointVelocityLimits(0.1)
     for constraints in (LIMITS, (*LIMITS, tight)):
         for cost, text in (
             (value, r"cost 'late': its value is nan at t = 2\.0625 s"),
             (gradient, r"cost 'bad': its gradient is .* at t = 2\.0625 s"),
         ):
-            with pytest.raises(sm.ProblemError, match=text):
+            with pytest.raises(sm.errors.ProblemError, match=text):
                 sm.plan(panda_circle(costs=[cost], constraints=constraints))
 
 
 def test_a_wrong_gradient_is_no_convergence(panda_circle: Circle) -> None:
-    wrong = sm.FunctionCost(
+    wrong = sm.costs.FunctionCost(
         lambda qd, q, t: np.sum(q**2, axis=1), lambda qd, q, t: (0 * qd, -2 * q), "wrong"
     )
     plan = sm.plan(panda_circle(costs=[wrong], constraints=()))
-    assert plan.report.status is sm.Status.GRADIENT
+    assert plan.report.status is sm.optimise.Status.GRADIENT
     assert "check_cost" in plan.report.message

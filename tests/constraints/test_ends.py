@@ -15,17 +15,17 @@ from support.followed import standing
 Circle = Callable[..., sm.Problem]
 
 
-LIMITS = (sm.JointPositionLimits(), sm.JointVelocityLimits())
+LIMITS = (sm.constraints.JointPositionLimits(), sm.constraints.JointVelocityLimits())
 
 
-def certify_again(plan: sm.Plan, requirements: list[sm.Requirement]) -> sm.Certificate:
+def certify_again(plan: sm.Plan, requirements: list[sm.certificate.Requirement]) -> sm.Certificate:
     """Return a plan's certificate with other requirements."""
     return sm.certify(plan.robot, plan.path, plan.task, plan.trajectory, requirements=requirements)
 
 
 def test_a_hundred_loops_of_a_closed_circle_do_not_drift(panda_circle: Circle) -> None:
     open_loop = sm.plan(panda_circle())
-    plan = sm.plan(panda_circle(constraints=(*LIMITS, sm.ClosedPath())))
+    plan = sm.plan(panda_circle(constraints=(*LIMITS, sm.constraints.ClosedPath())))
     assert plan.certificate.verified
     assert plan.certificate.closure <= 1e-9
     assert plan.certificate.closure * 100 <= 1e-6
@@ -39,7 +39,7 @@ def test_a_hundred_loops_of_a_closed_circle_do_not_drift(panda_circle: Circle) -
 
 
 def test_closed_paths_from_a_free_start(panda_circle: Circle) -> None:
-    problem = panda_circle(constraints=(*LIMITS, sm.ClosedPath()))
+    problem = panda_circle(constraints=(*LIMITS, sm.constraints.ClosedPath()))
     fixed = sm.plan(problem)
     free = sm.plan(dataclasses.replace(problem, start=None))
     assert free.certificate.verified
@@ -49,8 +49,8 @@ def test_closed_paths_from_a_free_start(panda_circle: Circle) -> None:
 
 def test_a_closed_joint_path_needs_a_closed_tool_path(panda: sm.RobotModel) -> None:
     line = short_line(panda, PANDA_HOME)
-    with pytest.raises(sm.ProblemError, match="needs a closed tool path"):
-        sm.Problem(panda, line, start=PANDA_HOME, constraints=[sm.ClosedPath()])
+    with pytest.raises(sm.errors.ProblemError, match="needs a closed tool path"):
+        sm.Problem(panda, line, start=PANDA_HOME, constraints=[sm.constraints.ClosedPath()])
 
 
 def test_end_configuration_is_reached(panda_circle: Circle) -> None:
@@ -60,7 +60,7 @@ def test_end_configuration_is_reached(panda_circle: Circle) -> None:
     manifold = FreeStart(standing(robot, task), PANDA_HOME)
     target = manifold.configuration(np.array([0.2]), problem.follows.targets(np.zeros(1))[0])
     assert target is not None
-    constraints = (*LIMITS, sm.EndConfiguration(target))
+    constraints = (*LIMITS, sm.constraints.EndConfiguration(target))
     plan = sm.plan(panda_circle(constraints=constraints))
     assert plan.certificate.verified
     np.testing.assert_allclose(plan.trajectory.q[-1], target, atol=1e-7)
@@ -68,18 +68,18 @@ def test_end_configuration_is_reached(panda_circle: Circle) -> None:
 
 def test_an_end_velocity_is_reached_and_checked(panda_circle: Circle) -> None:
     """Rest where the path rests; the velocity of a motion known to be possible where it moves."""
-    rest = sm.plan(panda_circle("pointing", constraints=(*LIMITS, sm.EndVelocity())))
+    rest = sm.plan(panda_circle("pointing", constraints=(*LIMITS, sm.constraints.EndVelocity())))
     assert rest.certificate.verified, rest.certificate.verdict
     np.testing.assert_allclose(rest.trajectory.qd[-1], 0.0, atol=1e-6)
     problem = panda_circle("pointing")
     first = problem.path.pose(0.0)
-    path = sm.Circle.around(first, 0.15, 4.0, normal=(1.0, 0.0, 0.0), time_law="constant")
+    path = sm.paths.Circle.around(first, 0.15, 4.0, normal=(1.0, 0.0, 0.0), time_law="constant")
     problem = dataclasses.replace(problem, path=path)
-    with pytest.raises(sm.ProblemError, match="cannot end at rest"):
-        dataclasses.replace(problem, constraints=[sm.EndVelocity()])
+    with pytest.raises(sm.errors.ProblemError, match="cannot end at rest"):
+        dataclasses.replace(problem, constraints=[sm.constraints.EndVelocity()])
     free = sm.plan(problem)
     end, target = free.trajectory.q[-1], free.trajectory.qd[-1]
-    ends = (sm.EndConfiguration(end), sm.EndVelocity(target))
+    ends = (sm.constraints.EndConfiguration(end), sm.constraints.EndVelocity(target))
     kept = sm.plan(dataclasses.replace(problem, constraints=(*LIMITS, *ends)))
     assert kept.certificate.verified, kept.certificate.verdict
     np.testing.assert_allclose(kept.trajectory.qd[-1], target, atol=1e-6)
@@ -90,7 +90,9 @@ def test_an_end_velocity_is_reached_and_checked(panda_circle: Circle) -> None:
 
 
 def test_a_jump_in_velocity_is_refused_where_the_path_repeats(panda_circle: Circle) -> None:
-    plan = sm.plan(panda_circle(constraints=(*LIMITS, sm.ClosedPath(velocity=False)), rest=False))
+    plan = sm.plan(
+        panda_circle(constraints=(*LIMITS, sm.constraints.ClosedPath(velocity=False)), rest=False)
+    )
     assert plan.certificate.verified
     check = certify_again(plan, [ClosedMotion(velocity=True)])
     assert "off that of the start" in check.verdict
@@ -102,6 +104,10 @@ def test_end_conditions_that_contradict_each_other_are_named(panda_circle: Circl
         np.array([0.3]), follows.targets(np.zeros(1))[0]
     )
     assert end is not None
-    plan = sm.plan(panda_circle(constraints=[sm.ClosedPath(), sm.EndConfiguration(end)]))
+    plan = sm.plan(
+        panda_circle(
+            constraints=[sm.constraints.ClosedPath(), sm.constraints.EndConfiguration(end)]
+        )
+    )
     assert not plan.certificate.verified
     assert "not all constraints could be met" in plan.report.message

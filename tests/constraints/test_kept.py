@@ -159,7 +159,7 @@ def test_derivatives_of_another_shape_are_refused_by_name(
 def test_a_constraint_that_is_wrong_on_demand_does_not_pass() -> None:
     """Its tangents are right, but not what programmes are solved with."""
 
-    class Mine(sm.JointVelocityLimits):
+    class Mine(sm.constraints.JointVelocityLimits):
         def bind(self, follows, start, end):
             own = super().bind(follows, start, end)
             known = SimpleNamespace(picked=lambda *given: -own.picked(*given))

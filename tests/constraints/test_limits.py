@@ -12,7 +12,7 @@ from support.arms import robot_named, short_line
 Circle = Callable[..., sm.Problem]
 
 
-def certify_again(plan: sm.Plan, requirements: list[sm.Requirement]) -> sm.Certificate:
+def certify_again(plan: sm.Plan, requirements: list[sm.certificate.Requirement]) -> sm.Certificate:
     """Return a plan's certificate with other requirements."""
     return sm.certify(plan.robot, plan.path, plan.task, plan.trajectory, requirements=requirements)
 
@@ -22,7 +22,7 @@ def test_velocity_limits_are_kept_between_samples(panda_circle: Circle) -> None:
     limit = 0.55 * robot.velocity_limit
     without = sm.plan(panda_circle())
     assert (np.abs(without.trajectory.qd) / limit).max() > 1.0
-    constraints = (sm.JointPositionLimits(), sm.JointVelocityLimits(limit))
+    constraints = (sm.constraints.JointPositionLimits(), sm.constraints.JointVelocityLimits(limit))
     plan = sm.plan(panda_circle(constraints=constraints))
     assert plan.certificate.verified
     t = np.linspace(0, plan.trajectory.duration, 5001)
@@ -34,7 +34,10 @@ def test_position_limits_are_kept_between_samples(panda_circle: Circle) -> None:
     free = sm.plan(panda_circle())
     upper = np.array(free.robot.upper)
     upper[1] = free.trajectory.q[:, 1].max() - 0.05
-    constraints = (sm.JointPositionLimits(upper=upper), sm.JointVelocityLimits())
+    constraints = (
+        sm.constraints.JointPositionLimits(upper=upper),
+        sm.constraints.JointVelocityLimits(),
+    )
     plan = sm.plan(panda_circle(constraints=constraints))
     assert plan.certificate.verified
     t = np.linspace(0, plan.trajectory.duration, 5001)
@@ -43,12 +46,12 @@ def test_position_limits_are_kept_between_samples(panda_circle: Circle) -> None:
 
 def test_unreachable_limits_are_named(panda_circle: Circle) -> None:
     robot = panda_circle().robot
-    constraints = [sm.JointVelocityLimits(0.1 * robot.velocity_limit)]
+    constraints = [sm.constraints.JointVelocityLimits(0.1 * robot.velocity_limit)]
     plan = sm.plan(panda_circle(constraints=constraints))
     assert not plan.certificate.verified
     assert "velocity limits: speed of joint 'panda_joint" in plan.report.message
     assert "times its limit" in plan.certificate.verdict
-    with pytest.raises(sm.PlanError):
+    with pytest.raises(sm.errors.PlanError):
         plan.require()
 
 
@@ -57,7 +60,9 @@ def test_a_limit_on_one_side_is_kept(panda_circle: Circle) -> None:
     joint = int(np.argmax(np.ptp(free.trajectory.q, axis=0)))
     lower, upper = np.full(7, -np.inf), np.full(7, np.inf)
     upper[joint] = free.trajectory.q[:, joint].max() - 0.02
-    kept = sm.plan(panda_circle("position", constraints=[sm.JointPositionLimits(lower, upper)]))
+    kept = sm.plan(
+        panda_circle("position", constraints=[sm.constraints.JointPositionLimits(lower, upper)])
+    )
     assert kept.certificate.verified, kept.certificate.verdict
     assert kept.trajectory.q[:, joint].max() < upper[joint]
 
@@ -88,12 +93,12 @@ def test_limits_that_nobody_knows_are_told_of() -> None:
     """A constraint that has nothing to ask of an arm is not passed over in silence."""
     robot = robot_named("ur10")
     start = robot.dexterous_configuration("pointing")
-    asked = sm.JointAccelerationLimits()
+    asked = sm.constraints.JointAccelerationLimits()
     problem = sm.Problem(robot, short_line(robot, start), "pointing", start, constraints=[asked])
     told = [text for text in problem.remarks if "asked for" in text]
     assert told == [
         "joint acceleration limits are asked for, but none are known of ur10: give limit"
     ]
-    for quiet in ({"constraints": [sm.JointAccelerationLimits(5.0)]}, {}):
+    for quiet in ({"constraints": [sm.constraints.JointAccelerationLimits(5.0)]}, {}):
         usual = sm.Problem(robot, problem.path, "pointing", start, **quiet)
         assert not any("asked for" in text for text in usual.remarks)

@@ -14,7 +14,7 @@ LINK = "panda_link6"
 
 @pytest.fixture
 def problem(panda: sm.RobotModel) -> sm.Problem:
-    path = sm.Circle.around(panda.pose(PANDA_HOME), 0.12, 5.0, normal=(1, 0, 0))
+    path = sm.paths.Circle.around(panda.pose(PANDA_HOME), 0.12, 5.0, normal=(1, 0, 0))
     return sm.Problem(panda, path, "position", start=PANDA_HOME)
 
 
@@ -32,7 +32,7 @@ def test_a_tilt_is_kept_at_all_times_and_has_a_price(
     towards = panda.chain_to(LINK).place(PANDA_HOME).rotation[:, 0]
     free = sm.plan(problem)
     most = tilts(panda, free.trajectory, towards).max()
-    tilt = sm.Tilt(LINK, "x", within=0.7 * most, towards=towards)
+    tilt = sm.constraints.Tilt(LINK, "x", within=0.7 * most, towards=towards)
     asked = dataclasses.replace(problem, constraints=(*problem.constraints, tilt))
     check_constraint(tilt, asked)
     plan = sm.plan(asked).require()
@@ -48,7 +48,9 @@ def test_a_tilt_is_kept_at_all_times_and_has_a_price(
 
 def test_derivatives_equal_differences() -> None:
     robot, rng = robot_named("tiago"), np.random.default_rng(0)
-    quantity = sm.Tilt("arm_5_link", (1.0, 2.0, 0.5), 0.3, (0.0, 1.0, 1.0)).quantity(robot)
+    quantity = sm.constraints.Tilt("arm_5_link", (1.0, 2.0, 0.5), 0.3, (0.0, 1.0, 1.0)).quantity(
+        robot
+    )
     q = rng.normal(size=robot.dof)
     (exact,) = quantity.derivatives(q[None], q[None], q[None])
     for c in range(3):
@@ -73,5 +75,5 @@ def test_derivatives_equal_differences() -> None:
 def test_what_is_no_tilt_is_refused(
     panda: sm.RobotModel, given: dict[str, object], message: str
 ) -> None:
-    with pytest.raises(sm.ProblemError, match=message):
-        sm.Tilt(**given).quantity(panda)  # type: ignore[arg-type]
+    with pytest.raises(sm.errors.ProblemError, match=message):
+        sm.constraints.Tilt(**given).quantity(panda)  # type: ignore[arg-type]

@@ -39,7 +39,7 @@ def test_derivatives_equal_central_differences(panda: sm.RobotModel) -> None:
 
 @pytest.mark.parametrize("task", ["pose", "position", "pointing"])
 def test_the_constraint_keeps_the_laws(panda: sm.RobotModel, task: str) -> None:
-    limits = sm.ToolLimits(0.3, 0.5, 1.0, 2.0)
+    limits = sm.constraints.ToolLimits(0.3, 0.5, 1.0, 2.0)
     testing.check_constraint(limits, small_circle(panda, task=task))
 
 
@@ -54,12 +54,14 @@ def test_what_the_task_leaves_free_keeps_its_limit(
         return float(np.linalg.norm(velocity[:, 3:], axis=1).max())
 
     fastest = turn_rate(free)
-    wide = sm.ToolLimits(turn_rate=2.0 * fastest).requirement(panda)
+    wide = sm.constraints.ToolLimits(turn_rate=2.0 * fastest).requirement(panda)
     found = wide.judge(FinishedMotion(panda, free.trajectory))
     assert 0.5 <= found.amount <= 0.5 * (1.0 + 1e-4)
-    asked = sm.ToolLimits(turn_rate=0.5 * fastest)
+    asked = sm.constraints.ToolLimits(turn_rate=0.5 * fastest)
     plan = sm.plan(
-        small_circle(panda, task="position", constraints=[sm.JointVelocityLimits(), asked])
+        small_circle(
+            panda, task="position", constraints=[sm.constraints.JointVelocityLimits(), asked]
+        )
     )
     assert plan.certificate.verified, plan.certificate.verdict
     assert "tool turn rate" in plan.certificate.covers
@@ -73,7 +75,7 @@ def test_a_path_that_is_too_fast_is_refused_with_the_amount(panda: sm.RobotModel
     path = small_circle(panda).path
     t = np.linspace(0.0, path.duration, 4001)
     fastest = np.linalg.norm(path.samples(t).twist[:, :3], axis=1).max()
-    limits = sm.ToolLimits(speed=0.5 * fastest)
+    limits = sm.constraints.ToolLimits(speed=0.5 * fastest)
     plan = sm.plan(small_circle(panda, constraints=[limits]), max_evaluations=20)
     assert not plan.certificate.verified
     assert "give it 2 times the duration" in plan.certificate.verdict
@@ -90,5 +92,5 @@ def test_a_path_that_is_too_fast_is_refused_with_the_amount(panda: sm.RobotModel
     ],
 )
 def test_limits_that_make_no_sense(options: dict, message: str) -> None:
-    with pytest.raises(sm.ProblemError, match=message):
-        sm.ToolLimits(**options)
+    with pytest.raises(sm.errors.ProblemError, match=message):
+        sm.constraints.ToolLimits(**options)

@@ -16,7 +16,7 @@ from support.files_of_people import finger
 
 def test_the_constraint_keeps_the_laws(panda: sm.RobotModel) -> None:
     testing.check_constraint(
-        sm.JointTorqueLimits(limit=20.0), upright_circle(panda, task="position")
+        sm.constraints.JointTorqueLimits(limit=20.0), upright_circle(panda, task="position")
     )
 
 
@@ -25,7 +25,7 @@ def test_torques_are_kept_and_judged_at_all_times(panda: sm.RobotModel, tmp_path
     dynamics, t = Dynamics(panda, 3.0), np.linspace(0.0, 4.0, 20_001)
     motion = free.trajectory
     needed = np.abs(dynamics.torques(motion(t), motion(t, 1), motion(t, 2)))
-    asked = sm.JointTorqueLimits(panda.effort_limit, payload=3.0)
+    asked = sm.constraints.JointTorqueLimits(panda.effort_limit, payload=3.0)
     found = asked.requirement(panda).judge(_finished(free))
     exact = float((needed / panda.effort_limit).max())
     assert exact <= found.amount <= exact * (1.0 + 1e-4)
@@ -33,8 +33,12 @@ def test_torques_are_kept_and_judged_at_all_times(panda: sm.RobotModel, tmp_path
     joint = int(np.argmax(needed.max(axis=0)))
     limit = np.array(panda.effort_limit)
     limit[joint] = 0.985 * needed[:, joint].max()
-    asked = sm.JointTorqueLimits(limit, payload=3.0)
-    constraints = [sm.JointPositionLimits(), sm.JointVelocityLimits(), asked]
+    asked = sm.constraints.JointTorqueLimits(limit, payload=3.0)
+    constraints = [
+        sm.constraints.JointPositionLimits(),
+        sm.constraints.JointVelocityLimits(),
+        asked,
+    ]
     plan = sm.plan(upright_circle(panda, task="position", constraints=constraints))
     assert plan.certificate.verified, plan.certificate.verdict
     assert "torques" in plan.certificate.covers
@@ -58,21 +62,34 @@ def test_whole_turns_between_samples_hide_nothing(panda: sm.RobotModel) -> None:
     needed = np.abs(dynamics.torques(motion(t), motion(t, 1), motion(t, 2))).max(axis=0)
     assert needed[1] > 30.0
     limit = np.full(7, 2.0 * needed.max())
-    assert sm.JointTorqueLimits(limit).requirement(panda).judge(FinishedMotion(panda, motion)).kept
+    assert (
+        sm.constraints.JointTorqueLimits(limit)
+        .requirement(panda)
+        .judge(FinishedMotion(panda, motion))
+        .kept
+    )
     limit[1] = 0.5 * needed[1]
-    found = sm.JointTorqueLimits(limit).requirement(panda).judge(FinishedMotion(panda, motion))
+    found = (
+        sm.constraints.JointTorqueLimits(limit)
+        .requirement(panda)
+        .judge(FinishedMotion(panda, motion))
+    )
     assert (found.kept, found.subject) == (False, panda.joint_names[1])
     assert found.amount == pytest.approx(2.0, rel=1e-3)
     # Too long a way to be looked at is not kept either.
     endless = sm.Trajectory(
         motion.t, np.array([upright, upright + 1e6]), np.full((2, 7), 1e4), panda.joint_names, still
     )
-    found = sm.JointTorqueLimits(limit).requirement(panda).judge(FinishedMotion(panda, endless))
+    found = (
+        sm.constraints.JointTorqueLimits(limit)
+        .requirement(panda)
+        .judge(FinishedMotion(panda, endless))
+    )
     assert not found.kept
 
 
 def test_a_payload_that_is_too_heavy_is_refused(panda: sm.RobotModel) -> None:
-    heavy = sm.JointTorqueLimits(payload=30.0)
+    heavy = sm.constraints.JointTorqueLimits(payload=30.0)
     plan = sm.plan(upright_circle(panda, constraints=[heavy]), max_evaluations=30)
     assert not plan.certificate.verified
     assert re.search(
@@ -90,7 +107,7 @@ def test_joints_that_mimic_keep_the_limits_of_whatever_turns_them(tmp_path: Path
     file = tmp_path / "finger.urdf"
     file.write_text(finger('lower="-2" upper="2" velocity="2" effort="4"'))
     robot = sm.load_robot(file, tool="tip")
-    quantity, asked = sm.JointTorqueLimits().quantity(robot), robot.dof + 2
+    quantity, asked = sm.constraints.JointTorqueLimits().quantity(robot), robot.dof + 2
     assert [column.subject for column in quantity.columns[-2:]] == ["j3", "j4"]
     np.testing.assert_array_equal(quantity.bounds, [5.0] * robot.dof + [5.0, 4.0])
     rng = np.random.default_rng(1)
@@ -122,11 +139,17 @@ def test_a_joint_that_mimics_is_judged_by_its_own_effort(
     motion = sm.Trajectory(np.array([0.0, 1.0]), q, q, robot.joint_names, q)
     # Links 4 and 5 weigh 0.9 and 1 kg, at 0.2 and 0.1 + 0.25 m.
     weight = 9.81 * (0.9 * 0.2 + 1.0 * 0.35)
-    found = sm.JointTorqueLimits().requirement(robot).judge(FinishedMotion(robot, motion))
+    found = (
+        sm.constraints.JointTorqueLimits().requirement(robot).judge(FinishedMotion(robot, motion))
+    )
     assert found.kept is (said is None)
     if said is not None:
         assert (found.subject, said in found.text) == ("j4", True)
         assert found.amount == pytest.approx(weight / 2.5, rel=1e-6)
     # Limits of one's own are of what is asked of the joint that is mimicked.
-    own = sm.JointTorqueLimits(30.0).requirement(robot).judge(FinishedMotion(robot, motion))
+    own = (
+        sm.constraints.JointTorqueLimits(30.0)
+        .requirement(robot)
+        .judge(FinishedMotion(robot, motion))
+    )
     assert own.kept

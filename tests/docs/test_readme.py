@@ -145,7 +145,7 @@ def test_figures_of_the_readme_are_those_of_the_page() -> None:
 
 def test_the_picture_is_of_what_the_readme_says() -> None:
     problem = two_motions.seam()
-    for plan in (sm.plan_by(problem, sm.PseudoInverse()), sm.plan(problem)):
+    for plan in (sm.plan_by(problem, sm.baselines.PseudoInverse()), sm.plan(problem)):
         assert f"at {100.0 * two_motions.shares(plan).max():.0f} %" in README
         assert f"at cost {plan.report.cost:.2f}" in README
     assert plan.certificate.verified

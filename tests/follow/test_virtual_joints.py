@@ -51,7 +51,7 @@ def test_the_tool_deviates_in_what_is_relaxed_and_by_what_the_joints_say(
     name: str, task: str, relaxations: list[sm.Relaxation]
 ) -> None:
     robot, rng = robot_named(name), np.random.default_rng(1)
-    real = Follows.of(robot, sm.Dwell(pin.SE3.Identity(), 1.0), task)
+    real = Follows.of(robot, sm.paths.Dwell(pin.SE3.Identity(), 1.0), task)
     follows = AugmentedFollows.with_tolerances(real, relaxations)
     virtual, n = follows.virtual, robot.dof
     lower, upper = robot.finite_limits()
@@ -62,7 +62,7 @@ def test_the_tool_deviates_in_what_is_relaxed_and_by_what_the_joints_say(
         q = np.hstack([rng.uniform(lower, upper)[None], s])
         # Where all is followed is where the joints put it; what deviates is the arm's own tool.
         pose, tool = follows.items[0].chain.place(q[0]), robot.pose(q[0, :n])
-        there = Follows.of(robot, sm.Dwell(pose, 1.0), task).items[0]
+        there = Follows.of(robot, sm.paths.Dwell(pose, 1.0), task).items[0]
         in_tool = any(item.in_tool_axes for item in relaxations)
         away = deviation_from(there, np.zeros(1), q[:, :n], in_tool)
         rest = away.copy()
@@ -85,7 +85,7 @@ def test_the_tool_deviates_in_what_is_relaxed_and_by_what_the_joints_say(
 
 def test_joints_stand_still_outside_of_windows() -> None:
     robot = robot_named("panda")
-    path = sm.Dwell(robot.pose(PANDA_HOME), 4.0)
+    path = sm.paths.Dwell(robot.pose(PANDA_HOME), 4.0)
     windows = [R("x", 0.1, during=(0.0, 2.0)), R(("rx", "ry"), 0.2, during=(1.0, 4.0)), R("z", 0.1)]
     follows = AugmentedFollows.with_tolerances(Follows.of(robot, path, "pose"), windows)
     names = follows.robot.joint_names[7:]
@@ -99,24 +99,32 @@ def test_joints_stand_still_outside_of_windows() -> None:
 
 def test_rotations_about_changing_pairs_of_axes_are_refused() -> None:
     robot = robot_named("panda")
-    path = sm.Dwell(robot.pose(PANDA_HOME), 4.0)
+    path = sm.paths.Dwell(robot.pose(PANDA_HOME), 4.0)
     pairs = [R("rx", 0.1, (0.0, 2.0)), R("ry", 0.1), R("rz", 0.1, (2.5, 4.0))]
-    with pytest.raises(sm.ProblemError, match="two and another two"):
+    with pytest.raises(sm.errors.ProblemError, match="two and another two"):
         sm.Problem(robot, path, start=PANDA_HOME, relaxations=pairs)
 
 
 def test_a_problem_with_tolerances_keeps_what_its_costs_and_limits_say_of_the_arm() -> None:
     """Their values and derivatives are those of the arm's own joints; bands are besides."""
     robot = robot_named("panda")
-    circle = sm.Circle.around(robot.pose(PANDA_HOME), 0.1, 3.0)
-    tilt = sm.Tilt("panda_link7", within=2.0, towards=(1.0, 0.0, 0.0))
-    costs = [sm.JointVelocity(), sm.InverseManipulability(0.1), sm.JointAcceleration(0.01)]
+    circle = sm.paths.Circle.around(robot.pose(PANDA_HOME), 0.1, 3.0)
+    tilt = sm.constraints.Tilt("panda_link7", within=2.0, towards=(1.0, 0.0, 0.0))
+    costs = [
+        sm.costs.JointVelocity(),
+        sm.costs.InverseManipulability(0.1),
+        sm.costs.JointAcceleration(0.01),
+    ]
     asked = sm.Problem(
         robot,
         circle,
         start=PANDA_HOME,
         costs=costs,
-        constraints=[sm.JointPositionLimits(), sm.JointVelocityLimits(), tilt],
+        constraints=[
+            sm.constraints.JointPositionLimits(),
+            sm.constraints.JointVelocityLimits(),
+            tilt,
+        ],
         relaxations=[R(("rx", "ry"), 0.2), R("z", 0.01, axes="tool")],
     )
     problem, rng = asked.augmented, np.random.default_rng(0)
@@ -159,7 +167,7 @@ def test_gradients_along_nodes_equal_central_differences(
     relaxations: list[sm.Relaxation], window: tuple[float, float] | None
 ) -> None:
     robot = robot_named("panda")
-    circle = sm.Circle.around(robot.pose(PANDA_HOME), 0.1, 2.0)
+    circle = sm.paths.Circle.around(robot.pose(PANDA_HOME), 0.1, 2.0)
     items = [dataclasses.replace(item, during=window) for item in relaxations]
     asked = sm.Problem(
         robot, circle, start=PANDA_HOME, relaxations=items, rest=False, collision=None

@@ -10,5 +10,5 @@ from support.arms import PANDA_HOME, robot_named
 def plan() -> sm.Plan:
     """Return the motion of a Panda round a circle of 3 s."""
     panda = robot_named("panda")
-    circle = sm.Circle.around(panda.pose(PANDA_HOME), 0.1, 3.0, normal=(1.0, 0.0, 0.0))
+    circle = sm.paths.Circle.around(panda.pose(PANDA_HOME), 0.1, 3.0, normal=(1.0, 0.0, 0.0))
     return sm.plan(sm.Problem(panda, circle, start=PANDA_HOME))

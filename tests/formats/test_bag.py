@@ -22,7 +22,7 @@ SPOILED = 120
 @pytest.fixture(scope="module")
 def bag(plan: sm.Plan, tmp_path_factory: pytest.TempPathFactory) -> Path:
     file = tmp_path_factory.mktemp("bag") / "motion.mcap"
-    sm.write_motion(plan, file, rate=RATE)
+    sm.files.write_motion(plan, file, rate=RATE)
     return file
 
 
@@ -53,7 +53,7 @@ def test_a_public_reader_finds_states_and_the_tool(plan: sm.Plan, bag: Path) -> 
 
 
 def test_what_is_read_back_is_the_motion(plan: sm.Plan, bag: Path) -> None:
-    again = sm.read_motion(bag)
+    again = sm.files.read_motion(bag)
     assert plan.problem.certify(again, plan.tolerance).on_path
     assert again.joint_names == plan.trajectory.joint_names
     np.testing.assert_allclose(again.q, plan.trajectory(np.minimum(again.t, 3.0)), atol=1e-8)
@@ -63,13 +63,13 @@ def test_the_shell_writes_and_checks_a_bag(plan: sm.Plan, tmp_path: Path) -> Non
     plan.save(tmp_path / "plan.npz")
     code, text = invoke("export", tmp_path / "plan.npz", "--out", tmp_path / "b.mcap")
     assert (code, "b.mcap" in text) == (0, True)
-    assert sm.read_motion(tmp_path / "b.mcap").duration == pytest.approx(3.0)
+    assert sm.files.read_motion(tmp_path / "b.mcap").duration == pytest.approx(3.0)
 
 
 def test_spoiled_bags_are_refused_by_name(bag: Path, tmp_path: Path) -> None:
     """Or read as long as they were: not every byte counts."""
     whole, rng = bag.read_bytes(), np.random.default_rng(0)
-    original, file, refused = sm.read_motion(bag), tmp_path / "spoiled.mcap", 0
+    original, file, refused = sm.files.read_motion(bag), tmp_path / "spoiled.mcap", 0
     for _ in range(SPOILED):
         spoiled = bytearray(whole)
         for at in rng.integers(0, len(whole), 3):
@@ -85,8 +85,8 @@ def test_spoiled_bags_are_refused_by_name(bag: Path, tmp_path: Path) -> None:
 def outcome(file: Path) -> tuple[str, sm.Trajectory | None]:
     """Return why a file is refused, or its motion."""
     try:
-        return "", sm.read_motion(file)
-    except sm.FileFormatError as error:
+        return "", sm.files.read_motion(file)
+    except sm.errors.FileFormatError as error:
         return str(error), None
 
 
@@ -95,11 +95,11 @@ def test_a_bag_without_states_and_a_missing_package_are_told(
 ) -> None:
     empty = tmp_path / "empty.mcap"
     empty.write_bytes(b"")
-    with pytest.raises(sm.FileFormatError, match="is no bag"):
-        sm.read_motion(empty)
+    with pytest.raises(sm.errors.FileFormatError, match="is no bag"):
+        sm.files.read_motion(empty)
     monkeypatch.setitem(sys.modules, "mcap_ros2.writer", None)
-    with pytest.raises(sm.ProblemError, match=r"pip install 'selfmotion\[bags\]'"):
-        sm.write_motion(plan, tmp_path / "b.mcap")
+    with pytest.raises(sm.errors.ProblemError, match=r"pip install 'selfmotion\[bags\]'"):
+        sm.files.write_motion(plan, tmp_path / "b.mcap")
     plan.save(tmp_path / "plan.npz")
     said = complaint("export", tmp_path / "plan.npz", "--out", tmp_path / "b.mcap")
     assert "selfmotion[bags]" in said

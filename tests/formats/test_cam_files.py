@@ -128,7 +128,7 @@ def test_both_languages_say_the_same(tmp_path: Path) -> None:
 def test_the_path_goes_along_the_legs_at_the_feeds(tmp_path: Path, name: str) -> None:
     file = written(tmp_path, name, GCODE if name.endswith("nc") else CLDATA)
     rows = (read_gcode if name.endswith("nc") else read_cldata)(file)["cut 1"]
-    path = sm.read_path(file, seam="cut 1")
+    path = sm.files.read_path(file, seam="cut 1")
     t = np.linspace(0.0, path.duration, 4001)
     samples = path.samples(t)
     legs = list(zip(rows.positions[:-1], rows.positions[1:], strict=True))
@@ -283,7 +283,7 @@ def test_a_program_without_z_is_in_its_plane(tmp_path: Path) -> None:
 
 def test_a_cut_that_goes_back_rests_there(tmp_path: Path) -> None:
     text = "G0 X0 Y0 Z5\nG1 Z-5 F600\nZ5\nX10\n"
-    path = sm.read_path(written(tmp_path, "peck.nc", text))
+    path = sm.files.read_path(written(tmp_path, "peck.nc", text))
     times = np.linspace(0.0, path.duration, 5001)
     samples = path.samples(times)
     lowest = int(samples.translation[:, 2].argmin())
@@ -296,15 +296,19 @@ def test_tables_name_seams_and_events(tmp_path: Path) -> None:
     rows += [f"left,{0.02 * k},0,0,0.05,{'arc on' if k == 1 else ''}" for k in range(5)]
     rows += [f"right,{0.02 * k},0.1,0,0.05,{'arc off' if k == 4 else ''}" for k in range(5)]
     file = written(tmp_path, "seams.csv", "\n".join(rows) + "\n")
-    path = sm.read_path(file, seam="right")
+    path = sm.files.read_path(file, seam="right")
     np.testing.assert_allclose(path.pose(0.0).translation, [0, 0.1, 0], atol=1e-12)
-    with pytest.raises(sm.FileFormatError, match="has 2 seams or cuts, left to right: choose one"):
-        sm.read_path(file)
-    with pytest.raises(sm.FileFormatError, match="has no seam 'middle'; it has 'left', 'right'"):
-        sm.read_path(file, seam="middle")
+    with pytest.raises(
+        sm.errors.FileFormatError, match="has 2 seams or cuts, left to right: choose one"
+    ):
+        sm.files.read_path(file)
+    with pytest.raises(
+        sm.errors.FileFormatError, match="has no seam 'middle'; it has 'left', 'right'"
+    ):
+        sm.files.read_path(file, seam="middle")
     job = tmp_path / "job.toml"
     job.write_text('task = "position"\n[robot]\nname = "panda"\n[seams]\nfile = "seams.csv"\n')
-    left, right = sm.read_seam_job(job).seams
+    left, right = sm.files.read_seam_job(job).seams
     ((name, at),) = left.events
     assert name == "arc on"
     np.testing.assert_allclose(left.path.pose(at).translation, [0.02, 0, 0], atol=1e-4)
@@ -325,7 +329,7 @@ def test_events_come_at_their_poses_after_ramps_and_leads(
     text = 'task = "position"\nrobot.name = "panda"\nworkpiece.frame.position = [0, 1, 0]\n'
     options = f'file = "seams.csv"\n{ramp}{leads}'
     one = '[[seams]]\nname = "left"\n[seams.path]\nkind = "file"\nseam = "left"\n'
-    (seam,) = sm.read_seam_job(
+    (seam,) = sm.files.read_seam_job(
         written(tmp_path, "job.toml", text + (one if listed else "[seams]\n") + options)
     ).seams
     assert [name for name, _ in seam.events] == ["arc on", "gas on", "arc off"]
@@ -350,7 +354,7 @@ def test_events_of_dense_poses_after_corners_come_at_their_poses(tmp_path: Path)
         'task = "position"\n[robot]\nname = "panda"\n[seams]\nfile = "seams.csv"\n'
         'feed = 0.05\ncorners = "round"\ntolerance = 0.01\n'
     )
-    (seam,) = sm.read_seam_job(job).seams
+    (seam,) = sm.files.read_seam_job(job).seams
     ((_, at),) = seam.events
     place = seam.path.pose(at).translation[:2]
     np.testing.assert_allclose(place, points[300], atol=1e-6)
@@ -363,7 +367,7 @@ def test_a_job_is_read_from_a_machine_program(tmp_path: Path) -> None:
         'task = "pointing"\n[robot]\nname = "panda"\n[seams]\nfile = "slot.nc"\n'
         "frame = { position = [0.4, 0, 0.3] }\ntolerance = 0.0005\n"
     )
-    first, second = sm.read_seam_job(job).seams
+    first, second = sm.files.read_seam_job(job).seams
     assert (first.name, second.name) == ("cut 1", "cut 2")
     assert [name for name, _ in first.events] == ["M6", "M3", "M8", "M9"]
     assert [at for name, at in first.events if name in ("M6", "M9")] == [0.0, first.path.duration]
@@ -418,8 +422,8 @@ def test_a_job_is_read_from_a_machine_program(tmp_path: Path) -> None:
 )
 def test_other_words_are_refused_by_line(tmp_path: Path, line: str, said: str) -> None:
     text = GCODE.replace("N90 Z5 ; out", line)
-    with pytest.raises(sm.FileFormatError, match=rf"slot\.nc: line 1[12]: .*{said}"):
-        sm.read_path(written(tmp_path, "slot.nc", text), seam="cut 1")
+    with pytest.raises(sm.errors.FileFormatError, match=rf"slot\.nc: line 1[12]: .*{said}"):
+        sm.files.read_path(written(tmp_path, "slot.nc", text), seam="cut 1")
 
 
 @pytest.mark.parametrize(
@@ -445,21 +449,21 @@ def test_other_words_are_refused_by_line(tmp_path: Path, line: str, said: str) -
 )
 def test_other_statements_are_refused_by_line(tmp_path: Path, line: str, said: str) -> None:
     text = CLDATA.replace("GOTO/40,50,5", line)
-    with pytest.raises(sm.FileFormatError, match=rf"slot\.apt: line 1[56]: .*{said}"):
-        sm.read_path(written(tmp_path, "slot.apt", text), seam="cut 1")
+    with pytest.raises(sm.errors.FileFormatError, match=rf"slot\.apt: line 1[56]: .*{said}"):
+        sm.files.read_path(written(tmp_path, "slot.apt", text), seam="cut 1")
 
 
 def test_a_program_without_feeds_or_cuts_says_so(tmp_path: Path) -> None:
     file = written(tmp_path, "a.nc", "G0 X0 Y0 Z0\nG1 X10\n")
-    with pytest.raises(sm.FileFormatError, match="says no feed"):
-        sm.read_path(file)
-    assert sm.read_path(file, feed=0.02).duration > 0.5
-    with pytest.raises(sm.FileFormatError, match="duration has no effect"):
-        sm.read_path(file, duration=2.0)
-    with pytest.raises(sm.FileFormatError, match="has no cut"):
-        sm.read_path(written(tmp_path, "b.nc", "G0 X0 Y0 Z0\nX3\n"))
-    with pytest.raises(sm.FileFormatError, match="cuts, and X is not known yet"):
-        sm.read_path(written(tmp_path, "c.nc", "G1 Y3 F100\n"))
+    with pytest.raises(sm.errors.FileFormatError, match="says no feed"):
+        sm.files.read_path(file)
+    assert sm.files.read_path(file, feed=0.02).duration > 0.5
+    with pytest.raises(sm.errors.FileFormatError, match="duration has no effect"):
+        sm.files.read_path(file, duration=2.0)
+    with pytest.raises(sm.errors.FileFormatError, match="has no cut"):
+        sm.files.read_path(written(tmp_path, "b.nc", "G0 X0 Y0 Z0\nX3\n"))
+    with pytest.raises(sm.errors.FileFormatError, match="cuts, and X is not known yet"):
+        sm.files.read_path(written(tmp_path, "c.nc", "G1 Y3 F100\n"))
 
 
 SWITCHED = """%
@@ -490,7 +494,7 @@ def test_nothing_that_is_switched_is_lost_or_late(tmp_path: Path) -> None:
     job = written(
         tmp_path, "slot.toml", f'task = "pointing"\nrobot.name = "panda"\n[seams]\n{table}'
     )
-    first, second = sm.read_seam_job(job).seams
+    first, second = sm.files.read_seam_job(job).seams
     assert first.events[0] == ("M3", 0.0)
     assert [name for name, _ in first.events] == ["M3", "M9"]
     assert first.events[1][1] == pytest.approx(first.path.duration)
@@ -508,15 +512,15 @@ def test_a_list_of_seams_loses_no_events(tmp_path: Path) -> None:
     one = SWITCHED.replace("G0 X0 Y-60", "M30")
     written(tmp_path, "slot.nc", one)
     file = written(tmp_path, "job.toml", text.replace("EVENTS", ""))
-    (seam,) = sm.read_seam_job(file).seams
+    (seam,) = sm.files.read_seam_job(file).seams
     whole = written(
         tmp_path, "whole.toml", 'task="pointing"\nrobot.name="panda"\nseams.file="slot.nc"\n'
     )
-    assert seam.events == sm.read_seam_job(whole).seams[0].events
+    assert seam.events == sm.files.read_seam_job(whole).seams[0].events
     assert seam.events
     assert not seam.either_way
     told = written(tmp_path, "job.toml", text.replace("EVENTS", "events = []\n"))
-    assert not sm.read_seam_job(told).seams[0].events
+    assert not sm.files.read_seam_job(told).seams[0].events
     # Nor where the file is a part of the path; with other times it is refused.
     inner = '{ kind = "file", file = "slot.nc" }'
     for outer in (
@@ -524,7 +528,7 @@ def test_a_list_of_seams_loses_no_events(tmp_path: Path) -> None:
         f'kind = "weave"\npath = {inner}\namplitude = 0.001\npitch = 0.01\n',
     ):
         within = text.replace("EVENTS", "").replace(path, f"[seams.path]\n{outer}")
-        (again,) = sm.read_seam_job(written(tmp_path, "job.toml", within)).seams
+        (again,) = sm.files.read_seam_job(written(tmp_path, "job.toml", within)).seams
         assert again.events == seam.events
         assert not again.either_way
     for outer in (
@@ -532,8 +536,8 @@ def test_a_list_of_seams_loses_no_events(tmp_path: Path) -> None:
         f'kind = "feed"\nfeed = 0.01\npath = {inner}\n',
     ):
         within = text.replace("EVENTS", "").replace(path, f"[seams.path]\n{outer}")
-        with pytest.raises(sm.FileFormatError, match="event 'M3' would be lost"):
-            sm.read_seam_job(written(tmp_path, "job.toml", within))
+        with pytest.raises(sm.errors.FileFormatError, match="event 'M3' would be lost"):
+            sm.files.read_seam_job(written(tmp_path, "job.toml", within))
 
 
 @pytest.mark.parametrize(
@@ -593,7 +597,7 @@ def test_events_of_rows_with_times_are_at_these_times_after_a_ramp(tmp_path: Pat
             'task="position"\ncollision=false\n[robot]\nname="panda"\n[seams]\n'
             'file="rows.csv"\nramp=0.3\n',
         )
-        (seam,) = sm.read_seam_job(job).seams
+        (seam,) = sm.files.read_seam_job(job).seams
         ((_, at),) = seam.events
         row = np.array([table[number][1], table[number][2], 300.0])
         assert np.linalg.norm(1e3 * seam.path.pose(at).translation - row) < 1e-3

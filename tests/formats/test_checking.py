@@ -85,7 +85,7 @@ MALFORMED = [
 
 KINDS = {
     f"{family.__name__}-{name}": kind
-    for family in (sm.Constraint, sm.Cost, Coordinate)
+    for family in (sm.constraints.Constraint, sm.costs.Cost, Coordinate)
     for name, kind in family.kinds().items()
 }
 
@@ -178,7 +178,7 @@ def test_files_that_cannot_be_read(tmp_path: Path) -> None:
     ],
 )  # fmt: skip
 def test_documents_that_mislead_or_exhaust(tmp_path: Path, name: str, text: str, said: str) -> None:
-    with pytest.raises(sm.FileFormatError) as refused:
+    with pytest.raises(sm.errors.FileFormatError) as refused:
         read_document(written(tmp_path, text, name))
     assert said in str(refused.value)
     assert name in str(refused.value)
@@ -187,7 +187,9 @@ def test_documents_that_mislead_or_exhaust(tmp_path: Path, name: str, text: str,
 def test_degrees_are_refused_for_joints_that_slide(tmp_path: Path) -> None:
     text = 'robot = { name = "tiago" }\nstart_deg = [1,2,3,4,5,6,7,8]\ntask = "position"\n'
     file = written(tmp_path, text + 'path = { kind = "line", by = [0, 0, 0.1], duration = 1 }')
-    with pytest.raises(sm.FileFormatError, match="start_deg: joint 'torso_lift_joint' slides"):
+    with pytest.raises(
+        sm.errors.FileFormatError, match="start_deg: joint 'torso_lift_joint' slides"
+    ):
         sm.read_problem(file)
 
 
@@ -231,7 +233,7 @@ def test_whatever_is_put_anywhere_is_planned_or_refused_by_name(tmp_path: Path) 
 @pytest.mark.parametrize("kind", ["JointVelocityLimits", "JointTorqueLimits", "ToolLimits"])
 def test_a_margin_that_is_a_share_has_no_unit(kind: str) -> None:
     """Half a degree would be taken for a share of 0.0087."""
-    with pytest.raises(sm.FileFormatError, match="is a share here"):
+    with pytest.raises(sm.errors.FileFormatError, match="is a share here"):
         in_si({"constraints": [{"kind": kind, "margin_deg": 0.5}]})
     found = in_si({"constraints": [{"kind": "JointPositionLimits", "margin_deg": 0.5}]})
     assert found["constraints"][0]["margin"] == pytest.approx(np.radians(0.5))

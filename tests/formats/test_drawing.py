@@ -58,10 +58,10 @@ def test_units_are_those_of_the_drawing(tmp_path: Path, number: int, metres: flo
 @pytest.mark.parametrize("number", [0, 17])
 def test_a_drawing_without_a_unit_is_refused_until_it_is_said(tmp_path: Path, number: int) -> None:
     said = rf"part\.dxf: says no unit .*\$INSUNITS is {number}.*unit = 'mm'.* mm, cm, dm"
-    with pytest.raises(sm.FileFormatError, match=said):
+    with pytest.raises(sm.errors.FileFormatError, match=said):
         rows_of(tmp_path, lambda s: s.add_line((0, 0), (3, 4)), units=number)
     for unit, length in (("mm", 0.005), ("in", 5 * 0.0254)):
-        path = sm.read_path(tmp_path / "part.dxf", unit=unit, feed=0.1, jump=2.0)
+        path = sm.files.read_path(tmp_path / "part.dxf", unit=unit, feed=0.1, jump=2.0)
         first, last = path.evaluate(np.array([0.0, path.duration])).translation
         assert np.linalg.norm(last - first) == pytest.approx(length)
     line = refused("plan", "panda", "--path", tmp_path / "part.dxf", "--feed", "0.1")
@@ -72,12 +72,12 @@ def test_a_unit_that_is_said_counts_more_than_that_of_the_file(tmp_path: Path) -
     file = drawn(tmp_path / "part.dxf", lambda s: s.add_line((0, 0), (3, 4)), units=6)
     found = read_drawing(file, unit="mm")
     assert np.linalg.norm(found["0"].positions[1]) == pytest.approx(5e-3)
-    with pytest.raises(sm.FileFormatError, match=r"jumps by 5 m .*if \$INSUNITS is wrong"):
-        sm.read_path(file, feed=0.1)
-    with pytest.raises(sm.FileFormatError, match=r"unit is 'inch', expected one of: 'mm'"):
-        sm.read_path(file, unit="inch")
-    with pytest.raises(sm.FileFormatError, match=r"slot\.nc: unit has no effect"):
-        sm.read_path("slot.nc", unit="mm")
+    with pytest.raises(sm.errors.FileFormatError, match=r"jumps by 5 m .*if \$INSUNITS is wrong"):
+        sm.files.read_path(file, feed=0.1)
+    with pytest.raises(sm.errors.FileFormatError, match=r"unit is 'inch', expected one of: 'mm'"):
+        sm.files.read_path(file, unit="inch")
+    with pytest.raises(sm.errors.FileFormatError, match=r"slot\.nc: unit has no effect"):
+        sm.files.read_path("slot.nc", unit="mm")
 
 
 def off_circle(points: np.ndarray, centre: tuple[float, float], radius: float) -> float:
@@ -206,24 +206,26 @@ def test_what_is_not_read_is_named_and_hidden_layers_are_not_read(tmp_path: Path
     notes = document.layers.add("notes")
     file = tmp_path / "part.dxf"
     document.saveas(file)
-    with pytest.raises(sm.FileFormatError, match=f"'notes': SOLID {fill.dxf.handle} is not read"):
-        sm.read_path(file, feed=0.1)
+    with pytest.raises(
+        sm.errors.FileFormatError, match=f"'notes': SOLID {fill.dxf.handle} is not read"
+    ):
+        sm.files.read_path(file, feed=0.1)
     for hide in (notes.off, notes.freeze):
         hide()
         document.saveas(file)
-        assert sm.read_path(file, feed=0.1, seam="Weld").duration > 1.0
+        assert sm.files.read_path(file, feed=0.1, seam="Weld").duration > 1.0
         notes.on()
     # Texts and marks move nothing.
     space.delete_entity(fill)
     notes.thaw()
     document.saveas(file)
-    path = sm.read_path(file, feed=0.1)
+    path = sm.files.read_path(file, feed=0.1)
     assert path.duration > 1.0
     assert path.notes == ("passed over: 1 POINT, 1 TEXT",)
     document.layers.get("Weld").off()
     document.saveas(file)
-    with pytest.raises(sm.FileFormatError, match="nothing drawn in model space"):
-        sm.read_path(file, feed=0.1)
+    with pytest.raises(sm.errors.FileFormatError, match="nothing drawn in model space"):
+        sm.files.read_path(file, feed=0.1)
 
 
 def test_beside_the_layer_of_a_seam_anything_may_be_drawn(tmp_path: Path) -> None:
@@ -242,9 +244,9 @@ def test_beside_the_layer_of_a_seam_anything_may_be_drawn(tmp_path: Path) -> Non
         "7": "has no seam '7'; it has 'weld', 'glue', 'notes'",
         "notes": "layer 'notes': SOLID .* is not read",
     }.items():
-        with pytest.raises(sm.FileFormatError, match=told):
-            sm.read_path(file, feed=0.05, seam=seam)
-    with pytest.raises(sm.FileFormatError, match=r"layer 'notes': SOLID .* is not read"):
+        with pytest.raises(sm.errors.FileFormatError, match=told):
+            sm.files.read_path(file, feed=0.05, seam=seam)
+    with pytest.raises(sm.errors.FileFormatError, match=r"layer 'notes': SOLID .* is not read"):
         read_drawing(file)
 
 
@@ -254,11 +256,13 @@ def test_a_drawing_is_a_path_and_its_strokes_a_job(tmp_path: Path) -> None:
         space.add_line((0, 80), (60, 80), dxfattribs={"layer": "glue"})
 
     file = drawn(tmp_path / "part.dxf", draw)
-    with pytest.raises(sm.FileFormatError, match="has 2 seams or cuts, weld to glue: choose one"):
-        sm.read_path(file, feed=0.05)
-    with pytest.raises(sm.FileFormatError, match="says no feed"):
-        sm.read_path(file, seam="glue")
-    path = sm.read_path(file, feed=0.05, seam="weld", tolerance=1e-3)
+    with pytest.raises(
+        sm.errors.FileFormatError, match="has 2 seams or cuts, weld to glue: choose one"
+    ):
+        sm.files.read_path(file, feed=0.05)
+    with pytest.raises(sm.errors.FileFormatError, match="says no feed"):
+        sm.files.read_path(file, seam="glue")
+    path = sm.files.read_path(file, feed=0.05, seam="weld", tolerance=1e-3)
     ends = path.samples([0.0, path.duration])
     np.testing.assert_allclose(ends.translation, [[0, 0, 0], [0.06, 0.04, 0]], atol=1e-9)
     np.testing.assert_allclose(ends.rotation[:, :, 2], [[0, 0, -1]] * 2, atol=1e-12)
@@ -270,7 +274,7 @@ def test_a_drawing_is_a_path_and_its_strokes_a_job(tmp_path: Path) -> None:
         'task = "pointing"\n[robot]\nname = "panda"\n[seams]\nfile = "part.dxf"\nfeed_mm = 50\n'
         "frame = {position = [0.4, 0, 0.3]}\n"
     )
-    seams = sm.read_seam_job(job).seams
+    seams = sm.files.read_seam_job(job).seams
     assert [(seam.name, seam.either_way) for seam in seams] == [("weld", True), ("glue", True)]
 
 
@@ -278,7 +282,7 @@ def complaint(file: Path) -> str | None:
     """Return why a drawing is refused, None where it is read."""
     try:
         read_drawing(file)
-    except sm.FileFormatError as error:
+    except sm.errors.FileFormatError as error:
         return str(error)
     return None
 
@@ -304,15 +308,15 @@ def test_spoilt_drawings_are_refused_in_one_line(tmp_path: Path, capfd: Any) -> 
     assert capfd.readouterr() == ("", "")
     for content in (b"", b"not a drawing", b"0\nSECTION\n"):
         file.write_bytes(content)
-        with pytest.raises(sm.FileFormatError, match=r"spoilt\.dxf: "):
+        with pytest.raises(sm.errors.FileFormatError, match=r"spoilt\.dxf: "):
             read_drawing(file)
-    with pytest.raises(sm.FileFormatError, match="cannot be read: No such file"):
+    with pytest.raises(sm.errors.FileFormatError, match="cannot be read: No such file"):
         read_drawing(tmp_path / "none.dxf")
 
 
 def test_the_package_that_is_missing_is_named(tmp_path: Path, monkeypatch: Any) -> None:
     monkeypatch.setitem(sys.modules, "ezdxf.filemanagement", None)
-    with pytest.raises(sm.ProblemError, match=r"pip install 'selfmotion\[dxf\]'"):
+    with pytest.raises(sm.errors.ProblemError, match=r"pip install 'selfmotion\[dxf\]'"):
         read_drawing(tmp_path / "part.dxf")
 
 
@@ -321,7 +325,7 @@ def test_curves_that_are_absurdly_far_away_are_refused_without_a_warning(tmp_pat
     document.modelspace().add_spline().control_points = [(0, 0), (1e200, 0), (0, 1e200), (1, 1)]
     file = tmp_path / "far.dxf"
     document.saveas(file)
-    with pytest.raises(sm.FileFormatError, match=r"SPLINE .* cannot be drawn"):
+    with pytest.raises(sm.errors.FileFormatError, match=r"SPLINE .* cannot be drawn"):
         read_drawing(file)
 
 
@@ -355,7 +359,7 @@ def test_blocks_of_blocks_without_end_are_refused(tmp_path: Path) -> None:
         document.blocks.new(f"b{k}").add_blockref(f"b{k - 1}", (0, 0))
     document.modelspace().add_blockref("b22", (0, 0))
     document.saveas(tmp_path / "part.dxf")
-    with pytest.raises(sm.FileFormatError, match=r"INSERT .* of block 'b22': has more than"):
+    with pytest.raises(sm.errors.FileFormatError, match=r"INSERT .* of block 'b22': has more than"):
         read_drawing(tmp_path / "part.dxf")
 
 
@@ -368,7 +372,7 @@ def test_blocks_of_blocks_without_end_are_refused(tmp_path: Path) -> None:
 )
 def test_what_is_no_drawing_says_what_to_do(content: bytes, said: str, tmp_path: Path) -> None:
     (tmp_path / "part.dxf").write_bytes(content)
-    with pytest.raises(sm.FileFormatError, match=said):
+    with pytest.raises(sm.errors.FileFormatError, match=said):
         read_drawing(tmp_path / "part.dxf")
 
 
@@ -377,11 +381,13 @@ def test_a_drawing_of_hidden_layers_or_layouts_names_them(tmp_path: Path) -> Non
         space.doc.layers.add("weld").off()
         space.add_line((0, 0), (9, 0), {"layer": "weld"})
 
-    with pytest.raises(sm.FileFormatError, match="layer 'weld' is off or frozen: switch it on"):
+    with pytest.raises(
+        sm.errors.FileFormatError, match="layer 'weld' is off or frozen: switch it on"
+    ):
         rows_of(tmp_path, hide)
-    with pytest.raises(sm.FileFormatError, match=r"in layouts \(paper space\) is not read"):
+    with pytest.raises(sm.errors.FileFormatError, match=r"in layouts \(paper space\) is not read"):
         rows_of(tmp_path, lambda s: s.doc.layout("Layout1").add_line((0, 0), (9, 0)))
-    with pytest.raises(sm.FileFormatError, match="its TEXT entities are no strokes"):
+    with pytest.raises(sm.errors.FileFormatError, match="its TEXT entities are no strokes"):
         rows_of(tmp_path, lambda s: s.add_text("weld here"))
 
 
@@ -390,7 +396,9 @@ def test_legs_of_a_drawing_are_followed_at_the_feed(tmp_path: Path) -> None:
     corners = [(0, 0), (60, 0), (60, 40)]
     file = drawn(tmp_path / "part.dxf", lambda s: s.add_lwpolyline(corners))
     for rests in (False, True):
-        path = sm.read_path(file, feed=0.03, tolerance=5e-4, corners="stop" if rests else "blend")
+        path = sm.files.read_path(
+            file, feed=0.03, tolerance=5e-4, corners="stop" if rests else "blend"
+        )
         samples = path.samples(np.linspace(0.0, path.duration, 2001))
         points = samples.translation
         np.testing.assert_allclose(points[[0, -1], :2], [[0, 0], [0.06, 0.04]], atol=1e-9)

@@ -66,8 +66,8 @@ def test_tables_of_all_forms_give_one_motion(
     table: tuple[str, str, str | None], tmp_path: Path
 ) -> None:
     _, text, columns = table
-    path = sm.read_path(written(tmp_path, "a.txt", text), feed=0.05, columns=columns)
-    plain = sm.read_path(written(tmp_path, "b.csv", TABLES[0][1]), feed=0.05)
+    path = sm.files.read_path(written(tmp_path, "a.txt", text), feed=0.05, columns=columns)
+    plain = sm.files.read_path(written(tmp_path, "b.csv", TABLES[0][1]), feed=0.05)
     assert path.duration == pytest.approx(plain.duration)
     t = np.linspace(0.0, min(plain.duration, path.duration), 31)
     found, wanted = path.samples(t), plain.samples(t)
@@ -83,14 +83,14 @@ def test_letters_of_other_machines_are_no_matter(code: str, tmp_path: Path) -> N
     file.write_bytes(
         f"# Naht für Träger\r\nx;y;z;roll [°];pitch [°];yaw [°]\r\n{rows}".encode(code)
     )
-    path = sm.read_path(file, feed=0.05)
+    path = sm.files.read_path(file, feed=0.05)
     np.testing.assert_allclose(path.pose(0.0).translation, GOOD[0], atol=ROUNDING)
     np.testing.assert_allclose(path.pose(0.0).rotation[:, 2], DOWN, atol=ROUNDING)
 
 
 def test_a_trajectory_of_a_camera_is_read(tmp_path: Path) -> None:
     text = "# timestamp tx ty tz qx qy qz qw\n5.0 0.4 0 0.3 1 0 0 0\n7.0 0.5 0 0.3 1 0 0 0\n"
-    assert sm.read_path(written(tmp_path, "a.txt", text)).duration == pytest.approx(2.0)
+    assert sm.files.read_path(written(tmp_path, "a.txt", text)).duration == pytest.approx(2.0)
 
 
 @pytest.mark.parametrize(
@@ -106,17 +106,17 @@ def test_a_trajectory_of_a_camera_is_read(tmp_path: Path) -> None:
     ],
 )
 def test_tables_that_lack_or_have_more_say_what_to_do(text: str, said: str, tmp_path: Path) -> None:
-    with pytest.raises(sm.FileFormatError, match=said):
-        sm.read_path(written(tmp_path, "a.csv", text), feed=0.05)
+    with pytest.raises(sm.errors.FileFormatError, match=said):
+        sm.files.read_path(written(tmp_path, "a.csv", text), feed=0.05)
 
 
 def test_a_tool_that_turns_in_place_takes_time_for_it(tmp_path: Path) -> None:
     rows = ["0.4,0,0.3,180,0,0", "0.4,0,0.3,180,0,30", "0.45,0,0.3,180,0,30"]
     text = "\n".join(["x,y,z,roll_deg,pitch_deg,yaw_deg", *rows])
     file = written(tmp_path, "a.csv", text)
-    with pytest.raises(sm.FileFormatError, match=r"line 3: .*a feed with corners round"):
-        sm.read_path(file, feed=0.05)
-    path = sm.read_path(file, feed=0.05, corners="round")
+    with pytest.raises(sm.errors.FileFormatError, match=r"line 3: .*a feed with corners round"):
+        sm.files.read_path(file, feed=0.05)
+    path = sm.files.read_path(file, feed=0.05, corners="round")
     samples = path.samples(np.linspace(0.0, path.duration, 501))
     turning = np.abs(samples.twist[:, 5]) > 0.5
     assert turning.any()
@@ -136,8 +136,8 @@ def test_a_table_without_header_is_planned_with_columns(tmp_path: Path) -> None:
 def test_normals_that_point_out_are_flipped_and_tips_held_back(tmp_path: Path) -> None:
     text = TABLES[0][1].replace(",-1", ",1")
     file = written(tmp_path, "a.csv", text)
-    path = sm.read_path(file, feed=0.05, flip_normals=True, standoff=0.01)
-    plain = sm.read_path(written(tmp_path, "b.csv", TABLES[0][1]), feed=0.05)
+    path = sm.files.read_path(file, feed=0.05, flip_normals=True, standoff=0.01)
+    plain = sm.files.read_path(written(tmp_path, "b.csv", TABLES[0][1]), feed=0.05)
     found, wanted = path.pose(0.0), plain.pose(0.0)
     np.testing.assert_allclose(found.rotation[:, 2], DOWN, atol=ROUNDING)
     np.testing.assert_allclose(found.translation - wanted.translation, [0, 0, 0.01], atol=1e-12)
@@ -158,7 +158,7 @@ def test_normals_that_seem_to_point_out_are_told(
     file = written(tmp_path, "a.csv", f"x,y,z,nx,ny,nz\n{rows}\n")
 
     def refused(*_: object, **__: object) -> sm.Plan:
-        raise sm.PlanError("not planned here")
+        raise sm.errors.PlanError("not planned here")
 
     monkeypatch.setattr("selfmotion.cli.commands.plan_with_progress", refused)
     job = tmp_path / "a.toml"
@@ -189,15 +189,17 @@ def test_normals_that_seem_to_point_out_are_told(
 def test_a_path_that_leaves_its_straight_lines_says_by_how_much(tmp_path: Path) -> None:
     text = "x,y,z\n0.40,-0.10,0.4\n0.45,-0.10,0.4\n0.45,0.10,0.4\n"
     file = written(tmp_path, "three.csv", text)
-    (note,) = sm.read_path(file, feed=0.05).notes
+    (note,) = sm.files.read_path(file, feed=0.05).notes
     assert "by up to 40.0 mm at line 3: corners round (--corners round) keeps 1 mm" in note
-    assert sm.read_path(file, feed=0.05, corners="round").notes == ()
-    assert sm.read_path(file, feed=0.05, corners="stop").notes == ()
+    assert sm.files.read_path(file, feed=0.05, corners="round").notes == ()
+    assert sm.files.read_path(file, feed=0.05, corners="stop").notes == ()
     # Not of what is smooth.
     angle = np.linspace(0.0, np.pi, 60)
     arc = np.column_stack([0.4 + 0.1 * np.sin(angle), 0.1 * np.cos(angle), np.full(60, 0.4)])
     rows = "\n".join(",".join(map(repr, row)) for row in arc.tolist())
-    assert sm.read_path(written(tmp_path, "arc.csv", f"x,y,z\n{rows}\n"), feed=0.05).notes == ()
+    assert (
+        sm.files.read_path(written(tmp_path, "arc.csv", f"x,y,z\n{rows}\n"), feed=0.05).notes == ()
+    )
     placed = tmp_path / "a.toml"
     placed.write_text(
         'task = "position"\nrobot.name = "panda"\n[path]\nkind = "file"\nfile = "three.csv"\n'
@@ -225,9 +227,9 @@ _SAME_LINE = {
 
 @pytest.mark.parametrize("kind", _SAME_LINE)
 def test_legs_shorter_than_the_tolerance_hardly_count(kind: str, tmp_path: Path) -> None:
-    def cut(text: str, corners: str) -> sm.Path:
+    def cut(text: str, corners: str) -> sm.paths.Path:
         file = written(tmp_path, "a.nc", _HEAD + text + "G0 Z10\nM30\n")
-        return sm.read_path(file, seam="cut 1", corners=corners)
+        return sm.files.read_path(file, seam="cut 1", corners=corners)
 
     plain, path = cut("G1 X30\nG1 Y30\n", "round"), cut(_SAME_LINE[kind], "round")
     assert path.duration == pytest.approx(plain.duration, rel=ALIKE)
@@ -268,9 +270,9 @@ def drawing_through(file: Path, places: list[tuple[float, float]]) -> Path:
 def test_short_legs_hardly_count_in_apt_and_drawings(
     write: Callable[[Path, list[tuple[float, float]]], Path], kind: str, tmp_path: Path
 ) -> None:
-    def path(places: list[tuple[float, float]], corners: str = "round") -> sm.Path:
+    def path(places: list[tuple[float, float]], corners: str = "round") -> sm.paths.Path:
         file = write(tmp_path / f"a.{'apt' if write is apt_through else 'dxf'}", places)
-        return sm.read_path(file, feed=0.03, corners=corners)
+        return sm.files.read_path(file, feed=0.03, corners=corners)
 
     found = path(_SAME_CORNER[kind])
     assert found.duration == pytest.approx(path(_CORNER).duration, rel=ALIKE)
@@ -292,12 +294,12 @@ def test_rows_that_are_repeated_or_all_but_repeated_hardly_count(
     corners: str, tmp_path: Path
 ) -> None:
     rows = ["0.4,-0.1,0.4", "0.45,-0.1,0.4", "0.45,0.1,0.4"]
-    plain = sm.read_path(
+    plain = sm.files.read_path(
         written(tmp_path, "a.csv", "\n".join(["x,y,z", *rows])), feed=0.05, corners=corners
     )
     for extra in (rows[1], "0.4500001,-0.1,0.4", "0.45,-0.10001,0.4"):
         text = "\n".join(["x,y,z", *rows[:2], extra, rows[2]])
-        path = sm.read_path(written(tmp_path, "b.csv", text), feed=0.05, corners=corners)
+        path = sm.files.read_path(written(tmp_path, "b.csv", text), feed=0.05, corners=corners)
         assert path.duration == pytest.approx(plain.duration, rel=ALIKE)
         t = np.linspace(0.0, 1.0, 101)
         one, other = (each.samples(t * each.duration).translation for each in (plain, path))
@@ -352,10 +354,10 @@ def test_what_extrudes_is_a_cut(relative: bool, tmp_path: Path) -> None:
     (note,) = loop.notes
     assert "line 5: G28 goes to a place of the machine's own" in note
     assert "not known until X, Y and Z are given" in note
-    path = sm.read_path(tmp_path / "part.gcode", seam="cut 1")
+    path = sm.files.read_path(tmp_path / "part.gcode", seam="cut 1")
     # 100 mm at 25 mm/s, less what three rounded corners save.
     assert path.duration == pytest.approx(4.0, rel=0.02)
-    with pytest.raises(sm.FileFormatError, match="line 6: G92 X: zeros that move"):
+    with pytest.raises(sm.errors.FileFormatError, match="line 6: G92 X: zeros that move"):
         read_gcode(written(tmp_path, "b.gcode", text.replace("G92 E0", "G92 X0 E0", 1)))
 
 
@@ -418,30 +420,41 @@ def test_a_rotary_table_turns_the_part(
 
 def test_rotary_words_without_what_they_turn_are_refused(tmp_path: Path) -> None:
     file = written(tmp_path, "a.nc", ROTARY.format("B"))
-    with pytest.raises(sm.FileFormatError, match=r"line 4: B turns a table or the head.*_axes"):
-        sm.read_path(file)
+    with pytest.raises(
+        sm.errors.FileFormatError, match=r"line 4: B turns a table or the head.*_axes"
+    ):
+        sm.files.read_path(file)
     asked = ("plan", "panda", "--path", file, "--task", "pointing")
     assert "say --rotary table with --rotary-axes (BC, AC)" in complaint(*asked)
-    known = {name: sm.read_path(file, rotary="head").pose(0.5).homogeneous for name in ("head",)}
+    known = {
+        name: sm.files.read_path(file, rotary="head").pose(0.5).homogeneous for name in ("head",)
+    }
     tip = written(tmp_path, "b.nc", ROTARY.format("B").replace("G94", "G94 G43.4 H1"))
-    np.testing.assert_array_equal(sm.read_path(tip).pose(0.5).homogeneous, known["head"])
+    np.testing.assert_array_equal(sm.files.read_path(tip).pose(0.5).homogeneous, known["head"])
     # A way home behind the cut leaves it as it is.
     home = written(tmp_path, "d.nc", ROTARY.format("B").replace("G0 Z60", "G28 X0 Y0"))
-    found = sm.read_path(home, rotary="head").pose(0.5).homogeneous
+    found = sm.files.read_path(home, rotary="head").pose(0.5).homogeneous
     np.testing.assert_array_equal(found, known["head"])
     # A table under tool centre point control turns as the head, or the other way.
-    table = sm.read_path(file, rotary="head", rotary_axes="BC").pose(0.5).homogeneous
+    table = sm.files.read_path(file, rotary="head", rotary_axes="BC").pose(0.5).homogeneous
     np.testing.assert_allclose(table, known["head"], atol=1e-12)
     mirrored = ROTARY.format("B").replace("B-26.5 C-5", "B26.5 C5")
-    other = sm.read_path(written(tmp_path, "e.nc", mirrored), rotary="head", rotary_axes="-B,-C")
+    other = sm.files.read_path(
+        written(tmp_path, "e.nc", mirrored), rotary="head", rotary_axes="-B,-C"
+    )
     np.testing.assert_allclose(other.pose(0.5).homogeneous, known["head"], atol=1e-12)
     file = written(tmp_path, "f.nc", ROTARY.format("A"))
     for options in ({"rotary": "head"}, {"rotary": "table", "rotary_center": [0, 0, 0]}):
-        with pytest.raises(sm.FileFormatError, match=r"A turns.* none of rotary_axes \(B, C"):
-            sm.read_path(file, rotary_axes="BC", **options)
+        with pytest.raises(
+            sm.errors.FileFormatError, match=r"A turns.* none of rotary_axes \(B, C"
+        ):
+            sm.files.read_path(file, rotary_axes="BC", **options)
     file = tmp_path / "a.nc"
     # Words of 0 turn nothing.
-    assert sm.read_path(written(tmp_path, "c.nc", "G0 X0 Y0 Z0 A0\nG1 X10 F600 A0\n")).duration > 0
+    assert (
+        sm.files.read_path(written(tmp_path, "c.nc", "G0 X0 Y0 Z0 A0\nG1 X10 F600 A0\n")).duration
+        > 0
+    )
     for options, said in (
         ({"rotary": "bed"}, "expected 'head' or 'table'"),
         ({"rotary": "table"}, "rotary_center is missing"),
@@ -450,8 +463,8 @@ def test_rotary_words_without_what_they_turn_are_refused(tmp_path: Path) -> None
         ({"rotary_axes": "BC"}, "are of rotary = 'table'"),
         ({"rotary": "head", "rotary_center": [0, 0, 0]}, "is of a table whose positions are"),
     ):
-        with pytest.raises(sm.FileFormatError, match=said):
-            sm.read_path(file, **options)
+        with pytest.raises(sm.errors.FileFormatError, match=said):
+            sm.files.read_path(file, **options)
 
 
 def test_arcs_in_all_planes_are_turned_ones_of_the_first(tmp_path: Path) -> None:
@@ -484,11 +497,13 @@ def test_lists_of_pose_arrays_are_seams(tmp_path: Path) -> None:
     nested = [[raster(0.0)], [raster(0.1)]]
     for k, document in enumerate((arrays, {"paths": arrays}, nested, jobs)):
         file = written(tmp_path, f"{k}.json", json.dumps(document))
-        second = sm.read_path(file, seam="seam 2", feed=0.05)
+        second = sm.files.read_path(file, seam="seam 2", feed=0.05)
         np.testing.assert_allclose(second.pose(0.0).translation, [0.4, 0.1, 0.3], atol=ROUNDING)
-        with pytest.raises(sm.FileFormatError, match="has 2 seams or cuts, seam 1 to seam 2"):
-            sm.read_path(file, feed=0.05)
-    one = sm.read_path(written(tmp_path, "one.json", json.dumps(arrays[:1])), feed=0.05)
+        with pytest.raises(
+            sm.errors.FileFormatError, match="has 2 seams or cuts, seam 1 to seam 2"
+        ):
+            sm.files.read_path(file, feed=0.05)
+    one = sm.files.read_path(written(tmp_path, "one.json", json.dumps(arrays[:1])), feed=0.05)
     assert one.duration > 0.0
 
 
@@ -497,15 +512,15 @@ def test_trajectories_of_other_tools_are_judged_alike(tmp_path: Path) -> None:
     q = robot.dexterous_configuration()
     goal = robot.pose(q)
     goal.translation += [0.0, 0.1, 0.0]
-    line = sm.Line(robot.pose(q), goal, 2.0)
+    line = sm.paths.Line(robot.pose(q), goal, 2.0)
     plan = sm.plan(sm.Problem(robot, line, "pose", q), max_evaluations=3)
-    sm.write_motion(plan, tmp_path / "good.yaml", rate=50.0)
+    sm.files.write_motion(plan, tmp_path / "good.yaml", rate=50.0)
     good = yaml.safe_load((tmp_path / "good.yaml").read_text())
     miss = robot_miss(robot, plan)
 
     def judged(document: object) -> sm.Certificate:
         file = written(tmp_path, "other.yaml", yaml.dump(document))
-        return sm.certify(robot, line, "pose", sm.read_motion(file))
+        return sm.certify(robot, line, "pose", sm.files.read_motion(file))
 
     wanted = judged(good)
     assert wanted.verified, wanted.verdict

@@ -32,7 +32,9 @@ def test_a_motion_with_the_joints_that_mimic_others_is_that_of_the_arm(arm: sm.R
     found = without_followers(motion, arm).of_joints(arm.joint_names)
     np.testing.assert_array_equal(found.q, q)
     places[3, names.index("j4")] += 0.01
-    with pytest.raises(sm.FileFormatError, match=r"'j4' is 0\.01 off where joint 'j3', which it"):
+    with pytest.raises(
+        sm.errors.FileFormatError, match=r"'j4' is 0\.01 off where joint 'j3', which it"
+    ):
         without_followers(sm.Trajectory(t, places, motion.qd, names), arm)
 
 

@@ -42,7 +42,9 @@ def written(folder: Path, document: object) -> Path:
 def test_the_limits_of_a_file_are_scaled_and_join_the_arms(
     panda: sm.RobotModel, tmp_path: Path
 ) -> None:
-    position, speed, acceleration, jerk = sm.read_joint_limits(written(tmp_path, PANDA), panda)
+    position, speed, acceleration, jerk = sm.files.read_joint_limits(
+        written(tmp_path, PANDA), panda
+    )
     lower, upper = position.limits(panda)
     assert (lower[1], upper[1]) == (-0.5, 0.75)
     np.testing.assert_array_equal(np.delete(lower, 1), np.delete(panda.lower, 1))
@@ -52,17 +54,17 @@ def test_the_limits_of_a_file_are_scaled_and_join_the_arms(
     np.testing.assert_array_equal(acceleration.of(panda)[1:], panda.acceleration_limit[1:])
     assert jerk.of(panda)[1] == 100.0
     assert jerk.of(panda)[0] == panda.jerk_limit[0]
-    whole = sm.read_joint_limits(written(tmp_path, PANDA), panda, scaled=False)
+    whole = sm.files.read_joint_limits(written(tmp_path, PANDA), panda, scaled=False)
     assert whole[1].of(panda)[0] == 2.0
     # As a parameter file of a node.
     nested = {"/**": {"ros__parameters": {"robot_description_planning": PANDA}}}
-    assert sm.read_joint_limits(written(tmp_path, nested), panda)[1].of(panda)[0] == 1.0
+    assert sm.files.read_joint_limits(written(tmp_path, nested), panda)[1].of(panda)[0] == 1.0
 
 
 def test_a_makers_limits_stay_unless_they_are_replaced(panda: sm.RobotModel) -> None:
     for kind, published in (
-        (sm.JointAccelerationLimits, panda.acceleration_limit),
-        (sm.JointJerkLimits, panda.jerk_limit),
+        (sm.constraints.JointAccelerationLimits, panda.acceleration_limit),
+        (sm.constraints.JointJerkLimits, panda.jerk_limit),
     ):
         np.testing.assert_array_equal(kind(1e6).of(panda), published)
         np.testing.assert_array_equal(kind(1e6, replace=True).of(panda), np.full(7, 1e6))
@@ -101,10 +103,10 @@ def test_what_is_wrong_is_named_by_joint_and_key(
     change(document)
     file = written(tmp_path, document)
     if not message:
-        assert len(sm.read_joint_limits(file, panda)) == 2
+        assert len(sm.files.read_joint_limits(file, panda)) == 2
         return
-    with pytest.raises(sm.FileFormatError) as refused:
-        sm.read_joint_limits(file, panda)
+    with pytest.raises(sm.errors.FileFormatError) as refused:
+        sm.files.read_joint_limits(file, panda)
     assert message in str(refused.value)
     assert str(file) in str(refused.value)
     line = complaint("plan", "panda", "--line", "0.1,0,0", "--joint-limits", file)

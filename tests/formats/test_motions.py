@@ -35,7 +35,7 @@ def ur_plan() -> sm.Plan:
     ur5 = robot_named("ur5")
     start = ur5.dexterous_configuration("pointing")
     return sm.plan(
-        sm.Problem(ur5, sm.Circle.around(ur5.pose(start), 0.05, 1.01), "pointing", start)
+        sm.Problem(ur5, sm.paths.Circle.around(ur5.pose(start), 0.05, 1.01), "pointing", start)
     )
 
 
@@ -113,7 +113,7 @@ def test_what_is_written_is_the_motion(
 ) -> None:
     suffix, read = READERS[form]
     file = tmp_path / f"motion{suffix}"
-    sm.write_motion(plan, file, rate=rate, form=form)
+    sm.files.write_motion(plan, file, rate=rate, form=form)
     names, t, q, qd, qdd = read(file)
     assert tuple(names) == plan.trajectory.joint_names
     assert t[0] == 0.0
@@ -129,7 +129,7 @@ def test_what_is_written_is_the_motion(
             values[rows], plan.trajectory(np.minimum(t, 3.0)[rows], order), atol=1e-6
         )
     # Read back, it is still the motion that was certified.
-    again = sm.read_motion(file)
+    again = sm.files.read_motion(file)
     assert plan.problem.certify(again, plan.tolerance).verified
     np.testing.assert_array_equal(again.q, q)
 
@@ -154,11 +154,11 @@ def test_messages_are_yaml_as_others_read_it(plan: sm.Plan, form: str) -> None:
 
 def test_a_broken_file_is_no_longer_verified(plan: sm.Plan, tmp_path: Path) -> None:
     file = tmp_path / "motion.yaml"
-    sm.write_motion(plan, file)
+    sm.files.write_motion(plan, file)
     message = load(file.read_text())
     message["points"][20]["positions"][2] += 1e-3
     file.write_text(yaml.dump(message))
-    assert not plan.problem.certify(sm.read_motion(file), plan.tolerance).verified
+    assert not plan.problem.certify(sm.files.read_motion(file), plan.tolerance).verified
     for change, said in (
         (lambda m: m["points"][3].pop("velocities"), r"points\[3\]: velocities are given for some"),
         (
@@ -176,8 +176,8 @@ def test_a_broken_file_is_no_longer_verified(plan: sm.Plan, tmp_path: Path) -> N
         broken = load(yaml.dump(message))
         change(broken)
         file.write_text(yaml.dump(broken))
-        with pytest.raises(sm.FileFormatError, match=said):
-            sm.read_motion(file)
+        with pytest.raises(sm.errors.FileFormatError, match=said):
+            sm.files.read_motion(file)
 
 
 @pytest.mark.parametrize("suffix", ["json", "npz"])
@@ -190,8 +190,8 @@ def test_a_table_that_says_what_is_not_read_is_refused(suffix: str, tmp_path: Pa
         file.write_text(json.dumps(table))
     else:
         np.savez(file, **table)
-    with pytest.raises(sm.FileFormatError, match="'qddd' is not read; nearest: 'qdd'"):
-        sm.read_motion(file)
+    with pytest.raises(sm.errors.FileFormatError, match="'qddd' is not read; nearest: 'qdd'"):
+        sm.files.read_motion(file)
 
 
 def test_a_motion_that_begins_or_ends_moving_is_written_nowhere_unforced(tmp_path: Path) -> None:
@@ -199,28 +199,31 @@ def test_a_motion_that_begins_or_ends_moving_is_written_nowhere_unforced(tmp_pat
     q = robot.dexterous_configuration()
     first = robot.pose(q)
     goal = pin.SE3(first.rotation, first.translation + np.array([0.0, 0.05, 0.0]))
-    moving = sm.Line(first, goal, 2.0, time_law="constant")
+    moving = sm.paths.Line(first, goal, 2.0, time_law="constant")
     problem = sm.Problem(robot, moving, "position", q)
     plan = sm.plan(problem, max_evaluations=2)
     assert plan.certificate.verified, plan.certificate.verdict
     plan.save(tmp_path / "plan.npz")
     for name in ("a.yaml", "a.csv", "a.json", "a.npz", "a.xml", "a.src", "a.script"):
         with pytest.raises(
-            sm.PlanError, match=r"joint '\w+' begins at .* rad/s at t = 0 s.*--ramp"
+            sm.errors.PlanError, match=r"joint '\w+' begins at .* rad/s at t = 0 s.*--ramp"
         ):
-            sm.write_motion(plan, tmp_path / name)
+            sm.files.write_motion(plan, tmp_path / name)
         assert not (tmp_path / name).exists()
         code, text = invoke("export", tmp_path / "plan.npz", "--out", tmp_path / name)
         assert code == 1
         assert text.startswith("nothing is written: joint '")
-    sm.write_motion(plan, tmp_path / "a.yaml", force=True)
+    sm.files.write_motion(plan, tmp_path / "a.yaml", force=True)
     # Not where the problem asks for it, nor at rest.
-    ends = [sm.StartVelocity(plan.trajectory.qd[0]), sm.EndVelocity(plan.trajectory.qd[-1])]
+    ends = [
+        sm.constraints.StartVelocity(plan.trajectory.qd[0]),
+        sm.constraints.EndVelocity(plan.trajectory.qd[-1]),
+    ]
     for asked in ({"rest": False}, {"constraints": ends}):
         other = replace(plan, problem=replace(problem, **asked))
-        sm.write_motion(replace(other, certificate=other.check()), tmp_path / "b.yaml")
-    resting = sm.plan(replace(problem, path=sm.section_at_rest(moving)), max_evaluations=2)
-    sm.write_motion(resting, tmp_path / "c.yaml")
+        sm.files.write_motion(replace(other, certificate=other.check()), tmp_path / "b.yaml")
+    resting = sm.plan(replace(problem, path=sm.paths.section_at_rest(moving)), max_evaluations=2)
+    sm.files.write_motion(resting, tmp_path / "c.yaml")
     for point in (load((tmp_path / "c.yaml").read_text())["points"][k] for k in (0, -1)):
         assert set(point["velocities"]) == {0.0}
 
@@ -252,7 +255,7 @@ def simulated(robot: sm.RobotModel, keys: Path) -> mujoco.MjModel:
 @pytest.mark.parametrize("name", ["panda", "planar_3r"])
 def test_mujoco_puts_the_tool_where_the_plan_says(plan: sm.Plan, tmp_path: Path, name: str) -> None:
     shown = plan if name == "panda" else sm.plan(sm.sample_problem())
-    sm.write_motion(shown, tmp_path / "keys.xml", rate=20)
+    sm.files.write_motion(shown, tmp_path / "keys.xml", rate=20)
     model = simulated(shown.robot, tmp_path / "keys.xml")
     count = int(shown.trajectory.duration * 20) + 1
     assert model.nkey == count
@@ -274,7 +277,7 @@ def test_mujoco_puts_the_tool_where_the_plan_says(plan: sm.Plan, tmp_path: Path,
 
 def test_urscript_streams_the_motion(ur_plan: sm.Plan, tmp_path: Path) -> None:
     file = tmp_path / "motion.script"
-    sm.write_motion(ur_plan, file, rate=200)
+    sm.files.write_motion(ur_plan, file, rate=200)
     lines = file.read_text().splitlines()
     head = " ".join(line for line in lines if line.startswith("#"))
     assert "200 Hz" in head
@@ -294,15 +297,17 @@ def test_urscript_streams_the_motion(ur_plan: sm.Plan, tmp_path: Path) -> None:
 
 
 def test_what_a_format_cannot_say_is_refused(plan: sm.Plan, tmp_path: Path) -> None:
-    with pytest.raises(sm.ProblemError, match="URScript is for arms of 6 revolute joints"):
-        sm.write_motion(plan, tmp_path / "motion.script")
-    with pytest.raises(sm.FileFormatError, match=r"suffix '\.txt' is no format of motions: csv"):
-        sm.write_motion(plan, tmp_path / "motion.txt")
-    with pytest.raises(sm.FileFormatError, match="form 'vtk' is no format"):
-        sm.write_motion(plan, tmp_path / "motion.txt", form="vtk")
+    with pytest.raises(sm.errors.ProblemError, match="URScript is for arms of 6 revolute joints"):
+        sm.files.write_motion(plan, tmp_path / "motion.script")
+    with pytest.raises(
+        sm.errors.FileFormatError, match=r"suffix '\.txt' is no format of motions: csv"
+    ):
+        sm.files.write_motion(plan, tmp_path / "motion.txt")
+    with pytest.raises(sm.errors.FileFormatError, match="form 'vtk' is no format"):
+        sm.files.write_motion(plan, tmp_path / "motion.txt", form="vtk")
     for rate in (0.0, -1.0, np.nan, 0.1):
-        with pytest.raises(sm.ProblemError, match="rate is"):
-            sm.write_motion(plan, tmp_path / "motion.csv", rate=rate)
+        with pytest.raises(sm.errors.ProblemError, match="rate is"):
+            sm.files.write_motion(plan, tmp_path / "motion.csv", rate=rate)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -368,24 +373,24 @@ def carried() -> sm.Plan:
     )
     first = pin.SE3(np.diag([1.0, -1.0, -1.0]), np.array([0.45, 0.2, 0.3]))
     grasp = pin.SE3(np.eye(3), np.array([0.0, 0.4, 0.0]))
-    circle = sm.Circle.around(first, radius=0.05, duration=3.0, normal=(0, 1, 0))
+    circle = sm.paths.Circle.around(first, radius=0.05, duration=3.0, normal=(0, 1, 0))
     follows = [sm.Follow(circle, tool=left), sm.Follow(grasp, tool=right, reference=left)]
     return sm.plan(sm.Problem(pair, follows, collision=None)).require()
 
 
 @pytest.mark.parametrize("name", ["m.csv", "m.npz", "m.json", "m.yaml"])
 def test_parts_are_written_in_step(carried: sm.Plan, tmp_path: Path, name: str) -> None:
-    files = sm.write_parts(carried, tmp_path / name, rate=200.0)
+    files = sm.files.write_parts(carried, tmp_path / name, rate=200.0)
     stem, suffix = name.split(".")
     assert [file.name for file in files.values()] == [
         f"{stem}.left.{suffix}",
         f"{stem}.right.{suffix}",
     ]
     alone = robot_named("panda").joint_names
-    assert all(sm.read_motion(file).joint_names == alone for file in files.values())
-    together = sm.read_parts(files)
-    sm.write_motion(carried, tmp_path / name, rate=200.0)
-    whole = sm.read_motion(tmp_path / name)
+    assert all(sm.files.read_motion(file).joint_names == alone for file in files.values())
+    together = sm.files.read_parts(files)
+    sm.files.write_motion(carried, tmp_path / name, rate=200.0)
+    whole = sm.files.read_motion(tmp_path / name)
     assert together.joint_names == whole.joint_names
     for order in (0, 1, 2):
         np.testing.assert_array_equal(together(whole.t, order), whole(whole.t, order))
@@ -396,31 +401,31 @@ def test_parts_are_written_in_step(carried: sm.Plan, tmp_path: Path, name: str) 
 
 
 def test_parts_out_of_step_are_found(carried: sm.Plan, tmp_path: Path) -> None:
-    files = sm.write_parts(carried, tmp_path / "m.npz", rate=200.0)
-    slower = sm.write_parts(carried, tmp_path / "slower.npz", rate=150.0)
+    files = sm.files.write_parts(carried, tmp_path / "m.npz", rate=200.0)
+    slower = sm.files.write_parts(carried, tmp_path / "slower.npz", rate=150.0)
     with pytest.raises(
-        sm.FileFormatError, match=r"m\.right\.npz: has 601 samples .* at other times"
+        sm.errors.FileFormatError, match=r"m\.right\.npz: has 601 samples .* at other times"
     ):
-        sm.read_parts({"left": slower["left"], "right": files["right"]})
+        sm.files.read_parts({"left": slower["left"], "right": files["right"]})
     # Two motions of the same times that do not belong together: the grasp slips.
-    late = sm.read_motion(files["right"])
+    late = sm.files.read_motion(files["right"])
     moved = sm.Trajectory(late.t, np.roll(late.q, 1, axis=0), late.qd, late.joint_names, late.qdd)
     arrays = {"t": moved.t, "q": moved.q, "qd": moved.qd, "qdd": moved.qdd}
     np.savez(files["right"], joint_names=np.array(moved.joint_names), **arrays)
-    found = carried.problem.certify(sm.read_parts(files), carried.tolerance)
+    found = carried.problem.certify(sm.files.read_parts(files), carried.tolerance)
     assert not found.verified
     assert found.others[0][0].value > 100.0 * carried.tolerance.position
 
 
 def test_a_robot_of_its_own_has_no_parts(plan: sm.Plan, carried: sm.Plan, tmp_path: Path) -> None:
-    with pytest.raises(sm.ProblemError, match="'panda_joint1' is of no part"):
-        sm.write_parts(plan, tmp_path / "m.csv")
-    with pytest.raises(sm.ProblemError, match="keyframes are of all joints"):
-        sm.write_parts(carried, tmp_path / "m.xml")
-    with pytest.raises(sm.ProblemError, match="of 6 revolute joints, this one has 7"):
-        sm.write_parts(carried, tmp_path / "m.script")
-    with pytest.raises(sm.FileFormatError, match="no file of a part"):
-        sm.read_parts({})
+    with pytest.raises(sm.errors.ProblemError, match="'panda_joint1' is of no part"):
+        sm.files.write_parts(plan, tmp_path / "m.csv")
+    with pytest.raises(sm.errors.ProblemError, match="keyframes are of all joints"):
+        sm.files.write_parts(carried, tmp_path / "m.xml")
+    with pytest.raises(sm.errors.ProblemError, match="of 6 revolute joints, this one has 7"):
+        sm.files.write_parts(carried, tmp_path / "m.script")
+    with pytest.raises(sm.errors.FileFormatError, match="no file of a part"):
+        sm.files.read_parts({})
 
 
 def test_export_writes_parts_and_judges_them_together(carried: sm.Plan, tmp_path: Path) -> None:
@@ -441,7 +446,7 @@ def test_programs_have_no_parts_and_other_files_beside_them_do(
     carried.save(tmp_path / "plan.npz")
     program, motion = tmp_path / "m.src", tmp_path / "m.yaml"
     asked = ("export", tmp_path / "plan.npz", "--parts", "--out")
-    with pytest.raises(sm.ProblemError, match="--parts has no effect on programs"):
+    with pytest.raises(sm.errors.ProblemError, match="--parts has no effect on programs"):
         invoke(*asked, program)
     assert invoke(*asked, motion, "--out", tmp_path / "m.csv")[0] == 0
     assert (tmp_path / "m.left.yaml").exists()

@@ -23,7 +23,7 @@ T = np.array([0.0, 0.5, 1.2, 2.0])
 @pytest.fixture(scope="module")
 def poses() -> list[pin.SE3]:
     panda = robot_named("panda")
-    line = sm.Line(panda.pose(PANDA_HOME), panda.pose(PANDA_HOME + 0.05), 2.0)
+    line = sm.paths.Line(panda.pose(PANDA_HOME), panda.pose(PANDA_HOME + 0.05), 2.0)
     return [line.pose(t) for t in T]
 
 
@@ -48,7 +48,7 @@ def table(header: str, values: Array, mark: str = ",") -> str:
     return "\n".join(lines) + "\n"
 
 
-def agree(path: sm.Path, poses: list[pin.SE3], rotation: bool = True) -> None:
+def agree(path: sm.paths.Path, poses: list[pin.SE3], rotation: bool = True) -> None:
     for t, pose in zip(T, poses, strict=True):
         found = path.pose(t)
         np.testing.assert_allclose(found.translation, pose.translation, atol=ROUNDING)
@@ -74,14 +74,14 @@ def test_tables_of_all_kinds(
     text = table(",".join(names), values[:, order], mark)
     file = tmp_path / "seam.csv"
     file.write_text("\ufeff# a seam\n" + text.replace("\n", "\n# a remark\n\n", 2), "utf-8")
-    agree(sm.read_path(file), poses)
+    agree(sm.files.read_path(file), poses)
 
 
 def test_units_are_said_by_the_columns(poses: list[pin.SE3], tmp_path: Path) -> None:
     values = np.column_stack([T, rows(poses, "rpy") * ([1e3] * 3 + [180 / np.pi] * 3)])
     file = tmp_path / "seam.csv"
     file.write_text(table("t,x_mm,y_mm,z_mm,roll_deg,pitch_deg,yaw_deg", values))
-    agree(sm.read_path(file), poses)
+    agree(sm.files.read_path(file), poses)
 
 
 def test_a_normal_is_the_tool_axis(poses: list[pin.SE3], tmp_path: Path) -> None:
@@ -89,7 +89,7 @@ def test_a_normal_is_the_tool_axis(poses: list[pin.SE3], tmp_path: Path) -> None
     file.write_text(
         table("t,x,y,z,nx,ny,nz", np.column_stack([T, rows(poses, "normal") * [1, 1, 1, 3, 3, 3]]))
     )
-    path = sm.read_path(file)
+    path = sm.files.read_path(file)
     agree(path, poses, rotation=False)
     for t, pose in zip(T, poses, strict=True):
         np.testing.assert_allclose(path.pose(t).rotation[:, 2], pose.rotation[:, 2], atol=ROUNDING)
@@ -98,12 +98,12 @@ def test_a_normal_is_the_tool_axis(poses: list[pin.SE3], tmp_path: Path) -> None
 def test_arrays(poses: list[pin.SE3], tmp_path: Path) -> None:
     file, values = tmp_path / "seam.npy", rows(poses, "quaternion")
     np.save(file, np.column_stack([T, values]))
-    agree(sm.read_path(file), poses)
+    agree(sm.files.read_path(file), poses)
     np.save(file, np.column_stack([T, values[:, :3]]))
-    agree(sm.read_path(file), poses, rotation=False)
+    agree(sm.files.read_path(file), poses, rotation=False)
     for array in (values, np.array([pose.homogeneous for pose in poses])):
         np.save(file, array)
-        path = sm.read_path(file, duration=2.0)
+        path = sm.files.read_path(file, duration=2.0)
         assert path.duration == pytest.approx(2.0)
         assert not path.samples([0.0, 2.0]).twist.any()
         for t, pose in ((0.0, poses[0]), (2.0, poses[-1])):
@@ -128,11 +128,11 @@ def test_what_ros_writes(poses: list[pin.SE3], tmp_path: Path, suffix: str) -> N
     file = tmp_path / f"seam{suffix}"
     dump = json.dumps if suffix == ".json" else lambda m: yaml.safe_dump(m) + "---\n"
     file.write_text(dump(message))
-    agree(sm.read_path(file), poses)
+    agree(sm.files.read_path(file), poses)
     # A PoseArray has no times.
     listed = [item["pose"] for item in message["poses"]]  # type: ignore[attr-defined]
     file.write_text(dump({"header": message["header"], "poses": listed}))
-    path = sm.read_path(file, feed=0.02)
+    path = sm.files.read_path(file, feed=0.02)
     t = np.linspace(0.0, path.duration, 400)
     speeds = np.linalg.norm(path.samples(t).twist[:, :3], axis=1)
     turning = np.linalg.norm(path.samples(t).twist[:, 3:], axis=1)
@@ -147,7 +147,7 @@ def test_a_frame_of_ones_own(poses: list[pin.SE3], tmp_path: Path) -> None:
     local = [frame.inverse() * pose for pose in poses]
     file = tmp_path / "seam.csv"
     file.write_text(table("t,x,y,z,qw,qx,qy,qz", np.column_stack([T, rows(local, "quaternion")])))
-    placed = sm.Placed(sm.read_path(file), frame)
+    placed = sm.paths.Placed(sm.files.read_path(file), frame)
     agree(placed, poses)
     # Its twist is the derivative of its pose, like that of every path.
     from selfmotion.testing import check_path
@@ -288,24 +288,28 @@ def test_malformed_files_are_one_line_and_exit_2(
 @pytest.mark.parametrize("corners", ["blend", "round"])
 def test_an_angle_of_corners_is_of_those_where_the_tool_stops(corners: str, tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text(csv("0.4,0,0", "0.4,0,1e-1", header="x,y,z"))
-    with pytest.raises(sm.FileFormatError, match=f"no effect where corners are '{corners}'"):
-        sm.read_path(tmp_path / "a.csv", feed=0.1, corners=corners, corner_angle=0.5)
+    with pytest.raises(sm.errors.FileFormatError, match=f"no effect where corners are '{corners}'"):
+        sm.files.read_path(tmp_path / "a.csv", feed=0.1, corners=corners, corner_angle=0.5)
 
 
 @pytest.mark.parametrize("shape", [(3,), (2, 5), (2, 3, 3)])
 def test_arrays_of_other_shapes(shape: tuple[int, ...], tmp_path: Path) -> None:
     np.save(tmp_path / "a.npy", np.zeros(shape))
-    with pytest.raises(sm.FileFormatError, match=r"has shape .*, expected \(N, 4, 4\) poses"):
-        sm.read_path(tmp_path / "a.npy")
+    with pytest.raises(
+        sm.errors.FileFormatError, match=r"has shape .*, expected \(N, 4, 4\) poses"
+    ):
+        sm.files.read_path(tmp_path / "a.npy")
     matrix = np.tile(np.eye(4), (3, 1, 1))
     matrix[1, 0, 0] = -1.0
     np.save(tmp_path / "a.npy", matrix)
-    with pytest.raises(sm.FileFormatError, match="row 2: the pose: its rotation is a mirror"):
-        sm.read_path(tmp_path / "a.npy", duration=1.0)
+    with pytest.raises(
+        sm.errors.FileFormatError, match="row 2: the pose: its rotation is a mirror"
+    ):
+        sm.files.read_path(tmp_path / "a.npy", duration=1.0)
 
 
 def test_long_ways_between_poses_are_read_where_they_are_meant(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text(csv("0,.4,0,.5", "1,.4,.9,.5", header="t,x,y,z"))
-    with pytest.raises(sm.FileFormatError, match=r"jumps by 0\.9 m"):
-        sm.read_path(tmp_path / "a.csv")
-    assert sm.read_path(tmp_path / "a.csv", jump=1.0).duration == 1.0
+    with pytest.raises(sm.errors.FileFormatError, match=r"jumps by 0\.9 m"):
+        sm.files.read_path(tmp_path / "a.csv")
+    assert sm.files.read_path(tmp_path / "a.csv", jump=1.0).duration == 1.0

@@ -47,7 +47,7 @@ FORMS = {
 def test_lists_and_names_of_poses_are_one_path(form: str, tmp_path: Path) -> None:
     file = tmp_path / "poses.yaml"
     file.write_text(json.dumps(FORMS[form]))
-    path = sm.read_path(file, feed=0.05)
+    path = sm.files.read_path(file, feed=0.05)
     for t, place in ((0.0, PLACES[0]), (path.duration, PLACES[-1])):
         np.testing.assert_allclose(path.pose(t).translation, place, atol=1e-12)
         np.testing.assert_allclose(path.pose(t).rotation, np.diag([1.0, -1.0, -1.0]), atol=1e-9)
@@ -70,5 +70,5 @@ def test_lists_and_names_of_poses_are_one_path(form: str, tmp_path: Path) -> Non
 def test_lists_that_are_none_say_what_is_read(document: object, said: str, tmp_path: Path) -> None:
     file = tmp_path / "poses.yaml"
     file.write_text(json.dumps(document))
-    with pytest.raises(sm.FileFormatError, match=said):
-        sm.read_path(file, feed=0.05)
+    with pytest.raises(sm.errors.FileFormatError, match=said):
+        sm.files.read_path(file, feed=0.05)

@@ -36,23 +36,23 @@ def same_motion(one: sm.Plan, other: sm.Plan, tolerance: float = 0.0) -> None:
 
 
 @pytest.fixture(scope="module")
-def job(tmp_path_factory: pytest.TempPathFactory) -> sm.Job:
-    return sm.read_job(written(tmp_path_factory.mktemp("cell"), CELL))
+def job(tmp_path_factory: pytest.TempPathFactory) -> sm.files.Job:
+    return sm.files.read_job(written(tmp_path_factory.mktemp("cell"), CELL))
 
 
-def test_a_file_says_what_python_says(job: sm.Job) -> None:
+def test_a_file_says_what_python_says(job: sm.files.Job) -> None:
     panda = sm.load_robot("panda", lock={"panda_finger_joint1": 0.02})
-    circle = sm.Circle.around(panda.pose(PANDA_HOME), 0.1, 4.0, normal=(1.0, 0.0, 0.0))
+    circle = sm.paths.Circle.around(panda.pose(PANDA_HOME), 0.1, 4.0, normal=(1.0, 0.0, 0.0))
     turned = pin.SE3(pin.rpy.rpyToMatrix(np.array([0, 0, np.pi / 18])), np.array([0, -0.6, 0.6]))
     problem = sm.Problem(
         panda,
         circle,
         start=PANDA_HOME,
-        null_motion=sm.FreeNullMotion(),
-        costs=[sm.JointVelocity(), sm.InverseManipulability(0.001)],
+        null_motion=sm.motion.FreeNullMotion(),
+        costs=[sm.costs.JointVelocity(), sm.costs.InverseManipulability(0.001)],
         constraints=[
-            sm.JointPositionLimits(),
-            sm.Clearance([sm.Box("post", turned, [0.1, 0.1, 1.2])], 0.01),
+            sm.constraints.JointPositionLimits(),
+            sm.constraints.Clearance([sm.obstacles.Box("post", turned, [0.1, 0.1, 1.2])], 0.01),
         ],
         relaxations=[sm.Relaxation(("rx", "ry"), np.pi / 36)],
     )
@@ -61,8 +61,8 @@ def test_a_file_says_what_python_says(job: sm.Job) -> None:
 
 
 @pytest.mark.parametrize("name", ["again.toml", "again.json"])
-def test_written_problems_give_the_same_plan(job: sm.Job, tmp_path: Path, name: str) -> None:
-    sm.write_problem(job.problem, tmp_path / name)
+def test_written_problems_give_the_same_plan(job: sm.files.Job, tmp_path: Path, name: str) -> None:
+    sm.files.write_problem(job.problem, tmp_path / name)
     again = sm.read_problem(tmp_path / name)
     same_motion(sm.plan(again, **job.settings), job.plan())
 
@@ -72,28 +72,31 @@ def test_problems_of_all_kinds_round_trip(tmp_path: Path) -> None:
     base = pin.SE3(pin.exp3(np.array([0.1, 0.2, 0.3])), np.array([0.4, 0.5, 0.6]))
     held = sm.load_robot("panda", base=base, tool_offset=pin.SE3(np.eye(3), np.array([0, 0, 0.1])))
     start = held.dexterous_configuration()
-    line = sm.Line(held.pose(start), held.pose(start + 0.05), 2.0)
-    seam = sm.Waypoints([0, 1, 2], [line.pose(t).translation for t in (0.0, 1.0, 2.0)])
+    line = sm.paths.Line(held.pose(start), held.pose(start + 0.05), 2.0)
+    seam = sm.paths.Waypoints([0, 1, 2], [line.pose(t).translation for t in (0.0, 1.0, 2.0)])
     problems = [
         sm.sample_problem(),
         sm.Problem(held, line, start=start, collision=None),
         sm.Problem(
             panda,
-            sm.Placed(seam, base.inverse()),
+            sm.paths.Placed(seam, base.inverse()),
             "position",
-            null_motion=sm.BSplineNullMotion(6),
-            costs=[sm.GravityTorque(panda), sm.JointAcceleration([1, 2, 3, 4, 5, 6, 7])],
+            null_motion=sm.motion.BSplineNullMotion(6),
+            costs=[
+                sm.costs.GravityTorque(panda),
+                sm.costs.JointAcceleration([1, 2, 3, 4, 5, 6, 7]),
+            ],
             constraints=[
-                sm.JointAccelerationLimits(5.0),
-                sm.JointVelocityLimits(1.0, replace=True),
+                sm.constraints.JointAccelerationLimits(5.0),
+                sm.constraints.JointVelocityLimits(1.0, replace=True),
             ],
             relaxations=[sm.Relaxation("z", during=(0.5, 1.5))],
             damping=sm.Damping(),
-            collision=sm.Clearance(disabled=[("panda_link0", "panda_link2")]),
+            collision=sm.constraints.Clearance(disabled=[("panda_link0", "panda_link2")]),
         ),
     ]
     for problem in problems:
-        sm.write_problem(problem, file)
+        sm.files.write_problem(problem, file)
         read = sm.read_problem(file)
         for t in (0.0, 0.3, 0.9):
             np.testing.assert_array_equal(
@@ -110,7 +113,7 @@ def test_problems_of_all_kinds_round_trip(tmp_path: Path) -> None:
         assert read.damping == problem.damping
         assert (read.collision is None) == (problem.collision is None)
         text = file.read_text()
-        sm.write_problem(read, file)
+        sm.files.write_problem(read, file)
         if problem.robot is not held:
             assert file.read_text() == text
 
@@ -123,7 +126,7 @@ def test_a_base_and_a_tool_offset_move_what_they_should(tmp_path: Path) -> None:
     wanted = base * plain.pose(PANDA_HOME) * offset
     np.testing.assert_allclose(placed.pose(PANDA_HOME).homogeneous, wanted.homogeneous, atol=1e-12)
     plan = sm.plan(
-        sm.Problem(placed, sm.Circle.around(wanted, 0.05, 3.0), start=PANDA_HOME)
+        sm.Problem(placed, sm.paths.Circle.around(wanted, 0.05, 3.0), start=PANDA_HOME)
     ).require()
     plan.save(tmp_path / "plan.npz")
     assert sm.load_plan(tmp_path / "plan.npz").certificate.verified
@@ -167,8 +170,8 @@ def test_arguments_of_a_cell_are_those_of_each_part(tmp_path: Path) -> None:
     assert robot.pose(np.zeros(3)).translation[0] == pytest.approx(7.0)
     assert other.pose(np.zeros(3)).translation[0] == pytest.approx(10.0)
     start = np.array([0.1, 0.5, 0.5])
-    line = sm.Line(robot.pose(start), robot.pose(start + 0.01), 2.0)
-    sm.write_problem(sm.Problem(robot, line, "planar", start), tmp_path / "cell.toml")
+    line = sm.paths.Line(robot.pose(start), robot.pose(start + 0.01), 2.0)
+    sm.files.write_problem(sm.Problem(robot, line, "planar", start), tmp_path / "cell.toml")
     read = sm.read_problem(tmp_path / "cell.toml").robot
     np.testing.assert_array_equal(read.pose(start).homogeneous, robot.pose(start).homogeneous)
     for wrong, said in (
@@ -176,13 +179,13 @@ def test_arguments_of_a_cell_are_those_of_each_part(tmp_path: Path) -> None:
         ({"lft": {"long": 2}}, "nearest: 'left'"),
         ({"hand": {"long": 2}}, "panda: arguments are given, which only a .xacro file has"),
     ):
-        with pytest.raises(sm.RobotError, match=said):
+        with pytest.raises(sm.errors.RobotError, match=said):
             sm.load_robot(parts, "left/tool", arguments=wrong)
-    with pytest.raises(sm.RobotError, match="arguments are given, which only"):
+    with pytest.raises(sm.errors.RobotError, match="arguments are given, which only"):
         sm.load_robot("panda", arguments={"long": 2})
     written(tmp_path, XACRO.replace("-3", "-2"), "arm.xacro")
-    with pytest.raises(sm.ProblemError, match="files of its parts have changed"):
-        sm.write_problem(sm.Problem(robot, line, "planar", start), tmp_path / "cell.toml")
+    with pytest.raises(sm.errors.ProblemError, match="files of its parts have changed"):
+        sm.files.write_problem(sm.Problem(robot, line, "planar", start), tmp_path / "cell.toml")
 
 
 def test_code_of_the_user_is_loaded_only_where_allowed(tmp_path: Path) -> None:
@@ -195,7 +198,7 @@ def test_code_of_the_user_is_loaded_only_where_allowed(tmp_path: Path) -> None:
         return 1.0 - np.cos(q[:, 3])
 
     @dataclass(frozen=True)
-    class BendOfATest(sm.Cost):
+    class BendOfATest(sm.costs.Cost):
         mu: float = 1.0
         name: str = "elbow class"
         def value(self, samples):
@@ -203,13 +206,13 @@ def test_code_of_the_user_is_loaded_only_where_allowed(tmp_path: Path) -> None:
         def gradient(self, samples):
             by_q = np.zeros_like(samples.q)
             by_q[:, 3] = self.mu * np.sin(samples.q[:, 3])
-            return sm.Partials(q=by_q)
+            return sm.costs.Partials(q=by_q)
     """
     written(tmp_path, "\n".join(line[4:] for line in code.splitlines()), "own_costs_of_a_test.py")
     own = CELL.replace('"InverseManipulability"\nmu', '"own_costs_of_a_test:BendOfATest"\nmu')
     own += '\n[[costs]]\nkind = "own_costs_of_a_test:elbow"\nname = "elbow function"\n'
     file = written(tmp_path, own)
-    with pytest.raises(sm.FileFormatError, match=r"costs\[1\]\.kind.*--allow-code"):
+    with pytest.raises(sm.errors.FileFormatError, match=r"costs\[1\]\.kind.*--allow-code"):
         sm.read_problem(file)
     assert "own_costs_of_a_test" not in sys.modules
     problem = sm.read_problem(file, allow_code=True)
@@ -217,14 +220,14 @@ def test_code_of_the_user_is_loaded_only_where_allowed(tmp_path: Path) -> None:
         "joint velocity", "elbow class", "elbow function",
     ]  # fmt: skip
     again = tmp_path / "again.toml"
-    with pytest.raises(sm.ProblemError, match="'elbow function' holds a function"):
-        sm.write_problem(problem, again)
-    sm.write_problem(replace(problem, costs=problem.costs[:2]), again)
+    with pytest.raises(sm.errors.ProblemError, match="'elbow function' holds a function"):
+        sm.files.write_problem(problem, again)
+    sm.files.write_problem(replace(problem, costs=problem.costs[:2]), again)
     assert sm.read_problem(again, allow_code=True).costs[1] == problem.costs[1]
     # A misspelt key of an own class is found like one of ours.
     wrong = written(tmp_path, own.replace("mu =", "mus ="))
     with pytest.raises(
-        sm.FileFormatError, match=r"costs\[1\]\.mus: unknown key, did you mean 'mu'"
+        sm.errors.FileFormatError, match=r"costs\[1\]\.mus: unknown key, did you mean 'mu'"
     ):
         sm.read_problem(wrong, allow_code=True)
 
@@ -262,7 +265,7 @@ def test_examples_run_as_they_are(name: str, tmp_path: Path) -> None:
     assert json.loads(text)["certificate"]["verified"]
     assert sm.load_plan(tmp_path / "plan.npz").certificate.verified
     assert "is there already" in complaint("init", name, "--out", file)
-    with pytest.raises(sm.RobotError, match="unknown robot 'none'"):
+    with pytest.raises(sm.errors.RobotError, match="unknown robot 'none'"):
         example_text("none", "cell.toml")
 
 
@@ -275,18 +278,20 @@ def test_examples_of_files_jobs_and_cells_are_read(tmp_path: Path) -> None:
         asked = ("init", tmp_path / "arms" / name, "--out", file)
         assert invoke(*asked)[0] == 0
         assert f'file = "arms/{name}"' in file.read_text()
-        assert sm.read_job(file).problem.robot.dof == 3
+        assert sm.files.read_job(file).problem.robot.dof == 3
         if name == "arm.xacro":
             continue
         assert invoke(*asked, "--job", "--force")[0] == 0
-        first, second = sm.read_seam_job(file).seams
+        first, second = sm.files.read_seam_job(file).seams
         assert (first.name, second.name) == ("one", "two")
         assert first.events == (("tool on", 0.0),)
     file = tmp_path / "cell.toml"
     for options in ((), ("--job",)):
         asked = ("init", "panda", "--positioner", "--out", file, "--force", *options)
         assert invoke(*asked)[0] == 0
-        cell = sm.read_seam_job(file).robot if options else sm.read_job(file).problem.robot
+        cell = (
+            sm.files.read_seam_job(file).robot if options else sm.files.read_job(file).problem.robot
+        )
         assert cell.dof == 9
         assert cell.reference == "table/plate"
 
@@ -296,22 +301,22 @@ def test_what_init_writes_runs_where_the_most_dexterous_pose_is_stretched(tmp_pa
     arm, file = tmp_path / "arm7.urdf", tmp_path / "arm7.toml"
     arm.write_text(reaching_arm())
     assert invoke("init", arm, "--out", file)[0] == 0
-    assert sm.read_job(file).plan().certificate.verified
+    assert sm.files.read_job(file).plan().certificate.verified
     # The former start, with the same circle.
     text = file.read_text()
     file.write_text(re.sub(r"start = \[.*?\]", 'start = "dexterous"', text, count=1))
     assert file.read_text() != text
-    problem = sm.read_job(file).problem
+    problem = sm.files.read_job(file).problem
     shoulder = problem.robot.model.jointPlacements[1].translation
     poses = [problem.path.pose(t) for t in np.linspace(0.0, problem.path.duration, 41)]
     farthest = max(poses, key=lambda pose: float(np.linalg.norm(pose.translation - shoulder)))
-    with pytest.raises(sm.InverseKinematicsError):
+    with pytest.raises(sm.errors.InverseKinematicsError):
         problem.robot.inverse_kinematics(farthest, problem.task, problem.start)
 
 
 def test_the_example_cell_runs() -> None:
     cell = ROOT / "examples" / "cell.toml"
-    assert sm.read_job(cell).plan().certificate.verified
+    assert sm.files.read_job(cell).plan().certificate.verified
 
 
 def test_the_schema_accepts_what_is_read_and_refuses_what_is_not(tmp_path: Path) -> None:
@@ -361,12 +366,12 @@ def test_a_seam_is_woven_as_a_file_says(tmp_path: Path) -> None:
     plain = sm.read_problem(file).path
     file.write_text(text + swing)
     woven = sm.read_problem(file).path
-    expected = sm.Weave(plain, 2e-3, 0.01, axis=(1.0, 0.0, 0.0), dwell=0.1)
+    expected = sm.paths.Weave(plain, 2e-3, 0.01, axis=(1.0, 0.0, 0.0), dwell=0.1)
     assert woven.to_dict() == expected.to_dict()
     for wrong in ("pich = 0.1", "amplitude = 0.1"):
         file.write_text(text + f"weave = {{{wrong}}}\n")
         with pytest.raises(
-            sm.FileFormatError, match=r"path: weave\.(pich: unknown|pitch: is missing)"
+            sm.errors.FileFormatError, match=r"path: weave\.(pich: unknown|pitch: is missing)"
         ):
             sm.read_problem(file)
 
@@ -376,13 +381,13 @@ def test_the_axis_of_a_tilt_is_a_letter_or_numbers(tmp_path: Path) -> None:
     head += 'path = { kind = "line", by = [0, 0.1, 0], duration = 2 }\n[[constraints]]\n'
     for axis, said in (('"z"', "z"), ("[0, 0, 1]", [0, 0, 1])):
         text = f'kind = "Tilt"\nframe = "panda_hand"\nwithin_deg = 9\naxis = {axis}\n'
-        with pytest.raises(sm.FileFormatError, match=r"towards.* is missing"):
+        with pytest.raises(sm.errors.FileFormatError, match=r"towards.* is missing"):
             sm.read_problem(written(tmp_path, head + text))
         text += "towards = [0, 0, -1]\n"
         (tilt,) = sm.read_problem(written(tmp_path, head + text)).constraints
-        assert isinstance(tilt, sm.Tilt)
+        assert isinstance(tilt, sm.constraints.Tilt)
         assert tilt.axis == said
-    with pytest.raises(sm.FileFormatError, match=r"axis: is 'w', expected x, y, z or three"):
+    with pytest.raises(sm.errors.FileFormatError, match=r"axis: is 'w', expected x, y, z or three"):
         sm.read_problem(written(tmp_path, head + text.replace("[0, 0, 1]", '"w"')))
 
 
@@ -391,12 +396,12 @@ def test_up_to_three_faults_are_told_and_the_nearest_key(tmp_path: Path) -> None
     head += 'path = { kind = "line", by = [0, 0.1, 0], duration = 2 }\n'
     wrong = '[[constraints]]\nkind = "JointVelocityLimits"\nlimit_degs = 300\n'
     with pytest.raises(
-        sm.FileFormatError, match="limit_degs: unknown key, did you mean 'limit_deg'"
+        sm.errors.FileFormatError, match="limit_degs: unknown key, did you mean 'limit_deg'"
     ):
         sm.read_problem(written(tmp_path, head + wrong))
     for count in (1, 2, 3, 4):
         lines = "".join(f"zzz{k} = 1\n" for k in range(count))
-        with pytest.raises(sm.FileFormatError) as caught:
+        with pytest.raises(sm.errors.FileFormatError) as caught:
             sm.read_problem(written(tmp_path, lines + head))
         assert str(caught.value).count("unknown key") == min(count, 3)
         assert ("and 1 more" in str(caught.value)) == (count == 4)

@@ -33,7 +33,7 @@ LATE = 2e-5
 @pytest.fixture(scope="module")
 def plan() -> sm.Plan:
     panda = robot_named("panda")
-    circle = sm.Circle.around(panda.pose(PANDA_HOME), 0.1, 3.0, normal=(1.0, 0.0, 0.0))
+    circle = sm.paths.Circle.around(panda.pose(PANDA_HOME), 0.1, 3.0, normal=(1.0, 0.0, 0.0))
     return sm.plan(sm.Problem(panda, circle, start=PANDA_HOME, collision=None)).require()
 
 
@@ -49,15 +49,17 @@ def program() -> sm.Program:
         begin.translation = first.translation + np.array([0.0, side, 0.0])
         end.translation = begin.translation + np.array([0.0, 0.0, 0.05])
         events = [("arc on", 0.0), ("arc off", 0.7)]
-        path = sm.Line(begin, end, 1.0)
+        path = sm.paths.Line(begin, end, 1.0)
         seams.append(sm.Seam(f"seam {k}", path, "pointing", wait=0.5 * (1 - k), events=events))
     made = sm.plan_job(ur5, seams, start=start, order="given", branches=1, clearance=None)
     return made.require()
 
 
-def settings(file: str, deviation: float = 2e-4) -> sm.ProgramSettings:
+def settings(file: str, deviation: float = 2e-4) -> sm.files.ProgramSettings:
     signals = SIGNALS if file.endswith(".src") else NAMED
-    return sm.ProgramSettings(sm.Tolerance(deviation, 10 * deviation), signals=signals, mass=3.0)
+    return sm.files.ProgramSettings(
+        sm.Tolerance(deviation, 10 * deviation), signals=signals, mass=3.0
+    )
 
 
 def krl_targets(text: str) -> tuple[list[list[float]], list[float]]:
@@ -116,7 +118,7 @@ def joined(file: Path, names: tuple[str, ...], seventh: int | None) -> tuple[Arr
 def test_the_deviation_that_is_stated_holds(plan: sm.Plan, tmp_path: Path, name: str) -> None:
     file, counts = tmp_path / name, []
     for deviation in (1e-3, 1e-4):
-        sm.write_motion(plan, file, settings=settings(name, deviation))
+        sm.files.write_motion(plan, file, settings=settings(name, deviation))
         count, stated, found = program_miss(plan, file)
         counts.append(count)
         # KUKA's LBR and ABB's IRB 14000 count the third of seven joints apart.
@@ -141,8 +143,8 @@ def test_the_deviation_that_is_stated_holds(plan: sm.Plan, tmp_path: Path, name:
 @pytest.mark.parametrize("name", FILES)
 def test_what_is_read_is_what_was_written(plan: sm.Plan, tmp_path: Path, name: str) -> None:
     file = tmp_path / name
-    sm.write_motion(plan, file, settings=settings(name))
-    again = sm.read_motion(file).of_joints(plan.robot.joint_names)
+    sm.files.write_motion(plan, file, settings=settings(name))
+    again = sm.files.read_motion(file).of_joints(plan.robot.joint_names)
     t, q = joined(file, plan.robot.joint_names, seventh=2)
     np.testing.assert_allclose(again.t, t, atol=1e-9)
     np.testing.assert_allclose(again.q, q, atol=1e-12)
@@ -164,13 +166,13 @@ def test_a_job_keeps_its_seams_events_and_waits(
     program: sm.Program, tmp_path: Path, name: str
 ) -> None:
     file = tmp_path / name
-    sm.write_motion(program, file, settings=settings(name))
+    sm.files.write_motion(program, file, settings=settings(name))
     text = file.read_text()
     for step in program.steps:
         assert f"step: {step.name.replace('→', '->')}" in text
     t, q = joined(file, program.robot.joint_names, seventh=None)
     np.testing.assert_allclose(q, program.trajectory(np.minimum(t, program.duration)), atol=LATE)
-    motion = sm.read_motion(file)
+    motion = sm.files.read_motion(file)
     assert motion.duration == pytest.approx(program.duration, abs=1e-4)
     count, stated, found = program_miss(program, file)
     assert found.path.position <= stated.path.position <= 2e-4
@@ -194,7 +196,7 @@ def cornered() -> sm.Plan:
     corner, end = begin.copy(), begin.copy()
     corner.translation = begin.translation - np.array([0.0, 0.0, 0.04])
     end.translation = corner.translation + np.array([0.0, 0.05, 0.0])
-    path = sm.Joined([sm.Line(begin, corner, 1.0), sm.Line(corner, end, 1.0)])
+    path = sm.paths.Joined([sm.paths.Line(begin, corner, 1.0), sm.paths.Line(corner, end, 1.0)])
     return sm.plan(sm.Problem(ur5, path, "pointing", start, collision=None)).require()
 
 
@@ -205,7 +207,7 @@ def test_where_the_arm_rests_controllers_stop(cornered: sm.Plan, tmp_path: Path,
     step = Step("a", cornered, events=(("arc on", at), ("arc off", cornered.trajectory.duration)))
     made = sm.Program(cornered.robot, (step,), {})
     abb, kuka = tmp_path / "weld.mod", tmp_path / "weld.src"
-    sm.write_motion(made, abb, settings=settings(abb.name))
+    sm.files.write_motion(made, abb, settings=settings(abb.name))
     lines = [line.strip() for line in abb.read_text().splitlines()]
     before = lines[lines.index("SetDO doArc, 1;") - 1]
     if before.startswith("! step"):
@@ -213,7 +215,7 @@ def test_where_the_arm_rests_controllers_stop(cornered: sm.Plan, tmp_path: Path,
     assert ("fine" in before) == rests
     # A stop in the middle, whatever happens there, besides the first target and the last.
     assert sum("fine" in line for line in lines) == 3
-    sm.write_motion(made, kuka, settings=settings(kuka.name))
+    sm.files.write_motion(made, kuka, settings=settings(kuka.name))
     text = kuka.read_text()
     assert text.count("PTP_SPLINE") == 2
     first = text.split("ENDSPLINE")[0]
@@ -235,9 +237,9 @@ def past() -> sm.Move:
     ur5 = robot_named("ur5")
     first = np.array([-1.2, -1.2, 1.4, -1.8, -1.5, 0.0])
     last = first + np.array([2.4, 0.2, 0.0, 0.0, 0.3, 0.0])
-    box = sm.Box("post", [0.9, 0.0, 0.1], [0.1, 0.1, 0.2])
-    limits = (sm.JointVelocityLimits(1.5), sm.JointAccelerationLimits(6.0))
-    asked = sm.Clearance([box], 0.005)
+    box = sm.obstacles.Box("post", [0.9, 0.0, 0.1], [0.1, 0.1, 0.2])
+    limits = (sm.constraints.JointVelocityLimits(1.5), sm.constraints.JointAccelerationLimits(6.0))
+    asked = sm.constraints.Clearance([box], 0.005)
     return sm.move(ur5, first, last, constraints=limits, clearance=asked).require()
 
 
@@ -247,7 +249,7 @@ def test_free_moves_are_as_far_off_as_bodies_keep_apart(
 ) -> None:
     """However the controller joins the targets; the elbow and all else, not the tool alone."""
     file = tmp_path / name
-    sm.write_motion(past, file, settings=settings(name, 1e-4))
+    sm.files.write_motion(past, file, settings=settings(name, 1e-4))
     few, stated, found = program_miss(past, file)
     assert stated.path == NO_MISS
     assert found.moves.position <= stated.moves.position
@@ -259,7 +261,7 @@ def test_free_moves_are_as_far_off_as_bodies_keep_apart(
         assert min(apart.model.distance(q).value for q in way) >= apart.distance
     # Where nothing else is said, and not for less.
     narrow = replace(settings(name, 1e-4), move_deviation=sm.Tolerance(1e-4, 1e-3))
-    sm.write_motion(past, file, settings=narrow)
+    sm.files.write_motion(past, file, settings=narrow)
     many, stated, found = program_miss(past, file)
     assert found.moves.position <= stated.moves.position <= 1e-4
     assert many > 1.5 * few
@@ -273,7 +275,7 @@ def test_targets_grow_with_the_root_of_the_error_where_a_motion_has_straight_par
     for deviation in (1e-3, 1e-4, 1e-5):
         within = sm.Tolerance(deviation, 10 * deviation)
         asked = replace(settings("a.src"), move_deviation=within)
-        sm.write_motion(past, tmp_path / "a.src", settings=asked)
+        sm.files.write_motion(past, tmp_path / "a.src", settings=asked)
         count, stated, _ = program_miss(past, tmp_path / "a.src")
         assert stated.moves.position <= deviation
         counts.append(count)
@@ -288,8 +290,8 @@ def test_what_digits_forbid_is_said_in_words_of_the_file(past: sm.Move, tmp_path
         r"'move': programs count angles in 1e-05°, which is up to .* mm and .*° of the tool; allow "
         r"more than move_deviation = \{ position_mm = 1e-05, "
     )
-    with pytest.raises(sm.ProblemError, match=said):
-        sm.write_motion(past, tmp_path / "a.src", settings=asked)
+    with pytest.raises(sm.errors.ProblemError, match=said):
+        sm.files.write_motion(past, tmp_path / "a.src", settings=asked)
 
 
 @pytest.mark.parametrize("name", FILES)
@@ -299,7 +301,7 @@ def test_a_program_of_a_job_is_verified_by_its_job(
     """Step by step, at the deviation that is stated; and not once a target is elsewhere."""
     file, job = tmp_path / name, tmp_path / "a.program"
     program.save(job)
-    sm.write_motion(program, file, settings=settings(name, 1e-3))
+    sm.files.write_motion(program, file, settings=settings(name, 1e-3))
     code, text = invoke("check", file, "--robot", job)
     assert code == 0, text
     assert [line.split(":")[0] for line in text.splitlines()[:-1]] == [
@@ -318,7 +320,7 @@ def test_a_program_of_a_job_is_verified_by_its_job(
     assert code == 1
     assert f"not verified: 1 of {len(found)} steps" in text
     other = replace(program, steps=program.steps[:-1])
-    with pytest.raises(sm.FileFormatError, match="goes on with '"):
+    with pytest.raises(sm.errors.FileFormatError, match="goes on with '"):
         judged_program(file, other)
 
 
@@ -333,14 +335,18 @@ def test_a_program_of_a_plan_is_verified_as_it_is_written(
     corner, last = first.copy(), first.copy()
     corner.translation = first.translation - np.array([0.0, 0.0, 0.1])
     last.translation = corner.translation + np.array([0.0, 0.1, 0.0])
-    way = sm.Polyline([x.translation for x in (first, corner, last)], tolerance=2e-3)
-    path = sm.Feed(way, 0.05)
-    limits = (sm.JointPositionLimits(), sm.JointVelocityLimits(), sm.JointAccelerationLimits(9.0))
+    way = sm.paths.Polyline([x.translation for x in (first, corner, last)], tolerance=2e-3)
+    path = sm.paths.Feed(way, 0.05)
+    limits = (
+        sm.constraints.JointPositionLimits(),
+        sm.constraints.JointVelocityLimits(),
+        sm.constraints.JointAccelerationLimits(9.0),
+    )
     problem = sm.Problem(ur5, path, "position", start, constraints=limits, collision=None)
     made = sm.plan(problem).require()
-    sm.write_problem(problem, tmp_path / "cell.toml")
+    sm.files.write_problem(problem, tmp_path / "cell.toml")
     asked = settings(name, deviation)
-    sm.write_motion(made, tmp_path / name, settings=asked)
+    sm.files.write_motion(made, tmp_path / name, settings=asked)
     code, text = invoke("check", tmp_path / name, "--robot", tmp_path / "cell.toml")
     assert code == 0, text
     assert "feed (at least 0.049)" in text
@@ -356,7 +362,7 @@ def test_a_program_of_a_plan_is_verified_as_it_is_written(
 
 def test_urscript_knows_tool_load_and_outputs(program: sm.Program, tmp_path: Path) -> None:
     file = tmp_path / "weld.script"
-    sm.write_motion(program, file, settings=settings("weld.src").streamed)
+    sm.files.write_motion(program, file, settings=settings("weld.src").streamed)
     lines = file.read_text().splitlines()
     head = [line for line in lines if "servoj(" not in line]
     assert any(line.startswith("  set_tcp(p[0.0") for line in head)
@@ -369,9 +375,9 @@ def test_urscript_knows_tool_load_and_outputs(program: sm.Program, tmp_path: Pat
     late = [125.0 * (at + 0.1) for at, _, _ in program.events]
     np.testing.assert_allclose(stream, late, atol=1.0)
     # These arms have eight.
-    beyond = sm.ProgramSettings(signals={"arc on": (8, True), "arc off": (8, False)})
-    with pytest.raises(sm.ProblemError, match="from 0 to 7"):
-        sm.write_motion(program, file, settings=beyond)
+    beyond = sm.files.ProgramSettings(signals={"arc on": (8, True), "arc off": (8, False)})
+    with pytest.raises(sm.errors.ProblemError, match="from 0 to 7"):
+        sm.files.write_motion(program, file, settings=beyond)
 
 
 def test_other_axes_are_in_mm_and_counted_apart(tmp_path: Path) -> None:
@@ -379,17 +385,17 @@ def test_other_axes_are_in_mm_and_counted_apart(tmp_path: Path) -> None:
     first = tiago.dexterous_configuration()
     last = first + np.array([0.1, *[0.2] * 7])
     move = sm.move(tiago, first, last, clearance=None).require()
-    sm.write_motion(move, tmp_path / "lift.mod")
+    sm.files.write_motion(move, tmp_path / "lift.mod")
     text = (tmp_path / "lift.mod").read_text()
     assert "E2 = torso_lift_joint [mm]" in text
     (begin,) = re.findall(r"MoveAbsJ \[\[.*?\], \[(.*?)\]\]", text)[:1]
     slide = begin.split(", ")[1]
     assert float(slide) == pytest.approx(1e3 * first[0], abs=1e-4)
-    again = sm.read_motion(tmp_path / "lift.mod").of_joints(tiago.joint_names)
+    again = sm.files.read_motion(tmp_path / "lift.mod").of_joints(tiago.joint_names)
     np.testing.assert_allclose(again.q[-1], last, atol=1e-6)
     axes = {name: f"A{k}" for k, name in enumerate(tiago.joint_names[1:7], 1)}
     axes |= {tiago.joint_names[7]: "E1", tiago.joint_names[0]: "E3"}
-    sm.write_motion(move, tmp_path / "lift.src", settings=sm.ProgramSettings(axes=axes))
+    sm.files.write_motion(move, tmp_path / "lift.src", settings=sm.files.ProgramSettings(axes=axes))
     assert "E3" in (tmp_path / "lift.src").read_text()
     for wrong, said in (
         ({"torso_lift_joint": "A1"}, "joint 'arm_1_joint' has no axis"),
@@ -397,22 +403,22 @@ def test_other_axes_are_in_mm_and_counted_apart(tmp_path: Path) -> None:
         ({**axes, "torso_lift_joint": "A1", "arm_1_joint": "E3"}, "'torso_lift_joint' slides"),
         (axes | {"nose": "E4"}, "'nose' is none of its joints"),
     ):
-        asked = sm.ProgramSettings(axes=wrong)
-        with pytest.raises(sm.ProblemError, match=said):
-            sm.write_motion(move, tmp_path / "lift.src", settings=asked)
+        asked = sm.files.ProgramSettings(axes=wrong)
+        with pytest.raises(sm.errors.ProblemError, match=said):
+            sm.files.write_motion(move, tmp_path / "lift.src", settings=asked)
 
 
 def test_settings_that_have_no_effect_are_refused_by_name(
     program: sm.Program, tmp_path: Path
 ) -> None:
-    with pytest.raises(sm.ProblemError, match="center: has no effect without a mass"):
-        sm.ProgramSettings(center=(0.0, 0.1, 0.0))
+    with pytest.raises(sm.errors.ProblemError, match="center: has no effect without a mass"):
+        sm.files.ProgramSettings(center=(0.0, 0.1, 0.0))
     asked = settings("a.src")
     axes = {name: f"A{k}" for k, name in enumerate(program.robot.joint_names, 1)}
     for given in ({"axes": axes}, {"deviation": sm.Tolerance(1e-3, 1e-3)}):
         other = replace(asked, **given)
-        with pytest.raises(sm.ProblemError, match="axes have no effect on URScript"):
-            sm.write_motion(program, tmp_path / "a.script", settings=other)
+        with pytest.raises(sm.errors.ProblemError, match="axes have no effect on URScript"):
+            sm.files.write_motion(program, tmp_path / "a.script", settings=other)
         assert other.streamed == asked.streamed
 
 
@@ -425,14 +431,14 @@ def test_what_is_not_verified_is_written_only_when_forced(
         for name in (*FILES, "weld.csv"):
             file = tmp_path / name
             asked = settings(name) if name in FILES else None
-            with pytest.raises(sm.PlanError, match=r"is not written: .*force=True"):
-                sm.write_motion(made, file, settings=asked)
+            with pytest.raises(sm.errors.PlanError, match=r"is not written: .*force=True"):
+                sm.files.write_motion(made, file, settings=asked)
             assert not file.exists()
-            sm.write_motion(made, file, settings=asked, force=True)
+            sm.files.write_motion(made, file, settings=asked, force=True)
             assert file.exists()
             file.unlink()
-    with pytest.raises(sm.ProblemError, match="settings have no effect"):
-        sm.write_motion(program, tmp_path / "weld.csv", settings=settings("weld.src"))
+    with pytest.raises(sm.errors.ProblemError, match="settings have no effect"):
+        sm.files.write_motion(program, tmp_path / "weld.csv", settings=settings("weld.src"))
     unmade.save(tmp_path / "a.program")
     asked = ("export", tmp_path / "a.program", "--out", tmp_path / "a.csv")
     code, text = invoke(*asked)
@@ -456,26 +462,36 @@ def test_the_shell_writes_programs_and_confirms_them(program: sm.Program, tmp_pa
     assert re.search(r"read back: \d+ targets, between which the tool is at most 0\.\d+ mm", text)
     assert "CM {X 0.0000, Y 0.0000, Z 60.0000" in (tmp_path / "weld.src").read_text()
     with pytest.raises(
-        sm.ProblemError, match=r"'arc on' has no signal; .*--settings .*\[signals\]"
+        sm.errors.ProblemError, match=r"'arc on' has no signal; .*--settings .*\[signals\]"
     ):
         invoke(*asked)
     # A signal of no event is named where it may be meant, one of another event is not.
     signals = {"arc on": (7, True), "arc of": (7, False)}
-    with pytest.raises(sm.ProblemError, match="'arc off' has no signal; nearest: 'arc of'; say"):
-        sm.write_motion(program, tmp_path / "b.src", settings=sm.ProgramSettings(signals=signals))
+    with pytest.raises(
+        sm.errors.ProblemError, match="'arc off' has no signal; nearest: 'arc of'; say"
+    ):
+        sm.files.write_motion(
+            program, tmp_path / "b.src", settings=sm.files.ProgramSettings(signals=signals)
+        )
     signals.pop("arc of")
     alike = {name: (7, True) for name in ("arc on", "arc off")}
-    with pytest.raises(sm.ProblemError, match="'arc on' and 'arc off' both switch 7 to True; one"):
-        sm.write_motion(program, tmp_path / "b.src", settings=sm.ProgramSettings(signals=alike))
-    with pytest.raises(sm.ProblemError, match="'arc off' has no signal; say"):
-        sm.write_motion(program, tmp_path / "b.src", settings=sm.ProgramSettings(signals=signals))
+    with pytest.raises(
+        sm.errors.ProblemError, match="'arc on' and 'arc off' both switch 7 to True; one"
+    ):
+        sm.files.write_motion(
+            program, tmp_path / "b.src", settings=sm.files.ProgramSettings(signals=alike)
+        )
+    with pytest.raises(sm.errors.ProblemError, match="'arc off' has no signal; say"):
+        sm.files.write_motion(
+            program, tmp_path / "b.src", settings=sm.files.ProgramSettings(signals=signals)
+        )
     (tmp_path / "quiet.toml").write_text('[signals]\n"arc on" = false\n"arc off" = false\n')
     assert invoke(*asked, "--settings", tmp_path / "quiet.toml")[0] == 0
     assert "; event: arc on" in (tmp_path / "weld.src").read_text()
-    with pytest.raises(sm.ProblemError, match="--rate has no effect"):
+    with pytest.raises(sm.errors.ProblemError, match="--rate has no effect"):
         invoke(*asked, "--rate", "100")
     (tmp_path / "kuka.toml").write_text("mas = 3\n")
-    with pytest.raises(sm.FileFormatError, match=r"unknown key 'mas'.*nearest: 'mass'"):
+    with pytest.raises(sm.errors.FileFormatError, match=r"unknown key 'mas'.*nearest: 'mass'"):
         invoke(*asked, "--settings", tmp_path / "kuka.toml")
 
 
@@ -488,25 +504,25 @@ def test_lines_that_are_not_written_are_refused_by_number(plan: sm.Plan, tmp_pat
         ("weld.mod", "    WaitTime 1;", "rest where it does not stop"),
     ):
         file = tmp_path / name
-        sm.write_motion(plan, file, settings=settings(name))
+        sm.files.write_motion(plan, file, settings=settings(name))
         lines = file.read_text().splitlines()
         at = len(lines) // 2
         while not re.match(r"\s+(SPTP|MoveAbsJ)", lines[at]):
             at += 1
         file.write_text("\n".join([*lines[:at], line, *lines[at:]]))
-        with pytest.raises(sm.FileFormatError, match=rf"{name}: line {at + 1}: .*({said})"):
-            sm.read_motion(file)
+        with pytest.raises(sm.errors.FileFormatError, match=rf"{name}: line {at + 1}: .*({said})"):
+            sm.files.read_motion(file)
         file.write_text("\n".join(lines[:at]))
-        with pytest.raises(sm.FileFormatError, match="is the last one, expected END"):
-            sm.read_motion(file)
+        with pytest.raises(sm.errors.FileFormatError, match="is the last one, expected END"):
+            sm.files.read_motion(file)
 
 
 def test_modules_are_called_as_controllers_allow(plan: sm.Plan, tmp_path: Path) -> None:
     for name in ("2weld.src", "we ld.mod", f"{'w' * 25}.src", f"{'w' * 29}.mod", "wéld.src"):
-        with pytest.raises(sm.FileFormatError, match="is no name: expected a letter"):
-            sm.write_motion(plan, tmp_path / name)
+        with pytest.raises(sm.errors.FileFormatError, match="is no name: expected a letter"):
+            sm.files.write_motion(plan, tmp_path / name)
     for name in (f"{'w' * 24}.src", f"{'w' * 28}.mod"):
-        sm.write_motion(plan, tmp_path / name)
+        sm.files.write_motion(plan, tmp_path / name)
         text = (tmp_path / name).read_text()
         assert max(len(word) for word in re.findall(r"\b[A-Za-z]\w*", text)) <= 32
         assert text.isascii()
@@ -524,31 +540,31 @@ def test_events_near_each_other_and_the_ends_are_all_written(
         file = tmp_path / f"weld{number}.src"
         made = sm.Program(plan.robot, (step,), {})
         assert made.verified
-        sm.write_motion(made, file, settings=settings("weld.src"))
+        sm.files.write_motion(made, file, settings=settings("weld.src"))
         assert file.read_text().count("$OUT[7]") == 2
-        sm.read_motion(file)
+        sm.files.read_motion(file)
 
 
 @pytest.mark.parametrize(("form", "name"), [("krl", "a.txt"), ("csv", "a.src"), ("rapid", "a.src")])
 def test_programs_have_the_suffix_of_their_controller(
     plan: sm.Plan, tmp_path: Path, form: str, name: str
 ) -> None:
-    with pytest.raises(sm.FileFormatError, match="is written with"):
-        sm.write_motion(plan, tmp_path / name, form=form)
+    with pytest.raises(sm.errors.FileFormatError, match="is written with"):
+        sm.files.write_motion(plan, tmp_path / name, form=form)
     assert not (tmp_path / name).exists()
 
 
 @pytest.mark.parametrize("name", ["for.src", "Loop.src", "test.mod", "proc.mod"])
 def test_words_of_a_language_name_no_module(plan: sm.Plan, tmp_path: Path, name: str) -> None:
-    with pytest.raises(sm.FileFormatError, match="is a word of the controller's language"):
-        sm.write_motion(plan, tmp_path / name)
+    with pytest.raises(sm.errors.FileFormatError, match="is a word of the controller's language"):
+        sm.files.write_motion(plan, tmp_path / name)
 
 
 def test_the_tool_of_an_arm_in_a_cell_is_that_of_the_arm_alone() -> None:
     alone = sm.load_robot("ur5", tool="tool0")
     cell = sm.load_robot({"arm": "ur5", "other": "z1"}, base={"other": np.eye(4)}, tool="arm/tool0")
     for robot in (alone, cell):
-        at = tool_from_flange(robot, sm.ProgramSettings())
+        at = tool_from_flange(robot, sm.files.ProgramSettings())
         np.testing.assert_allclose(at.homogeneous, np.eye(4), atol=1e-9)
 
 
@@ -558,7 +574,7 @@ def test_a_file_is_judged_as_a_whole_by_its_job(
 ) -> None:
     """Its ends and its outputs, though each of its steps is verified."""
     file = tmp_path / name
-    sm.write_motion(program, file, settings=settings(name, 1e-3))
+    sm.files.write_motion(program, file, settings=settings(name, 1e-3))
     assert judged_program(file, program).verified
     text = file.read_text()
     lines = text.splitlines(keepends=True)
@@ -624,16 +640,18 @@ def test_a_table_in_the_urdf_of_an_arm_is_no_wrist(tmp_path: Path) -> None:
     file = tmp_path / "cell.urdf"
     file.write_text(cell.urdf.text.replace("arm/", "arm_").replace("table/", "table_"))
     one = sm.load_robot(file, tool="arm_tool0", reference="table_plate", lock={"table_tilt": 0.0})
-    with pytest.raises(sm.ProblemError, match=r"'table_turn' does not carry the tool.*'A6'.*'E1'"):
-        axes_of(one, sm.ProgramSettings())
-    assert [axis.name for axis in axes_of(cell, sm.ProgramSettings())][-2:] == ["E1", "E2"]
+    with pytest.raises(
+        sm.errors.ProblemError, match=r"'table_turn' does not carry the tool.*'A6'.*'E1'"
+    ):
+        axes_of(one, sm.files.ProgramSettings())
+    assert [axis.name for axis in axes_of(cell, sm.files.ProgramSettings())][-2:] == ["E1", "E2"]
 
 
 def test_what_is_read_back_is_held_in_turns_joints_and_outputs_as_well(
     program: sm.Program, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     file = tmp_path / "weld.src"
-    sm.write_motion(program, file, settings=settings("weld.src", 1e-3))
+    sm.files.write_motion(program, file, settings=settings("weld.src", 1e-3))
     assert exports._confirmed(program, file)[0]
     count, stated, found = program_miss(program, file)
     for k in range(3):

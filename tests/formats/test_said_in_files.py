@@ -80,17 +80,17 @@ def tables() -> list[tuple[str, Callable[..., Any], set[str]]]:
         ("Tolerance", sm.Tolerance, keys_of("Tolerance")),
         ("Damping", sm.Damping, keys_of("Damping")),
         ("Relaxation", sm.Relaxation, keys_of("Relaxation")),
-        ("Clearance", sm.Clearance, keys_of("Clearance")),
+        ("Clearance", sm.constraints.Clearance, keys_of("Clearance")),
         ("Follow", sm.Follow, keys_of("Follow")),
-        ("Feed", sm.Feed, keys_of("feed")),
-        ("feed of a circle", sm.Feed, keys_of("circle") | {"path", "stretches"}),
-        ("Circle.around", sm.Circle.around, keys_of("circle") | {"options"}),
-        ("read_path", sm.read_path, path_file),
+        ("Feed", sm.paths.Feed, keys_of("feed")),
+        ("feed of a circle", sm.paths.Feed, keys_of("circle") | {"path", "stretches"}),
+        ("Circle.around", sm.paths.Circle.around, keys_of("circle") | {"options"}),
+        ("read_path", sm.files.read_path, path_file),
         ("load_robot", sm.load_robot, keys_of("Robot") | keys_of("RobotPart")),
         ("plan_job", sm.plan_job, {*JOB}),
         ("Seam", sm.Seam, {*SEAM, *OF_PROBLEM}),
     ]
-    families = (sm.Cost, sm.Constraint, sm.NullMotion, sm.Path)
+    families = (sm.costs.Cost, sm.constraints.Constraint, sm.motion.NullMotion, sm.paths.Path)
     for family in families:
         for kind, cls in family.kinds().items():
             ours = cls.__module__.startswith("selfmotion.") and kind in SCHEMA["$defs"]
@@ -121,7 +121,7 @@ def test_every_exception_has_a_reason_and_a_user() -> None:
 
 def test_what_is_written_is_planned_the_same_again(tmp_path: Path) -> None:
     """With its search, its optimiser and its goal."""
-    job = sm.Job(
+    job = sm.files.Job(
         sm.sample_problem(),
         search=sm.Search(starts=7, finalists=2, mode="local", rng=3),
         optimizer=sm.QuasiNewton(),
@@ -131,16 +131,16 @@ def test_what_is_written_is_planned_the_same_again(tmp_path: Path) -> None:
         goal="retimed",
     )
     for name in ("job.toml", "job.json"):
-        sm.write_problem(job, tmp_path / name)
-        again = sm.read_job(tmp_path / name)
+        sm.files.write_problem(job, tmp_path / name)
+        again = sm.files.read_job(tmp_path / name)
         assert again.search == job.search
         assert again.tolerance == job.tolerance
         assert dataclasses.asdict(again.optimizer) == dataclasses.asdict(job.optimizer)  # type: ignore[call-overload]
         assert (again.max_evaluations, again.goal) == (9, "retimed")
         assert [file.resolve() for file in again.outputs] == [tmp_path / "out" / "a.csv"]
     by_chance = dataclasses.replace(job, search=sm.Search(rng=np.random.default_rng(1)))
-    with pytest.raises(sm.ProblemError, match="search: rng is a generator"):
-        sm.write_problem(by_chance, tmp_path / "a.toml")
+    with pytest.raises(sm.errors.ProblemError, match="search: rng is a generator"):
+        sm.files.write_problem(by_chance, tmp_path / "a.toml")
 
 
 def test_a_goal_says_what_is_looked_for() -> None:
@@ -148,23 +148,23 @@ def test_a_goal_says_what_is_looked_for() -> None:
     start = np.array([0.4, 0.6, 0.5])
     end = arm.pose(start)
     end.translation = end.translation + np.array([-0.3, 0.2, 0.0])
-    limits = [sm.JointVelocityLimits(2.0), sm.JointAccelerationLimits(4.0)]
-    line = sm.Line(arm.pose(start), end, 8.0)
+    limits = [sm.constraints.JointVelocityLimits(2.0), sm.constraints.JointAccelerationLimits(4.0)]
+    line = sm.paths.Line(arm.pose(start), end, 8.0)
     problem = sm.Problem(arm, line, "planar", start, constraints=limits)
-    own, retimed = (sm.Job(problem, goal=goal).plan() for goal in ("best", "retimed"))
+    own, retimed = (sm.files.Job(problem, goal=goal).plan() for goal in ("best", "retimed"))
     assert retimed.certificate.verified
     assert retimed.trajectory.duration < 0.5 * own.trajectory.duration
-    parts = sm.Job(problem, goal="parts", parts={"ramp": 0.2})
-    with pytest.raises(sm.ProblemError, match=r"goal: is 'parts'"):
+    parts = sm.files.Job(problem, goal="parts", parts={"ramp": 0.2})
+    with pytest.raises(sm.errors.ProblemError, match=r"goal: is 'parts'"):
         parts.plan()
-    with pytest.raises(sm.ProblemError, match="search: has no effect on a motion in parts"):
+    with pytest.raises(sm.errors.ProblemError, match="search: has no effect on a motion in parts"):
         dataclasses.replace(parts, search=sm.Search()).in_parts()
 
 
 def test_what_has_no_effect_on_a_goal_is_refused(tmp_path: Path) -> None:
     robot = robot_named("planar_3r")
     start = np.array([0.1, 0.9, 0.9])
-    line = sm.Line(robot.pose(start), robot.pose(start + 0.1), 2.0)
+    line = sm.paths.Line(robot.pose(start), robot.pose(start + 0.1), 2.0)
     problem = sm.Problem(robot, line, "planar", start)
     keep, parts = {"JointVelocity": 1.1}, {"retreat": 0.1}
     for goal, given, said in (
@@ -173,13 +173,13 @@ def test_what_has_no_effect_on_a_goal_is_refused(tmp_path: Path) -> None:
         ("fastest", {"parts": parts}, "parts: has no effect on the fastest motion"),
         ("parts", {"keep": keep}, "keep: has no effect on a motion in parts"),
     ):
-        job = sm.Job(problem, goal=goal, **given)
-        with pytest.raises(sm.ProblemError, match=said):
+        job = sm.files.Job(problem, goal=goal, **given)
+        with pytest.raises(sm.errors.ProblemError, match=said):
             job.in_parts() if goal == "parts" else job.plan()
-    with pytest.raises(sm.ProblemError, match="goal is 'quick', expected one of"):
-        sm.Job(problem, goal="quick")
+    with pytest.raises(sm.errors.ProblemError, match="goal is 'quick', expected one of"):
+        sm.files.Job(problem, goal="quick")
     file = tmp_path / "cell.toml"
-    sm.write_problem(problem, file)
+    sm.files.write_problem(problem, file)
     file.write_text(file.read_text() + '\n[grid]\n"path.duration" = [3, 4]\n')
-    with pytest.raises(sm.FileFormatError, match="grid: stands for many problems"):
+    with pytest.raises(sm.errors.FileFormatError, match="grid: stands for many problems"):
         sm.read_problem(file)

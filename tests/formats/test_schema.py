@@ -107,9 +107,9 @@ def test_a_key_that_is_refused_is_not_valid_and_the_other_way_round(tmp_path: Pa
 def test_and_of_jobs(tmp_path: Path) -> None:
     from selfmotion.formats import write_document
 
-    def read(document: dict[str, Any]) -> sm.SeamJob:
+    def read(document: dict[str, Any]) -> sm.files.SeamJob:
         write_document(tmp_path / "job.json", document)
-        return sm.read_seam_job(tmp_path / "job.json")
+        return sm.files.read_seam_job(tmp_path / "job.json")
 
     assert CHECK.is_valid(SEAMS)
     read(SEAMS)

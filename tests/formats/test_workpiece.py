@@ -65,7 +65,7 @@ def test_bodies_of_a_workpiece_and_of_a_tool_are_in_its_frame_by_default(tmp_pat
     (body,) = found.collision.obstacles
     np.testing.assert_allclose(body.pose.homogeneous, stands(0.4, 9.0).homogeneous, atol=1e-12)
     world = f'[[constraints]]\nkind = "Clearance"\nobstacles = [{box}]'
-    with pytest.raises(sm.FileFormatError, match=r"obstacles\[0\]\.position: is missing"):
+    with pytest.raises(sm.errors.FileFormatError, match=r"obstacles\[0\]\.position: is missing"):
         problem(tmp_path, "line", 0.4, 9.0, bodies="", on=f"\n{world}")
 
 
@@ -83,7 +83,7 @@ def test_moving_the_workpiece_moves_all_that_belongs_to_it(tmp_path: Path, path:
             other.pose.homogeneous, (moved * one.pose).homogeneous, atol=1e-12
         )
     # Without a workpiece the file says the same by numbers in the world.
-    sm.write_problem(here, tmp_path / "again.toml")
+    sm.files.write_problem(here, tmp_path / "again.toml")
     again = sm.read_problem(tmp_path / "again.toml")
     np.testing.assert_allclose(
         again.path.pose(1.0).homogeneous, here.path.pose(1.0).homogeneous, atol=1e-12
@@ -99,7 +99,9 @@ def test_bodies_join_the_clearance_that_there_is(tmp_path: Path) -> None:
         'obstacles = [{ shape = "sphere", name = "lamp", position = [0, 0, 2], radius = 0.1 }] }]'
     )
     found = problem(tmp_path, "line", 0.4, 0.0, more=more)
-    (clearance,) = (item for item in found.constraints if isinstance(item, sm.Clearance))
+    (clearance,) = (
+        item for item in found.constraints if isinstance(item, sm.constraints.Clearance)
+    )
     assert [body.name for body in clearance.obstacles] == ["lamp", "clamp", "pin"]
     assert clearance.distance == 0.004
     lamp = clearance.obstacles[0]
@@ -116,12 +118,14 @@ def test_meshes_stand_where_their_coordinates_say(tmp_path: Path) -> None:
     for place in ("", ", position = [0, 0, 0]"):
         text = more.replace("MESH", mesh.replace("PLACE", place))
         found = problem(tmp_path, "line", 0.4, 0.0, more=text)
-        (clearance,) = (item for item in found.constraints if isinstance(item, sm.Clearance))
+        (clearance,) = (
+            item for item in found.constraints if isinstance(item, sm.constraints.Clearance)
+        )
         poses.append(clearance.obstacles[0].pose.homogeneous)
     np.testing.assert_array_equal(*poses)
     np.testing.assert_array_equal(poses[0], np.eye(4))
     box = more.replace("MESH", '{ shape = "box", name = "b", size = [1, 1, 1] }')
-    with pytest.raises(sm.FileFormatError, match="position"):
+    with pytest.raises(sm.errors.FileFormatError, match="position"):
         problem(tmp_path, "line", 0.4, 0.0, more=box)
 
 
@@ -149,7 +153,7 @@ def test_its_mesh_is_a_body(tmp_path: Path) -> None:
     ],
 )  # fmt: skip
 def test_what_has_no_meaning_is_refused(tmp_path: Path, more: dict[str, str], said: str) -> None:
-    with pytest.raises(sm.FileFormatError, match=said):
+    with pytest.raises(sm.errors.FileFormatError, match=said):
         problem(tmp_path, "line", 0.4, 0.0, **more)
 
 
@@ -157,7 +161,7 @@ def test_a_shape_needs_its_place_in_the_workpiece(tmp_path: Path) -> None:
     problem(tmp_path, "line", 0.4, 0.0)
     text = (tmp_path / "cell.toml").read_text().replace("start = { position = [0, 0, 0] }", "")
     (tmp_path / "cell.toml").write_text(text)
-    with pytest.raises(sm.FileFormatError, match=r"path\.start is missing"):
+    with pytest.raises(sm.errors.FileFormatError, match=r"path\.start is missing"):
         sm.read_problem(tmp_path / "cell.toml")
 
 
@@ -180,7 +184,7 @@ def test_seams_of_a_job_move_with_it_and_so_does_what_they_leave(
         frame = f"frame = {{ position = [{x}, 0.1, 0.2], rpy_deg = [170, {tilt}, 40] }}\n"
         text = f'task = "pointing"\n[robot]\nname = "panda"\n[workpiece]\n{frame}{BODIES}\n{given}'
         (tmp_path / "job.toml").write_text(text)
-        found.append(sm.read_seam_job(tmp_path / "job.toml"))
+        found.append(sm.files.read_seam_job(tmp_path / "job.toml"))
     here, there = found
     moved = stands(0.55, -5.0) * stands(0.4, 10.0).inverse()
     for one, other in zip(here.seams, there.seams, strict=True):

@@ -26,7 +26,7 @@ ALIKE = 1.05
 
 def seam(name: str, first, last, **given) -> sm.Seam:
     """Return a straight seam of a second, the tool pointing down."""
-    line = sm.Line(SE3(DOWN, np.array(first)), SE3(DOWN, np.array(last)), 1.0)
+    line = sm.paths.Line(SE3(DOWN, np.array(first)), SE3(DOWN, np.array(last)), 1.0)
     return sm.Seam(name, line, "pointing", **given)
 
 
@@ -110,7 +110,7 @@ def ordered() -> sm.Program:
 def test_directions_order_waits_and_events_are_as_asked(ordered) -> None:
     panda, seams = robot_named("panda"), {item.name: item for item in ordered_seams()}
     circle = [seams["seam 0"], replace(seams["seam 1"], after=("seam 0",)), seams["seam 2"]]
-    with pytest.raises(sm.ProblemError, match="circle"):
+    with pytest.raises(sm.errors.ProblemError, match="circle"):
         sm.plan_job(panda, circle, branches=1)
     made = ordered.require()
     assert made.order == ("seam 2", "seam 1", "seam 0")
@@ -154,13 +154,13 @@ def test_events_of_the_timetable_are_in_their_order(program, tmp_path) -> None:
     ],
 )
 def test_what_is_switched_on_and_off_at_once_is_refused(events, refused: bool) -> None:
-    with pytest.raises(sm.ProblemError, match="no effect") if refused else nullcontext():
+    with pytest.raises(sm.errors.ProblemError, match="no effect") if refused else nullcontext():
         seam("a", [0.4, 0.0, 0.3], [0.5, 0.0, 0.3], events=events)
 
 
 @pytest.mark.parametrize("name", ["job start", "job end"])
 def test_ends_of_a_job_have_names_of_their_own(name: str) -> None:
-    with pytest.raises(sm.ProblemError, match=f"'{name}' is an end of the job"):
+    with pytest.raises(sm.errors.ProblemError, match=f"'{name}' is an end of the job"):
         seam(name, [0.4, 0.0, 0.3], [0.5, 0.0, 0.3])
 
 
@@ -177,7 +177,7 @@ def tampered(program: sm.Program) -> Iterator[tuple[str, list[Step]]]:
             yield f"{step.name} turned", [*steps[:k], turned, *steps[k + 1 :]]
             late = replace(step, events=(*step.events[1:], ("late", 0.5)))
             yield f"{step.name} with other events", [*steps[:k], late, *steps[k + 1 :]]
-            left = replace(step, leaves=(sm.Sphere("drop", [0.0, 1.0, 2.0], 0.01),))
+            left = replace(step, leaves=(sm.obstacles.Sphere("drop", [0.0, 1.0, 2.0], 0.01),))
             yield f"{step.name} leaves something", [*steps[:k], left, *steps[k + 1 :]]
         met = replace(step, may_meet=("post",))
         yield f"{step.name} may meet more", [*steps[:k], met, *steps[k + 1 :]]
@@ -243,7 +243,7 @@ def test_what_is_made_stands_in_the_way_of_what_comes_later() -> None:
     panda = robot_named("panda")
     hand = panda.urdf.links
     assert "panda_hand" in hand
-    post = sm.Box("post", [0.45, 0.0, 0.3], [0.04, 0.04, 0.3])
+    post = sm.obstacles.Box("post", [0.45, 0.0, 0.3], [0.04, 0.04, 0.3])
     seams = [
         seam("raise", [0.45, 0.3, 0.35], [0.5, 0.3, 0.35], leaves=[post], wait=0.1),
         seam("beside", [0.4, -0.3, 0.35], [0.5, -0.3, 0.35], after=["raise"]),
@@ -282,7 +282,7 @@ def test_what_is_made_stands_in_the_way_of_what_comes_later() -> None:
 
 def test_a_seam_that_ends_in_what_it_leaves_is_made_from_there() -> None:
     panda = robot_named("panda")
-    post = sm.Box("post", [0.5, 0.2, 0.35], [0.04, 0.04, 0.04])
+    post = sm.obstacles.Box("post", [0.5, 0.2, 0.35], [0.04, 0.04, 0.04])
     seams = [
         seam("towards", [0.45, 0.3, 0.35], [0.5, 0.2, 0.35], leaves=[post]),
         seam("then", [0.4, -0.3, 0.35], [0.5, -0.3, 0.35]),
@@ -293,7 +293,7 @@ def test_a_seam_that_ends_in_what_it_leaves_is_made_from_there() -> None:
     free = [replace(seams[0], may_meet=("post",)), seams[1]]
     assert sm.plan_job(panda, free, branches=1, order="given").verified
     # From neither end where it leaves something at both: then it is the last one.
-    other = sm.Box("other", [0.45, 0.3, 0.35], [0.04, 0.04, 0.04])
+    other = sm.obstacles.Box("other", [0.45, 0.3, 0.35], [0.04, 0.04, 0.04])
     both = replace(seams[0], leaves=[post, other])
     assert sm.plan_job(panda, [both, seams[1]], branches=1).require().order == ("then", "towards")
     # Nor does it rest in it, or move away to the end of the program.
@@ -306,7 +306,7 @@ def test_a_seam_that_ends_in_what_it_leaves_is_made_from_there() -> None:
 
 
 def test_a_seam_that_no_move_reaches_is_given_up_soon(monkeypatch) -> None:
-    post = sm.Box("post", [-0.5, 0.5, 0.3], [0.05, 0.05, 0.05])
+    post = sm.obstacles.Box("post", [-0.5, 0.5, 0.3], [0.05, 0.05, 0.05])
     lone = seam("lone", [0.4, 0.3, 0.4], [0.45, 0.3, 0.4])
     first = replace(lone, name="first", leaves=[post])
     then = seam("then", [0.5, 0.0, 0.35], [0.55, 0.0, 0.35], after=["first"])
@@ -350,7 +350,7 @@ def not_verified(file: Path) -> bool:
     """Whether a file is refused, or is not verified."""
     try:
         return not sm.load_program(file).verified
-    except sm.FileFormatError:
+    except sm.errors.FileFormatError:
         return True
 
 
@@ -393,13 +393,15 @@ def test_what_was_put_in_afterwards_is_judged_anew(program) -> None:
 def test_a_program_begins_and_ends_at_rest() -> None:
     panda = robot_named("panda")
     ends = SE3(DOWN, np.array([0.4, 0.0, 0.3])), SE3(DOWN, np.array([0.45, 0.0, 0.3]))
-    moving = sm.Line(*ends, 1.0, time_law="constant")
-    turning = sm.TwistPath(ends[0], lambda t: np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.2]), 1.0)
-    with pytest.raises(sm.ProblemError, match=r"begins at 0 m/s and 0\.2 rad/s, expected rest"):
+    moving = sm.paths.Line(*ends, 1.0, time_law="constant")
+    turning = sm.paths.TwistPath(ends[0], lambda t: np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.2]), 1.0)
+    with pytest.raises(
+        sm.errors.ProblemError, match=r"begins at 0 m/s and 0\.2 rad/s, expected rest"
+    ):
         sm.Seam("turn", turning)
     # What the task leaves free need not rest.
     sm.Seam("turn", turning, "position")
-    with pytest.raises(sm.ProblemError, match=r"'hurry': its path begins at 0\.05 m/s"):
+    with pytest.raises(sm.errors.ProblemError, match=r"'hurry': its path begins at 0\.05 m/s"):
         sm.Seam("hurry", moving, "pointing")
     plan = sm.plan(sm.Problem(panda, moving, "pointing")).require()
     alone = sm.Program(panda, (Step("hurry", plan),), {})
@@ -475,16 +477,18 @@ def test_bad_jobs_are_refused() -> None:
         ([replace(seams[0], may_meet=("nobody",))], "may meet 'nobody', which no seam leaves"),
         (["seam"], "expected a Seam"),
     ):
-        with pytest.raises(sm.ProblemError, match=message):
+        with pytest.raises(sm.errors.ProblemError, match=message):
             sm.plan_job(panda, given)
-    with pytest.raises(sm.ProblemError, match="give it as clearance="):
-        sm.plan_job(panda, seams, constraints=[sm.Clearance()])
-    with pytest.raises(sm.ProblemError, match="one way only"):
-        replace(seams[0], constraints=[sm.EndConfiguration(HOME)])
+    with pytest.raises(sm.errors.ProblemError, match="give it as clearance="):
+        sm.plan_job(panda, seams, constraints=[sm.constraints.Clearance()])
+    with pytest.raises(sm.errors.ProblemError, match="one way only"):
+        replace(seams[0], constraints=[sm.constraints.EndConfiguration(HOME)])
     far = seam("far", [2.0, 0.0, 0.3], [2.1, 0.0, 0.3])
     farther = seam("farther", [3.0, 0.0, 0.3], [3.1, 0.0, 0.3])
     # A seam a line.
-    with pytest.raises(sm.PlanError, match=r"no seam has a motion:\n  'far': .*\n  'farther': "):
+    with pytest.raises(
+        sm.errors.PlanError, match=r"no seam has a motion:\n  'far': .*\n  'farther': "
+    ):
         sm.plan_job(panda, [far, farther], branches=1)
 
 

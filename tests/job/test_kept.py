@@ -19,8 +19,8 @@ DOWN = np.diag([1.0, -1.0, -1.0])
 HOME = np.array(sm.NAMED_ARMS["panda"].home)
 
 
-def line(first, last, seconds: float = 1.0) -> sm.Path:
-    return sm.Line(SE3(DOWN, np.array(first)), SE3(DOWN, np.array(last)), seconds)
+def line(first, last, seconds: float = 1.0) -> sm.paths.Path:
+    return sm.paths.Line(SE3(DOWN, np.array(first)), SE3(DOWN, np.array(last)), seconds)
 
 
 SEAMS = [
@@ -176,7 +176,7 @@ def test_a_program_is_of_the_tool_the_reference_and_the_tolerance_that_were_aske
 
 def test_what_happens_on_a_move_was_asked_for_by_nobody(kept) -> None:
     _, program = kept
-    far = sm.Box("far", [0.0, 0.0, 3.0], [0.1, 0.1, 0.1])
+    far = sm.obstacles.Box("far", [0.0, 0.0, 3.0], [0.1, 0.1, 0.1])
     for changes, said in (({"events": (("arc on", 0.1),)}, "arc on"), ({"leaves": (far,)}, "far")):
         first = replace(program.steps[0], **changes)
         verdict = replace(program, steps=(first, *program.steps[1:])).verdict
@@ -184,8 +184,12 @@ def test_what_happens_on_a_move_was_asked_for_by_nobody(kept) -> None:
 
 
 def test_a_seams_own_clearance_is_kept_besides_that_of_the_job() -> None:
-    far = sm.Clearance([sm.Box("far", [0.0, 0.8, 0.6], [0.1, 0.1, 1.2])], 0.01)
-    post = sm.Clearance([sm.Box("post", [0.0, -0.6, 0.6], [0.1, 0.1, 1.2])], 0.01)
+    far = sm.constraints.Clearance(
+        [sm.obstacles.Box("far", [0.0, 0.8, 0.6], [0.1, 0.1, 1.2])], 0.01
+    )
+    post = sm.constraints.Clearance(
+        [sm.obstacles.Box("post", [0.0, -0.6, 0.6], [0.1, 0.1, 1.2])], 0.01
+    )
     own = replace(SEAMS[0], constraints=[far])
     made = sm.plan_job(robot_named("panda"), [own], clearance=post, **ASKED).require()
     bodies = {item.name for item in made.plans["one"].obstacles}
@@ -194,21 +198,23 @@ def test_a_seams_own_clearance_is_kept_besides_that_of_the_job() -> None:
 
 def test_all_bodies_are_kept_as_far_as_was_asked_by_one_clearance() -> None:
     """One that keeps as far from nothing, and one that hardly keeps from all, are not enough."""
-    post = sm.Box("post", [0.0, -0.6, 0.6], [0.1, 0.1, 1.2])
-    asked = sm.Clearance([post], 0.02)
+    post = sm.obstacles.Box("post", [0.0, -0.6, 0.6], [0.1, 0.1, 1.2])
+    asked = sm.constraints.Clearance([post], 0.02)
 
-    def step(*judged: sm.Clearance) -> Step:
+    def step(*judged: sm.constraints.Clearance) -> Step:
         return Step("one", sm.Move(robot_named("panda"), judged, None, "none"))
 
-    assert step(sm.Clearance([], 0.02), sm.Clearance([post], 0.0)).meets({"post": post}, asked)
-    assert not step(sm.Clearance([post], 0.03)).meets({"post": post}, asked)
+    assert step(sm.constraints.Clearance([], 0.02), sm.constraints.Clearance([post], 0.0)).meets(
+        {"post": post}, asked
+    )
+    assert not step(sm.constraints.Clearance([post], 0.03)).meets({"post": post}, asked)
 
 
 @pytest.mark.parametrize("limit", [1.2, 1.262, 1.28])
 def test_a_seam_whose_limits_bind_rests_at_its_ends(limit: float) -> None:
     """Its first polynomial begins without acceleration, and so the program is verified."""
     path = line([0.3, -0.3, 0.3], [0.6, 0.1, 0.3], 1.3)
-    asked = [sm.JointVelocityLimits(np.full(7, limit))]
+    asked = [sm.constraints.JointVelocityLimits(np.full(7, limit))]
     seam = sm.Seam("a", path, task="pointing", constraints=asked, either_way=False)
     program = sm.plan_job(robot_named("panda"), [seam], **ASKED).require()
     motion = program.plans["a"].trajectory
@@ -219,10 +225,10 @@ def test_a_seam_whose_limits_bind_rests_at_its_ends(limit: float) -> None:
 
 def test_a_turned_plan_tells_the_times_of_its_own_direction() -> None:
     limit = 1.2
-    path = line([0.3, -0.3, 0.3], [0.6, 0.1, 0.3], 1.3) + sm.Dwell(
+    path = line([0.3, -0.3, 0.3], [0.6, 0.1, 0.3], 1.3) + sm.paths.Dwell(
         SE3(DOWN, np.array([0.6, 0.1, 0.3])), 1.0
     )
-    asked = [sm.JointVelocityLimits(np.full(7, limit))]
+    asked = [sm.constraints.JointVelocityLimits(np.full(7, limit))]
     plan = sm.plan(
         sm.Problem(robot_named("panda"), path, "pointing", constraints=asked, collision=None)
     )

@@ -21,7 +21,7 @@ from support.shell import complaint, invoke
 PROVED = 0.95
 # Of a turn, where bodies are long.
 TURNED = 0.6
-LIMITS = [sm.JointPositionLimits(), sm.JointVelocityLimits()]
+LIMITS = [sm.constraints.JointPositionLimits(), sm.constraints.JointVelocityLimits()]
 
 
 @pytest.fixture(scope="module")
@@ -29,13 +29,13 @@ def plan() -> sm.Plan:
     """A hand with a torch, above a plate and beside a post."""
     robot = robot_named("panda")
     tip = robot.pose(PANDA_HOME).translation
-    path = sm.Circle.around(robot.pose(PANDA_HOME), 0.08, 2.0, normal=(1.0, 0.0, 0.0))
+    path = sm.paths.Circle.around(robot.pose(PANDA_HOME), 0.08, 2.0, normal=(1.0, 0.0, 0.0))
     bodies = [
-        sm.Box("plate", [tip[0], 0.0, tip[2] - 0.13], [0.3, 0.5, 0.02]),
-        sm.Cylinder("post", [tip[0], 0.25, tip[2]], 0.04, 0.3),
-        sm.Capsule("torch", [0.08, 0.0, 0.05], 0.01, 0.1, frame="panda_hand"),
+        sm.obstacles.Box("plate", [tip[0], 0.0, tip[2] - 0.13], [0.3, 0.5, 0.02]),
+        sm.obstacles.Cylinder("post", [tip[0], 0.25, tip[2]], 0.04, 0.3),
+        sm.obstacles.Capsule("torch", [0.08, 0.0, 0.05], 0.01, 0.1, frame="panda_hand"),
     ]
-    constraints = [*LIMITS, sm.Clearance(bodies, 5e-3)]
+    constraints = [*LIMITS, sm.constraints.Clearance(bodies, 5e-3)]
     return sm.plan(sm.Problem(robot, path, start=PANDA_HOME, constraints=constraints)).require()
 
 
@@ -115,7 +115,7 @@ def test_a_tolerance_is_used_up_by_its_lever() -> None:
     start = np.array([0.4, 0.7, 0.6])
     pose = robot.pose(start)
     end = pin.SE3(pose.rotation, pose.translation + np.array([-0.2, 0.0, 0.0]))
-    problem = sm.Problem(robot, sm.Line(pose, end, 2.0), "planar", start, constraints=LIMITS)
+    problem = sm.Problem(robot, sm.paths.Line(pose, end, 2.0), "planar", start, constraints=LIMITS)
     plan = sm.plan(problem).require()
     found = sm.margin(plan, sm.Tolerance(1e-3, 0.5))
     missed = plan.certificate.position_error.value
@@ -142,11 +142,11 @@ def test_what_cannot_be_asked_is_refused(plan: sm.Plan) -> None:
         ({"clearance": -1.0}, "clearance"),
         ({"center": [0.0]}, "center"),
     ):
-        with pytest.raises(sm.ProblemError, match=said):
+        with pytest.raises(sm.errors.ProblemError, match=said):
             sm.margin(plan, **given)
     moved = dataclasses.replace(plan.trajectory, t=plan.trajectory.t * 2.0)
     other = dataclasses.replace(plan, trajectory=moved)
-    with pytest.raises(sm.PlanError, match="of another motion"):
+    with pytest.raises(sm.errors.PlanError, match="of another motion"):
         sm.margin(other)
 
 

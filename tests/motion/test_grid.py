@@ -36,7 +36,7 @@ def test_steps_are_short_where_the_path_bends_and_not_elsewhere() -> None:
     points = robot.pose(q).translation + bumped(t) - bumped(np.zeros(1))
     problem = sm.Problem(
         robot,
-        sm.Waypoints(t, points),
+        sm.paths.Waypoints(t, points),
         "position",
         q,
         null_motion=sm.PolynomialNullMotion(),

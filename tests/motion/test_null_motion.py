@@ -18,15 +18,15 @@ def test_paper_parameterisation_has_the_papers_order() -> None:
 
 
 def test_b_spline_functions_are_a_partition_of_unity_with_local_support() -> None:
-    motion = sm.BSplineNullMotion(intervals=6, degree=3)
+    motion = sm.motion.BSplineNullMotion(intervals=6, degree=3)
     t = np.linspace(0, 2.5, 61)
     functions = motion.functions(t, 2.5)
     assert functions.shape == (61, 9)
     np.testing.assert_allclose(functions.sum(axis=1), 1.0, atol=1e-12)
     assert (functions != 0).sum(axis=1).max() == 4
-    assert sm.BSplineNullMotion(1, 0).functions(t, 2.5).shape == (61, 1)
-    with pytest.raises(sm.ProblemError, match="intervals is 0"):
-        sm.BSplineNullMotion(0)
+    assert sm.motion.BSplineNullMotion(1, 0).functions(t, 2.5).shape == (61, 1)
+    with pytest.raises(sm.errors.ProblemError, match="intervals is 0"):
+        sm.motion.BSplineNullMotion(0)
 
 
 def test_legendre_functions_are_orthonormal_over_the_motion() -> None:
@@ -39,9 +39,9 @@ def test_legendre_functions_are_orthonormal_over_the_motion() -> None:
 
 @pytest.mark.parametrize("degree", [-1, 1.5])
 def test_bad_null_motions_are_refused(degree: object) -> None:
-    with pytest.raises(sm.ProblemError, match="degree"):
+    with pytest.raises(sm.errors.ProblemError, match="degree"):
         sm.PolynomialNullMotion(degree)
-    with pytest.raises(sm.ProblemError, match="space"):
+    with pytest.raises(sm.errors.ProblemError, match="space"):
         sm.PolynomialNullMotion(space="task")
-    with pytest.raises(sm.ProblemError, match="basis"):
+    with pytest.raises(sm.errors.ProblemError, match="basis"):
         sm.PolynomialNullMotion(basis="fourier")

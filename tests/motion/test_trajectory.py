@@ -18,7 +18,7 @@ import selfmotion as sm
 def test_malformed_trajectories_are_refused(change: dict[str, object], message: str) -> None:
     sound = {"t": [0.0, 1.0], "q": [[0.0], [1.0]], "qd": [[0.0], [0.0]], "joint_names": ("a",)}
     assert sm.Trajectory(**sound).duration == 1.0
-    with pytest.raises(sm.FileFormatError, match=message):
+    with pytest.raises(sm.errors.FileFormatError, match=message):
         sm.Trajectory(**(sound | {k: np.array(v) for k, v in change.items()}))
 
 
@@ -145,9 +145,9 @@ def test_a_motion_at_a_rate() -> None:
 
 
 def test_accelerations_of_another_shape_are_refused() -> None:
-    with pytest.raises(sm.FileFormatError, match=r"qdd \(2, 2\), expected \(2, 1\)"):
+    with pytest.raises(sm.errors.FileFormatError, match=r"qdd \(2, 2\), expected \(2, 1\)"):
         sm.Trajectory([0.0, 1.0], [[0.0], [1.0]], [[0.0], [0.0]], ("a",), np.zeros((2, 2)))
-    with pytest.raises(sm.FileFormatError, match="not finite"):
+    with pytest.raises(sm.errors.FileFormatError, match="not finite"):
         sm.Trajectory([0.0, 1.0], [[0.0], [1.0]], [[0.0], [0.0]], ("a",), [[np.nan], [0.0]])
 
 
@@ -155,7 +155,7 @@ def test_accelerations_of_another_shape_are_refused() -> None:
 def test_accelerations_of_a_plan_are_those_of_its_velocities(panda, task: str) -> None:
     """Exactly: what is optimised is what is judged."""
     start = panda.dexterous_configuration(task)
-    path = sm.Circle.around(panda.pose(start), 0.1, 4.0, normal=(1.0, 0.0, 0.0))
+    path = sm.paths.Circle.around(panda.pose(start), 0.1, 4.0, normal=(1.0, 0.0, 0.0))
     motion = sm.plan(sm.Problem(panda, path, task, start)).trajectory
     t, h = np.linspace(0.1, 3.9, 77), 1e-6
     difference = (motion(t + h, 1) - motion(t - h, 1)) / (2 * h)

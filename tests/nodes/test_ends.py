@@ -18,14 +18,14 @@ MET = 1e-8
 SHAPES = ("repeated", "repeated, any speed", "an end", "a speed", "both")
 
 
-def asked(shape: str, problem: sm.Problem) -> tuple[sm.Constraint, ...]:
+def asked(shape: str, problem: sm.Problem) -> tuple[sm.constraints.Constraint, ...]:
     """Return constraints on the ends, which the motion at x = 0 does not meet."""
     end = nodes_of(problem).place.q[-1]
     conditions = {
-        "repeated": (sm.ClosedPath(),),
-        "repeated, any speed": (sm.ClosedPath(velocity=False),),
-        "an end": (sm.EndConfiguration(end),),
-        "a speed": (sm.EndVelocity(nodes_of(problem).place.qd[-1]),),
+        "repeated": (sm.constraints.ClosedPath(),),
+        "repeated, any speed": (sm.constraints.ClosedPath(velocity=False),),
+        "an end": (sm.constraints.EndConfiguration(end),),
+        "a speed": (sm.constraints.EndVelocity(nodes_of(problem).place.qd[-1]),),
     }
     conditions["both"] = conditions["an end"] + conditions["a speed"]
     return conditions[shape]
@@ -36,7 +36,7 @@ def there_and_back(case: Case, shape: str, **options) -> sm.Problem:
     robot, task, start, path = case
     if shape.startswith("repeated"):
         last = path.duration
-        path = path + sm.Line(path.pose(last), path.pose(0.0), last)
+        path = path + sm.paths.Line(path.pose(last), path.pose(0.0), last)
     problem = problem_of((robot, task, start, path), **options)
     return replace(problem, constraints=asked(shape, problem))
 
@@ -62,7 +62,7 @@ def test_derivatives_are_central_differences(case: Case, shape: str) -> None:
 @pytest.mark.parametrize("free", [False, True])
 def test_the_optimum_meets_them_quickly(panda: sm.RobotModel, free: bool) -> None:
     """Quadratically, also where the start is free; and prices are what the ends cost."""
-    problem = circle(panda, constraints=(sm.ClosedPath(),))
+    problem = circle(panda, constraints=(sm.constraints.ClosedPath(),))
     misses: list[float] = []
 
     def told(step: Step) -> bool:
@@ -89,13 +89,13 @@ def test_a_repeated_motion_is_planned_on_nodes(
     problem = circle(panda, constraints=constraints, start=None if free else PANDA_HOME)
     plan = sm.plan(problem)
     assert plan.certificate.verified
-    assert isinstance(plan.report.null_motion, sm.NodeNullMotion)
+    assert isinstance(plan.report.null_motion, sm.motion.NodeNullMotion)
     motion = plan.trajectory
     np.testing.assert_allclose(motion.q[-1], motion.q[0], atol=MET)
     if shape == "repeated":
         np.testing.assert_allclose(motion.qd[-1], motion.qd[0], atol=MET)
     assert any(item.constraint == "closed path" for item in plan.report.active)
-    spline = sm.plan(replace(problem, null_motion=sm.BSplineNullMotion(32)))
+    spline = sm.plan(replace(problem, null_motion=sm.motion.BSplineNullMotion(32)))
     assert plan.report.cost <= 1.0005 * spline.report.cost
 
 
@@ -107,9 +107,9 @@ def test_a_given_end_is_reached_on_nodes(panda: sm.RobotModel) -> None:
     pose = problem.path.pose(problem.path.duration)
     last = panda.inverse_kinematics(pose, "pose", seed=turned)
     assert np.abs(last - end).max() > 0.05
-    plan = sm.plan(replace(problem, constraints=(sm.EndConfiguration(last),)))
+    plan = sm.plan(replace(problem, constraints=(sm.constraints.EndConfiguration(last),)))
     assert plan.certificate.verified
-    assert isinstance(plan.report.null_motion, sm.NodeNullMotion)
+    assert isinstance(plan.report.null_motion, sm.motion.NodeNullMotion)
     np.testing.assert_allclose(plan.trajectory.q[-1], last, atol=MET)
 
 
@@ -123,16 +123,20 @@ def test_a_given_acceleration_at_an_end_is_met_on_nodes(
     end = 0 if at_start else -1
     null = problem.follows.null_basis(free.q[end])[:, 0]
     wanted = free.qdd[end] + 0.4 * null
-    kind = sm.StartAcceleration if at_start else sm.EndAcceleration
-    rates = () if at_start else (sm.EndVelocity(free.qd[-1]), sm.EndConfiguration(free.q[-1]))
-    first = (sm.StartVelocity(free.qd[0]),) if at_start else ()
+    kind = sm.constraints.StartAcceleration if at_start else sm.constraints.EndAcceleration
+    rates = (
+        ()
+        if at_start
+        else (sm.constraints.EndVelocity(free.qd[-1]), sm.constraints.EndConfiguration(free.q[-1]))
+    )
+    first = (sm.constraints.StartVelocity(free.qd[0]),) if at_start else ()
     plan = sm.plan(replace(problem, constraints=(*first, *rates, kind(wanted))))
     assert plan.certificate.verified
-    assert isinstance(plan.report.null_motion, sm.NodeNullMotion)
+    assert isinstance(plan.report.null_motion, sm.motion.NodeNullMotion)
     np.testing.assert_allclose(plan.trajectory.qdd[end], wanted, atol=1e-6)
     assert np.abs(free.qdd[end] - wanted).max() > 0.1
 
 
 def circle(panda: sm.RobotModel, start=PANDA_HOME, **options) -> sm.Problem:
-    path = sm.Circle.around(panda.pose(PANDA_HOME), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
+    path = sm.paths.Circle.around(panda.pose(PANDA_HOME), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
     return sm.Problem(panda, path, "pose", start, **{"constraints": (), "rest": False, **options})

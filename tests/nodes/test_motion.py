@@ -14,7 +14,10 @@ CALM = 0.1
 
 
 def test_what_is_forgotten_is_the_same_again(case: Case) -> None:
-    limits = (sm.JointPositionLimits(-9.0, 9.0), sm.JointAccelerationLimits(50.0))
+    limits = (
+        sm.constraints.JointPositionLimits(-9.0, 9.0),
+        sm.constraints.JointAccelerationLimits(50.0),
+    )
     motion = nodes_of(problem_of(case, constraints=limits))
 
     def known() -> list[np.ndarray]:

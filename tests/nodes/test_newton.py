@@ -56,7 +56,7 @@ def test_another_step_gains_nothing_where_it_ends(case: Case) -> None:
 
 def test_what_costs_nothing_stays_as_it_is(panda: sm.RobotModel) -> None:
     """The tool's origin is on the last joint's axis: wherever that stands, costs are the same."""
-    path = sm.Circle.around(panda.pose(PANDA_HOME), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
+    path = sm.paths.Circle.around(panda.pose(PANDA_HOME), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
     begin = nodes_of(problem_of((panda, "position", PANDA_HOME, path)), 64, free=True)
     found = minimise(begin, never)
     assert found.status is Status.CONVERGED
@@ -67,7 +67,7 @@ def test_what_costs_nothing_stays_as_it_is(panda: sm.RobotModel) -> None:
 
 
 def test_many_nodes_take_as_many_iterations(panda: sm.RobotModel) -> None:
-    path = sm.Circle.around(panda.pose(PANDA_HOME), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
+    path = sm.paths.Circle.around(panda.pose(PANDA_HOME), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
     problem = sm.Problem(
         panda, path, "pose", PANDA_HOME, constraints=(), rest=False, collision=None
     )
@@ -83,7 +83,7 @@ def test_it_is_below_the_finest_spline(case: Case) -> None:
     spline = sm.plan(
         sm.Problem(
             *(problem.robot, problem.path, problem.task, problem.given_start),
-            null_motion=sm.BSplineNullMotion(32),
+            null_motion=sm.motion.BSplineNullMotion(32),
             constraints=(),
             rest=False,
             collision=None,
@@ -95,7 +95,7 @@ def test_it_is_below_the_finest_spline(case: Case) -> None:
 @pytest.mark.parametrize("free", [False, True])
 def test_other_costs_take_few_iterations(case: Case, free: bool) -> None:
     """Their curvature is nearly right, so that each step makes the gradient far smaller."""
-    costs = (sm.JointVelocity(), sm.InverseManipulability(0.02))
+    costs = (sm.costs.JointVelocity(), sm.costs.InverseManipulability(0.02))
     slopes = slopes_of(problem_of(case, costs=costs), 24, free=free)
     assert len(slopes) <= 12
     if len(slopes) > 1 and slopes[-2] > 1e-9 * slopes[0]:
@@ -107,7 +107,7 @@ def check_kept(panda: sm.RobotModel, limits, order: int, joint: int, share: floa
 
     Returns the plan, times, and how fast the joint is at them as a share of its limit.
     """
-    path = sm.Circle.around(panda.pose(PANDA_HOME), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
+    path = sm.paths.Circle.around(panda.pose(PANDA_HOME), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
     free = sm.plan(sm.Problem(panda, path, "pose", PANDA_HOME, constraints=(), rest=rest))
     most = np.abs((free.trajectory.qd, free.trajectory.qdd)[order - 1]).max(axis=0)
     limit = np.where(np.arange(7) == joint, share * most, np.inf)
@@ -115,7 +115,7 @@ def check_kept(panda: sm.RobotModel, limits, order: int, joint: int, share: floa
     problem = sm.Problem(panda, path, "pose", PANDA_HOME, constraints=constraints, rest=rest)
     plan = sm.plan(problem)
     assert plan.certificate.verified
-    assert isinstance(plan.report.null_motion, sm.NodeNullMotion)
+    assert isinstance(plan.report.null_motion, sm.motion.NodeNullMotion)
     t = np.linspace(0.0, path.duration, 20001)
     rates = np.abs(plan.trajectory(t, order))
     assert (rates <= limit).all()
@@ -128,7 +128,7 @@ def check_kept(panda: sm.RobotModel, limits, order: int, joint: int, share: floa
 def test_limits_of_speed_are_kept_at_all_times(
     panda: sm.RobotModel, joint: int, share: float
 ) -> None:
-    check_kept(panda, sm.JointVelocityLimits, 1, joint, share, rest=False)
+    check_kept(panda, sm.constraints.JointVelocityLimits, 1, joint, share, rest=False)
 
 
 @pytest.mark.parametrize("rest", [False, True])
@@ -137,7 +137,9 @@ def test_limits_of_acceleration_are_kept_at_all_times(
     panda: sm.RobotModel, joint: int, share: float, rest: bool
 ) -> None:
     """Where such a limit begins to bind, accelerations would rather jump."""
-    plan, t, used = check_kept(panda, sm.JointAccelerationLimits, 2, joint, share, rest=rest)
+    plan, t, used = check_kept(
+        panda, sm.constraints.JointAccelerationLimits, 2, joint, share, rest=rest
+    )
     # Where a limit is said to bind it is used: all but its margin, next to the ends less.
     (binding,) = plan.report.active
     for first, last in binding.spans:
@@ -148,11 +150,11 @@ def test_limits_of_acceleration_are_kept_at_all_times(
 @pytest.mark.parametrize("share", [0.3, 0.6, 0.9])
 def test_at_limits_prices_tell_what_the_limits_cost(panda: sm.RobotModel, share: float) -> None:
     """The first-order conditions, and dF/dlimit by planning with another limit."""
-    path = sm.Circle.around(panda.pose(PANDA_HOME), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
+    path = sm.paths.Circle.around(panda.pose(PANDA_HOME), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
 
     def optimum(upper: float):
         limit = np.where(np.arange(7) == 2, upper, panda.upper)
-        constraints = (sm.JointPositionLimits(upper=limit),)
+        constraints = (sm.constraints.JointPositionLimits(upper=limit),)
         problem = sm.Problem(
             panda, path, "pose", PANDA_HOME, constraints=constraints, rest=False, collision=None
         )
@@ -174,8 +176,8 @@ def test_at_limits_prices_tell_what_the_limits_cost(panda: sm.RobotModel, share:
 
 
 def test_what_cannot_be_kept_is_said_to_be_so(panda: sm.RobotModel) -> None:
-    path = sm.Circle.around(panda.pose(PANDA_HOME), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
-    slow = (sm.JointVelocityLimits(0.05),)
+    path = sm.paths.Circle.around(panda.pose(PANDA_HOME), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
+    slow = (sm.constraints.JointVelocityLimits(0.05),)
     problem = sm.Problem(
         panda, path, "pose", PANDA_HOME, constraints=slow, rest=False, collision=None
     )
@@ -185,7 +187,7 @@ def test_what_cannot_be_kept_is_said_to_be_so(panda: sm.RobotModel) -> None:
     assert optimum.motion.violation > 0.5
 
 
-class Backwards(sm.JointVelocity):
+class Backwards(sm.costs.JointVelocity):
     """A cost whose gradient points the wrong way."""
 
     def gradient(self, samples: Samples) -> Partials:
@@ -193,7 +195,7 @@ class Backwards(sm.JointVelocity):
 
 
 def test_a_wrong_gradient_is_said_to_be_wrong(panda: sm.RobotModel) -> None:
-    path = sm.Circle.around(panda.pose(PANDA_HOME), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
+    path = sm.paths.Circle.around(panda.pose(PANDA_HOME), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
     problem = sm.Problem(panda, path, "pose", PANDA_HOME, costs=[Backwards()], collision=None)
     optimum = minimise(nodes_of(problem, 24), never)
     assert optimum.status is Status.GRADIENT
@@ -203,7 +205,7 @@ def test_a_wrong_gradient_is_said_to_be_wrong(panda: sm.RobotModel) -> None:
 
 
 def test_it_stops_where_it_is_told_to(panda: sm.RobotModel) -> None:
-    path = sm.Circle.around(panda.pose(PANDA_HOME), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
+    path = sm.paths.Circle.around(panda.pose(PANDA_HOME), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
     problem = sm.Problem(
         panda, path, "pose", PANDA_HOME, constraints=(), rest=False, collision=None
     )
@@ -215,12 +217,12 @@ def test_it_stops_where_it_is_told_to(panda: sm.RobotModel) -> None:
 
 def test_a_start_deep_inside_a_body_is_no_dead_end(panda: sm.RobotModel) -> None:
     """Elastic rows: from 30 mm inside of a ball out of it."""
-    path = sm.Circle.around(panda.pose(PANDA_HOME), 0.1, 4.0, normal=(1.0, 0.0, 0.0))
+    path = sm.paths.Circle.around(panda.pose(PANDA_HOME), 0.1, 4.0, normal=(1.0, 0.0, 0.0))
     free = sm.plan(sm.Problem(panda, path, "pose", PANDA_HOME, constraints=(), collision=None))
     # In the middle, where the elbow would be: its bodies are to go aside.
     elbow = panda.chain_to("panda_link4").place(free.trajectory(np.array([2.0]))[0]).translation
-    ball = sm.Sphere("ball", elbow + np.array([0.092, 0.01, -0.076]), 0.05)
-    apart = (sm.Clearance([ball], 0.01),)
+    ball = sm.obstacles.Sphere("ball", elbow + np.array([0.092, 0.01, -0.076]), 0.05)
+    apart = (sm.constraints.Clearance([ball], 0.01),)
     problem = sm.Problem(panda, path, "pose", PANDA_HOME, constraints=apart, collision=None)
     begin = nodes_of(problem, 16)
     # In units of 0.1 m.
@@ -234,8 +236,8 @@ def test_a_start_deep_inside_a_body_is_no_dead_end(panda: sm.RobotModel) -> None
 
 
 def test_known_prices_spare_iterations(panda: sm.RobotModel) -> None:
-    path = sm.Circle.around(panda.pose(PANDA_HOME), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
-    slow = (sm.JointVelocityLimits(0.7),)
+    path = sm.paths.Circle.around(panda.pose(PANDA_HOME), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
+    slow = (sm.constraints.JointVelocityLimits(0.7),)
     problem = sm.Problem(
         panda, path, "pose", PANDA_HOME, constraints=slow, rest=False, collision=None
     )

@@ -14,13 +14,13 @@ NEAR = 1e-5
 GRADIENT, CURVATURE = 1e-7, 1e-6
 
 
-def costs_of(robot: sm.RobotModel) -> tuple[sm.Cost, ...]:
+def costs_of(robot: sm.RobotModel) -> tuple[sm.costs.Cost, ...]:
     weight = np.linspace(0.5, 2.0, robot.dof)
     posture = np.full(robot.dof, 0.2)
     return (
-        sm.JointVelocity(weight),
-        sm.JointAcceleration(0.01),
-        sm.Posture(posture=posture, weight=0.3),
+        sm.costs.JointVelocity(weight),
+        sm.costs.JointAcceleration(0.01),
+        sm.costs.Posture(posture=posture, weight=0.3),
     )
 
 
@@ -46,7 +46,7 @@ def matrix_of(motion) -> Banded:
 
 @pytest.mark.parametrize("rest", [False, True])
 def test_gradient_and_curvature_are_central_differences(case: Case, rest: bool) -> None:
-    costs = (sm.JointVelocity(),) if rest else costs_of(case[0])
+    costs = (sm.costs.JointVelocity(),) if rest else costs_of(case[0])
     motion = nodes_of(problem_of(case, costs=costs, rest=rest))
     motion = centred(moved(motion, random_step(motion, 1, 0.02)))
     # As large in q, q̇ and q̈ between the nodes.
@@ -70,17 +70,19 @@ def test_curvature_of_other_costs_is_right_to_second_order(case: Case, kind: str
     """Differences along the self-motion are all there is of it, as intervals become short."""
     robot = case[0]
     costs = {
-        "manipulability": sm.InverseManipulability(0.1),
-        "energy": sm.KineticEnergy(robot) if has_masses(robot) else None,
-        "function": sm.FunctionCost(lambda qd, q, t: np.sum(qd**4 + np.cos(q) * qd**2, axis=1)),
-        "limits": sm.JointLimitDistance(np.full(robot.dof, -4.0), np.full(robot.dof, 4.0)),
+        "manipulability": sm.costs.InverseManipulability(0.1),
+        "energy": sm.costs.KineticEnergy(robot) if has_masses(robot) else None,
+        "function": sm.costs.FunctionCost(
+            lambda qd, q, t: np.sum(qd**4 + np.cos(q) * qd**2, axis=1)
+        ),
+        "limits": sm.costs.JointLimitDistance(np.full(robot.dof, -4.0), np.full(robot.dof, 4.0)),
     }
     cost = costs[kind]
     if cost is None:
         return
     off = []
     for count in (12, 48):
-        motion = nodes_of(problem_of(case, costs=(sm.JointVelocity(), cost)), count)
+        motion = nodes_of(problem_of(case, costs=(sm.costs.JointVelocity(), cost)), count)
         shape = np.sin(np.linspace(0.0, 3.0, count + 1))[:, None]
         step = shape * np.ones(3 * motion.nu.shape[1])
         dense = matrix_of(motion).dense()

@@ -11,24 +11,29 @@ from support.nodes import along, around_of, centred, moved, nodes_of, random_ste
 NEAR, DIFFERENCE = 1e-5, 1e-6
 
 CONSTRAINTS = {
-    "positions": lambda: [sm.JointPositionLimits()],
+    "positions": lambda: [sm.constraints.JointPositionLimits()],
     "rates": lambda: [
-        sm.JointVelocityLimits(1.0),
-        sm.JointAccelerationLimits(2.0),
-        sm.JointJerkLimits(20.0),
+        sm.constraints.JointVelocityLimits(1.0),
+        sm.constraints.JointAccelerationLimits(2.0),
+        sm.constraints.JointJerkLimits(20.0),
     ],
-    "a band": lambda: [sm.Band.of_elbow("up")],
-    "tool": lambda: [sm.ToolLimits(acceleration=1.0)],
-    "two": lambda: [sm.JointPositionLimits(), sm.JointAccelerationLimits(2.0)],
+    "a band": lambda: [sm.constraints.Band.of_elbow("up")],
+    "tool": lambda: [sm.constraints.ToolLimits(acceleration=1.0)],
+    "two": lambda: [
+        sm.constraints.JointPositionLimits(),
+        sm.constraints.JointAccelerationLimits(2.0),
+    ],
     "clearance": lambda: [
-        sm.JointPositionLimits(),
-        sm.Clearance([sm.Sphere("ball", (0.6, 0.35, 0.4), 0.1)], distance=0.02),
+        sm.constraints.JointPositionLimits(),
+        sm.constraints.Clearance(
+            [sm.obstacles.Sphere("ball", (0.6, 0.35, 0.4), 0.1)], distance=0.02
+        ),
     ],
 }
 
 
 def motion_with(panda: sm.RobotModel, name: str):
-    path = sm.Circle.around(panda.pose(PANDA_HOME), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
+    path = sm.paths.Circle.around(panda.pose(PANDA_HOME), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
     problem = sm.Problem(
         *(panda, path, "position", PANDA_HOME),
         constraints=CONSTRAINTS[name](),

@@ -68,12 +68,12 @@ def test_each_is_what_it_is_alone(case: Case, rounds: int) -> None:
 @pytest.mark.parametrize("rest", [False, True])
 def test_each_is_what_it_is_alone_with_other_costs(panda: sm.RobotModel, rest: bool) -> None:
     """Of costs that are no quadratic forms, also of accelerations; each step lowers them."""
-    path = sm.Circle.around(panda.pose(PANDA_HOME), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
-    for more in (sm.InverseManipulability(1e-3), sm.JointAcceleration(1e-2)):
+    path = sm.paths.Circle.around(panda.pose(PANDA_HOME), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
+    for more in (sm.costs.InverseManipulability(1e-3), sm.costs.JointAcceleration(1e-2)):
         problem = sm.Problem(
             *(panda, path, "position", PANDA_HOME),
             constraints=(),
-            costs=[sm.JointVelocity(), more],
+            costs=[sm.costs.JointVelocity(), more],
             rest=rest,
             collision=None,
         )
@@ -103,7 +103,7 @@ def test_rough_optima_are_near_those_of_newtons_method(case: Case) -> None:
 
 
 def test_one_that_is_not_to_be_had_leaves_the_others(panda: sm.RobotModel) -> None:
-    path = sm.Circle.around(panda.pose(PANDA_HOME), 0.1, 4.0)
+    path = sm.paths.Circle.around(panda.pose(PANDA_HOME), 0.1, 4.0)
     problem = sm.Problem(*(panda, path, "pose", PANDA_HOME), constraints=(), collision=None)
     grid, motions = grid_of(problem), motions_of(problem)
     alone = advanced(Together.near(grid, np.delete(motions, 1, axis=0)), 2)
@@ -117,7 +117,7 @@ def test_one_that_is_not_to_be_had_leaves_the_others(panda: sm.RobotModel) -> No
 
 
 def test_some_of_them_are_what_they_were(panda: sm.RobotModel) -> None:
-    path = sm.Circle.around(panda.pose(PANDA_HOME), 0.1, 4.0)
+    path = sm.paths.Circle.around(panda.pose(PANDA_HOME), 0.1, 4.0)
     problem = sm.Problem(*(panda, path, "position", PANDA_HOME), constraints=(), collision=None)
     grid, motions = grid_of(problem), motions_of(problem)
     found = advanced(Together.near(grid, motions), 1)

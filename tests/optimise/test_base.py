@@ -8,7 +8,7 @@ from selfmotion.optimise.base import inverse_metric
 
 def test_defaults_are_what_is_documented() -> None:
     """They are part of the interface: a plan that was made with them can be made again."""
-    assert sm.QuasiNewton() == sm.QuasiNewton("fletcher", 1e-8, 200, sm.LineSearch(), 1e8)
+    assert sm.QuasiNewton() == sm.QuasiNewton("fletcher", 1e-8, 200, sm.optimise.LineSearch(), 1e8)
     assert sm.QuasiNewton(unbounded=0.5).unbounded == 0.5
     assert sm.QuasiNewton().initial_metric == "gauss-newton"
 

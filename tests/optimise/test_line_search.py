@@ -13,7 +13,9 @@ from support.functions import Counted
 
 
 def test_the_line_search_has_fletchers_constants() -> None:
-    assert sm.LineSearch() == sm.LineSearch(rho=0.01, sigma=0.9, tau1=9.0, tau2=0.1, tau3=0.5)
+    assert sm.optimise.LineSearch() == sm.optimise.LineSearch(
+        rho=0.01, sigma=0.9, tau1=9.0, tau2=0.1, tau3=0.5
+    )
 
 
 @pytest.mark.parametrize("tau1", [2.0, 9.0])
@@ -24,7 +26,7 @@ def test_bracketing_goes_tau1_times_as_far_while_the_slope_stays(tau1: float) ->
         tried.append(a)
         return -a
 
-    found = sm.LineSearch(tau1=tau1).search(
+    found = sm.optimise.LineSearch(tau1=tau1).search(
         value, lambda a: -1.0, 0.0, -1.0, first=1.0, longest=1e3, more=lambda: True
     )
     assert found == (1e3, -1e3)
@@ -40,7 +42,7 @@ def test_bracketing_goes_at_least_as_far_again() -> None:
         tried.append(a)
         return (a - 1.1) ** 2
 
-    sm.LineSearch(sigma=0.011).search(
+    sm.optimise.LineSearch(sigma=0.011).search(
         value,
         lambda a: 2.0 * (a - 1.1),
         1.21,
@@ -60,7 +62,7 @@ def test_a_trial_that_falls_no_further_ends_the_bracket() -> None:
         tried.append(a)
         return {0: -1.0, 1: -1.0}.get(len(tried) - 1, -2.0)
 
-    sm.LineSearch(sigma=0.01, tau1=2.0).search(
+    sm.optimise.LineSearch(sigma=0.01, tau1=2.0).search(
         value, lambda a: -0.5, 0.0, -1.0, first=1.0, longest=1e3, more=lambda: len(tried) < 3
     )
     assert 1.0 < tried[2] < tried[1]
@@ -76,7 +78,7 @@ def test_sectioning_keeps_away_from_the_ends_of_the_bracket(tau2: float, tau3: f
             tried.append(a)
             return np.inf if a >= 1.0 else (a - least) ** 2
 
-        sm.LineSearch(sigma=0.1, tau2=tau2, tau3=tau3).search(
+        sm.optimise.LineSearch(sigma=0.1, tau2=tau2, tau3=tau3).search(
             value,
             lambda a, least=least: 2.0 * (a - least),
             least**2,
@@ -103,7 +105,7 @@ def test_line_search_meets_the_wolfe_conditions(sigma: float, first: float) -> N
     def slope(a: float) -> float:
         return float((a**2 - 2) / (a**2 + 2) ** 2 + 0.09 * np.cos(3 * a))
 
-    search = sm.LineSearch(sigma=sigma)
+    search = sm.optimise.LineSearch(sigma=sigma)
     found = search.search(
         value, slope, value(0), slope(0), first=first, longest=1e6, more=lambda: True
     )
@@ -116,7 +118,7 @@ def test_line_search_meets_the_wolfe_conditions(sigma: float, first: float) -> N
 
 def test_line_search_gives_up_where_nothing_decreases() -> None:
     """A wrong slope (the function rises) ends the search instead of shrinking for ever."""
-    found = sm.LineSearch().search(
+    found = sm.optimise.LineSearch().search(
         lambda a: 1.0 + a, lambda a: 1.0, 1.0, -1.0, first=1.0, longest=1e6, more=lambda: True
     )
     assert found is None
@@ -158,7 +160,7 @@ def test_strong_wolfe_conditions_on_random_functions(seed: int, sigma: float) ->
         seen.append((a, value(a)))
         return seen[-1][1]
 
-    search = sm.LineSearch(sigma=sigma)
+    search = sm.optimise.LineSearch(sigma=sigma)
     first = 10.0 ** np.random.default_rng(seed).uniform(-2.0, 2.0)
     found = search.search(
         noted, slope, value(0), slope(0), first=first, longest=1e6, more=lambda: True

@@ -29,7 +29,7 @@ def rosenbrock() -> Counted:
 def test_quadratic_with_exact_searches_ends_in_n_iterations(update: str) -> None:
     """The family's defining property: n exact line searches find the minimum and H = G⁻¹."""
     function, hessian, center = quadratic()
-    search = sm.LineSearch(sigma=1e-6, tau2=1e-6, tau3=1e-6)
+    search = sm.optimise.LineSearch(sigma=1e-6, tau2=1e-6, tau3=1e-6)
     method = plain(update, tolerance=1e-14, line_search=search)
     found = method.minimize(function, np.zeros(6))
     np.testing.assert_allclose(found.x, center, atol=1e-5)
@@ -40,7 +40,7 @@ def test_quadratic_with_exact_searches_ends_in_n_iterations(update: str) -> None
 @pytest.mark.parametrize("update", ["fletcher", "bfgs", "dfp"])
 def test_rosenbrock(update: str) -> None:
     # DFP is known to want fairly exact searches.
-    search = sm.LineSearch(sigma=0.1)
+    search = sm.optimise.LineSearch(sigma=0.1)
     method = plain(update, tolerance=1e-14, line_search=search)
     found = method.minimize(rosenbrock(), np.array([-1.2, 1.0]))
     np.testing.assert_allclose(found.x, [1.0, 1.0], atol=1e-5)
@@ -51,7 +51,7 @@ def test_the_exact_inverse_hessian_needs_one_step() -> None:
     found = plain().minimize(function, np.zeros(6), np.linalg.inv(hessian))
     np.testing.assert_allclose(found.x, center, atol=1e-10)
     assert function.evaluations == 2
-    assert found.status is sm.Status.CONVERGED
+    assert found.status is sm.optimise.Status.CONVERGED
 
 
 def test_switch_takes_dfp_when_curvature_is_below_the_models() -> None:
@@ -77,14 +77,14 @@ def test_switch_takes_dfp_when_curvature_is_below_the_models() -> None:
 
 def test_infinite_start_is_refused() -> None:
     function = Counted(lambda x: np.inf, lambda x: x)
-    with pytest.raises(sm.ProblemError, match="at the start is not finite"):
+    with pytest.raises(sm.errors.ProblemError, match="at the start is not finite"):
         plain().minimize(function, np.zeros(2))
 
 
 def test_unbounded_functions_are_named() -> None:
     function = Counted(lambda x: float(-x[0]), lambda x: np.array([-1.0]))
     found = plain(unbounded=1e4).minimize(function, np.zeros(1))
-    assert found.status is sm.Status.UNBOUNDED
+    assert found.status is sm.optimise.Status.UNBOUNDED
     assert "JointVelocity" in found.status.message
 
 
@@ -103,7 +103,7 @@ def interrupted_after(count: int, error: BaseException) -> Minimum:
 
 def test_interruption_keeps_the_best_so_far() -> None:
     found = interrupted_after(12, KeyboardInterrupt())
-    assert found.status is sm.Status.INTERRUPTED
+    assert found.status is sm.optimise.Status.INTERRUPTED
     assert found.cost == min(iteration.cost for iteration in found.history)
     assert found.cost < 25.2
     with pytest.raises(ZeroDivisionError):
@@ -115,17 +115,17 @@ def test_evaluation_limit_is_kept(limit: int) -> None:
     function = rosenbrock()
     found = plain().minimize(function, np.array([-1.2, 1.0]), max_evaluations=limit)
     assert function.evaluations <= limit
-    assert found.status is sm.Status.MAX_EVALUATIONS
+    assert found.status is sm.optimise.Status.MAX_EVALUATIONS
 
 
 def test_iteration_limit_and_callback_stop() -> None:
     found = plain(max_iterations=3).minimize(rosenbrock(), np.array([-1.2, 1.0]))
-    assert found.status is sm.Status.MAX_ITERATIONS
+    assert found.status is sm.optimise.Status.MAX_ITERATIONS
     assert len(found.history) == 4
     found = plain().minimize(
         rosenbrock(), np.array([-1.2, 1.0]), callback=lambda step: step.evaluations > 5
     )
-    assert found.status is sm.Status.STOPPED
+    assert found.status is sm.optimise.Status.STOPPED
 
 
 def test_cost_never_rises() -> None:
@@ -138,7 +138,7 @@ def test_cost_never_rises() -> None:
     "arguments", [{"update": "sr1"}, {"tolerance": 0.0}, {"tolerance": float("nan")}]
 )
 def test_bad_settings_are_refused(arguments: dict[str, object]) -> None:
-    with pytest.raises(sm.ProblemError, match="optimiser"):
+    with pytest.raises(sm.errors.ProblemError, match="optimiser"):
         plain(**arguments)
 
 
@@ -149,13 +149,13 @@ def test_costs_below_zero_converge_as_others(offset: float) -> None:
     for sign in (offset, abs(offset)):
         function, hessian, center = quadratic(offset=sign)
         found = sm.QuasiNewton().minimize(function, np.zeros(6), 0.7 * np.linalg.inv(hessian))
-        assert found.status is sm.Status.CONVERGED
+        assert found.status is sm.optimise.Status.CONVERGED
         np.testing.assert_allclose(found.x, center, atol=1e-2)
         counts.append(function.evaluations)
     assert abs(counts[0] - counts[1]) <= 1
     function, _, center = quadratic(offset=offset)
     found = plain().minimize(function, np.zeros(6))
-    assert found.status is sm.Status.CONVERGED
+    assert found.status is sm.optimise.Status.CONVERGED
     assert function.evaluations <= 40
 
 
@@ -163,7 +163,7 @@ def test_costs_below_zero_converge_as_others(offset: float) -> None:
 def test_falling_for_ever_stops_at_the_stated_bound(slope: float) -> None:
     function = Counted(lambda x: float(-slope * x[0]), lambda x: np.array([-slope, 0.0]))
     found = plain(unbounded=1e4).minimize(function, np.zeros(2))
-    assert found.status is sm.Status.UNBOUNDED
+    assert found.status is sm.optimise.Status.UNBOUNDED
     # The line search may go twice as far from where it began.
     assert 1e4 < np.linalg.norm(found.x) <= 3e4
     assert function.evaluations <= 20
@@ -180,13 +180,13 @@ def test_the_first_step_from_the_identity_is_no_longer_than_one() -> None:
 
 def test_a_gradient_that_is_not_finite_is_an_error_and_a_slope_a_step_too_far() -> None:
     function = Counted(lambda x: float(x @ x), lambda x: np.full(2, np.nan))
-    with pytest.raises(sm.ProblemError, match="its gradient is not"):
+    with pytest.raises(sm.errors.ProblemError, match="its gradient is not"):
         plain().minimize(function, np.ones(2))
 
     def slope(a: float) -> float:
         return 2.0 * a - 2.0 if a < 3.0 else np.nan
 
-    found = sm.LineSearch(sigma=0.1).search(
+    found = sm.optimise.LineSearch(sigma=0.1).search(
         lambda a: a**2 - 2.0 * a if a < 3.0 else -1.5,
         slope,
         0.0,
@@ -202,5 +202,5 @@ def test_a_gradient_that_is_not_finite_is_an_error_and_a_slope_a_step_too_far() 
 def test_a_function_without_bottom_ends_where_its_start_is_lost_in_rounding() -> None:
     function = Counted(lambda x: float(-(x[0] ** 3)) - x[0], lambda x: -3.0 * x**2 - 1.0)
     found = plain().minimize(function, np.zeros(1))
-    assert found.status is sm.Status.UNBOUNDED
+    assert found.status is sm.optimise.Status.UNBOUNDED
     assert function.evaluations <= 100

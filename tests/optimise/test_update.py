@@ -39,7 +39,7 @@ plain = partial(sm.QuasiNewton, initial_metric="identity")
 def test_updates_satisfy_the_secant_equation() -> None:
     function, _, _ = quadratic(seed=3)
     for update in ("bfgs", "dfp"):
-        steps: list[sm.Iteration] = []
+        steps: list[sm.optimise.Iteration] = []
         method = plain(update, max_iterations=3)
         found = method.minimize(function, np.ones(6), callback=steps.append)
         s = steps[-1].x - steps[-2].x

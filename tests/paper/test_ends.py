@@ -23,10 +23,14 @@ ALGEBRA = 1e-9
 BETWEEN = 1e-5
 
 CLOSED_PATHS = {
-    "closed": [sm.ClosedPath(velocity=False)],
-    "closed in velocity": [sm.ClosedPath()],
-    "at rest": [sm.StartVelocity(), sm.EndVelocity()],
-    "accelerations": [sm.ClosedPath(velocity=False), sm.StartAcceleration(), sm.EndAcceleration()],
+    "closed": [sm.constraints.ClosedPath(velocity=False)],
+    "closed in velocity": [sm.constraints.ClosedPath()],
+    "at rest": [sm.constraints.StartVelocity(), sm.constraints.EndVelocity()],
+    "accelerations": [
+        sm.constraints.ClosedPath(velocity=False),
+        sm.constraints.StartAcceleration(),
+        sm.constraints.EndAcceleration(),
+    ],
 }
 
 
@@ -35,12 +39,14 @@ def problem_of(name: str) -> sm.Problem:
     if name == "planar":
         return sm.sample_problem(duration=2.0)
     robot = robot_named("panda")
-    circle = sm.Circle.around(robot.pose(PANDA_HOME), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
+    circle = sm.paths.Circle.around(robot.pose(PANDA_HOME), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
     null_motion = PolynomialNullMotion()
     return sm.Problem(robot, circle, name, PANDA_HOME, null_motion, constraints=(), rest=False)
 
 
-def solved(name: str, asked: list[sm.Constraint], *, free: bool = False, **options) -> Solution:
+def solved(
+    name: str, asked: list[sm.constraints.Constraint], *, free: bool = False, **options
+) -> Solution:
     problem = problem_of(name)
     still, _ = settled_still_motion(problem, np.array(problem.given_start))
     ends = [item.bind(problem.follows, still.start, still.end) for item in asked]
@@ -84,7 +90,7 @@ def test_the_gradient_is_that_of_motions_that_meet_the_ends(
 def test_the_optimum_is_that_of_another_solver(name: str, asked: str, free: bool) -> None:
     """SciPy's SLSQP on all unknowns, with the ends as equalities, from x = 0."""
     found = solved(name, CLOSED_PATHS[asked], free=free)
-    assert found.status is sm.Status.CONVERGED
+    assert found.status is sm.optimise.Status.CONVERGED
     objective = found.objective
     # In coordinates in which the cost is about as steep in all directions.
     values, vectors = np.linalg.eigh(inverse_metric(objective.metric(found.x)))
@@ -171,10 +177,10 @@ def test_where_no_motion_meets_the_ends_the_cost_is_infinite() -> None:
 
 def test_ends_that_follow_from_others_change_nothing() -> None:
     """A motion at rest at both ends has equal velocities there."""
-    asked = [sm.ClosedPath(velocity=False), *CLOSED_PATHS["at rest"]]
+    asked = [sm.constraints.ClosedPath(velocity=False), *CLOSED_PATHS["at rest"]]
     for name in ("planar", "position"):
-        plain, twice = solved(name, asked), solved(name, [*asked, sm.ClosedPath()])
-        assert twice.status is sm.Status.CONVERGED
+        plain, twice = solved(name, asked), solved(name, [*asked, sm.constraints.ClosedPath()])
+        assert twice.status is sm.optimise.Status.CONVERGED
         # What follows does so but for the error of the grid.
         assert twice.cost == pytest.approx(plain.cost, rel=1e-6)
         assert twice.unmet == ()
@@ -191,16 +197,16 @@ def configuration_along(problem: sm.Problem, z: float) -> Array:
 @pytest.mark.parametrize("z", [-1.5, -0.3, 0.3, 1.5])
 def test_a_given_end_is_reached(z: float) -> None:
     end = configuration_along(problem_of("pose"), z)
-    found = solved("pose", [sm.EndConfiguration(end)])
-    assert found.status is sm.Status.CONVERGED
+    found = solved("pose", [sm.constraints.EndConfiguration(end)])
+    assert found.status is sm.optimise.Status.CONVERGED
     # What the integration leaves of the path error, put onto the path.
     np.testing.assert_allclose(found.evaluation().trajectory.q[-1], end, atol=1e-9)
 
 
 def test_ends_that_contradict_each_other_are_named() -> None:
     end = configuration_along(problem_of("pose"), 0.3)
-    found = solved("pose", [sm.EndConfiguration(end), sm.ClosedPath()])
-    assert found.status is sm.Status.INFEASIBLE
+    found = solved("pose", [sm.constraints.EndConfiguration(end), sm.constraints.ClosedPath()])
+    assert found.status is sm.optimise.Status.INFEASIBLE
     assert [text.split(":")[0] for text in found.unmet] == ["end configuration", "closed path"]
     # The nearest motion is one, all the same.
     assert np.isfinite(found.refined().again().cost)
@@ -217,5 +223,5 @@ def test_an_end_that_is_missed_is_named_on_either_side() -> None:
 
 
 def test_limits_are_refused() -> None:
-    with pytest.raises(sm.ProblemError, match="'joint velocity limits' is none on the ends"):
-        solved("pose", [sm.JointVelocityLimits()])
+    with pytest.raises(sm.errors.ProblemError, match="'joint velocity limits' is none on the ends"):
+        solved("pose", [sm.constraints.JointVelocityLimits()])

@@ -31,7 +31,7 @@ def test_the_metric_is_the_differenced_gauss_newton_matrix(
     panda: sm.RobotModel, order: int
 ) -> None:
     """∫ (∂q^(k)/∂x)ᵀ W (∂q^(k)/∂x) dt, the derivatives by central differences of motions."""
-    cost = (sm.JointVelocity(), sm.JointAcceleration(), sm.JointJerk())[order - 1]
+    cost = (sm.costs.JointVelocity(), sm.costs.JointAcceleration(), sm.costs.JointJerk())[order - 1]
     path = short_line(panda, PANDA_HOME)
     motion = PolynomialNullMotion(3, "joint")
     problem = sm.Problem(panda, path, "pose", PANDA_HOME, motion, costs=[cost], constraints=())
@@ -62,22 +62,22 @@ GRADIENT = 1e-6
 
 
 COSTS = {
-    "velocity": lambda r, t: sm.JointVelocity(),
-    "weighted velocity": lambda r, t: sm.JointVelocity(np.arange(1.0, r.dof + 1.0)),
-    "full weight": lambda r, t: sm.JointVelocity(np.eye(r.dof) + 0.3),
-    "acceleration": lambda r, t: sm.JointAcceleration(),
-    "jerk": lambda r, t: sm.JointJerk(),
-    "posture": lambda r, t: sm.Posture(np.arange(1.0, r.dof + 1.0), posture=np.ones(r.dof)),
-    "joint limits": lambda r, t: sm.JointLimitDistance(r.lower, r.upper),
-    "path length": lambda r, t: sm.PathLength(),
-    "reversals": lambda r, t: sm.JointReversals(0.5, speed=0.2),
-    "inverse manipulability": lambda r, t: sm.InverseManipulability(0.01),
-    "manipulability": lambda r, t: sm.Manipulability(0.7),
-    "directional": lambda r, t: sm.DirectionalManipulability(np.arange(1.0, t.dimension + 1)),
-    "smallest singular value": lambda r, t: sm.SmallestSingularValue(),
-    "kinetic energy": lambda r, t: sm.KineticEnergy(r),
-    "gravity torque": lambda r, t: sm.GravityTorque(r),
-    "function": lambda r, t: sm.FunctionCost(
+    "velocity": lambda r, t: sm.costs.JointVelocity(),
+    "weighted velocity": lambda r, t: sm.costs.JointVelocity(np.arange(1.0, r.dof + 1.0)),
+    "full weight": lambda r, t: sm.costs.JointVelocity(np.eye(r.dof) + 0.3),
+    "acceleration": lambda r, t: sm.costs.JointAcceleration(),
+    "jerk": lambda r, t: sm.costs.JointJerk(),
+    "posture": lambda r, t: sm.costs.Posture(np.arange(1.0, r.dof + 1.0), posture=np.ones(r.dof)),
+    "joint limits": lambda r, t: sm.costs.JointLimitDistance(r.lower, r.upper),
+    "path length": lambda r, t: sm.costs.PathLength(),
+    "reversals": lambda r, t: sm.costs.JointReversals(0.5, speed=0.2),
+    "inverse manipulability": lambda r, t: sm.costs.InverseManipulability(0.01),
+    "manipulability": lambda r, t: sm.costs.Manipulability(0.7),
+    "directional": lambda r, t: sm.costs.DirectionalManipulability(np.arange(1.0, t.dimension + 1)),
+    "smallest singular value": lambda r, t: sm.costs.SmallestSingularValue(),
+    "kinetic energy": lambda r, t: sm.costs.KineticEnergy(r),
+    "gravity torque": lambda r, t: sm.costs.GravityTorque(r),
+    "function": lambda r, t: sm.costs.FunctionCost(
         lambda qd, q, t: np.sin(q).sum(axis=1) * (qd**2).sum(axis=1) + t * q[:, 0]
     ),
 }
@@ -107,7 +107,11 @@ def test_gradient_with_several_tips_and_moving_frames(seed: int, tmp_path: Path)
     rollout = Rollout(follows, Grid.aligned(follows.items[0].path.knots, 10))
     functions = PolynomialNullMotion(2, "joint").functions(rollout.grid.stage_times, 2.0)
     table = NullMotionTable(functions, None, robot.dof)
-    costs = [sm.JointVelocity(), sm.InverseManipulability(1e-3), sm.KineticEnergy(robot)]
+    costs = [
+        sm.costs.JointVelocity(),
+        sm.costs.InverseManipulability(1e-3),
+        sm.costs.KineticEnergy(robot),
+    ]
     objective = objective_of(rollout, table, costs, FixedStart(start))
     x = 0.05 * rng.normal(size=objective.size)
     exact = objective.gradient(x)
@@ -120,11 +124,11 @@ def test_panda_gradient_to_seven_digits() -> None:
     """50 steps, 6 rows; differences extrapolated so that their own error is far below."""
     robot = robot_named("panda")
     start = start_of(robot, "pose")
-    path = sm.Circle.around(robot.pose(start), 0.1, 4.0, normal=(1.0, 0.0, 0.0))
+    path = sm.paths.Circle.around(robot.pose(start), 0.1, 4.0, normal=(1.0, 0.0, 0.0))
     rollout = Rollout(Follows.of(robot, path, sm.Task.POSE), Grid.aligned(path.knots, 50))
     functions = PolynomialNullMotion(3, "joint").functions(rollout.grid.stage_times, 4.0)
     table = NullMotionTable(functions, None, robot.dof)
-    costs = [sm.JointVelocity(), sm.InverseManipulability(0.01)]
+    costs = [sm.costs.JointVelocity(), sm.costs.InverseManipulability(0.01)]
     objective = objective_of(rollout, table, costs, FixedStart(start))
     x = 0.05 * np.random.default_rng(13).normal(size=objective.size)
     exact = objective.gradient(x)

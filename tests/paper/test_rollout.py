@@ -132,11 +132,11 @@ def test_breakdown_is_reported_not_raised(planar: sm.RobotModel) -> None:
     pose = planar.pose(start)
     end = pose.copy()
     end.translation = pose.translation * 1.1
-    path = sm.Line(pose, end, 1.0)
+    path = sm.paths.Line(pose, end, 1.0)
     rollout = Rollout(Follows.of(planar, path, sm.Task.PLANAR), Grid.aligned(path.knots, 10))
     assert rollout.run(start, np.zeros((41, 3))) == 0.0
     table = NullMotionTable(np.ones((41, 1)), None, 3)
-    objective = objective_of(rollout, table, [sm.JointVelocity()], FixedStart(start))
+    objective = objective_of(rollout, table, [sm.costs.JointVelocity()], FixedStart(start))
     assert objective.value(np.zeros(3)) == np.inf
     assert np.isnan(objective.gradient(np.zeros(3))).all()
     assert rollout.run(np.array([0.3, 1.0, np.nan]), np.zeros((41, 3))) is not None
@@ -184,7 +184,7 @@ def test_polished_nodes_of_a_tilted_pointing_path_are_on_it(name: str, task: str
     end = pose.copy()
     end.translation = pose.translation + np.array([-0.04, 0.03, -0.03])
     end.rotation = pin.exp3(np.array([0.2, -0.3, 0.1])) @ pose.rotation
-    path = sm.Line(pose, end, 1.5)
+    path = sm.paths.Line(pose, end, 1.5)
     rows = sm.Task.of(task)
     rollout = Rollout(Follows.of(robot, path, rows), Grid.aligned(path.knots, 8))
     assert rollout.run(start, 0.1 * np.ones((33, robot.dof))) is None

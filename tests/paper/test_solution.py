@@ -31,11 +31,11 @@ def solved(problem: sm.Problem, **options) -> Solution:
 
 def closed_circle(**options) -> Solution:
     robot = robot_named("panda")
-    circle = sm.Circle.around(robot.pose(PANDA_HOME), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
+    circle = sm.paths.Circle.around(robot.pose(PANDA_HOME), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
     cubic = PolynomialNullMotion()
     problem = sm.Problem(robot, circle, "pose", PANDA_HOME, cubic, constraints=(), rest=False)
     still = still_of(problem)
-    end = sm.ClosedPath().bind(problem.follows, still.start, still.end)
+    end = sm.constraints.ClosedPath().bind(problem.follows, still.start, still.end)
     return solve(problem, still, ends=[end], **options)
 
 
@@ -229,9 +229,9 @@ class NoNullMotion(NullMotion):
 
 
 @pytest.mark.parametrize("space", ["null", "joint"])
-@pytest.mark.parametrize("asked", [(), (sm.EndVelocity(),)])
+@pytest.mark.parametrize("asked", [(), (sm.constraints.EndVelocity(),)])
 def test_without_coefficients_there_is_nothing_to_optimise(
-    space: str, asked: tuple[sm.Constraint, ...]
+    space: str, asked: tuple[sm.constraints.Constraint, ...]
 ) -> None:
     robot = robot_named("panda")
     start = start_of(robot, "pose")
@@ -254,12 +254,12 @@ def edge(radius: float, damping: sm.Damping | None) -> sm.Problem:
     start = robot.pose(q0)
     end = start.copy()
     end.translation = radius * start.translation / np.linalg.norm(start.translation)
-    line, cubic = sm.Line(start, end, 1.0), PolynomialNullMotion()
+    line, cubic = sm.paths.Line(start, end, 1.0), PolynomialNullMotion()
     return sm.Problem(robot, line, "planar", q0, cubic, damping=damping, constraints=())
 
 
 def test_a_damped_motion_leaves_the_path() -> None:
-    with pytest.raises(sm.BreakdownError, match="reaches a singular pose"):
+    with pytest.raises(sm.errors.BreakdownError, match="reaches a singular pose"):
         still_of(edge(5.2, None))
     found = solved(edge(5.2, sm.Damping()))
     assert found.status is Status.CONVERGED
@@ -273,18 +273,22 @@ def test_a_motion_that_breaks_down_is_refused_with_the_time() -> None:
     robot, start = robot_named("planar_3r"), np.array([0.3, 0.0, 0.0])
     end = robot.pose(start)
     end.translation = 1.1 * end.translation
-    line, cubic = sm.Line(robot.pose(start), end, 1.0), PolynomialNullMotion()
+    line, cubic = sm.paths.Line(robot.pose(start), end, 1.0), PolynomialNullMotion()
     problem = sm.Problem(robot, line, "planar", start, cubic, constraints=())
     broken = StillMotion.on(problem, start, Grid.aligned(problem.knots, 32))
     assert broken.broken == 0.0
-    with pytest.raises(sm.BreakdownError, match=r"eq\. 4 breaks down near t = 0 s") as caught:
+    with pytest.raises(
+        sm.errors.BreakdownError, match=r"eq\. 4 breaks down near t = 0 s"
+    ) as caught:
         solve(problem, broken)
     assert caught.value.time == 0.0
 
 
 def test_a_cost_without_a_value_is_named() -> None:
-    nowhere = sm.FunctionCost(lambda qd, q, t: np.where(t < 0.5, 1.0, np.nan), name="nowhere")
-    with pytest.raises(sm.ProblemError, match=r"cost 'nowhere': its value is nan at t = 0\.5"):
+    nowhere = sm.costs.FunctionCost(lambda qd, q, t: np.where(t < 0.5, 1.0, np.nan), name="nowhere")
+    with pytest.raises(
+        sm.errors.ProblemError, match=r"cost 'nowhere': its value is nan at t = 0\.5"
+    ):
         solved(replace(sm.sample_problem(), costs=[nowhere]))
 
 

@@ -19,32 +19,36 @@ def tumbling(t: float) -> list[float]:
 
 
 PATHS = {
-    "line": lambda: sm.Line(pose(1), pose(2), 2.0),
-    "line at constant speed": lambda: sm.Line(pose(1), pose(2), 2.0, "constant"),
-    "circle": lambda: sm.Circle(pose(1), [0, 0, 0], [0, 1, 1], 2.0),
-    "turning arc": lambda: sm.Circle(pose(1), [0, 0, 0], [0, 1, 1], 2.0, -0.4, turn_tool=True),
-    "spiral": lambda: sm.Spiral(pose(1), [0, 0, 0], [0, 1, 1], 2.0, 1.5, 0.1),
-    "helix": lambda: sm.Spiral(
+    "line": lambda: sm.paths.Line(pose(1), pose(2), 2.0),
+    "line at constant speed": lambda: sm.paths.Line(pose(1), pose(2), 2.0, "constant"),
+    "circle": lambda: sm.paths.Circle(pose(1), [0, 0, 0], [0, 1, 1], 2.0),
+    "turning arc": lambda: sm.paths.Circle(
+        pose(1), [0, 0, 0], [0, 1, 1], 2.0, -0.4, turn_tool=True
+    ),
+    "spiral": lambda: sm.paths.Spiral(pose(1), [0, 0, 0], [0, 1, 1], 2.0, 1.5, 0.1),
+    "helix": lambda: sm.paths.Spiral(
         pose(1), pose(1).translation, [0, 1, 1], 2.0, -1.5, 0.2, rise=0.3, turn_tool=True
     ),
-    "twist": lambda: sm.TwistPath(pose(1), tumbling, 2.0),
+    "twist": lambda: sm.paths.TwistPath(pose(1), tumbling, 2.0),
     "waypoints": random_waypoints,
     "waypoints with stops": lambda: random_waypoints("stop"),
-    "ramped line": lambda: sm.section_at_rest(sm.Line(pose(1), pose(2), 2.0, "constant"), ramp=0.4),
-    "ramped waypoints": lambda: sm.section_at_rest(random_waypoints(), ramp=0.9),
-    "end of waypoints": lambda: sm.Section(random_waypoints(), 0.7, 1.9, crowding=True),
+    "ramped line": lambda: sm.paths.section_at_rest(
+        sm.paths.Line(pose(1), pose(2), 2.0, "constant"), ramp=0.4
+    ),
+    "ramped waypoints": lambda: sm.paths.section_at_rest(random_waypoints(), ramp=0.9),
+    "end of waypoints": lambda: sm.paths.Section(random_waypoints(), 0.7, 1.9, crowding=True),
     "there and back": there_and_back,
-    "waypoints, woven": lambda: sm.Weave(random_waypoints(), 0.01, 0.5, dwell=0.1),
-    "waypoints backwards": lambda: sm.Reversed(random_waypoints()),
+    "waypoints, woven": lambda: sm.paths.Weave(random_waypoints(), 0.01, 0.5, dwell=0.1),
+    "waypoints backwards": lambda: sm.paths.Reversed(random_waypoints()),
 }
 
 
 @pytest.fixture(params=PATHS)
-def path(request: pytest.FixtureRequest) -> sm.Path:
+def path(request: pytest.FixtureRequest) -> sm.paths.Path:
     return PATHS[request.param]()
 
 
-def test_twist_is_the_derivative_of_the_pose(path: sm.Path) -> None:
+def test_twist_is_the_derivative_of_the_pose(path: sm.paths.Path) -> None:
     h, t = 1e-6, np.linspace(0, path.duration, 42)[1:-1]
     before, here, after = path.samples(t - h), path.samples(t), path.samples(t + h)
     linear = (after.translation - before.translation) / (2 * h)
@@ -53,14 +57,14 @@ def test_twist_is_the_derivative_of_the_pose(path: sm.Path) -> None:
     np.testing.assert_allclose(here.twist, np.hstack([linear, angular]), rtol=0, atol=DIFFERENCE)
 
 
-def test_rotations_are_rotations(path: sm.Path) -> None:
+def test_rotations_are_rotations(path: sm.paths.Path) -> None:
     rotation = path.samples(np.linspace(0, path.duration, 30)).rotation
     identity = np.broadcast_to(np.eye(3), rotation.shape)
     np.testing.assert_allclose(rotation @ rotation.transpose(0, 2, 1), identity, atol=1e-12)
 
 
-def test_description_restores_the_path_exactly(path: sm.Path) -> None:
-    restored = restore(sm.Path, json.loads(json.dumps(path.to_dict())))
+def test_description_restores_the_path_exactly(path: sm.paths.Path) -> None:
+    restored = restore(sm.paths.Path, json.loads(json.dumps(path.to_dict())))
     t = np.linspace(0, path.duration, 17)
     for name in ("translation", "rotation", "twist"):
         np.testing.assert_array_equal(
@@ -68,60 +72,60 @@ def test_description_restores_the_path_exactly(path: sm.Path) -> None:
         )
 
 
-def test_single_and_many_times_agree(path: sm.Path) -> None:
+def test_single_and_many_times_agree(path: sm.paths.Path) -> None:
     t = 0.3 * path.duration
     np.testing.assert_array_equal(path.pose(t).translation, path.samples([t]).translation[0])
     np.testing.assert_array_equal(path.twist(t), path.samples([t]).twist[0])
 
 
-def test_times_outside_are_refused(path: sm.Path) -> None:
-    with pytest.raises(sm.PathError, match="outside the path"):
+def test_times_outside_are_refused(path: sm.paths.Path) -> None:
+    with pytest.raises(sm.errors.PathError, match="outside the path"):
         path.pose(path.duration + 0.1)
-    with pytest.raises(sm.PathError, match="outside the path"):
+    with pytest.raises(sm.errors.PathError, match="outside the path"):
         path.pose(np.nan)
 
 
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda: sm.Line(pose(1), pose(2), 0.0), "duration is 0.0"),
-        (lambda: sm.Line(pose(1), np.eye(3), 1.0), "shape"),
-        (lambda: sm.Line(pose(1), 2 * np.eye(4), 1.0), "not orthonormal"),
-        (lambda: sm.Line(pose(1), pose(2), 1.0, "fast"), "unknown time law 'fast'"),
-        (lambda: sm.Circle(pose(1), [0, 0], [0, 0, 1], 1.0), "center"),
-        (lambda: sm.Circle(pose(1), [0, 0, 0], [0, 0, 0], 1.0), "normal is zero"),
-        (lambda: sm.Circle(pose(1), pose(1).translation, [0, 0, 1], 1.0), "radius is zero"),
-        (lambda: sm.Circle.around(pose(1), -0.1, 1.0), "radius is -0.1"),
-        (lambda: sm.Waypoints([0, 1], [[0, 0, 0]]), "positions has shape"),
-        (lambda: sm.Waypoints([0, 1], [[0, 0, 0]] * 2, corners="cut"), "corners is 'cut'"),
-        (lambda: restore(sm.Path, {"kind": "corkscrew"}), "path kind is 'corkscrew'"),
-        (lambda: restore(sm.Path, {"kind": "line", "begin": 1}), "path of kind 'line'"),
+        (lambda: sm.paths.Line(pose(1), pose(2), 0.0), "duration is 0.0"),
+        (lambda: sm.paths.Line(pose(1), np.eye(3), 1.0), "shape"),
+        (lambda: sm.paths.Line(pose(1), 2 * np.eye(4), 1.0), "not orthonormal"),
+        (lambda: sm.paths.Line(pose(1), pose(2), 1.0, "fast"), "unknown time law 'fast'"),
+        (lambda: sm.paths.Circle(pose(1), [0, 0], [0, 0, 1], 1.0), "center"),
+        (lambda: sm.paths.Circle(pose(1), [0, 0, 0], [0, 0, 0], 1.0), "normal is zero"),
+        (lambda: sm.paths.Circle(pose(1), pose(1).translation, [0, 0, 1], 1.0), "radius is zero"),
+        (lambda: sm.paths.Circle.around(pose(1), -0.1, 1.0), "radius is -0.1"),
+        (lambda: sm.paths.Waypoints([0, 1], [[0, 0, 0]]), "positions has shape"),
+        (lambda: sm.paths.Waypoints([0, 1], [[0, 0, 0]] * 2, corners="cut"), "corners is 'cut'"),
+        (lambda: restore(sm.paths.Path, {"kind": "corkscrew"}), "path kind is 'corkscrew'"),
+        (lambda: restore(sm.paths.Path, {"kind": "line", "begin": 1}), "path of kind 'line'"),
     ],
 )
 def test_bad_paths_are_refused(call, message: str) -> None:
-    with pytest.raises((sm.PathError, sm.FileFormatError), match=message):
+    with pytest.raises((sm.errors.PathError, sm.errors.FileFormatError), match=message):
         call()
 
 
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: sm.Joined([]), "no pieces"),
+        (lambda: sm.paths.Joined([]), "no pieces"),
         (
-            lambda: sm.Line(pose(1), pose(2), 2.0) + sm.Dwell(pose(3), 1.0),
+            lambda: sm.paths.Line(pose(1), pose(2), 2.0) + sm.paths.Dwell(pose(3), 1.0),
             "piece 2 begins .* m and",
         ),
         (
-            lambda: sm.Line(pose(1), pose(2), 2.0, "constant") + sm.Dwell(pose(2), 1.0),
+            lambda: sm.paths.Line(pose(1), pose(2), 2.0, "constant") + sm.paths.Dwell(pose(2), 1.0),
             "faster or slower than piece 1 ends",
         ),
         (
-            lambda: sm.section_at_rest(sm.Line(pose(1), pose(2), 2.0), ramp=3.0),
+            lambda: sm.paths.section_at_rest(sm.paths.Line(pose(1), pose(2), 2.0), ramp=3.0),
             "ramp is 3.0 s, expected",
         ),
-        (lambda: sm.Dwell(pose(1), 0.0), "duration"),
+        (lambda: sm.paths.Dwell(pose(1), 0.0), "duration"),
     ],
 )
 def test_paths_that_cannot_be_joined_or_run_up(make, message: str) -> None:
-    with pytest.raises(sm.PathError, match=message):
+    with pytest.raises(sm.errors.PathError, match=message):
         make()

@@ -14,8 +14,8 @@ from support.paths import pose, random_waypoints
 def test_a_section_is_the_path_between_two_times() -> None:
     path = random_waypoints()
     for crowding in (False, True):
-        section = sm.Section(path, 0.5, 1.7, crowding)
-        again = restore(sm.Path, section.to_dict())
+        section = sm.paths.Section(path, 0.5, 1.7, crowding)
+        again = restore(sm.paths.Path, section.to_dict())
         t: Array = np.linspace(0.0, section.duration, 50)
         for one in (section, again):
             np.testing.assert_array_equal(one.samples(t).twist, path.samples(0.5 + t).twist)
@@ -26,15 +26,15 @@ def test_a_section_is_the_path_between_two_times() -> None:
             assert (one.duration - one.knots[-2] < 1e-3 * one.duration) == crowding
         assert np.all(np.isin(section.knots, section.marks))
     for first, last in ((1.7, 0.5), (-0.1, 1.0), (1.0, 11.0)):
-        with pytest.raises(sm.PathError, match="two times in order within"):
-            sm.Section(path, first, last)
+        with pytest.raises(sm.errors.PathError, match="two times in order within"):
+            sm.paths.Section(path, first, last)
 
 
 @pytest.mark.parametrize("ramp", [0.3, 1.2])
 def test_a_section_rests_where_asked(ramp: float) -> None:
     path = random_waypoints()
     for ramped in itertools.product((False, True), repeat=2):
-        slower = sm.section_at_rest(path, 0.5, 1.7, ramp, ramped)
+        slower = sm.paths.section_at_rest(path, 0.5, 1.7, ramp, ramped)
         check_path(slower)
         assert slower.duration == pytest.approx(1.2 + 0.5 * ramp * sum(ramped))
         speeds = [np.abs(slower.twist(time)).max() for time in (0.0, slower.duration)]
@@ -45,8 +45,8 @@ def test_a_section_rests_where_asked(ramp: float) -> None:
 
 
 def test_a_ramp_begins_and_ends_at_rest_and_keeps_the_pace_in_between() -> None:
-    line = sm.Line(pose(1), pose(2), 2.0, "constant")
-    ramped = sm.section_at_rest(line, ramp=0.4)
+    line = sm.paths.Line(pose(1), pose(2), 2.0, "constant")
+    ramped = sm.paths.section_at_rest(line, ramp=0.4)
     assert ramped.duration == pytest.approx(2.4)
     assert np.abs(ramped.samples([0.0, ramped.duration]).twist).max() == 0.0
     t = np.linspace(0.4, 2.0, 9)

@@ -26,43 +26,45 @@ def turns(rng: np.random.Generator, count: int) -> Array:
     return np.array(found)
 
 
-def waypoints(rng: np.random.Generator, corners: str = "blend") -> sm.Path:
+def waypoints(rng: np.random.Generator, corners: str = "blend") -> sm.paths.Path:
     t = np.cumsum(rng.uniform(0.2, 1.0, 8))
-    return sm.Waypoints(t, rng.normal(0.0, 0.3, (8, 3)), turns(rng, 8), corners=corners)
+    return sm.paths.Waypoints(t, rng.normal(0.0, 0.3, (8, 3)), turns(rng, 8), corners=corners)
 
 
-def polyline(rng: np.random.Generator) -> sm.Path:
-    return sm.Polyline(rng.normal(0.0, 0.3, (5, 3)), turns(rng, 5), tolerance=5e-3)
+def polyline(rng: np.random.Generator) -> sm.paths.Path:
+    return sm.paths.Polyline(rng.normal(0.0, 0.3, (5, 3)), turns(rng, 5), tolerance=5e-3)
 
 
 def twist(t: float) -> Array:
     return np.array([np.cos(3.0 * t), np.sin(t), 0.1, np.sin(5.0 * t), 1.0, 0.0])
 
 
-PATHS: dict[str, Callable[[np.random.Generator], sm.Path]] = {
-    "line": lambda rng: sm.Line(pose(rng), pose(rng), 2.0),
-    "steady line": lambda rng: sm.Line(pose(rng), pose(rng), 2.0, "constant"),
-    "circle": lambda rng: sm.Circle.around(pose(rng), 0.2, 3.0, turn_tool=True, turns=1.5),
-    "spiral": lambda rng: sm.Spiral(pose(rng), [0, 0, 0], [0, 1, 1], 3.0, 1.0, 0.3, rise=0.1),
-    "spiral from its middle": lambda rng: sm.Spiral(
+PATHS: dict[str, Callable[[np.random.Generator], sm.paths.Path]] = {
+    "line": lambda rng: sm.paths.Line(pose(rng), pose(rng), 2.0),
+    "steady line": lambda rng: sm.paths.Line(pose(rng), pose(rng), 2.0, "constant"),
+    "circle": lambda rng: sm.paths.Circle.around(pose(rng), 0.2, 3.0, turn_tool=True, turns=1.5),
+    "spiral": lambda rng: sm.paths.Spiral(pose(rng), [0, 0, 0], [0, 1, 1], 3.0, 1.0, 0.3, rise=0.1),
+    "spiral from its middle": lambda rng: sm.paths.Spiral(
         pose(rng), [0, 0, 0], [0, 0, 1], 3.0, -1.0, 0.0, turn_tool=True
     ),
     "waypoints": waypoints,
     "stops": lambda rng: waypoints(rng, "stop"),
     "polyline": polyline,
-    "feed": lambda rng: sm.Feed(polyline(rng), 0.05),
-    "feed in bends": lambda rng: sm.Feed(waypoints(rng), 0.05),
-    "twist": lambda rng: sm.TwistPath(pose(rng), twist, 2.0),
-    "leads": lambda rng: sm.with_leads(sm.Line(pose(rng), pose(rng), 2.0), 0.1, 1.0),
-    "placed": lambda rng: sm.Placed(waypoints(rng), pose(rng)),
+    "feed": lambda rng: sm.paths.Feed(polyline(rng), 0.05),
+    "feed in bends": lambda rng: sm.paths.Feed(waypoints(rng), 0.05),
+    "twist": lambda rng: sm.paths.TwistPath(pose(rng), twist, 2.0),
+    "leads": lambda rng: sm.paths.with_leads(sm.paths.Line(pose(rng), pose(rng), 2.0), 0.1, 1.0),
+    "placed": lambda rng: sm.paths.Placed(waypoints(rng), pose(rng)),
     "section": lambda rng: Section(waypoints(rng), 0.3, 1.7),
     "section at rest": lambda rng: section_at_rest(waypoints(rng), 0.3, 1.7, 0.4, (True, True)),
-    "backwards": lambda rng: sm.Reversed(sm.Feed(waypoints(rng), 0.05)),
-    "woven": lambda rng: sm.Weave(sm.Feed(waypoints(rng), 0.05), 0.01, 0.05, axis=(1.0, 2.0, 0.0)),
-    "woven with dwells": lambda rng: sm.Weave(
-        sm.Line(pose(rng), pose(rng), 2.0), 0.01, 0.05, dwell=0.2
+    "backwards": lambda rng: sm.paths.Reversed(sm.paths.Feed(waypoints(rng), 0.05)),
+    "woven": lambda rng: sm.paths.Weave(
+        sm.paths.Feed(waypoints(rng), 0.05), 0.01, 0.05, axis=(1.0, 2.0, 0.0)
     ),
-    "dwell": lambda rng: sm.Dwell(pose(rng), 1.0),
+    "woven with dwells": lambda rng: sm.paths.Weave(
+        sm.paths.Line(pose(rng), pose(rng), 2.0), 0.01, 0.05, dwell=0.2
+    ),
+    "dwell": lambda rng: sm.paths.Dwell(pose(rng), 1.0),
 }
 
 
@@ -104,13 +106,13 @@ def test_no_interpolation_misses_by_more_than_the_bound(name: str) -> None:
 def test_a_class_of_ones_own_that_moves_otherwise_has_no_bound() -> None:
     """It inherits our series, but they are not its own."""
 
-    class Wobbling(sm.Circle, kind="wobbling"):
-        def evaluate(self, t: Array) -> sm.PathSamples:
+    class Wobbling(sm.paths.Circle, kind="wobbling"):
+        def evaluate(self, t: Array) -> sm.paths.PathSamples:
             found = super().evaluate(t)
             swing = 1e-3 * np.sin(40.0 * t)[:, None]
-            return sm.PathSamples(t, found.translation + swing, found.rotation, found.twist)
+            return sm.paths.PathSamples(t, found.translation + swing, found.rotation, found.twist)
 
-    class Named(sm.Circle, kind="named"):
+    class Named(sm.paths.Circle, kind="named"):
         """Moves as ours does."""
 
     place, half = np.array([1.0]), np.array([0.1])
@@ -118,9 +120,9 @@ def test_a_class_of_ones_own_that_moves_otherwise_has_no_bound() -> None:
     assert path_series(Named.around(start, 0.1, 2.0), place, half) is not None
     wobbling = Wobbling.around(start, 0.1, 2.0)
     assert path_series(wobbling, place, half) is None
-    assert path_series(sm.Placed(wobbling, start), place, half) is None
-    line = sm.Line(wobbling.pose(2.0), start, 1.0)
-    both = sm.Dwell(start, 1.0) + sm.Dwell(start, 1.0)
+    assert path_series(sm.paths.Placed(wobbling, start), place, half) is None
+    line = sm.paths.Line(wobbling.pose(2.0), start, 1.0)
+    both = sm.paths.Dwell(start, 1.0) + sm.paths.Dwell(start, 1.0)
     assert path_series(both, place, half) is not None
     assert path_series(line, place / 2.0, half) is not None
 
@@ -129,15 +131,15 @@ def test_what_gives_no_bound_is_judged_as_measured_and_the_verdict_says_so() -> 
     panda = sm.load_robot("panda")
     start = panda.dexterous_configuration()
 
-    class Own(sm.Path, kind="own, without a bound"):
+    class Own(sm.paths.Path, kind="own, without a bound"):
         duration = 1.0
 
-        def evaluate(self, t: Array) -> sm.PathSamples:
-            return sm.Dwell(panda.pose(start), 1.0).evaluate(t)
+        def evaluate(self, t: Array) -> sm.paths.PathSamples:
+            return sm.paths.Dwell(panda.pose(start), 1.0).evaluate(t)
 
     rest = sm.Trajectory([0.0, 1.0], [start, start], np.zeros((2, 7)), panda.joint_names)
     words = "as measured between its marks"
-    for path, said in ((Own(), True), (sm.Dwell(panda.pose(start), 1.0), False)):
+    for path, said in ((Own(), True), (sm.paths.Dwell(panda.pose(start), 1.0), False)):
         certificate = sm.certify(panda, path, "pose", rest)
         assert certificate.verified
         assert (words in certificate.verdict) is said

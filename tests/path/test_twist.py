@@ -17,14 +17,14 @@ def test_twist_path_integrates_the_papers_velocity() -> None:
 
 def test_twist_path_turns_like_the_exponential() -> None:
     omega = np.array([0.3, -0.5, 0.9])
-    path = sm.TwistPath(pose(1), lambda t: [0, 0, 0, *omega], 2.0)
+    path = sm.paths.TwistPath(pose(1), lambda t: [0, 0, 0, *omega], 2.0)
     np.testing.assert_allclose(
         path.pose(1.3).rotation, pin.exp3(1.3 * omega) @ pose(1).rotation, atol=1e-11
     )
 
 
 def test_twist_path_refuses_a_jump() -> None:
-    with pytest.raises(sm.PathError, match=r"not smooth near t = 0\.[67]"):
-        sm.TwistPath(pose(1), lambda t: [float(t > 0.7), 0, 0], 1.0)
-    with pytest.raises(sm.PathError, match="expected"):
-        sm.TwistPath(pose(1), lambda t: [1.0, 2.0], 1.0)
+    with pytest.raises(sm.errors.PathError, match=r"not smooth near t = 0\.[67]"):
+        sm.paths.TwistPath(pose(1), lambda t: [float(t > 0.7), 0, 0], 1.0)
+    with pytest.raises(sm.errors.PathError, match="expected"):
+        sm.paths.TwistPath(pose(1), lambda t: [1.0, 2.0], 1.0)

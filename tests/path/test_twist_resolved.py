@@ -27,7 +27,7 @@ def test_no_smooth_sidestep_is_lost(place: float, width: float) -> None:
         found[5] = 0.3 * bump(t, place * duration, width)
         return found
 
-    path = sm.TwistPath(pin.SE3.Identity(), velocity, duration)
+    path = sm.paths.TwistPath(pin.SE3.Identity(), velocity, duration)
     end = path.pose(duration)
     assert end.translation[1] == pytest.approx(0.02, abs=WAY)
     assert float(np.linalg.norm(pin.log3(end.rotation))) == pytest.approx(0.3, abs=WAY)

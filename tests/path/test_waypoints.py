@@ -24,7 +24,7 @@ SQUARE = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [1, 2, 0], [0, 2, 0]]
 
 
 def test_corners_stop_rests_at_kinks_and_keeps_the_legs() -> None:
-    path = sm.Waypoints([0, 1, 2, 3, 4], SQUARE, corners="stop")
+    path = sm.paths.Waypoints([0, 1, 2, 3, 4], SQUARE, corners="stop")
     np.testing.assert_array_equal(path.corner_times, [0.0, 1.0, 3.0, 4.0])
     np.testing.assert_allclose(path.samples(path.corner_times).twist, 0.0, atol=1e-12)
     assert np.linalg.norm(path.twist(2.0)) > 0.5
@@ -33,7 +33,7 @@ def test_corners_stop_rests_at_kinks_and_keeps_the_legs() -> None:
 
 
 def test_corners_blend_swings_through_smoothly() -> None:
-    path = sm.Waypoints([0, 1, 2, 3, 4], SQUARE, corners="blend")
+    path = sm.paths.Waypoints([0, 1, 2, 3, 4], SQUARE, corners="blend")
     assert path.corner_times.size == 0
     assert np.linalg.norm(path.twist(1.0)) > 0.5
     h = 1e-7
@@ -49,10 +49,10 @@ def write_csv(folder: Path, text: str) -> Path:
 
 def test_csv_is_read(tmp_path: Path) -> None:
     file = write_csv(tmp_path, "t,x,y,z,qw,qx,qy,qz\n5,0,0,0,2,0,0,0\n6,1,0,0,0,0,0,1\n")
-    path = sm.Waypoints.from_csv(file)
+    path = sm.paths.Waypoints.from_csv(file)
     assert path.duration == 1.0
     np.testing.assert_allclose(path.pose(1.0).rotation, np.diag([-1, -1, 1]), atol=1e-12)
-    plain = sm.Waypoints.from_csv(write_csv(tmp_path, "t,x,y,z\n0,0,0,0\n1,1,2,3\n"))
+    plain = sm.paths.Waypoints.from_csv(write_csv(tmp_path, "t,x,y,z\n0,0,0,0\n1,1,2,3\n"))
     np.testing.assert_allclose(plain.pose(1.0).translation, [1, 2, 3])
 
 
@@ -70,12 +70,12 @@ def test_csv_is_read(tmp_path: Path) -> None:
     ],
 )
 def test_bad_csv_is_named(tmp_path: Path, text: str, message: str) -> None:
-    with pytest.raises(sm.FileFormatError, match=message):
-        sm.Waypoints.from_csv(write_csv(tmp_path, text))
+    with pytest.raises(sm.errors.FileFormatError, match=message):
+        sm.paths.Waypoints.from_csv(write_csv(tmp_path, text))
 
 
 def test_samples_of_a_corner_path_are_continuous() -> None:
     """No piece is skipped or taken twice at its ends."""
-    path = sm.Waypoints([0, 1, 2, 3, 4], SQUARE, corners="stop")
+    path = sm.paths.Waypoints([0, 1, 2, 3, 4], SQUARE, corners="stop")
     positions: Array = path.samples(np.linspace(0, 4, 4001)).translation
     assert np.linalg.norm(np.diff(positions, axis=0), axis=1).max() < 3e-3

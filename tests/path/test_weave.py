@@ -17,14 +17,14 @@ COUNTED = 1e-6
 MICROMETRE = 1e-6
 
 
-def seam(turned: bool = False) -> sm.Path:
+def seam(turned: bool = False) -> sm.paths.Path:
     rotation = np.diag([1.0, -1.0, -1.0]) if turned else np.eye(3)
     first = SE3(rotation, np.array([0.1, 0.2, 0.3]))
     last = SE3(rotation, np.array([0.1 + LENGTH, 0.2, 0.3]))
-    return sm.Line(first, last, 5.0)
+    return sm.paths.Line(first, last, 5.0)
 
 
-def offsets(woven: sm.Path, plain: sm.Path, t: Array) -> Array:
+def offsets(woven: sm.paths.Path, plain: sm.paths.Path, t: Array) -> Array:
     """Return how far the tool is from the seam, in its own frame, (K, 3)."""
     one, other = woven.samples(t), plain.samples(t)
     away = one.translation - other.translation
@@ -33,8 +33,8 @@ def offsets(woven: sm.Path, plain: sm.Path, t: Array) -> Array:
 
 @pytest.mark.parametrize("dwell", [0.0, 0.2])
 def test_it_swings_evenly_whatever_the_feed(dwell: float) -> None:
-    plain = sm.Feed(seam(turned=True), 0.03)
-    woven = sm.Weave(plain, AMPLITUDE, PITCH, dwell=dwell)
+    plain = sm.paths.Feed(seam(turned=True), 0.03)
+    woven = sm.paths.Weave(plain, AMPLITUDE, PITCH, dwell=dwell)
     assert woven.swings == round(LENGTH / PITCH)
     t = np.linspace(0.0, woven.duration, 20001)
     away = offsets(woven, plain, t)
@@ -53,7 +53,7 @@ def test_it_swings_evenly_whatever_the_feed(dwell: float) -> None:
 
 def test_a_sine_is_a_sine() -> None:
     plain = seam()
-    woven = sm.Weave(plain, AMPLITUDE, PITCH, axis=(0.0, 0.0, 2.0))
+    woven = sm.paths.Weave(plain, AMPLITUDE, PITCH, axis=(0.0, 0.0, 2.0))
     t = np.linspace(0.0, plain.duration, 501)
     x = (plain.samples(t).translation[:, 0] - 0.1) / LENGTH * woven.swings
     inner = (x > 1.0) & (x < woven.swings - 1.0)
@@ -66,17 +66,19 @@ def test_a_sine_is_a_sine() -> None:
         np.testing.assert_array_equal(woven.pose(end).homogeneous, plain.pose(end).homogeneous)
 
 
-def carrier(name: str) -> sm.Path:
+def carrier(name: str) -> sm.paths.Path:
     """Return a seam to be woven along: straight, round or with rounded corners."""
     tilted = Rotation.from_euler("xyz", [2.5, 0.3, -0.4]).as_matrix()
     first = SE3(tilted, np.array([0.4, -0.2, 0.3]))
     if name == "line":
         further = Rotation.from_euler("xyz", [2.1, 0.1, 0.5]).as_matrix()
-        return sm.Feed(sm.Line(first, SE3(further, np.array([0.6, 0.1, 0.35])), 1.0), 0.05)
+        return sm.paths.Feed(
+            sm.paths.Line(first, SE3(further, np.array([0.6, 0.1, 0.35])), 1.0), 0.05
+        )
     if name == "circle":
-        return sm.Circle.around(first, 0.1, 6.0, normal=(0.2, 0.1, 1.0))
+        return sm.paths.Circle.around(first, 0.1, 6.0, normal=(0.2, 0.1, 1.0))
     legs = [[0.4, -0.2, 0.3], [0.55, -0.2, 0.3], [0.55, 0.0, 0.35], [0.7, 0.1, 0.35]]
-    return sm.Feed(sm.Polyline(legs, tolerance=2e-3), 0.04)
+    return sm.paths.Feed(sm.paths.Polyline(legs, tolerance=2e-3), 0.04)
 
 
 def published_swing(count: Array, swings: int, dwell: float) -> Array:
@@ -105,7 +107,7 @@ def published_swing(count: Array, swings: int, dwell: float) -> Array:
 @pytest.mark.parametrize("dwell", [0.0, 0.15])
 def test_the_tool_is_where_the_formula_says_within_a_micrometre(name: str, dwell: float) -> None:
     plain, axis = carrier(name), np.array([0.0, 0.6, 0.8])
-    woven = sm.Weave(plain, AMPLITUDE, PITCH, axis=axis, dwell=dwell)
+    woven = sm.paths.Weave(plain, AMPLITUDE, PITCH, axis=axis, dwell=dwell)
     # The length of the seam by its chords: of places alone, without any derivative.
     t = np.linspace(0.0, plain.duration, 50_001)
     places = plain.samples(t)
@@ -130,11 +132,15 @@ def test_a_woven_seam_is_planned_and_verified() -> None:
     panda = sm.load_robot("panda")
     pose = panda.pose(sm.NAMED_ARMS["panda"].home)
     last = SE3(pose.rotation, pose.translation + np.array([0.0, 0.08, 0.0]))
-    woven = sm.Weave(sm.Feed(sm.Line(pose, last, 1.0), 0.02), 2e-3, 0.02, axis=(1.0, 0.0, 0.0))
+    woven = sm.paths.Weave(
+        sm.paths.Feed(sm.paths.Line(pose, last, 1.0), 0.02), 2e-3, 0.02, axis=(1.0, 0.0, 0.0)
+    )
     plan = sm.plan(sm.Problem(panda, woven, start=sm.NAMED_ARMS["panda"].home))
     assert plan.certificate.verified, plan.certificate.verdict
     assert not plan.certificate.notes
-    plain = sm.Section(sm.Feed(sm.Line(pose, last, 1.0), 0.02), 0.0, woven.duration)
+    plain = sm.paths.Section(
+        sm.paths.Feed(sm.paths.Line(pose, last, 1.0), 0.02), 0.0, woven.duration
+    )
     assert not sm.certify(panda, plain, "pose", plan.trajectory).verified
 
 
@@ -150,27 +156,29 @@ def test_a_woven_seam_is_planned_and_verified() -> None:
     ],
 )
 def test_what_is_no_swing_is_refused(given: dict, named: str) -> None:
-    with pytest.raises(sm.PathError, match=named):
-        sm.Weave(seam(), **{"amplitude": AMPLITUDE, "pitch": PITCH, **given})
+    with pytest.raises(sm.errors.PathError, match=named):
+        sm.paths.Weave(seam(), **{"amplitude": AMPLITUDE, "pitch": PITCH, **given})
 
 
 def test_a_weave_that_never_ends_is_refused_at_once() -> None:
     """A pitch a hundred times too small: by its swings, or by how it accelerates."""
-    with pytest.raises(sm.PathError, match=r"makes 1e\+05 swings, expected 20,000 at most"):
-        sm.Weave(seam(), 2e-3, float(length_of(seam())) / 1e5)
+    with pytest.raises(sm.errors.PathError, match=r"makes 1e\+05 swings, expected 20,000 at most"):
+        sm.paths.Weave(seam(), 2e-3, float(length_of(seam())) / 1e5)
     panda = robot_named("panda")
     start = panda.dexterous_configuration()
     here = panda.pose(start)
     there = here.copy()
     there.translation = here.translation + np.array([0.0, 0.07, 0.0])
-    line = sm.Feed(sm.Line(here, there, 4.0), 0.02)
-    woven = sm.Weave(line, 2e-3, 5e-5)
-    with pytest.raises(sm.ProblemError, match=r"accelerates at 1\.\d*e\+04 m/s².*times gravity"):
+    line = sm.paths.Feed(sm.paths.Line(here, there, 4.0), 0.02)
+    woven = sm.paths.Weave(line, 2e-3, 5e-5)
+    with pytest.raises(
+        sm.errors.ProblemError, match=r"accelerates at 1\.\d*e\+04 m/s².*times gravity"
+    ):
         sm.Problem(panda, woven, task="position", start=start)
     # As it was meant it is planned.
-    sm.Problem(panda, sm.Weave(line, 2e-3, 5e-3), task="position", start=start)
+    sm.Problem(panda, sm.paths.Weave(line, 2e-3, 5e-3), task="position", start=start)
 
 
-def length_of(path: sm.Path) -> float:
+def length_of(path: sm.paths.Path) -> float:
     places = path.samples(np.linspace(0.0, path.duration, 2001)).translation
     return float(np.linalg.norm(np.diff(places, axis=0), axis=1).sum())

@@ -11,7 +11,7 @@ from support.arms import robot_named
 from support.displaced import MISSED, Judge, random_displacement
 from support.shell import invoke
 
-LIMITS = [sm.JointPositionLimits(), sm.JointVelocityLimits()]
+LIMITS = [sm.constraints.JointPositionLimits(), sm.constraints.JointVelocityLimits()]
 WANTED = sm.Margin(0.03, 0.02)
 
 
@@ -21,12 +21,12 @@ def beside_the_elbow() -> sm.Problem:
     pose = robot.pose(sm.NAMED_ARMS["panda"].home)
     end = pose.copy()
     end.translation = pose.translation + np.array([0.0, 0.2, 0.0])
-    problem = sm.Problem(robot, sm.Line(pose, end, 3.0), constraints=LIMITS)
+    problem = sm.Problem(robot, sm.paths.Line(pose, end, 3.0), constraints=LIMITS)
     motion = sm.plan(problem).trajectory
     first, last = robot.joint_poses(motion(np.array([0.0, 3.0])))[:, 3, :3]
     ahead = (last - first) / np.linalg.norm(last - first)
-    ball = sm.Sphere("ball", last + 0.16 * ahead, 0.05)
-    clear = sm.Clearance([ball], 5e-3)
+    ball = sm.obstacles.Sphere("ball", last + 0.16 * ahead, 0.05)
+    clear = sm.constraints.Clearance([ball], 5e-3)
     return problem.changed(start=motion.q[0], constraints=(*LIMITS, clear))
 
 
@@ -97,7 +97,7 @@ def test_bands_give_what_a_displacement_uses(problem: sm.Problem) -> None:
     asked = problem.changed(start="free", relaxations=(sm.Relaxation("z", 0.06),))
     given = bought._narrowed(asked, sm.Margin(0.01, 0.02), 0.5)
     assert given[0].band == pytest.approx(0.06 - 0.01 - 0.5 * 0.02)
-    with pytest.raises(sm.ProblemError, match=r"the band of z is 0\.06"):
+    with pytest.raises(sm.errors.ProblemError, match=r"the band of z is 0\.06"):
         bought._narrowed(asked, sm.Margin(0.05, 0.02), 0.5)
     turned = dataclasses.replace(asked, relaxations=(sm.Relaxation("rz", 0.1),))
     assert bought._narrowed(turned, sm.Margin(0.01, 0.02), 0.5)[0].band == pytest.approx(0.08)
@@ -109,17 +109,17 @@ def test_what_cannot_be_bought_is_refused(problem: sm.Problem) -> None:
         ({"of": "cell"}, "of is 'cell'"),
         ({"clearance": -1}, "clearance"),
     ):
-        with pytest.raises(sm.ProblemError, match=said):
+        with pytest.raises(sm.errors.ProblemError, match=said):
             sm.plan_with_margin(problem, **{"margin": WANTED, **given})  # type: ignore[arg-type]
-    with pytest.raises(sm.ProblemError, match="position and rotation are 0"):
+    with pytest.raises(sm.errors.ProblemError, match="position and rotation are 0"):
         sm.Margin()
-    with pytest.raises(sm.ProblemError, match="margin: position"):
+    with pytest.raises(sm.errors.ProblemError, match="margin: position"):
         sm.Margin(-1.0)
 
 
 def test_margins_bought_in_the_shell(problem: sm.Problem, tmp_path) -> None:  # type: ignore[no-untyped-def]
     file, out = tmp_path / "cell.toml", tmp_path / "plan.npz"
-    sm.write_problem(problem, file)
+    sm.files.write_problem(problem, file)
     code, told = invoke("plan-margin", file, "--position", "0.01", "--out", out)
     assert code == 0, told
     assert "margin of 10 mm" in told

@@ -10,7 +10,7 @@ from selfmotion.placement.places import Places, Tried
 from support.arms import robot_named
 from support.shell import invoke
 
-LIMITS = [sm.JointPositionLimits(), sm.JointVelocityLimits()]
+LIMITS = [sm.constraints.JointPositionLimits(), sm.constraints.JointVelocityLimits()]
 
 
 def plan_to(reach: float) -> sm.Plan:
@@ -20,7 +20,7 @@ def plan_to(reach: float) -> sm.Plan:
     pose = robot.pose(start)
     away = np.array([np.cos(0.9), np.sin(0.9), 0.0])
     end = pin.SE3(pose.rotation, reach * away)
-    problem = sm.Problem(robot, sm.Line(pose, end, 2.0), "planar", start, constraints=LIMITS)
+    problem = sm.Problem(robot, sm.paths.Line(pose, end, 2.0), "planar", start, constraints=LIMITS)
     return sm.plan(problem).require()
 
 
@@ -44,7 +44,7 @@ def test_each_corner_is_a_verified_motion_by_its_own(plan: sm.Plan) -> None:
     for sign in (1.0, -1.0):
         for k in range(2):
             frame = pin.SE3(np.eye(3), sign * found.translation.size * np.eye(3)[k])
-            there = plan.problem.changed(path=sm.Placed(plan.path, frame), start="free")
+            there = plan.problem.changed(path=sm.paths.Placed(plan.path, frame), start="free")
             assert sm.plan(there).certificate.verified
     assert "confirmed at 12 corners" in str(found)
 
@@ -96,7 +96,7 @@ def test_what_cannot_be_corrected_is_refused(plan: sm.Plan) -> None:
         ({"center": [0]}, "center"),
         ({"part": ["plate"]}, "no obstacle 'plate'"),
     ):
-        with pytest.raises(sm.ProblemError, match=said):
+        with pytest.raises(sm.errors.ProblemError, match=said):
             sm.correction(plan, **given)  # type: ignore[arg-type]
-    with pytest.raises(sm.ProblemError, match="expected a Plan"):
+    with pytest.raises(sm.errors.ProblemError, match="expected a Plan"):
         sm.correction(None)  # type: ignore[arg-type]

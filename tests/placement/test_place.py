@@ -15,7 +15,7 @@ from selfmotion.placement.search import Box, Descent, finalists
 from support.arms import robot_named
 from support.shell import invoke
 
-LIMITS = [sm.JointPositionLimits(), sm.JointVelocityLimits()]
+LIMITS = [sm.constraints.JointPositionLimits(), sm.constraints.JointVelocityLimits()]
 WITHIN = {"x": (-0.3, 0.3), "y": (-0.4, 0.4)}
 # A place may cost so much more than the best of a grid.
 NO_WORSE = 1.01
@@ -27,7 +27,7 @@ def planar() -> sm.Problem:
     start = np.array([0.4, 0.9, 0.6])
     pose = robot.pose(start)
     end = pin.SE3(pose.rotation, pose.translation + np.array([-0.3, 0.2, 0.0]))
-    seam = sm.Line(pose, end, 2.0)
+    seam = sm.paths.Line(pose, end, 2.0)
     return sm.Problem(robot, seam, "planar", constraints=LIMITS)
 
 
@@ -38,10 +38,10 @@ def panda() -> sm.Problem:
     end = pose.copy()
     end.translation = pose.translation + np.array([0.0, 0.2, 0.0])
     middle = 0.5 * (pose.translation + end.translation)
-    block = sm.Box("block", middle - [0.0, 0.0, 0.15], [0.1, 0.1, 0.05])
-    wall = sm.Box("wall", [0.9, 0.0, 0.5], [0.02, 1.0, 0.4])
-    clear = sm.Clearance([block, wall], 5e-3)
-    return sm.Problem(robot, sm.Line(pose, end, 3.0), constraints=[*LIMITS, clear])
+    block = sm.obstacles.Box("block", middle - [0.0, 0.0, 0.15], [0.1, 0.1, 0.05])
+    wall = sm.obstacles.Box("wall", [0.9, 0.0, 0.5], [0.02, 1.0, 0.4])
+    clear = sm.constraints.Clearance([block, wall], 5e-3)
+    return sm.Problem(robot, sm.paths.Line(pose, end, 3.0), constraints=[*LIMITS, clear])
 
 
 @pytest.fixture(scope="module")
@@ -53,7 +53,7 @@ def test_a_place_is_no_worse_than_any_of_a_grid(found: sm.Placement) -> None:
     costs = []
     for x in np.linspace(*WITHIN["x"], 4):
         for y in np.linspace(*WITHIN["y"], 4):
-            path = sm.Placed(planar().path, pin.SE3(np.eye(3), np.array([x, y, 0.0])))
+            path = sm.paths.Placed(planar().path, pin.SE3(np.eye(3), np.array([x, y, 0.0])))
             try:
                 plan = sm.plan(planar().changed(path=path))
             except sm.SelfmotionError:
@@ -75,7 +75,7 @@ def test_a_place_says_what_keeps_it_there(found: sm.Placement) -> None:
         for aside in (-0.02, 0.02):
             moved = {**found.place, name: value + aside}
             frame = pin.SE3(np.eye(3), np.array([moved["x"], moved["y"], 0.0]))
-            there = planar().changed(path=sm.Placed(planar().path, frame))
+            there = planar().changed(path=sm.paths.Placed(planar().path, frame))
             assert sm.plan(there).report.cost >= found.cost * (1.0 - 1e-3)
     assert "move the part by" in str(found)
 
@@ -94,14 +94,14 @@ def test_a_map_is_of_plans_on_their_own(found: sm.Placement, tmp_path: Path) -> 
     assert np.nanmin(drawn.costs) >= found.cost * (1.0 - 1e-3)
     for i, j in ((0, 1), (2, 2)):
         frame = pin.SE3(np.eye(3), np.array([drawn.across[j], drawn.up[i], 0.0]))
-        plan = sm.plan(planar().changed(path=sm.Placed(planar().path, frame)))
+        plan = sm.plan(planar().changed(path=sm.paths.Placed(planar().path, frame)))
         if not drawn.reasons[i][j]:
             assert drawn.costs[i, j] >= plan.report.cost * (1.0 - 1e-3)
     page = found.to_html(tmp_path / "map.html", drawn).read_text()
     assert page.count("<rect") == 9
     assert "x [m]" in page
     drawn.figure().savefig(tmp_path / "map.png")
-    with pytest.raises(sm.PlanError, match="over two of x, y"):
+    with pytest.raises(sm.errors.PlanError, match="over two of x, y"):
         found.map(("x", "yaw"))
 
 
@@ -118,7 +118,7 @@ def test_the_base_is_moved_for_what_stays(tmp_path: Path) -> None:
         there.homogeneous, (found.displacement * before).homogeneous, atol=1e-12
     )
     file = tmp_path / "base.toml"
-    sm.write_problem(plan.problem, file)
+    sm.files.write_problem(plan.problem, file)
     np.testing.assert_allclose(
         read_problem(file).robot.pose(q).homogeneous, there.homogeneous, atol=1e-12
     )
@@ -144,7 +144,7 @@ def test_several_seams_are_placed_together_and_elsewhere_alike(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(search, "_BEGINNINGS", 4)
-    first, second = planar(), planar().changed(path=sm.Reversed(planar().path))
+    first, second = planar(), planar().changed(path=sm.paths.Reversed(planar().path))
     box = {"x": (-0.1, 0.2)}
     together = sm.place([first, second], box)
     assert len(together.plans) == 2
@@ -200,9 +200,9 @@ def test_what_cannot_be_placed_is_refused(monkeypatch: pytest.MonkeyPatch) -> No
         ({"executor": 3}, "executor is 3"),
     ):
         asked = {"within": {"x": (0.0, 0.1)}, "part": ["block"], **given}
-        with pytest.raises(sm.ProblemError, match=said):
+        with pytest.raises(sm.errors.ProblemError, match=said):
             sm.place(panda(), **asked)  # type: ignore[arg-type]
-    with pytest.raises(sm.PlanError, match="no verified motion at any"):
+    with pytest.raises(sm.errors.PlanError, match="no verified motion at any"):
         sm.place(planar(), {"x": (50.0, 60.0)})
 
 
@@ -210,7 +210,7 @@ def test_places_from_the_shell(tmp_path: Path) -> None:
     cell, out, plan, page = (
         tmp_path / name for name in ("cell.toml", "out.toml", "plan.npz", "map.html")
     )
-    sm.write_problem(planar(), cell)
+    sm.files.write_problem(planar(), cell)
     code, told = invoke(
         "place", cell, "--x=-0.1,0.1", "--y=0,0.1", "--out", out, "--out", plan,
         "--map", page, "--points", "2",

@@ -13,13 +13,13 @@ def test_the_shortest_motion_is_a_chain_that_keeps_all_between_its_nodes() -> No
         robot,
         line_of(robot, "position"),
         task="position",
-        costs=[sm.PathLength(smoothing=1e-3)],
-        constraints=[sm.JointPositionLimits(), sm.JointVelocityLimits()],
+        costs=[sm.costs.PathLength(smoothing=1e-3)],
+        constraints=[sm.constraints.JointPositionLimits(), sm.constraints.JointVelocityLimits()],
         rest=False,
     )
     search = sm.Search(mode="global", rng=0)
     plan = sm.plan(problem, search=search).require()
-    assert isinstance(plan.report.null_motion, sm.NodeNullMotion)
+    assert isinstance(plan.report.null_motion, sm.motion.NodeNullMotion)
     steps = np.abs(np.diff(plan.trajectory(np.linspace(0.0, problem.path.duration, 2001)), axis=0))
     # What is smoothed and what is not differ by no more than δ for each joint.
     assert plan.report.cost <= steps.sum() <= plan.report.cost + robot.dof * 1e-3 * 2.0

@@ -47,7 +47,7 @@ def test_a_given_start_is_the_only_one_tried(panda_circle: Circle) -> None:
 @pytest.mark.parametrize("mode", ["auto", "local", "global"])
 def test_attempts_come_in_order(planar: sm.RobotModel, mode: str) -> None:
     start = planar.inverse_kinematics(pin.SE3(np.eye(3), np.array([2.0, 1.0, 0.0])), "planar")
-    line = sm.Line(planar.pose(start), pin.SE3(np.eye(3), np.array([2.2, 0.7, 0.0])), 1.0)
+    line = sm.paths.Line(planar.pose(start), pin.SE3(np.eye(3), np.array([2.2, 0.7, 0.0])), 1.0)
     plan = sm.plan(sm.Problem(planar, line, "planar"), search=sm.Search(mode=mode, starts=6))
     tried = names_of(plan)
     assert tried == sorted(tried, key=NAMES.index)
@@ -57,7 +57,7 @@ def test_attempts_come_in_order(planar: sm.RobotModel, mode: str) -> None:
 
 def test_a_part_is_an_attempt_with_a_reason(planar: sm.RobotModel) -> None:
     start = planar.inverse_kinematics(pin.SE3(np.eye(3), np.array([2.0, 1.0, 0.0])), "planar")
-    line = sm.Line(planar.pose(start), pin.SE3(np.eye(3), np.array([9.0, 1.0, 0.0])), 2.0)
+    line = sm.paths.Line(planar.pose(start), pin.SE3(np.eye(3), np.array([9.0, 1.0, 0.0])), 2.0)
     plan = sm.plan(sm.Problem(planar, line, "planar", start))
     assert plan.report.ending
     last = plan.report.attempts[-1]
@@ -71,7 +71,7 @@ def test_what_is_interrupted_is_an_attempt(panda_circle: Circle) -> None:
             raise KeyboardInterrupt
 
     plan = sm.plan(panda_circle(), progress=progress)
-    assert plan.report.status is sm.Status.INTERRUPTED
+    assert plan.report.status is sm.optimise.Status.INTERRUPTED
     assert names_of(plan) == ["given start", "finer grids and proof"]
 
 
@@ -90,7 +90,7 @@ def test_what_costs_more_freely_is_not_optimised_with_limits(
 ) -> None:
     free = sm.plan(panda_circle("position"))
     fastest = np.abs(free.trajectory.qd).max()
-    limits = [sm.JointVelocityLimits(0.9 * fastest)]
+    limits = [sm.constraints.JointVelocityLimits(0.9 * fastest)]
     problem = dataclasses.replace(panda_circle("position"), constraints=limits)
     effort = Effort(None, None, None, Counts())
     session = Session(Beginning.of(problem, effort, problem.given_start, free=False))
@@ -103,7 +103,7 @@ def test_what_conditions_did_not_count_for_is_none_that_keeps_them(panda_circle:
     """Who stops on the way to the free optimum is left no motion: it may break limits."""
     free = sm.plan(panda_circle("position"))
     fastest = np.abs(free.trajectory.qd).max()
-    limits = [sm.JointVelocityLimits(0.9 * fastest)]
+    limits = [sm.constraints.JointVelocityLimits(0.9 * fastest)]
     problem = dataclasses.replace(panda_circle("position"), constraints=limits)
     start = np.array(problem.given_start)
     bound = problem.bind_constraints(start, start)
@@ -115,7 +115,9 @@ def test_what_conditions_did_not_count_for_is_none_that_keeps_them(panda_circle:
     assert found.violations
     assert descent.latest is None
     # One that does is kept.
-    easy = dataclasses.replace(problem, constraints=[sm.JointVelocityLimits(2.0 * fastest)])
+    easy = dataclasses.replace(
+        problem, constraints=[sm.constraints.JointVelocityLimits(2.0 * fastest)]
+    )
     bound = easy.bind_constraints(start, start)
     descent = NodeDescent(easy, effort, bound, free=False)
     descent.near([free.trajectory], first_nodes(easy))
@@ -129,7 +131,9 @@ def test_an_optimum_that_takes_the_arm_into_itself_goes_on_at_once(panda: sm.Rob
     start = lower + (upper - lower) * rng.uniform(0.1, 0.9, panda.dof)
     moves = np.cumsum(rng.uniform(-0.5, 0.5, (3, panda.dof)), axis=0)
     poses = [panda.pose(q) for q in (start, *np.clip(start + moves, lower, upper))]
-    problem = sm.Problem(panda, sm.Waypoints.from_poses(np.linspace(0, 4, 4), poses), start=start)
+    problem = sm.Problem(
+        panda, sm.paths.Waypoints.from_poses(np.linspace(0, 4, 4), poses), start=start
+    )
     careless = sm.plan(dataclasses.replace(problem, collision=None))
     assert not problem.keeps_off_itself(careless.trajectory.q)
     plan = sm.plan(problem)

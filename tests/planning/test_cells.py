@@ -33,7 +33,7 @@ def bar(x: float) -> sm.Problem:
         tool=HANDS,
     )
     first = pin.SE3(np.diag([1.0, -1.0, -1.0]), np.array([x, 0.2, 0.3]))
-    circle = sm.Circle.around(first, radius=0.15, duration=6.0, normal=(0, 1, 0))
+    circle = sm.paths.Circle.around(first, radius=0.15, duration=6.0, normal=(0, 1, 0))
     grasp = sm.Follow(stand(0.4), tool=HANDS[1], reference=HANDS[0])
     return sm.Problem(cell, [sm.Follow(circle, tool=HANDS[0]), grasp])
 
@@ -95,7 +95,7 @@ def test_plans_of_cells_are_saved_and_their_problems_written(
     carried.save(tmp_path / "plan.npz")
     loaded = sm.load_plan(tmp_path / "plan.npz")
     assert loaded.certificate == carried.certificate
-    sm.write_problem(carried.problem, tmp_path / "cell.toml")
+    sm.files.write_problem(carried.problem, tmp_path / "cell.toml")
     again = sm.read_problem(tmp_path / "cell.toml")
     assert sm.problem.problem_to_dict(again) == sm.problem.problem_to_dict(carried.problem)
 
@@ -129,7 +129,7 @@ def test_torques_are_those_of_the_tree(tmp_path: Path) -> None:
     columns = [world.joint_names.index(name) for name in seen.joint_names]
 
     def torques(robot: sm.RobotModel, parts: list[np.ndarray]) -> np.ndarray:
-        return sm.JointTorqueLimits().quantity(robot).values(*parts)
+        return sm.constraints.JointTorqueLimits().quantity(robot).values(*parts)
 
     full = [np.zeros((5, world.dof)) for _ in range(3)]
     for table, part in zip(full, (q, qd, qdd), strict=True):
@@ -157,25 +157,29 @@ BAD = {
 
 @pytest.mark.parametrize("message", BAD)
 def test_cells_that_make_no_sense_are_refused_by_name(message: str) -> None:
-    with pytest.raises(sm.RobotError, match=message.replace("no part 'tabel'", "part 'tabel'")):
+    with pytest.raises(
+        sm.errors.RobotError, match=message.replace("no part 'tabel'", "part 'tabel'")
+    ):
         BAD[message]()
 
 
 def test_follows_that_do_not_fit_are_refused(carried: sm.Plan) -> None:
     robot, path = carried.robot, carried.problem.path
     left = sm.Follow(path, tool=HANDS[0])
-    longer = sm.Line(path.pose(0.0), path.pose(1.0), 7.0)
-    with pytest.raises(sm.ProblemError, match="lasts 7 s, expected 6 s"):
+    longer = sm.paths.Line(path.pose(0.0), path.pose(1.0), 7.0)
+    with pytest.raises(sm.errors.ProblemError, match="lasts 7 s, expected 6 s"):
         sm.Problem(robot, [left, sm.Follow(longer, tool=HANDS[1])])
-    with pytest.raises(sm.ProblemError, match="cannot move them freely"):
+    with pytest.raises(sm.errors.ProblemError, match="cannot move them freely"):
         sm.Problem(robot, [left, sm.Follow(path, tool=HANDS[0])])
-    with pytest.raises(sm.ProblemError, match="'planar_pose' is for frames that move in the x-y"):
+    with pytest.raises(
+        sm.errors.ProblemError, match="'planar_pose' is for frames that move in the x-y"
+    ):
         sm.Problem(robot, [left, sm.Follow(path, "planar_pose", tool=HANDS[1])])
-    with pytest.raises(sm.ProblemError, match="does not tell how long the motion lasts"):
+    with pytest.raises(sm.errors.ProblemError, match="does not tell how long the motion lasts"):
         sm.Problem(robot, [sm.Follow(stand(0.4), tool=HANDS[1]), left])
-    with pytest.raises(sm.ProblemError, match="also: 3, expected a Follow"):
+    with pytest.raises(sm.errors.ProblemError, match="also: 3, expected a Follow"):
         sm.certify(robot, path, "pose", carried.trajectory, also=[3])  # type: ignore[list-item]
-    with pytest.raises(sm.ProblemError, match="path is an empty list"):
+    with pytest.raises(sm.errors.ProblemError, match="path is an empty list"):
         sm.Problem(robot, [])
 
 
@@ -215,12 +219,12 @@ def test_two_arms_of_six_joints_carry_a_bar_that_may_lean() -> None:
         tool=hands,
     )
     first = pin.SE3(np.diag([1.0, -1.0, -1.0]), np.array([0.45, 0.2, 0.3]))
-    circle = sm.Circle.around(first, radius=0.1, duration=6.0, normal=(0, 1, 0))
+    circle = sm.paths.Circle.around(first, radius=0.1, duration=6.0, normal=(0, 1, 0))
     follows = [
         sm.Follow(circle, tool=hands[0]),
         sm.Follow(stand(0.4), tool=hands[1], reference=hands[0]),
     ]
-    with pytest.raises(sm.RedundancyError, match="relax some of the first"):
+    with pytest.raises(sm.errors.RedundancyError, match="relax some of the first"):
         sm.Problem(pair, follows)
     problem = sm.Problem(pair, follows, relaxations=[sm.Relaxation(("rx", "ry", "rz"), 0.4)])
     plan = sm.plan(problem, search=FEW).require()
@@ -228,7 +232,7 @@ def test_two_arms_of_six_joints_carry_a_bar_that_may_lean() -> None:
     assert max(position.value, rotation.value) < TOLERANCE
     # Out of reach, it goes as far as both hands do, without a null motion to refine.
     end = pin.SE3(first.rotation, first.translation + np.array([1.5, 0.0, 0.0]))
-    away = sm.Follow(sm.Line(first, end, 6.0), tool=hands[0])
+    away = sm.Follow(sm.paths.Line(first, end, 6.0), tool=hands[0])
     far = sm.plan(dataclasses.replace(problem, path=away.path, also=problem.also), search=FEW)
     assert not far.certificate.verified
     assert "out of reach" in far.certificate.verdict
@@ -239,7 +243,7 @@ def test_part_weights_are_by_part_and_by_joint(carried: sm.Plan) -> None:
     robot = carried.robot
     found = robot.part_weights({"right": 0.5, "left/panda_joint2": 3.0})
     np.testing.assert_array_equal(found, [1, 3, 1, 1, 1, 1, 1, *[0.5] * 7])
-    with pytest.raises(sm.RobotError, match="no part or joint 'middle'"):
+    with pytest.raises(sm.errors.RobotError, match="no part or joint 'middle'"):
         robot.part_weights({"middle": 1.0})
 
 
@@ -248,14 +252,14 @@ def test_follows_of_other_frames_than_the_arm_was_loaded_for_are_saved(tmp_path:
     file = random_cell(np.random.default_rng(0), tmp_path)
     robot = sm.load_robot(file, tool=(LEFT, RIGHT))
     first = robot.chain_to(LEFT, RIGHT).place(robot.generic_configurations()[0])
-    circle = sm.Circle.around(first, 0.05, 3.0, normal=(0, 0, 1))
+    circle = sm.paths.Circle.around(first, 0.05, 3.0, normal=(0, 0, 1))
     left = sm.Follow(circle, "position", tool=LEFT, reference=RIGHT)
     problem = sm.Problem(robot, [left], collision=None)
     loaded = sm.problem.problem_from_dict(sm.problem.problem_to_dict(problem))
     assert loaded.robot.joint_names == robot.joint_names
     assert len(sm.load_robot(file, tool=LEFT, reference=RIGHT).joint_names) < robot.dof
-    with pytest.raises(sm.ProblemError, match="was loaded for other frames"):
-        sm.write_problem(problem, tmp_path / "cell.toml")
+    with pytest.raises(sm.errors.ProblemError, match="was loaded for other frames"):
+        sm.files.write_problem(problem, tmp_path / "cell.toml")
 
 
 def positioned(**options: object) -> sm.RobotModel:
@@ -265,14 +269,14 @@ def positioned(**options: object) -> sm.RobotModel:
     return sm.load_robot({"arm": "panda", "table": "positioner"}, **where)
 
 
-RING = sm.Circle.around(
+RING = sm.paths.Circle.around(
     pin.SE3(np.diag([1.0, -1.0, -1.0]), np.array([0.1, 0.0, 0.03])), 0.05, 4.0, normal=(0, 0, 1)
 )
 
 
 def test_what_the_arm_of_a_cell_holds_is_written(tmp_path: Path) -> None:
     robot = positioned(tool_offset=pin.SE3(np.eye(3), np.array([0.0, 0.0, 0.1])))
-    sm.write_problem(sm.Problem(robot, RING, "pointing"), tmp_path / "cell.toml")
+    sm.files.write_problem(sm.Problem(robot, RING, "pointing"), tmp_path / "cell.toml")
     again = sm.read_problem(tmp_path / "cell.toml").robot
     assert again.tools == robot.tools
     q = np.full(robot.dof, 0.3)
@@ -295,7 +299,11 @@ def test_parts_that_stand_in_each_other_are_not_verified(at: float) -> None:
     still = sm.Trajectory(
         np.array([0.0, 1.0]), np.zeros((2, robot.dof)), np.zeros((2, robot.dof)), robot.joint_names
     )
-    finding = sm.Clearance(distance=0.0).requirement(robot).judge(FinishedMotion(robot, still))
+    finding = (
+        sm.constraints.Clearance(distance=0.0)
+        .requirement(robot)
+        .judge(FinishedMotion(robot, still))
+    )
     stands = {"arm/panda_link0 - table/stand", "table/stand - arm/panda_link0"}
     assert (finding.subject in stands and "into each other" in finding.text) is (at < 0.2)
 
@@ -309,8 +317,8 @@ def test_every_feed_of_a_cell_is_judged(carried: sm.Plan) -> None:
     """Also that of a frame that is not the first."""
     robot, first = carried.robot, carried.problem.path.pose(0.0)
     away = first * pin.SE3(np.eye(3), np.array([0.05, 0.0, 0.0]))
-    held = sm.Feed(sm.Line(first, away, 1.0), 0.01, within=0.1)
-    slower = sm.Dwell(first, held.duration)
+    held = sm.paths.Feed(sm.paths.Line(first, away, 1.0), 0.01, within=0.1)
+    slower = sm.paths.Dwell(first, held.duration)
     items = [sm.Follow(slower, tool=HANDS[0]), sm.Follow(held, tool=HANDS[1])]
     q = np.zeros((2, robot.dof))
     motion = sm.Trajectory(np.array([0.0, held.duration]), q, q, robot.joint_names)
@@ -322,7 +330,7 @@ def test_several_paths_are_retimed_together(carried: sm.Plan) -> None:
     """A path of the second hand's own, too."""
     robot, circle = carried.robot, carried.problem.path
     grasp = stand(0.4)
-    second = sm.Dwell(grasp, circle.duration)
+    second = sm.paths.Dwell(grasp, circle.duration)
     items = [sm.Follow(circle, tool=HANDS[0]), sm.Follow(second, "pose", HANDS[1], HANDS[0])]
     problem = sm.Problem(robot, items, start=carried.trajectory.q[0])
     again = dataclasses.replace(carried, problem=problem)
@@ -340,15 +348,15 @@ REFUSED = {
 
 @pytest.mark.parametrize("message", REFUSED)
 def test_bad_arguments_of_cells_are_refused_by_name(message: str) -> None:
-    with pytest.raises(sm.RobotError, match=message):
+    with pytest.raises(sm.errors.RobotError, match=message):
         REFUSED[message]()
 
 
 def test_what_cannot_follow_several_paths_says_so(carried: sm.Plan) -> None:
-    with pytest.raises(sm.ProblemError, match="the moves between parts would not keep"):
+    with pytest.raises(sm.errors.ProblemError, match="the moves between parts would not keep"):
         sm.plan_in_parts(carried.problem)
-    with pytest.raises(sm.ProblemError, match="other works' methods follow one path"):
-        sm.plan_by(carried.problem, sm.PseudoInverse())
+    with pytest.raises(sm.errors.ProblemError, match="other works' methods follow one path"):
+        sm.plan_by(carried.problem, sm.baselines.PseudoInverse())
 
 
 def test_links_of_parts_that_always_overlap_are_judged() -> None:

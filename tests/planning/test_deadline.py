@@ -28,7 +28,7 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
 @pytest.fixture
 def problem(panda: sm.RobotModel) -> sm.Problem:
     start = np.array(sm.NAMED_ARMS["panda"].home)
-    path = sm.Circle.around(panda.pose(start), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
+    path = sm.paths.Circle.around(panda.pose(start), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
     return sm.Problem(panda, path, "position", start, collision=None)
 
 
@@ -37,7 +37,7 @@ def test_the_best_so_far_is_returned_and_judged(
     problem: sm.Problem, clock: Clock, seconds: float
 ) -> None:
     found = sm.plan(problem, deadline=seconds)
-    assert found.report.status is sm.Status.DEADLINE
+    assert found.report.status is sm.optimise.Status.DEADLINE
     assert "deadline" in found.report.message
     assert found.report.cost <= found.report.initial_cost
     assert found.certificate.on_path
@@ -58,11 +58,11 @@ def test_time_enough_changes_nothing(problem: sm.Problem) -> None:
 
 def test_too_early_for_any_motion_is_said(panda: sm.RobotModel, clock: Clock) -> None:
     pose = panda.pose(np.array(sm.NAMED_ARMS["panda"].home))
-    path = sm.Circle.around(pose, 0.15, 4.0, normal=(1.0, 0.0, 0.0))
-    with pytest.raises(sm.PlanError, match="deadline of 1"):
+    path = sm.paths.Circle.around(pose, 0.15, 4.0, normal=(1.0, 0.0, 0.0))
+    with pytest.raises(sm.errors.PlanError, match="deadline of 1"):
         sm.plan(sm.Problem(panda, path, "position"), deadline=1.0)
 
 
 def test_a_deadline_is_a_positive_time(problem: sm.Problem) -> None:
-    with pytest.raises(sm.ProblemError, match="deadline"):
+    with pytest.raises(sm.errors.ProblemError, match="deadline"):
         sm.plan(problem, deadline=0.0)

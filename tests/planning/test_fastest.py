@@ -26,7 +26,7 @@ def found() -> sm.Fastest:
     panda = robot_named("panda")
     start = panda.pose(PANDA_HOME)
     end = pin.SE3(start.rotation, start.translation + np.array([-0.1, 0.25, 0.15]))
-    return sm.fastest(sm.Problem(panda, sm.Line(start, end, 2.0), start=PANDA_HOME))
+    return sm.fastest(sm.Problem(panda, sm.paths.Line(start, end, 2.0), start=PANDA_HOME))
 
 
 def test_it_is_faster_than_the_pseudo_inverse_and_keeps_all_limits(found: sm.Fastest) -> None:
@@ -63,15 +63,17 @@ def test_arms_and_paths_without_a_fastest_pace(panda: sm.RobotModel) -> None:
     start = panda.pose(PANDA_HOME)
     baxter = robot_named("baxter")
     pose = baxter.dexterous_configuration()
-    path = sm.Circle.around(baxter.pose(pose), 0.05, 2.0)
-    with pytest.raises(sm.ProblemError, match=r"no limit of acceleration is known .* give accel"):
+    path = sm.paths.Circle.around(baxter.pose(pose), 0.05, 2.0)
+    with pytest.raises(
+        sm.errors.ProblemError, match=r"no limit of acceleration is known .* give accel"
+    ):
         sm.fastest(sm.Problem(baxter, path, start=pose))
     away = pin.SE3(start.rotation, start.translation + np.array([1.5, 0.0, 0.0]))
     # The reason is where it ends, and nothing of how fast it would be.
     told = r"no motion keeps all limits at any pace: the motion ends at [^;]*$"
-    with pytest.raises(sm.PlanError, match=told):
-        sm.fastest(sm.Problem(panda, sm.Line(start, away, 4.0), start=PANDA_HOME))
-    with pytest.raises(sm.ProblemError, match="problem is 1, expected a Problem"):
+    with pytest.raises(sm.errors.PlanError, match=told):
+        sm.fastest(sm.Problem(panda, sm.paths.Line(start, away, 4.0), start=PANDA_HOME))
+    with pytest.raises(sm.errors.ProblemError, match="problem is 1, expected a Problem"):
         sm.fastest(1)
 
 
@@ -79,15 +81,17 @@ def slow_line() -> sm.Problem:
     panda = robot_named("panda")
     start = panda.pose(PANDA_HOME)
     end = pin.SE3(start.rotation, start.translation + np.array([-0.1, 0.2, 0.1]))
-    return sm.Problem(panda, sm.Line(start, end, 2.0), start=PANDA_HOME)
+    return sm.Problem(panda, sm.paths.Line(start, end, 2.0), start=PANDA_HOME)
 
 
 def test_it_is_no_slower_than_the_motion_that_is_best_by_the_costs(found: sm.Fastest) -> None:
     problem = dataclasses.replace(
-        found.plan.problem, path=slow_line().path, constraints=(sm.JointPositionLimits(),)
+        found.plan.problem,
+        path=slow_line().path,
+        constraints=(sm.constraints.JointPositionLimits(),),
     )
     assert found.duration <= found.retimed < np.inf
-    assert found.status is sm.Status.CONVERGED
+    assert found.status is sm.optimise.Status.CONVERGED
     assert found.plan.limits_used.busy > 0.9
     slow = sm.plan(problem)
     assert slow.limits_used.busy < 0.1
@@ -96,7 +100,7 @@ def test_it_is_no_slower_than_the_motion_that_is_best_by_the_costs(found: sm.Fas
 def test_costs_are_kept_at_the_time_law_of_the_path() -> None:
     """No cheaper than asked, no slower than retiming; what nothing costs is named."""
     problem = slow_line()
-    best, cost = sm.plan(problem), sm.JointVelocity()
+    best, cost = sm.plan(problem), sm.costs.JointVelocity()
     kept = KeptCosts.of(problem, {cost.kind: KEPT})
 
     def twice(stage: str, done: int, total: int) -> None:
@@ -109,9 +113,9 @@ def test_costs_are_kept_at_the_time_law_of_the_path() -> None:
     assert found.duration <= found.retimed
     # At another pace the same joint path costs the same.
     assert kept.values(sm.retime(best)) == pytest.approx(best.report.cost, rel=SAME)
-    with pytest.raises(sm.ProblemError, match="no cost 'PathLength', but JointVelocity"):
+    with pytest.raises(sm.errors.ProblemError, match="no cost 'PathLength', but JointVelocity"):
         sm.fastest(problem, keep={"PathLength": 1.1})
-    with pytest.raises(sm.ProblemError, match="keep: JointVelocity"):
+    with pytest.raises(sm.errors.ProblemError, match="keep: JointVelocity"):
         sm.fastest(problem, keep={"JointVelocity": 0.9})
 
 
@@ -123,7 +127,7 @@ def test_an_interruption_and_a_deadline_keep_the_best_so_far(
             raise KeyboardInterrupt
 
     stopped = sm.fastest(slow_line(), progress=interrupting)
-    assert stopped.status is sm.Status.INTERRUPTED
+    assert stopped.status is sm.optimise.Status.INTERRUPTED
     assert stopped.plan.certificate.verified
     assert stopped.times == ()
     assert stopped.duration == min(stopped.retimed, stopped.pseudo_inverse)
@@ -135,18 +139,20 @@ def test_an_interruption_and_a_deadline_keep_the_best_so_far(
         clock[0] += 100.0 * (stage == "fastest")
 
     out = sm.fastest(slow_line(), deadline=90.0, progress=late)
-    assert out.status is sm.Status.DEADLINE
+    assert out.status is sm.optimise.Status.DEADLINE
     assert out.plan.certificate.verified
-    with pytest.raises(sm.PlanError, match="no motion keeps all limits at any pace in 1e-06 s"):
+    with pytest.raises(
+        sm.errors.PlanError, match="no motion keeps all limits at any pace in 1e-06 s"
+    ):
         sm.fastest(slow_line(), deadline=1e-6)
 
 
 def test_a_file_may_ask_for_the_fastest_motion(tmp_path: Path) -> None:
     file = tmp_path / "line.toml"
-    sm.write_problem(slow_line(), file)
+    sm.files.write_problem(slow_line(), file)
     text = file.read_text(encoding="utf-8")
     file.write_text(f'goal = "fastest"\n{text}', encoding="utf-8")
-    job = sm.read_job(file)
+    job = sm.files.read_job(file)
     assert job.goal == "fastest"
 
     def interrupting(stage: str, done: int, total: int) -> None:
@@ -155,21 +161,23 @@ def test_a_file_may_ask_for_the_fastest_motion(tmp_path: Path) -> None:
 
     assert job.plan(progress=interrupting).path.duration < 1.0
     kept = dataclasses.replace(job, keep={"JointVelocity": 1.1})
-    sm.write_problem(kept, file)
-    assert sm.read_job(file).keep == kept.keep
+    sm.files.write_problem(kept, file)
+    assert sm.files.read_job(file).keep == kept.keep
     file.write_text(f'goal = "fastest"\nmax_evaluations = 3\n{text}', encoding="utf-8")
-    with pytest.raises(sm.ProblemError, match="max_evaluations: has no effect on the fastest"):
-        sm.read_job(file).plan()
+    with pytest.raises(
+        sm.errors.ProblemError, match="max_evaluations: has no effect on the fastest"
+    ):
+        sm.files.read_job(file).plan()
     file.write_text(f'goal = "quick"\n{text}', encoding="utf-8")
-    with pytest.raises(sm.FileFormatError, match="goal"):
-        sm.read_job(file)
+    with pytest.raises(sm.errors.FileFormatError, match="goal"):
+        sm.files.read_job(file)
 
 
 def test_windows_of_relaxations_stay_where_they_are_on_the_path() -> None:
     robot, start, window = robot_named("planar_3r"), np.array([0.2, 1.2, 0.9]), (1.0, 2.0)
     pose = robot.pose(start)
     there = pin.SE3(pose.rotation, pose.translation + np.array([-0.06, 0.06, 0.0]))
-    line = sm.Line(pose, there, 3.0)
+    line = sm.paths.Line(pose, there, 3.0)
     asked = sm.Problem(
         robot,
         line,
@@ -199,7 +207,7 @@ def test_a_pace_that_no_smooth_one_is_near_ends_the_rounds() -> None:
     """The quintic through it would turn back: what was found by then is the motion."""
     panda = robot_named("panda")
     start = panda.dexterous_configuration()
-    circle = sm.Circle.around(panda.pose(start), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
+    circle = sm.paths.Circle.around(panda.pose(start), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
     found = sm.fastest(sm.Problem(panda, circle, "position", start))
     assert found.plan.certificate.verified
     assert found.duration <= found.pseudo_inverse

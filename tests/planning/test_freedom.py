@@ -17,7 +17,7 @@ POSES = DATA / "panda__1cube" / "path.csv"
 
 
 @dataclass(frozen=True, eq=False)
-class Corridor(sm.Constraint):
+class Corridor(sm.constraints.Constraint):
     """The last joint within `WIDTH` of a known motion's."""
 
     motion: sm.Trajectory
@@ -25,7 +25,7 @@ class Corridor(sm.Constraint):
     def bind(self, follows: sm.Follows, start: Array, end: Array) -> "Nodes":
         return Nodes(self.motion)
 
-    def requirement(self, robot: sm.RobotModel) -> sm.Requirement:
+    def requirement(self, robot: sm.RobotModel) -> sm.certificate.Requirement:
         return Judge(self.motion)
 
 
@@ -36,32 +36,34 @@ class Nodes:
     equality: bool = False
     tolerance: float = 1e-2
 
-    def _off(self, samples: sm.Samples) -> Array:
+    def _off(self, samples: sm.costs.Samples) -> Array:
         nodes = samples.nodes
         return np.asarray(samples.q[nodes, -1] - self.motion(samples.t[nodes])[:, -1])
 
-    def residual(self, samples: sm.Samples) -> Array:
+    def residual(self, samples: sm.costs.Samples) -> Array:
         return (np.abs(self._off(samples)) / WIDTH - 1.0)[:, None]
 
-    def tangents(self, samples: sm.Samples, motion: sm.NodeTangents) -> Array:
+    def tangents(self, samples: sm.costs.Samples, motion: sm.constraints.NodeTangents) -> Array:
         side = np.sign(self._off(samples))[:, None]
         return np.asarray(side * motion.q[:, -1] / WIDTH)[:, None]
 
-    def describe(self, samples: sm.Samples, row: int, column: int) -> str:
+    def describe(self, samples: sm.costs.Samples, row: int, column: int) -> str:
         return f"{self._off(samples)[row]:.3f} rad off"
 
 
 @dataclass(frozen=True, eq=False)
-class Judge(sm.Requirement):
+class Judge(sm.certificate.Requirement):
     motion: sm.Trajectory
     name: str = "corridor"
 
-    def judge(self, motion: sm.FinishedMotion) -> sm.Finding:
+    def judge(self, motion: sm.certificate.FinishedMotion) -> sm.certificate.Finding:
         off = np.abs(motion.q[:, -1] - self.motion(motion.t)[:, -1])
         worst = int(np.argmax(off))
         time, most = float(motion.t[worst]), float(off[worst])
         kept = bool(most <= 1.05 * WIDTH)
-        return sm.Finding(self.name, "joint 3", time, most, WIDTH, kept, f"{most:.3f} rad off")
+        return sm.certificate.Finding(
+            self.name, "joint 3", time, most, WIDTH, kept, f"{most:.3f} rad off"
+        )
 
 
 @pytest.fixture(scope="module")
@@ -72,9 +74,9 @@ def winding() -> sm.Problem:
     def pulled(qd: Array, q: Array, t: Array) -> Array:
         return 50.0 * (q[:, -1] - free.given_start[-1] - 0.15 * np.sin(3.0 * np.pi * t)) ** 2
 
-    spline = sm.BSplineNullMotion(16)
+    spline = sm.motion.BSplineNullMotion(16)
     problem = sm.Problem(
-        free.robot, free.path, free.task, free.given_start, spline, [sm.FunctionCost(pulled)]
+        free.robot, free.path, free.task, free.given_start, spline, [sm.costs.FunctionCost(pulled)]
     )
     known = sm.plan(problem).trajectory
     return sm.Problem(
@@ -82,7 +84,7 @@ def winding() -> sm.Problem:
         free.path,
         free.task,
         free.given_start,
-        costs=[sm.JointVelocity()],
+        costs=[sm.costs.JointVelocity()],
         constraints=[Corridor(known)],
     )
 
@@ -92,13 +94,13 @@ def test_what_a_cubic_cannot_meet_the_default_meets_with_more_freedom(winding: s
     assert not sm.plan(cubic).certificate.verified
     found = sm.plan(winding)
     assert found.certificate.verified
-    assert isinstance(found.report.null_motion, sm.NodeNullMotion)
+    assert isinstance(found.report.null_motion, sm.motion.NodeNullMotion)
 
 
 def test_what_no_cubic_near_x_0_keeps_is_kept() -> None:
     """200 poses that a Panda can follow within its limits, but not by a cubic near x = 0."""
     robot = sm.load_robot("panda", tool="panda_hand")
-    path = sm.Waypoints.from_csv(POSES)
+    path = sm.paths.Waypoints.from_csv(POSES)
     start = robot.inverse_kinematics(path.pose(0.0), seed=[0.0, -0.5, 0.0, -2.0, 0.0, 1.6, 0.8])
     problem = sm.Problem(robot, path, start=start)
     cubic = sm.plan(replace(problem, null_motion=sm.PolynomialNullMotion()))
@@ -110,17 +112,21 @@ def test_what_no_cubic_near_x_0_keeps_is_kept() -> None:
     assert sm.plan(problem).certificate.verified
 
 
-def too_fast(motion: sm.NullMotion) -> sm.Plan:
+def too_fast(motion: sm.motion.NullMotion) -> sm.Plan:
     """Plan a path that is twice as fast as its limit, whatever the joints do."""
     free = sm.sample_problem()
     times = np.linspace(0.0, free.path.duration, 2001)
     speed = np.linalg.norm(free.path.samples(times).twist[:, :3], axis=1).max()
-    limits = sm.ToolLimits(speed=0.5 * speed)
+    limits = sm.constraints.ToolLimits(speed=0.5 * speed)
     return sm.plan(replace(free, null_motion=motion, constraints=[limits]))
 
 
 def test_where_nothing_can_be_met_the_verdict_says_by_how_much() -> None:
-    for motion in (sm.PolynomialNullMotion(), sm.FreeNullMotion(), sm.BSplineNullMotion(32)):
+    for motion in (
+        sm.PolynomialNullMotion(),
+        sm.motion.FreeNullMotion(),
+        sm.motion.BSplineNullMotion(32),
+    ):
         plan = too_fast(motion)
         assert not plan.certificate.verified
         assert "2 times its limit" in plan.certificate.verdict

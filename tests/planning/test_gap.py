@@ -28,8 +28,8 @@ def level(x: float, y: float) -> pin.SE3:
 def free() -> sm.Problem:
     """A path inside 3 m, where elbow up and elbow down are families of their own."""
     robot = sm.load_robot("planar_3r")
-    path = sm.Line(level(1.0, 0.5), level(1.6, 0.1), 1.0)
-    limits = (sm.JointPositionLimits(), sm.JointVelocityLimits())
+    path = sm.paths.Line(level(1.0, 0.5), level(1.6, 0.1), 1.0)
+    limits = (sm.constraints.JointPositionLimits(), sm.constraints.JointVelocityLimits())
     return sm.Problem(robot, path, "planar", constraints=limits)
 
 
@@ -73,8 +73,8 @@ def test_a_given_start_is_kept_and_only_compared(
 
 def test_path_lengths_are_compared_like_with_like(free: sm.Problem) -> None:
     """Where the cost is the path length, the plan is about as long as the shortest sequence."""
-    costs = [sm.PathLength(smoothing=0.005)]
-    motion = sm.BSplineNullMotion(20)
+    costs = [sm.costs.PathLength(smoothing=0.005)]
+    motion = sm.motion.BSplineNullMotion(20)
     gap = sm.plan(
         dataclasses.replace(free, costs=costs, null_motion=motion),
         search=sm.Search(mode="global"),
@@ -97,6 +97,8 @@ def test_the_gap_is_saved_and_shown(compared: dict[float, sm.Plan], tmp_path: Pa
 
 def test_other_redundancies_are_refused(panda: sm.RobotModel) -> None:
     start = panda.dexterous_configuration()
-    path = sm.Line(panda.pose(start), panda.pose(start + 0.05), 1.0)
-    with pytest.raises(sm.ProblemError, match="compare: the global search needs redundancy 1"):
+    path = sm.paths.Line(panda.pose(start), panda.pose(start + 0.05), 1.0)
+    with pytest.raises(
+        sm.errors.ProblemError, match="compare: the global search needs redundancy 1"
+    ):
         sm.plan(sm.Problem(panda, path, "position", start=start), search=sm.Search(compare=True))

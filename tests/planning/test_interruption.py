@@ -32,10 +32,10 @@ def level(x: float, y: float) -> pin.SE3:
 @pytest.fixture
 def problem(planar: sm.RobotModel) -> sm.Problem:
     times = np.linspace(0.0, 1.0, 6)
-    line = sm.Line(level(1.0, 0.5), level(1.3, 0.3), 1.0)
-    path = sm.Waypoints.from_poses(times, [line.pose(float(t)) for t in times])
+    line = sm.paths.Line(level(1.0, 0.5), level(1.3, 0.3), 1.0)
+    path = sm.paths.Waypoints.from_poses(times, [line.pose(float(t)) for t in times])
     # Of path length there is more than one good sequence here.
-    return sm.Problem(planar, path, "planar", costs=[sm.PathLength()])
+    return sm.Problem(planar, path, "planar", costs=[sm.costs.PathLength()])
 
 
 SEARCH = sm.Search(starts=6, finalists=3, compare=True)
@@ -76,7 +76,7 @@ def test_an_interruption_of_the_published_method_yields_the_best_so_far(
 ) -> None:
     for stage in ("optimising start", "refining", "checking"):
         found = plan(published(problem), progress=interrupt_at(stage, 1))
-        assert found.report.status is sm.Status.INTERRUPTED
+        assert found.report.status is sm.optimise.Status.INTERRUPTED
         assert found.certificate.position_error.value < 1e-3
 
 
@@ -88,7 +88,7 @@ def test_an_interruption_at_any_stage_yields_the_best_so_far(
     alone = ("optimising start", "refining", "checking")
     number = 1 if stage in alone else 2
     found = plan(problem, progress=interrupt_at(stage, number))
-    assert found.report.status is sm.Status.INTERRUPTED
+    assert found.report.status is sm.optimise.Status.INTERRUPTED
     assert "interrupted" in found.report.message
     assert found.certificate.position_error.value < 1e-3
 
@@ -106,7 +106,7 @@ def test_an_interruption_among_guides_keeps_the_first_one(problem: sm.Problem) -
     assert whole.report.gap is not None
     assert whole.report.gap.sequences > 1
     found = plan(problem, search=GLOBAL, progress=interrupt_at("refining sequence", 2))
-    assert found.report.status is sm.Status.INTERRUPTED
+    assert found.report.status is sm.optimise.Status.INTERRUPTED
     assert found.certificate.verified
 
 
@@ -130,7 +130,7 @@ def test_an_interruption_within_any_rollout(
     for at[0] in np.unique(np.linspace(1, total, 25).astype(int)):
         calls[0] = 0
         found = plan(problem)
-        assert found.report.status is sm.Status.INTERRUPTED
+        assert found.report.status is sm.optimise.Status.INTERRUPTED
         assert np.isfinite(found.report.cost)
         assert found.certificate.position_error.value < 1e-3
 
@@ -138,12 +138,12 @@ def test_an_interruption_within_any_rollout(
 def test_a_callback_stops_all_starts(problem: sm.Problem) -> None:
     costs: list[float] = []
 
-    def stop(iteration: sm.Iteration) -> bool:
+    def stop(iteration: sm.optimise.Iteration) -> bool:
         costs.append(iteration.cost)
         return len(costs) == 2
 
     found = plan(problem, callback=stop)
-    assert found.report.status is sm.Status.STOPPED
+    assert found.report.status is sm.optimise.Status.STOPPED
     assert len(costs) == 2
     # On few nodes the cost is a little less than that of the arm's own motion through these.
     assert found.report.cost < costs[0]
@@ -155,17 +155,17 @@ def test_a_callback_that_stops_is_asked_no_more_and_is_told_of(
 ) -> None:
     """Wherever it stops: also where what is found then is worse than what there was."""
     if asked == "acceleration":
-        problem = dataclasses.replace(problem, costs=[sm.JointAcceleration()])
+        problem = dataclasses.replace(problem, costs=[sm.costs.JointAcceleration()])
     elif asked == "too slow":
         start = problem.robot.inverse_kinematics(problem.path.pose(0.0), "planar", rng=0)
-        limits = [sm.JointVelocityLimits(0.2)]
+        limits = [sm.constraints.JointVelocityLimits(0.2)]
         problem = dataclasses.replace(problem, start=start, constraints=limits)
     search = None if problem.given_start is not None else sm.Search(starts=6, finalists=3)
 
     def stopped_at(most: float) -> tuple[sm.Plan, int]:
         calls = 0
 
-        def stop(_: sm.Iteration) -> bool:
+        def stop(_: sm.optimise.Iteration) -> bool:
             nonlocal calls
             calls += 1
             return calls >= most
@@ -176,7 +176,7 @@ def test_a_callback_that_stops_is_asked_no_more_and_is_told_of(
     for most in np.unique(np.linspace(1, total, 20).astype(int)):
         found, calls = stopped_at(most)
         assert calls == most
-        assert found.report.status is sm.Status.STOPPED
+        assert found.report.status is sm.optimise.Status.STOPPED
         assert found.certificate.position_error.value < 1e-3
 
 
@@ -185,5 +185,5 @@ def test_an_interruption_of_a_given_start(problem: sm.Problem) -> None:
     given = dataclasses.replace(problem, start=start)
     for stage in STAGES[2:]:
         found = plan(given, progress=interrupt_at(stage, 1))
-        assert found.report.status is sm.Status.INTERRUPTED
+        assert found.report.status is sm.optimise.Status.INTERRUPTED
         np.testing.assert_allclose(found.trajectory.q[0], start, atol=1e-9)

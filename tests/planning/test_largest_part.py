@@ -22,15 +22,15 @@ EDGE = 1e-3
 LIMITED = 5e-3
 
 
-def outward(planar: sm.RobotModel, factor: float, duration: float = 10.0) -> sm.Line:
+def outward(planar: sm.RobotModel, factor: float, duration: float = 10.0) -> sm.paths.Line:
     """Return a line in the plane straight away from the base, from a distance of 4.66 m."""
     pose = planar.pose([0.0, 0.5, 0.5])
     end = pose.copy()
     end.translation = pose.translation * factor
-    return sm.Line(pose, end, duration, time_law="constant")
+    return sm.paths.Line(pose, end, duration, time_law="constant")
 
 
-def time_at(line: sm.Line, distance: float) -> float:
+def time_at(line: sm.paths.Line, distance: float) -> float:
     """Return when a line straight away from the base is at a distance from it, in closed form."""
     first, last = (np.linalg.norm(line.pose(t).translation) for t in (0.0, line.duration))
     return float((distance - first) / (last - first) * line.duration)
@@ -55,7 +55,7 @@ def check_part(plan: sm.Plan, edge: float) -> None:
     assert certificate.rotation_error.value <= 1e-6
     assert certificate.limit_margin.value >= 0.0
     assert certificate.velocity_ratio.value <= 1.0
-    with pytest.raises(sm.PlanError, match="the motion ends at"):
+    with pytest.raises(sm.errors.PlanError, match="the motion ends at"):
         plan.require()
 
 
@@ -91,9 +91,13 @@ def test_speed_limits_end_it_earlier_and_are_named(planar: sm.RobotModel) -> Non
 def test_joint_limits_bound_the_workspace(planar: sm.RobotModel) -> None:
     """With an elbow bent by 0.5 at least, links of 2, 2 and 1 m reach 4 cos(0.25) + 1 m."""
     line = outward(planar, 1.06)
-    limits = sm.JointPositionLimits([-6.0, 0.5, -6.0], [6.0, 3.0, 6.0])
+    limits = sm.constraints.JointPositionLimits([-6.0, 0.5, -6.0], [6.0, 3.0, 6.0])
     problem = sm.Problem(
-        planar, line, "planar", [0.0, 0.5, 0.5], constraints=[limits, sm.JointVelocityLimits()]
+        planar,
+        line,
+        "planar",
+        [0.0, 0.5, 0.5],
+        constraints=[limits, sm.constraints.JointVelocityLimits()],
     )
     start = planar.inverse_kinematics(line.pose(0.0), "planar", seed=[0.0, 0.8, 0.1])
     plan = sm.plan(dataclasses.replace(problem, start=start))
@@ -109,12 +113,12 @@ def test_a_panda_beyond_its_reach(task: str, free: bool) -> None:
     start = panda.dexterous_configuration(task)
     end = panda.pose(start)
     end.translation = 1.8 * end.translation
-    line = sm.Line(panda.pose(start), end, 4.0)
+    line = sm.paths.Line(panda.pose(start), end, 4.0)
     plan = sm.plan(sm.Problem(panda, line, task, None if free else start))
     last = plan.trajectory.t[-1]
     assert last > 0.8
     check_part(plan, 4.0)
-    with pytest.raises(sm.InverseKinematicsError):
+    with pytest.raises(sm.errors.InverseKinematicsError):
         panda.inverse_kinematics(line.pose(1.2 * last), task)
 
 
@@ -122,7 +126,9 @@ def test_limits_that_are_not_asked_for_cut_nothing_off(planar: sm.RobotModel) ->
     """Beyond the URDF's limits the certificate says so, on the whole path."""
     start = np.array([planar.lower[0] + 0.01, planar.lower[1] + 0.5, planar.lower[2] + 0.5])
     pose = planar.pose(start)
-    problem = sm.Problem(planar, sm.Circle.around(pose, 1.0, 4.0), "planar", start, constraints=[])
+    problem = sm.Problem(
+        planar, sm.paths.Circle.around(pose, 1.0, 4.0), "planar", start, constraints=[]
+    )
     plan = sm.plan(problem)
     assert plan.certificate.limit_margin.value < 0.0
     assert plan.trajectory.t[-1] == 4.0
@@ -148,13 +154,13 @@ def test_another_null_motion_where_x_0_breaks_down(planar: sm.RobotModel) -> Non
     here = planar.pose(beside)
     inner, outer = here.copy(), here.copy()
     inner.translation, outer.translation = here.translation * 0.8, here.translation * 1.3
-    inward = sm.Line(here, inner, 1.0)
+    inward = sm.paths.Line(here, inner, 1.0)
     back = Rollout(Follows.of(planar, inward, sm.Task.PLANAR), Grid.aligned(inward.knots, 8000))
     assert back.run(beside, np.zeros((32001, 3))) is None
     start = planar.inverse_kinematics(inner, "planar", seed=back.samples().q[-1])
-    line = sm.Line(inner, outer, 4.0)
+    line = sm.paths.Line(inner, outer, 4.0)
     problem = sm.Problem(planar, line, "planar", start)
-    with pytest.raises(sm.BreakdownError):
+    with pytest.raises(sm.errors.BreakdownError):
         settled_still_motion(problem, start)
     plan = sm.plan(problem)
     assert plan.certificate.verified
@@ -166,27 +172,29 @@ def test_without_a_part_the_errors_stay(planar: sm.RobotModel) -> None:
     pose = planar.pose(start)
     end = pose.copy()
     end.translation = pose.translation * 1.5
-    with pytest.raises(sm.BreakdownError, match="singular pose near t ="):
-        sm.plan(sm.Problem(planar, sm.Line(pose, end, 1.0, time_law="constant"), "planar", start))
+    with pytest.raises(sm.errors.BreakdownError, match="singular pose near t ="):
+        sm.plan(
+            sm.Problem(planar, sm.paths.Line(pose, end, 1.0, time_law="constant"), "planar", start)
+        )
     far = end.copy()
     far.translation = pose.translation * 2.0
-    with pytest.raises(sm.InverseKinematicsError, match="move the pose into the workspace"):
-        sm.plan(sm.Problem(planar, sm.Line(end, far, 1.0), "planar"))
+    with pytest.raises(sm.errors.InverseKinematicsError, match="move the pose into the workspace"):
+        sm.plan(sm.Problem(planar, sm.paths.Line(end, far, 1.0), "planar"))
 
 
 def test_an_interruption_keeps_the_part_so_far(planar: sm.RobotModel) -> None:
-    def interrupt(step: sm.Iteration) -> None:
+    def interrupt(step: sm.optimise.Iteration) -> None:
         if step.evaluations >= 3:
             raise KeyboardInterrupt
 
     problem = sm.Problem(planar, outward(planar, 1.5), "planar", [0.0, 0.5, 0.5])
     plan = sm.plan(problem, callback=interrupt)
-    assert plan.report.status is sm.Status.INTERRUPTED
+    assert plan.report.status is sm.optimise.Status.INTERRUPTED
     assert "the motion ends at" in plan.certificate.verdict
 
 
 def test_conditions_on_the_end_do_not_bind_a_part(planar: sm.RobotModel) -> None:
-    constraints = [sm.JointPositionLimits(), sm.EndVelocity(0.1)]
+    constraints = [sm.constraints.JointPositionLimits(), sm.constraints.EndVelocity(0.1)]
     line = outward(planar, 1.5)
     problem = sm.Problem(planar, line, "planar", [0.0, 0.5, 0.5], constraints=constraints)
     plan = sm.plan(problem)
@@ -199,7 +207,7 @@ def test_an_excursion_between_the_poses_looked_at_is_found(planar: sm.RobotModel
     pose = np.eye(4)
     pose[0, 3] = 4.002
     centre, axis = np.array([4.502, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])
-    circle = sm.Circle(pose, centre, axis, 4.0, turns=1.013)
+    circle = sm.paths.Circle(pose, centre, axis, 4.0, turns=1.013)
     start = planar.inverse_kinematics(circle.pose(0.0), "planar")
     plan = sm.plan(sm.Problem(planar, circle, "planar", start))
     times = np.linspace(0.0, 4.0, 400_001)
@@ -219,8 +227,8 @@ def test_poses_that_limits_put_out_of_reach_end_the_search(
     first = planar.pose(start)
     last = first.copy()
     last.translation = 0.25 * first.translation
-    line = sm.Line(first, last, 3.0)
-    limits = sm.JointPositionLimits(np.full(3, -most), np.full(3, most))
+    line = sm.paths.Line(first, last, 3.0)
+    limits = sm.constraints.JointPositionLimits(np.full(3, -most), np.full(3, most))
     stages: list[str] = []
     news: list[str] = []
 

@@ -29,9 +29,12 @@ def loops(planar: sm.RobotModel, count: int, start: bool = False) -> sm.Problem:
     angle = np.linspace(0.0, 2.0 * np.pi * count, WAYPOINTS * count + 1)
     flat = np.zeros_like(angle)
     points = np.stack([2.2 + RADIUS * np.cos(angle), RADIUS * np.sin(angle), flat], axis=1)
-    path = sm.Waypoints(np.linspace(0.0, PERIOD * count, len(angle)), points)
+    path = sm.paths.Waypoints(np.linspace(0.0, PERIOD * count, len(angle)), points)
     first = planar.inverse_kinematics(path.pose(0.0), "planar", seed=ELBOW) if start else None
-    limits = [sm.JointPositionLimits(np.full(3, -2.8), np.full(3, 2.8)), sm.JointVelocityLimits()]
+    limits = [
+        sm.constraints.JointPositionLimits(np.full(3, -2.8), np.full(3, 2.8)),
+        sm.constraints.JointVelocityLimits(),
+    ]
     return sm.Problem(planar, path, "planar", first, constraints=limits, rest=False)
 
 
@@ -104,7 +107,7 @@ def test_an_interruption_is_obeyed_on_the_stretch_too(
 def test_a_callback_that_stops_ends_it(planar: sm.RobotModel) -> None:
     told: list[float] = []
 
-    def stop(iteration: sm.Iteration) -> bool:
+    def stop(iteration: sm.optimise.Iteration) -> bool:
         told.append(iteration.cost)
         return True
 
@@ -119,7 +122,7 @@ def test_an_interruption_of_newtons_method_keeps_the_best_so_far(planar: sm.Robo
     whole: list[float] = []
     stages: list[str] = []
 
-    def interrupt(iteration: sm.Iteration) -> bool:
+    def interrupt(iteration: sm.optimise.Iteration) -> bool:
         if stages[-1] == "posture":
             whole.append(iteration.cost)
         if len(whole) == 2:
@@ -142,7 +145,7 @@ def test_who_wants_no_more_among_the_postures_of_a_stretch_waits_for_nothing(
 ) -> None:
     """Also where the motion in such a posture is worse than what there is."""
     problem = loops(planar, 8, start=True)
-    slow = [problem.constraints[0], sm.JointVelocityLimits(0.3)]
+    slow = [problem.constraints[0], sm.constraints.JointVelocityLimits(0.3)]
     problem = dataclasses.replace(problem, constraints=slow)
     stages: list[str] = []
     asked: list[str] = []
@@ -152,12 +155,14 @@ def test_who_wants_no_more_among_the_postures_of_a_stretch_waits_for_nothing(
         if stage == "optimising start" and not stops:
             raise KeyboardInterrupt
 
-    def stop(_: sm.Iteration) -> bool:
+    def stop(_: sm.optimise.Iteration) -> bool:
         asked.append(stages[-1] if stages else "")
         return asked[-1] == "optimising start"
 
     found = sm.plan(problem, progress=progress, callback=stop)
-    assert found.report.status is (sm.Status.STOPPED if stops else sm.Status.INTERRUPTED)
+    assert found.report.status is (
+        sm.optimise.Status.STOPPED if stops else sm.optimise.Status.INTERRUPTED
+    )
     assert asked.count("optimising start") == stops
     assert asked[-1] == ("optimising start" if stops else "")
     assert stages[-1] == "checking"

@@ -12,7 +12,7 @@ from support.arms import PANDA_HOME
 CLEARANCE = 1e-3
 
 
-def fork(folder: Path, gap: float) -> sm.Mesh:
+def fork(folder: Path, gap: float) -> sm.obstacles.Mesh:
     """Return a fork ahead of the flange, two prongs with a gap [m], in one mesh."""
     prongs = [
         trimesh.creation.box([0.01, 0.01, 0.06], trimesh.transformations.translation_matrix(at))
@@ -23,7 +23,7 @@ def fork(folder: Path, gap: float) -> sm.Mesh:
     )
     file = folder / "fork.stl"
     trimesh.boolean.union([*prongs, bridge], engine="manifold").export(file)
-    return sm.Mesh("fork", np.eye(4), file)
+    return sm.obstacles.Mesh("fork", np.eye(4), file)
 
 
 @pytest.mark.parametrize(("gap", "verified"), [(0.04, True), (0.012, False)])
@@ -35,13 +35,16 @@ def test_a_rod_between_the_prongs_of_a_fork(tmp_path: Path, gap: float, verified
     home = panda.pose(PANDA_HOME)
     end = home.copy()
     end.translation = home.translation + home.rotation @ np.array([0.0, 0.05, 0.0])
-    line = sm.Line(home, end, 2.0)
+    line = sm.paths.Line(home, end, 2.0)
     # Along the way, so that it stays in the middle of the gap.
     along = np.eye(4)
     along[:3, :3] = home.rotation @ np.array([[1.0, 0, 0], [0, 0, -1.0], [0, 1.0, 0]])
     along[:3, 3] = home.translation
-    rod = sm.Cylinder("rod", along, 0.005, 0.3)
-    limits = [sm.JointPositionLimits(), sm.Clearance([rod], 1.5 * CLEARANCE)]
+    rod = sm.obstacles.Cylinder("rod", along, 0.005, 0.3)
+    limits = [
+        sm.constraints.JointPositionLimits(),
+        sm.constraints.Clearance([rod], 1.5 * CLEARANCE),
+    ]
     plan = sm.plan(
         sm.Problem(panda, line, "pose", PANDA_HOME, constraints=limits),
     )

@@ -18,10 +18,16 @@ def test_moves_go_round_what_is_in_the_way(tmp_path) -> None:
     first, last = rng.uniform(-1.2, 1.2, (2, 7))
     kinematics = Arm(robot)
     _, middle = kinematics.place(kinematics.tool, 0.5 * (first + last)[None])
-    ball = sm.Sphere("ball", middle[0], 0.08)
-    clearance = sm.Clearance([ball], 2e-3)
-    path = sm.Line(robot.pose(first), robot.pose(first) * pin.SE3(np.eye(3), np.full(3, 0.01)), 2.0)
-    limits = [sm.JointPositionLimits(), sm.JointVelocityLimits(), sm.JointAccelerationLimits(20.0)]
+    ball = sm.obstacles.Sphere("ball", middle[0], 0.08)
+    clearance = sm.constraints.Clearance([ball], 2e-3)
+    path = sm.paths.Line(
+        robot.pose(first), robot.pose(first) * pin.SE3(np.eye(3), np.full(3, 0.01)), 2.0
+    )
+    limits = [
+        sm.constraints.JointPositionLimits(),
+        sm.constraints.JointVelocityLimits(),
+        sm.constraints.JointAccelerationLimits(20.0),
+    ]
     problem = sm.Problem(robot, path, "pose", constraints=[*limits, clearance])
     mover = Mover(between_parts(problem), None, np.random.default_rng(0), lambda *_: None)
 
@@ -49,7 +55,7 @@ def test_moves_go_round_what_is_in_the_way(tmp_path) -> None:
     assert "ball" in missing.trouble
 
 
-def screw(angle: float, *more: sm.Constraint) -> sm.Problem:
+def screw(angle: float, *more: sm.constraints.Constraint) -> sm.Problem:
     """Return the problem of a Panda that turns its tool on the spot, joint 7 by 6.8 rad at most.
 
     The others turn by 0.2 rad at most, so that one part turns the tool by 6.8 + 6 · 0.2 rad at
@@ -63,24 +69,24 @@ def screw(angle: float, *more: sm.Constraint) -> sm.Problem:
     turns = np.linspace(0.0, angle, int(2.0 * angle))
     poses = [pose * pin.SE3(pin.exp3(np.array([0.0, 0.0, a])), np.zeros(3)) for a in turns]
     constraints = [
-        sm.JointPositionLimits(lower, upper, replace=True),
-        sm.JointVelocityLimits(),
-        sm.JointAccelerationLimits(),
+        sm.constraints.JointPositionLimits(lower, upper, replace=True),
+        sm.constraints.JointVelocityLimits(),
+        sm.constraints.JointAccelerationLimits(),
         *more,
     ]
-    path = sm.Waypoints.from_poses(1.5 * turns, poses)
+    path = sm.paths.Waypoints.from_poses(1.5 * turns, poses)
     return sm.Problem(panda, path, "pose", constraints=constraints)
 
 
 def test_the_tool_leaves_the_work_before_a_move_and_comes_back_after_it(tmp_path) -> None:
     parts = sm.plan_in_parts(screw(10.0), retreat=0.02).require()
     parts.save(tmp_path / "screw.parts")
-    again = sm.load_parts(tmp_path / "screw.parts").require()
+    again = sm.files.load_parts(tmp_path / "screw.parts").require()
     np.testing.assert_array_equal(again.trajectory.q, parts.trajectory.q)
     assert (again.cuts, again.endings) == (parts.cuts, parts.endings)
     # Its path begins at speed, and so does the motion.
-    sm.write_motion(parts, tmp_path / "screw.csv", force=True)
-    written = sm.read_motion(tmp_path / "screw.csv")
+    sm.files.write_motion(parts, tmp_path / "screw.csv", force=True)
+    written = sm.files.read_motion(tmp_path / "screw.csv")
     np.testing.assert_allclose(written.q[-1], parts.trajectory.q[-1], atol=1e-12)
     assert len(parts.plans) == 2
     (move,) = parts.moves

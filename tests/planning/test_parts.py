@@ -28,7 +28,7 @@ SPEED, ACCELERATION, JERK = 3.0, 10.0, 1e3
 RESTING = 1e-6
 
 
-def wound(angle: float, *more: sm.Constraint, start: Array | None = None) -> sm.Problem:
+def wound(angle: float, *more: sm.constraints.Constraint, start: Array | None = None) -> sm.Problem:
     """Return the problem of the planar arm on a circle about its base, of any angle [rad].
 
     With the arm in one shape, its first joint draws all that it turns by: so TURN of the path can
@@ -40,13 +40,13 @@ def wound(angle: float, *more: sm.Constraint, start: Array | None = None) -> sm.
     angles = np.linspace(0.0, angle, int(10 * angle) + 2)
     turned = np.stack([pin.exp3(np.array([0.0, 0.0, a])) @ first for a in angles])
     constraints = [
-        sm.JointPositionLimits(lower, upper),
-        sm.JointVelocityLimits(SPEED),
-        sm.JointAccelerationLimits(ACCELERATION),
-        sm.JointJerkLimits(JERK),
+        sm.constraints.JointPositionLimits(lower, upper),
+        sm.constraints.JointVelocityLimits(SPEED),
+        sm.constraints.JointAccelerationLimits(ACCELERATION),
+        sm.constraints.JointJerkLimits(JERK),
         *more,
     ]
-    path = sm.Waypoints(2.0 * angles, turned)
+    path = sm.paths.Waypoints(2.0 * angles, turned)
     return sm.Problem(robot, path, "planar", start, constraints=constraints)
 
 
@@ -119,7 +119,12 @@ def test_a_path_that_needs_two_changes_is_found_with_two() -> None:
         (dataclasses.replace(parts, moves=()), "3 parts have 0 moves in between"),
         (dataclasses.replace(parts, plans=parts.plans[::-1]), "it is not the path from 0 to"),
         (dataclasses.replace(parts, cuts=(parts.cuts[0], parts.cuts[1] + 1e-3)), "the path from"),
-        (dataclasses.replace(parts, problem=wound(2.9 * TURN, sm.ToolLimits(speed=9.0))), "Tool"),
+        (
+            dataclasses.replace(
+                parts, problem=wound(2.9 * TURN, sm.constraints.ToolLimits(speed=9.0))
+            ),
+            "Tool",
+        ),
         (loose, "it is judged within 1e-06 m"),
     ):
         assert not wrong.verified
@@ -139,7 +144,7 @@ def test_a_path_that_needs_no_change_is_one_plan() -> None:
 def test_what_is_asked_of_the_ends_is_asked_of_the_first_and_the_last_part() -> None:
     start = np.array([-0.4 * TURN, *SHAPE])
     end = np.array([-0.5 * TURN + 1.9 * TURN - 2.0 * np.pi, *SHAPE])
-    problem = wound(1.9 * TURN, sm.EndConfiguration(end))
+    problem = wound(1.9 * TURN, sm.constraints.EndConfiguration(end))
     reached = problem.robot.inverse_kinematics(problem.path.pose(0.0), "planar", start)
     pinned = sm.Problem(
         problem.robot, problem.path, "planar", reached, constraints=problem.constraints
@@ -152,7 +157,7 @@ def test_what_is_asked_of_the_ends_is_asked_of_the_first_and_the_last_part() -> 
 
 
 def test_a_closed_path_in_parts_is_closed_by_a_last_move() -> None:
-    problem = wound(4.0 * np.pi, sm.ClosedPath())
+    problem = wound(4.0 * np.pi, sm.constraints.ClosedPath())
     parts = sm.plan_in_parts(problem).require()
     assert len(parts.moves) == len(parts.plans) == fewest(4.0 * np.pi)
     whole = parts.trajectory
@@ -164,12 +169,14 @@ def test_what_no_part_follows_is_refused_with_time_and_reason() -> None:
     problem = wound(1.9 * TURN)
     robot = problem.robot
     far = np.linspace(4.0, 6.0, 9)
-    out = sm.Waypoints(np.linspace(0.0, 4.0, 9), np.stack([far, 0 * far, 0 * far], axis=1))
+    out = sm.paths.Waypoints(np.linspace(0.0, 4.0, 9), np.stack([far, 0 * far, 0 * far], axis=1))
     with pytest.raises(NoSequenceError, match="in however many parts, passes t = ") as error:
         sm.plan_in_parts(sm.Problem(robot, out, "planar"))
     assert 1.5 < error.value.time < 2.5
     # A single pose in the middle that limits forbid.
-    gap = wound(2.0, sm.JointPositionLimits([-0.5 * TURN, -7, -7], [-0.5 * TURN + 0.7, 7, 7]))
+    gap = wound(
+        2.0, sm.constraints.JointPositionLimits([-0.5 * TURN, -7, -7], [-0.5 * TURN + 0.7, 7, 7])
+    )
     with pytest.raises(NoSequenceError, match="joint limits"):
         sm.plan_in_parts(gap)
 
@@ -210,7 +217,7 @@ def test_what_parts_cannot_be_is_refused() -> None:
         sm.plan_in_parts(damped)
     ur5 = robot_named("ur5")
     pose = ur5.pose(ur5.dexterous_configuration("pose"))
-    line = sm.Line(pose, pose * pin.SE3(np.eye(3), np.full(3, 0.02)), 2.0)
+    line = sm.paths.Line(pose, pose * pin.SE3(np.eye(3), np.full(3, 0.02)), 2.0)
     relaxed = sm.Problem(ur5, line, "pose", relaxations=[sm.Relaxation("rz", 0.2)])
     with pytest.raises(ProblemError, match="leaves no self-motion to search"):
         sm.plan_in_parts(relaxed)

@@ -42,7 +42,7 @@ def test_a_cone_lowers_the_cost_and_is_kept(panda_circle: Callable, free: bool) 
 
 
 def test_a_band_is_used_and_a_smaller_one_is_refused(planar: sm.RobotModel) -> None:
-    free = sm.sample_problem(null_motion=sm.FreeNullMotion())
+    free = sm.sample_problem(null_motion=sm.motion.FreeNullMotion())
     problem = dataclasses.replace(free, relaxations=[sm.Relaxation("y", 0.05)], constraints=())
     plan = sm.plan(problem)
     exact = sm.plan(dataclasses.replace(problem, relaxations=()))
@@ -96,7 +96,7 @@ def test_six_joints_and_a_full_pose_with_a_cone() -> None:
     robot = robot_named("ur5")
     start = start_of(robot, "pose")
     path = short_line(robot, start)
-    with pytest.raises(sm.RedundancyError, match="relax"):
+    with pytest.raises(sm.errors.RedundancyError, match="relax"):
         sm.Problem(robot, path, start=start)
     cone = sm.Relaxation(("rx", "ry"), 0.3)
     for given in (start, None):
@@ -104,9 +104,15 @@ def test_six_joints_and_a_full_pose_with_a_cone() -> None:
         plan = sm.plan(sm.Problem(robot, path, start=given, relaxations=[cone]), search=search)
         assert plan.certificate.verified, plan.certificate.verdict
         assert plan.report.cost < 0.99 * plan.report.initial_cost
-    circle = sm.Circle.around(robot.pose(start), 0.05, 2.0, normal=(1.0, 0.0, 0.0))
+    circle = sm.paths.Circle.around(robot.pose(start), 0.05, 2.0, normal=(1.0, 0.0, 0.0))
     closed = sm.plan(
-        sm.Problem(robot, circle, start=start, relaxations=[cone], constraints=[sm.ClosedPath()])
+        sm.Problem(
+            robot,
+            circle,
+            start=start,
+            relaxations=[cone],
+            constraints=[sm.constraints.ClosedPath()],
+        )
     )
     assert closed.certificate.verified, closed.certificate.verdict
 
@@ -124,15 +130,21 @@ def test_a_narrow_band_costs_no_more_than_none(panda_circle: Callable, band: flo
 
 
 def test_other_methods_refuse_relaxations(panda_circle: Callable) -> None:
-    with pytest.raises(sm.ProblemError, match="leave the relaxations out"):
-        sm.plan_by(panda_circle(relaxations=[sm.Relaxation("z", 0.01)]), sm.PseudoInverse())
+    with pytest.raises(sm.errors.ProblemError, match="leave the relaxations out"):
+        sm.plan_by(
+            panda_circle(relaxations=[sm.Relaxation("z", 0.01)]), sm.baselines.PseudoInverse()
+        )
 
 
 @pytest.mark.parametrize("given", [False, True])
 def test_where_a_path_closes_the_deviation_does_so_too(panda_circle: Callable, given: bool) -> None:
     """A given start is on the path itself, and so is the end then."""
     band = sm.Relaxation("x", 0.01)
-    constraints = (sm.JointPositionLimits(), sm.JointVelocityLimits(), sm.ClosedPath())
+    constraints = (
+        sm.constraints.JointPositionLimits(),
+        sm.constraints.JointVelocityLimits(),
+        sm.constraints.ClosedPath(),
+    )
     problem = dataclasses.replace(panda_circle(), relaxations=[band], constraints=constraints)
     problem = problem if given else dataclasses.replace(problem, start=None)
     plan = sm.plan(problem)
@@ -147,10 +159,10 @@ def test_where_a_path_closes_the_deviation_does_so_too(panda_circle: Callable, g
 def test_ends_that_are_asked_for_are_on_the_path(panda_circle: Callable) -> None:
     """However much of the band is used on the way."""
     exact = sm.plan(panda_circle())
-    end = sm.EndConfiguration(exact.trajectory.q[-1])
+    end = sm.constraints.EndConfiguration(exact.trajectory.q[-1])
     band = sm.Relaxation(("x", "y"), 0.01)
-    limits = (sm.JointPositionLimits(), sm.JointVelocityLimits())
-    for asked in (end, sm.EndVelocity(0.0)):
+    limits = (sm.constraints.JointPositionLimits(), sm.constraints.JointVelocityLimits())
+    for asked in (end, sm.constraints.EndVelocity(0.0)):
         plan = sm.plan(panda_circle(relaxations=[band], constraints=[*limits, asked]))
         assert plan.certificate.verified, plan.certificate.verdict
         assert plan.certificate.deviations[0].value > 1e-3
@@ -187,7 +199,7 @@ def test_a_part_before_a_window_has_none_of_its_joints(panda: sm.RobotModel) -> 
     start = panda.dexterous_configuration()
     pose = panda.pose(start)
     away = pin.SE3(pose.rotation, pose.translation + np.array([1.2, 0.0, 0.0]))
-    line = sm.Line(pose, away, 4.0)
+    line = sm.paths.Line(pose, away, 4.0)
     problem = sm.Problem(panda, line, start=start, collision=None)
     late = sm.Relaxation("z", 5e-3, during=(3.5, 3.9), axes="tool")
     ends = [
@@ -209,5 +221,5 @@ def test_a_part_before_a_window_has_none_of_its_joints(panda: sm.RobotModel) -> 
 def test_the_published_method_knows_no_tolerances() -> None:
     """Nothing would keep the tool within its band: said at once."""
     problem = dataclasses.replace(sm.sample_problem(), relaxations=[sm.Relaxation("y", 0.05)])
-    with pytest.raises(sm.ProblemError, match=r"relaxations: .* leave null_motion out"):
+    with pytest.raises(sm.errors.ProblemError, match=r"relaxations: .* leave null_motion out"):
         sm.plan(problem)

@@ -16,7 +16,7 @@ def outward() -> sm.Problem:
     start = planar.pose([0.0, 0.5, 0.5])
     end = start.copy()
     end.translation = start.translation / np.linalg.norm(start.translation) * (5.0 + BEYOND)
-    return sm.Problem(planar, sm.Line(start, end, 5.0), "planar")
+    return sm.Problem(planar, sm.paths.Line(start, end, 5.0), "planar")
 
 
 def test_a_path_beyond_reach_by_less_than_its_band_is_followed() -> None:

@@ -62,10 +62,10 @@ def test_ranked_motions_are_on_the_path_and_about_as_dear_as_their_optima(
 def test_costs_of_accelerations_and_conditions_on_ends_are_ranked_one_by_one() -> None:
     """Few nodes say little of the first, and motions side by side nothing of the second."""
     problem = problem_of("panda", "pose")
-    circle = sm.Circle.around(problem.path.pose(0.0), 0.05, 2.0)
+    circle = sm.paths.Circle.around(problem.path.pose(0.0), 0.05, 2.0)
     for other in (
-        replace(problem, costs=[sm.JointAcceleration()]),
-        replace(problem, path=circle, constraints=[sm.ClosedPath()]),
+        replace(problem, costs=[sm.costs.JointAcceleration()]),
+        replace(problem, path=circle, constraints=[sm.constraints.ClosedPath()]),
     ):
         told_of: list[str] = []
         ranking = Ranking(other, effort(), lambda stage, done, total, to=told_of: to.append(stage))
@@ -82,7 +82,13 @@ def test_where_the_cheapest_break_conditions_those_come_first_that_keep_them() -
     free.run(starts, 3)
     speeds = np.abs(free.ranked[0].trajectory.qd).max(axis=0)
     limits = np.where(np.arange(7) == 3, 0.9 * speeds, np.inf)
-    slow = replace(problem, constraints=[sm.JointPositionLimits(), sm.JointVelocityLimits(limits)])
+    slow = replace(
+        problem,
+        constraints=[
+            sm.constraints.JointPositionLimits(),
+            sm.constraints.JointVelocityLimits(limits),
+        ],
+    )
     other = Ranking(slow, effort(), told)
     assert other.run(starts, 3)
     kept = [motion.violation <= 0.0 for motion in other.ranked]
@@ -93,7 +99,7 @@ def test_where_the_cheapest_break_conditions_those_come_first_that_keep_them() -
     middle = free.ranked[0].trajectory
     place = tuple(problem.robot.pose(middle.q[len(middle.q) // 2]).translation)
     for center, is_best in ((place, False), ((2.0, 2.0, 2.0), True)):
-        ball = sm.Clearance([sm.Sphere("ball", center, 0.1)])
+        ball = sm.constraints.Clearance([sm.obstacles.Sphere("ball", center, 0.1)])
         among = Ranking(replace(problem, constraints=[ball]), effort(), told)
         assert among.run(starts, 3)
         same = among.ranked[0].cost == pytest.approx(free.ranked[0].cost, rel=1e-6)
@@ -102,7 +108,7 @@ def test_where_the_cheapest_break_conditions_those_come_first_that_keep_them() -
 
 def test_whoever_interrupts_gets_the_cheapest() -> None:
     problem = problem_of("xarm7", "pose")
-    speeds = [sm.JointVelocityLimits(0.05)]
+    speeds = [sm.constraints.JointVelocityLimits(0.05)]
 
     def interrupt(stage: str, done: int, total: int) -> None:
         if stage == "start":
@@ -144,8 +150,8 @@ def test_costs_of_accelerations_are_ranked_by_what_becomes_of_them() -> None:
             [-0.144, 0.036, -0.026],
         ]
     )
-    path = sm.Waypoints(np.linspace(0.0, 2.0, len(way)), place + way)
-    limits = [sm.JointVelocityLimits(), sm.JointAccelerationLimits(3.78)]
-    costs = [sm.JointAcceleration()]
+    path = sm.paths.Waypoints(np.linspace(0.0, 2.0, len(way)), place + way)
+    limits = [sm.constraints.JointVelocityLimits(), sm.constraints.JointAccelerationLimits(3.78)]
+    costs = [sm.costs.JointAcceleration()]
     plan = sm.plan(sm.Problem(arm, path, "position", costs=costs, constraints=limits)).require()
     assert plan.report.cost < 2.0

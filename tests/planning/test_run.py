@@ -74,7 +74,7 @@ def test_sample_problem_optimum(sample: sm.Plan) -> None:
     first = next(i for i in sample.report.history if i.cost <= 10.5145)
     assert first.evaluations <= 10
     assert sample.report.evaluations <= 15
-    assert sample.report.status is sm.Status.CONVERGED
+    assert sample.report.status is sm.optimise.Status.CONVERGED
     assert sample.certificate.verified
 
 
@@ -108,7 +108,7 @@ def test_there_and_back() -> None:
 
 def test_without_the_velocity_term_joints_race(sample: sm.Plan) -> None:
     """Why the paper adds the term: manipulability alone is bought with any joint speed."""
-    alone = dataclasses.replace(sm.sample_problem(), costs=[sm.Manipulability()])
+    alone = dataclasses.replace(sm.sample_problem(), costs=[sm.costs.Manipulability()])
     plan = sm.plan(alone, max_evaluations=100)
     assert np.abs(plan.trajectory.qd).max() > 2.0 * np.abs(sample.trajectory.qd).max()
     assert plan.report.cost < plan.report.initial_cost
@@ -118,7 +118,7 @@ def test_without_the_velocity_term_joints_race(sample: sm.Plan) -> None:
 def test_evaluations_to_the_optimum(panda_circle: Circle, task: str | None) -> None:
     """Within 1 % after at most 6 evaluations, within 1e-6 after at most 15, on one grid."""
     problem = sm.sample_problem() if task is None else panda_circle(task)
-    tight = sm.QuasiNewton(tolerance=1e-13, line_search=sm.LineSearch(sigma=0.1))
+    tight = sm.QuasiNewton(tolerance=1e-13, line_search=sm.optimise.LineSearch(sigma=0.1))
     best = _first_grid(sm.plan(problem, optimizer=tight))[-1].cost
     history = _first_grid(sm.plan(problem))
     near = next(i.evaluations for i in history if i.cost <= best * 1.01)
@@ -127,7 +127,7 @@ def test_evaluations_to_the_optimum(panda_circle: Circle, task: str | None) -> N
     assert converged <= 15
 
 
-def _first_grid(plan: sm.Plan) -> list[sm.Iteration]:
+def _first_grid(plan: sm.Plan) -> list[sm.optimise.Iteration]:
     """Return the iterations up to the second grid's start (a record without a step)."""
     history = plan.report.history
     end = next((k for k in range(1, len(history)) if history[k].step == 0.0), len(history))
@@ -158,9 +158,9 @@ def test_panda_circle_is_followed_to_a_micrometre(
 
 @pytest.mark.parametrize("limit", [0, -5])
 def test_bad_limits_and_tolerances_are_refused(limit: int) -> None:
-    with pytest.raises(sm.ProblemError, match="max_evaluations"):
+    with pytest.raises(sm.errors.ProblemError, match="max_evaluations"):
         sm.plan(sm.sample_problem(), max_evaluations=limit)
-    with pytest.raises(sm.ProblemError, match="tolerance: position"):
+    with pytest.raises(sm.errors.ProblemError, match="tolerance: position"):
         sm.Tolerance(limit, 1.0)
 
 
@@ -170,19 +170,19 @@ def test_breakdown_names_the_time(planar: sm.RobotModel) -> None:
     pose = planar.pose(start)
     end = pose.copy()
     end.translation = pose.translation * 1.5
-    line = sm.Line(pose, end, 1.0, time_law="constant")
-    with pytest.raises(sm.BreakdownError, match="singular pose near t =") as caught:
+    line = sm.paths.Line(pose, end, 1.0, time_law="constant")
+    with pytest.raises(sm.errors.BreakdownError, match="singular pose near t =") as caught:
         sm.plan(sm.Problem(planar, line, "planar", start))
     assert 0.0 < caught.value.time < 0.01
 
 
 def test_interruption_returns_the_best_so_far() -> None:
-    def interrupt(step: sm.Iteration) -> None:
+    def interrupt(step: sm.optimise.Iteration) -> None:
         if step.evaluations >= 3:
             raise KeyboardInterrupt
 
     plan = sm.plan(sm.sample_problem(), callback=interrupt)
-    assert plan.report.status is sm.Status.INTERRUPTED
+    assert plan.report.status is sm.optimise.Status.INTERRUPTED
     assert plan.report.cost < plan.report.initial_cost
     assert plan.certificate.position_error.value < 1e-6
 
@@ -198,7 +198,7 @@ def test_a_free_start_is_no_dearer_than_a_good_given_one() -> None:
     robot = sm.load_robot("panda")
     start = robot.dexterous_configuration()
     for task, normal in (("pose", (1.0, 0.0, 0.0)), ("position", (0.0, 0.0, 1.0))):
-        path = sm.Circle.around(robot.pose(start), 0.1, 4.0, normal=normal)
+        path = sm.paths.Circle.around(robot.pose(start), 0.1, 4.0, normal=normal)
         given = sm.plan(sm.Problem(robot, path, task, start=start))
         free = sm.plan(sm.Problem(robot, path, task))
         assert free.certificate.verified
@@ -224,7 +224,7 @@ def test_little_is_left_to_save_and_that_is_said(
     problem = panda_circle(task, constraints=(), rest=False)
     plan = sm.plan(problem)
     spline = sm.plan(
-        dataclasses.replace(problem, null_motion=sm.BSplineNullMotion(48)), warm_start=plan
+        dataclasses.replace(problem, null_motion=sm.motion.BSplineNullMotion(48)), warm_start=plan
     )
     assert plan.report.remaining is not None
     assert plan.report.remaining <= LEFT * plan.report.cost
@@ -235,7 +235,7 @@ def test_little_is_left_to_save_and_that_is_said(
 
 def short_line(**given: Any) -> sm.Problem:
     arm, start = robot_named("planar_3r"), np.array([0.1, 0.9, 0.9])
-    path = sm.Line(arm.pose(start), arm.pose(start + 0.1), 1.0)
+    path = sm.paths.Line(arm.pose(start), arm.pose(start + 0.1), 1.0)
     return sm.Problem(arm, path, "planar", start, **given)
 
 
@@ -252,6 +252,6 @@ def test_an_optimiser_that_is_given_is_used_whatever_its_settings() -> None:
 
 
 def test_what_falls_short_is_told_with_its_unit_and_what_was_allowed() -> None:
-    plan = sm.plan(short_line(constraints=[sm.JointVelocityLimits(0.01)]))
+    plan = sm.plan(short_line(constraints=[sm.constraints.JointVelocityLimits(0.01)]))
     told = r"speed of joint 'joint\d' is \S+ rad/s at t = \S+ s, limit -?0\.01 rad/s"
     assert re.search(told, plan.report.message)

@@ -20,7 +20,7 @@ def changes(accelerations: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize("task", ["position", "pose"])
 def test_accelerations_do_not_waver_between_nodes(task: str) -> None:
     panda = sm.load_robot("panda")
-    circle = sm.Circle.around(panda.pose(PANDA_HOME), 0.1, 4.0)
+    circle = sm.paths.Circle.around(panda.pose(PANDA_HOME), 0.1, 4.0)
     plan = sm.plan(sm.Problem(panda, circle, task, PANDA_HOME)).require()
     motion = plan.trajectory
     # Away from the ends, where the self-motion starts and stops.

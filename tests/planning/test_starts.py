@@ -79,7 +79,7 @@ def test_a_motion_that_takes_the_arm_into_itself_is_passed_over_for_another() ->
     center = [-0.1580378732556933, -0.02460255901258996, -0.3915036403927299]
     normal = [-0.5276985537584152, -0.6121715290793273, -0.5888805102446127]
     ur5 = robot_named("ur5")
-    problem = sm.Problem(ur5, sm.Circle(start, center, normal, 4.0), "pointing")
+    problem = sm.Problem(ur5, sm.paths.Circle(start, center, normal, 4.0), "pointing")
     careless = sm.plan(dataclasses.replace(problem, collision=None))
     assert not problem.keeps_off_itself(careless.trajectory.q)
     plan = sm.plan(problem)

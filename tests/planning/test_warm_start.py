@@ -22,8 +22,12 @@ FEW = 6
 def problems() -> dict[str, sm.Problem]:
     panda = sm.load_robot("panda")
     start = panda.dexterous_configuration()
-    circle = sm.Circle.around(panda.pose(start), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
-    closed = (sm.JointPositionLimits(), sm.JointVelocityLimits(), sm.ClosedPath())
+    circle = sm.paths.Circle.around(panda.pose(start), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
+    closed = (
+        sm.constraints.JointPositionLimits(),
+        sm.constraints.JointVelocityLimits(),
+        sm.constraints.ClosedPath(),
+    )
     return {
         "paper": sm.sample_problem(),
         "pose": sm.Problem(panda, circle, "pose", start),
@@ -103,9 +107,11 @@ def test_a_given_start_is_kept_where_the_plan_begins_elsewhere(
 
 def test_what_is_no_plan_of_the_arm_is_refused(plans: dict[str, sm.Plan]) -> None:
     plan = plans["pose"]
-    with pytest.raises(sm.ProblemError, match=r"warm_start is 'plan.npz', expected a Plan"):
+    with pytest.raises(sm.errors.ProblemError, match=r"warm_start is 'plan.npz', expected a Plan"):
         sm.plan(plan.problem, warm_start="plan.npz")  # type: ignore[arg-type]
-    with pytest.raises(sm.ProblemError, match="its joints are joint1, joint2, joint3, expected"):
+    with pytest.raises(
+        sm.errors.ProblemError, match="its joints are joint1, joint2, joint3, expected"
+    ):
         sm.plan(plan.problem, warm_start=plans["paper"])
 
 

@@ -23,10 +23,10 @@ from selfmotion.problem.fit import check_relaxations
 def test_relaxations_that_misfit_are_refused(
     panda_circle: Callable, task: str, relaxations: list, message: str
 ) -> None:
-    with pytest.raises(sm.ProblemError, match=message):
+    with pytest.raises(sm.errors.ProblemError, match=message):
         check_relaxations(relaxations, panda_circle().path, sm.Task.of(task))
 
 
 def test_problem_refuses_what_is_no_relaxation(panda_circle: Callable) -> None:
-    with pytest.raises(sm.ProblemError, match="relaxations"):
+    with pytest.raises(sm.errors.ProblemError, match="relaxations"):
         panda_circle(relaxations=[0.1])

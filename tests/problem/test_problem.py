@@ -17,7 +17,7 @@ Circle = Callable[..., sm.Problem]
 def test_start_off_the_path_is_refused_with_the_miss(panda_circle: Circle) -> None:
     problem = panda_circle()
     off = np.asarray(problem.start) + np.array([0, 0, 0, 0, 0, 0.01, 0])
-    with pytest.raises(sm.StartError, match=r"m and 0\.01 rad off the start") as caught:
+    with pytest.raises(sm.errors.StartError, match=r"m and 0\.01 rad off the start") as caught:
         dataclasses.replace(problem, start=off)
     assert caught.value.rotation_miss == pytest.approx(0.01, rel=1e-3)
     assert caught.value.position_miss > 1e-4
@@ -29,20 +29,22 @@ def test_a_start_in_degrees_names_the_joint_and_its_limits(panda_circle: Circle)
     said = (
         r"'panda_joint2' at -45\.\d+ rad, beyond its limits of -1\.\d+ to 1\.\d+ rad; in degrees\?"
     )
-    with pytest.raises(sm.StartError, match=said):
+    with pytest.raises(sm.errors.StartError, match=said):
         dataclasses.replace(problem, start=beyond)
 
 
 def test_limits_far_above_the_arms_own_are_told(panda_circle: Circle) -> None:
     problem = panda_circle()
     for limit, told in ((120.0, 1), (2.0, 0), ([9.0] * 6 + [180.0], 1)):
-        found = dataclasses.replace(problem, constraints=[sm.JointVelocityLimits(limit)])
+        found = dataclasses.replace(
+            problem, constraints=[sm.constraints.JointVelocityLimits(limit)]
+        )
         remarks = [text for text in found.remarks if "in degrees? limit_deg" in text]
         assert len(remarks) == told
     assert (
         "180 rad/s for 'panda_joint7' has no effect"
         in dataclasses.replace(
-            problem, constraints=[sm.JointVelocityLimits([9.0] * 6 + [180.0])]
+            problem, constraints=[sm.constraints.JointVelocityLimits([9.0] * 6 + [180.0])]
         ).remarks[-1]
     )
 
@@ -50,20 +52,23 @@ def test_limits_far_above_the_arms_own_are_told(panda_circle: Circle) -> None:
 @pytest.mark.parametrize(
     ("limit", "told"),
     [
-        (sm.JointVelocityLimits(120.0, replace=True), "is more than arms do (above 50"),
+        (sm.constraints.JointVelocityLimits(120.0, replace=True), "is more than arms do (above 50"),
         (
-            sm.JointAccelerationLimits(400.0, replace=True),
+            sm.constraints.JointAccelerationLimits(400.0, replace=True),
             "is more than arms do (above 200",
         ),
-        (sm.JointAccelerationLimits(400.0), "has no effect, the arm's own limit is 15 rad/s²"),
-        (sm.JointJerkLimits(1e6), "has no effect, the arm's own limit is 7500 rad/s³"),
-        (sm.JointAccelerationLimits(7.0), ""),
-        (sm.ToolLimits(speed=250.0), "in mm/s? speed_mm"),
-        (sm.ToolLimits(speed=0.25), ""),
+        (
+            sm.constraints.JointAccelerationLimits(400.0),
+            "has no effect, the arm's own limit is 15 rad/s²",
+        ),
+        (sm.constraints.JointJerkLimits(1e6), "has no effect, the arm's own limit is 7500 rad/s³"),
+        (sm.constraints.JointAccelerationLimits(7.0), ""),
+        (sm.constraints.ToolLimits(speed=250.0), "in mm/s? speed_mm"),
+        (sm.constraints.ToolLimits(speed=0.25), ""),
     ],
 )
 def test_limits_that_no_arm_has_are_told(
-    panda_circle: Circle, limit: sm.Constraint, told: str
+    panda_circle: Circle, limit: sm.constraints.Constraint, told: str
 ) -> None:
     remarks = dataclasses.replace(panda_circle(), constraints=[limit]).remarks
     assert len(remarks) == bool(told)
@@ -73,12 +78,16 @@ def test_limits_that_no_arm_has_are_told(
 def test_values_of_angles_beyond_turns_are_in_degrees(panda_circle: Circle) -> None:
     problem = panda_circle()
     panda = problem.robot
-    with pytest.raises(sm.ProblemError, match=r"center is 90 rad, more than a turn; in degrees\?"):
-        sm.Band(sm.SwivelAngle(), 90.0, 0.1)
-    with pytest.raises(sm.ProblemError, match=r"target is 90 rad, more than a turn; in degrees\?"):
-        sm.Towards(panda, sm.SwivelAngle(), 90.0)
-    with pytest.raises(sm.ProblemError, match=r"'panda_joint4': -135 rad is -21.5 turns"):
-        dataclasses.replace(problem, costs=[sm.Posture(posture=[0, 0, 0, -135, 0, 0, 0])])
+    with pytest.raises(
+        sm.errors.ProblemError, match=r"center is 90 rad, more than a turn; in degrees\?"
+    ):
+        sm.constraints.Band(sm.robot.SwivelAngle(), 90.0, 0.1)
+    with pytest.raises(
+        sm.errors.ProblemError, match=r"target is 90 rad, more than a turn; in degrees\?"
+    ):
+        sm.costs.Towards(panda, sm.robot.SwivelAngle(), 90.0)
+    with pytest.raises(sm.errors.ProblemError, match=r"'panda_joint4': -135 rad is -21.5 turns"):
+        dataclasses.replace(problem, costs=[sm.costs.Posture(posture=[0, 0, 0, -135, 0, 0, 0])])
 
 
 @pytest.mark.parametrize("shape", ["box", "capsule", "mesh", "away", "on the tool", "held"])
@@ -90,14 +99,16 @@ def test_a_path_inside_an_obstacle_is_told_where_the_tool_has_no_body(
     place = problem.path.pose(0.0).translation
     trimesh.creation.icosphere(radius=0.02).export(tmp_path / "ball.stl")
     obstacle = {
-        "capsule": sm.Capsule("it", place, 0.01, 0.02),
-        "mesh": sm.Mesh("it", place, tmp_path / "ball.stl"),
-        "away": sm.Box("it", place + np.array([0.0, 0.0, 1.0]), [0.02] * 3),
-        "on the tool": sm.Box("it", [0.0, 0.0, 0.3], [0.02] * 3, frame="panda_hand_tcp"),
-    }.get(shape, sm.Box("it", place, [0.02] * 3))
-    held = [sm.Sphere("tip", [0.0] * 3, 0.005)] if shape == "held" else []
+        "capsule": sm.obstacles.Capsule("it", place, 0.01, 0.02),
+        "mesh": sm.obstacles.Mesh("it", place, tmp_path / "ball.stl"),
+        "away": sm.obstacles.Box("it", place + np.array([0.0, 0.0, 1.0]), [0.02] * 3),
+        "on the tool": sm.obstacles.Box("it", [0.0, 0.0, 0.3], [0.02] * 3, frame="panda_hand_tcp"),
+    }.get(shape, sm.obstacles.Box("it", place, [0.02] * 3))
+    held = [sm.obstacles.Sphere("tip", [0.0] * 3, 0.005)] if shape == "held" else []
     robot = sm.load_robot("panda", bodies=held) if held else problem.robot
-    asked = dataclasses.replace(problem, robot=robot, constraints=[sm.Clearance([obstacle])])
+    asked = dataclasses.replace(
+        problem, robot=robot, constraints=[sm.constraints.Clearance([obstacle])]
+    )
     told = [text for text in asked.remarks if "nothing is checked there" in text]
     assert len(told) == (shape in ("box", "capsule", "mesh"))
     if told:
@@ -116,8 +127,10 @@ def test_missing_start_is_found(panda_circle: Circle) -> None:
 def test_no_redundancy_is_refused() -> None:
     ur5 = sm.load_robot("ur5")
     pose = ur5.pose(ur5.dexterous_configuration())
-    with pytest.raises(sm.RedundancyError, match="6 joints and task 'pose' with 6 rows") as caught:
-        sm.Problem(ur5, sm.Circle.around(pose, 0.1, 1.0))
+    with pytest.raises(
+        sm.errors.RedundancyError, match="6 joints and task 'pose' with 6 rows"
+    ) as caught:
+        sm.Problem(ur5, sm.paths.Circle.around(pose, 0.1, 1.0))
     assert (caught.value.dof, caught.value.rows) == (6, 6)
 
 
@@ -127,8 +140,8 @@ def test_no_redundancy_is_refused() -> None:
 def test_rows_the_arm_cannot_move_in_are_refused(name: str, task: str) -> None:
     robot = sm.load_robot(name)
     pose = robot.pose(robot.dexterous_configuration("planar"))
-    with pytest.raises(sm.ProblemError, match="choose another task"):
-        sm.Problem(robot, sm.Circle.around(pose, 0.1, 1.0), task)
+    with pytest.raises(sm.errors.ProblemError, match="choose another task"):
+        sm.Problem(robot, sm.paths.Circle.around(pose, 0.1, 1.0), task)
 
 
 def test_planar_pose_with_three_joints_has_no_freedom(planar: sm.RobotModel) -> None:
@@ -146,22 +159,22 @@ def test_planar_pose_with_three_joints_has_no_freedom(planar: sm.RobotModel) -> 
         ({"path": None}, "expected a Path"),
         ({"null_motion": "cubic"}, "null_motion is 'cubic'"),
         ({"constraints": [3]}, "constraints: 3 is no Constraint"),
-        ({"costs": [sm.PathLength(float("inf"))]}, "smoothing is inf"),
-        ({"costs": [sm.JointVelocity(), sm.JointVelocity()]}, "two costs are called"),
-        ({"costs": [sm.JointVelocity([1.0, 2.0])]}, r"weight has shape \(2,\)"),
-        ({"costs": [sm.InverseManipulability(-1.0)]}, "mu is -1.0"),
-        ({"costs": [sm.Manipulability(float("nan"))]}, "mu is nan"),
+        ({"costs": [sm.costs.PathLength(float("inf"))]}, "smoothing is inf"),
+        ({"costs": [sm.costs.JointVelocity(), sm.costs.JointVelocity()]}, "two costs are called"),
+        ({"costs": [sm.costs.JointVelocity([1.0, 2.0])]}, r"weight has shape \(2,\)"),
+        ({"costs": [sm.costs.InverseManipulability(-1.0)]}, "mu is -1.0"),
+        ({"costs": [sm.costs.Manipulability(float("nan"))]}, "mu is nan"),
     ],
 )
 def test_bad_problems_are_refused(
     panda_circle: Circle, change: dict[str, object], message: str
 ) -> None:
-    with pytest.raises(sm.ProblemError, match=message):
+    with pytest.raises(sm.errors.ProblemError, match=message):
         dataclasses.replace(panda_circle(), **change)
 
 
 def test_one_cost_may_stand_without_a_list(panda_circle: Circle) -> None:
-    assert len(panda_circle(costs=sm.JointVelocity()).costs) == 1
+    assert len(panda_circle(costs=sm.costs.JointVelocity()).costs) == 1
 
 
 def test_one_number_is_a_tolerance_for_both() -> None:
@@ -175,11 +188,11 @@ def test_one_number_is_a_tolerance_for_both() -> None:
 def test_a_start_in_collision_is_called_that() -> None:
     panda = robot_named("panda")
     home = np.array(sm.NAMED_ARMS["panda"].home)
-    stay = sm.Dwell(panda.pose(home), 1.0)
+    stay = sm.paths.Dwell(panda.pose(home), 1.0)
     motion = sm.Trajectory([0.0, 1.0], [home] * 2, [0.0 * home] * 2, panda.joint_names)
 
     def verdict(at: np.ndarray) -> str:
-        kept = sm.Clearance([sm.Sphere("ball", at, 0.05)], distance=0.02)
+        kept = sm.constraints.Clearance([sm.obstacles.Sphere("ball", at, 0.05)], distance=0.02)
         asked = [kept.requirement(panda)]
         return sm.certify(panda, stay, "position", motion, requirements=asked).verdict
 

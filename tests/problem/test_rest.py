@@ -14,8 +14,10 @@ from support.arms import PANDA_HOME, robot_named, short_line, start_of
 REST = 1e-9
 
 
-def circle(robot: sm.RobotModel, start: np.ndarray, law: str = "minimum_jerk") -> sm.Circle:
-    return sm.Circle.around(robot.pose(start), 0.06, 4.0, normal=(1.0, 0.0, 0.0), time_law=law)
+def circle(robot: sm.RobotModel, start: np.ndarray, law: str = "minimum_jerk") -> sm.paths.Circle:
+    return sm.paths.Circle.around(
+        robot.pose(start), 0.06, 4.0, normal=(1.0, 0.0, 0.0), time_law=law
+    )
 
 
 @pytest.mark.parametrize("name", ["panda", "xarm7", "tiago", "planar_3r"])
@@ -25,7 +27,7 @@ def test_an_arm_rests_where_its_tool_does(name: str, free: bool) -> None:
     task = "planar" if name == "planar_3r" else "pose"
     start = start_of(robot, task)
     path = short_line(robot, start)
-    costs = [sm.JointVelocity(), sm.InverseManipulability(0.1)]
+    costs = [sm.costs.JointVelocity(), sm.costs.InverseManipulability(0.1)]
     plan = sm.plan(sm.Problem(robot, path, task, None if free else start, costs=costs))
     assert plan.certificate.verified, plan.certificate.verdict
     assert "rest at both ends" in plan.certificate.covers
@@ -37,7 +39,7 @@ def test_an_arm_rests_where_its_tool_does(name: str, free: bool) -> None:
 
 
 def test_rest_costs_little(panda: sm.RobotModel) -> None:
-    wide = sm.Circle.around(panda.pose(PANDA_HOME), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
+    wide = sm.paths.Circle.around(panda.pose(PANDA_HOME), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
     problem = sm.Problem(panda, wide, start=PANDA_HOME)
     resting, moving = (sm.plan(dataclasses.replace(problem, rest=rest)) for rest in (True, False))
     assert np.abs(moving.trajectory.qd[0]).max() > 1e-3
@@ -61,7 +63,7 @@ def test_a_path_that_moves_at_its_ends_asks_for_no_rest(panda: sm.RobotModel) ->
     assert rest_orders(circle(panda, PANDA_HOME), sm.Task.POSE) == (2, 2)
     plan = sm.plan(sm.Problem(panda, path, start=PANDA_HOME))
     assert not any("rest" in what for what in plan.certificate.covers)
-    ramped = sm.section_at_rest(path)
+    ramped = sm.paths.section_at_rest(path)
     assert rest_orders(ramped, sm.Task.POSE) == (2, 2)
     assert "rest at both ends" in sm.plan(sm.Problem(panda, ramped)).certificate.covers
 
@@ -83,7 +85,11 @@ def test_relaxed_rows_rest_as_well(panda: sm.RobotModel) -> None:
 
 
 def test_closed_paths_at_rest_need_no_condition_on_speed(panda: sm.RobotModel) -> None:
-    limits = (sm.JointPositionLimits(), sm.JointVelocityLimits(), sm.ClosedPath())
+    limits = (
+        sm.constraints.JointPositionLimits(),
+        sm.constraints.JointVelocityLimits(),
+        sm.constraints.ClosedPath(),
+    )
     plan = sm.plan(sm.Problem(panda, circle(panda, PANDA_HOME), constraints=limits))
     assert plan.certificate.verified
     assert plan.certificate.closure <= 1e-8
@@ -103,7 +109,7 @@ def test_a_moving_arm_hands_over_its_velocity(panda: sm.RobotModel, tmp_path) ->
         panda,
         circle(panda, PANDA_HOME),
         start=PANDA_HOME,
-        constraints=[sm.JointVelocityLimits(), sm.StartVelocity(0.2 * own)],
+        constraints=[sm.constraints.JointVelocityLimits(), sm.constraints.StartVelocity(0.2 * own)],
     )
     plan = sm.plan(problem)
     assert plan.certificate.verified, plan.certificate.verdict
@@ -132,12 +138,12 @@ def test_a_moving_arm_hands_over_its_velocity(panda: sm.RobotModel, tmp_path) ->
     ],
 )
 def test_start_velocities_that_contradict_the_path(panda, start, qd, message: str) -> None:
-    with pytest.raises(sm.ProblemError, match=message):
+    with pytest.raises(sm.errors.ProblemError, match=message):
         sm.Problem(
             panda,
             circle(panda, PANDA_HOME),
             start=start,
-            constraints=[sm.StartVelocity(qd)],
+            constraints=[sm.constraints.StartVelocity(qd)],
         )
 
 
@@ -146,10 +152,14 @@ def test_a_motion_in_two_parts_is_handed_over_without_a_jump(panda: sm.RobotMode
     now = 0.3 * whole.path.duration
     q, qd, qdd = (whole.trajectory(now, order) for order in (0, 1, 2))
     # What is left of the path, by twists.
-    rest = sm.TwistPath(
+    rest = sm.paths.TwistPath(
         panda.pose(q), lambda t: whole.path.twist(now + t), whole.path.duration - now
     )
-    constraints = [sm.JointVelocityLimits(), sm.StartVelocity(qd), sm.StartAcceleration(qdd)]
+    constraints = [
+        sm.constraints.JointVelocityLimits(),
+        sm.constraints.StartVelocity(qd),
+        sm.constraints.StartAcceleration(qdd),
+    ]
     plan = sm.plan(sm.Problem(panda, rest, start=q, constraints=constraints))
     assert plan.certificate.verified, plan.certificate.verdict
     # The first part is on the path between its samples up to this only.
@@ -166,12 +176,14 @@ def test_a_motion_in_two_parts_is_handed_over_without_a_jump(panda: sm.RobotMode
 def test_an_arm_at_rest_ends_with_the_acceleration_that_is_asked_for(panda: sm.RobotModel) -> None:
     own = np.linalg.svd(panda.task_jacobian(PANDA_HOME, "pose"))[2][-1]
     path = circle(panda, PANDA_HOME)
-    start = sm.StartAcceleration(0.05 * own)
+    start = sm.constraints.StartAcceleration(0.05 * own)
     plan = sm.plan(sm.Problem(panda, path, start=PANDA_HOME, constraints=[start]))
     assert plan.certificate.verified, plan.certificate.verdict
     assert np.abs(plan.trajectory.qd[0]).max() <= REST
     np.testing.assert_allclose(plan.trajectory(0.0, 2), 0.05 * own, rtol=0, atol=1e-4)
-    last = sm.plan(sm.Problem(panda, path, start=PANDA_HOME, constraints=[sm.EndAcceleration()]))
+    last = sm.plan(
+        sm.Problem(panda, path, start=PANDA_HOME, constraints=[sm.constraints.EndAcceleration()])
+    )
     assert last.certificate.verified, last.certificate.verdict
-    with pytest.raises(sm.ProblemError, match="needs a given start"):
+    with pytest.raises(sm.errors.ProblemError, match="needs a given start"):
         sm.Problem(panda, path, constraints=[start])

@@ -7,5 +7,5 @@ from support.arms import PANDA_HOME
 
 
 @pytest.fixture
-def slow_circle(panda: sm.RobotModel) -> sm.Circle:
-    return sm.Circle.around(panda.pose(PANDA_HOME), 0.08, 6.0, normal=(1.0, 0.0, 0.0))
+def slow_circle(panda: sm.RobotModel) -> sm.paths.Circle:
+    return sm.paths.Circle.around(panda.pose(PANDA_HOME), 0.08, 6.0, normal=(1.0, 0.0, 0.0))

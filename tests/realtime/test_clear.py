@@ -27,9 +27,9 @@ def beside_the_elbow(panda: sm.RobotModel) -> Array:
 
 def test_a_ball_that_comes_near_is_avoided_by_the_self_motion(panda: sm.RobotModel) -> None:
     first = beside_the_elbow(panda)
-    clearance = sm.Clearance([sm.Sphere("ball", first, 0.06)], distance=0.005)
+    clearance = sm.constraints.Clearance([sm.obstacles.Sphere("ball", first, 0.06)], distance=0.005)
     replanner = Replanner(panda, constraints=[clearance])
-    hold = sm.Dwell(panda.pose(PANDA_HOME), 100.0)
+    hold = sm.paths.Dwell(panda.pose(PANDA_HOME), 100.0)
     t, q = 0.0, PANDA_HOME
     nearest = np.inf
     for _ in range(300):
@@ -38,7 +38,7 @@ def test_a_ball_that_comes_near_is_avoided_by_the_self_motion(panda: sm.RobotMod
         segment = replanner.step(t, q, np.zeros(7), hold, {"ball": place})
         t += replanner.period
         q = segment.q[segment.index(t)]
-        ball = sm.CollisionModel(panda, [sm.Sphere("ball", place, 0.06)])
+        ball = sm.obstacles.CollisionModel(panda, [sm.obstacles.Sphere("ball", place, 0.06)])
         if round(t / replanner.period) % 20 == 0:
             nearest = min(nearest, ball.distance(q).value)
     assert np.abs(q - PANDA_HOME).max() > 0.1
@@ -52,12 +52,12 @@ def test_where_no_self_motion_helps_the_arm_stops_before_the_obstacle(
 ) -> None:
     pose = panda.pose(PANDA_HOME)
     ahead = pin.SE3(np.eye(3), pose.translation + np.array([0.0, 0.3, 0.0]))
-    clearance = sm.Clearance([sm.Sphere("ball", ahead, 0.05)], distance=0.01)
+    clearance = sm.constraints.Clearance([sm.obstacles.Sphere("ball", ahead, 0.05)], distance=0.01)
     replanner = Replanner(panda, constraints=[clearance])
     goal = pin.SE3(pose.rotation, pose.translation + np.array([0.0, 0.3, 0.0]))
-    path = sm.Line(pose, goal, 2.0, time_law="minimum_jerk")
+    path = sm.paths.Line(pose, goal, 2.0, time_law="minimum_jerk")
     segments, places = closed_loop(replanner, path, PANDA_HOME, 2.5)
-    exact = sm.CollisionModel(panda, clearance.obstacles)
+    exact = sm.obstacles.CollisionModel(panda, clearance.obstacles)
     assert min(exact.distance(q).value for q in places[::10]) > 0.0
     assert segments[-1].flag is Flag.STOPPING
     assert "ball" in segments[-1].reasons[-1]
@@ -77,36 +77,42 @@ def test_the_arm_stops_before_what_it_carries_meets_something(panda: sm.RobotMod
     across = pose.rotation.T @ np.array([0.0, 1.0, 0.0])
     frame = pin.SE3(np.eye(3), 0.1 * across + np.array([0.0, 0.0, 0.02]))
     turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), across).toRotationMatrix()
-    torch = sm.Cylinder(
+    torch = sm.obstacles.Cylinder(
         "torch", pin.SE3(turn, frame.translation), 0.01, 0.2, frame="panda_hand_tcp"
     )
     ahead = pose.translation + np.array([0.0, 0.4, 0.0])
-    bodies = [torch, sm.Sphere("ball", ahead, 0.05)]
-    replanner = Replanner(panda, constraints=[sm.Clearance(bodies, distance=0.01)])
+    bodies = [torch, sm.obstacles.Sphere("ball", ahead, 0.05)]
+    replanner = Replanner(panda, constraints=[sm.constraints.Clearance(bodies, distance=0.01)])
     goal = pin.SE3(pose.rotation, pose.translation + np.array([0.0, 0.3, 0.0]))
-    path = sm.Line(pose, goal, 2.0, time_law="minimum_jerk")
+    path = sm.paths.Line(pose, goal, 2.0, time_law="minimum_jerk")
     segments, places = closed_loop(replanner, path, PANDA_HOME, 2.5)
-    exact = sm.CollisionModel(panda, bodies)
+    exact = sm.obstacles.CollisionModel(panda, bodies)
     assert min(exact.distance(q).value for q in places[::10]) > 0.0
     assert segments[-1].flag is Flag.STOPPING
     assert "torch" in segments[-1].reasons[-1]
     # The hand alone goes on.
-    alone = Replanner(panda, constraints=[sm.Clearance(bodies[1:], distance=0.01)])
+    alone = Replanner(panda, constraints=[sm.constraints.Clearance(bodies[1:], distance=0.01)])
     _, farther = closed_loop(alone, path, PANDA_HOME, 2.5)
     came, comes = (panda.pose(each[-1]).translation[1] for each in (places, farther))
     assert comes > came + 0.05
 
 
 def test_an_obstacle_that_is_not_known_is_refused(
-    panda: sm.RobotModel, slow_circle: sm.Circle
+    panda: sm.RobotModel, slow_circle: sm.paths.Circle
 ) -> None:
-    clearance = sm.Clearance([sm.Sphere("ball", np.array([0.0, 0.0, 9.0]), 0.05)])
+    clearance = sm.constraints.Clearance(
+        [sm.obstacles.Sphere("ball", np.array([0.0, 0.0, 9.0]), 0.05)]
+    )
     replanner = Replanner(panda, constraints=[clearance])
-    with pytest.raises(sm.ProblemError, match="'bal'"):
+    with pytest.raises(sm.errors.ProblemError, match="'bal'"):
         replanner.step(0.0, PANDA_HOME, np.zeros(7), slow_circle, {"bal": pin.SE3.Identity()})
 
 
-LIMITS = (sm.JointPositionLimits(), sm.JointVelocityLimits(), sm.JointAccelerationLimits())
+LIMITS = (
+    sm.constraints.JointPositionLimits(),
+    sm.constraints.JointVelocityLimits(),
+    sm.constraints.JointAccelerationLimits(),
+)
 
 
 def test_all_clearances_are_kept() -> None:
@@ -114,12 +120,15 @@ def test_all_clearances_are_kept() -> None:
     panda, q = robot_named("panda"), np.array(sm.NAMED_ARMS["panda"].home)
     first = panda.pose(q)
     last = pin.SE3(first.rotation, first.translation + np.array([0.0, 0.25, 0.0]))
-    path = sm.Line(first, last, 3.0)
+    path = sm.paths.Line(first, last, 3.0)
     place = first.translation + np.array([0.0, 0.225, 0.0])
-    ball, far = sm.Sphere("ball", place, 0.05), sm.Sphere("far", [3.0] * 3, 0.05)
-    bodies = [sm.Clearance([far], 0.02), sm.Clearance([ball], 0.02)]
+    ball, far = (
+        sm.obstacles.Sphere("ball", place, 0.05),
+        sm.obstacles.Sphere("far", [3.0] * 3, 0.05),
+    )
+    bodies = [sm.constraints.Clearance([far], 0.02), sm.constraints.Clearance([ball], 0.02)]
     replanner = sm.Replanner(panda, "position", constraints=[*LIMITS, *bodies], horizon=2.0)
-    model = sm.CollisionModel(panda, [ball])
+    model = sm.obstacles.CollisionModel(panda, [ball])
     with_ball = [k for k, pair in enumerate(model.pairs) if "ball" in pair]
     t, state, least = 0.0, (q, 0.0 * q), np.inf
     for _ in range(250):
@@ -133,7 +142,7 @@ def test_all_clearances_are_kept() -> None:
     replanner.step(t, *state, path, {"ball": pin.SE3.Identity(), "far": pin.SE3.Identity()})
 
 
-def cell_with_a_hook(panda: sm.RobotModel, file: Path) -> sm.Clearance:
+def cell_with_a_hook(panda: sm.RobotModel, file: Path) -> sm.constraints.Clearance:
     """Four posts far off, and a hook ahead of the tool, in one mesh: its hull holds the arm."""
     ahead = panda.pose(PANDA_HOME).translation + np.array([0.0, 0.15, 0.0])
     parts = [trimesh.creation.icosphere(radius=0.02, subdivisions=1).apply_translation(ahead)]
@@ -141,7 +150,7 @@ def cell_with_a_hook(panda: sm.RobotModel, file: Path) -> sm.Clearance:
         post = trimesh.creation.box((0.02, 0.02, 4.0))
         parts.append(post.apply_translation([x, y, 0.5]))
     trimesh.util.concatenate(parts).export(file)
-    return sm.Clearance([sm.Mesh("cell", [0.0] * 3, file)], 0.01)
+    return sm.constraints.Clearance([sm.obstacles.Mesh("cell", [0.0] * 3, file)], 0.01)
 
 
 def test_in_a_cell_as_one_mesh_the_arm_stops_before_a_hook(tmp_path: Path) -> None:
@@ -151,10 +160,10 @@ def test_in_a_cell_as_one_mesh_the_arm_stops_before_a_hook(tmp_path: Path) -> No
     first = panda.pose(PANDA_HOME)
     last = pin.SE3(first.rotation, first.translation + np.array([0.0, 0.3, 0.0]))
     t, q, qd, least = 0.0, PANDA_HOME, np.zeros(7), np.inf
-    exact = sm.CollisionModel(panda, cell.obstacles)
+    exact = sm.obstacles.CollisionModel(panda, cell.obstacles)
     with_cell = [k for k, pair in enumerate(exact.pairs) if "cell" in pair]
     for _ in range(120):
-        segment = replanner.step(t, q, qd, sm.Line(first, last, 2.0))
+        segment = replanner.step(t, q, qd, sm.paths.Line(first, last, 2.0))
         t += replanner.period
         q, qd = (each[segment.index(t)] for each in (segment.q, segment.qd))
         least = min(least, float(exact.distances(q[None])[0, with_cell].min()))
@@ -168,5 +177,7 @@ def test_an_open_cell_as_one_mesh_is_refused(tmp_path: Path) -> None:
     mesh = trimesh.load(tmp_path / "cell.stl")
     mesh.update_faces(np.arange(len(mesh.faces)) > 0)
     mesh.export(tmp_path / "cell.stl")
-    with pytest.raises(sm.ProblemError, match=r"convex hulls, and that of 'cell' always contains"):
+    with pytest.raises(
+        sm.errors.ProblemError, match=r"convex hulls, and that of 'cell' always contains"
+    ):
         sm.Replanner(panda, "position", constraints=[*LIMITS, cell])

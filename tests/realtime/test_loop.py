@@ -9,7 +9,7 @@ from support.arms import PANDA_HOME
 
 
 def test_the_loop_reads_until_there_is_no_state(
-    panda: sm.RobotModel, slow_circle: sm.Circle
+    panda: sm.RobotModel, slow_circle: sm.paths.Circle
 ) -> None:
     replanner = Replanner(panda)
     arm, written = SimulatedArm(PANDA_HOME, replanner.cycle), []
@@ -24,5 +24,5 @@ def test_the_loop_reads_until_there_is_no_state(
 
     assert realtime.follow(replanner, read, write) == 5
     assert [item.t[0] for item in written] == pytest.approx([0.0, 0.01, 0.02, 0.03, 0.04])
-    with pytest.raises(sm.ProblemError, match="expected State or None"):
+    with pytest.raises(sm.errors.ProblemError, match="expected State or None"):
         realtime.follow(replanner, lambda: 1, write)  # type: ignore[arg-type, return-value]

@@ -38,7 +38,7 @@ def test_segments_go_on_without_a_jump_and_the_tool_stays_on_its_path(
 ) -> None:
     robot = sm.load_robot(arm)
     start = robot.dexterous_configuration()
-    path = sm.Circle.around(robot.pose(start), 0.05, 4.0, normal=(1.0, 0.0, 0.0))
+    path = sm.paths.Circle.around(robot.pose(start), 0.05, 4.0, normal=(1.0, 0.0, 0.0))
     replanner = Replanner(robot, task, horizon=horizon)
     segments, places = closed_loop(replanner, path, start, 1.5)
     for one, other in pairwise(segments):
@@ -53,7 +53,7 @@ def test_segments_go_on_without_a_jump_and_the_tool_stays_on_its_path(
 
 
 def test_each_segment_ends_at_rest_and_keeps_all_limits(
-    panda: sm.RobotModel, slow_circle: sm.Circle
+    panda: sm.RobotModel, slow_circle: sm.paths.Circle
 ) -> None:
     replanner = Replanner(panda, "position")
     for segment in closed_loop(replanner, slow_circle, PANDA_HOME, 1.5)[0][::20]:
@@ -64,7 +64,7 @@ def test_each_segment_ends_at_rest_and_keeps_all_limits(
 
 
 def test_the_same_inputs_give_the_same_segments(
-    panda: sm.RobotModel, slow_circle: sm.Circle
+    panda: sm.RobotModel, slow_circle: sm.paths.Circle
 ) -> None:
     runs = [closed_loop(Replanner(panda), slow_circle, PANDA_HOME, 0.3)[1] for _ in range(2)]
     assert np.array_equal(*runs)
@@ -72,8 +72,8 @@ def test_the_same_inputs_give_the_same_segments(
 
 def test_a_closed_loop_costs_little_more_than_planning_all_at_once(panda: sm.RobotModel) -> None:
     # The paper's cost (eq. 12), on a path where the self-motion saves more than 5 %.
-    path = sm.Circle.around(panda.pose(PANDA_HOME), 0.15, 20.0, normal=(1.0, 0.0, 0.0))
-    costs = sm.JointVelocity(), sm.InverseManipulability(mu=0.02)
+    path = sm.paths.Circle.around(panda.pose(PANDA_HOME), 0.15, 20.0, normal=(1.0, 0.0, 0.0))
+    costs = sm.costs.JointVelocity(), sm.costs.InverseManipulability(mu=0.02)
     full = sm.plan(
         sm.Problem(panda, path, "position", PANDA_HOME, costs=costs, collision=None)
     ).report
@@ -84,7 +84,7 @@ def test_a_closed_loop_costs_little_more_than_planning_all_at_once(panda: sm.Rob
     q = np.concatenate([segment.q[:count] for segment in segments])
     qd = np.concatenate([segment.qd[:count] for segment in segments])
     sampling = sm.motion.Sampling.trapezoidal(replanner.cycle * np.arange(len(q)))
-    samples = sm.Samples.along(standing(panda, sm.Task.POSITION), sampling, q, qd)
+    samples = sm.costs.Samples.along(standing(panda, sm.Task.POSITION), sampling, q, qd)
     cost = sum(float(samples.weights @ item.value(samples)) for item in costs)
     assert cost < 1.03 * full.cost
     assert cost < full.initial_cost
@@ -94,7 +94,7 @@ def test_a_closed_loop_costs_little_more_than_planning_all_at_once(panda: sm.Rob
 
 
 def test_a_path_that_fails_is_kept_for_a_while_and_then_the_arm_stops(
-    panda: sm.RobotModel, slow_circle: sm.Circle
+    panda: sm.RobotModel, slow_circle: sm.paths.Circle
 ) -> None:
     replanner = Replanner(panda, patience=0.05)
     segments, _ = closed_loop(replanner, slow_circle, PANDA_HOME, 0.5)
@@ -112,7 +112,7 @@ def test_a_path_that_fails_is_kept_for_a_while_and_then_the_arm_stops(
 
 
 def test_without_a_plan_the_tool_is_tracked(
-    panda: sm.RobotModel, slow_circle: sm.Circle, monkeypatch: pytest.MonkeyPatch
+    panda: sm.RobotModel, slow_circle: sm.paths.Circle, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     replanner = Replanner(panda, "position")
     monkeypatch.setattr(replanner._horizon, "improve", scenarios.no_plan(replanner))
@@ -123,16 +123,16 @@ def test_without_a_plan_the_tool_is_tracked(
 
 
 def test_a_cost_that_is_not_finite_is_told_and_the_tool_is_tracked(
-    panda: sm.RobotModel, slow_circle: sm.Circle
+    panda: sm.RobotModel, slow_circle: sm.paths.Circle
 ) -> None:
-    cost = sm.FunctionCost(lambda qd, q, t: np.full(len(t), np.nan))
+    cost = sm.costs.FunctionCost(lambda qd, q, t: np.full(len(t), np.nan))
     segments, _ = closed_loop(Replanner(panda, "position", [cost]), slow_circle, PANDA_HOME, 0.1)
     assert {item.flag for item in segments} == {Flag.TRACKING}
     assert all("not finite" in reason for item in segments for reason in item.reasons)
 
 
 def test_a_late_step_goes_on_from_what_was_commanded_meanwhile(
-    panda: sm.RobotModel, slow_circle: sm.Circle
+    panda: sm.RobotModel, slow_circle: sm.paths.Circle
 ) -> None:
     replanner = Replanner(panda)
     last = closed_loop(replanner, slow_circle, PANDA_HOME, 1.0)[0][-1]
@@ -145,7 +145,7 @@ def test_a_late_step_goes_on_from_what_was_commanded_meanwhile(
 
 
 def test_an_arm_that_is_elsewhere_than_its_command_stops(
-    panda: sm.RobotModel, slow_circle: sm.Circle
+    panda: sm.RobotModel, slow_circle: sm.paths.Circle
 ) -> None:
     replanner = Replanner(panda)
     closed_loop(replanner, slow_circle, PANDA_HOME, 0.2)
@@ -155,8 +155,8 @@ def test_an_arm_that_is_elsewhere_than_its_command_stops(
     assert "panda_joint1" in segment.reasons[0]
 
 
-def test_time_does_not_go_back(panda: sm.RobotModel, slow_circle: sm.Circle) -> None:
+def test_time_does_not_go_back(panda: sm.RobotModel, slow_circle: sm.paths.Circle) -> None:
     replanner = Replanner(panda)
     replanner.step(1.0, PANDA_HOME, np.zeros(7), slow_circle)
-    with pytest.raises(sm.ProblemError, match=r"t is 0\.5"):
+    with pytest.raises(sm.errors.ProblemError, match=r"t is 0\.5"):
         replanner.step(0.5, PANDA_HOME, np.zeros(7), slow_circle)

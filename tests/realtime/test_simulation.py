@@ -17,7 +17,7 @@ def test_random_scenarios_keep_all_laws(panda: sm.RobotModel, seed: int) -> None
 
 
 def test_the_judge_of_scenarios_rejects_a_jump_and_a_broken_limit(
-    panda: sm.RobotModel, slow_circle: sm.Circle
+    panda: sm.RobotModel, slow_circle: sm.paths.Circle
 ) -> None:
     replanner = Replanner(panda)
     arm = SimulatedArm(PANDA_HOME, replanner.cycle)
@@ -35,5 +35,5 @@ def test_the_judge_of_scenarios_rejects_a_jump_and_a_broken_limit(
 
 
 def test_a_simulated_arm_wants_a_segment() -> None:
-    with pytest.raises(sm.ProblemError, match="no segment"):
+    with pytest.raises(sm.errors.ProblemError, match="no segment"):
         SimulatedArm(PANDA_HOME, 1e-3).run(0.1)

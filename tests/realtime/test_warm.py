@@ -18,7 +18,7 @@ from support.loops import closed_loop
 
 
 def test_after_warming_up_nothing_is_compiled_and_no_memory_grows(
-    panda: sm.RobotModel, slow_circle: sm.Circle
+    panda: sm.RobotModel, slow_circle: sm.paths.Circle
 ) -> None:
     replanner = Replanner(panda, "position")
     realtime.warm_up(replanner)

@@ -242,7 +242,7 @@ def test_joints_that_mimic_move_what_is_drawn_of_them(tmp_path):
     file.write_text(re.sub(r'(<link name="l\d">)', rf"\1{bar}", finger()))
     robot = load_robot(file, tool="side")
     start = np.array([0.3, 0.4, 0.5, 0.2])
-    path = sm.Line(robot.pose(start), robot.pose(start), 1.0)
+    path = sm.paths.Line(robot.pose(start), robot.pose(start), 1.0)
     plan = sm.plan(sm.Problem(robot, path, "position", start))
     content = page_content([plan], ["a"], Payload(), triads=3)
     assert content["movers"] == ["j1", "j2", "j3", "j4", "j5"]

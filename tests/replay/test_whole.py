@@ -38,7 +38,7 @@ def test_a_program_becomes_a_page_and_what_is_missing_none(program) -> None:
     assert program.verdict in page
     assert Whole.of(program.moves[0]).marks[0].end == program.moves[0].motion.duration
     missing = sm.Move(program.robot, (), None, "no way")
-    with pytest.raises(sm.PlanError, match="no way"):
+    with pytest.raises(sm.errors.PlanError, match="no way"):
         replay_html(missing)
 
 

@@ -57,7 +57,7 @@ def test_continuous_joints_and_locks_survive(tmp_path: Path) -> None:
     for name, lock in (("kinova", {}), ("tiago", {"torso_lift_joint": 0.2})):
         robot = sm.load_robot(name, lock=lock)
         start = robot.dexterous_configuration("position")
-        path = sm.Circle.around(robot.pose(start), 0.03, 3.0)
+        path = sm.paths.Circle.around(robot.pose(start), 0.03, 3.0)
         plan = sm.plan(sm.Problem(robot, path, "position", start))
         plan.save(tmp_path / "plan.npz")
         loaded = sm.load_plan(tmp_path / "plan.npz").robot
@@ -86,8 +86,10 @@ def test_limits_that_an_arm_was_given_survive(
     assert loaded.problem.digest == problem.digest != plan.problem.digest
     assert loaded.certificate.verified == other.certificate.verified
     assert loaded.certificate.verified == (name in ("lower", "effort_limit"))
-    with pytest.raises(sm.ProblemError, match=f"its {name} is another than it is loaded with"):
-        sm.write_problem(problem, tmp_path / "problem.toml")
+    with pytest.raises(
+        sm.errors.ProblemError, match=f"its {name} is another than it is loaded with"
+    ):
+        sm.files.write_problem(problem, tmp_path / "problem.toml")
 
 
 def test_csv_has_every_digit(plan: sm.Plan, tmp_path: Path) -> None:
@@ -104,22 +106,23 @@ def test_csv_has_every_digit(plan: sm.Plan, tmp_path: Path) -> None:
 
 
 def test_files_that_are_no_plans_are_named(plan: sm.Plan, tmp_path: Path) -> None:
-    with pytest.raises(sm.FileFormatError, match=r"none\.npz: no such file"):
+    with pytest.raises(sm.errors.FileFormatError, match=r"none\.npz: no such file"):
         sm.load_plan(tmp_path / "none.npz")
     text = tmp_path / "text.npz"
     text.write_text("not a plan")
-    with pytest.raises(sm.FileFormatError, match=r"text\.npz: is no plan"):
+    with pytest.raises(sm.errors.FileFormatError, match=r"text\.npz: is no plan"):
         sm.load_plan(text)
     np.savez(tmp_path / "other.npz", a=np.zeros(2))
-    with pytest.raises(sm.FileFormatError, match=r"other\.npz: is no plan"):
+    with pytest.raises(sm.errors.FileFormatError, match=r"other\.npz: is no plan"):
         sm.load_plan(tmp_path / "other.npz")
     files.write_archive(tmp_path / "empty.npz", {}, {})
-    with pytest.raises(sm.FileFormatError, match="its format is None"):
+    with pytest.raises(sm.errors.FileFormatError, match="its format is None"):
         sm.load_plan(tmp_path / "empty.npz")
 
 
 @pytest.mark.parametrize(
-    ("load", "key", "kind"), [(sm.load_plan, "format", "plan"), (sm.load_move, "move", "move")]
+    ("load", "key", "kind"),
+    [(sm.load_plan, "format", "plan"), (sm.files.load_move, "move", "move")],
 )
 def test_files_of_another_version_say_so(
     load: Callable[[Path], object], key: str, kind: str, tmp_path: Path
@@ -127,11 +130,11 @@ def test_files_of_another_version_say_so(
     file = tmp_path / "a.npz"
     for found, told in ((0, f"an older version of selfmotion (a {kind}"), (99, "a newer version")):
         files.write_archive(file, {key: found}, {})
-        with pytest.raises(sm.FileFormatError, match=re.escape(told)):
+        with pytest.raises(sm.errors.FileFormatError, match=re.escape(told)):
             load(file)
     other = {"format": "move", "move": "format"}[key]
     files.write_archive(file, {other: 1}, {})
-    with pytest.raises(sm.FileFormatError, match=f"not a {kind}"):
+    with pytest.raises(sm.errors.FileFormatError, match=f"not a {kind}"):
         load(file)
 
 
@@ -168,6 +171,6 @@ def test_no_part_of_a_file_is_edited_unseen(plan: sm.Plan, seed: int, tmp_path: 
         with np.errstate(all="ignore"):
             assert not sm.load_plan(file).certificate.verdict.startswith("verified")
         told = str(file)
-    except sm.FileFormatError as error:
+    except sm.errors.FileFormatError as error:
         told = str(error)
     assert told.startswith(str(file))

@@ -16,14 +16,14 @@ from typing import ClassVar
 import coal
 import selfmotion as sm
 
-class Own(sm.Path, kind="kept for a test"):
+class Own(sm.paths.Path, kind="kept for a test"):
     duration = 2.0
     def __init__(self, path): self.path = path
     def evaluate(self, t): return self.path.samples(t)
     def to_dict(self): return {"kind": self.kind}
 
 @dataclass(frozen=True, eq=False)
-class Cone(sm.Obstacle):
+class Cone(sm.obstacles.Obstacle):
     shape: ClassVar[str] = "cone kept for a test"
     radius: float
     def geometry(self): return coal.Cone(self.radius, self.radius)
@@ -37,9 +37,9 @@ def test_ones_own_code_is_in_the_key(tmp_path: Path, monkeypatch: pytest.MonkeyP
     monkeypatch.syspath_prepend(tmp_path)
     own = importlib.import_module("kept_own_code")
     pose = robot_named("planar_3r").pose(np.zeros(3))
-    path = own.Own(sm.Dwell(pose, 2.0)) + sm.Dwell(pose, 1.0)
-    apart = sm.Clearance([own.Cone("cone", pose, 0.1)])
-    plain = sm.Dwell(pose, 2.0)
+    path = own.Own(sm.paths.Dwell(pose, 2.0)) + sm.paths.Dwell(pose, 1.0)
+    apart = sm.constraints.Clearance([own.Cone("cone", pose, 0.1)])
+    plain = sm.paths.Dwell(pose, 2.0)
     described = [item.to_dict() for item in (path, apart, plain)]
     assert [own_modules(item) for item in described] == [["kept_own_code"]] * 2 + [[]]
     before = [key_of(item, {}) for item in described]

@@ -38,7 +38,7 @@ def test_knots_are_bounded_also_where_no_pace_keeps_the_limits(
     motion = sm.Trajectory(t, q, np.tile(turn, (9, 1)), panda.joint_names, 0.0 * q)
     # Less than the torque that holds the arm does not; three times as much moves it.
     held = np.abs(Dynamics(panda).torques(q[:1], 0.0 * q[:1], 0.0 * q[:1])).max()
-    torques = sm.JointTorqueLimits(share * held)
+    torques = sm.constraints.JointTorqueLimits(share * held)
     limits = PaceLimits(
         np.full(7, 0.02),
         np.full(7, 5.0),

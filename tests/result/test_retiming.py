@@ -30,8 +30,8 @@ SLOWLY, FEW_KNOTS = 2e-3, 6000
 def fast() -> sm.Plan:
     """A circle in half a second: far too fast for a Panda."""
     panda = robot_named("panda")
-    path = sm.Circle.around(panda.pose(PANDA_HOME), 0.15, 0.5, normal=(1.0, 0.0, 0.0))
-    only = (sm.JointPositionLimits(),)
+    path = sm.paths.Circle.around(panda.pose(PANDA_HOME), 0.15, 0.5, normal=(1.0, 0.0, 0.0))
+    only = (sm.constraints.JointPositionLimits(),)
     return sm.plan(sm.Problem(panda, path, start=PANDA_HOME, constraints=only))
 
 
@@ -43,7 +43,7 @@ def test_retimed_plans_keep_limits_and_geometry(fast: sm.Plan, tmp_path) -> None
     assert slow.certificate.acceleration_ratio.value <= 1.0
     assert slow.trajectory.duration > 2.0 * fast.trajectory.duration
     np.testing.assert_allclose(slow.trajectory.qd[[0, -1]], 0.0, atol=1e-6)
-    assert isinstance(slow.path, sm.Retimed)
+    assert isinstance(slow.path, sm.paths.Retimed)
     sigma = slow.path.pace(slow.trajectory.t)
     np.testing.assert_allclose(slow.trajectory.q, fast.trajectory(sigma), atol=1e-9)
     slow.save(tmp_path / "slow.npz")
@@ -52,8 +52,8 @@ def test_retimed_plans_keep_limits_and_geometry(fast: sm.Plan, tmp_path) -> None
 
 def test_what_binds_does_so_where_it_did(panda: sm.RobotModel) -> None:
     """At other times, but at the same places of the joint path."""
-    path = sm.Circle.around(panda.pose(PANDA_HOME), 0.15, 6.0, normal=(1.0, 0.0, 0.0))
-    limits = (sm.JointPositionLimits(), sm.JointVelocityLimits(0.36))
+    path = sm.paths.Circle.around(panda.pose(PANDA_HOME), 0.15, 6.0, normal=(1.0, 0.0, 0.0))
+    limits = (sm.constraints.JointPositionLimits(), sm.constraints.JointVelocityLimits(0.36))
     problem = sm.Problem(panda, path, task="position", start=PANDA_HOME, constraints=limits)
     plan = sm.plan(problem).require()
     again = sm.retime(plan, ACCELERATION, velocity=0.15)
@@ -73,29 +73,36 @@ def test_the_factor_is_the_one_that_suffices(fast: sm.Plan) -> None:
     panda = fast.robot
     for share, verified in ((1.01, True), (0.9, False)):
         duration = 0.5 * factor * share
-        path = sm.Circle.around(panda.pose(PANDA_HOME), 0.15, duration, normal=(1.0, 0.0, 0.0))
-        only = (sm.JointPositionLimits(),)
+        path = sm.paths.Circle.around(
+            panda.pose(PANDA_HOME), 0.15, duration, normal=(1.0, 0.0, 0.0)
+        )
+        only = (sm.constraints.JointPositionLimits(),)
         plan = sm.plan(sm.Problem(panda, path, start=PANDA_HOME, constraints=only))
         assert plan.certificate.verified is verified
     assert sm.slowdown(fast, ACCELERATION) > factor
 
 
 def test_bad_limits_are_refused(fast: sm.Plan) -> None:
-    with pytest.raises(sm.ProblemError, match="expected numbers > 0"):
+    with pytest.raises(sm.errors.ProblemError, match="expected numbers > 0"):
         sm.retime(fast, 0.0)
 
 
 def test_a_retimed_plan_keeps_what_the_plan_was_asked_to_keep(panda: sm.RobotModel) -> None:
     """Clearance and own velocity limits: what was refused before is not verified afterwards."""
     pose = panda.pose(PANDA_HOME)
-    path = sm.Circle.around(pose, 0.15, 4.0, normal=(1.0, 0.0, 0.0))
-    wall = sm.Box("wall", pose.translation + np.array([0.0, 0.0, 0.16]), [0.05, 0.05, 0.05])
+    path = sm.paths.Circle.around(pose, 0.15, 4.0, normal=(1.0, 0.0, 0.0))
+    wall = sm.obstacles.Box(
+        "wall", pose.translation + np.array([0.0, 0.0, 0.16]), [0.05, 0.05, 0.05]
+    )
     slow = np.full(7, 0.9)
     problem = sm.Problem(
         panda,
         path,
         start=PANDA_HOME,
-        constraints=[sm.JointVelocityLimits(slow), sm.Clearance(wall, 0.03)],
+        constraints=[
+            sm.constraints.JointVelocityLimits(slow),
+            sm.constraints.Clearance(wall, 0.03),
+        ],
     )
     plan = sm.plan(problem, max_evaluations=5)
     retimed = sm.retime(plan, 10.0)
@@ -103,22 +110,22 @@ def test_a_retimed_plan_keeps_what_the_plan_was_asked_to_keep(panda: sm.RobotMod
     assert retimed.certificate == retimed.check()
     assert np.abs(retimed.trajectory.qd).max() <= 0.9
     for bad in (np.nan, 0.0, [1.0, 2.0]):
-        with pytest.raises(sm.ProblemError):
+        with pytest.raises(sm.errors.ProblemError):
             sm.slowdown(plan, bad)
-        with pytest.raises(sm.ProblemError):
+        with pytest.raises(sm.errors.ProblemError):
             sm.retime(plan, bad)
 
 
 def test_retiming_keeps_torques_and_what_the_tool_may(panda: sm.RobotModel) -> None:
-    path = sm.Circle.around(panda.pose(PANDA_HOME), 0.12, 4.0, normal=(1.0, 0.0, 0.0))
+    path = sm.paths.Circle.around(panda.pose(PANDA_HOME), 0.12, 4.0, normal=(1.0, 0.0, 0.0))
     slow = sm.plan(sm.Problem(panda, path, start=PANDA_HOME)).require()
     dynamics, t = Dynamics(panda), np.linspace(0.0, 4.0, 2001)
     motion = slow.trajectory
     needed = np.abs(dynamics.torques(motion(t), motion(t, 1), motion(t, 2))).max(axis=0)
     for limit in (
-        sm.JointTorqueLimits(1.1 * needed + 0.5),
-        sm.ToolLimits(speed=0.6),
-        sm.ToolLimits(acceleration=1.2),
+        sm.constraints.JointTorqueLimits(1.1 * needed + 0.5),
+        sm.constraints.ToolLimits(speed=0.6),
+        sm.constraints.ToolLimits(acceleration=1.2),
     ):
         problem = dataclasses.replace(slow.problem, constraints=(*slow.problem.constraints, limit))
         asked = dataclasses.replace(slow, problem=problem)
@@ -129,20 +136,22 @@ def test_retiming_keeps_torques_and_what_the_tool_may(panda: sm.RobotModel) -> N
         assert kept.limits_used.busy > BUSY
 
 
-def cornered(robot: sm.RobotModel, start: np.ndarray) -> sm.Path:
+def cornered(robot: sm.RobotModel, start: np.ndarray) -> sm.paths.Path:
     """Straight legs around corners of 2 mm, at a constant feed."""
     pose = robot.pose(start)
     legs = np.array(
         [[0, 0, 0], [0, 0.1, 0], [0, 0.1, 0.03], [0, 0, 0.03], [0, 0, 0.06], [0, 0.1, 0.06]]
     )
-    seam = sm.Feed(
-        sm.Polyline(pose.translation + legs, np.tile(_quaternion(pose), (6, 1)), tolerance=2e-3),
+    seam = sm.paths.Feed(
+        sm.paths.Polyline(
+            pose.translation + legs, np.tile(_quaternion(pose), (6, 1)), tolerance=2e-3
+        ),
         0.1,
     )
     # A bit slower nobody asks for its feed.
     slower = 1.001
     rates = np.full(2, 1.0 / slower)
-    return sm.Retimed(seam, [0.0, slower * seam.duration], [0.0, seam.duration], rates)
+    return sm.paths.Retimed(seam, [0.0, slower * seam.duration], [0.0, seam.duration], rates)
 
 
 def _quaternion(pose: pin.SE3) -> np.ndarray:
@@ -185,7 +194,7 @@ def optimum(motion: sm.Trajectory, velocity: np.ndarray, acceleration: np.ndarra
 def test_no_motion_along_the_path_is_much_faster(name: str) -> None:
     robot = robot_named(name)
     start = robot.dexterous_configuration()
-    only = (sm.JointPositionLimits(),)
+    only = (sm.constraints.JointPositionLimits(),)
     plan = sm.plan(
         sm.Problem(robot, cornered(robot, start), "position", start=start, constraints=only)
     )
@@ -207,8 +216,8 @@ def test_jerks_cost_time_and_are_kept(panda: sm.RobotModel) -> None:
     path = cornered(panda, PANDA_HOME)
     times = []
     for jerk in (200.0, np.inf):
-        limits = () if jerk == np.inf else (sm.JointJerkLimits(jerk, replace=True),)
-        only = (sm.JointPositionLimits(), *limits)
+        limits = () if jerk == np.inf else (sm.constraints.JointJerkLimits(jerk, replace=True),)
+        only = (sm.constraints.JointPositionLimits(), *limits)
         plan = sm.plan(sm.Problem(panda, path, "position", start=PANDA_HOME, constraints=only))
         fast = sm.retime(plan, 8.0, 1.5)
         assert fast.certificate.verified, fast.certificate.verdict
@@ -237,10 +246,14 @@ def test_slow_limits_take_time_of_the_arm_alone(fast: sm.Plan) -> None:
 
 
 def test_a_motion_that_begins_moving_goes_on_as_it_did(panda: sm.RobotModel) -> None:
-    path = sm.Circle.around(panda.pose(PANDA_HOME), 0.1, 4.0, normal=(1.0, 0.0, 0.0))
+    path = sm.paths.Circle.around(panda.pose(PANDA_HOME), 0.1, 4.0, normal=(1.0, 0.0, 0.0))
     free = sm.plan(sm.Problem(panda, path, start=PANDA_HOME))
     qd = free.trajectory.qd[0]
-    kept = (*free.problem.constraints, sm.StartVelocity(qd), sm.StartAcceleration(np.zeros(7)))
+    kept = (
+        *free.problem.constraints,
+        sm.constraints.StartVelocity(qd),
+        sm.constraints.StartAcceleration(np.zeros(7)),
+    )
     plan = dataclasses.replace(free, problem=dataclasses.replace(free.problem, constraints=kept))
     fast = sm.retime(plan, 8.0)
     assert np.abs(fast.trajectory.qd[0] - qd).max() <= 1e-9
@@ -251,13 +264,13 @@ def test_a_motion_that_begins_moving_goes_on_as_it_did(panda: sm.RobotModel) -> 
 def test_waits_are_told_of_and_what_rests_all_the_time_is_refused(panda: sm.RobotModel) -> None:
     pose = panda.pose(PANDA_HOME)
     there = pin.SE3(pose.rotation, pose.translation + np.array([0.0, 0.05, 0.0]))
-    forth, back = sm.Line(pose, there, 1.0), sm.Line(there, pose, 1.0)
-    for waiting, told in ((forth + sm.Dwell(there, 0.5) + back, True), (forth + back, False)):
+    forth, back = sm.paths.Line(pose, there, 1.0), sm.paths.Line(there, pose, 1.0)
+    for waiting, told in ((forth + sm.paths.Dwell(there, 0.5) + back, True), (forth + back, False)):
         plan = sm.plan(sm.Problem(panda, waiting, start=PANDA_HOME))
         message = sm.retime(plan, ACCELERATION).report.message
         assert ("the 0.5 s that the tool waits" in message) == told
-    still = sm.plan(sm.Problem(panda, sm.Dwell(pose, 1.0), start=PANDA_HOME))
-    with pytest.raises(sm.PlanError, match="rests all the time"):
+    still = sm.plan(sm.Problem(panda, sm.paths.Dwell(pose, 1.0), start=PANDA_HOME))
+    with pytest.raises(sm.errors.PlanError, match="rests all the time"):
         sm.retime(still, ACCELERATION)
 
 
@@ -265,8 +278,8 @@ def test_windows_of_tolerances_are_where_they_were_on_the_path() -> None:
     """Up to rounding, not to the steps of the pace: near rest it hardly moves in one."""
     robot = robot_named("planar_3r")
     start, window = np.array([0.1, 0.9, 0.9]), np.array([0.05, 1.93])
-    line = sm.Line(robot.pose(start), robot.pose(start + 0.2), 2.0)
-    limits = [sm.JointVelocityLimits(2.0), sm.JointAccelerationLimits(3.0)]
+    line = sm.paths.Line(robot.pose(start), robot.pose(start + 0.2), 2.0)
+    limits = [sm.constraints.JointVelocityLimits(2.0), sm.constraints.JointAccelerationLimits(3.0)]
     relaxed = [sm.Relaxation("x", 0.01, during=tuple(window))]
     problem = sm.Problem(robot, line, "planar", start, constraints=limits, relaxations=relaxed)
     faster = sm.retime(sm.plan(problem, max_evaluations=3))

@@ -46,10 +46,10 @@ def test_trembling_is_no_turning() -> None:
 def test_the_cost_counts_and_a_motion_turns_round_less_often() -> None:
     arm = sm.load_robot("planar_3r")
     points = [[2.0, -0.6, 0.0], [2.0, 0.6, 0.0], [1.7, 0.6, 0.0], [1.7, -0.6, 0.0]]
-    path = sm.Feed(sm.Polyline(points, tolerance=0.03), 1.0, within=0.5)
-    velocity, turning = sm.JointVelocity(), sm.JointReversals(0.2)
+    path = sm.paths.Feed(sm.paths.Polyline(points, tolerance=0.03), 1.0, within=0.5)
+    velocity, turning = sm.costs.JointVelocity(), sm.costs.JointReversals(0.2)
     q = arm.inverse_kinematics(path.pose(0.0), "planar", seed=[-1.2, 1.2, 0.6])
-    limits = [sm.JointPositionLimits()]
+    limits = [sm.constraints.JointPositionLimits()]
     problem = sm.Problem(arm, path, "planar", q, costs=[velocity], constraints=limits)
     plain, fewer = (
         sm.plan(replace(problem, costs=costs)) for costs in ([velocity], [velocity, turning])

@@ -16,10 +16,10 @@ from support.arms import robot_named
 BUMP = 1e-6
 
 
-def toward(first: SE3, seconds: float) -> sm.Path:
+def toward(first: SE3, seconds: float) -> sm.paths.Path:
     """Return a straight line from a pose, of so many seconds."""
     last = SE3(first.rotation, first.translation + np.array([-0.3, 0.1, 0.0]))
-    return sm.Line(first, last, seconds)
+    return sm.paths.Line(first, last, seconds)
 
 
 @pytest.fixture(scope="module")
@@ -41,9 +41,9 @@ def test_a_plan_with_another_motion_has_no_certificate(plan: sm.Plan, tmp_path: 
     for attempt in (
         coarse.require,
         lambda: coarse.save(tmp_path / "a.npz"),
-        lambda: sm.write_motion(coarse, tmp_path / "a.csv"),
+        lambda: sm.files.write_motion(coarse, tmp_path / "a.csv"),
     ):
-        with pytest.raises(sm.PlanError, match="of another motion or problem"):
+        with pytest.raises(sm.errors.PlanError, match="of another motion or problem"):
             attempt()
     assert not list(tmp_path.iterdir())
     # What is judged again is what it is.
@@ -54,14 +54,16 @@ def test_a_plan_with_another_motion_has_no_certificate(plan: sm.Plan, tmp_path: 
 
 def test_a_plan_of_another_problem_has_no_certificate(plan: sm.Plan) -> None:
     problem = plan.problem
-    slower = replace(problem, constraints=[*problem.constraints, sm.JointVelocityLimits(1.0)])
+    slower = replace(
+        problem, constraints=[*problem.constraints, sm.constraints.JointVelocityLimits(1.0)]
+    )
     other = replace(plan, problem=slower)
     assert not other.certificate.verified
     assert replace(other, certificate=other.check()).certificate.problem == slower.digest
     # Nor can that of another problem be handed over.
     assert not replace(other, certificate=plan.certificate).certificate.verified
     # What no certificate judges does not count.
-    dearer = replace(problem, costs=[sm.JointVelocity(weight=2.0)])
+    dearer = replace(problem, costs=[sm.costs.JointVelocity(weight=2.0)])
     assert replace(plan, problem=dearer).certificate.verified
     assert plan.certificate.version
 
@@ -73,8 +75,8 @@ def test_everything_that_is_judged_is_in_the_digest_of_a_problem(plan: sm.Plan) 
         replace(problem, path=longer),
         replace(problem, rest=False),
         replace(problem, constraints=[]),
-        replace(problem, constraints=[sm.JointVelocityLimits(1.0)]),
-        replace(problem, constraints=[sm.JointVelocityLimits(1.0 + 1e-15)]),
+        replace(problem, constraints=[sm.constraints.JointVelocityLimits(1.0)]),
+        replace(problem, constraints=[sm.constraints.JointVelocityLimits(1.0 + 1e-15)]),
         replace(problem, relaxations=[sm.Relaxation("x", 0.01)]),
         replace(problem, damping=sm.Damping()),
         # What limits of one's own are held against besides.
@@ -88,7 +90,7 @@ def test_everything_that_is_judged_is_in_the_digest_of_a_problem(plan: sm.Plan) 
     ]
     digests = [problem.digest, *(item.digest for item in others)]
     assert len(set(digests)) == len(digests)
-    assert replace(problem, costs=[sm.JointVelocity(weight=3.0)]).digest == problem.digest
+    assert replace(problem, costs=[sm.costs.JointVelocity(weight=3.0)]).digest == problem.digest
     assert replace(problem, start=None).digest not in digests
 
 
@@ -123,10 +125,10 @@ def test_a_motion_has_one_digest_whatever_made_it() -> None:
     assert replace(motion, qdd=np.zeros((4, 3))).digest != motion.digest
 
 
-class Bumped(sm.Path, kind="bumped for a test"):
+class Bumped(sm.paths.Path, kind="bumped for a test"):
     """A line with a bump that is no longer than a thousandth of it, at a place of its own."""
 
-    def __init__(self, line: sm.Path, at: float, height: float) -> None:
+    def __init__(self, line: sm.paths.Path, at: float, height: float) -> None:
         self.line, self.at, self.height, self.duration = line, at, height, line.duration
 
     @property
@@ -159,11 +161,14 @@ def test_what_a_plan_was_not_judged_by_is_told(plan: sm.Plan) -> None:
             "acceleration of its joint 'joint1' is inf rad/s², not 7",
         ),
         ({"robot": replace(problem.robot, touching=(("a", "b"),))}, "links of it may touch"),
-        ({"path": sm.Dwell(problem.path.pose(0.0), 2.0)}, "along another path"),
+        ({"path": sm.paths.Dwell(problem.path.pose(0.0), 2.0)}, "along another path"),
         ({"task": sm.Task.POSITION}, "its task is"),
         ({"relaxations": [sm.Relaxation("x", 0.01)]}, "other rows are relaxed"),
-        ({"constraints": [sm.JointVelocityLimits(1.0)]}, "not judged by JointVelocityLimits"),
-        ({"clearance": sm.Clearance()}, "the clearance that was asked for"),
+        (
+            {"constraints": [sm.constraints.JointVelocityLimits(1.0)]},
+            "not judged by JointVelocityLimits",
+        ),
+        ({"clearance": sm.constraints.Clearance()}, "the clearance that was asked for"),
         ({"tolerance": sm.Tolerance(1e-8, 1e-8)}, "judged within 1e-06 m"),
     ):
         assert said in "; ".join(replace(asked, **changes).failures(plan)), changes
@@ -184,8 +189,10 @@ def test_parts_that_are_not_judged_by_rest_are_not_verified(plan: sm.Plan) -> No
 
 def test_what_was_changed_stays_so_in_another_file(plan: sm.Plan, tmp_path: Path) -> None:
     robot, start = plan.robot, plan.trajectory.q[0]
-    move = sm.move(robot, start, start + 0.1, constraints=[sm.JointAccelerationLimits(2.0)])
-    for made, load in ((plan, sm.load_plan), (move.require(), sm.load_move)):
+    move = sm.move(
+        robot, start, start + 0.1, constraints=[sm.constraints.JointAccelerationLimits(2.0)]
+    )
+    for made, load in ((plan, sm.load_plan), (move.require(), sm.files.load_move)):
         made.save(tmp_path / "a.npz")
         arrays = dict(np.load(tmp_path / "a.npz"))
         np.savez(tmp_path / "a.npz", **{**arrays, "q": arrays["q"] * (1.0 + 1e-12)})
@@ -194,11 +201,11 @@ def test_what_was_changed_stays_so_in_another_file(plan: sm.Plan, tmp_path: Path
         again = load(tmp_path / "b.npz")
         again.save(tmp_path / "c.npz")
         for found in (changed, again, load(tmp_path / "c.npz")):
-            with pytest.raises(sm.PlanError, match=r"a\.npz was changed after"):
+            with pytest.raises(sm.errors.PlanError, match=r"a\.npz was changed after"):
                 found.require()
     parts = sm.Parts(plan.problem, (plan,), altered="it was changed")
     parts.save(tmp_path / "a.parts")
-    assert sm.load_parts(tmp_path / "a.parts").verdict == "not verified: it was changed"
+    assert sm.files.load_parts(tmp_path / "a.parts").verdict == "not verified: it was changed"
 
 
 def test_motions_are_in_the_robots_order_of_joints(plan: sm.Plan, tmp_path: Path) -> None:

@@ -180,8 +180,8 @@ def line_of(robot: sm.RobotModel) -> sm.Problem:
     pose = robot.pose(start)
     end = pose.copy()
     end.translation = pose.translation + np.array([0.05, 0.1, 0.0])
-    limits = [sm.JointPositionLimits(), sm.JointVelocityLimits()]
-    return sm.Problem(robot, sm.Line(pose, end, 2.0), "pointing", start, constraints=limits)
+    limits = [sm.constraints.JointPositionLimits(), sm.constraints.JointVelocityLimits()]
+    return sm.Problem(robot, sm.paths.Line(pose, end, 2.0), "pointing", start, constraints=limits)
 
 
 def test_a_plan_for_the_drawn_arm_misses_on_the_measured_one(tmp_path: Path) -> None:
@@ -209,7 +209,7 @@ def test_a_plan_for_the_drawn_arm_misses_on_the_measured_one(tmp_path: Path) -> 
     q = configurations()[0]
     np.testing.assert_array_equal(named.pose(q).homogeneous, read.robot.pose(q).homogeneous)
     file.write_text(file.read_text().replace("0.0892", "0.0893"))
-    with pytest.raises(sm.ProblemError, match="calibration file says now"):
+    with pytest.raises(sm.errors.ProblemError, match="calibration file says now"):
         write_problem(read.problem, described)
 
 
@@ -249,17 +249,17 @@ def test_what_is_no_calibration_is_refused(name: str, tmp_path: Path) -> None:
     text, said = BAD[name]
     file = tmp_path / name
     file.write_text(text)
-    with pytest.raises(sm.RobotError, match=said):
+    with pytest.raises(sm.errors.RobotError, match=said):
         sm.load_robot("ur5", calibration=file)
 
 
 def test_calibrations_of_another_arm_are_refused(tmp_path: Path) -> None:
     file = written(MEASURED, tmp_path)
-    with pytest.raises(sm.RobotError, match="0 joints 'shoulder_pan_joint'"):
+    with pytest.raises(sm.errors.RobotError, match="0 joints 'shoulder_pan_joint'"):
         sm.load_robot("panda", calibration=file)
-    with pytest.raises(sm.RobotError, match="calibrated already"):
+    with pytest.raises(sm.errors.RobotError, match="calibrated already"):
         sm.calibrated(line_of(sm.load_robot("ur5", calibration=file)), file)
-    with pytest.raises(sm.RobotError, match="by part"):
+    with pytest.raises(sm.errors.RobotError, match="by part"):
         sm.load_robot({"arm": "ur5"}, calibration=file)
-    with pytest.raises(sm.RobotError, match="cannot be read"):
+    with pytest.raises(sm.errors.RobotError, match="cannot be read"):
         sm.load_robot("ur5", calibration=tmp_path / "nowhere.yaml")

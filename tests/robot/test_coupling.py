@@ -168,7 +168,11 @@ def test_gradients_of_rollouts_are_differences(robot: sm.RobotModel) -> None:
     t = rollout.grid.stage_times
     functions = PolynomialNullMotion(2, "joint").functions(t, case[3].duration)
     table = NullMotionTable(functions, None, robot.dof)
-    costs = [sm.JointVelocity(), sm.InverseManipulability(1e-3), sm.KineticEnergy(robot)]
+    costs = [
+        sm.costs.JointVelocity(),
+        sm.costs.InverseManipulability(1e-3),
+        sm.costs.KineticEnergy(robot),
+    ]
     objective = objective_of(rollout, table, costs, FixedStart(case[2]))
     x = 0.1 * np.random.default_rng(7).normal(size=objective.size)
     exact = objective.gradient(x)
@@ -189,7 +193,7 @@ def test_gradients_on_nodes_are_differences(robot: sm.RobotModel) -> None:
 
 
 def test_bodies_turn_with_what_they_mimic(robot: sm.RobotModel) -> None:
-    model = sm.CollisionModel(robot)
+    model = sm.obstacles.CollisionModel(robot)
     rng = np.random.default_rng(3)
     for q in drawn(robot, 2):
         step = 1e-2 * rng.normal(size=robot.dof)
@@ -213,7 +217,9 @@ def test_the_torso_carries_both_arms(tmp_path: Path) -> None:
     turned = np.array([[np.cos(0.7), -np.sin(0.7), 0], [np.sin(0.7), np.cos(0.7), 0], [0, 0, 1]])
     np.testing.assert_allclose(turn, turned @ still.rotation, atol=EXACT)
     np.testing.assert_allclose(at, turned @ still.translation, atol=EXACT)
-    with pytest.raises(sm.RobotError, match="lock holds joint 't2', which mimics 't1', and that"):
+    with pytest.raises(
+        sm.errors.RobotError, match="lock holds joint 't2', which mimics 't1', and that"
+    ):
         sm.load_robot(file, tool="left7", lock={"t2": 0.0})
     held = sm.load_robot(file, tool="left7", lock={"t1": 0.4})
     assert held.locked["t2"] == pytest.approx(0.4)
@@ -233,13 +239,15 @@ def test_limits_are_the_tighter_ones(tmp_path: Path) -> None:
     assert arm.upper[k] == pytest.approx(0.3)
     assert arm.velocity_limit[k] == pytest.approx(0.5)
     file.write_text(finger(limits='lower="8" upper="9" velocity="1" effort="5"', mimic=""))
-    with pytest.raises(sm.RobotError, match="joint 'j3' has no position within the limits of all"):
+    with pytest.raises(
+        sm.errors.RobotError, match="joint 'j3' has no position within the limits of all"
+    ):
         sm.load_robot(file, tool="tip")
 
 
 def test_coupled_arms_plan_save_export_and_replay(robot: sm.RobotModel, tmp_path: Path) -> None:
     q = robot.dexterous_configuration("position")
-    path = sm.Circle.around(robot.pose(q), 0.03, 3.0)
+    path = sm.paths.Circle.around(robot.pose(q), 0.03, 3.0)
     plan = sm.plan(sm.Problem(robot, path, "position", q))
     assert plan.certificate.verified, plan.certificate.verdict
     plan.save(tmp_path / "plan.npz")
@@ -254,7 +262,7 @@ def test_coupled_arms_plan_save_export_and_replay(robot: sm.RobotModel, tmp_path
         )
         at = other.get_transform(robot.tool, robot.urdf.root)[:3, 3]
         np.testing.assert_allclose(at, path.pose(t).translation, atol=1e-6)
-    sm.write_motion(plan, tmp_path / "plan.csv")
-    assert sm.read_motion(tmp_path / "plan.csv").joint_names == robot.joint_names
+    sm.files.write_motion(plan, tmp_path / "plan.csv")
+    assert sm.files.read_motion(tmp_path / "plan.csv").joint_names == robot.joint_names
     poses = robot.joint_poses(plan.trajectory.q[[0, -1]])
     assert poses.shape[1] == robot.model.nv

@@ -135,8 +135,8 @@ def test_torques_equal_those_of_another_recursion(name: str, loaded: bool) -> No
     ],
 )
 def test_payloads_that_make_no_sense(panda: sm.RobotModel, options: dict, message: str) -> None:
-    with pytest.raises(sm.ProblemError, match=message):
-        upright_circle(panda, constraints=[sm.JointTorqueLimits(**options)])
+    with pytest.raises(sm.errors.ProblemError, match=message):
+        upright_circle(panda, constraints=[sm.constraints.JointTorqueLimits(**options)])
 
 
 def test_an_arm_without_masses_is_refused(panda: sm.RobotModel, tmp_path: Path) -> None:
@@ -144,5 +144,5 @@ def test_an_arm_without_masses_is_refused(panda: sm.RobotModel, tmp_path: Path) 
     bare = re.sub(r"<(visual|collision)>.*?</\1>", "", bare, flags=re.DOTALL)
     (tmp_path / "bare.urdf").write_text(bare)
     robot = sm.load_robot(tmp_path / "bare.urdf", tool=panda.tool)
-    with pytest.raises(sm.ProblemError, match="gives no masses"):
-        upright_circle(robot, constraints=[sm.JointTorqueLimits()])
+    with pytest.raises(sm.errors.ProblemError, match="gives no masses"):
+        upright_circle(robot, constraints=[sm.constraints.JointTorqueLimits()])

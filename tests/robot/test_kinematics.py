@@ -20,6 +20,6 @@ def test_inverse_kinematics_reaches(name: str) -> None:
 
 
 def test_inverse_kinematics_names_the_miss(planar: sm.RobotModel) -> None:
-    with pytest.raises(sm.InverseKinematicsError, match=r"misses by 1 m") as caught:
+    with pytest.raises(sm.errors.InverseKinematicsError, match=r"misses by 1 m") as caught:
         planar.inverse_kinematics(pin.SE3(np.eye(3), np.array([6.0, 0, 0])), "planar", attempts=5)
     assert caught.value.position_miss == pytest.approx(1.0)

@@ -32,7 +32,7 @@ def test_broken_urdfs_are_refused(tmp_path: Path, old: str, new: str, message: s
     assert old in text
     file = tmp_path / "broken.urdf"
     file.write_text(text.replace(old, new) if old == "robot" else text.replace(old, new, 1))
-    with pytest.raises(sm.RobotError, match=message):
+    with pytest.raises(sm.errors.RobotError, match=message):
         sm.load_robot(file)
 
 
@@ -83,5 +83,5 @@ def test_a_sound_copy_is_accepted(tmp_path: Path) -> None:
     ],
 )
 def test_bad_requests_are_refused(call, message: str) -> None:
-    with pytest.raises(sm.RobotError, match=message):
+    with pytest.raises(sm.errors.RobotError, match=message):
         call()

@@ -56,7 +56,9 @@ def test_packages_beside_are_found(
     np.testing.assert_allclose(robot.pose(np.zeros(7)).translation, UP, atol=1e-12)
     if way != "below":
         monkeypatch.undo()
-        with pytest.raises(sm.RobotError, match=r"package 'arm_description' is in none of .*work"):
+        with pytest.raises(
+            sm.errors.RobotError, match=r"package 'arm_description' is in none of .*work"
+        ):
             sm.load_robot(file, tool="l7")
 
 
@@ -102,15 +104,19 @@ def test_addresses_of_meshes_are_looked_up_alike(address: str, tmp_path: Path) -
 def test_what_is_not_found_is_named_with_where_it_was_looked_for(tmp_path: Path) -> None:
     file = described_package(tmp_path / "one")
     file.write_text(file.read_text().replace("find arm_description", "find arm_descriptions"))
-    with pytest.raises(sm.RobotError, match=r"package 'arm_descriptions' .*ROS_PACKAGE_PATH") as no:
+    with pytest.raises(
+        sm.errors.RobotError, match=r"package 'arm_descriptions' .*ROS_PACKAGE_PATH"
+    ) as no:
         sm.load_robot(file)
     assert str(tmp_path) in str(no.value)
     assert "--packages DIR" in str(no.value)
     mesh = '<geometry><mesh filename="package://hand/a.stl"/></geometry>'
     file = tmp_path / "arm.urdf"
     file.write_text(arm(f"<collision>{mesh}</collision>"))
-    with pytest.raises(sm.RobotError, match=r"link 'l4': no such mesh file, package 'hand' is in"):
-        sm.CollisionModel(sm.load_robot(file))
+    with pytest.raises(
+        sm.errors.RobotError, match=r"link 'l4': no such mesh file, package 'hand' is in"
+    ):
+        sm.obstacles.CollisionModel(sm.load_robot(file))
 
 
 def test_arguments_of_a_xacro_are_given_in_the_shell(tmp_path: Path) -> None:
@@ -124,7 +130,7 @@ def test_arguments_of_a_xacro_are_given_in_the_shell(tmp_path: Path) -> None:
     assert "has no argument 'nam'; nearest: 'name'" in said
     given = ("--argument", "name=arm", "--argument", "reach=0.3")
     assert invoke("init", file, "--out", out, *given, "--lock", "j3=0.1")[0] == 0
-    robot = sm.read_job(out).problem.robot
+    robot = sm.files.read_job(out).problem.robot
     assert robot.dof == 6
     assert robot.locked == {"j3": 0.1}
     np.testing.assert_allclose(robot.model.jointPlacements[1].translation, [0, 0, 0.3])
@@ -216,9 +222,13 @@ def test_an_inertial_that_lacks_something_is_missed_only_by_torques(
     robot = sm.load_robot(file)
     (note,) = robot.urdf.notes
     assert note.startswith("link 'l4': ")
-    path = sm.Line(robot.pose(np.full(7, 0.3)), robot.pose(np.full(7, 0.31)), 1.0)
+    path = sm.paths.Line(robot.pose(np.full(7, 0.3)), robot.pose(np.full(7, 0.31)), 1.0)
     problem = sm.Problem(robot, path, "pose", np.full(7, 0.3))
     assert note in problem.remarks
-    for ask in (sm.GravityTorque, sm.KineticEnergy, sm.JointTorqueLimits(5.0).quantity):
-        with pytest.raises(sm.ProblemError, match=r"link 'l4': .*: add it"):
+    for ask in (
+        sm.costs.GravityTorque,
+        sm.costs.KineticEnergy,
+        sm.constraints.JointTorqueLimits(5.0).quantity,
+    ):
+        with pytest.raises(sm.errors.ProblemError, match=r"link 'l4': .*: add it"):
             ask(robot)

@@ -36,7 +36,7 @@ def with_mesh(tag: str, file: str) -> str:
 
 
 def plan_of(robot: sm.RobotModel) -> sm.Plan:
-    stay = sm.Dwell(robot.pose(Q), 1.0)
+    stay = sm.paths.Dwell(robot.pose(Q), 1.0)
     relaxed = [sm.Relaxation("x", 0.01)]
     return sm.plan(sm.Problem(robot, stay, "planar", Q, relaxations=relaxed))
 
@@ -62,7 +62,7 @@ def test_so100_whose_gripper_is_link_and_joint_plans_and_saves(tmp_path: Path) -
     robot = sm.load_robot(Path(str(file)), tool="gripper")
     assert (robot.dof, robot.tool) == (5, "gripper")
     start = robot.dexterous_configuration("position")
-    path = sm.Line(robot.pose(start), robot.pose(start), 1.0)
+    path = sm.paths.Line(robot.pose(start), robot.pose(start), 1.0)
     plan = sm.plan(sm.Problem(robot, path, "position", start))
     assert plan.certificate.verified, plan.certificate.verdict
     assert "self-collision" in plan.certificate.verdict
@@ -91,8 +91,8 @@ def test_kinematics_load_without_meshes_and_messages_name_them(
     blind = load(tmp_path, with_mesh("collision", file))
     np.testing.assert_array_equal(blind.pose(Q).homogeneous, expected.homogeneous)
     said = rf"link 'upper': .*{reason}.*{Path(file).name}; or .*--no-self-collision"
-    with pytest.raises(sm.RobotError, match=said):
-        sm.CollisionModel(blind)
+    with pytest.raises(sm.errors.RobotError, match=said):
+        sm.obstacles.CollisionModel(blind)
     undrawn = load(tmp_path, with_mesh("visual", file))
     geometry, missing = undrawn.visuals()
     # Its collision body stands for it.
@@ -118,7 +118,7 @@ def test_what_urdfdom_says_is_an_error_and_the_rest_is_passed_on(
 ) -> None:
     """`<dynamics>` without numbers passes the checks of elements, but not urdfdom."""
     broken = SOUND.replace('<axis xyz="0 0 1"/>', '<axis xyz="0 0 1"/><dynamics/>')
-    with pytest.raises(sm.RobotError, match=r"not read by Pinocchio: .*\[shoulder\]"):
+    with pytest.raises(sm.errors.RobotError, match=r"not read by Pinocchio: .*\[shoulder\]"):
         load(tmp_path, broken)
     assert capfd.readouterr().err == ""
 
@@ -144,10 +144,10 @@ def test_matrices_are_poses_wherever_one_is_taken() -> None:
         placed.pose(np.zeros(7)).homogeneous, expected.homogeneous, atol=1e-9
     )
     for given in (
-        sm.Box("box", matrix, [1, 1, 1]).pose,
-        sm.Dwell(matrix, 1.0).pose(0.0),
-        sm.Placed(sm.Dwell(np.eye(4), 1.0), matrix).pose(0.0),
-        sm.Waypoints.from_poses([0, 1], [matrix, matrix]).pose(0.0),
+        sm.obstacles.Box("box", matrix, [1, 1, 1]).pose,
+        sm.paths.Dwell(matrix, 1.0).pose(0.0),
+        sm.paths.Placed(sm.paths.Dwell(np.eye(4), 1.0), matrix).pose(0.0),
+        sm.paths.Waypoints.from_poses([0, 1], [matrix, matrix]).pose(0.0),
         panda.pose(panda.inverse_kinematics(matrix)),
     ):
         np.testing.assert_allclose(given.homogeneous, matrix, atol=1e-9)
@@ -173,9 +173,11 @@ def test_a_locked_joint_moves_the_one_that_mimics_it(tmp_path: Path) -> None:
     file.write_text(f'<robot name="g"><link name="l0"/>{joints}{FINGERS}</robot>')
     robot = sm.load_robot(file, "l2", {"g_left": 0.3})
     assert robot.locked == {"g_left": 0.3, "g_right": 0.3}
-    model = sm.CollisionModel(robot, [sm.Sphere("ball", [0.0, -0.33, 0.7], 0.03)])
+    model = sm.obstacles.CollisionModel(
+        robot, [sm.obstacles.Sphere("ball", [0.0, -0.33, 0.7], 0.03)]
+    )
     assert model.distance([0.0, 0.0]).value < 0.0
-    with pytest.raises(sm.RobotError, match=r"it mimics 'g_left' and stands at 0\.3"):
+    with pytest.raises(sm.errors.RobotError, match=r"it mimics 'g_left' and stands at 0\.3"):
         sm.load_robot(file, "l2", {"g_left": 0.3, "g_right": 0.0})
 
 
@@ -190,7 +192,7 @@ def test_a_loop_of_links_beside_the_tree_is_refused(tmp_path: Path) -> None:
         '<parent link="a"/><child link="b"/><axis xyz="0 0 1"/></joint><link name="z1"/>'
         f'<link name="z2"/>{loop}</robot>'
     )
-    with pytest.raises(sm.RobotError, match="its joints form a loop"):
+    with pytest.raises(sm.errors.RobotError, match="its joints form a loop"):
         sm.load_robot(file, tool="z1")
 
 
@@ -220,7 +222,7 @@ def test_urdfs_that_pinocchio_stumbles_over_are_refused_by_name(
 ) -> None:
     file = tmp_path / "arm.urdf"
     file.write_text(ONE_JOINT.format(link=link, limit=limit))
-    with pytest.raises(sm.RobotError, match=message):
+    with pytest.raises(sm.errors.RobotError, match=message):
         sm.load_robot(file)
 
 
@@ -250,6 +252,6 @@ def test_an_arm_of_one_joint_is_an_arm(tmp_path: Path) -> None:
     robot = sm.load_robot(file)
     assert robot.jacobian([0.3]).shape == (6, 1)
     assert robot.redundancy("position") == 1
-    path = sm.Waypoints.from_poses([0.0, 1.0], [robot.pose([0.3])] * 2)
+    path = sm.paths.Waypoints.from_poses([0.0, 1.0], [robot.pose([0.3])] * 2)
     motion = sm.Trajectory([0.0, 1.0], [[0.3], [0.3]], [[0.0], [0.0]], robot.joint_names)
     assert sm.certify(robot, path, "pose", motion).verified

@@ -46,7 +46,7 @@ def test_curves_of_a_planar_arm_are_those_of_the_closed_form(arm: sm.RobotModel)
     # down, on which that angle makes a turn.
     x = np.array([1.2, 1.6])
     motion = SelfMotion(standing(arm, sm.Task.PLANAR), 0.05)
-    target = Follows.of(arm, sm.Line(level(*x), level(1.3, 1.6), 1.0), "planar").targets(
+    target = Follows.of(arm, sm.paths.Line(level(*x), level(1.3, 1.6), 1.0), "planar").targets(
         np.array([0.0])
     )[0]
     seeds = np.random.default_rng(1).uniform(-3.0, 3.0, (30, 3))
@@ -77,9 +77,9 @@ def test_curves_of_a_planar_arm_are_those_of_the_closed_form(arm: sm.RobotModel)
 def test_one_curve_where_elbow_up_and_down_meet(arm: sm.RobotModel) -> None:
     # Beyond 3 m the stretched elbow joins the two families to one curve.
     motion = SelfMotion(standing(arm, sm.Task.PLANAR), 0.05)
-    target = Follows.of(arm, sm.Line(level(3.5, 0.0), level(3.4, 0.0), 1.0), "planar").targets(
-        np.array([0.0])
-    )[0]
+    target = Follows.of(
+        arm, sm.paths.Line(level(3.5, 0.0), level(3.4, 0.0), 1.0), "planar"
+    ).targets(np.array([0.0]))[0]
     curves = motion.curves(target, np.random.default_rng(1).uniform(-3.0, 3.0, (30, 3))).curves
     assert [curve.closed for curve in curves] == [True]
     assert curves[0].q[:, 1].min() < -0.1 < 0.1 < curves[0].q[:, 1].max()
@@ -90,9 +90,9 @@ def test_one_curve_where_elbow_up_and_down_meet(arm: sm.RobotModel) -> None:
 def test_points_of_curves_are_found_where_they_were_asked_for(arm: sm.RobotModel) -> None:
     """Of all curves at once, by turns added; and what is beside them is on none."""
     motion = SelfMotion(standing(arm, sm.Task.PLANAR), 0.05)
-    target = Follows.of(arm, sm.Line(level(1.2, 1.6), level(1.3, 1.6), 1.0), "planar").targets(
-        np.array([0.0])
-    )[0]
+    target = Follows.of(
+        arm, sm.paths.Line(level(1.2, 1.6), level(1.3, 1.6), 1.0), "planar"
+    ).targets(np.array([0.0]))[0]
     rng = np.random.default_rng(1)
     found = motion.curves(target, rng.uniform(-3.0, 3.0, (30, 3)))
     number = rng.integers(len(found.curves), size=50)

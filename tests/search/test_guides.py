@@ -19,7 +19,7 @@ def test_the_search_looks_at_neither_too_few_nor_too_many_times(waypoints: int) 
     rng = np.random.default_rng(waypoints)
     times = np.concatenate([[0.0], np.cumsum(rng.uniform(0.2, 1.0, waypoints - 1))])
     poses = [level(2.0 + 0.5 * time / times[-1], 1.0) for time in times]
-    t = search_times(sm.Waypoints.from_poses(times, poses), 60)
+    t = search_times(sm.paths.Waypoints.from_poses(times, poses), 60)
     assert (t[0], t[-1]) == (0.0, times[-1])
     assert 60 <= len(t) <= 401
     assert np.diff(t).min() > 0.0
@@ -28,7 +28,7 @@ def test_the_search_looks_at_neither_too_few_nor_too_many_times(waypoints: int) 
 def test_the_search_looks_as_the_tool_moves_on() -> None:
     """However the path is timed, and whether it moves or turns; at pauses hardly at all."""
     poses = [level(2.0, 1.0), level(4.0, 1.0), level(4.0, 1.0), level(4.0, -1.0)]
-    path = sm.Waypoints.from_poses(np.array([0.0, 1.0, 5.0, 9.0]), poses)
+    path = sm.paths.Waypoints.from_poses(np.array([0.0, 1.0, 5.0, 9.0]), poses)
     t = search_times(path, 60)
     tool = path.samples(t).translation
     strides = np.linalg.norm(np.diff(tool, axis=0), axis=1)
@@ -39,7 +39,7 @@ def test_the_search_looks_as_the_tool_moves_on() -> None:
 
 def test_a_chain_passes_beside_a_pose_that_rounding_puts_out_of_reach() -> None:
     t = np.linspace(0.0, DURATION, 33)
-    problem = rounded_problem(costs=[sm.PathLength()])
+    problem = rounded_problem(costs=[sm.costs.PathLength()])
     found = shortest_along(problem, t, stretching(t), t, (1.0, 0.3))
     assert found is not None
     where, q = found
@@ -54,9 +54,9 @@ def test_a_chain_passes_beside_a_pose_that_rounding_puts_out_of_reach() -> None:
 def test_chains_beside_bodies_are_shortened_with_virtual_joints(panda: sm.RobotModel) -> None:
     """These come after the arm's own, and move no bodies."""
     start = panda.dexterous_configuration()
-    path = sm.Circle.around(panda.pose(start), 0.1, 4.0, normal=(1.0, 0.0, 0.0))
+    path = sm.paths.Circle.around(panda.pose(start), 0.1, 4.0, normal=(1.0, 0.0, 0.0))
     # Beside the forearm, near enough to be watched.
-    ball = sm.Clearance([sm.Sphere("ball", (0.2, 0.25, 0.6), 0.05)], 0.01)
+    ball = sm.constraints.Clearance([sm.obstacles.Sphere("ball", (0.2, 0.25, 0.6), 0.05)], 0.01)
     problem = sm.Problem(
         panda, path, constraints=[ball], relaxations=[sm.Relaxation("rz", 0.3, during=(1.0, 2.0))]
     ).augmented

@@ -21,7 +21,7 @@ def motion(name: str, task: str) -> tuple[sm.Problem, Array, Array]:
     robot = robot_named(name)
     start = robot.dexterous_configuration(task)
     pose = robot.pose(start)
-    path = sm.Circle.around(pose, 0.08, 6.0, turns=0.6)
+    path = sm.paths.Circle.around(pose, 0.08, 6.0, turns=0.6)
     problem = sm.Problem(robot, path, task, start)
     found = sm.plan(problem)
     t = np.linspace(0.0, path.duration, COUNT)
@@ -35,7 +35,7 @@ def turned_over(problem: sm.Problem, time: float, q: Array) -> Array:
         seed = rng.uniform(*robot.finite_limits())
         try:
             found = robot.inverse_kinematics(problem.path.pose(time), problem.task, seed)
-        except sm.InverseKinematicsError:
+        except sm.errors.InverseKinematicsError:
             continue
         if np.linalg.norm(found - q) > 1.5:
             return found
@@ -61,7 +61,7 @@ def wound() -> sm.Problem:
     radii = 0.532 + 0.011 * angles / np.pi
     places = np.stack([-radii * np.cos(angles), -radii * np.sin(angles), np.full(140, 0.3)], axis=1)
     down = np.tile([0.0, 1.0, 0.0, 0.0], (len(places), 1))
-    path = sm.Feed(sm.Polyline(places, down, tolerance=5e-3), 0.1, acceleration=2.0)
+    path = sm.paths.Feed(sm.paths.Polyline(places, down, tolerance=5e-3), 0.1, acceleration=2.0)
     return sm.Problem(robot_named("panda"), path, "pose")
 
 

@@ -26,7 +26,7 @@ def test_compiled_kinematics_that_are_not_those_of_pinocchio_are_refused(
     wrong[3, 0] += off
     tree = arrays.tree._replace(positions=wrong)
     monkeypatch.setattr(robot.chain, "table", arrays._replace(tree=tree).table)
-    with pytest.raises(sm.RobotError, match="compiled kinematics put 'panda_hand_tcp'"):
+    with pytest.raises(sm.errors.RobotError, match="compiled kinematics put 'panda_hand_tcp'"):
         Manifold(standing(robot, sm.Task.POSITION), robot.lower, robot.upper)
 
 

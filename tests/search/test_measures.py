@@ -15,9 +15,9 @@ from support.arms import robot_named
 from support.followed import standing
 
 COSTS = (
-    sm.JointVelocity(2.0),
-    sm.InverseManipulability(1e-3),
-    sm.KineticEnergy(robot_named("panda")),
+    sm.costs.JointVelocity(2.0),
+    sm.costs.InverseManipulability(1e-3),
+    sm.costs.KineticEnergy(robot_named("panda")),
 )
 
 
@@ -51,7 +51,7 @@ def test_faster_steps_count_as_spread_over_the_time_that_they_take() -> None:
     t = np.array([0.0, 0.1, 0.2])
     q = np.array(sm.NAMED_ARMS["panda"].home)
     jump = np.array([q, q + 0.5, q + 0.5])
-    measure = RunningCost.by(standing(robot, task), [sm.JointVelocity()], t)
+    measure = RunningCost.by(standing(robot, task), [sm.costs.JointVelocity()], t)
     moved = 0.5 * np.sqrt(7.0)
     assert measure.of(jump) == pytest.approx(0.5 * moved**2 / 0.1)
     # At twice the mean speed v: ½v² over |Δq| / v.
@@ -86,8 +86,12 @@ def test_the_cheapest_chain_is_that_of_brute_force_and_so_backwards() -> None:
 def test_lengths_are_measured_as_such_and_accelerations_left_out() -> None:
     robot, task, t = robot_named("panda"), sm.Task.POSE, np.linspace(0.0, 1.0, 5)
     ones = np.ones(7)
-    assert isinstance(measure_of(standing(robot, task), [sm.PathLength()], t, ones), Length)
-    assert isinstance(measure_of(standing(robot, task), [sm.JointAcceleration()], t, ones), Length)
-    both = measure_of(standing(robot, task), [sm.JointVelocity(), sm.JointJerk()], t, ones)
+    assert isinstance(measure_of(standing(robot, task), [sm.costs.PathLength()], t, ones), Length)
+    assert isinstance(
+        measure_of(standing(robot, task), [sm.costs.JointAcceleration()], t, ones), Length
+    )
+    both = measure_of(
+        standing(robot, task), [sm.costs.JointVelocity(), sm.costs.JointJerk()], t, ones
+    )
     assert isinstance(both, RunningCost)
     assert [cost.name for cost in (*both.placed, *both.moving)] == ["joint velocity"]

@@ -36,33 +36,33 @@ def known_motion(robot: sm.RobotModel, seed: int) -> tuple[Array, Array]:
 def test_it_never_refuses_what_a_known_motion_follows(name: str, task: str) -> None:
     """Past a ball that nearly touches it, too."""
     robot = robot_named(name)
-    own = sm.CollisionModel(robot)
+    own = sm.obstacles.CollisionModel(robot)
     looks = 0
     for seed in range(12):
         t, q = known_motion(robot, seed)
         if own.worst(q).value < 5e-3:
             continue
-        path = sm.Waypoints.from_poses(t, [robot.pose(x) for x in q])
+        path = sm.paths.Waypoints.from_poses(t, [robot.pose(x) for x in q])
         tool = path.pose(2.0).translation
         for height in (0.06, 0.1, 0.2):
-            ball = sm.Sphere("ball", tool + np.array([0.0, 0.0, height]), 0.05)
-            if sm.CollisionModel(robot, [ball]).worst(q).value > 2e-3:
+            ball = sm.obstacles.Sphere("ball", tool + np.array([0.0, 0.0, height]), 0.05)
+            if sm.obstacles.CollisionModel(robot, [ball]).worst(q).value > 2e-3:
                 break
         else:
             continue
-        asked = [sm.JointPositionLimits(), sm.Clearance([ball], 1e-3)]
+        asked = [sm.constraints.JointPositionLimits(), sm.constraints.Clearance([ball], 1e-3)]
         assert looked(sm.Problem(robot, path, task, constraints=asked, rest=False)) is None
         looks += 1
     assert looks >= 3
 
 
-def beyond(far: float) -> sm.Line:
+def beyond(far: float) -> sm.paths.Line:
     """Return a line in the plane from within the reach of 5 m to `far` beyond it."""
     planar = robot_named("planar_3r")
     start = planar.pose([0.0, 0.5, 0.5])
     end = start.copy()
     end.translation = start.translation / np.linalg.norm(start.translation) * (5.0 + far)
-    return sm.Line(start, end, 5.0)
+    return sm.paths.Line(start, end, 5.0)
 
 
 @pytest.mark.parametrize("far", [0.01, 0.2])
@@ -85,7 +85,7 @@ def test_a_joint_in_the_way_is_named_with_how_far_it_would_have_to_go() -> None:
     """An elbow bent by 0.5 at least keeps the arm at 4 cos(0.25) + 1 m."""
     planar = robot_named("planar_3r")
     bent = 4.0 * np.cos(0.25) + 1.0
-    limits = sm.JointPositionLimits([-6.0, 0.5, -6.0], [6.0, 3.0, 6.0])
+    limits = sm.constraints.JointPositionLimits([-6.0, 0.5, -6.0], [6.0, 3.0, 6.0])
     path = beyond(0.5 * (bent + 5.0) - 5.0)
     problem = sm.Problem(planar, path, "planar", constraints=[limits])
     found = looked(problem)
@@ -103,15 +103,15 @@ def test_what_stands_on_the_path_is_named() -> None:
     pose = panda.pose(panda.dexterous_configuration())
     end = pose.copy()
     end.translation = pose.translation + np.array([0.0, 0.1, 0.0])
-    ball = sm.Sphere("ball", end.translation, 0.04)
-    asked = [sm.JointPositionLimits(), sm.Clearance([ball], 1e-3)]
-    problem = sm.Problem(panda, sm.Line(pose, end, 2.0), constraints=asked)
+    ball = sm.obstacles.Sphere("ball", end.translation, 0.04)
+    asked = [sm.constraints.JointPositionLimits(), sm.constraints.Clearance([ball], 1e-3)]
+    problem = sm.Problem(panda, sm.paths.Line(pose, end, 2.0), constraints=asked)
     found = looked(problem)
     assert found is not None
     assert found.is_met
     assert "'ball'" in found.reason
     assert "wanted: 1 mm" in found.reason
-    with pytest.raises(sm.NoSequenceError, match=r"'ball'.*; what would help: "):
+    with pytest.raises(sm.errors.NoSequenceError, match=r"'ball'.*; what would help: "):
         sm.plan(problem)
 
 

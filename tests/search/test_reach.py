@@ -28,7 +28,7 @@ def test_what_a_motion_within_the_limits_draws_is_in_reach(name: str, task: str)
         rough = make_interp_spline(np.linspace(0.0, 4.0, 5), knots)(t)
         inside = np.pad(np.clip(rough, lower + 1e-3, upper - 1e-3), ((4, 4), (0, 0)), mode="edge")
         q = np.stack([np.convolve(joint, np.ones(9) / 9.0, "valid") for joint in inside.T], axis=1)
-        path = sm.Waypoints.from_poses(t, [robot.pose(x) for x in q])
+        path = sm.paths.Waypoints.from_poses(t, [robot.pose(x) for x in q])
         for start in (None, q[0]):
             problem = sm.Problem(robot, path, task, start, rest=False, collision=None)
             assert reachable(problem, 48, np.random.default_rng(0)).reason == ""

@@ -17,7 +17,9 @@ from support.paths import line_of
 STEP = 0.5
 
 
-def searched(robot: sm.RobotModel, path: sm.Path, **options: object) -> list[sm.search.Sequence]:
+def searched(
+    robot: sm.RobotModel, path: sm.paths.Path, **options: object
+) -> list[sm.search.Sequence]:
     values = {
         "lower": robot.lower,
         "upper": robot.upper,
@@ -34,8 +36,8 @@ def searched(robot: sm.RobotModel, path: sm.Path, **options: object) -> list[sm.
 def test_sequences_follow_the_path_keep_all_and_are_as_long_as_they_say() -> None:
     robot = robot_named("panda")
     path = line_of(robot, "position")
-    post = sm.Sphere("post", path.pose(1.0).translation - [0.0, 0.25, 0.0], 0.05)
-    model = sm.CollisionModel(robot, [post])
+    post = sm.obstacles.Sphere("post", path.pose(1.0).translation - [0.0, 0.25, 0.0], 0.05)
+    model = sm.obstacles.CollisionModel(robot, [post])
     found = searched(robot, path, bodies=[(model, 2e-3)])
     lengths = [sequence.length for sequence in found]
     assert lengths == sorted(lengths)
@@ -84,11 +86,11 @@ def test_metres_are_not_added_to_radians_unasked() -> None:
     assert np.all((weights[slides] > 1.0) & (weights[slides] < 10.0))
     path = line_of(robot, "pose")
     joint = robot.joint_names[int(np.argmax(slides))]
-    with pytest.raises(sm.ProblemError, match=f"'{joint}' moves in metres.*joint_weights"):
-        sm.Problem(robot, path, costs=[sm.PathLength()])
-    with pytest.raises(sm.ProblemError, match=r"joint_weights are .* expected 8 numbers"):
-        sm.Problem(robot, path, costs=[sm.PathLength(joint_weights=[1.0, 2.0])])
-    sm.Problem(robot, path, costs=[sm.PathLength(joint_weights=weights)])
+    with pytest.raises(sm.errors.ProblemError, match=f"'{joint}' moves in metres.*joint_weights"):
+        sm.Problem(robot, path, costs=[sm.costs.PathLength()])
+    with pytest.raises(sm.errors.ProblemError, match=r"joint_weights are .* expected 8 numbers"):
+        sm.Problem(robot, path, costs=[sm.costs.PathLength(joint_weights=[1.0, 2.0])])
+    sm.Problem(robot, path, costs=[sm.costs.PathLength(joint_weights=weights)])
     # The usual cost says what it counts a metre as.
     (usual,) = sm.Problem(robot, path).costs
     np.testing.assert_allclose(usual.weight, weights**2)

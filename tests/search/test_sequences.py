@@ -22,13 +22,13 @@ MARGIN = 5e-4
 
 def faults(
     robot: sm.RobotModel,
-    path: sm.Path,
+    path: sm.paths.Path,
     task: sm.Task,
     sequence: Sequence,
     lower: Array,
     upper: Array,
     step: float,
-    collision: sm.CollisionModel | None = None,
+    collision: sm.obstacles.CollisionModel | None = None,
 ) -> set[str]:
     """Say what is wrong with a sequence, from poses and distances alone."""
     found = set()
@@ -47,21 +47,24 @@ def faults(
     return found
 
 
-def suite_problem(name: str) -> tuple[sm.RobotModel, sm.Waypoints, sm.CollisionModel | None]:
+def suite_problem(
+    name: str,
+) -> tuple[sm.RobotModel, sm.paths.Waypoints, sm.obstacles.CollisionModel | None]:
     facts = json.loads((DATA / name / "problem.json").read_text())
-    path = sm.Waypoints.from_csv(DATA / name / "path.csv")
+    path = sm.paths.Waypoints.from_csv(DATA / name / "path.csv")
     if "fetch" in name:
         lock = {"torso_lift_joint": 0.0}
         return sm.load_robot(DATA / "fetch.urdf", tool=facts["tip_frame"], lock=lock), path, None
     robot = sm.load_robot("panda", tool=facts["tip_frame"])
     boxes = [
-        sm.Box(f"box{i}", box["center_m"], box["size_m"]) for i, box in enumerate(facts["boxes"])
+        sm.obstacles.Box(f"box{i}", box["center_m"], box["size_m"])
+        for i, box in enumerate(facts["boxes"])
     ]
-    return robot, path, sm.CollisionModel(robot, boxes)
+    return robot, path, sm.obstacles.CollisionModel(robot, boxes)
 
 
 @pytest.fixture(scope="module")
-def flappy_bird() -> tuple[sm.RobotModel, sm.Waypoints, sm.CollisionModel | None]:
+def flappy_bird() -> tuple[sm.RobotModel, sm.paths.Waypoints, sm.obstacles.CollisionModel | None]:
     return suite_problem("panda__flappy_bird")
 
 
@@ -127,14 +130,14 @@ def level(x: float, y: float) -> pin.SE3:
     return pin.SE3(np.eye(3), np.array([x, y, 0.0]))
 
 
-def planar_search(arm: sm.RobotModel, path: sm.Path, **options) -> list[Sequence]:
+def planar_search(arm: sm.RobotModel, path: sm.paths.Path, **options) -> list[Sequence]:
     settings = {"lower": -2.9, "upper": 2.9, "largest_step": 0.3, "count": 2} | options
     return best_sequences(
         Follows.of(arm, path, "planar"), np.linspace(0.0, path.duration, 21), **settings
     )
 
 
-LINE = sm.Line(level(2.0, 1.0), level(3.0, -0.5), 1.0)
+LINE = sm.paths.Line(level(2.0, 1.0), level(3.0, -0.5), 1.0)
 
 
 def test_planar_sequences_are_valid_and_repeatable(arm: sm.RobotModel) -> None:
@@ -163,7 +166,7 @@ def test_a_continuous_joint_goes_on_past_pi() -> None:
 
 
 def test_a_path_out_of_the_workspace_says_when(arm: sm.RobotModel) -> None:
-    path = sm.Line(level(4.0, 0.0), level(6.0, 0.0), 1.0)
+    path = sm.paths.Line(level(4.0, 0.0), level(6.0, 0.0), 1.0)
     with pytest.raises(NoSequenceError, match="no configuration puts 'tool' on the path") as error:
         planar_search(arm, path)
     assert error.value.time == pytest.approx(0.5, abs=0.051)
@@ -186,8 +189,8 @@ def test_a_box_in_the_way_is_named(panda: sm.RobotModel) -> None:
     home = np.array(sm.NAMED_ARMS["panda"].home)
     start = panda.pose(home)
     end = pin.SE3(start.rotation, start.translation + np.array([0.0, 0.3, 0.0]))
-    path = sm.Line(start, end, 1.0)
-    box = sm.Box("crate", start.translation + np.array([0.0, 0.25, 0.0]), [0.3, 0.1, 0.3])
+    path = sm.paths.Line(start, end, 1.0)
+    box = sm.obstacles.Box("crate", start.translation + np.array([0.0, 0.25, 0.0]), [0.3, 0.1, 0.3])
     with pytest.raises(NoSequenceError, match=r"collision.*'crate'") as error:
         best_sequences(
             Follows.of(panda, path, "pose"),
@@ -195,7 +198,7 @@ def test_a_box_in_the_way_is_named(panda: sm.RobotModel) -> None:
             lower=panda.lower,
             upper=panda.upper,
             largest_step=0.2,
-            bodies=[(sm.CollisionModel(panda, [box]), 0.0)],
+            bodies=[(sm.obstacles.CollisionModel(panda, [box]), 0.0)],
         )
     assert 0.1 < error.value.time < 0.8
 
@@ -215,7 +218,7 @@ def test_nonsense_is_refused(arm: sm.RobotModel, options, message: str) -> None:
 
 
 def test_other_redundancies_are_refused(panda: sm.RobotModel) -> None:
-    path = sm.Line(panda.pose(np.zeros(7)), panda.pose(np.full(7, 0.1)), 1.0)
+    path = sm.paths.Line(panda.pose(np.zeros(7)), panda.pose(np.full(7, 0.1)), 1.0)
     with pytest.raises(ProblemError, match="has redundancy 4 for task 'position'"):
         best_sequences(
             Follows.of(panda, path, "position"), [0.0, 1.0], lower=-1.0, upper=1.0, largest_step=0.1

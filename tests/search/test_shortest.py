@@ -36,7 +36,7 @@ class Chain:
             found.append(q[0])
         self.q = np.array(found)
 
-    def kept(self, *bodies: tuple[sm.CollisionModel, float]) -> Admissible:
+    def kept(self, *bodies: tuple[sm.obstacles.CollisionModel, float]) -> Admissible:
         """Return what its configurations have to keep."""
         return Admissible(self.robot.lower, self.robot.upper, self.robot.is_revolute, bodies)
 
@@ -77,7 +77,9 @@ def test_it_goes_round_what_the_chain_kept_clear_of() -> None:
     elbow = chain.robot.chain_to("panda_link4", None)
     apart = [elbow.place(q).translation for q in (chain.q[COUNT // 2], free[COUNT // 2])]
     away = (apart[1] - apart[0]) / np.linalg.norm(apart[1] - apart[0])
-    model = sm.CollisionModel(chain.robot, [sm.Sphere("ball", apart[1] + 0.13 * away, 0.05)])
+    model = sm.obstacles.CollisionModel(
+        chain.robot, [sm.obstacles.Sphere("ball", apart[1] + 0.13 * away, 0.05)]
+    )
     kept = chain.kept((model, 1e-3))
     # A ball that the shortest chain of all meets, and the given one does not.
     assert kept.keep(chain.q).all()

@@ -47,14 +47,14 @@ def plan() -> sm.Plan:
     """A motion with a body near it, whose joints reach a limit of their speed."""
     robot = robot_named("panda")
     start = np.array(sm.NAMED_ARMS["panda"].home)
-    circle = sm.Circle.around(robot.pose(start), 0.1, 3.0, normal=(1.0, 0.0, 0.0))
-    block = sm.Box(
+    circle = sm.paths.Circle.around(robot.pose(start), 0.1, 3.0, normal=(1.0, 0.0, 0.0))
+    block = sm.obstacles.Box(
         "<block>", robot.pose(start).translation - np.array([0, 0, 0.15]), [0.2, 0.2, 0.02]
     )
     constraints = [
-        sm.JointPositionLimits(),
-        sm.JointVelocityLimits(),
-        sm.Clearance([block], 5e-3),
+        sm.constraints.JointPositionLimits(),
+        sm.constraints.JointVelocityLimits(),
+        sm.constraints.Clearance([block], 5e-3),
     ]
     return sm.plan(sm.Problem(robot, circle, start=start, constraints=constraints)).require()
 
@@ -99,8 +99,8 @@ def test_feeds_are_asked_and_reached(tmp_path: Path) -> None:
     pose = robot.pose(np.array(sm.NAMED_ARMS["panda"].home))
     end = pose.copy()
     end.translation = pose.translation + np.array([0.0, 0.1, 0.0])
-    line = sm.Line(pose, end, 3.0)
-    plan = sm.plan(sm.Problem(robot, sm.Feed(line, 0.02), "position"))
+    line = sm.paths.Line(pose, end, 3.0)
+    plan = sm.plan(sm.Problem(robot, sm.paths.Feed(line, 0.02), "position"))
     (feed,) = plan.path.feeds
     cells = Cells(sm.write_sheet(plan, tmp_path / "sheet.html", title="a & b").read_text())
     (row,) = cells.tables["Feeds"][1:]
@@ -109,15 +109,15 @@ def test_feeds_are_asked_and_reached(tmp_path: Path) -> None:
 
 
 def test_what_is_no_sheet_is_refused(plan: sm.Plan, tmp_path: Path) -> None:
-    with pytest.raises(sm.ProblemError, match="expected a Plan"):
+    with pytest.raises(sm.errors.ProblemError, match="expected a Plan"):
         sm.write_sheet(None, tmp_path / "a.html")  # type: ignore[arg-type]
-    with pytest.raises(sm.ProblemError, match=re.escape("ends in .html")):
+    with pytest.raises(sm.errors.ProblemError, match=re.escape("ends in .html")):
         sm.write_sheet(plan, tmp_path / "a.pdf")
-    with pytest.raises(sm.ProblemError, match="expected Margins"):
+    with pytest.raises(sm.errors.ProblemError, match="expected Margins"):
         sm.write_sheet(plan, tmp_path / "a.html", 3)  # type: ignore[arg-type]
     moved = dataclasses.replace(plan.trajectory, t=plan.trajectory.t * 2.0)
     other = dataclasses.replace(plan, trajectory=moved)
-    with pytest.raises(sm.PlanError, match="of another motion"):
+    with pytest.raises(sm.errors.PlanError, match="of another motion"):
         sm.write_sheet(other, tmp_path / "a.html")
 
 

@@ -182,7 +182,7 @@ def test_solver_points_integrate_straight_lines(planar: sm.RobotModel) -> None:
 
 def test_samples_along_are_those_of_the_rollout(panda: sm.RobotModel) -> None:
     start = panda.dexterous_configuration("pointing")
-    path = sm.Circle.around(panda.pose(start), 0.1, 2.0)
+    path = sm.paths.Circle.around(panda.pose(start), 0.1, 2.0)
     objective = bind(sm.Problem(panda, path, "pointing", start), 8)
     ours = objective.samples(np.zeros(objective.size))
     again = Samples.along(standing(panda, sm.Task.POINTING), ours.sampling, ours.q, ours.qd)
@@ -199,9 +199,9 @@ def test_operations_are_counted_as_stated() -> None:
 
 
 def test_optimum_stops_where_coefficients_run_away(joint_space: sm.Problem) -> None:
-    wild = dataclasses.replace(joint_space, costs=(sm.Manipulability(),))
+    wild = dataclasses.replace(joint_space, costs=(sm.costs.Manipulability(),))
     _, found = optimum(wild, max_iterations=400, unbounded=100.0)
-    assert found.status is sm.Status.UNBOUNDED
+    assert found.status is sm.optimise.Status.UNBOUNDED
     assert "JointVelocity" in found.status.message
 
 

@@ -31,7 +31,7 @@ CASES = [
 
 PANDA_HOME = np.array(sm.NAMED_ARMS["panda"].home)
 
-Case = tuple[sm.RobotModel, sm.Task, Array, sm.Path]
+Case = tuple[sm.RobotModel, sm.Task, Array, sm.paths.Path]
 
 _robots: dict[str, sm.RobotModel] = {}
 
@@ -47,19 +47,19 @@ def start_of(robot: sm.RobotModel, task: str) -> Array:
     return robot.dexterous_configuration(task)
 
 
-def short_line(robot: sm.RobotModel, start: Array, duration: float = 1.5) -> sm.Line:
+def short_line(robot: sm.RobotModel, start: Array, duration: float = 1.5) -> sm.paths.Line:
     """Return a line of 6 cm that also turns the tool a little, from `start`."""
     pose = robot.pose(start)
     end = pose.copy()
     end.translation = pose.translation + np.array([-0.04, 0.03, -0.03])
     end.rotation = pin.exp3(np.array([0.0, 0.0, 0.1])) @ pose.rotation
-    return sm.Line(pose, end, duration)
+    return sm.paths.Line(pose, end, duration)
 
 
 def objective_of(
     rollout: Rollout,
     table: NullMotionTable,
-    costs: Sequence[sm.Cost],
+    costs: Sequence[sm.costs.Cost],
     start: Start,
 ) -> Objective:
     """Return an objective of parts, for laws that hold whatever problem they come from."""

@@ -30,7 +30,7 @@ _TURNS = np.tile([1.0, 0, 0, 0], (3, 1))
 _COORDINATES = {
     "'panda_joint1'": "panda_joint1",
     "None": None,
-    "JointCoordinate (the class)": sm.JointCoordinate,
+    "JointCoordinate (the class)": sm.robot.JointCoordinate,
 }
 
 
@@ -49,13 +49,13 @@ def addition_rows() -> list[Row]:
 
 def _path_rows() -> list[Row]:
     area = "Paths"
-    corner = sm.Waypoints([0, 1, 2], _POINTS, corners="stop")
-    bend = sound(sm.Retimed, path=line(), t=[0, 1], sigma=[0, 2], rate=[0, 0], bend=[0, 0])
+    corner = sm.paths.Waypoints([0, 1, 2], _POINTS, corners="stop")
+    bend = sound(sm.paths.Retimed, path=line(), t=[0, 1], sigma=[0, 2], rate=[0, 0], bend=[0, 0])
     return [
         *bad_values_of(
             area,
             "Feed",
-            sound(sm.Feed, path=line(), feed=0.1),
+            sound(sm.paths.Feed, path=line(), feed=0.1),
             path=PATHS,
             feed=POSITIVE,
             turn_rate=POSITIVE,
@@ -63,12 +63,12 @@ def _path_rows() -> list[Row]:
             turn_acceleration=POSITIVE,
             smoothing=POSITIVE,
         ),
-        Row(area, "Feed() of a path that rests on its way", lambda _: sm.Feed(corner, 0.1)),
-        Row(area, "Feed() of a Dwell", lambda _: sm.Feed(sm.Dwell(POSE, 1.0), 0.1)),
+        Row(area, "Feed() of a path that rests on its way", lambda _: sm.paths.Feed(corner, 0.1)),
+        Row(area, "Feed() of a Dwell", lambda _: sm.paths.Feed(sm.paths.Dwell(POSE, 1.0), 0.1)),
         *bad_values_of(
             area,
             "Polyline",
-            sound(sm.Polyline, positions=_POINTS, quaternions=_TURNS),
+            sound(sm.paths.Polyline, positions=_POINTS, quaternions=_TURNS),
             positions={
                 "of shape (3, 2)": _POINTS[:, :2],
                 "of shape (2, 3)": _POINTS[:2],
@@ -93,7 +93,7 @@ def _path_rows() -> list[Row]:
         *bad_values_of(
             area,
             "Polyline.from_poses",
-            sm.Polyline.from_poses,
+            sm.paths.Polyline.from_poses,
             poses={
                 "[SE3]": [POSE],
                 "'here'": "here",
@@ -105,7 +105,7 @@ def _path_rows() -> list[Row]:
         *bad_values_of(
             area,
             "with_leads",
-            sound(sm.with_leads, path=line(), length=0.05, duration=1.0),
+            sound(sm.paths.with_leads, path=line(), length=0.05, duration=1.0),
             path=PATHS,
             length=POSITIVE,
             duration=POSITIVE,
@@ -114,7 +114,9 @@ def _path_rows() -> list[Row]:
         Row(
             area,
             "with_leads() of a path that begins at speed",
-            lambda _: sm.with_leads(sm.Line(POSE, _moved(), 2.0, time_law="constant"), 0.05, 1.0),
+            lambda _: sm.paths.with_leads(
+                sm.paths.Line(POSE, _moved(), 2.0, time_law="constant"), 0.05, 1.0
+            ),
         ),
         *bad_values_of(
             area,
@@ -125,29 +127,29 @@ def _path_rows() -> list[Row]:
         Row(
             area,
             "Retimed() that leaves out the start",
-            lambda _: sm.Retimed(line(), [0, 2], [0.5, 2], [0, 0]),
+            lambda _: sm.paths.Retimed(line(), [0, 2], [0.5, 2], [0, 0]),
         ),
         Row(
             area,
             "Retimed() with rates that make it run backwards",
-            lambda _: sm.Retimed(line(), [0, 1, 2], [0, 0.2, 2], [0, 3, 0]),
+            lambda _: sm.paths.Retimed(line(), [0, 1, 2], [0, 0.2, 2], [0, 3, 0]),
         ),
         Row(
             area,
             "Weave() with a pitch a hundred thousand times too small",
-            lambda _: sm.Weave(line(), 1e-3, 1e-7),
+            lambda _: sm.paths.Weave(line(), 1e-3, 1e-7),
         ),
         Row(
             "Problems",
             "a weave that no arm swings",
-            lambda _: _panda(sm.Weave(line(), 1e-2, 3e-5), task="position"),
+            lambda _: _panda(sm.paths.Weave(line(), 1e-2, 3e-5), task="position"),
         ),
         *(
             Row("Problems", f"{kind.__name__}, without orientations, for a full pose", call)
             for kind, call in (
-                (sm.Waypoints, lambda _: _panda(sm.Waypoints([0, 1, 2], _POINTS))),
-                (sm.Polyline, lambda _: _panda(sm.Polyline(_POINTS))),
-                (sm.Feed, lambda _: _panda(sm.Feed(sm.Polyline(_POINTS), 0.1))),
+                (sm.paths.Waypoints, lambda _: _panda(sm.paths.Waypoints([0, 1, 2], _POINTS))),
+                (sm.paths.Polyline, lambda _: _panda(sm.paths.Polyline(_POINTS))),
+                (sm.paths.Feed, lambda _: _panda(sm.paths.Feed(sm.paths.Polyline(_POINTS), 0.1))),
             )
         ),
     ]
@@ -156,9 +158,9 @@ def _path_rows() -> list[Row]:
 def _dropped_rows() -> list[Row]:
     """Return what would make no difference where it is given."""
     panda = robot_named("panda")
-    fed = sm.Feed(line(), 0.05)
+    fed = sm.paths.Feed(line(), 0.05)
     move = {"robot": panda, "first": PANDA_HOME, "last": PANDA_HOME + 0.1}
-    end = sm.EndConfiguration(PANDA_HOME)
+    end = sm.constraints.EndConfiguration(PANDA_HOME)
     seam = sm.Seam("one", line(), "pointing")
     return [
         Row("Planning", "move(constraints=[EndConfiguration(…)])", lambda _: _ended(move, end)),
@@ -174,7 +176,7 @@ def _dropped_rows() -> list[Row]:
     ]
 
 
-def _ended(move: dict[str, Any], end: sm.Constraint) -> object:
+def _ended(move: dict[str, Any], end: sm.constraints.Constraint) -> object:
     return sm.move(**move, constraints=[end])
 
 
@@ -188,9 +190,9 @@ def _moved() -> Any:
     return moved
 
 
-def _panda(path: sm.Path | None = None, **given: Any) -> sm.Problem:
+def _panda(path: sm.paths.Path | None = None, **given: Any) -> sm.Problem:
     arm = robot_named("panda")
-    around = sm.Circle.around(arm.pose(PANDA_HOME), 0.1, 4.0)
+    around = sm.paths.Circle.around(arm.pose(PANDA_HOME), 0.1, 4.0)
     return sm.Problem(arm, around if path is None else path, **given)
 
 
@@ -200,26 +202,26 @@ def _coordinate_rows() -> list[Row]:
     directions = {**VECTORS, "(0, 0, 0)": (0, 0, 0)}
 
     def banded(coordinate: Any, robot: sm.RobotModel = arm) -> object:
-        return sm.Band(coordinate, 0.0, 0.5).requirement(robot)
+        return sm.constraints.Band(coordinate, 0.0, 0.5).requirement(robot)
 
     return [
         *bad_values_of(
             area,
             "JointCoordinate",
-            lambda joint: banded(sm.JointCoordinate(joint)),
+            lambda joint: banded(sm.robot.JointCoordinate(joint)),
             joint={**names, "'panda_joint9'": "panda_joint9"},
         ),
         *bad_values_of(
             area,
             "FrameCoordinate",
-            lambda **g: banded(sm.FrameCoordinate(**{"frame": "panda_link4", **g})),
+            lambda **g: banded(sm.robot.FrameCoordinate(**{"frame": "panda_link4", **g})),
             frame={**names, "'panda_link44'": "panda_link44", "'panda_link0'": "panda_link0"},
             direction=directions,
         ),
         *bad_values_of(
             area,
             "SwivelAngle",
-            lambda **g: banded(sm.SwivelAngle(**g)),
+            lambda **g: banded(sm.robot.SwivelAngle(**g)),
             reference=directions,
             shoulder={"3": 3, "'shoulder'": "shoulder"},
             elbow={"'panda_jont4'": "panda_jont4"},
@@ -227,22 +229,31 @@ def _coordinate_rows() -> list[Row]:
         Row(
             area,
             "SwivelAngle() of an arm of three joints",
-            lambda _: banded(sm.SwivelAngle(), small),
+            lambda _: banded(sm.robot.SwivelAngle(), small),
         ),
         *bad_values_of(
             area,
             "Band",
-            sound(sm.Band, coordinate=sm.JointCoordinate("joint1"), center=0.0, half=0.5),
+            sound(
+                sm.constraints.Band,
+                coordinate=sm.robot.JointCoordinate("joint1"),
+                center=0.0,
+                half=0.5,
+            ),
             coordinate=_COORDINATES,
             center=NUMBERS,
             half=POSITIVE,
             margin={**POSITIVE, "2": 2},
         ),
-        Row(area, "Band(SwivelAngle(), 0, 4)", lambda _: sm.Band(sm.SwivelAngle(), 0.0, 4.0)),
+        Row(
+            area,
+            "Band(SwivelAngle(), 0, 4)",
+            lambda _: sm.constraints.Band(sm.robot.SwivelAngle(), 0.0, 4.0),
+        ),
         *bad_values_of(
             area,
             "Band.of_elbow",
-            sound(sm.Band.of_elbow, side="up"),
+            sound(sm.constraints.Band.of_elbow, side="up"),
             side={"'above'": "above", "None": None, "3": 3},
             half={**POSITIVE, "4": 4},
             elbow_up={"True": True},
@@ -250,9 +261,14 @@ def _coordinate_rows() -> list[Row]:
         *bad_values_of(
             area,
             "Towards",
-            sound(sm.Towards, robot=arm, coordinate=sm.JointCoordinate("panda_joint1"), target=0),
+            sound(
+                sm.costs.Towards,
+                robot=arm,
+                coordinate=sm.robot.JointCoordinate("panda_joint1"),
+                target=0,
+            ),
             robot={"'panda'": "panda", "None": None},
-            coordinate={**_COORDINATES, "of no joint": sm.JointCoordinate("panda_joint9")},
+            coordinate={**_COORDINATES, "of no joint": sm.robot.JointCoordinate("panda_joint9")},
             target=NUMBERS,
             weight={**NUMBERS, "-1": -1},
             name={"''": "", "3": 3},
@@ -261,7 +277,7 @@ def _coordinate_rows() -> list[Row]:
             area,
             "Towards() of another arm",
             lambda _: problem_with(
-                costs=[sm.Towards(arm, sm.JointCoordinate("panda_joint1"), 0.0)]
+                costs=[sm.costs.Towards(arm, sm.robot.JointCoordinate("panda_joint1"), 0.0)]
             ),
         ),
     ]
@@ -281,28 +297,30 @@ def _constraint_rows() -> list[Row]:
         "[[1, 1, 1]]": [[1, 1, 1]],
     }
     return [
-        *bad_values_of(area, "StartAcceleration", kept(sm.StartAcceleration), qdd=rates),
-        *bad_values_of(area, "EndAcceleration", kept(sm.EndAcceleration), qdd=rates),
+        *bad_values_of(
+            area, "StartAcceleration", kept(sm.constraints.StartAcceleration), qdd=rates
+        ),
+        *bad_values_of(area, "EndAcceleration", kept(sm.constraints.EndAcceleration), qdd=rates),
         *bad_values_of(
             area,
             "ToolLimits",
-            kept(lambda **given: sm.ToolLimits(**{"speed": 1.0, **given})),
+            kept(lambda **given: sm.constraints.ToolLimits(**{"speed": 1.0, **given})),
             speed=POSITIVE,
             turn_rate=limited,
             acceleration=limited,
             turn_acceleration=limited,
             margin={**POSITIVE, "2": 2},
         ),
-        Row(area, "ToolLimits()", lambda _: sm.ToolLimits()),
+        Row(area, "ToolLimits()", lambda _: sm.constraints.ToolLimits()),
         *(
             row
-            for kind in (sm.JointAccelerationLimits, sm.JointJerkLimits)
+            for kind in (sm.constraints.JointAccelerationLimits, sm.constraints.JointJerkLimits)
             for row in bad_values_of(area, kind.__name__, kept(kind), replace=FLAGS)
         ),
         *bad_values_of(
             "Costs",
             "LimitUse",
-            lambda **g: problem_with(costs=[sm.LimitUse(**{"velocity": 1.0, **g})]),
+            lambda **g: problem_with(costs=[sm.costs.LimitUse(**{"velocity": 1.0, **g})]),
             velocity={**shares, "inf": INF},
             acceleration=shares,
             power={**NUMBERS, "2": 2, "1000": 1000},
@@ -340,7 +358,7 @@ def _planning_rows() -> list[Row]:
 def _replanner_rows() -> list[Row]:
     area, arm = "While the arm moves", robot_named("panda")
     others = {"1": 1, "'fast'": "fast", "None": None}
-    asked = {"[ToolLimits]": [sm.ToolLimits(speed=1.0)], "[1]": [1], **others}
+    asked = {"[ToolLimits]": [sm.constraints.ToolLimits(speed=1.0)], "[1]": [1], **others}
     state = {"None": None, "'home'": "home", "of six joints": PANDA_HOME[:6], "NaN": [NAN] * 7}
 
     def stepped(**given: Any) -> object:
@@ -407,7 +425,7 @@ def _limit_file_rows() -> list[Row]:
     }
 
     def read(folder: Path, document: Any) -> object:
-        return sm.read_joint_limits(_written(folder, document), arm)
+        return sm.files.read_joint_limits(_written(folder, document), arm)
 
     return [
         *(
@@ -417,13 +435,13 @@ def _limit_file_rows() -> list[Row]:
         Row(
             area,
             "read_joint_limits() of no file",
-            lambda folder: sm.read_joint_limits(folder / "none.yaml", arm),
+            lambda folder: sm.files.read_joint_limits(folder / "none.yaml", arm),
         ),
-        Row(area, "read_joint_limits(None)", lambda _: sm.read_joint_limits(None, arm)),
+        Row(area, "read_joint_limits(None)", lambda _: sm.files.read_joint_limits(None, arm)),
         Row(
             area,
             "read_joint_limits() for no arm",
-            lambda folder: sm.read_joint_limits(_written(folder, None), "panda"),
+            lambda folder: sm.files.read_joint_limits(_written(folder, None), "panda"),
         ),
     ]
 

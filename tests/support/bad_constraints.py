@@ -37,7 +37,7 @@ def constraint_rows() -> list[Row]:
     }
     rates = {**bounds, "0": 0, "-1": -1, "[1, 0, 1]": [1, 0, 1]}
     margins = {**POSITIVE, "2": 2}
-    box = sm.Box("post", [3, 0, 0], [0.1, 0.1, 0.1])
+    box = sm.obstacles.Box("post", [3, 0, 0], [0.1, 0.1, 0.1])
     pairs = {
         "'link1'": "link1",
         "['link1']": ["link1"],
@@ -49,7 +49,7 @@ def constraint_rows() -> list[Row]:
         *bad_values_of(
             area,
             "JointPositionLimits",
-            kept(sm.JointPositionLimits),
+            kept(sm.constraints.JointPositionLimits),
             lower={**bounds, "[9, 9, 9]": [9] * 3, "-360, in degrees": -360},
             upper={**bounds, "[-9, -9, -9]": [-9] * 3, "180, in degrees": 180},
             margin=margins,
@@ -58,7 +58,7 @@ def constraint_rows() -> list[Row]:
         *bad_values_of(
             area,
             "JointVelocityLimits",
-            kept(sm.JointVelocityLimits),
+            kept(sm.constraints.JointVelocityLimits),
             limit=rates,
             margin=margins,
             replace=FLAGS,
@@ -66,17 +66,21 @@ def constraint_rows() -> list[Row]:
         *bad_values_of(
             area,
             "JointAccelerationLimits",
-            kept(sm.JointAccelerationLimits),
+            kept(sm.constraints.JointAccelerationLimits),
             limit=rates,
             margin=margins,
         ),
         *bad_values_of(
-            area, "JointJerkLimits", kept(sm.JointJerkLimits), limit=rates, margin=margins
+            area,
+            "JointJerkLimits",
+            kept(sm.constraints.JointJerkLimits),
+            limit=rates,
+            margin=margins,
         ),
         *bad_values_of(
             area,
             "EndConfiguration",
-            kept(sm.EndConfiguration),
+            kept(sm.constraints.EndConfiguration),
             q={
                 "None": None,
                 "[0, 0]": [0, 0],
@@ -89,26 +93,33 @@ def constraint_rows() -> list[Row]:
         *bad_values_of(
             area,
             "EndVelocity",
-            kept(sm.EndVelocity),
+            kept(sm.constraints.EndVelocity),
             qd={"None": None, "[0, 0]": [0, 0], "nan": NAN, "'rest'": "rest"},
         ),
         *bad_values_of(
             area,
             "StartVelocity",
-            kept(sm.StartVelocity),
+            kept(sm.constraints.StartVelocity),
             qd={"None": None, "[0, 0]": [0, 0], "nan": NAN, "[1, 1, 1]": [1, 1, 1]},
         ),
-        *bad_values_of(area, "ClosedPath", kept(sm.ClosedPath), velocity=FLAGS),
+        *bad_values_of(area, "ClosedPath", kept(sm.constraints.ClosedPath), velocity=FLAGS),
         Row(
             area,
             "ClosedPath() on an open path",
-            lambda _: problem_with(constraints=[sm.ClosedPath()], path=sample_line(arm)),
+            lambda _: problem_with(
+                constraints=[sm.constraints.ClosedPath()], path=sample_line(arm)
+            ),
         ),
         *bad_values_of(
             area,
             "Clearance",
-            kept(sm.Clearance),
-            obstacles={"None": None, "'box'": "box", "[1]": [1], "Box (the class)": sm.Box},
+            kept(sm.constraints.Clearance),
+            obstacles={
+                "None": None,
+                "'box'": "box",
+                "[1]": [1],
+                "Box (the class)": sm.obstacles.Box,
+            },
             distance={**NUMBERS, "-1": -1},
             disabled=pairs,
             srdf={"'nowhere.srdf'": "nowhere.srdf"},
@@ -116,7 +127,7 @@ def constraint_rows() -> list[Row]:
         Row(
             area,
             "Clearance() of an arm without bodies",
-            lambda _: problem_with(constraints=[sm.Clearance([box])]),
+            lambda _: problem_with(constraints=[sm.constraints.Clearance([box])]),
         ),
         *bad_values_of(
             area,
@@ -126,19 +137,19 @@ def constraint_rows() -> list[Row]:
                 "None": None,
                 "3": 3,
                 "[3]": [3],
-                "[ClosedPath] (the class)": [sm.ClosedPath],
+                "[ClosedPath] (the class)": [sm.constraints.ClosedPath],
             },
         ),
         *_obstacle_rows(),
     ]
 
 
-def sample_line(arm: sm.RobotModel) -> sm.Line:
+def sample_line(arm: sm.RobotModel) -> sm.paths.Line:
     """Return a short line from the sample problem's start."""
     start = sm.sample_problem().path.pose(0.0)
     end = pin.SE3(start)
     end.translation = start.translation + np.array([-0.1, 0.0, 0.0])
-    return sm.Line(start, end, 2.0)
+    return sm.paths.Line(start, end, 2.0)
 
 
 def _obstacle_rows() -> list[Row]:
@@ -149,7 +160,7 @@ def _obstacle_rows() -> list[Row]:
         *bad_values_of(
             area,
             "Box",
-            sound(sm.Box, **place, size=(1, 1, 1)),
+            sound(sm.obstacles.Box, **place, size=(1, 1, 1)),
             name=names,
             pose=poses,
             size={
@@ -163,28 +174,28 @@ def _obstacle_rows() -> list[Row]:
         *bad_values_of(
             area,
             "Sphere",
-            sound(sm.Sphere, **place, radius=1),
+            sound(sm.obstacles.Sphere, **place, radius=1),
             pose=poses,
             radius={**POSITIVE, "1e300": 1e300},
         ),
         *bad_values_of(
             area,
             "Cylinder",
-            sound(sm.Cylinder, **place, radius=1, length=1),
+            sound(sm.obstacles.Cylinder, **place, radius=1, length=1),
             radius=POSITIVE,
             length=POSITIVE,
         ),
         *bad_values_of(
             area,
             "Capsule",
-            sound(sm.Capsule, **place, radius=1, length=1),
+            sound(sm.obstacles.Capsule, **place, radius=1, length=1),
             radius=POSITIVE,
             length=POSITIVE,
         ),
         *bad_values_of(
             area,
             "Mesh",
-            sound(sm.Mesh, **place, file="a.stl"),
+            sound(sm.obstacles.Mesh, **place, file="a.stl"),
             scale=POSITIVE,
             file={"None": None, "3": 3},
         ),
@@ -200,4 +211,4 @@ def _mesh(folder: Path, content: bytes | None) -> object:
     file.unlink(missing_ok=True)
     if content is not None:
         file.write_bytes(content)
-    return sm.Mesh("post", POSE, file).geometry()
+    return sm.obstacles.Mesh("post", POSE, file).geometry()

@@ -33,15 +33,15 @@ _PAIRS = [
 
 def _panda(**given: Any) -> sm.Problem:
     robot = robot_named("panda")
-    path = sm.Circle.around(robot.pose(PANDA_HOME), 0.1, 4.0)
+    path = sm.paths.Circle.around(robot.pose(PANDA_HOME), 0.1, 4.0)
     return sm.Problem(**{"robot": robot, "path": path, "start": PANDA_HOME, **given})
 
 
-def _line(duration: float, length: float = 0.01) -> sm.Line:
+def _line(duration: float, length: float = 0.01) -> sm.paths.Line:
     start = robot_named("panda").pose(PANDA_HOME)
     end = pin.SE3(start)
     end.translation = start.translation + np.array([-length, 0.0, 0.0])
-    return sm.Line(start, end, duration)
+    return sm.paths.Line(start, end, duration)
 
 
 def problem_rows() -> list[Row]:
@@ -83,7 +83,11 @@ def problem_rows() -> list[Row]:
         Row(area, "other pairs of rotations at other times", lambda _: _panda(relaxations=_PAIRS)),
         Row(area, "1 cm in 1 ns", lambda _: _panda(path=_line(1e-9))),
         Row(area, "1 m in 1 µs", lambda _: _panda(path=_line(1e-6, 1.0))),
-        Row(area, "a path in millimetres", lambda _: _panda(path=sm.Dwell(far, 1.0), start=None)),
+        Row(
+            area,
+            "a path in millimetres",
+            lambda _: _panda(path=sm.paths.Dwell(far, 1.0), start=None),
+        ),
         Row(
             area,
             "a full pose for an arm of six joints",
@@ -157,7 +161,7 @@ def setting_rows() -> list[Row]:
         *bad_values_of(
             "Null motions",
             "BSplineNullMotion",
-            sm.BSplineNullMotion,
+            sm.motion.BSplineNullMotion,
             intervals={**WHOLE, "0": 0, "1e9": 10**9},
             degree=whole,
             space=spaces,
@@ -235,11 +239,15 @@ def setting_rows() -> list[Row]:
             "Planning",
             "plan_by",
             lambda **g: sm.plan_by(
-                **{"problem": sm.sample_problem(), "method": sm.PseudoInverse(), **g}
+                **{"problem": sm.sample_problem(), "method": sm.baselines.PseudoInverse(), **g}
             ),
             problem={"None": None},
             tolerance={"0": 0, "'1'": "1"},
-            method={"None": None, "'pinv'": "pinv", "PseudoInverse (the class)": sm.PseudoInverse},
+            method={
+                "None": None,
+                "'pinv'": "pinv",
+                "PseudoInverse (the class)": sm.baselines.PseudoInverse,
+            },
         ),
         *bad_values_of(
             "Planning",
@@ -255,14 +263,14 @@ def setting_rows() -> list[Row]:
         *bad_values_of(
             "Planning",
             "DampedLeastSquares",
-            sm.DampedLeastSquares,
+            sm.baselines.DampedLeastSquares,
             damping=POSITIVE,
             threshold={"0": 0, "nan": NAN, "'1'": "1"},
         ),
         *bad_values_of(
             "Planning",
             "GradientProjection",
-            sm.GradientProjection,
+            sm.baselines.GradientProjection,
             gain={"-1": -1, "nan": NAN, "'1'": "1"},
         ),
         *bad_values_of(
@@ -324,7 +332,7 @@ def setting_rows() -> list[Row]:
         *bad_values_of(
             "Files",
             "read_path",
-            lambda **g: sm.read_path(**{"file": "a.csv", **g}),
+            lambda **g: sm.files.read_path(**{"file": "a.csv", **g}),
             feed=POSITIVE_OR_NONE,
             duration=POSITIVE_OR_NONE,
             jump=POSITIVE,
@@ -332,13 +340,13 @@ def setting_rows() -> list[Row]:
         *bad_values_of(
             "Files",
             "write_motion",
-            lambda **g: sm.write_motion(**{"plan": None, "file": "a.csv", **g}),
+            lambda **g: sm.files.write_motion(**{"plan": None, "file": "a.csv", **g}),
             plan={"None": None, "'plan'": "plan"},
         ),
         *bad_values_of(
             "Files",
             "ProgramSettings",
-            sm.ProgramSettings,
+            sm.files.ProgramSettings,
             deviation={"None": None, "0.1": 0.1},
             axes={"['A1']": ["A1"], "{'joint1': 'A7'}": {"joint1": "A7"}},
             signals={"3": 3, "{'on': 7}": {"on": 7}, "{'on': (7, 1)}": {"on": (7, 1)}},
@@ -350,7 +358,9 @@ def setting_rows() -> list[Row]:
         *bad_values_of(
             "Files",
             "write_problem",
-            lambda **g: sm.write_problem(**{"problem": sm.sample_problem(), "file": "a.toml", **g}),
+            lambda **g: sm.files.write_problem(
+                **{"problem": sm.sample_problem(), "file": "a.toml", **g}
+            ),
             problem={"None": None, "'panda'": "panda"},
             file={"None": None, "3": 3, "'a.docx'": "a.docx"},
         ),
@@ -369,9 +379,9 @@ def _file_rows() -> list[Row]:
     readers = {
         "load_plan": sm.load_plan,
         "read_problem": sm.read_problem,
-        "read_job": sm.read_job,
-        "read_path": sm.read_path,
-        "read_motion": sm.read_motion,
+        "read_job": sm.files.read_job,
+        "read_path": sm.files.read_path,
+        "read_motion": sm.files.read_motion,
     }
     saved = {"load_plan": "npz", "read_problem": "toml", "read_job": "json"}
     found = []

@@ -222,8 +222,8 @@ def loading_rows() -> list[Row]:
     skewed, nan = np.diag([1.0, 2.0, 1.0, 1.0]), np.eye(4)
     nan[0, 3] = np.nan
 
-    def box(name: str, frame: str | None = None) -> sm.Box:
-        return sm.Box(name, [0.0, 0.0, 0.0], [0.1, 0.1, 0.1], frame=frame)
+    def box(name: str, frame: str | None = None) -> sm.obstacles.Box:
+        return sm.obstacles.Box(name, [0.0, 0.0, 0.0], [0.1, 0.1, 0.1], frame=frame)
 
     return [
         _named("load_robot('pandaa')", "pandaa"),
@@ -261,7 +261,7 @@ def loading_rows() -> list[Row]:
         _sound("base= with a skewed rotation", base=skewed),
         _sound("base= with NaN", base=nan),
         _sound("bodies='torch'", bodies="torch"),
-        _sound("bodies=[Box] (the class)", bodies=[sm.Box]),
+        _sound("bodies=[Box] (the class)", bodies=[sm.obstacles.Box]),
         _sound("bodies= on a link that is none", bodies=[box("gun", "uper")]),
         _sound("bodies= with the name of a link", bodies=[box("base")]),
         _sound("tool_offset=0.1", tool_offset=0.1),

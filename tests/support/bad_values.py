@@ -43,7 +43,7 @@ POSES = {
     "a matrix with NaN": _NAN_POSE,
     "the class SE3": pin.SE3,
 }
-PATHS = {"'line'": "line", "None": None, "Line (the class)": sm.Line, "[1, 2]": [1, 2]}
+PATHS = {"'line'": "line", "None": None, "Line (the class)": sm.paths.Line, "[1, 2]": [1, 2]}
 
 
 def bad_values_of(
@@ -58,9 +58,9 @@ def bad_values_of(
 
 
 @cache
-def line() -> sm.Line:
+def line() -> sm.paths.Line:
     end = pin.SE3(np.eye(3), np.array([0.1, 0.0, 0.0]))
-    return sm.Line(POSE, end, 2.0)
+    return sm.paths.Line(POSE, end, 2.0)
 
 
 def sound(kind: Callable[..., object], **sound: Any) -> Callable[..., object]:
@@ -70,18 +70,18 @@ def sound(kind: Callable[..., object], **sound: Any) -> Callable[..., object]:
 def path_rows() -> list[Row]:
     """Return rows of tool motions."""
     area = "Paths"
-    circle = sound(sm.Circle, start=POSE, center=(0.1, 0, 0), normal=(0, 0, 1), duration=2.0)
-    around = sound(sm.Circle.around, start=POSE, radius=0.1, duration=2.0)
+    circle = sound(sm.paths.Circle, start=POSE, center=(0.1, 0, 0), normal=(0, 0, 1), duration=2.0)
+    around = sound(sm.paths.Circle.around, start=POSE, radius=0.1, duration=2.0)
     points = np.array([[0, 0, 0], [0.1, 0, 0], [0.2, 0.1, 0]], dtype=float)
     turns = np.tile([1.0, 0, 0, 0], (3, 1))
-    ways = sound(sm.Waypoints, t=[0, 1, 2], positions=points, quaternions=turns)
-    twist = sound(sm.TwistPath, start=POSE, velocity=lambda t: [0.1, 0, 0], duration=1.0)
-    retimed = sound(sm.Retimed, path=line(), t=[0, 1], sigma=[0, 2], rate=[0, 0])
+    ways = sound(sm.paths.Waypoints, t=[0, 1, 2], positions=points, quaternions=turns)
+    twist = sound(sm.paths.TwistPath, start=POSE, velocity=lambda t: [0.1, 0, 0], duration=1.0)
+    retimed = sound(sm.paths.Retimed, path=line(), t=[0, 1], sigma=[0, 2], rate=[0, 0])
     return [
         *bad_values_of(
             area,
             "Line",
-            sound(sm.Line, start=POSE, end=POSE, duration=1.0),
+            sound(sm.paths.Line, start=POSE, end=POSE, duration=1.0),
             start=POSES,
             end=POSES,
             duration={**POSITIVE, "1e300": 1e300},
@@ -138,7 +138,7 @@ def path_rows() -> list[Row]:
         *bad_values_of(
             area,
             "Waypoints.from_poses",
-            sound(sm.Waypoints.from_poses, t=[0, 1], poses=[POSE]),
+            sound(sm.paths.Waypoints.from_poses, t=[0, 1], poses=[POSE]),
             poses={
                 "[SE3] for two times": [POSE],
                 "'here'": "here",
@@ -166,27 +166,27 @@ def path_rows() -> list[Row]:
             },
         ),
         *bad_values_of(
-            area, "Placed", sound(sm.Placed, path=line(), frame=POSE), path=PATHS, frame=POSES
+            area, "Placed", sound(sm.paths.Placed, path=line(), frame=POSE), path=PATHS, frame=POSES
         ),
         *bad_values_of(
-            area, "Dwell", sound(sm.Dwell, at=POSE, duration=1.0), at=POSES, duration=POSITIVE
+            area, "Dwell", sound(sm.paths.Dwell, at=POSE, duration=1.0), at=POSES, duration=POSITIVE
         ),
         *bad_values_of(
             area,
             "section_at_rest",
-            sound(sm.section_at_rest, path=line(), ramp=0.5),
+            sound(sm.paths.section_at_rest, path=line(), ramp=0.5),
             path=PATHS,
             ramp={**POSITIVE, "longer than the path": 3.0},
         ),
         *bad_values_of(
             area,
             "Joined",
-            sm.Joined,
+            sm.paths.Joined,
             pieces={
                 "[]": [],
                 "None": None,
                 "[1]": [1],
-                "Line (the class)": sm.Line,
+                "Line (the class)": sm.paths.Line,
                 "[line, line], which jumps": [line(), line()],
             },
         ),
@@ -257,7 +257,7 @@ def cost_rows() -> list[Row]:
         "lambda qd, q, t: None": lambda qd, q, t: None,
     }
     found = []
-    for kind in (sm.JointVelocity, sm.JointAcceleration, sm.JointJerk):
+    for kind in (sm.costs.JointVelocity, sm.costs.JointAcceleration, sm.costs.JointJerk):
         found += bad_values_of(area, kind.__name__, _cost(kind), weight=weights, name=names)
     other = robot_named("panda")
     arms = {"'panda'": "panda", "None": None, "RobotModel": sm.RobotModel, "another arm": other}
@@ -266,34 +266,40 @@ def cost_rows() -> list[Row]:
         *bad_values_of(
             area,
             "Posture",
-            _cost(sm.Posture, posture=[0, 0, 0]),
+            _cost(sm.costs.Posture, posture=[0, 0, 0]),
             weight={"nan": NAN, "-1": -1},
             posture={**VECTORS, "[0, 0, 0, 0]": [0] * 4},
         ),
         *bad_values_of(
             area,
             "JointLimitDistance",
-            _cost(sm.JointLimitDistance, lower=[-1] * 3, upper=[1] * 3),
+            _cost(sm.costs.JointLimitDistance, lower=[-1] * 3, upper=[1] * 3),
             lower=limits,
             upper={"[-2] * 3": [-2] * 3, "[1] * 4": [1] * 4},
             mu=factors,
             power={**WHOLE, "3": 3, "0": 0},
         ),
-        *bad_values_of(area, "PathLength", _cost(sm.PathLength), smoothing=POSITIVE, name=names),
         *bad_values_of(
-            *(area, "JointReversals", _cost(sm.JointReversals)),
+            area, "PathLength", _cost(sm.costs.PathLength), smoothing=POSITIVE, name=names
+        ),
+        *bad_values_of(
+            *(area, "JointReversals", _cost(sm.costs.JointReversals)),
             weight={key: value for key, value in POSITIVE.items() if key != "0"},
             speed=POSITIVE,
             smoothing=POSITIVE,
         ),
-        *bad_values_of(area, "Manipulability", _cost(sm.Manipulability), mu=factors),
+        *bad_values_of(area, "Manipulability", _cost(sm.costs.Manipulability), mu=factors),
         *bad_values_of(
-            area, "InverseManipulability", _cost(sm.InverseManipulability), mu=factors, name=names
+            area,
+            "InverseManipulability",
+            _cost(sm.costs.InverseManipulability),
+            mu=factors,
+            name=names,
         ),
         *bad_values_of(
             area,
             "DirectionalManipulability",
-            _cost(sm.DirectionalManipulability, direction=[1, 0]),
+            _cost(sm.costs.DirectionalManipulability, direction=[1, 0]),
             direction={
                 "[0, 0]": [0, 0],
                 "[1, 0, 0]": [1, 0, 0],
@@ -305,23 +311,27 @@ def cost_rows() -> list[Row]:
             mu=factors,
         ),
         *bad_values_of(
-            area, "SmallestSingularValue", _cost(sm.SmallestSingularValue), mu=factors, power=WHOLE
+            area,
+            "SmallestSingularValue",
+            _cost(sm.costs.SmallestSingularValue),
+            mu=factors,
+            power=WHOLE,
         ),
         *bad_values_of(
-            area, "KineticEnergy", _cost(sm.KineticEnergy, robot=arm), robot=arms, mu=factors
+            area, "KineticEnergy", _cost(sm.costs.KineticEnergy, robot=arm), robot=arms, mu=factors
         ),
         *bad_values_of(
             area,
             "GravityTorque",
-            _cost(sm.GravityTorque, robot=arm),
+            _cost(sm.costs.GravityTorque, robot=arm),
             robot=arms,
             weight={"nan": NAN, "[1, 2]": [1, 2]},
         ),
         *bad_values_of(
             area,
             "FunctionCost",
-            _cost(sm.FunctionCost, g=lambda qd, q, t: t),
-            g={"None": None, "3": 3, "JointVelocity()": sm.JointVelocity()},
+            _cost(sm.costs.FunctionCost, g=lambda qd, q, t: t),
+            g={"None": None, "3": 3, "JointVelocity()": sm.costs.JointVelocity()},
             g_gradient={"3": 3},
             name=names,
         ),
@@ -329,7 +339,7 @@ def cost_rows() -> list[Row]:
             Row(
                 area,
                 f"plan() with FunctionCost({written})",
-                lambda _, g=g: sm.plan(problem_with(costs=[sm.FunctionCost(g)])),
+                lambda _, g=g: sm.plan(problem_with(costs=[sm.costs.FunctionCost(g)])),
             )
             for written, g in functions.items()
             if callable(g)
@@ -344,9 +354,9 @@ def cost_rows() -> list[Row]:
                 "3": 3,
                 "'fast'": "fast",
                 "[3]": [3],
-                "JointVelocity (the class)": sm.JointVelocity,
-                "[JointVelocity] (the class)": [sm.JointVelocity],
-                "two of one name": [sm.JointVelocity(), sm.JointVelocity()],
+                "JointVelocity (the class)": sm.costs.JointVelocity,
+                "[JointVelocity] (the class)": [sm.costs.JointVelocity],
+                "two of one name": [sm.costs.JointVelocity(), sm.costs.JointVelocity()],
             },
         ),
     ]

@@ -87,7 +87,7 @@ class Asked(NamedTuple):
     """
 
     measure: Measure
-    constraints: Callable[[float], Sequence[sm.Constraint]] = lambda limit: ()
+    constraints: Callable[[float], Sequence[sm.constraints.Constraint]] = lambda limit: ()
     tolerance: Callable[[float], sm.Tolerance] = lambda limit: sm.Tolerance(ANYTHING, ANYTHING)
     problem: Mapping[str, Any] = MappingProxyType({})
     most: float = np.inf
@@ -292,10 +292,10 @@ def _joint(cell: Cell) -> Asked:
     """A joint stays within a band."""
     k = int(cell.rng.integers(cell.robot.dof))
     center = float(cell.start[0][0, k])
-    which = sm.JointCoordinate(cell.robot.joint_names[k])
+    which = sm.robot.JointCoordinate(cell.robot.joint_names[k])
     return Asked(
         lambda t, motion: np.abs(motion[0][:, k] - center),
-        lambda limit: [sm.Band(which, center, limit)],
+        lambda limit: [sm.constraints.Band(which, center, limit)],
     )
 
 
@@ -310,7 +310,7 @@ def _place(cell: Cell) -> Asked:
     center = float(height(cell.start)[0])
     return Asked(
         lambda t, motion: np.abs(height(motion) - center),
-        lambda limit: [sm.Band(sm.FrameCoordinate(link, toward), center, limit)],
+        lambda limit: [sm.constraints.Band(sm.robot.FrameCoordinate(link, toward), center, limit)],
     )
 
 
@@ -327,10 +327,10 @@ def _swivel(cell: Cell) -> Asked:
         return np.asarray(np.arctan2(sine, np.sum(flat[0] * flat[1], axis=1)))
 
     center = float(angle(cell.start)[0])
-    which = sm.SwivelAngle(up, *names)
+    which = sm.robot.SwivelAngle(up, *names)
     return Asked(
         lambda t, motion: np.abs((angle(motion) - center + np.pi) % (2.0 * np.pi) - np.pi),
-        lambda limit: [sm.Band(which, center, limit)],
+        lambda limit: [sm.constraints.Band(which, center, limit)],
         most=3.14,
     )
 
@@ -345,7 +345,7 @@ def _tilt(cell: Cell) -> Asked:
         chord = np.linalg.norm(cell.arm.moving(link, motion).turn @ axis - toward, axis=1)
         return np.asarray(2.0 * np.arcsin(np.minimum(0.5 * chord, 1.0)))
 
-    return Asked(measure, lambda limit: [sm.Tilt(link, axis, limit, toward)], most=3.14)
+    return Asked(measure, lambda limit: [sm.constraints.Tilt(link, axis, limit, toward)], most=3.14)
 
 
 def _torque(cell: Cell) -> Asked:
@@ -357,7 +357,7 @@ def _torque(cell: Cell) -> Asked:
     scale[joint] = 1.0
     return Asked(
         lambda t, motion: np.abs(cell.arm.torques(motion, payload, center) / scale).max(axis=1),
-        lambda limit: [sm.JointTorqueLimits(limit * scale, payload, center)],
+        lambda limit: [sm.constraints.JointTorqueLimits(limit * scale, payload, center)],
     )
 
 
@@ -370,7 +370,7 @@ def _tool(cell: Cell) -> Asked:
         rows = {"speed": tip.speed, "turn_rate": tip.spin, "acceleration": tip.speeding}
         return np.linalg.norm(rows.get(which, tip.spinning), axis=1)
 
-    return Asked(measure, lambda limit: [sm.ToolLimits(**{which: limit})])
+    return Asked(measure, lambda limit: [sm.constraints.ToolLimits(**{which: limit})])
 
 
 def _limits(cell: Cell) -> Asked:
@@ -387,16 +387,20 @@ def _jerk(motion: sm.Trajectory, t: Array) -> Array:
     return along(motion, t, 3)
 
 
-def _only(cell: Cell, k: int, order: int) -> Callable[[float], list[sm.Constraint]]:
+def _only(cell: Cell, k: int, order: int) -> Callable[[float], list[sm.constraints.Constraint]]:
     """Return the limits of one joint, all others being free."""
     free, q = np.full(cell.robot.dof, np.inf), cell.start[0][0]
 
-    def made(limit: float) -> list[sm.Constraint]:
+    def made(limit: float) -> list[sm.constraints.Constraint]:
         one = free.copy()
         one[k] = limit
         if order == 0:
-            return [sm.JointPositionLimits(q - one, q + one, replace=True)]
-        kinds = sm.JointVelocityLimits, sm.JointAccelerationLimits, sm.JointJerkLimits
+            return [sm.constraints.JointPositionLimits(q - one, q + one, replace=True)]
+        kinds = (
+            sm.constraints.JointVelocityLimits,
+            sm.constraints.JointAccelerationLimits,
+            sm.constraints.JointJerkLimits,
+        )
         return [kinds[order - 1](one, replace=True)]
 
     return made
@@ -415,8 +419,8 @@ def _apart(cell: Cell) -> Asked:
         )
         away = rng.normal(size=3)
         away *= (balls[link].radius + 0.02 + rng.uniform(0.0, 0.1)) / np.linalg.norm(away)
-        obstacles.append(sm.Sphere(f"ball{k}", at.at[0] + away, 0.02))
-    model = sm.Clearance(obstacles).model(cell.robot)
+        obstacles.append(sm.obstacles.Sphere(f"ball{k}", at.at[0] + away, 0.02))
+    model = sm.constraints.Clearance(obstacles).model(cell.robot)
     # Only what the verdict's remarks leave out, as made, is left out.
     said = {frozenset((x.first, x.second)) for x in model.overlapping if not x.is_checked}
 
@@ -449,7 +453,7 @@ def _apart(cell: Cell) -> Asked:
         # Shares of limits grow as bodies come near.
         return np.asarray(1.0 / np.maximum(np.min(found, axis=0), 1e-9))
 
-    return Asked(measure, lambda limit: [sm.Clearance(obstacles, 1.0 / limit)])
+    return Asked(measure, lambda limit: [sm.constraints.Clearance(obstacles, 1.0 / limit)])
 
 
 def _is_joint(cell: Cell, first: str, second: str) -> bool:
@@ -501,18 +505,18 @@ def _judged(made: Cell, asked: Asked, limit: float, folder: Path) -> tuple[sm.Ce
     """Return what the certificate says, asked in one of four ways."""
     rng, robot = made.rng, made.robot
     held = made.tip(made.start, robot.tool, robot.reference)
-    dwell = sm.Dwell(pin.SE3(held.turn[0], held.at[0]), float(made.motion.t[-1]))
+    dwell = sm.paths.Dwell(pin.SE3(held.turn[0], held.at[0]), float(made.motion.t[-1]))
     free = np.full(robot.dof, np.inf)
     constraints = list(asked.constraints(limit))
-    if not any(isinstance(item, sm.JointPositionLimits) for item in constraints):
-        constraints.append(sm.JointPositionLimits(-free, free, replace=True))
+    if not any(isinstance(item, sm.constraints.JointPositionLimits) for item in constraints):
+        constraints.append(sm.constraints.JointPositionLimits(-free, free, replace=True))
     given = {"task": "position", "also": (), "relaxations": ()} | asked.problem
     tolerance = asked.tolerance(limit)
     try:
         problem = sm.Problem(robot, dwell, constraints=constraints, rest=False, **given)
-    except (sm.RedundancyError, sm.ProblemError) as error:
+    except (sm.errors.RedundancyError, sm.errors.ProblemError) as error:
         # A cell that cannot move in all the rows is judged, but not planned.
-        if not isinstance(error, sm.RedundancyError) and "freely" not in str(error):
+        if not isinstance(error, sm.errors.RedundancyError) and "freely" not in str(error):
             raise
         problem = None
     way = 0 if problem is None else int(rng.integers(4))
@@ -523,7 +527,7 @@ def _judged(made: Cell, asked: Asked, limit: float, folder: Path) -> tuple[sm.Ce
     if way == 1:
         return problem.certify(made.motion, tolerance), "problem"
     if way == 2:
-        sm.write_problem(problem, folder / "problem.toml")
+        sm.files.write_problem(problem, folder / "problem.toml")
         return sm.read_problem(folder / "problem.toml").certify(made.motion, tolerance), "file"
     plan = replace(
         _any_plan(),
@@ -549,8 +553,8 @@ def _feed(number: int, folder: Path) -> Deception:
     asked, within = float(10.0 ** rng.uniform(-2.0, -0.5)), float(rng.choice([0.02, 0.1]))
     length, toward = float(rng.uniform(0.3, 1.0)), rng.normal(size=3)
     toward /= np.linalg.norm(toward)
-    line = sm.Line(np.eye(4), pin.SE3(np.eye(3), length * toward), 1.0)
-    path = sm.Feed(line, asked, within=within, acceleration=5.0)
+    line = sm.paths.Line(np.eye(4), pin.SE3(np.eye(3), length * toward), 1.0)
+    path = sm.paths.Feed(line, asked, within=within, acceleration=5.0)
     t = np.union1d(path.marks, np.linspace(0.0, path.duration, int(rng.integers(50, 400))))
     t = t[np.append(True, np.diff(t) > 1e-6 * path.duration)]
     t[-1] = path.duration
@@ -589,21 +593,21 @@ def _absent(number: int, folder: Path) -> Deception:
     own = [str(rng.choice(ways)) for _ in kinds]
     try:
         robot = gantry(folder, own, kinds)
-    except sm.RobotError:
+    except sm.errors.RobotError:
         # An attribute that URDF demands.
         own = [x if "velocity" in x and "effort" in x else WIDE for x in own]
         robot = gantry(folder, own, kinds)
     t, q = np.array([0.0, 1.0]), np.zeros((2, 4))
     motion = sm.Trajectory(t, q, q, robot.joint_names, q)
     kinds_asked = [
-        sm.JointPositionLimits(),
-        sm.JointVelocityLimits(),
-        sm.JointAccelerationLimits(),
-        sm.JointJerkLimits(),
-        sm.JointTorqueLimits(),
+        sm.constraints.JointPositionLimits(),
+        sm.constraints.JointVelocityLimits(),
+        sm.constraints.JointAccelerationLimits(),
+        sm.constraints.JointJerkLimits(),
+        sm.constraints.JointTorqueLimits(),
     ]
     picked = [item for item in kinds_asked if rng.random() < 0.7]
-    dwell = sm.Dwell(robot.pose(q[0]), 1.0)
+    dwell = sm.paths.Dwell(robot.pose(q[0]), 1.0)
     if rng.random() < 0.5:
         found = [item.requirement(robot) for item in picked if item.applies(robot)]
         certificate = sm.certify(robot, dwell, "position", motion, None, found)
@@ -611,7 +615,7 @@ def _absent(number: int, folder: Path) -> Deception:
         certificate = sm.Problem(robot, dwell, "position", constraints=picked).certify(motion)
     speeds = all('velocity="99"' in x for x in own)
     torques = all('effort="9' in x for x in own)
-    asks_torque = any(isinstance(x, sm.JointTorqueLimits) for x in picked)
+    asks_torque = any(isinstance(x, sm.constraints.JointTorqueLimits) for x in picked)
     allowed = {
         "speeds": speeds,
         "torques": torques and asks_torque,

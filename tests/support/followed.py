@@ -6,5 +6,5 @@ from selfmotion.follow import Follows
 
 def standing(robot: sm.RobotModel, task: sm.Task | str) -> Follows:
     """Return that the tool stays where it is at a dexterous configuration."""
-    place = sm.Dwell(robot.pose(robot.dexterous_configuration()), 1.0)
+    place = sm.paths.Dwell(robot.pose(robot.dexterous_configuration()), 1.0)
     return Follows.of(robot, place, task)

@@ -8,7 +8,7 @@ from selfmotion.realtime import Replanner, Segment
 
 
 def closed_loop(
-    replanner: Replanner, path: sm.Path, start: Array, seconds: float
+    replanner: Replanner, path: sm.paths.Path, start: Array, seconds: float
 ) -> tuple[list[Segment], Array]:
     """Let the arm do exactly what is commanded; return the segments and q at each step."""
     t, q, qd = 0.0, start, np.zeros(len(start))

@@ -90,11 +90,11 @@ points:
 
 
 def _others(file: Path) -> object:
-    return sm.read_path(file, feed=0.05, corners="round")
+    return sm.files.read_path(file, feed=0.05, corners="round")
 
 
 def _drawn_in_mm(file: Path) -> object:
-    return sm.read_path(file, feed=0.05, unit="mm")
+    return sm.files.read_path(file, feed=0.05, unit="mm")
 
 
 def _expanded(file: Path) -> object:
@@ -115,27 +115,27 @@ def good_files() -> tuple[Good, ...]:
         Good("others' files", ".dxf", _drawing(unit=0), _drawn_in_mm),
         Good("xacro", ".xacro", with_arguments_text().encode(), _expanded),
         Good("URDF", ".urdf", finger().encode(), lambda file: sm.load_robot(file, tool="tip")),
-        Good("motion", ".yaml", _POINTS, sm.read_motion),
-        Good("SRDF", ".srdf", _SRDF, lambda file: sm.Clearance(srdf=file)),
+        Good("motion", ".yaml", _POINTS, sm.files.read_motion),
+        Good("SRDF", ".srdf", _SRDF, lambda file: sm.constraints.Clearance(srdf=file)),
         Good("obstacles", ".json", json.dumps(_OBSTACLES, indent=1).encode(), read_obstacles),
         Good("obstacles", ".toml", _OBSTACLES_TOML, read_obstacles),
-        Good("limits", ".yaml", _LIMITS, lambda file: sm.read_joint_limits(file, arm)),
+        Good("limits", ".yaml", _LIMITS, lambda file: sm.files.read_joint_limits(file, arm)),
     ]
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         for suffix in (".csv", ".npz", ".json", ".yaml"):
-            sm.write_motion(plan, folder / f"motion{suffix}", rate=10.0)
+            sm.files.write_motion(plan, folder / f"motion{suffix}", rate=10.0)
             content = (folder / f"motion{suffix}").read_bytes()
-            found.append(Good("motion", suffix, content, sm.read_motion))
-        limits = [sm.JointAccelerationLimits([9.0] * 3)]
+            found.append(Good("motion", suffix, content, sm.files.read_motion))
+        limits = [sm.constraints.JointAccelerationLimits([9.0] * 3)]
         ends = np.zeros(3), np.array([0.4, 0.3, -0.5])
         move = sm.move(arm, *ends, constraints=limits, clearance=None)
         for suffix in (".src", ".mod"):
-            sm.write_motion(move, folder / f"motion{suffix}")
+            sm.files.write_motion(move, folder / f"motion{suffix}")
             content = (folder / f"motion{suffix}").read_bytes()
-            found.append(Good("program", suffix, content, sm.read_motion))
+            found.append(Good("program", suffix, content, sm.files.read_motion))
         for suffix in (".toml", ".json"):
-            sm.write_problem(problem, folder / f"problem{suffix}")
+            sm.files.write_problem(problem, folder / f"problem{suffix}")
             content = (folder / f"problem{suffix}").read_bytes()
             found.append(Good("problem", suffix, content, sm.read_problem))
         found.append(Good("problem", ".toml", _PROBLEM, sm.read_problem))
@@ -355,11 +355,11 @@ def _kind(suffix: str) -> str:
 def _path(file: Path) -> object:
     """Read a path, and draw it: what is wrong with it must be said before it is followed."""
     try:
-        path = sm.read_path(file)
-    except sm.FileFormatError as error:
+        path = sm.files.read_path(file)
+    except sm.errors.FileFormatError as error:
         if not re.search("has no times|says no feed", str(error)):
             raise
-        path = sm.read_path(file, feed=0.1)
+        path = sm.files.read_path(file, feed=0.1)
     return path.samples([0.0, 0.5 * path.duration, path.duration])
 
 

@@ -92,12 +92,12 @@ class Judge:
     """
 
     robot: sm.RobotModel
-    path: sm.Path
+    path: sm.paths.Path
     task: str = "pose"
     tolerance: sm.Tolerance = field(default_factory=sm.Tolerance)
     relaxations: Sequence[sm.Relaxation] = ()
     limits: dict[int, tuple[Array, Array]] = field(default_factory=dict)
-    bodies: Sequence[tuple[Sequence[sm.Obstacle], Sequence[tuple[str, str]], float]] = ()
+    bodies: Sequence[tuple[Sequence[sm.obstacles.Obstacle], Sequence[tuple[str, str]], float]] = ()
     ends: Sequence[tuple[int, Array | None]] = ()
     per_interval: int = PER_INTERVAL
 
@@ -122,19 +122,19 @@ class Judge:
 
         for item in problem.constraints:
             match item:
-                case sm.JointPositionLimits():
+                case sm.constraints.JointPositionLimits():
                     limit(0, *item.limits(problem.robot))
-                case sm.JointVelocityLimits():
+                case sm.constraints.JointVelocityLimits():
                     limit(1, -item.of(problem.robot), item.of(problem.robot))
-                case sm.JointAccelerationLimits():
+                case sm.constraints.JointAccelerationLimits():
                     limit(2, -item.of(problem.robot), item.of(problem.robot))
-                case sm.JointJerkLimits():
+                case sm.constraints.JointJerkLimits():
                     limit(3, -item.of(problem.robot), item.of(problem.robot))
-                case sm.EndConfiguration():
+                case sm.constraints.EndConfiguration():
                     ends.append((0, np.asarray(item.q)))
-                case sm.EndVelocity():
+                case sm.constraints.EndVelocity():
                     ends.append((1, item.target(problem.robot)))
-                case sm.ClosedPath():
+                case sm.constraints.ClosedPath():
                     ends += [(0, None), (1, None)][: 1 + item.velocity]
         for wanted in plan.requirements:
             if isinstance(wanted, KeepsApart):
@@ -264,7 +264,7 @@ class Judge:
         self,
         q: Array,
         known: dict[str, Any],
-        obstacles: Sequence[sm.Obstacle],
+        obstacles: Sequence[sm.obstacles.Obstacle],
         pairs: Sequence[tuple[str, str]],
         distance: float,
     ) -> Verdict:

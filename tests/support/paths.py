@@ -21,20 +21,20 @@ def pose(seed: int) -> pin.SE3:
     return pin.exp6(np.random.default_rng(seed).normal(size=6))
 
 
-def random_waypoints(corners: str = "blend") -> sm.Waypoints:
+def random_waypoints(corners: str = "blend") -> sm.paths.Waypoints:
     rng = np.random.default_rng(5)
     poses = [pose(1) * pin.exp6(0.4 * rng.normal(size=6)) for _ in range(9)]
-    return sm.Waypoints.from_poses(np.linspace(0, 2, 9), poses, corners=corners)
+    return sm.paths.Waypoints.from_poses(np.linspace(0, 2, 9), poses, corners=corners)
 
 
-def there_and_back() -> sm.Path:
+def there_and_back() -> sm.paths.Path:
     """A line, a pause at its end, and the way back."""
-    way, back = sm.Line(pose(1), pose(2), 2.0), sm.Line(pose(2), pose(1), 3.0)
-    return way + sm.Dwell(pose(2), 0.7) + back
+    way, back = sm.paths.Line(pose(1), pose(2), 2.0), sm.paths.Line(pose(2), pose(1), 3.0)
+    return way + sm.paths.Dwell(pose(2), 0.7) + back
 
 
-def line_of(robot: sm.RobotModel, task: str, length: float = 0.2) -> sm.Line:
+def line_of(robot: sm.RobotModel, task: str, length: float = 0.2) -> sm.paths.Line:
     pose = robot.pose(robot.dexterous_configuration(task))
     end = pose.copy()
     end.translation = pose.translation - [0.0, 0.0, length]
-    return sm.Line(pose, end, 2.0)
+    return sm.paths.Line(pose, end, 2.0)

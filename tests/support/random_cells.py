@@ -96,5 +96,5 @@ def _follow(
     first = robot.chain_to(tool, reference).place(start)
     turn = pin.exp3(0.1 * rng.normal(size=3))
     last = pin.SE3(first.rotation @ turn, first.translation + 0.05 * rng.normal(size=3))
-    path = sm.Line(first, last, 2.0, time_law="minimum_jerk")
+    path = sm.paths.Line(first, last, 2.0, time_law="minimum_jerk")
     return sm.Follow(path, task, tool=tool, reference=reference)

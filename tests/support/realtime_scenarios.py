@@ -27,7 +27,7 @@ _CHASE = 2.0
 _SPREAD = 0.08
 
 
-class Broken(sm.Path):
+class Broken(sm.paths.Path):
     """A path that raises, or is not a number."""
 
     def __init__(self, nan: bool) -> None:
@@ -37,7 +37,7 @@ class Broken(sm.Path):
         if not self._nan:
             raise RuntimeError("no camera")
         many = np.full((len(t), 3), np.nan)
-        return sm.PathSamples(t, many, np.full((len(t), 3, 3), np.nan), np.zeros((len(t), 6)))
+        return sm.paths.PathSamples(t, many, np.full((len(t), 3, 3), np.nan), np.zeros((len(t), 6)))
 
 
 @dataclass
@@ -57,7 +57,7 @@ def target_near(robot, q, rng, spread=_SPREAD):
     pose = robot.pose(np.clip(near, robot.lower + 0.1, robot.upper - 0.1))
     turn = pin.exp3(rng.uniform(-0.2, 0.2, 3))
     end = pin.SE3(turn @ pose.rotation, pose.translation + rng.uniform(-0.05, 0.05, 3))
-    return sm.Line(pose, end, 20.0)
+    return sm.paths.Line(pose, end, 20.0)
 
 
 def run(seed: int, task: str, robot: sm.RobotModel, replanner: Replanner) -> Outcome:
@@ -105,7 +105,7 @@ def run(seed: int, task: str, robot: sm.RobotModel, replanner: Replanner) -> Out
         if active and kind == "broken path":
             wanted = Broken(nan=bool(rng.integers(2)))
         if active and kind == "out of reach":
-            wanted = sm.Line(robot.pose(home), beyond(robot.pose(home)), 0.5)
+            wanted = sm.paths.Line(robot.pose(home), beyond(robot.pose(home)), 0.5)
         if not (active and kind == "late"):
             segment = replanner.step(t, q, qd, wanted)
             arm.write(segment)

@@ -23,7 +23,7 @@ def arm_plan(name: str) -> sm.Plan:
     robot = sm.load_robot(name)
     task = sm.Task.POSE if robot.dof > 6 else sm.Task.POSITION
     start = robot.dexterous_configuration(task)
-    path = sm.Circle.around(robot.pose(start), 0.06, 4.0, normal=(1.0, 0.0, 0.0))
+    path = sm.paths.Circle.around(robot.pose(start), 0.06, 4.0, normal=(1.0, 0.0, 0.0))
     return sm.plan(sm.Problem(robot, path, task, start))
 
 
@@ -35,11 +35,13 @@ def two_seams() -> sm.Program:
     ahead = np.array([0.1, 0.0, 0.0])
     seams = [
         sm.Seam(
-            f"seam {k}", sm.Line(pin.SE3(down, end), pin.SE3(down, end + ahead), 1.0), "pointing"
+            f"seam {k}",
+            sm.paths.Line(pin.SE3(down, end), pin.SE3(down, end + ahead), 1.0),
+            "pointing",
         )
         for k, end in enumerate(ends)
     ]
-    clearance = sm.Clearance([sm.Sphere("post", [0.8, 0.0, 0.2], 0.05)], 5e-3)
+    clearance = sm.constraints.Clearance([sm.obstacles.Sphere("post", [0.8, 0.0, 0.2], 0.05)], 5e-3)
     home = np.array(sm.NAMED_ARMS["panda"].home)
     job = sm.plan_job(sm.load_robot("panda"), seams, start=home, branches=1, clearance=clearance)
     return job.require()

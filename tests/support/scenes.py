@@ -21,7 +21,7 @@ NEAR = 0.03
 
 
 @dataclass(frozen=True, eq=False)
-class Followed(sm.Path):
+class Followed(sm.paths.Path):
     """The tool's own motion, so that nothing but limits and distances is at stake."""
 
     arm: Arm
@@ -32,9 +32,9 @@ class Followed(sm.Path):
     def knots(self) -> Array:
         return self.motion.t
 
-    def evaluate(self, t: Array) -> sm.PathSamples:
+    def evaluate(self, t: Array) -> sm.paths.PathSamples:
         turn, at = self.arm.place(self.arm.tool, along(self.motion, t, 0))
-        return sm.PathSamples(t, at, turn, np.zeros((len(t), 6)))
+        return sm.paths.PathSamples(t, at, turn, np.zeros((len(t), 6)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +43,7 @@ class Scene:
 
     judge: Judge
     motion: sm.Trajectory
-    requirements: Sequence[sm.Requirement] = field(default_factory=tuple)
+    requirements: Sequence[sm.certificate.Requirement] = field(default_factory=tuple)
 
     def certify(self) -> sm.Certificate:
         """Return what the package finds."""
@@ -134,9 +134,11 @@ def carrying(number: int, folder: Path) -> Scene:
     place = pin.SE3(pin.rpy.rpyToMatrix(*rng.uniform(-3.0, 3.0, 3)), rng.uniform(-0.2, 0.2, 3))
     size = rng.uniform(0.005, 0.03, 3)
     carried = {
-        0: sm.Sphere("carried", place, float(size[0]), frame=links[last]),
-        1: sm.Capsule("carried", place, float(size[0]), float(5.0 * size[1]), frame=links[last]),
-        2: sm.Box("carried", place, size * [1.0, 1.0, 5.0], frame=links[last]),
+        0: sm.obstacles.Sphere("carried", place, float(size[0]), frame=links[last]),
+        1: sm.obstacles.Capsule(
+            "carried", place, float(size[0]), float(5.0 * size[1]), frame=links[last]
+        ),
+        2: sm.obstacles.Box("carried", place, size * [1.0, 1.0, 5.0], frame=links[last]),
     }[number % 3]
     solids = [(links[last], solid_of_obstacle(carried))]
     plates = []
@@ -155,11 +157,11 @@ def _among(
     robot: sm.RobotModel,
     known: Arm,
     motion: sm.Trajectory,
-    bodies: Sequence[sm.Obstacle],
+    bodies: Sequence[sm.obstacles.Obstacle],
     rng: np.random.Generator,
 ) -> Scene:
     distance = float(rng.choice([2e-4, 1e-3, 5e-3]))
-    wanted = sm.Clearance(bodies, distance)
+    wanted = sm.constraints.Clearance(bodies, distance)
     judge = Judge(
         robot,
         Followed(known, motion, motion.duration),
@@ -175,7 +177,7 @@ def _plate(
     solids: Sequence[tuple[str, Solid]],
     motion: sm.Trajectory,
     rng: np.random.Generator,
-) -> tuple[sm.Box, Array]:
+) -> tuple[sm.obstacles.Box, Array]:
     """Return a plate across the way of a body, and when: it meets, touches or clears it then."""
     link, solid = solids[rng.integers(len(solids))]
     t = rng.uniform(0.0, motion.t[-1]) + np.array([0.0, 1e-4])
@@ -192,7 +194,7 @@ def _plate(
     # Its edge along the body's side, from 1 cm within the body to 3 cm away.
     clear = solid.reach if solid.radius else float(solid.half.max())
     aside = rotation[:, 0] * (half[0] + clear + rng.uniform(-0.01, 0.03))
-    return sm.Box(name, pin.SE3(rotation, at[0] + aside), 2.0 * half), t
+    return sm.obstacles.Box(name, pin.SE3(rotation, at[0] + aside), 2.0 * half), t
 
 
 def near_limits(number: int, folder: Path) -> Scene:
@@ -212,7 +214,7 @@ def near_limits(number: int, folder: Path) -> Scene:
     speed = np.abs(x[1]).max(axis=0) * (shares if critical == 1 else 2.0) + 1e-9
     robot = arm(folder, rng, joints, limits=(middle - half, middle + half, speed))
     most = np.abs(x[2]).max(axis=0) * (shares if critical == 2 else 2.0) + 1e-9
-    wanted = sm.JointAccelerationLimits(most)
+    wanted = sm.constraints.JointAccelerationLimits(most)
     judge = Judge(
         robot,
         Followed(Arm(robot), motion, motion.duration),
@@ -222,7 +224,7 @@ def near_limits(number: int, folder: Path) -> Scene:
     return Scene(judge, motion, [wanted.requirement(robot)])
 
 
-def seam(number: int, robot: sm.RobotModel, start: Array) -> sm.Waypoints:
+def seam(number: int, robot: sm.RobotModel, start: Array) -> sm.paths.Waypoints:
     """Return a measured seam of 20 to 120 rows: noise of 10 to 100 µm, corners, pauses."""
     rng = np.random.default_rng(number)
     pose, count, duration = robot.pose(start), int(rng.integers(20, 120)), rng.uniform(6.0, 20.0)
@@ -238,7 +240,7 @@ def seam(number: int, robot: sm.RobotModel, start: Array) -> sm.Waypoints:
     if number % 4 == 0:
         points[count // 3 + 1] = points[count // 3]
     turns = np.tile(np.roll(pin.Quaternion(pose.rotation).coeffs(), 1), (count, 1))
-    return sm.Waypoints(t, points, turns, corners=("blend", "stop")[number % 2])
+    return sm.paths.Waypoints(t, points, turns, corners=("blend", "stop")[number % 2])
 
 
 def seams(number: int, robot: sm.RobotModel, start: Array) -> list[Scene]:

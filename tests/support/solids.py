@@ -165,22 +165,22 @@ def solid_of_link(collision: Any) -> Solid:
     raise ValueError("the judge knows boxes, spheres and cylinders, no meshes")
 
 
-def solid_of_obstacle(obstacle: sm.Obstacle) -> Solid:
+def solid_of_obstacle(obstacle: sm.obstacles.Obstacle) -> Solid:
     """Return the body of an obstacle."""
     place = {"turn": obstacle.pose.rotation, "at": obstacle.pose.translation}
     match obstacle:
-        case sm.Sphere():
+        case sm.obstacles.Sphere():
             return Solid(np.zeros(3), obstacle.radius, **place)
-        case sm.Box():
+        case sm.obstacles.Box():
             return Solid(0.5 * obstacle.size, 0.0, **place)
-        case sm.Capsule():
+        case sm.obstacles.Capsule():
             return Solid(np.array([0.0, 0.0, 0.5 * obstacle.length]), obstacle.radius, **place)
-        case sm.Mesh():
+        case sm.obstacles.Mesh():
             # Meshes here are those of boxes.
             low, high = trimesh.load_mesh(obstacle.file).bounds * obstacle.scale
             place["at"] = place["at"] + place["turn"] @ (0.5 * (low + high))
             return Solid(0.5 * (high - low), 0.0, **place)
-        case sm.Cylinder():
+        case sm.obstacles.Cylinder():
             half = np.array([obstacle.radius, obstacle.radius, 0.5 * obstacle.length])
             return Solid(half, 0.0, **place, is_round=True)
     raise ValueError(f"the judge knows no {obstacle.label}")

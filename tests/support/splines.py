@@ -14,7 +14,7 @@ NEAR = -0.6
 
 def best_spline(problem: sm.Problem, intervals: int = 16, steps: int = 64) -> float:
     """Return F of the best null motion of so many intervals that keeps its limits at all nodes."""
-    problem = problem.changed(null_motion=sm.BSplineNullMotion(intervals))
+    problem = problem.changed(null_motion=sm.motion.BSplineNullMotion(intervals))
     start = problem.given_start
     assert start is not None
     still = StillMotion.on(problem, start, Grid.aligned(problem.knots, steps))

@@ -155,7 +155,7 @@ def build(words: Generated, folder: Path) -> sm.Problem:
     start: Any = None if words.free else q
     if words.odd in ("nan", "shape", "far"):
         start = {"nan": q * np.nan, "shape": q[:-1], "far": q + 3.0}[words.odd]
-    limits = [sm.JointPositionLimits(), sm.JointVelocityLimits()]
+    limits = [sm.constraints.JointPositionLimits(), sm.constraints.JointVelocityLimits()]
     wanted = [
         _constraint(name, words, robot, path, task, folder, rng) for name in words.constraints
     ]
@@ -173,74 +173,78 @@ def build(words: Generated, folder: Path) -> sm.Problem:
     )
 
 
-def _path(kind: str, poses: list[pin.SE3], duration: float, rng: np.random.Generator) -> sm.Path:
+def _path(
+    kind: str, poses: list[pin.SE3], duration: float, rng: np.random.Generator
+) -> sm.paths.Path:
     first, second = poses[:2]
     if kind in ("line", "constant"):
         law = {"line": "minimum_jerk", "constant": "constant"}[kind]
-        return sm.Line(first, second, duration, law)
+        return sm.paths.Line(first, second, duration, law)
     if kind == "circle":
         radius, normal = rng.uniform(0.01, 0.08), rng.normal(size=3)
-        return sm.Circle.around(
+        return sm.paths.Circle.around(
             first, radius, duration, normal=normal, turn_tool=rng.random() < 0.2
         )
     if kind == "twist":
         v = rng.uniform(-0.1, 0.1, 6) / duration
-        return sm.TwistPath(first, lambda t: v * np.sin(np.pi * t / duration), duration)
+        return sm.paths.TwistPath(first, lambda t: v * np.sin(np.pi * t / duration), duration)
     if kind == "spline":
-        return sm.Waypoints.from_poses(np.linspace(0.0, duration, len(poses)), poses)
+        return sm.paths.Waypoints.from_poses(np.linspace(0.0, duration, len(poses)), poses)
     if kind == "noisy":
         count = int(rng.integers(10, 80))
-        line, t = sm.Line(first, second, duration), np.linspace(0.0, duration, count)
+        line, t = sm.paths.Line(first, second, duration), np.linspace(0.0, duration, count)
         points = line.samples(t)
         noise = 10.0 ** rng.uniform(-6, -4)
         turns = [np.roll(pin.Quaternion(turn).coeffs(), 1) for turn in points.rotation]
         points = points.translation + noise * rng.normal(size=(count, 3))
-        return sm.Waypoints(t, points, turns)
+        return sm.paths.Waypoints(t, points, turns)
     if kind == "pause":
-        return sm.Waypoints.from_poses(
+        return sm.paths.Waypoints.from_poses(
             np.array([0.0, 0.4, 0.6, 1.0]) * duration, [first, second, second, poses[2]]
         )
     corners = "stop" if kind == "stop" else "blend"
-    return sm.Waypoints.from_poses(np.linspace(0, duration, 4), poses[:4], corners=corners)
+    return sm.paths.Waypoints.from_poses(np.linspace(0, duration, 4), poses[:4], corners=corners)
 
 
 def _constraint(
     name: str,
     words: Generated,
     robot: sm.RobotModel,
-    path: sm.Path,
+    path: sm.paths.Path,
     task: str,
     folder: Path,
     rng: np.random.Generator,
-) -> sm.Constraint:
+) -> sm.constraints.Constraint:
     if words.odd == "zero" and name in ("speed", "acceleration"):
-        return sm.JointAccelerationLimits(0.0)
+        return sm.constraints.JointAccelerationLimits(0.0)
     lower, upper = robot.finite_limits()
-    makers: dict[str, Callable[[], sm.Constraint]] = {
-        "speed": lambda: sm.JointVelocityLimits(rng.uniform(0.3, 3.0, robot.dof)),
-        "acceleration": lambda: sm.JointAccelerationLimits(rng.uniform(1.0, 20.0)),
+    makers: dict[str, Callable[[], sm.constraints.Constraint]] = {
+        "speed": lambda: sm.constraints.JointVelocityLimits(rng.uniform(0.3, 3.0, robot.dof)),
+        "acceleration": lambda: sm.constraints.JointAccelerationLimits(rng.uniform(1.0, 20.0)),
         "rest": lambda: (
-            sm.EndVelocity(0.0) if words.path in ("line", "twist") else sm.JointVelocityLimits()
+            sm.constraints.EndVelocity(0.0)
+            if words.path in ("line", "twist")
+            else sm.constraints.JointVelocityLimits()
         ),
-        "end": lambda: sm.EndConfiguration(
+        "end": lambda: sm.constraints.EndConfiguration(
             robot.inverse_kinematics(path.pose(path.duration), task, attempts=10)
         ),
-        "closed": lambda: sm.ClosedPath(),
-        "position": lambda: sm.JointPositionLimits(
+        "closed": lambda: sm.constraints.ClosedPath(),
+        "position": lambda: sm.constraints.JointPositionLimits(
             lower + rng.uniform(0.0, 0.1), np.degrees(upper) if words.odd == "degrees" else upper
         ),
-        "clearance": lambda: sm.Clearance(
+        "clearance": lambda: sm.constraints.Clearance(
             [_obstacle(kind, robot, folder, rng) for kind in words.obstacles],
             float(rng.choice([0.0, 1e-3, 5e-3, 2e-2])),
         ),
-        "self": lambda: sm.Clearance((), 1e-3),
+        "self": lambda: sm.constraints.Clearance((), 1e-3),
     }
     return makers[name]()
 
 
 def _obstacle(
     kind: str, robot: sm.RobotModel, folder: Path, rng: np.random.Generator
-) -> sm.Obstacle:
+) -> sm.obstacles.Obstacle:
     away = rng.normal(size=3)
     away *= robot.reach * rng.uniform(0.2, 1.0) / np.linalg.norm(away)
     pose = pin.SE3(pin.exp3(rng.uniform(-2, 2, 3)), away)
@@ -248,44 +252,46 @@ def _obstacle(
     match kind:
         case "torch":
             place = pin.SE3(pose.rotation, rng.uniform(-0.1, 0.1, 3))
-            return sm.Cylinder(kind, place, 0.1 * size[0], size[1], frame="tcp")
+            return sm.obstacles.Cylinder(kind, place, 0.1 * size[0], size[1], frame="tcp")
         case "bracket":
             place = pin.SE3(pose.rotation, rng.uniform(-0.15, 0.15, 3))
-            return sm.Box(kind, place, 0.3 * size, frame=str(rng.choice(robot.urdf.links)))
+            return sm.obstacles.Box(
+                kind, place, 0.3 * size, frame=str(rng.choice(robot.urdf.links))
+            )
         case "box":
-            return sm.Box(kind, pose, size)
+            return sm.obstacles.Box(kind, pose, size)
         case "plate":
-            return sm.Box(kind, pose, [1.0, 1.0, rng.uniform(1e-3, 5e-3)])
+            return sm.obstacles.Box(kind, pose, [1.0, 1.0, rng.uniform(1e-3, 5e-3)])
         case "sphere":
-            return sm.Sphere(kind, pose, size[0])
+            return sm.obstacles.Sphere(kind, pose, size[0])
         case "cylinder":
-            return sm.Cylinder(kind, pose, size[0], size[1])
+            return sm.obstacles.Cylinder(kind, pose, size[0], size[1])
         case "capsule":
-            return sm.Capsule(kind, pose, 0.5 * size[0], size[1])
+            return sm.obstacles.Capsule(kind, pose, 0.5 * size[0], size[1])
     file = folder / "made.stl"
     trimesh.creation.box([0.1, 0.1, 0.2]).export(file)
-    return sm.Mesh(kind, pose, file)
+    return sm.obstacles.Mesh(kind, pose, file)
 
 
 def _null_motion(kind: str) -> NullMotion:
     return {
         "polynomial": lambda: sm.PolynomialNullMotion(3),
         "monomial": lambda: sm.PolynomialNullMotion(2, "joint", "monomial"),
-        "spline": lambda: sm.BSplineNullMotion(6),
+        "spline": lambda: sm.motion.BSplineNullMotion(6),
         "still": lambda: sm.PolynomialNullMotion(0),
     }[kind]()
 
 
-def _cost(name: str, q: Array, lower: Array, upper: Array) -> sm.Cost:
+def _cost(name: str, q: Array, lower: Array, upper: Array) -> sm.costs.Cost:
     return {
-        "velocity": sm.JointVelocity,
-        "acceleration": sm.JointAcceleration,
-        "jerk": sm.JointJerk,
-        "manipulability": sm.InverseManipulability,
-        "posture": lambda: sm.Posture(0.5, posture=q),
-        "limits": lambda: sm.JointLimitDistance(lower, upper),
-        "length": lambda: sm.PathLength(joint_weights=np.ones(len(q))),
-        "own": lambda: sm.FunctionCost(lambda qd, q, t: np.sum(qd**2, axis=1), name="own"),
+        "velocity": sm.costs.JointVelocity,
+        "acceleration": sm.costs.JointAcceleration,
+        "jerk": sm.costs.JointJerk,
+        "manipulability": sm.costs.InverseManipulability,
+        "posture": lambda: sm.costs.Posture(0.5, posture=q),
+        "limits": lambda: sm.costs.JointLimitDistance(lower, upper),
+        "length": lambda: sm.costs.PathLength(joint_weights=np.ones(len(q))),
+        "own": lambda: sm.costs.FunctionCost(lambda qd, q, t: np.sum(qd**2, axis=1), name="own"),
     }[name]()
 
 

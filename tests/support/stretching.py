@@ -24,5 +24,5 @@ def rounded_problem(count: int = 33, **options) -> sm.Problem:
     t = np.linspace(0.0, DURATION, count)
     known = [robot.pose(q) for q in stretching(t)]
     poses = [pin.SE3(pose.rotation, np.round(pose.translation, _DIGITS)) for pose in known]
-    path = sm.Waypoints.from_poses(t, poses)
+    path = sm.paths.Waypoints.from_poses(t, poses)
     return sm.Problem(robot, path, "planar", rest=False, collision=None, **options)

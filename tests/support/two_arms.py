@@ -25,5 +25,5 @@ def both_arms(left: str, right: str) -> tuple[Follows, Array]:
     items = []
     for tool, reference, task in ((LEFT, None, left), (RIGHT, LEFT, right)):
         chain = robot.chain_to(tool, reference)
-        items.append(BoundFollow(chain, sm.Dwell(chain.place(start), 1.0), sm.Task.of(task)))
+        items.append(BoundFollow(chain, sm.paths.Dwell(chain.place(start), 1.0), sm.Task.of(task)))
     return Follows(robot, tuple(items)), np.array(start)

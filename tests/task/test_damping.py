@@ -98,7 +98,7 @@ def test_damped_gradient_equals_central_differences(case: Case) -> None:
     rollout = partly_damped(case)
     table = table_of(rollout)
     away = OffPath(1e3, case[1].dimension)
-    costs = [sm.JointVelocity(), sm.Manipulability(0.7), away]
+    costs = [sm.costs.JointVelocity(), sm.costs.Manipulability(0.7), away]
     objective = objective_of(rollout, table, costs, FixedStart(start))
     x = 0.1 * np.random.default_rng(7).normal(size=objective.size)
     exact = objective.gradient(x)
@@ -159,7 +159,9 @@ def touching(planar: sm.RobotModel, reach: float) -> sm.Problem:
     """Return a circle whose farthest point is `reach` from the base (5 m: stretched)."""
     pose = np.eye(4)
     pose[0, 3] = reach - 1.0
-    circle = sm.Circle(pose, np.array([reach - 0.5, 0.0, 0.0]), np.array([0.0, 0.0, 1.0]), 4.0)
+    circle = sm.paths.Circle(
+        pose, np.array([reach - 0.5, 0.0, 0.0]), np.array([0.0, 0.0, 1.0]), 4.0
+    )
     start = planar.inverse_kinematics(circle.pose(0.0), "planar")
     return sm.Problem(planar, circle, "planar", start, damping=sm.Damping())
 
@@ -249,13 +251,15 @@ def test_a_heavier_path_weight_leaves_less_path_error(planar: sm.RobotModel) -> 
 
 
 def test_what_damping_refuses(planar: sm.RobotModel) -> None:
-    with pytest.raises(sm.ProblemError, match=r"damping: strength is 0\.0, expected"):
+    with pytest.raises(sm.errors.ProblemError, match=r"damping: strength is 0\.0, expected"):
         sm.Damping(strength=0.0)
-    with pytest.raises(sm.ProblemError, match=r"damping is 0\.1, expected a Damping"):
+    with pytest.raises(sm.errors.ProblemError, match=r"damping is 0\.1, expected a Damping"):
         dataclasses.replace(sm.sample_problem(), damping=0.1)
-    twice = dataclasses.replace(sm.sample_problem(), costs=[sm.JointVelocity(name="path error")])
-    with pytest.raises(sm.ProblemError, match="two costs are called 'path error'"):
+    twice = dataclasses.replace(
+        sm.sample_problem(), costs=[sm.costs.JointVelocity(name="path error")]
+    )
+    with pytest.raises(sm.errors.ProblemError, match="two costs are called 'path error'"):
         dataclasses.replace(twice, damping=sm.Damping())
     damped = dataclasses.replace(sm.sample_problem(), damping=sm.Damping())
-    with pytest.raises(sm.ProblemError, match="damping is for the optimised motion"):
-        sm.plan_by(damped, sm.PseudoInverse())
+    with pytest.raises(sm.errors.ProblemError, match="damping is for the optimised motion"):
+        sm.plan_by(damped, sm.baselines.PseudoInverse())

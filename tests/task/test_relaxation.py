@@ -26,5 +26,5 @@ import selfmotion as sm
     ],
 )
 def test_bad_relaxations_are_refused(options: dict, message: str) -> None:
-    with pytest.raises(sm.ProblemError, match=message):
+    with pytest.raises(sm.errors.ProblemError, match=message):
         sm.Relaxation(**options)

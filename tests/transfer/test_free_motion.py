@@ -15,7 +15,7 @@ LONGER = 2.5
 # What a motion from rest may move at its ends [rad/s, rad/s²]: rounding.
 RESTING = 1e-6
 SCENE = tuple(
-    sm.Box(f"box {k}", place, [0.15, 0.15, 0.5])
+    sm.obstacles.Box(f"box {k}", place, [0.15, 0.15, 0.5])
     for k, place in enumerate([[0.55, 0.0, 0.25], [0.0, 0.55, 0.4], [-0.4, -0.35, 0.6]])
 )
 HOME = np.array(sm.NAMED_ARMS["panda"].home)
@@ -34,11 +34,15 @@ ROUND_A_BOX = (HOME + turned(0.9, 1.2, 0.5), HOME + turned(-0.9, 1.2, 0.5))
 def test_moves_keep_all_limits_and_clearances_by_an_independent_judge(joints, tmp_path) -> None:
     robot = arm(tmp_path, np.random.default_rng(joints), joints, "box")
     kinematics, limit = Arm(robot), np.full(joints, 20.0)
-    limits = [sm.JointPositionLimits(), sm.JointVelocityLimits(), sm.JointAccelerationLimits(20.0)]
+    limits = [
+        sm.constraints.JointPositionLimits(),
+        sm.constraints.JointVelocityLimits(),
+        sm.constraints.JointAccelerationLimits(20.0),
+    ]
     first, last = np.random.default_rng(5).uniform(-1.2, 1.2, (2, joints))
     _, middle = kinematics.place(kinematics.tool, 0.5 * (first + last)[None])
-    ball = sm.Sphere("ball", middle[0], 0.08)
-    clearance = sm.Clearance([ball], 2e-3)
+    ball = sm.obstacles.Sphere("ball", middle[0], 0.08)
+    clearance = sm.constraints.Clearance([ball], 2e-3)
     move = sm.move(robot, first, last, constraints=limits, clearance=clearance).require()
     motion = move.motion
     np.testing.assert_array_equal(motion.q[[0, -1]], [first, last])
@@ -62,7 +66,7 @@ def test_a_straight_move_takes_little_more_than_the_limits_ask_for() -> None:
 
 
 def test_the_same_seed_gives_the_same_move() -> None:
-    robot, clearance = robot_named("panda"), sm.Clearance(list(SCENE), 5e-3)
+    robot, clearance = robot_named("panda"), sm.constraints.Clearance(list(SCENE), 5e-3)
     first, last = ROUND_A_BOX
     one, other = (sm.move(robot, first, last, clearance=clearance, rng=3) for _ in range(2))
     straight = sm.move(robot, first, last)
@@ -98,9 +102,14 @@ def test_a_move_passes_what_it_goes_via_without_a_stop() -> None:
 
 def test_moves_keep_bands_and_what_depends_on_the_pace() -> None:
     panda = robot_named("panda")
-    upright = sm.Tilt("panda_hand_tcp", within=0.5)
-    slow = sm.ToolLimits(speed=0.2)
-    constraints = [sm.JointPositionLimits(), sm.JointVelocityLimits(), upright, slow]
+    upright = sm.constraints.Tilt("panda_hand_tcp", within=0.5)
+    slow = sm.constraints.ToolLimits(speed=0.2)
+    constraints = [
+        sm.constraints.JointPositionLimits(),
+        sm.constraints.JointVelocityLimits(),
+        upright,
+        slow,
+    ]
     last = panda.inverse_kinematics(
         panda.pose(HOME) * sm.task.SE3(np.eye(3), np.array([0.2, -0.3, 0.0])), seed=HOME
     )
@@ -117,7 +126,7 @@ HURRIED, SOFT = 1.01, 0.02
 
 def test_straight_moves_are_as_fast_as_limits_allow() -> None:
     panda = robot_named("panda")
-    constraints = [sm.JointPositionLimits(), sm.JointVelocityLimits()]
+    constraints = [sm.constraints.JointPositionLimits(), sm.constraints.JointVelocityLimits()]
     planner = FreeMotions(panda, constraints, np.random.default_rng(0))
     rng = np.random.default_rng(3)
     for size in (1e-3, 0.01, 0.1, 0.1, 0.5, 0.5):
@@ -129,7 +138,7 @@ def test_straight_moves_are_as_fast_as_limits_allow() -> None:
 
 def test_what_is_not_found_is_said_and_no_more() -> None:
     panda = robot_named("panda")
-    clearance = sm.Clearance(list(SCENE), 5e-3)
+    clearance = sm.constraints.Clearance(list(SCENE), 5e-3)
     first, last = ROUND_A_BOX
     # Nothing but the straight one is looked at before the deadline.
     blocked = sm.move(panda, first, last, clearance=clearance, deadline=1e-6)
@@ -139,24 +148,24 @@ def test_what_is_not_found_is_said_and_no_more() -> None:
     assert "box 0" in met.trouble
     far = sm.move(panda, HOME, HOME + turned(9.0, 0.0, 0.0)).trouble
     assert "joint 'panda_joint1' is at 9 rad (-2.8973 to 2.8973 allowed); give one" in far
-    with pytest.raises(sm.PlanError, match="not allowed"):
+    with pytest.raises(sm.errors.PlanError, match="not allowed"):
         met.require()
     beyond = sm.move(panda, HOME, np.full(7, 9.0))
     assert "joint 'panda_joint1' is" in beyond.trouble
 
 
 def test_a_saved_move_is_the_same_and_a_changed_one_is_not_verified(tmp_path) -> None:
-    panda, clearance = robot_named("panda"), sm.Clearance(list(SCENE), 5e-3)
+    panda, clearance = robot_named("panda"), sm.constraints.Clearance(list(SCENE), 5e-3)
     move = sm.move(panda, HOME, HOME + 0.4, clearance=clearance).require()
     move.save(tmp_path / "move.npz")
-    again = sm.load_move(tmp_path / "move.npz").require()
+    again = sm.files.load_move(tmp_path / "move.npz").require()
     np.testing.assert_array_equal(again.motion.q, move.motion.q)
     assert again.verdict == move.verdict
-    with pytest.raises(sm.FileFormatError, match="is a move, not a plan"):
+    with pytest.raises(sm.errors.FileFormatError, match="is a move, not a plan"):
         sm.load_plan(tmp_path / "move.npz")
     from selfmotion.basics import read_archive, write_archive
 
     description, arrays = read_archive(tmp_path / "move.npz")
     arrays["q"] = arrays["q"] + 1e-12
     write_archive(tmp_path / "changed.npz", description, arrays)
-    assert "digest" in sm.load_move(tmp_path / "changed.npz").trouble
+    assert "digest" in sm.files.load_move(tmp_path / "changed.npz").trouble

@@ -28,7 +28,7 @@ def test_a_fast_circle_is_run(name: str, free: bool) -> None:
     robot = sm.load_robot(name)
     start = robot.dexterous_configuration("pose")
     seconds = {("panda", False): 2.6, ("panda", True): 2.0}.get((name, free), 1.6)
-    path = sm.Circle.around(robot.pose(start), 0.1, seconds, normal=(1.0, 0.0, 0.0))
+    path = sm.paths.Circle.around(robot.pose(start), 0.1, seconds, normal=(1.0, 0.0, 0.0))
     plan = sm.plan(sm.Problem(robot, path, "pose", None if free else start)).require()
     assert {"accelerations", "rest at both ends"} <= set(plan.certificate.covers)
     found = used(plan.trajectory, name)
@@ -37,8 +37,10 @@ def test_a_fast_circle_is_run(name: str, free: bool) -> None:
 
 def test_standstill_is_part_of_it(panda: sm.RobotModel) -> None:
     """An arm that is to begin at 0.07 rad/s is refused, whatever its acceleration is later."""
-    path = sm.Circle.around(panda.pose(PANDA_HOME), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
-    problem = sm.Problem(panda, path, "position", PANDA_HOME, costs=[sm.InverseManipulability(1.0)])
+    path = sm.paths.Circle.around(panda.pose(PANDA_HOME), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
+    problem = sm.Problem(
+        panda, path, "position", PANDA_HOME, costs=[sm.costs.InverseManipulability(1.0)]
+    )
     assert used(sm.plan(problem).trajectory, "panda").max() <= 1.0
     moving = sm.plan(dataclasses.replace(problem, rest=False))
     speed = np.abs(moving.trajectory.qd[0]).max()

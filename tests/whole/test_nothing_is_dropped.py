@@ -26,13 +26,13 @@ HERE = PANDA.pose(PANDA_HOME)
 FAR, FURTHER = np.array([0.0, 0.6, 0.6]), np.array([0.0, 0.5, 0.0])
 
 
-def line(seconds: float = 2.0) -> sm.Path:
+def line(seconds: float = 2.0) -> sm.paths.Path:
     there = SE3(HERE.rotation, HERE.translation + np.array([0.0, 0.05, 0.0]))
-    return sm.Line(HERE, there, seconds)
+    return sm.paths.Line(HERE, there, seconds)
 
 
-def box(name: str, at: np.ndarray) -> sm.Obstacle:
-    return sm.Box(name, at, [0.05, 0.05, 0.05])
+def box(name: str, at: np.ndarray) -> sm.obstacles.Obstacle:
+    return sm.obstacles.Box(name, at, [0.05, 0.05, 0.05])
 
 
 # For each parameter of a problem a value that matters to the motion below.
@@ -42,11 +42,11 @@ PROBLEM: dict[str, Any] = {
     "task": "position",
     "start": PANDA_HOME,
     "null_motion": sm.PolynomialNullMotion(2),
-    "costs": [sm.JointVelocity(weight=2.0)],
-    "constraints": [sm.Clearance([box("post", HERE.translation)], 0.01)],
+    "costs": [sm.costs.JointVelocity(weight=2.0)],
+    "constraints": [sm.constraints.Clearance([box("post", HERE.translation)], 0.01)],
     "relaxations": [sm.Relaxation("y", 0.02)],
     "damping": sm.Damping(),
-    "collision": sm.Clearance([box("wall", HERE.translation + FAR)], 0.01),
+    "collision": sm.constraints.Clearance([box("wall", HERE.translation + FAR)], 0.01),
     "rest": False,
     "also": [sm.Follow(PANDA.pose(PANDA_HOME), "position", tool="panda_link1")],
 }
@@ -111,7 +111,7 @@ def test_a_problem_uses_or_refuses_all_it_is_given(name: str) -> None:
 def planned(**given: Any) -> Any:
     robot = robot_named("planar_3r")
     start = np.array([0.1, 0.9, 0.9])
-    path = sm.Line(robot.pose(start), robot.pose(start + 0.2), 2.0)
+    path = sm.paths.Line(robot.pose(start), robot.pose(start + 0.2), 2.0)
     problem = given.pop("problem", sm.Problem(robot, path, "planar"))
     plan = sm.plan(problem, **given)
     report = plan.report
@@ -128,7 +128,7 @@ def told() -> tuple[list[Any], Callable[..., None]]:
 def test_each_parameter_of_plan_matters() -> None:
     robot = robot_named("planar_3r")
     start = np.array([0.1, 0.9, 0.9])
-    path = sm.Line(robot.pose(start), robot.pose(start + 0.2), 2.0)
+    path = sm.paths.Line(robot.pose(start), robot.pose(start + 0.2), 2.0)
     given = sm.Problem(robot, path, "planar", start)
     heard, tell = told()
     iterations: list[Any] = []
@@ -148,11 +148,11 @@ def test_each_parameter_of_plan_matters() -> None:
     for name, value in changed.items():
         try:
             found = planned(**{name: value})
-        except sm.PlanError as refused:
+        except sm.errors.PlanError as refused:
             found = str(refused)
         assert found != base or {"callback": iterations, "progress": heard}.get(name), name
     # A search has no effect on a given start: that is said.
-    with pytest.raises(sm.ProblemError, match="search"):
+    with pytest.raises(sm.errors.ProblemError, match="search"):
         sm.plan(given, search=sm.Search(starts=3))
 
 
@@ -163,8 +163,8 @@ def test_each_parameter_of_move_matters() -> None:
         "robot": sm.load_robot("panda", tool="panda_link8"),
         "first": PANDA_HOME + 0.01,
         "last": last + 0.01,
-        "constraints": [sm.JointVelocityLimits(0.1)],
-        "clearance": sm.Clearance([box("far", FAR + FURTHER)], 0.01),
+        "constraints": [sm.constraints.JointVelocityLimits(0.1)],
+        "clearance": sm.constraints.Clearance([box("far", FAR + FURTHER)], 0.01),
         "via": [PANDA_HOME + 0.2 * np.arange(7) / 7.0],
         "task": "position",
         "deadline": 1e-9,
@@ -182,18 +182,20 @@ def test_each_parameter_of_move_matters() -> None:
     for name, value in changed.items():
         try:
             other = found(**{name: value})
-        except sm.ProblemError as error:
+        except sm.errors.ProblemError as error:
             other = f"{name}: refused" if name in str(error) else base
         # The straight move is found at once, whatever the seed, and before any deadline.
         if name not in ("rng", "deadline"):
             assert other != base or (name == "progress" and heard), name
     # A constraint on an end is nothing that a move keeps: its ends are given.
-    with pytest.raises(sm.ProblemError, match="EndConfiguration"):
-        found(constraints=[sm.EndConfiguration(last)])
+    with pytest.raises(sm.errors.ProblemError, match="EndConfiguration"):
+        found(constraints=[sm.constraints.EndConfiguration(last)])
     # Where no way is straight, seed and deadline matter.
     turns = np.array([[0.9, 1.2, 0.0, 0.5, 0.0, 0.0, 0.0], [-0.9, 1.2, 0.0, 0.5, 0.0, 0.0, 0.0]])
     past = dict(zip(("first", "last"), PANDA_HOME + turns, strict=True))
-    post = sm.Clearance([sm.Box("post", [0.55, 0.0, 0.25], [0.15, 0.15, 0.5])], 0.005)
+    post = sm.constraints.Clearance(
+        [sm.obstacles.Box("post", [0.55, 0.0, 0.25], [0.15, 0.15, 0.5])], 0.005
+    )
     ways = [found(clearance=post, **past, rng=seed)[1] for seed in (0, 1)]
     assert ways[0] != ways[1]
     assert "no way was found" in found(clearance=post, **past, deadline=1e-9)[2]
@@ -206,9 +208,9 @@ def test_each_parameter_of_other_paces_matters() -> None:
     assert set(changed) == set(inspect.signature(sm.retime).parameters)
     for name, value in list(changed.items())[1:]:
         assert sm.retime(plan, **{name: value}).trajectory.digest != base, name
-    fed = sm.plan(sm.Problem(PANDA, sm.Feed(line(), 0.02), start=PANDA_HOME, collision=None))
+    fed = sm.plan(sm.Problem(PANDA, sm.paths.Feed(line(), 0.02), start=PANDA_HOME, collision=None))
     for call in (lambda: sm.retime(fed), lambda: sm.fastest(fed.problem)):
-        with pytest.raises(sm.ProblemError, match=r"asks for a feed of 0\.02 m/s"):
+        with pytest.raises(sm.errors.ProblemError, match=r"asks for a feed of 0\.02 m/s"):
             call()
 
 
@@ -217,7 +219,7 @@ def test_each_parameter_of_fastest_matters(monkeypatch: pytest.MonkeyPatch) -> N
     monkeypatch.setattr(sys.modules["selfmotion.planning.fastest"], "ROUNDS", 1)
     robot, (heard, tell) = robot_named("planar_3r"), told()
     start = np.array([0.1, 0.9, 0.9])
-    path = sm.Line(robot.pose(start), robot.pose(start + 0.2), 2.0)
+    path = sm.paths.Line(robot.pose(start), robot.pose(start + 0.2), 2.0)
     problem = sm.Problem(robot, path, "planar", start)
     free = sm.Problem(robot, path, "planar")
     changed: dict[str, Any] = {
@@ -235,7 +237,7 @@ def test_each_parameter_of_fastest_matters(monkeypatch: pytest.MonkeyPatch) -> N
         asked = {"problem": problem, "acceleration": 2.0, **given}
         try:
             best = sm.fastest(**asked).plan
-        except (sm.ProblemError, sm.PlanError) as error:
+        except (sm.errors.ProblemError, sm.errors.PlanError) as error:
             return str(error)
         return best.trajectory.digest, best.tolerance
 
@@ -251,7 +253,7 @@ def test_each_parameter_of_a_job_matters(tmp_path: Path) -> None:
 
     def seam(name: str, y: float) -> sm.Seam:
         ends = (SE3(down, np.array([x, y, 0.3])) for x in (0.4, 0.45))
-        return sm.Seam(name, sm.Line(*ends, 1.0), "pointing")
+        return sm.Seam(name, sm.paths.Line(*ends, 1.0), "pointing")
 
     heard, tell = told()
     home = PANDA_HOME + 0.01
@@ -262,8 +264,8 @@ def test_each_parameter_of_a_job_matters(tmp_path: Path) -> None:
         "start": home,
         "end": home,
         "order": "given",
-        "constraints": [sm.JointVelocityLimits(0.3)],
-        "clearance": sm.Clearance([box("far", FAR + FURTHER)], 0.01),
+        "constraints": [sm.constraints.JointVelocityLimits(0.3)],
+        "clearance": sm.constraints.Clearance([box("far", FAR + FURTHER)], 0.01),
         "branches": 2,
         "seconds_per_cost": 5.0,
         "deadline": 1e-9,
@@ -305,8 +307,8 @@ def test_each_parameter_of_a_job_matters(tmp_path: Path) -> None:
             assert list(tmp_path.glob("*.npz"))
         else:
             assert other != base or (name == "progress" and heard), name
-    for wrong in ([sm.EndConfiguration(home)], [sm.Clearance()]):
-        with pytest.raises(sm.ProblemError, match=type(wrong[0]).__name__):
+    for wrong in ([sm.constraints.EndConfiguration(home)], [sm.constraints.Clearance()]):
+        with pytest.raises(sm.errors.ProblemError, match=type(wrong[0]).__name__):
             found(constraints=wrong)
 
 
@@ -344,13 +346,13 @@ def said(document: Mapping[str, Any], folder: Path, is_job: bool) -> str:
     file.write_text(json.dumps(document))
     try:
         if is_job:
-            job = sm.read_seam_job(file)
+            job = sm.files.read_seam_job(file)
             seams = [
                 (seam.name, seam.path.to_dict(), seam.events, seam.wait, seam.after, str(seam.task))
                 for seam in job.seams
             ]
             return repr((job, seams, job.robot.urdf.sha256, job.robot.tools))
-        read = sm.read_job(file)
+        read = sm.files.read_job(file)
         described = problem_to_dict(read.problem)
         return json.dumps(described, sort_keys=True) + repr(
             (read.settings, read.outputs, read.goal, read.parts, read.keep)
@@ -392,5 +394,5 @@ def test_a_job_refuses_the_keys_of_a_problem_that_no_seam_has(tmp_path: Path) ->
     for key in lost:
         file = tmp_path / "job.json"
         file.write_text(json.dumps(document | {key: True}))
-        with pytest.raises(sm.FileFormatError, match=rf"{key}\b"):
-            sm.read_seam_job(file)
+        with pytest.raises(sm.errors.FileFormatError, match=rf"{key}\b"):
+            sm.files.read_seam_job(file)

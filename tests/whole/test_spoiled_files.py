@@ -46,22 +46,22 @@ def test_what_announces_more_than_it_holds_is_refused(tmp_path: Path) -> None:
     ):
         for _ in range(20):
             member.write(bytes(1 << 24))
-    with pytest.raises(sm.FileFormatError, match=r"bomb.npz: .* unpacks to 3.36e\+08 bytes"):
-        sm.read_motion(bomb)
+    with pytest.raises(sm.errors.FileFormatError, match=r"bomb.npz: .* unpacks to 3.36e\+08 bytes"):
+        sm.files.read_motion(bomb)
     out = io.BytesIO()
     head = {"descr": "<f8", "fortran_order": False, "shape": (10**12, 3)}
     np.lib.format.write_array_header_1_0(out, head)
     file = tmp_path / "path.npy"
     file.write_bytes(out.getvalue())
-    with pytest.raises(sm.FileFormatError, match=r"path.npy: .* announces an array"):
-        sm.read_path(file, feed=0.1)
+    with pytest.raises(sm.errors.FileFormatError, match=r"path.npy: .* announces an array"):
+        sm.files.read_path(file, feed=0.1)
 
 
 def test_arrays_are_read_as_numpy_writes_them(tmp_path: Path) -> None:
     file = tmp_path / "path.npy"
     table = np.asfortranarray(np.linspace(0.0, 0.3, 9).reshape(3, 3))
     np.save(file, table)
-    path = sm.read_path(file, duration=1.0)
+    path = sm.files.read_path(file, duration=1.0)
     np.testing.assert_allclose(path.pose(1.0).translation, table[-1], atol=1e-12)
 
 
@@ -69,8 +69,8 @@ def test_messages_show_no_control_codes_and_no_endless_words(tmp_path: Path) -> 
     """What a file says must neither steer a terminal nor fill it."""
     file = tmp_path / "path.csv"
     file.write_text("t,x,y,z\n0,0,0,\x1b[2J" + "9" * 10_000 + "x\n", encoding="utf-8")
-    with pytest.raises(sm.FileFormatError) as raised:
-        sm.read_path(file)
+    with pytest.raises(sm.errors.FileFormatError) as raised:
+        sm.files.read_path(file)
     assert "\x1b" not in str(raised.value)
     assert len(str(raised.value)) < 300
 
@@ -78,5 +78,5 @@ def test_messages_show_no_control_codes_and_no_endless_words(tmp_path: Path) -> 
 def test_a_path_that_turns_without_end_is_refused() -> None:
     values = sm.sample_problem().path.to_dict()
     values["coefficients"] = np.array(values["coefficients"]) + 1e9
-    with pytest.raises(sm.PathError, match="turns by up to"):
-        sm.TwistPath.from_dict({key: value for key, value in values.items() if key != "kind"})
+    with pytest.raises(sm.errors.PathError, match="turns by up to"):
+        sm.paths.TwistPath.from_dict({key: value for key, value in values.items() if key != "kind"})

@@ -17,9 +17,9 @@ from support.own_kinematics import Arm
 PANDA_POINT = np.array([0.5, 0.0, 0.3])
 
 
-def still(panda: sm.RobotModel) -> tuple[sm.Path, Array]:
+def still(panda: sm.RobotModel) -> tuple[sm.paths.Path, Array]:
     pose = panda.pose(PANDA_HOME)
-    return sm.Waypoints.from_poses([0.0, 1.0], [pose, pose]), PANDA_HOME.copy()
+    return sm.paths.Waypoints.from_poses([0.0, 1.0], [pose, pose]), PANDA_HOME.copy()
 
 
 def test_speed_beyond_its_limit_between_two_samples(panda: sm.RobotModel) -> None:
@@ -52,12 +52,12 @@ def test_one_waypoint_off_by_five_millimetres_is_met_or_missed_by_name(
     points = PANDA_POINT + np.outer(np.sin(0.3 * t), [0.02, 0.05, 0.0])
     k = int(0.3123 * count)
     turns = np.tile([0.0, 1.0, 0.0, 0.0], (count, 1))
-    smooth = sm.Waypoints(t, points, turns)
+    smooth = sm.paths.Waypoints(t, points, turns)
     plan = sm.plan(sm.Problem(panda, smooth), max_evaluations=3)
     assert plan.certificate.verified
     spiked = points.copy()
     spiked[k, 2] += 0.005
-    certificate = sm.certify(panda, sm.Waypoints(t, spiked, turns), "pose", plan.trajectory)
+    certificate = sm.certify(panda, sm.paths.Waypoints(t, spiked, turns), "pose", plan.trajectory)
     assert not certificate.verified
     assert certificate.position_error.value >= 0.005 - 1e-6
     assert certificate.position_error.time == pytest.approx(t[k], abs=1.5 * t[1])
@@ -70,7 +70,7 @@ def test_the_tool_rests_in_a_pause(panda: sm.RobotModel, corners: str) -> None:
         poses, ([0, 0, 0], [0, 0.2, 0], [0, 0.2, 0], [0.1, 0.2, 0]), strict=True
     ):
         pose.translation = pose.translation + np.array(shift)
-    path = sm.Waypoints.from_poses([0.0, 4.0, 6.0, 10.0], poses, corners=corners)
+    path = sm.paths.Waypoints.from_poses([0.0, 4.0, 6.0, 10.0], poses, corners=corners)
     ends = [0.0, 10.0] if corners == "stop" else []
     np.testing.assert_array_equal(path.corner_times, sorted([4.0, 6.0, *ends]))
     plan = sm.plan(sm.Problem(panda, path, start=PANDA_HOME), max_evaluations=3).require()
@@ -80,8 +80,8 @@ def test_the_tool_rests_in_a_pause(panda: sm.RobotModel, corners: str) -> None:
 
 @pytest.mark.parametrize("when", [0.5, 0.37, 1.0 / 3.0, 0.9999, 1e-4])
 def test_a_velocity_that_jumps_is_refused(panda: sm.RobotModel, when: float) -> None:
-    with pytest.raises(sm.PathError, match=r"jumps|not smooth"):
-        sm.TwistPath(panda.pose(PANDA_HOME), lambda t: [0.0, 0.1 * (t > when), 0.0], 1.0)
+    with pytest.raises(sm.errors.PathError, match=r"jumps|not smooth"):
+        sm.paths.TwistPath(panda.pose(PANDA_HOME), lambda t: [0.0, 0.1 * (t > when), 0.0], 1.0)
 
 
 @pytest.fixture(scope="module")
@@ -90,7 +90,7 @@ def line_plan() -> sm.Plan:
     pose = panda.pose(PANDA_HOME)
     end = pose.copy()
     end.translation = end.translation + np.array([0.0, 0.1, 0.0])
-    return sm.plan(sm.Problem(panda, sm.Line(pose, end, 2.0), start=PANDA_HOME)).require()
+    return sm.plan(sm.Problem(panda, sm.paths.Line(pose, end, 2.0), start=PANDA_HOME)).require()
 
 
 @pytest.mark.parametrize("shift", [5.0, 1.0, -1.0])
@@ -100,16 +100,16 @@ def test_a_motion_that_begins_beside_its_path_is_refused(
     """Standing still is right at every time at which both are; half of the path has no motion."""
     path, q = still(panda)
     motion = sm.Trajectory([shift, shift + 1.0], [q, q], np.zeros((2, 7)), panda.joint_names)
-    with pytest.raises(sm.ProblemError, match="the motion begins at t ="):
+    with pytest.raises(sm.errors.ProblemError, match="the motion begins at t ="):
         sm.certify(panda, path, "pose", motion)
 
 
 def test_a_retimed_path_knows_when_waypoints_are_passed() -> None:
     """Else a certificate would look beside them."""
     t = np.linspace(0.0, 4.0, 30)
-    path = sm.Waypoints(t, np.outer(np.sin(t), [1.0, 0.0, 0.5]))
+    path = sm.paths.Waypoints(t, np.outer(np.sin(t), [1.0, 0.0, 0.5]))
     sigma = np.array([0.0, 1.0, 1.2, 3.0, 4.0])
-    slow = sm.Retimed(path, [0.0, 2.0, 3.0, 4.0, 6.0], sigma, [0.0, 0.4, 0.3, 0.9, 0.0])
+    slow = sm.paths.Retimed(path, [0.0, 2.0, 3.0, 4.0, 6.0], sigma, [0.0, 0.4, 0.3, 0.9, 0.0])
     passed = slow.pace(slow.marks)
     assert np.abs(passed[:, None] - t).min(axis=0).max() < 1e-12
 
@@ -123,24 +123,24 @@ def test_joints_that_turn_a_thousand_times_come_to_a_verdict(
     rates = np.zeros((2, 7))
     rates[0, 6] = size
     motion = sm.Trajectory([0.0, 1.0], [q, q], rates, panda.joint_names)
-    wide = sm.JointVelocityLimits(1e301, replace=True).requirement(panda)
+    wide = sm.constraints.JointVelocityLimits(1e301, replace=True).requirement(panda)
     certificate = sm.certify(panda, path, "pointing", motion, requirements=[wide])
     assert certificate.samples < 10**5
     assert not certificate.verified
 
 
 @dataclass(frozen=True, eq=False)
-class Unknown(sm.Path, kind="unknown"):
+class Unknown(sm.paths.Path, kind="unknown"):
     """A path that is not a number for a while."""
 
-    path: sm.Path
+    path: sm.paths.Path
     duration: float
 
     @property
     def knots(self) -> Array:
         return np.array([0.0, 0.5, 0.7, self.duration])
 
-    def evaluate(self, t: Array) -> sm.PathSamples:
+    def evaluate(self, t: Array) -> sm.paths.PathSamples:
         samples = self.path.evaluate(t)
         hidden = (t >= 0.5) & (t <= 0.7)
         return replace(samples, translation=np.where(hidden[:, None], np.nan, samples.translation))
@@ -170,21 +170,21 @@ def test_joints_are_told_by_name(line_plan: sm.Plan) -> None:
     assert certified(turned).verified
     swapped = sm.Trajectory(motion.t, motion.q, motion.qd, names[::-1], motion.qdd)
     assert not certified(swapped).verified
-    with pytest.raises(sm.FileFormatError, match="joint 'panda_joint7' is missing"):
+    with pytest.raises(sm.errors.FileFormatError, match="joint 'panda_joint7' is missing"):
         certified(sm.Trajectory(motion.t, motion.q, motion.qd, (*names[:-1], "wrist")))
 
 
 def test_limits_that_cannot_be_meant_are_refused(panda: sm.RobotModel) -> None:
-    with pytest.raises(sm.ProblemError, match="expected numbers > 0"):
-        sm.JointVelocityLimits(-np.ones(7)).requirement(panda)
-    with pytest.raises(sm.ProblemError, match="limits are in radians"):
-        sm.JointPositionLimits(np.full(7, -170.0), np.full(7, 170.0)).requirement(panda)
-    with pytest.raises(sm.RobotError, match="'panda_joint1' at 99 rad, beyond its limits"):
+    with pytest.raises(sm.errors.ProblemError, match="expected numbers > 0"):
+        sm.constraints.JointVelocityLimits(-np.ones(7)).requirement(panda)
+    with pytest.raises(sm.errors.ProblemError, match="limits are in radians"):
+        sm.constraints.JointPositionLimits(np.full(7, -170.0), np.full(7, 170.0)).requirement(panda)
+    with pytest.raises(sm.errors.RobotError, match="'panda_joint1' at 99 rad, beyond its limits"):
         sm.load_robot("panda", lock={"panda_joint1": 99.0})
     path, q = still(panda)
     q[0] += 2.0 * np.pi
     motion = sm.Trajectory([0.0, 1.0], [q, q], np.zeros((2, 7)), panda.joint_names)
-    wide = sm.JointPositionLimits(np.full(7, -7.0), np.full(7, 7.0)).requirement(panda)
+    wide = sm.constraints.JointPositionLimits(np.full(7, -7.0), np.full(7, 7.0)).requirement(panda)
     assert not sm.certify(panda, path, "pose", motion, requirements=[wide]).verified
 
 
@@ -199,7 +199,7 @@ def test_a_plan_that_was_changed_on_disk_is_not_verified(
         np.savez_compressed(file, **(arrays | change))
         altered = sm.load_plan(file)
         assert not altered.check().verified
-        with pytest.raises(sm.PlanError, match="was changed after the plan was written"):
+        with pytest.raises(sm.errors.PlanError, match="was changed after the plan was written"):
             altered.require()
 
 
@@ -209,8 +209,8 @@ def test_a_cost_that_writes_to_its_arguments_is_told(line_plan: sm.Plan, argumen
         {"qd": qd, "q": q, "t": t}[argument][:] = 0.0
         return np.sum(qd**2, axis=1)
 
-    costs = [sm.JointVelocity(), sm.FunctionCost(careless)]
-    with pytest.raises((ValueError, sm.ProblemError), match="read-only"):
+    costs = [sm.costs.JointVelocity(), sm.costs.FunctionCost(careless)]
+    with pytest.raises((ValueError, sm.errors.ProblemError), match="read-only"):
         sm.plan(replace(line_plan.problem, costs=costs))
 
 
@@ -224,7 +224,7 @@ def test_a_robot_may_be_shared_by_threads(panda: sm.RobotModel, line_plan: sm.Pl
     """With a switch every microsecond: the same poses and plans as by one thread alone."""
     q = PANDA_HOME + 0.01 * np.arange(50)[:, None]
     poses = [panda.pose(x).homogeneous for x in q]
-    problem = replace(line_plan.problem, costs=[sm.JointVelocity()])
+    problem = replace(line_plan.problem, costs=[sm.costs.JointVelocity()])
     alone = sm.plan(problem, max_evaluations=3).trajectory.q
     wrong: list[str] = []
 
@@ -269,7 +269,7 @@ def test_a_joint_beyond_the_urdfs_limits_lengthens_levers(tmp_path: Path) -> Non
         np.column_stack([still + 2.0, still]),
         robot.joint_names,
     )
-    path = sm.Circle(
+    path = sm.paths.Circle(
         robot.pose([0.0, 5.0]),
         [0.0, 0.0, 0.0],
         [0.0, 0.0, 1.0],
@@ -278,13 +278,15 @@ def test_a_joint_beyond_the_urdfs_limits_lengthens_levers(tmp_path: Path) -> Non
         turn_tool=True,
         time_law="constant",
     )
-    limits = sm.JointPositionLimits([-3.0, -10.0], [3.0, 10.0], replace=True).requirement(robot)
+    limits = sm.constraints.JointPositionLimits(
+        [-3.0, -10.0], [3.0, 10.0], replace=True
+    ).requirement(robot)
 
     def certified(angle: float) -> sm.Certificate:
         place = pin.SE3(pin.exp3(np.array([0.0, 0.0, angle])), np.zeros(3))
         place.translation = 5.0 * place.rotation[:, 0]
-        plate = sm.Box("plate", place, [0.1, 0.002, 0.1])
-        clearance = sm.Clearance([plate], 0.001).requirement(robot)
+        plate = sm.obstacles.Box("plate", place, [0.1, 0.002, 0.1])
+        clearance = sm.constraints.Clearance([plate], 0.001).requirement(robot)
         return sm.certify(
             robot, path, "planar", motion, sm.Tolerance(1e-3, 1e-3), [limits, clearance]
         )

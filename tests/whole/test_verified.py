@@ -133,7 +133,7 @@ def test_a_certificate_that_looks_at_the_samples_alone_is_refuted(
         largest = values.max(axis=1)
         return largest, stretch.intervals[:, :1] + 0.0 * largest, largest
 
-    path = sm.Circle.around(panda.pose(PANDA_HOME), 0.1, 4.0)
+    path = sm.paths.Circle.around(panda.pose(PANDA_HOME), 0.1, 4.0)
     motion = sm.plan(sm.Problem(panda, path, start=PANDA_HOME), max_evaluations=3).trajectory
     # Farther apart the samples are on the path, and what lies between them is not.
     keep = np.unique(np.append(np.arange(0, len(motion.t), 3), len(motion.t) - 1))
@@ -145,13 +145,13 @@ def test_a_certificate_that_looks_at_the_samples_alone_is_refuted(
 
 
 @dataclass(frozen=True)
-class Blind(sm.Requirement):
+class Blind(sm.certificate.Requirement):
     """A requirement that everything keeps."""
 
     name: str = "blind"
 
-    def judge(self, motion: sm.FinishedMotion) -> sm.Finding:
-        return sm.Finding(self.name, "", 0.0, 0.0, 0.0, True, "")
+    def judge(self, motion: sm.certificate.FinishedMotion) -> sm.certificate.Finding:
+        return sm.certificate.Finding(self.name, "", 0.0, 0.0, 0.0, True, "")
 
 
 def test_a_requirement_that_everything_keeps_is_refuted(tmp_path: Path) -> None:
@@ -171,7 +171,7 @@ def test_a_certificate_that_leaves_what_rides_in_the_world_is_refuted(tmp_path: 
     for scene in carrying_scenes(tmp_path, 30):
         (bodies, _, distance) = scene.judge.bodies[0]
         standing = [bodies[0], *(replace(plate, frame=None) for plate in bodies[1:])]
-        wanted = sm.Clearance(standing, distance).requirement(scene.judge.robot)
+        wanted = sm.constraints.Clearance(standing, distance).requirement(scene.judge.robot)
         scenes.append(replace(scene, requirements=[wanted]))
     assert "apart" in " ".join(text for item in refuted(scenes) for text in item)
 

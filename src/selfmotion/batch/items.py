@@ -51,7 +51,7 @@ class Item:
         if lost:
             raise ProblemError(
                 f"cost '{lost[0]}' is a function, which cannot be sent to another process; derive "
-                f"a class from selfmotion.Cost"
+                f"a class from selfmotion.costs.Cost"
             )
         problem = problem_to_dict(job.problem)
         # A class in a script that is run is known to processes that begin with it alone.

@@ -157,7 +157,7 @@ def _check(requirements: Sequence[Requirement]) -> None:
         if not isinstance(item, Requirement):
             raise ProblemError(
                 f"requirements: {shown(item)} is no Requirement; derive a class of your own from "
-                f"selfmotion.Requirement, or take constraint.requirement(robot)"
+                f"selfmotion.certificate.Requirement, or take constraint.requirement(robot)"
             )
 
 

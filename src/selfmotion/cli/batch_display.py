@@ -38,7 +38,7 @@ class BatchDisplay(Display):
 def check_cluster(address: str | None, workers: int | None) -> None:
     """Raise ProblemError where processes of this machine are asked for beside a cluster."""
     if address is not None and workers is not None:
-        raise sm.ProblemError("--workers has no effect beside --dask, whose workers plan")
+        raise sm.errors.ProblemError("--workers has no effect beside --dask, whose workers plan")
 
 
 @contextmanager
@@ -56,12 +56,14 @@ def executor_at(address: str | None) -> Iterator[Executor | None]:
     try:
         from distributed import Client
     except ImportError:
-        raise sm.ProblemError(
+        raise sm.errors.ProblemError(
             "--dask needs the package distributed: pip install 'selfmotion[cluster]'"
         ) from None
     try:
         client = Client(address, timeout=10)
     except (OSError, ValueError) as error:
-        raise sm.ProblemError(f"--dask: no scheduler answers at '{address}': {error}") from error
+        raise sm.errors.ProblemError(
+            f"--dask: no scheduler answers at '{address}': {error}"
+        ) from error
     with client:
         yield client.get_executor()

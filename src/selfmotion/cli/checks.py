@@ -22,7 +22,7 @@ def read(
     file: Path, degrees: bool, within: sm.Tolerance | None
 ) -> tuple[sm.Trajectory, sm.Tolerance | None]:
     """Return the motion of a file, and what it may miss its path by: what a program states."""
-    motion = sm.read_motion(file, degrees=degrees)
+    motion = sm.files.read_motion(file, degrees=degrees)
     if within is None and is_program(file):
         within = formats.stated_deviation(file)
         if within is not None:
@@ -94,7 +94,7 @@ def of_problem(
     calibration: Path | None = None,
 ) -> tuple[sm.Certificate, _Near, sm.RobotModel]:
     """Return the same of a motion by all that a problem file asks, and what else is."""
-    job = sm.read_job(file)
+    job = sm.files.read_job(file)
     problem = job.problem
     if of_controller:
         kept = formats.what_targets_keep(problem.constraints)
@@ -109,15 +109,21 @@ def of_problem(
     return certificate, near(robot, motion, (*problem.requirements, *besides)), robot
 
 
-def near(robot: sm.RobotModel, motion: sm.Trajectory, asked: Sequence[sm.Requirement]) -> _Near:
+def near(
+    robot: sm.RobotModel, motion: sm.Trajectory, asked: Sequence[sm.certificate.Requirement]
+) -> _Near:
     """Return how near each body comes."""
-    return approaches(asked, sm.FinishedMotion(robot, motion.of_joints(robot.joint_names)))
+    return approaches(
+        asked, sm.certificate.FinishedMotion(robot, motion.of_joints(robot.joint_names))
+    )
 
 
 def of_program(file: Path, job: Path, within: sm.Tolerance | None, as_json: bool) -> NoReturn:
     """Judge a controller's program by the job that it is of, each step and the whole, and end."""
     if not is_program(file):
-        raise sm.ProblemError(f"{file}: is no program of a controller, which {job} could judge")
+        raise sm.errors.ProblemError(
+            f"{file}: is no program of a controller, which {job} could judge"
+        )
     found = formats.judged_program(file, sm.load_program(job), within)
     steps, verified = found.steps, found.verified
     if as_json:

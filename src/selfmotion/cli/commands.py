@@ -130,7 +130,7 @@ def init(
     """Write a commented problem file to begin with; of an arm from a file, one that was planned."""
     file = Path(f"{Path(robot).stem}.toml") if out is None else out
     if os.path.exists(file) and not force:
-        raise sm.FileFormatError(f"{file}: is there already; give --out or --force")
+        raise sm.errors.FileFormatError(f"{file}: is there already; give --out or --force")
     texts = formats.example_texts(
         robot,
         file,
@@ -240,7 +240,7 @@ def check(
             )
         else:
             if robot is None or path is None:
-                raise sm.ProblemError(
+                raise sm.errors.ProblemError(
                     f"{file}: a motion is checked against a robot and a path: give --robot and "
                     f"--path, or a problem file as --robot (a job's .program for its program)"
                 )
@@ -313,7 +313,7 @@ def replay(
         first = saved[0]
     if png is not None and not 0.0 <= png <= first.trajectory.duration:
         lasts = f"the motion lasts {first.trajectory.duration:.6g} s"
-        raise sm.RenderError(f"--png: there is no picture at t = {png:g} s: {lasts}")
+        raise sm.errors.RenderError(f"--png: there is no picture at t = {png:g} s: {lasts}")
     labels = [plan.stem for plan in plans] if len(plans) > 1 else None
     written = [write_replay(saved, html, labels=labels)]
     if png is not None:

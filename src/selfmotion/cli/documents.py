@@ -142,19 +142,23 @@ class Shell:
 
     def _path(self, normal: str) -> dict[str, Any]:
         if sum(option is not None for option in (self.path, self.circle, self.line)) != 1:
-            raise sm.ProblemError("give the tool motion by one of --path, --circle and --line")
+            raise sm.errors.ProblemError(
+                "give the tool motion by one of --path, --circle and --line"
+            )
         if self.normal is not None and self.circle is None:
-            raise sm.ProblemError("--normal is for --circle, and has no effect on another motion")
+            raise sm.errors.ProblemError(
+                "--normal is for --circle, and has no effect on another motion"
+            )
         if self.path is not None:
             return path_table(self.path, vars(self))
         for name in OF_PATH:
             if name not in _OF_SHAPE and getattr(self, name) not in (None, False):
-                raise sm.ProblemError(
+                raise sm.errors.ProblemError(
                     f"--{name.replace('_', '-')} is for --path: a shape is one, and rests at its "
                     f"ends"
                 )
         if self.feed is not None and self.duration is not None:
-            raise sm.ProblemError("give the pace by one of --feed and --duration")
+            raise sm.errors.ProblemError("give the pace by one of --feed and --duration")
         pace = {"feed": self.feed} if self.feed is not None else {"duration": self.duration or 4.0}
         if self.circle is not None:
             axis = [float(normal == name) for name in "xyz"]
@@ -181,7 +185,7 @@ class Shell:
             found.append({"kind": "ClosedPath"})
         if self.obstacles is not None or self.clearance != 0.0 or self.srdf is not None:
             if self.no_collision:
-                raise sm.ProblemError(
+                raise sm.errors.ProblemError(
                     "--no-self-collision has no effect beside --obstacles, --clearance and --srdf, "
                     "which keep links apart from each other as well; leave out pairs by --srdf"
                 )
@@ -218,7 +222,7 @@ def path_table(file: Path, typed: Mapping[str, Any]) -> dict[str, Any]:
     return table | {key: value for key, value in given.items() if value is not None}
 
 
-def followed(file: Path, typed: Mapping[str, Any], robot: sm.RobotModel) -> sm.Path:
+def followed(file: Path, typed: Mapping[str, Any], robot: sm.RobotModel) -> sm.paths.Path:
     """Return the tool motion of a file, by the options `OF_PATH` as typed."""
     table = path_table(file, typed)
     if "frame" in table:
@@ -238,13 +242,13 @@ def read(
     settings: list[str],
     allow_code: bool,
     warm_start: sm.Plan | None = None,
-) -> sm.Job:
+) -> sm.files.Job:
     """Return the job of a problem file, or of a robot with the options of the shell.
 
     Options that say what a problem file says itself are refused beside one.
     """
     if Path(given).suffix.lower() in PATH_SUFFIXES:
-        raise sm.ProblemError(
+        raise sm.errors.ProblemError(
             f"{given}: is a path, expected a robot or a problem file first: selfmotion plan panda "
             f"--path {given}"
         )
@@ -253,19 +257,19 @@ def read(
         return _with_settings(document, None, settings, allow_code)
     typed = _typed(context)
     if typed:
-        raise sm.ProblemError(
+        raise sm.errors.ProblemError(
             f"{given}: the problem is in the file, so that {typed[0]} has no effect; change the "
             f"file, or use --set KEY=VALUE"
         )
     return of_file(Path(given), settings, allow_code)
 
 
-def of_file(file: Path, settings: list[str], allow_code: bool) -> sm.Job:
+def of_file(file: Path, settings: list[str], allow_code: bool) -> sm.files.Job:
     """Return the job of a problem file."""
     document = read_document(file)
     if "grid" in document:
         count = len(grid_documents(document))
-        raise sm.ProblemError(f"{file}: grid has {count} problems: use `selfmotion batch`")
+        raise sm.errors.ProblemError(f"{file}: grid has {count} problems: use `selfmotion batch`")
     return _with_settings(document, file, settings, allow_code)
 
 
@@ -288,14 +292,14 @@ def first_that_runs(texts: Iterable[str], file: Path, job: bool) -> str:
             else:
                 certificate = plan_with_progress(job_of(document, file).problem).certificate
                 verified, reason = certificate.verified, certificate.verdict
-        except sm.PlanError as error:
+        except sm.errors.PlanError as error:
             verified, reason = False, str(error)
         if verified:
             return text
-    raise sm.ProblemError(f"{file}: no example was found that this arm follows: {reason}")
+    raise sm.errors.ProblemError(f"{file}: no example was found that this arm follows: {reason}")
 
 
-def seams_of_file(file: Path, settings: list[str], allow_code: bool) -> sm.SeamJob:
+def seams_of_file(file: Path, settings: list[str], allow_code: bool) -> sm.files.SeamJob:
     """Return the job of a file with seams."""
     document = read_document(file)
     _set(document, settings)
@@ -317,7 +321,7 @@ def _set(document: dict[str, Any], settings: list[str]) -> None:
 
 def _with_settings(
     document: dict[str, Any], file: Path | None, settings: list[str], allow_code: bool
-) -> sm.Job:
+) -> sm.files.Job:
     _set(document, settings)
     job = job_of(document, file, allow_code=allow_code)
     _tell_left_out(document, file)
@@ -325,7 +329,7 @@ def _with_settings(
     return job
 
 
-def _tell_flip(document: dict[str, Any], file: Path | None, job: sm.Job) -> None:
+def _tell_flip(document: dict[str, Any], file: Path | None, job: sm.files.Job) -> None:
     """Print that normals seem to point the other way, where only so the path is in reach."""
     path = document.get("path")
     if not (isinstance(path, dict) and path.get("kind") == "file"):
@@ -340,7 +344,7 @@ def _tell_flip(document: dict[str, Any], file: Path | None, job: sm.Job) -> None
         _say_flip("the path", path)
 
 
-def _tell_flip_of_seams(document: dict[str, Any], file: Path, job: sm.SeamJob) -> None:
+def _tell_flip_of_seams(document: dict[str, Any], file: Path, job: sm.files.SeamJob) -> None:
     """Print the same of a job's first seam."""
     seams, first = document["seams"], job.seams[0]
     listed = isinstance(seams, list)
@@ -370,13 +374,13 @@ def _say_flip(what: str, table: dict[str, Any]) -> None:
     )
 
 
-def _is_in_reach(robot: sm.RobotModel, path: sm.Path, task: sm.Task) -> bool:
+def _is_in_reach(robot: sm.RobotModel, path: sm.paths.Path, task: sm.Task) -> bool:
     """Return whether some poses of a path are in reach, each on its own."""
     q = None
     for t in np.linspace(0.0, path.duration, _LOOKS):
         try:
             q = robot.inverse_kinematics(path.pose(t), task, q, attempts=8)
-        except sm.InverseKinematicsError:
+        except sm.errors.InverseKinematicsError:
             return False
     return True
 
@@ -406,9 +410,9 @@ def _typed(context: typer.Context) -> list[str]:
 
 def _cost(text: str) -> dict[str, Any]:
     kind, mark, value = text.partition("=")
-    known = sm.Cost.kinds()
+    known = sm.costs.Cost.kinds()
     if kind not in known:
-        raise sm.ProblemError(
+        raise sm.errors.ProblemError(
             f"--cost is '{text}', expected NAME or NAME=WEIGHT, NAME one of: {', '.join(known)}"
         )
     if not mark:
@@ -416,7 +420,7 @@ def _cost(text: str) -> dict[str, Any]:
     names = [name for name in _WEIGHTS if name in known[kind].__annotations__]
     names = names or [name for name in _WEIGHTS if hasattr(known[kind], name)]
     if not names:
-        raise sm.ProblemError(f"--cost: {kind} has no weight; give it without =")
+        raise sm.errors.ProblemError(f"--cost: {kind} has no weight; give it without =")
     return {"kind": kind, names[0]: float(options.numbers(value, "--cost", 1)[0])}
 
 

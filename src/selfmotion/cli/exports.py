@@ -55,28 +55,30 @@ def export(
 ) -> None:
     """Write a plan's motion for controllers and simulators, and check what was written."""
     if rate is not None and all(_is_program(target, form) for target in out):
-        raise sm.ProblemError("--rate has no effect on programs: targets are as many as it takes")
+        raise sm.errors.ProblemError(
+            "--rate has no effect on programs: targets are as many as it takes"
+        )
     if parts and all(_is_program(target, form) for target in out):
-        raise sm.ProblemError(
+        raise sm.errors.ProblemError(
             "--parts has no effect on programs of controllers, which move all joints of a cell; "
             "leave it out, or give a file of another kind as well"
         )
     if settings is not None and not any(_is_of_controller(target, form) for target in out):
-        raise sm.ProblemError(
+        raise sm.errors.ProblemError(
             "--settings has no effect: it is of controllers' programs (.script, .src, .mod)"
         )
-    asked = None if settings is None else sm.read_program_settings(settings)
+    asked = None if settings is None else sm.files.read_program_settings(settings)
     made: _Made
     if file.suffix == jobs.PROGRAM:
         made = sm.load_program(file)
     elif file.suffix == jobs.PARTS:
-        made = sm.load_parts(file)
+        made = sm.files.load_parts(file)
     elif is_move(file):
-        made = sm.load_move(file)
+        made = sm.files.load_move(file)
     else:
         made = sm.load_plan(file)
     if parts and not isinstance(made, sm.Plan):
-        raise sm.ProblemError(
+        raise sm.errors.ProblemError(
             f"{file}: --parts is of a cell's plan, which this is not; leave it out"
         )
     _check_verified(made, force, as_json)
@@ -91,19 +93,19 @@ def export(
             given["rate"] = rate
         together: dict[str, Path] = {}
         if parts and isinstance(made, sm.Plan) and not _is_program(target, form):
-            together = sm.write_parts(made, target, **given)
+            together = sm.files.write_parts(made, target, **given)
         with StageDisplay(stages) as display:
             own = asked if _is_of_controller(target, form) else None
             if own is not None and not _is_program(target, form) and programs:
                 own = own.streamed
-            sm.write_motion(made, target, settings=own, progress=display.stage, **given)
+            sm.files.write_motion(made, target, settings=own, progress=display.stage, **given)
         kept, verdicts[str(target)] = _read_back(made, target, form, rate)
         sound &= kept
         if together:
             names = ", ".join(map(str, together.values()))
             verdicts[names] = ""
             if _is_readable(target, form) and isinstance(made, sm.Plan):
-                kept, verdicts[names] = _judged(made, sm.read_parts(together))
+                kept, verdicts[names] = _judged(made, sm.files.read_parts(together))
                 sound &= kept
     _finish(made, rate, verdicts, sound, as_json)
 
@@ -160,7 +162,7 @@ def _read_back(made: _Made, target: Path, form: str | None, rate: float | None) 
         return _confirmed(made, target)
     if not _is_readable(target, form):
         return _verified(made), ""
-    motion = sm.read_motion(target)
+    motion = sm.files.read_motion(target)
     match made:
         case sm.Plan():
             return _judged(made, motion)

@@ -57,7 +57,7 @@ class Link:
     """
 
     port: socket.socket
-    path: sm.Path
+    path: sm.paths.Path
     limits: Array
     tell: Callable[[str], object]
     silence: float
@@ -104,7 +104,7 @@ class Link:
         rows = np.column_stack([segment.t + self._first, segment.q, segment.qd, segment.qdd])
         data = rows.astype(_FLOAT).tobytes()
         if len(data) > _LARGEST:
-            raise sm.ProblemError(
+            raise sm.errors.ProblemError(
                 f"a segment of {len(rows)} cycles takes {len(data)} bytes, more than a datagram "
                 f"holds ({_LARGEST}): give a longer --cycle"
             )
@@ -202,23 +202,31 @@ def listening(address: str) -> Iterator[socket.socket]:
     """Yield a socket that is bound to host:port; ProblemError where that cannot be."""
     host, colon, port = address.rpartition(":")
     if not (colon and host and port.isdecimal() and int(port) < 65_536):
-        raise sm.ProblemError(f"--listen is '{address}', expected host:port like 127.0.0.1:5005")
+        raise sm.errors.ProblemError(
+            f"--listen is '{address}', expected host:port like 127.0.0.1:5005"
+        )
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as made:
         try:
             made.bind((host, int(port)))
         except OSError as error:
-            raise sm.ProblemError(f"--listen {address}: {error.strerror or error}") from error
+            raise sm.errors.ProblemError(
+                f"--listen {address}: {error.strerror or error}"
+            ) from error
         yield made
 
 
 def replanner_of(problem: sm.Problem, **options: Any) -> sm.Replanner:
     """Return the replanner of a problem; ProblemError for what is not followed while moving."""
     if problem.also:
-        raise sm.ProblemError("while the arm moves one frame follows a path: leave 'also' out")
+        raise sm.errors.ProblemError(
+            "while the arm moves one frame follows a path: leave 'also' out"
+        )
     if problem.relaxations:
-        raise sm.ProblemError("while the arm moves no row is relaxed: leave 'relaxations' out")
+        raise sm.errors.ProblemError(
+            "while the arm moves no row is relaxed: leave 'relaxations' out"
+        )
     if problem.damping is not None:
-        raise sm.ProblemError("while the arm moves nothing is damped: leave 'damping' out")
+        raise sm.errors.ProblemError("while the arm moves nothing is damped: leave 'damping' out")
     # Limits of the jerk that nobody wrote, as all problems have them by default, are left to plans.
     asked = [
         item

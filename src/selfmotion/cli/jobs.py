@@ -50,15 +50,15 @@ def job(
         _check(target)
     check_cluster(dask, workers if workers > 1 else None)
     if settings is not None and not any(_switches(target) for target in wanted):
-        raise sm.ProblemError(
+        raise sm.errors.ProblemError(
             "--settings has no effect: it is of controllers' programs (--out .script, .src, .mod)"
         )
     work = documents.seams_of_file(file, changes or [], allow_code)
-    asked = None if settings is None else sm.read_program_settings(settings)
+    asked = None if settings is None else sm.files.read_program_settings(settings)
     if asked is not None or any(_switches(target) for target in wanted):
         # Before anything is planned.
         happens = {event: seam.name for seam in work.seams for event, _ in seam.events}
-        formats.check_signals(happens, asked or sm.ProgramSettings())
+        formats.check_signals(happens, asked or sm.files.ProgramSettings())
     remarks = work.remarks
     outputs.tell(remarks)
     kept = folder or Path("out") / f"{file.stem}.job"
@@ -88,7 +88,7 @@ def job(
 def _check(file: Path) -> None:
     if not (file.suffix in (PROGRAM, ".html", *formats.SUFFIXES) or _is_timetable(file)):
         known = ", ".join(formats.SUFFIXES)
-        raise sm.FileFormatError(
+        raise sm.errors.FileFormatError(
             f"{file}: --out writes .program, .timetable.csv, .html (a replay) or the motion "
             f"({known})"
         )
@@ -104,7 +104,7 @@ def _is_timetable(file: Path) -> bool:
 
 
 def write_program(
-    program: sm.Program, file: Path, settings: sm.ProgramSettings | None = None
+    program: sm.Program, file: Path, settings: sm.files.ProgramSettings | None = None
 ) -> None:
     """Write a program as what the name of a file says."""
     if file.suffix == PROGRAM:
@@ -118,16 +118,16 @@ def write_program(
     else:
         own = settings if _switches(file) else None
         with StageDisplay(stages) as display:
-            sm.write_motion(program, file, settings=own, progress=display.stage)
+            sm.files.write_motion(program, file, settings=own, progress=display.stage)
 
 
-def finish_parts(job: sm.Job, out: list[Path], as_json: bool) -> NoReturn:
+def finish_parts(job: sm.files.Job, out: list[Path], as_json: bool) -> NoReturn:
     """Plan a motion in parts, print it, write its files, and end."""
     wanted = [*job.outputs, *out]
     for file in wanted:
         if file.suffix not in (PARTS, ".html", *formats.SUFFIXES):
             known = ", ".join(formats.SUFFIXES)
-            raise sm.FileFormatError(
+            raise sm.errors.FileFormatError(
                 f"{file}: of parts --out writes {PARTS} (all of it), .html or the motion ({known})"
             )
     with StageDisplay(stages) as display:
@@ -145,7 +145,7 @@ def finish_parts(job: sm.Job, out: list[Path], as_json: bool) -> NoReturn:
 
             write_replay(found, file)
         else:
-            sm.write_motion(found, file)
+            sm.files.write_motion(found, file)
         if not as_json:
             terminal.print(f"wrote {file}", markup=False, soft_wrap=True)
             outputs.tell_large(file, terminal)
@@ -172,7 +172,7 @@ def check(file: Path, as_json: bool) -> NoReturn:
     """Print what is known of a program or of parts, read and judged anew, and end."""
     made: sm.Program | sm.Parts
     if file.suffix == PARTS:
-        made = sm.load_parts(file)
+        made = sm.files.load_parts(file)
         _show_parts(made, as_json)
     else:
         made = sm.load_program(file)

@@ -127,7 +127,7 @@ def sheet(
 def _process(tolerance: float | None, turn: float | None) -> sm.Tolerance | None:
     """Return what a process allows, both numbers or none."""
     if (tolerance is None) != (turn is None):
-        raise sm.ProblemError("--tolerance and --turn say together what the process allows")
+        raise sm.errors.ProblemError("--tolerance and --turn say together what the process allows")
     return None if tolerance is None or turn is None else sm.Tolerance(tolerance, turn)
 
 

@@ -291,7 +291,7 @@ def relaxation(text: str) -> sm.Relaxation:
             (first, last) if window else None,
         )
     except ValueError:
-        raise sm.ProblemError(
+        raise sm.errors.ProblemError(
             f"--relax is '{text}', expected ROWS[=BAND][@FROM:TO] like rx,ry=0.2 or rz@1:2.5"
         ) from None
     return found
@@ -312,9 +312,11 @@ def numbers(text: str, option: str, count: int | None = None) -> Array:
     try:
         numbers = np.array([float(part) for part in text.split(",")])
     except ValueError:
-        raise sm.ProblemError(f"{option} is '{text}', expected numbers like 0,-0.8,1.6") from None
+        raise sm.errors.ProblemError(
+            f"{option} is '{text}', expected numbers like 0,-0.8,1.6"
+        ) from None
     if count is not None and len(numbers) != count:
-        raise sm.ProblemError(f"{option} has {len(numbers)} numbers, expected {count}")
+        raise sm.errors.ProblemError(f"{option} has {len(numbers)} numbers, expected {count}")
     return numbers
 
 
@@ -327,7 +329,7 @@ def locks(texts: list[str]) -> dict[str, float]:
         try:
             held[name] = float(value)
         except ValueError:
-            raise sm.RobotError(
+            raise sm.errors.RobotError(
                 f"--lock is '{text}', expected NAME=VALUE like joint_7=0.5"
             ) from None
     return held
@@ -340,7 +342,9 @@ def arguments(texts: list[str] | None) -> dict[str, str]:
     for text in texts or []:
         name, mark, value = text.partition("=")
         if not (name and mark):
-            raise sm.RobotError(f"--argument is '{text}', expected NAME=VALUE like prefix=left_")
+            raise sm.errors.RobotError(
+                f"--argument is '{text}', expected NAME=VALUE like prefix=left_"
+            )
         found[name] = value
     return found
 
@@ -349,14 +353,14 @@ def refuse_twice(option: str, names: list[str]) -> None:
     """Raise ProblemError where an option says the same thing twice: only the last would count."""
     twice = next((name for name in names if names.count(name) > 1), None)
     if twice is not None:
-        raise sm.ProblemError(f"{option} says '{twice}' twice; say it once")
+        raise sm.errors.ProblemError(f"{option} says '{twice}' twice; say it once")
 
 
 def refuse(given: dict[str, Any], file: Path | str, whose: str) -> None:
     """Raise ProblemError for an option that what is checked says itself."""
     for name, value in given.items():
         if value is not None:
-            raise sm.ProblemError(f"{file}: --{name} is {whose} own: leave it out")
+            raise sm.errors.ProblemError(f"{file}: --{name} is {whose} own: leave it out")
 
 
 def requirements(
@@ -367,18 +371,20 @@ def requirements(
     obstacles: Path | None,
     clearance: float,
     srdf: Path | None,
-) -> tuple[sm.Requirement, ...]:
+) -> tuple[sm.certificate.Requirement, ...]:
     """Return what a motion of others has to keep besides its path and the arm's own limits."""
-    asked: list[sm.Constraint] = []
+    asked: list[sm.constraints.Constraint] = []
     if velocity is not None:
-        asked.append(sm.JointVelocityLimits(one_or_each(velocity, "--velocity")))
+        asked.append(sm.constraints.JointVelocityLimits(one_or_each(velocity, "--velocity")))
     if acceleration is not None:
-        asked.append(sm.JointAccelerationLimits(one_or_each(acceleration, "--acceleration")))
+        asked.append(
+            sm.constraints.JointAccelerationLimits(one_or_each(acceleration, "--acceleration"))
+        )
     if joint_limits is not None:
         asked += formats.read_joint_limits(joint_limits, robot)
     if obstacles is not None or clearance != 0.0 or srdf is not None:
         bodies = () if obstacles is None else read_obstacles(obstacles)
-        asked.append(sm.Clearance(bodies, clearance, srdf))
+        asked.append(sm.constraints.Clearance(bodies, clearance, srdf))
     return tuple(item.requirement(robot) for item in asked)
 
 
@@ -393,21 +399,21 @@ def pose(text: str, option: str) -> dict[str, Any]:
     values = numbers(text, option, 6).tolist()
     for angle in values[3:]:
         if abs(angle) > TURN:
-            raise sm.ProblemError(
+            raise sm.errors.ProblemError(
                 f"{option} has an angle of {angle:g} rad, more than a turn; in degrees? Expected "
                 f"x,y,z,roll,pitch,yaw in m and rad: 90° is 1.5708"
             )
     return {"position": values[:3], "rpy": values[3:]}
 
 
-def read_obstacles(file: Path) -> tuple[sm.Obstacle, ...]:
+def read_obstacles(file: Path) -> tuple[sm.obstacles.Obstacle, ...]:
     """Return the obstacles of a file; see `obstacle_tables`."""
     found = []
     for k, item in enumerate(obstacle_tables(file)):
         try:
             found.append(formats.obstacle(item, lambda name: Path(name)))
         except sm.SelfmotionError as error:
-            raise sm.FileFormatError(f"{file}: [{k}]: {error}") from error
+            raise sm.errors.FileFormatError(f"{file}: [{k}]: {error}") from error
     return tuple(found)
 
 
@@ -418,7 +424,9 @@ def obstacle_tables(file: Path) -> list[dict[str, Any]]:
     """
     listed = _listed(file)
     if not (isinstance(listed, list) and all(isinstance(item, dict) for item in listed)):
-        raise sm.FileFormatError(f"{file}: expected a list of obstacles, each a table of values")
+        raise sm.errors.FileFormatError(
+            f"{file}: expected a list of obstacles, each a table of values"
+        )
     found = [formats.in_si(item, f"{file}: [{k}].") for k, item in enumerate(listed)]
     for item in found:
         if isinstance(item.get("file"), str):

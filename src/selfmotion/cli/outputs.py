@@ -48,7 +48,7 @@ def write(
             tell_large(file, console)
     if faults:
         kept = next(file for file in written if file.suffix == ".npz")
-        raise sm.FileFormatError(f"{'; '.join(faults)}; the plan is in {kept}")
+        raise sm.errors.FileFormatError(f"{'; '.join(faults)}; the plan is in {kept}")
 
 
 def tell(remarks: Sequence[str]) -> None:
@@ -120,7 +120,7 @@ def _write_one(result: sm.Plan, file: Path, *, page: bool) -> None:
     elif file.suffix == ".npz":
         result.save(file)
     else:
-        sm.write_motion(result, file)
+        sm.files.write_motion(result, file)
 
 
 def _replay(result: sm.Plan, file: Path) -> None:
@@ -134,6 +134,6 @@ def check_suffixes(files: list[Path]) -> None:
     for file in files:
         if file.suffix not in (".npz", ".html", *formats.SUFFIXES):
             known = ", ".join(formats.SUFFIXES)
-            raise sm.FileFormatError(
+            raise sm.errors.FileFormatError(
                 f"{file}: --out writes .npz (the plan), .html (its replay) or its motion ({known})"
             )

@@ -48,7 +48,7 @@ def fastest(
 ) -> None:
     """Look for the fastest motion along a path, whatever its own pace; Ctrl-C keeps the best."""
     if Path(problem).suffix not in documents.SUFFIXES:
-        raise sm.ProblemError(
+        raise sm.errors.ProblemError(
             f"{problem}: expected a problem file ({', '.join(documents.SUFFIXES)}); "
             f"selfmotion init writes one"
         )
@@ -81,7 +81,7 @@ def _factor(text: str) -> tuple[str, float]:
     try:
         return kind, float(factor)
     except ValueError:
-        raise sm.ProblemError(
+        raise sm.errors.ProblemError(
             f"--keep {text}: expected a cost and a factor, such as JointVelocity=1.1"
         ) from None
 

@@ -63,11 +63,15 @@ def place(
 ) -> None:
     """Look for the place of the part, or the arm, at which the motions cost least."""
     if part and path_alone:
-        raise sm.ProblemError("--part and --path-alone say different things; give one of them")
+        raise sm.errors.ProblemError(
+            "--part and --path-alone say different things; give one of them"
+        )
     for file in [*(out or []), *(drawn or [])]:
         known = (*_PROBLEMS, ".npz") if file in (out or []) else _PAGES
         if file.suffix not in known:
-            raise sm.FileFormatError(f"{file}: expected a name that ends in {', '.join(known)}")
+            raise sm.errors.FileFormatError(
+                f"{file}: expected a name that ends in {', '.join(known)}"
+            )
     problems = [documents.of_file(file, settings or [], allow_code).problem for file in files]
     named = {"x": x, "y": y, "z": z, "roll": roll, "pitch": pitch, "yaw": yaw}
     within = {
@@ -94,7 +98,7 @@ def place(
             if file.suffix == ".html":
                 found.to_html(file, pictured)
             elif pictured is None:
-                raise sm.ProblemError(f"{file}: a picture of places is over two coordinates")
+                raise sm.errors.ProblemError(f"{file}: a picture of places is over two coordinates")
             else:
                 pictured.figure().savefig(file)
             terminal.print(f"wrote {file}", markup=False, soft_wrap=True)
@@ -143,5 +147,5 @@ def _write(found: sm.Placement, file: Path) -> None:
         if named.suffix == ".npz":
             plan.save(named)
         else:
-            sm.write_problem(plan.problem, named)
+            sm.files.write_problem(plan.problem, named)
         terminal.print(f"wrote {named}", markup=False, soft_wrap=True)

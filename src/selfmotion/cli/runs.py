@@ -67,7 +67,7 @@ def batch(
     names = [item.name for item in items]
     twice = next((name for name in names if names.count(name) > 1), None)
     if twice is not None:
-        raise sm.ProblemError(f"two problem files are called '{twice}'; rename one of them")
+        raise sm.errors.ProblemError(f"two problem files are called '{twice}'; rename one of them")
     try:
         with executor_at(dask) as executor, BatchDisplay(stages) as display:
             result = plan_items(
@@ -113,7 +113,7 @@ def demo(
         files = [out / f"{name}.npz", out / f"{name}.csv"]
         outputs.write(result, files, out / f"{name}.html", terminal)
         verified = verified and result.certificate.verified
-    tracked = sm.plan_by(problem, sm.PseudoInverse()).certificate
+    tracked = sm.plan_by(problem, sm.baselines.PseudoInverse()).certificate
     terminal.print(
         f"the pseudo-inverse on the same problem: {tracked.verdict}", markup=False, soft_wrap=True
     )

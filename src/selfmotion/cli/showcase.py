@@ -13,14 +13,14 @@ def panda_past_a_box() -> sm.Problem:
     """
     panda = sm.load_robot("panda")
     start = np.array(sm.NAMED_ARMS["panda"].home)
-    circle = sm.Circle.around(panda.pose(start), 0.15, 5.0, normal=(1.0, 0.0, 0.0))
-    box = sm.Box("box", np.array([0.1, -0.2, 0.75]), np.full(3, 0.1))
+    circle = sm.paths.Circle.around(panda.pose(start), 0.15, 5.0, normal=(1.0, 0.0, 0.0))
+    box = sm.obstacles.Box("box", np.array([0.1, -0.2, 0.75]), np.full(3, 0.1))
     constraints = (
-        sm.JointPositionLimits(),
-        sm.JointVelocityLimits(),
-        sm.JointAccelerationLimits(),
-        sm.JointJerkLimits(),
-        sm.ClosedPath(),
-        sm.Clearance((box,), 0.01),
+        sm.constraints.JointPositionLimits(),
+        sm.constraints.JointVelocityLimits(),
+        sm.constraints.JointAccelerationLimits(),
+        sm.constraints.JointJerkLimits(),
+        sm.constraints.ClosedPath(),
+        sm.constraints.Clearance((box,), 0.01),
     )
     return sm.Problem(panda, circle, "pointing", start, constraints=constraints)

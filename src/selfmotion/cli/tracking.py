@@ -39,7 +39,7 @@ class Conveyor:
     """
 
     def __init__(self, robot: sm.RobotModel, start: Array, ball: Array, seconds: float) -> None:
-        self._circle = sm.Circle.around(
+        self._circle = sm.paths.Circle.around(
             robot.pose(start),
             _RADIUS,
             seconds + 10.0,
@@ -49,7 +49,7 @@ class Conveyor:
         self._push = _FAR * np.where(np.arange(robot.dof) % 2, 1.0, -1.0)
         self._ball = SE3(np.eye(3), np.asarray(ball))
 
-    def path(self, t: float) -> sm.Path:
+    def path(self, t: float) -> sm.paths.Path:
         """Return the circle where the conveyor is, going on as fast as it is now."""
         # The conveyor's drive is measured: place and velocity of a sine.
         phase = 2.0 * np.pi * t / _TURN
@@ -76,13 +76,19 @@ def conveyor_run(
     start = np.array(sm.NAMED_ARMS["panda"].home)
     # In the way of the elbow, not of the tool.
     ball = robot.chain_to("panda_link4").place(start).translation + np.array([0.0, 0.19, 0.0])
-    limits = (sm.JointPositionLimits(), sm.JointVelocityLimits(), sm.JointAccelerationLimits())
-    clearance = sm.Clearance((sm.Sphere("ball", ball, _BALL),), distance=_DISTANCE)
+    limits = (
+        sm.constraints.JointPositionLimits(),
+        sm.constraints.JointVelocityLimits(),
+        sm.constraints.JointAccelerationLimits(),
+    )
+    clearance = sm.constraints.Clearance(
+        (sm.obstacles.Sphere("ball", ball, _BALL),), distance=_DISTANCE
+    )
     replanner = realtime.Replanner(robot, task, constraints=(*limits, clearance), horizon=horizon)
     realtime.warm_up(replanner)
     arm = realtime.SimulatedArm(start, replanner.cycle, rng=seed)
     record = realtime.track(replanner, arm, Conveyor(robot, start, ball, seconds), seconds)
-    shown = sm.Clearance((sm.Sphere("ball", ball, _BALL),), distance=0.0)
+    shown = sm.constraints.Clearance((sm.obstacles.Sphere("ball", ball, _BALL),), distance=0.0)
     return replanner, record, record.as_plan(replanner, constraints=(limits[0], shown))
 
 

@@ -74,7 +74,7 @@ def _name_shapes(listed: list[Any], where: str, folder: FilePath, allowed: bool)
             elif value is not None:
                 raise FileFormatError(
                     f"{place}: '{item['shape']}' is {value!r}, expected a class derived from "
-                    f"selfmotion.Obstacle"
+                    f"selfmotion.obstacles.Obstacle"
                 )
 
 

@@ -241,7 +241,7 @@ def check_can_be_sent(costs: Sequence[Any]) -> None:
         if isinstance(cost, FunctionCost):
             raise ProblemError(
                 f"cost '{cost.name}' is a function, which can neither be kept in a folder nor sent "
-                f"to another process; derive a class from selfmotion.Cost"
+                f"to another process; derive a class from selfmotion.costs.Cost"
             )
 
 

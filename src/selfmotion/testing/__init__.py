@@ -4,7 +4,7 @@ One checker per protocol, for your tests as for ours: it returns nothing, or rai
 with the law, the place and both numbers. All seeds are fixed.
 
 >>> from selfmotion.testing import check_cost
->>> check_cost(sm.InverseManipulability(0.01))
+>>> check_cost(sm.costs.InverseManipulability(0.01))
 """
 
 from selfmotion.testing.constraints import check_constraint as check_constraint
