@@ -5,7 +5,8 @@ the null space of the task.
 
 What a first script needs is here. The rest is in namespaces: `costs`, `constraints`, `paths`,
 `obstacles`, `files`, `errors`, `motion` (null motions), `optimise`, `robot` (coordinates),
-`certificate`, `result`, `job`, `baselines` (other works' methods), `realtime` and `replay`.
+`certificate`, `result`, `job`, `margins`, `placement`, `realtime`, `replay` and `baselines` (other
+works' methods).
 """
 
 from typing import TYPE_CHECKING, Any
@@ -18,10 +19,12 @@ from selfmotion import (
     errors as errors,
     files as files,
     job as job,
+    margins as margins,
     motion as motion,
     obstacles as obstacles,
     optimise as optimise,
     paths as paths,
+    placement as placement,
     result as result,
     robot as robot,
 )
@@ -41,8 +44,14 @@ from selfmotion.job import (
     load_program as load_program,
     plan_job as plan_job,
 )
+from selfmotion.margins import Margin as Margin, margin as margin
 from selfmotion.motion import PolynomialNullMotion as PolynomialNullMotion, Trajectory as Trajectory
 from selfmotion.optimise import QuasiNewton as QuasiNewton
+from selfmotion.placement import (
+    correction as correction,
+    place as place,
+    plan_with_margin as plan_with_margin,
+)
 from selfmotion.planning import (
     Fastest as Fastest,
     Search as Search,
@@ -50,7 +59,12 @@ from selfmotion.planning import (
     plan as plan,
     plan_in_parts as plan_in_parts,
 )
-from selfmotion.problem import Problem as Problem, sample_problem as sample_problem
+from selfmotion.problem import (
+    Problem as Problem,
+    calibrated as calibrated,
+    off_nominal as off_nominal,
+    sample_problem as sample_problem,
+)
 from selfmotion.result import (
     Move as Move,
     Parts as Parts,
@@ -65,6 +79,7 @@ from selfmotion.robot import (
     RobotModel as RobotModel,
     load_robot as load_robot,
 )
+from selfmotion.sheet import write_sheet as write_sheet
 from selfmotion.task import Damping as Damping, Relaxation as Relaxation, Task as Task
 from selfmotion.transfer import move as move
 
@@ -82,10 +97,12 @@ _NAMESPACES = (
     "errors",
     "files",
     "job",
+    "margins",
     "motion",
     "obstacles",
     "optimise",
     "paths",
+    "placement",
     "result",
     "robot",
 )
@@ -97,6 +114,7 @@ __all__ = [
     "Fastest",
     "Follow",
     "Follows",
+    "Margin",
     "Move",
     "Parts",
     "Plan",
@@ -115,9 +133,11 @@ __all__ = [
     "Tolerance",
     "Trajectory",
     "baselines",
+    "calibrated",
     "certificate",
     "certify",
     "constraints",
+    "correction",
     "costs",
     "errors",
     "fastest",
@@ -126,16 +146,22 @@ __all__ = [
     "load_plan",
     "load_program",
     "load_robot",
+    "margin",
+    "margins",
     "motion",
     "move",
     "obstacles",
+    "off_nominal",
     "optimise",
     "paths",
+    "place",
+    "placement",
     "plan",
     "plan_by",
     "plan_in_parts",
     "plan_job",
     "plan_many",
+    "plan_with_margin",
     "read_problem",
     "result",
     "retime",
@@ -143,6 +169,7 @@ __all__ = [
     "sample_problem",
     "slowdown",
     "warm_up",
+    "write_sheet",
 ]
 
 

@@ -123,7 +123,8 @@ def test_no_option_is_left_without_an_effect(plan: Path) -> None:
     refused = {"robot", "path", "task", "tool", "reference", "lock", "degrees"}
     refused |= {"argument", "packages", *documents.OF_PATH}
     judged = {"velocity", "acceleration", "joint_limits", "obstacles", "clearance", "srdf"}
-    assert names == refused | judged | {"tolerance"}
+    # What a calibration does is in tests/robot/test_calibration.py.
+    assert names == refused | judged | {"tolerance", "calibration"}
 
 
 CELL = """

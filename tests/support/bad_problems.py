@@ -320,6 +320,13 @@ def setting_rows() -> list[Row]:
             requirements={"3": 3, "[3]": [3], "None": None},
         ),
         *bad_values_of("Motions", "slowdown", sm.slowdown, plan={"None": None, "'plan'": "plan"}),
+        *bad_values_of(
+            "Motions",
+            "place",
+            lambda **g: sm.place(**{"problems": None, "within": {"x": (0, 1)}, **g}),
+            problems={"None": None, "()": ()},
+        ),
+        *bad_values_of("Motions", "margin", sm.margin, plan={"None": None, "'plan'": "plan"}),
         Row("Motions", "retime(None, 1.0)", lambda _: sm.retime(None, 1.0)),
         *_file_rows(),
         *bad_values_of(

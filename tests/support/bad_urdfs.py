@@ -237,6 +237,8 @@ def loading_rows() -> list[Row]:
         _named("load_robot('https://host/arm.urdf')", "https://host/arm.urdf"),
         _named("load_robot('panda', tool='panda_hand_tpc')", "panda", tool="panda_hand_tpc"),
         _named("load_robot('panda', tool='world')", "panda", tool="world"),
+        _named("load_robot('panda', calibration=3)", "panda", calibration=3),
+        _named("load_robot('panda', calibration='no.yaml')", "panda", calibration="no.yaml"),
         _named("load_robot('panda', tool=3)", "panda", tool=3),
         _named("load_robot('panda', tool='panda_link0')", "panda", tool="panda_link0"),
         _sound("tool='tol'", tool="tol"),

@@ -4,7 +4,9 @@ from selfmotion.cli import (
     commands as commands,
     exports as exports,
     jobs as jobs,
+    margins as margins,
     paces as paces,
+    placing as placing,
     runs as runs,
     warm_up as warm_up,
 )

@@ -5,6 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, NoReturn
 
+import numpy as np
 import typer
 
 import selfmotion as sm
@@ -38,11 +39,43 @@ def is_program(file: Path) -> bool:
     return file.suffix.lower() in formats.READ_PROGRAMS
 
 
+def on_calibrated(problem: sm.Problem, calibration: Path) -> sm.Problem:
+    """Return what a motion that was planned for the arm as drawn is judged by on a calibrated one.
+
+    Where the motion begins is then a question of the path.
+    """
+    return sm.calibrated(replace(problem, start="free"), calibration)
+
+
+def tell_difference(robot: sm.RobotModel, motion: sm.Trajectory) -> None:
+    """Print how far the tool of a calibrated arm is from where the arm as drawn has it."""
+    position, rotation = sm.off_nominal(robot, motion)
+    text = (
+        f"calibrated arm: '{position.name}' is up to {position.value * 1e3:.3g} mm (at "
+        f"{position.time:.4g} s) and {np.degrees(rotation.value):.3g}° (at {rotation.time:.4g} s) "
+        f"from where the arm as drawn has it"
+    )
+    stages.print(text, markup=False, soft_wrap=True)
+
+
 def of_plan(
-    file: Path, within: sm.Tolerance | None, judged: tuple[Any, ...], progress: Progress
+    file: Path,
+    within: sm.Tolerance | None,
+    judged: tuple[Any, ...],
+    progress: Progress,
+    calibration: Path | None = None,
 ) -> tuple[sm.Certificate, _Near, sm.RobotModel]:
     """Return the certificate of a plan, how near bodies come, and the arm."""
     plan = sm.load_plan(file, progress=progress)
+    if calibration is not None:
+        problem = on_calibrated(plan.problem, calibration)
+        besides = options.requirements(problem.robot, *judged)
+        found = problem.certify(
+            plan.trajectory, within or plan.tolerance, plan.report.ending, besides, progress
+        )
+        tell_difference(problem.robot, plan.trajectory)
+        asked = (*problem.requirements, *besides)
+        return found, near(problem.robot, plan.trajectory, asked), problem.robot
     besides = options.requirements(plan.robot, *judged)
     close = near(plan.robot, plan.trajectory, (*plan.requirements, *besides))
     if within is None and not any(judged):
@@ -57,6 +90,7 @@ def of_problem(
     within: sm.Tolerance | None,
     judged: tuple[Any, ...],
     progress: Progress,
+    calibration: Path | None = None,
 ) -> tuple[sm.Certificate, _Near, sm.RobotModel]:
     """Return the same of a motion by all that a problem file asks, and what else is."""
     job = sm.files.read_job(asked)
@@ -71,6 +105,9 @@ def of_problem(
         if formats.shift_told(program):
             stages.print(f"note: {formats.shift_told(program)}", markup=False, soft_wrap=True)
     motion = formats.without_followers(motion, problem.robot)
+    if calibration is not None:
+        problem = on_calibrated(problem, calibration)
+        tell_difference(problem.robot, motion)
     besides = options.requirements(problem.robot, *judged)
     allowed, robot = within or job.tolerance, problem.robot
     certificate = problem.certify(motion, allowed, besides=besides, progress=progress)

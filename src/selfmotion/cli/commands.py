@@ -189,6 +189,7 @@ def check(
     lock: options.LockOption = None,
     argument: options.ArgumentOption = None,
     packages: options.PackagesOption = None,
+    calibration: options.CalibrationOption = None,
     degrees: options.DegreesOption = False,
     velocity: options.VelocityOption = None,
     acceleration: options.AccelerationOption = None,
@@ -207,23 +208,28 @@ def check(
     own: dict[str, Any] = {name.replace("_", "-"): value for name, value in typed.items()}
     own |= {"task": task, "tool": tool, "reference": reference, "lock": lock or None}
     own |= {"argument": argument or None, "packages": packages or None}
+    measured = {"calibration": calibration}
     if file.suffix in (jobs.PROGRAM, jobs.PARTS):
-        given = own | {"robot": robot, "degrees": degrees or None, "tolerance": tolerance}
+        given = (
+            own | measured | {"robot": robot, "degrees": degrees or None, "tolerance": tolerance}
+        )
         whose = "the program's" if file.suffix == jobs.PROGRAM else "the parts'"
         options.refuse(given | {"limits": any(judged) or None}, file, whose)
         jobs.check(file, as_json)
     if robot is not None and Path(robot).suffix == jobs.PROGRAM:
-        options.refuse(own | {"degrees": degrees or None}, robot, "the program's")
+        options.refuse(own | measured | {"degrees": degrees or None}, robot, "the program's")
         options.refuse({"limits": any(judged) or None}, robot, "the program's")
         checks.of_program(file, Path(robot), within, as_json)
     with StageDisplay(stages) as display:
         if file.suffix == ".npz":
             options.refuse(own | {"robot": robot, "degrees": degrees or None}, file, "the plan's")
-            certificate, near, arm = checks.of_plan(file, within, judged, display.stage)
+            certificate, near, arm = checks.of_plan(
+                file, within, judged, display.stage, calibration
+            )
         elif robot is not None and Path(robot).suffix in documents.SUFFIXES:
             options.refuse(own, robot, "the problem's")
             certificate, near, arm = checks.of_problem(
-                file, robot, degrees, within, judged, display.stage
+                file, robot, degrees, within, judged, display.stage, calibration
             )
         else:
             if robot is None or path is None:
@@ -239,6 +245,7 @@ def check(
                 reference=reference,
                 arguments=options.arguments(argument),
                 packages=packages or (),
+                calibration=calibration,
             )
             motion, stated = checks.read(file, degrees, within, arm)
             motion = formats.without_followers(motion, arm)

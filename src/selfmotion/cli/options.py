@@ -233,6 +233,13 @@ PackagesOption = Annotated[
         "Repeatable."
     ),
 ]
+CalibrationOption = Annotated[
+    Path | None,
+    typer.Option(
+        help="File that says where the joints of this very arm are: Universal Robots' kinematics "
+        "(.yaml), their calibration.conf, or joints and offsets (.yaml, .toml)."
+    ),
+]
 DegreesOption = Annotated[
     bool, typer.Option("--degrees", help="Angles of the motion are in degrees.")
 ]

@@ -5,6 +5,10 @@ from selfmotion.collision.clearance import (
     ClearanceModel as ClearanceModel,
     Clearances as Clearances,
 )
+from selfmotion.collision.displaced import (
+    DisplacedBodies as DisplacedBodies,
+    Separation as Separation,
+)
 from selfmotion.collision.exact import CollisionModel as CollisionModel
 from selfmotion.collision.found import (
     Closest as Closest,

@@ -104,6 +104,11 @@ class HullDistances:
             self._model.addCollisionPair(pin.CollisionPair(first, second))
         self._per_thread = threading.local()
 
+    @property
+    def bodies(self) -> tuple[Body, ...]:
+        """The bodies, as `pairs` counts them."""
+        return self._bodies
+
     def lower_bounds(self, q: Array, limit: float = math.inf) -> Array:
         """Return what the distances at q (K, n) are at least, (K, P); see `BoundingBoxes`."""
         return self._boxes.lower_bounds(q, self.pairs, limit)

@@ -5,13 +5,14 @@ from collections.abc import Sequence
 from copy import copy
 from dataclasses import replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from selfmotion.basics import Array, RobotError
 from selfmotion.collision import levers
-from selfmotion.collision.bodies import obstacle_bodies
+from selfmotion.collision.bodies import Body, obstacle_bodies
 from selfmotion.collision.checked import checked_pairs
 from selfmotion.collision.distances import HullDistances, Ints
 from selfmotion.collision.found import Closest
@@ -107,12 +108,23 @@ class CollisionModel:
         self._near = PairDistances(self.robot, self._bodies, self._index)
         self.hulls = self._near.hulls
 
-    def _with(self, pairs: Sequence[tuple[int, int]]) -> "CollisionModel":
+    def of_pairs(self, pairs: Sequence[tuple[int, int]]) -> "CollisionModel":
+        """Return the model of the same bodies in which these pairs are checked, by index."""
         other = copy(self)
         for known in ("pair_levers", "_levers"):
             other.__dict__.pop(known, None)
         other._take(pairs)
         return other
+
+    @property
+    def every_body(self) -> tuple[Body, ...]:
+        """The B bodies, as `bodies` names them."""
+        return self._bodies
+
+    @property
+    def index(self) -> Ints:
+        """Which bodies each pair is of, (P, 2)."""
+        return self._index
 
     @property
     def groups(self) -> dict[str, "CollisionModel"]:
@@ -125,7 +137,7 @@ class CollisionModel:
         for (i, j), pair in zip(self._index.tolist(), self.pairs, strict=True):
             for name in [name for name in names if name in pair] or [ITSELF]:
                 found.setdefault(name, []).append((i, j))
-        return {name: self._with(found[name]) for name in (ITSELF, *names) if name in found}
+        return {name: self.of_pairs(found[name]) for name in (ITSELF, *names) if name in found}
 
     @cached_property
     def stuck(self) -> Closest | None:
@@ -133,7 +145,7 @@ class CollisionModel:
         pairs = held_pairs(self._bodies, self.robot.urdf, self.robot.locked, self._disabled)
         if not pairs:
             return None
-        worst = self._with(pairs).worst(np.zeros((1, self.robot.dof)))
+        worst = self.of_pairs(pairs).worst(np.zeros((1, self.robot.dof)))
         return worst if worst.value < -_TOUCHING else None
 
     @property
@@ -232,12 +244,15 @@ class CollisionModel:
         """Those of all joints of the model, (P, N)."""
         return levers.pair_levers(self._axis_distances, self._moved, self.hulls.pairs)
 
-    def pair_levers_up_to(self, farthest: Array) -> Array:
+    def pair_levers_up_to(self, farthest: Array, aside: Array | None = None) -> Array:
         """Return `pair_levers` where joints go as far as `farthest` (n,) from 0, (P, n).
 
-        A prismatic joint beyond its limits lengthens the levers of all revolute ones.
+        A prismatic joint beyond its limits lengthens the levers of all revolute ones, and so does
+        a body of the pair that is put `aside` by so much at most (P,) [m].
         """
-        extra = levers.travel_beyond(self.robot, farthest)
+        extra: Any = levers.travel_beyond(self.robot, farthest)
+        if aside is not None:
+            extra = extra + aside[:, None]
         counted = levers.is_turned(self.robot) & (self._levers > 0.0)
         return self.robot.coupling.bounds(self._levers + np.where(counted, extra, 0.0))
 

@@ -90,7 +90,7 @@ _WHOLLY_OWN = {"twist"}
 
 # The arm: one known by name, or a URDF or xacro file; or a cell of several of these.
 _ROBOT: _Fields = {
-    **dict.fromkeys(("name", "file", "reference"), (Text, None)),
+    **dict.fromkeys(("name", "file", "calibration", "reference"), (Text, None)),
     **dict.fromkeys(("base", "tool_offset"), (Pose, None)),
     "tool": (Names, None),
     "packages": (Names, None),
@@ -98,7 +98,7 @@ _ROBOT: _Fields = {
     "lock": (Coordinates, None),
 }
 _PART: _Fields = {
-    **dict.fromkeys(("name", "file", "on"), (Text, None)),
+    **dict.fromkeys(("name", "file", "on", "calibration"), (Text, None)),
     "base": (Pose, None),
     "arguments": (Table, None),
 }

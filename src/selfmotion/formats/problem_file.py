@@ -198,17 +198,22 @@ class _Reader:
         values["bodies"] = [self._obstacle(item) for item in values.pop("bodies", [])]
         if "packages" in values:
             values["packages"] = [self._beside(name) for name in values["packages"]]
+        for table in (values, *(parts or {}).values()):
+            if "calibration" in table:
+                table["calibration"] = self._beside(table["calibration"])
         if parts is None:
             return load_robot(self._source(values), **values)
-        for key in ("name", "file", "base", "arguments"):
+        for key in ("name", "file", "base", "arguments", "calibration"):
             if key in values:
                 raise RobotError(f"{key}: is given in each of parts, where there are some")
-        base, on, arguments = (
+        base, on, arguments, measured = (
             {part: item[key] for part, item in parts.items() if key in item}
-            for key in ("base", "on", "arguments")
+            for key in ("base", "on", "arguments", "calibration")
         )
         robots = {part: self._source(item, f"parts.{part}: ") for part, item in parts.items()}
-        return load_robot(robots, **values, base=base, on=on, arguments=arguments)
+        return load_robot(
+            robots, **values, base=base, on=on, arguments=arguments, calibration=measured
+        )
 
     def _source(self, values: dict[str, Any], where: str = "") -> str | FilePath:
         """Take the name of a robot, or its file, from a table."""

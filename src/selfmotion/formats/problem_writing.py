@@ -2,6 +2,7 @@
 
 import dataclasses
 import os
+import xml.etree.ElementTree as ElementTree
 from pathlib import Path as FilePath
 from typing import Any
 
@@ -119,9 +120,19 @@ def _robot(robot: RobotModel) -> dict[str, Any]:
             f"{robot.name}: its URDF is not (or no longer) in the file '{source}', which a problem "
             f"file could name; write `robot.urdf.text` to a .urdf file and load it from there"
         )
-    lock, reference, packages = robot.locked, robot.reference, robot.urdf.packages
-    named_by = named or source
-    _check_limits(robot, load_robot(named_by, tools, lock, reference=reference, packages=packages))
+    calibration = robot.urdf.calibration
+    if calibration is not None:
+        table["calibration"] = calibration
+    now = load_robot(
+        named or source,
+        tools,
+        robot.locked,
+        reference=robot.reference,
+        packages=robot.urdf.packages,
+        calibration=calibration,
+    )
+    _check_limits(robot, now)
+    _check_calibration(robot, now)
     if mounting.base is not None:
         table["base"] = {"position": mounting.base[0], "rpy": mounting.base[1]}
     table["lock"] = dict(robot.locked)
@@ -138,6 +149,25 @@ def _check_limits(robot: RobotModel, known: RobotModel) -> None:
             )
 
 
+def _check_calibration(robot: RobotModel, known: RobotModel) -> None:
+    """Refuse an arm whose joints are elsewhere than its calibration file says now."""
+    if not robot.urdf.is_calibrated:
+        return
+    placements = _placements(robot)
+    if any(placements[name] != place for name, place in _placements(known).items()):
+        raise ProblemError(
+            f"{robot.name}: its joints are elsewhere than its calibration file says now, so that "
+            f"a problem file would name another arm; load it anew"
+        )
+
+
+def _placements(robot: RobotModel) -> dict[str, dict[str, str]]:
+    """Return where each joint is in its parent link, as the URDF says it."""
+    joints = ElementTree.fromstring(robot.urdf.text).findall("joint")
+    origins = {joint.get("name", ""): joint.find("origin") for joint in joints}
+    return {name: {} if found is None else found.attrib for name, found in origins.items()}
+
+
 def _check_unchanged(robot: RobotModel, tools: list[str]) -> None:
     """Refuse a cell whose parts' files are no longer those that it was made of."""
     given = robot.urdf.parts
@@ -150,7 +180,9 @@ def _check_unchanged(robot: RobotModel, tools: list[str]) -> None:
         on={part.name: part.on for part in given if part.on is not None},
         arguments={part.name: part.arguments for part in given},
         packages=robot.urdf.packages,
+        calibration={part.name: part.calibration for part in given if part.calibration} or None,
     )
+    _check_calibration(robot, now)
     if now.urdf.bare_text() != robot.urdf.bare_text():
         raise ProblemError(
             f"{robot.name}: the files of its parts have changed since it was loaded, so that a "
@@ -183,6 +215,8 @@ def _part(part: UrdfPart) -> dict[str, Any]:
         }
     if part.on is not None:
         table["on"] = part.on
+    if part.calibration is not None:
+        table["calibration"] = part.calibration
     if part.arguments:
         table["arguments"] = dict(part.arguments)
     return table

@@ -1,5 +1,10 @@
 """What to plan, and every check of whether arm, path and task fit."""
 
+from selfmotion.problem.calibrated import (
+    calibrated as calibrated,
+    off_nominal as off_nominal,
+    start_on_path as start_on_path,
+)
 from selfmotion.problem.defaults import KEPT as KEPT, NO_OVERLAP as NO_OVERLAP
 from selfmotion.problem.envelopes import envelope_of as envelope_of
 from selfmotion.problem.feeds import check_feeds as check_feeds

@@ -4,6 +4,12 @@ from selfmotion.robot.angles import check_radians as check_radians
 from selfmotion.robot.building import (
     moving_joints as moving_joints,
     rebuild_robot as rebuild_robot,
+    root_place as root_place,
+    with_moved_base as with_moved_base,
+)
+from selfmotion.robot.calibration import (
+    calibrated_robot as calibrated_robot,
+    nominal_robot as nominal_robot,
 )
 from selfmotion.robot.chain import (
     WORLD as WORLD,
@@ -47,6 +53,7 @@ from selfmotion.robot.tip_places import place_tips as place_tips
 from selfmotion.robot.tool_rates import ToolRates as ToolRates
 from selfmotion.robot.tree_arrays import TreeArrays as TreeArrays
 from selfmotion.robot.urdf import (
+    BASE_JOINT as BASE_JOINT,
     TOOL_JOINT as TOOL_JOINT,
     Urdf as Urdf,
     UrdfJoint as UrdfJoint,

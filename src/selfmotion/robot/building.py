@@ -7,13 +7,14 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from selfmotion.basics import RobotError, as_number, nearest, read_only
+from selfmotion.basics import Array, RobotError, as_number, nearest, read_only
 from selfmotion.robot.coupling import Follower, coupling_of, follower_of, tighter_limits
 from selfmotion.robot.full_model import full_model, name_links
 from selfmotion.robot.held import locked_configuration
 from selfmotion.robot.model import LIMITS, RobotModel
+from selfmotion.robot.mounting import moved_base
 from selfmotion.robot.named import names_of
-from selfmotion.robot.urdf import Urdf, UrdfJoint, parse_urdf
+from selfmotion.robot.urdf import BASE_JOINT, Urdf, UrdfJoint, parse_urdf
 
 # A joint that is held may be this far beyond its limits [rad or m]: rounding of a file.
 _BESIDE = 1e-9
@@ -172,6 +173,30 @@ def rebuild_robot(
         if values.shape != (built.dof,):
             raise RobotError(f"{source}: {name} has shape {values.shape}, expected ({built.dof},)")
     return dataclasses.replace(built, touching=pairs, **given)
+
+
+def with_urdf(robot: RobotModel, urdf: Urdf) -> RobotModel:
+    """Return an arm with another URDF of the same links and joints."""
+    free = [
+        joint
+        for joint in urdf.joints.values()
+        if joint.kind in ("revolute", "continuous", "prismatic") and joint.name not in robot.locked
+    ]
+    built = build_robot(urdf, robot.tools, robot.locked, robot.reference, free)
+    kept = {name: getattr(robot, name) for name in (*LIMITS, "acceleration_limit", "jerk_limit")}
+    return dataclasses.replace(built, touching=robot.touching, **kept)
+
+
+def with_moved_base(robot: RobotModel, by: pin.SE3) -> RobotModel:
+    """Return an arm that stands elsewhere, moved by a rigid motion in world axes."""
+    return with_urdf(robot, moved_base(robot.urdf, by))
+
+
+def root_place(robot: RobotModel) -> Array:
+    """Return where the root link of an arm as it is drawn stands in the world, (3,) [m]."""
+    urdf = robot.urdf
+    link = urdf.joints[BASE_JOINT].child if BASE_JOINT in urdf.joints else urdf.root
+    return np.array(robot.carrier_of(link)[1].translation)
 
 
 def _check_lock(urdf: Urdf, model: Any, lock: Mapping[str, float]) -> None:

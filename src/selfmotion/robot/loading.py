@@ -12,6 +12,7 @@ import pinocchio as pin
 
 from selfmotion.basics import RobotError, is_folder, nearest, read_only, shown
 from selfmotion.robot.building import build_robot
+from selfmotion.robot.calibration import calibrated_urdf
 from selfmotion.robot.composing import composed
 from selfmotion.robot.expansion import expand
 from selfmotion.robot.model import RobotModel
@@ -34,6 +35,7 @@ def load_robot(
     bodies: Sequence[CarriedBody] = (),
     arguments: Mapping[str, Any] | None = None,
     packages: str | Path | Sequence[str | Path] = (),
+    calibration: str | Path | Mapping[str, str | Path] | None = None,
 ) -> RobotModel:
     """Load an arm, or a cell of several robots.
 
@@ -70,6 +72,11 @@ def load_robot(
         Folders in which packages that files name are looked up first (``package://``,
         ``$(find …)``). Without, they are found in folders above the file and three levels below
         these, and by ``AMENT_PREFIX_PATH`` and ``ROS_PACKAGE_PATH``.
+    calibration : path, optional
+        File that says where the joints of this very arm are: Universal Robots' kinematics
+        (``.yaml``) or ``calibration.conf``; or a ``.yaml`` or ``.toml`` file with ``joints``, for
+        each its ``position`` and ``rpy`` in its parent link, and ``offsets``, what the coordinate
+        of each is where it says zero [rad or m]. Of several robots a dict, by part.
 
     Returns
     -------
@@ -92,9 +99,9 @@ def load_robot(
             raise RobotError(f"{name} is {shown(given)}, expected a dict")
     folders = _folders(packages)
     source = (
-        _parts(robot, base, on, arguments or {}, folders)
+        _parts(robot, base, on, arguments or {}, folders, calibration)
         if isinstance(robot, Mapping)
-        else _single(robot, base, on, arguments or {}, folders)
+        else _single(robot, base, on, arguments or {}, folders, calibration)
     )
     urdf = source.urdf
     if tool is None:
@@ -170,12 +177,17 @@ def _single(
     on: Mapping[str, str] | None,
     arguments: Mapping[str, str],
     packages: tuple[str, ...],
+    calibration: Any,
 ) -> _Source:
     if isinstance(base, Mapping) or on is not None:
         what = "on" if on is not None else "base"
         raise RobotError(f"{what} is a dict of parts, but there is one robot, '{robot}'")
     source = _read(robot, arguments, packages)
     urdf = source.urdf
+    if calibration is not None:
+        if not isinstance(calibration, str | Path):
+            raise RobotError(f"calibration is {shown(calibration)}, expected the path of a file")
+        urdf = calibrated_urdf(urdf, calibration)
     if base is not None:
         urdf = with_base(urdf, as_pose(base, f"{urdf.source}: base", RobotError))
     return dataclasses.replace(source, urdf=urdf)
@@ -187,6 +199,7 @@ def _parts(
     on: Mapping[str, str] | None,
     arguments: Mapping[str, Any],
     packages: tuple[str, ...],
+    calibration: Any,
 ) -> _Source:
     """Return several robots as one."""
     for name in robots:
@@ -209,15 +222,31 @@ def _parts(
                 f"arguments: '{name}' is {shown(given)}, expected a dict for each part that is a "
                 f".xacro file{nearest(name, robots)}; parts: {', '.join(robots)}"
             )
+    measured = {} if calibration is None else calibration
+    if not isinstance(measured, Mapping) or not set(measured) <= set(robots):
+        raise RobotError(
+            f"calibration is {shown(calibration)}, expected a dict of files by part: "
+            f"{', '.join(robots)}"
+        )
     own_arguments = {name: dict(arguments.get(name, {})) for name in robots}
     sources = {name: _read(robot, own_arguments[name], packages) for name, robot in robots.items()}
+    for name, file in measured.items():
+        urdf = calibrated_urdf(sources[name].urdf, file)
+        sources[name] = dataclasses.replace(sources[name], urdf=urdf)
     poses = {
         name: as_pose(at, f"base of '{name}'", RobotError) for name, at in (base or {}).items()
     }
     urdf = composed({name: source.urdf for name, source in sources.items()}, poses, on or {})
     on = on or {}
     parts = tuple(
-        UrdfPart(name, str(robot), poses.get(name), on.get(name), own_arguments[name])
+        UrdfPart(
+            name,
+            str(robot),
+            poses.get(name),
+            on.get(name),
+            own_arguments[name],
+            sources[name].urdf.calibration,
+        )
         for name, robot in robots.items()
     )
     notes = tuple(

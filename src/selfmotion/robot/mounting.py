@@ -79,6 +79,21 @@ def with_base(urdf: Urdf, pose: pin.SE3) -> Urdf:
     return _joined(urdf, BASE_JOINT, _BASE_LINK, urdf.root, _BASE_LINK, pose)
 
 
+def moved_base(urdf: Urdf, by: pin.SE3) -> Urdf:
+    """Return the URDF with its root moved by a rigid motion in world axes."""
+    if BASE_JOINT not in urdf.joints:
+        return with_base(urdf, by)
+    root = ElementTree.fromstring(urdf.text)
+    joint = next(item for item in root.findall("joint") if item.get("name") == BASE_JOINT)
+    xyz, rpy = mounting_of(urdf, urdf.root).base or ([0.0] * 3, [0.0] * 3)
+    pose = by * pin.SE3(pin.rpy.rpyToMatrix(*rpy), np.array(xyz))
+    at = list(root).index(joint)
+    root.remove(joint)
+    ends = urdf.joints[BASE_JOINT]
+    root.insert(at, placed(BASE_JOINT, ends.parent, ends.child, pose))
+    return dataclasses.replace(urdf, text=ElementTree.tostring(root, encoding="unicode"))
+
+
 def with_tool_offset(urdf: Urdf, tool: str, pose: pin.SE3) -> tuple[Urdf, str]:
     """Return the URDF with a frame at `pose` in that of the link `tool`, and the frame's name."""
     urdf.check_tool(tool)

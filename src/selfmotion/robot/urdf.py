@@ -36,6 +36,8 @@ from selfmotion.robot.urdf_text import (
 # Fixed joints that are ours: where the base stands, how the tool is held, and before the name of a
 # body that the arm carries.
 BASE_JOINT, TOOL_JOINT, BODY_JOINT = "base_placement", "tool_offset", "carried_body/"
+# What a calibrated robot says of its file, and before the keys of the placements that it had drawn.
+CALIBRATION, NOMINAL = "calibration", "nominal_"
 # What a file says it is written in, and the marks of UTF-16.
 _SAYS = re.compile(rb"\s*<\?xml[^>]*encoding=[\"']([A-Za-z0-9._-]{1,40})[\"']")
 _UTF16 = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
@@ -79,6 +81,8 @@ class UrdfPart:
         The link of another part that carries it.
     arguments : dict
         Of a xacro file.
+    calibration : str or None
+        The file that says where its joints are.
     """
 
     name: str
@@ -86,6 +90,7 @@ class UrdfPart:
     base: Any = None
     on: str | None = None
     arguments: Mapping[str, str] = field(default_factory=dict)
+    calibration: str | None = None
 
 
 @dataclass(frozen=True)
@@ -160,9 +165,26 @@ class Urdf:
         joint = self.joints.get(f"{BODY_JOINT}{link}")
         return link if joint is None else self.carrier(joint.parent)
 
-    def bare_text(self) -> str:
-        """Return the text without base placement, tool offset and carried bodies."""
+    @property
+    def is_calibrated(self) -> bool:
+        """Whether joints are elsewhere than they were drawn."""
+        return f"{NOMINAL}xyz=" in self.text
+
+    @property
+    def calibration(self) -> str | None:
+        """The file that says where the joints are; None where none does, or of a cell."""
+        return ElementTree.fromstring(self.text).get(CALIBRATION)
+
+    def nominal(self) -> "Urdf":
+        """Return the same with its joints as they were drawn."""
         root = ElementTree.fromstring(self.text)
+        _draw_again(root)
+        return replace(self, text=ElementTree.tostring(root, encoding="unicode"))
+
+    def bare_text(self) -> str:
+        """Return the text as drawn, without base placement, tool offset and carried bodies."""
+        root = ElementTree.fromstring(self.text)
+        _draw_again(root)
         for joint in root.findall("joint"):
             name = joint.get("name", "")
             if name in (BASE_JOINT, TOOL_JOINT) or name.startswith(BODY_JOINT):
@@ -205,6 +227,22 @@ class Urdf:
             chain.append(by_child[link])
             link = by_child[link].parent
         return chain[::-1]
+
+
+def _draw_again(root: ElementTree.Element) -> None:
+    """Put the joints of a calibrated robot back to where they were drawn."""
+    root.attrib.pop(CALIBRATION, None)
+    for joint in root.findall("joint"):
+        origin = joint.find("origin")
+        if origin is None or f"{NOMINAL}xyz" not in origin.attrib:
+            continue
+        for key in ("xyz", "rpy"):
+            drawn = origin.attrib.pop(f"{NOMINAL}{key}")
+            origin.set(key, drawn)
+            if not drawn:
+                del origin.attrib[key]
+        if not origin.attrib:
+            joint.remove(origin)
 
 
 def read_urdf(path: Path, packages: Iterable[str] = ()) -> Urdf:

@@ -1,0 +1,147 @@
+"""The commands that say how wrong a cell may be."""
+
+import dataclasses
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import typer
+
+import selfmotion as sm
+from selfmotion.cli import checks, options, outputs
+from selfmotion.cli.app import app, plan_with_progress, stages, terminal
+from selfmotion.cli.stage_display import StageDisplay
+
+_NAMES = "may be given several times"
+
+
+@app.command(epilog="Example: selfmotion margin plan.npz --tolerance 5e-4 --turn 0.02")
+def margin(
+    file: Annotated[Path, typer.Argument(help="A plan saved as .npz.")],
+    tolerance: Annotated[
+        float | None, typer.Option(help="What the process lets the tool be off its path (m).")
+    ] = None,
+    turn: Annotated[
+        float | None, typer.Option(help="By how much it may be turned (rad); with --tolerance.")
+    ] = None,
+    clearance: Annotated[float, typer.Option(help="What is left between bodies (m).")] = 0.0,
+    part: Annotated[
+        list[str] | None,
+        typer.Option(help=f"A body of the part ({_NAMES}); by default all obstacles there."),
+    ] = None,
+    tool: Annotated[
+        list[str] | None,
+        typer.Option(help=f"A body of the tool ({_NAMES}); by default all on its joint."),
+    ] = None,
+    center: Annotated[
+        str | None,
+        typer.Option(help="What the part turns about: x,y,z (m); by default the path's middle."),
+    ] = None,
+    corrected: Annotated[
+        bool,
+        typer.Option(
+            "--corrected", help="Say besides how far part and base may be off when planned again."
+        ),
+    ] = False,
+    as_json: options.JsonOption = False,
+) -> None:
+    """Say by how much part, tool and base may be displaced while a plan runs unchanged."""
+    within = _process(tolerance, turn)
+    about = None if center is None else options.numbers(center, "--center", 3)
+    plan = sm.load_plan(file)
+    found = sm.margin(
+        plan,
+        within,
+        clearance=clearance,
+        part=part or None,
+        tool=tool or None,
+        center=about,
+    )
+    again = []
+    if corrected:
+        with StageDisplay(stages) as display:
+            again = [
+                sm.correction(plan, of="part", part=part or None, progress=display.stage),
+                sm.correction(plan, of="base", progress=display.stage),
+            ]
+    if as_json:
+        planned = {item.of: _plain(dataclasses.asdict(item)) for item in again}
+        terminal.print_json(data=margins_json(found) | {"corrected": planned})
+        return
+    for told in (found, *again):
+        terminal.print(str(told), markup=False, soft_wrap=True)
+
+
+@app.command(epilog="Example: selfmotion calibrate plan.npz ur5_kinematics.yaml --out measured.npz")
+def calibrate(
+    file: Annotated[Path, typer.Argument(help="A plan saved as .npz, for the arm as drawn.")],
+    calibration: Annotated[
+        Path,
+        typer.Argument(help="File that says where the joints of this very arm are; see check."),
+    ],
+    out: options.OutOption = None,
+    html: options.HtmlOption = None,
+    as_json: options.JsonOption = False,
+) -> None:
+    """Say what a plan does on an arm as it was measured, and plan it again for that arm."""
+    outputs.check_suffixes(out or [])
+    planned = sm.load_plan(file)
+    problem = sm.calibrated(planned.problem, calibration)
+    checks.tell_difference(problem.robot, planned.trajectory)
+    judged = checks.on_calibrated(planned.problem, calibration)
+    verdict = judged.certify(planned.trajectory, planned.tolerance, planned.report.ending).verdict
+    stages.print(f"as planned, on the calibrated arm: {verdict}", markup=False, soft_wrap=True)
+    result = plan_with_progress(problem, warm_start=planned, tolerance=planned.tolerance)
+    outputs.finish(result, out or [], html, as_json)
+
+
+@app.command(epilog="Example: selfmotion sheet plan.npz --tolerance 5e-4 --turn 0.02 -o sheet.html")
+def sheet(
+    file: Annotated[Path, typer.Argument(help="A plan saved as .npz.")],
+    out: Annotated[Path, typer.Option("--out", "-o", help="The page to write (.html).")] = Path(
+        "sheet.html"
+    ),
+    tolerance: Annotated[
+        float | None, typer.Option(help="What the process lets the tool be off its path (m).")
+    ] = None,
+    turn: Annotated[
+        float | None, typer.Option(help="By how much it may be turned (rad); with --tolerance.")
+    ] = None,
+    part: Annotated[
+        list[str] | None,
+        typer.Option(help=f"A body of the part ({_NAMES}); by default all obstacles there."),
+    ] = None,
+    title: Annotated[str, typer.Option(help="Of the page; by default arm and task.")] = "",
+) -> None:
+    """Write what a plan does, keeps and survives as one page that prints on A4."""
+    within = _process(tolerance, turn)
+    plan = sm.load_plan(file)
+    bodies = any(what in plan.certificate.covers for what in ("self-collision", "obstacles"))
+    margins = None
+    if plan.certificate.verified and (bodies or within is not None):
+        margins = sm.margin(plan, within, part=part or None)
+    written = sm.write_sheet(plan, out, margins, title=title)
+    terminal.print(f"wrote {written}", markup=False, soft_wrap=True)
+
+
+def _process(tolerance: float | None, turn: float | None) -> sm.Tolerance | None:
+    """Return what a process allows, both numbers or none."""
+    if (tolerance is None) != (turn is None):
+        raise sm.errors.ProblemError("--tolerance and --turn say together what the process allows")
+    return None if tolerance is None or turn is None else sm.Tolerance(tolerance, turn)
+
+
+def margins_json(found: sm.margins.Margins) -> dict[str, Any]:
+    """Return margins as JSON-safe values, the sentence first."""
+    return {"sentence": found.sentence, **_plain(dataclasses.asdict(found))}
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _plain(each) for key, each in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(each) for each in value]
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    # JSON has no number for what has no time, or no end.
+    return None if isinstance(value, float) and not np.isfinite(value) else value

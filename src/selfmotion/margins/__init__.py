@@ -1,0 +1,20 @@
+"""How wrong a cell may be: what a program survives."""
+
+from selfmotion.margins.found import (
+    Displacement as Displacement,
+    Margins as Margins,
+    SubjectMargin as SubjectMargin,
+)
+from selfmotion.margins.margin import margin as margin
+from selfmotion.margins.shortfall import (
+    Margin as Margin,
+    Shortfall as Shortfall,
+    shortfalls as shortfalls,
+)
+
+__all__ = [
+    "Displacement",
+    "Margins",
+    "Shortfall",
+    "SubjectMargin",
+]

@@ -1,0 +1,249 @@
+"""What is found of places: the best one, and what others around it cost."""
+
+import html
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from selfmotion.basics import Array, PlanError, as_path, as_whole, write_text
+from selfmotion.batch import Row, maps
+from selfmotion.placement.places import Places, Tried
+from selfmotion.placement.search import Box
+from selfmotion.problem import Problem
+from selfmotion.result import Plan
+from selfmotion.task import SE3
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+# A coordinate nearer to its bound than this share of the box is on it.
+_ON_BOUND = 1e-6
+_STYLE = "body{font-family:system-ui,sans-serif;margin:2em;max-width:60em}td,th{padding:2px 1em}"
+
+
+@dataclass(frozen=True, eq=False)
+class PlaceMap:
+    """What places cost around the best one, over two coordinates.
+
+    Attributes
+    ----------
+    names : (str, str)
+        The coordinates, the first to the right, the second up; the others are as they are at best.
+    across, up : (C,), (U,)
+        Their values [m or rad].
+    costs : (U, C)
+        Of all plans together; NaN where a place fails.
+    reasons : tuple of tuple of str
+        Why it does; "" where it does not.
+    """
+
+    names: tuple[str, str]
+    across: Array
+    up: Array
+    costs: Array
+    reasons: tuple[tuple[str, ...], ...]
+
+    def svg(self) -> str:
+        """Return it as a picture: a cell for each place, why it fails where the pointer rests."""
+        rows: list[Row] = []
+        for i, high in enumerate(self.up.tolist()):
+            for j, far in enumerate(self.across.tolist()):
+                cost, reason = float(self.costs[i, j]), self.reasons[i][j]
+                settings = {_label(self.names[0]): far, _label(self.names[1]): high}
+                few = "out of reach" if "out of reach" in reason else "no plan"
+                rows.append(
+                    Row(
+                        f"place-{len(rows)}",
+                        "",
+                        Path(),
+                        {name: _rounded(value) for name, value in settings.items()},
+                        error=reason,
+                        reason=few,
+                        verified=not reason,
+                        cost=math.inf if reason else cost,
+                        aim=math.inf if reason else cost,
+                    )
+                )
+        return "\n".join(maps(rows, {}))
+
+    def figure(self) -> "Figure":
+        """Return it as a matplotlib figure (``pip install 'selfmotion[plots]'``).
+
+        Raises
+        ------
+        PlanError
+            matplotlib is not installed.
+        """
+        try:
+            from matplotlib.figure import Figure
+        except ImportError as error:
+            raise PlanError(
+                "a figure of a map needs matplotlib: pip install 'selfmotion[plots]'"
+            ) from error
+        figure = Figure(figsize=(5.0, 4.2), layout="constrained")
+        axes = figure.subplots()
+        shown = axes.pcolormesh(self.across, self.up, self.costs, shading="nearest")
+        figure.colorbar(shown, label="cost")
+        i, j = np.unravel_index(int(np.nanargmin(self.costs)), self.costs.shape)
+        axes.plot(self.across[j], self.up[i], "r+", markersize=12)
+        axes.set(xlabel=_label(self.names[0]), ylabel=_label(self.names[1]))
+        return figure
+
+
+@dataclass(frozen=True, eq=False)
+class Placement:
+    """The best place that was found for a part, or an arm.
+
+    Attributes
+    ----------
+    of : str
+        ``"part"`` or ``"base"``.
+    place : dict
+        Coordinate → how far it is moved [m or rad].
+    displacement : SE3
+        The same as a rigid motion in world axes: of all points of the part, or of the base.
+    problems : tuple of Problem
+        There: paths and the part's obstacles moved, or the arm.
+    plans : tuple of Plan
+        Of these, each verified.
+    cost : float
+        Of all together.
+    cost_before : float
+        Where it stands now; inf where a motion there is not verified, NaN where that is not in the
+        box.
+    on_bounds : tuple of str
+        The coordinates that are at an end of the box: a larger one would gain.
+    tried : tuple of Tried
+        All places that were looked at.
+    """
+
+    of: str
+    place: Mapping[str, float]
+    displacement: SE3
+    problems: tuple[Problem, ...]
+    plans: tuple[Plan, ...]
+    cost: float
+    cost_before: float
+    on_bounds: tuple[str, ...]
+    tried: tuple[Tried, ...]
+    _places: Places = field(repr=False)
+    _box: Box = field(repr=False)
+    _best: Tried = field(repr=False)
+
+    @property
+    def verified(self) -> bool:
+        """Whether all plans are."""
+        return all(plan.certificate.verified for plan in self.plans)
+
+    @property
+    def binds(self) -> tuple[str, ...]:
+        """What keeps the cost from being lower: ends of the box, and active constraints."""
+        active = [
+            f"{item.constraint}: {item.easing} would save {item.saving:.3g}"
+            for plan in self.plans
+            for item in plan.report.active
+        ]
+        return (*(f"the box in {name}" for name in self.on_bounds), *dict.fromkeys(active))
+
+    def __str__(self) -> str:
+        """Return the place, what it gains, and what binds."""
+        moved = ", ".join(f"{_label(name)} {value:+.4g}" for name, value in self.place.items())
+        before = "no verified motion where it stands"
+        if math.isnan(self.cost_before):
+            before = "where it stands is not in the box"
+        elif math.isfinite(self.cost_before):
+            gain = 1.0 - self.cost / self.cost_before if self.cost_before else 0.0
+            before = f"{self.cost_before:.6g} where it stands, {gain:.1%} less"
+        failed = sum(not np.isfinite(item.cost) for item in self.tried)
+        lines = [
+            f"move the {self.of} by {moved}",
+            f"cost {self.cost:.6g} ({before}); {len(self.plans)} "
+            f"motion{'s' if len(self.plans) > 1 else ''}, {'all' if self.verified else 'not'} "
+            f"verified",
+            f"{len(self.tried)} places looked at, {failed} of them without a verified motion",
+            *(f"binds: {text}" for text in self.binds),
+        ]
+        return "\n".join(lines)
+
+    __repr__ = __str__
+
+    def map(self, names: Sequence[str] | None = None, points: int = 9) -> PlaceMap:
+        """Return what places cost around this one, all over the box in two coordinates.
+
+        Each is planned, beginning with the nearest place that is.
+
+        Parameters
+        ----------
+        names : (str, str), optional
+            Of the coordinates that vary; by default the first two.
+        points : int
+            Of each.
+
+        Raises
+        ------
+        PlanError
+            Only one coordinate varies, or a name is none of them.
+        """
+        every = self._places.names
+        chosen = tuple(every[:2] if names is None else names)
+        if len(chosen) != 2 or not set(chosen) <= set(every) or len(set(chosen)) < 2:
+            raise PlanError(f"a map is over two of {', '.join(every)}, not over {chosen!r}")
+        count = as_whole(points, "points", 2, 200, PlanError)
+        first, second = (every.index(name) for name in chosen)
+        low, high, best = self._box.low, self._box.high, self._best
+        across, up = (np.linspace(low[k], high[k], count) for k in (first, second))
+        cells = [(i, j) for i in range(count) for j in range(count)]
+        at = {cell: best.place.copy() for cell in cells}
+        for (i, j), place in at.items():
+            place[first], place[second] = across[j], up[i]
+        known, found = [best], {}
+        # From the best outwards, each from the nearest motions that are known.
+        for cell in sorted(cells, key=lambda cell: self._far(at[cell], best)):
+            place = at[cell]
+            far = [self._far(place, other) for other in known]
+            found[cell] = self._places.tried(place, known[int(np.argmin(far))].plans)
+            if np.isfinite(found[cell].cost):
+                known.append(found[cell])
+        costs = np.array([[found[i, j].cost for j in range(count)] for i in range(count)])
+        return PlaceMap(
+            (chosen[0], chosen[1]),
+            across,
+            up,
+            np.where(np.isfinite(costs), costs, np.nan),
+            tuple(tuple(found[i, j].reason for j in range(count)) for i in range(count)),
+        )
+
+    def _far(self, place: Array, other: Tried) -> float:
+        return float(np.linalg.norm(self._box.share(place) - self._box.share(other.place)))
+
+    def to_html(self, file: str | Path, found: PlaceMap | None = None) -> Path:
+        """Write a page with the place, what binds, and a map if one is given; atomically."""
+        path = as_path(file)
+        title = f"Where to put the {self.of}"
+        lines = "".join(f"<p>{html.escape(line)}</p>" for line in str(self).splitlines())
+        drawn = "" if found is None else found.svg()
+        write_text(
+            path,
+            f'<!doctype html><html lang="en"><meta charset="utf-8"><title>{title}</title>'
+            f"<style>{_STYLE}</style><h1>{title}</h1>{lines}{drawn}</html>\n",
+        )
+        return path
+
+
+def on_bounds(places: Places, box: Box, place: Array) -> tuple[str, ...]:
+    """Return the coordinates of a place that are at an end of the box."""
+    share = box.share(place)
+    ends = (share <= _ON_BOUND) | (share >= 1.0 - _ON_BOUND)
+    return tuple(name for name, at_end in zip(places.names, ends.tolist(), strict=True) if at_end)
+
+
+def _label(name: str) -> str:
+    return f"{name} [{'m' if name in ('x', 'y', 'z') else 'rad'}]"
+
+
+def _rounded(value: float) -> float:
+    return float(f"{value:.4g}")

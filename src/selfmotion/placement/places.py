@@ -1,0 +1,310 @@
+"""Problems at another place: the part, or the arm, stands elsewhere."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from selfmotion.basics import (
+    Array,
+    InverseKinematicsError,
+    PlanError,
+    ProblemError,
+    SelfmotionError,
+    nearest,
+)
+from selfmotion.collision import Obstacle
+from selfmotion.constraints import Clearance
+from selfmotion.follow import BoundFollow
+from selfmotion.path import Path, Placed
+from selfmotion.planning import Search, plan
+from selfmotion.problem import Problem, problem_from_dict, start_on_path
+from selfmotion.result import Plan
+from selfmotion.robot import root_place, with_moved_base
+from selfmotion.task import SE3
+
+# How motions are looked for where some are known near by, and where none is: among many places a
+# quick 'no' is worth more than the last start.
+_NEAR, _QUICK = Search(1, 1, "local"), Search(16, 2, "local")
+# So long a place is worked at [s]: near known motions, what comes at all comes in a tenth of that.
+_PATIENCE_NEAR, _PATIENCE = 0.3, 0.6
+# What a place is told by: a shift [m] and roll, pitch and yaw [rad], as URDFs have them.
+COORDINATES = ("x", "y", "z", "roll", "pitch", "yaw")
+# Poses of each path that have to be reached before a place is planned, and tries of each.
+_POSES, _TRIES = 5, 20
+
+
+@dataclass(frozen=True, eq=False)
+class Tried:
+    """What became of a place.
+
+    Attributes
+    ----------
+    place : (d,)
+        The coordinates that vary [m or rad].
+    cost : float
+        Of all plans together; inf where one is not verified.
+    reason : str
+        Why not; "" where all are.
+    plans : tuple of Plan
+        Empty where it was not planned, or in another process.
+    """
+
+    place: Array
+    cost: float
+    reason: str = ""
+    plans: tuple[Plan, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Places:
+    """Problems, and what of them is moved.
+
+    Attributes
+    ----------
+    problems : tuple of Problem
+    of : str
+        ``"part"`` or ``"base"``.
+    bodies : frozenset of str
+        The obstacles that belong to the part.
+    center : (3,)
+        What it is turned about, in world axes [m].
+    names : tuple of str
+        The coordinates that vary.
+    """
+
+    problems: tuple[Problem, ...]
+    of: str
+    bodies: frozenset[str]
+    center: Array
+    names: tuple[str, ...]
+
+    def displacement(self, place: Array) -> SE3:
+        """Return the rigid motion of part or base that a place (d,) stands for, in world axes."""
+        values = dict(zip(self.names, np.asarray(place).tolist(), strict=True))
+        shift = np.array([values.get(name, 0.0) for name in COORDINATES[:3]])
+        turn = pin.rpy.rpyToMatrix(*(values.get(name, 0.0) for name in COORDINATES[3:]))
+        return pin.SE3(turn, self.center + shift - turn @ self.center)
+
+    def at(self, place: Array) -> list[Problem]:
+        """Return the problems at a place, as they look from the arm's base: with free starts."""
+        by = self.displacement(place)
+        if self.of == "base":
+            by = by.inverse()
+        return [self._moved(problem, by) for problem in self.problems]
+
+    def really_at(self, place: Array) -> list[Problem]:
+        """Return the problems at a place, the arm's base moved where that is what moves."""
+        if self.of == "part":
+            return self.at(place)
+        by = self.displacement(place)
+        return [
+            problem.changed(robot=with_moved_base(problem.robot, by), start="free")
+            for problem in self.problems
+        ]
+
+    def tried(self, place: Array, near: Sequence[Plan] = (), thorough: bool = False) -> Tried:
+        """Plan at a place; from plans of one `near`, where they are given.
+
+        As well as it can be, where it is to be `thorough`; among many places a quick 'no' counts.
+        """
+        plans: list[Plan] = []
+        total = 0.0
+        for k, problem in enumerate(self.at(place)):
+            try:
+                if thorough:
+                    found = plan(problem)
+                elif near:
+                    found = _quickly(problem, near[k], _NEAR, _PATIENCE_NEAR)
+                else:
+                    _check_reach(problem)
+                    found = _quickly(problem, None, _QUICK, _PATIENCE)
+            except SelfmotionError as error:
+                return Tried(place, np.inf, str(error))
+            if not found.certificate.verified:
+                return Tried(place, np.inf, found.certificate.verdict)
+            plans.append(found)
+            total += found.report.cost
+        return Tried(place, total, "", tuple(plans))
+
+    def corrected(self, place: Array, near: Sequence[Plan]) -> Tried:
+        """Plan at a place from plans near by; a start that is given moves onto the path there."""
+        plans: list[Plan] = []
+        for problem, known in zip(self.at(place), near, strict=True):
+            start = known.problem.given_start
+            try:
+                if start is not None:
+                    problem = problem.changed(start=start_on_path(problem.follows, start))
+                search = _NEAR if start is None else None
+                found = _quickly(problem, known, search, _PATIENCE)
+            except SelfmotionError as error:
+                return Tried(place, np.inf, str(error))
+            if not found.certificate.verified:
+                return Tried(place, np.inf, found.certificate.verdict)
+            plans.append(found)
+        return Tried(place, sum(found.report.cost for found in plans), "", tuple(plans))
+
+    def _moved(self, problem: Problem, by: SE3) -> Problem:
+        items = problem.follows.items
+        also = tuple(
+            item.along(_placed(bound, by)) if _stands(bound) else item
+            for item, bound in zip(problem.also, items[1:], strict=True)
+        )
+        # Of the base all moves that stands in the world.
+        bodies = None if self.of == "base" else self.bodies
+        collision = problem.collision
+        return problem.changed(
+            path=_placed(items[0], by),
+            also=also,
+            start="free",
+            constraints=tuple(_with_bodies(item, bodies, by) for item in problem.constraints),
+            collision=None if collision is None else _with_bodies(collision, bodies, by),
+        )
+
+
+def places_of(
+    problems: Sequence[Problem],
+    of: str,
+    part: Sequence[str] | None,
+    center: Array | None,
+    names: tuple[str, ...],
+) -> Places:
+    """Return what is moved of problems.
+
+    Raises
+    ------
+    ProblemError
+        A body does not exist or rides on the arm, it is not said which belong to the part, or a
+        path is given in a frame that moves.
+    """
+    for problem in problems:
+        if not _stands(problem.follows.items[0]):
+            raise ProblemError(
+                f"place: the path of {problem.robot.name} is given in the frame of "
+                f"'{problem.robot.reference}', which moves; only what stands in the world is placed"
+            )
+    standing = {
+        body.name: body
+        for problem in problems
+        for item in (*problem.constraints, problem.collision)
+        if isinstance(item, Clearance)
+        for body in item.obstacles
+        if body.frame is None
+    }
+    if of == "base" and part is not None:
+        raise ProblemError("place: part says what belongs to the part, which stays where it is")
+    if of == "part" and part is None and standing:
+        raise ProblemError(
+            f"place: which obstacles belong to the part and move along? Give part= their names, of "
+            f"{', '.join(standing)}, or () for none"
+        )
+    for name in part or ():
+        if name not in standing:
+            raise ProblemError(
+                f"place: part: no obstacle '{name}' stands in the world{nearest(name, standing)}; "
+                f"obstacles: {', '.join(standing) or 'none'}"
+            )
+    if center is None:
+        center = root_place(problems[0].robot) if of == "base" else _middle(problems)
+    return Places(tuple(problems), of, frozenset(part or ()), center, names)
+
+
+def described(places: Places, problems: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Return places as JSON-safe values, given the problems as such; see `restored`."""
+    return {
+        "problems": list(problems),
+        "of": places.of,
+        "bodies": sorted(places.bodies),
+        "center": places.center.tolist(),
+        "names": list(places.names),
+    }
+
+
+def restored(values: Mapping[str, Any], known: dict[str, Any]) -> Places:
+    """Return the places that `described` described."""
+    return Places(
+        tuple(problem_from_dict(item, known) for item in values["problems"]),
+        values["of"],
+        frozenset(values["bodies"]),
+        np.array(values["center"]),
+        tuple(values["names"]),
+    )
+
+
+def _quickly(problem: Problem, known: Plan | None, search: Search | None, patience: float) -> Plan:
+    """Plan, from what is known if anything is, or give up soon."""
+    return plan(
+        problem,
+        warm_start=known,
+        search=search,
+        deadline=patience,
+        progress=_stop_where_blocked,
+    )
+
+
+def _stop_where_blocked(stage: str, number: int, count: int) -> None:
+    """Raise PlanError where it is known that no motion passes: what comes before is not asked."""
+    if not count:
+        raise PlanError(stage)
+
+
+def _stands(item: BoundFollow) -> bool:
+    return item.chain.carrier < 0
+
+
+def _placed(item: BoundFollow, by: SE3) -> Path:
+    """Return a path moved by a rigid motion in world axes."""
+    frame = item.chain.base_placement
+    return Placed(item.path, frame.inverse() * by * frame)
+
+
+def _with_bodies(item: Any, names: frozenset[str] | None, by: SE3) -> Any:
+    """Return a constraint whose obstacles stand elsewhere, by name or all that stand."""
+    if not isinstance(item, Clearance):
+        return item
+
+    def moves(body: Obstacle) -> bool:
+        return body.frame is None and (names is None or body.name in names)
+
+    if not any(moves(body) for body in item.obstacles):
+        # The same one: its bodies are known.
+        return item
+    bodies = tuple(
+        replace(body, pose=by * body.pose) if moves(body) else body for body in item.obstacles
+    )
+    return replace(item, obstacles=bodies)
+
+
+def _middle(problems: Sequence[Problem]) -> Array:
+    """Return the middle of the box around all paths (3,), in world axes."""
+    points = np.concatenate(
+        [
+            problem.path.samples(np.linspace(0.0, problem.path.duration, 101)).translation
+            for problem in problems
+        ]
+    )
+    middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
+    return np.asarray(problems[0].follows.items[0].chain.base_placement.act(middle))
+
+
+def _check_reach(problem: Problem) -> None:
+    """Raise InverseKinematicsError where a pose of the path is out of reach by a quick look.
+
+    Where something is relaxed, or follows in other frames, planning itself has to tell.
+    """
+    robot, item = problem.robot, problem.follows.items[0]
+    if problem.relaxations or not robot.chain.is_rooted:
+        return
+    seed: Array | None = None
+    for t in np.linspace(0.0, problem.path.duration, _POSES).tolist():
+        try:
+            pose = item.path.pose(t)
+            seed = robot.inverse_kinematics(pose, problem.task, seed, attempts=_TRIES)
+        except InverseKinematicsError as error:
+            raise InverseKinematicsError(
+                f"out of reach at t = {t:.4g} s: {error}",
+                position_miss=error.position_miss,
+                rotation_miss=error.rotation_miss,
+            ) from error

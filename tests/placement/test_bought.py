@@ -1,0 +1,126 @@
+"""Bought margins: they are there, by a judge of their own, and they have a price."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import selfmotion as sm
+from selfmotion.placement import bought
+from support.arms import robot_named
+from support.displaced import MISSED, Judge, random_displacement
+from support.shell import invoke
+
+LIMITS = [sm.constraints.JointPositionLimits(), sm.constraints.JointVelocityLimits()]
+WANTED = sm.Margin(0.03, 0.02)
+
+
+def beside_the_elbow() -> sm.Problem:
+    """A seam, and a ball that the elbow of the motion that is best without it comes near to."""
+    robot = robot_named("panda")
+    pose = robot.pose(sm.NAMED_ARMS["panda"].home)
+    end = pose.copy()
+    end.translation = pose.translation + np.array([0.0, 0.2, 0.0])
+    problem = sm.Problem(robot, sm.paths.Line(pose, end, 3.0), constraints=LIMITS)
+    motion = sm.plan(problem).trajectory
+    first, last = robot.joint_poses(motion(np.array([0.0, 3.0])))[:, 3, :3]
+    ahead = (last - first) / np.linalg.norm(last - first)
+    ball = sm.obstacles.Sphere("ball", last + 0.16 * ahead, 0.05)
+    clear = sm.constraints.Clearance([ball], 5e-3)
+    return problem.changed(start=motion.q[0], constraints=(*LIMITS, clear))
+
+
+@pytest.fixture(scope="module")
+def problem() -> sm.Problem:
+    return beside_the_elbow()
+
+
+@pytest.fixture(scope="module")
+def found(problem: sm.Problem) -> sm.placement.BoughtMargin:
+    return sm.plan_with_margin(problem, WANTED, of=("part", "base"))
+
+
+def lacks(plan: sm.Plan, rng: np.random.Generator) -> int:
+    """Return how many displacements of the wanted size bring bodies together."""
+    judge, margins = Judge(plan), sm.margin(plan)
+    t = np.linspace(0.0, plan.trajectory.duration, 40)
+    failed = 0
+    for subject in (margins.part, margins.base):
+        found = subject.both
+        # Straight at what is met first, and anywhere.
+        straight = WANTED.position * np.asarray(found.direction), np.zeros(3)
+        moves = [random_displacement(rng, WANTED.position, WANTED.rotation) for _ in range(20)]
+        for shift, turn in [straight, *moves]:
+            failed += judge.least(judge.moved_by(subject, shift, turn), t) < -MISSED
+    return failed
+
+
+def test_the_margin_is_there_and_was_not_before(
+    problem: sm.Problem, found: sm.placement.BoughtMargin
+) -> None:
+    assert found.reached, str(found)
+    assert found.kept_apart
+    rng = np.random.default_rng(0)
+    assert lacks(found.plan, rng) == 0
+    assert lacks(sm.plan(problem), rng) > 0
+
+
+def test_the_plan_is_of_the_problem_that_was_asked(
+    problem: sm.Problem, found: sm.placement.BoughtMargin
+) -> None:
+    assert found.plan.problem is problem
+    assert found.plan.certificate.verified
+    assert found.plan.check().verified
+    without = sm.plan(problem)
+    assert found.cost_without == pytest.approx(without.report.cost, rel=1e-6)
+    assert found.price > 0.0
+    assert "proved" in str(found)
+
+
+def test_a_margin_that_is_there_costs_nothing(problem: sm.Problem) -> None:
+    small = sm.plan_with_margin(problem, sm.Margin(1e-4))
+    assert small.reached
+    assert not small.kept_apart
+    assert small.price == 0.0
+
+
+def test_a_margin_that_no_motion_has_is_not_claimed(problem: sm.Problem) -> None:
+    large = sm.plan_with_margin(problem, sm.Margin(0.5), of="part", deadline=1.0)
+    assert not large.reached
+    assert large.shortfalls[0].scale < 1.0
+    assert "no margin of" in str(large)
+    # What is there is verified all the same.
+    assert large.plan.certificate.verified
+
+
+def test_bands_give_what_a_displacement_uses(problem: sm.Problem) -> None:
+    asked = problem.changed(start="free", relaxations=(sm.Relaxation("z", 0.06),))
+    given = bought._narrowed(asked, sm.Margin(0.01, 0.02), 0.5)
+    assert given[0].band == pytest.approx(0.06 - 0.01 - 0.5 * 0.02)
+    with pytest.raises(sm.errors.ProblemError, match=r"the band of z is 0\.06"):
+        bought._narrowed(asked, sm.Margin(0.05, 0.02), 0.5)
+    turned = dataclasses.replace(asked, relaxations=(sm.Relaxation("rz", 0.1),))
+    assert bought._narrowed(turned, sm.Margin(0.01, 0.02), 0.5)[0].band == pytest.approx(0.08)
+
+
+def test_what_cannot_be_bought_is_refused(problem: sm.Problem) -> None:
+    for given, said in (
+        ({"margin": 0.01}, "expected a Margin"),
+        ({"of": "cell"}, "of is 'cell'"),
+        ({"clearance": -1}, "clearance"),
+    ):
+        with pytest.raises(sm.errors.ProblemError, match=said):
+            sm.plan_with_margin(problem, **{"margin": WANTED, **given})  # type: ignore[arg-type]
+    with pytest.raises(sm.errors.ProblemError, match="position and rotation are 0"):
+        sm.Margin()
+    with pytest.raises(sm.errors.ProblemError, match="margin: position"):
+        sm.Margin(-1.0)
+
+
+def test_margins_bought_in_the_shell(problem: sm.Problem, tmp_path) -> None:  # type: ignore[no-untyped-def]
+    file, out = tmp_path / "cell.toml", tmp_path / "plan.npz"
+    sm.files.write_problem(problem, file)
+    code, told = invoke("plan-margin", file, "--position", "0.01", "--out", out)
+    assert code == 0, told
+    assert "margin of 10 mm" in told
+    assert sm.load_plan(out).certificate.verified

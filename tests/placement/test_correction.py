@@ -1,0 +1,102 @@
+"""Corrections: what is claimed was planned again, and no more."""
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import selfmotion as sm
+from selfmotion.placement import corners
+from selfmotion.placement.places import Places, Tried
+from support.arms import robot_named
+from support.shell import invoke
+
+LIMITS = [sm.constraints.JointPositionLimits(), sm.constraints.JointVelocityLimits()]
+
+
+def plan_to(reach: float) -> sm.Plan:
+    """A straight seam of a planar arm, from its start to a distance from its root [m]."""
+    robot = robot_named("planar_3r")
+    start = np.array([0.4, 0.9, 0.6])
+    pose = robot.pose(start)
+    away = np.array([np.cos(0.9), np.sin(0.9), 0.0])
+    end = pin.SE3(pose.rotation, reach * away)
+    problem = sm.Problem(robot, sm.paths.Line(pose, end, 2.0), "planar", start, constraints=LIMITS)
+    return sm.plan(problem).require()
+
+
+@pytest.fixture(scope="module")
+def plan() -> sm.Plan:
+    return plan_to(2.0)
+
+
+def test_each_corner_is_a_verified_motion_by_its_own(plan: sm.Plan) -> None:
+    found = sm.correction(plan, farthest=0.05, most_turned=0.05)
+    assert found.translation.size == 0.05
+    assert [corner.name for corner in found.translation.corners] == [
+        "+x",
+        "-x",
+        "+y",
+        "-y",
+        "+z",
+        "-z",
+    ]
+    assert not any(corner.reason for corner in found.translation.corners)
+    for sign in (1.0, -1.0):
+        for k in range(2):
+            frame = pin.SE3(np.eye(3), sign * found.translation.size * np.eye(3)[k])
+            there = plan.problem.changed(path=sm.paths.Placed(plan.path, frame), start="free")
+            assert sm.plan(there).certificate.verified
+    assert "confirmed at 12 corners" in str(found)
+
+
+def test_no_more_than_the_reach_is_claimed() -> None:
+    """The seam ends 4 cm before the arm is stretched; a corner takes it nearer by its share."""
+    robot = robot_named("planar_3r")
+    plan = plan_to(robot.reach - 0.04)
+    found = sm.correction(plan, farthest=0.2, most_turned=1e-3)
+    # Towards y, where the seam ends nearly.
+    most = 0.04 / np.sin(0.9)
+    assert 0.3 * most < found.translation.size <= most * 1.02
+    assert found.translation.stops
+
+
+def test_a_corner_that_fails_is_not_claimed(plan: sm.Plan, monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = Places.corrected
+
+    def failing(self: Places, place: np.ndarray, near: object) -> Tried:
+        if place[1] < -0.01:
+            return Tried(place, np.inf, "no motion that way")
+        return whole(self, place, near)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(Places, "corrected", failing)
+    found = sm.correction(plan, farthest=0.05, most_turned=0.01)
+    assert 0.009 < found.translation.size <= 0.01
+    assert found.translation.stops.startswith("-y")
+    monkeypatch.setattr(corners, "NEAR", 1e-9)
+    none = sm.correction(plan, farthest=0.05, most_turned=0.01)
+    assert none.translation.size == 0.0
+    assert not none.translation.corners
+    assert "from the plan" in none.translation.stops
+
+
+def test_corrections_from_the_shell(plan: sm.Plan, tmp_path) -> None:  # type: ignore[no-untyped-def]
+    file = tmp_path / "plan.npz"
+    plan.save(file)
+    code, told = invoke(
+        "margin", file, "--tolerance", "1e-3", "--turn", "0.1", "--corrected", "--json"
+    )
+    assert code == 0
+    assert '"corrected"' in told
+
+
+def test_what_cannot_be_corrected_is_refused(plan: sm.Plan) -> None:
+    for given, said in (
+        ({"of": "tool"}, "of is 'tool'"),
+        ({"farthest": 0}, "farthest"),
+        ({"center": [0]}, "center"),
+        ({"part": ["plate"]}, "no obstacle 'plate'"),
+    ):
+        with pytest.raises(sm.errors.ProblemError, match=said):
+            sm.correction(plan, **given)  # type: ignore[arg-type]
+    with pytest.raises(sm.errors.ProblemError, match="expected a Plan"):
+        sm.correction(None)  # type: ignore[arg-type]

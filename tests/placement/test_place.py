@@ -1,0 +1,226 @@
+"""Places: what is found is no worse than a grid of places, each planned on its own."""
+
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import selfmotion as sm
+from selfmotion.formats import read_problem
+from selfmotion.placement import search
+from selfmotion.placement.places import Places, Tried, places_of
+from selfmotion.placement.search import Box, Descent, finalists
+from support.arms import robot_named
+from support.shell import invoke
+
+LIMITS = [sm.constraints.JointPositionLimits(), sm.constraints.JointVelocityLimits()]
+WITHIN = {"x": (-0.3, 0.3), "y": (-0.4, 0.4)}
+# A place may cost so much more than the best of a grid.
+NO_WORSE = 1.01
+
+
+def planar() -> sm.Problem:
+    """A straight seam of a planar arm, in which nothing is in the way."""
+    robot = robot_named("planar_3r")
+    start = np.array([0.4, 0.9, 0.6])
+    pose = robot.pose(start)
+    end = pin.SE3(pose.rotation, pose.translation + np.array([-0.3, 0.2, 0.0]))
+    seam = sm.paths.Line(pose, end, 2.0)
+    return sm.Problem(robot, seam, "planar", constraints=LIMITS)
+
+
+def panda() -> sm.Problem:
+    """A seam above a block that belongs to it, beside a wall that does not."""
+    robot = robot_named("panda")
+    pose = robot.pose(sm.NAMED_ARMS["panda"].home)
+    end = pose.copy()
+    end.translation = pose.translation + np.array([0.0, 0.2, 0.0])
+    middle = 0.5 * (pose.translation + end.translation)
+    block = sm.obstacles.Box("block", middle - [0.0, 0.0, 0.15], [0.1, 0.1, 0.05])
+    wall = sm.obstacles.Box("wall", [0.9, 0.0, 0.5], [0.02, 1.0, 0.4])
+    clear = sm.constraints.Clearance([block, wall], 5e-3)
+    return sm.Problem(robot, sm.paths.Line(pose, end, 3.0), constraints=[*LIMITS, clear])
+
+
+@pytest.fixture(scope="module")
+def found() -> sm.placement.Placement:
+    return sm.place(planar(), WITHIN)
+
+
+def test_a_place_is_no_worse_than_any_of_a_grid(found: sm.placement.Placement) -> None:
+    costs = []
+    for x in np.linspace(*WITHIN["x"], 4):
+        for y in np.linspace(*WITHIN["y"], 4):
+            path = sm.paths.Placed(planar().path, pin.SE3(np.eye(3), np.array([x, y, 0.0])))
+            try:
+                plan = sm.plan(planar().changed(path=path))
+            except sm.SelfmotionError:
+                continue
+            costs += [plan.report.cost] if plan.certificate.verified else []
+    assert found.verified
+    assert found.cost <= NO_WORSE * min(costs)
+    assert found.cost < 0.9 * found.cost_before
+
+
+def test_a_place_says_what_keeps_it_there(found: sm.placement.Placement) -> None:
+    """The cost falls towards an end of the box, or it is flat."""
+    for name, (low, high) in WITHIN.items():
+        value = found.place[name]
+        if name in found.on_bounds:
+            assert min(value - low, high - value) == pytest.approx(0.0, abs=1e-6)
+            assert f"the box in {name}" in found.binds
+            continue
+        for aside in (-0.02, 0.02):
+            moved = {**found.place, name: value + aside}
+            frame = pin.SE3(np.eye(3), np.array([moved["x"], moved["y"], 0.0]))
+            there = planar().changed(path=sm.paths.Placed(planar().path, frame))
+            assert sm.plan(there).report.cost >= found.cost * (1.0 - 1e-3)
+    assert "move the part by" in str(found)
+
+
+def test_the_problem_at_the_place_is_the_moved_one(found: sm.placement.Placement) -> None:
+    (problem,) = found.problems
+    t = np.linspace(0.0, 2.0, 5)
+    moved = problem.path.samples(t).translation
+    shift = np.array([found.place["x"], found.place["y"], 0.0])
+    np.testing.assert_allclose(moved, planar().path.samples(t).translation + shift, atol=1e-12)
+
+
+def test_a_map_is_of_plans_on_their_own(found: sm.placement.Placement, tmp_path: Path) -> None:
+    drawn = found.map(points=3)
+    assert drawn.costs.shape == (3, 3)
+    assert np.nanmin(drawn.costs) >= found.cost * (1.0 - 1e-3)
+    for i, j in ((0, 1), (2, 2)):
+        frame = pin.SE3(np.eye(3), np.array([drawn.across[j], drawn.up[i], 0.0]))
+        plan = sm.plan(planar().changed(path=sm.paths.Placed(planar().path, frame)))
+        if not drawn.reasons[i][j]:
+            assert drawn.costs[i, j] >= plan.report.cost * (1.0 - 1e-3)
+    page = found.to_html(tmp_path / "map.html", drawn).read_text()
+    assert page.count("<rect") == 9
+    assert "x [m]" in page
+    drawn.figure().savefig(tmp_path / "map.png")
+    with pytest.raises(sm.errors.PlanError, match="over two of x, y"):
+        found.map(("x", "yaw"))
+
+
+def test_the_base_is_moved_for_what_stays(tmp_path: Path) -> None:
+    """The arm itself stands elsewhere: its plans are of the problem as it was given."""
+    box = {"x": (-0.1, 0.1), "yaw": (-0.3, 0.3)}
+    found = sm.place(planar(), box, of="base")
+    (plan,) = found.plans
+    assert plan.certificate.verified
+    np.testing.assert_array_equal(plan.path.pose(1.0), planar().path.pose(1.0))
+    q = plan.trajectory.q[0]
+    there, before = plan.robot.pose(q), robot_named("planar_3r").pose(q)
+    np.testing.assert_allclose(
+        there.homogeneous, (found.displacement * before).homogeneous, atol=1e-12
+    )
+    file = tmp_path / "base.toml"
+    sm.files.write_problem(plan.problem, file)
+    np.testing.assert_allclose(
+        read_problem(file).robot.pose(q).homogeneous, there.homogeneous, atol=1e-12
+    )
+
+
+def test_only_what_belongs_to_the_part_moves_along() -> None:
+    places = places_of([panda()], "part", ["block"], None, ("x", "yaw"))
+    (moved,) = places.at(np.array([0.1, 0.2]))
+    bodies = {body.name: body for body in moved.constraints[-1].obstacles}  # type: ignore[attr-defined]
+    before = {body.name: body for body in panda().constraints[-1].obstacles}  # type: ignore[attr-defined]
+    np.testing.assert_array_equal(bodies["wall"].pose, before["wall"].pose)
+    # What is between path and block stays, whatever both are moved by.
+    for t in (0.0, 1.5):
+        apart = bodies["block"].pose.inverse() * moved.path.pose(t)
+        same = before["block"].pose.inverse() * panda().path.pose(t)
+        np.testing.assert_allclose(apart.homogeneous, same.homogeneous, atol=1e-12)
+    (seen,) = places_of([panda()], "base", None, None, ("x",)).at(np.array([0.1]))
+    walls = {body.name: body for body in seen.constraints[-1].obstacles}  # type: ignore[attr-defined]
+    assert walls["wall"].pose.translation[0] == pytest.approx(0.8)
+
+
+def test_several_seams_are_placed_together_and_elsewhere_alike(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(search, "_BEGINNINGS", 4)
+    first, second = planar(), planar().changed(path=sm.paths.Reversed(planar().path))
+    box = {"x": (-0.1, 0.2)}
+    together = sm.place([first, second], box)
+    assert len(together.plans) == 2
+    assert together.cost == pytest.approx(sum(plan.report.cost for plan in together.plans))
+    with ThreadPoolExecutor(1) as executor:
+        elsewhere = sm.place([first, second], box, executor=executor)
+    assert elsewhere.place["x"] == pytest.approx(together.place["x"], abs=2e-3)
+    assert elsewhere.cost == pytest.approx(together.cost, rel=1e-3)
+
+
+class Bowl(Places):
+    """A place's cost by a formula; beyond a line there is no motion."""
+
+    def __init__(self, edge: float) -> None:
+        super().__init__((), "part", frozenset(), np.zeros(3), ("x", "y"))
+        object.__setattr__(self, "edge", edge)
+
+    def tried(self, place, near=(), thorough=False):  # type: ignore[no-untyped-def]
+        x, y = place
+        if x + y > self.edge:  # type: ignore[attr-defined]
+            return Tried(place, np.inf, "too far")
+        return Tried(place, 1.0 + 3.0 * (x - 0.3) ** 2 + (y - 0.1) ** 2 + x * y)
+
+
+@pytest.mark.parametrize("edge", [5.0, 0.2])
+def test_downhill_ends_at_the_bottom_or_where_motions_end(edge: float) -> None:
+    places, box = Bowl(edge), Box(np.array([-1.0, -1.0]), np.array([1.0, 1.0]))
+    descent = Descent(places, box, lambda _: None)
+    arrived = descent.run(places.tried(np.array([-0.8, 0.7])))
+    # 6 (x - 0.3) + y = 0 and 2 (y - 0.1) + x = 0.
+    bottom = np.linalg.solve([[6.0, 1.0], [1.0, 2.0]], [1.8, 0.2])
+    if edge > 1.0:
+        np.testing.assert_allclose(arrived.place, bottom, atol=0.02)
+    assert arrived.cost <= places.tried(bottom).cost + 1e-3
+    chosen = finalists([arrived, *descent.tried], box)
+    assert chosen[0].cost == min(item.cost for item in [arrived, *descent.tried])
+    assert len(chosen) <= search._FINALISTS
+
+
+def test_what_cannot_be_placed_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(search, "_BEGINNINGS", 2)
+    monkeypatch.setattr(search, "_MOST_BEGINNINGS", 3)
+    for given, said in (
+        ({"within": {}}, "expected lowest and highest"),
+        ({"within": {"up": (0, 1)}}, "no coordinate 'up'"),
+        ({"within": {"x": (1, 0)}}, "nothing varies"),
+        ({"within": {"x": (0, 1, 2)}}, r"within: x"),
+        ({"of": "tool"}, "of is 'tool'"),
+        ({"part": None}, "which obstacles belong to the part"),
+        ({"part": ["blok"]}, "no obstacle 'blok'"),
+        ({"part": "block"}, "expected names"),
+        ({"of": "base"}, "part says what belongs"),
+        ({"executor": 3}, "executor is 3"),
+    ):
+        asked = {"within": {"x": (0.0, 0.1)}, "part": ["block"], **given}
+        with pytest.raises(sm.errors.ProblemError, match=said):
+            sm.place(panda(), **asked)  # type: ignore[arg-type]
+    with pytest.raises(sm.errors.PlanError, match="no verified motion at any"):
+        sm.place(planar(), {"x": (50.0, 60.0)})
+
+
+def test_places_from_the_shell(tmp_path: Path) -> None:
+    cell, out, plan, page = (
+        tmp_path / name for name in ("cell.toml", "out.toml", "plan.npz", "map.html")
+    )
+    sm.files.write_problem(planar(), cell)
+    code, told = invoke(
+        "place", cell, "--x=-0.1,0.1", "--y=0,0.1", "--out", out, "--out", plan,
+        "--map", page, "--points", "2",
+    )  # fmt: skip
+    assert code == 0, told
+    assert "move the part by x [m]" in told
+    assert sm.load_plan(plan).certificate.verified
+    np.testing.assert_allclose(
+        read_problem(out).path.pose(0.0).homogeneous,
+        sm.load_plan(plan).path.pose(0.0).homogeneous,
+        atol=1e-12,
+    )
+    assert "<svg" in page.read_text()
