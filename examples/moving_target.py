@@ -38,13 +38,12 @@ class Part:
         return 0.02 * lean * np.array([1, -1, 1, -1, 1, -1, 1])
 
 
+ball = sm.obstacles.Sphere("ball", BALL, 0.06)
 constraints = [
-    *(
-        sm.constraints.JointPositionLimits(),
-        sm.constraints.JointVelocityLimits(),
-        sm.constraints.JointAccelerationLimits(),
-    ),
-    sm.constraints.Clearance([sm.obstacles.Sphere("ball", BALL, 0.06)], distance=0.005),
+    sm.constraints.JointPositionLimits(),
+    sm.constraints.JointVelocityLimits(),
+    sm.constraints.JointAccelerationLimits(),
+    sm.constraints.Clearance([ball], distance=0.005),
 ]
 # Plans anew every 10 ms, from where the arm is.
 replanner = realtime.Replanner(panda, "pose", constraints=constraints, horizon=2.0)

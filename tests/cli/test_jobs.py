@@ -166,7 +166,7 @@ def test_bad_targets_are_refused_before_anything_is_planned(table) -> None:
 def test_settings_are_of_controllers_files_alone(table, tmp_path, monkeypatch) -> None:
     """Beside other files they are no reason to write none after all is planned."""
     told = []
-    monkeypatch.setattr(sm, "write_motion", lambda *_, settings, **__: told.append(settings))
+    monkeypatch.setattr(sm.files, "write_motion", lambda *_, settings, **__: told.append(settings))
     settings = sm.files.ProgramSettings()
     for name in ("a.yaml", "a.src", "a.script", "a.csv"):
         jobs.write_program(None, tmp_path / name, settings)
