@@ -176,7 +176,7 @@ __all__ = [
 def __getattr__(name: str) -> Any:
     """Return what is imported when it is first asked for: not every plan is made in a loop.
 
-    What has a namespace was here before 0.2.
+    What has a namespace was here in earlier states of 0.1.
     """
     if name in _LATER:
         from selfmotion import realtime
