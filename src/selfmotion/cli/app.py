@@ -13,6 +13,10 @@ from selfmotion.cli import tables
 from selfmotion.cli.remedies import in_shell
 from selfmotion.cli.stage_display import StageDisplay
 
+# Under which commands are listed.
+PLAN, LOOK, FILES = "Plan", "Look at what was planned", "Files"
+LOOP, BEGIN = "While the arm moves", "To begin with"
+
 app = typer.Typer(
     help="Plan the joint motion of a redundant arm along a tool motion.",
     no_args_is_help=True,

@@ -12,7 +12,10 @@ from selfmotion import formats
 from selfmotion.basics import write_text
 from selfmotion.cli import checks, documents, jobs, json_tables, options, outputs, tables
 from selfmotion.cli.app import (
+    FILES,
+    LOOK,
     NOT_VERIFIED,
+    PLAN,
     VERIFIED,
     app,
     fastest_with_progress,
@@ -25,7 +28,8 @@ from selfmotion.cli.stage_display import StageDisplay
 
 @app.command(
     epilog="Example: selfmotion plan panda --circle 0.15 --duration 4 --out plan.npz --html a.html"
-    "; or: selfmotion plan cell.toml"
+    "; or: selfmotion plan cell.toml",
+    rich_help_panel=PLAN,
 )
 def plan(
     context: typer.Context,
@@ -108,7 +112,8 @@ def plan(
 
 @app.command(
     epilog="Example: selfmotion init panda; then: selfmotion plan panda.toml; or: selfmotion init "
-    "arm.xacro --job --out seams.toml"
+    "arm.xacro --job --out seams.toml",
+    rich_help_panel=FILES,
 )
 def init(
     robot: Annotated[
@@ -147,7 +152,7 @@ def init(
     terminal.print(f"wrote {file}", markup=False, soft_wrap=True)
 
 
-@app.command(epilog="Example: selfmotion schema --out problem.schema.json")
+@app.command(epilog="Example: selfmotion schema --out problem.schema.json", rich_help_panel=FILES)
 def schema(
     out: Annotated[Path | None, typer.Option(help="File; by default the terminal.")] = None,
 ) -> None:
@@ -161,7 +166,8 @@ def schema(
 
 
 @app.command(
-    epilog="Example: selfmotion check motion.csv --robot panda --path seam.csv --acceleration 10"
+    epilog="Example: selfmotion check motion.csv --robot panda --path seam.csv --acceleration 10",
+    rich_help_panel=LOOK,
 )
 def check(
     context: typer.Context,
@@ -262,7 +268,7 @@ def check(
     raise typer.Exit(VERIFIED if certificate.verified else NOT_VERIFIED)
 
 
-@app.command(epilog="Example: selfmotion compare a.npz b.npz")
+@app.command(epilog="Example: selfmotion compare a.npz b.npz", rich_help_panel=LOOK)
 def compare(
     plans: Annotated[list[Path], typer.Argument(help="Plans saved as .npz.")],
     as_json: options.JsonOption = False,
@@ -278,7 +284,8 @@ def compare(
 
 
 @app.command(
-    epilog="Example: selfmotion replay plan.npz --html replay.html --png 1.5 --gif motion.gif"
+    epilog="Example: selfmotion replay plan.npz --html replay.html --png 1.5 --gif motion.gif",
+    rich_help_panel=LOOK,
 )
 def replay(
     plans: Annotated[

@@ -10,14 +10,17 @@ import typer
 import selfmotion as sm
 from selfmotion import formats
 from selfmotion.cli import jobs, options, outputs, program_options
-from selfmotion.cli.app import NOT_VERIFIED, VERIFIED, app, stages, terminal
+from selfmotion.cli.app import FILES, NOT_VERIFIED, VERIFIED, app, stages, terminal
 from selfmotion.cli.stage_display import StageDisplay
 from selfmotion.result import is_move
 
 _Made = sm.Plan | sm.Parts | sm.Move | sm.Program
 
 
-@app.command(epilog="Example: selfmotion export plan.npz --out motion.yaml; or: --out weld.src")
+@app.command(
+    epilog="Example: selfmotion export plan.npz --out motion.yaml; or: --out weld.src",
+    rich_help_panel=FILES,
+)
 def export(
     file: Annotated[
         Path, typer.Argument(help="A plan or a move saved as .npz, a .program or .parts.")

@@ -10,7 +10,7 @@ import typer
 import selfmotion as sm
 from selfmotion import formats
 from selfmotion.cli import documents, json_tables, options, outputs, program_options, tables
-from selfmotion.cli.app import NOT_VERIFIED, VERIFIED, app, complain, stages, terminal
+from selfmotion.cli.app import NOT_VERIFIED, PLAN, VERIFIED, app, complain, stages, terminal
 from selfmotion.cli.batch_display import check_cluster, executor_at
 from selfmotion.cli.stage_display import StageDisplay
 
@@ -18,7 +18,10 @@ PROGRAM, PARTS = ".program", ".parts"
 TIMETABLE = ".timetable.csv"
 
 
-@app.command(epilog="Example: selfmotion job frame.toml --out frame.program --out frame.yaml")
+@app.command(
+    epilog="Example: selfmotion job frame.toml --out frame.program --out frame.yaml",
+    rich_help_panel=PLAN,
+)
 def job(
     file: Annotated[Path, typer.Argument(help="A job file: a problem file with seams.")],
     out: Annotated[

@@ -9,13 +9,15 @@ import typer
 
 import selfmotion as sm
 from selfmotion.cli import checks, options, outputs
-from selfmotion.cli.app import app, plan_with_progress, stages, terminal
+from selfmotion.cli.app import LOOK, PLAN, app, plan_with_progress, stages, terminal
 from selfmotion.cli.stage_display import StageDisplay
 
 _NAMES = "may be given several times"
 
 
-@app.command(epilog="Example: selfmotion margin plan.npz --tolerance 5e-4 --turn 0.02")
+@app.command(
+    epilog="Example: selfmotion margin plan.npz --tolerance 5e-4 --turn 0.02", rich_help_panel=LOOK
+)
 def margin(
     file: Annotated[Path, typer.Argument(help="A plan saved as .npz.")],
     tolerance: Annotated[
@@ -72,7 +74,10 @@ def margin(
         terminal.print(str(told), markup=False, soft_wrap=True)
 
 
-@app.command(epilog="Example: selfmotion calibrate plan.npz ur5_kinematics.yaml --out measured.npz")
+@app.command(
+    epilog="Example: selfmotion calibrate plan.npz ur5_kinematics.yaml --out measured.npz",
+    rich_help_panel=PLAN,
+)
 def calibrate(
     file: Annotated[Path, typer.Argument(help="A plan saved as .npz, for the arm as drawn.")],
     calibration: Annotated[
@@ -95,7 +100,10 @@ def calibrate(
     outputs.finish(result, out or [], html, as_json)
 
 
-@app.command(epilog="Example: selfmotion sheet plan.npz --tolerance 5e-4 --turn 0.02 -o sheet.html")
+@app.command(
+    epilog="Example: selfmotion sheet plan.npz --tolerance 5e-4 --turn 0.02 -o sheet.html",
+    rich_help_panel=LOOK,
+)
 def sheet(
     file: Annotated[Path, typer.Argument(help="A plan saved as .npz.")],
     out: Annotated[Path, typer.Option("--out", "-o", help="The page to write (.html).")] = Path(

@@ -8,10 +8,13 @@ import typer
 
 import selfmotion as sm
 from selfmotion.cli import documents, options, outputs
-from selfmotion.cli.app import app, fastest_with_progress, stages
+from selfmotion.cli.app import PLAN, app, fastest_with_progress, stages
 
 
-@app.command(epilog="Example: selfmotion retime plan.npz --acceleration 8 --out fast.npz")
+@app.command(
+    epilog="Example: selfmotion retime plan.npz --acceleration 8 --out fast.npz",
+    rich_help_panel=PLAN,
+)
 def retime(
     file: Annotated[Path, typer.Argument(help="A plan saved as .npz.")],
     acceleration: options.AccelerationOption = None,
@@ -26,7 +29,10 @@ def retime(
     outputs.finish(result, out or [], html, as_json)
 
 
-@app.command(epilog="Example: selfmotion fastest cell.toml --deadline 60 --out fast.npz")
+@app.command(
+    epilog="Example: selfmotion fastest cell.toml --deadline 60 --out fast.npz",
+    rich_help_panel=PLAN,
+)
 def fastest(
     problem: Annotated[str, typer.Argument(help="A problem file (.toml, .json).")],
     acceleration: options.AccelerationOption = None,

@@ -9,7 +9,7 @@ import typer
 import selfmotion as sm
 from selfmotion.batch import processes
 from selfmotion.cli import documents, options, outputs
-from selfmotion.cli.app import NOT_VERIFIED, VERIFIED, app, stages, terminal
+from selfmotion.cli.app import NOT_VERIFIED, PLAN, VERIFIED, app, stages, terminal
 from selfmotion.cli.stage_display import StageDisplay
 
 _Range = Annotated[str | None, typer.Option(help="From and to how far to move it: low,high (m).")]
@@ -19,7 +19,8 @@ _PROBLEMS, _PAGES = (".toml", ".json"), (".html", ".png")
 
 @app.command(
     epilog="Example: selfmotion place cell.toml --x=-0.2,0.2 --yaw=-0.5,0.5 --part block --out "
-    "placed.toml --map map.html"
+    "placed.toml --map map.html",
+    rich_help_panel=PLAN,
 )
 def place(
     files: Annotated[list[Path], typer.Argument(help="Problem files, of one arm.")],
@@ -107,6 +108,7 @@ def place(
 @app.command(
     "plan-margin",
     epilog="Example: selfmotion plan-margin cell.toml --position 0.005 --rotation 0.01 --out a.npz",
+    rich_help_panel=PLAN,
 )
 def plan_margin(
     file: Annotated[Path, typer.Argument(help="A problem file.")],

@@ -10,7 +10,11 @@ import selfmotion as sm
 from selfmotion import formats, realtime
 from selfmotion.cli import json_tables, options, outputs, tables
 from selfmotion.cli.app import (
+    BEGIN,
+    FILES,
+    LOOP,
     NOT_VERIFIED,
+    PLAN,
     VERIFIED,
     app,
     complain,
@@ -32,7 +36,9 @@ _OF_PLANS = (
 )
 
 
-@app.command(epilog="Example: selfmotion batch cell.toml --workers 2 --out out/batch")
+@app.command(
+    epilog="Example: selfmotion batch cell.toml --workers 2 --out out/batch", rich_help_panel=PLAN
+)
 def batch(
     files: Annotated[
         list[Path], typer.Argument(help=r"Problem files; of a \[grid], all combinations.")
@@ -89,7 +95,7 @@ def is_answered(several: Sequence[Sequence["Item"]], verified: Container[str]) -
     return all(any(item.name in verified for item in each) for each in several)
 
 
-@app.command(epilog="Example: selfmotion robots")
+@app.command(epilog="Example: selfmotion robots", rich_help_panel=FILES)
 def robots(as_json: options.JsonOption = False) -> None:
     """List the arms known by name: joints, tool frame, and redundancy for each task."""
     arms = {name: sm.load_robot(name) for name in sm.NAMED_ARMS}
@@ -99,7 +105,7 @@ def robots(as_json: options.JsonOption = False) -> None:
         tables.show_robots(arms, terminal)
 
 
-@app.command(epilog="Example: selfmotion demo --out out")
+@app.command(epilog="Example: selfmotion demo --out out", rich_help_panel=BEGIN)
 def demo(
     out: Annotated[Path, typer.Option(help="Folder for plans and replays.")] = Path("out"),
 ) -> None:
@@ -120,7 +126,7 @@ def demo(
     raise typer.Exit(VERIFIED if verified else NOT_VERIFIED)
 
 
-@app.command(epilog="Example: selfmotion track --seconds 12 --out out/track")
+@app.command(epilog="Example: selfmotion track --seconds 12 --out out/track", rich_help_panel=LOOP)
 def track(
     task: options.TaskOption = "pose",
     seconds: Annotated[float, typer.Option(help="How long (s).", min=1.0, max=600.0)] = 12.0,
@@ -146,7 +152,9 @@ def _told_apart(text: str) -> None:
     stages.print(text, markup=False, soft_wrap=True)
 
 
-@app.command(epilog="Example: selfmotion follow cell.toml --listen 127.0.0.1:5005")
+@app.command(
+    epilog="Example: selfmotion follow cell.toml --listen 127.0.0.1:5005", rich_help_panel=LOOP
+)
 def follow(
     file: Annotated[Path, typer.Argument(help="A problem file: arm, path, costs, constraints.")],
     listen: Annotated[
@@ -201,7 +209,7 @@ def follow(
     raise typer.Exit(VERIFIED if link.is_followed else NOT_VERIFIED)
 
 
-@app.command(epilog="Example: selfmotion study --out out/study")
+@app.command(epilog="Example: selfmotion study --out out/study", rich_help_panel=BEGIN)
 def study(
     out: Annotated[Path, typer.Option(help="Folder for the report.")] = Path("out/study"),
     reduced: Annotated[

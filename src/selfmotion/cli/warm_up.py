@@ -5,12 +5,12 @@ import time
 from numba.core import event
 
 from selfmotion.basics import ALL_WORKS, companion
-from selfmotion.cli.app import app, stages, terminal
+from selfmotion.cli.app import BEGIN, app, stages, terminal
 from selfmotion.cli.stage_display import StageDisplay
 from selfmotion.warm import Compiled, small_works
 
 
-@app.command("warm-up", epilog="Example: selfmotion warm-up")
+@app.command("warm-up", epilog="Example: selfmotion warm-up", rich_help_panel=BEGIN)
 def warm_up() -> None:
     """Compile all numerical kernels now, once per machine: no plan waits for them later."""
     began = time.perf_counter()
