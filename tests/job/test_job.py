@@ -499,3 +499,21 @@ def test_other_processes_come_to_the_same_program() -> None:
     here = sm.plan_job(panda, seams, start=HOME, branches=1)
     assert there.order == here.order
     np.testing.assert_array_equal(there.trajectory.q, here.trajectory.q)
+
+
+def test_progress_tells_what_each_stage_is_about(program) -> None:
+    told: list[tuple[str, int, int]] = []
+    panda, seams = robot_named("panda"), row_of_seams()
+    sm.plan_job(
+        panda,
+        seams,
+        start=HOME,
+        end=HOME,
+        branches=1,
+        progress=lambda *given: told.append(given),
+    )
+    stages = [stage for stage, *_ in told]
+    assert {f"seam 'seam {k}'" for k in range(3)} <= set(stages)
+    names = [step.name for step in program.steps if not step.is_seam]
+    assert {f"move '{name}'" for name in names} <= set(stages)
+    assert all(1 <= done <= total for _, done, total in told)

@@ -69,7 +69,7 @@ class StageDisplay(Display):
             BarColumn(),
             TimeElapsedColumn(),
         )
-        self._stage = self._count = self._cost = self._left = ""
+        self._stage = self._about = self._count = self._cost = self._left = ""
         self._began = 0.0
 
     def stage(self, stage: str, done: int, total: int) -> None:
@@ -80,10 +80,12 @@ class StageDisplay(Display):
         if total == 0:
             self._console.print(stage, markup=False, highlight=False, soft_wrap=True)
             return
+        stage, quote, about = stage.partition(" '")
         if stage != self._stage:
             self._stage, self._cost, self._began = stage, "", time.monotonic()
             if not self._console.is_terminal:
                 self._console.print(f"{stage} 1 of {total}" if total > 1 else stage, markup=False)
+        self._about = quote + about
         self._count = f" {done} of {total}" if total > 1 else ""
         spent = time.monotonic() - self._began
         left = spent * (total - done + 1) / (done - 1) if done > 1 else 0.0
@@ -98,5 +100,5 @@ class StageDisplay(Display):
         self._describe()
 
     def _describe(self) -> None:
-        said = self._stage + self._count + self._left + self._cost
+        said = self._stage + self._count + self._about + self._left + self._cost
         self._progress.update(self._bar, description=said)

@@ -94,7 +94,8 @@ class Builder:
     ) -> None:
         """Plan moves, and let the order know what they take."""
         asked = [(*self._ends_of(pair), ()) for pair in wanted]
-        for pair, move in zip(wanted, self._work.moves(asked), strict=True):
+        named = [self._named(pair) for pair in wanted]
+        for pair, move in zip(wanted, self._work.moves(asked, named), strict=True):
             moves[pair] = move
             seconds = move.motion.duration if move.verified else np.inf
             self._ordering.learn(*pair, seconds)

@@ -153,7 +153,8 @@ class Growing:
         ways = self._ways(states)
         new = [way for way in ways if way not in self._moves]
         asked = [(*self._ends_of(way), tuple(ways[way].values())) for way in new]
-        self._moves |= zip(new, self._work.moves(asked), strict=True)
+        names = [self._named(way) for way in new]
+        self._moves |= zip(new, self._work.moves(asked, names), strict=True)
         goes = True
         for way, past in ways.items():
             first, last, _ = way
@@ -283,11 +284,15 @@ class Growing:
         if None in moves:
             yield self._move_step(*moves[None])
 
-    def _move_step(self, way: _Way, move: Move) -> Step:
+    def _named(self, way: _Way) -> str:
         first, last = (None if k is None else self._seam(k) for k in way[:2])
         names = JOB_START if first is None else first.name, JOB_END if last is None else last.name
-        may = tuple(name for one in (first, last) if one is not None for name in one.may_meet)
-        return Step(" → ".join(names), move, may_meet=may)
+        return f"{names[0]} → {names[1]}"
+
+    def _move_step(self, way: _Way, move: Move) -> Step:
+        ends = [self._seam(k) for k in way[:2] if k is not None]
+        may = tuple(name for one in ends for name in one.may_meet)
+        return Step(self._named(way), move, may_meet=may)
 
     def _seam(self, state: int) -> Seam:
         return self._ordering.seams[self._ordering.states[state].seam]

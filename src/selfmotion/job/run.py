@@ -103,7 +103,8 @@ def plan_job(
     rng : int
         Seed of all random numbers.
     progress : callable, optional
-        Told the stage, as in `plan`: ``("seam", 3, 12)``, ``("move", 1, 11)``.
+        Told the stage, as in `plan`, and what it is about: ``("seam 'left'", 3, 12)``,
+        ``("move 'left → right'", 1, 11)``.
 
     Returns
     -------

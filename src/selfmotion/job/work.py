@@ -173,16 +173,22 @@ class Work:
         ]
         return [found for found, _ in self._plans(tasks, "nearby")]
 
-    def moves(self, wanted: Sequence[tuple[Array, Array, Sequence[Any]]]) -> list[Move]:
-        """Return moves from configurations (n,) to others, with what stands there each time."""
+    def moves(
+        self, wanted: Sequence[tuple[Array, Array, Sequence[Any]]], names: Sequence[str]
+    ) -> list[Move]:
+        """Return moves from configurations (n,) to others, with what stands there each time.
+
+        Progress tells their `names`.
+        """
         tasks, before = list[_Task](), list[Move | None]()
-        for first, last, standing in wanted:
+        for (first, last, standing), name in zip(wanted, names, strict=True):
             ends = np.stack([first, last])
             known = None if self.earlier is None else self.earlier.move_like(ends)
             before.append(known)
             tasks.append(
                 {
                     "arm": (self.asked.robot, self.asked.of_moves(standing)),
+                    "named": name,
                     "ends": ends,
                     "seconds": self.asked.deadline,
                     "seed": [self.asked.seed, _number(ends.tobytes())],
@@ -226,8 +232,13 @@ class Work:
         found = {k: known for k, known in enumerate(kept) if known is not None}
         todo = {k: task for k, task in enumerate(tasks) if k not in found}
         with closing(self._done(todo, kind)) as fresh:
+            # In other processes all are begun at once.
+            here = [] if self._executor is not None else list(todo)
             for number in range(1, len(tasks) + 1):
-                self.tell(stage, number, len(tasks))
+                k = number - 1 - (len(tasks) - len(todo))
+                named = tasks[here[k]] if k >= 0 and here else {}
+                about = named.get("named", named.get("name", ""))
+                self.tell(f"{stage} '{about}'" if about else stage, number, len(tasks))
                 if number > len(tasks) - len(todo):
                     k, made = next(fresh)
                     keep(files[k], made)
@@ -328,7 +339,9 @@ def _plans_asked(task: _Task) -> dict[str, Any]:
 
 
 def _move_asked(task: _Task) -> dict[str, Any]:
-    return {**task, "arm": describe_arm(*task["arm"]), "ends": task["ends"].tolist()}
+    # What it is called changes nothing of it.
+    asked = {key: value for key, value in task.items() if key != "named"}
+    return {**asked, "arm": describe_arm(*task["arm"]), "ends": task["ends"].tolist()}
 
 
 # Arms and bodies of tasks done before in this process.
