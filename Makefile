@@ -6,7 +6,7 @@ READY := $(VENV)/.ready
 # What is imported by many processes is compiled to bytecode once.
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: demo test lint format bench bench-constrained bench-remaining bench-relaxed bench-batch bench-peers bench-starts bench-places bench-margins bench-place bench-first bench-fastest bench-feeds bench-job bench-moved bench-moves bench-raster bench-lifts bench-spirals bench-latency docs errors suite suite-made fuzz fuzz-tasks fuzz-cells fuzz-certificate fuzz-deceptions fuzz-generated fuzz-realtime fuzz-files fuzz-job fuzz-kept fuzz-programs arms mutants memory acceptance distances study clean
+.PHONY: demo test lint format bench bench-constrained bench-remaining bench-relaxed bench-batch bench-peers bench-starts bench-places bench-margins bench-corrections bench-place bench-first bench-fastest bench-feeds bench-job bench-moved bench-moves bench-raster bench-lifts bench-spirals bench-latency docs errors suite suite-made fuzz fuzz-tasks fuzz-cells fuzz-certificate fuzz-deceptions fuzz-generated fuzz-realtime fuzz-files fuzz-job fuzz-kept fuzz-programs arms mutants memory acceptance distances study clean
 
 demo: $(READY)  ## plan, check and replay the paper's planar arm and a Panda, into out/
 	$(BIN)/selfmotion demo --out out
@@ -48,6 +48,9 @@ bench-first: $(READY)  ## the first plan on a machine; what compiles after a war
 
 bench-places: $(READY)  ## a seam at 300 places around three arms, each 'no' held against an exhaustive search
 	OMP_NUM_THREADS=1 $(BIN)/python benchmarks/places.py
+
+bench-corrections: $(READY)  ## how far parts may stand elsewhere when planned again, held against random displacements
+	OMP_NUM_THREADS=1 $(BIN)/python benchmarks/corrections.py
 
 bench-margins: $(READY)  ## by how much part, tool and base may be displaced: 200 plans, 10,000 displacements, judged
 	OMP_NUM_THREADS=1 $(BIN)/python benchmarks/margins.py

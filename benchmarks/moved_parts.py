@@ -80,7 +80,7 @@ def main(
     ratios, lasts, costs, lost, counted = [], [], [], 0, 0
     for number in range(count):
         robot, seams, apart = job(number, placed(number, moved=False))
-        home = sm.NAMED_ARMS[robot.name].home
+        home = robot.dexterous_configuration()
         first = sm.plan_job(robot, seams, clearance=apart, start=home, end=home)
         _, seams, apart = job(number, placed(number, moved=True))
         programs, seconds = list[sm.Program](), list[float]()
