@@ -2,8 +2,8 @@
 
 Random plans among bodies, as in `margins.py`. Of each, how far the part may be moved and turned is
 looked for at the corners; then it is planned again for random displacements within that, in any
-direction, which no corner is. Prints how many of these are verified, how many of them by another motion than one near the
-plan's, and what takes how long.
+direction, which no corner is. Prints how many of these are verified, how many of them by a motion
+that is not near the plan's, and what takes how long.
 """
 
 from __future__ import annotations
