@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -10,7 +10,11 @@ import numpy.typing as npt
 from selfmotion.basics import Array, PathError, as_number, as_numbers, read_only, series, shown
 from selfmotion.path.base import Path, PathSamples, PathSeries, path_pose, rotvecs, unit
 from selfmotion.path.merging import merged
+from selfmotion.path.waypoint_arguments import scalar_first
 from selfmotion.task import SE3, Quaternion
+
+if TYPE_CHECKING:
+    from scipy.spatial.transform import Rotation
 
 # The pace of a polyline itself, to be replaced by `Feed` [m/s].
 _SPEED = 1.0
@@ -42,8 +46,9 @@ class Polyline(Path, kind="polyline"):
     ----------
     positions : (N, 3)
         [m], world axes.
-    quaternions : (N, 4), optional
-        Orientations [w, x, y, z]; normalised, either sign. By default none is prescribed, for
+    quaternions : (N, 4) or scipy.spatial.transform.Rotation, optional
+        Orientations [w, x, y, z]; normalised, either sign. Rotations of SciPy know their order,
+        numbers have to be in this one. By default none is prescribed, for
         tasks that leave it free ('position').
     tolerance : float
         How far the tool may pass from a corner [m].
@@ -60,7 +65,7 @@ class Polyline(Path, kind="polyline"):
     def __init__(
         self,
         positions: npt.ArrayLike,
-        quaternions: npt.ArrayLike | None = None,
+        quaternions: "npt.ArrayLike | Rotation | None" = None,
         *,
         tolerance: float = 1e-3,
         turn_tolerance: float = 1e-2,
@@ -69,7 +74,7 @@ class Polyline(Path, kind="polyline"):
         self._oriented = quaternions is not None
         if quaternions is None:
             quaternions = np.tile([1.0, 0.0, 0.0, 0.0], (len(np.atleast_1d(points)), 1))
-        turns = as_numbers(quaternions, "polyline: quaternions", error=PathError)
+        turns = as_numbers(scalar_first(quaternions), "polyline: quaternions", error=PathError)
         if points.ndim != 2 or points.shape[1:] != (3,) or len(points) < 2:
             raise PathError(
                 f"polyline: positions have shape {points.shape}, expected (N, 3) with N ≥ 2"

@@ -1,5 +1,7 @@
 """What waypoints are given, checked; and where they bend."""
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 import numpy.typing as npt
 
@@ -8,6 +10,9 @@ from selfmotion.basics import (
     PathError,
     as_numbers,
 )
+
+if TYPE_CHECKING:
+    from scipy.spatial.transform import Rotation
 
 
 def bends(legs: Array, angle: float, least: float) -> npt.NDArray[np.bool_]:
@@ -22,6 +27,13 @@ def bends(legs: Array, angle: float, least: float) -> npt.NDArray[np.bool_]:
 def as_table(values: npt.ArrayLike, name: str) -> Array:
     """Return numbers of waypoints; PathError names what is none."""
     return as_numbers(values, f"waypoints: {name}", error=PathError)
+
+
+def scalar_first(orientations: "npt.ArrayLike | Rotation") -> npt.ArrayLike:
+    """Return orientations as quaternions [w, x, y, z]: SciPy's know their own order."""
+    if hasattr(orientations, "as_quat"):
+        return np.asarray(orientations.as_quat(scalar_first=True), dtype=np.float64)
+    return orientations
 
 
 def check_waypoints(t: Array, points: Array, turns: Array) -> None:

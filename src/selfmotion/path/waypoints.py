@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from functools import cached_property
 from itertools import pairwise
 from pathlib import Path as FilePath
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -24,8 +24,11 @@ from selfmotion.basics import (
 )
 from selfmotion.path.base import Path, PathSamples, PathSeries, path_pose, rotvecs, unit
 from selfmotion.path.turns import Turning
-from selfmotion.path.waypoint_arguments import as_table, bends, check_waypoints
+from selfmotion.path.waypoint_arguments import as_table, bends, check_waypoints, scalar_first
 from selfmotion.task import SE3, Quaternion
+
+if TYPE_CHECKING:
+    from scipy.spatial.transform import Rotation
 
 _COLUMNS = ("t", "x", "y", "z")
 _QUATERNION = ("qw", "qx", "qy", "qz")
@@ -47,8 +50,9 @@ class Waypoints(Path, kind="waypoints"):
         Times [s], increasing; the first one becomes 0.
     positions : (N, 3)
         [m], world axes.
-    quaternions : (N, 4), optional
-        Orientations [w, x, y, z]; normalised, either sign. By default none is prescribed, for
+    quaternions : (N, 4) or scipy.spatial.transform.Rotation, optional
+        Orientations [w, x, y, z]; normalised, either sign. Rotations of SciPy know their order,
+        numbers have to be in this one. By default none is prescribed, for
         tasks that leave it free ('position').
     corners : {"blend", "stop"}
         What to do where the path has a kink (see `corner_angle`): swing smoothly through the
@@ -68,7 +72,7 @@ class Waypoints(Path, kind="waypoints"):
         self,
         t: npt.ArrayLike,
         positions: npt.ArrayLike,
-        quaternions: npt.ArrayLike | None = None,
+        quaternions: "npt.ArrayLike | Rotation | None" = None,
         *,
         corners: str = "blend",
         corner_angle: float = np.pi / 6,
@@ -77,7 +81,7 @@ class Waypoints(Path, kind="waypoints"):
         self._oriented = quaternions is not None
         if quaternions is None:
             quaternions = np.tile([1.0, 0.0, 0.0, 0.0], (len(np.atleast_1d(points)), 1))
-        turns = as_table(quaternions, "quaternions")
+        turns = as_table(scalar_first(quaternions), "quaternions")
         check_waypoints(times, points, turns)
         as_choice(corners, "waypoints: corners", ("blend", "stop"), PathError)
         what = "waypoints: corner_angle"
