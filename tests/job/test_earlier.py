@@ -1,12 +1,17 @@
 """A job that is like an earlier one keeps what did not change, and begins at its motions."""
 
 from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
 
 import numpy as np
 import pytest
+import trimesh
 
 import selfmotion as sm
+from selfmotion.basics import silent
 from selfmotion.job import work
+from selfmotion.job.earlier import Earlier
+from selfmotion.job.files import Shelf
 from selfmotion.task import SE3
 from selfmotion.transfer import FreeMotions, free_motion
 from support.arms import robot_named
@@ -104,6 +109,47 @@ def test_where_no_program_comes_of_it_all_is_planned_anew(program, monkeypatch) 
     monkeypatch.setattr(FreeMotions, "between", between)
     again = planned_again(program, seams(0.02)).require()
     np.testing.assert_array_equal(again.trajectory.q, cold.trajectory.q)
+
+
+def test_bodies_whose_file_has_changed_are_looked_at_anew(tmp_path, monkeypatch) -> None:
+    """A motion that was kept clear of a mesh is not of what its file holds by now."""
+    panda, file = robot_named("panda"), tmp_path / "part.stl"
+
+    def clear_of(size) -> sm.constraints.Clearance:
+        trimesh.creation.box(size).export(file)
+        part = sm.obstacles.Mesh("part", SE3(np.eye(3), np.array([0.45, 0.0, 0.1])), file)
+        return sm.constraints.Clearance([part], distance=0.0)
+
+    def planned(apart, **given) -> sm.Program:
+        return sm.plan_job(panda, seams(count=1), start=HOME, branches=1, clearance=apart, **given)
+
+    low, high = [0.1, 0.1, 0.1], [0.3, 0.6, 0.6]
+    before = planned(clear_of(low)).require()
+    again = planned(clear_of(low), warm_start=before).require()
+    np.testing.assert_array_equal(again.trajectory.q, before.trajectory.q)
+    # Nothing else is tried than what is known.
+    monkeypatch.setattr(work, "branches", lambda *_: ([], "nothing else is tried"))
+    monkeypatch.setattr(FreeMotions, "through", lambda self, *_: self._missing("nothing else"))
+    with pytest.raises(sm.errors.PlanError, match="nothing else is tried"):
+        planned(clear_of(high), warm_start=before)
+    # Nor is a move kept that goes through it.
+    apart = clear_of(high)
+    asked = work.Asked(panda, (), apart, 1, 1.0, 0)
+    at_work = work.Work(asked, Shelf(None, sm.Tolerance(), {}), None, silent, Earlier(before))
+    move = next(step.made for step in before.steps if not step.is_seam)
+    (found,) = at_work.moves([(*move.motion.q[[0, -1]], ())], ["move"])
+    assert not found.verified
+
+
+def test_other_costs_are_planned_for(program) -> None:
+    """A motion that is best by other costs is not kept for nothing having moved."""
+    costs = [sm.costs.JointVelocity([1.0, 50.0, 1.0, 1.0, 1.0, 1.0, 1.0])]
+    other = [replace(seam, costs=costs) for seam in seams()]
+    again = planned_again(program, other).require()
+    for name, plan in again.plans.items():
+        assert plan.problem.costs[0] is costs[0]
+        known = program.plans[name].trajectory
+        assert len(plan.trajectory.t) != len(known.t) or np.any(plan.trajectory.q != known.q)
 
 
 def test_another_process_comes_to_the_same_program(program) -> None:

@@ -219,11 +219,11 @@ class Shelf:
 
 def leads(found: Move, missing: Move, ends: Array) -> bool:
     """Whether a move is verified for what is asked of a `missing` one, between ends (2, n)."""
-    if not found.verified or any(another_tool(found.robot, missing.robot)):
+    if found.trajectory is None or any(another_tool(found.robot, missing.robot)):
         return False
-    if any(not_judged_by(found.constraints, missing.constraints, None)):
+    if float(np.abs(found.motion.q[[0, -1]] - ends).max()) > _JOINED:
         return False
-    return float(np.abs(found.motion.q[[0, -1]] - ends).max()) <= _JOINED
+    return found.verified and not any(not_judged_by(found.constraints, missing.constraints, None))
 
 
 def _archives(file: Path, count: int) -> list[Path]:

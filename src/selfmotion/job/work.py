@@ -200,8 +200,11 @@ class Work:
         kept = list[Move | None]()
         for file, task, known in zip(files, tasks, before, strict=True):
             missing = _missing(task, "")
-            same = known is not None and leads(known, missing, task["ends"])
-            kept.append(known if same else shelf.move(file, missing, task["ends"]))
+            # Judged by what is asked now: files of bodies may have changed.
+            arm, asked = missing.robot, missing.constraints
+            again = None if known is None else replace(known, robot=arm, constraints=asked)
+            same = again is not None and leads(again, missing, task["ends"])
+            kept.append(again if same else shelf.move(file, missing, task["ends"]))
         return self._finished("move", "move", tasks, files, kept, shelf.keep_move)
 
     def _plans(self, tasks: Sequence[_Task], stage: str) -> list[tuple[list[Plan], str]]:

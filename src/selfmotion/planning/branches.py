@@ -1,10 +1,12 @@
 """Several motions along one path that begin in different configurations."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from selfmotion.basics import Array, Progress, SelfmotionError, silent
+from selfmotion.basics import Array, Progress, SelfmotionError, description_of, silent
+from selfmotion.costs import Cost, FunctionCost
 from selfmotion.optimise import Status
 from selfmotion.planning.posture import wound_back
 from selfmotion.planning.rough import rough_grid
@@ -77,11 +79,15 @@ def branches(
 def like_before(problem: Problem, before: Plan) -> Plan | None:
     """Return the verified plan that begins at the motion of another one, or None.
 
-    That of the same problem is taken as it is.
+    Where the same is asked with the same costs, its motion is taken as it is, and judged anew: what
+    files of bodies hold may have changed.
     """
     same = replace(before.problem, start=problem.start).digest == problem.digest
-    if same and before.certificate.verified:
-        return before
+    if same and _cost_the_same(before.problem.costs, problem.costs):
+        kept = replace(before, problem=replace(problem, start=before.problem.start))
+        kept = replace(kept, certificate=kept.check())
+        if kept.certificate.verified:
+            return kept
     start = near_start(problem, before.trajectory.q[0])
     return None if start is None else from_start(problem, start, before)[0]
 
@@ -101,6 +107,17 @@ def from_start(
     if made.certificate.verified:
         return made, ""
     return None, made.certificate.verdict
+
+
+def _cost_the_same(some: Sequence[Cost], others: Sequence[Cost]) -> bool:
+    """Whether costs are the same; of functions nobody can tell but where they are one."""
+    if len(some) != len(others):
+        return False
+    return all(
+        one is other
+        or (not isinstance(one, FunctionCost) and description_of(one) == description_of(other))
+        for one, other in zip(some, others, strict=True)
+    )
 
 
 def _whole(made: Plan) -> Plan:
