@@ -18,7 +18,7 @@ from selfmotion.formats.program_axes import axes_of
 from selfmotion.formats.tool_frames import ToolFrames
 from selfmotion.task import SE3, Quaternion, exp3
 from support.arms import PANDA_HOME, robot_named
-from support.industrial import industrial_arm
+from support.industrial import industrial_arm, two_seams
 from support.own_kinematics import Arm
 from support.played_programs import off, placed, read_poses
 from support.shell import invoke
@@ -81,19 +81,7 @@ def turned() -> sm.Plan:
 @pytest.fixture(scope="module")
 def program() -> sm.Program:
     """Two seams of a UR5, with an arc, moves and a wait."""
-    ur5 = robot_named("ur5")
-    start = ur5.dexterous_configuration("pointing")
-    first = ur5.pose(start)
-    seams = []
-    for k, side in enumerate((0.0, 0.06)):
-        begin, end = first.copy(), first.copy()
-        begin.translation = first.translation + np.array([0.0, side, 0.0])
-        end.translation = begin.translation + np.array([0.0, 0.0, 0.05])
-        events = [("arc on", 0.0), ("arc off", 0.7)]
-        path = sm.paths.Line(begin, end, 1.0)
-        seams.append(sm.Seam(f"seam {k}", path, "pointing", wait=0.5 * (1 - k), events=events))
-    made = sm.plan_job(ur5, seams, start=start, order="given", branches=1, clearance=None)
-    return made.require()
+    return two_seams()
 
 
 def named(plan: sm.Plan | sm.Program) -> dict[str, str]:

@@ -19,6 +19,7 @@ from selfmotion.formats.program_files import read_program
 from selfmotion.formats.stretches import NO_MISS, ways
 from selfmotion.job import Step
 from support.arms import PANDA_HOME, robot_named
+from support.industrial import two_seams
 from support.shell import invoke
 
 SIGNALS = {"arc on": (7, True), "arc off": (7, False)}
@@ -50,19 +51,7 @@ def plans(plan: sm.Plan) -> dict[str, sm.Plan]:
 @pytest.fixture(scope="module")
 def program() -> sm.Program:
     """Two seams of a UR5, with an arc, moves and a wait."""
-    ur5 = robot_named("ur5")
-    start = ur5.dexterous_configuration("pointing")
-    first = ur5.pose(start)
-    seams = []
-    for k, side in enumerate((0.0, 0.06)):
-        begin, end = first.copy(), first.copy()
-        begin.translation = first.translation + np.array([0.0, side, 0.0])
-        end.translation = begin.translation + np.array([0.0, 0.0, 0.05])
-        events = [("arc on", 0.0), ("arc off", 0.7)]
-        path = sm.paths.Line(begin, end, 1.0)
-        seams.append(sm.Seam(f"seam {k}", path, "pointing", wait=0.5 * (1 - k), events=events))
-    made = sm.plan_job(ur5, seams, start=start, order="given", branches=1, clearance=None)
-    return made.require()
+    return two_seams()
 
 
 def settings(file: str, deviation: float = 2e-4) -> sm.files.ProgramSettings:

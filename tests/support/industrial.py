@@ -7,7 +7,10 @@ its axes 1, 4 and 6 turn the other way.
 
 from pathlib import Path
 
+import numpy as np
+
 import selfmotion as sm
+from support.arms import robot_named
 
 # Of each axis where it is from the one before [m], what it turns about, and its limits [deg].
 _ABB = (
@@ -77,3 +80,20 @@ def _fixed(name: str, above: str, link: str, xyz: str, turned: str) -> str:
         f'<link name="{link}"/><joint name="{name}" type="fixed"><parent link="{above}"/>'
         f'<child link="{link}"/><origin xyz="{xyz}" rpy="{turned}"/></joint>'
     )
+
+
+def two_seams() -> sm.Program:
+    """Two seams of a UR5, with an arc, moves and a wait."""
+    ur5 = robot_named("ur5")
+    start = ur5.dexterous_configuration("pointing")
+    first = ur5.pose(start)
+    seams = []
+    for k, side in enumerate((0.0, 0.06)):
+        begin, end = first.copy(), first.copy()
+        begin.translation = first.translation + np.array([0.0, side, 0.0])
+        end.translation = begin.translation + np.array([0.0, 0.0, 0.05])
+        events = [("arc on", 0.0), ("arc off", 0.7)]
+        path = sm.paths.Line(begin, end, 1.0)
+        seams.append(sm.Seam(f"seam {k}", path, "pointing", wait=0.5 * (1 - k), events=events))
+    made = sm.plan_job(ur5, seams, start=start, order="given", branches=1, clearance=None)
+    return made.require()

@@ -15,22 +15,27 @@ from selfmotion.cli.stage_display import StageDisplay
 _NAMES = "may be given several times"
 
 
+_Tolerance = Annotated[
+    float | None, typer.Option(help="What the process lets the tool be off its path (m).")
+]
+_Turn = Annotated[
+    float | None, typer.Option(help="By how much it may be turned (rad); with --tolerance.")
+]
+_Part = Annotated[
+    list[str] | None,
+    typer.Option(help=f"A body of the part ({_NAMES}); by default all obstacles there."),
+]
+
+
 @app.command(
     epilog="Example: selfmotion margin plan.npz --tolerance 5e-4 --turn 0.02", rich_help_panel=LOOK
 )
 def margin(
     file: Annotated[Path, typer.Argument(help="A plan saved as .npz.")],
-    tolerance: Annotated[
-        float | None, typer.Option(help="What the process lets the tool be off its path (m).")
-    ] = None,
-    turn: Annotated[
-        float | None, typer.Option(help="By how much it may be turned (rad); with --tolerance.")
-    ] = None,
+    tolerance: _Tolerance = None,
+    turn: _Turn = None,
     clearance: Annotated[float, typer.Option(help="What is left between bodies (m).")] = 0.0,
-    part: Annotated[
-        list[str] | None,
-        typer.Option(help=f"A body of the part ({_NAMES}); by default all obstacles there."),
-    ] = None,
+    part: _Part = None,
     tool: Annotated[
         list[str] | None,
         typer.Option(help=f"A body of the tool ({_NAMES}); by default all on its joint."),
@@ -109,16 +114,9 @@ def sheet(
     out: Annotated[Path, typer.Option("--out", "-o", help="The page to write (.html).")] = Path(
         "sheet.html"
     ),
-    tolerance: Annotated[
-        float | None, typer.Option(help="What the process lets the tool be off its path (m).")
-    ] = None,
-    turn: Annotated[
-        float | None, typer.Option(help="By how much it may be turned (rad); with --tolerance.")
-    ] = None,
-    part: Annotated[
-        list[str] | None,
-        typer.Option(help=f"A body of the part ({_NAMES}); by default all obstacles there."),
-    ] = None,
+    tolerance: _Tolerance = None,
+    turn: _Turn = None,
+    part: _Part = None,
     title: Annotated[str, typer.Option(help="Of the page; by default arm and task.")] = "",
 ) -> None:
     """Write what a plan does, keeps and survives as one page that prints on A4."""

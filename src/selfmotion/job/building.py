@@ -10,7 +10,6 @@ from selfmotion.job.growing import Growing
 from selfmotion.job.order import EXACT
 from selfmotion.job.ordering import Ordering
 from selfmotion.job.program import Program
-from selfmotion.job.seam import JOB_END, JOB_START
 from selfmotion.job.seam_steps import seam_steps
 from selfmotion.job.step import Step
 from selfmotion.job.work import Work
@@ -94,13 +93,13 @@ class Builder:
     ) -> None:
         """Plan moves, and let the order know what they take."""
         asked = [(*self._ends_of(pair), ()) for pair in wanted]
-        named = [self._named(pair) for pair in wanted]
+        named = [self._ordering.name_of_move(*pair) for pair in wanted]
         for pair, move in zip(wanted, self._work.moves(asked, named), strict=True):
             moves[pair] = move
             seconds = move.motion.duration if move.verified else np.inf
             self._ordering.learn(*pair, seconds)
             if not move.verified:
-                names = self._named(pair)
+                names = self._ordering.name_of_move(*pair)
                 self._notes.append(f"'{names}' is given up: {move.trouble}")
 
     def _ends_of(self, pair: Pair) -> tuple[Array, Array]:
@@ -119,20 +118,16 @@ class Builder:
         own = sum(self._ordering.own(state) for state in states)
         return own + sum(move.motion.duration for move in found)
 
-    def _named(self, pair: Pair) -> str:
-        names = [None if k is None else self._ordering.name_of(k) for k in pair]
-        return f"{names[0] or JOB_START} → {names[1] or JOB_END}"
-
     def _steps(self, states: Sequence[int], moves: dict[Pair, Move]) -> list[Step]:
         pairs, steps = self._pairs(states), list[Step]()
         by_last = {pair[1]: pair for pair in pairs}
         for state in states:
             if state in by_last:
                 pair = by_last[state]
-                steps.append(Step(self._named(pair), moves[pair]))
+                steps.append(Step(self._ordering.name_of_move(*pair), moves[pair]))
             here = self._ordering.states[state]
             seam = self._ordering.seams[here.seam]
             steps += seam_steps(seam, here.made, here.turned, self._work)
         if None in by_last:
-            steps.append(Step(self._named(by_last[None]), moves[by_last[None]]))
+            steps.append(Step(self._ordering.name_of_move(*by_last[None]), moves[by_last[None]]))
         return steps

@@ -8,8 +8,9 @@ import numpy as np
 
 from selfmotion.basics import Array, ProblemError, shown
 from selfmotion.job.program import Program
-from selfmotion.job.seam import Seam
+from selfmotion.job.seam import Seam, waiting
 from selfmotion.motion import Trajectory
+from selfmotion.planning import check_joints
 from selfmotion.result import Move, Plan
 from selfmotion.robot import RobotModel
 
@@ -48,14 +49,8 @@ class Earlier:
         named, made = {seam.name: seam for seam in seams}, self.program.order
         if sorted(made) != sorted(named):
             return None
-        listed, done = [named[name] for name in made], set[str]()
-        for seam in listed:
-            if not done.issuperset(seam.after):
-                return None
-            if seam.after_any and done.isdisjoint(seam.after_any):
-                return None
-            done.add(seam.name)
-        return listed
+        listed = [named[name] for name in made]
+        return listed if waiting(listed).keeps(range(len(listed))) else None
 
     def move_like(self, ends: Array) -> Move | None:
         """Return the move whose ends are nearest to others (2, n), or None for none near."""
@@ -71,12 +66,7 @@ def check_earlier(earlier: object, robot: RobotModel) -> None:
         raise ProblemError(
             f"warm_start is {shown(earlier)}, expected a Program; load_program reads one"
         )
-    theirs, ours = earlier.robot.joint_names, robot.joint_names
-    if theirs != ours:
-        raise ProblemError(
-            f"warm_start: its joints are {', '.join(theirs)}, expected those of {robot.name}: "
-            f"{', '.join(ours)}"
-        )
+    check_joints(earlier.robot, robot)
 
 
 def way_along(motion: Trajectory, ends: Array) -> Array:

@@ -9,7 +9,7 @@ from selfmotion.basics import Array
 from selfmotion.job.meeting import Meeting, Standing, without
 from selfmotion.job.ordering import Ordering
 from selfmotion.job.program import Program
-from selfmotion.job.seam import JOB_END, JOB_START, Seam
+from selfmotion.job.seam import Seam
 from selfmotion.job.seam_steps import seam_steps
 from selfmotion.job.step import Step
 from selfmotion.job.work import Work
@@ -153,7 +153,7 @@ class Growing:
         ways = self._ways(states)
         new = [way for way in ways if way not in self._moves]
         asked = [(*self._ends_of(way), tuple(ways[way].values())) for way in new]
-        names = [self._named(way) for way in new]
+        names = [self._ordering.name_of_move(*way[:2]) for way in new]
         self._moves |= zip(new, self._work.moves(asked, names), strict=True)
         goes = True
         for way, past in ways.items():
@@ -284,15 +284,10 @@ class Growing:
         if None in moves:
             yield self._move_step(*moves[None])
 
-    def _named(self, way: _Way) -> str:
-        first, last = (None if k is None else self._seam(k) for k in way[:2])
-        names = JOB_START if first is None else first.name, JOB_END if last is None else last.name
-        return f"{names[0]} → {names[1]}"
-
     def _move_step(self, way: _Way, move: Move) -> Step:
         ends = [self._seam(k) for k in way[:2] if k is not None]
         may = tuple(name for one in ends for name in one.may_meet)
-        return Step(self._named(way), move, may_meet=may)
+        return Step(self._ordering.name_of_move(*way[:2]), move, may_meet=may)
 
     def _seam(self, state: int) -> Seam:
         return self._ordering.seams[self._ordering.states[state].seam]

@@ -8,8 +8,8 @@ import numpy as np
 
 from selfmotion.basics import Array, ProblemError
 from selfmotion.job.order import EXACT, best_round
-from selfmotion.job.seam import Seam, backwards_plan
-from selfmotion.job.stops import Before, Round, Stops
+from selfmotion.job.seam import JOB_END, JOB_START, Seam, backwards_plan, waiting
+from selfmotion.job.stops import Round, Stops
 from selfmotion.job.work import Work
 from selfmotion.problem import Problem
 from selfmotion.result import Plan
@@ -138,6 +138,11 @@ class Ordering:
         """Return the name of a state's seam."""
         return self.seams[self.states[state].seam].name
 
+    def name_of_move(self, first: int | None, last: int | None) -> str:
+        """Return the name of a move between states; None is the start or the end of the program."""
+        one = JOB_START if first is None else self.name_of(first)
+        return f"{one} → {JOB_END if last is None else self.name_of(last)}"
+
     def seconds(self, first: Array, last: Array) -> float:
         """Return what a move between configurations (n,) takes at least [s]."""
         return float(self._free.time_of(first, last))
@@ -169,7 +174,7 @@ class Ordering:
 
     def _never(self) -> list[int]:
         """Return the seams that are not missing, but before which something always is."""
-        before = self._before({k: k for k in range(len(self.seams))})
+        before = waiting(self.seams)
         made, count = set[int](), -1
         while len(made) > count:
             count = len(made)
@@ -209,16 +214,6 @@ class Ordering:
         """The seams that are not missing, numbered anew from 0 on."""
         return {seam: k for k, seam in enumerate(self.made)}
 
-    def _before(self, place: dict[int, int]) -> Before:
-        """Return what has to come before what, by their places."""
-        names = {self.seams[seam].name: k for seam, k in place.items()}
-        each = [self.seams[seam] for seam in place]
-        after, after_any = (
-            [frozenset(names[name] for name in wanted if name in names) for wanted in several]
-            for several in ([seam.after for seam in each], [seam.after_any for seam in each])
-        )
-        return Before(after, after_any)
-
     def best(self, near: Sequence[int] | None = None) -> Round:
         """Return the best round of states by what is known; its states are numbers of `states`.
 
@@ -253,7 +248,7 @@ class Ordering:
                 last[row[one]] = seconds
             elif one in row and other in row:
                 between[row[one], row[other]] = seconds
-        before = self._before(place)
+        before = waiting([self.seams[seam] for seam in place])
         too_late = np.zeros((len(kept), len(place)), dtype=bool)
         for k, state in enumerate(kept):
             seams = self._too_late.get(self.states[state].plan, ())

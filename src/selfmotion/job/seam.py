@@ -17,6 +17,7 @@ from selfmotion.basics import (
 from selfmotion.collision import Obstacle
 from selfmotion.constraints import Constraint
 from selfmotion.costs import Cost
+from selfmotion.job.stops import Before
 from selfmotion.motion import NodeNullMotion, NullMotion, reversed_motion
 from selfmotion.path import STILL, Path, Reversed
 from selfmotion.problem import Problem, rest_orders
@@ -216,3 +217,13 @@ def _names(given: object, what: str) -> tuple[str, ...]:
     if not isinstance(given, list | tuple) or not all(isinstance(name, str) for name in given):
         raise ProblemError(f"{what} is {shown(given)}, expected a list of names")
     return tuple(given)
+
+
+def waiting(seams: Sequence[Seam]) -> Before:
+    """Return what has to come before what of seams, by their places in the list."""
+    places = {seam.name: k for k, seam in enumerate(seams)}
+    after, after_any = (
+        [frozenset(places[name] for name in wanted if name in places) for wanted in several]
+        for several in ([seam.after for seam in seams], [seam.after_any for seam in seams])
+    )
+    return Before(after, after_any)

@@ -1,6 +1,6 @@
 """Problems at another place: the part, or the arm, stands elsewhere."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -110,35 +110,35 @@ class Places:
 
         As well as it can be, where it is to be `thorough`; among many places a quick 'no' counts.
         """
-        plans: list[Plan] = []
-        total = 0.0
-        for k, problem in enumerate(self.at(place)):
-            try:
-                if thorough:
-                    found = plan(problem)
-                elif near:
-                    found = _quickly(problem, near[k], _NEAR, _PATIENCE_NEAR)
-                else:
-                    _check_reach(problem)
-                    found = _quickly(problem, None, _QUICK, _PATIENCE)
-            except SelfmotionError as error:
-                return Tried(place, np.inf, str(error))
-            if not found.certificate.verified:
-                return Tried(place, np.inf, found.certificate.verdict)
-            plans.append(found)
-            total += found.report.cost
-        return Tried(place, total, "", tuple(plans))
+
+        def planned(k: int, problem: Problem) -> Plan:
+            if thorough:
+                return plan(problem)
+            if near:
+                return _quickly(problem, near[k], _NEAR, _PATIENCE_NEAR)
+            _check_reach(problem)
+            return _quickly(problem, None, _QUICK, _PATIENCE)
+
+        return self._each(place, planned)
 
     def corrected(self, place: Array, near: Sequence[Plan]) -> Tried:
         """Plan at a place from plans near by; a start that is given moves onto the path there."""
+
+        def planned(k: int, problem: Problem) -> Plan:
+            start = near[k].problem.given_start
+            if start is None:
+                return _quickly(problem, near[k], _NEAR, _PATIENCE)
+            there = problem.changed(start=start_on_path(problem.follows, start))
+            return _quickly(there, near[k], None, _PATIENCE)
+
+        return self._each(place, planned)
+
+    def _each(self, place: Array, planned: Callable[[int, Problem], Plan]) -> Tried:
+        """Return what comes of all problems at a place, each planned in some way."""
         plans: list[Plan] = []
-        for problem, known in zip(self.at(place), near, strict=True):
-            start = known.problem.given_start
+        for k, problem in enumerate(self.at(place)):
             try:
-                if start is not None:
-                    problem = problem.changed(start=start_on_path(problem.follows, start))
-                search = _NEAR if start is None else None
-                found = _quickly(problem, known, search, _PATIENCE)
+                found = planned(k, problem)
             except SelfmotionError as error:
                 return Tried(place, np.inf, str(error))
             if not found.certificate.verified:

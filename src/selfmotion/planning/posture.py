@@ -10,13 +10,10 @@ _WHOLE, _ROUNDING = 2.0 * np.pi, 1e-9
 
 def usual_posture(robot: RobotModel) -> Array:
     """Return home (n,) where it is known, else the middle of the joints' limits [rad or m]."""
-    limited = np.isfinite(robot.lower) & np.isfinite(robot.upper)
     try:
-        return np.where(limited, robot.home, 0.0)
+        return robot.home
     except RobotError:
-        middle = np.zeros(robot.dof)
-        middle[limited] = 0.5 * (robot.lower[limited] + robot.upper[limited])
-        return middle
+        return np.asarray(0.5 * np.add(*robot.finite_limits()))
 
 
 def far_from_usual(robot: RobotModel, motions: Array) -> Array:

@@ -6,7 +6,7 @@ from selfmotion.basics import Array, InverseKinematicsError, ProblemError, shown
 from selfmotion.motion import NullMotionTable, Trajectory
 from selfmotion.problem import Problem
 from selfmotion.result import Plan
-from selfmotion.robot import null_space
+from selfmotion.robot import RobotModel, null_space
 from selfmotion.search import Manifold
 
 
@@ -14,11 +14,15 @@ def check_warm_start(plan: object, problem: Problem) -> None:
     """Raise ProblemError where a plan is none, or one of another arm."""
     if not isinstance(plan, Plan):
         raise ProblemError(f"warm_start is {shown(plan)}, expected a Plan; load_plan reads one")
-    theirs, ours = plan.robot.joint_names, problem.robot.joint_names
-    if theirs != ours:
+    check_joints(plan.robot, problem.robot)
+
+
+def check_joints(theirs: RobotModel, ours: RobotModel) -> None:
+    """Raise ProblemError where what is known has another arm's joints."""
+    if theirs.joint_names != ours.joint_names:
         raise ProblemError(
-            f"warm_start: its joints are {', '.join(theirs)}, expected those of "
-            f"{problem.robot.name}: {', '.join(ours)}"
+            f"warm_start: its joints are {', '.join(theirs.joint_names)}, expected those of "
+            f"{ours.name}: {', '.join(ours.joint_names)}"
         )
 
 

@@ -83,7 +83,7 @@ def _joined(a: KeyFrames, b: KeyFrames) -> KeyFrames:
 
 
 def _poses(robot: RobotModel, trajectory: Trajectory, times: Array) -> KeyFrames:
-    return poses_of(robot, trajectory(_clock(trajectory, times)), times)
+    return poses_of(robot, trajectory(clock_of(trajectory, times)), times)
 
 
 def poses_of(robot: RobotModel, q: Array, times: Array) -> KeyFrames:
@@ -92,7 +92,7 @@ def poses_of(robot: RobotModel, q: Array, times: Array) -> KeyFrames:
     return KeyFrames(times, poses[..., :3], poses[..., 3:])
 
 
-def _clock(trajectory: Trajectory, times: Array) -> Array:
+def clock_of(trajectory: Trajectory, times: Array) -> Array:
     """Turn times from the start of the motion into the trajectory's own."""
     return np.asarray(np.minimum(trajectory.t[0] + times, trajectory.t[-1]))
 
@@ -185,7 +185,7 @@ def curves(
     chain, task = follow.chain, follow.task
     base, world = chain.base_placement, chain.to_base()
     times = np.linspace(0.0, trajectory.duration, points)
-    clock = _clock(trajectory, times)
+    clock = clock_of(trajectory, times)
     q, qd, qdd = (trajectory(clock, order) for order in range(3))
     asked = torque_limits(plan)
     target, carrier = follow.path.samples(clock), np.empty((points, 4, 4))

@@ -7,7 +7,7 @@ import numpy as np
 from selfmotion.basics import Array
 from selfmotion.motion import Trajectory
 from selfmotion.problem import Problem
-from selfmotion.replay.motion import KeyFrames, poses_of
+from selfmotion.replay.motion import KeyFrames, clock_of, poses_of
 from selfmotion.robot import null_space
 from selfmotion.search import Manifold
 
@@ -48,10 +48,9 @@ def self_motion(problem: Problem, trajectory: Trajectory) -> SelfMotion | None:
         return None
     robot = problem.robot
     times = np.linspace(0.0, trajectory.duration, _TIMES)
-    q = trajectory(np.minimum(trajectory.t[0] + times, trajectory.t[-1]))
+    q = trajectory(clock_of(trajectory, times))
     joint = _chosen(problem, q)
-    manifold, targets = Manifold(follows, robot.lower, robot.upper), follows.targets(times)
-    sides = [_stepped(problem, manifold, targets, q, joint, way * _STEP) for way in (-1.0, 1.0)]
+    sides = [_stepped(problem, times, q, joint, way * _STEP) for way in (-1.0, 1.0)]
     steps = [*reversed(sides[0]), q, *sides[1]]
     return SelfMotion(
         robot.joint_names[joint], tuple(poses_of(robot, step, times) for step in steps)
@@ -71,14 +70,14 @@ def _chosen(problem: Problem, q: Array) -> int:
     return int(np.argmax(moved))
 
 
-def _stepped(
-    problem: Problem, manifold: Manifold, targets: Array, q: Array, joint: int, step: float
-) -> list[Array]:
+def _stepped(problem: Problem, times: Array, q: Array, joint: int, step: float) -> list[Array]:
     """Return configurations (K, n) step by step to one side; those at a limit stay there."""
-    robot, found, moves = problem.robot, list[Array](), np.full(len(q), fill_value=True)
-    held = problem.follows.held(np.linspace(0.0, problem.path.duration, len(q)))
+    robot, follows = problem.robot, problem.follows
+    manifold = Manifold(follows, robot.lower, robot.upper)
+    targets, held = follows.targets(times), follows.held(times)
+    found, moves = list[Array](), np.full(len(q), fill_value=True)
     for _ in range(_STEPS):
-        basis = null_space(problem.follows.jacobians(q))
+        basis = null_space(follows.jacobians(q))
         # The least joint speed at which the joint turns by one: N Nᵀ e / (eᵀ N Nᵀ e).
         along = np.einsum("knr,kr->kn", basis, basis[:, joint])
         share = along[:, joint]

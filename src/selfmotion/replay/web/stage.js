@@ -38,6 +38,14 @@ function tracks({ t, position, quaternion }, joint, joints) {
   ];
 }
 
+// Rows of tables at a time, between those at even times.
+function between(t, time) {
+  const place = Math.min(time / t[t.length - 1], 1) * (t.length - 1);
+  const k = Math.min(Math.floor(place), t.length - 2);
+  return (table, width) => Array.from({ length: width }, (_, i) => table[width * k + i]
+    + (place - k) * (table[width * (k + 1) + i] - table[width * k + i]));
+}
+
 class Stage {
   constructor(element, content) {
     this.element = element;
@@ -136,9 +144,7 @@ class Stage {
 
   // Where the tool is, in meshcat's axes with y up.
   toolAt({ tool, t }, time) {
-    const place = Math.min(time / t[t.length - 1], 1) * (t.length - 1);
-    const k = Math.min(Math.floor(place), t.length - 2);
-    const [x, y, z] = [0, 1, 2].map((i) => tool[3 * k + i] + (place - k) * (tool[3 * k + 3 + i] - tool[3 * k + i]));
+    const [x, y, z] = between(t, time)(tool, 3);
     return new MeshCat.THREE.Vector3(x, z, -y);
   }
 
@@ -214,12 +220,9 @@ class Stage {
 
   // Place the tool's ellipsoid: a symmetric matrix per sample, interpolated between samples.
   stretch({ matrix, tool, t }, time, size) {
-    const place = Math.min(time / t[t.length - 1], 1) * (t.length - 1);
-    const k = Math.min(Math.floor(place), t.length - 2);
-    const mix = (array, width, i) => array[width * k + i]
-      + (place - k) * (array[width * (k + 1) + i] - array[width * k + i]);
-    const m = Array.from({ length: 9 }, (_, i) => size * mix(matrix, 9, i));
-    const p = [0, 1, 2].map((i) => mix(tool, 3, i));
+    const at = between(t, time);
+    const m = at(matrix, 9).map((value) => size * value);
+    const p = at(tool, 3);
     this.ball.matrix.set(
       m[0], m[1], m[2], p[0], m[3], m[4], m[5], p[1], m[6], m[7], m[8], p[2], 0, 0, 0, 1);
     this.ball.matrixWorldNeedsUpdate = true;
