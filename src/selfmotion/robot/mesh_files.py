@@ -2,6 +2,7 @@
 
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Collection
+from functools import lru_cache
 from pathlib import Path
 from typing import NamedTuple
 
@@ -51,12 +52,16 @@ def bad_meshes(urdf: Urdf, tag: str) -> tuple[BadMesh, ...]:
 
 def mesh_digests(urdf: Urdf, tag: str) -> dict[str, str]:
     """Return the SHA-256 of the mesh files of all ``<visual>`` or ``<collision>`` elements."""
-    root, found = ElementTree.fromstring(urdf.text), {}
-    for mesh in root.iterfind(f"link/{tag}/geometry/mesh"):
-        place = _place(urdf, mesh.get("filename", ""))
-        if place is not None:
-            found[str(place)] = digest_of_file(place)
-    return found
+    places = (_place(urdf, file) for file in _mesh_names(urdf.text, tag))
+    return {str(place): digest_of_file(place) for place in places if place is not None}
+
+
+# Each plan asks for them, and reading the text takes as long as a seventh of a plan.
+@lru_cache(maxsize=16)
+def _mesh_names(text: str, tag: str) -> tuple[str, ...]:
+    """Return the addresses of the meshes of all such elements."""
+    found = ElementTree.fromstring(text).iterfind(f"link/{tag}/geometry/mesh")
+    return tuple(dict.fromkeys(mesh.get("filename", "") for mesh in found))
 
 
 def _place(urdf: Urdf, file: str) -> Path | None:
