@@ -11,15 +11,14 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.basics import Counts
-from selfmotion.planning.attempts import ATTEMPTS
-from selfmotion.planning.beginning import Beginning
+from selfmotion.planning.candidate import Candidate
 from selfmotion.planning.effort import Effort
-from selfmotion.planning.for_nodes import first_nodes
-from selfmotion.planning.nodes import NodeDescent
-from selfmotion.planning.session import Session
+from selfmotion.planning.grids import first_nodes
+from selfmotion.planning.polish import Polisher
+from selfmotion.planning.steps import STEPS
 
 Circle = Callable[..., sm.Problem]
-NAMES = [name for name, _ in ATTEMPTS]
+NAMES = [name for name, _ in STEPS]
 PAGE = Path(__file__).parents[2] / "docs" / "pages" / "tried.md"
 
 
@@ -93,10 +92,11 @@ def test_what_costs_more_freely_is_not_optimised_with_limits(
     limits = [sm.constraints.JointVelocityLimits(0.9 * fastest)]
     problem = dataclasses.replace(panda_circle("position"), constraints=limits)
     effort = Effort(None, None, None, Counts())
-    session = Session(Beginning.of(problem, effort, problem.given_start, free=False))
-    session.minimize(dearest=free.report.cost * (0.5 if dearer else 2.0))
-    assert session.is_hopeless == dearer
-    assert dearer or not session.violations
+    assert problem.given_start is not None
+    candidate = Candidate(problem, effort, problem.given_start, free=False)
+    candidate.polish(dearest=free.report.cost * (0.5 if dearer else 2.0))
+    assert candidate.is_hopeless == dearer
+    assert dearer or not candidate.violations
 
 
 def test_what_conditions_did_not_count_for_is_none_that_keeps_them(panda_circle: Circle) -> None:
@@ -108,20 +108,20 @@ def test_what_conditions_did_not_count_for_is_none_that_keeps_them(panda_circle:
     start = np.array(problem.given_start)
     bound = problem.bind_constraints(start, start)
     effort = Effort(None, lambda iteration: True, None, Counts())
-    descent = NodeDescent(problem, effort, bound, free=False)
-    found = descent.near([free.trajectory], first_nodes(problem), dearest=10.0 * free.report.cost)
-    assert descent.history
+    polisher = Polisher(problem, effort, bound, free=False)
+    found = polisher.near([free.trajectory], first_nodes(problem), dearest=10.0 * free.report.cost)
+    assert polisher.history
     assert found is not None
     assert found.violations
-    assert descent.latest is None
+    assert polisher.latest is None
     # One that does is kept.
     easy = dataclasses.replace(
         problem, constraints=[sm.constraints.JointVelocityLimits(2.0 * fastest)]
     )
     bound = easy.bind_constraints(start, start)
-    descent = NodeDescent(easy, effort, bound, free=False)
-    descent.near([free.trajectory], first_nodes(easy))
-    assert descent.latest is not None
+    polisher = Polisher(easy, effort, bound, free=False)
+    polisher.near([free.trajectory], first_nodes(easy))
+    assert polisher.latest is not None
 
 
 def test_an_optimum_that_takes_the_arm_into_itself_goes_on_at_once(panda: sm.RobotModel) -> None:

@@ -7,10 +7,9 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.basics import Counts, silent
-from selfmotion.planning.draft import Draft
 from selfmotion.planning.effort import Effort
-from selfmotion.planning.known import Known
-from selfmotion.planning.long_paths import is_long
+from selfmotion.planning.planner import Planner
+from selfmotion.planning.postures import is_long
 from selfmotion.planning.settings import VERY_LONG_WAY
 from support.arms import robot_named
 
@@ -38,9 +37,9 @@ def loops(planar: sm.RobotModel, count: int, start: bool = False) -> sm.Problem:
     return sm.Problem(planar, path, "planar", first, constraints=limits, rest=False)
 
 
-def draft_of(problem: sm.Problem) -> Draft:
+def planner_of(problem: sm.Problem) -> Planner:
     effort = Effort(None, None, None, Counts())
-    return Draft(problem, effort, sm.Search(), sm.Tolerance(), silent, Known())
+    return Planner(problem, effort, sm.Search(), sm.Tolerance(), silent)
 
 
 @pytest.fixture(scope="module")
@@ -82,7 +81,7 @@ def test_short_paths_and_other_null_motions_go_the_usual_way(planar: sm.RobotMod
     few, many = loops(planar, 2), loops(planar, 15)
     cubic = sm.Problem(planar, many.path, "planar", null_motion=sm.PolynomialNullMotion())
     for problem, long in ((few, False), (many, True), (cubic, False)):
-        assert is_long(draft_of(problem)) is long
+        assert is_long(planner_of(problem)) is long
 
 
 @pytest.mark.parametrize(

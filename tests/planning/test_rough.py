@@ -7,9 +7,9 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.basics import Array, Counts
-from selfmotion.planning import rough as rough_motions
+from selfmotion.planning import screening as rough_motions
 from selfmotion.planning.effort import Effort
-from selfmotion.planning.rough import Ranking
+from selfmotion.planning.screening import Ranking
 from selfmotion.search import start_candidates
 from support.arms import robot_named
 from support.paths import line_of

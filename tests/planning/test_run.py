@@ -12,8 +12,8 @@ import yourdfpy
 import selfmotion as sm
 from selfmotion.certificate import Certificate, Extreme
 from selfmotion.optimise import Status
-from selfmotion.planning.gather import message_of, status_of
-from selfmotion.planning.nodes import NodeDescent
+from selfmotion.planning.outcome import message_of, status_of
+from selfmotion.planning.polish import Polisher
 from support.arms import robot_named
 
 # Share of the cost that finer nodes may still save.
@@ -210,7 +210,7 @@ def test_what_is_verified_is_not_said_to_contradict(
     panda_circle: Callable[[str], sm.Problem], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Where nodes lead nowhere the motion at x = 0 stands, and may keep all."""
-    monkeypatch.setattr(NodeDescent, "near", lambda *_: None)
+    monkeypatch.setattr(Polisher, "near", lambda *_: None)
     report = sm.plan(panda_circle("position")).require().report
     assert report.status is Status.PRECISION
     assert report.message == Status.PRECISION.message

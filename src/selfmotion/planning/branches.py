@@ -8,8 +8,8 @@ import numpy as np
 from selfmotion.basics import Array, Progress, SelfmotionError, description_of, silent
 from selfmotion.costs import Cost, FunctionCost
 from selfmotion.optimise import Status
+from selfmotion.planning.grids import rough_grid
 from selfmotion.planning.posture import wound_back
-from selfmotion.planning.rough import rough_grid
 from selfmotion.planning.run import plan
 from selfmotion.planning.search import Search
 from selfmotion.planning.settings import (

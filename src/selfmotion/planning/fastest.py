@@ -22,7 +22,7 @@ from selfmotion.constraints import Constraint
 from selfmotion.costs import LimitUse
 from selfmotion.optimise import Status
 from selfmotion.path import Path, Retimed
-from selfmotion.planning.deadline import Deadline
+from selfmotion.planning.effort import Deadline
 from selfmotion.planning.kept_costs import KeptCosts
 from selfmotion.planning.run import plan, told_of
 from selfmotion.planning.search import Search
@@ -132,10 +132,9 @@ def fastest(
     check_no_feed(problem)
     kept = KeptCosts.of(problem, {} if keep is None else keep)
     rounds = _Rounds(problem, *rate_limits(problem, acceleration, velocity), kept)
-    clock = Deadline(np.inf)
-    if deadline is not None:
-        clock = Deadline.after(as_number(deadline, "deadline", above=0.0))
-    options = _Options(search, tolerance, clock, clock.telling(progress))
+    seconds = None if deadline is None else as_number(deadline, "deadline", above=0.0)
+    clock = Deadline.after(seconds)
+    options = _Options(search, tolerance, clock, clock.checked_by(progress))
     status = Status.CONVERGED
     try:
         with held_interruption():

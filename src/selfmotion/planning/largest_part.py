@@ -9,9 +9,8 @@ from selfmotion.motion import Evaluation, Grid, Sampling
 from selfmotion.optimise import Status
 from selfmotion.paper import Guide, StillMotion
 from selfmotion.path import Section
-from selfmotion.planning.beginning import Beginning
+from selfmotion.planning.candidate import Candidate
 from selfmotion.planning.effort import Effort
-from selfmotion.planning.session import Session
 from selfmotion.planning.settings import (
     EDGE_MARGIN,
     END_AGREEMENT,
@@ -30,51 +29,52 @@ from selfmotion.planning.settings import (
 from selfmotion.problem import Problem
 from selfmotion.search import Reach
 
-_Candidate = tuple[Array, Guide | None]
+_Begin = tuple[Array, Guide | None]
+"""A start, and a null motion in place of x = 0."""
 
 
 @dataclass(frozen=True, eq=False)
-class LargestPart:
-    """A motion along the first part of a path.
+class Part:
+    """A motion along the first part of a path, or all of it.
 
     Attributes
     ----------
     problem : Problem
         That of the part.
-    session : Session
+    candidate : Candidate
         Optimised.
     ending : str
-        Why it goes no further; "" where the part is the whole after all.
+        Why it goes no further; "" where the part is the whole.
     why : str
         The reasons alone.
     """
 
     problem: Problem
-    session: Session
-    ending: str
+    candidate: Candidate
+    ending: str = ""
     why: str = ""
 
 
 @dataclass(frozen=True, eq=False)
 class _Attempt:
-    """A candidate on a part: its session unless it broke down, and how far all was kept."""
+    """What came of a start on a part: no candidate where it broke down; how far all was kept."""
 
-    candidate: _Candidate
+    begin: _Begin
     problem: Problem
-    session: Session | None
+    candidate: Candidate | None
     kept_until: float
     found: Evaluation | None
     trouble: str = ""
 
     @property
     def arrived(self) -> bool:
-        return self.session is not None and not self.session.violations
+        return self.candidate is not None and not self.candidate.violations
 
     @property
     def arrived_with_room(self) -> bool:
         """Whether a finer grid will find a motion, too: not on the last part that is possible."""
-        session = self.session
-        return session is not None and self.arrived and session.status is not Status.PRECISION
+        candidate = self.candidate
+        return candidate is not None and self.arrived and candidate.status is not Status.PRECISION
 
     @property
     def cost(self) -> float:
@@ -82,15 +82,15 @@ class _Attempt:
 
     @property
     def reason(self) -> str:
-        return self.trouble if self.session is None else "; ".join(self.session.violations)
+        return self.trouble if self.candidate is None else "; ".join(self.candidate.violations)
 
     @property
     def cut_short(self) -> bool:
         """Whether the user ended the optimisation."""
-        return self.session is not None and self.session.cut_short
+        return self.candidate is not None and self.candidate.cut_short
 
 
-def largest_part(problem: Problem, reach: Reach, effort: Effort) -> LargestPart | None:
+def largest_part(problem: Problem, reach: Reach, effort: Effort) -> Part | None:
     """Return an optimised motion along the largest part [0, t] of the path that can be found.
 
     Motions up to where single poses are in reach, by the same optimiser as any; where none
@@ -104,11 +104,11 @@ def largest_part(problem: Problem, reach: Reach, effort: Effort) -> LargestPart 
     reach : Reach
         How far single poses are in reach.
     effort : Effort
-        What the sessions share.
+        What candidates share.
 
     Returns
     -------
-    LargestPart or None
+    Part or None
         None where nothing worth the name is left.
     """
     goal = reach.time * (1.0 - EDGE_MARGIN) if reach.reason else reach.time
@@ -120,8 +120,8 @@ def largest_part(problem: Problem, reach: Reach, effort: Effort) -> LargestPart 
     few = reach.starts if given else reach.starts[:: -(-len(reach.starts) // PART_STARTS)]
     few = [_start_of(first, problem, q) for q in few]
     starts = _apart(first, few) if effort.apart else few
-    for candidate in _candidates(first, starts)[: PART_FINALISTS if given else 1]:
-        attempts.append(_attempt(first, candidate, effort))
+    for begin in _beginnings(first, starts)[: PART_FINALISTS if given else 1]:
+        attempts.append(_attempt(first, begin, effort))
         if attempts[-1].cut_short:
             return _part(problem, attempts[-1], reach, "")
     arrived = [attempt for attempt in attempts if attempt.arrived]
@@ -131,8 +131,8 @@ def largest_part(problem: Problem, reach: Reach, effort: Effort) -> LargestPart 
     return _bisect(problem, furthest, reach, effort)
 
 
-def _bisect(problem: Problem, failed: _Attempt, reach: Reach, effort: Effort) -> LargestPart | None:
-    """Return the candidate's motion on the largest part on which it arrives."""
+def _bisect(problem: Problem, failed: _Attempt, reach: Reach, effort: Effort) -> Part | None:
+    """Return the motion of a start on the largest part on which it arrives."""
     arrived: _Attempt | None = None
     edge: _Attempt | None = None
     low, high = 0.0, failed.problem.path.duration
@@ -149,7 +149,7 @@ def _bisect(problem: Problem, failed: _Attempt, reach: Reach, effort: Effort) ->
         if probe < LEAST_PART * problem.path.duration or high - low < agreement * high:
             break
         part = _until(problem, probe)
-        attempt = _attempt(part, _candidate_of(part, failed), effort)
+        attempt = _attempt(part, _begin_of(part, failed), effort)
         if attempt.arrived_with_room or attempt.cut_short:
             arrived, low = attempt, probe
         else:
@@ -161,33 +161,33 @@ def _bisect(problem: Problem, failed: _Attempt, reach: Reach, effort: Effort) ->
     return None if arrived is None else _part(problem, arrived, reach, failed.reason)
 
 
-def _part(problem: Problem, found: _Attempt, reach: Reach, further: str) -> LargestPart:
+def _part(problem: Problem, found: _Attempt, reach: Reach, further: str) -> Part:
     """Return the part, with the reason why nothing goes `further` in words."""
-    if found.session is None:
+    if found.candidate is None:
         raise RuntimeError("a part is made of a motion that was found")
     nearer = "gets nearer to that" if reach.reason else "goes further"
     reasons = [reach.reason] if reach.reason else []
     reasons += [f"no motion found {nearer}: {further}"] if further else []
-    return _ending_at(problem, found.problem, found.session, "; ".join(reasons))
+    return _ending_at(problem, found.problem, found.candidate, "; ".join(reasons))
 
 
-def shorter_part(problem: Problem, part: LargestPart, effort: Effort) -> LargestPart | None:
+def shorter_part(problem: Problem, part: Part, effort: Effort) -> Part | None:
     """Return a motion on a part that ends a little earlier; None where none is found.
 
     For one whose last bit is too rough: near a singular pose rates grow between its nodes.
     """
     first = _until(problem, part.problem.path.duration * (1.0 - PART_BACK))
-    start = _start_of(first, part.problem, part.session.motion().trajectory.q[0])
+    start = _start_of(first, part.problem, part.candidate.evaluation().trajectory.q[0])
     attempt = _attempt(first, (start, None), effort)
-    if attempt.session is None or not attempt.arrived:
+    if attempt.candidate is None or not attempt.arrived:
         return None
-    return _ending_at(problem, first, attempt.session, part.why)
+    return _ending_at(problem, first, attempt.candidate, part.why)
 
 
-def _ending_at(problem: Problem, part: Problem, session: Session, why: str) -> LargestPart:
+def _ending_at(problem: Problem, part: Problem, candidate: Candidate, why: str) -> Part:
     end, whole = part.path.duration, problem.path.duration
     ending = f"the motion ends at t = {end:.6g} s of {whole:.6g} s: {why}"
-    return LargestPart(part, session, ending if end < whole else "", why)
+    return Part(part, candidate, ending if end < whole else "", why)
 
 
 def _until(problem: Problem, time: float) -> Problem:
@@ -208,31 +208,31 @@ def _start_of(part: Problem, problem: Problem, q: Array) -> Array:
     return np.asarray(part.at(np.zeros(1), own)[0])
 
 
-def _candidate_of(part: Problem, failed: _Attempt) -> _Candidate:
-    """Return the candidate of another part as one of a part, which may have fewer joints."""
-    start, guide = failed.candidate
+def _begin_of(part: Problem, failed: _Attempt) -> _Begin:
+    """Return where another part begins as a start of a part, which may have fewer joints."""
+    start, guide = failed.begin
     if isinstance(guide, _Push):
         guide = guide.of(part.asked.robot.dof, part.robot.dof)
     return _start_of(part, failed.problem, start), guide
 
 
-def _attempt(problem: Problem, candidate: _Candidate, effort: Effort) -> _Attempt:
+def _attempt(problem: Problem, begin: _Begin, effort: Effort) -> _Attempt:
     try:
-        start, guide = candidate
+        start, guide = begin
         free = problem.given_start is None
-        session = Session(Beginning.of(problem, effort, start, free=free, guide=guide))
+        candidate = Candidate(problem, effort, start, free=free, guide=guide)
     except BreakdownError as error:
         reason = f"it runs into a singular pose near t = {error.time:.6g} s"
-        return _Attempt(candidate, problem, None, error.time, None, reason)
+        return _Attempt(begin, problem, None, error.time, None, reason)
     try:
-        session.minimize()
+        candidate.polish()
     except KeyboardInterrupt:
-        session.end(Status.INTERRUPTED)
-    found = session.motion()
+        candidate.end(Status.INTERRUPTED)
+    found = candidate.evaluation()
     motion = found.trajectory
     # Constraints that cannot be met may throw it far off: x = 0 then tells more.
-    until = max(_kept_until(problem, motion.t, motion.q, motion.qd), -_rank(problem, *candidate)[1])
-    return _Attempt(candidate, problem, session, until, found)
+    until = max(_kept_until(problem, motion.t, motion.q, motion.qd), -_rank(problem, *begin)[1])
+    return _Attempt(begin, problem, candidate, until, found)
 
 
 def _apart(problem: Problem, starts: list[Array]) -> list[Array]:
@@ -240,13 +240,13 @@ def _apart(problem: Problem, starts: list[Array]) -> list[Array]:
     return [q for q in starts if problem.keeps_off_itself(q[None])] or starts
 
 
-def _candidates(problem: Problem, starts: list[Array]) -> list[_Candidate]:
+def _beginnings(problem: Problem, starts: list[Array]) -> list[_Begin]:
     """Return starts, and null motions in place of x = 0 where that breaks down; the best first."""
     ranked = sorted(((start, None) for start in starts), key=lambda each: _rank(problem, *each))
     furthest = ranked[0][0]
     if -_rank(problem, furthest, None)[0] >= problem.path.duration:
         return list(ranked)
-    pushed: list[_Candidate] = [*ranked, *((furthest, push) for push in _pushes(problem, furthest))]
+    pushed: list[_Begin] = [*ranked, *((furthest, push) for push in _pushes(problem, furthest))]
     return sorted(pushed, key=lambda each: _rank(problem, *each))
 
 
@@ -275,9 +275,9 @@ def _pushes(problem: Problem, start: Array) -> list[Guide]:
 
 
 def _rank(problem: Problem, start: Array, guide: Guide | None) -> tuple[float, float, float]:
-    """Return how far a candidate stays on the path and within its limits [-s], and its effort.
+    """Return how far a motion stays on the path and within its limits [-s], and its effort.
 
-    The smaller, the better.
+    That without self-motion, from a start; the smaller, the better.
     """
     path = problem.path
     steps = FREE_FOLLOWED_STEPS if problem.given_start is None else FOLLOWED_STEPS

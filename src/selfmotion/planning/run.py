@@ -1,7 +1,6 @@
 """From a problem to a plan."""
 
 from dataclasses import replace
-from math import inf
 
 from selfmotion.basics import (
     PlanError,
@@ -18,15 +17,13 @@ from selfmotion.basics import (
 )
 from selfmotion.certificate import Tolerance
 from selfmotion.optimise import Callback, Optimizer, Status
-from selfmotion.planning.attempts import go_through
-from selfmotion.planning.deadline import Deadline, TimedCounts
-from selfmotion.planning.draft import Draft
-from selfmotion.planning.effort import Effort
-from selfmotion.planning.for_nodes import is_published
-from selfmotion.planning.gather import gathered
-from selfmotion.planning.known import Known
+from selfmotion.planning.effort import Deadline, Effort
+from selfmotion.planning.grids import is_published
+from selfmotion.planning.outcome import gathered
+from selfmotion.planning.planner import Planner
 from selfmotion.planning.search import Search
 from selfmotion.planning.settings import DAMPED_EVALUATIONS
+from selfmotion.planning.steps import go_through
 from selfmotion.planning.warm_start import check_warm_start
 from selfmotion.problem import Problem, check_feeds_of, check_problem
 from selfmotion.result import Plan
@@ -116,13 +113,11 @@ def plan(
     if callback is not None:
         as_called(callback, "callback")
     check_feeds_of(problem)
-    clock = Deadline(inf)
-    if deadline is not None:
-        clock = Deadline.after(as_number(deadline, "deadline", above=0.0))
+    seconds = None if deadline is None else as_number(deadline, "deadline", above=0.0)
+    clock = Deadline.after(seconds)
     if problem.damping is not None and max_evaluations is None:
         max_evaluations = DAMPED_EVALUATIONS
-    counts = TimedCounts(deadline=clock)
-    effort = Effort(optimizer, callback, max_evaluations, counts)
+    effort = Effort(optimizer, callback, max_evaluations, clock)
     if problem.relaxations and is_published(problem, effort):
         raise ProblemError(
             "relaxations: the published method keeps nothing but given ends, so that the tool "
@@ -132,17 +127,17 @@ def plan(
     if warm_start is not None:
         known = problem.with_own(warm_start.trajectory, warm_start.path)
         warm_start = replace(warm_start, trajectory=known)
-    draft = Draft(
+    planner = Planner(
         problem,
         effort,
         search,
         Tolerance.of(tolerance),
-        clock.telling(progress),
-        Known(plan=warm_start),
+        clock.checked_by(progress),
+        warm_start=warm_start,
     )
     try:
         with one_blas_thread(), held_interruption():
-            return _planned(draft, clock)
+            return _planned(planner, clock)
     except KeyboardInterrupt:
         if not clock.passed:
             raise
@@ -156,19 +151,19 @@ def plan_along(
     problem: Problem, guide: SequenceGuide, tolerance: Tolerance, progress: Progress
 ) -> Plan:
     """Plan as `plan` does, but try a motion first that is known, near which there should be one."""
-    clock = Deadline(inf)
-    effort = Effort(None, None, None, TimedCounts(deadline=clock))
+    clock = Deadline()
+    effort = Effort(None, None, None, clock)
     problem, chain = problem.augmented, guide.sequence
     guide = SequenceGuide(replace(chain, q=problem.at(chain.t, chain.q)))
-    draft = Draft(problem, effort, Search(), tolerance, progress, Known(guide=guide))
+    planner = Planner(problem, effort, Search(), tolerance, progress, guide=guide)
     with one_blas_thread(), held_interruption():
-        return _planned(draft, clock)
+        return _planned(planner, clock)
 
 
-def _planned(draft: Draft, clock: Deadline) -> Plan:
+def _planned(planner: Planner, clock: Deadline) -> Plan:
     """Return the plan, told of an interruption that came when all was done."""
-    go_through(draft)
-    found = gathered(draft, clock)
+    go_through(planner)
+    found = gathered(planner, clock)
     return told_of(found, Status.INTERRUPTED) if was_interrupted() else found
 
 

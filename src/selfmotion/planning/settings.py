@@ -4,7 +4,7 @@ What these do shows in `make bench` and `make bench-constrained` (single starts)
 bench-starts` (free starts against the best of everything tried) and `make suite-made`.
 """
 
-# --- grids: how fine a motion is computed (session, finish)
+# --- grids: how fine a motion is computed (polish, judge)
 # Agreement of the cost on few nodes and on twice as many, at which a rough motion tells what its
 # start is worth.
 ROUGH_AGREEMENT = 1e-2
@@ -51,7 +51,7 @@ FALLS = 0.7
 ROUGH_GRIDS = 3
 FINER = 4
 
-# --- long paths (long_paths)
+# --- long paths (postures)
 # A path is long where the tool goes more than so many times the arm's reach: x = 0 begins to drift
 # away. Of one that is longer than the second, rough motions from many starts tell nothing any more.
 LONG_WAY, VERY_LONG_WAY = 5.0, 12.0
@@ -60,7 +60,7 @@ STRETCH_WAY = 2.0
 # Nodes to begin with; the cost on them is right to this share.
 FIRST_NODES, LONG_AGREEMENT = 64, 1e-2
 
-# --- starts and sequences (rough, starts, sequences)
+# --- starts and chains (screening, starts, chains)
 # Where nothing else leads to a motion that keeps the constraints, this many times more are tried.
 SECOND_EFFORT = 4
 # The shortest chain of a sequence becomes a motion of so many times its waypoints, with more where

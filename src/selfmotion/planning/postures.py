@@ -16,9 +16,9 @@ from selfmotion.motion import Grid, Sampling
 from selfmotion.nodes import NodeMotion
 from selfmotion.optimise import Status
 from selfmotion.path import Section
-from selfmotion.planning.draft import Draft
-from selfmotion.planning.for_nodes import is_on_nodes, most_nodes, resolves
-from selfmotion.planning.nodes import NodeDescent
+from selfmotion.planning.grids import is_on_nodes, most_nodes, resolves
+from selfmotion.planning.planner import Planner
+from selfmotion.planning.polish import Polisher
 from selfmotion.planning.settings import (
     FIRST_NODES,
     LONG_AGREEMENT,
@@ -31,82 +31,82 @@ from selfmotion.planning.warm_start import on_start
 from selfmotion.problem import Problem, asked_of_part
 
 
-def is_long(draft: Draft) -> bool:
+def is_long(planner: Planner) -> bool:
     """Whether the tool's way is many times the arm's reach, and nodes will do for the problem."""
-    problem = draft.problem
-    return problem.way_in_reaches > LONG_WAY and is_on_nodes(problem, draft.effort)
+    problem = planner.problem
+    return problem.way_in_reaches > LONG_WAY and is_on_nodes(problem, planner.effort)
 
 
-def keep_to_posture(draft: Draft) -> None:
+def keep_to_posture(planner: Planner) -> None:
     """Optimise a stretch in the middle, then the whole path from motions in its postures.
 
     Where the user wants no more after the stretch, the motion in its posture has to do.
     """
-    postures, ended = _postures(draft)
+    postures, ended = _postures(planner)
     for number, posture in enumerate(postures, 1):
-        draft.progress("posture", number, len(postures))
-        _optimise(draft, posture, ended)
-        if draft.is_over:
+        planner.progress("posture", number, len(postures))
+        _optimise(planner, posture, ended)
+        if planner.is_over:
             break
     if ended is not None:
-        _end(draft, ended)
+        _end(planner, ended)
 
 
-def _end(draft: Draft, ended: Status) -> None:
+def _end(planner: Planner, ended: Status) -> None:
     """Let what stands be it, where the user wants no more; KeyboardInterrupt where nothing does."""
-    if draft.best is not None:
-        draft.best.end(ended)
+    if planner.best is not None:
+        planner.best.end(ended)
     elif ended is Status.INTERRUPTED:
         raise KeyboardInterrupt
 
 
-def _optimise(draft: Draft, posture: Array, ended: Status | None) -> None:
+def _optimise(planner: Planner, posture: Array, ended: Status | None) -> None:
     """Consider the best motion near one in a posture (n,), if it keeps the conditions.
 
     Where the user wants no more, it has to do where there is no other.
     """
-    problem, start = draft.problem, draft.problem.given_start
+    problem, start = planner.problem, planner.problem.given_start
     if start is None:
         try:
             start = on_start(problem, posture)
         except SelfmotionError:
             return
-    constraints = problem.bind_constraints(start, start, apart=draft.effort.apart)
-    descent = NodeDescent(problem, draft.effort, constraints, free=draft.is_free)
+    constraints = problem.bind_constraints(start, start, apart=planner.effort.apart)
+    polisher = Polisher(problem, planner.effort, constraints, free=planner.is_free)
     if ended is not None:
-        descent.end(ended)
-    motion = _near(descent, problem, start, posture)
+        polisher.end(ended)
+    motion = _near(polisher, problem, start, posture)
     if motion is None:
         return
     try:
-        found = descent.best_near(motion, draft.dearest)
+        found = polisher.best_near(motion, planner.dearest)
     except KeyboardInterrupt:
-        found, ended = descent.latest, Status.INTERRUPTED
+        found, ended = polisher.latest, Status.INTERRUPTED
         if found is None:
             raise
-    if descent.is_stopped:
+    if polisher.is_stopped:
         ended = Status.STOPPED
-    will_do = found is not None and not found.violations and found.cost < draft.dearest
-    if found is None or not (will_do or (ended is not None and draft.best is None)):
+    will_do = found is not None and not found.violations and found.cost < planner.dearest
+    if found is None or not (will_do or (ended is not None and planner.best is None)):
         if ended is not None:
-            _end(draft, ended)
+            _end(planner, ended)
         return
     # Of its velocities eq. 4 keeps the self-motion.
     rates, grid = partial(motion.trajectory, order=1), Grid(motion.grid.t)
-    session = draft.begin(start, free=draft.is_free, guide=rates, grid=grid)
-    if session is not None:
-        session.stand_on(found, descent.history)
+    candidate = planner.begin(start, free=planner.is_free, guide=rates, grid=grid)
+    if candidate is not None:
+        candidate.take(found, polisher.history)
         if ended is not None:
-            session.end(ended)
-        draft.consider(session)
+            candidate.end(ended)
+        planner.consider(candidate)
 
 
-def _postures(draft: Draft) -> tuple[list[Array], Status | None]:
+def _postures(planner: Planner) -> tuple[list[Array], Status | None]:
     """Return mean configurations (n,) of the best motions along a stretch in the middle.
 
     And what ended the search for them, if the user did.
     """
-    problem = draft.problem
+    problem = planner.problem
     middle, half = 0.5, 0.5 * STRETCH_WAY / problem.way_in_reaches
     first, last = (problem.path.duration * share for share in (middle - half, middle + half))
     stretch = problem.changed(
@@ -116,13 +116,13 @@ def _postures(draft: Draft) -> tuple[list[Array], Status | None]:
         rest=False,
     )
     inner = replace(
-        draft, problem=stretch, best=None, failure=None, waiting=(), ranking=None, attempts=[]
+        planner, problem=stretch, best=None, failure=None, waiting=(), ranking=None, attempts=[]
     )
     try:
-        optimise_starts(inner, draft.search.starts, draft.search.finalists)
+        optimise_starts(inner, planner.search.starts, planner.search.finalists)
     except SelfmotionError:
         return [], None
-    motions = [] if inner.best is None else [inner.best.motion().trajectory]
+    motions = [] if inner.best is None else [inner.best.evaluation().trajectory]
     ranked = [] if inner.ranking is None else inner.ranking.ranked
     motions += [motion.trajectory for motion in ranked]
     found: list[Array] = []
@@ -134,9 +134,7 @@ def _postures(draft: Draft) -> tuple[list[Array], Status | None]:
     return found, inner.best.status if inner.is_over and inner.best is not None else None
 
 
-def _near(
-    descent: NodeDescent, problem: Problem, start: Array, posture: Array
-) -> NodeMotion | None:
+def _near(polisher: Polisher, problem: Problem, start: Array, posture: Array) -> NodeMotion | None:
     """Return the motion from a start (n,) that goes to a posture (n,) by self-motion.
 
     On the coarsest nodes on which it costs what it does; None where there is none.
@@ -145,7 +143,7 @@ def _near(
     time = problem.path.duration / problem.way_in_reaches
     grid, most = Grid.aligned(problem.knots, FIRST_NODES), most_nodes(problem)
     while grid.steps <= most:
-        motion = descent.grid(grid.nodes).motion_towards(start, posture, time)
+        motion = polisher.grid(grid.nodes).motion_towards(start, posture, time)
         if motion is not None and resolves(motion, LONG_AGREEMENT):
             return motion
         grid = grid.halved()

@@ -8,14 +8,14 @@ import numpy as np
 from selfmotion.basics import read_only
 from selfmotion.certificate import Certificate
 from selfmotion.optimise import Status
-from selfmotion.planning.deadline import Deadline
-from selfmotion.planning.draft import Draft
-from selfmotion.planning.known import Proved
+from selfmotion.planning.effort import Deadline
+from selfmotion.planning.judge import Judged
+from selfmotion.planning.planner import Planner
 from selfmotion.result import Gap, Plan, Report
 from selfmotion.search import SPACING
 
 
-def gathered(draft: Draft, deadline: Deadline) -> Plan:
+def gathered(planner: Planner, deadline: Deadline) -> Plan:
     """Return the plan.
 
     Raises
@@ -23,15 +23,15 @@ def gathered(draft: Draft, deadline: Deadline) -> Plan:
     KeyboardInterrupt
         The interruptions left no time for a proof.
     """
-    proved = draft.proved
-    if proved is None:
+    judged = planner.judged
+    if judged is None:
         raise KeyboardInterrupt
-    part, finished = proved.part, proved.finished
-    session, motion, still = part.session, finished.motion, finished.still
-    if deadline.passed and session.status is Status.INTERRUPTED:
-        session.end(Status.DEADLINE)
-    counts, standing, check = session.counts, session.standing, finished.certificate
-    status = status_of(session.status, check)
+    part, motion, still, check = judged.part, judged.motion, judged.still, judged.certificate
+    candidate = part.candidate
+    if deadline.passed and candidate.status is Status.INTERRUPTED:
+        candidate.end(Status.DEADLINE)
+    counts, solution = candidate.effort.counts, candidate.solution
+    status = status_of(candidate.status, check)
     report = Report(
         cost=motion.cost,
         initial_cost=still.cost,
@@ -41,43 +41,43 @@ def gathered(draft: Draft, deadline: Deadline) -> Plan:
         gradient_evaluations=counts.gradients,
         jacobian_evaluations=counts.jacobians,
         steps=len(motion.trajectory.t) - 1,
-        iterations=sum(iteration.step > 0.0 for iteration in session.history),
-        history=tuple(session.history),
+        iterations=sum(iteration.step > 0.0 for iteration in candidate.history),
+        history=tuple(candidate.history),
         status=status,
         message=message_of(
             status,
-            session.violations,
+            candidate.violations,
             check,
             ending=part.ending,
-            notes=draft.notes,
-            published=draft.is_published,
+            notes=planner.notes,
+            published=planner.is_published,
         ),
-        seconds=time.perf_counter() - draft.began,
-        gap=_gap(draft, proved),
+        seconds=time.perf_counter() - planner.began,
+        gap=_gap(planner, judged),
         ending=part.ending,
-        active=standing.active,
-        null_motion=standing.null_motion,
-        remaining=standing.remaining,
-        attempts=tuple(draft.attempts),
+        active=solution.active,
+        null_motion=solution.null_motion,
+        remaining=solution.remaining,
+        attempts=tuple(planner.attempts),
     )
     return Plan(
-        problem=draft.problem.asked,
-        trajectory=draft.problem.own(motion.trajectory),
-        initial_trajectory=draft.problem.own(still.trajectory),
-        coefficients=read_only(standing.coefficients),
+        problem=planner.problem.asked,
+        trajectory=planner.problem.own(motion.trajectory),
+        initial_trajectory=planner.problem.own(still.trajectory),
+        coefficients=read_only(solution.coefficients),
         report=report,
         certificate=check,
     )
 
 
-def _gap(draft: Draft, proved: Proved) -> Gap | None:
+def _gap(planner: Planner, judged: Judged) -> Gap | None:
     """Compare a plan with what the global search knows; None where it knows nothing."""
-    if not draft.sequences or proved.part.session is not draft.best:
+    if not planner.sequences or judged.part.candidate is not planner.best:
         return None
-    motion, rival, rival_cost = proved.finished.motion, draft.rival, proved.rival_cost
-    shortest = min((each.sequence for each in draft.sequences), key=lambda each: each.length)
-    weights = draft.problem.robot.joint_weights
-    if rival is not None and rival is draft.best and not rival.violations:
+    motion, rival, rival_cost = judged.motion, planner.rival, judged.rival_cost
+    shortest = min((each.sequence for each in planner.sequences), key=lambda each: each.length)
+    weights = planner.problem.robot.joint_weights
+    if rival is not None and rival is planner.best and not rival.violations:
         rival_cost = motion.cost
     return Gap(
         cost=motion.cost,
@@ -85,7 +85,7 @@ def _gap(draft: Draft, proved: Proved) -> Gap | None:
         length=float((weights * np.abs(np.diff(motion.trajectory(shortest.t), axis=0))).sum()),
         best_length=shortest.length,
         spacing=SPACING,
-        sequences=len(draft.sequences),
+        sequences=len(planner.sequences),
     )
 
 

@@ -1,17 +1,18 @@
 """Rough motions from many starts, and which of them are worth more: on nodes, all at once."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from selfmotion.basics import Array, Flags, Ints, Progress
-from selfmotion.motion import Grid
+from selfmotion.constraints import penalised
+from selfmotion.costs import Samples
+from selfmotion.motion import Sampling
 from selfmotion.nodes import NodeGrid, NodeMotion, Together, minimise
-from selfmotion.planning.apart import apart_of, unlike
 from selfmotion.planning.effort import Effort
-from selfmotion.planning.for_nodes import resolves
+from selfmotion.planning.grids import resolves, rough_grid
 from selfmotion.planning.posture import far_from_usual, wound_back
-from selfmotion.planning.promise import most_promising
 from selfmotion.planning.settings import (
     ABOUT_AS_GOOD,
     AS_CHEAP,
@@ -19,21 +20,17 @@ from selfmotion.planning.settings import (
     ROUGH_AGREEMENT,
     ROUGH_MOTIONS,
     ROUGH_ROUNDS,
-    ROUGH_STEPS,
     SAME_OPTIMUM,
     SAME_TO_DIGITS,
     UNKEPT,
     WITH_CONDITIONS,
 )
 from selfmotion.problem import Problem
+from selfmotion.robot import RobotModel
 from selfmotion.search import carried
 
-
-def rough_grid(problem: Problem) -> Grid:
-    """Return the grid of rough motions."""
-    # A path of many waypoints is crossed in strides: what is rough needs not stop at each.
-    knots = problem.knots if len(problem.knots) <= ROUGH_STEPS else problem.knots[[0, -1]]
-    return Grid.aligned(knots, ROUGH_STEPS)
+Apart = Callable[[Array, Array], Array]
+"""How far a motion (N, n) is from each of others (K, N, n), (K,) [rad or m]."""
 
 
 class Ranking:
@@ -259,3 +256,83 @@ def _hopeful(found: Together) -> Flags:
 
 def _same(a: float, b: float | None) -> bool:
     return b is not None and abs(a - b) <= SAME_TO_DIGITS * abs(a)
+
+
+def most_promising(
+    problem: Problem,
+    starts: Sequence[Array],
+    motions: Array,
+    arrived: Flags,
+    t: Array,
+    apart: Apart,
+) -> list[int]:
+    """Return numbers of starts, the best first, and those last that are near a better one.
+
+    By what the motions cost that follow the path from them without self-motion, and by how much
+    these violate: the start of one that is near a better one moves there by itself. Last of all
+    come those from which the path cannot be followed like that.
+
+    Parameters
+    ----------
+    problem : Problem
+    starts : sequence of (n,)
+    motions : (K, N, n)
+        The motions from them, at few times t (N,) [s].
+    arrived : (K,)
+        Which of them follow the path to its end.
+    apart : callable
+        How far motions are from each other.
+    """
+    merits = np.full(len(starts), np.inf)
+    twists = problem.follows.twists(t)
+    sampling = Sampling.trapezoidal(t)
+    for k in np.flatnonzero(arrived):
+        merits[k] = _merit(problem, motions[k], twists, sampling)
+    order = np.argsort(merits, kind="stable")
+    followed = order[arrived[order]]
+    valleys, slopes = unlike(motions, followed, apart, ONE_VALLEY)
+    return [*valleys, *slopes, *order[~arrived[order]].tolist()]
+
+
+def _merit(problem: Problem, q: Array, twists: Array, sampling: Sampling) -> float:
+    """Return what a motion q (N, n) along the path costs, and more where it violates something.
+
+    `twists` (N, m) are those of the path at the grid's nodes, which are the samples.
+    """
+    still = Samples.along(problem.follows, sampling, q, np.zeros_like(q))
+    J = still.task_jacobian
+    gram = J @ J.transpose(0, 2, 1)
+    try:
+        qd = np.einsum("smn,sm->sn", J, np.linalg.solve(gram, twists[..., None])[..., 0])
+    except np.linalg.LinAlgError:
+        return np.inf
+    samples = replace(still, qd=qd)
+    costs = [float(sampling.weights @ cost.value(samples)) for cost in problem.all_costs]
+    bound = problem.bind_constraints(q[0], q[-1], apart=False)
+    return penalised(sum(costs), bound, samples)
+
+
+def apart_of(robot: RobotModel) -> Apart:
+    """Return how far motions of an arm are from each other, at most, up to whole turns."""
+    turning, sizes = robot.is_revolute, robot.coordinate_sizes
+
+    def apart(motion: Array, others: Array) -> Array:
+        difference = others - motion
+        turns = np.round(difference / (2.0 * np.pi))
+        away = sizes * np.abs(difference - 2.0 * np.pi * turns * turning)
+        return np.asarray(away.max(axis=(1, 2)))
+
+    return apart
+
+
+def unlike(motions: Array, order: Ints, apart: Apart, least: float) -> tuple[list[int], list[int]]:
+    """Return those of motions (K, N, n) that are not near one earlier in an order, and the others.
+
+    Numbers of motions, in that order; farther apart than `least` is not near.
+    """
+    alone: list[int] = []
+    near: list[int] = []
+    for k in order.tolist():
+        is_alone = bool((apart(motions[k], motions[alone]) > least).all())
+        (alone if is_alone else near).append(k)
+    return alone, near

@@ -1,18 +1,23 @@
-"""The shortest chain of the search as a motion of nodes, where that keeps the conditions."""
+"""Motions from the best chains of configurations over all self-motions.
 
-from collections.abc import Sequence
+The shortest chain is a motion of nodes at once, where length is all that is asked for.
+"""
+
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from selfmotion.basics import Array, Flags
+from selfmotion.basics import Array, Flags, NoSequenceError, Progress
 from selfmotion.constraints import BoundConstraint
 from selfmotion.motion import Grid
 from selfmotion.nodes import NodeGrid, NodeMotion
 from selfmotion.optimise import Status
+from selfmotion.planning.candidate import Candidate
 from selfmotion.planning.effort import Effort
-from selfmotion.planning.for_nodes import is_on_nodes
-from selfmotion.planning.on_nodes import MotionOnNodes
-from selfmotion.planning.settings import CHAIN_ROUNDS, FINER_CHAIN
+from selfmotion.planning.grids import is_on_nodes
+from selfmotion.planning.planner import Planner
+from selfmotion.planning.settings import CHAIN_ROUNDS, DEARER, DEARER_CHAIN, FINER_CHAIN
+from selfmotion.planning.solutions import NodeSolution
 from selfmotion.problem import Problem
 from selfmotion.search import LAST_SMOOTHINGS, SequenceGuide, asks_length, shortest_along
 
@@ -22,13 +27,59 @@ _LEAST, _STILL = 1e-2, 1e-9
 # Limits are looked at so often between two nodes.
 _LOOKS = 16
 
+_Searched = Callable[[Problem, np.random.Generator | int, Progress], list[SequenceGuide]]
+
+
+def optimise_sequences(planner: Planner, searched: _Searched, *, chosen: bool) -> None:
+    """Search, and optimise from the best sequences, one after another; note a search in vain.
+
+    What is found is compared with what stands, and `chosen` only if it may be.
+    """
+    try:
+        planner.sequences = searched(planner.problem, planner.search.rng, planner.progress)
+    except NoSequenceError as error:
+        planner.failure = error
+        planner.notes.append(f"global search: {error}")
+    begun: list[Candidate] = []
+    for number, guide in enumerate(planner.sequences, 1):
+        planner.progress("refining sequence", number, len(planner.sequences))
+        candidate = planner.begin(guide.start, free=True, guide=guide)
+        if candidate is None or (begun and _is_hopeless(planner, guide, candidate, begun[0])):
+            continue
+        found = along_chain(planner.problem, candidate.effort, guide, candidate.constraints)
+        if found is not None:
+            candidate.take(found)
+        if begun and begun[0].is_of_chain and not candidate.is_of_chain:
+            continue
+        planner.polish(candidate, chosen=chosen)
+        if planner.is_over:
+            return
+        begun = sorted([*begun, candidate], key=Candidate.score)
+    if begun:
+        planner.rival = begun[0]
+
+
+def _is_hopeless(
+    planner: Planner, guide: SequenceGuide, candidate: Candidate, best: Candidate
+) -> bool:
+    """Whether a sequence is much dearer than the best, and costs more than what there is.
+
+    Optimising gains some percent on a sequence.
+    """
+    if best.violations:
+        return False
+    least = planner.sequences[0].sequence.cost
+    share = DEARER_CHAIN if best.is_of_chain else DEARER
+    dearer = guide.sequence.cost > least + (share - 1.0) * abs(least)
+    return dearer and candidate.solution.merit() > best.score()[-1]
+
 
 def along_chain(
     problem: Problem,
     effort: Effort,
     guide: SequenceGuide,
     constraints: Sequence[BoundConstraint],
-) -> MotionOnNodes | None:
+) -> NodeSolution | None:
     """Return the motion through the shortest chain near a sequence; None where it will not do.
 
     Where length is all that is asked for, joints rest and start again all over the path: a motion
@@ -56,7 +107,7 @@ def along_chain(
         broken = motion.broken_between() | _beyond_limits(motion)
         if not broken.any():
             none = np.zeros(len(motion.h))
-            return MotionOnNodes(motion, Status.PRECISION, none, is_chain=True)
+            return NodeSolution(motion, Status.PRECISION, none, is_chain=True)
         finer = Grid(t).halved(np.convolve(broken, np.ones(3), "same") > 0.0)
     return None
 

@@ -1,4 +1,4 @@
-"""Which problems are optimised on nodes, and on how many."""
+"""The nodes of a problem: which ones it has, at what times, and how many at most."""
 
 import numpy as np
 
@@ -6,7 +6,7 @@ from selfmotion.basics import Array
 from selfmotion.motion import FreeNullMotion, Grid
 from selfmotion.nodes import NodeMotion
 from selfmotion.planning.effort import Effort
-from selfmotion.planning.settings import FIRST_INTERVALS, MOST_NODES, STARTING
+from selfmotion.planning.settings import FIRST_INTERVALS, MOST_NODES, ROUGH_STEPS, STARTING
 from selfmotion.problem import Problem
 
 
@@ -39,6 +39,13 @@ def first_nodes(problem: Problem) -> Array:
     least = 0.5 * duration * min(map(abs, STARTING))
     apart = np.abs(inside[:, None] - t).min(axis=1, initial=np.inf) > least
     return np.sort(np.concatenate([t, inside[apart]]))
+
+
+def rough_grid(problem: Problem) -> Grid:
+    """Return the grid of rough motions."""
+    # A path of many waypoints is crossed in strides: what is rough needs not stop at each.
+    knots = problem.knots if len(problem.knots) <= ROUGH_STEPS else problem.knots[[0, -1]]
+    return Grid.aligned(knots, ROUGH_STEPS)
 
 
 def resolves(motion: NodeMotion, agreement: float) -> bool:

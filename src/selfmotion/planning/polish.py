@@ -13,8 +13,7 @@ from selfmotion.motion import Grid, Trajectory
 from selfmotion.nodes import NodeGrid, NodeMotion, Optimum, Step, minimise
 from selfmotion.optimise import Iteration, Status
 from selfmotion.planning.effort import Effort
-from selfmotion.planning.for_nodes import most_nodes
-from selfmotion.planning.on_nodes import MotionOnNodes
+from selfmotion.planning.grids import most_nodes
 from selfmotion.planning.settings import (
     ASIDE,
     ASIDE_AFTER,
@@ -32,13 +31,14 @@ from selfmotion.planning.settings import (
     UNKEPT,
     WANTED_NEAR_PATH,
 )
+from selfmotion.planning.solutions import NodeSolution
 from selfmotion.problem import Problem
 from selfmotion.search import BESIDE
 
 _ARRIVED = (Status.CONVERGED, Status.PRECISION)
 
 
-class NodeDescent:
+class Polisher:
     """Looks for the best motion on nodes near the motions that it is given.
 
     Parameters
@@ -52,7 +52,7 @@ class NodeDescent:
     Attributes
     ----------
     history : list of Iteration
-    latest : MotionOnNodes or None
+    latest : NodeSolution or None
         The last motion on the way that keeps the conditions: what an interruption leaves.
     is_hopeless : bool
         Whether even what is best freely costs as much as what is known.
@@ -70,7 +70,7 @@ class NodeDescent:
         self._constraints, self._free = constraints, free
         self._first = effort.counts.evaluations
         self.history: list[Iteration] = []
-        self.latest: MotionOnNodes | None = None
+        self.latest: NodeSolution | None = None
         self.is_hopeless = False
         self._ended: Status | None = None
 
@@ -94,7 +94,7 @@ class NodeDescent:
         motions: Sequence[Trajectory],
         t: Array,
         dearest: float = np.inf,
-    ) -> MotionOnNodes | None:
+    ) -> NodeSolution | None:
         """Return the best motion near the cheapest of some, on nodes at times t (N + 1,).
 
         None where none of them can be had on nodes; see `best_near`.
@@ -117,7 +117,7 @@ class NodeDescent:
 
     def best_near(
         self, motion: NodeMotion, dearest: float = np.inf, prices: Array | None = None
-    ) -> MotionOnNodes | None:
+    ) -> NodeSolution | None:
         """Return the best motion near one of nodes; `prices` (R,) of its rows may be known.
 
         Where that breaks conditions, also near the free optimum, and near motions from its start
@@ -152,9 +152,9 @@ class NodeDescent:
         if not _is_kept(best.motion) and self._ended is None:
             # What control points of few nodes cannot keep, the curve may.
             best = min(best, self._on_halved(best), key=rank)
-        return self._standing(best)
+        return self._solution(best)
 
-    def with_more(self, known: MotionOnNodes) -> MotionOnNodes | None:
+    def with_more(self, known: NodeSolution) -> NodeSolution | None:
         """Return the best motion near one of which less was asked, the rest after that; or None."""
         motion = self.grid(known.motion.grid.t).at(known.motion.centred)
         more = len(motion.h) - len(known.prices)
@@ -214,55 +214,55 @@ class NodeDescent:
         motion = optimum.motion.on(optimum.motion.grid.on(finer))
         return optimum if motion is None else self._minimise(motion)
 
-    def again(self, standing: MotionOnNodes, *, roughly: bool = False) -> MotionOnNodes | None:
+    def again(self, known: NodeSolution, *, roughly: bool = False) -> NodeSolution | None:
         """Return the optimum near a motion on its nodes; None where that breaks conditions."""
-        optimum = self._minimise(standing.motion, standing.prices, roughly=roughly)
-        return self._standing(optimum) if _is_kept(optimum.motion) else None
+        optimum = self._minimise(known.motion, known.prices, roughly=roughly)
+        return self._solution(optimum) if _is_kept(optimum.motion) else None
 
-    def settled(self, standing: MotionOnNodes) -> MotionOnNodes:
+    def settled(self, known: NodeSolution) -> NodeSolution:
         """Return the optimum on nodes so near to each other that more change nothing.
 
         The curve is on its path between them, control points give hardly anything away, and what
         is asked at points holds between them.
         """
-        found = self._resolved(standing)
+        found = self._resolved(known)
         return self._farther_apart(found) or found
 
-    def _resolved(self, standing: MotionOnNodes) -> MotionOnNodes:
+    def _resolved(self, known: NodeSolution) -> NodeSolution:
         """Return the optimum on nodes so near to each other that more change nothing, if it may."""
         before, most, is_rough = np.inf, most_nodes(self._problem), True
         for _ in range(NODE_ROUNDS):
             if self._ended is not None:
                 break
-            t = self._finer(standing)
-            if t is None and before - standing.cost > GIVEN_AWAY * abs(standing.cost):
+            t = self._finer(known)
+            if t is None and before - known.cost > GIVEN_AWAY * abs(known.cost):
                 # Where limits of q̈ or jerk begin and end to bind, the best motion has a kink: finer
                 # there, while it pays.
-                t, before = _at_kinks(standing.motion), standing.cost
-            finer = None if t is None or len(t) > most else standing.on(t)
+                t, before = _at_kinks(known.motion), known.cost
+            finer = None if t is None or len(t) > most else known.on(t)
             polishes = finer is None
             if polishes and not is_rough:
                 break
-            found = self.again(finer or standing, roughly=not polishes)
+            found = self.again(finer or known, roughly=not polishes)
             if found is None:
                 break
-            gains = standing.cost - found.cost > GIVEN_AWAY * abs(standing.cost)
+            gains = known.cost - found.cost > GIVEN_AWAY * abs(known.cost)
             if not (found.has_arrived or gains) and self._ended is None:
                 # More nodes lead nowhere, and prices on the way say nothing.
-                found = None if polishes else self.again(standing)
-                return found if found is not None and found.has_arrived else standing
-            standing, is_rough = found.after(standing.cost), not polishes
-        return standing
+                found = None if polishes else self.again(known)
+                return found if found is not None and found.has_arrived else known
+            known, is_rough = found.after(known.cost), not polishes
+        return known
 
-    def _farther_apart(self, standing: MotionOnNodes) -> MotionOnNodes | None:
+    def _farther_apart(self, known: NodeSolution) -> NodeSolution | None:
         """Return a motion on its nodes that keeps between them what it breaks there; or None.
 
         Beside corners of bodies more nodes may lead nowhere: on these, bodies are kept farther
         apart at the points.
         """
-        if self._ended is not None or not standing.motion.broken_between().any():
+        if self._ended is not None or not known.motion.broken_between().any():
             return None
-        grid = standing.motion.grid
+        grid = known.motion.grid
         for far in FARTHER_APART:
             asked = [
                 replace(item, distance=item.distance + far, _last=[])
@@ -270,22 +270,22 @@ class NodeDescent:
                 else item
                 for item in grid.constraints
             ]
-            optimum = self._minimise(grid.asking(asked).at(standing.motion.centred))
+            optimum = self._minimise(grid.asking(asked).at(known.motion.centred))
             found = replace(optimum, motion=grid.at(optimum.motion.centred))
             if _is_kept(found.motion) and not found.motion.broken_between().any():
-                return self._standing(found)
+                return self._solution(found)
         return None
 
-    def _finer(self, standing: MotionOnNodes) -> Array | None:
+    def _finer(self, known: NodeSolution) -> Array | None:
         """Return times of nodes near enough to each other, or None where these are."""
-        motion = standing.motion
+        motion = known.motion
         grid, spline = motion.grid, motion.grid.spline
         errors = self._problem.errors_between(motion.trajectory).max(axis=1)
         # Where one is too far apart, so is what is nearly so: on the next nodes it would be.
         wanted = WANTED_NEAR_PATH if errors.max() > NEAR_PATH else NEAR_PATH
         parts = np.ceil((errors / wanted) ** FINER_POWER - 1e-9)
         parts = np.clip(parts, 1.0, MOST_PARTS).astype(int)
-        away = grid.rows.given_away(standing.prices, motion.curve_ends)
+        away = grid.rows.given_away(known.prices, motion.curve_ends)
         least = GIVEN_AWAY * abs(motion.aim)
         if away.sum() > least:
             parts[(away > least / spline.count) & (parts == 1)] = 2
@@ -300,7 +300,7 @@ class NodeDescent:
     def _told(self, step: Step) -> bool:
         """Note an iteration, and the motion if it keeps all; return whether to stop."""
         if _is_kept(step.motion):
-            self.latest = MotionOnNodes.on_the_way(step.motion)
+            self.latest = NodeSolution.on_the_way(step.motion)
         return self._noted(step)
 
     def _noted(self, step: Step) -> bool:
@@ -324,12 +324,12 @@ class NodeDescent:
             self._ended = Status.MAX_EVALUATIONS
         return self._ended is not None
 
-    def _standing(self, optimum: Optimum) -> MotionOnNodes:
+    def _solution(self, optimum: Optimum) -> NodeSolution:
         status = optimum.status
         if status not in (*_ARRIVED, Status.GRADIENT):
             # What keeps the conditions, and leads no further, is as good as it gets.
             status = Status.PRECISION if _is_kept(optimum.motion) else Status.INFEASIBLE
-        return MotionOnNodes.of(optimum, self._ended or status)
+        return NodeSolution.of(optimum, self._ended or status)
 
 
 def _is_kept(motion: NodeMotion) -> bool:

@@ -1,4 +1,4 @@
-"""The motion of a session on the first grid that holds the tolerance, with its certificate."""
+"""The motion of a candidate on the first grid that holds the tolerance, with its certificate."""
 
 from dataclasses import dataclass
 
@@ -9,86 +9,90 @@ from selfmotion.certificate import LIMIT_NAMES, Certificate, Tolerance
 from selfmotion.motion import Evaluation, Trajectory
 from selfmotion.optimise import Status
 from selfmotion.paper import MOST_HALVINGS
-from selfmotion.planning.largest_part import LargestPart
-from selfmotion.planning.session import Session
+from selfmotion.planning.candidate import Candidate
+from selfmotion.planning.largest_part import Part
 from selfmotion.planning.settings import FALLS, FINER, RESOLVED, ROUGH_GRIDS
 from selfmotion.problem import Problem
 
 
 @dataclass(frozen=True, eq=False)
-class Finished:
-    """A motion, the one at x = 0 on the same grid, and the check.
+class Judged:
+    """What a plan is made of: a motion along all of the path or a part of it, and its check.
 
     Attributes
     ----------
+    part : Part
     motion, still : Evaluation
+        The motion, and the minimum-norm one on the same grid.
     certificate : Certificate
+    rival_cost : float or None
+        That of the best motion from the chains of the search, where it keeps the constraints.
     """
 
+    part: Part
     motion: Evaluation
     still: Evaluation
     certificate: Certificate
+    rival_cost: float | None = None
 
 
-def finish(
-    problem: Problem, part: LargestPart, tolerance: Tolerance, progress: Progress
-) -> Finished:
+def judge(problem: Problem, part: Part, tolerance: Tolerance, progress: Progress) -> Judged:
     """Return what there is on the first grid on which the motion holds the tolerance."""
-    session = part.session
-    finished: Finished | None = None
+    candidate = part.candidate
+    judged: Judged | None = None
     coarse: Trajectory | None = None
     misses: list[float] = []
-    roughs, first = 0, session.standing.steps
+    roughs, first = 0, candidate.solution.steps
     for _ in range(MOST_HALVINGS):
         try:
             progress("checking", 1, 1)
-            finished = _check(problem, session, tolerance, part.ending)
-            if _meets_itself(problem, finished.certificate) and session.keep_off_itself():
-                session.settle()
+            judged = _check(problem, part, tolerance)
+            if _meets_itself(problem, judged.certificate) and candidate.keep_off_itself():
+                candidate.settle()
                 continue
-            rough = _rough(problem, finished, session)
+            rough = _rough(problem, judged, candidate)
             roughs += rough
             # Where no evaluations are left, finer grids change nothing.
-            out = session.status is Status.MAX_EVALUATIONS
-            spent = out or roughs > ROUGH_GRIDS or session.standing.steps > FINER * first
-            if finished.certificate.on_path and (spent or not rough):
+            out = candidate.status is Status.MAX_EVALUATIONS
+            spent = out or roughs > ROUGH_GRIDS or candidate.solution.steps > FINER * first
+            if judged.certificate.on_path and (spent or not rough):
                 break
-            trajectory = finished.motion.trajectory
+            trajectory = judged.motion.trajectory
             # What damping costs stays on any grid: there, the motion stands when the tool does.
             if coarse is not None and _same(problem, coarse, trajectory, tolerance):
                 break
-            coarse = trajectory if finished.motion.damped else None
+            coarse = trajectory if judged.motion.damped else None
             # What is out of reach is so on any grid.
-            check = finished.certificate
+            check = judged.certificate
             misses.append(check.position_error.value + check.rotation_error.value)
             if coarse is None and len(misses) > 2 and misses[-1] > 0.5 * misses[-3]:
                 break
-            if session.standing.steps >= session.beginning.most_steps:
+            if candidate.solution.steps >= candidate.most_steps:
                 break
-            session.refine()
-            if rough and not session.cut_short:
-                session.minimize()
+            candidate.refine()
+            if rough and not candidate.cut_short:
+                candidate.polish()
         except KeyboardInterrupt:
-            session.end(Status.INTERRUPTED)
+            candidate.end(Status.INTERRUPTED)
             break
     # No plan goes without a certificate, interrupted or not.
-    return finished or _check(problem, session, tolerance, part.ending)
+    return judged or _check(problem, part, tolerance)
 
 
-def _resolved(problem: Problem, session: Session, tolerance: Tolerance) -> Evaluation:
+def _resolved(problem: Problem, candidate: Candidate, tolerance: Tolerance) -> Evaluation:
     """Return the motion, steps halved between whose nodes the tool was off the path."""
     allowed, before = np.array([tolerance.position, tolerance.rotation]), np.inf
-    motion = session.motion()
+    motion = candidate.evaluation()
     for _ in range(MOST_HALVINGS):
         errors = problem.errors_between(motion.trajectory) / allowed
         worst = float(errors.max())
         # Written so that NaN is no progress. Damping's error is not that of the steps.
-        stuck = not worst < FALLS * before or len(errors) > session.beginning.most_steps
+        stuck = not worst < FALLS * before or len(errors) > candidate.most_steps
         if motion.damped or worst <= RESOLVED or stuck:
             break
         before = worst
-        session.refine((errors > RESOLVED).any(axis=1))
-        motion = session.motion()
+        candidate.refine((errors > RESOLVED).any(axis=1))
+        motion = candidate.evaluation()
     return motion
 
 
@@ -98,19 +102,19 @@ def _meets_itself(problem: Problem, certificate: Certificate) -> bool:
     return asked and not certificate.findings[-1].kept
 
 
-def _rough(problem: Problem, finished: Finished, session: Session) -> bool:
+def _rough(problem: Problem, judged: Judged, candidate: Candidate) -> bool:
     """Whether what was asked for and is kept at the nodes is not so between them."""
-    if session.violations or not finished.certificate.on_path:
+    if candidate.violations or not judged.certificate.on_path:
         return False
     asked = {item.name for item in problem.requirements}
     if problem.own_collision is not None:
         # Where only the default asks it, it was not asked of the nodes either.
         asked.discard(problem.requirements[-1].name)
-    nodes = finished.motion.trajectory.t
+    nodes = judged.motion.trajectory.t
     # Rates are judged on both sides of a node; anything else that is wrong there stays so.
     return any(
         item.requirement in LIMIT_NAMES or item.time not in nodes
-        for item in finished.certificate.findings
+        for item in judged.certificate.findings
         if not item.kept and item.requirement in asked
     )
 
@@ -129,7 +133,7 @@ def _same(problem: Problem, coarse: Trajectory, fine: Trajectory, tolerance: Tol
     return bool(position <= tolerance.position and rotation <= tolerance.rotation)
 
 
-def _check(problem: Problem, session: Session, tolerance: Tolerance, ending: str) -> Finished:
-    motion = _resolved(problem, session, tolerance)
-    certificate = problem.certify(motion.trajectory, tolerance, ending)
-    return Finished(motion, session.still_evaluation(), certificate)
+def _check(problem: Problem, part: Part, tolerance: Tolerance) -> Judged:
+    motion = _resolved(problem, part.candidate, tolerance)
+    certificate = problem.certify(motion.trajectory, tolerance, part.ending)
+    return Judged(part, motion, part.candidate.still_evaluation(), certificate)

@@ -11,56 +11,59 @@ from selfmotion.certificate import Tolerance
 from selfmotion.motion import Grid, Trajectory
 from selfmotion.optimise import Status
 from selfmotion.paper import Guide
-from selfmotion.planning.beginning import Beginning
+from selfmotion.planning.candidate import Candidate
 from selfmotion.planning.effort import Effort
-from selfmotion.planning.finish import finish
-from selfmotion.planning.for_nodes import is_published
-from selfmotion.planning.known import Known, Proved
-from selfmotion.planning.largest_part import LargestPart, largest_part, shorter_part
-from selfmotion.planning.rough import Ranking
+from selfmotion.planning.grids import is_published
+from selfmotion.planning.judge import Judged, judge
+from selfmotion.planning.largest_part import Part, largest_part, shorter_part
+from selfmotion.planning.screening import Ranking
 from selfmotion.planning.search import Search
-from selfmotion.planning.session import Session
 from selfmotion.planning.settings import FREE_PART_EVALUATIONS, PART_EVALUATIONS, SHORTER_PARTS
 from selfmotion.problem import Problem
-from selfmotion.result import Attempt
+from selfmotion.result import Attempt, Plan
 from selfmotion.search import Obstruction, Reach, SequenceGuide, reachable
 
 
 @dataclass(eq=False)
-class Draft:
-    """What is known of one plan while it is made; the attempts change it.
+class Planner:
+    """What is known of one plan while it is made; the steps of `steps.py` change it.
 
     Attributes
     ----------
     problem : Problem
         With its tolerances as virtual joints, see `Problem.augmented`.
     effort : Effort
-        What all sessions share.
+        What all candidates share.
     search : Search
     tolerance : Tolerance
     progress : Progress
-    known : Known
+    warm_start : Plan or None
+        Of this problem or of one like it: tried first; where its motion will do, nothing else is.
+    guide : SequenceGuide or None
+        Likewise a motion that a search over the whole path has found.
     attempts : list of Attempt
         What was tried, in order.
     began : float
         When, by the clock `time.perf_counter` [s].
     blocked : Obstruction or None
         A pose that no configuration was found for.
-    best : Session or None
+    best : Candidate or None
+        The best so far.
     sequences : list of SequenceGuide
         What the global search found; empty where it was not asked for or in vain.
-    rival : Session or None
+    rival : Candidate or None
         The best motion from these. It is not chosen where the start is given or the search local,
         and only compared with.
     failure : SelfmotionError or None
         Why there is no motion, if there is none: the last reason.
     notes : list of str
         Why a search was in vain; what would help.
-    waiting : sequence of Session
+    waiting : sequence of Candidate
         Complete motions that are not optimised yet.
     ranking : Ranking or None
         Rough motions of starts.
-    proved : Proved or None
+    judged : Judged or None
+        What the plan is made of.
     """
 
     problem: Problem
@@ -68,18 +71,19 @@ class Draft:
     search: Search
     tolerance: Tolerance
     progress: Progress
-    known: Known
+    warm_start: Plan | None = None
+    guide: SequenceGuide | None = None
     attempts: list[Attempt] = field(default_factory=list)
     began: float = field(default_factory=time.perf_counter)
     blocked: Obstruction | None = None
-    best: Session | None = None
+    best: Candidate | None = None
     sequences: list[SequenceGuide] = field(default_factory=list)
-    rival: Session | None = None
+    rival: Candidate | None = None
     failure: SelfmotionError | None = None
     notes: list[str] = field(default_factory=list)
-    waiting: Sequence[Session] = ()
+    waiting: Sequence[Candidate] = ()
     ranking: Ranking | None = None
-    proved: Proved | None = None
+    judged: Judged | None = None
 
     def __post_init__(self) -> None:
         self.rng = np.random.default_rng(self.search.rng)
@@ -89,6 +93,11 @@ class Draft:
     def is_free(self) -> bool:
         """Whether the start is free."""
         return self.problem.given_start is None
+
+    @property
+    def is_begun(self) -> bool:
+        """Whether a motion is known to begin with."""
+        return self.warm_start is not None or self.guide is not None
 
     @property
     def is_searchable(self) -> bool:
@@ -109,7 +118,7 @@ class Draft:
     @property
     def is_sought(self) -> bool:
         """Whether a motion is still looked for."""
-        return self.proved is None and not self.is_over
+        return self.judged is None and not self.is_over
 
     @property
     def is_over(self) -> bool:
@@ -119,75 +128,58 @@ class Draft:
     @property
     def is_unmet(self) -> bool:
         """Whether no motion is known yet that keeps all constraints that are asked of it."""
-        return self.best is None or not (self.is_published or _will_do(self.best))
+        return self.best is None or not (self.is_published or self.best.will_do)
 
     @property
     def is_published(self) -> bool:
         """Whether the published method is asked for: it keeps nothing but given ends."""
         return is_published(self.problem, self.effort)
 
-    def begin(
-        self,
-        start: Array,
-        *,
-        free: bool,
-        guide: Guide | None = None,
-        grid: Grid | None = None,
-    ) -> Session | None:
-        """Return the session of a start; None where it breaks down at once, which is noted."""
-        try:
-            begun = Beginning.of(
-                self.problem,
-                self.effort,
-                start,
-                free=free,
-                guide=guide,
-                grid=grid,
-            )
-        except BreakdownError as error:
-            self.failure = error
-            return None
-        return Session(begun)
-
-    def taken_up(self, motion: Trajectory) -> Session | None:
-        """Return the session that begins at a rough motion; None where it breaks down at once."""
-        session = self.begin(motion.q[0], free=True)
-        if session is not None:
-            session.resume(motion)
-        return session
-
-    def optimise(self, session: Session, *, chosen: bool = True) -> None:
-        """Optimise a session; keep it if it is the best one and may be chosen."""
-        # What is only compared with is optimised to the end.
-        known = self.dearest if chosen else np.inf
-        try:
-            session.minimize(known)
-        except KeyboardInterrupt:
-            session.end(Status.INTERRUPTED)
-        self.note(session, chosen=chosen)
-
     @property
     def dearest(self) -> float:
         """What a motion costs that is known and will do; inf where there is none."""
         best = self.best
-        return best.standing.cost if best is not None and _will_do(best) else np.inf
+        return best.solution.cost if best is not None and best.will_do else np.inf
 
-    def note(self, session: Session, *, chosen: bool = True) -> None:
-        """Keep what came of a session, if it may be `chosen`."""
-        if session.is_hopeless:
+    def begin(
+        self, start: Array, *, free: bool, guide: Guide | None = None, grid: Grid | None = None
+    ) -> Candidate | None:
+        """Return the candidate of a start; None where it breaks down at once, which is noted."""
+        try:
+            return Candidate(self.problem, self.effort, start, free=free, guide=guide, grid=grid)
+        except BreakdownError as error:
+            self.failure = error
+            return None
+
+    def taken_up(self, motion: Trajectory) -> Candidate | None:
+        """Return the candidate that begins at a rough motion; None where it breaks down at once."""
+        candidate = self.begin(motion.q[0], free=True)
+        if candidate is not None:
+            candidate.resume(motion)
+        return candidate
+
+    def polish(self, candidate: Candidate, *, chosen: bool = True) -> None:
+        """Optimise a candidate; keep it if it is the best one and may be chosen."""
+        # What is only compared with is optimised to the end.
+        dearest = self.dearest if chosen else np.inf
+        try:
+            candidate.polish(dearest)
+        except KeyboardInterrupt:
+            candidate.end(Status.INTERRUPTED)
+        if candidate.is_hopeless:
             return
         if chosen:
-            self.consider(session)
-        if session.violations and session.beginning.effort.apart:
+            self.consider(candidate)
+        if candidate.violations and candidate.effort.apart:
             # Others are asked at once to keep the arm off itself.
-            self.effort = session.beginning.effort
-        if session.cut_short and self.best is not None:
-            self.best.end(session.status)
+            self.effort = candidate.effort
+        if candidate.cut_short and self.best is not None:
+            self.best.end(candidate.status)
 
-    def consider(self, session: Session) -> None:
-        """Keep a session if it is the best one."""
-        if self.best is None or session.score() < self.best.score():
-            self.best = session
+    def consider(self, candidate: Candidate) -> None:
+        """Keep a candidate if it is the best one."""
+        if self.best is None or candidate.score() < self.best.score():
+            self.best = candidate
 
     def reach(self, suspect: float = 0.0) -> Reach:
         """Return how far single poses are in reach, after a closer look at a time [s].
@@ -210,10 +202,10 @@ class Draft:
         failure = self.failure
         return isinstance(failure, BreakdownError) and bool(self.reach(failure.time).reason)
 
-    def prove(self, best: Session) -> None:
+    def judge(self, best: Candidate) -> None:
         """Let the best motion be what the plan is made of, on grids that are fine enough."""
         rival_cost = _settle_both(best, self.rival, self.progress)
-        self.proved = self._proved(LargestPart(self.problem, best, ""), rival_cost)
+        self.judged = self._judged(Part(self.problem, best), rival_cost)
 
     def is_free_by_meshes(self) -> bool:
         """Whether bodies are apart by their meshes along the best motion, though not by hulls."""
@@ -223,17 +215,17 @@ class Draft:
         bodies = self.problem.envelope.bodies
         if all(model.is_all_convex for model, _ in bodies):
             return False
-        q = best.motion().trajectory.q
+        q = best.evaluation().trajectory.q
         return all(model.worst(q).value >= far for model, far in bodies)
 
-    def prove_as_it_is(self, best: Session) -> bool:
+    def judge_as_it_is(self, best: Candidate) -> bool:
         """Let a motion be it if it is verified; return whether it is."""
-        proved = self._proved(LargestPart(self.problem, best, ""))
-        if proved.finished.certificate.verified:
-            self.proved = proved
-        return self.proved is not None
+        judged = self._judged(Part(self.problem, best))
+        if judged.certificate.verified:
+            self.judged = judged
+        return self.judged is not None
 
-    def prove_part(self, suspect: float = 0.0) -> bool:
+    def judge_part(self, suspect: float = 0.0) -> bool:
         """Let the largest part be it, a time [s] looked at closely; return whether there is one."""
         effort = self.effort
         if effort.max_evaluations is None:
@@ -244,46 +236,41 @@ class Draft:
         found = largest_part(self.problem, known, effort)
         if found is None:
             return False
-        _settle_both(found.session, None, self.progress)
-        self.proved = self._proved(found)
+        _settle_both(found.candidate, None, self.progress)
+        self.judged = self._judged(found)
         for _ in range(SHORTER_PARTS):
             # Besides that it ends, nothing should be wrong with it.
-            if len(self.proved.finished.certificate.failures) < 2 or found.session.cut_short:
+            if len(self.judged.certificate.failures) < 2 or found.candidate.cut_short:
                 break
             if (shorter := shorter_part(self.problem, found, effort)) is None:
                 break
             found = shorter
-            _settle_both(found.session, None, self.progress)
-            proved = self._proved(found)
-            if len(proved.finished.certificate.failures) < 2:
-                self.proved = proved
+            _settle_both(found.candidate, None, self.progress)
+            judged = self._judged(found)
+            if len(judged.certificate.failures) < 2:
+                self.judged = judged
         return True
 
-    def _proved(self, part: LargestPart, rival_cost: float | None = None) -> Proved:
+    def _judged(self, part: Part, rival_cost: float | None = None) -> Judged:
         """Return a motion on the first grid that holds the tolerance, with its check."""
-        finished = finish(self.problem, part, self.tolerance, self.progress)
-        return Proved(part, finished, rival_cost)
+        found = judge(self.problem, part, self.tolerance, self.progress)
+        return replace(found, rival_cost=rival_cost)
 
     def interrupted(self) -> None:
         """Make the best that is known the outcome; raise KeyboardInterrupt where nothing is."""
         if self.best is None and not self.waiting:
             ranked = [] if self.ranking is None else self.ranking.ranked[:1]
             begun = (self.taken_up(motion.trajectory) for motion in ranked)
-            self.waiting = [session for session in begun if session is not None]
-        for session in self.waiting if self.best is None else ():
-            session.end(Status.INTERRUPTED)
-            self.consider(session)
+            self.waiting = [candidate for candidate in begun if candidate is not None]
+        for candidate in self.waiting if self.best is None else ():
+            candidate.end(Status.INTERRUPTED)
+            self.consider(candidate)
         if self.best is None:
             raise KeyboardInterrupt
         self.best.end(Status.INTERRUPTED)
 
 
-def _will_do(session: Session) -> bool:
-    """Whether what stands keeps all constraints, and keeps the arm off itself."""
-    return not session.violations and session.standing.keeps_off_itself
-
-
-def _settle_both(best: Session, rival: Session | None, progress: Progress) -> float | None:
+def _settle_both(best: Candidate, rival: Candidate | None, progress: Progress) -> float | None:
     """Settle a motion, and what it is compared with; return what the latter costs, if it will do.
 
     An interruption ends both as they are.
@@ -295,7 +282,7 @@ def _settle_both(best: Session, rival: Session | None, progress: Progress) -> fl
             rival.settle()
             if rival.cut_short:
                 best.end(rival.status)
-            return None if rival.violations else rival.standing.cost
+            return None if rival.violations else rival.solution.cost
     except KeyboardInterrupt:
         best.end(Status.INTERRUPTED)
     return None

@@ -1,0 +1,304 @@
+"""A motion from one start: the minimum-norm motion first, then what polishing makes of it."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from selfmotion.basics import Array, Flags, ProblemError
+from selfmotion.constraints import BoundConstraint, BoundEnd
+from selfmotion.motion import Evaluation, FreeNullMotion, Grid, PolynomialNullMotion, Trajectory
+from selfmotion.optimise import Iteration, QuasiNewton, Status
+from selfmotion.paper import (
+    MOST_HALVINGS,
+    Guide,
+    Method,
+    Objective,
+    Solution as PaperSolution,
+    settled_still_motion,
+)
+from selfmotion.planning.effort import Effort
+from selfmotion.planning.grids import first_nodes, is_on_nodes, is_published, most_nodes
+from selfmotion.planning.polish import Polisher
+from selfmotion.planning.solutions import NodeSolution, PublishedSolution, Solution, score
+from selfmotion.planning.warm_start import coefficients_of, moved_to, pace_of, slower
+from selfmotion.problem import Problem
+from selfmotion.result import Plan
+
+
+class Candidate:
+    """A start, its minimum-norm motion, and the best motion that was found near that.
+
+    What is found is replaced as a whole, so that an interruption finds what belongs together.
+
+    Parameters
+    ----------
+    problem : Problem
+    effort : Effort
+    start : (n,)
+    free : bool
+        Whether the start may move along its self-motion.
+    guide : Guide, optional
+        The null motion that stands for x = 0 in eq. 4: where the search found one worth starting
+        from.
+    grid : Grid, optional
+        To begin with; it is refined until the motion stays near the path.
+
+    Attributes
+    ----------
+    constraints : tuple of BoundConstraint
+        Those that count, bound to the ends.
+    still : PublishedSolution
+        The minimum-norm motion: eq. 4 at x = 0.
+    history : list of Iteration
+    is_hopeless : bool
+        Whether it ended because another motion is known that costs less.
+
+    Raises
+    ------
+    BreakdownError
+        The minimum-norm motion runs into a singular pose.
+    ProblemError
+        A constraint asks for an equality elsewhere than at the ends.
+    """
+
+    def __init__(
+        self,
+        problem: Problem,
+        effort: Effort,
+        start: Array,
+        *,
+        free: bool,
+        guide: Guide | None = None,
+        grid: Grid | None = None,
+    ) -> None:
+        begun, jacobians = settled_still_motion(problem, start, guide, grid)
+        effort.counts.jacobians += jacobians
+        self.problem, self.effort, self.free = problem, effort, free
+        self.constraints = tuple(problem.bind_constraints(start, begun.end, apart=effort.apart))
+        _require_known(self.constraints)
+        self._ends = begun.start, begun.end
+        # Beyond so many steps a grid is not refined any more.
+        self.most_steps = int(begun.grid.steps * 2**MOST_HALVINGS)
+        if isinstance(problem.null_motion, FreeNullMotion) and is_published(problem, effort):
+            problem = problem.changed(null_motion=PolynomialNullMotion())
+        ends = tuple(item for item in self.constraints if item.equality)
+        own = QuasiNewton() if effort.optimizer is None else effort.optimizer
+        counts = effort.counts
+        objective = Objective.of(
+            problem, begun, free=free, ends=ends, counts=counts, rollout=begun.rollout
+        )
+        method = Method(problem, begun, free, ends, own, counts, None, None)
+        solution = PaperSolution(method, objective, np.zeros(objective.size))
+        self.still = PublishedSolution(self.problem, self.constraints, solution)
+        self.history: list[Iteration] = []
+        self.is_hopeless = False
+        self._found: Solution | None = None
+        self._ended: Status | None = None
+        self._warm: Plan | None = None
+        self._known: Trajectory | None = None
+
+    @property
+    def solution(self) -> Solution:
+        """The best motion so far."""
+        return self._found or self.still
+
+    @property
+    def status(self) -> Status:
+        """How the last minimisation ended, or what ended all of them."""
+        return self.solution.status if self._ended is None else self._ended
+
+    @property
+    def cut_short(self) -> bool:
+        """Whether the user wants no more."""
+        return self.status.is_cut_short
+
+    @property
+    def is_spent(self) -> bool:
+        """Whether nothing more is to be evaluated."""
+        return self.cut_short or self.status is Status.MAX_EVALUATIONS
+
+    @property
+    def violations(self) -> tuple[str, ...]:
+        """What is wrong, for each constraint that the best motion violates."""
+        return self.solution.violations
+
+    @property
+    def will_do(self) -> bool:
+        """Whether the best motion keeps all constraints, and keeps the arm off itself."""
+        return not self.violations and self.solution.keeps_off_itself
+
+    @property
+    def is_of_chain(self) -> bool:
+        """Whether the best motion is a chain of the search, at its optimum."""
+        return isinstance(self._found, NodeSolution) and self._found.is_chain
+
+    def end(self, status: Status) -> None:
+        """Take the motion as it is; there is no time for another one."""
+        self._ended = status
+
+    def evaluation(self) -> Evaluation:
+        """Return the motion as it is now."""
+        return self.solution.evaluation()
+
+    def still_evaluation(self) -> Evaluation:
+        """Return the minimum-norm motion, on the grid of the best one where that has one."""
+        found = self._found
+        known = found if isinstance(found, PublishedSolution) else self.still
+        return known.solution.still_evaluation()
+
+    def score(self) -> tuple[bool, bool, float]:
+        """Return what ranks it among others: the smaller, the better; see `score`."""
+        return score(self.solution)
+
+    def take(self, found: NodeSolution, history: Sequence[Iteration] = ()) -> None:
+        """Let what was found elsewhere be the best motion, with the way to it."""
+        self._found = found
+        self.history += history
+
+    def adopt(self, plan: Plan) -> None:
+        """Begin at a plan's motion instead of x = 0, unless that would be worse."""
+        self._warm = plan
+
+    def resume(self, trajectory: Trajectory) -> None:
+        """Begin at a motion that is known."""
+        self._known = trajectory
+
+    def polish(self, dearest: float = np.inf) -> None:
+        """Optimise from the motion that there is.
+
+        Where a motion is known that costs `dearest`: it ends where it becomes clear that this one
+        will cost more.
+        """
+        if self._ended is not None or self.is_of_chain:
+            return
+        if not np.isfinite(self.still.cost):
+            self.still.solution.objective.require_finite(self.still.solution.x)
+        if is_published(self.problem, self.effort):
+            self._polish_as_published()
+        elif is_on_nodes(self.problem, self.effort):
+            self._polish_on_nodes(dearest)
+
+    def settle(self) -> None:
+        """Go on until more nodes save nothing; the published method has done so on its grids."""
+        found = self._found
+        if self._ended is None and isinstance(found, NodeSolution) and not found.is_chain:
+            self._by_nodes(lambda polisher: polisher.settled(found))
+
+    def refine(self, where: Flags | None = None) -> None:
+        """Go on with half the step length, everywhere or for some of the steps (N,)."""
+        if self._found is None:
+            self.still = self.still.refined(where)
+        else:
+            self._found = self._found.refined(where)
+
+    def keep_off_itself(self) -> bool:
+        """Ask that of an optimum that takes the arm into itself; return whether there is a new one.
+
+        Few do, so that the others need not wait for distances.
+        """
+        found = self._found
+        if not isinstance(found, NodeSolution) or found.violations:
+            return False
+        # Of a given start in which it meets itself, nothing else begins.
+        can = self.free or self.problem.keeps_off_itself(found.motion.place.q[:1])
+        if self._ended is not None or self.effort.apart or found.is_chain or not can:
+            return False
+        self.effort = replace(self.effort, apart=True)
+        self.constraints = tuple(self.problem.bind_constraints(*self._ends))
+        self.still = replace(self.still, constraints=self.constraints)
+
+        def optimum(polisher: Polisher) -> NodeSolution | None:
+            first = self._known or self.still.evaluation().trajectory
+            return polisher.with_more(found) or polisher.near([first], found.motion.grid.t)
+
+        self._by_nodes(optimum)
+        return self._found is not found
+
+    def _polish_as_published(self) -> None:
+        """Go to the optimum of the published method."""
+        effort, before = self.effort, self._found
+        if isinstance(before, PublishedSolution):
+            solution = before.solution.again()
+        else:
+            begun, most = self.still.solution, effort.max_evaluations
+            limit = None if most is None else effort.counts.evaluations + most
+            method = replace(begun.method, limit=limit, callback=effort.callback)
+            solution = replace(begun, method=method, x=self._first_coefficients()).settled()
+        self._found = replace(self.still, solution=solution)
+        self.history = list(solution.history)
+        if solution.status is Status.INTERRUPTED:
+            self.end(Status.INTERRUPTED)
+
+    def _first_coefficients(self) -> Array:
+        """Return the decision vector that is nearest to a known plan, if no worse than x = 0."""
+        plan, problem = self._warm, self.problem
+        objective, none = self.still.solution.objective, self.still.solution.x
+        if plan is None:
+            return none
+        t, pace = objective.grid.stage_times, pace_of(plan, problem)
+        near = coefficients_of(plan.trajectory, pace, problem, t, objective.null_motion)
+        z, _ = objective.parts(none)
+        x = np.concatenate([z, near])
+        return x if objective.value(x) <= self.still.cost else none
+
+    def _polish_on_nodes(self, dearest: float) -> None:
+        """Go to the optimum on nodes near the motion."""
+        before = self._found
+
+        def optimum(polisher: Polisher) -> NodeSolution | None:
+            if isinstance(before, NodeSolution):
+                return polisher.again(before)
+            motions, t = self._first_motions()
+            return polisher.near(motions, t, dearest)
+
+        self._by_nodes(optimum)
+        found = self._found
+        # One that costs more already is none to take either way.
+        if found is not None and found.cost < dearest and not found.keeps_off_itself:
+            self.keep_off_itself()
+        if self.status is Status.GRADIENT:
+            # A gradient that is not finite is named with its time.
+            self.still.solution.objective.gradient(self.still.solution.x)
+
+    def _first_motions(self) -> tuple[list[Trajectory], Array]:
+        """Return motions to begin near, and the times of the first nodes (N + 1,)."""
+        problem, warm, t = self.problem, self._warm, first_nodes(self.problem)
+        motions = [self._known or self.still.evaluation().trajectory]
+        if warm is not None and warm.trajectory.t[-1] == warm.path.duration:
+            own = slower(warm.trajectory, pace_of(warm, problem))
+            if not self.free:
+                own = moved_to(own, self._ends[0])
+            motions = [own, *motions]
+            if len(own.t) <= most_nodes(problem):
+                # Its nodes are where such a motion needs them.
+                t = np.unique(np.append(own.t, problem.knots))
+        return motions, t
+
+    def _by_nodes(self, search: Callable[[Polisher], NodeSolution | None]) -> None:
+        """Let what is found on nodes be the best motion, if something is."""
+        polisher = Polisher(self.problem, self.effort, self.constraints, free=self.free)
+        try:
+            found = search(polisher)
+        except KeyboardInterrupt:
+            if polisher.latest is None and self._found is None:
+                raise
+            found = polisher.latest
+            self._ended = Status.INTERRUPTED
+        if polisher.is_stopped:
+            # A motion that was better before it is left as it was, and does not say so.
+            self._ended = Status.STOPPED
+        self.history += polisher.history
+        self.is_hopeless = polisher.is_hopeless
+        self._found = found or self._found
+
+
+def _require_known(constraints: Sequence[BoundConstraint]) -> None:
+    """Raise ProblemError for equalities that are none on the ends."""
+    for item in constraints:
+        if item.equality and not isinstance(item, BoundEnd):
+            raise ProblemError(
+                f"constraint '{item.name}': it is an equality, expected h ≤ 0 at all nodes; "
+                f"equalities are asked of the ends alone (ClosedPath, EndConfiguration, …), and "
+                f"others are two-sided bands"
+            )

@@ -1,0 +1,317 @@
+"""What is known of a motion that was found, by the published method or on nodes, as one value."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Protocol
+
+import numpy as np
+
+from selfmotion import paper
+from selfmotion.basics import Array, BreakdownError, Flags
+from selfmotion.constraints import (
+    Binding,
+    BoundConstraint,
+    Priced,
+    active_of,
+    penalised,
+    violated,
+)
+from selfmotion.costs import Samples
+from selfmotion.motion import Evaluation, Grid, NodeNullMotion, NullMotion
+from selfmotion.nodes import NodeMotion, Optimum
+from selfmotion.optimise import Status
+from selfmotion.planning.settings import ENDS_MET, LEAST_SAVING
+from selfmotion.problem import Problem
+from selfmotion.search import BESIDE
+
+
+class Solution(Protocol):
+    """What is asked of a motion, however it was found."""
+
+    @property
+    def status(self) -> Status:
+        """How the last minimisation ended."""
+
+    @property
+    def violations(self) -> tuple[str, ...]:
+        """What is wrong for each constraint that it could not meet."""
+
+    @property
+    def active(self) -> tuple[Binding, ...]:
+        """What kept it from a lower cost."""
+
+    @property
+    def remaining(self) -> float | None:
+        """What any other motion could still save, as far as is known [cost]."""
+
+    @property
+    def null_motion(self) -> NullMotion:
+        """The parameterisation of its null motion."""
+
+    @property
+    def coefficients(self) -> Array:
+        """The null motion's coefficients."""
+
+    @property
+    def steps(self) -> int:
+        """Of its grid."""
+
+    @property
+    def cost(self) -> float:
+        """F."""
+
+    @property
+    def keeps_off_itself(self) -> bool:
+        """Whether the arm does where only the default asks it to, at the nodes and by meshes."""
+
+    def merit(self) -> float:
+        """Return the cost, much larger where constraints are violated: for ranking."""
+
+    def evaluation(self) -> Evaluation:
+        """Return the motion with its costs."""
+
+    def refined(self, where: Flags | None = None) -> "Solution":
+        """Return it with half the step length, everywhere or for some of the steps (N,)."""
+
+
+def score(solution: Solution) -> tuple[bool, bool, float]:
+    """Return what ranks motions, the smaller, the better.
+
+    Whether constraints are violated, whether the arm meets itself, which would be refused in the
+    end, and the cost. Of two that violate constraints, the one that does so less is nearer to a
+    motion.
+    """
+    if solution.violations:
+        return True, False, solution.merit()
+    return False, not solution.keeps_off_itself, solution.cost
+
+
+@dataclass(frozen=True, eq=False)
+class PublishedSolution:
+    """A motion of the published method: at x = 0, the minimum-norm motion, or optimised.
+
+    Attributes
+    ----------
+    problem : Problem
+    constraints : sequence of BoundConstraint
+        Judged, not asked.
+    solution : selfmotion.paper.Solution
+    """
+
+    problem: Problem
+    constraints: Sequence[BoundConstraint]
+    solution: paper.Solution
+
+    @property
+    def status(self) -> Status:
+        """How the optimisation ended."""
+        if self.solution.is_optimised:
+            return self.solution.status
+        # Without self-motion it is the only one; else nothing better was found.
+        free = self.problem.follows.redundancy > 0
+        return Status.INFEASIBLE if free else Status.CONVERGED
+
+    @cached_property
+    def violations(self) -> tuple[str, ...]:
+        """See `Solution.violations`."""
+        return violated(self.constraints, self._samples)
+
+    @property
+    def active(self) -> tuple[Binding, ...]:
+        """Nothing: constraints are not asked of it, only judged."""
+        return ()
+
+    @property
+    def remaining(self) -> None:
+        """Not known."""
+
+    @property
+    def null_motion(self) -> NullMotion:
+        """See `Solution.null_motion`."""
+        return self.solution.null_motion
+
+    @property
+    def coefficients(self) -> Array:
+        """See `Solution.coefficients`."""
+        return self.solution.coefficients
+
+    @property
+    def steps(self) -> int:
+        """See `Solution.steps`."""
+        return self.solution.steps
+
+    @property
+    def cost(self) -> float:
+        """F."""
+        return self.solution.cost
+
+    @cached_property
+    def keeps_off_itself(self) -> bool:
+        """See `Solution.keeps_off_itself`."""
+        return self.problem.keeps_off_itself(self.solution.nodes)
+
+    @property
+    def _samples(self) -> Samples:
+        return self.solution.objective.samples(self.solution.x)
+
+    def merit(self) -> float:
+        """See `Solution.merit`."""
+        if not np.isfinite(self.cost):
+            return np.inf
+        return penalised(self.cost, self.constraints, self._samples)
+
+    def evaluation(self) -> Evaluation:
+        """Return the motion with its costs."""
+        return self.solution.evaluation()
+
+    def refined(self, where: Flags | None = None) -> "PublishedSolution":
+        """Return it with half the step length, everywhere or for some of the steps (N,).
+
+        As it is where it breaks down on that grid.
+        """
+        try:
+            return replace(self, solution=self.solution.refined(where))
+        except BreakdownError:
+            return self
+
+
+@dataclass(frozen=True, eq=False)
+class NodeSolution:
+    """A motion on nodes: the best that was found near a start.
+
+    Attributes
+    ----------
+    motion : NodeMotion
+    status : Status
+    prices : (R,)
+        Of all rows of its conditions.
+    remaining : float or None
+        What more nodes and another step might still save [cost]; None where that is not known.
+    optimum : Optimum or None
+        What it was found as; None of what is none.
+    is_chain : bool
+        Whether it is a chain of the global search, which is at its optimum.
+    """
+
+    motion: NodeMotion
+    status: Status
+    prices: Array
+    remaining: float | None = None
+    optimum: Optimum | None = None
+    is_chain: bool = False
+
+    @classmethod
+    def of(cls, optimum: Optimum, status: Status) -> "NodeSolution":
+        """Return the one at an optimum."""
+        motion: NodeMotion = optimum.motion
+        promised = optimum.promised if np.isfinite(optimum.promised) else 0.0
+        away = motion.grid.rows.given_away(optimum.prices, motion.curve_ends)
+        return cls(motion, status, optimum.prices, promised + float(away.sum()), optimum)
+
+    @classmethod
+    def on_the_way(cls, motion: NodeMotion) -> "NodeSolution":
+        """Return the one of a motion that keeps the conditions and has to do as it is."""
+        return cls(motion, Status.STOPPED, np.zeros(len(motion.h)))
+
+    @cached_property
+    def active(self) -> tuple[Binding, ...]:
+        """What kept the optimum from a lower cost; on the way to one, prices say nothing."""
+        return _binding(self.optimum) if self.optimum is not None and self.has_arrived else ()
+
+    @property
+    def has_arrived(self) -> bool:
+        """Whether it is an optimum, and no motion on the way to one."""
+        return self.optimum is None or self.optimum.status in (Status.CONVERGED, Status.PRECISION)
+
+    @property
+    def steps(self) -> int:
+        """Intervals between the nodes."""
+        return len(self.motion.grid.t) - 1
+
+    @property
+    def null_motion(self) -> NullMotion:
+        """The null motion's functions: of its values at the nodes, for each joint."""
+        return NodeNullMotion(tuple(self.motion.grid.t / self.motion.grid.t[-1]))
+
+    @property
+    def coefficients(self) -> Array:
+        """The null motion at the nodes, joint by joint."""
+        return self.motion.epsilon.T.ravel()
+
+    @property
+    def cost(self) -> float:
+        """F."""
+        return self.motion.cost
+
+    @cached_property
+    def keeps_off_itself(self) -> bool:
+        """Whether the arm does where only the default asks it to, at the nodes and by meshes."""
+        return self.motion.grid.problem.keeps_off_itself(self.motion.place.q)
+
+    @cached_property
+    def violations(self) -> tuple[str, ...]:
+        """See `Solution.violations`."""
+        motion = self.motion
+        ends = np.abs(motion.c).max(initial=0.0)
+        # Written so that NaN is not kept.
+        if motion.violation <= 0.0 and ends <= ENDS_MET:
+            return ()
+        # What control points exceed, the curve may keep.
+        return violated(motion.grid.constraints, motion.checked)
+
+    def merit(self) -> float:
+        """See `Solution.merit`."""
+        motion = self.motion
+        if motion.violation <= 0.0:
+            return self.cost
+        return penalised(self.cost, motion.grid.constraints, motion.checked)
+
+    def evaluation(self) -> Evaluation:
+        """Return the motion with its costs."""
+        motion = self.motion
+        found = Evaluation(self.coefficients, motion.terms, motion.trajectory, damped=False)
+        motion.forget()
+        return found
+
+    def after(self, before: float) -> "NodeSolution":
+        """Return it as what came of a motion on fewer nodes that cost so much."""
+        remaining = (self.remaining or 0.0) + max(before - self.cost, 0.0)
+        return replace(self, remaining=remaining)
+
+    def on(self, t: Array) -> "NodeSolution | None":
+        """Return it on other nodes (N + 1,); None where one of them is out of reach.
+
+        Beside a singular pose the path may be so, by next to nothing: a little later it is not.
+        """
+        beside, new = t.copy(), ~np.isin(t, self.motion.grid.t)
+        beside[new] += BESIDE * np.diff(t, append=t[-1])[new]
+        calm = self.motion.would_be_calm()
+        for times in (t, beside):
+            motion = self.motion.on(self.motion.grid.on(times, calm=calm))
+            if motion is not None:
+                prices = motion.grid.rows.carried(self.motion.grid.rows, self.prices)
+                self.motion.forget()
+                return replace(self, motion=motion, prices=prices)
+        return None
+
+    def refined(self, where: Flags | None = None) -> "NodeSolution":
+        """Return it with all intervals halved, or some (N,); as it is where that cannot be."""
+        return self.on(Grid(self.motion.grid.t).halved(where).nodes) or self
+
+
+def _binding(optimum: Optimum) -> tuple[Binding, ...]:
+    """Return what kept an optimum from a lower cost."""
+    if not (optimum.prices.any() or optimum.end_prices.size):
+        return ()
+    motion, grid = optimum.motion, optimum.motion.grid
+    inner = iter(grid.rows.priced(optimum.prices, motion.curve_ends))
+    ends = grid.ends.by_item(optimum.end_prices)
+    each = []
+    for item in grid.constraints:
+        if item.equality:
+            own = ends[id(item)][None]
+            each.append(Priced(item, own, np.zeros(1), np.ones(own.shape, dtype=np.bool_)))
+        else:
+            each.append(next(inner))
+    return active_of(each, grid.t[[0, -1]], LEAST_SAVING * abs(motion.cost))

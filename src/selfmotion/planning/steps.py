@@ -1,0 +1,264 @@
+"""The list that a plan goes through: look, propose and polish, judge; in this order, and when.
+
+A proposal is a motion to begin with, or several, cheap ones first. `Planner.polish` optimises each
+and keeps the best; a proposal is left out where what is known will do. In the end the best is
+judged, on finer grids until its certificate finds nothing wrong, or a part of it is.
+"""
+
+import time
+from collections.abc import Callable
+
+from selfmotion.basics import BreakdownError, InverseKinematicsError, NoSequenceError
+from selfmotion.planning.candidate import Candidate
+from selfmotion.planning.chains import optimise_sequences
+from selfmotion.planning.planner import Planner
+from selfmotion.planning.postures import is_long, keep_to_posture
+from selfmotion.planning.refusal import looked_at, no_way
+from selfmotion.planning.settings import SECOND_EFFORT, VERY_LONG_WAY
+from selfmotion.planning.starts import optimise_starts
+from selfmotion.planning.warm_start import on_start
+from selfmotion.result import Attempt
+from selfmotion.search import guides
+
+
+def go_through(planner: Planner) -> None:
+    """Try everything that applies, in order.
+
+    An interruption ends one step; of those after it, what applies to the best so far is done.
+
+    Raises
+    ------
+    SelfmotionError
+        There is no motion.
+    KeyboardInterrupt
+        The interruption came before there was a complete motion.
+    """
+    for name, step in STEPS:
+        began = time.perf_counter()
+        try:
+            tried = step(planner)
+        except KeyboardInterrupt:
+            planner.interrupted()
+            tried = True
+        if tried:
+            seconds = time.perf_counter() - began
+            planner.attempts.append(Attempt(name, *_outcome(planner), seconds))
+
+
+def _outcome(planner: Planner) -> tuple[str, float | None]:
+    """Return in words what is best, and what it costs."""
+    judged, best = planner.judged, planner.best
+    if judged is not None:
+        parts = (judged.part.ending, judged.certificate.verdict)
+        return "; ".join(text for text in parts if text), judged.motion.cost
+    if best is not None:
+        wrong = "; ".join(best.violations)
+        if wrong:
+            return f"not all constraints are met: {wrong}", best.solution.cost
+        itself = "" if best.solution.keeps_off_itself else ", but the arm meets itself"
+        return f"all constraints are met{itself}", best.solution.cost
+    if planner.failure is not None:
+        return str(planner.failure), None
+    return planner.blocked.reason if planner.blocked else "nothing is in the way", None
+
+
+def _look(planner: Planner) -> bool:
+    """Look whether the arm can be at some single poses at all, where nothing is known yet."""
+    if not planner.is_free or planner.is_begun:
+        return False
+    blocked = planner.blocked = looked_at(planner.problem, planner.search)
+    if blocked is not None:
+        # What can be planned all the same takes many times as long as the 'no'.
+        planner.progress(f"no motion passes t = {blocked.time:.6g} s: {blocked.reason}", 0, 0)
+    return True
+
+
+def _plan_before_blocked_pose(planner: Planner) -> bool:
+    """Plan what comes before a pose that is out of reach."""
+    blocked = planner.blocked
+    if blocked is None or blocked.is_met:
+        return False
+    told = blocked.help.removeprefix("; ")
+    planner.notes += [told] if told else []
+    try:
+        found = planner.judge_part(blocked.time)
+    except InverseKinematicsError:
+        found = False
+    if not found:
+        raise no_way(planner.problem, blocked)
+    return True
+
+
+def _follow_guide(planner: Planner) -> bool:
+    """Optimise from a motion that is known."""
+    guide = planner.guide
+    if guide is None:
+        return False
+    candidate = planner.begin(guide.start, free=planner.is_free, guide=guide)
+    if candidate is not None:
+        planner.polish(candidate)
+    return True
+
+
+def _begin_at_plan(planner: Planner) -> bool:
+    """Optimise from a plan of this problem or of one like it, if it leads to a motion."""
+    plan = planner.warm_start
+    if plan is None or not planner.is_free:
+        return False
+    try:
+        start = on_start(planner.problem, plan.trajectory.q[0])
+    except InverseKinematicsError as error:
+        planner.failure = error
+        return True
+    candidate = planner.begin(start, free=True)
+    if candidate is not None:
+        candidate.adopt(plan)
+        planner.progress("warm start", 1, 1)
+        planner.polish(candidate)
+    return True
+
+
+def _keep_to_posture(planner: Planner) -> bool:
+    """Optimise from motions in the postures that are best on a stretch, on a very long path."""
+    return planner.problem.way_in_reaches > VERY_LONG_WAY and _try_postures(planner)
+
+
+def _begin_at_start(planner: Planner) -> bool:
+    """Optimise from the start that is given."""
+    start = planner.problem.given_start
+    if start is None or not (planner.is_sought and planner.is_unmet):
+        return False
+    candidate = planner.begin(start, free=False)
+    if candidate is not None:
+        if planner.warm_start is not None:
+            candidate.adopt(planner.warm_start)
+        planner.polish(candidate)
+    return True
+
+
+def _draw_starts(planner: Planner) -> bool:
+    """Optimise from the best of starts that are drawn."""
+    search = planner.search
+    if not (planner.is_sought and planner.takes_starts and (planner.is_unmet or search.compare)):
+        return False
+    optimise_starts(planner, search.starts, search.finalists)
+    return True
+
+
+def _compare_postures(planner: Planner) -> bool:
+    """Do so on a path that is long, where it may lead to a better motion than other starts."""
+    return planner.problem.way_in_reaches <= VERY_LONG_WAY and _try_postures(planner)
+
+
+def _try_postures(planner: Planner) -> bool:
+    wanted = planner.is_unmet or not planner.is_begun
+    possible = is_long(planner) and (planner.takes_starts or not planner.is_free)
+    if not (planner.is_sought and wanted and possible):
+        return False
+    keep_to_posture(planner)
+    return True
+
+
+def _judge_on_meshes(planner: Planner) -> bool:
+    """Take a motion that bodies' hulls forbid where their meshes do not."""
+    if planner.best is None or not planner.is_sought or not planner.is_free_by_meshes():
+        return False
+    planner.judge_as_it_is(planner.best)
+    return True
+
+
+def _search_globally(planner: Planner) -> bool:
+    """Optimise from the best chains of configurations over all self-motions."""
+    wanted = planner.search.compare or (planner.chooses_globally and planner.is_unmet)
+    can = planner.is_searchable and (planner.is_free or planner.best)
+    if not (planner.is_sought and wanted and can) or planner.is_out_of_reach():
+        return False
+    optimise_sequences(planner, guides, chosen=planner.chooses_globally)
+    return True
+
+
+def _draw_more_starts(planner: Planner) -> bool:
+    """Draw many more starts; they do not help where the search knows that nothing will."""
+    search, more = planner.search, SECOND_EFFORT
+    wanted = planner.is_unmet and not planner.notes
+    if not (planner.is_sought and planner.takes_starts and wanted) or planner.is_out_of_reach():
+        return False
+    optimise_starts(planner, more * search.starts, more * search.finalists)
+    return True
+
+
+def _plan_largest_part(planner: Planner) -> bool:
+    """Plan the part that can be followed, where there is no motion, or poses are out of reach.
+
+    No other motion on finer grids would be better then.
+    """
+    best, failure = planner.best, planner.failure
+    if best is not None:
+        short = planner.is_sought and _may_meet_more(best) and planner.problem.damping is None
+        if short and planner.reach().reason:
+            planner.judge_part()
+            return True
+        return False
+    if planner.judged is not None:
+        return False
+    if failure is None:
+        raise RuntimeError("each start leads to a motion or to an error")
+    if not isinstance(failure, BreakdownError | NoSequenceError):
+        raise failure
+    # Chains of configurations end at obstacles and step limits as well: these stay errors.
+    blocked = isinstance(failure, NoSequenceError) and not planner.reach(failure.time).reason
+    if blocked or not planner.judge_part(failure.time):
+        raise failure
+    return True
+
+
+def _may_meet_more(best: Candidate) -> bool:
+    return bool(best.violations) and not best.is_spent
+
+
+def _judge(planner: Planner) -> bool:
+    """Go on to finer grids, until the certificate finds nothing wrong."""
+    if planner.best is None or planner.judged is not None:
+        return False
+    planner.judge(planner.best)
+    return True
+
+
+def _plan_part_instead(planner: Planner) -> bool:
+    """Plan the largest part where a motion along all of the path is off it, or past limits."""
+    best, judged = planner.best, planner.judged
+    if best is None or judged is None or best is not judged.part.candidate:
+        return False
+    check = judged.certificate
+    # With damping the motion goes on where the path cannot be followed: so it was asked for.
+    if best.is_spent or planner.problem.damping is not None:
+        return False
+    out_of_limits = bool(best.violations) and check.limit_margin.value < 0.0
+    suspect = check.position_error.time
+    # Where single poses are in reach, constraints that are not met say more than a part.
+    if (check.on_path and not out_of_limits) or not planner.reach(suspect).reason:
+        return False
+    planner.judge_part(suspect)
+    return True
+
+
+# By name, as reports have it; each says whether it was tried.
+STEPS: tuple[tuple[str, Callable[[Planner], bool]], ...] = (
+    # Look: a 'no' before anything is planned.
+    ("look at single poses", _look),
+    ("part before a pose out of reach", _plan_before_blocked_pose),
+    # Propose and polish, until one will do.
+    ("motion that is known", _follow_guide),
+    ("warm start", _begin_at_plan),
+    ("posture of a stretch", _keep_to_posture),
+    ("given start", _begin_at_start),
+    ("starts", _draw_starts),
+    ("postures compared", _compare_postures),
+    ("proof on meshes", _judge_on_meshes),
+    ("global search", _search_globally),
+    ("more starts", _draw_more_starts),
+    # Judge.
+    ("largest part", _plan_largest_part),
+    ("finer grids and proof", _judge),
+    ("largest part instead", _plan_part_instead),
+)
