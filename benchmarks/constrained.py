@@ -21,6 +21,7 @@ from typing import Annotated, Any
 import numpy as np
 import pinocchio as pin
 import typer
+from problems import PANDA_HOME
 from rich.console import Console
 from rich.table import Table
 
@@ -112,9 +113,9 @@ def _made(robot: sm.RobotModel, task: str, kind: str, seed: int, number: int) ->
 
 def _without(robot: sm.RobotModel, task: str, kind: str, rng: np.random.Generator) -> sm.Problem:
     """Return a problem without constraints; closed paths are circles."""
-    named = sm.NAMED_ARMS.get(robot.name)
-    home = None if named is None or named.home is None else np.array(named.home)
-    start = robot.dexterous_configuration(task) if home is None else home
+    # Homes of the others are upright, and singular.
+    is_panda = robot.name == "panda"
+    start = PANDA_HOME if is_panda else robot.dexterous_configuration(task)
     start = start + rng.uniform(-0.15, 0.15, robot.dof)
     pose = robot.pose(start)
     duration = float(np.round(rng.uniform(1.5, 4.0), 2))

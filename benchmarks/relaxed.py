@@ -18,6 +18,7 @@ from typing import Annotated, Any
 
 import numpy as np
 import typer
+from problems import PANDA_HOME
 from rich.console import Console
 
 import selfmotion as sm
@@ -38,10 +39,8 @@ def problem(number: int) -> tuple[str, sm.Problem]:
     rng = np.random.default_rng([23, number])
     robot = sm.load_robot(ARMS[number % len(ARMS)])
     kind = KINDS[number % len(KINDS)]
-    named = sm.NAMED_ARMS.get(robot.name)
-    home = robot.dexterous_configuration("pose")
-    if named is not None and named.home is not None:
-        home = np.array(named.home)
+    # Homes of the others are upright, and singular.
+    home = PANDA_HOME if robot.name == "panda" else robot.dexterous_configuration("pose")
     start = home + rng.uniform(-0.3, 0.3, robot.dof)
     pose, duration = robot.pose(start), float(np.round(rng.uniform(2.0, 5.0), 2))
     normal = rng.normal(size=3)

@@ -13,6 +13,7 @@ from selfmotion.basics import (
     RedundancyError,
     RenderError,
     RobotError,
+    SelfmotionError,
     StartError,
 )
 
@@ -29,5 +30,6 @@ __all__ = [
     "RedundancyError",
     "RenderError",
     "RobotError",
+    "SelfmotionError",
     "StartError",
 ]

@@ -223,3 +223,16 @@ def test_the_published_method_knows_no_tolerances() -> None:
     problem = dataclasses.replace(sm.sample_problem(), relaxations=[sm.Relaxation("y", 0.05)])
     with pytest.raises(sm.errors.ProblemError, match=r"relaxations: .* leave null_motion out"):
         sm.plan(problem)
+
+
+def test_a_part_without_self_motion_is_none() -> None:
+    """Before a window six joints have none: what is in the way is said, not that of a part."""
+    arm = robot_named("ur10")
+    start = arm.dexterous_configuration("pose")
+    far = arm.pose(start)
+    far.translation = 3.0 * far.translation
+    line = sm.paths.Line(arm.pose(start), far, 4.0)
+    window = [sm.Relaxation("rz", 0.3, during=(2.5, 3.5))]
+    problem = sm.Problem(arm, line, "pose", relaxations=window)
+    with pytest.raises(sm.errors.PlanError, match="no motion along the path passes"):
+        sm.plan(problem)

@@ -181,6 +181,26 @@ class _Model(NamedTuple):
     border: Border
 
 
+class _Linear(NamedTuple):
+    """A model, and the step of its nodes for any barrier μ: solved[:, 0] + μ solved[:, 1].
+
+    Attributes
+    ----------
+    model : _Model
+    stiff : (R,)
+        How much a change of h changes prices.
+    right : (2, (N + 1) 3r)
+        What pulls at the nodes, without barrier and by each unit of it.
+    solved : ((N + 1) 3r, 2 + E)
+        Also of what is asked of the ends.
+    """
+
+    model: _Model
+    stiff: Array
+    right: Array
+    solved: Array
+
+
 class _Change(NamedTuple):
     """A step of all unknowns."""
 
@@ -271,10 +291,11 @@ class _Solver:
         slope = float(np.linalg.norm(model.gradient))
         if told(Step(self.motion, slope, self._length)):
             return Status.STOPPED
+        linear = self._linear(model)
+        if linear is None:
+            return Status.GRADIENT
         while True:
-            step = self._step(model)
-            if step is None:
-                return Status.GRADIENT
+            step = self._step(linear)
             last = not self._prices.size or self._barrier <= self._least
             self._changing = self._share_of(step.prices)
             if last and self._is_there() and self._changing <= _SETTLED:
@@ -363,27 +384,42 @@ class _Solver:
         left = self._elastics * (self._price - self._prices)
         return float(max(by_slack, np.abs(left - self._barrier).max(initial=0.0)))
 
-    def _step(self, model: _Model) -> _Change | None:
-        """Return Newton's step of all unknowns for the present barrier."""
-        grid, barrier, prices = self.motion.grid, self._barrier, self._prices
-        slacks, elastics, left = self._slacks, self._elastics, self._price - self._prices
-        stiff = 1.0 / (slacks / prices + elastics / left)
-        off = self._h + barrier / prices - barrier / left
-        right, intervals = model.gradient, model.intervals
+    def _linear(self, model: _Model) -> _Linear | None:
+        """Return the step for any barrier; None where the matrix says nothing."""
+        grid, prices = self.motion.grid, self._prices
+        left = self._price - prices
+        stiff = 1.0 / (self._slacks / prices + self._elastics / left)
+        gradient, intervals = model.gradient, model.intervals
+        right = np.stack([gradient.ravel(), np.zeros(gradient.size)])
         if prices.size:
-            push = model.rows.pulled(self._all(prices + stiff * off))
-            right = right + model.around.pulled(grid.spline.scattered(push))
-            right.reshape(-1)[grid.held] = 0.0
+            by_barrier = stiff * (1.0 / prices - 1.0 / left)
+            for k, pulls in enumerate((prices + stiff * self._h, by_barrier)):
+                push = model.rows.pulled(self._all(pulls))
+                pulled = model.around.pulled(grid.spline.scattered(push))
+                pulled.reshape(-1)[grid.held] = 0.0
+                right[k] += pulled.ravel()
             intervals = intervals + self._stiffness(model, stiff)
         solved = self._solved(right, model, intervals)
-        if solved is None:
-            return None
-        step, end_prices = solved
-        by_ends = _along(model.both, step)
-        by_prices = stiff * (model.rows.along(by_ends) + off)
+        return None if solved is None else _Linear(model, stiff, right, solved)
+
+    def _step(self, linear: _Linear) -> _Change:
+        """Return Newton's step of all unknowns for the present barrier."""
+        barrier, prices, model = self._barrier, self._prices, linear.model
+        slacks, elastics, left = self._slacks, self._elastics, self._price - self._prices
+        step, end_prices = self._nodes_of(linear.solved, model)
+        right = linear.right[0] + barrier * linear.right[1]
+        self._promised = float(-(right + model.border.columns @ end_prices) @ step)
+        nodes = step.reshape(model.gradient.shape)
+        off = self._h + barrier / prices - barrier / left
+        by_prices = linear.stiff * (model.rows.along(_along(model.both, nodes)) + off)
         by_slacks = barrier / prices - slacks - slacks / prices * by_prices
         by_elastics = barrier / left - elastics + elastics / left * by_prices
-        return _Change(step, by_slacks, by_elastics, by_prices, end_prices)
+        return _Change(nodes, by_slacks, by_elastics, by_prices, end_prices)
+
+    def _nodes_of(self, solved: Array, model: _Model) -> tuple[Array, Array]:
+        """Return the step of the nodes for the present barrier, and the prices of the ends."""
+        own = solved[:, 0] + self._barrier * solved[:, 1]
+        return model.border.met_by(np.column_stack([own, solved[:, 2:]]))
 
     def _stiffness(self, model: _Model, stiff: Array) -> Array:
         """Return ∂hᵀ D ∂h on each interval, (N, 6r, 6r)."""
@@ -398,30 +434,30 @@ class _Solver:
         of_points = model.rows.squared_points(weights, both)
         return found if of_points is None else found + of_points
 
-    def _solved(self, right: Array, model: _Model, intervals: Array) -> tuple[Array, Array] | None:
-        """Return the step of the coordinates (N + 1, 3r), and the prices of the ends.
+    def _solved(self, right: Array, model: _Model, intervals: Array) -> Array | None:
+        """Return the steps for two right sides (2, …), and of what is asked of the ends.
 
         `intervals` (N, 6r, 6r) are those of the model with what its rows make stiff.
         """
         curved, border = model.around.curvature, model.border
-        count, size = right.shape
+        count, size = model.gradient.shape
         largest = float(np.abs(curved).max() + np.abs(intervals).max())
         diagonals = np.abs(np.diagonal(intervals, axis1=1, axis2=2)).ravel()
         usual = float(np.partition(diagonals, len(diagonals) // 2)[len(diagonals) // 2])
         shift = _FLAT / count**2 * usual
+        columns = np.column_stack([-right.T, border.columns])
         while shift <= 1e6 * largest:
             matrix = Banded(count, size, 1)
             matrix.add(0, 0, curved)
             matrix.add_pairs(0, intervals)
             matrix.add_diagonal(shift)
             matrix.hold(self.motion.grid.held)
-            solved = matrix.solve(np.column_stack([-right.ravel(), border.columns]))
+            solved = matrix.solve(columns)
             if solved is not None:
-                step, prices = border.met_by(solved)
+                step, _ = self._nodes_of(solved, model)
                 if np.abs(step.reshape(count, 3, -1)[:, 0]).max() <= _TRUSTED:
                     self._shift = shift
-                    self._promised = float(-(right.ravel() + border.columns @ prices) @ step)
-                    return step.reshape(count, size), prices
+                    return solved
             shift = max(_MORE * shift, _LESS * self._shift, _LEAST_SHIFT * largest)
             if solved is None:
                 # Beside entries of stiff rows, what is added to the diagonal would leave no step.

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from selfmotion.basics import Array, BreakdownError
+from selfmotion.basics import Array, BreakdownError, RedundancyError
 from selfmotion.motion import Evaluation, Grid, Sampling
 from selfmotion.optimise import Status
 from selfmotion.paper import Guide, StillMotion
@@ -111,6 +111,14 @@ def largest_part(problem: Problem, reach: Reach, effort: Effort) -> Part | None:
     Part or None
         None where nothing worth the name is left.
     """
+    try:
+        return _largest_part(problem, reach, effort)
+    except RedundancyError:
+        # Before a tolerance's window, a part may have no self-motion.
+        return None
+
+
+def _largest_part(problem: Problem, reach: Reach, effort: Effort) -> Part | None:
     goal = reach.time * (1.0 - EDGE_MARGIN) if reach.reason else reach.time
     if goal < LEAST_PART * problem.path.duration:
         return None
