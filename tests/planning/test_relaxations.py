@@ -234,5 +234,5 @@ def test_a_part_without_self_motion_is_none() -> None:
     line = sm.paths.Line(arm.pose(start), far, 4.0)
     window = [sm.Relaxation("rz", 0.3, during=(2.5, 3.5))]
     problem = sm.Problem(arm, line, "pose", relaxations=window)
-    with pytest.raises(sm.errors.PlanError, match="no motion along the path passes"):
+    with pytest.raises(sm.errors.NoSequenceError, match="no motion along the path passes"):
         sm.plan(problem)
