@@ -10,6 +10,7 @@ from mkdocs.structure.pages import Page
 sys.path.insert(0, str(Path(__file__).parent))
 
 import drawings
+import keys
 import shown
 from mathml import MathMl
 
@@ -58,6 +59,7 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
         drawn = drawings.draw_all(pages)
     made: dict[str, str] = {
         "examples.md": examples_page(ran),
+        "keys.md": keys.keys_page(),
         "gallery.md": gallery_page(ran),
         **{f"replays/{name}.html": ran[name].replay() for name in GALLERY},
         **{f"drawings/{name}.svg": text for name, text in drawn.items()},

@@ -1,4 +1,4 @@
-"""What can go wrong: every error is a `SelfmotionError`, and says what to do."""
+"""What can go wrong: every error is a `selfmotion.SelfmotionError`, and says what to do."""
 
 from selfmotion.basics import (
     BreakdownError,
@@ -13,7 +13,6 @@ from selfmotion.basics import (
     RedundancyError,
     RenderError,
     RobotError,
-    SelfmotionError,
     StartError,
 )
 
@@ -30,6 +29,5 @@ __all__ = [
     "RedundancyError",
     "RenderError",
     "RobotError",
-    "SelfmotionError",
     "StartError",
 ]

@@ -143,3 +143,30 @@ def test_defaults_are_in_the_unit_of_their_key() -> None:
         assert other == pytest.approx(plain * scale), key
     # What editors parse has no infinity.
     json.dumps(SCHEMA, allow_nan=False)
+
+
+def keys_of(node: Any) -> Iterator[tuple[str, str, dict[str, Any]]]:
+    """Yield table, key and schema of every key in a schema."""
+    if isinstance(node, list):
+        for item in node:
+            yield from keys_of(item)
+    if isinstance(node, dict):
+        if isinstance(node.get("properties"), dict) and "type" in node:
+            for key, value in node["properties"].items():
+                yield str(node.get("title")), key, value
+        for item in node.values():
+            yield from keys_of(item)
+
+
+def test_every_key_says_what_it_is() -> None:
+    """Where editors show it, and on the page of all keys."""
+    found = list(keys_of(SCHEMA))
+    assert len(found) > 500
+    assert [(table, key) for table, key, value in found if not value.get("description")] == []
+
+
+def test_no_pose_is_offered_in_degrees() -> None:
+    keys = SCHEMA["$defs"]["line"]["properties"]
+    assert "start" in keys
+    assert "start_deg" not in keys
+    assert "start_deg" in SCHEMA["properties"]

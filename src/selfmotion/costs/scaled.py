@@ -15,7 +15,9 @@ class Scaled(Cost):
     Parameters
     ----------
     cost : Cost
+        The other cost.
     factor : float
+        What it is multiplied by.
     """
 
     cost: Cost

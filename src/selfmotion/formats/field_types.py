@@ -98,6 +98,7 @@ _POSE = {
     "anyOf": [
         {"type": "array", "minItems": 4, "maxItems": 4},
         {
+            "title": "Pose",
             "type": "object",
             "properties": {"position": _TRIPLE, **{key: {"type": "array"} for key in ORIENTATIONS}},
             "additionalProperties": False,

@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from selfmotion.formats.documents import ANGLES, LENGTHS, is_share
+from selfmotion.formats.key_notes import notes_of
 from selfmotion.formats.models import document_model
 from selfmotion.formats.seam_job import HIGHEST, JOB, OF_PROBLEM, OF_TABLE, SEAM
 from selfmotion.optimise import QuasiNewton
@@ -43,6 +44,7 @@ def json_schema() -> dict[str, Any]:
     for name in ("collision", "damping"):
         keys[name] = {"anyOf": [_FLAG, keys[name]]}
     schema["required"] = [name for name in schema["required"] if name != "path"]
+    _note(schema)
     schema |= {
         "oneOf": [{"required": ["path"]}, {"required": ["seams"]}],
         "dependentRequired": {"job": ["seams"]},
@@ -84,22 +86,41 @@ def _seams(schema: Mapping[str, Any]) -> dict[str, Any]:
     }
     table["feed"] = {"anyOf": [file["feed"], {"const": HIGHEST}]}
     one = {**of_all, "path": _of(_MOTION)}
-    entry = _table(one, ["name", "path"])
-    return {"anyOf": [{"type": "array", "items": entry, "minItems": 1}, _table(table, ["file"])]}
+    entry = _table("Seam", one, ["name", "path"])
+    return {
+        "anyOf": [{"type": "array", "items": entry, "minItems": 1}, _table("Seam", table, ["file"])]
+    }
 
 
 def _job(schema: Mapping[str, Any]) -> dict[str, Any]:
     start = schema["properties"]["start"]
-    return _table({name: _OF_JOB.get(name, start) for name in JOB}, [])
+    return _table("Job", {name: _OF_JOB.get(name, start) for name in JOB}, [])
 
 
-def _table(keys: Mapping[str, Any], required: list[str]) -> dict[str, Any]:
+def _table(title: str, keys: Mapping[str, Any], required: list[str]) -> dict[str, Any]:
     return {
+        "title": title,
         "type": "object",
-        "properties": dict(keys),
+        "properties": {key: dict(value) for key, value in keys.items()},
         "required": required,
         "additionalProperties": False,
     }
+
+
+def _note(node: Any) -> None:
+    """Say of each key of all tables in a schema what it means, where editors show it."""
+    if isinstance(node, list):
+        for item in node:
+            _note(item)
+    if not isinstance(node, dict):
+        return
+    for item in node.values():
+        _note(item)
+    if "title" in node and isinstance(node.get("properties"), dict):
+        notes = notes_of(node["title"])
+        for key, value in node["properties"].items():
+            if key in notes:
+                value["description"] = notes[key]
 
 
 def _with_units(node: Any) -> Any:
@@ -121,12 +142,16 @@ def _with_units(node: Any) -> Any:
     for suffix, names, scale in (("_deg", ANGLES, 180.0 / math.pi), ("_mm", LENGTHS, 1e3)):
         for name in sorted(names & set(keys)):
             # A table, whose own keys have units; or a number that has none here.
-            if "$ref" in keys[name] or is_share(name, keys.get("kind", {}).get("const")):
+            if _is_table(keys[name]) or is_share(name, keys.get("kind", {}).get("const")):
                 continue
             keys[name + suffix] = _scaled(keys[name], scale)
             if name in found.get("required", []):
                 found["required"].remove(name)
     return found
+
+
+def _is_table(node: Mapping[str, Any]) -> bool:
+    return "$ref" in node or any(item.get("type") == "object" for item in node.get("anyOf", ()))
 
 
 def _scaled(node: Mapping[str, Any], scale: float) -> dict[str, Any]:

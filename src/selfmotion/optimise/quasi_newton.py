@@ -35,13 +35,16 @@ class QuasiNewton:
     Parameters
     ----------
     update : {"fletcher", "bfgs", "dfp"}
+        Which end of the family: Fletcher's switch, or one of the two alone.
     initial_metric : {"gauss-newton", "identity"}
         H0 where none is given: the inverse of the function's Gauss-Newton matrix at the start, or
         the paper's identity.
     tolerance : float
         Converged when the decrease that the model predicts, ½ ∇Fᵀ H ∇F, is below this times |F|.
     max_iterations : int
+        After so many it stops where it is.
     line_search : LineSearch
+        How far it goes along each direction.
     unbounded : float
         Stops when |x| exceeds this times its scale at the start (1 + |x0|), or F is so negative
         that its value at the start is lost in rounding.

@@ -22,6 +22,7 @@ class Reversed(_Derived, kind="reversed"):
     Parameters
     ----------
     path : Path
+        The motion that is reversed.
 
     Raises
     ------
