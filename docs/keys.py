@@ -9,9 +9,8 @@ _INTRO = """# Every key of a file
 
 Problem files and job files are TOML, JSON or YAML. Units are SI; a key that is an angle may end in
 `_deg`, and one that is a length or a speed in `_mm` (`radius_mm = 150`). Keys in **bold** are
-required. `selfmotion schema` writes the same as a JSON Schema, by which editors complete and explain
-keys.
-[Read and write files](howto/files.md) shows them at work."""
+required. `selfmotion schema` writes the same as a JSON Schema, by which editors complete and
+explain keys. [Read and write files](howto/files.md) shows them at work."""
 _POSE = """## A pose { #pose }
 
 A table `{ position = [x, y, z], … }` with one orientation, or a 4 × 4 matrix."""
