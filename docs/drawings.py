@@ -37,6 +37,8 @@ def draw_all(pages: Mapping[str, "Page"]) -> dict[str, str]:
         "speeds": speeds(plan),
         "convergence": convergence(),
         "path_error": path_error(plan),
+        "knot_points": knot_points(),
+        "control_points": control_points(),
         **{name: draw(pages[name]) for name, draw in _OF_PAGES.items()},
         "weave": weave(pages["seam"]),
     }
@@ -69,6 +71,80 @@ def speeds(plan: sm.Plan) -> str:
         axes.set(title=name, xlabel="t [s]")
         axes.legend(frameon=False)
     figure.axes[0].set_ylabel("joint speed [rad/s]")
+    return _svg(figure)
+
+
+def knot_points() -> str:
+    """Draw the self-motion manifolds of a path side by side, and two motions across them."""
+    arm, start = sm.load_robot("planar_3r"), [0.2, 1.9, -2.2]
+    end = arm.pose(start)
+    end.translation = end.translation + [-3.4, -0.4, 0.0]
+    line = sm.paths.Line(arm.pose(start), end, 4.0)
+    costs = sm.sample_problem().costs
+    plan = sm.plan(sm.Problem(arm, line, "planar", start, costs=costs, constraints=[])).require()
+    t, angles = np.linspace(0.0, line.duration, 121), np.linspace(-np.pi, np.pi, 121)
+    places = line.samples(t).translation[:, :2]
+    first, second, third = 2.0, 2.0, 1.0
+    wrist = places[:, None] - third * np.stack([np.cos(angles), np.sin(angles)], axis=-1)
+    far = np.linalg.norm(wrist, axis=-1)
+    # The elbow angle by the law of cosines, on the side on which the motion begins.
+    cosine = (far**2 - first**2 - second**2) / (2.0 * first * second)
+    elbow = np.arccos(np.where(np.abs(cosine) <= 1.0, cosine, np.nan))
+    away = np.arctan2(wrist[..., 1], wrist[..., 0])
+    q1 = away - np.arctan2(second * np.sin(elbow), first + second * np.cos(elbow))
+    q = np.stack([q1, elbow, angles - q1 - elbow], axis=-1)
+    shown = ~np.isnan(elbow)
+    measure = np.full(elbow.shape, np.nan)
+    rows = np.array([arm.task_jacobian(each, "planar") for each in q[shown]])
+    measure[shown] = np.sqrt(np.linalg.det(rows @ np.swapaxes(rows, 1, 2)))
+    figure, axes = _axes()
+    figure.set_size_inches(6.4, 3.6)
+    mesh = axes.pcolormesh(t, angles, measure.T, cmap="Greys_r", rasterized=True, alpha=0.6)
+    figure.colorbar(mesh, ax=axes, label="manipulability")
+    for motion, ink, name in (
+        (plan.initial_trajectory, _ORANGE, "minimum norm"),
+        (plan.trajectory, _BLUE, "optimised"),
+    ):
+        axes.plot(t, motion(t).sum(axis=1), color=ink, linewidth=2, label=name)
+    knots = plan.trajectory.t
+    axes.plot(knots, plan.trajectory(knots).sum(axis=1), "o", color=_BLUE, markersize=3)
+    axes.set(xlabel="t [s]", ylabel="direction of the last link [rad]", ylim=angles[[0, -1]])
+    axes.legend(frameon=False, loc="upper left")
+    return _svg(figure)
+
+
+def control_points() -> str:
+    """Draw the speed of a joint at its limit, with its control points."""
+    panda = sm.load_robot("panda")
+    start = panda.dexterous_configuration()
+    circle = sm.paths.Circle.around(panda.pose(start), 0.15, 4.0, normal=(1, 0, 0))
+    free = sm.plan(sm.Problem(panda, circle, task="position", start=start))
+    busy = int(np.abs(free.trajectory.qd).max(axis=0).argmax())
+    limit = 0.8 * float(np.abs(free.trajectory.qd[:, busy]).max())
+    asked = [sm.constraints.JointVelocityLimits(limit)]
+    asked_of = sm.Problem(panda, circle, task="position", start=start, constraints=asked)
+    motion = sm.plan(asked_of).require().trajectory
+    figure, axes = _axes()
+    t, h = np.linspace(0.0, circle.duration, 1200), np.diff(motion.t)
+    q, qd, qdd = (motion(motion.t, order)[:, busy] for order in range(3))
+    ends = (q[:-1], q[1:]), (qd[:-1], qd[1:]), (qdd[:-1], qdd[1:])
+    (q0, q1), (v0, v1), (a0, a1) = ends
+    # The quintic's Bernstein form, and that of its derivative.
+    left = [q0, q0 + h * v0 / 5, q0 + 2 * h * v0 / 5 + h**2 * a0 / 20]
+    right = [q1 - 2 * h * v1 / 5 + h**2 * a1 / 20, q1 - h * v1 / 5, q1]
+    speeds = 5.0 * np.diff(np.stack(left + right), axis=0) / h
+    for k in range(len(h)):
+        where = motion.t[k] + h[k] * np.linspace(0.0, 1.0, 5)
+        name = "control points" if k == 0 else ""
+        axes.plot(where, speeds[:, k], ".-", color=_ORANGE, linewidth=1.0, markersize=7, label=name)
+    name = f"speed of joint {busy + 1}"
+    axes.plot(t, motion(t, 1)[:, busy], color=_BLUE, linewidth=1.5, label=name)
+    for side in (-limit, limit):
+        axes.axhline(side, color="black", linestyle="dashed", linewidth=1)
+    near = motion.t[int((np.abs(motion.qd[:, busy]) > 0.98 * limit).argmax())]
+    axes.set(xlabel="t [s]", ylabel="speed [rad/s]", xlim=(near - 0.12, near + 0.08))
+    axes.set(ylim=(0.85 * limit, 1.01 * limit))
+    axes.legend(frameon=False, loc="lower right")
     return _svg(figure)
 
 
