@@ -78,7 +78,7 @@ def knot_points() -> str:
     """Draw the self-motion manifolds of a path side by side, and two motions across them."""
     arm, start = sm.load_robot("planar_3r"), [0.2, 1.9, -2.2]
     end = arm.pose(start)
-    end.translation = end.translation + [-3.4, -0.4, 0.0]
+    end.translation = end.translation + np.array([-3.4, -0.4, 0.0])
     line = sm.paths.Line(arm.pose(start), end, 4.0)
     costs = sm.sample_problem().costs
     plan = sm.plan(sm.Problem(arm, line, "planar", start, costs=costs, constraints=[])).require()
