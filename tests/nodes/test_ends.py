@@ -52,16 +52,16 @@ def test_derivatives_are_central_differences(case: Case, shape: str) -> None:
     held = motion.grid.held
     found = ends.border(motion.c, around.changes, held).columns.T @ step.ravel()
     np.testing.assert_allclose(found, expected, atol=ALIKE * max(1.0, np.abs(expected).max()))
-    prices = np.random.default_rng(2).normal(size=ends.count)
-    pulled = np.einsum("kon,konw,kw->", ends.pulled(prices, len(step)), around.changes, step)
+    multipliers = np.random.default_rng(2).normal(size=ends.count)
+    pulled = np.einsum("kon,konw,kw->", ends.pulled(multipliers, len(step)), around.changes, step)
     assert float(pulled) == pytest.approx(
-        float(prices @ expected), abs=1e2 * ALIKE * max(1.0, float(np.abs(expected).max()))
+        float(multipliers @ expected), abs=1e2 * ALIKE * max(1.0, float(np.abs(expected).max()))
     )
 
 
 @pytest.mark.parametrize("free", [False, True])
 def test_the_optimum_meets_them_quickly(panda: sm.RobotModel, free: bool) -> None:
-    """Quadratically, also where the start is free; and prices are what the ends cost."""
+    """Quadratically, also where the start is free; and multipliers are what the ends cost."""
     problem = circle(panda, constraints=(sm.constraints.ClosedPath(),))
     misses: list[float] = []
 

@@ -166,13 +166,13 @@ def test_at_limits_prices_tell_what_the_limits_cost(panda: sm.RobotModel, share:
     here = PANDA_HOME[2] + share * (farthest - PANDA_HOME[2])
     bound, eased = optimum(here), optimum(here + 1e-4)
     assert bound.status is Status.CONVERGED
-    assert (bound.prices >= 0.0).all()
+    assert (bound.multipliers >= 0.0).all()
     assert bound.motion.h.max() <= 1e-6
     # What does not bind costs nothing.
-    assert np.abs(bound.prices * bound.motion.h).sum() <= 1e-5 * bound.motion.cost
+    assert np.abs(bound.multipliers * bound.motion.h).sum() <= 1e-5 * bound.motion.cost
     assert bound.motion.cost > free.motion.cost
     saved = bound.motion.cost - eased.motion.cost
-    assert saved == pytest.approx(1e-4 * bound.prices.sum(), rel=0.1)
+    assert saved == pytest.approx(1e-4 * bound.multipliers.sum(), rel=0.1)
 
 
 def test_what_cannot_be_kept_is_said_to_be_so(panda: sm.RobotModel) -> None:
@@ -243,8 +243,8 @@ def test_known_prices_spare_iterations(panda: sm.RobotModel) -> None:
     )
     steps: list[list[Step]] = [[], []]
     first = minimise(nodes_of(problem, 16), lambda step: bool(steps[0].append(step)), roughly=True)
-    assert first.prices.max() > 0.0
-    again = minimise(first.motion, lambda step: bool(steps[1].append(step)), first.prices)
+    assert first.multipliers.max() > 0.0
+    again = minimise(first.motion, lambda step: bool(steps[1].append(step)), first.multipliers)
     cold = minimise(nodes_of(problem, 16), never)
     assert again.motion.cost <= cold.motion.cost * (1.0 + 1e-5)
     assert 2 * len(steps[1]) < len(steps[0])

@@ -58,10 +58,10 @@ def test_rows_and_pullbacks_are_central_differences(panda: sm.RobotModel, name: 
     # Distances of hulls to a sphere have slopes of their own accuracy.
     allowed = 1e-3 if name == "clearance" else DIFFERENCE
     np.testing.assert_allclose(linear.along(changes), change, atol=allowed * scale)
-    prices = np.zeros(len(kept))
-    prices[kept] = np.random.default_rng(3).uniform(size=kept.sum())
-    pulled = float(np.sum(linear.pulled(prices) * changes))
-    expected = float(prices[kept] @ change)
+    multipliers = np.zeros(len(kept))
+    multipliers[kept] = np.random.default_rng(3).uniform(size=kept.sum())
+    pulled = float(np.sum(linear.pulled(multipliers) * changes))
+    expected = float(multipliers[kept] @ change)
     assert pulled == pytest.approx(expected, abs=allowed * scale * kept.sum())
     # Those that do not count have no say.
     few = kept & (np.arange(len(kept)) % 3 == 0)
@@ -123,13 +123,14 @@ def test_prices_are_carried_to_other_nodes_by_density(panda: sm.RobotModel) -> N
     for one in (motion, limits):
         finer = one.on(one.grid.on(np.sort(np.append(one.grid.t, one.grid.t[:-1] + 0.2))))
         assert finer is not None
-        prices = np.where(one.h > -500.0, 1.0, 0.0)
-        carried = finer.grid.rows.carried(one.grid.rows, prices)
+        multipliers = np.where(one.h > -500.0, 1.0, 0.0)
+        carried = finer.grid.rows.carried(one.grid.rows, multipliers)
         assert carried.shape == finer.h.shape
         carried[finer.h <= -500.0] = 0.0
         # Of each kind of row, per time.
         parts = (
-            rows.split(each) for rows, each in ((finer.grid.rows, carried), (one.grid.rows, prices))
+            rows.split(each)
+            for rows, each in ((finer.grid.rows, carried), (one.grid.rows, multipliers))
         )
         for mine, theirs in zip(*parts, strict=True):
             assert mine.sum() == pytest.approx(theirs.sum(), rel=0.25)

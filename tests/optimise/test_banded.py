@@ -80,7 +80,7 @@ def uneven_splines(seed: int, count: int) -> tuple[np.ndarray, BandedRows]:
     return np.ones(count + 2), BandedRows(matrix, least, np.column_stack([most, -least[:, 1:]]))
 
 
-# Prices of steep rows round.
+# Multipliers of steep rows round.
 STEEP_GAP = 1e-3
 
 

@@ -35,12 +35,14 @@ def test_the_step_is_the_best_of_its_model(seed: int) -> None:
     )
     assert answer.status in (0, 8)
     assert found is not None
-    p, prices = found
+    p, multipliers = found
     assert model(p) == pytest.approx(answer.fun, abs=1e-8)
-    assert np.all(prices >= -1e-10)
+    assert np.all(multipliers >= -1e-10)
     assert np.all(rows @ p <= upper + 1e-9)
     inside = np.abs(p) < region - 1e-9
-    np.testing.assert_allclose((hessian @ p + gradient + rows.T @ prices)[inside], 0.0, atol=1e-8)
+    np.testing.assert_allclose(
+        (hessian @ p + gradient + rows.T @ multipliers)[inside], 0.0, atol=1e-8
+    )
 
 
 def test_contradictory_rows_have_no_answer() -> None:

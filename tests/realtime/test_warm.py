@@ -14,7 +14,7 @@ from selfmotion.warm import Compiled
 from support.arms import PANDA_HOME
 from support.loops import closed_loop
 
-# Around the loop.
+# LocalModel the loop.
 
 
 def test_after_warming_up_nothing_is_compiled_and_no_memory_grows(

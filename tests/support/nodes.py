@@ -6,7 +6,7 @@ import selfmotion as sm
 from selfmotion.basics import Array, Counts
 from selfmotion.motion import Trajectory
 from selfmotion.nodes import NodeGrid, NodeMotion
-from selfmotion.nodes.objective import Around
+from selfmotion.nodes.objective import LocalModel
 from selfmotion.paper import settled_still_motion
 from support.arms import Case
 
@@ -49,10 +49,10 @@ def centred(motion: NodeMotion) -> NodeMotion:
     return found
 
 
-def around_of(motion: NodeMotion, force: Array | None = None) -> Around:
+def around_of(motion: NodeMotion, force: Array | None = None) -> LocalModel:
     """Return how nodes at the reference of their charts move, for λ (N + 1, 3, n) or none."""
     force = np.zeros_like(motion.place.nodes) if force is None else force
-    found = Around.of(motion.charts, motion.nu, motion.alpha, motion.place, force)
+    found = LocalModel.of(motion.charts, motion.nu, motion.alpha, motion.place, force)
     assert found is not None
     return found
 

@@ -1,5 +1,5 @@
 """Motions given by nodes on their self-motion manifolds, optimised by Newton's method."""
 
+from selfmotion.nodes.batch import Batch as Batch
 from selfmotion.nodes.motion import NodeGrid as NodeGrid, NodeMotion as NodeMotion
 from selfmotion.nodes.newton import Optimum as Optimum, Step as Step, minimise as minimise
-from selfmotion.nodes.together import Together as Together

@@ -25,7 +25,7 @@ class Border(NamedTuple):
     columns: Array
 
     def met_by(self, solved: Array) -> tuple[Array, Array]:
-        """Return the step that meets them to first order, and their prices.
+        """Return the step that meets them to first order, and their multipliers.
 
         For the step that knows nothing of them and what each of them moves, side by side.
         """
@@ -34,8 +34,8 @@ class Border(NamedTuple):
             return step, self.c
         turned = self.columns.T
         # Least squares: what is held may be asked for as well.
-        prices = np.asarray(np.linalg.lstsq(turned @ moved, turned @ step + self.c)[0], float)
-        return step - moved @ prices, prices
+        multipliers = np.asarray(np.linalg.lstsq(turned @ moved, turned @ step + self.c)[0], float)
+        return step - moved @ multipliers, multipliers
 
 
 class NodeEnds:
@@ -81,23 +81,23 @@ class NodeEnds:
         columns[held] = 0.0
         return Border(c, columns)
 
-    def pulled(self, prices: Array, count: int) -> Array:
-        """Return Σ prices (E,) · ∂c/∂(q, q̇, q̈) of the nodes, (count, 3, n)."""
+    def pulled(self, multipliers: Array, count: int) -> Array:
+        """Return Σ multipliers (E,) · ∂c/∂(q, q̇, q̈) of the nodes, (count, 3, n)."""
         n = self._items[0].null.shape[0]
         found, first = np.zeros((count, _ORDERS, n)), 0
         for item in self._items:
             signed = self._signed(item)
-            own = prices[first : first + len(signed)]
+            own = multipliers[first : first + len(signed)]
             first += len(signed)
             found[[0, -1]] += np.einsum("e,eokn->kon", own, signed)
         return found
 
-    def by_item(self, prices: Array) -> dict[int, Array]:
-        """Return the prices of each condition, by its identity."""
+    def by_item(self, multipliers: Array) -> dict[int, Array]:
+        """Return the multipliers of each condition, by its identity."""
         found, first = {}, 0
         for item in self._items:
             size = len(item.orders) * item.null.shape[1]
-            found[id(item)] = prices[first : first + size]
+            found[id(item)] = multipliers[first : first + size]
             first += size
         return found
 

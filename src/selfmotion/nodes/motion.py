@@ -118,7 +118,7 @@ class NodeGrid:
         return self._other(self._one, constraints)
 
     def copied(self, copies: int) -> "NodeGrid":
-        """Return the nodes of so many motions, one after the other, for `Together`.
+        """Return the nodes of so many motions, one after the other, for `Batch`.
 
         Of what belongs to several, `NodeMotion` knows places, samples and costs alone.
         """

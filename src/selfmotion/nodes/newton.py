@@ -20,7 +20,7 @@ import numpy as np
 from selfmotion.basics import Array, Flags
 from selfmotion.nodes.ends import Border
 from selfmotion.nodes.motion import NodeMotion
-from selfmotion.nodes.objective import Around
+from selfmotion.nodes.objective import LocalModel
 from selfmotion.nodes.rows import LinearRows
 from selfmotion.optimise import Banded, Status
 
@@ -28,7 +28,7 @@ from selfmotion.optimise import Banded, Status
 _AGREES, _AGREES_BOUND = 1e-8, 1e-6
 # A step that promises more than this share of the cost, and lowers it by nothing, is no rounding.
 _ROUNDING = 1e-5
-# Slacks and prices go no further than this share towards 0 in one step.
+# Slacks and multipliers go no further than this share towards 0 in one step.
 _INWARD = 0.995
 # A step is taken if it does at least this share of what it promises, and cut by half otherwise.
 _SHARE, _SHORTEST = 1e-4, 1e-7
@@ -45,21 +45,22 @@ _LEAST_SHIFT = 1e-18
 # matrix that says something.
 _FARTHEST, _TRUSTED = 0.5, 5.0
 # Barriers begin with this share of the cost for all rows, and end with that; slacks begin with at
-# least so much [units of h]. Where prices are known, with these.
+# least so much [units of h]. Where multipliers are known, with these.
 _FIRST, _LAST, _SLACK = 1e-1, 1e-6, 1e-1
 _KNOWN_FIRST, _KNOWN_SLACK = 1e-5, 1e-3
 # A row that comes in begins with so much of e.
 _ELASTIC = 1e-3
 # ρ is this many times the cost for a unit of h.
-_PRICE = 10.0
+_ELASTIC_COST = 10.0
 # A barrier is solved to this many times itself, before it falls to this share, or this power; at
 # the end products of slack and price may be this many times the barrier.
 _SOLVED, _FALL, _POWER, _CENTRED = 10.0, 0.2, 1.5, 30.0
 # Rows are linear to this [units of h] before a barrier falls, and at the end.
 _ABOUT_MET, _MET = 1e-2, 1e-7
-# Prices are known where a step changes them by no more than this share of all; together they are no
-# less than this share of the cost. Between stiff rows a step promises little, whatever these say.
-_SETTLED, _NO_PRICE = 1e-2, 1e-3
+# Multipliers are known where a step changes them by no more than this share of all; together they
+# are no less than this share of the cost. Between stiff rows a step promises little, whatever these
+# say.
+_SETTLED, _NO_MULTIPLIER = 1e-2, 1e-3
 # Of a row that counts by less than this share of the barrier, the gap does not matter.
 _IDLE = 1e-2
 # What is asked of the ends is met to this [rad, rad/s].
@@ -94,8 +95,8 @@ class Step(NamedTuple):
     length: float
 
 
-Told = Callable[[Step], bool]
-"""Told of each iteration; True stops."""
+Callback = Callable[[Step], bool]
+"""Called with each iteration; True stops."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,26 +106,26 @@ class Optimum:
     Attributes
     ----------
     motion : NodeMotion
-    prices : (R,)
+    multipliers : (R,)
         λ of all rows; 0 of those that did not count.
     status : Status
     promised : float
         By how much another step would lower the cost.
-    end_prices : (E,)
+    end_multipliers : (E,)
         Of what is asked of the ends.
     """
 
     motion: NodeMotion
-    prices: Array
+    multipliers: Array
     status: Status
     promised: float
-    end_prices: Array
+    end_multipliers: Array
 
 
 def minimise(
     begin: NodeMotion,
-    told: Told,
-    prices: Array | None = None,
+    callback: Callback,
+    multipliers: Array | None = None,
     *,
     roughly: bool = False,
     most: int = _MOST,
@@ -134,18 +135,18 @@ def minimise(
     Parameters
     ----------
     begin : NodeMotion
-    told : callable
-    prices : (R,), optional
+    callback : callable
+    multipliers : (R,), optional
         Of an optimum near by.
     roughly : bool
         Whether it is enough where such an optimum can be begun with: rows keep off what binds.
     most : int
         Iterations.
     """
-    solver = _Solver(begin, prices, roughly=roughly)
+    solver = _Solver(begin, multipliers, roughly=roughly)
     least, since = np.inf, 0
     for _ in range(most):
-        status = solver.advance(told)
+        status = solver.advance(callback)
         if status is not None:
             return solver.optimum(status)
         broken, since = solver.motion.violation, since + 1
@@ -165,7 +166,7 @@ class _Model(NamedTuple):
         ∂F/∂w.
     both : (N, n, 6, 6r)
         ∂y/∂w of both ends of each interval.
-    around : Around
+    around : LocalModel
         How the nodes move, to second order along what pulls at them.
     intervals : (N, 6r, 6r)
         What bends by costs.
@@ -175,7 +176,7 @@ class _Model(NamedTuple):
 
     gradient: Array
     both: Array
-    around: Around
+    around: LocalModel
     intervals: Array
     rows: LinearRows
     border: Border
@@ -188,7 +189,7 @@ class _Linear(NamedTuple):
     ----------
     model : _Model
     stiff : (R,)
-        How much a change of h changes prices.
+        How much a change of h changes multipliers.
     right : (2, (N + 1) 3r)
         What pulls at the nodes, without barrier and by each unit of it.
     solved : ((N + 1) 3r, 2 + E)
@@ -207,42 +208,44 @@ class _Change(NamedTuple):
     nodes: Array
     slacks: Array
     elastics: Array
-    prices: Array
-    end_prices: Array
+    multipliers: Array
+    end_multipliers: Array
 
 
 class _Solver:
-    """The state of Newton's method: a motion, slacks, prices and the barrier.
+    """The state of Newton's method: a motion, slacks, multipliers and the barrier.
 
     Of rows, s, e and λ are those of the rows that count, in their order.
     """
 
-    def __init__(self, begin: NodeMotion, prices: Array | None, *, roughly: bool) -> None:
+    def __init__(self, begin: NodeMotion, multipliers: Array | None, *, roughly: bool) -> None:
         self.motion, h = begin, begin.h
         self._size = max(abs(begin.aim), np.finfo(float).tiny)
         each = self._size / max(int((h > -1e2).sum()), 1)
         self._roughly, last = roughly, _KNOWN_FIRST if roughly else _LAST
-        self._least, self._price = last * each, _PRICE * self._size
-        self._barrier = (_FIRST if prices is None else _KNOWN_FIRST) * each
+        self._least, self._elastic_cost = last * each, _ELASTIC_COST * self._size
+        self._barrier = (_FIRST if multipliers is None else _KNOWN_FIRST) * each
         self._kept: Flags = np.zeros(len(h), dtype=np.bool_)
-        self._slacks = self._elastics = self._prices = np.zeros(0)
+        self._slacks = self._elastics = self._multipliers = np.zeros(0)
         self._admit()
-        if prices is not None:
-            self._begin_with(prices)
+        if multipliers is not None:
+            self._begin_with(multipliers)
         self._penalty, self._promised, self._length, self._shift = 0.0, np.inf, 0.0, 0.0
-        self._end_prices = np.zeros(begin.grid.ends.count)
-        self._changing = np.inf if self._prices.size else 0.0
+        self._end_multipliers = np.zeros(begin.grid.ends.count)
+        self._changing = np.inf if self._multipliers.size else 0.0
 
-    def _begin_with(self, prices: Array) -> None:
-        """Begin with known prices of all rows, (R,)."""
-        h, known = self._h, prices[self._kept]
+    def _begin_with(self, multipliers: Array) -> None:
+        """Begin with known multipliers of all rows, (R,)."""
+        h, known = self._h, multipliers[self._kept]
         usual = self._barrier / np.maximum(-h, _KNOWN_SLACK)
-        self._prices = np.clip(np.maximum(known, usual), None, 0.5 * self._price)
-        slacks = np.maximum(-h, self._barrier / self._prices)
-        self._elastics = np.maximum(h + slacks, 0.0) + self._barrier / (self._price - self._prices)
+        self._multipliers = np.clip(np.maximum(known, usual), None, 0.5 * self._elastic_cost)
+        slacks = np.maximum(-h, self._barrier / self._multipliers)
+        self._elastics = np.maximum(h + slacks, 0.0) + self._barrier / (
+            self._elastic_cost - self._multipliers
+        )
         self._slacks = np.maximum(slacks, self._elastics - h)
-        # Where prices are not those of the rows, as far off as they are.
-        off = float(np.mean(self._slacks * self._prices)) if len(h) else 0.0
+        # Where multipliers are not those of the rows, as far off as they are.
+        off = float(np.mean(self._slacks * self._multipliers)) if len(h) else 0.0
         self._barrier = min(max(self._barrier, off), _FIRST / _KNOWN_FIRST * self._barrier)
 
     @property
@@ -262,16 +265,18 @@ class _Solver:
             return
         x = motion.h
         slacks = np.maximum(-x, _SLACK) + _ELASTIC
-        full = slacks, x + slacks, np.minimum(self._barrier / slacks, 0.5 * self._price)
-        for values, own in zip(full, (self._slacks, self._elastics, self._prices), strict=True):
+        full = slacks, x + slacks, np.minimum(self._barrier / slacks, 0.5 * self._elastic_cost)
+        for values, own in zip(
+            full, (self._slacks, self._elastics, self._multipliers), strict=True
+        ):
             values[self._kept] = own
         self._kept = near
-        self._slacks, self._elastics, self._prices = (values[near] for values in full)
+        self._slacks, self._elastics, self._multipliers = (values[near] for values in full)
 
     def optimum(self, status: Status) -> Optimum:
         """Return where it is now."""
         return Optimum(
-            self.motion, self._all(self._prices), status, self._promised, self._end_prices
+            self.motion, self._all(self._multipliers), status, self._promised, self._end_multipliers
         )
 
     def _all(self, own: Array) -> Array:
@@ -280,26 +285,26 @@ class _Solver:
         found[self._kept] = own
         return found
 
-    def advance(self, told: Told) -> Status | None:
+    def advance(self, callback: Callback) -> Status | None:
         """Take a step; return how the method ended, if it did."""
         if self._arrived():
-            told(Step(self.motion, 0.0, self._length))
+            callback(Step(self.motion, 0.0, self._length))
             return Status.CONVERGED
         model = self._model()
         if model is None:
             return Status.GRADIENT
         slope = float(np.linalg.norm(model.gradient))
-        if told(Step(self.motion, slope, self._length)):
+        if callback(Step(self.motion, slope, self._length)):
             return Status.STOPPED
         linear = self._linear(model)
         if linear is None:
             return Status.GRADIENT
         while True:
             step = self._step(linear)
-            last = not self._prices.size or self._barrier <= self._least
-            self._changing = self._share_of(step.prices)
+            last = not self._multipliers.size or self._barrier <= self._least
+            self._changing = self._share_of(step.multipliers)
             if last and self._is_there() and self._changing <= _SETTLED:
-                self._end_prices = step.end_prices
+                self._end_multipliers = step.end_multipliers
                 return Status.CONVERGED
             if last or not self._is_solved():
                 return self._move(model, step)
@@ -313,13 +318,13 @@ class _Solver:
         slopes = grid.cost.slopes(motion.samples, motion.curve_ends, motion.partials)
         by_cost = spline.scattered(slopes)
         rows = grid.rows.linearised(motion.checked, self._kept)
-        force, prices = by_cost, self._all(self._prices)
+        force, multipliers = by_cost, self._all(self._multipliers)
         wild = float(np.max(self._h, initial=0.0)) > _WILD
-        if not wild and self._prices.size:
-            force = force + spline.scattered(rows.pulled(prices))
+        if not wild and self._multipliers.size:
+            force = force + spline.scattered(rows.pulled(multipliers))
         if not wild and len(motion.c):
-            force = force + grid.ends.pulled(self._end_prices, len(force))
-        around = Around.of(motion.charts, motion.nu, motion.alpha, motion.place, force)
+            force = force + grid.ends.pulled(self._end_multipliers, len(force))
+        around = LocalModel.of(motion.charts, motion.nu, motion.alpha, motion.place, force)
         if around is None:
             return None
         around = around.scaled(grid.scale)
@@ -327,7 +332,7 @@ class _Solver:
         intervals = grid.cost.curvature(motion.samples, motion.partials, both)
         # Rows of tolerances bend as they do, however far they are broken; not past others.
         apart = wild and motion.breaks_hard(_WILD)
-        bending = None if apart else grid.rows.bending(motion.checked, prices, both)
+        bending = None if apart else grid.rows.bending(motion.checked, multipliers, both)
         if bending is not None:
             intervals = intervals + bending
         gradient = around.pulled(by_cost)
@@ -349,13 +354,13 @@ class _Solver:
         return False
 
     def _share_of(self, step: Array) -> float:
-        """Return how much of all prices a step changes them by."""
-        known = float(self._prices.sum()) + _NO_PRICE * self._size
+        """Return how much of all multipliers a step changes them by."""
+        known = float(self._multipliers.sum()) + _NO_MULTIPLIER * self._size
         return float(np.abs(step).sum()) / known
 
     def _is_there(self) -> bool:
         """Whether another step would promise nothing, and all is met."""
-        agrees = (_AGREES_BOUND if self._prices.size else _AGREES) * self._size
+        agrees = (_AGREES_BOUND if self._multipliers.size else _AGREES) * self._size
         if self._roughly:
             agrees *= _ROUGHLY
         met = self._open <= _MET * (_ROUGHLY if self._roughly else 1.0)
@@ -375,25 +380,25 @@ class _Solver:
         On very short intervals rates are known to few digits: what costs next to nothing is met.
         """
         gap = np.abs(self._gap)
-        return float(gap[self._prices * gap > _IDLE * self._barrier].max(initial=0.0))
+        return float(gap[self._multipliers * gap > _IDLE * self._barrier].max(initial=0.0))
 
     @property
     def _off(self) -> float:
-        """How far products of slacks and prices are off the barrier."""
-        by_slack = np.abs(self._slacks * self._prices - self._barrier).max(initial=0.0)
-        left = self._elastics * (self._price - self._prices)
+        """How far products of slacks and multipliers are off the barrier."""
+        by_slack = np.abs(self._slacks * self._multipliers - self._barrier).max(initial=0.0)
+        left = self._elastics * (self._elastic_cost - self._multipliers)
         return float(max(by_slack, np.abs(left - self._barrier).max(initial=0.0)))
 
     def _linear(self, model: _Model) -> _Linear | None:
         """Return the step for any barrier; None where the matrix says nothing."""
-        grid, prices = self.motion.grid, self._prices
-        left = self._price - prices
-        stiff = 1.0 / (self._slacks / prices + self._elastics / left)
+        grid, multipliers = self.motion.grid, self._multipliers
+        left = self._elastic_cost - multipliers
+        stiff = 1.0 / (self._slacks / multipliers + self._elastics / left)
         gradient, intervals = model.gradient, model.intervals
         right = np.stack([gradient.ravel(), np.zeros(gradient.size)])
-        if prices.size:
-            by_barrier = stiff * (1.0 / prices - 1.0 / left)
-            for k, pulls in enumerate((prices + stiff * self._h, by_barrier)):
+        if multipliers.size:
+            by_barrier = stiff * (1.0 / multipliers - 1.0 / left)
+            for k, pulls in enumerate((multipliers + stiff * self._h, by_barrier)):
                 push = model.rows.pulled(self._all(pulls))
                 pulled = model.around.pulled(grid.spline.scattered(push))
                 pulled.reshape(-1)[grid.held] = 0.0
@@ -404,20 +409,24 @@ class _Solver:
 
     def _step(self, linear: _Linear) -> _Change:
         """Return Newton's step of all unknowns for the present barrier."""
-        barrier, prices, model = self._barrier, self._prices, linear.model
-        slacks, elastics, left = self._slacks, self._elastics, self._price - self._prices
-        step, end_prices = self._nodes_of(linear.solved, model)
+        barrier, multipliers, model = self._barrier, self._multipliers, linear.model
+        slacks, elastics, left = (
+            self._slacks,
+            self._elastics,
+            self._elastic_cost - self._multipliers,
+        )
+        step, end_multipliers = self._nodes_of(linear.solved, model)
         right = linear.right[0] + barrier * linear.right[1]
-        self._promised = float(-(right + model.border.columns @ end_prices) @ step)
+        self._promised = float(-(right + model.border.columns @ end_multipliers) @ step)
         nodes = step.reshape(model.gradient.shape)
-        off = self._h + barrier / prices - barrier / left
-        by_prices = linear.stiff * (model.rows.along(_along(model.both, nodes)) + off)
-        by_slacks = barrier / prices - slacks - slacks / prices * by_prices
-        by_elastics = barrier / left - elastics + elastics / left * by_prices
-        return _Change(nodes, by_slacks, by_elastics, by_prices, end_prices)
+        off = self._h + barrier / multipliers - barrier / left
+        by_multipliers = linear.stiff * (model.rows.along(_along(model.both, nodes)) + off)
+        by_slacks = barrier / multipliers - slacks - slacks / multipliers * by_multipliers
+        by_elastics = barrier / left - elastics + elastics / left * by_multipliers
+        return _Change(nodes, by_slacks, by_elastics, by_multipliers, end_multipliers)
 
     def _nodes_of(self, solved: Array, model: _Model) -> tuple[Array, Array]:
-        """Return the step of the nodes for the present barrier, and the prices of the ends."""
+        """Return the step of the nodes for the present barrier, and the multipliers of the ends."""
         own = solved[:, 0] + self._barrier * solved[:, 1]
         return model.border.met_by(np.column_stack([own, solved[:, 2:]]))
 
@@ -471,13 +480,13 @@ class _Solver:
         gap = float(np.abs(motion.c).sum() + np.abs(self._gap).sum())
         slope = float((model.gradient * step.nodes).sum()) + float(
             np.sum(
-                (self._price - self._barrier / self._elastics) * step.elastics
+                (self._elastic_cost - self._barrier / self._elastics) * step.elastics
                 - self._barrier / self._slacks * step.slacks
             )
         )
         if gap > 0.0:
             # So that the step lowers the merit, whichever way the cost goes.
-            dearest = 1.5 * float(np.abs(step.end_prices).max(initial=0.0))
+            dearest = 1.5 * float(np.abs(step.end_multipliers).max(initial=0.0))
             self._penalty = max(self._penalty, 2.0 * slope / gap, dearest)
         merit = self._merit(motion, self._slacks, self._elastics)
         promise = slope - self._penalty * gap
@@ -498,26 +507,26 @@ class _Solver:
                 # Written so that NaN is no gain; what is below rounding is none to look for.
                 if gained >= -_SHARE * length * min(promise, 0.0) - 1e-13 * abs(merit):
                     share = min(
-                        _longest(self._prices, step.prices),
-                        _longest(self._price - self._prices, -step.prices),
+                        _longest(self._multipliers, step.multipliers),
+                        _longest(self._elastic_cost - self._multipliers, -step.multipliers),
                     )
-                    self._prices = self._prices + share * step.prices
+                    self._multipliers = self._multipliers + share * step.multipliers
                     self._slacks, self._elastics = slacks, elastics
                     self.motion, self._length = new, length
-                    self._end_prices = step.end_prices
+                    self._end_multipliers = step.end_multipliers
                     self._admit()
                     return None
             length *= 0.5
         if self._promised <= _ROUNDING * self._size:
             return Status.PRECISION
         # What a good step promises and none does is no rounding: the gradient is wrong.
-        asked = self._prices.size or len(self._end_prices)
+        asked = self._multipliers.size or len(self._end_multipliers)
         return Status.INFEASIBLE if asked else Status.GRADIENT
 
     def _merit(self, motion: NodeMotion, slacks: Array, elastics: Array) -> float:
         barrier = self._barrier * float(np.log(slacks).sum() + np.log(elastics).sum())
         gap = np.abs(motion.h[self._kept] + slacks - elastics).sum() + np.abs(motion.c).sum()
-        elastic = self._price * float(elastics.sum())
+        elastic = self._elastic_cost * float(elastics.sum())
         return motion.aim + elastic - barrier + self._penalty * float(gap)
 
 

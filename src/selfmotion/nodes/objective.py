@@ -223,7 +223,7 @@ def _outer(a: Array, b: Array) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class Around:
+class LocalModel:
     """How nodes move when their coordinates do, to second order.
 
     Attributes
@@ -240,7 +240,7 @@ class Around:
     @classmethod
     def of(
         cls, charts: Charts, nu: Array, alpha: Array, place: Place, force: Array
-    ) -> "Around | None":
+    ) -> "LocalModel | None":
         """Look around the reference of charts; None where a neighbour is not to be had.
 
         `place` is that of the nodes there, `force` (N + 1, 3, n) is λ.
@@ -279,9 +279,9 @@ class Around:
         cls._by_rates(charts, place, here, force, curvature)
         return cls(changes, curvature)
 
-    def scaled(self, scale: Array) -> "Around":
+    def scaled(self, scale: Array) -> "LocalModel":
         """Return the same by coordinates that are these (3r,) times as small."""
-        return Around(self.changes * scale, self.curvature * scale * scale[:, None])
+        return LocalModel(self.changes * scale, self.curvature * scale * scale[:, None])
 
     def pulled(self, force: Array) -> Array:
         """Return Γᵀλ of the nodes, (N + 1, 3r), for λ (N + 1, 3, n)."""

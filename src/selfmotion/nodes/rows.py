@@ -95,10 +95,10 @@ class PointRows:
         """Return ∂h along changes of y (N, 6, n), (R,)."""
         return np.asarray(np.sum(self.by_ends * changes[self.intervals], axis=(1, 2)))
 
-    def pulled(self, prices: Array, count: int) -> Array:
-        """Return Σ prices ∂h/∂y, (count, 6, n)."""
+    def pulled(self, multipliers: Array, count: int) -> Array:
+        """Return Σ multipliers ∂h/∂y, (count, 6, n)."""
         found = np.zeros((count, *self.by_ends.shape[1:]))
-        np.add.at(found, self.intervals, prices[:, None, None] * self.by_ends)
+        np.add.at(found, self.intervals, multipliers[:, None, None] * self.by_ends)
         return found
 
     def squared(self, weights: Array, both: Array) -> Array:
@@ -233,13 +233,13 @@ class NodeRows:
         by = rows.reshape(len(which), ORDERS, n)
         return PointRows(intervals, np.swapaxes(shares, 1, 2) @ by)
 
-    def bending(self, samples: Samples, prices: Array, both: Array) -> Array | None:
-        """Return Σ prices · ∂²h/∂w² of rows that are sums of squares: what they bend by.
+    def bending(self, samples: Samples, multipliers: Array, both: Array) -> Array | None:
+        """Return Σ multipliers · ∂²h/∂w² of rows that are sums of squares: what they bend by.
 
         By w of both ends of each interval, (N, d, d); None where there are none.
         """
         found = None
-        for item, own in zip(self.constraints, self.split(prices), strict=True):
+        for item, own in zip(self.constraints, self.split(multipliers), strict=True):
             squares = getattr(item, "squares", None)
             if squares is None or not own.any():
                 continue
@@ -251,10 +251,10 @@ class NodeRows:
             found = one if found is None else found + one
         return found
 
-    def priced(self, prices: Array, ends: Array) -> list[Priced]:
+    def priced(self, multipliers: Array, ends: Array) -> list[Priced]:
         """Return what the rows of each constraint cost, (R,), in the order of time."""
         found = []
-        for item, own in zip(self.constraints, self.split(prices), strict=True):
+        for item, own in zip(self.constraints, self.split(multipliers), strict=True):
             if not isinstance(item, BoundLimits):
                 used = np.ones(own.shape, dtype=np.bool_)
                 found.append(Priced(item, own, self.spline.points.t, used))
@@ -279,13 +279,13 @@ class NodeRows:
         ]
         return np.concatenate([np.zeros(0), *each])
 
-    def given_away(self, prices: Array, ends: Array) -> Array:
+    def given_away(self, multipliers: Array, ends: Array) -> Array:
         """Return by how much F might fall if limits were asked of the curve itself, (N,).
 
-        Where control points are beyond the curve by as much, prices times that.
+        Where control points are beyond the curve by as much, multipliers times that.
         """
         found = np.zeros(self.spline.count)
-        for item, own in zip(self.constraints, self.split(prices), strict=True):
+        for item, own in zip(self.constraints, self.split(multipliers), strict=True):
             if isinstance(item, BoundLimits) and own.any():
                 h = self._limits(item, ends, _FINE).max(axis=1) - _granted(item)
                 found += (own.sum(axis=1) * np.maximum(-h, 0.0)).sum(axis=(1, 2))
@@ -327,12 +327,12 @@ class NodeRows:
                 found[:-1] |= change
         return found
 
-    def carried(self, before: "NodeRows", prices: Array) -> Array:
-        """Return the prices of rows on other nodes, (R,): of the nearest ones, by density."""
+    def carried(self, before: "NodeRows", multipliers: Array) -> Array:
+        """Return the multipliers of rows on other nodes, (R,): of the nearest ones, by density."""
         spline, old, found = self.spline, before.spline, [np.zeros(0)]
         middles = 0.5 * (spline.t[:-1] + spline.t[1:])
         k = np.searchsorted(old.t, middles) - 1
-        for item, own in zip(self.constraints, before.split(prices), strict=True):
+        for item, own in zip(self.constraints, before.split(multipliers), strict=True):
             if isinstance(item, BoundLimits):
                 each = own.copy()
                 if item.order < ORDERS - 1:
@@ -394,14 +394,14 @@ class LinearRows:
                 found.append(np.stack([x, -x], axis=2)[own])
         return np.concatenate(found)
 
-    def pulled(self, prices: Array) -> Array:
-        """Return Σ prices ∂h/∂y, (N, 6, n), for prices of all rows.
+    def pulled(self, multipliers: Array) -> Array:
+        """Return Σ multipliers ∂h/∂y, (N, 6, n), for multipliers of all rows.
 
         They are 0 of those that do not count.
         """
         spline = self.rows.spline
         found = np.zeros((spline.count, 6, self.rows.dof))
-        for (item, own, part), kept in zip(self._each(prices), self._counting, strict=True):
+        for (item, own, part), kept in zip(self._each(multipliers), self._counting, strict=True):
             if part is not None:
                 found += part.pulled(own[kept], spline.count)
             elif isinstance(item, BoundLimits) and own.any():

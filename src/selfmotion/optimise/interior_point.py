@@ -11,10 +11,10 @@ from selfmotion.basics import Array, Flags, Ints, called, kernel
 MET = 1e-7
 _STEPS = 200
 # Products of slack and price are aimed at this share of the gap, no less: the smaller they are, the
-# more prices of steep rows round.
+# more multipliers of steep rows round.
 _AIMED = 0.1
 # Where rounding leaves so much of g·c unpaid, by shares, and so many steps each leave more than
-# this of what the one before left, prices pay as exactly as they can.
+# this of what the one before left, multipliers pay as exactly as they can.
 _ROUNDED, _STALLED, _SAME = 1e-2, 3, 0.7
 # Share of the way to the boundary that a step goes.
 _TO_BOUNDARY = 0.99
@@ -109,7 +109,7 @@ def _begin(
     slack: Array,
     price: Array,
 ) -> float:
-    """Fill slacks and prices to begin with; return about how large g·c may be."""
+    """Fill slacks and multipliers to begin with; return about how large g·c may be."""
     count, value = len(limit), 0.0
     for k in range(len(gradient)):
         value += abs(gradient[k]) * max(abs(c[k]), 1.0)
@@ -124,7 +124,7 @@ def _begin(
 def _unpaid(
     gradient: Array, free: Flags, paid: Array, c: Array, value: float
 ) -> tuple[float, float]:
-    """Return how large g·c is, and what of it prices do not pay for."""
+    """Return how large g·c is, and what of it multipliers do not pay for."""
     reached, left = 0.0, 0.0
     for k in range(len(gradient)):
         reached += gradient[k] * c[k]
@@ -165,7 +165,7 @@ def _measure(
     band: Array,
     paid: Array,
 ) -> tuple[float, float]:
-    """Fill what rows miss, the normal matrix (3, N) and what prices pay; return Σ s z, the most."""
+    """Fill what rows miss, the normal matrix (3, N) and what is paid; return Σ s z, the most."""
     band[:], paid[:] = 0.0, 0.0
     products, met = 0.0, 0.0
     for r in range(len(limit)):
@@ -268,7 +268,7 @@ def _longest(
     second: float,
     share: float,
 ) -> tuple[float, float]:
-    """Fill the changes of slacks and prices; return how far they may go, at most the whole way."""
+    """Fill the changes of slacks and multipliers; return how far they may go, at most 1."""
     falls, drops = 0.0, 0.0
     for r in range(len(slack)):
         wanted = centre

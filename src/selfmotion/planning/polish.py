@@ -112,13 +112,13 @@ class Polisher:
             return None
         # What an earlier plan has found need not begin far from what binds.
         is_plan = len(motions) > 1 and motion is near[0]
-        prices = np.zeros(len(motion.h)) if is_plan else None
-        return self.best_near(motion, dearest, prices)
+        multipliers = np.zeros(len(motion.h)) if is_plan else None
+        return self.best_near(motion, dearest, multipliers)
 
     def best_near(
-        self, motion: NodeMotion, dearest: float = np.inf, prices: Array | None = None
+        self, motion: NodeMotion, dearest: float = np.inf, multipliers: Array | None = None
     ) -> NodeSolution | None:
-        """Return the best motion near one of nodes; `prices` (R,) of its rows may be known.
+        """Return the best motion near one of nodes; `multipliers` (R,) of its rows may be known.
 
         Where that breaks conditions, also near the free optimum, and near motions from its start
         whose self-motion goes towards the middle of the joints' limits; where all do, the one that
@@ -135,19 +135,19 @@ class Polisher:
                 # With conditions it would cost more still.
                 self.is_hopeless = True
                 return None
-        if prices is None and not _is_kept(motion):
+        if multipliers is None and not _is_kept(motion):
             # One that breaks nothing is at its optimum before this one breaks nothing.
             most = KEPT_FIRST * abs(motion.aim)
             tried = (begin for begin in self._beginnings(motion) if begin and begin.aim <= most)
             motion = next(filter(_is_kept, tried), motion)
         # What takes long is seldom kept in the end: other beginnings come before the rest of it.
-        first = best = minimise(motion, self._told, prices, roughly=True, most=FEWER)
+        first = best = minimise(motion, self._report, multipliers, roughly=True, most=FEWER)
         rank = partial(_rank, begun=motion)
         if not _is_kept(best.motion) and self._ended is None:
             best = self._other(motion, best, free)
         unfinished = first.status is Status.MAX_ITERATIONS and self._ended is None
         if unfinished and (best is first or not _is_kept(best.motion)):
-            rest = self._minimise(first.motion, first.prices if best is first else None)
+            rest = self._minimise(first.motion, first.multipliers if best is first else None)
             best = min(best, rest, key=rank)
         if not _is_kept(best.motion) and self._ended is None:
             # What control points of few nodes cannot keep, the curve may.
@@ -157,8 +157,8 @@ class Polisher:
     def with_more(self, known: NodeSolution) -> NodeSolution | None:
         """Return the best motion near one of which less was asked, the rest after that; or None."""
         motion = self.grid(known.motion.grid.t).at(known.motion.centred)
-        more = len(motion.h) - len(known.prices)
-        found = self.best_near(motion, prices=np.append(known.prices, np.zeros(more)))
+        more = len(motion.h) - len(known.multipliers)
+        found = self.best_near(motion, multipliers=np.append(known.multipliers, np.zeros(more)))
         return None if found is None or found.violations else found
 
     def _freely(self, motion: NodeMotion) -> Optimum:
@@ -176,7 +176,7 @@ class Polisher:
         best = min(first, unbound, key=rank)
         for begin in chain([open_one], self._beginnings(begun), self._aside(begun)):
             if begin is not None:
-                found = minimise(begin, self._told, roughly=True, most=FEWER)
+                found = minimise(begin, self._report, roughly=True, most=FEWER)
                 best = min(best, found, key=rank)
             if self._ended is not None or _is_kept(best.motion):
                 break
@@ -216,7 +216,7 @@ class Polisher:
 
     def again(self, known: NodeSolution, *, roughly: bool = False) -> NodeSolution | None:
         """Return the optimum near a motion on its nodes; None where that breaks conditions."""
-        optimum = self._minimise(known.motion, known.prices, roughly=roughly)
+        optimum = self._minimise(known.motion, known.multipliers, roughly=roughly)
         return self._solution(optimum) if _is_kept(optimum.motion) else None
 
     def settled(self, known: NodeSolution) -> NodeSolution:
@@ -248,7 +248,7 @@ class Polisher:
                 break
             gains = known.cost - found.cost > GIVEN_AWAY * abs(known.cost)
             if not (found.has_arrived or gains) and self._ended is None:
-                # More nodes lead nowhere, and prices on the way say nothing.
+                # More nodes lead nowhere, and multipliers on the way say nothing.
                 found = None if polishes else self.again(known)
                 return found if found is not None and found.has_arrived else known
             known, is_rough = found.after(known.cost), not polishes
@@ -285,7 +285,7 @@ class Polisher:
         wanted = WANTED_NEAR_PATH if errors.max() > NEAR_PATH else NEAR_PATH
         parts = np.ceil((errors / wanted) ** FINER_POWER - 1e-9)
         parts = np.clip(parts, 1.0, MOST_PARTS).astype(int)
-        away = grid.rows.given_away(known.prices, motion.curve_ends)
+        away = grid.rows.given_away(known.multipliers, motion.curve_ends)
         least = GIVEN_AWAY * abs(motion.aim)
         if away.sum() > least:
             parts[(away > least / spline.count) & (parts == 1)] = 2
@@ -293,11 +293,11 @@ class Polisher:
         return None if (parts == 1).all() else _divided(spline.t, parts)
 
     def _minimise(
-        self, motion: NodeMotion, prices: Array | None = None, *, roughly: bool = True
+        self, motion: NodeMotion, multipliers: Array | None = None, *, roughly: bool = True
     ) -> Optimum:
-        return minimise(motion, self._told, prices, roughly=roughly)
+        return minimise(motion, self._report, multipliers, roughly=roughly)
 
-    def _told(self, step: Step) -> bool:
+    def _report(self, step: Step) -> bool:
         """Note an iteration, and the motion if it keeps all; return whether to stop."""
         if _is_kept(step.motion):
             self.latest = NodeSolution.on_the_way(step.motion)

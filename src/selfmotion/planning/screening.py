@@ -9,7 +9,7 @@ from selfmotion.basics import Array, Flags, Ints, Progress
 from selfmotion.constraints import penalised
 from selfmotion.costs import Samples
 from selfmotion.motion import Sampling
-from selfmotion.nodes import NodeGrid, NodeMotion, Together, minimise
+from selfmotion.nodes import Batch, NodeGrid, NodeMotion, minimise
 from selfmotion.planning.effort import Effort
 from selfmotion.planning.grids import resolves, rough_grid
 from selfmotion.planning.posture import far_from_usual, wound_back
@@ -51,7 +51,7 @@ class Ranking:
         self._problem, self._effort, self._progress = problem, effort, progress
         self._apart = apart_of(problem.robot)
         self._t = rough_grid(problem).nodes
-        self._found: Together | None = None
+        self._found: Batch | None = None
         self._ranked: list[NodeMotion] = []
 
     @property
@@ -110,10 +110,10 @@ class Ranking:
         nodes = self._grid(problem)
         total = 1 + ROUGH_ROUNDS
         self._progress("screening start", 1, total)
-        found = self._found = Together.near(nodes, motions)
+        found = self._found = Batch.near(nodes, motions)
         soft = problem.softened(float(found.costs.min()))
         if soft is not problem:
-            found = self._found = Together.near(self._grid(soft), motions)
+            found = self._found = Batch.near(self._grid(soft), motions)
         alone, near = unlike(found.q, _cheapest(found), self._apart, ONE_VALLEY)
         which = [*alone, *near][: max(ROUGH_MOTIONS, finalists)]
         if not which:
@@ -132,7 +132,7 @@ class Ranking:
         counts = self._effort.counts
         return NodeGrid(problem, self._t, (), free=True, counts=counts, calm=True)
 
-    def _decisive(self, found: Together, finalists: int) -> list[NodeMotion]:
+    def _decisive(self, found: Batch, finalists: int) -> list[NodeMotion]:
         """Return the cheapest motion that keeps all, then others about as cheap; or none.
 
         None is the cheapest for sure where it is not at its optimum yet, or the nodes are too few.
@@ -193,7 +193,7 @@ class Ranking:
         cost = motion.cost
         return not self._clear(motion), cost + UNKEPT * abs(cost) * motion.violation
 
-    def _motion(self, found: Together, k: int) -> NodeMotion | None:
+    def _motion(self, found: Batch, k: int) -> NodeMotion | None:
         """Return one of the motions, with the conditions that are asked of it.
 
         Its joints are turned by whole turns to where people expect them. What knows no limits may
@@ -206,7 +206,7 @@ class Ranking:
             return motion
         return self._near(self._turned_inside(q), found.qd[k], found.qdd[k])
 
-    def _expected(self, found: Together) -> Ints:
+    def _expected(self, found: Batch) -> Ints:
         """Return the numbers of motions, the cheapest first; of about as cheap ones the usual."""
         order = _cheapest(found)
         if not order.size:
@@ -241,13 +241,13 @@ class Ranking:
         return self._problem.keeps_off_itself(motion.place.q)
 
 
-def _cheapest(found: Together) -> Ints:
+def _cheapest(found: Batch) -> Ints:
     """Return the numbers of motions, the cheapest first, without those that are not to be had."""
     order = np.argsort(found.costs, kind="stable")
     return np.asarray(order[np.isfinite(found.costs[order])])
 
 
-def _hopeful(found: Together) -> Flags:
+def _hopeful(found: Batch) -> Flags:
     """Return which motions are on their way, and may come to cost less than what has arrived."""
     least = found.costs[~found.going].min(initial=np.inf)
     dearest = least + ABOUT_AS_GOOD * abs(least) if np.isfinite(least) else least

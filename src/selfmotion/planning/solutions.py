@@ -184,7 +184,7 @@ class NodeSolution:
     ----------
     motion : NodeMotion
     status : Status
-    prices : (R,)
+    multipliers : (R,)
         Of all rows of its conditions.
     remaining : float or None
         What more nodes and another step might still save [cost]; None where that is not known.
@@ -196,7 +196,7 @@ class NodeSolution:
 
     motion: NodeMotion
     status: Status
-    prices: Array
+    multipliers: Array
     remaining: float | None = None
     optimum: Optimum | None = None
     is_chain: bool = False
@@ -206,8 +206,8 @@ class NodeSolution:
         """Return the one at an optimum."""
         motion: NodeMotion = optimum.motion
         promised = optimum.promised if np.isfinite(optimum.promised) else 0.0
-        away = motion.grid.rows.given_away(optimum.prices, motion.curve_ends)
-        return cls(motion, status, optimum.prices, promised + float(away.sum()), optimum)
+        away = motion.grid.rows.given_away(optimum.multipliers, motion.curve_ends)
+        return cls(motion, status, optimum.multipliers, promised + float(away.sum()), optimum)
 
     @classmethod
     def on_the_way(cls, motion: NodeMotion) -> "NodeSolution":
@@ -216,7 +216,7 @@ class NodeSolution:
 
     @cached_property
     def active(self) -> tuple[Binding, ...]:
-        """What kept the optimum from a lower cost; on the way to one, prices say nothing."""
+        """What kept the optimum from a lower cost; on the way to one, multipliers say nothing."""
         return _binding(self.optimum) if self.optimum is not None and self.has_arrived else ()
 
     @property
@@ -290,9 +290,9 @@ class NodeSolution:
         for times in (t, beside):
             motion = self.motion.on(self.motion.grid.on(times, calm=calm))
             if motion is not None:
-                prices = motion.grid.rows.carried(self.motion.grid.rows, self.prices)
+                multipliers = motion.grid.rows.carried(self.motion.grid.rows, self.multipliers)
                 self.motion.forget()
-                return replace(self, motion=motion, prices=prices)
+                return replace(self, motion=motion, multipliers=multipliers)
         return None
 
     def refined(self, where: Flags | None = None) -> "NodeSolution":
@@ -302,11 +302,11 @@ class NodeSolution:
 
 def _binding(optimum: Optimum) -> tuple[Binding, ...]:
     """Return what kept an optimum from a lower cost."""
-    if not (optimum.prices.any() or optimum.end_prices.size):
+    if not (optimum.multipliers.any() or optimum.end_multipliers.size):
         return ()
     motion, grid = optimum.motion, optimum.motion.grid
-    inner = iter(grid.rows.priced(optimum.prices, motion.curve_ends))
-    ends = grid.ends.by_item(optimum.end_prices)
+    inner = iter(grid.rows.priced(optimum.multipliers, motion.curve_ends))
+    ends = grid.ends.by_item(optimum.end_multipliers)
     each = []
     for item in grid.constraints:
         if item.equality:

@@ -5,7 +5,7 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.basics import Array, Counts
-from selfmotion.nodes import NodeGrid, Step, Together, minimise
+from selfmotion.nodes import Batch, NodeGrid, Step, minimise
 from support.arms import PANDA_HOME, Case
 from support.nodes import problem_of
 
@@ -36,15 +36,15 @@ def motions_of(problem: sm.Problem, count: int = 4, size: float = 0.15) -> Array
     return np.array(found)
 
 
-def advanced(found: Together, rounds: int = ROUNDS) -> Together:
+def advanced(found: Batch, rounds: int = ROUNDS) -> Batch:
     for _ in range(rounds):
         found = found.advanced()
     return found
 
 
-def agrees(together: Together, motions: Array, grid: NodeGrid, rounds: int) -> bool:
+def agrees(together: Batch, motions: Array, grid: NodeGrid, rounds: int) -> bool:
     for k in range(len(motions)):
-        alone = advanced(Together.near(grid, motions[[k]]), rounds)
+        alone = advanced(Batch.near(grid, motions[[k]]), rounds)
         mine, own = together.costs[k], alone.costs[0]
         if not abs(mine - own) <= ROUNDING * abs(own):
             return False
@@ -58,7 +58,7 @@ def test_each_is_what_it_is_alone(case: Case, rounds: int) -> None:
     """Whatever is beside it, before Newton's method and after some of its steps."""
     problem = problem_of(case)
     grid, motions = grid_of(problem), motions_of(problem)
-    together = advanced(Together.near(grid, motions), rounds)
+    together = advanced(Batch.near(grid, motions), rounds)
     assert agrees(together, motions, grid, rounds)
     # In another order they are others: the law says something.
     if rounds == 0 and problem.follows.redundancy and len(np.unique(together.costs.round(9))) > 1:
@@ -78,7 +78,7 @@ def test_each_is_what_it_is_alone_with_other_costs(panda: sm.RobotModel, rest: b
             collision=None,
         )
         grid, motions = grid_of(problem), motions_of(problem, size=0.4)
-        before = Together.near(grid, motions)
+        before = Batch.near(grid, motions)
         after = advanced(before, 3)
         assert agrees(after, motions, grid, 3)
         assert (after.costs <= before.costs).all()
@@ -88,7 +88,7 @@ def test_each_is_what_it_is_alone_with_other_costs(panda: sm.RobotModel, rest: b
 def test_rough_optima_are_near_those_of_newtons_method(case: Case) -> None:
     problem = problem_of(case)
     grid, motions = grid_of(problem), motions_of(problem, 3, 0.1)
-    rough = advanced(Together.near(grid, motions), 2 * ROUNDS)
+    rough = advanced(Batch.near(grid, motions), 2 * ROUNDS)
     found = rough.motion.grid.copied(1)
     for k in np.flatnonzero(~rough.going):
         motion = found.near(rough.q[k], rough.qd[k], rough.qdd[k])
@@ -106,9 +106,9 @@ def test_one_that_is_not_to_be_had_leaves_the_others(panda: sm.RobotModel) -> No
     path = sm.paths.Circle.around(panda.pose(PANDA_HOME), 0.1, 4.0)
     problem = sm.Problem(*(panda, path, "pose", PANDA_HOME), constraints=(), collision=None)
     grid, motions = grid_of(problem), motions_of(problem)
-    alone = advanced(Together.near(grid, np.delete(motions, 1, axis=0)), 2)
+    alone = advanced(Batch.near(grid, np.delete(motions, 1, axis=0)), 2)
     motions[1, 3] = np.nan
-    found = Together.near(grid, motions)
+    found = Batch.near(grid, motions)
     assert np.isinf(found.costs[1])
     assert np.isfinite(np.delete(found.costs, 1)).all()
     beside = advanced(found, 2)
@@ -120,7 +120,7 @@ def test_some_of_them_are_what_they_were(panda: sm.RobotModel) -> None:
     path = sm.paths.Circle.around(panda.pose(PANDA_HOME), 0.1, 4.0)
     problem = sm.Problem(*(panda, path, "position", PANDA_HOME), constraints=(), collision=None)
     grid, motions = grid_of(problem), motions_of(problem)
-    found = advanced(Together.near(grid, motions), 1)
+    found = advanced(Batch.near(grid, motions), 1)
     some = found.picked(np.array([3, 1]))
     np.testing.assert_array_equal(some.costs, found.costs[[3, 1]])
     np.testing.assert_array_equal(some.q, found.q[[3, 1]])

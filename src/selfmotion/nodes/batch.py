@@ -14,7 +14,7 @@ import numpy as np
 from selfmotion.basics import Array, Flags, Ints
 from selfmotion.nodes.charts import Centred, Charts, Place
 from selfmotion.nodes.motion import NodeGrid, NodeMotion
-from selfmotion.nodes.objective import Around
+from selfmotion.nodes.objective import LocalModel
 from selfmotion.nodes.spline import GAUSS
 from selfmotion.optimise import Banded
 
@@ -32,7 +32,7 @@ _LEAVES = "of several motions, one that is not to be had leaves the others"
 
 
 @dataclass(frozen=True, eq=False)
-class Together:
+class Batch:
     """Motions on the same nodes, side by side.
 
     Attributes
@@ -53,7 +53,7 @@ class Together:
     promised: Array
 
     @classmethod
-    def near(cls, grid: NodeGrid, motions: Array) -> "Together":
+    def near(cls, grid: NodeGrid, motions: Array) -> "Batch":
         """Return motions without self-motion whose nodes are those nearest to q (K, N + 1, n)."""
         many, q = grid.copied(len(motions)), motions.reshape(-1, motions.shape[2])
         begun = many.manifolds.near(q, np.zeros_like(q), np.zeros_like(q))
@@ -63,7 +63,7 @@ class Together:
         return cls._of(many.at(begun), np.ones(count, dtype=np.bool_), np.full(count, np.inf))
 
     @classmethod
-    def _of(cls, motion: NodeMotion, going: Flags, promised: Array) -> "Together":
+    def _of(cls, motion: NodeMotion, going: Flags, promised: Array) -> "Batch":
         """Return the motions of nodes, of which those on their way are looked at anew."""
         samples, grid, count = motion.samples, motion.grid, len(going)
         # That looks at the clock as well.
@@ -97,7 +97,7 @@ class Together:
         """Their accelerations there, (K, N + 1, n)."""
         return self._each(self.motion.place.qdd)
 
-    def picked(self, which: Ints) -> "Together":
+    def picked(self, which: Ints) -> "Batch":
         """Return some of them."""
         motion, whole = self.motion, self.motion.place
         grid = motion.grid.copied(len(which))
@@ -105,16 +105,16 @@ class Together:
         charts = Charts(grid.manifolds, motion.charts.q[rows], motion.charts.bases[rows])
         place = Place(*(np.ascontiguousarray(getattr(whole, name)[rows]) for name in _PLACE))
         some = grid.at(Centred(charts, motion.nu[rows], motion.alpha[rows], place))
-        return Together(some, self.costs[which], self.going[which], self.promised[which])
+        return Batch(some, self.costs[which], self.going[which], self.promised[which])
 
-    def advanced(self) -> "Together":
+    def advanced(self) -> "Batch":
         """Return them after one of Newton's steps with each that is on its way."""
         which = np.flatnonzero(self.going)
         if len(which) == self.count:
             return self._stepped()
         return self._with(which, self.picked(which)._stepped()) if len(which) else self
 
-    def _with(self, which: Ints, others: "Together") -> "Together":
+    def _with(self, which: Ints, others: "Batch") -> "Batch":
         """Return them with others in place of some."""
         mine, own = self.motion, others.motion
         rows = self._rows(which)
@@ -133,7 +133,7 @@ class Together:
             *(joined(getattr(mine.place, name), getattr(own.place, name)) for name in _PLACE)
         )
         nu, alpha = joined(mine.nu, own.nu), joined(mine.alpha, own.alpha)
-        return Together(
+        return Batch(
             mine.grid.at(Centred(charts, nu, alpha, place)),
             joined(self.costs, others.costs, which),
             joined(self.going, others.going, which),
@@ -145,7 +145,7 @@ class Together:
         size = len(self.motion.nu) // self.count
         return np.asarray((which[:, None] * size + np.arange(size)).ravel())
 
-    def _stepped(self) -> "Together":
+    def _stepped(self) -> "Batch":
         motion, grid = self.motion, self.motion.grid
         grid.counts.gradients += self.count
         # Beside what is not to be had, others know nothing of that.
@@ -153,7 +153,7 @@ class Together:
         slopes = grid.cost.slopes(motion.samples, motion.curve_ends, motion.partials)
         slopes[spline.gaps] = 0.0
         force = spline.scattered(slopes)
-        around = Around.of(motion.charts, motion.nu, motion.alpha, motion.place, force)
+        around = LocalModel.of(motion.charts, motion.nu, motion.alpha, motion.place, force)
         if around is None:
             raise RuntimeError(_LEAVES)
         around = around.scaled(grid.scale)
@@ -178,10 +178,10 @@ class Together:
         promised = np.where(sound, (rights * step).sum(axis=1), np.inf)
         going = sound & (promised > _ENOUGH * np.abs(self.costs))
         if not going.any():
-            return Together(self.motion, self.costs, going, promised)
+            return Batch(self.motion, self.costs, going, promised)
         return self._moved(step, promised, going)
 
-    def _moved(self, step: Array, promised: Array, going: Flags) -> "Together":
+    def _moved(self, step: Array, promised: Array, going: Flags) -> "Batch":
         """Return them along their steps, each as far as it does what it promises."""
         motion, r, due = self.motion, self.motion.nu.shape[1], np.where(going, promised, 0.0)
         by_node = step.reshape(self.count, -1, 3, r)
@@ -193,7 +193,7 @@ class Together:
             found = motion.stepped((length[:, None, None, None] * by_node).reshape(-1, 3 * r))
             if found is None:
                 raise RuntimeError(_LEAVES)
-            new = Together._of(found, going & (length > 0.0), promised)
+            new = Batch._of(found, going & (length > 0.0), promised)
             left[left] = ~(new.costs <= self.costs - _DONE * length * due)[left]
             if not left.any():
                 break
