@@ -73,7 +73,7 @@ def seconds(action: Callable[[], object]) -> float:
     return float(np.median(times))
 
 
-def multipliers() -> Iterator[tuple[str, float, float]]:
+def prices() -> Iterator[tuple[str, float, float]]:
     """Yield (what, seconds of the plain check, seconds of the certificate)."""
     for name in ARMS:
         robot = sm.load_robot(name)
@@ -107,7 +107,7 @@ def main(
     seed: Annotated[int, typer.Option(help="Of the first one.")] = 0,
     kinds: Annotated[str, typer.Option(help="Which of them.")] = "plates,carried,limits,seams",
 ) -> None:
-    """Make motions, certify and judge, tell counts and multipliers."""
+    """Make motions, certify and judge, tell counts and prices."""
     console, wrong = Console(), False
     makers = {
         "plates": lambda: made(among_plates, count, seed),
@@ -139,7 +139,7 @@ def main(
             soft_wrap=True,
         )
         wrong |= false > 0 or strict > 0.03 * valid
-    for what, plain, proved in multipliers():
+    for what, plain, proved in prices():
         console.print(
             f"{what}: {1e3 * proved:.1f} ms, {proved / plain:.2f} times {1e3 * plain:.1f} ms"
         )

@@ -14,7 +14,7 @@ from selfmotion.warm import Compiled
 from support.arms import PANDA_HOME
 from support.loops import closed_loop
 
-# LocalModel the loop.
+# Around the loop.
 
 
 def test_after_warming_up_nothing_is_compiled_and_no_memory_grows(
