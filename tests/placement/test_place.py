@@ -141,7 +141,7 @@ def test_only_what_belongs_to_the_part_moves_along() -> None:
 
 
 def test_several_seams_are_placed_together_and_elsewhere_alike(
-    monkeypatch: pytest.MonkeyPatch,
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setattr(search, "_BEGINNINGS", 4)
     first, second = planar(), planar().changed(path=sm.paths.Reversed(planar().path))
@@ -153,6 +153,16 @@ def test_several_seams_are_placed_together_and_elsewhere_alike(
         elsewhere = sm.place([first, second], box, executor=executor)
     assert elsewhere.place["x"] == pytest.approx(together.place["x"], abs=2e-3)
     assert elsewhere.cost == pytest.approx(together.cost, rel=1e-3)
+    # Two workers of a cluster try the same places.
+    distributed = pytest.importorskip("distributed")
+    cluster = distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, processes=True, host="127.0.0.1",
+        dashboard_address=None, silence_logs=50, local_directory=str(tmp_path / "dask"),
+    )  # fmt: skip
+    with cluster, distributed.Client(cluster) as client:
+        there = sm.place([first, second], box, executor=client.get_executor())
+    assert there.place == pytest.approx(elsewhere.place, abs=1e-9)
+    assert there.cost == pytest.approx(elsewhere.cost, rel=1e-9)
 
 
 class Bowl(Places):
