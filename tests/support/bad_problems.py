@@ -105,7 +105,8 @@ def problem_rows() -> list[Row]:
                 "[nan] * 7": [NAN] * 7,
                 "'home'": "home",
                 "None": None,
-                "[[0] * 7]": [[0] * 7],
+                "[[0] * 6, [0] * 6]": [[0] * 6, [0] * 6],
+                "[[[0] * 7]]": [[[0] * 7]],
                 "[0, [1]]": [0, [1]],
             },
         ),
@@ -114,6 +115,19 @@ def problem_rows() -> list[Row]:
             "robot.jacobian",
             robot_named("panda").jacobian,
             q={"[0] * 8": [0] * 8, "inf": [np.inf] * 7, "'q'": "q"},
+        ),
+        *bad_values_of(
+            area,
+            "robot.null_space",
+            lambda **given: robot_named("planar_3r").null_space(
+                **{"q": [0.3, 0.8, 0.4], "task": "planar", **given}
+            ),
+            q={
+                "[0, 0]": [0, 0],
+                "[[0, 0, 0], [0, nan, 0]]": [[0, 0, 0], [0, NAN, 0]],
+                "[[0, 1, 1], [0, 0, 0]]": [[0, 1, 1], [0, 0, 0]],
+            },
+            task=TEXTS,
         ),
         *bad_values_of(
             area,

@@ -171,6 +171,12 @@ def _placements(robot: RobotModel) -> dict[str, dict[str, str]]:
 def _check_unchanged(robot: RobotModel, tools: list[str]) -> None:
     """Refuse a cell whose parts' files are no longer those that it was made of."""
     given = robot.urdf.parts
+    for part in given:
+        if part.source not in {**NAMED_ARMS, **NAMED_PARTS} and not is_file(FilePath(part.source)):
+            raise ProblemError(
+                f"{robot.name}: part '{part.name}' is of {part.source}, and in no file that a "
+                f"problem file could name; write its URDF to one and load it from there"
+            )
     now = load_robot(
         {part.name: part.source for part in given},
         tools,
