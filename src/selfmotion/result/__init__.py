@@ -28,6 +28,7 @@ from selfmotion.result.limits_used import (
     LimitsUsed as LimitsUsed,
     quantities_of_pace as quantities_of_pace,
 )
+from selfmotion.result.measured import NullSpaceVelocity as NullSpaceVelocity
 from selfmotion.result.move import Move as Move, is_move as is_move, load_move as load_move
 from selfmotion.result.pace_rows import PaceLimits as PaceLimits
 from selfmotion.result.pacing import Ends as Ends, along as along, fastest_pace as fastest_pace
@@ -51,4 +52,5 @@ __all__ = [
     "Attempt",
     "Gap",
     "LimitsUsed",
+    "NullSpaceVelocity",
 ]

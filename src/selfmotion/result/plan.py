@@ -7,6 +7,7 @@ from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
 import numpy as np
+import numpy.typing as npt
 
 from selfmotion.basics import (
     Array,
@@ -30,12 +31,14 @@ from selfmotion.certificate import (
     approaches,
 )
 from selfmotion.collision import Obstacle
+from selfmotion.costs import Cost
 from selfmotion.motion import Trajectory, column_names
 from selfmotion.path import Path
 from selfmotion.problem.problem import Problem
 from selfmotion.result.archive import Archive
 from selfmotion.result.joint_order import in_order_of
 from selfmotion.result.limits_used import LimitsUsed, limits_used
+from selfmotion.result.measured import NullSpaceVelocity, cost_of, null_space_velocity
 from selfmotion.result.report import Report
 from selfmotion.result.reversals import Reversals
 from selfmotion.robot import RobotModel
@@ -156,6 +159,45 @@ class Plan:
     def reversals(self) -> Reversals:
         """When each joint turns round, by more than 1 mrad or 1 mm. Found when it is asked for."""
         return Reversals.of(self.trajectory)
+
+    def null_motion(self, t: npt.ArrayLike) -> NullSpaceVelocity:
+        """Return what of the joint velocities lies in the null space of the task at `t`.
+
+        q̇ = J⁺ẋ + (I − J⁺J) q̇: the first part moves the tool, the second one only the joints. J are
+        the rows of all frames that follow a path, as they are prescribed; where tolerances
+        (`relaxations`) are used, ẋ = J q̇ is what the tool does, not what the path asks.
+
+        Parameters
+        ----------
+        t : float or (K,)
+            Times within the motion [s].
+
+        Returns
+        -------
+        NullSpaceVelocity
+            In joints, ``joints`` (n,) or (K, n), and in coordinates, ``coordinates`` (r,) or
+            (K, r), of a ``basis``.
+
+        Raises
+        ------
+        ValueError
+            A time is outside the motion.
+        """
+        return null_space_velocity(self.problem.follows, self.trajectory, t)
+
+    def evaluate(self, cost: Cost) -> float:
+        """Return ∫ G dt of any cost along the plan, also of one that it was not planned for.
+
+        By Gauss-Legendre quadrature with five points on each interval of the motion. Of the plan's
+        own costs it is ``report.terms`` (of the published method up to its integration error).
+
+        Raises
+        ------
+        ProblemError
+            It is no cost, does not fit the arm or the task, or is not finite somewhere: the time is
+            named. Costs that were functions are not in a plan's file: give them again.
+        """
+        return cost_of(self.problem.follows, self.trajectory, cost)
 
     def check(
         self,
