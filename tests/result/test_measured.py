@@ -139,5 +139,5 @@ def test_what_cannot_be_evaluated_says_why(panda_plan: sm.Plan, tmp_path: Path) 
     )
     sm.plan(lost, max_evaluations=2).save(tmp_path / "plan.npz")
     (own,) = sm.load_plan(tmp_path / "plan.npz").problem.costs
-    with pytest.raises(sm.errors.ProblemError, match=r"'own' was a function.*give it again"):
+    with pytest.raises(sm.errors.ProblemError, match=r"'own' was a FunctionCost.*give it again"):
         panda_plan.evaluate(own)

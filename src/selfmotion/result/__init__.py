@@ -9,6 +9,7 @@ from selfmotion.result.asked import (
     not_judged_by as not_judged_by,
 )
 from selfmotion.result.bundle import read_bundle as read_bundle, write_bundle as write_bundle
+from selfmotion.result.comparison import Comparison as Comparison, compare as compare
 from selfmotion.result.joints import (
     Piece as Piece,
     elsewhere as elsewhere,
@@ -50,6 +51,7 @@ from selfmotion.result.reversals import Reversals as Reversals
 
 __all__ = [
     "Attempt",
+    "Comparison",
     "Gap",
     "LimitsUsed",
     "NullSpaceVelocity",
