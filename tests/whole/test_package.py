@@ -52,7 +52,7 @@ def test_what_has_moved_is_found_for_one_version_more() -> None:
 
 
 def test_signatures_show_what_one_would_type() -> None:
-    """In help(): no factories, functions or addresses, of anything public."""
+    """In help(): no factories, functions, addresses or spelt-out unions, of anything public."""
     for name in offered(sm):
         found = of(sm, name)
         members = vars(found) if inspect.isclass(found) else {}
@@ -60,8 +60,16 @@ def test_signatures_show_what_one_would_type() -> None:
         for item in [found, *public]:
             if inspect.isfunction(item) or inspect.isclass(item):
                 shown = str(inspect.signature(item))
-                for strange in ("<factory>", "<function", "<object", " object at", "0x", "<lambda"):
+                for strange in (
+                    *("<factory>", "<function", "<object", " object at", "0x", "<lambda"),
+                    *("_array_like", "_Buffer"),
+                ):
                     assert strange not in shown, f"{name}: {shown}"
+
+
+def test_arrays_are_called_array_like() -> None:
+    for make, name in ((sm.Problem, "start"), (sm.paths.Waypoints, "t"), (sm.retime, "velocity")):
+        assert str(inspect.signature(make).parameters[name]).startswith(f"{name}: 'npt.ArrayLike")
 
 
 def test_the_one_liner() -> None:

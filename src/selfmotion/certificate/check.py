@@ -1,5 +1,7 @@
 """Re-checks a finished trajectory by forward kinematics; shares no code with the rollout."""
 
+from __future__ import annotations
+
 from collections.abc import Iterator, Sequence
 
 import numpy as np

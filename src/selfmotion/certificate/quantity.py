@@ -1,5 +1,7 @@
 """What constraints measure along a motion, written once for optimiser and certificate."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -102,7 +104,7 @@ class Quantity:
         derivatives: Callable[[Array, Array, Array], tuple[Array, ...]],
         series: Callable[[Stretch], Array] | None = None,
         unit: str = "",
-    ) -> "Quantity":
+    ) -> Quantity:
         """Return one number that is to stay within a band.
 
         Its `values` are (K,), its `derivatives` (K, n) each, its `series` (K + 1, I). Where one

@@ -1,5 +1,7 @@
 """Tool motions from files: tables, arrays, what ROS writes, programs of machine tools, drawings."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path as FilePath
 from typing import Any

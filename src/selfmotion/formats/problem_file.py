@@ -1,5 +1,7 @@
 """From a problem file to a problem, and how to plan it."""
 
+from __future__ import annotations
+
 import json
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager

@@ -1,5 +1,7 @@
 """From seams to a program."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Sequence
 from concurrent.futures import Executor

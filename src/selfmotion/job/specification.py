@@ -1,5 +1,7 @@
 """What a job asks for, which its program is held against."""
 
+from __future__ import annotations
+
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from typing import Any
@@ -151,7 +153,7 @@ class Specification:
         }
 
     @classmethod
-    def from_dict(cls, values: Mapping[str, Any], robot: RobotModel) -> "Specification":
+    def from_dict(cls, values: Mapping[str, Any], robot: RobotModel) -> Specification:
         """Return what `to_dict` described."""
         ends = (values[end] for end in ("start", "end"))
         start, end = (None if q is None else robot.configuration(q) for q in ends)

@@ -1,5 +1,7 @@
 """What a program survives: margins as values, and in words."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass

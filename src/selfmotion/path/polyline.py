@@ -1,5 +1,7 @@
 """Straight legs with rounded corners."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -65,7 +67,7 @@ class Polyline(Path, kind="polyline"):
     def __init__(
         self,
         positions: npt.ArrayLike,
-        quaternions: "npt.ArrayLike | Rotation | None" = None,
+        quaternions: npt.ArrayLike | Rotation | None = None,
         *,
         tolerance: float = 1e-3,
         turn_tolerance: float = 1e-2,
@@ -104,7 +106,7 @@ class Polyline(Path, kind="polyline"):
         self._check_reversals()
 
     @classmethod
-    def from_poses(cls, poses: list[SE3], **options: Any) -> "Polyline":
+    def from_poses(cls, poses: list[SE3], **options: Any) -> Polyline:
         """Return the path through `poses` (SE3 or (4, 4)); options as in the class."""
         if not isinstance(poses, Sequence | np.ndarray):
             raise PathError(f"polyline: poses is {shown(poses)}, expected a list of poses")
@@ -179,7 +181,7 @@ class Polyline(Path, kind="polyline"):
         return Rotation.from_quat(self._turns, scalar_first=True)
 
     @cached_property
-    def _corners(self) -> "_Corners":
+    def _corners(self) -> _Corners:
         # The ends are corners without a change.
         lasts = self._lasts
         speeds = np.diff(self._points, axis=0) / lasts[:, None]

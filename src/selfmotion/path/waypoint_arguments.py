@@ -1,5 +1,7 @@
 """What waypoints are given, checked; and where they bend."""
 
+from __future__ import annotations
+
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -29,7 +31,7 @@ def as_table(values: npt.ArrayLike, name: str) -> Array:
     return as_numbers(values, f"waypoints: {name}", error=PathError)
 
 
-def scalar_first(orientations: "npt.ArrayLike | Rotation") -> npt.ArrayLike:
+def scalar_first(orientations: npt.ArrayLike | Rotation) -> npt.ArrayLike:
     """Return orientations as quaternions [w, x, y, z]: SciPy's know their own order."""
     if hasattr(orientations, "as_quat"):
         return np.asarray(orientations.as_quat(scalar_first=True), dtype=np.float64)

@@ -1,5 +1,7 @@
 """A tool motion through given poses at given times."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from functools import cached_property
 from itertools import pairwise
@@ -72,7 +74,7 @@ class Waypoints(Path, kind="waypoints"):
         self,
         t: npt.ArrayLike,
         positions: npt.ArrayLike,
-        quaternions: "npt.ArrayLike | Rotation | None" = None,
+        quaternions: npt.ArrayLike | Rotation | None = None,
         *,
         corners: str = "blend",
         corner_angle: float = np.pi / 6,
@@ -94,7 +96,7 @@ class Waypoints(Path, kind="waypoints"):
         self._corner_angle = float(corner_angle)
 
     @classmethod
-    def from_poses(cls, t: npt.ArrayLike, poses: list[SE3], **options: Any) -> "Waypoints":
+    def from_poses(cls, t: npt.ArrayLike, poses: list[SE3], **options: Any) -> Waypoints:
         """Return the path through `poses` (SE3 or (4, 4)) at times `t`; options as in the class."""
         if not isinstance(poses, Sequence | np.ndarray):
             raise PathError(f"waypoints: poses is {shown(poses)}, expected a list of poses")
@@ -103,7 +105,7 @@ class Waypoints(Path, kind="waypoints"):
         return cls(t, [frame.translation for frame in frames], turns, **options)
 
     @classmethod
-    def from_csv(cls, file: str | FilePath, **options: Any) -> "Waypoints":
+    def from_csv(cls, file: str | FilePath, **options: Any) -> Waypoints:
         """Read ``t,x,y,z,qw,qx,qy,qz`` with a header line [s, m]; the quaternion may be missing.
 
         Raises
@@ -156,7 +158,7 @@ class Waypoints(Path, kind="waypoints"):
         """Times [s] of the waypoints where the tool comes to rest: corners and pauses."""
         return self._t[self._stops]
 
-    def between_corners(self) -> list["Waypoints"]:
+    def between_corners(self) -> list[Waypoints]:
         """Return the path in pieces that rest nowhere, from one corner to the next."""
         turns = self._turns if self._oriented else None
         parts = [slice(first, last + 1) for first, last in pairwise(self._bounds)]

@@ -5,6 +5,8 @@ as it lacks; then the motion is planned again, and judged as any other (`margins
 kept farther apart than it has to be.
 """
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any

@@ -4,6 +4,8 @@ An estimate from the room that the joints have, and what is confirmed: motions p
 corners, each from the one that there is.
 """
 
+from __future__ import annotations
+
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,5 +1,7 @@
 """What is found of places: the best one, and what others around it cost."""
 
+from __future__ import annotations
+
 import html
 import math
 from collections.abc import Mapping, Sequence
@@ -70,7 +72,7 @@ class PlaceMap:
                 )
         return "\n".join(maps(rows, {}))
 
-    def figure(self) -> "Figure":
+    def figure(self) -> Figure:
         """Return it as a matplotlib figure (``pip install 'selfmotion[plots]'``).
 
         Raises

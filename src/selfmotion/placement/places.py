@@ -1,5 +1,7 @@
 """Problems at another place: the part, or the arm, stands elsewhere."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any

@@ -1,5 +1,7 @@
 """What can be asked of a finished motion: its part in the null space, and its cost by any cost."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 
 import numpy as np

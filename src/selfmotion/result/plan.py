@@ -1,5 +1,7 @@
 """A finished plan: the motion, the problem it solves, how it was found, and what the check says."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping, MutableMapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -51,10 +53,10 @@ if TYPE_CHECKING:
 class Views(Protocol):
     """What shows plans: made by the replay, which knows plans, not the other way round."""
 
-    def notebook_html(self, plan: "Plan") -> str:
+    def notebook_html(self, plan: Plan) -> str:
         """Return the replay as HTML for a notebook."""
 
-    def figure(self, plan: "Plan") -> "Figure":
+    def figure(self, plan: Plan) -> Figure:
         """Return the plan's curves as a matplotlib figure."""
 
 
@@ -219,7 +221,7 @@ class Plan:
             return found
         return replace(found, failures=(self.altered, *found.failures))
 
-    def require(self) -> "Plan":
+    def require(self) -> Plan:
         """Return the plan itself if its certificate is verified.
 
         Raises
@@ -264,7 +266,7 @@ class Plan:
         table = np.column_stack([motion.t, motion.q, motion.qd, motion(motion.t, 2)])
         write_csv(as_path(file), column_names(motion.joint_names), table)
 
-    def figure(self) -> "Figure":
+    def figure(self) -> Figure:
         """Return joint positions and velocities, manipulability and path error as a figure.
 
         Needs matplotlib (``pip install 'selfmotion[plots]'``).

@@ -1,5 +1,7 @@
 """Configurations as they are given: n numbers, or K rows of them."""
 
+from __future__ import annotations
+
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,12 +13,12 @@ if TYPE_CHECKING:
     from selfmotion.robot.model import RobotModel
 
 
-def as_configuration(robot: "RobotModel", q: npt.ArrayLike) -> Array:
+def as_configuration(robot: RobotModel, q: npt.ArrayLike) -> Array:
     """Return `q` as finite numbers (n,); see `RobotModel.configuration`."""
     return _checked(robot, q, several=False)
 
 
-def as_configurations(robot: "RobotModel", q: npt.ArrayLike) -> Array:
+def as_configurations(robot: RobotModel, q: npt.ArrayLike) -> Array:
     """Return `q` as finite numbers, (n,) or (K, n).
 
     Raises
@@ -27,7 +29,7 @@ def as_configurations(robot: "RobotModel", q: npt.ArrayLike) -> Array:
     return _checked(robot, q, several=True)
 
 
-def _checked(robot: "RobotModel", q: npt.ArrayLike, several: bool) -> Array:
+def _checked(robot: RobotModel, q: npt.ArrayLike, several: bool) -> Array:
     array, names = plain_numbers(q), ", ".join(robot.joint_names)
     if array is None:
         raise RobotError(

@@ -1,5 +1,7 @@
 """Arms from URDF files or text, from Pinocchio's models, or by name."""
 
+from __future__ import annotations
+
 import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field

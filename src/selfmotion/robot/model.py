@@ -1,5 +1,7 @@
 """The arm as a chain with one coordinate per joint, on Pinocchio's model of it."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
