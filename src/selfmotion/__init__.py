@@ -80,7 +80,6 @@ from selfmotion.robot import (
     RobotModel as RobotModel,
     load_robot as load_robot,
 )
-from selfmotion.sheet import write_sheet as write_sheet
 from selfmotion.task import Damping as Damping, Relaxation as Relaxation, Task as Task
 from selfmotion.transfer import move as move
 
@@ -171,7 +170,6 @@ __all__ = [
     "sample_problem",
     "slowdown",
     "warm_up",
-    "write_sheet",
 ]
 
 

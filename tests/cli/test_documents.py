@@ -89,7 +89,7 @@ def test_jumps_of_acceleration_pass_every_limit_of_jerk(plan: sm.Plan) -> None:
 
 
 def test_limits_and_obstacles_of_a_motion(plan: sm.Plan, seam: Path, tmp_path: Path) -> None:
-    plan.to_csv(tmp_path / "motion.csv")
+    sm.files.write_motion(plan, tmp_path / "motion.csv", force=True)
     asked = [tmp_path / "motion.csv", "--robot", "panda", "--path", seam]
     code, text = invoke(*asked, "--acceleration", "0.1")
     assert (code, "accelerates at" in text) == (1, True)

@@ -571,7 +571,7 @@ def test_programs_have_the_suffix_of_their_controller(
     plan: sm.Plan, tmp_path: Path, form: str, name: str
 ) -> None:
     with pytest.raises(sm.errors.FileFormatError, match="is written with"):
-        sm.files.write_motion(plan, tmp_path / name, form=form)
+        sm.files.write_motion(plan, tmp_path / name, format=form)
     assert not (tmp_path / name).exists()
 
 

@@ -132,7 +132,7 @@ def test_events_of_the_timetable_are_in_their_order(program, tmp_path) -> None:
     asked = [("gas on", 0.2), ("arc on", 0.2), ("arc off", 0.9), ("zap off", 1.0), ("air", 1.0)]
     steps[k] = replace(steps[k], name="end", events=tuple(asked))
     made = replace(program, steps=tuple(steps))
-    made.write_timetable(tmp_path / "a.csv")
+    sm.files.write_timetable(made, tmp_path / "a.csv")
     rows = [line.split(",") for line in (tmp_path / "a.csv").read_text().splitlines()[1:]]
     begins = [float(row[0]) for row in rows]
     assert begins == sorted(begins)

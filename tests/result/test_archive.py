@@ -93,7 +93,7 @@ def test_limits_that_an_arm_was_given_survive(
 
 
 def test_csv_has_every_digit(plan: sm.Plan, tmp_path: Path) -> None:
-    plan.to_csv(tmp_path / "plan.csv")
+    sm.files.write_motion(plan, tmp_path / "plan.csv")
     lines = (tmp_path / "plan.csv").read_text().splitlines()
     assert lines[0].split(",")[:3] == ["t", "joint1", "joint2"]
     table = np.array([[float(value) for value in line.split(",")] for line in lines[1:]])

@@ -47,6 +47,9 @@ def test_what_has_moved_is_found_for_one_version_more() -> None:
     with pytest.warns(DeprecationWarning, match=r"sm\.Circle is sm\.paths\.Circle now"):
         moved = getattr(sm, "Circle")  # noqa: B009
     assert moved is sm.paths.Circle
+    with pytest.warns(DeprecationWarning, match=r"sm\.write_sheet is sm\.files\.write_sheet now"):
+        moved = getattr(sm, "write_sheet")  # noqa: B009
+    assert moved is sm.files.write_sheet
     with pytest.raises(AttributeError, match="has no attribute 'Circel'"):
         _ = sm.Circel
 

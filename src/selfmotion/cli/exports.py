@@ -104,7 +104,7 @@ def export(
         coarsest = formats.coarsest_rate(made)
     sound = True
     for target in out:
-        given: dict[str, Any] = {"form": form, "force": force}
+        given: dict[str, Any] = {"format": form, "force": force}
         if not _is_program(target, form, asked):
             given["rate"] = coarsest if rate is None and _is_message(target, form) else rate
         together: dict[str, Path] = {}

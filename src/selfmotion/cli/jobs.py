@@ -136,7 +136,7 @@ def write_program(
     if file.suffix == PROGRAM:
         program.save(file)
     elif _is_timetable(file):
-        program.write_timetable(file)
+        sm.files.write_timetable(program, file)
     elif file.suffix == ".html":
         from selfmotion.replay import write_replay
 

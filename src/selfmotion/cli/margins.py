@@ -126,7 +126,7 @@ def sheet(
     margins = None
     if plan.certificate.verified and (bodies or within is not None):
         margins = sm.margin(plan, within, part=part or None)
-    written = sm.write_sheet(plan, out, margins, title=title)
+    written = sm.files.write_sheet(plan, out, margins, title=title)
     terminal.print(f"wrote {written}", markup=False, soft_wrap=True)
 
 

@@ -115,8 +115,6 @@ def tell_large(file: Path, console: Console, *, given_rate: bool = False) -> Non
 def _write_one(result: sm.Plan, file: Path, *, page: bool) -> None:
     if page or file.suffix == ".html":
         _replay(result, file)
-    elif file.suffix == ".csv":
-        result.to_csv(file)
     elif file.suffix == ".npz":
         result.save(file)
     else:

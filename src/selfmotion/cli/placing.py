@@ -97,7 +97,7 @@ def place(
         pictured = found.map(points=points) if len(within) > 1 else None
         for file in drawn:
             if file.suffix == ".html":
-                found.to_html(file, pictured)
+                sm.files.write_placement(found, file, pictured)
             elif pictured is None:
                 raise sm.errors.ProblemError(f"{file}: a picture of places is over two coordinates")
             else:

@@ -6,7 +6,7 @@ from functools import cached_property
 from itertools import accumulate
 from pathlib import Path as FilePath
 
-from selfmotion.basics import PlanError, as_path, write_text
+from selfmotion.basics import PlanError, as_path
 from selfmotion.certificate import Tolerance
 from selfmotion.collision import Obstacle
 from selfmotion.constraints import Clearance
@@ -205,24 +205,6 @@ class Program:
         if not self.verified:
             raise PlanError(f"{self.robot.name}: {self.verdict}")
         return self
-
-    def write_timetable(self, file: str | FilePath) -> None:
-        """Write when each step begins and ends, and each event is [s], as CSV; atomically.
-
-        Events at one time are in the order in which they were given.
-        """
-        rows = list[tuple[float, float, str, str]]()
-        for begin, step in zip(self.begins, self.steps, strict=True):
-            kind = "seam" if step.is_seam else "move"
-            rows.append((begin, begin + step.duration, kind, step.name))
-            for event, at in step.happenings:
-                rows.append((begin + at, begin + at, "event", f"{step.name}: {event}"))
-        lines = ["begin,end,kind,name"]
-        lines += [
-            f'{begin:.6f},{end:.6f},{kind},"{name.replace(chr(34), chr(34) * 2)}"'
-            for begin, end, kind, name in rows
-        ]
-        write_text(as_path(file), "\n".join(lines) + "\n")
 
     def save(self, file: str | FilePath) -> None:
         """Write the program, without loss, to a file that `load_program` reads; atomically."""

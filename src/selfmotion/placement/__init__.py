@@ -11,6 +11,7 @@ from selfmotion.placement.corners import (
     correction as correction,
 )
 from selfmotion.placement.found import PlaceMap as PlaceMap, Placement as Placement
+from selfmotion.placement.page import write_placement as write_placement
 from selfmotion.placement.place import place as place
 from selfmotion.placement.places import Tried as Tried
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -11,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from selfmotion.basics import Array, PlanError, as_path, as_whole, write_text
+from selfmotion.basics import Array, PlanError, as_whole
 from selfmotion.batch import Row, maps
 from selfmotion.placement.places import Places, Tried
 from selfmotion.placement.search import Box
@@ -24,7 +23,6 @@ if TYPE_CHECKING:
 
 # A coordinate nearer to its bound than this share of the box is on it.
 _ON_BOUND = 1e-6
-_STYLE = "body{font-family:system-ui,sans-serif;margin:2em;max-width:60em}td,th{padding:2px 1em}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -221,19 +219,6 @@ class Placement:
 
     def _far(self, place: Array, other: Tried) -> float:
         return float(np.linalg.norm(self._box.share(place) - self._box.share(other.place)))
-
-    def to_html(self, file: str | Path, found: PlaceMap | None = None) -> Path:
-        """Write a page with the place, what binds, and a map if one is given; atomically."""
-        path = as_path(file)
-        title = f"Where to put the {self.of}"
-        lines = "".join(f"<p>{html.escape(line)}</p>" for line in str(self).splitlines())
-        drawn = "" if found is None else found.svg()
-        write_text(
-            path,
-            f'<!doctype html><html lang="en"><meta charset="utf-8"><title>{title}</title>'
-            f"<style>{_STYLE}</style><h1>{title}</h1>{lines}{drawn}</html>\n",
-        )
-        return path
 
 
 def on_bounds(places: Places, box: Box, place: Array) -> tuple[str, ...]:

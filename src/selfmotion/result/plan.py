@@ -8,7 +8,6 @@ from functools import cached_property
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
-import numpy as np
 import numpy.typing as npt
 
 from selfmotion.basics import (
@@ -21,7 +20,6 @@ from selfmotion.basics import (
     SelfmotionError,
     as_path,
     silent,
-    write_csv,
 )
 from selfmotion.certificate import (
     Certificate,
@@ -34,7 +32,7 @@ from selfmotion.certificate import (
 )
 from selfmotion.collision import Obstacle
 from selfmotion.costs import Cost
-from selfmotion.motion import Trajectory, column_names
+from selfmotion.motion import Trajectory
 from selfmotion.path import Path
 from selfmotion.problem.problem import Problem
 from selfmotion.result.archive import Archive
@@ -256,15 +254,6 @@ class Plan:
             self.certificate,
             self.altered,
         ).write(as_path(file))
-
-    def to_csv(self, file: str | FilePath) -> None:
-        """Write ``t`` and a column per joint for q, then for q̇ and q̈.
-
-        They are called ``NAME``, ``NAME_velocity`` and ``NAME_acceleration``.
-        """
-        motion = self.trajectory
-        table = np.column_stack([motion.t, motion.q, motion.qd, motion(motion.t, 2)])
-        write_csv(as_path(file), column_names(motion.joint_names), table)
 
     def figure(self) -> Figure:
         """Return joint positions and velocities, manipulability and path error as a figure.
