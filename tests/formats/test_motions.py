@@ -407,7 +407,7 @@ def carried() -> sm.Plan:
     grasp = pin.SE3(np.eye(3), np.array([0.0, 0.4, 0.0]))
     circle = sm.paths.Circle.around(first, radius=0.05, duration=3.0, normal=(0, 1, 0))
     follows = [sm.Follow(circle, tool=left), sm.Follow(grasp, tool=right, reference=left)]
-    return sm.plan(sm.Problem(pair, follows, collision=None)).require()
+    return sm.plan(sm.Problem(pair, follows, clearance=None)).require()
 
 
 @pytest.mark.parametrize("name", ["m.csv", "m.npz", "m.json", "m.yaml"])

@@ -77,7 +77,7 @@ def problem_rows() -> list[Row]:
             null_motion=null,
             relaxations={"'z'": "z", "None": None, "[1]": [1]},
             damping={"0.1": 0.1, "True": True, "Damping (the class)": sm.Damping},
-            collision={"0.01": 0.01, "True": True, "'none'": "none"},
+            clearance={"0.01": 0.01, "True": True, "'none'": "none"},
             rest=FLAGS,
         ),
         Row(area, "other pairs of rotations at other times", lambda _: _panda(relaxations=_PAIRS)),

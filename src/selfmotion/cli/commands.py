@@ -145,7 +145,7 @@ def init(
         lock=options.locks(lock or []),
         arguments=options.arguments(argument),
         packages=packages or (),
-        collision=not no_collision,
+        clearance=not no_collision,
     )
     text = next(texts) if robot in sm.NAMED_ARMS else documents.first_that_runs(texts, file, job)
     write_text(file, text)

@@ -189,7 +189,7 @@ def _document_model(known: tuple[type, ...]) -> type[BaseModel]:
         "costs": (list[_one_of(costs.values(), "kind")], None),  # type: ignore[misc]
         "constraints": (list[_one_of(constraints.values(), "kind")], None),  # type: ignore[misc]
         "relaxations": (list[model_of(Relaxation)], None),  # type: ignore[misc]
-        "collision": (clearance, None),
+        "clearance": (clearance, None),
         "workpiece": (_model("Workpiece", of_workpiece), None),
         "damping": (model_of(Damping), None),
         "rest": (bool, True),

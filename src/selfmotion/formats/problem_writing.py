@@ -86,8 +86,11 @@ def _plain(value: Any) -> Any:
 def problem_table(problem: Problem) -> dict[str, Any]:
     """Return the table of a problem file; see `write_problem`."""
     table = problem_to_dict(problem, _robot, _described)
-    if isinstance(table.get("collision"), dict):
-        del table["collision"]["kind"]
+    if "collision" in table:
+        # Plans' files have the name that it had when their format was made.
+        table["clearance"] = table.pop("collision")
+    if isinstance(table.get("clearance"), dict):
+        del table["clearance"]["kind"]
     return {key: _without_none(value) for key, value in table.items()}
 
 

@@ -83,7 +83,7 @@ def plan_job(
     constraints : sequence of Constraint
         What all seams and moves must keep; see `Problem`.
     clearance : Clearance, optional
-        What keeps the arm apart from obstacles and itself; see `Problem.collision`.
+        What keeps the arm apart from obstacles and itself; see `Problem.clearance`.
     branches : int
         Motions in different configurations that are planned for each seam.
     seconds_per_cost : float

@@ -205,7 +205,7 @@ def _kept(problem: Problem, apart: dict[tuple[str, str], float]) -> list[Clearan
     found = []
     bodies = {
         body.name: body
-        for item in (*problem.constraints, problem.collision)
+        for item in (*problem.constraints, problem.clearance)
         if isinstance(item, Clearance)
         for body in item.obstacles
     }

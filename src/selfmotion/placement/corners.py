@@ -167,7 +167,7 @@ def correction(
 
 
 def _standing(plan: Plan) -> tuple[str, ...]:
-    items = (*plan.problem.constraints, plan.problem.collision)
+    items = (*plan.problem.constraints, plan.problem.clearance)
     return tuple(
         body.name
         for item in items

@@ -156,13 +156,13 @@ class Places:
         )
         # Of the base all moves that stands in the world.
         bodies = None if self.of == "base" else self.bodies
-        collision = problem.collision
+        clearance = problem.clearance
         return problem.changed(
             path=_placed(items[0], by),
             also=also,
             start="free",
             constraints=tuple(_with_bodies(item, bodies, by) for item in problem.constraints),
-            collision=None if collision is None else _with_bodies(collision, bodies, by),
+            clearance=None if clearance is None else _with_bodies(clearance, bodies, by),
         )
 
 
@@ -190,7 +190,7 @@ def places_of(
     standing = {
         body.name: body
         for problem in problems
-        for item in (*problem.constraints, problem.collision)
+        for item in (*problem.constraints, problem.clearance)
         if isinstance(item, Clearance)
         for body in item.obstacles
         if body.frame is None

@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 
 from selfmotion.basics import Array, Flags
-from selfmotion.constraints import Binding, Priced, active_of, penalised, violated
+from selfmotion.constraints import ActiveConstraint, Priced, active_of, penalised, violated
 from selfmotion.motion import Evaluation, Grid, NodeNullMotion, NullMotion
 from selfmotion.nodes import NodeMotion, Optimum
 from selfmotion.optimise import Status
@@ -53,7 +53,7 @@ class MotionOnNodes:
         return cls(motion, Status.STOPPED, np.zeros(len(motion.h)))
 
     @cached_property
-    def active(self) -> tuple[Binding, ...]:
+    def active(self) -> tuple[ActiveConstraint, ...]:
         """What kept the optimum from a lower cost; on the way to one, prices say nothing."""
         return _binding(self.optimum) if self.optimum is not None and self.has_arrived else ()
 
@@ -138,7 +138,7 @@ class MotionOnNodes:
         return self.on(Grid(self.motion.grid.t).halved(where).nodes) or self
 
 
-def _binding(optimum: Optimum) -> tuple[Binding, ...]:
+def _binding(optimum: Optimum) -> tuple[ActiveConstraint, ...]:
     """Return what kept an optimum from a lower cost."""
     if not (optimum.prices.any() or optimum.end_prices.size):
         return ()

@@ -7,7 +7,7 @@ from typing import Protocol
 import numpy as np
 
 from selfmotion.basics import Array, BreakdownError, Flags
-from selfmotion.constraints import Binding, penalised, violated
+from selfmotion.constraints import ActiveConstraint, penalised, violated
 from selfmotion.costs import Samples
 from selfmotion.motion import Evaluation, NullMotion
 from selfmotion.optimise import Status
@@ -27,7 +27,7 @@ class Standing(Protocol):
         """What is wrong for each constraint that it could not meet."""
 
     @property
-    def active(self) -> tuple[Binding, ...]:
+    def active(self) -> tuple[ActiveConstraint, ...]:
         """What kept it from a lower cost."""
 
     @property
@@ -105,7 +105,7 @@ class PaperMotion:
         return violated(self.beginning.constraints, self._samples)
 
     @property
-    def active(self) -> tuple[Binding, ...]:
+    def active(self) -> tuple[ActiveConstraint, ...]:
         """Nothing: constraints are not asked of it, only judged."""
         return ()
 

@@ -100,7 +100,7 @@ class Problem:
         self-motion. By default none. A given start is on the path itself, and so is the end of a
         path with conditions there; where a path is closed, the deviation is so, too. Of several
         paths the first is relaxed.
-    collision : Clearance, optional
+    clearance : Clearance, optional
         How the arm keeps apart from itself and from obstacles, besides what constraints say: by
         default its links must not overlap, where its URDF has bodies and no constraint is a
         `Clearance`. None to leave that out; the verdict then says so.
@@ -141,7 +141,7 @@ class Problem:
     constraints: Sequence[Constraint] = KEPT
     relaxations: Sequence[Relaxation] = ()
     damping: Damping | None = None
-    collision: Clearance | None = NO_OVERLAP
+    clearance: Clearance | None = NO_OVERLAP
     rest: bool = True
     also: Sequence[Follow] = ()
 
@@ -260,13 +260,13 @@ class Problem:
         The default is left out where a constraint keeps the arm apart, or it has no bodies; what
         was given never is.
         """
-        if self.collision is not NO_OVERLAP:
-            return self.collision
+        if self.clearance is not NO_OVERLAP:
+            return self.clearance
         if not self.robot.urdf.has_collisions:
             return None
         if any(item.envelope(self.robot).bodies for item in self.constraints):
             return None
-        return self.collision
+        return self.clearance
 
     def keeps_off_itself(self, q: Array) -> bool:
         """Whether configurations (K, n) keep the arm apart from itself by its meshes.

@@ -20,7 +20,7 @@ from selfmotion.basics import (
     write_archive,
 )
 from selfmotion.certificate import Certificate, DampedStretch, Extreme, Finding, Tolerance
-from selfmotion.constraints import Binding
+from selfmotion.constraints import ActiveConstraint
 from selfmotion.motion import NullMotion, Trajectory
 from selfmotion.optimise import Iteration, Status
 from selfmotion.problem.problem import Problem
@@ -208,7 +208,7 @@ def _restore(
     motion = report["null_motion"]
     report["null_motion"] = None if motion is None else restore(NullMotion, motion)
     report["active"] = tuple(
-        Binding(**{**item, "spans": tuple(tuple(span) for span in item["spans"])})
+        ActiveConstraint(**{**item, "spans": tuple(tuple(span) for span in item["spans"])})
         for item in report["active"]
     )
     return Archive(
