@@ -61,7 +61,9 @@ SeamOption = Annotated[
 ]
 ColumnsOption = Annotated[
     str | None,
-    typer.Option(help="Names of the columns of --path, where it has no header: x,y,z,nx,ny,nz."),
+    typer.Option(
+        help="Names of the columns of --path, an array or without a header: x,y,z,nx,ny,nz."
+    ),
 ]
 FlipOption = Annotated[
     bool,

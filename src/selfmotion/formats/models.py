@@ -72,8 +72,9 @@ _OWN: Mapping[str, _Fields] = {
     "spiral": {"start": (Pose, None), "center": (Numbers, ...), "normal": (Numbers, ...),
                **_PACED},
     "line": {"start": (Pose, None), "end": (Pose, None), "by": (Numbers, None), **_PACED},
-    "waypoints": _SHAPE,
-    "polyline": _SHAPE,
+    # Files say `quaternions`, which are w, x, y, z there.
+    "waypoints": {**_SHAPE, "quaternions": (Any, None)},
+    "polyline": {**_SHAPE, "quaternions": (Any, None)},
     "twist": {"start": (Pose, ...), "breaks": (Numbers, ...), "coefficients": (Numbers, ...)},
     "retimed": {"path": (Table, ...)},
     "section": {"path": (Table, ...)},

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 from itertools import pairwise
 from pathlib import Path as FilePath
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -26,7 +26,13 @@ from selfmotion.basics import (
 )
 from selfmotion.path.base import Path, PathSamples, PathSeries, path_pose, rotvecs, unit
 from selfmotion.path.turns import Turning
-from selfmotion.path.waypoint_arguments import as_table, bends, check_waypoints, scalar_first
+from selfmotion.path.waypoint_arguments import (
+    as_table,
+    bends,
+    check_waypoints,
+    of_file,
+    scalar_first,
+)
 from selfmotion.task import SE3, Quaternion
 
 if TYPE_CHECKING:
@@ -52,7 +58,7 @@ class Waypoints(Path, kind="waypoints"):
         Times [s], increasing; the first one becomes 0.
     positions : (N, 3)
         [m], world axes.
-    quaternions : (N, 4) or scipy.spatial.transform.Rotation, optional
+    quaternions_wxyz : (N, 4) or scipy.spatial.transform.Rotation, optional
         Orientations [w, x, y, z]; normalised, either sign. Rotations of SciPy know their order,
         numbers have to be in this one. By default none is prescribed, for
         tasks that leave it free ('position').
@@ -74,16 +80,16 @@ class Waypoints(Path, kind="waypoints"):
         self,
         t: npt.ArrayLike,
         positions: npt.ArrayLike,
-        quaternions: npt.ArrayLike | Rotation | None = None,
+        quaternions_wxyz: npt.ArrayLike | Rotation | None = None,
         *,
         corners: str = "blend",
         corner_angle: float = np.pi / 6,
     ) -> None:
         times, points = as_table(t, "t"), as_table(positions, "positions")
-        self._oriented = quaternions is not None
-        if quaternions is None:
-            quaternions = np.tile([1.0, 0.0, 0.0, 0.0], (len(np.atleast_1d(points)), 1))
-        turns = as_table(scalar_first(quaternions), "quaternions")
+        self._oriented = quaternions_wxyz is not None
+        if quaternions_wxyz is None:
+            quaternions_wxyz = np.tile([1.0, 0.0, 0.0, 0.0], (len(np.atleast_1d(points)), 1))
+        turns = as_table(scalar_first(quaternions_wxyz), "quaternions")
         check_waypoints(times, points, turns)
         as_choice(corners, "waypoints: corners", ("blend", "stop"), PathError)
         what = "waypoints: corner_angle"
@@ -274,3 +280,8 @@ class Waypoints(Path, kind="waypoints"):
             "corners": self._corners,
             "corner_angle": self._corner_angle,
         }
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any], **context: Any) -> Self:
+        """See `Saved.from_dict`: files say `quaternions`."""
+        return super().from_dict(of_file(values), **context)
