@@ -91,6 +91,7 @@ def calibrate(
     ],
     out: options.OutOption = None,
     html: options.HtmlOption = None,
+    verbose: options.VerboseOption = False,
     as_json: options.JsonOption = False,
 ) -> None:
     """Say what a plan does on an arm as it was measured, and plan it again for that arm."""
@@ -102,7 +103,7 @@ def calibrate(
     verdict = judged.certify(planned.trajectory, planned.tolerance, planned.report.ending).verdict
     stages.print(f"as planned, on the calibrated arm: {verdict}", markup=False, soft_wrap=True)
     result = plan_with_progress(problem, warm_start=planned, tolerance=planned.tolerance)
-    outputs.finish(result, out or [], html, as_json)
+    outputs.finish(result, out or [], html, as_json, verbose)
 
 
 @app.command(

@@ -271,6 +271,9 @@ ToleranceOption = Annotated[
         help="Allowed deviation from the path (m and rad); 1e-6 by default, or the plan's."
     ),
 ]
+VerboseOption = Annotated[
+    bool, typer.Option("--verbose", "-v", help="Print all that was measured, tried and found.")
+]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print the outcome as JSON.")]
 
 

@@ -21,12 +21,13 @@ def retime(
     velocity: options.VelocityOption = None,
     out: options.OutOption = None,
     html: options.HtmlOption = None,
+    verbose: options.VerboseOption = False,
     as_json: options.JsonOption = False,
 ) -> None:
     """Run through a plan's joint path in the least time within limits, and check it."""
     outputs.check_suffixes(out or [])
     result = sm.retime(sm.load_plan(file), *_limits(acceleration, velocity))
-    outputs.finish(result, out or [], html, as_json)
+    outputs.finish(result, out or [], html, as_json, verbose)
 
 
 @app.command(
@@ -50,6 +51,7 @@ def fastest(
     allow_code: options.AllowCodeOption = False,
     out: options.OutOption = None,
     html: options.HtmlOption = None,
+    verbose: options.VerboseOption = False,
     as_json: options.JsonOption = False,
 ) -> None:
     """Look for the fastest motion along a path, whatever its own pace; Ctrl-C keeps the best."""
@@ -75,7 +77,9 @@ def fastest(
             markup=False,
             soft_wrap=True,
         )
-    outputs.finish(found.plan, [*job.outputs, *(out or [])], html, as_json, remarks=remarks)
+    outputs.finish(
+        found.plan, [*job.outputs, *(out or [])], html, as_json, verbose, remarks=remarks
+    )
 
 
 def _time(seconds: float) -> str:

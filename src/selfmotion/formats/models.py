@@ -229,7 +229,9 @@ def _parameters(cls: type) -> dict[str, inspect.Parameter]:
     """Return what a class is made from, with types instead of their texts."""
     names: dict[str, Any] = {}
     for base in reversed(cls.__mro__):
-        names |= vars(sys.modules[base.__module__])
+        # A script that was run has no module any more.
+        module = sys.modules.get(base.__module__)
+        names |= {} if module is None else vars(module)
     parameters = inspect.signature(cls).parameters
     return {
         name: item.replace(annotation=_evaluated(item.annotation, names))

@@ -7,7 +7,7 @@ from itertools import accumulate
 from pathlib import Path as FilePath
 
 from selfmotion.basics import PlanError, as_path
-from selfmotion.certificate import Tolerance
+from selfmotion.certificate import Tolerance, first_of
 from selfmotion.collision import Obstacle
 from selfmotion.constraints import Clearance
 from selfmotion.job.specification import Specification
@@ -137,6 +137,11 @@ class Program:
                 f"rest; {reached}{alone}"
             )
         return f"not verified: {'; '.join(self.failures)}"
+
+    @property
+    def summary(self) -> str:
+        """The verdict in short: of what is wrong the first."""
+        return self.verdict if self.verified else first_of(self.failures)
 
     @cached_property
     def failures(self) -> tuple[str, ...]:
