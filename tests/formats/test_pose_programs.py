@@ -148,7 +148,7 @@ def test_a_positioner_carries_its_work_object(
     text = file.read_text()
     said = '[FALSE, FALSE, "STN1", ' if unit == "STN1" else "EK(MACHINE_DEF[2].ROOT, MACHINE_DEF[2]"
     assert said in text
-    with pytest.raises(sm.errors.FileFormatError, match="whose joints only the robot tells"):
+    with pytest.raises(sm.errors.FileFormatError, match="whose joint positions need the robot"):
         sm.files.read_motion(file)
     again = sm.files.read_motion(file, robot=turned.robot).of_joints(turned.robot.joint_names)
     within = sm.Tolerance(stated.path.position, max(stated.path.rotation, 1e-5))

@@ -35,7 +35,7 @@ _MOST_POSES = 50_000
 # is within the tolerance until both have ended.
 _CLOCK = 1e-4
 # What is said of paths without bounds of their derivatives.
-_MEASURED = "the path is judged as measured between its marks: it gives no bounds (Path.series)"
+_MEASURED = "the path is checked at samples only: it gives no bounds (Path.series)"
 
 
 def certify(

@@ -59,7 +59,7 @@ class Quantity:
         0 for vectors.
     series : callable, optional
         ``series(stretch)`` → majorants of the values (m, K + 1, I), of their lengths where they are
-        vectors (`selfmotion.basics.series`). By default none: it is judged as measured.
+        vectors (`selfmotion.basics.series`). By default none: it is checked at samples.
     components : int
         Length c of vectors; 1 for numbers.
     of_pace : bool
@@ -189,7 +189,7 @@ class QuantityKept(Requirement):
         free = [free[k] for k in np.flatnonzero(~np.isfinite(self.quantity.bounds))]
         said = [f"not limited: {', '.join(free)}"] if free else []
         if self.quantity.series is None:
-            said.append(f"{self.name}: judged as measured between samples, it gives no bounds")
+            said.append(f"{self.name}: checked at samples only, as it gives no bounds")
         return tuple(said)
 
     def judge(self, motion: FinishedMotion) -> Finding:

@@ -160,7 +160,7 @@ def _check_calibration(robot: RobotModel, known: RobotModel) -> None:
     if any(placements[name] != place for name, place in _placements(known).items()):
         raise ProblemError(
             f"{robot.name}: its joints are elsewhere than its calibration file says now, so that "
-            f"a problem file would name another arm; load it anew"
+            f"a problem file would name another arm; load it again"
         )
 
 
@@ -195,7 +195,7 @@ def _check_unchanged(robot: RobotModel, tools: list[str]) -> None:
     if now.urdf.bare_text() != robot.urdf.bare_text():
         raise ProblemError(
             f"{robot.name}: the files of its parts have changed since it was loaded, so that a "
-            f"problem file would name another cell; load it anew"
+            f"problem file would name another cell; load it again"
         )
     _check_limits(robot, now)
 

@@ -169,7 +169,7 @@ class Ordering:
             self.missing[seam.name] = (
                 f"it comes after '{gone[0]}', which is not made"
                 if gone
-                else "none of what it stands on is made before it"
+                else "nothing that supports it is made before it"
             )
 
     def _never(self) -> list[int]:

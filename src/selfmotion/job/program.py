@@ -130,7 +130,7 @@ class Program:
     def verdict(self) -> str:
         """One line: verified, or what is wrong with which seam or move."""
         if self.verified:
-            alone = "" if self.specification else "; nothing says what was asked for"
+            alone = "" if self.specification else "; the file does not say what was asked for"
             reached = reached_text(list(self.plans.values()), self.tolerance)
             return (
                 f"verified at all times: {self.extent}, and all moves in between, from rest to "
@@ -183,7 +183,7 @@ class Program:
         for step in self.steps:
             met = step.meets(standing, apart)
             if met:
-                yield f"'{step.name}' is not judged against '{met[0]}', which stands there by then"
+                yield f"'{step.name}' is not checked against '{met[0]}', which is there by then"
             standing |= {item.name: item for item in step.leaves}
 
     def _beyond(self) -> Iterator[str]:

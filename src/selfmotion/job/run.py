@@ -101,7 +101,7 @@ def plan_job(
     warm_start : Program, optional
         An earlier program of this job, or of one like it, as when a part was moved: seams and moves
         that did not change are kept, others begin at its motions, in its order where it made the
-        same seams. Where no verified program comes of that, all is planned anew.
+        same seams. Where no verified program comes of that, all is replanned.
     rng : int
         Seed of all random numbers.
     progress : callable, optional

@@ -99,7 +99,7 @@ class Specification:
             if late:
                 yield f"seam '{name}' is made before '{late[0]}', after which it has to come"
             if seam.after_any and before.isdisjoint(seam.after_any):
-                yield f"seam '{name}' is made before any of those on which it stands"
+                yield f"seam '{name}' is made before any of those that support it"
 
     def _ends(self, robot: RobotModel, steps: Sequence[Step]) -> Iterator[str]:
         """Yield where it begins or ends elsewhere; moves that were not found are told elsewhere."""

@@ -127,7 +127,7 @@ class Path(Saved, ABC, family="path"):
         """Return bounds of all derivatives, for proofs; None where they are not known.
 
         For intervals of these middles and half widths (I,) [s], none of which contains a mark. A
-        path without is judged as measured between its marks, and the verdict says so.
+        path without is checked at samples only, and the verdict says so.
         """
         return None
 

@@ -101,7 +101,7 @@ class Correction:
         lines = [f"planned again, the {self.of} may be (confirmed at {count} corners)"]
         for what, side in sides:
             told = " ".join(corner.name for corner in side.corners) or "nowhere"
-            stops = side.stops or "nothing as far as was looked"
+            stops = side.stops or "nothing in the range that was searched"
             lines.append(
                 f"{what} by {_told(what, side.size)}: verified at {told}; estimate "
                 f"{_told(what, side.estimate)}; stops: {stops}"

@@ -152,19 +152,19 @@ class Placement:
     def __str__(self) -> str:
         """Return the place, what it gains, and what binds."""
         moved = ", ".join(f"{_label(name)} {value:+.4g}" for name, value in self.place.items())
-        before = "no verified motion where it stands"
+        before = "no verified motion at the present place"
         if math.isnan(self.cost_before):
-            before = "where it stands is not in the box"
+            before = "the present place is not in the box"
         elif math.isfinite(self.cost_before):
             gain = 1.0 - self.cost / self.cost_before if self.cost_before else 0.0
-            before = f"{self.cost_before:.6g} where it stands, {gain:.1%} less"
+            before = f"{self.cost_before:.6g} at the present place, {gain:.1%} less"
         failed = sum(not np.isfinite(item.cost) for item in self.tried)
         lines = [
             f"move the {self.of} by {moved}",
             f"cost {self.cost:.6g} ({before}); {len(self.plans)} "
             f"motion{'s' if len(self.plans) > 1 else ''}, {'all' if self.verified else 'not'} "
             f"verified",
-            f"{len(self.tried)} places looked at, {failed} of them without a verified motion",
+            f"{len(self.tried)} places tried, {failed} of them without a verified motion",
             *(f"binds: {text}" for text in self.binds),
         ]
         return "\n".join(lines)

@@ -185,7 +185,7 @@ def places_of(
         if not _stands(problem.follows.items[0]):
             raise ProblemError(
                 f"place: the path of {problem.robot.name} is given in the frame of "
-                f"'{problem.robot.reference}', which moves; only what stands in the world is placed"
+                f"'{problem.robot.reference}', which moves; expected one fixed in the world"
             )
     standing = {
         body.name: body
@@ -205,7 +205,7 @@ def places_of(
     for name in part or ():
         if name not in standing:
             raise ProblemError(
-                f"place: part: no obstacle '{name}' stands in the world{nearest(name, standing)}; "
+                f"place: part: no obstacle '{name}' is in the world{nearest(name, standing)}; "
                 f"obstacles: {', '.join(standing) or 'none'}"
             )
     if center is None:

@@ -282,7 +282,7 @@ def reached_text(plans: Sequence[Plan], tolerance: Tolerance) -> str:
     beyond = any(plan.certificate.deviations for plan in plans)
     return (
         f"at most {position:.1e} m and {rotation:.1e} rad off the path"
-        f"{', beyond what is relaxed' if beyond else ''}{allowed_text(tolerance)}"
+        f"{', beyond its tolerances' if beyond else ''}{allowed_text(tolerance)}"
     )
 
 
@@ -310,7 +310,7 @@ def load_plan(
     try:
         certificate = plan.check(progress=progress)
     except (CollisionError, RobotError) as error:
-        unknown = f"it could not be measured anew: {error}"
+        unknown = f"it could not be checked again: {error}"
         written = archive.certificate
         certificate = replace(
             written,
