@@ -62,7 +62,7 @@ def show(plan: Plan, console: Console) -> None:
         share = 100.0 * report.remaining / abs(report.cost)
         console.print(f"further saving possible: about {share:.2g} % (estimate)")
     if report.active:
-        console.print(_prices(report))
+        console.print(_active_constraints(report))
     if report.gap is not None:
         console.print(_distance(report.gap))
     show_certificate(plan.certificate, plan.approaches, plan.robot, console)
@@ -309,7 +309,7 @@ def _distance(gap: Gap) -> str:
     )
 
 
-def _prices(report: Report) -> Table:
+def _active_constraints(report: Report) -> Table:
     """Return what each active constraint costs, by its multipliers."""
     table = _table("active constraints")
     table.add_column("if you allow")
