@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 import pytest
+from typer.testing import CliRunner
 
 import selfmotion as sm
 from selfmotion.cli import app
@@ -163,7 +164,7 @@ def test_a_log_names_the_stages_and_the_gap(tmp_path: Path) -> None:
         *("--compare", "--verbose"),
     )
     assert planned.returncode in (0, 1), planned.stderr
-    assert planned.stderr.splitlines()[-1] == "checking"
+    assert planned.stderr.splitlines()[-1].startswith("checking the motion")
     assert "refining sequence" in planned.stderr
     assert "\x1b" not in planned.stderr
     assert "% from its best motion" in planned.stdout
@@ -185,3 +186,11 @@ def test_retime_and_fastest(tmp_path: Path) -> None:
         invoke("fastest", file, "--deadline", "1e-6")
     with pytest.raises(sm.errors.ProblemError, match="expected a problem file"):
         invoke("fastest", "panda")
+
+
+def test_help_begins_with_plan_and_job() -> None:
+    shown = CliRunner().invoke(app, ["--help"]).output
+    listed = re.findall(r"^\W*([a-z-]+)  ", shown.partition("Plan ─")[2], re.MULTILINE)
+    assert listed[:2] == ["plan", "job"]
+    for panel in ("Plan", "Inspect plans", "Files", "To begin with", "While the arm moves"):
+        assert f"{panel} ─" in shown

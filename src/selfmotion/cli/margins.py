@@ -56,14 +56,16 @@ def margin(
     within = _process(tolerance, turn)
     about = None if center is None else options.numbers(center, "--center", 3)
     plan = sm.load_plan(file)
-    found = sm.margin(
-        plan,
-        within,
-        clearance=clearance,
-        part=part or None,
-        tool=tool or None,
-        center=about,
-    )
+    with StageDisplay(stages) as display:
+        display.stage("measuring margins", 1, 1)
+        found = sm.margin(
+            plan,
+            within,
+            clearance=clearance,
+            part=part or None,
+            tool=tool or None,
+            center=about,
+        )
     again = []
     if corrected:
         with StageDisplay(stages) as display:
@@ -126,7 +128,9 @@ def sheet(
     bodies = any(what in plan.certificate.covers for what in ("self-collision", "obstacles"))
     margins = None
     if plan.certificate.verified and (bodies or within is not None):
-        margins = sm.margin(plan, within, part=part or None)
+        with StageDisplay(stages) as display:
+            display.stage("measuring margins", 1, 1)
+            margins = sm.margin(plan, within, part=part or None)
     written = sm.files.write_sheet(plan, out, margins, title=title)
     terminal.print(f"wrote {written}", markup=False, soft_wrap=True)
 

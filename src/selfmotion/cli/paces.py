@@ -9,6 +9,7 @@ import typer
 import selfmotion as sm
 from selfmotion.cli import documents, options, outputs
 from selfmotion.cli.app import PLAN, app, fastest_with_progress, stages
+from selfmotion.cli.stage_display import StageDisplay
 
 
 @app.command(
@@ -26,7 +27,9 @@ def retime(
 ) -> None:
     """Run through a plan's joint path in the least time within limits, and check it."""
     outputs.check_suffixes(out or [])
-    result = sm.retime(sm.load_plan(file), *_limits(acceleration, velocity))
+    with StageDisplay(stages) as display:
+        display.stage("retiming", 1, 1)
+        result = sm.retime(sm.load_plan(file), *_limits(acceleration, velocity))
     outputs.finish(result, out or [], html, as_json, verbose)
 
 
