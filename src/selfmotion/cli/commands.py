@@ -133,7 +133,7 @@ def init(
     no_collision: options.NoCollisionOption = False,
     force: Annotated[bool, typer.Option("--force", help="Overwrite a file.")] = False,
 ) -> None:
-    """Write a commented problem file to begin with; of an arm from a file, one that was planned."""
+    """Write a commented problem file to begin with; for an arm from a file it is tried first."""
     file = Path(f"{Path(robot).stem}.toml") if out is None else out
     if os.path.exists(file) and not force:
         raise sm.errors.FileFormatError(f"{file}: is there already; give --out or --force")
@@ -208,7 +208,7 @@ def check(
     verbose: options.VerboseOption = False,
     as_json: options.JsonOption = False,
 ) -> None:
-    """Check a motion by forward kinematics: a saved plan, or one that something else made."""
+    """Verify a motion by forward kinematics: a saved plan, or one made elsewhere."""
     judged = velocity, acceleration, joint_limits, obstacles, clearance, srdf
     within = None if tolerance is None else sm.Tolerance(tolerance, tolerance)
     typed = {"path": path, **{name: context.params[name] for name in documents.OF_PATH}}
@@ -299,7 +299,7 @@ def replay(
     ] = None,
     gif: Annotated[Path | None, typer.Option(help="Also draw the motion as a GIF.")] = None,
 ) -> None:
-    """Write a page that replays plans in a browser, offline; several get a switch.
+    """Write an offline page that replays plans in a browser, several side by side.
 
     Pictures need a browser (chromium) on this machine.
     """

@@ -60,7 +60,7 @@ def export(
     verbose: options.VerboseOption = False,
     as_json: options.JsonOption = False,
 ) -> None:
-    """Write a plan's motion for controllers and simulators, and check what was written."""
+    """Write a plan's motion for controllers and simulators, and verify the file."""
     asked = program_options.program_settings(settings, targets, wobj, mass)
     if rate is not None and all(_is_program(target, form, asked) for target in out):
         raise sm.errors.ProblemError(

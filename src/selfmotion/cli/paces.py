@@ -25,7 +25,7 @@ def retime(
     verbose: options.VerboseOption = False,
     as_json: options.JsonOption = False,
 ) -> None:
-    """Run through a plan's joint path in the least time within limits, and check it."""
+    """Retime a plan: the same joint path in the least time within limits."""
     outputs.check_suffixes(out or [])
     with StageDisplay(stages) as display:
         display.stage("retiming", 1, 1)
@@ -57,7 +57,7 @@ def fastest(
     verbose: options.VerboseOption = False,
     as_json: options.JsonOption = False,
 ) -> None:
-    """Look for the fastest motion along a path, whatever its own pace; Ctrl-C keeps the best."""
+    """Find the fastest motion along a path, whatever its own timing; Ctrl-C keeps the best."""
     if Path(problem).suffix not in documents.SUFFIXES:
         raise sm.errors.ProblemError(
             f"{problem}: expected a problem file ({', '.join(documents.SUFFIXES)}); "
