@@ -110,7 +110,7 @@ def ordered() -> sm.Program:
 def test_directions_order_waits_and_events_are_as_asked(ordered) -> None:
     panda, seams = robot_named("panda"), {item.name: item for item in ordered_seams()}
     circle = [seams["seam 0"], replace(seams["seam 1"], after=("seam 0",)), seams["seam 2"]]
-    with pytest.raises(sm.errors.ProblemError, match="circle"):
+    with pytest.raises(sm.errors.ProblemError, match="circular"):
         sm.plan_job(panda, circle, branches=1)
     made = ordered.require()
     assert made.order == ("seam 2", "seam 1", "seam 0")

@@ -122,7 +122,7 @@ def plan_job(
     PlanError
         No seam has a motion.
     ProblemError
-        An argument is not what it should be, or what has to come first goes round in a circle.
+        An argument is not what it should be, or what has to come first is circular.
     KeyboardInterrupt
         It was interrupted; what is finished by then is in the folder, where there is one.
     """
@@ -184,7 +184,7 @@ def _slowest(seam: Seam) -> float:
 
 def _checked_constraints(constraints: Sequence[Constraint]) -> tuple[Constraint, ...]:
     listed = as_several(constraints, "constraints", Constraint)
-    check_all_times(listed, "give it to a seam that is made one way (either_way=False)")
+    check_all_times(listed, "give it to a seam that has one direction (either_way=False)")
     for item in listed:
         if isinstance(item, Clearance):
             raise ProblemError(

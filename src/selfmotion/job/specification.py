@@ -72,7 +72,7 @@ class Specification:
         made = [step.name for step in steps if step.is_seam]
         for name in dict.fromkeys(made):
             if name not in seams:
-                yield f"nobody asked for seam '{name}'"
+                yield f"there is an extra seam '{name}'"
             elif made.count(name) > 1:
                 yield f"seam '{name}' is made {made.count(name)} times"
         if not seams.keys() >= set(made):
@@ -189,7 +189,7 @@ def _moves(steps: Sequence[Step], seams: Mapping[str, Seam]) -> Iterator[str]:
             yield f"'{step.name}' is there twice"
         added = [*(event for event, _ in step.events), *(item.name for item in step.leaves)]
         if added:
-            yield f"'{step.name}' has '{added[0]}', which nobody asked of a move or a wait"
+            yield f"'{step.name}' has '{added[0]}', which was not asked of a move or a wait"
         may = {name for side in (before, after) if side in seams for name in seams[side].may_meet}
         if not set(step.may_meet) <= may:
             yield f"'{step.name}' may meet more than the seams beside it"
