@@ -77,6 +77,13 @@ def test_a_plan_that_was_cut_short_says_so(slow: sm.Plan) -> None:
         assert any(early.report.message in line for line in told(summaries.show_plan, early))
 
 
+def test_a_retimed_plan_has_no_cost_of_before(slow: sm.Plan) -> None:
+    fast = sm.retime(slow, 10.0, 10.0)
+    lines = told(summaries.show_plan, fast)
+    assert lines[1] == f"duration {fast.trajectory.duration:.4g} s"
+    assert not any(line.startswith("cost") for line in lines)
+
+
 def test_commands_are_short_unless_asked(slow: sm.Plan, tmp_path: Path) -> None:
     file, motion = tmp_path / "plan.npz", tmp_path / "motion.csv"
     slow.save(file)

@@ -231,7 +231,7 @@ class Judge:
         return np.asarray(axis * angle / np.where(length > 0.0, length, 1.0))
 
     def _beyond(self, t: Array, miss: Array, items: Sequence[sm.Relaxation]) -> Array:
-        """Return how large misses (K, 3) are beyond its tolerances, (K,)."""
+        """Return how large misses (K, 3) are beyond what is relaxed, (K,)."""
         rest = miss.copy()
         for item in items:
             first, last = item.window(self.path.duration)

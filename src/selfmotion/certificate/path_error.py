@@ -46,7 +46,7 @@ class PathCheck:
     Attributes
     ----------
     position, rotation : Extreme
-        Bounds of the errors beyond its tolerances [m], [rad], and about when they are largest.
+        Bounds of the errors beyond the tolerances [m], [rad], and about when they are largest.
     deviations : tuple of Extreme
         Bounds of the deviation of each relaxation's rows.
     undecided : tuple of (float, float)

@@ -8,6 +8,7 @@ from selfmotion.certificate import Certificate, Extreme
 from selfmotion.cli.remedies import in_shell
 from selfmotion.job import Program
 from selfmotion.optimise import Status
+from selfmotion.path import Retimed
 from selfmotion.result import Plan
 
 # What else a summary leaves out is said by this.
@@ -23,8 +24,9 @@ def show_plan(plan: Plan, console: Console) -> None:
     report, certificate = plan.report, plan.certificate
     show_certificate(certificate, {}, console)
     duration = f"duration {plan.trajectory.duration:.4g} s"
-    if report.ending:
-        # The cost of a part of the path compares with nothing.
+    if report.ending or isinstance(plan.path, Retimed):
+        # The cost of a part of the path compares with nothing, and that of another pace is no cost
+        # of this motion.
         _print(console, duration)
         return
     change = ""

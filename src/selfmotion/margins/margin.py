@@ -47,7 +47,7 @@ def margin(
         A verified one.
     tolerance : Tolerance, optional
         What the process lets the tool miss its path by; in the rows that the task prescribes, and
-        beyond its tolerances. By default only clearances are judged.
+        beyond what is relaxed. By default only clearances are judged.
     clearance : float
         What has to be left between bodies [m]; by default they may come near but not meet.
     part : sequence of str, optional
