@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import coal
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -60,6 +61,22 @@ def test_a_model_keeps_its_masses(robot: sm.RobotModel) -> None:
             for arm in (found, from_file)
         ]
         np.testing.assert_allclose(*torques, rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize("name", ["panda", "tiago", "z1"])
+def test_a_model_with_bodies_collides_as_its_file(name: str) -> None:
+    """The same distances between the same links: by meshes, boxes, spheres and cylinders."""
+    robot = robot_named(name)
+    model, file, folders = model_of(robot), file_of(robot), list(robot.urdf.package_dirs)
+    geometry = pin.buildGeomFromUrdf(
+        model, str(file), pin.GeometryType.COLLISION, package_dirs=folders
+    )
+    found = sm.load_robot(model, robot.tools, robot.locked, geometry=geometry)
+    from_file = sm.load_robot(file, robot.tools, robot.locked, packages=folders)
+    for q in robot.generic_configurations():
+        one, other = (sm.obstacles.CollisionModel(arm).worst(q[None]) for arm in (found, from_file))
+        assert one.value == pytest.approx(other.value, abs=1e-9)
+        assert (one.first, one.second) == (other.first, other.second)
 
 
 def test_a_frame_that_was_added_is_a_tool(panda: sm.RobotModel) -> None:
@@ -128,3 +145,15 @@ def doubled() -> pin.Model:
 def test_what_is_no_arm_is_refused(given, message: str) -> None:
     with pytest.raises(sm.errors.RobotError, match=message):
         sm.load_robot(given)
+
+
+def test_bodies_that_a_urdf_cannot_say_are_refused() -> None:
+    model, geometry = model_of(robot_named("planar_3r")), pin.GeometryModel()
+    cone = pin.GeometryObject("hat", 1, pin.SE3.Identity(), coal.Cone(0.1, 0.2))
+    geometry.addGeometryObject(cone)
+    with pytest.raises(sm.errors.RobotError, match="body 'hat' is a Cone, expected a box"):
+        sm.load_robot(model, tool="tool", geometry=geometry)
+    with pytest.raises(sm.errors.RobotError, match=r"which only a pinocchio\.Model has"):
+        sm.load_robot("panda", geometry=geometry)
+    with pytest.raises(sm.errors.RobotError, match=r"expected a pinocchio\.GeometryModel"):
+        sm.load_robot(model, tool="tool", geometry=3)

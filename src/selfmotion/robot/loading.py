@@ -34,6 +34,7 @@ def load_robot(
     tool: str | Sequence[str] | None = None,
     lock: Mapping[str, float] | None = None,
     *,
+    geometry: pin.GeometryModel | None = None,
     reference: str | None = None,
     base: pin.SE3 | npt.ArrayLike | Mapping[str, pin.SE3 | npt.ArrayLike] | None = None,
     on: Mapping[str, str] | None = None,
@@ -51,7 +52,7 @@ def load_robot(
         A name from `NAMED_ARMS` (``"panda"``, ``"planar_3r"``, …), ``"positioner"``, or the path of
         a ``.urdf`` or ``.xacro`` file; the text of a URDF, which begins with ``<``, such as ROS's
         ``robot_description``; or a model of Pinocchio's, which brings kinematics, limits and
-        inertias, but no shapes: self-collision is not looked at, and nothing is drawn but joints.
+        inertias, but no visuals, and no bodies without `geometry`.
         Or several of these by name, as one tree: links and joints of part ``"arm"`` are called
         ``arm/NAME`` then.
     tool : str or sequence of str, optional
@@ -61,6 +62,9 @@ def load_robot(
     lock : dict, optional
         Joints to hold, with their coordinate [rad or m]. Joints that move no tool relative to the
         reference are held anyway, at 0 or the nearest limit unless given here.
+    geometry : pinocchio.GeometryModel, optional
+        Of a ``pinocchio.Model``: its collision bodies (boxes, spheres, cylinders, meshes of files).
+        Without, self-collision is not looked at.
     reference : str, optional
         The link in whose frame poses, twists and paths are given: a part that a table turns, or
         that another hand holds. By default the world.
@@ -110,11 +114,18 @@ def load_robot(
     for name, given in (("lock", lock), ("arguments", arguments), ("on", on)):
         if not isinstance(given, Mapping | None):
             raise RobotError(f"{name} is {shown(given)}, expected a dict")
+    if geometry is not None and not isinstance(robot, pin.Model):
+        raise RobotError(
+            "geometry is given, which only a pinocchio.Model has; leave it out, since a URDF has "
+            "its own"
+        )
+    if not isinstance(geometry, pin.GeometryModel | None):
+        raise RobotError(f"geometry is {shown(geometry)}, expected a pinocchio.GeometryModel")
     folders = _folders(packages)
     source = (
         _parts(robot, base, on, arguments or {}, folders, calibration)
         if isinstance(robot, Mapping)
-        else _single(robot, base, on, arguments or {}, folders, calibration)
+        else _single(robot, geometry, base, on, arguments or {}, folders, calibration)
     )
     urdf = source.urdf
     if tool is None:
@@ -175,13 +186,17 @@ class _Source:
 
 
 def _read(
-    robot: str | Path | pin.Model, arguments: Mapping[str, str], packages: tuple[str, ...]
+    robot: str | Path | pin.Model,
+    arguments: Mapping[str, str],
+    packages: tuple[str, ...],
+    geometry: Any = None,
 ) -> _Source:
     known = {**NAMED_ARMS, **NAMED_PARTS}
     source = _called(robot)
     if isinstance(robot, pin.Model) or source == _TEXT:
         _check_no_arguments(source, arguments)
-        text = urdf_text_of(robot, source) if isinstance(robot, pin.Model) else str(robot).strip()
+        is_model = isinstance(robot, pin.Model)
+        text = urdf_text_of(robot, geometry, source) if is_model else str(robot).strip()
         return _Source(urdf_of_file(text, Packages(Path(source), packages)), None)
     if isinstance(robot, str) and robot in known:
         _check_no_arguments(robot, arguments)
@@ -200,6 +215,7 @@ def _called(robot: str | Path | pin.Model) -> str:
 
 def _single(
     robot: str | Path | pin.Model,
+    geometry: Any,
     base: Any,
     on: Mapping[str, str] | None,
     arguments: Mapping[str, str],
@@ -209,7 +225,7 @@ def _single(
     if isinstance(base, Mapping) or on is not None:
         what = "on" if on is not None else "base"
         raise RobotError(f"{what} is a dict of parts, but there is one robot, '{_called(robot)}'")
-    source = _read(robot, arguments, packages)
+    source = _read(robot, arguments, packages, geometry)
     urdf = source.urdf
     if calibration is not None:
         if not isinstance(calibration, str | Path):

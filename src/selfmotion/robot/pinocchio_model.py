@@ -1,12 +1,14 @@
 """URDFs of Pinocchio's models, so that an arm that was built in code is one like any other."""
 
 import xml.etree.ElementTree as ElementTree
+from pathlib import Path
 from typing import Any
 
+import coal
 import numpy as np
 import pinocchio as pin
 
-from selfmotion.basics import Array, RobotError
+from selfmotion.basics import Array, RobotError, is_file
 from selfmotion.task import rpy
 
 # Angles beyond the first are no limits [rad]; speeds and efforts beyond the second are none.
@@ -15,23 +17,26 @@ _ENDLESS, _NONE = 1e5, 1e30
 _NAMED = (pin.FrameType.BODY, pin.FrameType.OP_FRAME, pin.FrameType.SENSOR)
 
 
-def urdf_text_of(model: Any, source: str) -> str:
+def urdf_text_of(model: Any, geometry: Any, source: str) -> str:
     """Return URDF text of a ``pinocchio.Model``.
 
     Its bodies and frames become links, its revolute and prismatic joints are joints with their
-    limits, and the inertia of each joint is that of the link it carries. A model has no shapes, and
-    what else it has (gravity, friction, rotors) a URDF has not.
+    limits, and the inertia of each joint is that of the link it carries. What else it has (gravity,
+    friction, rotors) a URDF has not.
 
     Parameters
     ----------
     model : pinocchio.Model
+    geometry : pinocchio.GeometryModel or None
+        Its collision bodies, without which there are none.
     source : str
         What messages call it.
 
     Raises
     ------
     RobotError
-        A joint is neither revolute nor prismatic, or a name is there twice.
+        A joint is neither revolute nor prismatic, a name is there twice, or a URDF knows no such
+        body.
     """
     robot = ElementTree.Element("robot", name=model.name or "robot")
     links = _Links(model)
@@ -39,15 +44,17 @@ def urdf_text_of(model: Any, source: str) -> str:
     twice = next((name for name in names if names.count(name) > 1), None)
     if twice is not None:
         raise RobotError(f"{source}: two frames are called '{twice}'; rename one")
+    bodies = {} if geometry is None else _bodies(model, links, geometry, source)
     for joint, link in enumerate(links.of_joint):
         element = ElementTree.SubElement(robot, "link", name=link)
+        element.extend(bodies.get(link, ()))
         if joint:
             _add_inertia(element, model.inertias[joint])
     for joint in range(1, model.njoints):
         robot.append(_moving_joint(model, joint, links, source))
     for frame in links.others:
         item = model.frames[frame]
-        ElementTree.SubElement(robot, "link", name=item.name)
+        ElementTree.SubElement(robot, "link", name=item.name).extend(bodies.get(item.name, ()))
         parent, place = links.above(frame)
         fixed = ElementTree.SubElement(robot, "joint", name=f"{item.name}_fixed", type="fixed")
         _connect(fixed, parent, item.name, place)
@@ -98,6 +105,42 @@ class _Links:
         return self.of_joint[joint], item.placement
 
 
+def _bodies(
+    model: Any, links: _Links, geometry: Any, source: str
+) -> dict[str, list[ElementTree.Element]]:
+    """Return the ``<collision>`` elements of each link that has some."""
+    found: dict[str, list[ElementTree.Element]] = {}
+    for item in geometry.geometryObjects:
+        link, place = links.of_joint[item.parentJoint], item.placement
+        if item.parentFrame in links.others:
+            # Of what was built in code it may be no frame at all.
+            frame = model.frames[item.parentFrame]
+            link, place = frame.name, frame.placement.actInv(place)
+        element = ElementTree.Element("collision", name=item.name)
+        ElementTree.SubElement(element, "origin", _origin(place))
+        ElementTree.SubElement(element, "geometry").append(_shape(item, source))
+        found.setdefault(link, []).append(element)
+    return found
+
+
+def _shape(item: Any, source: str) -> ElementTree.Element:
+    body = item.geometry
+    match body:
+        case coal.Box():
+            return ElementTree.Element("box", size=_text(2.0 * body.halfSide))
+        case coal.Sphere():
+            return ElementTree.Element("sphere", radius=repr(float(body.radius)))
+        case coal.Cylinder():
+            sizes = {"radius": body.radius, "length": 2.0 * body.halfLength}
+            return ElementTree.Element("cylinder", {k: repr(float(v)) for k, v in sizes.items()})
+    if not is_file(Path(item.meshPath)):
+        raise RobotError(
+            f"{source}: body '{item.name}' is a {type(body).__name__}, expected a box, sphere or "
+            f"cylinder, or a mesh that was read from a file"
+        )
+    return ElementTree.Element("mesh", filename=item.meshPath, scale=_text(item.meshScale))
+
+
 def _moving_joint(model: Any, joint: int, links: _Links, source: str) -> ElementTree.Element:
     kind, name = model.joints[joint], model.names[joint]
     data = kind.createData()
@@ -139,8 +182,12 @@ def _limits(model: Any, kind: Any) -> tuple[float, float, float, float]:
 def _connect(joint: ElementTree.Element, parent: str, child: str, place: pin.SE3) -> None:
     ElementTree.SubElement(joint, "parent", link=parent)
     ElementTree.SubElement(joint, "child", link=child)
-    angles = _text(rpy.matrixToRpy(np.array(place.rotation)))
-    ElementTree.SubElement(joint, "origin", xyz=_text(place.translation), rpy=angles)
+    ElementTree.SubElement(joint, "origin", _origin(place))
+
+
+def _origin(place: pin.SE3) -> dict[str, str]:
+    angles = rpy.matrixToRpy(np.array(place.rotation))
+    return {"xyz": _text(place.translation), "rpy": _text(angles)}
 
 
 def _add_inertia(link: ElementTree.Element, inertia: pin.Inertia) -> None:
