@@ -89,6 +89,8 @@ if TYPE_CHECKING:
     from selfmotion.realtime import Replanner as Replanner, warm_up as warm_up
 
 _LATER = ("Replanner", "warm_up")
+# Names that were at the top level once, and have another one since.
+_RENAMED = {"Binding": "ActiveConstraint", "BoughtMargin": "PlanWithMargin"}
 _NAMESPACES = (
     "baselines",
     "certificate",
@@ -182,13 +184,14 @@ def __getattr__(name: str) -> Any:
         from selfmotion import realtime
 
         return getattr(realtime, name)
+    now = _RENAMED.get(name, name)
     for space in _NAMESPACES:
-        if name in globals()[space].__all__:
+        if now in globals()[space].__all__:
             from warnings import warn
 
-            moved = f"sm.{name} is sm.{space}.{name} now; the old name goes with the next version"
+            moved = f"sm.{name} is sm.{space}.{now} now; the old name goes with the next version"
             warn(moved, DeprecationWarning, stacklevel=2)
-            return getattr(globals()[space], name)
+            return getattr(globals()[space], now)
     raise AttributeError(f"module 'selfmotion' has no attribute '{name}'")
 
 

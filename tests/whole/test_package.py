@@ -50,6 +50,11 @@ def test_what_has_moved_is_found_for_one_version_more() -> None:
     with pytest.warns(DeprecationWarning, match=r"sm\.write_sheet is sm\.files\.write_sheet now"):
         moved = getattr(sm, "write_sheet")  # noqa: B009
     assert moved is sm.files.write_sheet
+    with pytest.warns(
+        DeprecationWarning, match=r"sm\.Binding is sm\.constraints\.ActiveConstraint"
+    ):
+        moved = getattr(sm, "Binding")  # noqa: B009
+    assert moved is sm.constraints.ActiveConstraint
     with pytest.raises(AttributeError, match="has no attribute 'Circel'"):
         _ = sm.Circel
 
