@@ -160,7 +160,7 @@ def _planned(robot: sm.RobotModel, task: str, folder: Path | None) -> str:
     end = begin.copy()
     end.translation = begin.translation + _LENGTH * np.array([1.0, 1.0, 0.0]) / np.sqrt(2.0)
     line = sm.paths.Line(begin, end, _DURATION)
-    plan = sm.plan(sm.Problem(robot, line, task, start, collision=apart))
+    plan = sm.plan(sm.Problem(robot, line, task, start, clearance=apart))
     if folder is not None:
         replay.write_replay(plan, folder / "replay.html").unlink()
     if not plan.certificate.verified:

@@ -150,7 +150,7 @@ def losses(robot):
     ]
     for name, task, costs, start, radius, normal in cases:
         path = sm.paths.Circle.around(robot.pose(start), radius, 20.0, normal=normal)
-        full = sm.plan(sm.Problem(robot, path, task, start, costs=costs, collision=None)).report
+        full = sm.plan(sm.Problem(robot, path, task, start, costs=costs, clearance=None)).report
         row = []
         for horizon, motion in ((2.0, None), (8.0, sm.motion.BSplineNullMotion(6))):
             replanner = Replanner(robot, task, costs, (), horizon, motion, steps=24)

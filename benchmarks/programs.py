@@ -124,7 +124,7 @@ def cases(number: int, folder: Path) -> Iterator[tuple[int, Case]]:
             start = middle + half * rng.uniform(-1.0, 1.0, robot.dof)
             try:
                 path = path_from(robot.chain.place(start), rng)
-                problem = sm.Problem(robot, path, task, start, collision=None)
+                problem = sm.Problem(robot, path, task, start, clearance=None)
                 plan = sm.plan(problem, max_evaluations=40)
             except sm.SelfmotionError:
                 continue

@@ -43,7 +43,7 @@ def problems(seed: int) -> Iterator[tuple[str, sm.Problem]]:
         options: dict[str, Any] = {"constraints": (), "rest": kind == "at rest"}
         yield (
             name,
-            replace(problem, collision=None, null_motion=sm.motion.FreeNullMotion(), **options),
+            replace(problem, clearance=None, null_motion=sm.motion.FreeNullMotion(), **options),
         )
 
 

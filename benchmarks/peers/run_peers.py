@@ -46,7 +46,7 @@ def main() -> int:
     whole = sm.Problem(robot, path, start=start)
     # As the peers have it: no bodies, no rest, the URDF's limits of position alone.
     bare = replace(
-        whole, constraints=(sm.constraints.JointPositionLimits(),), rest=False, collision=None
+        whole, constraints=(sm.constraints.JointPositionLimits(),), rest=False, clearance=None
     )
     rows = [
         *ours(bare, "default, limits of position only"),

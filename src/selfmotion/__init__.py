@@ -70,6 +70,7 @@ from selfmotion.result import (
     Parts as Parts,
     Plan as Plan,
     Report as Report,
+    compare as compare,
     load_plan as load_plan,
     retime as retime,
     slowdown as slowdown,
@@ -79,7 +80,6 @@ from selfmotion.robot import (
     RobotModel as RobotModel,
     load_robot as load_robot,
 )
-from selfmotion.sheet import write_sheet as write_sheet
 from selfmotion.task import Damping as Damping, Relaxation as Relaxation, Task as Task
 from selfmotion.transfer import move as move
 
@@ -89,6 +89,8 @@ if TYPE_CHECKING:
     from selfmotion.realtime import Replanner as Replanner, warm_up as warm_up
 
 _LATER = ("Replanner", "warm_up")
+# Names that were at the top level once, and have another one since.
+_RENAMED = {"Binding": "ActiveConstraint", "BoughtMargin": "PlanWithMargin"}
 _NAMESPACES = (
     "baselines",
     "certificate",
@@ -136,6 +138,7 @@ __all__ = [
     "calibrated",
     "certificate",
     "certify",
+    "compare",
     "constraints",
     "correction",
     "costs",
@@ -169,7 +172,6 @@ __all__ = [
     "sample_problem",
     "slowdown",
     "warm_up",
-    "write_sheet",
 ]
 
 
@@ -182,13 +184,14 @@ def __getattr__(name: str) -> Any:
         from selfmotion import realtime
 
         return getattr(realtime, name)
+    now = _RENAMED.get(name, name)
     for space in _NAMESPACES:
-        if name in globals()[space].__all__:
+        if now in globals()[space].__all__:
             from warnings import warn
 
-            moved = f"sm.{name} is sm.{space}.{name} now; the old name goes with the next version"
+            moved = f"sm.{name} is sm.{space}.{now} now; the old name goes with the next version"
             warn(moved, DeprecationWarning, stacklevel=2)
-            return getattr(globals()[space], name)
+            return getattr(globals()[space], now)
     raise AttributeError(f"module 'selfmotion' has no attribute '{name}'")
 
 

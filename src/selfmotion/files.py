@@ -1,4 +1,8 @@
-"""Files of problems, jobs, tool motions and joint motions: readers and writers."""
+"""Files of problems, jobs, tool motions and joint motions: readers and writers.
+
+What can be loaded again, without loss, has `save`: plans, moves, parts and programs. Everything
+else is written by a function ``write_…(thing, file)``; replays by `selfmotion.replay.write_replay`.
+"""
 
 from selfmotion.formats import (
     Job,
@@ -15,10 +19,13 @@ from selfmotion.formats import (
     write_parts,
     write_problem,
 )
+from selfmotion.job import write_timetable
+from selfmotion.placement import write_placement
 from selfmotion.result import (
     load_move,
     load_parts,
 )
+from selfmotion.sheet import write_sheet
 
 __all__ = [
     "Job",
@@ -35,5 +42,8 @@ __all__ = [
     "read_seam_job",
     "write_motion",
     "write_parts",
+    "write_placement",
     "write_problem",
+    "write_sheet",
+    "write_timetable",
 ]

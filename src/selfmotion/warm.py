@@ -51,7 +51,7 @@ def small_works() -> Iterator[tuple[str, Callable[[], object]]]:
     place, size = np.array([0.5, 0.4, 0.3]), np.array([0.1, 0.1, 0.6])
     circle = sm.paths.Circle.around(arm.pose(home), 0.05, 4.0)
     box = sm.constraints.Clearance((sm.obstacles.Box("post", place, size),), 0.01)
-    alone = sm.Problem(arm, circle, "position", home, collision=None)
+    alone = sm.Problem(arm, circle, "position", home, clearance=None)
 
     def plan(problem: sm.Problem, **options: Any) -> Callable[[], object]:
         return lambda: sm.plan(problem, **options)

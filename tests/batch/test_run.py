@@ -432,7 +432,7 @@ def test_a_mesh_that_changed_is_planned_anew_in_any_process(tmp_path: Path) -> N
     found, resumed = row()
     assert (found.verified, resumed) == (False, 0)
     # Another file in the place of its plan is not its plan.
-    other = sm.plan(sm.Problem(panda, line, "position", PANDA_HOME, collision=None))
+    other = sm.plan(sm.Problem(panda, line, "position", PANDA_HOME, clearance=None))
     other.save(out / "plans" / "plan-0.npz")
     assert (row()[0].verified, row()[1]) == (False, 1)
 

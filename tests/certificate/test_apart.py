@@ -241,7 +241,7 @@ def test_the_default_keeps_an_arm_apart_from_itself(name: str) -> None:
     plan = sm.plan(sm.Problem(robot, short_line(robot, start), start=start))
     assert "self-collision" in plan.certificate.covers
     assert plan.certificate.clearance is not None
-    without = sm.plan(dataclasses.replace(plan.problem, collision=None))
+    without = sm.plan(dataclasses.replace(plan.problem, clearance=None))
     assert "self-collision" in without.certificate.not_checked
     assert "self-collision" in without.certificate.verdict.split("not checked: ")[1]
     # Where nothing comes near, it changes nothing.
@@ -257,7 +257,7 @@ def test_a_motion_into_itself_is_not_verified_and_planned_anew() -> None:
     end = pose.copy()
     end.translation = pose.translation + rng.uniform(-0.1, 0.1, 3)
     careless = sm.plan(
-        sm.Problem(robot, sm.paths.Line(pose, end, 3.0), start=start, collision=None)
+        sm.Problem(robot, sm.paths.Line(pose, end, 3.0), start=start, clearance=None)
     )
     model = sm.obstacles.CollisionModel(robot)
     overlap = KeepsApart(model, 0.0).judge(
@@ -265,7 +265,7 @@ def test_a_motion_into_itself_is_not_verified_and_planned_anew() -> None:
     )
     assert not overlap.kept
     plan = sm.plan(
-        dataclasses.replace(careless.problem, collision=sm.constraints.Clearance(distance=0.0))
+        dataclasses.replace(careless.problem, clearance=sm.constraints.Clearance(distance=0.0))
     )
     assert plan.certificate.verified, plan.certificate.verdict
     assert model.worst(plan.trajectory.q).value >= 0.0
@@ -295,7 +295,7 @@ def test_pairs_that_the_srdf_leaves_out_are_listed(tmp_path: Path) -> None:
     (tmp_path / "one.srdf").write_text(srdf_without(every[:1]))
     one = sm.constraints.Clearance(srdf=tmp_path / "one.srdf").requirement(robot)
     assert one.covers == ("self-collision",)
-    assert f"left out as asked: {' - '.join(every[0])}" in one.remarks
+    assert f"pairs not checked, as asked: {' - '.join(every[0])}" in one.remarks
 
 
 def test_a_plan_keeps_the_pairs_that_its_srdf_left_out(tmp_path: Path) -> None:
@@ -305,12 +305,12 @@ def test_a_plan_keeps_the_pairs_that_its_srdf_left_out(tmp_path: Path) -> None:
     pair = sm.obstacles.CollisionModel(robot).pairs[0]
     (tmp_path / "one.srdf").write_text(srdf_without([pair]))
     kept = sm.constraints.Clearance(srdf=tmp_path / "one.srdf")
-    plan = sm.plan(sm.Problem(robot, short_line(robot, start), start=start, collision=kept))
+    plan = sm.plan(sm.Problem(robot, short_line(robot, start), start=start, clearance=kept))
     plan.save(tmp_path / "plan.npz")
     (tmp_path / "one.srdf").write_text(srdf_without(sm.obstacles.CollisionModel(robot).pairs))
     again = sm.load_plan(tmp_path / "plan.npz")
-    assert again.problem.collision is not None
-    assert again.problem.collision.disabled == (pair,)
+    assert again.problem.clearance is not None
+    assert again.problem.clearance.disabled == (pair,)
     assert again.certificate.remarks == plan.certificate.remarks
 
 
@@ -327,7 +327,7 @@ def test_where_the_srdf_leaves_out_all_pairs_self_collision_is_not_covered(tmp_p
     start = start_of(robot, "pose")
     line = short_line(robot, start)
     own = sm.constraints.Clearance(srdf=tmp_path / "all.srdf")
-    plan = sm.plan(sm.Problem(robot, line, start=start, collision=own))
+    plan = sm.plan(sm.Problem(robot, line, start=start, clearance=own))
     assert "self-collision" in plan.certificate.not_checked
     assert sm.constraints.Clearance(
         [sm.obstacles.Sphere("ball", [2.0, 0.0, 0.0], 0.1)], srdf=tmp_path / "all.srdf"

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 import pytest
+from typer.testing import CliRunner
 
 import selfmotion as sm
 from selfmotion.cli import app
@@ -27,7 +28,7 @@ def test_plan_check_and_replay(tmp_path: Path) -> None:
     plan, csv, html = tmp_path / "plan.npz", tmp_path / "plan.csv", tmp_path / "a.html"
     planned = run(
         "plan", "planar_3r", "--circle", "0.5", "--normal", "z", "--task", "planar",
-        "--mu", "1", "--out", plan, "--out", csv, "--html", html,
+        "--mu", "1", "--out", plan, "--out", csv, "--html", html, "--verbose",
     )  # fmt: skip
     assert planned.returncode == 0, planned.stderr
     for word in ("joint velocity", "inverse manipulability", "total", "verified", "evaluations"):
@@ -57,7 +58,7 @@ def test_plan_through_waypoints(tmp_path: Path) -> None:
         rows.append(",".join(map(repr, map(float, [t, *pose.translation, w, x, y, z]))))
     file = tmp_path / "path.csv"
     file.write_text("\n".join(rows) + "\n")
-    code, text = invoke("plan", "panda", "--path", file, "--task", "pose")
+    code, text = invoke("plan", "panda", "--path", file, "--task", "pose", "-v")
     assert code in (0, 1)
     assert "position error" in text
 
@@ -153,16 +154,17 @@ def test_a_path_that_leaves_the_workspace_exits_with_1(tmp_path: Path) -> None:
     code, output = invoke(*line, "--damped")
     assert code == 1
     text = " ".join(output.split())
-    assert "path error" in text
+    assert "m off the path at t = " in text
     assert "where damping was active" in text
 
 
 def test_a_log_names_the_stages_and_the_gap(tmp_path: Path) -> None:
     planned = run(
-        "plan", "planar_3r", "--circle", "0.1", "--normal", "z", "--task", "planar", "--compare"
+        *("plan", "planar_3r", "--circle", "0.1", "--normal", "z", "--task", "planar"),
+        *("--compare", "--verbose"),
     )
     assert planned.returncode in (0, 1), planned.stderr
-    assert planned.stderr.splitlines()[-1] == "checking"
+    assert planned.stderr.splitlines()[-1].startswith("checking the motion")
     assert "refining sequence" in planned.stderr
     assert "\x1b" not in planned.stderr
     assert "% from its best motion" in planned.stdout
@@ -176,7 +178,7 @@ def test_retime_and_fastest(tmp_path: Path) -> None:
     file, plan, fast = (tmp_path / name for name in ("line.toml", "plan.npz", "fast.npz"))
     sm.files.write_problem(problem, file)
     sm.plan(problem).save(plan)
-    code, told = invoke("retime", plan, "--acceleration", "8", "--out", fast)
+    code, told = invoke("retime", plan, "--acceleration", "8", "--out", fast, "-v")
     assert code == 0, told
     assert "limits used fully" in told
     assert sm.load_plan(fast).trajectory.duration < 1.0
@@ -184,3 +186,11 @@ def test_retime_and_fastest(tmp_path: Path) -> None:
         invoke("fastest", file, "--deadline", "1e-6")
     with pytest.raises(sm.errors.ProblemError, match="expected a problem file"):
         invoke("fastest", "panda")
+
+
+def test_help_begins_with_plan_and_job() -> None:
+    shown = CliRunner().invoke(app, ["--help"]).output
+    listed = re.findall(r"^\W*([a-z-]+)  ", shown.partition("Plan ─")[2], re.MULTILINE)
+    assert listed[:2] == ["plan", "job"]
+    for panel in ("Plan", "Inspect plans", "Files", "To begin with", "While the arm moves"):
+        assert f"{panel} ─" in shown

@@ -107,7 +107,7 @@ def test_a_path_is_read_by_the_options_that_it_was_planned_with(tmp_path: Path) 
     frame = {"frame": {"position": [0.4, -0.1, 0.4]}}
     document = {"task": "position", "start": "free", "path": table | frame}
     problem = job_of({"robot": {"name": "panda"}, **document}, None).problem
-    sm.plan(problem, max_evaluations=3).to_csv(tmp_path / "motion.csv")
+    sm.files.write_motion(sm.plan(problem, max_evaluations=3), tmp_path / "motion.csv")
     run = ["check", str(tmp_path / "motion.csv"), "--robot", "panda", *map(str, typed)]
     found = CliRunner().invoke(app, run)
     assert found.exit_code == 0, found.output
@@ -117,9 +117,10 @@ def test_a_path_is_read_by_the_options_that_it_was_planned_with(tmp_path: Path) 
 
 
 def test_no_option_is_left_without_an_effect(plan: Path) -> None:
-    """Each is refused, or judged; --json and help change what is printed."""
+    """Each is refused, or judged; --json, --verbose and help change what is printed."""
     (command,) = (item for item in app.registered_commands if item.callback is commands.check)
-    names = set(inspect.signature(command.callback).parameters) - {"context", "file", "as_json"}
+    names = set(inspect.signature(command.callback).parameters) - {"context", "file"}
+    names -= {"as_json", "verbose"}
     refused = {"robot", "path", "task", "tool", "reference", "lock", "degrees"}
     refused |= {"argument", "packages", *documents.OF_PATH}
     judged = {"velocity", "acceleration", "joint_limits", "obstacles", "clearance", "srdf"}
@@ -160,9 +161,9 @@ def test_a_motion_of_a_cell_is_judged_by_its_problem_file(tmp_path: Path) -> Non
         CELL + "towards = [0, 0, 1]\n" + "[tolerance]\nposition = 1e-3\nrotation = 1e-3\n"
     )
     problem = sm.read_problem(file)
-    sm.plan(problem, max_evaluations=5).to_csv(tmp_path / "motion.csv")
+    sm.files.write_motion(sm.plan(problem, max_evaluations=5), tmp_path / "motion.csv")
     run = ["check", str(tmp_path / "motion.csv"), "--robot", str(file)]
-    found = CliRunner().invoke(app, run)
+    found = CliRunner().invoke(app, [*run, "--verbose"])
     assert found.exit_code == 0, found.output
     assert "tilt" in found.output
     assert CliRunner().invoke(app, [*run, "--velocity", "0.001"]).exit_code == 1

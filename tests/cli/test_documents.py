@@ -89,7 +89,7 @@ def test_jumps_of_acceleration_pass_every_limit_of_jerk(plan: sm.Plan) -> None:
 
 
 def test_limits_and_obstacles_of_a_motion(plan: sm.Plan, seam: Path, tmp_path: Path) -> None:
-    plan.to_csv(tmp_path / "motion.csv")
+    sm.files.write_motion(plan, tmp_path / "motion.csv", force=True)
     asked = [tmp_path / "motion.csv", "--robot", "panda", "--path", seam]
     code, text = invoke(*asked, "--acceleration", "0.1")
     assert (code, "accelerates at" in text) == (1, True)
@@ -100,7 +100,7 @@ def test_limits_and_obstacles_of_a_motion(plan: sm.Plan, seam: Path, tmp_path: P
     (tmp_path / "world.json").write_text(json.dumps([box.to_dict()]))
     code, text = invoke(*asked, "--obstacles", tmp_path / "world.json")
     assert (code, "box overlap by" in text) == (1, True)
-    code, text = invoke(*asked, "--clearance", "0.001")
+    code, text = invoke(*asked, "--clearance", "0.001", "-v")
     assert (code, "self-collision" in text) == (0, True)
 
 

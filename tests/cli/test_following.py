@@ -188,7 +188,7 @@ def test_a_clearance_that_is_given_as_collision_is_kept_while_moving(tmp_path: P
     )
     asked = []
     with patch.object(sm, "Replanner", lambda *given, **_: asked.append(given[3])):
-        replanner_of(replace(problem, collision=apart))
+        replanner_of(replace(problem, clearance=apart))
         replanner_of(problem)
     assert apart in asked[0]
     assert not any(isinstance(item, sm.constraints.Clearance) for item in asked[1])

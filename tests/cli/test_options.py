@@ -84,7 +84,7 @@ def test_obstacles_pairs_and_locks(tmp_path: Path) -> None:
 
 def test_self_collision_can_be_left_out(tmp_path: Path) -> None:
     plan = planned(tmp_path, "--no-self-collision", "--damped")
-    assert plan.problem.collision is None
+    assert plan.problem.clearance is None
     assert plan.problem.damping == sm.Damping()
 
 

@@ -33,7 +33,7 @@ def test_tables_fit_narrow_terminals_and_logs(tmp_path: Path, columns: int | Non
     environment = {key: value for key, value in os.environ.items() if key != "COLUMNS"}
     environment |= {} if columns is None else {"COLUMNS": str(columns)}
     verdict = sm.load_plan(file).certificate.verdict
-    commands = [["check", str(file)], ["compare", str(file), str(file)], ["robots"]]
+    commands = [["check", str(file), "--verbose"], ["compare", str(file), str(file)], ["robots"]]
     printed = subprocess.run(
         [sys.executable, "-c", SEVERAL, json.dumps(commands)],
         capture_output=True,

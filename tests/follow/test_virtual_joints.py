@@ -170,7 +170,7 @@ def test_gradients_along_nodes_equal_central_differences(
     circle = sm.paths.Circle.around(robot.pose(PANDA_HOME), 0.1, 2.0)
     items = [dataclasses.replace(item, during=window) for item in relaxations]
     asked = sm.Problem(
-        robot, circle, start=PANDA_HOME, relaxations=items, rest=False, collision=None
+        robot, circle, start=PANDA_HOME, relaxations=items, rest=False, clearance=None
     )
     motion = nodes_of(asked.augmented)
     held = motion.grid.manifolds.held

@@ -113,7 +113,7 @@ def test_what_is_written_is_the_motion(
 ) -> None:
     suffix, read = READERS[form]
     file = tmp_path / f"motion{suffix}"
-    sm.files.write_motion(plan, file, rate=rate, form=form)
+    sm.files.write_motion(plan, file, rate=rate, format=form)
     names, t, q, qd, qdd = read(file)
     assert tuple(names) == plan.trajectory.joint_names
     assert t[0] == 0.0
@@ -303,8 +303,8 @@ def test_what_a_format_cannot_say_is_refused(plan: sm.Plan, tmp_path: Path) -> N
         sm.errors.FileFormatError, match=r"suffix '\.txt' is no format of motions: csv"
     ):
         sm.files.write_motion(plan, tmp_path / "motion.txt")
-    with pytest.raises(sm.errors.FileFormatError, match="form 'vtk' is no format"):
-        sm.files.write_motion(plan, tmp_path / "motion.txt", form="vtk")
+    with pytest.raises(sm.errors.FileFormatError, match="format 'vtk' is no format"):
+        sm.files.write_motion(plan, tmp_path / "motion.txt", format="vtk")
     for rate in (0.0, -1.0, np.nan, 0.1):
         with pytest.raises(sm.errors.ProblemError, match="rate is"):
             sm.files.write_motion(plan, tmp_path / "motion.csv", rate=rate)
@@ -407,7 +407,7 @@ def carried() -> sm.Plan:
     grasp = pin.SE3(np.eye(3), np.array([0.0, 0.4, 0.0]))
     circle = sm.paths.Circle.around(first, radius=0.05, duration=3.0, normal=(0, 1, 0))
     follows = [sm.Follow(circle, tool=left), sm.Follow(grasp, tool=right, reference=left)]
-    return sm.plan(sm.Problem(pair, follows, collision=None)).require()
+    return sm.plan(sm.Problem(pair, follows, clearance=None)).require()
 
 
 @pytest.mark.parametrize("name", ["m.csv", "m.npz", "m.json", "m.yaml"])

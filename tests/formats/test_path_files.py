@@ -98,16 +98,34 @@ def test_a_normal_is_the_tool_axis(poses: list[pin.SE3], tmp_path: Path) -> None
 def test_arrays(poses: list[pin.SE3], tmp_path: Path) -> None:
     file, values = tmp_path / "seam.npy", rows(poses, "quaternion")
     np.save(file, np.column_stack([T, values]))
-    agree(sm.files.read_path(file), poses)
+    agree(sm.files.read_path(file, columns="t,x,y,z,qw,qx,qy,qz"), poses)
+    np.save(file, np.column_stack([T, values[:, :3], np.roll(values[:, 3:], -1, axis=1)]))
+    agree(sm.files.read_path(file, columns="t,x,y,z,qx,qy,qz,qw"), poses)
     np.save(file, np.column_stack([T, values[:, :3]]))
     agree(sm.files.read_path(file), poses, rotation=False)
-    for array in (values, np.array([pose.homogeneous for pose in poses])):
+    for array, columns in (
+        (values, "x,y,z,qw,qx,qy,qz"),
+        (np.column_stack([values, T]), ["x", "y", "z", "qw", "qx", "qy", "qz", "-"]),
+        (np.array([pose.homogeneous for pose in poses]), None),
+    ):
         np.save(file, array)
-        path = sm.files.read_path(file, duration=2.0)
+        path = sm.files.read_path(file, duration=2.0, columns=columns)
         assert path.duration == pytest.approx(2.0)
         assert not path.samples([0.0, 2.0]).twist.any()
         for t, pose in ((0.0, poses[0]), (2.0, poses[-1])):
             np.testing.assert_allclose(path.pose(t).homogeneous, pose.homogeneous, atol=ROUNDING)
+
+
+@pytest.mark.parametrize("width", [7, 8])
+def test_the_order_of_quaternions_is_never_guessed(width: int, tmp_path: Path) -> None:
+    np.save(tmp_path / "a.npy", np.ones((3, width)))
+    with pytest.raises(
+        sm.errors.FileFormatError,
+        match=r"does not say in which order .*give columns \('(t,)?x,y,z,qw.*' or '(t,)?x,y,z,qx",
+    ):
+        sm.files.read_path(tmp_path / "a.npy")
+    with pytest.raises(sm.errors.FileFormatError, match="3 columns are named"):
+        sm.files.read_path(tmp_path / "a.npy", columns="x,y,z")
 
 
 def ros(poses: list[pin.SE3]) -> dict[str, object]:

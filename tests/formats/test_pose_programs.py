@@ -53,7 +53,7 @@ def alone(abb: sm.RobotModel) -> sm.Plan:
     start = np.radians([10.0, -20.0, 30.0, 20.0, 60.0, 15.0])
     begin = abb.pose(start)
     end = SE3(begin.rotation, begin.translation + np.array([0.02, 0.15, -0.03]))
-    problem = sm.Problem(abb, sm.paths.Line(begin, end, 3.0), "pointing", start, collision=None)
+    problem = sm.Problem(abb, sm.paths.Line(begin, end, 3.0), "pointing", start, clearance=None)
     return sm.plan(problem).require()
 
 
@@ -62,7 +62,7 @@ def on_rail(kuka: sm.RobotModel) -> sm.Plan:
     """A circle of an arm on a rail, which is its redundancy."""
     start = np.append(0.3, np.radians([10.0, -80.0, 100.0, 20.0, 60.0, 15.0]))
     circle = sm.paths.Circle.around(kuka.pose(start), 0.06, 4.0, normal=(0.0, 0.3, 1.0))
-    return sm.plan(sm.Problem(kuka, circle, "pose", start, collision=None)).require()
+    return sm.plan(sm.Problem(kuka, circle, "pose", start, clearance=None)).require()
 
 
 @pytest.fixture(scope="module")
@@ -75,7 +75,7 @@ def turned() -> sm.Plan:
     cell = sm.load_robot(parts, base=base, tool="arm/tool0", reference="table/plate")
     start = cell.dexterous_configuration("pose")
     circle = sm.paths.Circle.around(cell.chain.place(start), 0.05, 4.0, normal=(0.0, 0.0, 1.0))
-    return sm.plan(sm.Problem(cell, circle, "pose", start, collision=None)).require()
+    return sm.plan(sm.Problem(cell, circle, "pose", start, clearance=None)).require()
 
 
 @pytest.fixture(scope="module")
@@ -148,7 +148,7 @@ def test_a_positioner_carries_its_work_object(
     text = file.read_text()
     said = '[FALSE, FALSE, "STN1", ' if unit == "STN1" else "EK(MACHINE_DEF[2].ROOT, MACHINE_DEF[2]"
     assert said in text
-    with pytest.raises(sm.errors.FileFormatError, match="whose joints only the robot tells"):
+    with pytest.raises(sm.errors.FileFormatError, match="whose joint positions need the robot"):
         sm.files.read_motion(file)
     again = sm.files.read_motion(file, robot=turned.robot).of_joints(turned.robot.joint_names)
     within = sm.Tolerance(stated.path.position, max(stated.path.rotation, 1e-5))
@@ -255,7 +255,7 @@ def test_a_job_keeps_its_seams_events_and_waits(
 def test_a_seven_axis_arm_has_joint_targets_and_is_told_why(tmp_path: Path) -> None:
     panda = robot_named("panda")
     circle = sm.paths.Circle.around(panda.pose(PANDA_HOME), 0.05, 3.0, normal=(1.0, 0.0, 0.0))
-    plan = sm.plan(sm.Problem(panda, circle, start=PANDA_HOME, collision=None)).require()
+    plan = sm.plan(sm.Problem(panda, circle, start=PANDA_HOME, clearance=None)).require()
     plan.save(tmp_path / "plan.npz")
     out = tmp_path / "weld.mod"
     asked = ("export", tmp_path / "plan.npz", "--out", out, "--targets", "poses")
@@ -282,7 +282,7 @@ def test_an_arm_that_holds_the_part_has_joint_targets(tmp_path: Path) -> None:
     line = sm.paths.Line(
         begin, SE3(begin.rotation, begin.translation + np.array([0.03, 0.0, 0.0])), 1.0
     )
-    plan = sm.plan(sm.Problem(ur5, line, "pointing", start, collision=None)).require()
+    plan = sm.plan(sm.Problem(ur5, line, "pointing", start, clearance=None)).require()
     sm.files.write_motion(plan, tmp_path / "held.mod", settings=settings("held.mod"))
     text = (tmp_path / "held.mod").read_text()
     assert "not all of A1 to A6 of ur5 carry its tool" in text

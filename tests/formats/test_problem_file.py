@@ -76,7 +76,7 @@ def test_problems_of_all_kinds_round_trip(tmp_path: Path) -> None:
     seam = sm.paths.Waypoints([0, 1, 2], [line.pose(t).translation for t in (0.0, 1.0, 2.0)])
     problems = [
         sm.sample_problem(),
-        sm.Problem(held, line, start=start, collision=None),
+        sm.Problem(held, line, start=start, clearance=None),
         sm.Problem(
             panda,
             sm.paths.Placed(seam, base.inverse()),
@@ -92,7 +92,7 @@ def test_problems_of_all_kinds_round_trip(tmp_path: Path) -> None:
             ],
             relaxations=[sm.Relaxation("z", during=(0.5, 1.5))],
             damping=sm.Damping(),
-            collision=sm.constraints.Clearance(disabled=[("panda_link0", "panda_link2")]),
+            clearance=sm.constraints.Clearance(disabled=[("panda_link0", "panda_link2")]),
         ),
     ]
     for problem in problems:
@@ -111,7 +111,7 @@ def test_problems_of_all_kinds_round_trip(tmp_path: Path) -> None:
             assert [item.to_dict() for item in one] == [item.to_dict() for item in other]
         assert read.null_motion == problem.null_motion
         assert read.damping == problem.damping
-        assert (read.collision is None) == (problem.collision is None)
+        assert (read.clearance is None) == (problem.clearance is None)
         text = file.read_text()
         sm.files.write_problem(read, file)
         if problem.robot is not held:
@@ -405,3 +405,46 @@ def test_up_to_three_faults_are_told_and_the_nearest_key(tmp_path: Path) -> None
             sm.read_problem(written(tmp_path, lines + head))
         assert str(caught.value).count("unknown key") == min(count, 3)
         assert ("and 1 more" in str(caught.value)) == (count == 4)
+
+
+_CLEARANCE = """
+[robot]
+name = "panda"
+
+[path]
+kind = "circle"
+radius = 0.05
+duration = 4.0
+"""
+
+
+@pytest.mark.parametrize("key", ["clearance", "collision"])
+@pytest.mark.parametrize("form", ["table", "switch"])
+def test_files_of_before_call_the_clearance_collision(tmp_path: Path, key: str, form: str) -> None:
+    said = f"{key} = false" if form == "switch" else ""
+    table = f"\n[{key}]\ndistance_mm = 5\n" if form == "table" else ""
+    file = tmp_path / "cell.toml"
+    file.write_text(f'start = "dexterous"\n{said}\n{_CLEARANCE}{table}')
+    found = sm.read_problem(file).clearance
+    if form == "switch":
+        assert found is None
+    else:
+        assert found is not None
+        assert found.distance == 0.005
+    job = tmp_path / "job.toml"
+    pose = "position = [0.5, {y}, 0.5]\nrpy = [3.1, 0.0, 0.0]\n"
+    seams = (
+        '\n[[seams]]\nname = "a"\n[seams.path]\nkind = "line"\nduration = 2.0\n'
+        f"[seams.path.start]\n{pose.format(y=0.0)}[seams.path.end]\n{pose.format(y=0.1)}"
+    )
+    head = _CLEARANCE.partition("[path]")[0]
+    job.write_text(f"{said}\n{head}{table}{seams}")
+    asked = sm.files.read_seam_job(job).settings["clearance"]
+    assert (asked is None) == (form == "switch")
+
+
+def test_the_clearance_is_given_once(tmp_path: Path) -> None:
+    file = tmp_path / "cell.toml"
+    file.write_text(f"clearance = false\ncollision = false\n{_CLEARANCE}")
+    with pytest.raises(sm.errors.FileFormatError, match="the former name of clearance"):
+        sm.read_problem(file)

@@ -35,7 +35,7 @@ LATE = 2e-5
 def plan() -> sm.Plan:
     panda = robot_named("panda")
     circle = sm.paths.Circle.around(panda.pose(PANDA_HOME), 0.1, 3.0, normal=(1.0, 0.0, 0.0))
-    return sm.plan(sm.Problem(panda, circle, start=PANDA_HOME, collision=None)).require()
+    return sm.plan(sm.Problem(panda, circle, start=PANDA_HOME, clearance=None)).require()
 
 
 @pytest.fixture(scope="module")
@@ -44,7 +44,7 @@ def plans(plan: sm.Plan) -> dict[str, sm.Plan]:
     ur5 = robot_named("ur5")
     start = ur5.dexterous_configuration("pointing")
     circle = sm.paths.Circle.around(ur5.pose(start), 0.1, 3.0, normal=(1.0, 0.0, 0.0))
-    problem = sm.Problem(ur5, circle, "pointing", start=start, collision=None)
+    problem = sm.Problem(ur5, circle, "pointing", start=start, clearance=None)
     return {".src": sm.plan(problem).require(), ".mod": plan}
 
 
@@ -202,7 +202,7 @@ def cornered() -> sm.Plan:
     corner.translation = begin.translation - np.array([0.0, 0.0, 0.04])
     end.translation = corner.translation + np.array([0.0, 0.05, 0.0])
     path = sm.paths.Joined([sm.paths.Line(begin, corner, 1.0), sm.paths.Line(corner, end, 1.0)])
-    return sm.plan(sm.Problem(ur5, path, "pointing", start, collision=None)).require()
+    return sm.plan(sm.Problem(ur5, path, "pointing", start, clearance=None)).require()
 
 
 @pytest.mark.parametrize("at", [1.0, 1.0 + 1e-12, 1.0 - 1e-12, 0.6])
@@ -347,7 +347,7 @@ def test_a_program_of_a_plan_is_verified_as_it_is_written(
         sm.constraints.JointVelocityLimits(),
         sm.constraints.JointAccelerationLimits(9.0),
     )
-    problem = sm.Problem(ur5, path, "position", start, constraints=limits, collision=None)
+    problem = sm.Problem(ur5, path, "position", start, constraints=limits, clearance=None)
     made = sm.plan(problem).require()
     sm.files.write_problem(problem, tmp_path / "cell.toml")
     asked = settings(name, deviation)
@@ -571,7 +571,7 @@ def test_programs_have_the_suffix_of_their_controller(
     plan: sm.Plan, tmp_path: Path, form: str, name: str
 ) -> None:
     with pytest.raises(sm.errors.FileFormatError, match="is written with"):
-        sm.files.write_motion(plan, tmp_path / name, form=form)
+        sm.files.write_motion(plan, tmp_path / name, format=form)
     assert not (tmp_path / name).exists()
 
 

@@ -62,7 +62,7 @@ def test_bodies_of_a_workpiece_and_of_a_tool_are_in_its_frame_by_default(tmp_pat
     box = '{ shape = "box", name = "web", size_mm = [9, 9, 9] }'
     held = '[[robot.bodies]]\nshape = "sphere"\nname = "tip"\nradius_mm = 5'
     found = problem(tmp_path, "line", 0.4, 9.0, bodies=f"obstacles = [{box}]", reference=held)
-    (body,) = found.collision.obstacles
+    (body,) = found.clearance.obstacles
     np.testing.assert_allclose(body.pose.homogeneous, stands(0.4, 9.0).homogeneous, atol=1e-12)
     world = f'[[constraints]]\nkind = "Clearance"\nobstacles = [{box}]'
     with pytest.raises(sm.errors.FileFormatError, match=r"obstacles\[0\]\.position: is missing"):
@@ -76,7 +76,7 @@ def test_moving_the_workpiece_moves_all_that_belongs_to_it(tmp_path: Path, path:
     for t in np.linspace(0.0, here.path.duration, 7):
         wanted = moved * here.path.pose(t)
         np.testing.assert_allclose(there.path.pose(t).homogeneous, wanted.homogeneous, atol=1e-12)
-    bodies = [item.collision.obstacles for item in (here, there) if item.collision is not None]
+    bodies = [item.clearance.obstacles for item in (here, there) if item.clearance is not None]
     assert [body.name for body in bodies[0]] == ["clamp", "pin"]
     for one, other in zip(*bodies, strict=True):
         np.testing.assert_allclose(
@@ -88,8 +88,8 @@ def test_moving_the_workpiece_moves_all_that_belongs_to_it(tmp_path: Path, path:
     np.testing.assert_allclose(
         again.path.pose(1.0).homogeneous, here.path.pose(1.0).homogeneous, atol=1e-12
     )
-    assert again.collision is not None
-    for one, other in zip(bodies[0], again.collision.obstacles, strict=True):
+    assert again.clearance is not None
+    for one, other in zip(bodies[0], again.clearance.obstacles, strict=True):
         np.testing.assert_allclose(other.pose.homogeneous, one.pose.homogeneous, atol=1e-12)
 
 
@@ -135,8 +135,8 @@ def test_its_mesh_is_a_body(tmp_path: Path) -> None:
     trimesh.creation.box((100.0, 50.0, 10.0)).export(tmp_path / "part.stl")
     mesh = 'mesh = "part.stl"\nscale = 0.001'
     found = problem(tmp_path, "line", 0.4, 0.0, bodies=mesh)
-    assert found.collision is not None
-    (body,) = found.collision.obstacles
+    assert found.clearance is not None
+    (body,) = found.clearance.obstacles
     assert (body.name, body.file, body.scale) == ("workpiece", tmp_path / "part.stl", 0.001)
     np.testing.assert_allclose(body.pose.homogeneous, stands(0.4, 0.0).homogeneous, atol=1e-12)
 
@@ -146,7 +146,7 @@ def test_its_mesh_is_a_body(tmp_path: Path) -> None:
     [
         ({"on": 'on = "plate"'}, "expected robot.reference = 'plate'"),
         ({"on": "scale = 2.0"}, "scale has no effect without a mesh"),
-        ({"more": "collision = false"}, "has bodies, but collision is false"),
+        ({"more": "clearance = false"}, "has bodies, but clearance is false"),
         ({"bodies": BODIES.replace("radius_mm = 5", 'radius_mm = 5, frame = "panda_link3"')},
          "obstacle 'pin' rides on 'panda_link3'"),
         ({"on": "fram = 3"}, "workpiece.fram: unknown key, did you mean 'frame'"),
@@ -217,7 +217,7 @@ def test_what_else_follows_rides_on_what_the_workpiece_stands_on(tmp_path: Path)
 
 TWO_TOOLS = """
 task = "pointing"
-collision = false
+clearance = false
 [robot]
 tool = ["arm/panda_hand_tcp", "other/panda_hand_tcp"]
 reference = "table/plate"

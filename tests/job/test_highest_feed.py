@@ -61,7 +61,7 @@ def test_what_a_refusal_says_is_possible_is_tried_next() -> None:
 
 JOB = """
 task = "pointing"
-collision = false
+clearance = false
 robot = { name = "panda" }
 
 [job]

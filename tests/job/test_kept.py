@@ -230,7 +230,7 @@ def test_a_turned_plan_tells_the_times_of_its_own_direction() -> None:
     )
     asked = [sm.constraints.JointVelocityLimits(np.full(7, limit))]
     plan = sm.plan(
-        sm.Problem(robot_named("panda"), path, "pointing", constraints=asked, collision=None)
+        sm.Problem(robot_named("panda"), path, "pointing", constraints=asked, clearance=None)
     )
     turned = backwards_plan(plan).require()
     spans = [span for item in turned.report.active for span in item.spans]

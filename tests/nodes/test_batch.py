@@ -75,7 +75,7 @@ def test_each_is_what_it_is_alone_with_other_costs(panda: sm.RobotModel, rest: b
             constraints=(),
             costs=[sm.costs.JointVelocity(), more],
             rest=rest,
-            collision=None,
+            clearance=None,
         )
         grid, motions = grid_of(problem), motions_of(problem, size=0.4)
         before = Batch.near(grid, motions)
@@ -104,7 +104,7 @@ def test_rough_optima_are_near_those_of_newtons_method(case: Case) -> None:
 
 def test_one_that_is_not_to_be_had_leaves_the_others(panda: sm.RobotModel) -> None:
     path = sm.paths.Circle.around(panda.pose(PANDA_HOME), 0.1, 4.0)
-    problem = sm.Problem(*(panda, path, "pose", PANDA_HOME), constraints=(), collision=None)
+    problem = sm.Problem(*(panda, path, "pose", PANDA_HOME), constraints=(), clearance=None)
     grid, motions = grid_of(problem), motions_of(problem)
     alone = advanced(Batch.near(grid, np.delete(motions, 1, axis=0)), 2)
     motions[1, 3] = np.nan
@@ -118,7 +118,7 @@ def test_one_that_is_not_to_be_had_leaves_the_others(panda: sm.RobotModel) -> No
 
 def test_some_of_them_are_what_they_were(panda: sm.RobotModel) -> None:
     path = sm.paths.Circle.around(panda.pose(PANDA_HOME), 0.1, 4.0)
-    problem = sm.Problem(*(panda, path, "position", PANDA_HOME), constraints=(), collision=None)
+    problem = sm.Problem(*(panda, path, "position", PANDA_HOME), constraints=(), clearance=None)
     grid, motions = grid_of(problem), motions_of(problem)
     found = advanced(Batch.near(grid, motions), 1)
     some = found.picked(np.array([3, 1]))

@@ -69,7 +69,7 @@ def test_what_costs_nothing_stays_as_it_is(panda: sm.RobotModel) -> None:
 def test_many_nodes_take_as_many_iterations(panda: sm.RobotModel) -> None:
     path = sm.paths.Circle.around(panda.pose(PANDA_HOME), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
     problem = sm.Problem(
-        panda, path, "pose", PANDA_HOME, constraints=(), rest=False, collision=None
+        panda, path, "pose", PANDA_HOME, constraints=(), rest=False, clearance=None
     )
     counts = [len(slopes_of(problem, count)) for count in (50, 500, 5000)]
     # The first steps of many are cut; then it is as quick.
@@ -86,7 +86,7 @@ def test_it_is_below_the_finest_spline(case: Case) -> None:
             null_motion=sm.motion.BSplineNullMotion(32),
             constraints=(),
             rest=False,
-            collision=None,
+            clearance=None,
         )
     )
     assert optimum.motion.cost <= spline.report.cost * (1.0 + 1e-5)
@@ -156,7 +156,7 @@ def test_at_limits_prices_tell_what_the_limits_cost(panda: sm.RobotModel, share:
         limit = np.where(np.arange(7) == 2, upper, panda.upper)
         constraints = (sm.constraints.JointPositionLimits(upper=limit),)
         problem = sm.Problem(
-            panda, path, "pose", PANDA_HOME, constraints=constraints, rest=False, collision=None
+            panda, path, "pose", PANDA_HOME, constraints=constraints, rest=False, clearance=None
         )
         begin = nodes_of(problem, 24)
         return minimise(begin, never)
@@ -179,7 +179,7 @@ def test_what_cannot_be_kept_is_said_to_be_so(panda: sm.RobotModel) -> None:
     path = sm.paths.Circle.around(panda.pose(PANDA_HOME), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
     slow = (sm.constraints.JointVelocityLimits(0.05),)
     problem = sm.Problem(
-        panda, path, "pose", PANDA_HOME, constraints=slow, rest=False, collision=None
+        panda, path, "pose", PANDA_HOME, constraints=slow, rest=False, clearance=None
     )
     begin = nodes_of(problem, 24)
     optimum = minimise(begin, never)
@@ -196,7 +196,7 @@ class Backwards(sm.costs.JointVelocity):
 
 def test_a_wrong_gradient_is_said_to_be_wrong(panda: sm.RobotModel) -> None:
     path = sm.paths.Circle.around(panda.pose(PANDA_HOME), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
-    problem = sm.Problem(panda, path, "pose", PANDA_HOME, costs=[Backwards()], collision=None)
+    problem = sm.Problem(panda, path, "pose", PANDA_HOME, costs=[Backwards()], clearance=None)
     optimum = minimise(nodes_of(problem, 24), never)
     assert optimum.status is Status.GRADIENT
     report = sm.plan(problem).report
@@ -207,7 +207,7 @@ def test_a_wrong_gradient_is_said_to_be_wrong(panda: sm.RobotModel) -> None:
 def test_it_stops_where_it_is_told_to(panda: sm.RobotModel) -> None:
     path = sm.paths.Circle.around(panda.pose(PANDA_HOME), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
     problem = sm.Problem(
-        panda, path, "pose", PANDA_HOME, constraints=(), rest=False, collision=None
+        panda, path, "pose", PANDA_HOME, constraints=(), rest=False, clearance=None
     )
     begin = nodes_of(problem, 24)
     optimum = minimise(begin, lambda step: step.length > 0.0)
@@ -218,12 +218,12 @@ def test_it_stops_where_it_is_told_to(panda: sm.RobotModel) -> None:
 def test_a_start_deep_inside_a_body_is_no_dead_end(panda: sm.RobotModel) -> None:
     """Elastic rows: from 30 mm inside of a ball out of it."""
     path = sm.paths.Circle.around(panda.pose(PANDA_HOME), 0.1, 4.0, normal=(1.0, 0.0, 0.0))
-    free = sm.plan(sm.Problem(panda, path, "pose", PANDA_HOME, constraints=(), collision=None))
+    free = sm.plan(sm.Problem(panda, path, "pose", PANDA_HOME, constraints=(), clearance=None))
     # In the middle, where the elbow would be: its bodies are to go aside.
     elbow = panda.chain_to("panda_link4").place(free.trajectory(np.array([2.0]))[0]).translation
     ball = sm.obstacles.Sphere("ball", elbow + np.array([0.092, 0.01, -0.076]), 0.05)
     apart = (sm.constraints.Clearance([ball], 0.01),)
-    problem = sm.Problem(panda, path, "pose", PANDA_HOME, constraints=apart, collision=None)
+    problem = sm.Problem(panda, path, "pose", PANDA_HOME, constraints=apart, clearance=None)
     begin = nodes_of(problem, 16)
     # In units of 0.1 m.
     assert begin.violation > 0.25
@@ -239,7 +239,7 @@ def test_known_prices_spare_iterations(panda: sm.RobotModel) -> None:
     path = sm.paths.Circle.around(panda.pose(PANDA_HOME), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
     slow = (sm.constraints.JointVelocityLimits(0.7),)
     problem = sm.Problem(
-        panda, path, "pose", PANDA_HOME, constraints=slow, rest=False, collision=None
+        panda, path, "pose", PANDA_HOME, constraints=slow, rest=False, clearance=None
     )
     steps: list[list[Step]] = [[], []]
     first = minimise(nodes_of(problem, 16), lambda step: bool(steps[0].append(step)), roughly=True)

@@ -38,7 +38,7 @@ def motion_with(panda: sm.RobotModel, name: str):
         *(panda, path, "position", PANDA_HOME),
         constraints=CONSTRAINTS[name](),
         rest=False,
-        collision=None,
+        clearance=None,
     )
     motion = nodes_of(problem, 10)
     return centred(moved(motion, random_step(motion, 1, 0.02)))

@@ -138,7 +138,7 @@ def test_what_gives_no_bound_is_judged_as_measured_and_the_verdict_says_so() -> 
             return sm.paths.Dwell(panda.pose(start), 1.0).evaluate(t)
 
     rest = sm.Trajectory([0.0, 1.0], [start, start], np.zeros((2, 7)), panda.joint_names)
-    words = "as measured between its marks"
+    words = "checked at samples only"
     for path, said in ((Own(), True), (sm.paths.Dwell(panda.pose(start), 1.0), False)):
         certificate = sm.certify(panda, path, "pose", rest)
         assert certificate.verified

@@ -97,7 +97,7 @@ def test_a_map_is_of_plans_on_their_own(found: sm.placement.Placement, tmp_path:
         plan = sm.plan(planar().changed(path=sm.paths.Placed(planar().path, frame)))
         if not drawn.reasons[i][j]:
             assert drawn.costs[i, j] >= plan.report.cost * (1.0 - 1e-3)
-    page = found.to_html(tmp_path / "map.html", drawn).read_text()
+    page = sm.files.write_placement(found, tmp_path / "map.html", drawn).read_text()
     assert page.count("<rect") == 9
     assert "x [m]" in page
     drawn.figure().savefig(tmp_path / "map.png")

@@ -134,7 +134,7 @@ def test_an_optimum_that_takes_the_arm_into_itself_goes_on_at_once(panda: sm.Rob
     problem = sm.Problem(
         panda, sm.paths.Waypoints.from_poses(np.linspace(0, 4, 4), poses), start=start
     )
-    careless = sm.plan(dataclasses.replace(problem, collision=None))
+    careless = sm.plan(dataclasses.replace(problem, clearance=None))
     assert not problem.keeps_off_itself(careless.trajectory.q)
     plan = sm.plan(problem)
     assert plan.certificate.verified, plan.certificate.verdict

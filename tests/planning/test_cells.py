@@ -254,7 +254,7 @@ def test_follows_of_other_frames_than_the_arm_was_loaded_for_are_saved(tmp_path:
     first = robot.chain_to(LEFT, RIGHT).place(robot.generic_configurations()[0])
     circle = sm.paths.Circle.around(first, 0.05, 3.0, normal=(0, 0, 1))
     left = sm.Follow(circle, "position", tool=LEFT, reference=RIGHT)
-    problem = sm.Problem(robot, [left], collision=None)
+    problem = sm.Problem(robot, [left], clearance=None)
     loaded = sm.problem.problem_from_dict(sm.problem.problem_to_dict(problem))
     assert loaded.robot.joint_names == robot.joint_names
     assert len(sm.load_robot(file, tool=LEFT, reference=RIGHT).joint_names) < robot.dof
@@ -287,7 +287,7 @@ def test_the_arms_own_tool_by_its_name_is_seen_from_the_arms_reference() -> None
     robot = positioned()
     named = sm.Follow(RING, "pointing", tool="arm/panda_hand_tcp")
     for item in (named, sm.Follow(RING, "pointing")):
-        problem = sm.Problem(robot, [item], collision=None)
+        problem = sm.Problem(robot, [item], clearance=None)
         assert problem.robot.reference == "table/plate"
         assert item.on(robot, RING.duration).chain.base == problem.robot.chain.base
 

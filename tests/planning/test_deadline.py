@@ -29,7 +29,7 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
 def problem(panda: sm.RobotModel) -> sm.Problem:
     start = np.array(sm.NAMED_ARMS["panda"].home)
     path = sm.paths.Circle.around(panda.pose(start), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
-    return sm.Problem(panda, path, "position", start, collision=None)
+    return sm.Problem(panda, path, "position", start, clearance=None)
 
 
 @pytest.mark.parametrize("seconds", [1.0, 3.0, 5.0, 7.0])

@@ -184,7 +184,7 @@ def test_windows_of_relaxations_stay_where_they_are_on_the_path() -> None:
         "planar_pose",
         start,
         relaxations=[sm.Relaxation("rz", 0.3, during=window)],
-        collision=None,
+        clearance=None,
     )
 
     def enough(stage: str, done: int, _: int) -> None:

@@ -200,7 +200,7 @@ def test_a_part_before_a_window_has_none_of_its_joints(panda: sm.RobotModel) -> 
     pose = panda.pose(start)
     away = pin.SE3(pose.rotation, pose.translation + np.array([1.2, 0.0, 0.0]))
     line = sm.paths.Line(pose, away, 4.0)
-    problem = sm.Problem(panda, line, start=start, collision=None)
+    problem = sm.Problem(panda, line, start=start, clearance=None)
     late = sm.Relaxation("z", 5e-3, during=(3.5, 3.9), axes="tool")
     ends = [
         sm.plan(dataclasses.replace(problem, relaxations=items), max_evaluations=20)

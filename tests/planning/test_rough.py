@@ -29,7 +29,7 @@ def told(stage: str, done: int, total: int) -> None:
 
 def problem_of(arm: str, task: str) -> sm.Problem:
     robot = robot_named(arm)
-    return sm.Problem(robot, line_of(robot, task), task, collision=None)
+    return sm.Problem(robot, line_of(robot, task), task, clearance=None)
 
 
 def starts_of(problem: sm.Problem, count: int = 12) -> list[Array]:

@@ -80,7 +80,7 @@ def test_a_motion_that_takes_the_arm_into_itself_is_passed_over_for_another() ->
     normal = [-0.5276985537584152, -0.6121715290793273, -0.5888805102446127]
     ur5 = robot_named("ur5")
     problem = sm.Problem(ur5, sm.paths.Circle(start, center, normal, 4.0), "pointing")
-    careless = sm.plan(dataclasses.replace(problem, collision=None))
+    careless = sm.plan(dataclasses.replace(problem, clearance=None))
     assert not problem.keeps_off_itself(careless.trajectory.q)
     plan = sm.plan(problem)
     assert plan.certificate.verified, plan.certificate.verdict

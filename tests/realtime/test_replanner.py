@@ -75,7 +75,7 @@ def test_a_closed_loop_costs_little_more_than_planning_all_at_once(panda: sm.Rob
     path = sm.paths.Circle.around(panda.pose(PANDA_HOME), 0.15, 20.0, normal=(1.0, 0.0, 0.0))
     costs = sm.costs.JointVelocity(), sm.costs.InverseManipulability(mu=0.02)
     full = sm.plan(
-        sm.Problem(panda, path, "position", PANDA_HOME, costs=costs, collision=None)
+        sm.Problem(panda, path, "position", PANDA_HOME, costs=costs, clearance=None)
     ).report
     assert full.cost < 0.95 * full.initial_cost
     replanner = Replanner(panda, "position", costs)

@@ -93,7 +93,7 @@ def test_limits_that_an_arm_was_given_survive(
 
 
 def test_csv_has_every_digit(plan: sm.Plan, tmp_path: Path) -> None:
-    plan.to_csv(tmp_path / "plan.csv")
+    sm.files.write_motion(plan, tmp_path / "plan.csv")
     lines = (tmp_path / "plan.csv").read_text().splitlines()
     assert lines[0].split(",")[:3] == ["t", "joint1", "joint2"]
     table = np.array([[float(value) for value in line.split(",")] for line in lines[1:]])
@@ -174,3 +174,19 @@ def test_no_part_of_a_file_is_edited_unseen(plan: sm.Plan, seed: int, tmp_path: 
     except sm.errors.FileFormatError as error:
         told = str(error)
     assert told.startswith(str(file))
+
+
+def test_a_file_of_before_is_read_whole(tmp_path: Path) -> None:
+    """Written on 2026-11-26, when its clearance was `collision`, and constraints `Binding`."""
+    loaded = sm.load_plan(Path(__file__).parent / "plan_of_before.npz")
+    assert loaded.certificate.verified
+    assert not loaded.altered
+    assert loaded.problem.clearance is None
+    assert loaded.report.cost == pytest.approx(0.0511803, rel=1e-6)
+    (limit,) = loaded.report.active
+    assert limit.constraint == "joint velocity limits"
+    assert limit.spans == ((0.96875, 1.28125),)
+    loaded.save(tmp_path / "again.npz")
+    again = sm.load_plan(tmp_path / "again.npz")
+    assert again.report.active == loaded.report.active
+    assert again.problem.digest == loaded.problem.digest

@@ -34,7 +34,7 @@ def test_a_mesh_that_was_replaced_is_told(tmp_path: Path) -> None:
     assert "has changed" in loaded.certificate.verdict
     assert not loaded.altered
     file.unlink()
-    with pytest.raises(sm.errors.FileFormatError, match=r"cannot be measured anew: .*no such file"):
+    with pytest.raises(sm.errors.FileFormatError, match=r"cannot be checked again: .*no such file"):
         sm.load_plan(tmp_path / "plan.npz")
 
 

@@ -31,7 +31,7 @@ def test_home_of_a_cell_is_that_of_its_parts() -> None:
 
 def test_who_has_no_home_is_told_so() -> None:
     with pytest.raises(
-        sm.errors.RobotError, match="what is home is not known of this arm, only of panda"
+        sm.errors.RobotError, match="no home configuration is known of this arm, only of panda"
     ):
         _ = sm.load_robot("kinova").home
     pair = sm.load_robot(

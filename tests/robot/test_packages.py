@@ -141,8 +141,8 @@ def test_arguments_of_a_xacro_are_given_in_the_shell(tmp_path: Path) -> None:
     ("element", "said", "shapes"),
     [
         ("visual", None, {"Box"}),
-        ("collision", "its collision bodies stand for them", {"Box"}),
-        ("other", "its joints stand for it", {"Cylinder"}),
+        ("collision", "its collision bodies are drawn instead", {"Box"}),
+        ("other", "its joints are drawn instead", {"Cylinder"}),
     ],
 )
 def test_an_arm_without_visuals_is_drawn(

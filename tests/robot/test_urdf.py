@@ -98,7 +98,7 @@ def test_kinematics_load_without_meshes_and_messages_name_them(
     # Its collision body stands for it.
     assert len(geometry.geometryObjects) == 1
     assert reason in missing[0]
-    assert "its collision bodies stand for them" in missing[1]
+    assert "its collision bodies are drawn instead" in missing[1]
 
 
 @pytest.mark.filterwarnings("ignore:invalid value encountered:RuntimeWarning")
@@ -177,7 +177,7 @@ def test_a_locked_joint_moves_the_one_that_mimics_it(tmp_path: Path) -> None:
         robot, [sm.obstacles.Sphere("ball", [0.0, -0.33, 0.7], 0.03)]
     )
     assert model.distance([0.0, 0.0]).value < 0.0
-    with pytest.raises(sm.errors.RobotError, match=r"it mimics 'g_left' and stands at 0\.3"):
+    with pytest.raises(sm.errors.RobotError, match=r"it mimics 'g_left' and is at 0\.3"):
         sm.load_robot(file, "l2", {"g_left": 0.3, "g_right": 0.0})
 
 

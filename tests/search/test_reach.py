@@ -30,5 +30,5 @@ def test_what_a_motion_within_the_limits_draws_is_in_reach(name: str, task: str)
         q = np.stack([np.convolve(joint, np.ones(9) / 9.0, "valid") for joint in inside.T], axis=1)
         path = sm.paths.Waypoints.from_poses(t, [robot.pose(x) for x in q])
         for start in (None, q[0]):
-            problem = sm.Problem(robot, path, task, start, rest=False, collision=None)
+            problem = sm.Problem(robot, path, task, start, rest=False, clearance=None)
             assert reachable(problem, 48, np.random.default_rng(0)).reason == ""

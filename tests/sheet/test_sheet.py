@@ -61,7 +61,7 @@ def plan() -> sm.Plan:
 
 def test_numbers_are_those_of_certificate_report_and_margins(plan: sm.Plan, tmp_path: Path) -> None:
     margins = sm.margin(plan, sm.Tolerance(1e-3, 0.1))
-    page = sm.write_sheet(plan, tmp_path / "sheet.html", margins).read_text()
+    page = sm.files.write_sheet(plan, tmp_path / "sheet.html", margins).read_text()
     cells, check = Cells(page), plan.certificate
     assert not cells.outside
     assert check.verdict.split(":")[0] in page
@@ -87,7 +87,7 @@ def test_numbers_are_those_of_certificate_report_and_margins(plan: sm.Plan, tmp_
 
 def test_what_is_not_kept_is_said(plan: sm.Plan, tmp_path: Path) -> None:
     broken = dataclasses.replace(plan, certificate=plan.check(sm.Tolerance(1e-15, 1e-15)))
-    page = sm.write_sheet(broken, tmp_path / "sheet.html").read_text()
+    page = sm.files.write_sheet(broken, tmp_path / "sheet.html").read_text()
     assert 'class="refused"' in page
     assert "off the path" in page
     titles = [section.title for section in sections(broken, None)]
@@ -102,7 +102,7 @@ def test_feeds_are_asked_and_reached(tmp_path: Path) -> None:
     line = sm.paths.Line(pose, end, 3.0)
     plan = sm.plan(sm.Problem(robot, sm.paths.Feed(line, 0.02), "position"))
     (feed,) = plan.path.feeds
-    cells = Cells(sm.write_sheet(plan, tmp_path / "sheet.html", title="a & b").read_text())
+    cells = Cells(sm.files.write_sheet(plan, tmp_path / "sheet.html", title="a & b").read_text())
     (row,) = cells.tables["Feeds"][1:]
     assert float(row[1].split()[0]) == 0.02
     assert float(row[2].split()[0]) == pytest.approx(feed.reached, rel=1e-3)
@@ -110,15 +110,15 @@ def test_feeds_are_asked_and_reached(tmp_path: Path) -> None:
 
 def test_what_is_no_sheet_is_refused(plan: sm.Plan, tmp_path: Path) -> None:
     with pytest.raises(sm.errors.ProblemError, match="expected a Plan"):
-        sm.write_sheet(None, tmp_path / "a.html")  # type: ignore[arg-type]
+        sm.files.write_sheet(None, tmp_path / "a.html")  # type: ignore[arg-type]
     with pytest.raises(sm.errors.ProblemError, match=re.escape("ends in .html")):
-        sm.write_sheet(plan, tmp_path / "a.pdf")
+        sm.files.write_sheet(plan, tmp_path / "a.pdf")
     with pytest.raises(sm.errors.ProblemError, match="expected Margins"):
-        sm.write_sheet(plan, tmp_path / "a.html", 3)  # type: ignore[arg-type]
+        sm.files.write_sheet(plan, tmp_path / "a.html", 3)  # type: ignore[arg-type]
     moved = dataclasses.replace(plan.trajectory, t=plan.trajectory.t * 2.0)
     other = dataclasses.replace(plan, trajectory=moved)
     with pytest.raises(sm.errors.PlanError, match="of another motion"):
-        sm.write_sheet(other, tmp_path / "a.html")
+        sm.files.write_sheet(other, tmp_path / "a.html")
 
 
 def test_sheets_from_the_shell(plan: sm.Plan, tmp_path: Path) -> None:

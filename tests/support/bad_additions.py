@@ -68,7 +68,7 @@ def _path_rows() -> list[Row]:
         *bad_values_of(
             area,
             "Polyline",
-            sound(sm.paths.Polyline, positions=_POINTS, quaternions=_TURNS),
+            sound(sm.paths.Polyline, positions=_POINTS, quaternions_wxyz=_TURNS),
             positions={
                 "of shape (3, 2)": _POINTS[:, :2],
                 "of shape (2, 3)": _POINTS[:2],
@@ -81,7 +81,7 @@ def _path_rows() -> list[Row]:
                 "[]": [],
                 "ragged": [[0, 0, 0], [1, 1], [2, 2, 2]],
             },
-            quaternions={
+            quaternions_wxyz={
                 "of shape (3, 3)": _TURNS[:, :3],
                 "with a zero": _TURNS * [[1], [0], [1]],
                 "with NaN": _TURNS * [[1], [1], [NAN]],

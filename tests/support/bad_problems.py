@@ -77,7 +77,7 @@ def problem_rows() -> list[Row]:
             null_motion=null,
             relaxations={"'z'": "z", "None": None, "[1]": [1]},
             damping={"0.1": 0.1, "True": True, "Damping (the class)": sm.Damping},
-            collision={"0.01": 0.01, "True": True, "'none'": "none"},
+            clearance={"0.01": 0.01, "True": True, "'none'": "none"},
             rest=FLAGS,
         ),
         Row(area, "other pairs of rotations at other times", lambda _: _panda(relaxations=_PAIRS)),
@@ -105,7 +105,8 @@ def problem_rows() -> list[Row]:
                 "[nan] * 7": [NAN] * 7,
                 "'home'": "home",
                 "None": None,
-                "[[0] * 7]": [[0] * 7],
+                "[[0] * 6, [0] * 6]": [[0] * 6, [0] * 6],
+                "[[[0] * 7]]": [[[0] * 7]],
                 "[0, [1]]": [0, [1]],
             },
         ),
@@ -114,6 +115,19 @@ def problem_rows() -> list[Row]:
             "robot.jacobian",
             robot_named("panda").jacobian,
             q={"[0] * 8": [0] * 8, "inf": [np.inf] * 7, "'q'": "q"},
+        ),
+        *bad_values_of(
+            area,
+            "robot.null_space",
+            lambda **given: robot_named("planar_3r").null_space(
+                **{"q": [0.3, 0.8, 0.4], "task": "planar", **given}
+            ),
+            q={
+                "[0, 0]": [0, 0],
+                "[[0, 0, 0], [0, nan, 0]]": [[0, 0, 0], [0, NAN, 0]],
+                "[[0, 1, 1], [0, 0, 0]]": [[0, 1, 1], [0, 0, 0]],
+            },
+            task=TEXTS,
         ),
         *bad_values_of(
             area,

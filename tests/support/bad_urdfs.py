@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 
 import selfmotion as sm
 from support.bad_rows import Row
@@ -232,6 +233,10 @@ def loading_rows() -> list[Row]:
         _named("load_robot(None)", None),
         _named("load_robot(7)", 7),
         _named("load_robot('nowhere.urdf')", "nowhere.urdf"),
+        _named("load_robot('<robot>')", "<robot>"),
+        _named("load_robot('<robot/>')", "<robot/>"),
+        _named("load_robot(pinocchio.Model())", pin.Model()),
+        _named("load_robot(pinocchio.buildSampleModelHumanoid())", pin.buildSampleModelHumanoid()),
         _named("load_robot('nowhere.xacro')", "nowhere.xacro"),
         _named("load_robot('arm.sdf')", "arm.sdf"),
         _named("load_robot('https://host/arm.urdf')", "https://host/arm.urdf"),

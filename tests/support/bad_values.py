@@ -74,7 +74,7 @@ def path_rows() -> list[Row]:
     around = sound(sm.paths.Circle.around, start=POSE, radius=0.1, duration=2.0)
     points = np.array([[0, 0, 0], [0.1, 0, 0], [0.2, 0.1, 0]], dtype=float)
     turns = np.tile([1.0, 0, 0, 0], (3, 1))
-    ways = sound(sm.paths.Waypoints, t=[0, 1, 2], positions=points, quaternions=turns)
+    ways = sound(sm.paths.Waypoints, t=[0, 1, 2], positions=points, quaternions_wxyz=turns)
     twist = sound(sm.paths.TwistPath, start=POSE, velocity=lambda t: [0.1, 0, 0], duration=1.0)
     retimed = sound(sm.paths.Retimed, path=line(), t=[0, 1], sigma=[0, 2], rate=[0, 0])
     return [
@@ -126,7 +126,7 @@ def path_rows() -> list[Row]:
                 "1.0": 1.0,
                 "ragged": [[0, 0, 0], [1, 1], [2, 2, 2]],
             },
-            quaternions={
+            quaternions_wxyz={
                 "of shape (3, 3)": turns[:, :3],
                 "with a zero": turns * [[1], [0], [1]],
                 "with NaN": turns * [[1], [1], [NAN]],

@@ -406,7 +406,7 @@ def _paths() -> list[tuple[str, bytes]]:
     found.append((".yaml", yaml.safe_dump({"poses": poses}).encode()))
     bare = [pose["pose"] for pose in poses]
     found.append((".json", json.dumps({"header": {}, "poses": bare}, indent=1).encode()))
-    for array in (turned, table[:, 1:], np.tile(np.eye(4), (3, 1, 1)) + 0.0):
+    for array in (table[:, :4], table[:, 1:4], np.tile(np.eye(4), (3, 1, 1)) + 0.0):
         if array.ndim == 3:
             array[:, 0, 3] = [0.0, 0.1, 0.2]
         out = io.BytesIO()

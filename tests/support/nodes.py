@@ -15,7 +15,7 @@ def problem_of(case: Case, **options) -> sm.Problem:
     """Return a case's problem, free of limits and of rest unless asked for."""
     robot, task, start, path = case
     return sm.Problem(
-        robot, path, task, start, **{"constraints": (), "rest": False, "collision": None, **options}
+        robot, path, task, start, **{"constraints": (), "rest": False, "clearance": None, **options}
     )
 
 

@@ -25,4 +25,4 @@ def rounded_problem(count: int = 33, **options) -> sm.Problem:
     known = [robot.pose(q) for q in stretching(t)]
     poses = [pin.SE3(pose.rotation, np.round(pose.translation, _DIGITS)) for pose in known]
     path = sm.paths.Waypoints.from_poses(t, poses)
-    return sm.Problem(robot, path, "planar", rest=False, collision=None, **options)
+    return sm.Problem(robot, path, "planar", rest=False, clearance=None, **options)

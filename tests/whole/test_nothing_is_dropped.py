@@ -46,7 +46,7 @@ PROBLEM: dict[str, Any] = {
     "constraints": [sm.constraints.Clearance([box("post", HERE.translation)], 0.01)],
     "relaxations": [sm.Relaxation("y", 0.02)],
     "damping": sm.Damping(),
-    "collision": sm.constraints.Clearance([box("wall", HERE.translation + FAR)], 0.01),
+    "clearance": sm.constraints.Clearance([box("wall", HERE.translation + FAR)], 0.01),
     "rest": False,
     "also": [sm.Follow(PANDA.pose(PANDA_HOME), "position", tool="panda_link1")],
 }
@@ -202,13 +202,13 @@ def test_each_parameter_of_move_matters() -> None:
 
 
 def test_each_parameter_of_other_paces_matters() -> None:
-    plan = sm.plan(sm.Problem(PANDA, line(), start=PANDA_HOME, collision=None))
+    plan = sm.plan(sm.Problem(PANDA, line(), start=PANDA_HOME, clearance=None))
     base = sm.retime(plan).trajectory.digest
     changed: dict[str, Any] = {"plan": None, "acceleration": 1.0, "velocity": 0.05}
     assert set(changed) == set(inspect.signature(sm.retime).parameters)
     for name, value in list(changed.items())[1:]:
         assert sm.retime(plan, **{name: value}).trajectory.digest != base, name
-    fed = sm.plan(sm.Problem(PANDA, sm.paths.Feed(line(), 0.02), start=PANDA_HOME, collision=None))
+    fed = sm.plan(sm.Problem(PANDA, sm.paths.Feed(line(), 0.02), start=PANDA_HOME, clearance=None))
     for call in (lambda: sm.retime(fed), lambda: sm.fastest(fed.problem)):
         with pytest.raises(sm.errors.ProblemError, match=r"asks for a feed of 0\.02 m/s"):
             call()

@@ -47,12 +47,20 @@ def test_what_has_moved_is_found_for_one_version_more() -> None:
     with pytest.warns(DeprecationWarning, match=r"sm\.Circle is sm\.paths\.Circle now"):
         moved = getattr(sm, "Circle")  # noqa: B009
     assert moved is sm.paths.Circle
+    with pytest.warns(DeprecationWarning, match=r"sm\.write_sheet is sm\.files\.write_sheet now"):
+        moved = getattr(sm, "write_sheet")  # noqa: B009
+    assert moved is sm.files.write_sheet
+    with pytest.warns(
+        DeprecationWarning, match=r"sm\.Binding is sm\.constraints\.ActiveConstraint"
+    ):
+        moved = getattr(sm, "Binding")  # noqa: B009
+    assert moved is sm.constraints.ActiveConstraint
     with pytest.raises(AttributeError, match="has no attribute 'Circel'"):
         _ = sm.Circel
 
 
 def test_signatures_show_what_one_would_type() -> None:
-    """In help(): no factories, functions or addresses, of anything public."""
+    """In help(): no factories, functions, addresses or spelt-out unions, of anything public."""
     for name in offered(sm):
         found = of(sm, name)
         members = vars(found) if inspect.isclass(found) else {}
@@ -60,8 +68,16 @@ def test_signatures_show_what_one_would_type() -> None:
         for item in [found, *public]:
             if inspect.isfunction(item) or inspect.isclass(item):
                 shown = str(inspect.signature(item))
-                for strange in ("<factory>", "<function", "<object", " object at", "0x", "<lambda"):
+                for strange in (
+                    *("<factory>", "<function", "<object", " object at", "0x", "<lambda"),
+                    *("_array_like", "_Buffer"),
+                ):
                     assert strange not in shown, f"{name}: {shown}"
+
+
+def test_arrays_are_called_array_like() -> None:
+    for make, name in ((sm.Problem, "start"), (sm.paths.Waypoints, "t"), (sm.retime, "velocity")):
+        assert str(inspect.signature(make).parameters[name]).startswith(f"{name}: 'npt.ArrayLike")
 
 
 def test_the_one_liner() -> None:

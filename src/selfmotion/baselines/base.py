@@ -1,5 +1,7 @@
 """What a method is, and the plan made of the motion it finds."""
 
+from __future__ import annotations
+
 import time
 from collections.abc import Callable
 from dataclasses import dataclass

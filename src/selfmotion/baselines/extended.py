@@ -1,5 +1,7 @@
 """The extended Jacobian: rows added to the task until it is square."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,5 +1,7 @@
 """The optimum over all joint motions, by Pontryagin's conditions as a boundary-value problem."""
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -89,7 +91,7 @@ class LagrangianOptimum:
         status = Status.CONVERGED if found.success else Status.MAX_ITERATIONS
         return Motion(at, message, found.niter, flow.jacobian_evaluations, status)
 
-    def _end_conditions(self, problem: Problem, flow: "_Flow") -> Callable[[Array, Array], Array]:
+    def _end_conditions(self, problem: Problem, flow: _Flow) -> Callable[[Array, Array], Array]:
         start, n = start_of(problem), flow.n
         rows = problem.follows.jacobian(start)
         null = null_space(rows).T

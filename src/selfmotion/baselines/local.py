@@ -1,5 +1,7 @@
 """Methods that decide from the present pose alone: pseudo-inverse, gradient projection, damping."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 
 import numpy as np

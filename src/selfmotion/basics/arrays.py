@@ -1,5 +1,7 @@
 """The array type of the package, arrays that cannot be written to, and numbers per joint."""
 
+from __future__ import annotations
+
 import reprlib
 from typing import Any
 

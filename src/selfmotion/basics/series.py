@@ -7,6 +7,8 @@ parts as if they were power series (A. Cauchy; H. Cartan, Théorie élémentaire
 analytiques, 1961, ch. VII), in any norm with |xy| ≤ |x||y|.
 """
 
+from __future__ import annotations
+
 from functools import cache
 from math import comb
 

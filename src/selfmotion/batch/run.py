@@ -100,7 +100,7 @@ def plan_many(
     """Plan many problems, each in one of several processes, into a folder.
 
     Plans are written as they end. Run again with the same folder, those that are finished are not
-    planned anew; so a run that was killed goes on where it stopped. A problem that cannot be
+    replanned; so a run that was killed goes on where it stopped. A problem that cannot be
     planned, or that kills its worker, does not stop the others: its row says why.
 
     Parameters

@@ -38,6 +38,7 @@ from selfmotion.certificate.requirement import (
 from selfmotion.certificate.verdict import (
     Certificate as Certificate,
     allowed_text as allowed_text,
+    first_of as first_of,
 )
 
 __all__ = [

@@ -103,13 +103,13 @@ class KeepsApart(Requirement):
         ]
         said = []
         if left_out:
-            said.append(f"touching as they are made, left out: {', '.join(left_out)}")
+            said.append(f"links that overlap by design, not checked: {', '.join(left_out)}")
         if not self.model.pairs:
             said.append("no pair of bodies that can meet: nothing was measured")
         said += [item.hint for item in self.obstacles if item.hint]
         if self.model.disabled:
             disabled = ", ".join(" - ".join(pair) for pair in self.model.disabled)
-            said.append(f"left out as asked: {disabled}")
+            said.append(f"pairs not checked, as asked: {disabled}")
         if self.model.open_meshes:
             open_ = ", ".join(self.model.open_meshes)
             said.append(f"open meshes, in which a body wholly inside may be missed: {open_}")

@@ -1,5 +1,7 @@
 """Re-checks a finished trajectory by forward kinematics; shares no code with the rollout."""
 
+from __future__ import annotations
+
 from collections.abc import Iterator, Sequence
 
 import numpy as np
@@ -33,7 +35,7 @@ _MOST_POSES = 50_000
 # is within the tolerance until both have ended.
 _CLOCK = 1e-4
 # What is said of paths without bounds of their derivatives.
-_MEASURED = "the path is judged as measured between its marks: it gives no bounds (Path.series)"
+_MEASURED = "the path is checked at samples only: it gives no bounds (Path.series)"
 
 
 def certify(

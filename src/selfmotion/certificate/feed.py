@@ -53,7 +53,7 @@ class FeedReached(Requirement):
             is None
             for path in (self.follow.path, self.found.path)
         )
-        return ("feed: judged as measured between marks of the path",) if unknown else ()
+        return ("feed: checked at samples only",) if unknown else ()
 
     def judge(self, motion: FinishedMotion) -> Finding:
         """See `Requirement.judge`: the slowest speed where the feed counts."""

@@ -46,13 +46,13 @@ class PathCheck:
     Attributes
     ----------
     position, rotation : Extreme
-        Bounds of the errors beyond what is relaxed [m], [rad], and about when they are largest.
+        Bounds of the errors beyond the tolerances [m], [rad], and about when they are largest.
     deviations : tuple of Extreme
         Bounds of the deviation of each relaxation's rows.
     undecided : tuple of (float, float)
         Intervals [s] on which the bounds do not settle.
     proved : bool
-        Whether the bounds are theorems; else the path is judged as measured between its marks.
+        Whether the bounds are theorems; else the path is checked at samples only.
     samples : int
         How many poses were looked at.
     """

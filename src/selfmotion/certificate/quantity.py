@@ -1,5 +1,7 @@
 """What constraints measure along a motion, written once for optimiser and certificate."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -57,7 +59,7 @@ class Quantity:
         0 for vectors.
     series : callable, optional
         ``series(stretch)`` → majorants of the values (m, K + 1, I), of their lengths where they are
-        vectors (`selfmotion.basics.series`). By default none: it is judged as measured.
+        vectors (`selfmotion.basics.series`). By default none: it is checked at samples.
     components : int
         Length c of vectors; 1 for numbers.
     of_pace : bool
@@ -102,7 +104,7 @@ class Quantity:
         derivatives: Callable[[Array, Array, Array], tuple[Array, ...]],
         series: Callable[[Stretch], Array] | None = None,
         unit: str = "",
-    ) -> "Quantity":
+    ) -> Quantity:
         """Return one number that is to stay within a band.
 
         Its `values` are (K,), its `derivatives` (K, n) each, its `series` (K + 1, I). Where one
@@ -187,7 +189,7 @@ class QuantityKept(Requirement):
         free = [free[k] for k in np.flatnonzero(~np.isfinite(self.quantity.bounds))]
         said = [f"not limited: {', '.join(free)}"] if free else []
         if self.quantity.series is None:
-            said.append(f"{self.name}: judged as measured between samples, it gives no bounds")
+            said.append(f"{self.name}: checked at samples only, as it gives no bounds")
         return tuple(said)
 
     def judge(self, motion: FinishedMotion) -> Finding:

@@ -1,5 +1,7 @@
 """What a requirement is: something that a finished motion must keep, and that judges whether."""
 
+from __future__ import annotations
+
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

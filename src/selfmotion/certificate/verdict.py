@@ -1,6 +1,6 @@
 """What is known about a finished motion, and the verdict."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,6 +21,12 @@ def allowed_text(tolerance: Tolerance) -> str:
     if tolerance.position <= USUAL.position and tolerance.rotation <= USUAL.rotation:
         return ""
     return f" ({tolerance.position:.2g} m and {tolerance.rotation:.2g} rad are allowed)"
+
+
+def first_of(failures: Sequence[str]) -> str:
+    """Return the first of what speaks against a motion, and how much more there is."""
+    more = len(failures) - 1
+    return f"not verified: {failures[0]}{f'; and {more} more' if more else ''}"
 
 
 @dataclass(frozen=True)
@@ -123,7 +129,7 @@ class Certificate:
         # Written so that NaN fails.
         return all(
             position.value <= allowed.position and rotation.value <= allowed.rotation
-            for position, rotation in ((self.position_error, self.rotation_error), *self.others)
+            for position, rotation in self._errors
         )
 
     def __repr__(self) -> str:
@@ -138,21 +144,46 @@ class Certificate:
     def verdict(self) -> str:
         """One line: verified, or what is wrong."""
         if self.verified:
-            left_out = f"; not checked: {', '.join(self.not_checked)}" if self.not_checked else ""
             return (
                 f"verified at all times ({', '.join(self.covers)}): at most "
                 f"{self.position_error.value:.1e} m and {self.rotation_error.value:.1e} rad off "
-                f"the path{', beyond what is relaxed' if self.deviations else ''}"
+                f"the path{', tolerances not counted' if self.deviations else ''}"
                 f"{allowed_text(self.tolerance)}"
                 f"{self._others_text}"
-                f"{self._damping_text}{left_out}{''.join(f'; {note}' for note in self.notes)}"
+                f"{self._besides}"
             )
         return "; ".join(("not verified: " + "; ".join(self.failures), *self.notes))
 
     @property
+    def summary(self) -> str:
+        """The verdict in short: the largest error, or the first of what is wrong; see `verdict`.
+
+        What was not checked, where the inverse was damped, and what there is to note is in it.
+        """
+        if not self.verified:
+            return "; ".join((first_of(self.failures), *self.notes))
+        position = max(one.value for one, _ in self._errors)
+        rotation = max(one.value for _, one in self._errors)
+        return (
+            f"verified at all times: at most {position:.1e} m and {rotation:.1e} rad off the path"
+            f"{', tolerances not counted' if self.deviations else ''}{allowed_text(self.tolerance)}"
+            f"{self._besides}"
+        )
+
+    @property
+    def _errors(self) -> tuple[tuple[Extreme, Extreme], ...]:
+        return ((self.position_error, self.rotation_error), *self.others)
+
+    @property
+    def _besides(self) -> str:
+        """Where the inverse was damped, what was not checked, and what there is to note."""
+        left_out = f"; not checked: {', '.join(self.not_checked)}" if self.not_checked else ""
+        return f"{self._damping_text}{left_out}{''.join(f'; {note}' for note in self.notes)}"
+
+    @property
     def _others_text(self) -> str:
         return "".join(
-            f", '{position.name}' {position.value:.1e} m and {rotation.value:.1e} rad off its own"
+            f", '{position.name}' {position.value:.1e} m and {rotation.value:.1e} rad off its path"
             for position, rotation in self.others
         )
 

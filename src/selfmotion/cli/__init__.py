@@ -11,3 +11,13 @@ from selfmotion.cli import (
     warm_up as warm_up,
 )
 from selfmotion.cli.app import app as app, main as main
+
+# What most people come for is listed first; the others as their modules are imported.
+_FIRST = ("plan", "job")
+app.registered_commands.sort(
+    key=lambda command: (
+        _FIRST.index(name)
+        if (name := getattr(command.callback, "__name__", "")) in _FIRST
+        else len(_FIRST)
+    )
+)

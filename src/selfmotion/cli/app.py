@@ -14,7 +14,7 @@ from selfmotion.cli.remedies import in_shell
 from selfmotion.cli.stage_display import StageDisplay
 
 # Under which commands are listed.
-PLAN, LOOK, FILES = "Plan", "Look at what was planned", "Files"
+PLAN, LOOK, FILES = "Plan", "Inspect plans", "Files"
 LOOP, BEGIN = "While the arm moves", "To begin with"
 
 app = typer.Typer(

@@ -123,7 +123,9 @@ def near(
     )
 
 
-def of_program(file: Path, job: Path, within: sm.Tolerance | None, as_json: bool) -> NoReturn:
+def of_program(
+    file: Path, job: Path, within: sm.Tolerance | None, as_json: bool, verbose: bool
+) -> NoReturn:
     """Judge a controller's program by the job that it is of, each step and the whole, and end."""
     if not is_program(file):
         raise sm.errors.ProblemError(
@@ -139,7 +141,7 @@ def of_program(file: Path, job: Path, within: sm.Tolerance | None, as_json: bool
         }
         terminal.print_json(data=data)
     else:
-        for step in steps:
+        for step in steps if verbose else [step for step in steps if not step.verified]:
             style = None if step.verified else "bold red"
             text = f"{step.name}: {step.verdict}"
             terminal.print(text, style=style, markup=False, soft_wrap=True)

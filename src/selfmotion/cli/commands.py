@@ -81,6 +81,7 @@ def plan(
     allow_code: options.AllowCodeOption = False,
     out: options.OutOption = None,
     html: options.HtmlOption = None,
+    verbose: options.VerboseOption = False,
     as_json: options.JsonOption = False,
 ) -> None:
     """Plan a motion, check it, and write it."""
@@ -98,7 +99,7 @@ def plan(
     job.check_used(job.goal)
     if job.goal == "parts":
         options.refuse({"from": warm, **given}, "a motion in parts", "its own")
-        jobs.finish_parts(job, [*(out or []), *([] if html is None else [html])], as_json)
+        jobs.finish_parts(job, [*(out or []), *([] if html is None else [html])], as_json, verbose)
     if job.goal == "fastest":
         options.refuse({"from": warm, **given}, "the fastest motion", "its own")
         result = fastest_with_progress(job).plan
@@ -107,7 +108,7 @@ def plan(
         result = sm.retime(found)
     else:
         result = plan_with_progress(job.problem, warm_start=warm_start, **{**job.settings, **given})
-    outputs.finish(result, [*job.outputs, *(out or [])], html, as_json, remarks=remarks)
+    outputs.finish(result, [*job.outputs, *(out or [])], html, as_json, verbose, remarks=remarks)
 
 
 @app.command(
@@ -132,7 +133,7 @@ def init(
     no_collision: options.NoCollisionOption = False,
     force: Annotated[bool, typer.Option("--force", help="Overwrite a file.")] = False,
 ) -> None:
-    """Write a commented problem file to begin with; of an arm from a file, one that was planned."""
+    """Write a commented problem file to begin with; for an arm from a file it is tried first."""
     file = Path(f"{Path(robot).stem}.toml") if out is None else out
     if os.path.exists(file) and not force:
         raise sm.errors.FileFormatError(f"{file}: is there already; give --out or --force")
@@ -145,7 +146,7 @@ def init(
         lock=options.locks(lock or []),
         arguments=options.arguments(argument),
         packages=packages or (),
-        collision=not no_collision,
+        clearance=not no_collision,
     )
     text = next(texts) if robot in sm.NAMED_ARMS else documents.first_that_runs(texts, file, job)
     write_text(file, text)
@@ -204,9 +205,10 @@ def check(
     clearance: options.ClearanceOption = 0.0,
     srdf: options.SrdfOption = None,
     tolerance: options.ToleranceOption = None,
+    verbose: options.VerboseOption = False,
     as_json: options.JsonOption = False,
 ) -> None:
-    """Check a motion by forward kinematics: a saved plan, or one that something else made."""
+    """Verify a motion by forward kinematics: a saved plan, or one made elsewhere."""
     judged = velocity, acceleration, joint_limits, obstacles, clearance, srdf
     within = None if tolerance is None else sm.Tolerance(tolerance, tolerance)
     typed = {"path": path, **{name: context.params[name] for name in documents.OF_PATH}}
@@ -221,11 +223,11 @@ def check(
         )
         whose = "the program's" if file.suffix == jobs.PROGRAM else "the parts'"
         options.refuse(given | {"limits": any(judged) or None}, file, whose)
-        jobs.check(file, as_json)
+        jobs.check(file, as_json, verbose)
     if robot is not None and Path(robot).suffix == jobs.PROGRAM:
         options.refuse(own | measured | {"degrees": degrees or None}, robot, "the program's")
         options.refuse({"limits": any(judged) or None}, robot, "the program's")
-        checks.of_program(file, Path(robot), within, as_json)
+        checks.of_program(file, Path(robot), within, as_json, verbose)
     with StageDisplay(stages) as display:
         if file.suffix == ".npz":
             options.refuse(own | {"robot": robot, "degrees": degrees or None}, file, "the plan's")
@@ -264,7 +266,7 @@ def check(
     if as_json:
         terminal.print_json(data=json_tables.certificate_json(certificate, near))
     else:
-        tables.show_certificate(certificate, near, arm, terminal)
+        outputs.show_certificate(certificate, near, arm, verbose)
     raise typer.Exit(VERIFIED if certificate.verified else NOT_VERIFIED)
 
 
@@ -297,7 +299,7 @@ def replay(
     ] = None,
     gif: Annotated[Path | None, typer.Option(help="Also draw the motion as a GIF.")] = None,
 ) -> None:
-    """Write a page that replays plans in a browser, offline; several get a switch.
+    """Write an offline page that replays plans in a browser, several side by side.
 
     Pictures need a browser (chromium) on this machine.
     """

@@ -117,7 +117,7 @@ class Shell:
             "constraints": self._constraints(),
             "relaxations": [_relaxation(text) for text in self.relax],
             "damping": self.damped,
-            "collision": not self.no_collision,
+            "clearance": not self.no_collision,
         }
         if self.degree is not None:
             table["null_motion"] = {"kind": "PolynomialNullMotion", "degree": self.degree}

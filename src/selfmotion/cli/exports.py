@@ -57,9 +57,10 @@ def export(
         bool,
         typer.Option("--force", help="Write it even if it is not verified, or moves at an end."),
     ] = False,
+    verbose: options.VerboseOption = False,
     as_json: options.JsonOption = False,
 ) -> None:
-    """Write a plan's motion for controllers and simulators, and check what was written."""
+    """Write a plan's motion for controllers and simulators, and verify the file."""
     asked = program_options.program_settings(settings, targets, wobj, mass)
     if rate is not None and all(_is_program(target, form, asked) for target in out):
         raise sm.errors.ProblemError(
@@ -104,7 +105,7 @@ def export(
         coarsest = formats.coarsest_rate(made)
     sound = True
     for target in out:
-        given: dict[str, Any] = {"form": form, "force": force}
+        given: dict[str, Any] = {"format": form, "force": force}
         if not _is_program(target, form, asked):
             given["rate"] = coarsest if rate is None and _is_message(target, form) else rate
         together: dict[str, Path] = {}
@@ -115,13 +116,17 @@ def export(
             if own is not None and not _is_program(target, form, asked) and programs:
                 own = own.streamed
             sm.files.write_motion(made, target, settings=own, progress=display.stage, **given)
-        kept, verdicts[str(target)] = _read_back(made, target, form, rate, asked)
+        kept, verdicts[str(target)] = _read_back(
+            made, target, form, rate, asked, whole=verbose or as_json
+        )
         sound &= kept
         if together:
             names = ", ".join(map(str, together.values()))
             verdicts[names] = ""
             if _is_readable(target, form) and isinstance(made, sm.Plan):
-                kept, verdicts[names] = _judged(made, sm.files.read_parts(together))
+                kept, verdicts[names] = _judged(
+                    made, sm.files.read_parts(together), whole=verbose or as_json
+                )
                 sound &= kept
     streamed = [target for target in out if not _is_program(target, form, asked)]
     if all(_is_message(target, form) for target in streamed):
@@ -195,8 +200,13 @@ def _read_back(
     form: str | None,
     rate: float | None,
     asked: sm.files.ProgramSettings | None,
+    *,
+    whole: bool,
 ) -> tuple[bool, str]:
-    """Return whether what was written is still the motion, and what there is to say."""
+    """Return whether what was written is still the motion, and what there is to say.
+
+    The `whole` verdict, or its summary.
+    """
     if _is_program(target, form, asked) and target.suffix.lower() in formats.READ_PROGRAMS:
         return _confirmed(made, target)
     if not _is_readable(target, form):
@@ -204,7 +214,7 @@ def _read_back(
     motion = sm.files.read_motion(target)
     match made:
         case sm.Plan():
-            return _judged(made, motion)
+            return _judged(made, motion, whole=whole)
         case sm.Move():
             read = sm.Move(made.robot, made.constraints, motion.of_joints(made.robot.joint_names))
             return read.verified and made.verified, f"read back: {read.verdict}"
@@ -214,7 +224,7 @@ def _read_back(
         case sm.Program():
             found = formats.judged_motion(motion, made)
             return found.verified, f"read back: {found.verdict}"
-    return _judged_parts(made, motion)
+    return _judged_parts(made, motion, whole=whole)
 
 
 def _told_of_samples(motion: sm.Trajectory, read: sm.Trajectory, rate: float) -> str:
@@ -227,21 +237,21 @@ def _told_of_samples(motion: sm.Trajectory, read: sm.Trajectory, rate: float) ->
     )
 
 
-def _judged_parts(made: sm.Parts, motion: sm.Trajectory) -> tuple[bool, str]:
+def _judged_parts(made: sm.Parts, motion: sm.Trajectory, *, whole: bool) -> tuple[bool, str]:
     """Return whether a motion is still that of parts, part by part and move by move."""
-    whole = motion.of_joints(made.robot.joint_names)
+    every = motion.of_joints(made.robot.joint_names)
     stops = np.append(made.begins, made.trajectory.duration)
     plans, moves = [], []
     for k, (plan, begin) in enumerate(zip(made.plans, made.begins, strict=True)):
         end = begin + plan.trajectory.duration
-        read = replace(plan, trajectory=formats.part_of(whole, begin, end))
+        read = replace(plan, trajectory=formats.part_of(every, begin, end))
         plans.append(replace(read, certificate=read.check()))
         if k < len(made.moves):
             after = stops[k + 1]
-            part = formats.part_of(whole, end, float(after))
+            part = formats.part_of(every, end, float(after))
             moves.append(sm.Move(made.robot, made.moves[k].constraints, part))
     found = replace(made, plans=tuple(plans), moves=tuple(moves))
-    return found.verified, f"read back: {found.verdict}"
+    return found.verified, _told(found, whole)
 
 
 def _confirmed(made: _Made, target: Path) -> tuple[bool, str]:
@@ -268,9 +278,13 @@ def _verified(made: _Made) -> bool:
     return made.certificate.verified if isinstance(made, sm.Plan) else made.verified
 
 
-def _judged(plan: sm.Plan, motion: sm.Trajectory) -> tuple[bool, str]:
+def _judged(plan: sm.Plan, motion: sm.Trajectory, *, whole: bool) -> tuple[bool, str]:
     found = plan.problem.certify(motion, plan.tolerance, plan.report.ending)
-    return found.verified and not plan.altered, f"read back: {found.verdict}"
+    return found.verified and not plan.altered, _told(found, whole)
+
+
+def _told(found: sm.Certificate | sm.Parts, whole: bool) -> str:
+    return f"read back: {found.verdict if whole else found.summary}"
 
 
 def _finish(

@@ -233,8 +233,8 @@ def replanner_of(problem: sm.Problem, **options: Any) -> sm.Replanner:
         for item in problem.constraints
         if item.kept_moving or not any(item is usual for usual in KEPT)
     ]
-    if problem.collision is not NO_OVERLAP and problem.collision is not None:
-        asked.append(problem.collision)
+    if problem.clearance is not NO_OVERLAP and problem.clearance is not None:
+        asked.append(problem.clearance)
     return sm.Replanner(problem.robot, problem.task, problem.costs, asked, **options)
 
 

@@ -9,7 +9,15 @@ import typer
 
 import selfmotion as sm
 from selfmotion import formats
-from selfmotion.cli import documents, json_tables, options, outputs, program_options, tables
+from selfmotion.cli import (
+    documents,
+    json_tables,
+    options,
+    outputs,
+    program_options,
+    summaries,
+    tables,
+)
 from selfmotion.cli.app import NOT_VERIFIED, PLAN, VERIFIED, app, complain, stages, terminal
 from selfmotion.cli.batch_display import check_cluster, executor_at
 from selfmotion.cli.stage_display import StageDisplay
@@ -51,6 +59,7 @@ def job(
     settings: program_options.SettingsOption = None,
     changes: options.SetOption = None,
     allow_code: options.AllowCodeOption = False,
+    verbose: options.VerboseOption = False,
     as_json: options.JsonOption = False,
 ) -> None:
     """Plan many seams as one program: order, directions, and the moves in between."""
@@ -94,7 +103,7 @@ def job(
         feeds = [feed.asked for plan in program.plans.values() for feed in plan.path.feeds]
         text = f"feed: {max(feeds):g} m/s, the highest that was found at which all seams are kept"
         terminal.print(text, markup=False, soft_wrap=True)
-    _show(program, as_json, remarks)
+    _show(program, as_json, verbose, remarks)
     # What is only of programs of targets is said for these, where there are some.
     has_targets = any(target.suffix.lower() in formats.PROGRAMS for target in wanted)
     for target in wanted:
@@ -136,7 +145,7 @@ def write_program(
     if file.suffix == PROGRAM:
         program.save(file)
     elif _is_timetable(file):
-        program.write_timetable(file)
+        sm.files.write_timetable(program, file)
     elif file.suffix == ".html":
         from selfmotion.replay import write_replay
 
@@ -147,7 +156,7 @@ def write_program(
             sm.files.write_motion(program, file, settings=own, progress=display.stage)
 
 
-def finish_parts(job: sm.files.Job, out: list[Path], as_json: bool) -> NoReturn:
+def finish_parts(job: sm.files.Job, out: list[Path], as_json: bool, verbose: bool) -> NoReturn:
     """Plan a motion in parts, print it, write its files, and end."""
     wanted = [*job.outputs, *out]
     for file in wanted:
@@ -158,7 +167,7 @@ def finish_parts(job: sm.files.Job, out: list[Path], as_json: bool) -> NoReturn:
             )
     with StageDisplay(stages) as display:
         found = job.in_parts(progress=display.stage)
-    _show_parts(found, as_json, job.problem.remarks)
+    _show_parts(found, as_json, verbose, job.problem.remarks)
     for file in wanted:
         unsound = outputs.left_out(found)
         if unsound and outputs.is_motion(file):
@@ -178,29 +187,29 @@ def finish_parts(job: sm.files.Job, out: list[Path], as_json: bool) -> NoReturn:
     raise typer.Exit(VERIFIED if found.verified else NOT_VERIFIED)
 
 
-def _show(program: sm.Program, as_json: bool, remarks: Sequence[str] = ()) -> None:
+def _show(program: sm.Program, as_json: bool, verbose: bool, remarks: Sequence[str] = ()) -> None:
     if as_json:
         data = json_tables.program_json(program) | {"remarks": list(remarks)}
         terminal.print_json(data=data)
     else:
-        tables.show_program(program, terminal)
+        (tables if verbose else summaries).show_program(program, terminal)
 
 
-def _show_parts(parts: sm.Parts, as_json: bool, remarks: Sequence[str] = ()) -> None:
+def _show_parts(parts: sm.Parts, as_json: bool, verbose: bool, remarks: Sequence[str] = ()) -> None:
     if as_json:
         data = {"verified": parts.verified, "verdict": parts.verdict, "cuts": list(parts.cuts)}
         terminal.print_json(data=data | {"remarks": list(remarks)})
     else:
-        terminal.print(repr(parts), markup=False, soft_wrap=True)
+        terminal.print(repr(parts) if verbose else parts.summary, markup=False, soft_wrap=True)
 
 
-def check(file: Path, as_json: bool) -> NoReturn:
+def check(file: Path, as_json: bool, verbose: bool) -> NoReturn:
     """Print what is known of a program or of parts, read and judged anew, and end."""
     made: sm.Program | sm.Parts
     if file.suffix == PARTS:
         made = sm.files.load_parts(file)
-        _show_parts(made, as_json)
+        _show_parts(made, as_json, verbose)
     else:
         made = sm.load_program(file)
-        _show(made, as_json)
+        _show(made, as_json, verbose)
     raise typer.Exit(VERIFIED if made.verified else NOT_VERIFIED)

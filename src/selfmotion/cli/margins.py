@@ -16,10 +16,12 @@ _NAMES = "may be given several times"
 
 
 _Tolerance = Annotated[
-    float | None, typer.Option(help="What the process lets the tool be off its path (m).")
+    float | None,
+    typer.Option(help="Tolerance of the process: deviation of the tool from its path (m)."),
 ]
 _Turn = Annotated[
-    float | None, typer.Option(help="By how much it may be turned (rad); with --tolerance.")
+    float | None,
+    typer.Option(help="Tolerance of the process for the orientation (rad); with --tolerance."),
 ]
 _Part = Annotated[
     list[str] | None,
@@ -34,7 +36,9 @@ def margin(
     file: Annotated[Path, typer.Argument(help="A plan saved as .npz.")],
     tolerance: _Tolerance = None,
     turn: _Turn = None,
-    clearance: Annotated[float, typer.Option(help="What is left between bodies (m).")] = 0.0,
+    clearance: Annotated[
+        float, typer.Option(help="Clearance that must remain between bodies (m).")
+    ] = 0.0,
     part: _Part = None,
     tool: Annotated[
         list[str] | None,
@@ -42,28 +46,33 @@ def margin(
     ] = None,
     center: Annotated[
         str | None,
-        typer.Option(help="What the part turns about: x,y,z (m); by default the path's middle."),
+        typer.Option(
+            help="Centre of rotation of the part: x,y,z (m); by default the path's middle."
+        ),
     ] = None,
     corrected: Annotated[
         bool,
         typer.Option(
-            "--corrected", help="Say besides how far part and base may be off when planned again."
+            "--corrected",
+            help="Also: how far part and base may be displaced if the motion is planned again.",
         ),
     ] = False,
     as_json: options.JsonOption = False,
 ) -> None:
-    """Say by how much part, tool and base may be displaced while a plan runs unchanged."""
+    """Measure by how much part, tool and base may be displaced before a plan fails."""
     within = _process(tolerance, turn)
     about = None if center is None else options.numbers(center, "--center", 3)
     plan = sm.load_plan(file)
-    found = sm.margin(
-        plan,
-        within,
-        clearance=clearance,
-        part=part or None,
-        tool=tool or None,
-        center=about,
-    )
+    with StageDisplay(stages) as display:
+        display.stage("measuring margins", 1, 1)
+        found = sm.margin(
+            plan,
+            within,
+            clearance=clearance,
+            part=part or None,
+            tool=tool or None,
+            center=about,
+        )
     again = []
     if corrected:
         with StageDisplay(stages) as display:
@@ -87,13 +96,14 @@ def calibrate(
     file: Annotated[Path, typer.Argument(help="A plan saved as .npz, for the arm as drawn.")],
     calibration: Annotated[
         Path,
-        typer.Argument(help="File that says where the joints of this very arm are; see check."),
+        typer.Argument(help="Calibration of the arm; see check."),
     ],
     out: options.OutOption = None,
     html: options.HtmlOption = None,
+    verbose: options.VerboseOption = False,
     as_json: options.JsonOption = False,
 ) -> None:
-    """Say what a plan does on an arm as it was measured, and plan it again for that arm."""
+    """Check a plan on the calibrated arm, and plan again for that arm."""
     outputs.check_suffixes(out or [])
     planned = sm.load_plan(file)
     problem = sm.calibrated(planned.problem, calibration)
@@ -102,7 +112,7 @@ def calibrate(
     verdict = judged.certify(planned.trajectory, planned.tolerance, planned.report.ending).verdict
     stages.print(f"as planned, on the calibrated arm: {verdict}", markup=False, soft_wrap=True)
     result = plan_with_progress(problem, warm_start=planned, tolerance=planned.tolerance)
-    outputs.finish(result, out or [], html, as_json)
+    outputs.finish(result, out or [], html, as_json, verbose)
 
 
 @app.command(
@@ -117,16 +127,18 @@ def sheet(
     tolerance: _Tolerance = None,
     turn: _Turn = None,
     part: _Part = None,
-    title: Annotated[str, typer.Option(help="Of the page; by default arm and task.")] = "",
+    title: Annotated[str, typer.Option(help="Title; by default arm and task.")] = "",
 ) -> None:
-    """Write what a plan does, keeps and survives as one page that prints on A4."""
+    """Write a process sheet: motion, limits kept and margins on one A4 page."""
     within = _process(tolerance, turn)
     plan = sm.load_plan(file)
     bodies = any(what in plan.certificate.covers for what in ("self-collision", "obstacles"))
     margins = None
     if plan.certificate.verified and (bodies or within is not None):
-        margins = sm.margin(plan, within, part=part or None)
-    written = sm.write_sheet(plan, out, margins, title=title)
+        with StageDisplay(stages) as display:
+            display.stage("measuring margins", 1, 1)
+            margins = sm.margin(plan, within, part=part or None)
+    written = sm.files.write_sheet(plan, out, margins, title=title)
     terminal.print(f"wrote {written}", markup=False, soft_wrap=True)
 
 

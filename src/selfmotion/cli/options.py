@@ -54,14 +54,16 @@ FeedOption = Annotated[
 ]
 JumpOption = Annotated[
     float | None,
-    typer.Option(help="Distance between poses of --path that is refused (m; 0.5 by default)."),
+    typer.Option(help="Largest distance between poses of --path (m; 0.5 by default)."),
 ]
 SeamOption = Annotated[
     str | None, typer.Option(help="Which seam or cut of --path, where it has several.")
 ]
 ColumnsOption = Annotated[
     str | None,
-    typer.Option(help="Names of the columns of --path, where it has no header: x,y,z,nx,ny,nz."),
+    typer.Option(
+        help="Names of the columns of --path, an array or without a header: x,y,z,nx,ny,nz."
+    ),
 ]
 FlipOption = Annotated[
     bool,
@@ -90,7 +92,7 @@ RotaryCenterOption = Annotated[
 ]
 UnitOption = Annotated[
     DrawnUnit | None,
-    typer.Option(help="Of a drawing (.dxf) that says none, or another than it is drawn in."),
+    typer.Option(help="Unit of a drawing (.dxf) that states none, or a wrong one."),
 ]
 FrameOption = Annotated[
     str | None,
@@ -98,41 +100,43 @@ FrameOption = Annotated[
 ]
 RampOption = Annotated[
     float | None,
-    typer.Option(help="Run --path up to its speed from rest, and down again, in so long (s)."),
+    typer.Option(help="Duration of run-up from rest and of run-down of --path (s)."),
 ]
 CornersOption = Annotated[
     Corners | None,
     typer.Option(
-        help="At kinks of --path: swing through the pose (blend, the default), stop there, or, "
+        help="At corners of --path: blend through the pose (the default), stop there, or, "
         "with --feed, round the corner between straight legs."
     ),
 ]
 CornerToleranceOption = Annotated[
     float | None,
-    typer.Option(help="Distance from rounded corners (m; 0.001 by default).", min=1e-6),
+    typer.Option(help="Largest deviation at rounded corners (m; 0.001 by default).", min=1e-6),
 ]
-TaskOption = Annotated[TaskName, typer.Option(help="What the path prescribes.")]
+TaskOption = Annotated[TaskName, typer.Option(help="Task: what the path prescribes.")]
 CheckedTaskOption = Annotated[
-    TaskName | None, typer.Option(help="What the path prescribes; pose by default.")
+    TaskName | None, typer.Option(help="Task: what the path prescribes; pose by default.")
 ]
 PlannedTaskOption = Annotated[
     TaskName | None,
-    typer.Option(help="What the path prescribes; pose by default, of a planar arm planar."),
+    typer.Option(help="Task: what the path prescribes; pose by default, planar for a planar arm."),
 ]
 RelaxOption = Annotated[
     list[str] | None,
     typer.Option(
-        help="Rows that may leave the path: ROWS[=BAND]\\[@FROM:TO], rows of x,y,z or of "
+        help="Tolerances of the task: ROWS[=BAND]\\[@FROM:TO], rows of x,y,z or of "
         "rx,ry,rz (tool axes), BAND in m or rad (free without), times in s. Examples: z=0.002, "
         "rx,ry=0.2 (a cone), rz@1:2.5. Repeatable."
     ),
 ]
 StartOption = Annotated[
-    str | None, typer.Option(help="q1,q2,… (rad or m); default: one that suits the path.")
+    str | None, typer.Option(help="q1,q2,… (rad or m); by default the best that is found.")
 ]
 FromOption = Annotated[
     Path | None,
-    typer.Option("--from", help="Begin with the start and the null motion of this plan (.npz)."),
+    typer.Option(
+        "--from", help="Warm start: begin with the start and the null motion of this plan (.npz)."
+    ),
 ]
 ToolOption = Annotated[str | None, typer.Option(help="Tool frame (a link).")]
 ReferenceOption = Annotated[
@@ -142,12 +146,15 @@ ReferenceOption = Annotated[
 DegreeOption = Annotated[
     int | None,
     typer.Option(
-        help="The published method, with a null motion that is a polynomial of this degree: it "
-        "keeps no constraints but closure. By default any null motion is."
+        help="The published method: ε(t) is a polynomial of this degree, and no constraint is kept "
+        "but closure. By default ε(t) is unrestricted."
     ),
 ]
 MuOption = Annotated[
-    float, typer.Option(help="Weight of the cost 1/det(JJᵀ), which keeps off singular poses.")
+    float,
+    typer.Option(
+        help="Weight of the cost 1/det(JJᵀ), which keeps away from singular configurations."
+    ),
 ]
 CostOption = Annotated[
     list[str] | None,
@@ -183,14 +190,15 @@ LimitOption = Annotated[
 SearchOption = Annotated[
     SearchMode | None,
     typer.Option(
-        help="Without --start: from many starts (local), over all self-motions (global), or "
-        "the one after the other (auto, the default)."
+        help="Without --start: optimise from many starts (local), search all self-motions (global),"
+        " or global where local fails (auto, the default)."
     ),
 ]
 CompareOption = Annotated[
     bool,
     typer.Option(
-        "--compare", help="Report how far the plan is from the best motion of the global search."
+        "--compare",
+        help="Also run the global search, and report the distance from its best motion.",
     ),
 ]
 OutOption = Annotated[
@@ -213,13 +221,12 @@ RobotOption = Annotated[
     str | None,
     typer.Option(
         help="For a motion: name (`selfmotion robots`), .urdf file, or a problem file (.toml, "
-        ".json), all of which is judged then: a cell, constraints, what else is followed; of a "
-        "job's .src or .mod its .program."
+        ".json) with everything it asks for; for the .src or .mod of a job its .program."
     ),
 ]
 LockOption = Annotated[
     list[str] | None,
-    typer.Option(help="Joint to hold: NAME=VALUE (rad or m). Repeatable."),
+    typer.Option(help="Joint to lock: NAME=VALUE (rad or m). Repeatable."),
 ]
 ArgumentOption = Annotated[
     list[str] | None,
@@ -236,18 +243,18 @@ PackagesOption = Annotated[
 CalibrationOption = Annotated[
     Path | None,
     typer.Option(
-        help="File that says where the joints of this very arm are: Universal Robots' kinematics "
-        "(.yaml), their calibration.conf, or joints and offsets (.yaml, .toml)."
+        help="Calibration of this arm: Universal Robots' kinematics (.yaml), their "
+        "calibration.conf, or joints and offsets (.yaml, .toml)."
     ),
 ]
 DegreesOption = Annotated[
     bool, typer.Option("--degrees", help="Angles of the motion are in degrees.")
 ]
 VelocityOption = Annotated[
-    str | None, typer.Option(help="Speed limits (rad/s or m/s): one number, or one per joint.")
+    str | None, typer.Option(help="Velocity limits (rad/s or m/s): one, or one per joint.")
 ]
 AccelerationOption = Annotated[
-    str | None, typer.Option(help="Acceleration limits (rad/s² or m/s²), likewise.")
+    str | None, typer.Option(help="Acceleration limits (rad/s² or m/s²): one, or one per joint.")
 ]
 JointLimitsOption = Annotated[
     Path | None,
@@ -261,13 +268,16 @@ ClearanceOption = Annotated[
     float, typer.Option(help="Distance to keep from obstacles and of links from each other (m).")
 ]
 SrdfOption = Annotated[
-    Path | None, typer.Option(help="SRDF whose disabled pairs of links are left out.")
+    Path | None, typer.Option(help="SRDF: its disabled pairs of links are not checked.")
 ]
 ToleranceOption = Annotated[
     float | None,
     typer.Option(
         help="Allowed deviation from the path (m and rad); 1e-6 by default, or the plan's."
     ),
+]
+VerboseOption = Annotated[
+    bool, typer.Option("--verbose", "-v", help="Print all that was measured, tried and found.")
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print the outcome as JSON.")]
 

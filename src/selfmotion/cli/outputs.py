@@ -1,7 +1,7 @@
 """The files that a plan is written to."""
 
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NoReturn
 
@@ -10,7 +10,8 @@ from rich.console import Console
 
 import selfmotion as sm
 from selfmotion import formats
-from selfmotion.cli import json_tables, tables
+from selfmotion.certificate import Extreme
+from selfmotion.cli import json_tables, summaries, tables
 from selfmotion.cli.app import NOT_VERIFIED, VERIFIED, stages, terminal
 
 # Text of more than so many bytes is better a bag.
@@ -62,6 +63,7 @@ def finish(
     out: list[Path],
     html: Path | None,
     as_json: bool,
+    verbose: bool,
     *,
     remarks: Sequence[str] = (),
 ) -> NoReturn:
@@ -73,10 +75,28 @@ def finish(
         data = json_tables.plan_json(result) | {"remarks": list(remarks)}
         terminal.print_json(data=data)
     else:
-        tables.show(result, terminal)
+        show(result, verbose)
     write(result, out, html, terminal, quiet=as_json)
     whole = not (left_out(result) and any(map(is_motion, out)))
     raise typer.Exit(VERIFIED if result.certificate.verified and whole else NOT_VERIFIED)
+
+
+def show(result: sm.Plan, verbose: bool) -> None:
+    """Print what is to be known of a plan, or all of it."""
+    (tables.show if verbose else summaries.show_plan)(result, terminal)
+
+
+def show_certificate(
+    certificate: sm.Certificate,
+    approaches: Mapping[str, Extreme],
+    robot: sm.RobotModel,
+    verbose: bool,
+) -> None:
+    """Print what is to be known of a certificate, or all of it."""
+    if verbose:
+        tables.show_certificate(certificate, approaches, robot, terminal)
+    else:
+        summaries.show_certificate(certificate, approaches, terminal)
 
 
 def is_motion(file: Path) -> bool:
@@ -115,8 +135,6 @@ def tell_large(file: Path, console: Console, *, given_rate: bool = False) -> Non
 def _write_one(result: sm.Plan, file: Path, *, page: bool) -> None:
     if page or file.suffix == ".html":
         _replay(result, file)
-    elif file.suffix == ".csv":
-        result.to_csv(file)
     elif file.suffix == ".npz":
         result.save(file)
     else:

@@ -9,6 +9,7 @@ import typer
 import selfmotion as sm
 from selfmotion.cli import documents, options, outputs
 from selfmotion.cli.app import PLAN, app, fastest_with_progress, stages
+from selfmotion.cli.stage_display import StageDisplay
 
 
 @app.command(
@@ -21,12 +22,15 @@ def retime(
     velocity: options.VelocityOption = None,
     out: options.OutOption = None,
     html: options.HtmlOption = None,
+    verbose: options.VerboseOption = False,
     as_json: options.JsonOption = False,
 ) -> None:
-    """Run through a plan's joint path in the least time within limits, and check it."""
+    """Retime a plan: the same joint path in the least time within limits."""
     outputs.check_suffixes(out or [])
-    result = sm.retime(sm.load_plan(file), *_limits(acceleration, velocity))
-    outputs.finish(result, out or [], html, as_json)
+    with StageDisplay(stages) as display:
+        display.stage("retiming", 1, 1)
+        result = sm.retime(sm.load_plan(file), *_limits(acceleration, velocity))
+    outputs.finish(result, out or [], html, as_json, verbose)
 
 
 @app.command(
@@ -50,9 +54,10 @@ def fastest(
     allow_code: options.AllowCodeOption = False,
     out: options.OutOption = None,
     html: options.HtmlOption = None,
+    verbose: options.VerboseOption = False,
     as_json: options.JsonOption = False,
 ) -> None:
-    """Look for the fastest motion along a path, whatever its own pace; Ctrl-C keeps the best."""
+    """Find the fastest motion along a path, whatever its own timing; Ctrl-C keeps the best."""
     if Path(problem).suffix not in documents.SUFFIXES:
         raise sm.errors.ProblemError(
             f"{problem}: expected a problem file ({', '.join(documents.SUFFIXES)}); "
@@ -75,7 +80,9 @@ def fastest(
             markup=False,
             soft_wrap=True,
         )
-    outputs.finish(found.plan, [*job.outputs, *(out or [])], html, as_json, remarks=remarks)
+    outputs.finish(
+        found.plan, [*job.outputs, *(out or [])], html, as_json, verbose, remarks=remarks
+    )
 
 
 def _time(seconds: float) -> str:

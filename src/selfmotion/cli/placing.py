@@ -12,8 +12,8 @@ from selfmotion.cli import documents, options, outputs
 from selfmotion.cli.app import NOT_VERIFIED, PLAN, VERIFIED, app, stages, terminal
 from selfmotion.cli.stage_display import StageDisplay
 
-_Range = Annotated[str | None, typer.Option(help="From and to how far to move it: low,high (m).")]
-_Turn = Annotated[str | None, typer.Option(help="Likewise, low,high (rad).")]
+_Range = Annotated[str | None, typer.Option(help="Range of displacements: low,high (m).")]
+_Turn = Annotated[str | None, typer.Option(help="Range of rotations: low,high (rad).")]
 _PROBLEMS, _PAGES = (".toml", ".json"), (".html", ".png")
 
 
@@ -42,7 +42,7 @@ def place(
     ] = False,
     center: Annotated[
         str | None,
-        typer.Option(help="What is turned about: x,y,z (m); by default the middle of the paths."),
+        typer.Option(help="Centre of rotation: x,y,z (m); by default the middle of the paths."),
     ] = None,
     workers: Annotated[
         int | None, typer.Option(help="Processes; by default this one alone.", min=1)
@@ -58,11 +58,11 @@ def place(
         list[Path] | None,
         typer.Option("--map", help="Map of places around it, as .html or .png. Repeatable."),
     ] = None,
-    points: Annotated[int, typer.Option(help="Of the map, in each direction.", min=2)] = 9,
+    points: Annotated[int, typer.Option(help="Points of the map in each direction.", min=2)] = 9,
     settings: options.SetOption = None,
     allow_code: options.AllowCodeOption = False,
 ) -> None:
-    """Look for the place of the part, or the arm, at which the motions cost least."""
+    """Find the place of the part, or of the arm, at which the motions cost least."""
     if part and path_alone:
         raise sm.errors.ProblemError(
             "--part and --path-alone say different things; give one of them"
@@ -97,7 +97,7 @@ def place(
         pictured = found.map(points=points) if len(within) > 1 else None
         for file in drawn:
             if file.suffix == ".html":
-                found.to_html(file, pictured)
+                sm.files.write_placement(found, file, pictured)
             elif pictured is None:
                 raise sm.errors.ProblemError(f"{file}: a picture of places is over two coordinates")
             else:
@@ -125,7 +125,7 @@ def plan_margin(
     settings: options.SetOption = None,
     allow_code: options.AllowCodeOption = False,
 ) -> None:
-    """Plan a motion that survives displacements of part, tool or base, and say what that costs."""
+    """Plan a motion that tolerates displacements of part, tool or base."""
     outputs.check_suffixes(out or [])
     problem = documents.of_file(file, settings or [], allow_code).problem
     with StageDisplay(stages) as display:

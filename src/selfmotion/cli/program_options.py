@@ -27,7 +27,7 @@ TargetsOption = Annotated[
 WorkObjectOption = Annotated[
     str | None,
     typer.Option(
-        help="What poses are counted in: a link, or x,y,z,rx,ry,rz \\[m, and rotation vector in "
+        help="Work object of the poses: a link, or x,y,z,rx,ry,rz \\[m, and rotation vector in "
         "rad] in the frame of the arm's base; with --targets poses.",
         metavar="NAME|X,Y,Z,RX,RY,RZ",
     ),

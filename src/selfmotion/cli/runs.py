@@ -58,9 +58,9 @@ def batch(
     allow_code: options.AllowCodeOption = False,
     as_json: options.JsonOption = False,
 ) -> None:
-    """Plan many problems at once, into a folder with a ranked table.
+    """Plan many problems into a folder, with a table ranked by cost.
 
-    Exit code 0 if of each file some combination is verified.
+    Exit code 0 if some combination of each file is verified.
     """
     from selfmotion.batch import grid_items, plan_items
 
@@ -129,9 +129,9 @@ def demo(
 @app.command(epilog="Example: selfmotion track --seconds 12 --out out/track", rich_help_panel=LOOP)
 def track(
     task: options.TaskOption = "pose",
-    seconds: Annotated[float, typer.Option(help="How long (s).", min=1.0, max=600.0)] = 12.0,
-    horizon: Annotated[float, typer.Option(help="Planned ahead (s).", min=0.1)] = 2.0,
-    seed: Annotated[int, typer.Option(help="Of the noise.", min=0)] = 0,
+    seconds: Annotated[float, typer.Option(help="Duration (s).", min=1.0, max=600.0)] = 12.0,
+    horizon: Annotated[float, typer.Option(help="Planning horizon (s).", min=0.1)] = 2.0,
+    seed: Annotated[int, typer.Option(help="Seed of the noise.", min=0)] = 0,
     out: Annotated[Path, typer.Option(help="Folder for replay and histogram.")] = Path("out/track"),
 ) -> None:
     """Plan while the arm moves: a simulated Panda keeps up with a conveyor.
@@ -160,19 +160,21 @@ def follow(
     listen: Annotated[
         str, typer.Option(help="host:port to wait for states at.")
     ] = "127.0.0.1:5005",
-    horizon: Annotated[float, typer.Option(help="Planned ahead (s).", min=0.1)] = 2.0,
-    period: Annotated[float, typer.Option(help="Between states (s).", min=1e-3)] = 0.01,
-    cycle: Annotated[float, typer.Option(help="Between set-points (s).", min=1e-4)] = 1e-3,
+    horizon: Annotated[float, typer.Option(help="Planning horizon (s).", min=0.1)] = 2.0,
+    period: Annotated[float, typer.Option(help="Time between states (s).", min=1e-3)] = 0.01,
+    cycle: Annotated[float, typer.Option(help="Time between set-points (s).", min=1e-4)] = 1e-3,
     latency: Annotated[
         float,
         typer.Option(
-            help="From a state's measurement until the arm follows its segment (s).", min=0.0
+            help="Latency from measuring a state until the arm follows its segment (s).", min=0.0
         ),
     ] = 0.0,
     silence: Annotated[
-        float, typer.Option(help="Stop if no state comes for so long (s).", min=0.1)
+        float, typer.Option(help="Time-out: stop if no state comes for so long (s).", min=0.1)
     ] = 5.0,
-    seconds: Annotated[float, typer.Option(help="End after so long (s).", min=0.1)] = float("inf"),
+    seconds: Annotated[
+        float, typer.Option(help="Duration (s); by default until stopped.", min=0.1)
+    ] = float("inf"),
     allow_code: options.AllowCodeOption = False,
     as_json: options.JsonOption = False,
 ) -> None:

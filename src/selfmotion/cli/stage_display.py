@@ -1,5 +1,6 @@
 """Which stage is running: a bar on a terminal, a line per stage in a log."""
 
+import threading
 import time
 from types import TracebackType
 from typing import Self
@@ -18,6 +19,29 @@ from selfmotion.optimise import Iteration
 
 # Of shorter stages it is not said how long they will last [s].
 _WORTH_SAYING = 2.0
+# A log has a line at least this often [s], which is looked at in between.
+_SILENT, _TICK = 10.0, 1.0
+# Stages as they are told to callbacks → in words, where they are not already.
+_IN_WORDS = {
+    "start": "optimising start",
+    "branch": "looking for another branch of inverse kinematics, try",
+    "posture": "trying posture",
+    "part": "planning part",
+    "fastest": "improving the pace, round",
+    "seam": "planning seam",
+    "other ways": "planning seams in other configurations,",
+    "program": "trying order",
+    "feed": "trying feed",
+    "move": "planning a move",
+    "places": "trying place",
+    "corners": "planning at corner",
+    "margin": "planning with margin, round",
+    "targets": "choosing targets of piece",
+    "picture": "drawing picture",
+    "refining": "refining the motion",
+    "checking": "checking the motion",
+    "warm start": "starting from the given plan",
+}
 
 
 class Display:
@@ -56,6 +80,8 @@ class Display:
 class StageDisplay(Display):
     """Shows what `plan` tells: its `stage` is a progress callback, its `iteration` the other one.
 
+    In a log a stage has a line where it begins, and one more every ten seconds that it lasts.
+
     Parameters
     ----------
     console : Console
@@ -69,29 +95,45 @@ class StageDisplay(Display):
             BarColumn(),
             TimeElapsedColumn(),
         )
-        self._stage = self._about = self._count = self._cost = self._left = ""
-        self._began = 0.0
+        self._stage = self._about = self._cost = ""
+        self._done = self._total = 0
+        self._began = self._said = 0.0
+        self._ended = threading.Event()
+
+    def __enter__(self) -> Self:
+        """Begin to show."""
+        if not self._console.is_terminal:
+            threading.Thread(target=self._keep_saying, daemon=True).start()
+        return super().__enter__()
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        """Leave the terminal as it was."""
+        self._ended.set()
+        super().__exit__(kind, error, traceback)
 
     def stage(self, stage: str, done: int, total: int) -> None:
-        """Show that number `done` of `total` in a stage has begun; of 0, news that stay.
+        """Show that number `done` of `total` in a stage has begun.
 
-        How long the others will last, if as long as those before.
+        Of 0 where it is not known how many there will be; number 0 of 0 is news that stay.
         """
-        if total == 0:
-            self._console.print(stage, markup=False, highlight=False, soft_wrap=True)
+        if total == done == 0:
+            self._print(stage)
             return
         stage, quote, about = stage.partition(" '")
-        if stage != self._stage:
+        is_new = stage != self._stage
+        if is_new:
             self._stage, self._cost, self._began = stage, "", time.monotonic()
-            if not self._console.is_terminal:
-                self._console.print(f"{stage} 1 of {total}" if total > 1 else stage, markup=False)
-        self._about = quote + about
-        self._count = f" {done} of {total}" if total > 1 else ""
-        spent = time.monotonic() - self._began
-        left = spent * (total - done + 1) / (done - 1) if done > 1 else 0.0
-        told = f", {spent:.0f} s so far, about {left:.0f} s to go"
-        self._left = told if spent + left > _WORTH_SAYING else ""
-        self._progress.update(self._bar, completed=done - 1, total=total if total > 1 else None)
+        self._about, self._done, self._total = quote + about, done, total
+        if is_new and not self._console.is_terminal:
+            self._print(self._line())
+        self._progress.update(
+            self._bar, completed=max(done - 1, 0), total=total if total > 1 else None
+        )
         self._describe()
 
     def iteration(self, iteration: Iteration) -> None:
@@ -100,5 +142,33 @@ class StageDisplay(Display):
         self._describe()
 
     def _describe(self) -> None:
-        said = self._stage + self._count + self._about + self._left + self._cost
-        self._progress.update(self._bar, description=said)
+        self._progress.update(self._bar, description=self._line())
+
+    def _line(self) -> str:
+        """Return what is done, for how long, and for how much longer, in words."""
+        several = self._total != 1
+        count = (
+            f" {max(self._done, 1)}{f' of {self._total}' if self._total else ''}" if several else ""
+        )
+        words = _IN_WORDS.get(self._stage, self._stage)
+        return f"{words}{count}{self._about}{self._times()}{self._cost}"
+
+    def _times(self) -> str:
+        """Return how long a stage has taken, and how long it will if as long as before."""
+        spent = time.monotonic() - self._began
+        left = 0.0
+        if self._total > 1 and self._done > 1:
+            left = spent * (self._total - self._done + 1) / (self._done - 1)
+        if spent + left <= _WORTH_SAYING:
+            return ""
+        return f", {spent:.0f} s so far{f', about {left:.0f} s to go' if left else ''}"
+
+    def _print(self, text: str) -> None:
+        self._said = time.monotonic()
+        self._console.print(text, markup=False, highlight=False, soft_wrap=True)
+
+    def _keep_saying(self) -> None:
+        """Print a line where none was for a while, until all is over."""
+        while not self._ended.wait(_TICK):
+            if self._stage and time.monotonic() - max(self._said, self._began) >= _SILENT:
+                self._print(self._line())

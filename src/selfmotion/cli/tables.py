@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-import numpy as np
 from rich import box
 from rich.console import Console
 from rich.markup import escape
@@ -16,7 +15,7 @@ from rich.table import Table
 from selfmotion.certificate import LIMIT_NAMES, Certificate, Extreme, Finding
 from selfmotion.cli.remedies import in_shell
 from selfmotion.job import Program
-from selfmotion.result import Gap, Plan, Report
+from selfmotion.result import Gap, Plan, Report, compare
 from selfmotion.robot import RobotModel
 from selfmotion.task import Task
 
@@ -63,7 +62,7 @@ def show(plan: Plan, console: Console) -> None:
         share = 100.0 * report.remaining / abs(report.cost)
         console.print(f"further saving possible: about {share:.2g} % (estimate)")
     if report.active:
-        console.print(_prices(report))
+        console.print(_active_constraints(report))
     if report.gap is not None:
         console.print(_distance(report.gap))
     show_certificate(plan.certificate, plan.approaches, plan.robot, console)
@@ -172,54 +171,16 @@ def _in_mm(near: Extreme | None) -> Extreme | None:
 
 def show_comparison(plans: Mapping[str, Plan], console: Console) -> None:
     """Print a column per plan: its costs, and the worst that its check found."""
+    found = compare(plans)
     table = _table("plans side by side")
     table.add_column("")
-    for name in plans:
+    for name in found.names:
         table.add_column(escape(name), justify="right", overflow="fold")
-    shown = list(plans.values())
-    for term in dict.fromkeys(term for plan in shown for term in plan.report.terms):
-        table.add_row(term, *(_number(plan.report.terms.get(term)) for plan in shown))
-    # What ends before its path does has a cost that nothing can be compared with.
-    table.add_row("total cost", *map(_total, shown))
-    table.add_section()
-    table.add_row("duration, s", *(_number(plan.trajectory.duration) for plan in shown))
-    length = (float(np.abs(np.diff(plan.trajectory.q, axis=0)).sum()) for plan in shown)
-    table.add_row("joint path, rad or m", *map(_number, length))
-    for label, name in _WORST.items():
-        worst = [getattr(plan.certificate, name) for plan in shown]
-        if any(item is not None for item in worst):
-            table.add_row(label, *(_number(item and item.value) for item in worst))
-    table.add_row("verified", *("yes" if plan.certificate.verified else "no" for plan in shown))
+    for number, row in enumerate(found.cells(), start=1):
+        table.add_row(*row, end_section=number == len(found.costs))
     console.print(table)
-    for name, plan in plans.items():
-        if not plan.certificate.verified:
-            console.print(
-                f"{name}: {plan.certificate.verdict}",
-                style="bold red",
-                markup=False,
-                soft_wrap=not console.is_terminal,
-            )
-
-
-_WORST = {
-    "position error, m": "position_error",
-    "rotation error, rad": "rotation_error",
-    "margin to joint limits, rad or m": "limit_margin",
-    "speed, share of its limit": "velocity_ratio",
-    "acceleration, share of its limit": "acceleration_ratio",
-    "smallest singular value": "smallest_singular_value",
-    "clearance, m": "clearance",
-}
-
-
-def _total(plan: Plan) -> str:
-    if plan.report.ending:
-        return f"ends at t = {plan.trajectory.t[-1]:.4g} s"
-    return _number(plan.report.cost)
-
-
-def _number(value: float | None) -> str:
-    return "-" if value is None else f"{value:.5g}"
+    for line in found.refusals():
+        console.print(line, style="bold red", markup=False, soft_wrap=not console.is_terminal)
 
 
 def show_batch(batch: "Batch", console: Console) -> None:
@@ -348,7 +309,7 @@ def _distance(gap: Gap) -> str:
     )
 
 
-def _prices(report: Report) -> Table:
+def _active_constraints(report: Report) -> Table:
     """Return what each active constraint costs, by its multipliers."""
     table = _table("active constraints")
     table.add_column("if you allow")

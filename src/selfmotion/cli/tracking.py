@@ -150,7 +150,7 @@ def write(record: realtime.Record, result: sm.Plan, folder: Path) -> list[Path]:
     files = [folder / "track.html", folder / "track.npz", folder / "latency.png"]
     worst = 1e3 * record.error[record.t >= 1.0, 0].max(initial=0.0)
     said = (
-        f"A simulated {result.robot.name} keeps up with a circle on a conveyor. It is planned anew "
+        f"A simulated {result.robot.name} keeps up with a circle on a conveyor. It is replanned "
         f"{len(record.t)} times; it answers late, is measured with noise, and is pushed off its "
         f"command from {PUSHED[0]:g} to {PUSHED[1]:g} s, by up to {worst:.1f} mm at the tool. The "
         f"ball appears at {APPEARS:g} s. Shown is where the arm was, not what was commanded."

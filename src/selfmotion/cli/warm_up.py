@@ -12,7 +12,7 @@ from selfmotion.warm import Compiled, small_works
 
 @app.command("warm-up", epilog="Example: selfmotion warm-up", rich_help_panel=BEGIN)
 def warm_up() -> None:
-    """Compile all numerical kernels now, once per machine: no plan waits for them later."""
+    """Compile all numerical kernels now, once per machine, so that no plan waits for them."""
     began = time.perf_counter()
     counted, other = Compiled(), companion(ALL_WORKS)
     with event.install_listener("numba:compile", counted), StageDisplay(stages) as display:

@@ -1,5 +1,7 @@
 """Clearances that an optimiser follows: of convex hulls, with their derivatives."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass, field
 
 import numpy as np

@@ -1,5 +1,7 @@
 """Distances between the robot's real collision geometry, itself and the world."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Sequence
 from copy import copy
@@ -108,7 +110,7 @@ class CollisionModel:
         self._near = PairDistances(self.robot, self._bodies, self._index)
         self.hulls = self._near.hulls
 
-    def of_pairs(self, pairs: Sequence[tuple[int, int]]) -> "CollisionModel":
+    def of_pairs(self, pairs: Sequence[tuple[int, int]]) -> CollisionModel:
         """Return the model of the same bodies in which these pairs are checked, by index."""
         other = copy(self)
         for known in ("pair_levers", "_levers"):
@@ -127,7 +129,7 @@ class CollisionModel:
         return self._index
 
     @property
-    def groups(self) -> dict[str, "CollisionModel"]:
+    def groups(self) -> dict[str, CollisionModel]:
         """The models of "the arm itself", its links alone, and of each obstacle or carried body.
 
         With all that can meet it, by name. What has no pair is left out.

@@ -1,5 +1,7 @@
 """Obstacles: bodies of the world, or on a link. An own shape is a subclass of `Obstacle`."""
 
+from __future__ import annotations
+
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, dataclass, field, fields
@@ -18,7 +20,7 @@ _HUGE = 100.0
 # What every obstacle has besides the lengths of its shape.
 _PLACE = ("name", "pose", "frame")
 # Shape → class, filled as the classes are made.
-_shapes: dict[str, type["Obstacle"]] = {}
+_shapes: dict[str, type[Obstacle]] = {}
 
 
 @dataclass(frozen=True, eq=False)

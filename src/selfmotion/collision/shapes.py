@@ -1,5 +1,7 @@
 """The shapes of obstacles that come with the package."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path

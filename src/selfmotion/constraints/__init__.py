@@ -1,9 +1,9 @@
 """What a motion must keep: limits, end conditions, closed paths, clearance."""
 
 from selfmotion.constraints.active import Priced as Priced, active_of as active_of
+from selfmotion.constraints.active_constraint import ActiveConstraint as ActiveConstraint
 from selfmotion.constraints.band import Band as Band
 from selfmotion.constraints.base import Constraint as Constraint
-from selfmotion.constraints.binding import Binding as Binding
 from selfmotion.constraints.bound_end import BoundEnd as BoundEnd
 from selfmotion.constraints.clearance import (
     BoundClearance as BoundClearance,
@@ -42,8 +42,8 @@ from selfmotion.constraints.tool import ToolLimits as ToolLimits
 from selfmotion.constraints.torque import JointTorqueLimits as JointTorqueLimits
 
 __all__ = [
+    "ActiveConstraint",
     "Band",
-    "Binding",
     "BoundConstraint",
     "Clearance",
     "ClosedPath",

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from selfmotion.basics import Array, Flags
-from selfmotion.constraints.binding import Binding
+from selfmotion.constraints.active_constraint import ActiveConstraint
 from selfmotion.constraints.conditions import BoundConstraint, easing_of
 
 # A condition binds where its price is above this share of what it is at most: interior points leave
@@ -33,7 +33,7 @@ class Priced(NamedTuple):
     used: Flags
 
 
-def active_of(each: Sequence[Priced], span: Array, least: float) -> tuple[Binding, ...]:
+def active_of(each: Sequence[Priced], span: Array, least: float) -> tuple[ActiveConstraint, ...]:
     """Return what binds, the most expensive first; what would save less than `least` is left out.
 
     `span` (2,) is when the motion begins and ends [s].
@@ -56,7 +56,7 @@ def active_of(each: Sequence[Priced], span: Array, least: float) -> tuple[Bindin
         if saving >= least:
             binds = (at if at.any() else price) > _BINDS * price.max()
             spans = _spans(binds if binds.any() else price == price.max(), times, span)
-            kept.append(Binding(name, words, saving, spans))
+            kept.append(ActiveConstraint(name, words, saving, spans))
     return tuple(sorted(kept, key=lambda item: -item.saving))
 
 

@@ -1,5 +1,7 @@
 """Coordinates that stay within a band: the elbow up, a joint on one side, a link above a table."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -49,7 +51,7 @@ class Band(Constraint):
         as_number(self.margin, "band: margin", above=0.0, most=1.0)
 
     @classmethod
-    def of_elbow(cls, side: str, half: float = 0.5 * np.pi, **names: str) -> "Band":
+    def of_elbow(cls, side: str, half: float = 0.5 * np.pi, **names: str) -> Band:
         """Return the band that keeps the elbow 'up', 'down', 'left' or 'right'.
 
         Left and right are those of who looks from the shoulder to the wrist with the head up; the
@@ -94,6 +96,6 @@ class Band(Constraint):
         return found
 
     @classmethod
-    def from_dict(cls, values: Mapping[str, Any], **context: Any) -> "Band":
+    def from_dict(cls, values: Mapping[str, Any], **context: Any) -> Band:
         """See `Saved.from_dict`."""
         return cls(**{**values, "coordinate": restore(Coordinate, values["coordinate"])})

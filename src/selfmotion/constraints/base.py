@@ -3,6 +3,8 @@
 It is bound to one when a plan is made (`selfmotion.constraints.conditions`).
 """
 
+from __future__ import annotations
+
 from abc import ABC
 from typing import ClassVar
 
@@ -89,15 +91,15 @@ class Constraint(Saved, ABC, family="constraint"):
         """Return the configuration (n,) that the motion has to end in, where it says one."""
         return None
 
-    def at_rest(self) -> "Constraint":
+    def at_rest(self) -> Constraint:
         """Return what is left to ask of a motion that rests at both ends by itself."""
         return self
 
-    def on_part(self) -> "Constraint | None":
+    def on_part(self) -> Constraint | None:
         """Return what it asks of a motion along the first part of the path; None for nothing."""
         return self
 
-    def on_last_part(self) -> "Constraint | None":
+    def on_last_part(self) -> Constraint | None:
         """Return what it asks of a motion along the last part of the path; None for nothing."""
         return self
 

@@ -1,5 +1,7 @@
 """Distance from obstacles, and of links from each other."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 from dataclasses import InitVar, dataclass, field, replace
 from functools import cached_property
@@ -93,7 +95,7 @@ class Clearance(Constraint):
         """
         return self._models(robot).exact
 
-    def bind(self, follows: Follows, start: Array, end: Array) -> "BoundClearance":
+    def bind(self, follows: Follows, start: Array, end: Array) -> BoundClearance:
         """See `Constraint.bind`."""
         robot = follows.robot
         return BoundClearance(self._models(robot).smooth, self.distance)
@@ -107,7 +109,7 @@ class Clearance(Constraint):
         return replace(Envelope.unbounded(robot.dof), bodies=((self.model(robot), self.distance),))
 
     @classmethod
-    def from_dict(cls, values: Mapping[str, Any], **context: Any) -> "Clearance":
+    def from_dict(cls, values: Mapping[str, Any], **context: Any) -> Clearance:
         """See `Saved.from_dict`."""
         obstacles = tuple(obstacle_from_dict(item) for item in values["obstacles"])
         return cls(**{**values, "obstacles": obstacles})
@@ -121,7 +123,7 @@ class Clearance(Constraint):
             "disabled": [list(pair) for pair in self.disabled],
         }
 
-    def _models(self, robot: RobotModel) -> "_Models":
+    def _models(self, robot: RobotModel) -> _Models:
         made = _made.setdefault(self, WeakKeyDictionary())
         if robot not in made:
             made[robot] = _Models(self, robot)
@@ -197,7 +199,7 @@ class BoundClearance:
         """See `BoundConstraint.tangents`."""
         return _Pull(self._clearances(samples)).all(motion)
 
-    def linearised_at(self, samples: Samples) -> tuple[tuple[int, int], "_Pull"]:
+    def linearised_at(self, samples: Samples) -> tuple[tuple[int, int], _Pull]:
         """See `linearised`."""
         now = self._clearances(samples)
         return (len(now.values), now.values.shape[1]), _Pull(now)

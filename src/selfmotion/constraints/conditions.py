@@ -4,6 +4,8 @@ Limits are kept with a margin, so that the motion between nodes and the last dig
 optimisation stay within the limits themselves.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Protocol

@@ -8,6 +8,8 @@ the reference, and so are two velocities with the same tool velocity; the residu
 the integration leaves of the path error.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -249,7 +251,7 @@ class ClosedPath(Constraint):
                     f"{position:.3g} m and {rotation:.3g} rad from where it began"
                 )
 
-    def at_rest(self) -> "ClosedPath":
+    def at_rest(self) -> ClosedPath:
         """See `Constraint.at_rest`: both velocities are 0."""
         return ClosedPath(velocity=False)
 

@@ -1,5 +1,7 @@
 """What single configurations and single steps must keep, for searches that see no whole motion."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -36,13 +38,13 @@ class Envelope:
     quantities: tuple[Quantity, ...] = ()
 
     @classmethod
-    def unbounded(cls, dof: int) -> "Envelope":
+    def unbounded(cls, dof: int) -> Envelope:
         """Return the envelope of n joints that allows everything."""
         free = read_only(np.full(dof, np.inf))
         return cls(read_only(-free), free, free, free, free)
 
     @classmethod
-    def of_limits(cls, limits: JointLimits) -> "Envelope":
+    def of_limits(cls, limits: JointLimits) -> Envelope:
         """Return the envelope of limits of q, q̇, q̈ or the jerk."""
         own = cls.unbounded(len(limits.lower))
         if limits.order == 0:
@@ -54,11 +56,11 @@ class Envelope:
         return replace(own, jerk=limits.upper)
 
     @classmethod
-    def of_quantity(cls, quantity: Quantity, dof: int) -> "Envelope":
+    def of_quantity(cls, quantity: Quantity, dof: int) -> Envelope:
         """Return the envelope of a quantity of q alone, of n joints."""
         return replace(cls.unbounded(dof), quantities=(quantity,))
 
-    def __and__(self, other: "Envelope") -> "Envelope":
+    def __and__(self, other: Envelope) -> Envelope:
         """Return the envelope of what both allow."""
         return Envelope(
             read_only(np.maximum(self.lower, other.lower)),

@@ -1,5 +1,7 @@
 """Limits of joint position, velocity, acceleration and jerk."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from functools import cached_property
 from typing import ClassVar
@@ -46,7 +48,7 @@ class JointPositionLimits(Constraint):
         _check_margin(self.margin)
         as_flag(self.replace, f"{type(self).__name__}: replace")
 
-    def bind(self, follows: Follows, start: Array, end: Array) -> "BoundLimits":
+    def bind(self, follows: Follows, start: Array, end: Array) -> BoundLimits:
         """See `Constraint.bind`."""
         robot = follows.robot
         return BoundLimits.of(robot, self.requirement(robot), self.margin)
@@ -113,7 +115,7 @@ class _RateLimits(Constraint):
         """See `Constraint.applies`."""
         return bool(np.isfinite(self.of(robot)).any())
 
-    def bind(self, follows: Follows, start: Array, end: Array) -> "BoundLimits":
+    def bind(self, follows: Follows, start: Array, end: Array) -> BoundLimits:
         """See `Constraint.bind`."""
         return BoundLimits.of(follows.robot, self.requirement(follows.robot), self.margin)
 
@@ -216,7 +218,7 @@ class BoundLimits:
     equality = False
 
     @classmethod
-    def of(cls, robot: RobotModel, limits: JointLimits, margin: float) -> "BoundLimits":
+    def of(cls, robot: RobotModel, limits: JointLimits, margin: float) -> BoundLimits:
         """Return what is judged, for the joints with a finite limit on either side."""
         lower, upper, order = limits.lower, limits.upper, limits.order
         joints = np.flatnonzero(np.isfinite(lower) | np.isfinite(upper))
@@ -251,7 +253,7 @@ class BoundLimits:
         above = motion.of_order(self.order)[:, self.joints] / self.scale[:, None]
         return np.concatenate([above, -above], axis=1)
 
-    def linearised_at(self, samples: Samples) -> tuple[tuple[int, int], "BoundLimits"]:
+    def linearised_at(self, samples: Samples) -> tuple[tuple[int, int], BoundLimits]:
         """See `linearised`."""
         return (len(samples.nodes), 2 * len(self.joints)), self
 

@@ -1,5 +1,7 @@
 """An axis of a link near a direction of the world: a cup that must not spill, a flat seam."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 
 import numpy as np

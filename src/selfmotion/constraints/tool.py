@@ -1,5 +1,7 @@
 """Limits of how fast the tool moves and accelerates."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 
 import numpy as np

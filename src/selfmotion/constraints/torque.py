@@ -1,5 +1,7 @@
 """Limits of joint torque, with what the tool holds."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 
 import numpy as np

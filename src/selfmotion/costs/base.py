@@ -1,5 +1,7 @@
 """What a cost is: an integrand G of samples, with its derivatives."""
 
+from __future__ import annotations
+
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import ClassVar

@@ -1,5 +1,7 @@
 """Costs of the arm's dynamics: kinetic energy, and torques against gravity."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass, field
 from typing import ClassVar
 

@@ -1,5 +1,7 @@
 """Any integrand that a user can write down."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any

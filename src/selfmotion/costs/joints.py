@@ -1,5 +1,7 @@
 """Quadratic forms of the motion and its derivatives, and other costs of the joints alone."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -92,7 +94,7 @@ class JointVelocity(_Derivative):
     _order: ClassVar[int] = 1
 
     @classmethod
-    def usual(cls, robot: RobotModel) -> "JointVelocity":
+    def usual(cls, robot: RobotModel) -> JointVelocity:
         """Return that of an arm where none is given: W = 1, but for metres among radians.
 
         A joint that moves in metres counts by `RobotModel.joint_weights`, whose squares are W; the

@@ -1,5 +1,7 @@
 """How much of their limits joints use: a smooth stand-in for the time that a motion needs."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from typing import ClassVar
 

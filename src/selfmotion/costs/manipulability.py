@@ -1,5 +1,7 @@
 """Costs of the distance from singular poses; eq. numbers are those of the paper."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from typing import ClassVar
 

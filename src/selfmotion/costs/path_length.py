@@ -1,5 +1,7 @@
 """The length of the way in joint space."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from typing import ClassVar
 

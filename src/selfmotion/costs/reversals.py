@@ -1,5 +1,7 @@
 """How often joints turn round, as something smooth."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 
 import numpy as np

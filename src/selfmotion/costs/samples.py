@@ -1,5 +1,7 @@
 """A motion at sample times, as costs and constraints see it."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -38,7 +40,7 @@ class TipSamples:
     def __post_init__(self) -> None:
         _show(self, tuple(self.__dataclass_fields__))
 
-    def at(self, rows: Ints) -> "TipSamples":
+    def at(self, rows: Ints) -> TipSamples:
         """Return those of some of the times."""
         return TipSamples(*(getattr(self, name)[rows] for name in self.__dataclass_fields__))
 
@@ -74,7 +76,7 @@ class Samples:
         _show(self, _ARRAYS)
 
     @classmethod
-    def along(cls, follows: Follows, sampling: Sampling, q: Array, qd: Array) -> "Samples":
+    def along(cls, follows: Follows, sampling: Sampling, q: Array, qd: Array) -> Samples:
         """Return the samples of a motion on its path, q and q̇ (S, n) each."""
         tips, rows = [], []
         for item in follows.items:
@@ -135,7 +137,7 @@ class Samples:
         """Joint jerks, (S, n)."""
         return np.asarray(self.sampling.differentiation(2) @ self.qd[self.nodes])
 
-    def of(self, follows: Follows) -> "Samples":
+    def of(self, follows: Follows) -> Samples:
         """Return the motion of the arm alone, without the virtual joints after its own.
 
         What is asked for again is not made again.

@@ -1,5 +1,7 @@
 """A pull of a coordinate towards a value."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
@@ -79,7 +81,7 @@ class Towards(Cost):
             )
 
     @classmethod
-    def from_dict(cls, values: Mapping[str, Any], **context: Any) -> "Towards":
+    def from_dict(cls, values: Mapping[str, Any], **context: Any) -> Towards:
         """See `Saved.from_dict`."""
         coordinate = restore(Coordinate, values["coordinate"])
         return cls(**{**values, "robot": context["robot"], "coordinate": coordinate})

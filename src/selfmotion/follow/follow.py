@@ -1,5 +1,7 @@
 """A tip that follows a path, in the rows that are prescribed: as asked for, and on an arm."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -47,7 +49,7 @@ class Follow:
             if not isinstance(given, str | None):
                 raise ProblemError(f"follow: {name} is {shown(given)}, expected the name of a link")
 
-    def on(self, robot: RobotModel, duration: float) -> "BoundFollow":
+    def on(self, robot: RobotModel, duration: float) -> BoundFollow:
         """Return the same of an arm, for so many seconds.
 
         Raises
@@ -71,7 +73,7 @@ class Follow:
         chain = robot.chain_to(self.tool or robot.tool, reference)
         return BoundFollow(chain, path, Task.of(self.task))
 
-    def along(self, path: Path) -> "Follow":
+    def along(self, path: Path) -> Follow:
         """Return the same on another path."""
         return replace(self, path=path)
 

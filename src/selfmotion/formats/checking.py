@@ -7,7 +7,7 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 
 from selfmotion.basics import FileFormatError
-from selfmotion.formats.documents import ANGLES, LENGTHS
+from selfmotion.formats.documents import ANGLES, FORMER_CLEARANCE, LENGTHS
 from selfmotion.formats.models import document_model, path_model
 
 _UNITS = {"_deg": ANGLES, "_mm": LENGTHS}
@@ -25,8 +25,14 @@ def checked(document: Mapping[str, Any]) -> dict[str, Any]:
         A key is unknown, missing or has a value of the wrong kind; it is named.
     """
     raw = dict(document)
+    if FORMER_CLEARANCE in raw:
+        if "clearance" in raw:
+            raise FileFormatError(
+                f"{FORMER_CLEARANCE}: is the former name of clearance; give one of them"
+            )
+        raw["clearance"] = raw.pop(FORMER_CLEARANCE)
     switched: dict[str, Any] = {}
-    for name in ("collision", "damping"):
+    for name in ("clearance", "damping"):
         if isinstance(raw.get(name), bool):
             on = raw.pop(name)
             # Without damping there is none by default; self-collision is looked at.

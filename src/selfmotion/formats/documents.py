@@ -20,6 +20,8 @@ ANGLES = frozenset((*_BANDS, *_TURNS, *PER_JOINT))
 _SIZES = ("length", "radius", "rise", "rotary_center", "size", "standoff", "tolerance")
 _WAYS = ("amplitude", "by", "distance", "feed", "jump", "pitch", "position", "positions", "retreat")
 LENGTHS = frozenset((*_BANDS, *_WAYS, *_SIZES))
+# What files of before call `clearance`.
+FORMER_CLEARANCE = "collision"
 # Tables or lists in each other; files of the trade have less than ten.
 _DEEPEST = 50
 _SUFFIXES = {"_deg": (ANGLES, math.pi / 180.0), "_mm": (LENGTHS, 1e-3)}

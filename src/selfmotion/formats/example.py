@@ -21,7 +21,7 @@ _HEAD = """\
 # "#:schema ./problem.schema.json".
 
 task = "{task}"        # pose, position, pointing (rotation about the tool axis free), planar, …
-{start}{collision}    # leaves self-collision out
+{start}{clearance}    # leaves self-collision out
 
 """
 _START = """\
@@ -190,7 +190,7 @@ def example_texts(
     lock: Mapping[str, float] | None = None,
     arguments: Mapping[str, str] | None = None,
     packages: Sequence[str | FilePath] = (),
-    collision: bool = True,
+    clearance: bool = True,
 ) -> Iterator[str]:
     """Yield commented problem files to begin with, the one most likely to run first.
 
@@ -211,7 +211,7 @@ def example_texts(
         Whether a table that tilts and turns stands before the arm, and paths are on it.
     lock, arguments, packages : optional
         As of `load_robot`.
-    collision : bool
+    clearance : bool
         Whether the arm is kept from meeting itself.
 
     Raises
@@ -238,7 +238,7 @@ def example_texts(
         "command": "job" if job else "plan",
         "task": task.value,
         "away": _AWAY * arm.reach,
-        "collision": "# collision = false" if collision else "collision = false  ",
+        "clearance": "# clearance = false" if clearance else "clearance = false  ",
     }
     is_free = named or positioner
     starts = [(_RADII[0], None)] if is_free else list(_starts(arm, task, job))

@@ -495,6 +495,6 @@ class _Reader:
         turns = values.get("P", 1.0)
         if turns != round(turns) or not 1.0 <= turns <= _TURNS:
             raise self.machine.fault(
-                f"P of an arc is {turns:g}, expected how often it goes round: 1 to {_TURNS}"
+                f"P of an arc is {turns:g}, expected a number of turns: 1 to {_TURNS}"
             )
         return int(turns) - 1

@@ -4,6 +4,8 @@ Its keys: https://moveit.picknik.ai/main/doc/examples/robot_model_and_robot_stat
 on time parameterisation there.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any

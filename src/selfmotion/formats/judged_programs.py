@@ -182,7 +182,7 @@ def as_shifted(problem: Problem, program: ControllerProgram, begin: Array) -> Pr
     if len(between.joints) or problem.also:
         raise FileFormatError(
             f"its work object is shifted, and the path is given in '{robot.reference or WORLD}', "
-            f"which moves past it: plan anew with the part where it is"
+            f"which moves past it: plan again with the part where it is"
         )
     place = between.place(np.zeros(robot.dof))
     path = Placed(problem.path, place * program.shift * place.inverse())

@@ -4,8 +4,11 @@ So a class is described once, in Python: its keys, defaults and first line of do
 those of its parameters, and a class of one's own is known like ours.
 """
 
+from __future__ import annotations
+
 import dataclasses
 import inspect
+import sys
 from collections.abc import Iterable, Mapping
 from functools import lru_cache, reduce
 from operator import or_
@@ -69,8 +72,9 @@ _OWN: Mapping[str, _Fields] = {
     "spiral": {"start": (Pose, None), "center": (Numbers, ...), "normal": (Numbers, ...),
                **_PACED},
     "line": {"start": (Pose, None), "end": (Pose, None), "by": (Numbers, None), **_PACED},
-    "waypoints": _SHAPE,
-    "polyline": _SHAPE,
+    # Files say `quaternions`, which are w, x, y, z there.
+    "waypoints": {**_SHAPE, "quaternions": (Any, None)},
+    "polyline": {**_SHAPE, "quaternions": (Any, None)},
     "twist": {"start": (Pose, ...), "breaks": (Numbers, ...), "coefficients": (Numbers, ...)},
     "retimed": {"path": (Table, ...)},
     "section": {"path": (Table, ...)},
@@ -186,7 +190,7 @@ def _document_model(known: tuple[type, ...]) -> type[BaseModel]:
         "costs": (list[_one_of(costs.values(), "kind")], None),  # type: ignore[misc]
         "constraints": (list[_one_of(constraints.values(), "kind")], None),  # type: ignore[misc]
         "relaxations": (list[model_of(Relaxation)], None),  # type: ignore[misc]
-        "collision": (clearance, None),
+        "clearance": (clearance, None),
         "workpiece": (_model("Workpiece", of_workpiece), None),
         "damping": (model_of(Damping), None),
         "rest": (bool, True),
@@ -212,13 +216,37 @@ def model_of(
     own = _OWN.get(label, {}) if own is None else own
     fields: _Fields = {} if tag is None else {tag[0]: (Literal[tag[1]], ...)}
     alone = label in _WHOLLY_OWN or issubclass(cls, Obstacle)
-    parameters = {} if alone else inspect.signature(cls).parameters
+    parameters = {} if alone else _parameters(cls)
     for name, parameter in parameters.items():
         if name not in getattr(cls, "context", ()) and name not in own:
             default = ... if parameter.default is inspect.Parameter.empty else _default(parameter)
             fields[name] = (_type_of(parameter.annotation), default)
     about = (inspect.getdoc(cls) or "").partition("\n")[0]
     return _model(label, {**fields, **own}, about)
+
+
+def _parameters(cls: type) -> dict[str, inspect.Parameter]:
+    """Return what a class is made from, with types instead of their texts."""
+    names: dict[str, Any] = {}
+    for base in reversed(cls.__mro__):
+        # A script that was run has no module any more.
+        module = sys.modules.get(base.__module__)
+        names |= {} if module is None else vars(module)
+    parameters = inspect.signature(cls).parameters
+    return {
+        name: item.replace(annotation=_evaluated(item.annotation, names))
+        for name, item in parameters.items()
+    }
+
+
+def _evaluated(annotation: Any, names: dict[str, Any]) -> Any:
+    if not isinstance(annotation, str):
+        return annotation
+    try:
+        return eval(annotation, names)
+    except NameError:
+        # A name that only type checkers import; what has such a type may be anything.
+        return annotation
 
 
 def _model(label: str, fields: _Fields, about: str = "") -> type[BaseModel]:
@@ -258,6 +286,7 @@ def _placed(cls: type[Obstacle], rides: bool) -> _Fields:
     """Return an obstacle's fields with its pose as position and orientation."""
     orientations: _Fields = {key: (Numbers, None) for key in ORIENTATIONS}
     fields: _Fields = {}
+    parameters = _parameters(cls)
     for item in dataclasses.fields(cls):
         if item.name == "pose":
             # Meshes have a place of their own, and what rides on something has its frame.
@@ -265,7 +294,7 @@ def _placed(cls: type[Obstacle], rides: bool) -> _Fields:
             fields |= {"position": (Numbers, None if known else ...), **orientations}
         else:
             default = ... if item.default is dataclasses.MISSING else item.default
-            kind = Text if item.name == "file" else _type_of(item.type)
+            kind = Text if item.name == "file" else _type_of(parameters[item.name].annotation)
             fields[item.name] = (kind, default)
     return fields
 

@@ -18,7 +18,7 @@ def write_parts(
     file: str | Path,
     *,
     rate: float | None = None,
-    form: str | None = None,
+    format: str | None = None,
     force: bool = False,
 ) -> dict[str, Path]:
     """Write the motion of a cell in a file for each part: part → file.
@@ -30,7 +30,7 @@ def write_parts(
     Raises
     ------
     FileFormatError
-        The form is unknown, or a file cannot be written.
+        The format is unknown, or a file cannot be written.
     ProblemError
         The robot has no parts, the rate gives no samples, or a part has what the format cannot say.
     """
@@ -44,7 +44,7 @@ def write_parts(
             f"is written part by part"
         )
     path = as_path(file)
-    name = form_of(path, form)
+    name = form_of(path, format)
     if name not in WRITERS:
         raise FileFormatError(f"{path}: a program moves all joints of a cell; it has no parts")
     check_verified(plan, path, as_flag(force, "force"))

@@ -47,7 +47,7 @@ def write_motion(
     file: str | Path,
     *,
     rate: float | None = None,
-    form: str | None = None,
+    format: str | None = None,
     settings: ProgramSettings | None = None,
     force: bool = False,
     progress: Progress = silent,
@@ -77,7 +77,7 @@ def write_motion(
         Samples per second; by default those of the plan: few, whose quintics are its motion, as
         controllers of ROS 2 join them (URScript: 125). Messages of ROS have the coarsest rate at
         which straight lines keep the plan's tolerance, where that is fewer.
-    form : str, optional
+    format : str, optional
         By default the one that has the file's suffix.
     settings : ProgramSettings, optional
         Of a controller's program (``urscript``, ``krl``, ``rapid``): outputs, tool, load, approach.
@@ -91,7 +91,7 @@ def write_motion(
     Raises
     ------
     FileFormatError
-        The form is unknown, or the file cannot be written.
+        The format is unknown, or the file cannot be written.
     ProblemError
         The rate gives no samples, or the arm has what the format cannot say.
     PlanError
@@ -104,7 +104,7 @@ def write_motion(
         raise ProblemError(f"settings are {shown(settings)}, expected ProgramSettings")
     as_called(progress, "progress")
     path = as_path(file)
-    name = form_of(path, form)
+    name = form_of(path, format)
     check_verified(plan, path, as_flag(force, "force"))
     check_ends(plan, path, force)
     if name in PROGRAMS.values() or _is_linear(name, settings):
@@ -150,18 +150,18 @@ def check_verified(plan: Plan | Parts | Move | Program, file: Path, force: bool)
 
 
 def form_of(path: Path, form: str | None) -> str:
-    """Return the form of a file."""
+    """Return the format of a file."""
     ending = path.suffix.lower()
     own = ending in PROGRAMS
     name = SUFFIXES.get(ending) if form is None else form
     if name is None or name not in FORMS:
         known = ", ".join(f"{form} ({suffix})" for suffix, form in SUFFIXES.items())
-        found = f"suffix '{path.suffix}'" if form is None else f"form '{form}'"
+        found = f"suffix '{path.suffix}'" if form is None else f"format '{form}'"
         raise FileFormatError(f"{path}: {found} is no format of motions: {known}, moveit")
     if PROGRAMS.get(ending, name) != name or (name in PROGRAMS.values() and not own):
         # Controllers, and what reads their programs, go by the suffix.
         suffix = next((end for end, each in PROGRAMS.items() if each == name), "another suffix")
-        raise FileFormatError(f"{path}: form '{name}' is written with {suffix}")
+        raise FileFormatError(f"{path}: format '{name}' is written with {suffix}")
     return name
 
 
@@ -170,7 +170,7 @@ def read_motion(
 ) -> Trajectory:
     r"""Read a motion that `write_motion`, or something else, wrote.
 
-    In the forms ``csv``, ``npz``, ``json``, ``ros``, ``moveit`` and ``bag``, and programs.
+    In the formats ``csv``, ``npz``, ``json``, ``ros``, ``moveit`` and ``bag``, and programs.
     With accelerations where the file has them; see `Trajectory`. With `degrees` all coordinates are
     taken for angles in degrees, in any format.
 

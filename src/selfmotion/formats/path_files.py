@@ -1,5 +1,7 @@
 """Tool motions from files: tables, arrays, what ROS writes, programs of machine tools, drawings."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path as FilePath
 from typing import Any
@@ -67,8 +69,8 @@ def read_path(
       [mm]``; ``pos_x``, ``pose.position.x``, ``px`` and ``tx`` are ``x``, and ``orientation.x`` and
       ``quat_x`` are ``qx``; ``seam`` names the seam that a pose is of, ``event`` what happens there
       (``arc on; gas on``: both)
-    - ``.npy``: (N, 4, 4) poses, or a table (N, 3) x,y,z; (N, 4) t,x,y,z; (N, 7)
-      x,y,z,qw,qx,qy,qz; (N, 8) with t first
+    - ``.npy``: (N, 4, 4) poses, (N, 3) x,y,z or (N, 4) t,x,y,z; any other table
+      with `columns`, which say in which order quaternions are
     - ``.yaml .json``: ROS ``nav_msgs/Path``, ``geometry_msgs/PoseArray``, or poses in a list or by
       names (``waypoints``, ``poses``, parameters of a node): ``position`` and ``orientation``,
       columns of a table by name, or 4 × 4 matrices
@@ -146,7 +148,8 @@ def read_path(
     standoff : float
         How far the tool's tip is held back from the poses, along its z axis [m].
     columns : sequence of str, optional
-        Names of a table's columns, in place of its header or where it has none; "-" leaves one out.
+        Names of the columns of a table or of an array, in place of a header or where there is none;
+        "-" leaves one out.
     rotary : {"head", "table"}, optional
         What ``A B C`` of G-code turn, where it does not say ``G43.4``: the head, positions being
         those of the tip in the part, or a table with the part on it, positions being the machine's.

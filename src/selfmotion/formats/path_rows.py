@@ -2,13 +2,14 @@
 
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path as FilePath
 from typing import Any
 
 import numpy as np
 
 from selfmotion.basics import (
+    LEFT_OUT,
     Array,
     FileFormatError,
     ProblemError,
@@ -23,8 +24,9 @@ from selfmotion.formats.ros import nanoseconds
 from selfmotion.formats.rotary import Rotary
 
 _POSITION = ("x", "y", "z")
-# Suffixes of tables, and of G-code.
+# Suffixes of tables, of an array and of G-code.
 TABLES = (".csv", ".txt", ".tsv")
+ARRAY = ".npy"
 PROGRAMS = (".nc", ".ngc", ".gcode", ".tap", ".cnc", ".eia", ".mpf", ".g", ".gc", ".gco")
 
 
@@ -45,6 +47,8 @@ _HEADERS = {
     7: "x,y,z,qw,qx,qy,qz",
     8: "t,x,y,z,qw,qx,qy,qz",
 }
+# What the columns of an array are where nothing else is said.
+_ARRAYS = {3: ("x", "y", "z"), 4: ("t", "x", "y", "z")}
 # Units in brackets behind a title → what its name ends in; other names of columns.
 _BRACKETS = {"mm": "_mm", "mm/s": "_mm", "deg": "_deg", "°": "_deg", "degrees": "_deg"}
 _BRACKETS |= {"cm": "_cm", "cm/s": "_cm", "in": "_in", "inch": "_in", "in/s": "_in"}
@@ -170,7 +174,7 @@ class Reading:
             columns = columns.split(",")
         if not isinstance(columns, list | tuple) or not all(isinstance(x, str) for x in columns):
             raise FileFormatError(f"{file}: columns is {shown(columns)}, expected names")
-        if file.suffix.lower() not in TABLES:
+        if file.suffix.lower() not in (*TABLES, ARRAY):
             raise FileFormatError(f"{file}: columns has no effect: it is no table; drop it")
         return cls(tuple(name.strip() for name in columns))
 
@@ -331,21 +335,34 @@ def _meant(file: FilePath, title: str) -> tuple[str, float]:
     return name, scale
 
 
-def _read_array(file: FilePath) -> PoseRows:
+def _read_array(file: FilePath, reading: Reading) -> PoseRows:
     (array,) = read_arrays(file).values()
     if array.dtype.kind not in "iuf":
         raise FileFormatError(f"{file}: holds no array of numbers")
     places = [f"row {k}" for k in range(1, 1 + (len(array) if array.ndim else 0))]
     if array.ndim == 3 and array.shape[1:] == (4, 4):
         return PoseRows(places, array[:, :3, 3] * 1.0, "rotation", array[:, :3, :3] * 1.0, None)
-    if array.ndim != 2 or array.shape[1] not in (3, 4, 7, 8):
+    if array.ndim != 2:
         raise FileFormatError(
-            f"{file}: has shape {array.shape}, expected (N, 4, 4) poses, or (N, 3) x,y,z, "
-            f"(N, 4) t,x,y,z, (N, 7) x,y,z,qw,qx,qy,qz, (N, 8) with t first"
+            f"{file}: has shape {array.shape}, expected (N, 4, 4) poses, or a table (N, C)"
         )
-    t = array[:, 0] * 1.0 if array.shape[1] in (4, 8) else None
-    rest = array[:, 1:] * 1.0 if t is not None else array * 1.0
-    return PoseRows(places, rest[:, :3], "quaternion" if rest.shape[1] == 7 else "", rest[:, 3:], t)
+    columns = reading.columns or _ARRAYS.get(array.shape[1])
+    if columns is None and array.shape[1] in (7, 8):
+        before = "t," * (array.shape[1] == 8)
+        raise FileFormatError(
+            f"{file}: has shape {array.shape}, which does not say in which order quaternions are; "
+            f"give columns ('{before}x,y,z,qw,qx,qy,qz' or '{before}x,y,z,qx,qy,qz,qw')"
+        )
+    if columns is None or len(columns) != array.shape[1]:
+        named = "no columns" if columns is None else f"{len(columns)} columns"
+        raise FileFormatError(
+            f"{file}: has shape {array.shape} and {named} are named, expected (N, 4, 4) poses, "
+            f"(N, 3) x,y,z, (N, 4) t,x,y,z, or a name in columns for each"
+        )
+    kept = [k for k, name in enumerate(columns) if name != LEFT_OUT]
+    numbers = array[:, kept] * 1.0
+    rows = rows_of_table(file, [columns[k] for k in kept], numbers, range(1, 1 + len(array)), {})
+    return replace(rows, places=places)
 
 
 # What a list of messages may be called.
@@ -452,7 +469,7 @@ def _stamp(file: FilePath, place: str, given: Mapping[str, Any]) -> float | None
 
 READERS: Mapping[str, Callable[[FilePath, Reading], Mapping[str, PoseRows]]] = {
     **dict.fromkeys(TABLES, read_tables),
-    ".npy": lambda file, _: {"": _read_array(file)},
+    ARRAY: lambda file, reading: {"": _read_array(file, reading)},
     ".yaml": lambda file, _: _read_ros(file),
     ".yml": lambda file, _: _read_ros(file),
     ".json": lambda file, _: _read_ros(file),

@@ -1,5 +1,7 @@
 """From a problem file to a problem, and how to plan it."""
 
+from __future__ import annotations
+
 import json
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -164,7 +166,7 @@ class _Reader:
         ):
             if name in table:
                 options[name] = self._each(name, make)
-        for name, kind in (("collision", self._clearance), ("damping", lambda v: Damping(**v))):
+        for name, kind in (("clearance", self._clearance), ("damping", lambda v: Damping(**v))):
             if name in table:
                 with _named(file, name):
                     options[name] = None if table[name] is None else kind(table[name])

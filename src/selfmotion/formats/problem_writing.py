@@ -86,8 +86,11 @@ def _plain(value: Any) -> Any:
 def problem_table(problem: Problem) -> dict[str, Any]:
     """Return the table of a problem file; see `write_problem`."""
     table = problem_to_dict(problem, _robot, _described)
-    if isinstance(table.get("collision"), dict):
-        del table["collision"]["kind"]
+    if "collision" in table:
+        # Plans' files have the name that it had when their format was made.
+        table["clearance"] = table.pop("collision")
+    if isinstance(table.get("clearance"), dict):
+        del table["clearance"]["kind"]
     return {key: _without_none(value) for key, value in table.items()}
 
 
@@ -157,7 +160,7 @@ def _check_calibration(robot: RobotModel, known: RobotModel) -> None:
     if any(placements[name] != place for name, place in _placements(known).items()):
         raise ProblemError(
             f"{robot.name}: its joints are elsewhere than its calibration file says now, so that "
-            f"a problem file would name another arm; load it anew"
+            f"a problem file would name another arm; load it again"
         )
 
 
@@ -171,6 +174,12 @@ def _placements(robot: RobotModel) -> dict[str, dict[str, str]]:
 def _check_unchanged(robot: RobotModel, tools: list[str]) -> None:
     """Refuse a cell whose parts' files are no longer those that it was made of."""
     given = robot.urdf.parts
+    for part in given:
+        if part.source not in {**NAMED_ARMS, **NAMED_PARTS} and not is_file(FilePath(part.source)):
+            raise ProblemError(
+                f"{robot.name}: part '{part.name}' is of {part.source}, and in no file that a "
+                f"problem file could name; write its URDF to one and load it from there"
+            )
     now = load_robot(
         {part.name: part.source for part in given},
         tools,
@@ -186,7 +195,7 @@ def _check_unchanged(robot: RobotModel, tools: list[str]) -> None:
     if now.urdf.bare_text() != robot.urdf.bare_text():
         raise ProblemError(
             f"{robot.name}: the files of its parts have changed since it was loaded, so that a "
-            f"problem file would name another cell; load it anew"
+            f"problem file would name another cell; load it again"
         )
     _check_limits(robot, now)
 

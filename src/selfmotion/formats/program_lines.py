@@ -171,7 +171,7 @@ class Lines:
         if any(_has_poses(row) for row in rows):
             if robot is None or places is None:
                 raise FileFormatError(
-                    f"{self._file}: has tool poses, whose joints only the robot tells: give it "
+                    f"{self._file}: has tool poses, whose joint positions need the robot: give it "
                     f"(read_motion(file, robot=…), check --robot)"
                 )
             frames = places.frames(robot, axes, self._file)

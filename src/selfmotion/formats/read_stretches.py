@@ -274,7 +274,7 @@ class Follower:
     def _known(self) -> tuple[ToolFrames, list[int]]:
         """Return the frames, and which of the robot's joints each axis of the file is."""
         if self.frames is None:
-            raise FileFormatError(f"{self.file}: has poses, whose joints only the robot tells")
+            raise FileFormatError(f"{self.file}: has poses, whose joint positions need the robot")
         names = self.frames.robot.joint_names
         return self.frames, [names.index(axis.joint) for axis in self.axes]
 

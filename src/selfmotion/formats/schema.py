@@ -41,7 +41,7 @@ def json_schema() -> dict[str, Any]:
     known[_MOTION] = keys["path"]
     _made_of_others(known)
     keys |= {"path": _of(_MOTION), "seams": _seams(schema), "job": _job(schema)}
-    for name in ("collision", "damping"):
+    for name in ("clearance", "damping"):
         keys[name] = {"anyOf": [_FLAG, keys[name]]}
     schema["required"] = [name for name in schema["required"] if name != "path"]
     _note(schema)

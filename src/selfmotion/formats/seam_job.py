@@ -9,7 +9,7 @@ import numpy as np
 
 from selfmotion.basics import FileFormatError, SelfmotionError, as_path, is_file, nearest, shown
 from selfmotion.constraints import Clearance
-from selfmotion.formats.documents import in_si, read_document
+from selfmotion.formats.documents import FORMER_CLEARANCE, in_si, read_document
 from selfmotion.formats.job import Job
 from selfmotion.formats.path_events import times_of_events
 from selfmotion.formats.path_files import one_seam, read_path, read_seams
@@ -24,7 +24,7 @@ from selfmotion.problem import NO_OVERLAP, Problem
 from selfmotion.robot import RobotModel
 
 # Keys of what seams share, of a job, of a seam besides those of a problem, of seams in one table.
-SHARED = ("robot", NAME, "task", "costs", "constraints", "joint_limits", "relaxations", "collision")
+SHARED = ("robot", NAME, "task", "costs", "constraints", "joint_limits", "relaxations", "clearance")
 JOB = ("start", "end", "order", "branches", "seconds_per_cost", "deadline", "rng")
 SEAM = ("name", "either_way", "after", "after_any", "wait", "events", "leaves", "may_meet")
 OF_PROBLEM = ("path", "task", "costs", "constraints", "relaxations")
@@ -142,7 +142,7 @@ def seam_job_of(
             f"beside them"
         )
     for key in shared:
-        if key not in SHARED:
+        if key not in (*SHARED, FORMER_CLEARANCE):
             raise FileFormatError(
                 f"{file}: {key}: has no effect on a job{nearest(key, SHARED)}; leave it out; what "
                 f"holds for all seams is {', '.join(SHARED)}; the rest is of [job], or of a seam"
@@ -158,8 +158,8 @@ def seam_job_of(
         raise FileFormatError(f"{file}: constraints: two clearances, expected one for all")
     options = reader.settings(settings)
     kept = [item for item in reader.shared if not isinstance(item, Clearance)]
-    clearance = apart[0] if apart else whole.problem.collision
-    if apart or whole.problem.collision is not NO_OVERLAP:
+    clearance = apart[0] if apart else whole.problem.clearance
+    if apart or whole.problem.clearance is not NO_OVERLAP:
         options["clearance"] = clearance
     return SeamJob(whole.problem.robot, tuple(seams), {**options, "constraints": kept})
 

@@ -90,13 +90,13 @@ def _with_bodies(table: dict[str, Any], bodies: list[dict[str, Any]]) -> dict[st
         if item["kind"] == "Clearance":
             constraints[k] = {**item, "obstacles": [*item.get("obstacles", []), *bodies]}
             return {**table, "constraints": constraints}
-    collision = table.get("collision", {})
-    if collision is None:
+    clearance = table.get("clearance", {})
+    if clearance is None:
         raise ProblemError(
-            "workpiece: has bodies, but collision is false, and no constraint is a Clearance"
+            "workpiece: has bodies, but clearance is false, and no constraint is a Clearance"
         )
-    several = [*collision.get("obstacles", []), *bodies]
-    return {**table, "collision": {"distance": 0.0, **collision, "obstacles": several}}
+    several = [*clearance.get("obstacles", []), *bodies]
+    return {**table, "clearance": {"distance": 0.0, **clearance, "obstacles": several}}
 
 
 def standing(document: Mapping[str, Any]) -> tuple[SE3, str | None]:

@@ -11,5 +11,6 @@ from selfmotion.job.run import plan_job as plan_job
 from selfmotion.job.seam import Seam as Seam, are_opposite as are_opposite
 from selfmotion.job.specification import Specification as Specification
 from selfmotion.job.step import Step as Step
+from selfmotion.job.timetable import write_timetable as write_timetable
 
 __all__ = ["FeedFound", "Specification", "Step", "highest_feed"]

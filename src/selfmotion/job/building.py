@@ -100,7 +100,7 @@ class Builder:
             self._ordering.learn(*pair, seconds)
             if not move.verified:
                 names = self._ordering.name_of_move(*pair)
-                self._notes.append(f"'{names}' is given up: {move.trouble}")
+                self._notes.append(f"'{names}' is dropped: {move.trouble}")
 
     def _ends_of(self, pair: Pair) -> tuple[Array, Array]:
         """Return where a move begins and ends, (n,) each."""

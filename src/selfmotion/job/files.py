@@ -1,5 +1,7 @@
 """Programs as files, and what a job has finished so far."""
 
+from __future__ import annotations
+
 import math
 import re
 from collections.abc import Callable, Mapping, MutableMapping, Sequence

@@ -212,7 +212,7 @@ class Growing:
         seam = self._ordering.states[state].seam
         self._troubles.pop(seam, None)
         self._troubles[seam] = past, q, why
-        self._notes[f"'{self._ordering.name_of(state)}' is made otherwise: {why}"] = None
+        self._notes[f"'{self._ordering.name_of(state)}' is planned differently: {why}"] = None
 
     def _otherwise(self, states: Sequence[int]) -> Sequence[int]:
         """Return an order with other ways to make seams that did not go, or without some seam."""

@@ -79,7 +79,7 @@ class Ordering:
     Raises
     ------
     ProblemError
-        What has to come first goes round in a circle, or comes later in the order that is given.
+        What has to come first is circular, or comes later in the order that is given.
     """
 
     def __init__(
@@ -169,7 +169,7 @@ class Ordering:
             self.missing[seam.name] = (
                 f"it comes after '{gone[0]}', which is not made"
                 if gone
-                else "none of what it stands on is made before it"
+                else "nothing that supports it is made before it"
             )
 
     def _never(self) -> list[int]:
@@ -190,7 +190,7 @@ class Ordering:
         if not self._never():
             return
         if self.is_free:
-            raise ProblemError("what seams have to come after goes round in a circle")
+            raise ProblemError("the order of seams (after=) is circular")
         raise ProblemError(
             "the seams are in an order in which one comes before what it has to come after; "
             "give order='free', or another list"

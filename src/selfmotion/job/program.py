@@ -6,8 +6,8 @@ from functools import cached_property
 from itertools import accumulate
 from pathlib import Path as FilePath
 
-from selfmotion.basics import PlanError, as_path, write_text
-from selfmotion.certificate import Tolerance
+from selfmotion.basics import PlanError, as_path
+from selfmotion.certificate import Tolerance, first_of
 from selfmotion.collision import Obstacle
 from selfmotion.constraints import Clearance
 from selfmotion.job.specification import Specification
@@ -130,13 +130,18 @@ class Program:
     def verdict(self) -> str:
         """One line: verified, or what is wrong with which seam or move."""
         if self.verified:
-            alone = "" if self.specification else "; nothing says what was asked for"
+            alone = "" if self.specification else "; the file does not say what was asked for"
             reached = reached_text(list(self.plans.values()), self.tolerance)
             return (
                 f"verified at all times: {self.extent}, and all moves in between, from rest to "
                 f"rest; {reached}{alone}"
             )
         return f"not verified: {'; '.join(self.failures)}"
+
+    @property
+    def summary(self) -> str:
+        """The verdict in short: of what is wrong the first."""
+        return self.verdict if self.verified else first_of(self.failures)
 
     @cached_property
     def failures(self) -> tuple[str, ...]:
@@ -178,7 +183,7 @@ class Program:
         for step in self.steps:
             met = step.meets(standing, apart)
             if met:
-                yield f"'{step.name}' is not judged against '{met[0]}', which stands there by then"
+                yield f"'{step.name}' is not checked against '{met[0]}', which is there by then"
             standing |= {item.name: item for item in step.leaves}
 
     def _beyond(self) -> Iterator[str]:
@@ -205,24 +210,6 @@ class Program:
         if not self.verified:
             raise PlanError(f"{self.robot.name}: {self.verdict}")
         return self
-
-    def write_timetable(self, file: str | FilePath) -> None:
-        """Write when each step begins and ends, and each event is [s], as CSV; atomically.
-
-        Events at one time are in the order in which they were given.
-        """
-        rows = list[tuple[float, float, str, str]]()
-        for begin, step in zip(self.begins, self.steps, strict=True):
-            kind = "seam" if step.is_seam else "move"
-            rows.append((begin, begin + step.duration, kind, step.name))
-            for event, at in step.happenings:
-                rows.append((begin + at, begin + at, "event", f"{step.name}: {event}"))
-        lines = ["begin,end,kind,name"]
-        lines += [
-            f'{begin:.6f},{end:.6f},{kind},"{name.replace(chr(34), chr(34) * 2)}"'
-            for begin, end, kind, name in rows
-        ]
-        write_text(as_path(file), "\n".join(lines) + "\n")
 
     def save(self, file: str | FilePath) -> None:
         """Write the program, without loss, to a file that `load_program` reads; atomically."""

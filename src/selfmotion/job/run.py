@@ -1,5 +1,7 @@
 """From seams to a program."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Sequence
 from concurrent.futures import Executor
@@ -81,7 +83,7 @@ def plan_job(
     constraints : sequence of Constraint
         What all seams and moves must keep; see `Problem`.
     clearance : Clearance, optional
-        What keeps the arm apart from obstacles and itself; see `Problem.collision`.
+        What keeps the arm apart from obstacles and itself; see `Problem.clearance`.
     branches : int
         Motions in different configurations that are planned for each seam.
     seconds_per_cost : float
@@ -99,7 +101,7 @@ def plan_job(
     warm_start : Program, optional
         An earlier program of this job, or of one like it, as when a part was moved: seams and moves
         that did not change are kept, others begin at its motions, in its order where it made the
-        same seams. Where no verified program comes of that, all is planned anew.
+        same seams. Where no verified program comes of that, all is replanned.
     rng : int
         Seed of all random numbers.
     progress : callable, optional
@@ -120,7 +122,7 @@ def plan_job(
     PlanError
         No seam has a motion.
     ProblemError
-        An argument is not what it should be, or what has to come first goes round in a circle.
+        An argument is not what it should be, or what has to come first is circular.
     KeyboardInterrupt
         It was interrupted; what is finished by then is in the folder, where there is one.
     """
@@ -182,7 +184,7 @@ def _slowest(seam: Seam) -> float:
 
 def _checked_constraints(constraints: Sequence[Constraint]) -> tuple[Constraint, ...]:
     listed = as_several(constraints, "constraints", Constraint)
-    check_all_times(listed, "give it to a seam that is made one way (either_way=False)")
+    check_all_times(listed, "give it to a seam that has one direction (either_way=False)")
     for item in listed:
         if isinstance(item, Clearance):
             raise ProblemError(

@@ -1,5 +1,7 @@
 """One of the seams of a job."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 

@@ -1,5 +1,7 @@
 """What a job asks for, which its program is held against."""
 
+from __future__ import annotations
+
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from typing import Any
@@ -70,7 +72,7 @@ class Specification:
         made = [step.name for step in steps if step.is_seam]
         for name in dict.fromkeys(made):
             if name not in seams:
-                yield f"nobody asked for seam '{name}'"
+                yield f"there is an extra seam '{name}'"
             elif made.count(name) > 1:
                 yield f"seam '{name}' is made {made.count(name)} times"
         if not seams.keys() >= set(made):
@@ -97,7 +99,7 @@ class Specification:
             if late:
                 yield f"seam '{name}' is made before '{late[0]}', after which it has to come"
             if seam.after_any and before.isdisjoint(seam.after_any):
-                yield f"seam '{name}' is made before any of those on which it stands"
+                yield f"seam '{name}' is made before any of those that support it"
 
     def _ends(self, robot: RobotModel, steps: Sequence[Step]) -> Iterator[str]:
         """Yield where it begins or ends elsewhere; moves that were not found are told elsewhere."""
@@ -151,7 +153,7 @@ class Specification:
         }
 
     @classmethod
-    def from_dict(cls, values: Mapping[str, Any], robot: RobotModel) -> "Specification":
+    def from_dict(cls, values: Mapping[str, Any], robot: RobotModel) -> Specification:
         """Return what `to_dict` described."""
         ends = (values[end] for end in ("start", "end"))
         start, end = (None if q is None else robot.configuration(q) for q in ends)
@@ -187,7 +189,7 @@ def _moves(steps: Sequence[Step], seams: Mapping[str, Seam]) -> Iterator[str]:
             yield f"'{step.name}' is there twice"
         added = [*(event for event, _ in step.events), *(item.name for item in step.leaves)]
         if added:
-            yield f"'{step.name}' has '{added[0]}', which nobody asked of a move or a wait"
+            yield f"'{step.name}' has '{added[0]}', which was not asked of a move or a wait"
         may = {name for side in (before, after) if side in seams for name in seams[side].may_meet}
         if not set(step.may_meet) <= may:
             yield f"'{step.name}' may meet more than the seams beside it"

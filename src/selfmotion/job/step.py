@@ -75,7 +75,7 @@ class Step:
         return "" if check.verified else f"seam '{self.name}': {check.verdict}"
 
     def meets(self, standing: Mapping[str, Obstacle], apart: Clearance | None = None) -> list[str]:
-        """Return the names of what it is not judged against, though it stands there.
+        """Return the names of what it is not checked against, though it stands there.
 
         With `apart`, at its distance or more: another requirement may be about the same bodies.
         """

@@ -91,7 +91,7 @@ class Asked:
             seam.task,
             constraints=(*self.constraints, *seam.constraints),
             relaxations=tuple(seam.relaxations),
-            collision=self.apart(standing),
+            clearance=self.apart(standing),
         )
         if seam.costs is not None:
             given = replace(given, costs=tuple(seam.costs))

@@ -1,5 +1,7 @@
 """What a program survives: margins as values, and in words."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -50,7 +52,7 @@ class Displacement:
     def reason(self) -> str:
         """What stops it, in which direction and when, in words."""
         if not self.stops:
-            return "nothing is met as far as was looked"
+            return "no contact in the range that was searched"
         towards = ""
         if self.direction is not None:
             what = "towards" if self.position or not self.rotation else "about"

@@ -1,5 +1,7 @@
 """By how much part, tool and base may be displaced before a program fails that runs unchanged."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,5 +1,7 @@
 """What a plan lacks of a margin that is wanted."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple

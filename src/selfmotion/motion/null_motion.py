@@ -1,5 +1,7 @@
 """The null motion ε(t), linear in the coefficients x that are optimised: ε(t) = R(t) E φ(t)."""
 
+from __future__ import annotations
+
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import Any

@@ -1,5 +1,7 @@
 """A joint motion over time."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -98,7 +100,7 @@ class Trajectory:
         )
 
     @classmethod
-    def from_csv(cls, file: str | Path, *, degrees: bool = False) -> "Trajectory":
+    def from_csv(cls, file: str | Path, *, degrees: bool = False) -> Trajectory:
         """Read a motion that something else made.
 
         The columns are ``t`` [s], one per joint for q under the joint's name [rad or m], and
@@ -133,7 +135,7 @@ class Trajectory:
         """What tells it from any other motion: a digest of all its numbers and names."""
         return digest_of(self.joint_names, self.t, self.q, self.qd, self.qdd)
 
-    def of_joints(self, names: Sequence[str]) -> "Trajectory":
+    def of_joints(self, names: Sequence[str]) -> Trajectory:
         """Return the same motion with its joints in another order.
 
         Raises
@@ -283,7 +285,7 @@ class Trajectory:
         t = np.arange(count + 1) / rate
         return np.append(t, self.duration) if self.duration - t[-1] > _MOMENT else t
 
-    def sample(self, rate: float) -> "Trajectory":
+    def sample(self, rate: float) -> Trajectory:
         """Return the motion at `rate` samples per second [1/s], the last one at its end.
 
         Raises

@@ -1,5 +1,7 @@
 """What every tool motion offers."""
 
+from __future__ import annotations
+
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -125,7 +127,7 @@ class Path(Saved, ABC, family="path"):
         """Return bounds of all derivatives, for proofs; None where they are not known.
 
         For intervals of these middles and half widths (I,) [s], none of which contains a mark. A
-        path without is judged as measured between its marks, and the verdict says so.
+        path without is checked at samples only, and the verdict says so.
         """
         return None
 
@@ -148,7 +150,7 @@ class Path(Saved, ABC, family="path"):
             )
         return self.evaluate(np.clip(times, 0.0, self.duration))
 
-    def noted(self, notes: Iterable[str]) -> "Path":
+    def noted(self, notes: Iterable[str]) -> Path:
         """Give the path notes, unless there are none; return it."""
         found = tuple(notes)
         if found:
@@ -156,11 +158,11 @@ class Path(Saved, ABC, family="path"):
             object.__setattr__(self, "notes", found)
         return self
 
-    def at_constant_speed(self) -> "Path":
+    def at_constant_speed(self) -> Path:
         """Return the same path at a pace at which it rests nowhere, where it knows one."""
         return self
 
-    def __add__(self, other: "Path") -> "Path":
+    def __add__(self, other: Path) -> Path:
         """Return this path and then the other one; see `Joined`."""
         from selfmotion.path.joined import Joined
 

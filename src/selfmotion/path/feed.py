@@ -1,5 +1,7 @@
 """A path at a constant feed."""
 
+from __future__ import annotations
+
 from collections.abc import Iterator, Mapping
 from functools import cached_property
 from typing import Any
@@ -253,7 +255,7 @@ class Feed(_Derived, kind="feed"):
         """Turn rate, accelerations and smoothing, by their names, and the fastest feed."""
         return self._limits
 
-    def changed(self, feeds: Mapping[float, float], **limits: float) -> "Feed":
+    def changed(self, feeds: Mapping[float, float], **limits: float) -> Feed:
         """Return the same with other feeds in place of some [m/s], and other limits by name."""
         asked = self._asked.copy()
         for old, new in feeds.items():
@@ -262,7 +264,7 @@ class Feed(_Derived, kind="feed"):
         stretches = asked if len(asked) > 1 else None
         return Feed(self._path, **changed, within=self._within, stretches=stretches)
 
-    def along(self, path: Path, later: float) -> "Feed":
+    def along(self, path: Path, later: float) -> Feed:
         """Return the same along a longer path, on which the original begins `later` [s].
 
         Before it the feed is that of its begin.
@@ -272,7 +274,7 @@ class Feed(_Derived, kind="feed"):
         stretches = asked[1:] if len(asked) > 1 else None
         return Feed(path, **changed, within=self._within, stretches=stretches)
 
-    def slower(self, factor: float) -> "Feed":
+    def slower(self, factor: float) -> Feed:
         """Return the same motion, taking `factor` times as long.
 
         Feed and turn rate are smaller by the factor, accelerations by its square, and the smoothing

@@ -1,5 +1,7 @@
 """Tool motions one after the other, and waiting in between."""
 
+from __future__ import annotations
+
 import itertools
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -65,7 +67,7 @@ class Dwell(Path, kind="dwell"):
 
 def with_leads(
     path: Path, length: float, duration: float, *, axis: npt.ArrayLike = (0.0, 0.0, -1.0)
-) -> "Joined":
+) -> Joined:
     """Return a path with a straight lead-in and lead-out, each from rest to rest.
 
     Parameters
@@ -198,7 +200,7 @@ class Joined(Path, kind="joined"):
         return {"kind": self.kind, "pieces": [piece.to_dict() for piece in self.pieces]}
 
     @classmethod
-    def from_dict(cls, values: Mapping[str, Any], **context: Any) -> "Joined":
+    def from_dict(cls, values: Mapping[str, Any], **context: Any) -> Joined:
         """See `Saved.from_dict`."""
         return cls([restore(Path, piece) for piece in values["pieces"]])
 

@@ -1,5 +1,7 @@
 """A tool motion given in a frame of its own, such as that of the workpiece."""
 
+from __future__ import annotations
+
 from typing import Any
 
 import numpy as np
@@ -34,7 +36,7 @@ class Placed(_InStep, kind="placed"):
         self._frame = path_pose(frame, "placed path: frame")
         self.duration = path.duration
 
-    def at_constant_speed(self) -> "Placed":
+    def at_constant_speed(self) -> Placed:
         """See `Path.at_constant_speed`: as the original."""
         return Placed(self._path.at_constant_speed(), self._frame)
 

@@ -1,8 +1,10 @@
 """Straight legs with rounded corners."""
 
-from collections.abc import Sequence
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -10,7 +12,7 @@ import numpy.typing as npt
 from selfmotion.basics import Array, PathError, as_number, as_numbers, read_only, series, shown
 from selfmotion.path.base import Path, PathSamples, PathSeries, path_pose, rotvecs, unit
 from selfmotion.path.merging import merged
-from selfmotion.path.waypoint_arguments import scalar_first
+from selfmotion.path.waypoint_arguments import of_file, scalar_first
 from selfmotion.task import SE3, Quaternion
 
 if TYPE_CHECKING:
@@ -46,7 +48,7 @@ class Polyline(Path, kind="polyline"):
     ----------
     positions : (N, 3)
         [m], world axes.
-    quaternions : (N, 4) or scipy.spatial.transform.Rotation, optional
+    quaternions_wxyz : (N, 4) or scipy.spatial.transform.Rotation, optional
         Orientations [w, x, y, z]; normalised, either sign. Rotations of SciPy know their order,
         numbers have to be in this one. By default none is prescribed, for
         tasks that leave it free ('position').
@@ -65,16 +67,16 @@ class Polyline(Path, kind="polyline"):
     def __init__(
         self,
         positions: npt.ArrayLike,
-        quaternions: "npt.ArrayLike | Rotation | None" = None,
+        quaternions_wxyz: npt.ArrayLike | Rotation | None = None,
         *,
         tolerance: float = 1e-3,
         turn_tolerance: float = 1e-2,
     ) -> None:
         points = as_numbers(positions, "polyline: positions", error=PathError)
-        self._oriented = quaternions is not None
-        if quaternions is None:
-            quaternions = np.tile([1.0, 0.0, 0.0, 0.0], (len(np.atleast_1d(points)), 1))
-        turns = as_numbers(scalar_first(quaternions), "polyline: quaternions", error=PathError)
+        self._oriented = quaternions_wxyz is not None
+        if quaternions_wxyz is None:
+            quaternions_wxyz = np.tile([1.0, 0.0, 0.0, 0.0], (len(np.atleast_1d(points)), 1))
+        turns = as_numbers(scalar_first(quaternions_wxyz), "polyline: quaternions", error=PathError)
         if points.ndim != 2 or points.shape[1:] != (3,) or len(points) < 2:
             raise PathError(
                 f"polyline: positions have shape {points.shape}, expected (N, 3) with N ≥ 2"
@@ -104,7 +106,7 @@ class Polyline(Path, kind="polyline"):
         self._check_reversals()
 
     @classmethod
-    def from_poses(cls, poses: list[SE3], **options: Any) -> "Polyline":
+    def from_poses(cls, poses: list[SE3], **options: Any) -> Polyline:
         """Return the path through `poses` (SE3 or (4, 4)); options as in the class."""
         if not isinstance(poses, Sequence | np.ndarray):
             raise PathError(f"polyline: poses is {shown(poses)}, expected a list of poses")
@@ -179,7 +181,7 @@ class Polyline(Path, kind="polyline"):
         return Rotation.from_quat(self._turns, scalar_first=True)
 
     @cached_property
-    def _corners(self) -> "_Corners":
+    def _corners(self) -> _Corners:
         # The ends are corners without a change.
         lasts = self._lasts
         speeds = np.diff(self._points, axis=0) / lasts[:, None]
@@ -259,6 +261,11 @@ class Polyline(Path, kind="polyline"):
             "tolerance": self._tolerance,
             "turn_tolerance": self._turn_tolerance,
         }
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any], **context: Any) -> Self:
+        """See `Saved.from_dict`: files say `quaternions`."""
+        return super().from_dict(of_file(values), **context)
 
 
 class _Corners(NamedTuple):

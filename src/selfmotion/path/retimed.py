@@ -1,5 +1,7 @@
 """A tool motion run through at another pace."""
 
+from __future__ import annotations
+
 from dataclasses import replace
 from typing import Any
 

@@ -1,5 +1,7 @@
 """A tool motion the other way round."""
 
+from __future__ import annotations
+
 from typing import Any
 
 import numpy as np
@@ -54,7 +56,7 @@ class Reversed(_Derived, kind="reversed"):
         """See `Path.feeds`."""
         return tuple(item.timed(lambda t: self.duration - t) for item in self._path.feeds)
 
-    def at_constant_speed(self) -> "Reversed":
+    def at_constant_speed(self) -> Reversed:
         """See `Path.at_constant_speed`: as the original."""
         return Reversed(self._path.at_constant_speed())
 

@@ -1,5 +1,7 @@
 """Strokes that keep their feed from their begin to their end: run-up and run-down are outside."""
 
+from __future__ import annotations
+
 from typing import NamedTuple
 
 import numpy as np

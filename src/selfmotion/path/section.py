@@ -1,5 +1,7 @@
 """A stretch of a tool motion."""
 
+from __future__ import annotations
+
 from typing import Any
 
 import numpy as np

@@ -1,5 +1,7 @@
 """Straight lines and circles."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -46,7 +48,7 @@ class Line(Path, kind="line"):
         object.__setattr__(self, "duration", check_duration(self.duration))
         object.__setattr__(self, "time_law", TimeLaw.of(self.time_law))
 
-    def at_constant_speed(self) -> "Line":
+    def at_constant_speed(self) -> Line:
         """See `Path.at_constant_speed`."""
         return replace(self, time_law=TimeLaw.CONSTANT)
 
@@ -117,7 +119,7 @@ class Circle(Round, kind="circle"):
         *,
         normal: npt.ArrayLike = (0.0, 0.0, 1.0),
         **options: Any,
-    ) -> "Circle":
+    ) -> Circle:
         """Return a circle of `radius` [m] that begins at `start`.
 
         Its centre lies from the start in the direction of -x, or of -y where the axis is x.

@@ -1,5 +1,7 @@
 """Spirals in a plane, helices, and what is both."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,5 +1,7 @@
 """A tool motion given by its velocity."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Mapping
 from functools import cached_property
 from itertools import pairwise
@@ -63,7 +65,7 @@ class TwistPath(Path, kind="twist"):
         self._set(pose, *_resolve(velocity, check_duration(duration)))
 
     @classmethod
-    def from_dict(cls, values: Mapping[str, Any], **context: Any) -> "TwistPath":
+    def from_dict(cls, values: Mapping[str, Any], **context: Any) -> TwistPath:
         """See `Saved.from_dict`: the polynomials, not the function."""
         path = cls.__new__(cls)
         path._set(

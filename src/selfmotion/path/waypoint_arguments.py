@@ -1,6 +1,9 @@
 """What waypoints are given, checked; and where they bend."""
 
-from typing import TYPE_CHECKING
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -13,6 +16,10 @@ from selfmotion.basics import (
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
+
+
+# What quaternions are called in files, and as an argument.
+_IN_FILES, _ARGUMENT = "quaternions", "quaternions_wxyz"
 
 
 def bends(legs: Array, angle: float, least: float) -> npt.NDArray[np.bool_]:
@@ -29,11 +36,21 @@ def as_table(values: npt.ArrayLike, name: str) -> Array:
     return as_numbers(values, f"waypoints: {name}", error=PathError)
 
 
-def scalar_first(orientations: "npt.ArrayLike | Rotation") -> npt.ArrayLike:
+def scalar_first(orientations: npt.ArrayLike | Rotation) -> npt.ArrayLike:
     """Return orientations as quaternions [w, x, y, z]: SciPy's know their own order."""
     if hasattr(orientations, "as_quat"):
         return np.asarray(orientations.as_quat(scalar_first=True), dtype=np.float64)
     return orientations
+
+
+def of_file(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what a file says as arguments: its `quaternions` are w, x, y, z."""
+    given = dict(values)
+    if _IN_FILES in given:
+        if _ARGUMENT in given:
+            raise PathError(f"{_IN_FILES} and {_ARGUMENT} are one thing; give one of them")
+        given[_ARGUMENT] = given.pop(_IN_FILES)
+    return given
 
 
 def check_waypoints(t: Array, points: Array, turns: Array) -> None:

@@ -1,10 +1,12 @@
 """A tool motion through given poses at given times."""
 
-from collections.abc import Sequence
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 from itertools import pairwise
 from pathlib import Path as FilePath
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -24,7 +26,13 @@ from selfmotion.basics import (
 )
 from selfmotion.path.base import Path, PathSamples, PathSeries, path_pose, rotvecs, unit
 from selfmotion.path.turns import Turning
-from selfmotion.path.waypoint_arguments import as_table, bends, check_waypoints, scalar_first
+from selfmotion.path.waypoint_arguments import (
+    as_table,
+    bends,
+    check_waypoints,
+    of_file,
+    scalar_first,
+)
 from selfmotion.task import SE3, Quaternion
 
 if TYPE_CHECKING:
@@ -50,7 +58,7 @@ class Waypoints(Path, kind="waypoints"):
         Times [s], increasing; the first one becomes 0.
     positions : (N, 3)
         [m], world axes.
-    quaternions : (N, 4) or scipy.spatial.transform.Rotation, optional
+    quaternions_wxyz : (N, 4) or scipy.spatial.transform.Rotation, optional
         Orientations [w, x, y, z]; normalised, either sign. Rotations of SciPy know their order,
         numbers have to be in this one. By default none is prescribed, for
         tasks that leave it free ('position').
@@ -72,16 +80,16 @@ class Waypoints(Path, kind="waypoints"):
         self,
         t: npt.ArrayLike,
         positions: npt.ArrayLike,
-        quaternions: "npt.ArrayLike | Rotation | None" = None,
+        quaternions_wxyz: npt.ArrayLike | Rotation | None = None,
         *,
         corners: str = "blend",
         corner_angle: float = np.pi / 6,
     ) -> None:
         times, points = as_table(t, "t"), as_table(positions, "positions")
-        self._oriented = quaternions is not None
-        if quaternions is None:
-            quaternions = np.tile([1.0, 0.0, 0.0, 0.0], (len(np.atleast_1d(points)), 1))
-        turns = as_table(scalar_first(quaternions), "quaternions")
+        self._oriented = quaternions_wxyz is not None
+        if quaternions_wxyz is None:
+            quaternions_wxyz = np.tile([1.0, 0.0, 0.0, 0.0], (len(np.atleast_1d(points)), 1))
+        turns = as_table(scalar_first(quaternions_wxyz), "quaternions")
         check_waypoints(times, points, turns)
         as_choice(corners, "waypoints: corners", ("blend", "stop"), PathError)
         what = "waypoints: corner_angle"
@@ -94,7 +102,7 @@ class Waypoints(Path, kind="waypoints"):
         self._corner_angle = float(corner_angle)
 
     @classmethod
-    def from_poses(cls, t: npt.ArrayLike, poses: list[SE3], **options: Any) -> "Waypoints":
+    def from_poses(cls, t: npt.ArrayLike, poses: list[SE3], **options: Any) -> Waypoints:
         """Return the path through `poses` (SE3 or (4, 4)) at times `t`; options as in the class."""
         if not isinstance(poses, Sequence | np.ndarray):
             raise PathError(f"waypoints: poses is {shown(poses)}, expected a list of poses")
@@ -103,7 +111,7 @@ class Waypoints(Path, kind="waypoints"):
         return cls(t, [frame.translation for frame in frames], turns, **options)
 
     @classmethod
-    def from_csv(cls, file: str | FilePath, **options: Any) -> "Waypoints":
+    def from_csv(cls, file: str | FilePath, **options: Any) -> Waypoints:
         """Read ``t,x,y,z,qw,qx,qy,qz`` with a header line [s, m]; the quaternion may be missing.
 
         Raises
@@ -156,7 +164,7 @@ class Waypoints(Path, kind="waypoints"):
         """Times [s] of the waypoints where the tool comes to rest: corners and pauses."""
         return self._t[self._stops]
 
-    def between_corners(self) -> list["Waypoints"]:
+    def between_corners(self) -> list[Waypoints]:
         """Return the path in pieces that rest nowhere, from one corner to the next."""
         turns = self._turns if self._oriented else None
         parts = [slice(first, last + 1) for first, last in pairwise(self._bounds)]
@@ -272,3 +280,8 @@ class Waypoints(Path, kind="waypoints"):
             "corners": self._corners,
             "corner_angle": self._corner_angle,
         }
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any], **context: Any) -> Self:
+        """See `Saved.from_dict`: files say `quaternions`."""
+        return super().from_dict(of_file(values), **context)

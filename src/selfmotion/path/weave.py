@@ -1,5 +1,7 @@
 """A tool that swings from side to side while it goes along a path."""
 
+from __future__ import annotations
+
 from functools import cached_property
 from typing import Any
 
@@ -99,7 +101,7 @@ class Weave(_InStep, kind="weave"):
                 f"expected {_MOST_SWINGS:,} at most; lengths are in metres"
             )
 
-    def at_constant_speed(self) -> "Weave":
+    def at_constant_speed(self) -> Weave:
         """See `Path.at_constant_speed`: as the seam, along which the swings stay where they are."""
         return Weave(
             self._path.at_constant_speed(),

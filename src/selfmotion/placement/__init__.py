@@ -1,9 +1,5 @@
 """Where to put the part, or the arm."""
 
-from selfmotion.placement.bought import (
-    BoughtMargin as BoughtMargin,
-    plan_with_margin as plan_with_margin,
-)
 from selfmotion.placement.corners import (
     Corner as Corner,
     Correction as Correction,
@@ -11,15 +7,20 @@ from selfmotion.placement.corners import (
     correction as correction,
 )
 from selfmotion.placement.found import PlaceMap as PlaceMap, Placement as Placement
+from selfmotion.placement.page import write_placement as write_placement
 from selfmotion.placement.place import place as place
 from selfmotion.placement.places import Tried as Tried
+from selfmotion.placement.with_margin import (
+    PlanWithMargin as PlanWithMargin,
+    plan_with_margin as plan_with_margin,
+)
 
 __all__ = [
-    "BoughtMargin",
     "Corner",
     "Correction",
     "CorrectionSide",
     "PlaceMap",
     "Placement",
+    "PlanWithMargin",
     "Tried",
 ]

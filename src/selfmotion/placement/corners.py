@@ -4,6 +4,8 @@ An estimate from the room that the joints have, and what is confirmed: motions p
 corners, each from the one that there is.
 """
 
+from __future__ import annotations
+
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -99,7 +101,7 @@ class Correction:
         lines = [f"planned again, the {self.of} may be (confirmed at {count} corners)"]
         for what, side in sides:
             told = " ".join(corner.name for corner in side.corners) or "nowhere"
-            stops = side.stops or "nothing as far as was looked"
+            stops = side.stops or "nothing in the range that was searched"
             lines.append(
                 f"{what} by {_told(what, side.size)}: verified at {told}; estimate "
                 f"{_told(what, side.estimate)}; stops: {stops}"
@@ -165,7 +167,7 @@ def correction(
 
 
 def _standing(plan: Plan) -> tuple[str, ...]:
-    items = (*plan.problem.constraints, plan.problem.collision)
+    items = (*plan.problem.constraints, plan.problem.clearance)
     return tuple(
         body.name
         for item in items

@@ -1,6 +1,7 @@
 """What is found of places: the best one, and what others around it cost."""
 
-import html
+from __future__ import annotations
+
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -9,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from selfmotion.basics import Array, PlanError, as_path, as_whole, write_text
+from selfmotion.basics import Array, PlanError, as_whole
 from selfmotion.batch import Row, maps
 from selfmotion.placement.places import Places, Tried
 from selfmotion.placement.search import Box
@@ -22,7 +23,6 @@ if TYPE_CHECKING:
 
 # A coordinate nearer to its bound than this share of the box is on it.
 _ON_BOUND = 1e-6
-_STYLE = "body{font-family:system-ui,sans-serif;margin:2em;max-width:60em}td,th{padding:2px 1em}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +70,7 @@ class PlaceMap:
                 )
         return "\n".join(maps(rows, {}))
 
-    def figure(self) -> "Figure":
+    def figure(self) -> Figure:
         """Return it as a matplotlib figure (``pip install 'selfmotion[plots]'``).
 
         Raises
@@ -152,19 +152,19 @@ class Placement:
     def __str__(self) -> str:
         """Return the place, what it gains, and what binds."""
         moved = ", ".join(f"{_label(name)} {value:+.4g}" for name, value in self.place.items())
-        before = "no verified motion where it stands"
+        before = "no verified motion at the present place"
         if math.isnan(self.cost_before):
-            before = "where it stands is not in the box"
+            before = "the present place is not in the box"
         elif math.isfinite(self.cost_before):
             gain = 1.0 - self.cost / self.cost_before if self.cost_before else 0.0
-            before = f"{self.cost_before:.6g} where it stands, {gain:.1%} less"
+            before = f"{self.cost_before:.6g} at the present place, {gain:.1%} less"
         failed = sum(not np.isfinite(item.cost) for item in self.tried)
         lines = [
             f"move the {self.of} by {moved}",
             f"cost {self.cost:.6g} ({before}); {len(self.plans)} "
             f"motion{'s' if len(self.plans) > 1 else ''}, {'all' if self.verified else 'not'} "
             f"verified",
-            f"{len(self.tried)} places looked at, {failed} of them without a verified motion",
+            f"{len(self.tried)} places tried, {failed} of them without a verified motion",
             *(f"binds: {text}" for text in self.binds),
         ]
         return "\n".join(lines)
@@ -219,19 +219,6 @@ class Placement:
 
     def _far(self, place: Array, other: Tried) -> float:
         return float(np.linalg.norm(self._box.share(place) - self._box.share(other.place)))
-
-    def to_html(self, file: str | Path, found: PlaceMap | None = None) -> Path:
-        """Write a page with the place, what binds, and a map if one is given; atomically."""
-        path = as_path(file)
-        title = f"Where to put the {self.of}"
-        lines = "".join(f"<p>{html.escape(line)}</p>" for line in str(self).splitlines())
-        drawn = "" if found is None else found.svg()
-        write_text(
-            path,
-            f'<!doctype html><html lang="en"><meta charset="utf-8"><title>{title}</title>'
-            f"<style>{_STYLE}</style><h1>{title}</h1>{lines}{drawn}</html>\n",
-        )
-        return path
 
 
 def on_bounds(places: Places, box: Box, place: Array) -> tuple[str, ...]:

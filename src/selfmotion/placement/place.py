@@ -1,5 +1,7 @@
 """Where to put the part, or the arm: the place whose motions cost least."""
 
+from __future__ import annotations
+
 import json
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor

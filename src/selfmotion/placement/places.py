@@ -1,5 +1,7 @@
 """Problems at another place: the part, or the arm, stands elsewhere."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -154,13 +156,13 @@ class Places:
         )
         # Of the base all moves that stands in the world.
         bodies = None if self.of == "base" else self.bodies
-        collision = problem.collision
+        clearance = problem.clearance
         return problem.changed(
             path=_placed(items[0], by),
             also=also,
             start="free",
             constraints=tuple(_with_bodies(item, bodies, by) for item in problem.constraints),
-            collision=None if collision is None else _with_bodies(collision, bodies, by),
+            clearance=None if clearance is None else _with_bodies(clearance, bodies, by),
         )
 
 
@@ -183,12 +185,12 @@ def places_of(
         if not _stands(problem.follows.items[0]):
             raise ProblemError(
                 f"place: the path of {problem.robot.name} is given in the frame of "
-                f"'{problem.robot.reference}', which moves; only what stands in the world is placed"
+                f"'{problem.robot.reference}', which moves; expected one fixed in the world"
             )
     standing = {
         body.name: body
         for problem in problems
-        for item in (*problem.constraints, problem.collision)
+        for item in (*problem.constraints, problem.clearance)
         if isinstance(item, Clearance)
         for body in item.obstacles
         if body.frame is None
@@ -203,7 +205,7 @@ def places_of(
     for name in part or ():
         if name not in standing:
             raise ProblemError(
-                f"place: part: no obstacle '{name}' stands in the world{nearest(name, standing)}; "
+                f"place: part: no obstacle '{name}' is in the world{nearest(name, standing)}; "
                 f"obstacles: {', '.join(standing) or 'none'}"
             )
     if center is None:

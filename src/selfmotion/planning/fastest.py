@@ -1,5 +1,7 @@
 """The fastest motion along a path: pace and null motion, each in its turn."""
 
+from __future__ import annotations
+
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace

@@ -1,5 +1,7 @@
 """A path that no motion follows as a whole, in the fewest parts."""
 
+from __future__ import annotations
+
 import numpy as np
 import numpy.typing as npt
 

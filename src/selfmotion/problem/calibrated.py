@@ -1,5 +1,7 @@
 """The same problem on an arm as it was measured, and how far that is from the drawn one."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 from pathlib import Path
 

@@ -26,7 +26,7 @@ _KINDS: dict[str, Any] = {
     "path": Path,
     "null_motion": NullMotion,
     "damping": Damping | None,
-    "collision": Clearance | None,
+    "clearance": Clearance | None,
 }
 _EXAMPLES = {
     "robot": "RobotModel (load_robot)",
@@ -34,7 +34,7 @@ _EXAMPLES = {
     "null_motion": "NullMotion (PolynomialNullMotion, BSplineNullMotion, or a class derived "
     "from NullMotion)",
     "damping": "Damping or None",
-    "collision": "Clearance or None",
+    "clearance": "Clearance or None",
 }
 # A start nearer to the path than this is on it: far above rounding, far below any tolerance.
 _ON_PATH = 1e-7

@@ -1,5 +1,7 @@
 """What to plan: an arm, a tool motion, the rows that count, and what to minimise."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
@@ -98,7 +100,7 @@ class Problem:
         self-motion. By default none. A given start is on the path itself, and so is the end of a
         path with conditions there; where a path is closed, the deviation is so, too. Of several
         paths the first is relaxed.
-    collision : Clearance, optional
+    clearance : Clearance, optional
         How the arm keeps apart from itself and from obstacles, besides what constraints say: by
         default its links must not overlap, where its URDF has bodies and no constraint is a
         `Clearance`. None to leave that out; the verdict then says so.
@@ -139,7 +141,7 @@ class Problem:
     constraints: Sequence[Constraint] = KEPT
     relaxations: Sequence[Relaxation] = ()
     damping: Damping | None = None
-    collision: Clearance | None = NO_OVERLAP
+    clearance: Clearance | None = NO_OVERLAP
     rest: bool = True
     also: Sequence[Follow] = ()
 
@@ -183,14 +185,14 @@ class Problem:
         return Follows.of(self.robot, self.path, self.task, self.also)
 
     @cached_property
-    def augmented(self) -> "Problem":
+    def augmented(self) -> Problem:
         """The problem as planners see it: its tolerances are virtual joints."""
         from selfmotion.problem.augmented import AugmentedProblem
 
         return AugmentedProblem(self) if self.relaxations else self
 
     @property
-    def asked(self) -> "Problem":
+    def asked(self) -> Problem:
         """The problem as it was asked, where this is `augmented`."""
         return self
 
@@ -206,14 +208,14 @@ class Problem:
         """Return the motion of all joints for one of the arm's own along a path like this one's."""
         return trajectory
 
-    def softened(self, cost: float) -> "Problem":
+    def softened(self, cost: float) -> Problem:
         """Return the same where using tolerances costs, for who does not ask bands to be kept.
 
         Where `cost` is what a motion costs, being at a band all the time costs as much.
         """
         return self
 
-    def changed(self, **changes: Any) -> "Problem":
+    def changed(self, **changes: Any) -> Problem:
         """Return the same with other parameters."""
         return replace(self, **changes)
 
@@ -258,13 +260,13 @@ class Problem:
         The default is left out where a constraint keeps the arm apart, or it has no bodies; what
         was given never is.
         """
-        if self.collision is not NO_OVERLAP:
-            return self.collision
+        if self.clearance is not NO_OVERLAP:
+            return self.clearance
         if not self.robot.urdf.has_collisions:
             return None
         if any(item.envelope(self.robot).bodies for item in self.constraints):
             return None
-        return self.collision
+        return self.clearance
 
     def keeps_off_itself(self, q: Array) -> bool:
         """Whether configurations (K, n) keep the arm apart from itself by its meshes.
@@ -474,7 +476,7 @@ class Problem:
 
 
 # What help() shows of a field that is a descriptor.
-Problem.__init__.__annotations__["task"] = Task | str
+Problem.__init__.__annotations__["task"] = "Task | str"
 
 
 def check_feeds_of(problem: Problem) -> None:

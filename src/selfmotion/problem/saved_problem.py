@@ -29,7 +29,7 @@ def problem_to_dict(
     By default with the URDF's text, and without functions of the user's. A problem file names the
     arm instead, and refuses what it cannot carry.
     """
-    start, collision = problem.given_start, problem.collision
+    start, clearance = problem.given_start, problem.clearance
     document: dict[str, Any] = {
         "task": problem.task.value,
         "start": "free" if start is None else start.tolist(),
@@ -47,8 +47,9 @@ def problem_to_dict(
         ]
     if problem.damping is not None:
         document["damping"] = dataclasses.asdict(problem.damping)
-    if collision != NO_OVERLAP:
-        document["collision"] = False if collision is None else describe(collision)
+    if clearance != NO_OVERLAP:
+        # The key that it has had in files of plans from the first one on.
+        document["collision"] = False if clearance is None else describe(clearance)
     if not problem.rest:
         document["rest"] = False
     if problem.also:
@@ -103,9 +104,9 @@ def problem_from_dict(
     """
     known = {} if known is None else known
     robot, constraints = arm_and_constraints(values, known)
-    damping, collision = values.get("damping"), values.get("collision", NO_OVERLAP)
-    if isinstance(collision, Mapping):
-        collision = _once(known, collision, lambda: restore(Constraint, collision))
+    damping, clearance = values.get("damping"), values.get("collision", NO_OVERLAP)
+    if isinstance(clearance, Mapping):
+        clearance = _once(known, clearance, lambda: restore(Constraint, clearance))
     return Problem(
         robot,
         restore(Path, values["path"]),
@@ -116,7 +117,7 @@ def problem_from_dict(
         constraints,
         tuple(Relaxation(**item) for item in values.get("relaxations", ())),
         None if damping is None else Damping(**damping),
-        collision or None,
+        clearance or None,
         values.get("rest", True),
         tuple(follow_from_dict(item) for item in values.get("also", ())),
     )

@@ -1,5 +1,7 @@
 """A tool motion on something that moves, such as a conveyor."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Self

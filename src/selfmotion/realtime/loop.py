@@ -1,5 +1,7 @@
 """The loop around a replanner: reads states, writes segments, knows no transport."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 

@@ -1,5 +1,7 @@
 """A pose that goes on as it was seen to move."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 
 import numpy as np

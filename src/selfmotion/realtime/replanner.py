@@ -1,5 +1,7 @@
 """Plans the next seconds again and again while the arm moves."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping, Sequence
 
 import numpy as np

@@ -1,5 +1,7 @@
 """What a step hands to the controller."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from enum import Enum
 

@@ -107,7 +107,7 @@ class Record:
             iterations=steps,
             history=(),
             status=Status.STOPPED,
-            message="tracked in a closed loop, planned anew at each step",
+            message="tracked in a closed loop, replanned at each step",
             seconds=float(self.seconds.sum()),
         )
         certificate = problem.certify(motion, Tolerance(*_BACK))

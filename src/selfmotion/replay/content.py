@@ -1,5 +1,7 @@
 """All that a page knows, from plans: see `Payload` for how it travels."""
 
+from __future__ import annotations
+
 import numpy as np
 import numpy.typing as npt
 

@@ -1,5 +1,7 @@
 """One HTML file from one or several plans of a robot."""
 
+from __future__ import annotations
+
 import base64
 import gzip
 import hashlib

@@ -5,6 +5,8 @@ to a multiple of 8, then the arrays, each at a multiple of 8. In the JSON ``{"$"
 array k of its list ``arrays``. `payload.js` reads it.
 """
 
+from __future__ import annotations
+
 import base64
 import gzip
 import json

@@ -9,6 +9,7 @@ from selfmotion.result.asked import (
     not_judged_by as not_judged_by,
 )
 from selfmotion.result.bundle import read_bundle as read_bundle, write_bundle as write_bundle
+from selfmotion.result.comparison import Comparison as Comparison, compare as compare
 from selfmotion.result.joints import (
     Piece as Piece,
     elsewhere as elsewhere,
@@ -28,6 +29,7 @@ from selfmotion.result.limits_used import (
     LimitsUsed as LimitsUsed,
     quantities_of_pace as quantities_of_pace,
 )
+from selfmotion.result.measured import NullSpaceVelocity as NullSpaceVelocity
 from selfmotion.result.move import Move as Move, is_move as is_move, load_move as load_move
 from selfmotion.result.pace_rows import PaceLimits as PaceLimits
 from selfmotion.result.pacing import Ends as Ends, along as along, fastest_pace as fastest_pace
@@ -49,6 +51,8 @@ from selfmotion.result.reversals import Reversals as Reversals
 
 __all__ = [
     "Attempt",
+    "Comparison",
     "Gap",
     "LimitsUsed",
+    "NullSpaceVelocity",
 ]

@@ -20,7 +20,7 @@ from selfmotion.basics import (
     write_archive,
 )
 from selfmotion.certificate import Certificate, DampedStretch, Extreme, Finding, Tolerance
-from selfmotion.constraints import Binding
+from selfmotion.constraints import ActiveConstraint
 from selfmotion.motion import NullMotion, Trajectory
 from selfmotion.optimise import Iteration, Status
 from selfmotion.problem.problem import Problem
@@ -93,7 +93,7 @@ class Archive(NamedTuple):
             changed = tuple(name for name in then if now.get(name, "") != then[name])
             return found._replace(altered=altered, changed=changed)
         except (CollisionError, RobotError) as error:
-            raise FileFormatError(f"{file}: cannot be measured anew: {error}") from error
+            raise FileFormatError(f"{file}: cannot be checked again: {error}") from error
         except SelfmotionError as error:
             raise FileFormatError(f"{file}: is a damaged plan: {error}") from error
         # Any number or key of a damaged plan may be any other, and fail anywhere.
@@ -131,7 +131,7 @@ def check_version(file: FilePath, kind: str, found: object, wanted: int) -> None
     age = "an older" if found < wanted else "a newer"
     raise OtherVersionError(
         f"{file}: was written by {age} version of selfmotion (a {kind} of format {found}, expected "
-        f"{wanted}): make it anew, or read it with that version"
+        f"{wanted}): make it again, or read it with that version"
     )
 
 
@@ -208,7 +208,7 @@ def _restore(
     motion = report["null_motion"]
     report["null_motion"] = None if motion is None else restore(NullMotion, motion)
     report["active"] = tuple(
-        Binding(**{**item, "spans": tuple(tuple(span) for span in item["spans"])})
+        ActiveConstraint(**{**item, "spans": tuple(tuple(span) for span in item["spans"])})
         for item in report["active"]
     )
     return Archive(

@@ -1,5 +1,7 @@
 """Which limits a motion uses, and for how long: whether it could be faster."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -6,7 +6,7 @@ from itertools import accumulate
 from pathlib import Path as FilePath
 
 from selfmotion.basics import FileFormatError, PlanError, SelfmotionError, as_path
-from selfmotion.certificate import USUAL, Tolerance
+from selfmotion.certificate import USUAL, Tolerance, first_of
 from selfmotion.motion import Trajectory, joined_motions
 from selfmotion.problem import Problem, problem_from_dict, problem_to_dict
 from selfmotion.result.bundle import read_bundle, write_bundle
@@ -78,6 +78,11 @@ class Parts:
                 f"all moves in between; {reached_text(self.plans, self.tolerance)}"
             )
         return f"not verified: {'; '.join(self.failures)}"
+
+    @property
+    def summary(self) -> str:
+        """The verdict in short: of what is wrong the first."""
+        return self.verdict if self.verified else first_of(self.failures)
 
     @cached_property
     def failures(self) -> tuple[str, ...]:

@@ -1,12 +1,14 @@
 """A finished plan: the motion, the problem it solves, how it was found, and what the check says."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping, MutableMapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
-import numpy as np
+import numpy.typing as npt
 
 from selfmotion.basics import (
     Array,
@@ -18,7 +20,6 @@ from selfmotion.basics import (
     SelfmotionError,
     as_path,
     silent,
-    write_csv,
 )
 from selfmotion.certificate import (
     Certificate,
@@ -30,12 +31,14 @@ from selfmotion.certificate import (
     approaches,
 )
 from selfmotion.collision import Obstacle
-from selfmotion.motion import Trajectory, column_names
+from selfmotion.costs import Cost
+from selfmotion.motion import Trajectory
 from selfmotion.path import Path
 from selfmotion.problem.problem import Problem
 from selfmotion.result.archive import Archive
 from selfmotion.result.joint_order import in_order_of
 from selfmotion.result.limits_used import LimitsUsed, limits_used
+from selfmotion.result.measured import NullSpaceVelocity, cost_of, null_space_velocity
 from selfmotion.result.report import Report
 from selfmotion.result.reversals import Reversals
 from selfmotion.robot import RobotModel
@@ -48,10 +51,10 @@ if TYPE_CHECKING:
 class Views(Protocol):
     """What shows plans: made by the replay, which knows plans, not the other way round."""
 
-    def notebook_html(self, plan: "Plan") -> str:
+    def notebook_html(self, plan: Plan) -> str:
         """Return the replay as HTML for a notebook."""
 
-    def figure(self, plan: "Plan") -> "Figure":
+    def figure(self, plan: Plan) -> Figure:
         """Return the plan's curves as a matplotlib figure."""
 
 
@@ -157,6 +160,45 @@ class Plan:
         """When each joint turns round, by more than 1 mrad or 1 mm. Found when it is asked for."""
         return Reversals.of(self.trajectory)
 
+    def null_motion(self, t: npt.ArrayLike) -> NullSpaceVelocity:
+        """Return what of the joint velocities lies in the null space of the task at `t`.
+
+        q̇ = J⁺ẋ + (I − J⁺J) q̇: the first part moves the tool, the second one only the joints. J are
+        the rows of all frames that follow a path, as they are prescribed; where tolerances
+        (`relaxations`) are used, ẋ = J q̇ is what the tool does, not what the path asks.
+
+        Parameters
+        ----------
+        t : float or (K,)
+            Times within the motion [s].
+
+        Returns
+        -------
+        NullSpaceVelocity
+            In joints, ``joints`` (n,) or (K, n), and in coordinates, ``coordinates`` (r,) or
+            (K, r), of a ``basis``.
+
+        Raises
+        ------
+        ValueError
+            A time is outside the motion.
+        """
+        return null_space_velocity(self.problem.follows, self.trajectory, t)
+
+    def evaluate(self, cost: Cost) -> float:
+        """Return ∫ G dt of any cost along the plan, also of one that it was not planned for.
+
+        By Gauss-Legendre quadrature with five points on each interval of the motion. Of the plan's
+        own costs it is ``report.terms`` (of the published method up to its integration error).
+
+        Raises
+        ------
+        ProblemError
+            It is no cost, does not fit the arm or the task, or is not finite somewhere: the time is
+            named. Costs that were functions are not in a plan's file: give them again.
+        """
+        return cost_of(self.problem.follows, self.trajectory, cost)
+
     def check(
         self,
         tolerance: Tolerance | None = None,
@@ -177,7 +219,7 @@ class Plan:
             return found
         return replace(found, failures=(self.altered, *found.failures))
 
-    def require(self) -> "Plan":
+    def require(self) -> Plan:
         """Return the plan itself if its certificate is verified.
 
         Raises
@@ -213,16 +255,7 @@ class Plan:
             self.altered,
         ).write(as_path(file))
 
-    def to_csv(self, file: str | FilePath) -> None:
-        """Write ``t`` and a column per joint for q, then for q̇ and q̈.
-
-        They are called ``NAME``, ``NAME_velocity`` and ``NAME_acceleration``.
-        """
-        motion = self.trajectory
-        table = np.column_stack([motion.t, motion.q, motion.qd, motion(motion.t, 2)])
-        write_csv(as_path(file), column_names(motion.joint_names), table)
-
-    def figure(self) -> "Figure":
+    def figure(self) -> Figure:
         """Return joint positions and velocities, manipulability and path error as a figure.
 
         Needs matplotlib (``pip install 'selfmotion[plots]'``).
@@ -249,7 +282,7 @@ def reached_text(plans: Sequence[Plan], tolerance: Tolerance) -> str:
     beyond = any(plan.certificate.deviations for plan in plans)
     return (
         f"at most {position:.1e} m and {rotation:.1e} rad off the path"
-        f"{', beyond what is relaxed' if beyond else ''}{allowed_text(tolerance)}"
+        f"{', tolerances not counted' if beyond else ''}{allowed_text(tolerance)}"
     )
 
 
@@ -277,7 +310,7 @@ def load_plan(
     try:
         certificate = plan.check(progress=progress)
     except (CollisionError, RobotError) as error:
-        unknown = f"it could not be measured anew: {error}"
+        unknown = f"it could not be checked again: {error}"
         written = archive.certificate
         certificate = replace(
             written,

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from selfmotion.constraints import Binding
+from selfmotion.constraints import ActiveConstraint
 from selfmotion.motion import NullMotion
 from selfmotion.optimise import Iteration, Status
 
@@ -107,7 +107,7 @@ class Report:
         Distance from the global optimum, where a global search was made.
     ending : str
         Why the motion ends before its path does; "" where it does not.
-    active : tuple of Binding
+    active : tuple of ActiveConstraint
         The active constraints, the most expensive first.
     null_motion : NullMotion or None
         The parameterisation that the plan's coefficients are of; None for other works' methods.
@@ -134,7 +134,7 @@ class Report:
     seconds: float
     gap: Gap | None = None
     ending: str = ""
-    active: tuple[Binding, ...] = ()
+    active: tuple[ActiveConstraint, ...] = ()
     null_motion: NullMotion | None = None
     remaining: float | None = None
     attempts: tuple[Attempt, ...] = ()

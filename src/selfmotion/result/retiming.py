@@ -1,5 +1,7 @@
 """The same joint path in the time that velocity and acceleration limits allow."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import reduce

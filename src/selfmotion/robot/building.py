@@ -247,7 +247,7 @@ def _locked_joints(
             if name in lock and abs(followed - lock[name]) > _BESIDE:
                 raise RobotError(
                     f"{urdf.source}: lock holds joint '{name}' at {lock[name]:.6g}, but it mimics "
-                    f"'{source.mimics}' and stands at {followed:.6g}; hold that one"
+                    f"'{source.mimics}' and is at {followed:.6g}; hold that one"
                 )
             value = followed
         locked[name] = float(value)

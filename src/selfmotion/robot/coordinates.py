@@ -1,5 +1,7 @@
 """Numbers that tell how an arm stands: a joint, the place of a link, the swivel of the elbow."""
 
+from __future__ import annotations
+
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass

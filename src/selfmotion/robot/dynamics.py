@@ -1,5 +1,7 @@
 """Joint torques of a motion, by Pinocchio's recursive Newton-Euler algorithm."""
 
+from __future__ import annotations
+
 import numpy as np
 import numpy.typing as npt
 import pinocchio as pin

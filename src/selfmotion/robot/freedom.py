@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from selfmotion.basics import Array
+from selfmotion.basics import Array, RobotError
 from selfmotion.task import Task
 
 if TYPE_CHECKING:
@@ -12,6 +12,8 @@ if TYPE_CHECKING:
 
 # Singular values, and rates of rows, below this [m, rad] are zero.
 _ZERO = 1e-6
+# Singular values below this share of the largest one are rounding.
+_ROUNDING = 1e-12
 # Samples among which the most dexterous one is.
 _SAMPLES = 1000
 
@@ -39,3 +41,21 @@ def most_dexterous(robot: "RobotModel", task: Task) -> Array:
     jacobians = np.array([robot.task_jacobian(q, task) for q in samples])
     determinants = np.linalg.det(jacobians @ jacobians.transpose(0, 2, 1))
     return np.array(samples[np.argmax(determinants)])
+
+
+def null_space_at(robot: "RobotModel", q: Array, task: Task) -> Array:
+    """Return orthonormal null-space bases at checked `q`; see `RobotModel.null_space`."""
+    jacobians = robot.task_jacobian(q, task)
+    _, values, right = np.linalg.svd(jacobians)
+    large = values > _ROUNDING * values.max(axis=-1, keepdims=True)
+    ranks = np.atleast_1d(np.sum(large, axis=-1))
+    # Of no configurations there is none; then as it is in general.
+    rank = int(ranks[0]) if len(ranks) else robot.dof - redundancy(robot, task)
+    other = np.flatnonzero(ranks != rank)
+    if len(other):
+        raise RobotError(
+            f"{robot.name}: the Jacobian of task '{task.value}' has rank {rank} at configuration 0 "
+            f"and {ranks[other[0]]} at configuration {other[0]}, expected one rank; ask for "
+            f"the null space of these one at a time"
+        )
+    return np.asarray(np.swapaxes(right[..., rank:, :], -1, -2))

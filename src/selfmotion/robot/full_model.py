@@ -27,7 +27,7 @@ _terminal = threading.Lock()
 _drawn = coal.CachedMeshLoader()
 
 # How to go on without bodies; of what is not drawn it is told that it is not.
-_BARE = "; or go on without looking at self-collision: --no-self-collision (collision = false)"
+_BARE = "; or go on without looking at self-collision: --no-self-collision (clearance = false)"
 
 
 def full_model(urdf: Urdf) -> Any:

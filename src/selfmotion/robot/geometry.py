@@ -53,8 +53,10 @@ def stand_in(urdf: Urdf, locked: Mapping[str, float], model: Any, tip: int) -> t
     for item in bodies.geometryObjects:
         item.meshColor = _GREY
     if bodies.ngeoms:
-        return bodies, "the arm has no visuals to draw: its collision bodies stand for them"
-    return _bones(model, tip), "the arm has neither visuals nor bodies: its joints stand for it"
+        return bodies, "the arm has no visuals to draw: its collision bodies are drawn instead"
+    return _bones(
+        model, tip
+    ), "the arm has neither visuals nor bodies: its joints are drawn instead"
 
 
 def _bones(model: Any, tip: int) -> Any:

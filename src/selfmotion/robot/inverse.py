@@ -1,5 +1,7 @@
 """Inverse kinematics: Levenberg-Marquardt on the rows of a task, within joint limits."""
 
+from __future__ import annotations
+
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,7 +19,7 @@ _IK_TOLERANCE = 1e-10
 
 
 def solved(
-    robot: "RobotModel",
+    robot: RobotModel,
     pose: pin.SE3 | npt.ArrayLike,
     task: Task,
     seed: npt.ArrayLike | None,
@@ -47,7 +49,7 @@ def solved(
 
 
 def _levenberg_marquardt(
-    robot: "RobotModel", pose: pin.SE3, task: Task, start: Array, iterations: int = 100
+    robot: RobotModel, pose: pin.SE3, task: Task, start: Array, iterations: int = 100
 ) -> tuple[Array, tuple[float, float]]:
     q, damping = np.clip(start, robot.lower, robot.upper), 1e-3
     actual = robot.pose(q)

@@ -1,4 +1,6 @@
-"""Arms from URDF files, or by name."""
+"""Arms from URDF files or text, from Pinocchio's models, or by name."""
+
+from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping, Sequence
@@ -19,15 +21,20 @@ from selfmotion.robot.model import RobotModel
 from selfmotion.robot.mounting import CarriedBody, with_base, with_bodies, with_tool_offset
 from selfmotion.robot.named import NAMED_ARMS, NAMED_PARTS, published, read_named
 from selfmotion.robot.packages import Packages
+from selfmotion.robot.pinocchio_model import urdf_text_of
 from selfmotion.robot.urdf import Urdf, UrdfPart, read_urdf, urdf_of_file
 from selfmotion.task import as_pose
 
+# What the text of a URDF is called in messages.
+_TEXT = "the URDF text"
+
 
 def load_robot(
-    robot: str | Path | Mapping[str, str | Path],
+    robot: str | Path | pin.Model | Mapping[str, str | Path | pin.Model],
     tool: str | Sequence[str] | None = None,
     lock: Mapping[str, float] | None = None,
     *,
+    geometry: pin.GeometryModel | None = None,
     reference: str | None = None,
     base: pin.SE3 | npt.ArrayLike | Mapping[str, pin.SE3 | npt.ArrayLike] | None = None,
     on: Mapping[str, str] | None = None,
@@ -41,10 +48,13 @@ def load_robot(
 
     Parameters
     ----------
-    robot : str, Path or dict
+    robot : str, Path, pinocchio.Model or dict
         A name from `NAMED_ARMS` (``"panda"``, ``"planar_3r"``, …), ``"positioner"``, or the path of
-        a ``.urdf`` or ``.xacro`` file; or several of these by name, as one tree: links and joints
-        of part ``"arm"`` are called ``arm/NAME`` then.
+        a ``.urdf`` or ``.xacro`` file; the text of a URDF, which begins with ``<``, such as ROS's
+        ``robot_description``; or a model of Pinocchio's, which brings kinematics, limits and
+        inertias, but no visuals, and no bodies without `geometry`.
+        Or several of these by name, as one tree: links and joints of part ``"arm"`` are called
+        ``arm/NAME`` then.
     tool : str or sequence of str, optional
         Tool frame (a link), or several: the first is the one that paths are for where nothing else
         is said. Default: the named arm's usual one; for a file, its only leaf link; of several
@@ -52,6 +62,9 @@ def load_robot(
     lock : dict, optional
         Joints to hold, with their coordinate [rad or m]. Joints that move no tool relative to the
         reference are held anyway, at 0 or the nearest limit unless given here.
+    geometry : pinocchio.GeometryModel, optional
+        Of a ``pinocchio.Model``: its collision bodies (boxes, spheres, cylinders, meshes of files).
+        Without, self-collision is not looked at.
     reference : str, optional
         The link in whose frame poses, twists and paths are given: a part that a table turns, or
         that another hand holds. By default the world.
@@ -71,7 +84,8 @@ def load_robot(
     packages : path or sequence of path, optional
         Folders in which packages that files name are looked up first (``package://``,
         ``$(find …)``). Without, they are found in folders above the file and three levels below
-        these, and by ``AMENT_PREFIX_PATH`` and ``ROS_PACKAGE_PATH``.
+        these, and by ``AMENT_PREFIX_PATH`` and ``ROS_PACKAGE_PATH``. Text is as a file in the
+        working folder.
     calibration : path, optional
         File that says where the joints of this very arm are: Universal Robots' kinematics
         (``.yaml``) or ``calibration.conf``; or a ``.yaml`` or ``.toml`` file with ``joints``, for
@@ -92,16 +106,26 @@ def load_robot(
     >>> load_robot("panda").dof
     7
     """
-    if not isinstance(robot, str | Path | Mapping):
-        raise RobotError(f"robot is {shown(robot)}, expected a name or the path of a file")
+    if not isinstance(robot, str | Path | pin.Model | Mapping):
+        raise RobotError(
+            f"robot is {shown(robot)}, expected a name, the path of a file, the text of a URDF or "
+            f"a pinocchio.Model"
+        )
     for name, given in (("lock", lock), ("arguments", arguments), ("on", on)):
         if not isinstance(given, Mapping | None):
             raise RobotError(f"{name} is {shown(given)}, expected a dict")
+    if geometry is not None and not isinstance(robot, pin.Model):
+        raise RobotError(
+            "geometry is given, which only a pinocchio.Model has; leave it out, since a URDF has "
+            "its own"
+        )
+    if not isinstance(geometry, pin.GeometryModel | None):
+        raise RobotError(f"geometry is {shown(geometry)}, expected a pinocchio.GeometryModel")
     folders = _folders(packages)
     source = (
         _parts(robot, base, on, arguments or {}, folders, calibration)
         if isinstance(robot, Mapping)
-        else _single(robot, base, on, arguments or {}, folders, calibration)
+        else _single(robot, geometry, base, on, arguments or {}, folders, calibration)
     )
     urdf = source.urdf
     if tool is None:
@@ -161,8 +185,19 @@ class _Source:
     limits: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
 
 
-def _read(robot: str | Path, arguments: Mapping[str, str], packages: tuple[str, ...]) -> _Source:
+def _read(
+    robot: str | Path | pin.Model,
+    arguments: Mapping[str, str],
+    packages: tuple[str, ...],
+    geometry: Any = None,
+) -> _Source:
     known = {**NAMED_ARMS, **NAMED_PARTS}
+    source = _called(robot)
+    if isinstance(robot, pin.Model) or source == _TEXT:
+        _check_no_arguments(source, arguments)
+        is_model = isinstance(robot, pin.Model)
+        text = urdf_text_of(robot, geometry, source) if is_model else str(robot).strip()
+        return _Source(urdf_of_file(text, Packages(Path(source), packages)), None)
     if isinstance(robot, str) and robot in known:
         _check_no_arguments(robot, arguments)
         arm = known[robot]
@@ -171,8 +206,16 @@ def _read(robot: str | Path, arguments: Mapping[str, str], packages: tuple[str, 
     return _Source(urdf, None)
 
 
+def _called(robot: str | Path | pin.Model) -> str:
+    """Return what messages and parts call a robot that is given."""
+    if isinstance(robot, pin.Model):
+        return f"pinocchio.Model '{robot.name}'"
+    return _TEXT if str(robot).lstrip().startswith("<") else str(robot)
+
+
 def _single(
-    robot: str | Path,
+    robot: str | Path | pin.Model,
+    geometry: Any,
     base: Any,
     on: Mapping[str, str] | None,
     arguments: Mapping[str, str],
@@ -181,8 +224,8 @@ def _single(
 ) -> _Source:
     if isinstance(base, Mapping) or on is not None:
         what = "on" if on is not None else "base"
-        raise RobotError(f"{what} is a dict of parts, but there is one robot, '{robot}'")
-    source = _read(robot, arguments, packages)
+        raise RobotError(f"{what} is a dict of parts, but there is one robot, '{_called(robot)}'")
+    source = _read(robot, arguments, packages, geometry)
     urdf = source.urdf
     if calibration is not None:
         if not isinstance(calibration, str | Path):
@@ -194,7 +237,7 @@ def _single(
 
 
 def _parts(
-    robots: Mapping[str, str | Path],
+    robots: Mapping[str, str | Path | pin.Model],
     base: Any,
     on: Mapping[str, str] | None,
     arguments: Mapping[str, Any],
@@ -207,10 +250,10 @@ def _parts(
             raise RobotError(
                 f"robot: a part is called {shown(name)}, expected a name of letters, digits and _"
             )
-        if not isinstance(robots[name], str | Path):
+        if not isinstance(robots[name], str | Path | pin.Model):
             raise RobotError(
-                f"robot: part '{name}' is {shown(robots[name])}, expected a name or the path of a "
-                f"file"
+                f"robot: part '{name}' is {shown(robots[name])}, expected a name, the path of a "
+                f"file, the text of a URDF or a pinocchio.Model"
             )
     if not robots:
         raise RobotError("robot: there is no part, expected names with robots")
@@ -241,7 +284,7 @@ def _parts(
     parts = tuple(
         UrdfPart(
             name,
-            str(robot),
+            _called(robot),
             poses.get(name),
             on.get(name),
             own_arguments[name],

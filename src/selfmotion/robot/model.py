@@ -1,5 +1,7 @@
 """The arm as a chain with one coordinate per joint, on Pinocchio's model of it."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -9,10 +11,11 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from selfmotion.basics import Array, Flags, RobotError, plain_numbers, random_numbers, shown
+from selfmotion.basics import Array, Flags, random_numbers
 from selfmotion.robot.chain import WORLD, Chain
+from selfmotion.robot.configurations import as_configuration, as_configurations
 from selfmotion.robot.coupling import Coupling
-from selfmotion.robot.freedom import can_follow, most_dexterous, redundancy
+from selfmotion.robot.freedom import can_follow, most_dexterous, null_space_at, redundancy
 from selfmotion.robot.geometry import readable_visuals, reduced_geometry, stand_in
 from selfmotion.robot.inverse import solved
 from selfmotion.robot.named import home_of
@@ -192,37 +195,58 @@ class RobotModel:
         RobotError
             The shape is not (n,), or a number is not finite; the joint is named.
         """
-        array = plain_numbers(q)
-        if array is None:
-            raise RobotError(
-                f"configuration is {shown(q)}, expected {self.dof} numbers, one for each of "
-                f"{', '.join(self.joint_names)}"
-            )
-        if array.shape != (self.dof,):
-            raise RobotError(
-                f"configuration has shape {array.shape}, expected ({self.dof},) "
-                f"for joints {', '.join(self.joint_names)}"
-            )
-        bad = np.flatnonzero(~np.isfinite(array))
-        if bad.size:
-            raise RobotError(f"joint '{self.joint_names[bad[0]]}' is {array[bad[0]]}, not finite")
-        return np.array(array)
+        return as_configuration(self, q)
 
-    def pose(self, q: npt.ArrayLike) -> pin.SE3:
-        """Return the tool's pose at `q`."""
-        return self.chain.place(self.configuration(q))
+    def pose(self, q: npt.ArrayLike) -> Any:
+        """Return the tool's pose at `q` (n,) as an SE3; at (K, n) a list of K."""
+        given = as_configurations(self, q)
+        if given.ndim == 1:
+            return self.chain.place(given)
+        return [self.chain.place(row) for row in given]
 
     def jacobian(self, q: npt.ArrayLike) -> Array:
-        """Return the tool's Jacobian at `q`, (6, n): rows [v, ω] in world axes.
+        """Return the tool's Jacobian at `q` (n,), (6, n); at (K, n), (K, 6, n).
 
-        v is the velocity of the tool frame's origin (Pinocchio's LOCAL_WORLD_ALIGNED).
+        Its rows are [v, ω] in world axes; v is the velocity of the tool frame's origin (Pinocchio's
+        LOCAL_WORLD_ALIGNED).
         """
-        return self.chain.at(self.configuration(q))[0]
+        given = as_configurations(self, q)
+        return (self.chain.at if given.ndim == 1 else self.chain.along)(given)[0]
 
     def task_jacobian(self, q: npt.ArrayLike, task: Task | str) -> Array:
-        """Return the prescribed rows of the Jacobian at `q`, (m, n)."""
-        jacobian, rotation, _ = self.chain.at(self.configuration(q))
-        return Task.of(task).select(jacobian, rotation)
+        """Return the rows of the Jacobian that `task` prescribes, (m, n) or (K, m, n)."""
+        given, task = as_configurations(self, q), Task.of(task)
+        if given.ndim == 1:
+            jacobian, rotation, _ = self.chain.at(given)
+            return task.select(jacobian, rotation)
+        jacobians, rotations, _ = self.chain.along(given)
+        return task.select_along(jacobians, rotations)
+
+    def null_space(self, q: npt.ArrayLike, task: Task | str = Task.POSE) -> Array:
+        """Return an orthonormal basis N of the null space of the task's Jacobian at `q`.
+
+        J N = 0 and NᵀN = I: joint velocities N z do not move the tool in the rows that `task`
+        prescribes. The columns are the right singular vectors of the singular value 0; their order
+        and signs are arbitrary, and need not be continuous along a motion.
+
+        Parameters
+        ----------
+        q : (n,) or (K, n)
+            [rad or m].
+        task : Task or str
+
+        Returns
+        -------
+        (n, r) or (K, n, r)
+            r = n - rank J. At a singular configuration it is larger than `redundancy`.
+
+        Raises
+        ------
+        RobotError
+            `q` is no configuration; or the rank is not the same at all K, so that there is no array
+            of all bases: ask for one at a time there.
+        """
+        return null_space_at(self, as_configurations(self, q), Task.of(task))
 
     def redundancy(self, task: Task | str) -> int:
         """Return n - rank J of the task at generic configurations (0: no self-motion)."""

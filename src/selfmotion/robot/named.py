@@ -107,7 +107,7 @@ def home_of(urdf: Urdf, joints: Sequence[str], lower: Array, upper: Array) -> Ar
             told = f"part '{part}'" if part else "this arm"
             all_known = ", ".join(name for name, arm in NAMED_ARMS.items() if arm.home is not None)
             raise RobotError(
-                f"what is home is not known of {told}, only of {all_known}; give a configuration"
+                f"no home configuration is known of {told}, only of {all_known}; give one"
             )
     return q
 

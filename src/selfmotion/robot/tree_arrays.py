@@ -1,5 +1,7 @@
 """Trees and chains as arrays, for compiled kinematics."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 

@@ -15,6 +15,7 @@ from selfmotion.robot.packages import Packages
 _UNLIMITED = 1e6
 # Elements in each other; URDFs have six.
 _DEEPEST = 100
+_XACRO = "is xacro; give it as a file with the suffix .xacro"
 
 
 def root_of(text: str, source: str) -> ElementTree.Element:
@@ -25,7 +26,7 @@ def root_of(text: str, source: str) -> ElementTree.Element:
         root = ElementTree.fromstring(text)
     except ElementTree.ParseError as error:
         if "<xacro:" in text:
-            raise RobotError(f"{source}: is a xacro file; give it the suffix .xacro") from error
+            raise RobotError(f"{source}: {_XACRO}") from error
         if text.startswith("version https://git-lfs"):
             raise RobotError(
                 f"{source}: is a pointer of Git LFS, not the file itself; run git lfs pull"
@@ -37,7 +38,7 @@ def root_of(text: str, source: str) -> ElementTree.Element:
     if level:
         raise RobotError(f"{source}: more than {_DEEPEST} elements lie in each other")
     if any("xacro" in element.tag for element in root.iter() if isinstance(element.tag, str)):
-        raise RobotError(f"{source}: is a xacro file; give it the suffix .xacro")
+        raise RobotError(f"{source}: {_XACRO}")
     if root.tag != "robot":
         raise RobotError(f"{source}: the root element is <{root.tag}>, expected <robot>")
     if not root.get("name"):

@@ -1,5 +1,7 @@
 """What the study finds, as plain values: all the report shows and all the JSON file holds."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from enum import Enum
 
@@ -68,7 +70,7 @@ class PlottedCurve:
         *,
         marker: str = "",
         faint: bool = False,
-    ) -> "PlottedCurve":
+    ) -> PlottedCurve:
         """Return a curve through arrays."""
         return cls(
             label,

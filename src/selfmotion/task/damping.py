@@ -1,5 +1,7 @@
 """The singularity-robust inverse: how much damping, and where."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 
 import numpy as np
@@ -58,7 +60,7 @@ class Damping:
             value = as_number(getattr(self, name), f"damping: {name}", above=0.0)
             object.__setattr__(self, name, value)
 
-    def law(self, singular_value: float) -> "DampingLaw":
+    def law(self, singular_value: float) -> DampingLaw:
         """Return the damping for an arm with this σ [m, rad] at its dexterous configuration."""
         threshold = self.threshold * singular_value
         return DampingLaw(threshold, self.strength * threshold)

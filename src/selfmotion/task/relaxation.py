@@ -1,5 +1,7 @@
 """Rows of the tool's motion that need not follow the path exactly, for all of it or a while."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, dataclass, replace
 from numbers import Real
@@ -111,7 +113,7 @@ class Relaxation:
         """Return first and last time of the window in a motion of length `duration` [s]."""
         return (0.0, duration) if self.during is None else self.during
 
-    def moved(self, when: Callable[[Array], Array]) -> "Relaxation | None":
+    def moved(self, when: Callable[[Array], Array]) -> Relaxation | None:
         """Return the same with its window at other times [s]; None where nothing is left of it."""
         if self.during is None:
             return self

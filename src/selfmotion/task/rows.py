@@ -1,5 +1,7 @@
 """Which rows of the tool's motion are prescribed, and how a pose misses them."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from enum import Enum
 
@@ -37,7 +39,7 @@ class Task(Enum):
     PLANAR_POSE = "planar_pose"
 
     @classmethod
-    def of(cls, task: "Task | str") -> "Task":
+    def of(cls, task: Task | str) -> Task:
         """Return the task of that name.
 
         Raises

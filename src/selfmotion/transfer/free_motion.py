@@ -1,5 +1,7 @@
 """Joint motions from one configuration to another that nothing but limits and bodies tells."""
 
+from __future__ import annotations
+
 import time
 from collections.abc import Sequence
 from dataclasses import replace

@@ -1,5 +1,7 @@
 """A joint motion from one configuration to another, or to a pose of the tool."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 
 import numpy as np

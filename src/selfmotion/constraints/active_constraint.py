@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
-class Binding:
+class ActiveConstraint:
     """An active constraint: one that keeps the plan from a lower cost.
 
     Attributes

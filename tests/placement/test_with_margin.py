@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.placement import bought
+from selfmotion.placement import with_margin
 from support.arms import robot_named
 from support.displaced import MISSED, Judge, random_displacement
 from support.shell import invoke
@@ -36,7 +36,7 @@ def problem() -> sm.Problem:
 
 
 @pytest.fixture(scope="module")
-def found(problem: sm.Problem) -> sm.placement.BoughtMargin:
+def found(problem: sm.Problem) -> sm.placement.PlanWithMargin:
     return sm.plan_with_margin(problem, WANTED, of=("part", "base"))
 
 
@@ -56,7 +56,7 @@ def lacks(plan: sm.Plan, rng: np.random.Generator) -> int:
 
 
 def test_the_margin_is_there_and_was_not_before(
-    problem: sm.Problem, found: sm.placement.BoughtMargin
+    problem: sm.Problem, found: sm.placement.PlanWithMargin
 ) -> None:
     assert found.reached, str(found)
     assert found.kept_apart
@@ -66,14 +66,14 @@ def test_the_margin_is_there_and_was_not_before(
 
 
 def test_the_plan_is_of_the_problem_that_was_asked(
-    problem: sm.Problem, found: sm.placement.BoughtMargin
+    problem: sm.Problem, found: sm.placement.PlanWithMargin
 ) -> None:
     assert found.plan.problem is problem
     assert found.plan.certificate.verified
     assert found.plan.check().verified
     without = sm.plan(problem)
     assert found.cost_without == pytest.approx(without.report.cost, rel=1e-6)
-    assert found.price > 0.0
+    assert found.extra_cost > 0.0
     assert "proved" in str(found)
 
 
@@ -81,7 +81,7 @@ def test_a_margin_that_is_there_costs_nothing(problem: sm.Problem) -> None:
     small = sm.plan_with_margin(problem, sm.Margin(1e-4))
     assert small.reached
     assert not small.kept_apart
-    assert small.price == 0.0
+    assert small.extra_cost == 0.0
 
 
 def test_a_margin_that_no_motion_has_is_not_claimed(problem: sm.Problem) -> None:
@@ -95,12 +95,12 @@ def test_a_margin_that_no_motion_has_is_not_claimed(problem: sm.Problem) -> None
 
 def test_bands_give_what_a_displacement_uses(problem: sm.Problem) -> None:
     asked = problem.changed(start="free", relaxations=(sm.Relaxation("z", 0.06),))
-    given = bought._narrowed(asked, sm.Margin(0.01, 0.02), 0.5)
+    given = with_margin._narrowed(asked, sm.Margin(0.01, 0.02), 0.5)
     assert given[0].band == pytest.approx(0.06 - 0.01 - 0.5 * 0.02)
     with pytest.raises(sm.errors.ProblemError, match=r"the band of z is 0\.06"):
-        bought._narrowed(asked, sm.Margin(0.05, 0.02), 0.5)
+        with_margin._narrowed(asked, sm.Margin(0.05, 0.02), 0.5)
     turned = dataclasses.replace(asked, relaxations=(sm.Relaxation("rz", 0.1),))
-    assert bought._narrowed(turned, sm.Margin(0.01, 0.02), 0.5)[0].band == pytest.approx(0.08)
+    assert with_margin._narrowed(turned, sm.Margin(0.01, 0.02), 0.5)[0].band == pytest.approx(0.08)
 
 
 def test_what_cannot_be_bought_is_refused(problem: sm.Problem) -> None:

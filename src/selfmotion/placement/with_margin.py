@@ -5,6 +5,8 @@ as it lacks; then the motion is planned again, and judged as any other (`margins
 kept farther apart than it has to be.
 """
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -35,8 +37,8 @@ _SUBJECTS = ("part", "tool", "base")
 
 
 @dataclass(frozen=True, eq=False)
-class BoughtMargin:
-    """A motion that leaves a margin, and its price.
+class PlanWithMargin:
+    """A motion that leaves a margin, and what it costs.
 
     Attributes
     ----------
@@ -70,24 +72,24 @@ class BoughtMargin:
         return self.plan.certificate.verified and not self.shortfalls
 
     @property
-    def price(self) -> float:
+    def extra_cost(self) -> float:
         """What the margin costs, as a share of the cost without; 0 where it was there anyway."""
         return self.cost / self.cost_without - 1.0 if self.cost_without else 0.0
 
     def __str__(self) -> str:
-        """Return whether the margin is there, and its price, in words."""
+        """Return whether the margin is there, and what it costs, in words."""
         wanted = (
             f"{self.wanted.position * 1e3:.3g} mm and {np.degrees(self.wanted.rotation):.3g}° of "
             f"{', '.join(self.of)}"
         )
         if not self.plan.certificate.verified:
             return f"no margin of {wanted}: {self.plan.certificate.verdict}"
-        priced = f"cost {self.cost:.6g}, {self.cost_without:.6g} without ({self.price:+.2%})"
+        costs = f"cost {self.cost:.6g}, {self.cost_without:.6g} without ({self.extra_cost:+.2%})"
         if self.shortfalls:
             lacks = "; ".join(str(item) for item in self.shortfalls)
             why = f"; no motion keeps more: {self.refused}" if self.refused else ""
-            return f"no margin of {wanted}: {lacks}{why}; {priced}"
-        return f"margin of {wanted}, proved; {priced}"
+            return f"no margin of {wanted}: {lacks}{why}; {costs}"
+        return f"margin of {wanted}, proved; {costs}"
 
     __repr__ = __str__
 
@@ -103,7 +105,7 @@ def plan_with_margin(
     clearance: float = 0.0,
     progress: Progress = silent,
     **options: Any,
-) -> BoughtMargin:
+) -> PlanWithMargin:
     """Plan a motion that survives displacements of a size, and say what that costs.
 
     Bands of tolerances (`Relaxation`) are planned with as much less as the displacement may use.
@@ -125,7 +127,7 @@ def plan_with_margin(
 
     Returns
     -------
-    BoughtMargin
+    PlanWithMargin
         Also where the margin is not reached: `reached` and `shortfalls` say so.
 
     Raises
@@ -178,7 +180,7 @@ def plan_with_margin(
                 best = before
             break
         found = shortfalls(best, margin, named, **asked)
-    return BoughtMargin(
+    return PlanWithMargin(
         best, margin, named, found.items, best.report.cost, first.report.cost, apart, refused
     )
 
@@ -203,7 +205,7 @@ def _kept(problem: Problem, apart: dict[tuple[str, str], float]) -> list[Clearan
     found = []
     bodies = {
         body.name: body
-        for item in (*problem.constraints, problem.collision)
+        for item in (*problem.constraints, problem.clearance)
         if isinstance(item, Clearance)
         for body in item.obstacles
     }

@@ -1,0 +1,106 @@
+"""What commands print by default: the verdict, one number, one remedy, and files."""
+
+import io
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rich.console import Console
+from typer.testing import CliRunner
+
+import selfmotion as sm
+from selfmotion.cli import app, summaries
+from support.arms import robot_named
+
+# What a reader takes in at a glance.
+MOST_LINES = 4
+
+
+@pytest.fixture(scope="module")
+def slow() -> sm.Plan:
+    """A plan that one joint's speed limit keeps from a lower cost."""
+    arm, start = robot_named("planar_3r"), np.array([0.3, 0.8, 0.4])
+    pose = arm.pose(start)
+    end = pose.copy()
+    end.translation = pose.translation + np.array([-1.2, 0.8, 0.0])
+    path = sm.paths.Line(pose, end, 2.0)
+    free = sm.plan(sm.Problem(arm, path, "planar", start))
+    most = np.abs(free.trajectory.extremes(1)[1]).max(axis=0) * np.array([0.95, 3.0, 3.0])
+    limits = [sm.constraints.JointVelocityLimits(most)]
+    return sm.plan(sm.Problem(arm, path, "planar", start, constraints=limits))
+
+
+def told(show, thing) -> list[str]:
+    page = io.StringIO()
+    show(thing, Console(file=page, width=200))
+    return page.getvalue().splitlines()
+
+
+def test_of_a_plan_the_verdict_comes_first_then_cost_duration_and_what_would_help(
+    slow: sm.Plan,
+) -> None:
+    lines = told(summaries.show_plan, slow)
+    assert len(lines) <= MOST_LINES
+    assert lines[0] == slow.certificate.summary
+    assert lines[0].startswith("verified at all times: at most ")
+    assert f"cost {slow.report.cost:.6g} (" in lines[1]
+    assert "duration 2 s" in lines[1]
+    saving = 100.0 * slow.report.active[0].saving / slow.report.cost
+    assert lines[2] == (
+        f"2 % more speed for joint 'joint1' would lower the cost by about {saving:.2g} %"
+    )
+
+
+def test_of_what_is_not_verified_the_first_reason_and_how_many_more(slow: sm.Plan) -> None:
+    moved = replace(slow.trajectory, q=slow.trajectory.q + 0.3, qd=3.0 * slow.trajectory.qd)
+    plan = replace(slow, trajectory=moved)
+    plan = replace(plan, certificate=plan.check())
+    failures = plan.certificate.failures
+    assert len(failures) > 1
+    lines = told(summaries.show_plan, plan)
+    assert lines[0] == f"not verified: {failures[0]}; and {len(failures) - 1} more"
+    assert len(lines) <= MOST_LINES
+
+
+def test_what_was_not_checked_is_never_left_out(slow: sm.Plan) -> None:
+    check = slow.certificate
+    assert "not checked: accelerations, self-collision" in check.summary
+    noted = replace(check, notes=("the arm has changed",), motion=check.motion)
+    assert noted.summary.endswith("; the arm has changed")
+
+
+def test_a_plan_that_was_cut_short_says_so(slow: sm.Plan) -> None:
+    early = sm.plan(slow.problem, max_evaluations=2)
+    if early.certificate.verified:
+        assert any(early.report.message in line for line in told(summaries.show_plan, early))
+
+
+def test_a_retimed_plan_has_no_cost_of_before(slow: sm.Plan) -> None:
+    fast = sm.retime(slow, 10.0, 10.0)
+    lines = told(summaries.show_plan, fast)
+    assert lines[1] == f"duration {fast.trajectory.duration:.4g} s"
+    assert not any(line.startswith("cost") for line in lines)
+
+
+def test_commands_are_short_unless_asked(slow: sm.Plan, tmp_path: Path) -> None:
+    file, motion = tmp_path / "plan.npz", tmp_path / "motion.csv"
+    slow.save(file)
+    for command in (["check", file], ["export", file, "--out", motion]):
+        words = list(map(str, command))
+        short = CliRunner().invoke(app, words).output.splitlines()
+        whole = CliRunner().invoke(app, [*words, "--verbose"]).output
+        assert len(short) <= MOST_LINES
+        assert slow.certificate.summary in short[0]
+        # However a terminal wraps it.
+        assert slow.certificate.verdict in " ".join(whole.split())
+
+
+def test_json_is_whole_without_verbose(slow: sm.Plan, tmp_path: Path) -> None:
+    slow.save(tmp_path / "plan.npz")
+    run = ["check", str(tmp_path / "plan.npz"), "--json"]
+    found = [json.loads(CliRunner().invoke(app, [*run, *more]).output) for more in ([], ["-v"])]
+    assert found[0] == found[1]
+    assert found[0]["verdict"] == slow.certificate.verdict
+    assert found[0]["findings"]

@@ -1,0 +1,78 @@
+"""Plans side by side: numbers of the plans themselves, and a table of them."""
+
+import io
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+import selfmotion as sm
+from selfmotion.cli import tables
+
+
+@pytest.fixture(scope="module")
+def plans() -> dict[str, sm.Plan]:
+    problem = sm.sample_problem()
+    other = replace(problem, costs=[sm.costs.PathLength(), sm.costs.JointVelocity()])
+    return {"speed": sm.plan(problem), "length": sm.plan(other)}
+
+
+def test_its_numbers_are_the_plans(plans: dict[str, sm.Plan]) -> None:
+    found = sm.compare(plans)
+    assert found.names == ("speed", "length")
+    for k, plan in enumerate(plans.values()):
+        told = {name: values[k] for name, values in found.costs.items()}
+        assert told.pop("total cost") == plan.report.cost
+        assert {name: value for name, value in told.items() if value is not None} == dict(
+            plan.report.terms
+        )
+        assert found.figures["duration, s"][k] == plan.trajectory.duration
+        assert found.figures["position error, m"][k] == plan.certificate.position_error.value
+        way = np.abs(np.diff(plan.trajectory.q, axis=0)).sum()
+        assert found.figures["joint path, rad or m"][k] == pytest.approx(way)
+    assert found.verdicts == tuple(plan.certificate.verdict for plan in plans.values())
+
+
+def test_its_text_has_a_line_for_each_number(plans: dict[str, sm.Plan]) -> None:
+    lines = str(sm.compare(plans)).splitlines()
+    assert lines[0].split() == ["speed", "length"]
+    assert len(set(map(len, lines))) == 1, "columns are aligned"
+    cost = next(line for line in lines if line.startswith("total cost"))
+    assert cost.split()[2:] == [f"{plan.report.cost:.5g}" for plan in plans.values()]
+
+
+def test_the_shell_shows_the_same_cells(plans: dict[str, sm.Plan]) -> None:
+    page = io.StringIO()
+    tables.show_comparison(plans, Console(file=page, width=120))
+    shown = [line.split() for line in page.getvalue().splitlines()]
+    for row in sm.compare(plans).cells():
+        assert " ".join(row).split() in shown
+
+
+def test_plans_without_names_are_numbered(plans: dict[str, sm.Plan]) -> None:
+    assert sm.compare(list(plans.values())).names == ("plan 1", "plan 2")
+
+
+def test_what_is_not_verified_says_why(plans: dict[str, sm.Plan]) -> None:
+    plan = plans["speed"]
+    motion = replace(plan.trajectory, q=plan.trajectory.q + 0.1)
+    wrong = replace(plan, trajectory=motion)
+    wrong = replace(wrong, certificate=wrong.check())
+    found = sm.compare([plan, wrong])
+    assert found.verified == (True, False)
+    assert str(found).splitlines()[-1] == f"plan 2: {wrong.certificate.verdict}"
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ([], "expected plans, or a dict"),
+        ("a.npz", "expected plans, or a dict"),
+        (3, "plans is 3"),
+        (["a.npz"], r"'plan 1' is 'a.npz', expected a plan"),
+    ],
+)
+def test_what_are_no_plans_is_refused(given, message: str) -> None:
+    with pytest.raises(sm.errors.ProblemError, match=message):
+        sm.compare(given)

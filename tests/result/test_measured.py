@@ -1,0 +1,143 @@
+"""What is asked of a finished plan: its null-space velocity, and its cost by any cost."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import selfmotion as sm
+from selfmotion.basics import Array
+from support.arms import Case, robot_named, short_line, start_of
+
+# Roundings of velocities, by two ways to a pseudo-inverse.
+ROUNDING = 1e-9
+# Between its nodes a motion leaves its path by less than the tolerance; velocities by more [m/s].
+BETWEEN_NODES = 1e-3
+# A motion evaluated and summed in another order: its jerks are differences of large numbers.
+SUMMED = 1e-10
+
+
+@pytest.fixture
+def plan(case: Case) -> sm.Plan:
+    robot, task, start, path = case
+    return sm.plan(sm.Problem(robot, path, task, start), max_evaluations=3)
+
+
+def test_it_is_what_the_pseudo_inverse_leaves(plan: sm.Plan) -> None:
+    """q̇ = J⁺ẋ + N z, ẋ once what the tool does, once what the path asks for."""
+    t = np.linspace(0.0, plan.trajectory.duration, 7)
+    found = plan.null_motion(t)
+    twists = plan.path.evaluate(t).twist
+    for k, (q, qd) in enumerate(zip(plan.trajectory(t), plan.trajectory(t, 1), strict=True)):
+        rows = plan.robot.task_jacobian(q, plan.task)
+        inverse = np.linalg.pinv(rows)
+        np.testing.assert_allclose(inverse @ rows @ qd + found.joints[k], qd, atol=ROUNDING)
+        asked = plan.task.select(twists[k][:, None], plan.robot.pose(q).rotation)[:, 0]
+        np.testing.assert_allclose(inverse @ asked + found.joints[k], qd, atol=BETWEEN_NODES)
+        np.testing.assert_allclose(rows @ found.joints[k], 0.0, atol=ROUNDING)
+        basis = found.basis[k]
+        np.testing.assert_allclose(basis.T @ basis, np.eye(basis.shape[1]), atol=ROUNDING)
+        np.testing.assert_allclose(found.coordinates[k], basis.T @ qd, atol=ROUNDING)
+        np.testing.assert_allclose(found.joints[k], basis @ found.coordinates[k], atol=ROUNDING)
+
+
+def test_one_time_is_one_of_many(plan: sm.Plan) -> None:
+    t = np.array([0.4, 0.9])
+    one, many = plan.null_motion(0.9), plan.null_motion(t)
+    assert one.joints.shape == (plan.robot.dof,)
+    np.testing.assert_allclose(one.joints, many.joints[1], atol=ROUNDING)
+    # The basis is another, but spans the same.
+    np.testing.assert_allclose(
+        np.linalg.norm(one.coordinates), np.linalg.norm(many.coordinates[1]), atol=ROUNDING
+    )
+    with pytest.raises(ValueError, match="outside the motion"):
+        plan.null_motion(99.0)
+
+
+def test_its_coordinates_do_not_jump(plan: sm.Plan) -> None:
+    """No more than joint velocities and bases do, whose signs are arbitrary one by one."""
+    t = np.linspace(0.0, plan.trajectory.duration, 400)
+    steps = np.abs(np.diff(plan.null_motion(t).coordinates, axis=0)).max()
+    assert steps < 0.05 * max(1.0, np.abs(plan.trajectory(t, 1)).max())
+
+
+@pytest.fixture(scope="module")
+def panda_plan() -> sm.Plan:
+    panda = robot_named("panda")
+    start = start_of(panda, "position")
+    costs = (
+        sm.costs.JointVelocity(),
+        sm.costs.JointAcceleration(0.1),
+        sm.costs.JointJerk(1e-3),
+        sm.costs.Manipulability(mu=0.1),
+        sm.costs.GravityTorque(panda),
+        sm.costs.PathLength(),
+        sm.costs.Posture(posture=start),
+    )
+    path = short_line(panda, start)
+    return sm.plan(sm.Problem(panda, path, "position", start, costs=costs), max_evaluations=5)
+
+
+def test_of_its_own_costs_it_is_the_report(panda_plan: sm.Plan) -> None:
+    for cost in panda_plan.problem.costs:
+        found, told = panda_plan.evaluate(cost), panda_plan.report.terms[cost.name]
+        assert found == pytest.approx(told, rel=SUMMED)
+    assert sum(map(panda_plan.evaluate, panda_plan.problem.costs)) == pytest.approx(
+        panda_plan.report.cost, rel=SUMMED
+    )
+
+
+def test_with_tolerances_it_is_the_report_as_well(panda_plan: sm.Plan) -> None:
+    asked = replace(panda_plan.problem, task="pose", relaxations=[sm.Relaxation("rz", 0.3)])
+    found = sm.plan(asked, max_evaluations=5)
+    for cost in found.problem.costs:
+        assert found.evaluate(cost) == pytest.approx(found.report.terms[cost.name], rel=SUMMED)
+
+
+def test_of_any_other_cost_it_is_the_integral(panda_plan: sm.Plan) -> None:
+    """Against a trapezoidal sum on 20,000 steps, of a function of one's own."""
+
+    def g(qd: Array, q: Array, t: Array) -> Array:
+        return np.sum(qd**2, axis=1) * (1.0 + t) + np.sin(q[:, 0])
+
+    motion = panda_plan.trajectory
+    t = np.linspace(motion.t[0], motion.t[-1], 20001)
+    expected = np.trapezoid(g(motion(t, 1), motion(t), t), t)
+    assert panda_plan.evaluate(sm.costs.FunctionCost(g)) == pytest.approx(expected, rel=1e-7)
+
+
+def test_a_plan_with_another_motion_costs_what_that_does(panda_plan: sm.Plan) -> None:
+    slow = sm.Trajectory(
+        2.0 * panda_plan.trajectory.t,
+        panda_plan.trajectory.q,
+        0.5 * panda_plan.trajectory.qd,
+        panda_plan.trajectory.joint_names,
+        0.25 * panda_plan.trajectory.qdd,
+    )
+    speed = sm.costs.JointVelocity()
+    assert replace(panda_plan, trajectory=slow).evaluate(speed) == pytest.approx(
+        0.5 * panda_plan.evaluate(speed), rel=1e-12
+    )
+
+
+def test_what_cannot_be_evaluated_says_why(panda_plan: sm.Plan, tmp_path: Path) -> None:
+    for cost, message in (
+        (3, r"cost is 3, expected a cost such as sm.costs.JointVelocity\(\)"),
+        (sm.costs.JointVelocity, "the class JointVelocity, not an object of it"),
+        (sm.costs.JointVelocity([1.0, 2.0]), "expected one entry per joint"),
+        (sm.costs.FunctionCost(lambda qd, q, t: t / (t - t)), "its value is inf at t = "),
+        (sm.costs.FunctionCost(lambda qd, q, t: t[1:]), "returned shape"),
+    ):
+        with (
+            np.errstate(divide="ignore", invalid="ignore"),
+            pytest.raises(sm.errors.ProblemError, match=message),
+        ):
+            panda_plan.evaluate(cost)
+    lost = replace(
+        panda_plan.problem, costs=[sm.costs.FunctionCost(lambda qd, q, t: t, name="own")]
+    )
+    sm.plan(lost, max_evaluations=2).save(tmp_path / "plan.npz")
+    (own,) = sm.load_plan(tmp_path / "plan.npz").problem.costs
+    with pytest.raises(sm.errors.ProblemError, match=r"'own' was a FunctionCost.*give it again"):
+        panda_plan.evaluate(own)
