@@ -9,8 +9,8 @@ import pytest
 import selfmotion as sm
 from selfmotion.basics import Array, ProblemError
 from selfmotion.constraints import (
+    Multipliers,
     NodeTangents,
-    Priced,
     active_of,
     linearised,
     penalty,
@@ -94,15 +94,15 @@ def test_the_penalty_is_the_square_over_the_motion(
 def test_what_binds_is_priced_where_it_binds(grid: Grid) -> None:
     """Columns with the same words together, the most expensive first; one free node is no gap."""
     count, times = len(grid.nodes), grid.nodes
-    prices = np.zeros((count, 4))
-    prices[2:4, 0], prices[5, 2], prices[8:10, 2] = 1.0, 3.0, 1.0
-    prices[1, 1] = 0.5
+    multipliers = np.zeros((count, 4))
+    multipliers[2:4, 0], multipliers[5, 2], multipliers[8:10, 2] = 1.0, 3.0, 1.0
+    multipliers[1, 1] = 0.5
     limits, end = Given("limits", table(grid, 4)), Given("end", np.zeros((1, 2)), True)
-    used = np.ones(prices.shape, dtype=np.bool_)
+    used = np.ones(multipliers.shape, dtype=np.bool_)
     at_end = np.array([[-20.0, 0.0]])
     both = [
-        Priced(limits, prices, times, used),
-        Priced(end, at_end, times[:1], np.ones((1, 2), dtype=np.bool_)),
+        Multipliers(limits, multipliers, times, used),
+        Multipliers(end, at_end, times[:1], np.ones((1, 2), dtype=np.bool_)),
     ]
     span = times[[0, -1]]
     found = active_of(both, span, 0.25)
@@ -116,7 +116,7 @@ def test_what_binds_is_priced_where_it_binds(grid: Grid) -> None:
     assert found[1].spans == ((times[2], times[5]), (times[8], times[9]))
     assert found[2].spans == ((times[1], times[1]),)
     assert len(active_of(both, span, 0.26)) == 2
-    free = [Priced(limits, 0.0 * prices, times, used)]
+    free = [Multipliers(limits, 0.0 * multipliers, times, used)]
     assert active_of(free, span, 1e-9) == ()
 
 

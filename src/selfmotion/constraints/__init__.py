@@ -1,6 +1,6 @@
 """What a motion must keep: limits, end conditions, closed paths, clearance."""
 
-from selfmotion.constraints.active import Priced as Priced, active_of as active_of
+from selfmotion.constraints.active import Multipliers as Multipliers, active_of as active_of
 from selfmotion.constraints.active_constraint import ActiveConstraint as ActiveConstraint
 from selfmotion.constraints.band import Band as Band
 from selfmotion.constraints.base import Constraint as Constraint

@@ -18,8 +18,8 @@ from selfmotion.constraints import (
     BoundClearance,
     BoundConstraint,
     BoundLimits,
+    Multipliers,
     NodeTangents,
-    Priced,
     linearised,
 )
 from selfmotion.costs import Samples
@@ -251,13 +251,13 @@ class NodeRows:
             found = one if found is None else found + one
         return found
 
-    def priced(self, multipliers: Array, ends: Array) -> list[Priced]:
+    def multipliers_of(self, multipliers: Array, ends: Array) -> list[Multipliers]:
         """Return what the rows of each constraint cost, (R,), in the order of time."""
         found = []
         for item, own in zip(self.constraints, self.split(multipliers), strict=True):
             if not isinstance(item, BoundLimits):
                 used = np.ones(own.shape, dtype=np.bool_)
-                found.append(Priced(item, own, self.spline.points.t, used))
+                found.append(Multipliers(item, own, self.spline.points.t, used))
                 continue
             once = np.ones(own.shape[:2], dtype=np.bool_)
             if item.order < ORDERS - 1:
@@ -267,7 +267,9 @@ class NodeRows:
             at = unit_bases(np.linspace(0.0, 1.0, CONTROLS[item.order]))
             used = self._limits(item, ends, at) > _granted(item) - _USED
             shape = len(times), -1
-            found.append(Priced(item, own[once].reshape(shape), times, used[once].reshape(shape)))
+            found.append(
+                Multipliers(item, own[once].reshape(shape), times, used[once].reshape(shape))
+            )
         return found
 
     @cached_property

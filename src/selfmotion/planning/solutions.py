@@ -10,9 +10,9 @@ import numpy as np
 from selfmotion import paper
 from selfmotion.basics import Array, BreakdownError, Flags
 from selfmotion.constraints import (
-    Binding,
+    ActiveConstraint,
     BoundConstraint,
-    Priced,
+    Multipliers,
     active_of,
     penalised,
     violated,
@@ -38,7 +38,7 @@ class Solution(Protocol):
         """What is wrong for each constraint that it could not meet."""
 
     @property
-    def active(self) -> tuple[Binding, ...]:
+    def active(self) -> tuple[ActiveConstraint, ...]:
         """What kept it from a lower cost."""
 
     @property
@@ -118,7 +118,7 @@ class PublishedSolution:
         return violated(self.constraints, self._samples)
 
     @property
-    def active(self) -> tuple[Binding, ...]:
+    def active(self) -> tuple[ActiveConstraint, ...]:
         """Nothing: constraints are not asked of it, only judged."""
         return ()
 
@@ -215,9 +215,9 @@ class NodeSolution:
         return cls(motion, Status.STOPPED, np.zeros(len(motion.h)))
 
     @cached_property
-    def active(self) -> tuple[Binding, ...]:
+    def active(self) -> tuple[ActiveConstraint, ...]:
         """What kept the optimum from a lower cost; on the way to one, multipliers say nothing."""
-        return _binding(self.optimum) if self.optimum is not None and self.has_arrived else ()
+        return _active(self.optimum) if self.optimum is not None and self.has_arrived else ()
 
     @property
     def has_arrived(self) -> bool:
@@ -300,18 +300,18 @@ class NodeSolution:
         return self.on(Grid(self.motion.grid.t).halved(where).nodes) or self
 
 
-def _binding(optimum: Optimum) -> tuple[Binding, ...]:
+def _active(optimum: Optimum) -> tuple[ActiveConstraint, ...]:
     """Return what kept an optimum from a lower cost."""
     if not (optimum.multipliers.any() or optimum.end_multipliers.size):
         return ()
     motion, grid = optimum.motion, optimum.motion.grid
-    inner = iter(grid.rows.priced(optimum.multipliers, motion.curve_ends))
+    inner = iter(grid.rows.multipliers_of(optimum.multipliers, motion.curve_ends))
     ends = grid.ends.by_item(optimum.end_multipliers)
     each = []
     for item in grid.constraints:
         if item.equality:
             own = ends[id(item)][None]
-            each.append(Priced(item, own, np.zeros(1), np.ones(own.shape, dtype=np.bool_)))
+            each.append(Multipliers(item, own, np.zeros(1), np.ones(own.shape, dtype=np.bool_)))
         else:
             each.append(next(inner))
     return active_of(each, grid.t[[0, -1]], LEAST_SAVING * abs(motion.cost))
