@@ -20,9 +20,9 @@ along = np.array([0.5, 0.5, -np.sqrt(0.5)])
 across = np.array([-np.sqrt(0.5), np.sqrt(0.5), 0.0])
 turn = np.column_stack([across, np.cross(along, across), along])
 corners = np.array([[0.46, 0.395, 0.04], [0.46, 0.36, 0.04], [0.495, 0.36, 0.04]]) - 0.004 * along
-turns = np.tile(pin.Quaternion(turn).coeffs()[[3, 0, 1, 2]], (3, 1))
+poses = [pin.SE3(turn, corner) for corner in corners]
 seam = sm.paths.Placed(
-    sm.paths.Feed(sm.paths.Polyline(corners, turns, tolerance=1e-3), 0.01), place
+    sm.paths.Feed(sm.paths.Polyline.from_poses(poses, tolerance=1e-3), 0.01), place
 )
 
 problem = sm.Problem(

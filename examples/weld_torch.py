@@ -35,7 +35,7 @@ part = [
 angle, same = np.linspace(0.0, 2.0 * np.pi, 25), np.ones(25)
 seam = np.stack([0.081 * np.cos(angle), 0.081 * np.sin(angle), 0.011 * same], axis=1)
 turns = Rotation.from_euler("ZY", np.stack([angle, np.radians(-135.0) * same], axis=1))
-path = sm.paths.Feed(sm.paths.Waypoints(angle, seam, turns.as_quat(scalar_first=True)), 0.04)
+path = sm.paths.Feed(sm.paths.Waypoints(angle, seam, turns), 0.04)
 
 problem = sm.Problem(
     cell,

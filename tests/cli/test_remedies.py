@@ -34,6 +34,12 @@ def test_remedies_name_options(text: str, options: str, said: str, tmp_path: Pat
     assert said in complaint("plan", "panda", "--path", file, *options.split())
 
 
+def test_the_order_of_quaternions_is_asked_for_by_its_option(tmp_path: Path) -> None:
+    np.save(tmp_path / "seam.npy", np.ones((3, 7)))
+    line = complaint("plan", "panda", "--path", tmp_path / "seam.npy", "--feed", "0.1")
+    assert "give --columns ('x,y,z,qw,qx,qy,qz' or 'x,y,z,qx,qy,qz,qw')" in line
+
+
 def test_remedies_for_arms_name_options(tmp_path: Path) -> None:
     line = complaint("plan", "ur5", "--circle", "0.05", "--task", "pose")
     assert "take another --task (position, pointing, planar), relax some" in line

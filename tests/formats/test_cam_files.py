@@ -392,7 +392,7 @@ def test_a_job_is_read_from_a_machine_program(tmp_path: Path) -> None:
         ("G0 B0\nG81 X3 Z3 R1", "the hole ends 2 mm above where it begins"),
         ("G0 B0\nG83 X3 Z-3 R1", "drills by 0 mm at once, expected a step above 0"),
         ("G81 X3 Z-3 R1", "G81 drills along Z, and the tool is tilted"),
-        ("G3 X60 Y20 I-20 J0 P1.5", "P of an arc is 1.5, expected how often it goes round"),
+        ("G3 X60 Y20 I-20 J0 P1.5", "P of an arc is 1.5, expected a number of turns"),
         ("BEGIN PGM A MM", "is in Heidenhain's own language"),
         ("G1 X1 X2", "word X is there twice"),
         ("G1 X1 F0", "expected a feed above 0"),

@@ -11,7 +11,7 @@ from scipy.interpolate import CubicSpline
 import selfmotion as sm
 from selfmotion import formats
 from selfmotion.basics import Array
-from selfmotion.certificate import KeepsApart
+from selfmotion.certificate import Separation
 from selfmotion.cli import exports
 from selfmotion.formats import judged_program, program_miss
 from selfmotion.formats.program_axes import axes_of, tool_from_flange
@@ -259,7 +259,7 @@ def test_free_moves_are_as_far_off_as_bodies_keep_apart(
     assert stated.path == NO_MISS
     assert found.moves.position <= stated.moves.position
     assert stated.moves.position > 5e-4
-    (apart,) = (item for item in past.requirements if isinstance(item, KeepsApart))
+    (apart,) = (item for item in past.requirements if isinstance(item, Separation))
     (stretch,) = read_program(file).stretches
     times = np.linspace(0.0, stretch.t[-1], 400)
     for way in ways(stretch.t, stretch.q, times):
@@ -307,7 +307,7 @@ def test_a_program_of_a_job_is_verified_by_its_job(
     file, job = tmp_path / name, tmp_path / "a.program"
     program.save(job)
     sm.files.write_motion(program, file, settings=settings(name, 1e-3))
-    code, text = invoke("check", file, "--robot", job)
+    code, text = invoke("check", file, "--robot", job, "--verbose")
     assert code == 0, text
     assert [line.split(":")[0] for line in text.splitlines()[:-1]] == [
         step.name for step in program.steps
@@ -321,7 +321,7 @@ def test_a_program_of_a_job_is_verified_by_its_job(
     file.write_text(text[:middle] + moved)
     found = judged_program(file, program).steps
     assert sum(not step.verified for step in found) == 1
-    code, text = invoke("check", file, "--robot", job)
+    code, text = invoke("check", file, "--robot", job, "--verbose")
     assert code == 1
     assert f"not verified: 1 of {len(found)} steps" in text
     other = replace(program, steps=program.steps[:-1])
@@ -352,7 +352,7 @@ def test_a_program_of_a_plan_is_verified_as_it_is_written(
     sm.files.write_problem(problem, tmp_path / "cell.toml")
     asked = settings(name, deviation)
     sm.files.write_motion(made, tmp_path / name, settings=asked)
-    code, text = invoke("check", tmp_path / name, "--robot", tmp_path / "cell.toml")
+    code, text = invoke("check", tmp_path / name, "--robot", tmp_path / "cell.toml", "-v")
     assert code == 0, text
     assert "feed (at least 0.049)" in text
     # Slower than it was written, it neither takes its time nor keeps the feed.
@@ -360,7 +360,7 @@ def test_a_program_of_a_plan_is_verified_as_it_is_written(
     late = re.sub(r"(TIME_BLOCK END = )", r"\g<1>1", late)
     late = re.sub(r"\\T:=0", r"\\T:=1", late)
     (tmp_path / name).write_text(late)
-    code, text = invoke("check", tmp_path / name, "--robot", tmp_path / "cell.toml")
+    code, text = invoke("check", tmp_path / name, "--robot", tmp_path / "cell.toml", "-v")
     assert code == 1
     assert "feed (at least 0.049)" in text
 

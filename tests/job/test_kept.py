@@ -180,7 +180,7 @@ def test_what_happens_on_a_move_was_asked_for_by_nobody(kept) -> None:
     for changes, said in (({"events": (("arc on", 0.1),)}, "arc on"), ({"leaves": (far,)}, "far")):
         first = replace(program.steps[0], **changes)
         verdict = replace(program, steps=(first, *program.steps[1:])).verdict
-        assert f"'{first.name}' has '{said}', which nobody asked of a move" in verdict
+        assert f"'{first.name}' has '{said}', which was not asked of a move" in verdict
 
 
 def test_a_seams_own_clearance_is_kept_besides_that_of_the_job() -> None:

@@ -48,7 +48,7 @@ class Judge:
         wanted = {
             frozenset(pair)
             for item in plan.requirements
-            if isinstance(item, sm.certificate.KeepsApart)
+            if isinstance(item, sm.certificate.Separation)
             for pair in item.model.pairs
         }
         for i, first in enumerate(self.names):

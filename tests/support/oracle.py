@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 
 import selfmotion as sm
 from selfmotion.basics import Array
-from selfmotion.certificate import KeepsApart
+from selfmotion.certificate import Separation
 from support.own_kinematics import Arm, along
 from support.solids import solid_of_obstacle
 
@@ -137,7 +137,7 @@ class Judge:
                 case sm.constraints.ClosedPath():
                     ends += [(0, None), (1, None)][: 1 + item.velocity]
         for wanted in plan.requirements:
-            if isinstance(wanted, KeepsApart):
+            if isinstance(wanted, Separation):
                 bodies.append((wanted.obstacles, wanted.model.pairs, wanted.distance))
         return replace(judge, limits=limits, bodies=bodies, ends=ends)
 

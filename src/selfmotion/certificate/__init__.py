@@ -1,6 +1,5 @@
 """Re-checks finished motions: the path, and each requirement."""
 
-from selfmotion.certificate.apart import KeepsApart as KeepsApart
 from selfmotion.certificate.bounding import Bounded as Bounded, Stretch as Stretch
 from selfmotion.certificate.check import certify as certify
 from selfmotion.certificate.ends import (
@@ -35,6 +34,7 @@ from selfmotion.certificate.requirement import (
     Requirement as Requirement,
     approaches as approaches,
 )
+from selfmotion.certificate.separation import Separation as Separation
 from selfmotion.certificate.verdict import (
     Certificate as Certificate,
     allowed_text as allowed_text,

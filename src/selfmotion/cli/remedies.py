@@ -23,6 +23,8 @@ _WORDS = (
     (r"\b(rotary|unit) = '(\w+)'", r"--\1 \2"),
     (r"\brotary_(axes|center)\b", r"--rotary-\1"),
     (r"(?<=: )(columns|standoff|rotary|ramp|unit) (?=has|is)", r"--\1 "),
+    (r"raise max_evaluations", "raise --max-evaluations"),
+    (r"give columns \(", "give --columns ("),
     (r"choose another task \(", "choose another --task ("),
     (r"choose a task with fewer rows \(", "take another --task ("),
 )

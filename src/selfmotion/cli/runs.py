@@ -8,7 +8,7 @@ import typer
 
 import selfmotion as sm
 from selfmotion import formats, realtime
-from selfmotion.cli import json_tables, options, outputs, tables
+from selfmotion.cli import json_tables, options, outputs, summaries, tables
 from selfmotion.cli.app import (
     BEGIN,
     FILES,
@@ -115,7 +115,7 @@ def demo(
     for name, problem in problems.items():
         terminal.print(name, style="bold", markup=False)
         result = plan_with_progress(problem)
-        tables.show(result, terminal)
+        summaries.show_plan(result, terminal)
         files = [out / f"{name}.npz", out / f"{name}.csv"]
         outputs.write(result, files, out / f"{name}.html", terminal)
         verified = verified and result.certificate.verified

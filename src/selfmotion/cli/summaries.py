@@ -32,7 +32,8 @@ def show_plan(plan: Plan, console: Console) -> None:
     change = ""
     if report.initial_cost:
         share = (report.cost - report.initial_cost) / abs(report.initial_cost)
-        change = f" ({100.0 * share:+.2g} % from the minimum-norm motion)"
+        ignores = ", which ignores the constraints" if share > 0.0 else ""
+        change = f" ({100.0 * share:+.2g} % from the minimum-norm motion{ignores})"
     _print(console, f"cost {report.cost:.6g}{change}, {duration}")
     said = report.status in _ENDED_WELL and report.message == report.status.message
     if certificate.verified and not said:

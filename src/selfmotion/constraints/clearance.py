@@ -12,7 +12,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from selfmotion.basics import Array, Flags, Ints, ProblemError, as_number, shown
-from selfmotion.certificate import KeepsApart
+from selfmotion.certificate import Separation
 from selfmotion.collision import (
     ClearanceModel,
     Clearances,
@@ -100,9 +100,9 @@ class Clearance(Constraint):
         robot = follows.robot
         return BoundClearance(self._models(robot).smooth, self.distance)
 
-    def requirement(self, robot: RobotModel) -> KeepsApart:
+    def requirement(self, robot: RobotModel) -> Separation:
         """See `Constraint.requirement`."""
-        return KeepsApart(self.model(robot), self.distance)
+        return Separation(self.model(robot), self.distance)
 
     def envelope(self, robot: RobotModel) -> Envelope:
         """See `Constraint.envelope`."""

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from selfmotion.basics import Array, PlanError
-from selfmotion.certificate import JointLimits, KeepsApart, Requirement, Tolerance, arm_limits
+from selfmotion.certificate import JointLimits, Requirement, Separation, Tolerance, arm_limits
 from selfmotion.job import Program
 from selfmotion.motion import Trajectory
 from selfmotion.path import FeedKept
@@ -101,7 +101,7 @@ def safe_deviation(move: Move) -> Tolerance | None:
     """
     joint = _ROOMY.rotation
     for item, finding in zip(move.requirements, move.findings, strict=True):
-        if isinstance(item, KeepsApart) and item.model.pairs:
+        if isinstance(item, Separation) and item.model.pairs:
             lever = float(item.model.pair_levers_up_to(_farthest(move)).sum(axis=1).max())
             joint = min(joint, _SURE * (finding.amount - item.distance) / max(lever, 1e-9))
     return Tolerance(_ROOMY.position, joint) if joint > 0.0 else None

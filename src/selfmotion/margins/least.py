@@ -2,7 +2,7 @@
 
 At a time and for one pair, `Separation.least` bounds what is left of the distance after all
 displacements of a size. Between two times that changes by no more than the ways of the joints times
-their levers, as in the certificate (`certificate.apart`). So the middle of an interval decides
+their levers, as in the certificate (`certificate.separation`). So the middle of an interval decides
 about all of it. Intervals on which it does not are halved, the pair with the least first.
 """
 

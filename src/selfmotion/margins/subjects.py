@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from selfmotion.basics import Array, ProblemError, nearest
-from selfmotion.certificate import KeepsApart
+from selfmotion.certificate import Separation
 from selfmotion.collision import CollisionModel
 from selfmotion.follow import BoundFollow
 from selfmotion.result import Plan
@@ -70,7 +70,7 @@ class Subject:
 
 def models_of(plan: Plan) -> tuple[CollisionModel, ...]:
     """Return the models of all bodies that a plan keeps apart."""
-    return tuple(item.model for item in plan.requirements if isinstance(item, KeepsApart))
+    return tuple(item.model for item in plan.requirements if isinstance(item, Separation))
 
 
 def part_of(plan: Plan, names: Sequence[str] | None, center: Array | None) -> Subject:

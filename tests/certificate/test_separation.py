@@ -12,9 +12,9 @@ import pytest
 import selfmotion as sm
 from selfmotion.basics import Array
 from selfmotion.certificate import (
-    KeepsApart,
+    Separation,
 )
-from selfmotion.certificate.apart import Approach, _nearer, closest_at_all_times
+from selfmotion.certificate.separation import Approach, _nearer, closest_at_all_times
 from selfmotion.collision import Closest, Overlap
 from support.arms import PANDA_HOME, robot_named, short_line, start_of
 from support.motions import motion_of
@@ -67,7 +67,7 @@ class Bodies:
 @pytest.mark.parametrize("most", [1, 4, 200_000])
 def test_what_is_not_looked_at_is_never_kept(most: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """Two bodies that meet for an instant, while another pair nearly does all the time."""
-    monkeypatch.setattr("selfmotion.certificate.apart._MOST", most)
+    monkeypatch.setattr("selfmotion.certificate.separation._MOST", most)
     motion = motion_of([[0.0] * 3, [3.0, 0.0, 0.0]], [[3.0, 0.0, 0.0]] * 2, [0.0, 1.0])
     bodies = Bodies(
         lambda q: np.full(len(q), 1e-7),
@@ -104,7 +104,7 @@ def test_the_closest_approach_is_found_wherever_it_is(seed: int) -> None:
     assert found.open_until is None
     assert bodies.asked < 3000
     for distance, kept in ((0.999 * depth, True), (1.001 * depth, False)):
-        judged = KeepsApart(bodies, distance).judge(motion)  # type: ignore[arg-type]
+        judged = Separation(bodies, distance).judge(motion)  # type: ignore[arg-type]
         assert judged.kept is kept
         assert (judged.subject, judged.allowed) == ("first1 - second1", distance)
 
@@ -115,14 +115,14 @@ def test_in_lots_the_same_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
         lambda q: np.full(len(q), 0.35), lambda q: 0.01 + np.minimum(np.abs(q[:, 0] - 0.7), 0.3)
     )
     at_once = closest_at_all_times(bodies, motion.trajectory, 0.0)  # type: ignore[arg-type]
-    monkeypatch.setattr("selfmotion.certificate.apart._LOT", 3)
+    monkeypatch.setattr("selfmotion.certificate.separation._LOT", 3)
     assert closest_at_all_times(bodies, motion.trajectory, 0.0) == at_once  # type: ignore[arg-type]
 
 
 def test_a_distance_that_is_grazed_is_undecided_and_said_to_be() -> None:
     motion = motion_of([[0.0] * 3, [3.0, 0.0, 0.0]], [[3.0, 0.0, 0.0]] * 2, [0.0, 1.0])
     bodies = Bodies(lambda q: 0.1 + np.minimum(np.abs(q[:, 0] - 1.0), 0.3), lever=2.0)
-    judged = KeepsApart(bodies, 0.1).judge(motion)  # type: ignore[arg-type]
+    judged = Separation(bodies, 0.1).judge(motion)  # type: ignore[arg-type]
     assert not judged.kept
     assert "whether first0 - second0 keep 100.00 mm from t = 0.333333 to 0.333333 s" in judged.text
     assert "is not decided: they come to 100.0000 mm" in judged.text
@@ -138,7 +138,7 @@ def test_a_distance_that_is_grazed_is_undecided_and_said_to_be() -> None:
 
 def test_how_near_bodies_come_is_told_in_millimetres() -> None:
     motion = motion_of(np.zeros((2, 3)), np.zeros((2, 3)))
-    text = KeepsApart(Bodies(lambda q: np.full(len(q), 0.05)), 0.1).judge(motion).text  # type: ignore[arg-type]
+    text = Separation(Bodies(lambda q: np.full(len(q), 0.05)), 0.1).judge(motion).text  # type: ignore[arg-type]
     assert text.startswith("first0 - second0 are 50.00 mm apart at t = 0.000 s (wanted: 100.00 mm)")
 
 
@@ -146,13 +146,13 @@ def test_links_that_overlap_as_they_are_made_are_told_with_how_often() -> None:
     motion = motion_of(np.zeros((2, 3)), np.zeros((2, 3)))
     bodies = Bodies(lambda q: np.full(len(q), -0.05))
     bodies.overlapping = (Overlap("first0", "second0", 0.3, True),)
-    text = KeepsApart(bodies, 0.1).judge(motion).text  # type: ignore[arg-type]
+    text = Separation(bodies, 0.1).judge(motion).text  # type: ignore[arg-type]
     assert "overlap in 30 % of all configurations" in text
 
 
 def test_nothing_to_be_near_to_is_far_enough() -> None:
     motion = motion_of(np.zeros((2, 3)), np.zeros((2, 3)))
-    found = KeepsApart(Bodies(), 0.1).judge(motion)  # type: ignore[arg-type]
+    found = Separation(Bodies(), 0.1).judge(motion)  # type: ignore[arg-type]
     assert (found.kept, found.subject, found.amount) == (True, "nothing", np.inf)
 
 
@@ -166,12 +166,12 @@ def test_nothing_to_be_near_to_is_far_enough() -> None:
 def test_a_start_that_is_too_near_is_told(value: float, words: str) -> None:
     motion = motion_of(np.zeros((2, 3)), np.zeros((2, 3)))
     bodies = Bodies(lambda q: np.full(len(q), value))
-    assert words in KeepsApart(bodies, 0.1).judge(motion).text  # type: ignore[arg-type]
-    assert words not in KeepsApart(bodies, -1.0).judge(motion).text  # type: ignore[arg-type]
+    assert words in Separation(bodies, 0.1).judge(motion).text  # type: ignore[arg-type]
+    assert words not in Separation(bodies, -1.0).judge(motion).text  # type: ignore[arg-type]
     # Of the start it is said, not of what comes later.
     later = motion_of([[0.0] * 3, [1.0] * 3], np.zeros((2, 3)))
     nearer = Bodies(lambda q: np.where(q[:, 0] > 0.5, value, 1.0))
-    assert "the start" not in KeepsApart(nearer, 0.1).judge(later).text  # type: ignore[arg-type]
+    assert "the start" not in Separation(nearer, 0.1).judge(later).text  # type: ignore[arg-type]
 
 
 # Sums of a few hundred thousand steps against an exact integral, relative to its size.
@@ -212,7 +212,7 @@ def test_grazing_is_said_to_be_undecided_or_decided(circle: sm.Plan) -> None:
     """Down to the accuracy of distances something has to be said, and never that it is kept."""
     model = sm.obstacles.CollisionModel(circle.robot)
     least = model.worst(circle.trajectory(np.linspace(0.0, 4.0, 40_001))).value
-    finding = KeepsApart(model, least).judge(
+    finding = Separation(model, least).judge(
         sm.certificate.FinishedMotion(circle.robot, circle.trajectory)
     )
     assert abs(finding.amount - least) < 1e-6
@@ -229,7 +229,7 @@ def test_a_plate_between_samples_is_found(circle: sm.Plan) -> None:
     plate = sm.obstacles.Box("plate", inside.translation, [0.02, 2e-3, 0.02])
     model = sm.obstacles.CollisionModel(panda, [plate])
     assert model.worst(coarse.q).value > 0.0
-    finding = KeepsApart(model, 0.0).judge(sm.certificate.FinishedMotion(panda, coarse))
+    finding = Separation(model, 0.0).judge(sm.certificate.FinishedMotion(panda, coarse))
     assert not finding.kept
     assert "plate" in finding.subject
 
@@ -260,7 +260,7 @@ def test_a_motion_into_itself_is_not_verified_and_planned_anew() -> None:
         sm.Problem(robot, sm.paths.Line(pose, end, 3.0), start=start, clearance=None)
     )
     model = sm.obstacles.CollisionModel(robot)
-    overlap = KeepsApart(model, 0.0).judge(
+    overlap = Separation(model, 0.0).judge(
         sm.certificate.FinishedMotion(robot, careless.trajectory)
     )
     assert not overlap.kept
@@ -278,7 +278,7 @@ def test_an_arm_without_bodies_says_so(planar: sm.RobotModel) -> None:
 
 def test_pairs_left_out_are_listed() -> None:
     robot = robot_named("baxter")
-    remarks = " ".join(KeepsApart(sm.obstacles.CollisionModel(robot), 0.0).remarks)
+    remarks = " ".join(Separation(sm.obstacles.CollisionModel(robot), 0.0).remarks)
     for first, second in robot.touching:
         assert first in remarks
         assert second in remarks
@@ -345,7 +345,7 @@ def test_links_that_overlap_from_the_start_are_named_with_the_remedy() -> None:
         np.zeros((2, robot.dof)),
         robot.joint_names,
     )
-    check = sm.certify(robot, line, "pose", motion, requirements=[KeepsApart(model, 0.0)])
+    check = sm.certify(robot, line, "pose", motion, requirements=[Separation(model, 0.0)])
     assert (
         '<disable_collisions link1="r_shoulder_pan_link" link2="r_upper_arm_link"' in check.verdict
     )
@@ -398,7 +398,7 @@ def test_a_certificate_does_not_ask_for_details(
 ) -> None:
     plan = near_bodies(panda)
     asked = []
-    monkeypatch.setattr(KeepsApart, "approaches", lambda *_: asked.append(1) or {})
+    monkeypatch.setattr(Separation, "approaches", lambda *_: asked.append(1) or {})
     plan.check()
     assert not asked
     assert plan.approaches == {}

@@ -29,7 +29,7 @@ _SHARE, _SLACK = 0.02, 1e-4
 
 
 @dataclass(frozen=True, eq=False)
-class KeepsApart(Requirement):
+class Separation(Requirement):
     """Bodies keep a distance from each other.
 
     Attributes
