@@ -12,7 +12,7 @@ from selfmotion.certificate.bounding import Bounded, _measured
 from selfmotion.certificate.path_error import _PathErrors
 from selfmotion.certificate.quantity import Shares
 from selfmotion.follow import BoundFollow
-from selfmotion.testing.majorants import check_majorants
+from selfmotion.testing.constraints import check_majorants
 from support.arms import robot_named
 from support.two_arms import baxter_with_both_arms
 

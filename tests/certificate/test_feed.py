@@ -13,7 +13,7 @@ from selfmotion.certificate import Stretch
 from selfmotion.certificate.feed import FeedReached, _Along, _OwnPace, _Pace, _rounded_down
 from selfmotion.follow import Follows
 from selfmotion.path import section_at_rest
-from selfmotion.testing.majorants import check_majorants
+from selfmotion.testing.constraints import check_majorants
 from support.arms import PANDA_HOME, robot_named
 from support.gantries import gantry
 

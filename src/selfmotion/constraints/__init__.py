@@ -1,7 +1,10 @@
 """What a motion must keep: limits, end conditions, closed paths, clearance."""
 
-from selfmotion.constraints.active import Multipliers as Multipliers, active_of as active_of
-from selfmotion.constraints.active_constraint import ActiveConstraint as ActiveConstraint
+from selfmotion.constraints.active import (
+    ActiveConstraint as ActiveConstraint,
+    Multipliers as Multipliers,
+    active_of as active_of,
+)
 from selfmotion.constraints.band import Band as Band
 from selfmotion.constraints.base import Constraint as Constraint
 from selfmotion.constraints.bound_end import BoundEnd as BoundEnd

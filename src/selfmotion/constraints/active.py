@@ -1,17 +1,40 @@
 """Active constraints, from the multipliers of conditions."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from selfmotion.basics import Array, Flags
-from selfmotion.constraints.active_constraint import ActiveConstraint
 from selfmotion.constraints.conditions import BoundConstraint, easing_of
 
 # A condition is active where its multiplier is above this share of its largest one: interior points
 # leave a little everywhere.
 _ACTIVE = 1e-3
+
+
+@dataclass(frozen=True)
+class ActiveConstraint:
+    """An active constraint: one that keeps the plan from a lower cost.
+
+    Attributes
+    ----------
+    constraint : str
+        Its name.
+    easing : str
+        A small relaxation of it in words, with the joint or the pair.
+    saving : float
+        What that relaxation would take off F, to first order: the sum of the Lagrange multipliers
+        times its amount.
+    spans : tuple of (float, float)
+        First and last time [s] of each stretch on which it is active.
+    """
+
+    constraint: str
+    easing: str
+    saving: float
+    spans: tuple[tuple[float, float], ...]
 
 
 class Multipliers(NamedTuple):

@@ -14,14 +14,12 @@ from selfmotion.motion.null_motion import (
     NodeNullMotion as NodeNullMotion,
     NullMotion as NullMotion,
     PolynomialNullMotion as PolynomialNullMotion,
+    fading_window as fading_window,
+    resting_window as resting_window,
 )
 from selfmotion.motion.null_motion_table import NullMotionTable as NullMotionTable
 from selfmotion.motion.sampling import Sampling as Sampling
 from selfmotion.motion.trajectory import MOST_SAMPLES as MOST_SAMPLES, Trajectory as Trajectory
-from selfmotion.motion.windows import (
-    fading_window as fading_window,
-    resting_window as resting_window,
-)
 
 __all__ = [
     "BSplineNullMotion",

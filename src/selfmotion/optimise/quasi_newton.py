@@ -1,5 +1,6 @@
 """The Broyden-family quasi-Newton method with Fletcher's switch; knows only x → (F, ∇F)."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,11 +14,61 @@ from selfmotion.optimise.base import (
     Status,
     inverse_metric,
 )
-from selfmotion.optimise.derivative import is_misleading
 from selfmotion.optimise.line_search import LineSearch
-from selfmotion.optimise.update import renewed
 
 _FLETCHER = LineSearch()
+
+
+# The difference is taken over this share of the step that the method wanted, and means something
+# where it is so many times its own rounding.
+_SHARE, _ABOVE_ROUNDING = 1e-4, 1e3
+# The slope and the difference are taken for the same within this factor.
+_FACTOR = 2.0
+
+
+def renewed(h: Array, s: Array, y: Array, update: str) -> tuple[Array, str]:
+    """Return H renewed by a formula of Broyden's family for s = Δx and y = Δ∇F, and its name.
+
+    `update` is "bfgs", "dfp", or "fletcher" for the switch; the name is "none" where no formula
+    keeps H positive definite.
+    """
+    hy = h @ y
+    sy, yhy = float(s @ y), float(y @ hy)
+    # Without positive curvature along s no update keeps H positive definite.
+    if not (sy > 1e-14 * float(np.linalg.norm(s) * np.linalg.norm(y)) and yhy > 0.0):
+        return h, "none"
+    if update == "fletcher":
+        update = "dfp" if sy < yhy else "bfgs"
+    h = h + (np.outer(s, s) / sy - np.outer(hy, hy) / yhy)
+    if update == "bfgs":
+        v = s / sy - hy / yhy
+        h = h + yhy * np.outer(v, v)
+    return h, update
+
+
+def is_misleading(
+    value: Callable[[Array], float], x: Array, cost: float, step: Array, slope: float
+) -> bool:
+    """Return whether F does not change along `step` as its slope there says.
+
+    One central difference; False where rounding hides the answer, or F is infinite nearby.
+
+    Parameters
+    ----------
+    value : callable
+        F.
+    x, step : (size,)
+    cost, slope : float
+        F(x) and ∇F(x)ᵀ step.
+    """
+    rounding = float(np.finfo(float).eps) * abs(cost)
+    if not abs(slope) * _SHARE > _ABOVE_ROUNDING * rounding:
+        return False
+    rise = value(x + _SHARE * step) - value(x - _SHARE * step)
+    if not np.isfinite(rise):
+        return False
+    ratio = rise / (2.0 * _SHARE * slope)
+    return not 1.0 / _FACTOR <= ratio <= _FACTOR
 
 
 @dataclass(frozen=True)

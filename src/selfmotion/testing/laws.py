@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from selfmotion.basics import Array
+from selfmotion.basics import Array, read_only
 from selfmotion.costs import Cost, Samples
 from selfmotion.motion import Grid, NullMotion, PolynomialNullMotion, Sampling
 from selfmotion.optimise import Iteration, Minimum, Optimizer
@@ -15,7 +15,6 @@ from selfmotion.problem import Problem
 from selfmotion.robot import RobotModel, load_robot
 from selfmotion.task import Task, exp3, log3
 from selfmotion.testing.checks import near, require, require_gradient, saved
-from selfmotion.testing.functions import Bowl, Valley
 
 # Twists against central differences of poses [m/s, rad/s]: their truncation and rounding.
 TWIST = 1e-6
@@ -24,6 +23,56 @@ MINIMUM = 1e-4
 # Of a quadratic form, relative to its largest derivative; of G among other samples.
 CURVATURE = 1e-9
 _STEPS = 10
+
+
+class Bowl:
+    """½ (x - 1)ᵀ A (x - 1) + offset, with condition number 100."""
+
+    def __init__(self, offset: float) -> None:
+        self._hessian, self._offset = np.diag(np.geomspace(1.0, 100.0, 4)), offset
+        self.evaluations = 0
+
+    def value(self, x: Array) -> float:
+        """See `Function`."""
+        self.evaluations += 1
+        return float(0.5 * (x - 1.0) @ self._hessian @ (x - 1.0)) + self._offset
+
+    def gradient(self, x: Array) -> Array:
+        """See `Function`."""
+        return np.asarray(self._hessian @ (x - 1.0))
+
+    def slope(self, x: Array, direction: Array) -> float:
+        """See `Function`."""
+        return float(self.gradient(x) @ direction)
+
+    def metric(self, x: Array) -> Array:
+        """See `Function`."""
+        return read_only(np.eye(len(x)))
+
+
+class Valley:
+    """Rosenbrock's function, with its least value 1."""
+
+    def __init__(self) -> None:
+        self.evaluations = 0
+
+    def value(self, x: Array) -> float:
+        """See `Function`."""
+        self.evaluations += 1
+        return float((1.0 - x[0]) ** 2 + 100.0 * (x[1] - x[0] ** 2) ** 2) + 1.0
+
+    def gradient(self, x: Array) -> Array:
+        """See `Function`."""
+        across = x[1] - x[0] ** 2
+        return np.array([-2.0 * (1.0 - x[0]) - 400.0 * x[0] * across, 200.0 * across])
+
+    def slope(self, x: Array, direction: Array) -> float:
+        """See `Function`."""
+        return float(self.gradient(x) @ direction)
+
+    def metric(self, x: Array) -> Array:
+        """See `Function`."""
+        return read_only(np.eye(2))
 
 
 def check_path(path: Path) -> None:
