@@ -95,7 +95,7 @@ def _resolved(problem: Problem, session: Session, tolerance: Tolerance) -> Evalu
 def _meets_itself(problem: Problem, certificate: Certificate) -> bool:
     """Whether nothing else is wrong than that the arm meets itself, which only the default asks."""
     asked = problem.own_collision is not None and len(certificate.failures) == 1
-    return asked and not certificate.findings[-1].kept
+    return asked and not certificate.findings[-1].satisfied
 
 
 def _rough(problem: Problem, finished: Finished, session: Session) -> bool:
@@ -111,7 +111,7 @@ def _rough(problem: Problem, finished: Finished, session: Session) -> bool:
     return any(
         item.requirement in LIMIT_NAMES or item.time not in nodes
         for item in finished.certificate.findings
-        if not item.kept and item.requirement in asked
+        if not item.satisfied and item.requirement in asked
     )
 
 
