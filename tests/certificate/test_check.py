@@ -265,4 +265,4 @@ def test_what_no_slower_motion_mends_is_told_first() -> None:
     )
     fast = dataclasses.replace(fast, of_pace=True, factor=1.5)
     assert list(_told((fast, near))) == ["clearance", "speeds"]
-    assert list(_told((dataclasses.replace(near, kept=True), fast))) == ["speeds"]
+    assert list(_told((dataclasses.replace(near, satisfied=True), fast))) == ["speeds"]

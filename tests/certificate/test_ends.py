@@ -27,7 +27,7 @@ def test_ends_are_judged_to_a_micrometre(miss: float) -> None:
     ]
     for requirement, given, time in cases:
         found = requirement.judge(given)
-        assert found.kept is kept, requirement
+        assert found.satisfied is kept, requirement
         assert (found.subject, found.time) == (given.robot.joint_names[1], time)
         assert (found.amount, found.allowed) == (pytest.approx(abs(miss), rel=1e-6), 1e-6)
         where = ("ends", "at the end") if time else ("starts", "at the start")
@@ -50,9 +50,9 @@ def test_end_accelerations_are_judged_less_closely() -> None:
     motion = motion_of([[0.0] * 3, [1.0, 0.0, 0.0]], np.zeros((2, 3)))
     for miss, kept in ((0.9e-4, True), (1.1e-4, False)):
         found = EndState(2, np.array([-6.0, miss, 0.0])).judge(motion)
-        assert (found.kept, found.allowed) == (kept, 1e-4)
+        assert (found.satisfied, found.allowed) == (kept, 1e-4)
         assert "with an acceleration" in found.text
-    assert EndState(2, np.array([6.0, 0.0, 0.0]), at_start=True).judge(motion).kept
+    assert EndState(2, np.array([6.0, 0.0, 0.0]), at_start=True).judge(motion).satisfied
 
 
 def test_rest_covers_the_ends_that_it_is_asked_for() -> None:

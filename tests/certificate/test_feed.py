@@ -149,7 +149,7 @@ def test_each_of_several_feeds_is_judged_where_it_is_asked_for(
         inner = 0.7 * start + 0.3 * end, 0.3 * start + 0.7 * end
         assert followed(path, tmp_path, 0.005, inner).verified
         refused = followed(path, tmp_path, 0.1, inner)
-        broken = [item for item in refused.findings if not item.kept]
+        broken = [item for item in refused.findings if not item.satisfied]
         assert len(broken) == 1, refused.verdict
         assert inner[0] <= broken[0].time <= inner[1]
         assert f"{found.asked:g} m/s from t = {start:.3f} to {end:.3f} s" in broken[0].text
@@ -382,7 +382,7 @@ def test_random_paths_keep_what_is_proved_of_their_feeds(tmp_path: FilePath) -> 
         found = FeedReached(path.feeds[0], Follows.of(robot, path, "position").items[0])
         intervals, counts = path.feeds[0].pieces
         motion = sm.certificate.FinishedMotion(robot, followed_motion(robot, path))
-        if not found.judge(motion).kept:
+        if not found.judge(motion).satisfied:
             continue
         kept += 1
         inside = intervals[counts]
@@ -420,4 +420,4 @@ def test_what_a_weave_moves_along_its_seam_is_told_as_it_is() -> None:
     size = np.maximum(np.linalg.norm(wanted, axis=1), 1e-9)
     along = np.abs(np.einsum("kc,kc->k", tool - wanted, wanted)) / size
     assert along.max() < 4e-4
-    assert all(item.kept for item in plan.certificate.findings if item.requirement == "feed")
+    assert all(item.satisfied for item in plan.certificate.findings if item.requirement == "feed")

@@ -23,7 +23,7 @@ def test_margins_are_those_of_the_nearest_side() -> None:
         found = JointLimits(0, lower, upper).judge(motion)
         assert found.subject == motion.robot.joint_names[joint]
         assert (found.amount, found.allowed) == (pytest.approx(amount), 0.0)
-        assert found.kept is (amount >= 0.0)
+        assert found.satisfied is (amount >= 0.0)
         # No pace helps a joint that is where it may not be.
         assert not found.of_pace
         assert found.time == pytest.approx(time)
@@ -31,7 +31,7 @@ def test_margins_are_those_of_the_nearest_side() -> None:
         told = near if amount >= 0 else f"is {-amount:.3g} rad beyond its"
         assert f"{told} limit of {limit:g} rad at t = {time:.3f} s" in found.text
     kept = JointLimits(0, np.array([0.0, 0.0, -1.0]), np.array([1.0, 1.0, 0.0])).judge(motion)
-    assert (kept.kept, kept.amount) == (True, pytest.approx(0.0, abs=ROUNDING))
+    assert (kept.satisfied, kept.amount) == (True, pytest.approx(0.0, abs=ROUNDING))
 
 
 @pytest.mark.parametrize(("order", "longer"), [(1, 2.0), (2, 2.0**0.5), (3, 2.0 ** (1.0 / 3.0))])
@@ -42,7 +42,11 @@ def test_shares_of_rates_say_how_much_longer_it_takes(order: int, longer: float)
     limit = np.array([1e-3, 0.5 * most, np.inf])
     limits = JointLimits(order, -limit, limit)
     found = limits.judge(motion)
-    assert (found.subject, found.allowed, found.kept) == (motion.robot.joint_names[1], 1.0, False)
+    assert (found.subject, found.allowed, found.satisfied) == (
+        motion.robot.joint_names[1],
+        1.0,
+        False,
+    )
     assert found.amount == pytest.approx(2.0)
     assert f"{found.amount:.5g} times its limit of " in found.text
     assert f"give it {longer:.5g} times the duration" in found.text
@@ -63,16 +67,16 @@ def test_a_jump_of_acceleration_breaks_any_limit_of_jerk() -> None:
     motion = motion_of([[0.0] * 3, [1.0, 0.0, 0.0], [2.0, 0.0, 0.0]], np.zeros((3, 3)))
     wide = np.full(3, 1e3)
     found = JointLimits(3, -wide, wide).judge(motion)
-    assert (found.kept, found.subject, found.time) == (False, motion.robot.joint_names[0], 1.0)
+    assert (found.satisfied, found.subject, found.time) == (False, motion.robot.joint_names[0], 1.0)
     assert found.amount == pytest.approx(12.0 / (1e-6 * 1e3))
     assert "jumps by 12" in found.text
     assert (found.allowed, found.of_pace) == (1.0, True)
-    assert JointLimits(3, -1e8 * wide, 1e8 * wide).judge(motion).kept
+    assert JointLimits(3, -1e8 * wide, 1e8 * wide).judge(motion).satisfied
     # A jump just beyond what a limited jerk does in an instant, and just within.
     for share in (1.01, 0.99):
         narrow = np.full(3, 12.0 / (1e-6 * share))
         found = JointLimits(3, -narrow, narrow).judge(motion)
-        assert found.kept is (share < 1.0)
+        assert found.satisfied is (share < 1.0)
 
 
 @pytest.mark.parametrize(("order", "power"), [(2, 0.5), (3, 1.0 / 3.0)])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.certificate import Column, Quantity, QuantityKept
+from selfmotion.certificate import Column, Quantity, QuantityWithinLimits
 from selfmotion.certificate.bounding import Bounds
 from support.arms import robot_named
 from support.motions import motion_of
@@ -25,7 +25,7 @@ def test_the_tools_rates_are_told_with_the_time_they_take(column: int) -> None:
     names = ("speed", "turn rate", "acceleration", "turn acceleration")
     assert requirement.covers == (f"tool {names[column]}",)
     assert found.amount == pytest.approx(4.0 if column < 3 else 0.0, rel=1e-3, abs=1e-6)
-    assert found.kept is (column == 3)
+    assert found.satisfied is (column == 3)
     if column < 3:
         longer = found.amount if column < 2 else found.amount**0.5
         assert f"{names[column]} of the tool 'tool' is {found.amount * limit[column]:.4g}" in (
@@ -53,7 +53,7 @@ def test_a_band_is_half_its_width_from_its_middle() -> None:
         band = sm.constraints.Band(sm.robot.JointCoordinate(name), center, half)
         found = band.requirement(robot).judge(motion)
         assert found.amount == pytest.approx(share, rel=1e-3)
-        assert found.kept is (share <= 1.0)
+        assert found.satisfied is (share <= 1.0)
         assert f"expected {center - half:.4g} to {center + half:.4g}" in found.text
 
 
@@ -85,12 +85,12 @@ def sum_of(series: bool, reach: float = 1.0) -> Quantity:
 @pytest.mark.parametrize("series", [True, False])
 def test_a_quantity_without_a_majorant_is_judged_as_measured(series: bool) -> None:
     motion = motion_of([[0.0] * 3, [0.3, 0.5, 0.0]], np.zeros((2, 3)))
-    requirement = QuantityKept(sum_of(series))
+    requirement = QuantityWithinLimits(sum_of(series))
     found = requirement.judge(motion)
-    assert found.kept
+    assert found.satisfied
     assert found.amount == pytest.approx(0.8, rel=1e-3)
     assert ("checked at samples only" in " ".join(requirement.remarks)) is not series
-    assert not QuantityKept(sum_of(series, 0.7)).judge(motion).kept
+    assert not QuantityWithinLimits(sum_of(series, 0.7)).judge(motion).satisfied
 
 
 @pytest.mark.parametrize("limit", [0.0, -1.0, np.nan])
@@ -118,7 +118,7 @@ def test_a_quintic_that_vanishes_where_it_may_be_looked_at_is_caught() -> None:
         away = np.abs(coordinate(robot, motion.trajectory(t))[0] - center).max()
         for share in (0.999, 1.001):
             band = sm.constraints.Band(coordinate, center, away * share)
-            assert band.requirement(robot).judge(motion).kept is (share > 1.0)
+            assert band.requirement(robot).judge(motion).satisfied is (share > 1.0)
 
 
 @pytest.mark.parametrize("name", ["lower", "upper"])
@@ -143,9 +143,9 @@ def test_a_number_between_two_ends_is_kept_up_to_each(name: str) -> None:
         q, qd, qdd = (motion.trajectory(np.array([0.5]), order) for order in range(3))
         assert made.values(q, qd, qdd).shape == (1, 1)
         assert made.derivatives(q, qd, qdd)[0].shape == (1, 1, 3)
-        found = QuantityKept(made).judge(motion)
-        assert found.kept is kept, found.text
-        assert QuantityKept(made).remarks == ()
+        found = QuantityWithinLimits(made).judge(motion)
+        assert found.satisfied is kept, found.text
+        assert QuantityWithinLimits(made).remarks == ()
     for wrong in ((0.3, -0.1), (np.nan, 1.0), (0.0, np.inf)):
         with pytest.raises(sm.errors.ProblemError):
             Quantity.between("sum", *wrong, lambda *_: _[0], lambda *_: ())
@@ -168,13 +168,13 @@ def test_what_is_undecided_of_a_quantity_is_told(
     count: int, more: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Where, on how many intervals, and not kept; a limit that is passed is told all the same."""
-    motion, requirement = swung(0.1), QuantityKept(sum_of(True))
+    motion, requirement = swung(0.1), QuantityWithinLimits(sum_of(True))
     intervals = tuple((0.25 * k, 0.25 * k + 0.1) for k in range(1, count + 1))
     for share, told in ((0.9, True), (1.0, True), (1.1, False)):
         found = Bounds(np.array([share]), np.array([0.5]), intervals, True, 10)
         monkeypatch.setattr("selfmotion.certificate.quantity.bounded", lambda *_, f=found: f)
         judged = requirement.judge(motion)
-        assert not judged.kept
+        assert not judged.satisfied
         assert (judged.amount, judged.allowed) == (share, 1.0)
         words = f"whether sum hold from t = 0.25 to 0.35 s is not decided{more}: no bound"
         assert (words in judged.text) is told

@@ -105,7 +105,7 @@ def test_the_closest_approach_is_found_wherever_it_is(seed: int) -> None:
     assert bodies.asked < 3000
     for distance, kept in ((0.999 * depth, True), (1.001 * depth, False)):
         judged = Separation(bodies, distance).judge(motion)  # type: ignore[arg-type]
-        assert judged.kept is kept
+        assert judged.satisfied is kept
         assert (judged.subject, judged.allowed) == ("first1 - second1", distance)
 
 
@@ -123,7 +123,7 @@ def test_a_distance_that_is_grazed_is_undecided_and_said_to_be() -> None:
     motion = motion_of([[0.0] * 3, [3.0, 0.0, 0.0]], [[3.0, 0.0, 0.0]] * 2, [0.0, 1.0])
     bodies = Bodies(lambda q: 0.1 + np.minimum(np.abs(q[:, 0] - 1.0), 0.3), lever=2.0)
     judged = Separation(bodies, 0.1).judge(motion)  # type: ignore[arg-type]
-    assert not judged.kept
+    assert not judged.satisfied
     assert "whether first0 - second0 keep 100.00 mm from t = 0.333333 to 0.333333 s" in judged.text
     assert "is not decided: they come to 100.0000 mm" in judged.text
     assert judged.time == pytest.approx(1.0 / 3.0, abs=1e-3)
@@ -153,7 +153,7 @@ def test_links_that_overlap_as_they_are_made_are_told_with_how_often() -> None:
 def test_nothing_to_be_near_to_is_far_enough() -> None:
     motion = motion_of(np.zeros((2, 3)), np.zeros((2, 3)))
     found = Separation(Bodies(), 0.1).judge(motion)  # type: ignore[arg-type]
-    assert (found.kept, found.subject, found.amount) == (True, "nothing", np.inf)
+    assert (found.satisfied, found.subject, found.amount) == (True, "nothing", np.inf)
 
 
 @pytest.mark.parametrize(
@@ -216,7 +216,7 @@ def test_grazing_is_said_to_be_undecided_or_decided(circle: sm.Plan) -> None:
         sm.certificate.FinishedMotion(circle.robot, circle.trajectory)
     )
     assert abs(finding.amount - least) < 1e-6
-    assert finding.kept or "not decided" in finding.text or finding.amount < least
+    assert finding.satisfied or "not decided" in finding.text or finding.amount < least
 
 
 def test_a_plate_between_samples_is_found(circle: sm.Plan) -> None:
@@ -230,7 +230,7 @@ def test_a_plate_between_samples_is_found(circle: sm.Plan) -> None:
     model = sm.obstacles.CollisionModel(panda, [plate])
     assert model.worst(coarse.q).value > 0.0
     finding = Separation(model, 0.0).judge(sm.certificate.FinishedMotion(panda, coarse))
-    assert not finding.kept
+    assert not finding.satisfied
     assert "plate" in finding.subject
 
 
@@ -263,7 +263,7 @@ def test_a_motion_into_itself_is_not_verified_and_planned_anew() -> None:
     overlap = Separation(model, 0.0).judge(
         sm.certificate.FinishedMotion(robot, careless.trajectory)
     )
-    assert not overlap.kept
+    assert not overlap.satisfied
     plan = sm.plan(
         dataclasses.replace(careless.problem, clearance=sm.constraints.Clearance(distance=0.0))
     )

@@ -286,13 +286,13 @@ def test_it_meets_an_obstacle_where_the_arm_takes_it_between_samples(
     assert 0.0 < met[0] < 0.37 < met[-1] < 1.0
     judged = sm.certificate.FinishedMotion(panda, motion)
     found = sm.constraints.Clearance([torch, plate], 0.0).requirement(panda).judge(judged)
-    assert not found.kept
+    assert not found.satisfied
     assert found.subject == "torch - plate"
     assert met[0] - 1e-3 <= found.time <= met[-1] + 1e-3
     # Without it, and where it stands in the world, the way is free.
     standing = dataclasses.replace(torch, frame=None, pose=np.array([0.0, 0.0, 2.0]))
     for bodies in ([plate], [standing, plate]):
-        assert sm.constraints.Clearance(bodies, 0.0).requirement(panda).judge(judged).kept
+        assert sm.constraints.Clearance(bodies, 0.0).requirement(panda).judge(judged).satisfied
 
 
 @pytest.mark.parametrize("task", ["position", "pose"])

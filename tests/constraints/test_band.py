@@ -38,7 +38,7 @@ def test_a_band_is_kept_and_judged_at_all_times(panda: sm.RobotModel, name: str,
     refused = dict.fromkeys([band.requirement(panda)])
     wrong = sm.certify(panda, free.path, "position", free.trajectory, None, tuple(refused))
     assert wrong.findings[-1].requirement == band.requirement(panda).name
-    assert not wrong.findings[-1].kept
+    assert not wrong.findings[-1].satisfied
     plan.save(tmp_path / "plan.npz")
     assert sm.load_plan(tmp_path / "plan.npz").check().verified
     sm.files.write_problem(plan.problem, tmp_path / "cell.toml")

@@ -66,7 +66,7 @@ def test_whole_turns_between_samples_hide_nothing(panda: sm.RobotModel) -> None:
         sm.constraints.JointTorqueLimits(limit)
         .requirement(panda)
         .judge(FinishedMotion(panda, motion))
-        .kept
+        .satisfied
     )
     limit[1] = 0.5 * needed[1]
     found = (
@@ -74,7 +74,7 @@ def test_whole_turns_between_samples_hide_nothing(panda: sm.RobotModel) -> None:
         .requirement(panda)
         .judge(FinishedMotion(panda, motion))
     )
-    assert (found.kept, found.subject) == (False, panda.joint_names[1])
+    assert (found.satisfied, found.subject) == (False, panda.joint_names[1])
     assert found.amount == pytest.approx(2.0, rel=1e-3)
     # Too long a way to be looked at is not kept either.
     endless = sm.Trajectory(
@@ -85,7 +85,7 @@ def test_whole_turns_between_samples_hide_nothing(panda: sm.RobotModel) -> None:
         .requirement(panda)
         .judge(FinishedMotion(panda, endless))
     )
-    assert not found.kept
+    assert not found.satisfied
 
 
 def test_a_payload_that_is_too_heavy_is_refused(panda: sm.RobotModel) -> None:
@@ -142,7 +142,7 @@ def test_a_joint_that_mimics_is_judged_by_its_own_effort(
     found = (
         sm.constraints.JointTorqueLimits().requirement(robot).judge(FinishedMotion(robot, motion))
     )
-    assert found.kept is (said is None)
+    assert found.satisfied is (said is None)
     if said is not None:
         assert (found.subject, said in found.text) == ("j4", True)
         assert found.amount == pytest.approx(weight / 2.5, rel=1e-6)
@@ -152,4 +152,4 @@ def test_a_joint_that_mimics_is_judged_by_its_own_effort(
         .requirement(robot)
         .judge(FinishedMotion(robot, motion))
     )
-    assert own.kept
+    assert own.satisfied

@@ -153,7 +153,7 @@ def test_a_broken_constraint_of_ones_own_is_judged(broken: sm.Plan, tmp_path: Pa
     with pytest.raises(sm.errors.PlanError, match="the elbow turns at"):
         broken.require()
     (finding,) = (f for f in broken.certificate.findings if f.requirement == "slow elbow")
-    assert (finding.requirement, finding.allowed, finding.kept) == ("slow elbow", 0.02, False)
+    assert (finding.requirement, finding.allowed, finding.satisfied) == ("slow elbow", 0.02, False)
     broken.save(tmp_path / "plan.npz")
     result = CliRunner().invoke(app, ["check", str(tmp_path / "plan.npz")])
     assert result.exit_code == 1

@@ -118,5 +118,5 @@ def _reason(plan: Plan) -> str:
         return ""
     if plan.report.ending:
         return "ends on the way"
-    broken = [item.requirement for item in certificate.findings if not item.kept]
+    broken = [item.requirement for item in certificate.findings if not item.satisfied]
     return broken[0] if broken else "off the path"

@@ -26,7 +26,7 @@ from selfmotion.certificate.path_error import errors_between as errors_between
 from selfmotion.certificate.quantity import (
     Column as Column,
     Quantity as Quantity,
-    QuantityKept as QuantityKept,
+    QuantityWithinLimits as QuantityWithinLimits,
     Shares as Shares,
 )
 from selfmotion.certificate.requirement import (

@@ -138,7 +138,9 @@ def certify(
 def _told(findings: Sequence[Finding]) -> Iterator[str]:
     """Yield what is not kept: first what no slower motion would mend."""
     for of_pace in (False, True):
-        yield from (item.text for item in findings if not item.kept and item.of_pace is of_pace)
+        yield from (
+            item.text for item in findings if not item.satisfied and item.of_pace is of_pace
+        )
 
 
 def _check_arguments(robot: RobotModel, path: Path, trajectory: Trajectory, ending: str) -> None:

@@ -112,7 +112,7 @@ class ClosedMotion(Requirement):
         """See `Requirement.judge`: the joint that misses most."""
         q, qd = motion.trajectory.q, motion.trajectory.qd
         apart = _miss(self.name, motion, q[-1] - q[0], 0, "away from the start")
-        if not (apart.kept and self.velocity):
+        if not (apart.satisfied and self.velocity):
             return apart
         return _miss(self.name, motion, qd[-1] - qd[0], 1, "off that of the start")
 

@@ -270,7 +270,7 @@ def possible_feeds(feeds: Sequence[FeedReached], findings: Sequence[Finding]) ->
     Nothing where something else is wrong, too, the path itself does not keep a feed, or none was
     asked for.
     """
-    broken = [item for item in findings if not item.kept]
+    broken = [item for item in findings if not item.satisfied]
     factor = max((item.factor for item in broken), default=1.0)
     kept = all(item.found.kept for item in feeds)
     if not (feeds and kept and 1.0 < factor < np.inf and all(item.of_pace for item in broken)):

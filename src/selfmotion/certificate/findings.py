@@ -80,8 +80,8 @@ class Finding:
         What was found there.
     allowed : float
         What is allowed.
-    kept : bool
-        Whether the requirement is kept at all times.
+    satisfied : bool
+        Whether the requirement is satisfied at all times.
     text : str
         In words: who, how much, when, what was wanted, and what to do about it.
     of_pace : bool
@@ -100,7 +100,7 @@ class Finding:
     time: float
     amount: float
     allowed: float
-    kept: bool
+    satisfied: bool
     text: str
     of_pace: bool = False
     factor: float = 1.0

@@ -160,7 +160,7 @@ class Quantity:
 
 
 @dataclass(frozen=True, eq=False)
-class QuantityKept(Requirement):
+class QuantityWithinLimits(Requirement):
     """A quantity stays within its limits, at all times.
 
     Attributes

@@ -159,7 +159,7 @@ def _found(finding: Finding) -> tuple[str, str]:
         return name, _SHARE.format(finding.amount)
     if name == "rest":
         name = "acceleration at rest" if finding.unit.endswith("²") else "speed at rest"
-    above = finding.at_least or finding.kept == (finding.amount > allowed)
+    above = finding.at_least or finding.satisfied == (finding.amount > allowed)
     asked = f"at least {allowed:.4g}" if above else f"{allowed:.4g} allowed"
     return f"{name} ({asked})", f"{finding.amount:.4g} {finding.unit}".strip()
 

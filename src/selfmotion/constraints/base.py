@@ -11,7 +11,7 @@ from typing import ClassVar
 import numpy as np
 
 from selfmotion.basics import Array, ProblemError, Saved
-from selfmotion.certificate import Quantity, QuantityKept, Requirement
+from selfmotion.certificate import Quantity, QuantityWithinLimits, Requirement
 from selfmotion.constraints.conditions import BoundConstraint, BoundQuantity
 from selfmotion.constraints.envelope import Envelope
 from selfmotion.follow import Follows
@@ -71,7 +71,7 @@ class Constraint(Saved, ABC, family="constraint"):
 
     def requirement(self, robot: RobotModel) -> Requirement:
         """Return what the certificate judges; ProblemError where it misfits the arm."""
-        return QuantityKept(self.quantity(robot))
+        return QuantityWithinLimits(self.quantity(robot))
 
     def applies(self, robot: RobotModel) -> bool:
         """Return whether it asks anything of an arm: not where it keeps limits nobody knows."""

@@ -58,7 +58,7 @@ class Meeting:
             apart = asked.apart(tuple(new.values()))
             motion = FinishedMotion(asked.robot, plan.trajectory)
             found = None if apart is None else apart.requirement(asked.robot).judge(motion)
-            if found is None or found.kept:
+            if found is None or found.satisfied:
                 clear |= set(new)
                 break
             why = why or found.text

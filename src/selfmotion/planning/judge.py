@@ -99,7 +99,7 @@ def _resolved(problem: Problem, candidate: Candidate, tolerance: Tolerance) -> E
 def _meets_itself(problem: Problem, certificate: Certificate) -> bool:
     """Whether nothing else is wrong than that the arm meets itself, which only the default asks."""
     asked = problem.own_collision is not None and len(certificate.failures) == 1
-    return asked and not certificate.findings[-1].kept
+    return asked and not certificate.findings[-1].satisfied
 
 
 def _rough(problem: Problem, judged: Judged, candidate: Candidate) -> bool:
@@ -115,7 +115,7 @@ def _rough(problem: Problem, judged: Judged, candidate: Candidate) -> bool:
     return any(
         item.requirement in LIMIT_NAMES or item.time not in nodes
         for item in judged.certificate.findings
-        if not item.kept and item.requirement in asked
+        if not item.satisfied and item.requirement in asked
     )
 
 

@@ -30,6 +30,8 @@ from selfmotion.result.report import Attempt, Gap, Report
 
 # Raised with every change that older versions cannot read.
 FORMAT = 3
+# What files call `Finding.satisfied`.
+_SATISFIED = "kept"
 
 
 class Archive(NamedTuple):
@@ -54,7 +56,7 @@ class Archive(NamedTuple):
             "joint_names": list(self.trajectory.joint_names),
             "report": _report_to_dict(self.report),
             "history": [_without(iteration, "x") for iteration in history],
-            "certificate": dataclasses.asdict(self.certificate),
+            "certificate": _certificate_to_dict(self.certificate),
         }
         if self.altered:
             # Another file does not make it what was planned.
@@ -171,6 +173,14 @@ def _report_to_dict(report: Report) -> dict[str, Any]:
     }
 
 
+def _certificate_to_dict(certificate: Certificate) -> dict[str, Any]:
+    values = dataclasses.asdict(certificate)
+    for item in values["findings"]:
+        # The key that it has had in files of plans from the first one on.
+        item[_SATISFIED] = item.pop("satisfied")
+    return values
+
+
 def _certificate_from_dict(values: Mapping[str, Any]) -> Certificate:
     several = {"findings": Finding, "deviations": Extreme, "damped": DampedStretch}
     restored: dict[str, Any] = {
@@ -178,6 +188,10 @@ def _certificate_from_dict(values: Mapping[str, Any]) -> Certificate:
         for key, value in values.items()
         if key != "tolerance"
     }
+    restored["findings"] = [
+        {("satisfied" if key == _SATISFIED else key): value for key, value in item.items()}
+        for item in restored["findings"]
+    ]
     for key, kind in several.items():
         restored[key] = tuple(kind(**item) for item in restored[key])
     restored["others"] = tuple(

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from selfmotion.basics import Array
-from selfmotion.certificate import Quantity, QuantityKept, Requirement
+from selfmotion.certificate import Quantity, QuantityWithinLimits, Requirement
 from selfmotion.motion import Trajectory
 from selfmotion.problem import Problem
 from selfmotion.result.pace_rows import PaceLimits
@@ -46,7 +46,7 @@ class LimitsUsed:
 
 def quantities_of_pace(requirements: Sequence[Requirement]) -> tuple[Quantity, ...]:
     """Return the quantities within limits that a slower pace may keep."""
-    kept = (item.quantity for item in requirements if isinstance(item, QuantityKept))
+    kept = (item.quantity for item in requirements if isinstance(item, QuantityWithinLimits))
     return tuple(item for item in kept if item.of_pace and len(item.limited))
 
 

@@ -70,7 +70,7 @@ class Move:
     @property
     def trouble(self) -> str:
         """What is wrong with it, or why none was found; "" where all is kept."""
-        broken = [item.text for item in self.findings if not item.kept]
+        broken = [item.text for item in self.findings if not item.satisfied]
         return "; ".join(filter(None, (self.reason, *broken)))
 
     @property

@@ -98,7 +98,7 @@ def _kept(plan: Plan) -> Section:
             _found(plan, finding),
             f"{finding.time:.3f} s",
             finding.subject,
-            "kept" if finding.kept else "NOT KEPT",
+            "kept" if finding.satisfied else "NOT KEPT",
         )
         for finding in plan.certificate.findings
         if finding.requirement != "feed"

@@ -11,7 +11,7 @@ from selfmotion.certificate import (
     Bounded,
     Finding,
     FinishedMotion,
-    QuantityKept,
+    QuantityWithinLimits,
     Requirement,
     Shares,
     Stretch,
@@ -158,18 +158,24 @@ def _judges_alike(
         worst = float(np.max(np.abs(h) if bound.equality else h))
         found = requirement.judge(FinishedMotion(robot, objective.at(x).trajectory))
         require(isinstance(found, Finding), f"judge() returned {found!r}, expected a Finding")
-        if isinstance(requirement, QuantityKept) and requirement.quantity.series is not None:
+        if (
+            isinstance(requirement, QuantityWithinLimits)
+            and requirement.quantity.series is not None
+        ):
             _majorised(requirement, robot, objective.at(x).trajectory, rng)
         require(
-            found.kept or not worst <= -bound.tolerance or bound.equality,
+            found.satisfied or not worst <= -bound.tolerance or bound.equality,
             f"'{bound.name}' is kept at all nodes (h ≤ {worst:.3g}), but judged: {found.text}",
         )
-        refused += not found.kept
+        refused += not found.satisfied
     require(refused > 0, f"requirement '{requirement.name}' accepts every motion that was tried")
 
 
 def _majorised(
-    requirement: QuantityKept, robot: RobotModel, trajectory: Trajectory, rng: np.random.Generator
+    requirement: QuantityWithinLimits,
+    robot: RobotModel,
+    trajectory: Trajectory,
+    rng: np.random.Generator,
 ) -> None:
     """Require that a quantity's series is above its derivatives on intervals of a motion."""
     shares = Shares(requirement.quantity)

@@ -295,7 +295,7 @@ class FreeMotions:
             t, names = slower * motion.t, self.robot.joint_names
             whole = Trajectory(t, q, qd / slower, names, faster / slower**2)
             found = Move(self.robot, self.constraints, whole)
-            if not any(not item.kept and item.of_pace for item in found.findings):
+            if not any(not item.satisfied and item.of_pace for item in found.findings):
                 break
         return found
 
