@@ -74,7 +74,7 @@ def _look(planner: Planner) -> bool:
     """Look whether the arm can be at some single poses at all, where nothing is known yet."""
     if not planner.is_free or planner.is_begun:
         return False
-    blocked = planner.blocked = looked_at(planner.problem, planner.search)
+    blocked = planner.blocked = _looked_at(planner.problem, planner.search)
     if blocked is not None:
         # What can be planned all the same takes many times as long as the 'no'.
         planner.progress(f"no motion passes t = {blocked.time:.6g} s: {blocked.reason}", 0, 0)
@@ -93,7 +93,7 @@ def _plan_before_blocked_pose(planner: Planner) -> bool:
     except InverseKinematicsError:
         found = False
     if not found:
-        raise no_way(planner.problem, blocked)
+        raise _no_way(planner.problem, blocked)
     return True
 
 
@@ -272,7 +272,7 @@ STEPS: tuple[tuple[str, Callable[[Planner], bool]], ...] = (
 )
 
 
-def looked_at(problem: Problem, search: Search) -> Obstruction | None:
+def _looked_at(problem: Problem, search: Search) -> Obstruction | None:
     """Return a pose that the arm cannot be at; None where it can be at all that were looked at.
 
     Or where it goes on all the same: damped motions leave their path, and what only keeps the arm
@@ -293,11 +293,11 @@ def looked_at(problem: Problem, search: Search) -> Obstruction | None:
     if blocked.is_met and problem.own_collision is not None:
         return blocked
     if blocked.is_met or blocked.time == 0.0:
-        raise no_way(problem, blocked)
+        raise _no_way(problem, blocked)
     return blocked
 
 
-def no_way(problem: Problem, blocked: Obstruction) -> SelfmotionError:
+def _no_way(problem: Problem, blocked: Obstruction) -> SelfmotionError:
     """Return the error that says what is in the way, and what would help."""
     robot, pose = problem.robot, problem.path.pose(blocked.time)
     task = problem.asked.task.value
