@@ -28,7 +28,7 @@ def read(
         if within is not None:
             text = (
                 f"note: judged within the {1e3 * within.position:.3g} mm and {within.rotation:.2g} "
-                f"rad that the file states; accelerations are the controller's, and not judged"
+                f"rad that the file states; {formats.of_the_controller(file, robot)}"
             )
             stages.print(text, markup=False, soft_wrap=True)
     return motion, within
@@ -97,9 +97,9 @@ def of_problem(
     problem = job.problem
     motion, within = read(file, degrees, within, problem.robot)
     if is_program(file):
-        kept = formats.what_targets_keep(problem.constraints)
-        problem = replace(problem, constraints=kept)
+        problem = formats.by_targets(problem)
         program = formats.read_program(file, problem.robot)
+        motion = program.along(problem.path)
         begin = motion.of_joints(problem.robot.joint_names).q[0]
         problem = formats.as_shifted(problem, program, begin)
         if formats.shift_told(program):

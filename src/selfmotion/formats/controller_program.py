@@ -12,6 +12,9 @@ from typing import NamedTuple
 import numpy as np
 
 from selfmotion.basics import FileFormatError, ProblemError, Progress, nearest, silent
+from selfmotion.certificate import Tolerance
+from selfmotion.formats.feed_stretches import FeedStretch
+from selfmotion.formats.feed_thinning import FeedSpan
 from selfmotion.formats.pieces import pieces_of
 from selfmotion.formats.pose_numbers import ROUNDINGS
 from selfmotion.formats.pose_stretches import PoseStretch
@@ -20,9 +23,11 @@ from selfmotion.formats.program_axes import Axis, axes_of, in_order, tool_from_f
 from selfmotion.formats.program_settings import ProgramSettings, Signal
 from selfmotion.formats.stretches import NO_MISS, Miss, Misses, Stretch, miss_of
 from selfmotion.formats.targets import stretches_of
+from selfmotion.formats.thinning import TIME_DIGITS
 from selfmotion.formats.tool_frames import WORLD, ToolFrames, own_joint
 from selfmotion.job import Program, are_opposite
 from selfmotion.motion import Trajectory
+from selfmotion.path import Path
 from selfmotion.result import Move, Parts, Plan
 from selfmotion.robot import RobotModel
 from selfmotion.task import SE3, Quaternion
@@ -69,6 +74,9 @@ class ControllerProgram:
         The link that the work object is fixed to, or ``"world"``.
     remark : str
         Why targets are joints though poses were asked for.
+    within : Tolerance or None
+        Within what seams at speeds keep what is prescribed, by their certificates; None where none
+        is at a speed.
     """
 
     name: str
@@ -79,6 +87,7 @@ class ControllerProgram:
     shift: SE3 | None = None
     carrier: str = WORLD
     remark: str = ""
+    within: Tolerance | None = None
 
     @property
     def targets(self) -> int:
@@ -94,12 +103,27 @@ class ControllerProgram:
         FileFormatError
             There is none.
         """
+        return self._motion(None)
+
+    def along(self, path: Path) -> Trajectory:
+        """Return the motion at the pace of the path of its seam: ramps are those of the plan.
+
+        Raises
+        ------
+        FileFormatError
+            A speed is another one than the path has.
+        """
+        return self._motion(path)
+
+    def _motion(self, path: Path | None) -> Trajectory:
         t, q, qd = [np.zeros(1)], [self.stretches[0].q[:1]], [0.0 * self.stretches[0].q[:1]]
         for stretch in self.stretches:
             times, places, rates = stretch.t, stretch.q, 0.0 * stretch.q
-            if not stretch.is_rest:
+            if path is not None and isinstance(stretch, FeedStretch):
+                times, places, rates = stretch.along(path, float(t[-1][-1]))
+            elif not stretch.is_rest:
                 times, places, rates = stretch.knots()
-                rates[[0, -1]] = 0.0
+            rates[[0, -1]] = 0.0
             t.append(t[-1][-1] + times[1:])
             q.append(places[1:])
             qd.append(rates[1:])
@@ -127,7 +151,7 @@ class ControllerProgram:
             found = miss_of(same, piece.motion, piece.chains, piece.motion.t[0] + at)
             both = Misses(NO_MISS, found) if piece.is_move else Misses(found, NO_MISS)
             worst = worst.worse(both)
-            at += float(stretch.t[-1])
+            at += stretch.duration
             if at >= piece.motion.duration - _MOMENT:
                 at, k = 0.0, k + 1
         if k != len(pieces):
@@ -137,6 +161,10 @@ class ControllerProgram:
 
 # What a comment begins with that says why targets are joints.
 BECAUSE = "targets are joints, as poses do not keep the motion: "
+# What a comment begins with that says what seams at speeds keep.
+KEPT = "kept of what is prescribed: "
+# What a comment begins with that says how long a stretch at speeds was planned to take.
+PLANNED = "planned time: "
 # A piece is over where less of it is left than this [s].
 _MOMENT = 1e-4
 
@@ -182,12 +210,13 @@ def drafted(
     slides = np.array([axis.slides for axis in axes])
     given = pieces, slides, settings.deviation, settings.move_deviation, progress
     frames, why = None, ""
-    if settings.targets == "poses":
+    if settings.by_poses:
         frames = ToolFrames.of(robot, axes, settings).rounded(ROUNDINGS[form])
         why = frames.undetermined()
     if frames is not None and not why:
         try:
-            stretches, miss = stretches_of(*given, partial(PoseSpan.by, frames, ROUNDINGS[form]))
+            spans = PoseSpan if settings.targets == "timed-poses" else FeedSpan
+            stretches, miss = stretches_of(*given, partial(spans.by, frames, ROUNDINGS[form]))
         except NotByPosesError as error:
             why = str(error)
     if frames is None or why:
@@ -197,7 +226,11 @@ def drafted(
     sorted_ones = tuple(item.in_order(order) for item in stretches)
     ordered = tuple(axes[k] for k in order)
     stated = Misses(miss.path.stated, miss.moves.stated)
-    program = ControllerProgram(name, ordered, sorted_ones, stated, remark=plain(why))
+    at_speeds = any(isinstance(item, FeedStretch) for item in sorted_ones)
+    within = settings.deviation if at_speeds else None
+    program = ControllerProgram(
+        name, ordered, sorted_ones, stated, remark=plain(why), within=within
+    )
     tool = tool_from_flange(robot, settings)
     return Draft(program, robot, tool, settings, verdict, frames)
 
@@ -271,13 +304,49 @@ def head(draft: Draft) -> list[str]:
         plain(f"selfmotion: {draft.robot.name}, {program.targets} targets"),
         *folded(plain(draft.verdict)),
         *folded(plain(f"axes: {axes}")),
+        *_of_speeds(program),
         f"deviation: {_stated(program.miss.path)}",
         *([] if moves == NO_MISS else [f"deviation of moves: {_stated(moves)}"]),
         f"(of the tool from the plan, straight {_lines(draft)}, rounded corners or a spline",
-        "through the targets, at the times of the plan)",
+        "through the targets, at the times of the plan; of seams at speeds where the tool has gone",
+        "as far)",
         *([f"{BECAUSE}{program.remark}"] if program.remark else []),
         *_of_poses(draft),
         "Angles are those of the URDF: compare zeros and signs with the controller's.",
+    ]
+
+
+def speeds_of(program: ControllerProgram) -> list[float]:
+    """Return the speeds of its seams, each once [m/s]."""
+    at_speeds = (item for item in program.stretches if isinstance(item, FeedStretch))
+    return sorted({float(speed) for item in at_speeds for speed in item.speeds})
+
+
+def goes_round(program: ControllerProgram) -> bool:
+    """Whether it has circular motions."""
+    at_speeds = (item for item in program.stretches if isinstance(item, FeedStretch))
+    return any(bool(np.isfinite(item.vias).any()) for item in at_speeds)
+
+
+def before(stretch: Stretch) -> list[str]:
+    """Return the comments before a stretch, without what marks them as such."""
+    planned = isinstance(stretch, FeedStretch)
+    return [
+        *([plain(stretch.remark)] if stretch.remark else []),
+        *([f"{PLANNED}{stretch.duration:.{TIME_DIGITS}f} s"] if planned else []),
+    ]
+
+
+def _of_speeds(program: ControllerProgram) -> list[str]:
+    """Return what the head says of seams at speeds."""
+    within = program.within
+    if within is None:
+        return []
+    return [
+        f"{KEPT}{_up(1e3 * within.position, 6)} mm, {_up(within.rotation, 9)} rad",
+        "(seams are at their feeds, and keep that of what is prescribed; where the tool may turn,",
+        "and the arm's self-motion, are off the plan by what follows. Run-up and run-down, and so",
+        "when the tool is where, are the controller's)",
     ]
 
 

@@ -10,8 +10,9 @@ import numpy as np
 
 from selfmotion.basics import Array, FileFormatError
 from selfmotion.certificate import Tolerance
-from selfmotion.constraints import Constraint, JointAccelerationLimits, JointJerkLimits
+from selfmotion.constraints import Constraint
 from selfmotion.formats.controller_program import ControllerProgram, Switch, plain
+from selfmotion.formats.pieces import what_targets_keep
 from selfmotion.formats.pose_stretches import PoseStretch
 from selfmotion.formats.program_files import read_program
 from selfmotion.formats.read_stretches import SLOWLY
@@ -54,6 +55,8 @@ def stated_deviation(file: FilePath, robot: RobotModel | None = None) -> Toleran
 
 
 def _stated(program: ControllerProgram) -> Tolerance | None:
+    if program.within is not None:
+        return program.within
     miss = program.miss.path
     sound = np.isfinite([miss.position, miss.rotation]).all() and miss.position > 0.0
     return Tolerance(miss.position, max(miss.rotation, _LEAST)) if sound else None
@@ -71,12 +74,15 @@ class JudgedProgram(NamedTuple):
         What seams may miss their paths by, where that is not the job's own.
     shifted : str
         By how much the work object was shifted, in words; empty for not at all.
+    unjudged : str
+        What of a program that is verified is the controller's own, in words.
     """
 
     steps: tuple[JudgedStep, ...]
     failures: tuple[str, ...]
     within: Tolerance | None = None
     shifted: str = ""
+    unjudged: str = ""
 
     @property
     def verified(self) -> bool:
@@ -87,7 +93,8 @@ class JudgedProgram(NamedTuple):
     def verdict(self) -> str:
         """One line: verified, or how many steps are not, and what speaks against the whole."""
         if self.verified:
-            return f"verified: each step, and the whole{self._allowed}{self._told}"
+            own = f"; {self.unjudged}" if self.unjudged else ""
+            return f"verified: each step, and the whole{self._allowed}{self._told}{own}"
         count = sum(not step.verified for step in self.steps)
         told = [*([f"{count} of {len(self.steps)} steps"] if count else []), *self.failures]
         return f"not verified: {'; '.join(told)}{self._told}"
@@ -134,7 +141,21 @@ def judged_program(file: FilePath, job: Program, within: Tolerance | None = None
         *_otherwise_switched(job, program.switches),
         *_slowly_gone(program),
     )
-    return JudgedProgram(steps, failures, within, shift_told(program))
+    return JudgedProgram(steps, failures, within, shift_told(program), _unjudged(program))
+
+
+def of_the_controller(file: FilePath, robot: RobotModel | None = None) -> str:
+    """Return what of a program is the controller's own, and not judged, in words."""
+    return _unjudged(read_program(file, robot))
+
+
+def _unjudged(program: ControllerProgram) -> str:
+    if program.within is None:
+        return "accelerations are the controller's, and not judged"
+    return (
+        "seams at their feeds are judged with the ramps of the plan: how the controller runs up "
+        "and down, and so when it is where, is its own, and not judged"
+    )
 
 
 def _slowly_gone(program: ControllerProgram) -> Iterator[str]:
@@ -293,12 +314,6 @@ def _otherwise_switched(job: Program, switches: Sequence[Switch]) -> Iterator[st
             yield f"events '{one}' and '{other}' both switch '{first.output}' to {first.value}"
 
 
-def what_targets_keep(constraints: Sequence[Constraint]) -> tuple[Constraint, ...]:
-    """Return what targets can keep: how a controller accelerates between them is its own."""
-    own = (JointAccelerationLimits, JointJerkLimits)
-    return tuple(item for item in constraints if not isinstance(item, own))
-
-
 def _pieces(file: FilePath, program: ControllerProgram, job: Program) -> Iterator[Trajectory]:
     """Yield the motion of each step of a job."""
     names = job.robot.joint_names
@@ -313,12 +328,14 @@ def _pieces(file: FilePath, program: ControllerProgram, job: Program) -> Iterato
             left.pop(0)
         while left and seconds < step.motion.duration - _MOMENT:
             taken.append(left.pop(0))
-            seconds += float(taken[-1].t[-1])
+            seconds += taken[-1].duration
         if abs(seconds - step.motion.duration) > _MOMENT:
             raise FileFormatError(
                 f"{file}: its targets of '{step.name}' take {seconds:.6g} s, the job's "
                 f"{step.motion.duration:.6g} s: it is of another one"
             )
-        yield replace(program, stretches=tuple(taken)).trajectory.of_joints(names)
+        part, made = replace(program, stretches=tuple(taken)), step.made
+        motion = part.trajectory if isinstance(made, Move) else part.along(made.problem.path)
+        yield motion.of_joints(names)
     if left:
         raise FileFormatError(f"{file}: goes on with '{left[0].name}' when the job has ended")

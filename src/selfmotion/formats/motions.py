@@ -133,7 +133,7 @@ def write_motion(
 
 def _is_linear(form: str, settings: ProgramSettings | None) -> bool:
     """Whether a program of Universal Robots is one of targets, not a stream."""
-    return form == "urscript" and settings is not None and settings.targets == "poses"
+    return form == "urscript" and settings is not None and settings.by_poses
 
 
 def check_verified(plan: Plan | Parts | Move | Program, file: Path, force: bool) -> None:

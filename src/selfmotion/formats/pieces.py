@@ -1,15 +1,18 @@
 """What a motion is made of: seams, and moves through the air with room around them."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from selfmotion.basics import Array, PlanError
 from selfmotion.certificate import JointLimits, KeepsApart, Requirement, Tolerance, arm_limits
+from selfmotion.constraints import Constraint, JointAccelerationLimits, JointJerkLimits
 from selfmotion.job import Program
 from selfmotion.motion import Trajectory
 from selfmotion.path import FeedKept
+from selfmotion.problem import Problem
 from selfmotion.result import Move, Parts, Plan
 from selfmotion.robot import Chain
 
@@ -24,7 +27,8 @@ class Piece(NamedTuple):
 
     Of a move through the air also how far a controller may be off it, where there is room; of a
     seam the feeds that its tools keep, one list for each chain. `speeds` (n,) are what joints may
-    have [rad/s or m/s].
+    have [rad/s or m/s]. `keeps` says whether another motion keeps all that a seam's has to but
+    accelerations, within a tolerance.
     """
 
     name: str
@@ -35,6 +39,7 @@ class Piece(NamedTuple):
     room: Tolerance | None = None
     feeds: tuple[tuple[FeedKept, ...], ...] = ()
     speeds: Array | None = None
+    keeps: Callable[[Trajectory, Tolerance], bool] | None = None
 
 
 def pieces_of(plan: Plan | Parts | Move | Program) -> list[Piece]:
@@ -71,7 +76,22 @@ def _of_plan(name: str, plan: Plan) -> Piece:
     chains = tuple(item.chain for item in items)
     feeds = tuple(tuple(feed for feed in item.path.feeds if feed.kept) for item in items)
     speeds = _speeds((*arm_limits(plan.robot, plan.requirements), *plan.requirements))
-    return Piece(name, plan.trajectory, (), chains, feeds=feeds, speeds=speeds)
+
+    def keeps(motion: Trajectory, within: Tolerance) -> bool:
+        return by_targets(plan.problem).certify(motion, within).verified
+
+    return Piece(name, plan.trajectory, (), chains, feeds=feeds, speeds=speeds, keeps=keeps)
+
+
+def by_targets(problem: Problem) -> Problem:
+    """Return what targets can keep of a problem."""
+    return replace(problem, constraints=what_targets_keep(problem.constraints))
+
+
+def what_targets_keep(constraints: Sequence[Constraint]) -> tuple[Constraint, ...]:
+    """Return what targets can keep: how a controller accelerates between them is its own."""
+    own = (JointAccelerationLimits, JointJerkLimits)
+    return tuple(item for item in constraints if not isinstance(item, own))
 
 
 def _of_move(name: str, move: Move) -> Piece:

@@ -136,7 +136,7 @@ class PoseSpan(Span):
         lines = stretch.ways(times)
         for line in lines:
             joints = np.abs(line - exact).max(axis=1) / allowed.rotation
-            worst = np.maximum(worst, _largest(joints, count))
+            worst = np.maximum(worst, largest(joints, count))
         # Where joints are near, the tool is nearly so: only these are placed.
         for line in lines if worst.max() <= _JOINTS_FAR else []:
             for chain in self.piece.chains:
@@ -146,7 +146,7 @@ class PoseSpan(Span):
                 # |R - R'| is 2√2 sin(angle / 2).
                 angle = np.linalg.norm(turned - facing, axis=(1, 2)) / np.sqrt(2.0)
                 off = np.maximum(off, angle / allowed.rotation)
-                worst = np.maximum(worst, _largest(off, count))
+                worst = np.maximum(worst, largest(off, count))
         return np.where(np.isfinite(worst), SURE * worst, np.inf)
 
     def _evenly(self, fixed: Array, allowed: Tolerance, more: float) -> Array:
@@ -196,7 +196,7 @@ class PoseSpan(Span):
 _JOINTS_FAR = 10.0
 
 
-def _largest(values: Array, count: int) -> Array:
+def largest(values: Array, count: int) -> Array:
     """Return the largest of the values of each step, (count,), that at its end included."""
     steps = values[:-1].reshape(count, -1)
     found: Array = np.maximum(steps.max(axis=1), np.append(steps[1:, 0], values[-1]))

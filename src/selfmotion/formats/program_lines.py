@@ -8,7 +8,15 @@ from typing import Any, ClassVar
 import numpy as np
 
 from selfmotion.basics import FileFormatError, text_of
-from selfmotion.formats.controller_program import BECAUSE, ControllerProgram, Switch
+from selfmotion.certificate import Tolerance
+from selfmotion.formats.controller_program import (
+    BECAUSE,
+    KEPT,
+    PLANNED,
+    ControllerProgram,
+    Switch,
+)
+from selfmotion.formats.feed_stretches import Ramps, times_at
 from selfmotion.formats.program_axes import Axis
 from selfmotion.formats.read_stretches import (
     Follower,
@@ -101,6 +109,17 @@ class Lines:
         steps = [note.removeprefix("step: ") for note in self.notes if note.startswith("step: ")]
         return steps[-1] if steps else ""
 
+    def planned(self) -> float | None:
+        """Return the time that comments plan for what follows [s], once; None where they do not."""
+        for k in range(len(self.notes) - 1, -1, -1):
+            if self.notes[k].startswith("step: "):
+                return None
+            found = re.fullmatch(rf"{PLANNED}([\d.]+) s", self.notes[k][:80])
+            if found:
+                del self.notes[k]
+                return self.duration(found[1])
+        return None
+
     def _joints(self) -> dict[str, tuple[str, bool]]:
         """Return what comments say of axes: axis → its joint, and whether that slides."""
         said = next((note for note in self.notes if note.startswith("axes: ")), "axes: ")
@@ -116,17 +135,26 @@ class Lines:
 
     def miss(self) -> Misses:
         """Return the deviations that the comments state, or ones without bounds."""
-        path = self._stated("deviation")
+        path = self._stated("deviation: ")
         if path is None:
             return Misses(*[Miss(np.inf, np.inf, np.inf)] * 2)
-        return Misses(path, self._stated("deviation of moves") or path)
+        return Misses(path, self._stated("deviation of moves: ") or path)
 
     def _stated(self, what: str) -> Miss | None:
         for note in self.notes:
-            found = re.fullmatch(rf"{what}: ([\d.]+) mm, ([\d.]+) rad, joints ([\d.]+)", note[:200])
+            found = re.fullmatch(rf"{what}([\d.]+) mm, ([\d.]+) rad, joints ([\d.]+)", note[:200])
             if found:
                 position, rotation, joint = (self.number_of(text) for text in found.groups())
                 return Miss(1e-3 * position, rotation, joint)
+        return None
+
+    def within(self) -> Tolerance | None:
+        """Return what seams at speeds keep of what is prescribed, by the comments."""
+        for note in self.notes:
+            found = re.fullmatch(rf"{KEPT}([\d.]+) mm, ([\d.]+) rad", note[:200])
+            if found:
+                position, rotation = (self.number_of(text) for text in found.groups())
+                return Tolerance(1e-3 * position, rotation)
         return None
 
     def places(self, tool: SE3 | None, work: SE3 | None) -> Places:
@@ -190,6 +218,7 @@ class Lines:
             None if places is None else places.shift,
             "world" if places is None or frames is None else places.carrier,
             remark.removeprefix(BECAUSE),
+            self.within(),
         )
 
 
@@ -298,6 +327,36 @@ class ProgramReader:
         """Take a pose that the arm goes to slowly before it goes on by poses."""
         self.rows.append(SlowRow(pose))
         self.at, self.pose_at = None, pose
+
+    def drive(
+        self,
+        poses: list[Pose],
+        speeds: list[float],
+        vias: list[Pose | None],
+        happens: Sequence[tuple[int, Sequence[str]]] = (),
+    ) -> None:
+        """Take a stretch of poses at speeds [m/s], and what is switched at which of them."""
+        planned = self.lines.planned()
+        if self.pose_at is None:
+            raise self.lines.fault("a pose after axis targets, expected a slow motion there first")
+        if planned is None:
+            raise self.lines.fault(
+                f"a motion at a speed needs the comment '{PLANNED}… s' before it, which says how "
+                f"long all up to the next stop was planned to take"
+            )
+        every = [self.pose_at, *poses]
+        round_ones = np.array([[np.nan] * 3 if via is None else via.place for via in vias])
+        own = times_at(np.array([pose.place for pose in every]), round_ones, speeds)
+        if not 0.0 < own[-1] < planned:
+            raise self.lines.fault(
+                f"at these speeds it takes {own[-1]:.6g} s without ramps, planned are "
+                f"{planned:.6g} s; after a change of speeds plan anew, with the feed that is wanted"
+            )
+        at = Ramps(float(own[-1]), planned).times(own)
+        for number, what in happens:
+            self.switches.append(switched(self.clock + float(at[number]), what))
+        self.rows.append(PoseRow(self.lines.step(), every, [planned], speeds, round_ones))
+        self.at, self.pose_at = None, poses[-1]
 
     def follow(self, poses: list[Pose], seconds: list[float]) -> None:
         """Take a stretch of poses."""
