@@ -24,7 +24,7 @@ from support.own_kinematics import Arm
 # Newton's steps at most, differences [rad], and when it has arrived [m, parts of a turn].
 _STEPS, _DIFFERENCE, _ARRIVED = 30, 1e-6, 1e-9
 # Chords that the length of a motion's way is counted by.
-_CHORDS = 6000
+_CHORDS = 30_000
 
 
 @dataclass

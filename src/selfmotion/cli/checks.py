@@ -28,7 +28,7 @@ def read(
         if within is not None:
             text = (
                 f"note: judged within the {1e3 * within.position:.3g} mm and {within.rotation:.2g} "
-                f"rad that the file states; {formats.of_the_controller(file, robot)}"
+                f"rad that the file states; accelerations are the controller's, and not judged"
             )
             stages.print(text, markup=False, soft_wrap=True)
     return motion, within
@@ -37,6 +37,13 @@ def read(
 def is_program(file: Path) -> bool:
     """Whether a file is a program of a controller."""
     return file.suffix.lower() in formats.READ_PROGRAMS
+
+
+def tell_of_controller(file: Path, robot: sm.RobotModel) -> None:
+    """Print what a verdict on a program of seams at their feeds leaves to the controller."""
+    if is_program(file) and formats.read_program(file, robot).within is not None:
+        text = formats.of_the_controller(file, robot)
+        terminal.print(text, markup=False, soft_wrap=True)
 
 
 def on_calibrated(problem: sm.Problem, calibration: Path) -> sm.Problem:

@@ -6,6 +6,7 @@ the arm's self-motion, may be off by more: by as much as still keeps all that th
 its certificate judges.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise, product
 from typing import NamedTuple
@@ -22,6 +23,7 @@ from selfmotion.formats.pose_numbers import Rounding
 from selfmotion.formats.pose_stretches import on_one_side, straight
 from selfmotion.formats.pose_thinning import NotByPosesError, PoseSpan, largest
 from selfmotion.formats.stretches import SURE, Event, Miss, Stretch
+from selfmotion.formats.thinning import events_within, rests
 from selfmotion.formats.tool_frames import WORLD, ToolFrames
 from selfmotion.motion import Trajectory
 
@@ -33,6 +35,11 @@ _FEWEST, _MOST = 400, 2000
 # Stretches shorter than this have no feed [m]; steps at least [m]; of what is allowed, steps take
 # this much before corners and digits; tries to halve those that take more.
 _SHORT, _STEP, _OF_ALLOWED, _TRIES = 1e-3, 1e-5, 0.9, 12
+# Speeds have so many digits [m/s]. Leads have no feed: each ramp takes this share of their time.
+_SPEED_DIGITS, _RAMP = 8, 0.25
+# What joints are off may change by this share of what they may be off, from look to look, and by
+# so much at corners in any case [rad or m].
+_SWING, _LEAST_SWING = 0.1, 3e-4
 # Events have to be as near to their times [s]; half-turns have two axes [rad].
 _PROMPT, _NEARLY_HALF = 5e-4, 3.0
 
@@ -74,42 +81,77 @@ class FeedSpan(PoseSpan):
             return PoseSpan.by(*given)
         return super().by(*given)
 
-    def thinned(self, allowed: Tolerance) -> tuple[Stretch, Miss]:
-        """See `Span.thinned`: with times where speeds do not do, and the stretch says why."""
-        motion = self.piece.motion
-        gone = PassedLength.of_motion(self.frames, motion, self.first, self.last)
-        if gone.whole < _SHORT:
-            return super().thinned(allowed)
-        why = "no poses keep it where the tool has gone as far"
-        for free, share in product(_FREE, _OF_PLACES):
-            nearer = replace(allowed, position=share * allowed.position)
-            stretch = self._fewest(gone, nearer, max(free, allowed.rotation))
-            if stretch is None:
-                continue
-            if not self._is_prompt(stretch):
-                why = "an event is where the tool is slower than its feed"
-            elif self._keeps(stretch, gone, allowed):
-                return stretch, self._miss(stretch)
-        timed, miss = super().thinned(allowed)
-        return replace(timed, remark=f"with times: {why}"), miss
+    def stretches(self, allowed: Tolerance) -> list[tuple[Stretch, Miss]]:
+        """See `Span.stretches`: one from rest to rest of the tool, the arm's self-motion aside.
 
-    def _keeps(self, stretch: FeedStretch, gone: PassedLength, allowed: Tolerance) -> bool:
-        """Whether the seam keeps all that it has to with a stretch in place of its motion."""
-        motion = self.piece.motion
-        t, q, qd = stretch.at_pace(gone)
-        if not np.isfinite(q).all():
-            return False
+        With times where speeds do not do, and the stretch says why.
+        """
+        if rests(self.piece.motion, self.first, self.last):
+            return super().stretches(allowed)
+        parts = [self._part(*ends) for ends in pairwise(self._stops)]
+        gone = [part._gone for part in parts]
+        why = "there is no feed where the tool hardly moves"
+        for free, share in product(_FREE, _OF_PLACES):
+            if min(each.whole for each in gone) < _SHORT:
+                break
+            nearer = replace(allowed, position=share * allowed.position)
+            turning = max(free, allowed.rotation)
+            made = [
+                part._fewest(each, nearer, turning) for part, each in zip(parts, gone, strict=True)
+            ]
+            found = [stretch for stretch in made if stretch is not None]
+            why = "no poses keep it where the tool has gone as far"
+            if len(found) < len(parts):
+                continue
+            if not all(part._is_prompt(own) for part, own in zip(parts, found, strict=True)):
+                why = "an event is where the tool is slower than its feed, or it is at no feed"
+            elif self._keeps(found, gone, allowed):
+                pairs = zip(parts, found, strict=True)
+                return [(stretch, part._miss(stretch)) for part, stretch in pairs]
+        ((timed, miss),) = super().stretches(allowed)
+        return [(replace(timed, remark=f"with times: {why}"), miss)]
+
+    @property
+    def _stops(self) -> list[float]:
+        """When the tool rests, from the first to the last."""
+        at = self.piece.motion.t[0] + np.array(self.piece.tool_rests)
+        inside = at[(at > self.first + _PROMPT) & (at < self.last - _PROMPT)]
+        return [self.first, *inside.tolist(), self.last]
+
+    def _part(self, first: float, last: float) -> "FeedSpan":
+        events = events_within(self.piece, first, last)
+        return replace(self, first=first, last=last, events=events)
+
+    @property
+    def _gone(self) -> PassedLength:
+        return PassedLength.of_motion(self.frames, self.piece.motion, self.first, self.last)
+
+    def _keeps(
+        self, stretches: Sequence[FeedStretch], gone: Sequence[PassedLength], allowed: Tolerance
+    ) -> bool:
+        """Whether the seam keeps all that it has to with stretches in place of its motion."""
+        motion, begin = self.piece.motion, self.first
+        rows: list[tuple[Array, Array, Array]] = []
+        for stretch, each in zip(stretches, gone, strict=True):
+            t, q, qd = stretch.at_pace(each)
+            if not np.isfinite(q).all():
+                return False
+            kept = slice(1 if rows else 0, None)
+            rows.append((begin + t[kept], q[kept], qd[kept]))
+            begin += float(t[-1])
         before, after = motion.t < self.first - _PROMPT, motion.t > self.last + _PROMPT
-        whole = Trajectory(
-            np.concatenate([motion.t[before], self.first + t, motion.t[after]]),
-            np.vstack([motion.q[before], q, motion.q[after]]),
-            np.vstack([motion.qd[before], qd, motion.qd[after]]),
-            motion.joint_names,
-        )
-        return self.piece.keeps is not None and self.piece.keeps(whole, allowed)
+        given = motion.t, motion.q, motion.qd
+        whole = [
+            np.concatenate([own[before], *parts, own[after]])
+            for own, parts in zip(given, zip(*rows, strict=True), strict=True)
+        ]
+        judged = Trajectory(whole[0], whole[1], whole[2], motion.joint_names)
+        return self.piece.keeps is not None and self.piece.keeps(judged, allowed)
 
     def _is_prompt(self, stretch: FeedStretch) -> bool:
-        """Whether events are on time, ramps being even."""
+        """Whether there is time to run up, and events are on time, ramps being even."""
+        if not stretch.ramps.each > 0.0:
+            return False
         own = stretch.ramps.times(stretch.t)
         return all(
             abs(own[event.target] - (at - self.first)) < _PROMPT
@@ -121,7 +163,7 @@ class FeedSpan(PoseSpan):
         fixed = self._fixed(gone)
         along = self._along(gone, fixed)
         marks = [int(np.abs(along.gone - each).argmin()) for each in fixed]
-        limits = allowed.position, free
+        limits = allowed.position, allowed.rotation, free
         steps = _Steps([0], [])
         for first, last in pairwise(marks):
             part = self._joined(along, first, last, limits)
@@ -131,7 +173,10 @@ class FeedSpan(PoseSpan):
             steps = _Steps(steps.ends + part.ends[1:], steps.round + part.round)
         for _ in range(_TRIES):
             stretch = self._stretch(gone, along, steps)
-            far = self._off(stretch, allowed, free) > 1.0
+            taken = self._off(stretch, allowed, free)
+            if taken is None:
+                return None
+            far = taken > 1.0
             if not far.any():
                 return stretch
             finer = _halved(steps, far)
@@ -155,16 +200,17 @@ class FeedSpan(PoseSpan):
         inside = motion.t[(motion.t > self.first) & (motion.t < self.last)]
         inside = inside[:: max(1, len(inside) // (_MOST - _FEWEST))]
         even = np.linspace(0.0, gone.whole, _FEWEST + 1)
-        far = np.unique(np.concatenate([fixed, even, gone.at(inside)]))
-        kept = np.append(True, np.diff(far) > _STEP) | np.isin(far, fixed)
-        far = far[kept]
+        others = np.unique(np.concatenate([even, gone.at(inside)]))
+        others = others[np.append(True, np.diff(others) > _STEP)]
+        apart = np.abs(others[:, None] - fixed).min(axis=1) > _STEP
+        far = np.sort(np.concatenate([fixed, others[apart]]))
         q = self._at(gone, far)
         places, turns = self.frames.places(q)
         rows = np.hstack([places, on_one_side(turns), q[:, self.frames.external]])
         return _Along(gone, far, q, rows)
 
     def _joined(
-        self, along: _Along, first: int, last: int, limits: tuple[float, float]
+        self, along: _Along, first: int, last: int, limits: tuple[float, float, float]
     ) -> _Steps | None:
         """Return steps as long as they can be, one after the other."""
         steps, at = _Steps([first], []), first
@@ -179,7 +225,13 @@ class FeedSpan(PoseSpan):
         return steps
 
     def _farthest(
-        self, along: _Along, at: int, last: int, limits: tuple[float, float], *, is_round: bool
+        self,
+        along: _Along,
+        at: int,
+        last: int,
+        limits: tuple[float, float, float],
+        *,
+        is_round: bool,
     ) -> int:
         """Return how far ahead one step may go; where it begins for nowhere."""
         # The shortest arc has a place in between.
@@ -196,7 +248,7 @@ class FeedSpan(PoseSpan):
                 beyond = there
         return near
 
-    def _even(self, along: _Along, steps: _Steps, limits: tuple[float, float]) -> _Steps:
+    def _even(self, along: _Along, steps: _Steps, limits: tuple[float, float, float]) -> _Steps:
         """Return as many steps of one kind as long as each other, where these do as well."""
         count = len(steps.round)
         if count < 2 or len(set(steps.round)) > 1:
@@ -209,12 +261,18 @@ class FeedSpan(PoseSpan):
         return _Steps(ends, steps.round) if even else steps
 
     def _is_near(
-        self, along: _Along, first: int, last: int, limits: tuple[float, float], *, is_round: bool
+        self,
+        along: _Along,
+        first: int,
+        last: int,
+        limits: tuple[float, float, float],
+        *,
+        is_round: bool,
     ) -> bool:
         """Whether one step from a place to another keeps near the motion."""
         part = slice(first, last + 1)
         gone, exact = along.gone[part], along.rows[part]
-        place, free = (_OF_ALLOWED * limit for limit in limits)
+        place, free = (_OF_ALLOWED * limit for limit in (limits[0], limits[2]))
         if 2.0 * np.arccos(min(1.0, abs(float(exact[0, 3:7] @ exact[-1, 3:7])))) > _NEARLY_HALF:
             return False
         rows = straight(gone, gone[[0, -1]], exact[[0, -1]])
@@ -228,12 +286,25 @@ class FeedSpan(PoseSpan):
             return False
         if rows.shape[1] > 7 and np.abs(rows[:, 7:] - exact[:, 7:]).max() > free:
             return False
-        if np.linalg.norm(self.frames.turned(rows[:, 3:7], exact[:, 3:7]), axis=1).max() > free:
+        turned = self._turned(rows[:, 3:7], exact[:, 3:7], limits[1:])
+        if turned.max() > _OF_ALLOWED:
             return False
         near = np.array(along.q[part])
         near[:, self.frames.external] = rows[:, 7:]
         q, arrived = self.frames.solved(rows[:, :3], rows[:, 3:7], near)
         return bool(arrived.all() and np.abs(q - along.q[part]).max() <= free)
+
+    def _turned(self, turns: Array, facing: Array, limits: tuple[float, float]) -> Array:
+        """Return how much orientations (K, 4) take of what they may be off others, (K,).
+
+        What the task prescribes of them is held to the first of the limits, all else to the second.
+        """
+        strict, free = limits
+        whole = np.linalg.norm(self.frames.turned(turns, facing), axis=1)
+        if self.piece.turns.tool_axes:
+            leaned = np.linalg.norm(np.cross(_axes(turns), _axes(facing)), axis=1)
+            return np.asarray(np.maximum(leaned / strict, whole / free))
+        return np.asarray(whole / (strict if self.piece.turns.angular else free))
 
     def _middle(self, along: _Along, first: int, last: int) -> Array:
         """Return where the tool is halfway from one place to another, (3,)."""
@@ -285,28 +356,34 @@ class FeedSpan(PoseSpan):
         )
 
     def _speeds(self, gone: PassedLength, ends: Array) -> Array:
-        """Return the feed of each step; beside a feed, as fast as it is on average [m/s]."""
+        """Return the feed of each step; beside a feed, what takes as long with its ramps [m/s]."""
         middles = gone.when(0.5 * (ends[1:] + ends[:-1])) - self.piece.motion.t[0]
-        found = np.full(len(middles), gone.whole / (self.last - self.first))
+        found = np.full(len(middles), gone.whole / ((1.0 - _RAMP) * (self.last - self.first)))
         for item in self.piece.feeds[0]:
             for begin, end in item.during:
                 found[(middles >= begin) & (middles <= end)] = item.asked
-        return found
+        return np.round(found, _SPEED_DIGITS)
 
-    def _off(self, stretch: FeedStretch, allowed: Tolerance, free: float) -> Array:
-        """Return how much of what is allowed each step takes, corners included, (K,)."""
+    def _off(self, stretch: FeedStretch, allowed: Tolerance, free: float) -> Array | None:
+        """Return how much of what is allowed each step takes, corners included, (K,).
+
+        None where joints swing between two looks, as they do near a singular pose.
+        """
         times, count = stretch.looked_at(), len(stretch.t) - 1
         exact = stretch.matched(self.piece.motion, self.first)
         at, facing = self.frames.places(exact)
         worst = np.zeros(count)
         for line in stretch.ways(times):
             if not np.isfinite(line).all():
-                return np.full(count, np.inf)
+                return None
+            off = line - exact
+            if np.abs(np.diff(off, axis=0)).max() > max(_SWING * free, _LEAST_SWING):
+                return None
             places, turns = self.frames.places(line)
             taken = np.linalg.norm(places - at, axis=1) / allowed.position
-            taken = np.maximum(taken, np.abs(line - exact).max(axis=1) / free)
-            turned = np.linalg.norm(self.frames.turned(turns, facing), axis=1)
-            worst = np.maximum(worst, largest(np.maximum(taken, turned / free), count))
+            taken = np.maximum(taken, np.abs(off).max(axis=1) / free)
+            turned = self._turned(turns, facing, (allowed.rotation, free))
+            worst = np.maximum(worst, largest(np.maximum(taken, turned), count))
         return SURE * worst
 
 
@@ -315,6 +392,12 @@ def _rides_along(frames: ToolFrames) -> bool:
     robot = frames.robot
     carrier = robot.urdf.root if frames.carrier == WORLD else frames.carrier
     return len(robot.chain_to(carrier, robot.reference).joints) == 0
+
+
+def _axes(turns: Array) -> Array:
+    """Return the z axes of orientations (K, 4), (K, 3)."""
+    x, y, z, w = turns.T
+    return np.stack([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)], axis=1)
 
 
 def _halved(steps: _Steps, far: Flags) -> _Steps:

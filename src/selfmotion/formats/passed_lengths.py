@@ -13,7 +13,7 @@ from selfmotion.motion import Trajectory
 from selfmotion.path import Path, times_when
 
 # Speeds are looked at so often between two samples, and so often in all at least.
-_BETWEEN, _LEAST = 4, 400
+_BETWEEN, _LEAST = 4, 1600
 
 
 @dataclass(frozen=True, eq=False)
