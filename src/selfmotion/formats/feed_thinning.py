@@ -9,18 +9,18 @@ its certificate judges.
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise, product
-from typing import NamedTuple
 
 import numpy as np
 
 from selfmotion.basics import Array, Flags
 from selfmotion.certificate import Tolerance
-from selfmotion.formats.circular import MOST_TURN, arc_through, put_on_arcs, step_lengths
+from selfmotion.formats.circular import step_lengths
 from selfmotion.formats.feed_stretches import FeedStretch, times_at
+from selfmotion.formats.longest_steps import Allowed, Places, Steps, StepSearch
 from selfmotion.formats.passed_lengths import PassedLength
 from selfmotion.formats.pieces import Piece
 from selfmotion.formats.pose_numbers import Rounding
-from selfmotion.formats.pose_stretches import on_one_side, straight
+from selfmotion.formats.pose_stretches import on_one_side
 from selfmotion.formats.pose_thinning import NotByPosesError, PoseSpan, largest
 from selfmotion.formats.stretches import SURE, Event, Miss, Stretch
 from selfmotion.formats.thinning import events_within, rests
@@ -32,32 +32,16 @@ from selfmotion.motion import Trajectory
 _FREE, _OF_PLACES = (0.2, 0.02, 0.0), (1.0, 0.3)
 # Places along a stretch that are looked at, at least and at most.
 _FEWEST, _MOST = 400, 2000
-# Stretches shorter than this have no feed [m]; steps at least [m]; of what is allowed, steps take
-# this much before corners and digits; tries to halve those that take more.
-_SHORT, _STEP, _OF_ALLOWED, _TRIES = 1e-3, 1e-5, 0.9, 12
+# Stretches shorter than this have no feed [m]; steps at least [m]; tries to halve those that take
+# more than they may.
+_SHORT, _STEP, _TRIES = 1e-3, 1e-5, 12
 # Speeds have so many digits [m/s]. Leads have no feed: each ramp takes this share of their time.
 _SPEED_DIGITS, _RAMP = 8, 0.25
 # What joints are off may change by this share of what they may be off, from look to look, and by
 # so much at corners in any case [rad or m].
 _SWING, _LEAST_SWING = 0.1, 3e-4
-# Events have to be as near to their times [s]; half-turns have two axes [rad].
-_PROMPT, _NEARLY_HALF = 5e-4, 3.0
-
-
-class _Steps(NamedTuple):
-    """Targets by their places among those that are looked at, and which steps go round."""
-
-    ends: list[int]
-    round: list[bool]
-
-
-class _Along(NamedTuple):
-    """The motion at places along a stretch: how far the tool is [m], q (K, n) and rows of poses."""
-
-    lengths: PassedLength
-    gone: Array
-    q: Array
-    rows: Array
+# Events have to be as near to their times [s].
+_PROMPT = 5e-4
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,23 +147,19 @@ class FeedSpan(PoseSpan):
         fixed = self._fixed(gone)
         along = self._along(gone, fixed)
         marks = [int(np.abs(along.gone - each).argmin()) for each in fixed]
-        limits = allowed.position, allowed.rotation, free
-        steps = _Steps([0], [])
-        for first, last in pairwise(marks):
-            part = self._joined(along, first, last, limits)
-            if part is None:
-                return None
-            part = self._even(along, part, limits)
-            steps = _Steps(steps.ends + part.ends[1:], steps.round + part.round)
+        limits = Allowed(allowed.position, allowed.rotation, free)
+        steps = StepSearch(self.frames, self.piece.turns, along, limits).between(marks)
         for _ in range(_TRIES):
+            if steps is None:
+                return None
             stretch = self._stretch(gone, along, steps)
-            taken = self._off(stretch, allowed, free)
+            taken = self._off(stretch, limits)
             if taken is None:
                 return None
             far = taken > 1.0
             if not far.any():
                 return stretch
-            finer = _halved(steps, far)
+            finer = steps.halved(far)
             if len(finer.ends) == len(steps.ends):
                 return None
             steps = finer
@@ -195,7 +175,7 @@ class FeedSpan(PoseSpan):
         inside = inside[np.append(True, np.diff(inside) > _STEP)[: len(inside)]]
         return np.concatenate([[0.0], inside, [gone.whole]])
 
-    def _along(self, gone: PassedLength, fixed: Array) -> _Along:
+    def _along(self, gone: PassedLength, fixed: Array) -> Places:
         motion = self.piece.motion
         inside = motion.t[(motion.t > self.first) & (motion.t < self.last)]
         inside = inside[:: max(1, len(inside) // (_MOST - _FEWEST))]
@@ -207,122 +187,20 @@ class FeedSpan(PoseSpan):
         q = self._at(gone, far)
         places, turns = self.frames.places(q)
         rows = np.hstack([places, on_one_side(turns), q[:, self.frames.external]])
-        return _Along(gone, far, q, rows)
-
-    def _joined(
-        self, along: _Along, first: int, last: int, limits: tuple[float, float, float]
-    ) -> _Steps | None:
-        """Return steps as long as they can be, one after the other."""
-        steps, at = _Steps([first], []), first
-        while at < last:
-            line = self._farthest(along, at, last, limits, is_round=False)
-            arc = at if line == last else self._farthest(along, at, last, limits, is_round=True)
-            if max(line, arc) <= at:
-                return None
-            steps.round.append(arc > line + 1)
-            at = max(line, arc)
-            steps.ends.append(at)
-        return steps
-
-    def _farthest(
-        self,
-        along: _Along,
-        at: int,
-        last: int,
-        limits: tuple[float, float, float],
-        *,
-        is_round: bool,
-    ) -> int:
-        """Return how far ahead one step may go; where it begins for nowhere."""
-        # The shortest arc has a place in between.
-        near, beyond, ahead = at, last + 1, 2 if is_round else 1
-        while beyond - near > 1:
-            there = min(at + ahead, last) if beyond > last else (near + beyond) // 2
-            if there <= near:
-                break
-            if self._is_near(along, at, there, limits, is_round=is_round):
-                near, ahead = there, 2 * ahead
-                if near == last:
-                    break
-            else:
-                beyond = there
-        return near
-
-    def _even(self, along: _Along, steps: _Steps, limits: tuple[float, float, float]) -> _Steps:
-        """Return as many steps of one kind as long as each other, where these do as well."""
-        count = len(steps.round)
-        if count < 2 or len(set(steps.round)) > 1:
-            return steps
-        wanted = np.linspace(along.gone[steps.ends[0]], along.gone[steps.ends[-1]], count + 1)
-        ends = [int(np.abs(along.gone - each).argmin()) for each in wanted]
-        even = all(
-            self._is_near(along, *pair, limits, is_round=steps.round[0]) for pair in pairwise(ends)
-        )
-        return _Steps(ends, steps.round) if even else steps
-
-    def _is_near(
-        self,
-        along: _Along,
-        first: int,
-        last: int,
-        limits: tuple[float, float, float],
-        *,
-        is_round: bool,
-    ) -> bool:
-        """Whether one step from a place to another keeps near the motion."""
-        part = slice(first, last + 1)
-        gone, exact = along.gone[part], along.rows[part]
-        place, free = (_OF_ALLOWED * limit for limit in (limits[0], limits[2]))
-        if 2.0 * np.arccos(min(1.0, abs(float(exact[0, 3:7] @ exact[-1, 3:7])))) > _NEARLY_HALF:
-            return False
-        rows = straight(gone, gone[[0, -1]], exact[[0, -1]])
-        if is_round:
-            via = self._middle(along, first, last)
-            arc = arc_through(exact[0, :3], via, exact[-1, :3])
-            if arc is None or arc.angle > MOST_TURN:
-                return False
-            put_on_arcs(rows, gone, gone[[0, -1]], exact[[0, -1], :3], via[None])
-        if np.linalg.norm(rows[:, :3] - exact[:, :3], axis=1).max() > place:
-            return False
-        if rows.shape[1] > 7 and np.abs(rows[:, 7:] - exact[:, 7:]).max() > free:
-            return False
-        turned = self._turned(rows[:, 3:7], exact[:, 3:7], limits[1:])
-        if turned.max() > _OF_ALLOWED:
-            return False
-        near = np.array(along.q[part])
-        near[:, self.frames.external] = rows[:, 7:]
-        q, arrived = self.frames.solved(rows[:, :3], rows[:, 3:7], near)
-        return bool(arrived.all() and np.abs(q - along.q[part]).max() <= free)
-
-    def _turned(self, turns: Array, facing: Array, limits: tuple[float, float]) -> Array:
-        """Return how much orientations (K, 4) take of what they may be off others, (K,).
-
-        What the task prescribes of them is held to the first of the limits, all else to the second.
-        """
-        strict, free = limits
-        whole = np.linalg.norm(self.frames.turned(turns, facing), axis=1)
-        if self.piece.turns.tool_axes:
-            leaned = np.linalg.norm(np.cross(_axes(turns), _axes(facing)), axis=1)
-            return np.asarray(np.maximum(leaned / strict, whole / free))
-        return np.asarray(whole / (strict if self.piece.turns.angular else free))
-
-    def _middle(self, along: _Along, first: int, last: int) -> Array:
-        """Return where the tool is halfway from one place to another, (3,)."""
-        half = 0.5 * (along.gone[[first]] + along.gone[[last]])
-        return np.asarray(self.frames.places(self._at(along.lengths, half))[0][0])
+        return Places(far, q, rows, lambda lengths: self.frames.places(self._at(gone, lengths))[0])
 
     def _at(self, gone: PassedLength, far: Array) -> Array:
         """Return the motion where the tool has gone so far, (K, n)."""
         return self.piece.motion(np.minimum(gone.when(far), self.last))
 
-    def _stretch(self, gone: PassedLength, along: _Along, steps: _Steps) -> FeedStretch:
+    def _stretch(self, gone: PassedLength, along: Places, steps: Steps) -> FeedStretch:
         """Return targets, as the file has them."""
         motion, ends = self.piece.motion, steps.ends
         q = self._in_digits(along.q[ends])
         places, turns = self.rounding(along.rows[ends, :3], along.rows[ends, 3:7])
         vias = np.full((len(ends) - 1, 3), np.nan)
         for k in np.flatnonzero(steps.round):
-            via = self._middle(along, ends[k], ends[k + 1])
+            via = along.middle(ends[k], ends[k + 1])
             vias[k] = self.rounding(via[None], along.rows[ends[k] : ends[k] + 1, 3:7])[0][0]
         found, arrived = self.frames.solved(places, turns, self._mixed(along.q[ends], q))
         if not arrived.all():
@@ -364,7 +242,7 @@ class FeedSpan(PoseSpan):
                 found[(middles >= begin) & (middles <= end)] = item.asked
         return np.round(found, _SPEED_DIGITS)
 
-    def _off(self, stretch: FeedStretch, allowed: Tolerance, free: float) -> Array | None:
+    def _off(self, stretch: FeedStretch, allowed: Allowed) -> Array | None:
         """Return how much of what is allowed each step takes, corners included, (K,).
 
         None where joints swing between two looks, as they do near a singular pose.
@@ -377,12 +255,12 @@ class FeedSpan(PoseSpan):
             if not np.isfinite(line).all():
                 return None
             off = line - exact
-            if np.abs(np.diff(off, axis=0)).max() > max(_SWING * free, _LEAST_SWING):
+            if np.abs(np.diff(off, axis=0)).max() > max(_SWING * allowed.free, _LEAST_SWING):
                 return None
             places, turns = self.frames.places(line)
             taken = np.linalg.norm(places - at, axis=1) / allowed.position
-            taken = np.maximum(taken, np.abs(off).max(axis=1) / free)
-            turned = self._turned(turns, facing, (allowed.rotation, free))
+            taken = np.maximum(taken, np.abs(off).max(axis=1) / allowed.free)
+            turned = allowed.turned(self.frames, self.piece.turns, turns, facing)
             worst = np.maximum(worst, largest(np.maximum(taken, turned), count))
         return SURE * worst
 
@@ -392,24 +270,3 @@ def _rides_along(frames: ToolFrames) -> bool:
     robot = frames.robot
     carrier = robot.urdf.root if frames.carrier == WORLD else frames.carrier
     return len(robot.chain_to(carrier, robot.reference).joints) == 0
-
-
-def _axes(turns: Array) -> Array:
-    """Return the z axes of orientations (K, 4), (K, 3)."""
-    x, y, z, w = turns.T
-    return np.stack([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)], axis=1)
-
-
-def _halved(steps: _Steps, far: Flags) -> _Steps:
-    """Return steps with those halved that are too far off, and their neighbours."""
-    near = np.convolve(far, np.ones(3), mode="same") > 0.0
-    found = _Steps(steps.ends[:1], [])
-    for k, is_round in enumerate(steps.round):
-        first, last = steps.ends[k], steps.ends[k + 1]
-        # An arc has a place in between.
-        if near[k] and last - first >= (4 if is_round else 2):
-            found.ends.append((first + last) // 2)
-            found.round.append(is_round)
-        found.ends.append(last)
-        found.round.append(is_round)
-    return found

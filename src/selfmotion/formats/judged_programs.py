@@ -11,10 +11,11 @@ import numpy as np
 from selfmotion.basics import Array, FileFormatError
 from selfmotion.certificate import Tolerance
 from selfmotion.constraints import Constraint
-from selfmotion.formats.controller_program import ControllerProgram, Switch, plain
+from selfmotion.formats.controller_program import ControllerProgram, Switch
 from selfmotion.formats.pieces import what_targets_keep
 from selfmotion.formats.pose_stretches import PoseStretch
 from selfmotion.formats.program_files import read_program
+from selfmotion.formats.program_texts import plain
 from selfmotion.formats.read_stretches import SLOWLY
 from selfmotion.formats.tool_frames import WORLD
 from selfmotion.job import Program, are_opposite

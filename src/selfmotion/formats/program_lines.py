@@ -9,15 +9,10 @@ import numpy as np
 
 from selfmotion.basics import FileFormatError, text_of
 from selfmotion.certificate import Tolerance
-from selfmotion.formats.controller_program import (
-    BECAUSE,
-    KEPT,
-    PLANNED,
-    ControllerProgram,
-    Switch,
-)
+from selfmotion.formats.controller_program import ControllerProgram, Switch
 from selfmotion.formats.feed_stretches import Ramps, times_at
 from selfmotion.formats.program_axes import Axis
+from selfmotion.formats.program_texts import BECAUSE, KEPT, PLANNED
 from selfmotion.formats.read_stretches import (
     Follower,
     Places,

@@ -19,22 +19,14 @@ import numpy as np
 
 from selfmotion.basics import ProblemError, write_text
 from selfmotion.formats.arm_configurations import confdata
-from selfmotion.formats.controller_program import (
-    ControllerProgram,
-    Draft,
-    before,
-    goes_round,
-    head,
-    module_name,
-    plain,
-    speeds_of,
-    with_begins,
-)
+from selfmotion.formats.controller_program import ControllerProgram, Draft
 from selfmotion.formats.feed_stretches import FeedStretch
 from selfmotion.formats.pose_numbers import rapid_numbers
 from selfmotion.formats.pose_stretches import PoseStretch
 from selfmotion.formats.program_axes import written
+from selfmotion.formats.program_heads import before, goes_round, head, speeds_of, with_begins
 from selfmotion.formats.program_settings import AXES
+from selfmotion.formats.program_texts import module_name, plain
 from selfmotion.formats.stretches import Stretch
 from selfmotion.formats.thinning import TIME_DIGITS
 from selfmotion.task import SE3, Quaternion

@@ -14,19 +14,14 @@ from pathlib import Path as FilePath
 import numpy as np
 
 from selfmotion.basics import Array, write_text
-from selfmotion.formats.controller_program import (
-    Draft,
-    before,
-    head,
-    pin_values,
-    plain,
-    with_begins,
-)
+from selfmotion.formats.controller_program import Draft
 from selfmotion.formats.feed_stretches import ZONE, FeedStretch
 from selfmotion.formats.pose_numbers import urscript_numbers, urscript_pose
 from selfmotion.formats.pose_stretches import PoseStretch
+from selfmotion.formats.program_heads import before, head, with_begins
 from selfmotion.formats.program_lines import ProgramReader
 from selfmotion.formats.program_settings import AXES
+from selfmotion.formats.program_texts import pin_values, plain
 from selfmotion.formats.read_stretches import Pose, pose_of_values
 from selfmotion.formats.stretches import Stretch
 from selfmotion.formats.thinning import TIME_DIGITS
