@@ -30,6 +30,7 @@ from selfmotion.certificate import (
     approaches,
 )
 from selfmotion.collision import Obstacle
+from selfmotion.costs import metres_of
 from selfmotion.motion import Trajectory, column_names
 from selfmotion.path import Path
 from selfmotion.problem.problem import Problem
@@ -156,6 +157,14 @@ class Plan:
     def reversals(self) -> Reversals:
         """When each joint turns round, by more than 1 mrad or 1 mm. Found when it is asked for."""
         return Reversals.of(self.trajectory)
+
+    @property
+    def metres(self) -> Mapping[str, float]:
+        """What a metre of each joint that slides counted against a radian of the others [rad].
+
+        In the first cost of joint rates; empty for an arm of one kind of joints.
+        """
+        return metres_of(self.problem.costs, self.robot)
 
     def check(
         self,
