@@ -103,7 +103,7 @@ def test_a_straight_seam_is_one_motion_at_its_feed(
     asked = ("--targets", "poses", "--mass", "3")
     code, text = invoke("export", tmp_path / "plan.npz", "--out", file, *asked)
     assert code == 0, text
-    assert "1 targets" in text
+    assert "1 target, between which" in text
     assert "seams are at their feeds, with ramps of the controller's own" in text
     code, text = invoke("check", file, "--robot", cell)
     assert code == 0, text
@@ -303,3 +303,36 @@ def test_an_arc_is_the_circle_through_three_points() -> None:
         np.testing.assert_allclose(arc.at(np.array([0.3]))[0], points[3], atol=1e-9)
     first, last = np.zeros(3), np.array([1.0, 2.0, 3.0])
     assert arc_through(first, 0.4 * last, last) is None
+
+
+def test_slow_motions_to_a_shifted_seam_are_judged(tmp_path: Path) -> None:
+    """Moves from a stretched arm are joint targets: from there it goes slowly to shifted poses."""
+    ur10 = robot_named("ur10")
+    first = ur10.pose(ur10.dexterous_configuration("pointing"))
+    last = SE3(first.rotation, first.translation + np.array([0.0, 0.1, 0.0]))
+    seam = sm.Seam("seam", sm.paths.Feed(sm.paths.Line(first, last, 1.0), 0.05), "pointing")
+    home, low = ur10.home, sm.obstacles.Box("floor", [0.0, 0.0, -1.0], [3.0, 3.0, 0.1])
+    clear = sm.constraints.Clearance([low], 0.01)
+    made = sm.plan_job(ur10, [seam], start=home, end=home, branches=1, clearance=clear)
+    program, file = made.require(), tmp_path / "weld.mod"
+    sm.files.write_motion(program, file, settings=settings("weld.mod"))
+    text = file.read_text()
+    assert text.count("MoveAbsJ") > 10
+    assert len(re.findall(r"MoveL .*_f1", text)) == 1
+    file.write_text(text.replace('TRUE, "", [[0.0000,', 'TRUE, "", [[30.0000,'))
+    found = judged_program(file, program)
+    assert found.verified, found.verdict
+    slow = [step for step in found.steps if step.name.startswith("slowly to")]
+    assert [step.name for step in slow] == ["slowly to 'seam'", "slowly to 'seam → job end'"]
+    # By what the moves have to keep: a floor that a seam may come nearer to than they.
+    floor = sm.obstacles.Box("floor", [0.0, 0.0, 0.0], [3.0, 3.0, 0.1])
+    steps = [
+        replace(step, made=replace(step.made, constraints=(sm.constraints.Clearance([floor]),)))
+        if isinstance(step.made, sm.Move)
+        else step
+        for step in program.steps
+    ]
+    strict = judged_program(file, replace(program, steps=tuple(steps)))
+    told = {step.name: step.verified for step in strict.steps}
+    assert not told["slowly to 'seam'"]
+    assert told["seam"]

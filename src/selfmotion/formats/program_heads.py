@@ -44,8 +44,9 @@ def head(draft: Draft) -> list[str]:
         f"{axis.name} = {axis.joint} [{'mm' if axis.slides else 'deg'}]" for axis in program.axes
     )
     moves = program.miss.moves
+    targets = "target" if program.targets == 1 else "targets"
     return [
-        plain(f"selfmotion: {draft.robot.name}, {program.targets} targets"),
+        plain(f"selfmotion: {draft.robot.name}, {program.targets} {targets}"),
         *folded(plain(draft.verdict)),
         *folded(plain(f"axes: {axes}")),
         *_of_speeds(program),
