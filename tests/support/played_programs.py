@@ -131,6 +131,9 @@ def _arc(a: Array, via: Array, b: Array) -> tuple[Array, Array, Array, float]:
     y = np.cross(normal / np.linalg.norm(normal), x)
     radius = np.linalg.norm(x)
     angle = np.arctan2((b - center) @ y, (b - center) @ x) % (2.0 * np.pi)
+    # ABB's points are apart by 0.1 mm and 1°, and arcs below 240°.
+    assert np.radians(2.0) < angle < np.radians(240.0)
+    assert radius * angle > 5e-4
     middle = np.arctan2((via - center) @ y, (via - center) @ x) % (2.0 * np.pi)
     assert middle < angle
     return center, x, y, float(radius * angle)

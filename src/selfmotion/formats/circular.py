@@ -16,8 +16,9 @@ from selfmotion.basics import Array
 
 # Circles are flatter than this [m of height over the chord's length] where they are lines.
 _FLAT = 1e-6
-# No step goes farther round than this [rad]: ABB's are below 240°.
-MOST_TURN = np.radians(200.0)
+# No step goes farther round than this [rad], as ABB's are below 240°, nor less, as controllers ask
+# for points that are apart: ABB by 0.1 mm and 1°.
+MOST_TURN, LEAST_TURN, LEAST_LENGTH = np.radians(200.0), np.radians(3.0), 1e-3
 
 
 class Arc(NamedTuple):
@@ -42,6 +43,11 @@ class Arc(NamedTuple):
     def length(self) -> float:
         """How long it is [m]."""
         return self.angle * float(np.linalg.norm(self.arm))
+
+    @property
+    def is_meant(self) -> bool:
+        """Whether controllers make a step of it."""
+        return LEAST_TURN <= self.angle <= MOST_TURN and self.length >= LEAST_LENGTH
 
     def at(self, share: Array) -> Array:
         """Return points at shares of it (K,), (K, 3)."""

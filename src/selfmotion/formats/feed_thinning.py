@@ -159,7 +159,7 @@ class FeedSpan(PoseSpan):
             far = taken > 1.0
             if not far.any():
                 return stretch
-            finer = steps.halved(far)
+            finer = steps.halved(far, along.gone)
             if len(finer.ends) == len(steps.ends):
                 return None
             steps = finer

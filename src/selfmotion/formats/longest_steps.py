@@ -8,13 +8,15 @@ from typing import NamedTuple
 import numpy as np
 
 from selfmotion.basics import Array, Flags
-from selfmotion.formats.circular import MOST_TURN, arc_through, put_on_arcs
+from selfmotion.formats.circular import LEAST_LENGTH, arc_through, put_on_arcs
 from selfmotion.formats.pose_stretches import straight
 from selfmotion.formats.tool_frames import ToolFrames
 from selfmotion.task import Task
 
 # Of what is allowed, steps take this much before corners and digits.
 _OF_ALLOWED = 0.9
+# So often the first arc that is tried is made twice as long, where it is not one.
+_DOUBLED = 12
 # Half-turns have two axes [rad].
 _NEARLY_HALF = 3.0
 
@@ -25,18 +27,24 @@ class Steps(NamedTuple):
     ends: list[int]
     round: list[bool]
 
-    def halved(self, far: Flags) -> "Steps":
-        """Return them with those halved that are too far off, and their neighbours."""
+    def halved(self, far: Flags, gone: Array) -> "Steps":
+        """Return them with those halved that are too far off, and their neighbours.
+
+        Arcs that would be shorter than controllers make them become straight; `gone` (N,) is how
+        far the tool is at each place [m].
+        """
         near = np.convolve(far, np.ones(3), mode="same") > 0.0
         found = Steps(self.ends[:1], [])
         for k, is_round in enumerate(self.round):
             first, last = self.ends[k], self.ends[k + 1]
+            stays = is_round and gone[last] - gone[first] >= 2.0 * LEAST_LENGTH
             # An arc has a place in between.
-            if near[k] and last - first >= (4 if is_round else 2):
+            halves = near[k] and last - first >= (4 if stays else 2)
+            if halves:
                 found.ends.append((first + last) // 2)
-                found.round.append(is_round)
+                found.round.append(stays)
             found.ends.append(last)
-            found.round.append(is_round)
+            found.round.append(stays if halves else is_round)
         return found
 
 
@@ -119,8 +127,13 @@ class StepSearch:
         """Return steps as long as they can be, one after the other."""
         steps, at = Steps([first], []), first
         while at < last:
-            line = self._farthest(at, last, is_round=False)
-            arc = at if line == last else self._farthest(at, last, is_round=True)
+            line = self._farthest(at, last, is_round=False, least=at + 1)
+            arc = at
+            if line < last:
+                # The shortest arc has a place in between, and is one that controllers make.
+                long = self.along.gone[at] + LEAST_LENGTH
+                least = max(line + 1, at + 2, int(np.searchsorted(self.along.gone, long)))
+                arc = self._farthest(at, last, is_round=True, least=min(least, last))
             if max(line, arc) <= at:
                 return None
             steps.round.append(arc > line + 1)
@@ -128,24 +141,16 @@ class StepSearch:
             steps.ends.append(at)
         return steps
 
-    def _farthest(
-        self,
-        at: int,
-        last: int,
-        *,
-        is_round: bool,
-    ) -> int:
-        """Return how far ahead one step may go; where it begins for nowhere."""
-        # The shortest arc has a place in between.
-        near, beyond, ahead = at, last + 1, 2 if is_round else 1
-        while beyond - near > 1:
+    def _farthest(self, at: int, last: int, *, is_round: bool, least: int) -> int:
+        """Return how far ahead one step may go, from `least` on; where it begins for nowhere."""
+        tried = [min(at + (least - at) * 2**k, last) for k in range(_DOUBLED if is_round else 1)]
+        fits = (there for there in dict.fromkeys(tried) if there > at)
+        near = next((there for there in fits if self._is_near(at, there, is_round=is_round)), at)
+        ahead, beyond = 2 * (near - at), last + 1
+        while at < near < last and beyond - near > 1:
             there = min(at + ahead, last) if beyond > last else (near + beyond) // 2
-            if there <= near:
-                break
             if self._is_near(at, there, is_round=is_round):
                 near, ahead = there, 2 * ahead
-                if near == last:
-                    break
             else:
                 beyond = there
         return near
@@ -179,7 +184,7 @@ class StepSearch:
         if is_round:
             via = self.along.middle(first, last)
             arc = arc_through(exact[0, :3], via, exact[-1, :3])
-            if arc is None or arc.angle > MOST_TURN:
+            if arc is None or not arc.is_meant:
                 return False
             put_on_arcs(rows, gone, gone[[0, -1]], exact[[0, -1], :3], via[None])
         if np.linalg.norm(rows[:, :3] - exact[:, :3], axis=1).max() > place:
