@@ -14,7 +14,7 @@ import numpy as np
 
 from selfmotion.basics import Array, Flags
 from selfmotion.certificate import Tolerance
-from selfmotion.formats.circular import step_lengths
+from selfmotion.formats.circular import arc_through, step_lengths
 from selfmotion.formats.feed_stretches import FeedStretch, times_at
 from selfmotion.formats.longest_steps import Allowed, Places, Steps, StepSearch
 from selfmotion.formats.passed_lengths import PassedLength
@@ -159,7 +159,7 @@ class FeedSpan(PoseSpan):
             far = taken > 1.0
             if not far.any():
                 return stretch
-            finer = steps.halved(far, along.gone)
+            finer = steps.halved(far)
             if len(finer.ends) == len(steps.ends):
                 return None
             steps = finer
@@ -201,7 +201,11 @@ class FeedSpan(PoseSpan):
         vias = np.full((len(ends) - 1, 3), np.nan)
         for k in np.flatnonzero(steps.round):
             via = along.middle(ends[k], ends[k + 1])
-            vias[k] = self.rounding(via[None], along.rows[ends[k] : ends[k] + 1, 3:7])[0][0]
+            via = self.rounding(via[None], turns[[k]])[0][0]
+            arc = arc_through(places[k], via, places[k + 1])
+            # Halved ones may be too short: they are straight then.
+            if arc is not None and arc.is_meant:
+                vias[k] = via
         found, arrived = self.frames.solved(places, turns, self._mixed(along.q[ends], q))
         if not arrived.all():
             at = gone.when(along.gone[[ends[int(np.argmin(arrived))]]])[0] - motion.t[0]

@@ -27,24 +27,17 @@ class Steps(NamedTuple):
     ends: list[int]
     round: list[bool]
 
-    def halved(self, far: Flags, gone: Array) -> "Steps":
-        """Return them with those halved that are too far off, and their neighbours.
-
-        Arcs that would be shorter than controllers make them become straight; `gone` (N,) is how
-        far the tool is at each place [m].
-        """
+    def halved(self, far: Flags) -> "Steps":
+        """Return them with those halved that are too far off, and their neighbours."""
         near = np.convolve(far, np.ones(3), mode="same") > 0.0
         found = Steps(self.ends[:1], [])
         for k, is_round in enumerate(self.round):
             first, last = self.ends[k], self.ends[k + 1]
-            stays = is_round and gone[last] - gone[first] >= 2.0 * LEAST_LENGTH
-            # An arc has a place in between.
-            halves = near[k] and last - first >= (4 if stays else 2)
-            if halves:
+            if near[k] and last - first >= 2:
                 found.ends.append((first + last) // 2)
-                found.round.append(stays)
+                found.round.append(is_round)
             found.ends.append(last)
-            found.round.append(stays if halves else is_round)
+            found.round.append(is_round)
         return found
 
 
