@@ -336,3 +336,31 @@ def test_slow_motions_to_a_shifted_seam_are_judged(tmp_path: Path) -> None:
     told = {step.name: step.verified for step in strict.steps}
     assert not told["slowly to 'seam'"]
     assert told["seam"]
+
+
+def test_an_event_in_a_ramp_keeps_its_time(tmp_path: Path) -> None:
+    """Where the tool is then only the controller knows: the seam has times, and is told why."""
+    ur5 = robot_named("ur5")
+    first = ur5.pose(ur5.dexterous_configuration("pointing"))
+    last = SE3(first.rotation, first.translation + np.array([0.0, 0.0, 0.1]))
+    path = sm.paths.Feed(sm.paths.Line(first, last, 1.0), 0.2)
+    events = [("gun on", 0.1), ("gun off", path.duration - 0.1)]
+    seam = sm.Seam("seam", path, "pointing", events=events)
+    made = sm.plan_job(ur5, [seam], order="given", branches=1, clearance=None)
+    program, file = made.require(), tmp_path / "weld.mod"
+    program.save(tmp_path / "a.program")
+    sm.files.write_motion(program, file, settings=settings("weld.mod"))
+    read = read_program(file, ur5)
+    assert read.within is None
+    assert read.timed == (
+        "an event is where the tool is slower than its feed, or it is at no feed",
+    )
+    assert judged_program(file, program).verified
+    (tmp_path / "cell.toml").write_text(
+        'mass = 3\ntargets = "poses"\n'
+        '[signals]\n"gun on" = ["doGun", true]\n"gun off" = ["doGun", false]\n'
+    )
+    asked = ("--out", file, "--settings", tmp_path / "cell.toml")
+    code, text = invoke("export", tmp_path / "a.program", *asked)
+    assert code == 0, text
+    assert "a seam has times all the same: an event is where the tool is slower" in text

@@ -262,7 +262,8 @@ def _confirmed(made: _Made, target: Path) -> tuple[bool, str]:
     read = formats.read_program(target, made.robot)
     remark, at_feeds = read.remark, read.within is not None
     targets = "target" if count == 1 else "targets"
-    paced = ("seams are at their feeds, with ramps of the controller's own",) if at_feeds else ()
+    paced = ["seams are at their feeds, with ramps of the controller's own"] if at_feeds else []
+    paced += [f"a seam has times all the same: {reason}" for reason in read.timed]
     why = (f"they are joints, as poses do not keep the motion: {remark}",) if remark else ()
     return kept, f"read back: {'; '.join((f'{count} {targets}{far}', *paced, *why, *switched))}"
 

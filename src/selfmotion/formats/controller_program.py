@@ -73,6 +73,8 @@ class ControllerProgram:
     within : Tolerance or None
         Within what seams at speeds keep what is prescribed, by their certificates; None where none
         is at a speed.
+    timed : tuple of str
+        Why seams with a feed have times all the same, each reason once.
     """
 
     name: str
@@ -84,6 +86,7 @@ class ControllerProgram:
     carrier: str = WORLD
     remark: str = ""
     within: Tolerance | None = None
+    timed: tuple[str, ...] = ()
 
     @property
     def targets(self) -> int:

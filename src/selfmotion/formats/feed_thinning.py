@@ -22,6 +22,7 @@ from selfmotion.formats.pieces import Piece
 from selfmotion.formats.pose_numbers import Rounding
 from selfmotion.formats.pose_stretches import on_one_side
 from selfmotion.formats.pose_thinning import NotByPosesError, PoseSpan, largest
+from selfmotion.formats.program_texts import TIMED
 from selfmotion.formats.stretches import SURE, Event, Miss, Stretch
 from selfmotion.formats.thinning import events_within, rests
 from selfmotion.formats.tool_frames import WORLD, ToolFrames
@@ -93,7 +94,7 @@ class FeedSpan(PoseSpan):
                 pairs = zip(parts, found, strict=True)
                 return [(stretch, part._miss(stretch)) for part, stretch in pairs]
         ((timed, miss),) = super().stretches(allowed)
-        return [(replace(timed, remark=f"with times: {why}"), miss)]
+        return [(replace(timed, remark=f"{TIMED}{why}"), miss)]
 
     @property
     def _stops(self) -> list[float]:

@@ -12,7 +12,7 @@ from selfmotion.certificate import Tolerance
 from selfmotion.formats.controller_program import ControllerProgram, Switch
 from selfmotion.formats.feed_stretches import Ramps, times_at
 from selfmotion.formats.program_axes import Axis
-from selfmotion.formats.program_texts import BECAUSE, KEPT, PLANNED
+from selfmotion.formats.program_texts import BECAUSE, KEPT, PLANNED, TIMED
 from selfmotion.formats.read_stretches import (
     Follower,
     Places,
@@ -101,8 +101,12 @@ class Lines:
 
     def step(self) -> str:
         """Return the seam or move that the last comment about one names."""
-        steps = [note.removeprefix("step: ") for note in self.notes if note.startswith("step: ")]
+        steps = self._after("step: ")
         return steps[-1] if steps else ""
+
+    def _after(self, begin: str) -> list[str]:
+        """Return what comments say that begin so."""
+        return [note.removeprefix(begin) for note in self.notes if note.startswith(begin)]
 
     def planned(self) -> float | None:
         """Return the time that comments plan for what follows [s], once; None where they do not."""
@@ -214,6 +218,7 @@ class Lines:
             "world" if places is None or frames is None else places.carrier,
             remark.removeprefix(BECAUSE),
             self.within(),
+            tuple(dict.fromkeys(self._after(TIMED))),
         )
 
 

@@ -11,6 +11,8 @@ from selfmotion.task import SE3, Quaternion
 
 # What a comment begins with that says why targets are joints.
 BECAUSE = "targets are joints, as poses do not keep the motion: "
+# What a comment begins with that says why a seam with a feed has times all the same.
+TIMED = "with times: "
 # What a comment begins with that says what seams at speeds keep.
 KEPT = "kept of what is prescribed: "
 # What a comment begins with that says how long a stretch at speeds was planned to take.
