@@ -5,6 +5,9 @@ Each is written for KUKA, ABB and Universal Robots, read by patterns that share 
 package (`tests/support/played_programs.py`), and played: position linear in time, orientation by
 slerp, external axes linear, as lines, with rounded corners, and as a spline. What that is off the
 plan must be no more than the file states; and the work object shifted must shift the tool as far.
+Half of the plans have a feed: their programs have speeds and circular motions, and are held to the
+plan where the tool has gone as far; what the task prescribes must be within the deviation, and the
+speeds must be the feed.
 """
 
 from __future__ import annotations
@@ -14,6 +17,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, NamedTuple
 
@@ -28,7 +32,7 @@ import selfmotion as sm
 from selfmotion.formats import PROGRAMS, program_miss, read_program
 from selfmotion.task import SE3, exp3
 from support.industrial import industrial_arm
-from support.played_programs import off, read_poses
+from support.played_programs import Read, off, read_poses
 
 # Newton's method of the judge, and digits, leave this [m, rad].
 ROUNDED = 2e-8
@@ -67,7 +71,9 @@ class Row(NamedTuple):
 
     kind: str
     form: str
+    at_feed: bool
     targets: int
+    timed: int
     joints: int
     stated: float
     measured: float
@@ -91,8 +97,13 @@ def arms(folder: Path) -> dict[str, tuple[sm.RobotModel, str, str | None, str, b
     }
 
 
-def path_from(first: SE3, rng: np.random.Generator) -> sm.paths.Path:
-    """Return a line, a circle or a corner that begins at a pose."""
+def path_from(first: SE3, rng: np.random.Generator, *, at_feed: bool) -> sm.paths.Path:
+    """Return a line, an arc or a corner that begins at a pose, at a feed or not."""
+    shape = _shape_from(first, rng, at_feed=at_feed)
+    return sm.paths.Feed(shape, float(rng.uniform(0.01, 0.1))) if at_feed else shape
+
+
+def _shape_from(first: SE3, rng: np.random.Generator, *, at_feed: bool) -> sm.paths.Path:
     kind = int(rng.integers(3))
     side = rng.normal(size=3)
     side /= np.linalg.norm(side)
@@ -101,10 +112,14 @@ def path_from(first: SE3, rng: np.random.Generator) -> sm.paths.Path:
         last = SE3(first.rotation, first.translation + float(rng.uniform(0.05, 0.2)) * side)
         return sm.paths.Line(first, last, seconds)
     if kind == 1:
-        return sm.paths.Circle.around(first, float(rng.uniform(0.02, 0.08)), seconds, normal=side)
+        radius, turns = float(rng.uniform(0.02, 0.08)), float(rng.uniform(0.3, 1.0))
+        more = {"turns": turns, "turn_tool": bool(rng.integers(2))} if at_feed else {}
+        return sm.paths.Circle.around(first, radius, seconds, normal=side, **more)
     turned = SE3(first.rotation @ exp3(0.3 * rng.normal(size=3)), first.translation + 0.08 * side)
     across = np.cross(side, rng.normal(size=3))
     last = SE3(turned.rotation, turned.translation + 0.08 * across / np.linalg.norm(across))
+    if at_feed:
+        return sm.paths.Polyline.from_poses([first, turned, last])
     return sm.paths.Joined(
         [sm.paths.Line(first, turned, seconds), sm.paths.Line(turned, last, seconds)]
     )
@@ -123,7 +138,9 @@ def cases(number: int, folder: Path) -> Iterator[tuple[int, Case]]:
         for _ in range(TRIES):
             start = middle + half * rng.uniform(-1.0, 1.0, robot.dof)
             try:
-                path = path_from(robot.chain.place(start), rng)
+                path = path_from(
+                    robot.chain.place(start), rng, at_feed=bool(seed // len(kinds) % 2)
+                )
                 problem = sm.Problem(robot, path, task, start, clearance=None)
                 plan = sm.plan(problem, max_evaluations=40)
             except sm.SelfmotionError:
@@ -155,17 +172,39 @@ def judged(case: Case, form: str, file: Path, rng: np.random.Generator) -> Row |
     stated = program.miss.path
     wrong = [
         f"{name} {one:.6g} > {other:.6g}"
-        for name, one, other in zip(stated._fields, vars(found).values(), stated, strict=True)
-        if one > other + ROUNDED
+        for name, other in stated._asdict().items()
+        if (one := getattr(found, name)) > other + ROUNDED
     ]
+    at_feed = bool(case.plan.problem.path.feeds)
+    if at_feed:
+        turned = found.rotation if case.plan.problem.task.value == "pose" else found.axis
+        wrong += [f"turned by {turned:.3g} rad"] if turned > WITHIN.rotation + ROUNDED else []
+        wrong += _not_at_feed(case.plan.problem.path, read)
+    if found.position > WITHIN.position:
+        wrong.append(f"{1e3 * found.position:.4g} mm off")
+    targets = read.targets
     wrong += _not_shifted(case, file)
+    sm.files.write_motion(case.plan, file, settings=replace(asked, targets="timed-poses"))
+    timed = program_miss(case.plan, file)[0]
     joints = 0
     if form in PROGRAMS:
         sm.files.write_motion(case.plan, file, settings=sm.files.ProgramSettings(WITHIN, mass=2.0))
         joints = program_miss(case.plan, file)[0]
     return Row(
-        case.kind, form, read.targets, joints, stated.position, found.position, "; ".join(wrong)
+        *(case.kind, form, at_feed, targets, timed, joints),
+        *(stated.position, found.position, "; ".join(wrong)),
     )
+
+
+def _not_at_feed(path: sm.paths.Path, read: Read) -> list[str]:
+    """Return which speeds are none of the feed; stretches with times have none."""
+    asked = path.feeds[0].asked
+    return [
+        f"at {speed:.6g} m/s, the feed is {asked:.6g}"
+        for stretch in read.stretches
+        for speed in stretch.speeds
+        if abs(speed - asked) > 1e-5 * asked
+    ]
 
 
 def _not_shifted(case: Case, file: Path) -> list[str]:
@@ -201,7 +240,7 @@ def _not_shifted(case: Case, file: Path) -> list[str]:
 
 def main(number: Annotated[int, typer.Option(help="How many plans.")] = 100) -> None:
     """Judge random programs, and print a table; exit 1 where one is not as it states."""
-    console, rows, by_joints, begin = Console(), list[Row](), 0, time.perf_counter()
+    console, rows, by_joints, begin = Console(width=130), list[Row](), 0, time.perf_counter()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         for seed, case in cases(number, folder):
@@ -214,22 +253,28 @@ def main(number: Annotated[int, typer.Option(help="How many plans.")] = 100) -> 
                     rows.append(row)
                     if row.wrong:
                         console.print(f"seed {seed}, {case.kind}, {form}: {row.wrong}")
-    table = Table("arm", "form", "programs", "targets", "of joints", "stated", "measured", "wrong")
-    for kind, form in sorted({(row.kind, row.form) for row in rows}):
-        own = [row for row in rows if (row.kind, row.form) == (kind, form)]
-        ratio = [row.targets / row.joints for row in own if row.joints]
+    names = ("arm", "form", "at", "programs", "targets", "with times", "joints")
+    table = Table(*names, "stated", "measured", "wrong")
+    for kind, form, at_feed in sorted({(row.kind, row.form, row.at_feed) for row in rows}):
+        own = [row for row in rows if (row.kind, row.form, row.at_feed) == (kind, form, at_feed)]
+        counts = ([row.targets for row in own], [row.timed for row in own])
+        joints = [row.joints for row in own if row.joints]
         table.add_row(
-            kind,
-            form,
-            str(len(own)),
-            f"{np.median([row.targets for row in own]):.0f}",
-            f"{np.median(ratio):.2f}" if ratio else "",
+            *(kind, form, "a feed" if at_feed else "times", str(len(own))),
+            *(f"{np.median(each):.0f}" for each in counts),
+            f"{np.median(joints):.0f}" if joints else "",
             f"{1e3 * max(row.stated for row in own):.4f} mm",
             f"{1e3 * max(row.measured for row in own):.4f} mm",
             str(sum(bool(row.wrong) for row in own)),
         )
     console.print(table)
     wrong = sum(bool(row.wrong) for row in rows)
+    paced = [row for row in rows if row.at_feed]
+    left = sum(row.targets >= row.timed for row in paced)
+    console.print(
+        f"{len(paced)} programs of seams at a feed: {sum(row.targets for row in paced)} targets, "
+        f"{sum(row.timed for row in paced)} with times; {left} have times all the same"
+    )
     console.print(
         f"{len(rows)} programs of poses, {by_joints} of joints as poses do not keep the motion; "
         f"{wrong} wrong; {time.perf_counter() - begin:.0f} s"

@@ -327,7 +327,11 @@ def test_arrays_of_other_shapes(shape: tuple[int, ...], tmp_path: Path) -> None:
 
 
 def test_long_ways_between_poses_are_read_where_they_are_meant(tmp_path: Path) -> None:
-    (tmp_path / "a.csv").write_text(csv("0,.4,0,.5", "1,.4,.9,.5", header="t,x,y,z"))
+    rows = "0,.4,0,.5", "1,.4,.9,.5", "2,.4,1,.5"
+    (tmp_path / "a.csv").write_text(csv(*rows, header="t,x,y,z"))
     with pytest.raises(sm.errors.FileFormatError, match=r"jumps by 0\.9 m"):
         sm.files.read_path(tmp_path / "a.csv")
-    assert sm.files.read_path(tmp_path / "a.csv", jump=1.0).duration == 1.0
+    assert sm.files.read_path(tmp_path / "a.csv", jump=1.0).duration == 2.0
+    # Between both ends of a straight stroke none is missing.
+    (tmp_path / "a.csv").write_text(csv(*rows[:2], header="t,x,y,z"))
+    assert sm.files.read_path(tmp_path / "a.csv").duration == 1.0

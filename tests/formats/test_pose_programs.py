@@ -365,7 +365,7 @@ def test_numbers_of_poses_are_read_as_they_are_written(form: str) -> None:
 
 def test_settings_of_poses_say_what_is_wrong(alone: sm.Plan, tmp_path: Path) -> None:
     for given, said in (
-        ({"targets": "lines"}, "expected 'joints' or 'poses'"),
+        ({"targets": "lines"}, "expected one of 'joints', 'poses', 'timed-poses'"),
         ({"work_object": "table"}, "no effect on joint targets; give targets='poses'"),
         ({"targets": "poses", "positioner": 0}, "its number in MACHINE_DEF"),
         ({"targets": "poses", "work_object": np.zeros((4, 4))}, "work_object: its rotation"),

@@ -628,7 +628,9 @@ def test_a_file_is_judged_as_a_whole_by_its_job(
     assert "'arc on' and 'arc off' both switch" in judged_program(file, program).verdict
     file.write_text(text)
     said = judged_program(file, program).verdict
-    assert re.search(r"and the whole; seams within 0\.9\d* mm and \S+ rad of their paths$", said)
+    assert re.search(
+        r"and the whole; seams within 0\.9\d* mm and \S+ rad of their paths; acc", said
+    )
     loose = replace(program, specification=replace(program.specification, start=None))
     assert judged_program(file, loose).verified
     wrong = replace(program, missing={"seam 9": "nobody knows"})

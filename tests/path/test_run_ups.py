@@ -75,3 +75,13 @@ def test_what_has_no_feed_has_no_run_up() -> None:
     said = r"going on as the path begins the tool turns by 7.5 rad"
     with pytest.raises(sm.errors.PathError, match=said):
         sm.paths.with_run_ups(sm.paths.Feed(stroke(0.05, turned=1.5), 0.5))
+
+
+@pytest.mark.parametrize("feed", [0.05, 0.4, 0.8])
+def test_both_ways_are_as_long(feed: float) -> None:
+    """So that what is switched at the ends of a stroke is there as well where it is run back."""
+    ends = [SE3(np.eye(3), np.array([0.4, y, 0.3])) for y in (-0.36, 0.36)]
+    line = sm.paths.Line(*ends, 1.0)
+    stroke = sm.paths.with_run_ups(sm.paths.Feed(line, feed, acceleration=4.0))
+    assert stroke.run_up == stroke.run_down
+    assert stroke.path.duration - stroke.end == pytest.approx(stroke.begin, abs=1e-9)

@@ -93,8 +93,11 @@ def test_metres_are_not_added_to_radians_unasked() -> None:
     sm.Problem(robot, path, costs=[sm.costs.PathLength(joint_weights=weights)])
     # The usual cost says what it counts a metre as.
     (usual,) = sm.Problem(robot, path).costs
-    np.testing.assert_allclose(usual.weight, weights**2)
-    assert usual.name == f"joint velocity (1 m as {weights[slides][0]:.3g} rad)"
+    # By the limits of speed: what it turns in the time of a metre.
+    limits = robot.velocity_limit
+    by_speed = limits[~slides].mean() / limits[slides]
+    np.testing.assert_allclose(usual.weight, np.where(slides, by_speed**2, 1.0))
+    assert usual.name == f"joint velocity (1 m as {by_speed[0]:.3g} rad)"
     panda = robot_named("panda")
     (plain,) = sm.Problem(panda, line_of(panda, "pose")).costs
     assert (plain.name, float(plain.weight)) == ("joint velocity", 1.0)

@@ -39,6 +39,13 @@ def is_program(file: Path) -> bool:
     return file.suffix.lower() in formats.READ_PROGRAMS
 
 
+def tell_of_controller(file: Path, robot: sm.RobotModel) -> None:
+    """Print what a verdict on a program of seams at their feeds leaves to the controller."""
+    if is_program(file) and formats.read_program(file, robot).within is not None:
+        text = formats.of_the_controller(file, robot)
+        terminal.print(text, markup=False, soft_wrap=True)
+
+
 def on_calibrated(problem: sm.Problem, calibration: Path) -> sm.Problem:
     """Return what a motion that was planned for the arm as drawn is judged by on a calibrated one.
 
@@ -97,9 +104,9 @@ def of_problem(
     problem = job.problem
     motion, within = read(file, degrees, within, problem.robot)
     if is_program(file):
-        kept = formats.what_targets_keep(problem.constraints)
-        problem = replace(problem, constraints=kept)
+        problem = formats.by_targets(problem)
         program = formats.read_program(file, problem.robot)
+        motion = program.along(problem.path)
         begin = motion.of_joints(problem.robot.joint_names).q[0]
         problem = formats.as_shifted(problem, program, begin)
         if formats.shift_told(program):

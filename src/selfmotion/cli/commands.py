@@ -259,6 +259,8 @@ def check(
             motion = formats.without_followers(motion, arm)
             asked = options.requirements(arm, *judged)
             followed = documents.followed(path, context.params, arm)
+            if checks.is_program(file):
+                motion = formats.read_program(file, arm).along(followed)
             certificate = sm.certify(
                 arm, followed, task or "pose", motion, stated, asked, progress=display.stage
             )
@@ -267,6 +269,7 @@ def check(
         terminal.print_json(data=json_tables.certificate_json(certificate, near))
     else:
         outputs.show_certificate(certificate, near, arm, verbose)
+        checks.tell_of_controller(file, arm)
     raise typer.Exit(VERIFIED if certificate.verified else NOT_VERIFIED)
 
 

@@ -179,7 +179,7 @@ def _check_verified(made: _Made, force: bool, as_json: bool) -> None:
 def _is_program(target: Path, form: str | None, asked: sm.files.ProgramSettings | None) -> bool:
     """Whether a file is a program of targets, which has no rate."""
     name = form or formats.SUFFIXES.get(target.suffix.lower())
-    linear = asked is not None and asked.targets == "poses"
+    linear = asked is not None and asked.by_poses
     return name in formats.PROGRAMS.values() or (name == "urscript" and linear)
 
 
@@ -269,9 +269,13 @@ def _confirmed(made: _Made, target: Path) -> tuple[bool, str]:
     switched = formats.misswitched(target, made) if isinstance(made, sm.Program) else ()
     kept &= not switched
     far = f", between which the tool is at most {', and '.join(told)}" if told else ""
-    remark = formats.read_program(target, made.robot).remark
+    read = formats.read_program(target, made.robot)
+    remark, at_feeds = read.remark, read.within is not None
+    targets = "target" if count == 1 else "targets"
+    paced = ["seams are at their feeds, with ramps of the controller's own"] if at_feeds else []
+    paced += [f"a seam has times all the same: {reason}" for reason in read.timed]
     why = (f"they are joints, as poses do not keep the motion: {remark}",) if remark else ()
-    return kept, f"read back: {'; '.join((f'{count} targets{far}', *why, *switched))}"
+    return kept, f"read back: {'; '.join((f'{count} {targets}{far}', *paced, *why, *switched))}"
 
 
 def _verified(made: _Made) -> bool:

@@ -111,7 +111,7 @@ def job(
         if unsound and outputs.is_motion(target) and not _is_timetable(target):
             outputs.tell_left_out(target, terminal, unsound, quiet=as_json)
             continue
-        of_stream = asked is not None and asked.targets == "joints"
+        of_stream = asked is not None and not asked.by_poses
         streamed = of_stream and has_targets and target.suffix.lower() == ".script"
         write_program(program, target, asked.streamed if asked and streamed else asked)
         if not as_json:

@@ -72,6 +72,7 @@ def plan_json(plan: Plan) -> dict[str, Any]:
             "shares": dict(plan.limits_used.shares),
         },
         "reversals": {name: times.tolist() for name, times in plan.reversals.times.items()},
+        "metres": dict(plan.metres),
         "certificate": certificate_json(plan.certificate, plan.approaches),
     }
 

@@ -20,8 +20,9 @@ SettingsOption = Annotated[
 TargetsOption = Annotated[
     str | None,
     typer.Option(
-        help="Of controllers' programs: joints, or poses (linear motions in a work object, which "
-        "can be shifted and touched up)."
+        help="Of controllers' programs: joints; poses (linear and circular motions in a work "
+        "object at the feed, which can be shifted and touched up); timed-poses (at the plan's "
+        "times)."
     ),
 ]
 WorkObjectOption = Annotated[

@@ -22,6 +22,7 @@ from selfmotion.costs.joints import (
     JointLimitDistance as JointLimitDistance,
     JointVelocity as JointVelocity,
     Posture as Posture,
+    metres_of as metres_of,
 )
 from selfmotion.costs.limit_use import LimitUse as LimitUse
 from selfmotion.costs.manipulability import (

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -88,6 +89,7 @@ class JointVelocity(_Derivative):
     ----------
     weight : float, (n,) or (n, n)
         W: a multiple of the identity, a diagonal, or a symmetric positive semidefinite matrix.
+        Problem files without one, and problems without costs, have that of `usual`.
     """
 
     name: str = "joint velocity"
@@ -95,17 +97,43 @@ class JointVelocity(_Derivative):
 
     @classmethod
     def usual(cls, robot: RobotModel) -> JointVelocity:
-        """Return that of an arm where none is given: W = 1, but for metres among radians.
+        """Return that of an arm where no weight is given: W = 1, but for metres among radians.
 
-        A joint that moves in metres counts by `RobotModel.joint_weights`, whose squares are W; the
-        name of the cost says so.
+        A joint that moves in metres counts by `RobotModel.speed_weights`, whose squares are W; the
+        name of the cost says so. `make bench-rails` holds that against levers and masses.
         """
         slides = [robot.is_prismatic(name) for name in robot.joint_names]
         if all(slides) or not any(slides):
             return cls()
-        weights = robot.joint_weights
+        weights = robot.speed_weights
         metre = float(weights[slides.index(True)])
         return cls(weights**2, f"joint velocity (1 m as {metre:.3g} rad)")
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any], **context: Any) -> Self:
+        """See `Saved.from_dict`: without a weight it is the usual one of the robot."""
+        robot = context.get("robot")
+        if isinstance(robot, RobotModel) and not {"weight", "name"} & set(values):
+            values = {**values, **cls.usual(robot).to_dict()}
+            del values["kind"]
+        return super().from_dict(values, **context)
+
+
+def metres_of(costs: Sequence[Cost], robot: RobotModel) -> dict[str, float]:
+    """Return what a metre of each joint that slides counts in the first cost of joint rates [rad].
+
+    Against a radian of the revolute ones, on average; of an arm of one kind of joints nothing.
+    """
+    slides = np.array([robot.is_prismatic(name) for name in robot.joint_names])
+    rates = next((cost for cost in costs if isinstance(cost, _Derivative)), None)
+    if rates is None or slides.all() or not slides.any():
+        return {}
+    weights = np.diag(weight_matrix(rates._w, robot.dof))
+    usual = float(weights[~slides].mean())
+    if usual == 0.0:
+        return {}
+    names = np.array(robot.joint_names)[slides].tolist()
+    return dict(zip(names, np.sqrt(weights[slides] / usual).tolist(), strict=True))
 
 
 @dataclass(frozen=True, eq=False)

@@ -24,10 +24,10 @@ from selfmotion.formats.judged_programs import (
     judged_motion as judged_motion,
     judged_program as judged_program,
     misswitched as misswitched,
+    of_the_controller as of_the_controller,
     part_of as part_of,
     shift_told as shift_told,
     stated_deviation as stated_deviation,
-    what_targets_keep as what_targets_keep,
 )
 from selfmotion.formats.motion_parts import read_parts as read_parts, write_parts as write_parts
 from selfmotion.formats.motions import (
@@ -51,6 +51,7 @@ from selfmotion.formats.path_files import (
     has_normals as has_normals,
     read_path as read_path,
 )
+from selfmotion.formats.pieces import by_targets as by_targets
 from selfmotion.formats.poses import pose_of as pose_of
 from selfmotion.formats.problem_file import (
     job_of as job_of,

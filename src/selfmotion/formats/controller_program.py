@@ -1,31 +1,32 @@
 """A joint motion as programs of robot controllers say it, whichever language they speak."""
 
-import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
 from itertools import combinations
-from math import ceil
-from pathlib import Path as FilePath
 from typing import NamedTuple
 
 import numpy as np
 
 from selfmotion.basics import FileFormatError, ProblemError, Progress, nearest, silent
+from selfmotion.certificate import Tolerance
+from selfmotion.formats.feed_stretches import FeedStretch
+from selfmotion.formats.feed_thinning import FeedSpan
 from selfmotion.formats.pieces import pieces_of
 from selfmotion.formats.pose_numbers import ROUNDINGS
-from selfmotion.formats.pose_stretches import PoseStretch
 from selfmotion.formats.pose_thinning import NotByPosesError, PoseSpan
 from selfmotion.formats.program_axes import Axis, axes_of, in_order, tool_from_flange
 from selfmotion.formats.program_settings import ProgramSettings, Signal
-from selfmotion.formats.stretches import NO_MISS, Miss, Misses, Stretch, miss_of
+from selfmotion.formats.program_texts import plain
+from selfmotion.formats.stretches import NO_MISS, Misses, Stretch, miss_of
 from selfmotion.formats.targets import stretches_of
 from selfmotion.formats.tool_frames import WORLD, ToolFrames, own_joint
 from selfmotion.job import Program, are_opposite
 from selfmotion.motion import Trajectory
+from selfmotion.path import Path
 from selfmotion.result import Move, Parts, Plan
 from selfmotion.robot import RobotModel
-from selfmotion.task import SE3, Quaternion
+from selfmotion.task import SE3
 
 
 class Switch(NamedTuple):
@@ -69,6 +70,11 @@ class ControllerProgram:
         The link that the work object is fixed to, or ``"world"``.
     remark : str
         Why targets are joints though poses were asked for.
+    within : Tolerance or None
+        Within what seams at speeds keep what is prescribed, by their certificates; None where none
+        is at a speed.
+    timed : tuple of str
+        Why seams with a feed have times all the same, each reason once.
     """
 
     name: str
@@ -79,6 +85,8 @@ class ControllerProgram:
     shift: SE3 | None = None
     carrier: str = WORLD
     remark: str = ""
+    within: Tolerance | None = None
+    timed: tuple[str, ...] = ()
 
     @property
     def targets(self) -> int:
@@ -94,12 +102,27 @@ class ControllerProgram:
         FileFormatError
             There is none.
         """
+        return self._motion(None)
+
+    def along(self, path: Path) -> Trajectory:
+        """Return the motion at the pace of the path of its seam: ramps are those of the plan.
+
+        Raises
+        ------
+        FileFormatError
+            A speed is another one than the path has.
+        """
+        return self._motion(path)
+
+    def _motion(self, path: Path | None) -> Trajectory:
         t, q, qd = [np.zeros(1)], [self.stretches[0].q[:1]], [0.0 * self.stretches[0].q[:1]]
         for stretch in self.stretches:
             times, places, rates = stretch.t, stretch.q, 0.0 * stretch.q
-            if not stretch.is_rest:
+            if path is not None and isinstance(stretch, FeedStretch):
+                times, places, rates = stretch.along(path, float(t[-1][-1]))
+            elif not stretch.is_rest:
                 times, places, rates = stretch.knots()
-                rates[[0, -1]] = 0.0
+            rates[[0, -1]] = 0.0
             t.append(t[-1][-1] + times[1:])
             q.append(places[1:])
             qd.append(rates[1:])
@@ -127,7 +150,7 @@ class ControllerProgram:
             found = miss_of(same, piece.motion, piece.chains, piece.motion.t[0] + at)
             both = Misses(NO_MISS, found) if piece.is_move else Misses(found, NO_MISS)
             worst = worst.worse(both)
-            at += float(stretch.t[-1])
+            at += stretch.duration
             if at >= piece.motion.duration - _MOMENT:
                 at, k = 0.0, k + 1
         if k != len(pieces):
@@ -135,8 +158,6 @@ class ControllerProgram:
         return worst
 
 
-# What a comment begins with that says why targets are joints.
-BECAUSE = "targets are joints, as poses do not keep the motion: "
 # A piece is over where less of it is left than this [s].
 _MOMENT = 1e-4
 
@@ -182,12 +203,13 @@ def drafted(
     slides = np.array([axis.slides for axis in axes])
     given = pieces, slides, settings.deviation, settings.move_deviation, progress
     frames, why = None, ""
-    if settings.targets == "poses":
+    if settings.by_poses:
         frames = ToolFrames.of(robot, axes, settings).rounded(ROUNDINGS[form])
         why = frames.undetermined()
     if frames is not None and not why:
         try:
-            stretches, miss = stretches_of(*given, partial(PoseSpan.by, frames, ROUNDINGS[form]))
+            spans = PoseSpan if settings.targets == "timed-poses" else FeedSpan
+            stretches, miss = stretches_of(*given, partial(spans.by, frames, ROUNDINGS[form]))
         except NotByPosesError as error:
             why = str(error)
     if frames is None or why:
@@ -197,7 +219,11 @@ def drafted(
     sorted_ones = tuple(item.in_order(order) for item in stretches)
     ordered = tuple(axes[k] for k in order)
     stated = Misses(miss.path.stated, miss.moves.stated)
-    program = ControllerProgram(name, ordered, sorted_ones, stated, remark=plain(why))
+    at_speeds = any(isinstance(item, FeedStretch) for item in sorted_ones)
+    within = settings.deviation if at_speeds else None
+    program = ControllerProgram(
+        name, ordered, sorted_ones, stated, remark=plain(why), within=within
+    )
     tool = tool_from_flange(robot, settings)
     return Draft(program, robot, tool, settings, verdict, frames)
 
@@ -242,112 +268,3 @@ def check_signals(seams: Mapping[str, str], settings: ProgramSettings) -> None:
                 f"signals: '{one}' and '{other}' both switch {first[0]!r} to {first[1]}; one of "
                 f"them has to be {not first[1]}, or of another output"
             )
-
-
-def with_begins(stretches: Sequence[Stretch]) -> Iterator[tuple[Stretch, Stretch | None]]:
-    """Yield each stretch, and one to whose begin the arm has to go slowly before; else None.
-
-    That is where targets of the other kind follow, poses after joints or joints after poses, rests
-    in between included: where the work object was shifted, the arm is elsewhere by the other ones.
-    A program begins by joints.
-    """
-    by_poses = False
-    for k, stretch in enumerate(stretches):
-        moving = next((item for item in stretches[k:] if not item.is_rest), None)
-        begun = None
-        if moving is not None and by_poses != isinstance(moving, PoseStretch):
-            by_poses, begun = not by_poses, moving
-        yield stretch, begun
-
-
-def head(draft: Draft) -> list[str]:
-    """Return the comments at the head of a program, without what marks them as such."""
-    program = draft.program
-    axes = ", ".join(
-        f"{axis.name} = {axis.joint} [{'mm' if axis.slides else 'deg'}]" for axis in program.axes
-    )
-    moves = program.miss.moves
-    return [
-        plain(f"selfmotion: {draft.robot.name}, {program.targets} targets"),
-        *folded(plain(draft.verdict)),
-        *folded(plain(f"axes: {axes}")),
-        f"deviation: {_stated(program.miss.path)}",
-        *([] if moves == NO_MISS else [f"deviation of moves: {_stated(moves)}"]),
-        f"(of the tool from the plan, straight {_lines(draft)}, rounded corners or a spline",
-        "through the targets, at the times of the plan)",
-        *([f"{BECAUSE}{program.remark}"] if program.remark else []),
-        *_of_poses(draft),
-        "Angles are those of the URDF: compare zeros and signs with the controller's.",
-    ]
-
-
-def _lines(draft: Draft) -> str:
-    return "joint lines" if draft.frames is None else "lines of the tool"
-
-
-def _of_poses(draft: Draft) -> list[str]:
-    """Return what the head says of the frames of poses; the reader takes it from there."""
-    frames = draft.frames
-    if frames is None:
-        return []
-    place = ", ".join(f"{value:.9f}" for value in pin_values(frames.work))
-    flange = draft.settings.flange or "-"
-    return [
-        f"poses: work object {frames.name} of {frames.carrier}, flange {flange}",
-        f"planned work object: {place}",
-        "(m, and quaternion x, y, z, w, in that frame; shift the work object to shift the motion)",
-        "Poses are reached in the arm's configuration at the begin, by axes.",
-    ]
-
-
-def pin_values(pose: SE3) -> list[float]:
-    """Return a pose as position [m] and quaternion x, y, z, w."""
-    turn = Quaternion(pose.rotation).coeffs()
-    return [float(value) + 0.0 for value in (*pose.translation, *turn)]
-
-
-def _stated(miss: Miss) -> str:
-    tool = f"{_up(1e3 * miss.position, 6)} mm, {_up(miss.rotation, 9)} rad"
-    return f"{tool}, joints {_up(miss.joint, 9)}"
-
-
-def _up(value: float, digits: int) -> str:
-    """Return a number rounded up, so that what is stated holds."""
-    return f"{ceil(value * 10**digits) / 10**digits:.{digits}f}"
-
-
-def plain(text: str) -> str:
-    """Return a text as a comment may hold it: one line of ASCII."""
-    return " ".join(text.replace("→", "->").encode("ascii", "replace").decode().split())
-
-
-def folded(text: str, width: int = 100) -> list[str]:
-    """Return a text in lines, those after the first with two dots ahead."""
-    lines, words = [""], text.split(" ")
-    for word in words:
-        if lines[-1] and len(lines[-1]) + len(word) > width:
-            lines.append("..")
-        lines[-1] = f"{lines[-1]} {word}".strip()
-    return lines
-
-
-def module_name(file: FilePath, most: int, reserved: Sequence[str]) -> str:
-    """Return the name that a file's module has to have; words of its language are none.
-
-    Raises
-    ------
-    FileFormatError
-        Controllers know no module of that name.
-    """
-    name = file.stem
-    if not (re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name) and len(name) <= most):
-        raise FileFormatError(
-            f"{file}: the module is called as the file is, and '{name}' is no name: expected a "
-            f"letter, then letters, digits and _, {most} at most"
-        )
-    if name.upper() in reserved:
-        raise FileFormatError(
-            f"{file}: the module is called as the file is, and '{name}' is a word of the "
-            f"controller's language; call the file otherwise"
-        )
-    return name

@@ -61,7 +61,7 @@ _PATH = """\
 kind = "circle"        # or "line" (by = [dx, dy, dz] or end), "waypoints", "file"
 radius_mm = {radius}
 normal = [0, 0, 1]
-duration = 4.0
+duration = 4.0         # or feed_mm = 20: one speed from run-up to run-down [mm/s]
 # kind = "file"        # CSV, ROS Path or PoseArray, NumPy
 # file = "seam.csv"
 # feed = 0.05          # m/s, where the file has no times

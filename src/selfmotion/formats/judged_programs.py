@@ -10,11 +10,13 @@ import numpy as np
 
 from selfmotion.basics import Array, FileFormatError
 from selfmotion.certificate import Tolerance
-from selfmotion.constraints import Constraint, JointAccelerationLimits, JointJerkLimits
-from selfmotion.formats.controller_program import ControllerProgram, Switch, plain
+from selfmotion.constraints import Constraint
+from selfmotion.formats.controller_program import ControllerProgram, Switch
+from selfmotion.formats.pieces import what_targets_keep
 from selfmotion.formats.pose_stretches import PoseStretch
 from selfmotion.formats.program_files import read_program
-from selfmotion.formats.read_stretches import SLOWLY
+from selfmotion.formats.program_parts import JudgedStep, parts_of, slow_steps
+from selfmotion.formats.program_texts import plain
 from selfmotion.formats.tool_frames import WORLD
 from selfmotion.job import Program, are_opposite
 from selfmotion.motion import Trajectory
@@ -33,27 +35,14 @@ _DIGITS, _OF_POSES, _PROMPT = 1e-6, 1e-5, 1e-3
 _INSTANT = 1e-9
 
 
-class JudgedStep(NamedTuple):
-    """What a certificate says of the targets of a seam or move.
-
-    Attributes
-    ----------
-    name : str
-    verified : bool
-    verdict : str
-    """
-
-    name: str
-    verified: bool
-    verdict: str
-
-
 def stated_deviation(file: FilePath, robot: RobotModel | None = None) -> Tolerance | None:
     """Return how far off its path a program of a controller says it is; None where it does not."""
     return _stated(read_program(file, robot))
 
 
 def _stated(program: ControllerProgram) -> Tolerance | None:
+    if program.within is not None:
+        return program.within
     miss = program.miss.path
     sound = np.isfinite([miss.position, miss.rotation]).all() and miss.position > 0.0
     return Tolerance(miss.position, max(miss.rotation, _LEAST)) if sound else None
@@ -71,12 +60,15 @@ class JudgedProgram(NamedTuple):
         What seams may miss their paths by, where that is not the job's own.
     shifted : str
         By how much the work object was shifted, in words; empty for not at all.
+    unjudged : str
+        What of a program that is verified is the controller's own, in words.
     """
 
     steps: tuple[JudgedStep, ...]
     failures: tuple[str, ...]
     within: Tolerance | None = None
     shifted: str = ""
+    unjudged: str = ""
 
     @property
     def verified(self) -> bool:
@@ -87,7 +79,8 @@ class JudgedProgram(NamedTuple):
     def verdict(self) -> str:
         """One line: verified, or how many steps are not, and what speaks against the whole."""
         if self.verified:
-            return f"verified: each step, and the whole{self._allowed}{self._told}"
+            own = f"; {self.unjudged}" if self.unjudged else ""
+            return f"verified: each step, and the whole{self._allowed}{self._told}{own}"
         count = sum(not step.verified for step in self.steps)
         told = [*([f"{count} of {len(self.steps)} steps"] if count else []), *self.failures]
         return f"not verified: {'; '.join(told)}{self._told}"
@@ -114,7 +107,7 @@ def judged_program(file: FilePath, job: Program, within: Tolerance | None = None
     where the job does, and to switch what its events say, when they say it: an output or a comment
     for each, the same for each event of one name, and nothing else. Where the work object was
     shifted, seams have to be on their paths shifted with it, and the whole begins and ends
-    elsewhere.
+    elsewhere; slow motions to where it goes on have to keep what the move beside them has to.
 
     Raises
     ------
@@ -123,8 +116,10 @@ def judged_program(file: FilePath, job: Program, within: Tolerance | None = None
     """
     program = read_program(file, job.robot)
     within = within or _stated(program)
-    motions = list(_pieces(file, program, job))
-    steps, pieces = _judged_steps(job, motions, within, what_targets_keep, program)
+    parts = parts_of(file, program, job)
+    steps, pieces = _judged_steps(job, parts.motions, within, what_targets_keep, program)
+    slow, between = slow_steps(parts, job)
+    pieces = [piece for k, own in enumerate(pieces) for piece in (*between.get(k, ()), own)]
     # From axis targets to poses there are digits of both, which the arm's kinematics may magnify.
     digits = _OF_POSES if any(isinstance(s, PoseStretch) for s in program.stretches) else _DIGITS
     failures = (
@@ -132,19 +127,22 @@ def judged_program(file: FilePath, job: Program, within: Tolerance | None = None
         *gaps(job.robot, pieces, digits),
         *(() if program.shift is not None else _elsewhere(job, pieces, digits)),
         *_otherwise_switched(job, program.switches),
-        *_slowly_gone(program),
     )
-    return JudgedProgram(steps, failures, within, shift_told(program))
+    return JudgedProgram((*steps, *slow), failures, within, shift_told(program), _unjudged(program))
 
 
-def _slowly_gone(program: ControllerProgram) -> Iterator[str]:
-    """Yield how often the arm goes slowly between joint targets and shifted poses."""
-    count = sum(stretch.name == SLOWLY for stretch in program.stretches)
-    if count:
-        yield (
-            f"{count} times the arm goes slowly from axis targets to shifted poses, or back, which "
-            f"nothing has judged"
-        )
+def of_the_controller(file: FilePath, robot: RobotModel | None = None) -> str:
+    """Return what of a program is the controller's own, and not judged, in words."""
+    return _unjudged(read_program(file, robot))
+
+
+def _unjudged(program: ControllerProgram) -> str:
+    if program.within is None:
+        return "accelerations are the controller's, and not judged"
+    return (
+        "seams at their feeds are judged with the ramps of the plan: how the controller runs up "
+        "and down, and so when it is where, is its own, and not judged"
+    )
 
 
 def shift_told(program: ControllerProgram) -> str:
@@ -291,34 +289,3 @@ def _otherwise_switched(job: Program, switches: Sequence[Switch]) -> Iterator[st
     for (one, first), (other, second) in combinations(known.items(), 2):
         if first.value is not None and first[1:] == second[1:] and are_opposite(one, other):
             yield f"events '{one}' and '{other}' both switch '{first.output}' to {first.value}"
-
-
-def what_targets_keep(constraints: Sequence[Constraint]) -> tuple[Constraint, ...]:
-    """Return what targets can keep: how a controller accelerates between them is its own."""
-    own = (JointAccelerationLimits, JointJerkLimits)
-    return tuple(item for item in constraints if not isinstance(item, own))
-
-
-def _pieces(file: FilePath, program: ControllerProgram, job: Program) -> Iterator[Trajectory]:
-    """Yield the motion of each step of a job."""
-    names = job.robot.joint_names
-    known = [axis.joint for axis in program.axes]
-    if sorted(known) != sorted(names):
-        raise FileFormatError(f"{file}: has joints {', '.join(known)}, expected {', '.join(names)}")
-    left = list(program.stretches)
-    for step in job.steps:
-        taken, seconds = [], 0.0
-        # Slow motions to where a shifted program goes on are none of the job's.
-        while left and left[0].name == SLOWLY:
-            left.pop(0)
-        while left and seconds < step.motion.duration - _MOMENT:
-            taken.append(left.pop(0))
-            seconds += float(taken[-1].t[-1])
-        if abs(seconds - step.motion.duration) > _MOMENT:
-            raise FileFormatError(
-                f"{file}: its targets of '{step.name}' take {seconds:.6g} s, the job's "
-                f"{step.motion.duration:.6g} s: it is of another one"
-            )
-        yield replace(program, stretches=tuple(taken)).trajectory.of_joints(names)
-    if left:
-        raise FileFormatError(f"{file}: goes on with '{left[0].name}' when the job has ended")

@@ -9,7 +9,9 @@ longer.
 
 Tool poses are ``E6POS`` aggregates in ``$BASE``: ``SPL`` segments of a ``SPLINE`` block, and
 ``SLIN`` where the tool goes straight. Linear motions keep the status of where they begin, so that
-S and T decide nothing in them: the first pose has them for who makes it a ``PTP``.
+S and T decide nothing in them: the first pose has them for who makes it a ``PTP``. A seam at a feed
+has ``$VEL.CP`` in place of times, and ``SCIRC`` where it goes round, whose orientation turns evenly
+in ``$BASE`` (``$ORI_TYPE = #VAR``, ``$CIRC_TYPE = #BASE``).
 """
 
 from pathlib import Path as FilePath
@@ -18,17 +20,13 @@ import numpy as np
 
 from selfmotion.basics import ProblemError, write_text
 from selfmotion.formats.arm_configurations import status_and_turn
-from selfmotion.formats.controller_program import (
-    ControllerProgram,
-    Draft,
-    head,
-    module_name,
-    plain,
-    with_begins,
-)
+from selfmotion.formats.controller_program import ControllerProgram, Draft
+from selfmotion.formats.feed_stretches import FeedStretch
 from selfmotion.formats.pose_numbers import krl_numbers
 from selfmotion.formats.pose_stretches import PoseStretch, straight
 from selfmotion.formats.program_axes import written
+from selfmotion.formats.program_heads import before, goes_round, head, speeds_of, with_begins
+from selfmotion.formats.program_texts import module_name, plain
 from selfmotion.formats.stretches import Stretch
 from selfmotion.formats.thinning import TIME_DIGITS
 from selfmotion.task import SE3, Quaternion
@@ -72,6 +70,7 @@ def write_krl(file: FilePath, draft: Draft) -> None:
         f"  $TOOL = {_frame(draft.tool)}",
         *_load(draft),
         *_slow_and_fast(draft)[0],
+        *(["  $ORI_TYPE = #VAR", "  $CIRC_TYPE = #BASE"] if goes_round(program) else []),
         f"  BAS(#VEL_PTP, {percent})",
         f"  BAS(#ACC_PTP, {percent})",
         f"  PTP {_aggregate(first, 0, program)}",
@@ -81,6 +80,7 @@ def write_krl(file: FilePath, draft: Draft) -> None:
     begins = True
     for stretch, begun in with_begins(program.stretches):
         lines += ["", f"  ; step: {plain(stretch.name)}"]
+        lines += [f"  ; {line}" for line in before(stretch)]
         if begun is not None:
             lines += _slowly(draft, begun, percent, begins=begins)
             begins = False
@@ -100,22 +100,53 @@ def _block(draft: Draft, stretch: Stretch) -> list[str]:
                 f"  {_event(draft, item.name)}" for item in stretch.events if item.target == k
             ]
         return lines
+    if isinstance(stretch, FeedStretch):
+        return [*lines, *_at_speed(draft, stretch)]
     block, segment = "PTP_SPLINE", "SPTP"
     if isinstance(stretch, PoseStretch):
         block, segment = "SPLINE", "SLIN" if _is_straight(stretch) else "SPL"
+        # After a seam at its feed.
+        lines += [f"  $VEL.CP = {_UNBOUND:g}"] if speeds_of(draft.program) else []
     lines += [f"  {block}", "    TIME_BLOCK START"]
     for k in range(1, len(stretch.t)):
-        for item in stretch.events:
-            if item.target == k:
-                said = _event(draft, item.name)
-                # Without ONSTART it is at the end of the motion that follows.
-                comment = said.startswith(";")
-                lines.append(
-                    f"    {said}" if comment else f"    TRIGGER WHEN PATH = 0 DELAY = 0 DO {said}"
-                )
+        lines += _triggers(draft, stretch, k)
         lines.append(f"    {segment} {_target(stretch, k, draft.program)}")
         lines.append(f"    TIME_BLOCK PART = {_seconds(stretch.t[k] - stretch.t[k - 1])}")
     lines += [f"    TIME_BLOCK END = {_seconds(stretch.t[-1])}", "  ENDSPLINE"]
+    return lines
+
+
+def _at_speed(draft: Draft, stretch: FeedStretch) -> list[str]:
+    """Return the lines of a seam at its feed: one segment, or a block of them."""
+    speeds, count = stretch.speeds, len(stretch.speeds)
+    # Steps that bend, none of them round, are passed smoothly.
+    bends = not (np.isfinite(stretch.vias).any() or _is_straight(stretch))
+    straight_one = "SPL" if bends and count > 1 else "SLIN"
+    lines, segments = [f"  $VEL.CP = {speeds[0]:.7g}"], []
+    for k in range(1, count + 1):
+        segments += _triggers(draft, stretch, k)
+        segment = f"{straight_one} {_target(stretch, k, draft.program)}"
+        if stretch.goes_round(k):
+            via = _target(stretch.middles, k - 1, draft.program)
+            segment = f"SCIRC {via}, {_target(stretch, k, draft.program)}"
+        own = f" WITH $VEL.CP = {speeds[k - 1]:.7g}" if speeds[k - 1] != speeds[0] else ""
+        segments.append(f"    {segment}{own}")
+    if count == 1 and len(segments) == 1:
+        return [*lines, segments[0][2:]]
+    return [*lines, "  SPLINE", *segments, "  ENDSPLINE"]
+
+
+def _triggers(draft: Draft, stretch: Stretch, k: int) -> list[str]:
+    """Return what switches what is to be at a target."""
+    lines = []
+    for item in stretch.events:
+        if item.target == k:
+            said = _event(draft, item.name)
+            # Without ONSTART it is at the end of the motion that follows.
+            comment = said.startswith(";")
+            lines.append(
+                f"    {said}" if comment else f"    TRIGGER WHEN PATH = 0 DELAY = 0 DO {said}"
+            )
     return lines
 
 
@@ -137,7 +168,8 @@ def _slowly(draft: Draft, stretch: Stretch, percent: str, *, begins: bool) -> li
         *(unknown if begins and "S" not in configuration else []),
         *slow,
         f"  LIN {_target(stretch, 0, draft.program, configuration)}",
-        *fast,
+        # A seam at its feed says it itself.
+        *(fast[1:] if isinstance(stretch, FeedStretch) else fast),
     ]
 
 

@@ -32,6 +32,10 @@ class KrlReader(ProgramReader):
         self._by_poses = False
         # At which target what is switched.
         self._triggers: list[tuple[int, Sequence[str]]] = []
+        # Of segments at speeds: $VEL.CP [m/s], that of each, and through where they go.
+        self._speed = 0.0
+        self._speeds: list[float] = []
+        self._vias: list[Pose | None] = []
 
     def begin(self, given: Sequence[str]) -> None:
         """Begin the module."""
@@ -58,10 +62,47 @@ class KrlReader(ProgramReader):
         """Begin a spline block."""
         self.state, self._parts, self._triggers = "block", [], []
         self._targets, self._poses = [], []
+        self._speeds, self._vias = [], []
         self._by_poses = given[0].upper() == "SPLINE"
+
+    def speed_is(self, given: Sequence[str]) -> None:
+        """Take how fast segments are that do not say it themselves."""
+        self._speed = self._speed_of(given[0])
+
+    def segment(self, given: Sequence[str]) -> None:
+        """Take a straight or smooth segment at a speed, in a block or alone."""
+        pose, speed = given
+        self._at_speed(self._pose(pose), None, speed)
+
+    def round_segment(self, given: Sequence[str]) -> None:
+        """Take a circular segment at a speed, in a block or alone."""
+        via, pose, speed = given
+        self._at_speed(self._pose(pose), self._pose(via), speed)
+
+    def _at_speed(self, pose: Pose, via: Pose | None, speed: str | None) -> None:
+        alone = self.state == "body"
+        if alone:
+            self.block(["SPLINE"])
+        if not self._by_poses:
+            raise self.lines.fault("PTP_SPLINE has SPTP with times")
+        self._poses.append(pose)
+        self._vias.append(via)
+        self._speeds.append(self._speed if speed is None else self._speed_of(speed))
+        if not self._speeds[-1] > 0.0:
+            raise self.lines.fault("a segment without a time, expected $VEL.CP before it")
+        if alone:
+            self.close([])
+
+    def _speed_of(self, text: str) -> float:
+        value = self.lines.number_of(text)
+        if not value > 0.0:
+            raise self.lines.fault(f"$VEL.CP is {value:g} m/s, expected a number above 0")
+        return value
 
     def start(self, _: Sequence[str]) -> None:
         """Begin its time block."""
+        if self._speeds:
+            raise self.lines.fault("a time block after segments without times")
         self.state = "time"
 
     def target(self, given: Sequence[str]) -> None:
@@ -115,6 +156,12 @@ class KrlReader(ProgramReader):
 
     def close(self, _: Sequence[str]) -> None:
         """End a spline block."""
+        if self.state == "block":
+            if not self._speeds:
+                raise self.lines.fault("the spline block has no segments")
+            if any(number > len(self._speeds) for number, _ in self._triggers):
+                raise self.lines.fault("a trigger has no target after it")
+            self.drive(self._poses, self._speeds, self._vias, self._triggers)
         self.state = "body"
 
     def _target(self, text: str) -> list[float]:
@@ -157,12 +204,15 @@ _ANY = r"[^;{}]*"
 _IN_BODY = ("head", "body")
 _NUMBER = r"[A-Z][1-6]?\s+[^,{}]+"
 _POSE = rf"\{{\s*(?:E6POS\s*:|POS\s*:|FRAME\s*:)?\s*({_NUMBER}(?:,\s*{_NUMBER})*)\}}"
+_WITH = r"(?: WITH \$VEL\.CP ?= ?([\d.e-]+))?"
 _UNIT = r"MACHINE_DEF ?\[ ?\d+ ?\]"
 KrlReader.grammar = (
     (("before",), r"&(?:ACCESS|REL|PARAM|COMMENT)\b.*", KrlReader.skip),
     (("before",), rf"DEF ([A-Z]\w{{0,{NAME - 1}}}) ?\( ?\)", KrlReader.begin),
     (("head", "body"), r"BAS ?\( ?#\w+ ?, ?[\d.]+ ?\)", KrlReader.skip),
-    (_IN_BODY, r"\$VEL\.(?:CP|ORI1|ORI2) ?= ?[\d.]+", KrlReader.skip),
+    (_IN_BODY, r"\$VEL\.CP ?= ?([\d.e-]+)", KrlReader.speed_is),
+    (_IN_BODY, r"\$VEL\.(?:ORI1|ORI2) ?= ?[\d.]+", KrlReader.skip),
+    (("head",), r"\$(?:ORI_TYPE ?= ?#VAR|CIRC_TYPE ?= ?#BASE)", KrlReader.skip),
     (("head",), rf"\$TOOL ?= ?{_POSE}", KrlReader.tool_is),
     (("head",), rf"\$BASE ?= ?{_POSE}", KrlReader.work_is),
     (
@@ -180,14 +230,16 @@ KrlReader.grammar = (
     (("block",), r"TIME_BLOCK START", KrlReader.start),
     (("time",), rf"SPTP {_TARGET}", KrlReader.target),
     (("time",), rf"(?:SPL|SLIN) {_POSE}", KrlReader.pose),
+    (("block", "body"), rf"(?:SPL|SLIN) {_POSE}{_WITH}", KrlReader.segment),
+    (("block", "body"), rf"SCIRC {_POSE} ?, ?{_POSE}{_WITH}", KrlReader.round_segment),
     (("time",), r"TIME_BLOCK PART ?= ?(\S+)", KrlReader.part),
     (
-        ("time",),
+        ("time", "block"),
         r"TRIGGER WHEN PATH ?= ?0 DELAY ?= ?0 DO \$OUT ?\[ ?(\d+) ?\] ?= ?(TRUE|FALSE)",
         KrlReader.trigger,
     ),
-    (("time",), r"; event: (.*)", KrlReader.trigger),
+    (("time", "block"), r"; event: (.*)", KrlReader.trigger),
     (("time",), r"TIME_BLOCK END ?= ?(\S+)", KrlReader.whole),
-    (("ended",), r"ENDSPLINE", KrlReader.close),
+    (("ended", "block"), r"ENDSPLINE", KrlReader.close),
     (_IN_BODY, r"END", KrlReader.end),
 )

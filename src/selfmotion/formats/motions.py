@@ -66,8 +66,9 @@ def write_motion(
     - ``krl`` (``.src``): KUKA: axis targets with their times in spline blocks
     - ``rapid`` (``.mod``): ABB: axis targets with their times, rounded corners
 
-    With ``settings=ProgramSettings(targets="poses")`` programs of controllers are linear motions to
-    tool poses in a work object, wherever these keep the motion.
+    With ``settings=ProgramSettings(targets="poses")`` programs of controllers are linear and
+    circular motions to tool poses in a work object, wherever these keep the motion; seams at a feed
+    have it as their speed, with ramps of the controller's own.
 
     Parameters
     ----------
@@ -133,7 +134,7 @@ def write_motion(
 
 def _is_linear(form: str, settings: ProgramSettings | None) -> bool:
     """Whether a program of Universal Robots is one of targets, not a stream."""
-    return form == "urscript" and settings is not None and settings.targets == "poses"
+    return form == "urscript" and settings is not None and settings.by_poses
 
 
 def check_verified(plan: Plan | Parts | Move | Program, file: Path, force: bool) -> None:
@@ -179,18 +180,21 @@ def read_motion(
     number.
 
     - KRL: ``DEF``, ``END``, comments, ``BAS``, ``$BASE``, ``$TOOL``, ``$LOAD``, ``$VEL``,
-      ``$OUT[n]``, ``PTP {A1 …}``, ``PTP_SPLINE``, ``SPTP {A1 …}``, ``LIN {X …}``, ``SPLINE``,
-      ``SPL {X …}``, ``SLIN {X …}``, ``TIME_BLOCK`` with a ``PART`` for each target, ``TRIGGER WHEN
-      PATH = 0 DELAY = 0 DO $OUT[n]``, ``ENDSPLINE``, ``WAIT SEC``
+      ``$ORI_TYPE``, ``$CIRC_TYPE``, ``$OUT[n]``, ``PTP {A1 …}``, ``PTP_SPLINE``, ``SPTP {A1 …}``,
+      ``LIN {X …}``, ``SPLINE``, ``SPL {X …}``, ``SLIN {X …}``, ``SCIRC {X …}, {X …}`` (these
+      three ``WITH $VEL.CP``), ``TIME_BLOCK`` with a ``PART`` for each target, ``TRIGGER WHEN PATH =
+      0 DELAY = 0 DO $OUT[n]``, ``ENDSPLINE``, ``WAIT SEC``
     - RAPID: ``MODULE``, ``PROC`` without parameters, comments, ``tooldata``, ``wobjdata``,
-      ``speeddata``, ``ConfL``, ``MoveAbsJ [[…], […]]\NoEOffs`` and ``MoveL [[…], […], […], […]]``
-      with ``\T``, ``fine`` or a zone ``z…``, ``\WObj``, ``SetDO``, ``WaitTime``
-
+      ``speeddata``, ``ConfL``, ``CirPathMode \ObjectFrame``, ``MoveAbsJ [[…], […]]\NoEOffs`` with
+      ``\T``, ``MoveL [[…], […], […], […]]`` with ``\T`` or a speed, ``MoveC`` with a speed,
+      ``fine`` or a zone ``z…``, ``\WObj``, ``SetDO``, ``WaitTime``
     - URScript: ``def selfmotion():``, comments, ``set_tcp``, ``set_payload``, ``feature = p[…]``,
-      ``movel(pose_trans(feature, p[…]), t=…, r=…)``, ``movej``, ``sleep``,
-      ``set_standard_digital_out``, ``end``
+      ``movel(pose_trans(feature, p[…]), t=…, r=…)`` or with ``a=…, v=…, r=…``, ``movec`` with these
+      and ``mode=0``, ``movej``, ``sleep``, ``set_standard_digital_out``, ``end``
 
-    The motion is the cubic spline through their targets, from rest to rest. Comments ``axes: A1 =
+    The motion is the cubic spline through their targets, from rest to rest; of seams at speeds what
+    the makers publish of such motions, with even ramps that fill the time in the comment ``planned
+    time: … s``. Comments ``axes: A1 =
     joint [deg], …``, as they are written, name the joints and say which of them slide. Tool poses
     are those of a `robot`; its joints are followed from where the program begins.
 

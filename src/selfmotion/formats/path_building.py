@@ -346,6 +346,9 @@ def _check_jumps(file: FilePath, rows: PoseRows, rotations: Array, jump: float) 
     steps = np.linalg.norm(np.diff(rows.positions, axis=0), axis=1)
     cosines = np.einsum("kij,kij->k", rotations[:-1], rotations[1:])
     turns = np.arccos(np.clip(0.5 * (cosines - 1.0), -1.0, 1.0))
+    if len(steps) == 1 and jump >= JUMP and file.suffix.lower() != DRAWING:
+        # Both ends of a seam: no pose between them is missing.
+        steps = np.zeros(1)
     for what, amounts, bound, unit, remedy in (
         ("jumps by", steps, jump, "m", _remedy(jump, _units(file, rows))),
         ("turns by", turns, _FLIP, "rad", "which has no clear direction; add poses between"),

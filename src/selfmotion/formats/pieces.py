@@ -1,17 +1,21 @@
 """What a motion is made of: seams, and moves through the air with room around them."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from selfmotion.basics import Array, PlanError
 from selfmotion.certificate import JointLimits, Requirement, Separation, Tolerance, arm_limits
+from selfmotion.constraints import Constraint, JointAccelerationLimits, JointJerkLimits
 from selfmotion.job import Program
 from selfmotion.motion import Trajectory
-from selfmotion.path import FeedKept
+from selfmotion.path import STILL as _STILL, FeedKept, Path
+from selfmotion.problem import Problem
 from selfmotion.result import Move, Parts, Plan
 from selfmotion.robot import Chain
+from selfmotion.task import Task
 
 # What a move through the air may be off at most, however much room there is [m, rad].
 _ROOMY = Tolerance(5e-3, 5e-3)
@@ -24,7 +28,9 @@ class Piece(NamedTuple):
 
     Of a move through the air also how far a controller may be off it, where there is room; of a
     seam the feeds that its tools keep, one list for each chain. `speeds` (n,) are what joints may
-    have [rad/s or m/s].
+    have [rad/s or m/s]. `keeps` says whether another motion keeps all that a seam's has to but
+    accelerations, within a tolerance; `turns` is the task by whose rows its tool turns as it has
+    to, but for relaxed ones, and `tool_rests` when that rests on its way [s].
     """
 
     name: str
@@ -35,6 +41,9 @@ class Piece(NamedTuple):
     room: Tolerance | None = None
     feeds: tuple[tuple[FeedKept, ...], ...] = ()
     speeds: Array | None = None
+    keeps: Callable[[Trajectory, Tolerance], bool] | None = None
+    turns: Task = Task.POSE
+    tool_rests: tuple[float, ...] = ()
 
 
 def pieces_of(plan: Plan | Parts | Move | Program) -> list[Piece]:
@@ -71,7 +80,41 @@ def _of_plan(name: str, plan: Plan) -> Piece:
     chains = tuple(item.chain for item in items)
     feeds = tuple(tuple(feed for feed in item.path.feeds if feed.kept) for item in items)
     speeds = _speeds((*arm_limits(plan.robot, plan.requirements), *plan.requirements))
-    return Piece(name, plan.trajectory, (), chains, feeds=feeds, speeds=speeds)
+
+    def keeps(motion: Trajectory, within: Tolerance) -> bool:
+        return by_targets(plan.problem).certify(motion, within).verified
+
+    relaxed = {row for item in plan.problem.relaxations for row in item.rows}
+    turns = Task.POSITION if relaxed & {"rx", "ry", "rz"} else plan.problem.task
+    return Piece(
+        name,
+        plan.trajectory,
+        (),
+        chains,
+        feeds=feeds,
+        speeds=speeds,
+        keeps=keeps,
+        turns=turns,
+        tool_rests=_rests_of(plan.problem.path),
+    )
+
+
+def _rests_of(path: Path) -> tuple[float, ...]:
+    """Return at which of its marks a path is at rest, but for its ends [s]."""
+    marks = path.marks[1:-1]
+    still = np.linalg.norm(path.samples(marks).twist, axis=1) < _STILL if len(marks) else []
+    return tuple(float(t) for t in marks[still])
+
+
+def by_targets(problem: Problem) -> Problem:
+    """Return what targets can keep of a problem."""
+    return replace(problem, constraints=what_targets_keep(problem.constraints))
+
+
+def what_targets_keep(constraints: Sequence[Constraint]) -> tuple[Constraint, ...]:
+    """Return what targets can keep: how a controller accelerates between them is its own."""
+    own = (JointAccelerationLimits, JointJerkLimits)
+    return tuple(item for item in constraints if not isinstance(item, own))
 
 
 def _of_move(name: str, move: Move) -> Piece:

@@ -16,7 +16,7 @@ from selfmotion.certificate import Tolerance
 from selfmotion.formats.pieces import Piece
 from selfmotion.formats.pose_numbers import Rounding
 from selfmotion.formats.pose_stretches import PoseStretch, on_one_side
-from selfmotion.formats.stretches import SURE, Event, Stretch
+from selfmotion.formats.stretches import SURE, Event, Miss, Stretch
 from selfmotion.formats.thinning import TIME_DIGITS, Span, events_within
 from selfmotion.formats.tool_frames import ToolFrames
 
@@ -61,6 +61,20 @@ class PoseSpan(Span):
         """Return that of a piece, with the events that are in it."""
         return cls(piece, slides, first, last, events_within(piece, first, last), frames, rounding)
 
+    def thinned(self, allowed: Tolerance) -> tuple[Stretch, Miss]:
+        """See `Span.thinned`.
+
+        Raises
+        ------
+        NotByPosesError
+            There are no such poses.
+        """
+        stretch, miss = super().thinned(allowed)
+        # More targets are looked at elsewhere: near a singular pose joints swing in between.
+        if isinstance(stretch, PoseStretch) and miss.share(allowed) > 1.0:
+            raise self._singular(self.first, allowed)
+        return stretch, miss
+
     def _within(self, allowed: Tolerance, fixed: Array) -> Array:
         """See `Span._within`.
 
@@ -84,8 +98,10 @@ class PoseSpan(Span):
             # With their neighbours, so that a smooth curve through all does not swing.
             near = np.convolve(far, np.ones(3), mode="same") > 0.0
             t = np.sort(np.append(t, (0.5 * (t[1:] + t[:-1]))[near]))
-        at = float(t[:-1][far][0])
-        raise NotByPosesError(
+        raise self._singular(float(t[:-1][far][0]), allowed)
+
+    def _singular(self, at: float, allowed: Tolerance) -> NotByPosesError:
+        return NotByPosesError(
             f"'{self.piece.name}': near t = {at - self.piece.motion.t[0]:.4g} s the joints do not "
             f"follow from poses within {1e3 * allowed.position:.3g} mm and "
             f"{np.degrees(allowed.rotation):.3g}°: it is singular there, or turns too fast"
@@ -136,7 +152,7 @@ class PoseSpan(Span):
         lines = stretch.ways(times)
         for line in lines:
             joints = np.abs(line - exact).max(axis=1) / allowed.rotation
-            worst = np.maximum(worst, _largest(joints, count))
+            worst = np.maximum(worst, largest(joints, count))
         # Where joints are near, the tool is nearly so: only these are placed.
         for line in lines if worst.max() <= _JOINTS_FAR else []:
             for chain in self.piece.chains:
@@ -146,7 +162,7 @@ class PoseSpan(Span):
                 # |R - R'| is 2√2 sin(angle / 2).
                 angle = np.linalg.norm(turned - facing, axis=(1, 2)) / np.sqrt(2.0)
                 off = np.maximum(off, angle / allowed.rotation)
-                worst = np.maximum(worst, _largest(off, count))
+                worst = np.maximum(worst, largest(off, count))
         return np.where(np.isfinite(worst), SURE * worst, np.inf)
 
     def _evenly(self, fixed: Array, allowed: Tolerance, more: float) -> Array:
@@ -196,7 +212,7 @@ class PoseSpan(Span):
 _JOINTS_FAR = 10.0
 
 
-def _largest(values: Array, count: int) -> Array:
+def largest(values: Array, count: int) -> Array:
     """Return the largest of the values of each step, (count,), that at its end included."""
     steps = values[:-1].reshape(count, -1)
     found: Array = np.maximum(steps.max(axis=1), np.append(steps[1:, 0], values[-1]))

@@ -31,7 +31,7 @@ _HEAVIEST, _FARTHEST = 3000.0, 5.0
 # Mechanical units that a KUKA controller has at most.
 _UNITS = 16
 # What targets may be.
-TARGETS = ("joints", "poses")
+TARGETS = ("joints", "poses", "timed-poses")
 AXES = tuple(f"{kind}{number}" for kind in "AE" for number in range(1, 7))
 
 
@@ -69,8 +69,10 @@ class ProgramSettings:
     targets : str
         ``"joints"``: joint targets; or ``"poses"``: linear motions to tool poses in a work object
         (``MoveL``, ``SPLINE`` with ``SPL`` and ``SLIN``, ``movel``), which can be shifted and
-        touched up. Where poses do not keep the motion, joint targets are written all the same,
-        and the head of the file says why.
+        touched up. A seam at a feed has its feed as their speed, and arcs are circular motions;
+        its ramps are then the controller's. ``"timed-poses"``: the same with the times of the plan,
+        which takes more of them. Where poses do not keep the motion, joint targets are written all
+        the same, and the head of the file says why.
     work_object : str or SE3, optional
         What poses are counted in: a link that stands still or that an external axis carries, or a
         pose [m] in the frame that the controller counts its arm from (link ``base``, else the
@@ -140,7 +142,8 @@ class ProgramSettings:
 
     def _check_targets(self) -> None:
         if self.targets not in TARGETS:
-            raise ProblemError(f"targets are {shown(self.targets)}, expected 'joints' or 'poses'")
+            known = ", ".join(f"'{name}'" for name in TARGETS)
+            raise ProblemError(f"targets are {shown(self.targets)}, expected one of {known}")
         if not (self.work_object is None or isinstance(self.work_object, str)):
             work = as_pose(self.work_object, "work_object", ProblemError)
             object.__setattr__(self, "work_object", work)
@@ -153,8 +156,13 @@ class ProgramSettings:
                 f"its number in MACHINE_DEF, 1 to {_UNITS} (KUKA)"
             )
         for key in ("work_object", "positioner"):
-            if getattr(self, key) is not None and self.targets != "poses":
+            if getattr(self, key) is not None and not self.by_poses:
                 raise ProblemError(f"{key}: has no effect on joint targets; give targets='poses'")
+
+    @property
+    def by_poses(self) -> bool:
+        """Whether targets are tool poses."""
+        return self.targets != "joints"
 
     @property
     def streamed(self) -> "ProgramSettings":

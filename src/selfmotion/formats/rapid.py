@@ -6,9 +6,11 @@ and whose unit is degrees or mm, with ``\T``, the time in seconds that the motio
 place of its speed. ``fine`` is a stop, ``z1`` a zone in which corners are rounded, at most from the
 middle of one motion to that of the next. Tool poses are ``MoveL`` of a ``robtarget`` in the work
 object ``wobjdata``, whose ``confdata`` says in which configuration the arm is; ``ConfL \Off`` has
-the controller go on in the one that it is in, as a shifted work object may need other numbers.
-Outputs are set by ``SetDO``: where the arm rests when it rests, and where it moves when it enters
-the zone of its target.
+the controller go on in the one that it is in, as a shifted work object may need other numbers. A
+seam at a feed has a ``speeddata`` in place of times, and ``MoveC`` where it goes round,
+whose orientation turns evenly in the work object (``CirPathMode \ObjectFrame``). Outputs are set by
+``SetDO``: where the arm rests when it rests, and where it moves when it enters the zone of its
+target.
 """
 
 from pathlib import Path as FilePath
@@ -17,18 +19,14 @@ import numpy as np
 
 from selfmotion.basics import ProblemError, write_text
 from selfmotion.formats.arm_configurations import confdata
-from selfmotion.formats.controller_program import (
-    ControllerProgram,
-    Draft,
-    head,
-    module_name,
-    plain,
-    with_begins,
-)
+from selfmotion.formats.controller_program import ControllerProgram, Draft
+from selfmotion.formats.feed_stretches import FeedStretch
 from selfmotion.formats.pose_numbers import rapid_numbers
 from selfmotion.formats.pose_stretches import PoseStretch
 from selfmotion.formats.program_axes import written
+from selfmotion.formats.program_heads import before, goes_round, head, speeds_of, with_begins
 from selfmotion.formats.program_settings import AXES
+from selfmotion.formats.program_texts import module_name, plain
 from selfmotion.formats.stretches import Stretch
 from selfmotion.formats.thinning import TIME_DIGITS
 from selfmotion.task import SE3, Quaternion
@@ -70,13 +68,16 @@ def write_rapid(file: FilePath, draft: Draft) -> None:
         f"  TASK PERS tooldata {name}_t := {_tool(draft)};",
         *_work(draft, name),
         f"  CONST speeddata {name}_v := [{speed}];",
+        *_speeds(draft, name),
         "",
         f"  PROC {name}{_PROCEDURE}()",
         *([] if draft.frames is None else ["    ConfL \\Off;"]),
+        *(["    CirPathMode \\ObjectFrame;"] if goes_round(program) else []),
         _slowly(draft, program.stretches[0], name, by_axes=True),
     ]
     for stretch, begun in with_begins(program.stretches):
         lines += ["", f"    ! step: {plain(stretch.name)}"]
+        lines += [f"    ! {line}" for line in before(stretch)]
         if begun is not None:
             by_axes = not isinstance(begun, PoseStretch)
             lines.append(_slowly(draft, begun, name, by_axes=by_axes))
@@ -98,7 +99,11 @@ def _moves(draft: Draft, stretch: Stretch, name: str) -> list[str]:
         elif k:
             zone = "fine" if k == last else "z1"
             seconds = _seconds(stretch.t[k] - stretch.t[k - 1])
-            lines.append(f"    {_motion(draft, stretch, k, name, f'v100{_TIME}{seconds}, {zone}')}")
+            speed = f"v100{_TIME}{seconds}"
+            if isinstance(stretch, FeedStretch):
+                speed = f"{name}_f{speeds_of(draft.program).index(stretch.speeds[k - 1]) + 1}"
+                zone = "fine" if k == last else "z0"
+            lines.append(f"    {_motion(draft, stretch, k, name, f'{speed}, {zone}')}")
         lines += [f"    {_event(draft, item.name)}" for item in stretch.events if item.target == k]
     return lines
 
@@ -106,10 +111,20 @@ def _moves(draft: Draft, stretch: Stretch, name: str) -> list[str]:
 def _motion(draft: Draft, stretch: Stretch, k: int, name: str, speed_and_zone: str) -> str:
     """Return the motion to a target of a stretch: linear to a pose, by the axes to joints."""
     if isinstance(stretch, PoseStretch):
-        target = _robtarget(draft, stretch, k)
-        return f"MoveL {target}, {speed_and_zone}, {name}_t\\WObj:={name}_w;"
+        target, rest = _robtarget(draft, stretch, k), f"{speed_and_zone}, {name}_t\\WObj:={name}_w;"
+        if isinstance(stretch, FeedStretch) and k and stretch.goes_round(k):
+            return f"MoveC {_robtarget(draft, stretch.middles, k - 1)}, {target}, {rest}"
+        return f"MoveL {target}, {rest}"
     target = _target(stretch, k, draft.program)
     return f"MoveAbsJ {target}\\NoEOffs, {speed_and_zone}, {name}_t;"
+
+
+def _speeds(draft: Draft, name: str) -> list[str]:
+    """Return the speeds of seams: how fast the tool turns, and external axes, is as in v100."""
+    return [
+        f"  CONST speeddata {name}_f{k} := [{1e3 * speed:.7g}, 500, 5000, 1000];"
+        for k, speed in enumerate(speeds_of(draft.program), 1)
+    ]
 
 
 def _slowly(draft: Draft, stretch: Stretch, name: str, *, by_axes: bool) -> str:

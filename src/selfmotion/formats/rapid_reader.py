@@ -12,6 +12,8 @@ from selfmotion.formats.read_stretches import Pose, pose_of_values
 from selfmotion.robot import RobotModel
 from selfmotion.task import SE3
 
+# What the speed of slow motions is called by at its end.
+SLOW = "_v"
 # From where on a number means that there is no such axis.
 _ABSENT_FROM = 8.9e9
 
@@ -27,6 +29,11 @@ class RapidReader(ProgramReader):
         self._axes: list[list[float]] = []
         self._poses: list[Pose] = []
         self._times: list[float] = []
+        # Of motions at speeds: how fast [m/s], through where, and what is switched at which.
+        self._known: dict[str, float] = {}
+        self._speeds: list[float] = []
+        self._vias: list[Pose | None] = []
+        self._happens: list[tuple[int, Sequence[str]]] = []
 
     def begin(self, given: Sequence[str]) -> None:
         """Begin the module."""
@@ -52,6 +59,41 @@ class RapidReader(ProgramReader):
         self.begin_at(self._target(given[0], given[1]))
         self.state = "body"
 
+    def speed_is(self, given: Sequence[str]) -> None:
+        """Take the speed of a speeddata [mm/s]."""
+        values = [self.lines.number_of(item) for item in self._texts(given[1], 4, "speeddata")]
+        if not values[0] > 0.0:
+            raise self.lines.fault(f"v_tcp is {values[0]:g} mm/s, expected a number above 0")
+        self._known[given[0].lower()] = 1e-3 * values[0]
+
+    def move_at_speed(self, given: Sequence[str]) -> None:
+        """Take a pose at a speed, straight or round; one that is called …_v is a slow motion."""
+        *poses, speed, zone = given
+        if not poses[4:] and speed.lower().endswith(SLOW):
+            if zone.lower() != "fine":
+                raise self.lines.fault(f"a slow motion has zone {zone}, expected fine")
+            self.go_linear(poses)
+            return
+        if self._axes or self._times:
+            raise self.lines.fault(
+                "a motion at a speed after one with a time, expected fine before"
+            )
+        if speed.lower() not in self._known:
+            raise self.lines.fault(f"speed '{speed}' is no speeddata of the module")
+        self._poses.append(self._pose(poses[-4:]))
+        self._vias.append(self._pose(poses[:4]) if poses[4:] else None)
+        self._speeds.append(self._known[speed.lower()])
+        if zone.lower() == "fine":
+            self.drive(self._poses, self._speeds, self._vias, self._happens)
+            self._poses, self._speeds, self._vias, self._happens = [], [], [], []
+
+    def switch(self, given: Sequence[str]) -> None:
+        """See `ProgramReader.switch`: between motions at speeds when these are known."""
+        if self._speeds:
+            self._happens.append((len(self._speeds), given))
+        else:
+            super().switch(given)
+
     def go_linear(self, given: Sequence[str]) -> None:
         """Take the pose from which the motion goes on by poses."""
         self._check_stopped("a slow motion")
@@ -76,8 +118,8 @@ class RapidReader(ProgramReader):
     def move_linear(self, given: Sequence[str]) -> None:
         """Take a pose."""
         *target, seconds, zone = given
-        if self._axes:
-            raise self.lines.fault("a pose after an axis target whose zone is not fine")
+        if self._axes or self._speeds:
+            raise self.lines.fault("a pose after another kind of target whose zone is not fine")
         self._poses.append(self._pose(target))
         self._times.append(self.lines.duration(seconds))
         if zone.lower() == "fine":
@@ -91,12 +133,12 @@ class RapidReader(ProgramReader):
 
     def leave(self, _: Sequence[str]) -> None:
         """End the procedure."""
-        if self._times:
+        if self._times or self._speeds:
             raise self.lines.fault("the last target has a zone, expected fine")
         self.state = "left"
 
     def _check_stopped(self, what: str) -> None:
-        if self._times:
+        if self._times or self._speeds:
             raise self.lines.fault(f"{what} where it does not stop: zone is not fine")
 
     def _frame(self, place: str, turn: str) -> SE3:
@@ -146,6 +188,7 @@ _TARGET = rf"\[ ?{_LIST} ?, ?{_LIST} ?\]"
 _POSE = rf"\[ ?{_LIST} ?, ?{_LIST} ?, ?{_LIST} ?, ?{_LIST} ?\]"
 _FRAME = rf"\[ ?{_LIST} ?, ?{_LIST} ?\]"
 _TIMED = rf"{_WORD} ?\\T ?:= ?([^,]+), ?(fine|z[0-9]{{1,3}})"
+_AT_SPEED = rf"({_WORD}) ?, ?(fine|z[0-9]{{1,3}}) ?, ?{_WORD} ?\\WObj ?:= ?{_WORD} ?;"
 RapidReader.grammar = (
     (("before",), rf"MODULE ({_WORD})", RapidReader.begin),
     (
@@ -159,9 +202,10 @@ RapidReader.grammar = (
         rf"{_FRAME} ?, ?{_FRAME} ?\];",
         RapidReader.work_is,
     ),
-    (("data",), rf"CONST speeddata {_WORD} ?:= ?\[[^;!\[\]]*\];", RapidReader.skip),
+    (("data",), rf"CONST speeddata ({_WORD}) ?:= ?{_LIST};", RapidReader.speed_is),
     (("data",), rf"PROC {_WORD} ?\( ?\)", RapidReader.procedure),
     (("start", "body"), r"ConfL ?\\ ?(?:On|Off) ?;", RapidReader.skip),
+    (("start", "body"), r"CirPathMode ?\\ ?ObjectFrame ?;", RapidReader.skip),
     (
         ("start", "body"),
         rf"MoveAbsJ {_TARGET} ?\\NoEOffs ?, ?{_WORD} ?, ?fine ?, ?{_WORD} ?;",
@@ -172,11 +216,8 @@ RapidReader.grammar = (
         rf"MoveAbsJ {_TARGET} ?\\NoEOffs ?, ?{_TIMED} ?, ?{_WORD} ?;",
         RapidReader.move,
     ),
-    (
-        ("body",),
-        rf"MoveL {_POSE} ?, ?{_WORD} ?, ?fine ?, ?{_WORD} ?\\WObj ?:= ?{_WORD} ?;",
-        RapidReader.go_linear,
-    ),
+    (("body",), rf"MoveL {_POSE} ?, ?{_AT_SPEED}", RapidReader.move_at_speed),
+    (("body",), rf"MoveC {_POSE} ?, ?{_POSE} ?, ?{_AT_SPEED}", RapidReader.move_at_speed),
     (
         ("body",),
         rf"MoveL {_POSE} ?, ?{_TIMED} ?, ?{_WORD} ?\\WObj ?:= ?{_WORD} ?;",

@@ -6,10 +6,12 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from selfmotion.basics import Array, FileFormatError, Flags, RobotError
+from selfmotion.formats.circular import put_on_arcs
+from selfmotion.formats.feed_stretches import FeedStretch, times_at
 from selfmotion.formats.pose_stretches import PoseStretch, on_one_side, straight
 from selfmotion.formats.program_axes import Axis, tool_from_flange
 from selfmotion.formats.program_settings import ProgramSettings
-from selfmotion.formats.stretches import Stretch
+from selfmotion.formats.stretches import Stretch, finer
 from selfmotion.formats.tool_frames import ToolFrames
 from selfmotion.robot import RobotModel
 from selfmotion.task import SE3, Quaternion
@@ -22,6 +24,8 @@ _THERE = 1e-5
 # rad/s]; how often the joints are followed between two poses, from which step on one by one, and
 # steps that are none [rad].
 _SLOW, _BETWEEN, _STEP, _JUMP = 0.05, 16, 0.2, 0.5
+# So many times as often where steps are at speeds.
+_FINER = 8
 
 
 @dataclass
@@ -48,11 +52,17 @@ class Pose:
 
 @dataclass
 class PoseRow:
-    """A stretch of poses while it is read: where it begins, its targets, times between [s]."""
+    """A stretch of poses while it is read: where it begins, its targets, times between [s].
+
+    Of one at speeds the time that was planned for all of it, the speed of each step [m/s], and
+    through where it goes round.
+    """
 
     name: str
     poses: list[Pose]
     seconds: list[float]
+    speeds: list[float] = field(default_factory=list)
+    vias: Array = field(default_factory=lambda: np.zeros((0, 3)))
 
 
 @dataclass
@@ -199,8 +209,9 @@ class Follower:
     def _stretch(self, row: PoseRow) -> PoseStretch:
         """Return the stretch of poses, its joints followed from where the arm is."""
         frames, order = self._known()
-        t = times_of(row.seconds)
         places = np.array([pose.place for pose in row.poses])
+        at_speeds = bool(row.speeds)
+        t = times_at(places, row.vias, row.speeds) if at_speeds else times_of(row.seconds)
         turns = on_one_side(np.array([pose.turn for pose in row.poses]))
         outer = [k for k, axis in enumerate(self.axes) if axis.name.startswith("E")]
         if any(len(pose.others) != len(outer) for pose in row.poses):
@@ -210,12 +221,15 @@ class Follower:
         in_file = {self.axes[k].joint: c for c, k in enumerate(outer)}
         columns = [in_file[frames.axes[k].joint] for k in frames.external.tolist()]
         others = others[:, columns]
-        share = np.linspace(0.0, 1.0, _BETWEEN, endpoint=False)
-        times = np.append((t[:-1, None] + share * np.diff(t)[:, None]).ravel(), t[-1])
+        # Steps at speeds may be as long as the stretch.
+        count = _BETWEEN * (_FINER if at_speeds else 1)
+        times = finer(t, np.linspace(0.0, 1.0, count, endpoint=False))
         rows = straight(times, t, np.hstack([places, turns, others]))
+        if at_speeds:
+            put_on_arcs(rows, times, t, places, row.vias)
         assert self.at is not None
-        q = self._followed(frames, rows, self._by_robot(self.at[None])[0], row)
-        every = q[np.arange(0, len(times), _BETWEEN)]
+        q = self._followed(frames, rows, self._by_robot(self.at[None])[0], row, count)
+        every = q[np.arange(0, len(times), count)]
 
         def near(asked: Array) -> Array:
             return np.stack([np.interp(asked, times, column) for column in q.T], axis=1)
@@ -230,12 +244,17 @@ class Follower:
             near=near,
             order=np.arange(every.shape[1]),
         )
+        if at_speeds:
+            speeds, seconds = np.array(row.speeds), sum(row.seconds)
+            stretch = FeedStretch(**vars(stretch), speeds=speeds, vias=row.vias, seconds=seconds)
         return stretch.in_order(order)
 
-    def _followed(self, frames: ToolFrames, rows: Array, first: Array, row: PoseRow) -> Array:
+    def _followed(
+        self, frames: ToolFrames, rows: Array, first: Array, row: PoseRow, count: int
+    ) -> Array:
         """Return the robot's joints along poses: from one target to the next at once, if they join.
 
-        Else each found from the one before.
+        Else each found from the one before. From one target to the next are `count` poses.
         """
         found = np.empty((len(rows), len(first)))
         at = np.array(first)
@@ -245,7 +264,7 @@ class Follower:
             steps = np.diff(np.vstack([at, q]), axis=0)[:, frames.arm]
             # The arm may be somewhere else before its first pose: of a shifted work object.
             if not arrived.all() or np.abs(steps[1 if k == 0 else 0 :]).max(initial=0.0) > _STEP:
-                q = self._one_by_one(frames, block, at, row, k)
+                q = self._one_by_one(frames, block, at, row, (k, count))
             found[k : k + _BETWEEN] = q
             at = q[-1]
         return found
@@ -256,14 +275,14 @@ class Follower:
         return frames.solved(poses[:, :3], poses[:, 3:7], seeds)
 
     def _one_by_one(
-        self, frames: ToolFrames, poses: Array, at: Array, row: PoseRow, first: int
+        self, frames: ToolFrames, poses: Array, at: Array, row: PoseRow, place: tuple[int, int]
     ) -> Array:
-        found = np.empty((len(poses), len(at)))
+        found, (first, count) = np.empty((len(poses), len(at))), place
         for k, pose in enumerate(poses, first):
             q, arrived = self._solved(frames, pose[None], at)
             far = np.abs(q[0] - at)[frames.arm].max()
             if not arrived[0] or (far > _JUMP and k):
-                line = row.poses[min(k // _BETWEEN + 1, len(row.poses) - 1)].line
+                line = row.poses[min(k // count + 1, len(row.poses) - 1)].line
                 raise FileFormatError(
                     f"{self.file}: line {line}: the arm does not follow to this pose: it is out of "
                     f"reach, or singular on the way"

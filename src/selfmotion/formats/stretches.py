@@ -37,12 +37,20 @@ class Stretch:
     q : (K + 1, n)
         Where it begins, and its targets [rad or m].
     events : tuple of Event
+    remark : str
+        What there is to say of it.
     """
 
     name: str
     t: Array
     q: Array
     events: tuple[Event, ...] = ()
+    remark: str = ""
+
+    @property
+    def duration(self) -> float:
+        """How long it takes [s]."""
+        return float(self.t[-1])
 
     @property
     def is_rest(self) -> bool:
@@ -60,6 +68,10 @@ class Stretch:
     def ways(self, times: Array) -> list[Array]:
         """Return joint positions (K, n) at times by each way in which controllers join targets."""
         return ways(self.t, self.q, times)
+
+    def matched(self, motion: Trajectory, first: float) -> Array:
+        """Return what is to be where it is looked at: a motion (K, n), begun at `first`."""
+        return motion(np.clip(first + self.looked_at(), motion.t[0], motion.t[-1]))
 
     def smooth(self) -> tuple[Array, Array, Array]:
         """Return times (K,) [s], positions and velocities (K, n) of a spline through the targets.
@@ -132,10 +144,9 @@ def miss_of(
     In between it may go straight in joint space, past each corner on the line between the middles
     of the two sides, which is the largest corner that controllers round, or along the cubic spline
     through all targets that begins and ends at rest; at the times of the motion, which holds it to
-    its speeds as well.
+    its speeds as well. Stretches at a speed are held to where it goes alone.
     """
-    times = stretch.looked_at()
-    exact = motion(np.clip(first + times, motion.t[0], motion.t[-1]))
+    times, exact = stretch.looked_at(), stretch.matched(motion, first)
     worst = NO_MISS
     for line in stretch.ways(times):
         worst = Miss(*map(max, worst, miss_between(line, exact, chains)))

@@ -60,10 +60,10 @@ def stretches_of(
                 )
         within = _allowed(piece, allowed, of_moves)
         for first, last in _moving(motion, [motion.t[0] + at for at, _ in piece.events]):
-            stretch, miss = _thinned(piece, slides, first, last, within, posed)
-            both = Misses(NO_MISS, miss) if piece.is_move else Misses(miss, NO_MISS)
-            worst = worst.worse(both)
-            found.append(stretch)
+            for stretch, miss in _thinned(piece, slides, first, last, within, posed):
+                both = Misses(NO_MISS, miss) if piece.is_move else Misses(miss, NO_MISS)
+                worst = worst.worse(both)
+                found.append(stretch)
     return found, worst
 
 
@@ -74,15 +74,15 @@ def _thinned(
     last: float,
     within: Tolerance,
     posed: PosedSpans | None,
-) -> tuple[Stretch, Miss]:
+) -> list[tuple[Stretch, Miss]]:
     if posed is not None:
         try:
-            return posed(piece, slides, first, last).thinned(within)
+            return posed(piece, slides, first, last).stretches(within)
         except NotByPosesError:
             # A free move goes through singular configurations where it likes.
             if not piece.is_move:
                 raise
-    return Span.of(piece, slides, first, last).thinned(within)
+    return Span.of(piece, slides, first, last).stretches(within)
 
 
 def _allowed(piece: Piece, allowed: Tolerance, of_moves: Tolerance | None) -> Tolerance:

@@ -64,6 +64,16 @@ class Span:
         """Return that of a piece, with the events that are in it."""
         return cls(piece, slides, first, last, events_within(piece, first, last))
 
+    def stretches(self, allowed: Tolerance) -> list[tuple[Stretch, Miss]]:
+        """Return what it is written as: one stretch, or several where the tool rests in between.
+
+        Raises
+        ------
+        ProblemError
+            See `thinned`.
+        """
+        return [self.thinned(allowed)]
+
     def thinned(self, allowed: Tolerance) -> tuple[Stretch, Miss]:
         """Return its targets, and how far they are off.
 

@@ -169,6 +169,11 @@ class ToolFrames:
         turned = np.hstack([rates[:, :3] @ turn.T, rates[:, 3:] @ turn.T])
         return self._rates(self._tool_along(q)[0], turned)
 
+    def speeds(self, q: Array, qd: Array) -> Array:
+        """Return how fast the tool is in the work object at q and qd (K, n), (K,) [m/s]."""
+        moved = np.einsum("kcn,kn->kc", self._tool_along(q)[0][:, :3], qd)
+        return np.asarray(np.linalg.norm(moved, axis=1))
+
     @staticmethod
     def turned(first: Array, last: Array) -> Array:
         """Return the rotation vectors from quaternions to others (K, 4) in the work object."""

@@ -3,7 +3,9 @@
 After Universal Robots' script manual (e-Series, 5.11): ``movel`` goes straight to a pose, given as
 position [m] and rotation vector [rad] in the base's frame, in the time t [s] where that is given,
 and blends with the next motion within the radius r [m]; ``pose_trans(feature, p)`` is pose p of a
-feature; ``movej`` with t and r likewise between joint positions.
+feature; ``movej`` with t and r likewise between joint positions. A seam at a feed has its speed
+v [m/s] in place of times, and ``movec`` through a via pose where it goes round, whose orientation
+turns evenly to that of its end (mode 0).
 """
 
 from collections.abc import Sequence
@@ -12,11 +14,14 @@ from pathlib import Path as FilePath
 import numpy as np
 
 from selfmotion.basics import Array, write_text
-from selfmotion.formats.controller_program import Draft, head, pin_values, plain, with_begins
+from selfmotion.formats.controller_program import Draft
+from selfmotion.formats.feed_stretches import ZONE, FeedStretch
 from selfmotion.formats.pose_numbers import urscript_numbers, urscript_pose
 from selfmotion.formats.pose_stretches import PoseStretch
+from selfmotion.formats.program_heads import before, head, with_begins
 from selfmotion.formats.program_lines import ProgramReader
 from selfmotion.formats.program_settings import AXES
+from selfmotion.formats.program_texts import pin_values, plain
 from selfmotion.formats.read_stretches import Pose, pose_of_values
 from selfmotion.formats.stretches import Stretch
 from selfmotion.formats.thinning import TIME_DIGITS
@@ -48,6 +53,7 @@ def write_urscript(file: FilePath, draft: Draft) -> None:
     ]
     for stretch, begun in with_begins(draft.program.stretches):
         lines.append(f"  # step: {plain(stretch.name)}")
+        lines += [f"  # {line}" for line in before(stretch)]
         if begun is not None:
             lines.append(_slowly(draft, begun, by_axes=not isinstance(begun, PoseStretch)))
         lines += _moves(draft, stretch)
@@ -72,12 +78,27 @@ def _moves(draft: Draft, stretch: Stretch) -> list[str]:
     for k in range(1, len(stretch.t)):
         seconds = f"{stretch.t[k] - stretch.t[k - 1]:.{TIME_DIGITS}f}"
         word = "movel" if isinstance(stretch, PoseStretch) else "movej"
-        if stretch.is_rest:
+        if isinstance(stretch, FeedStretch):
+            lines.append(f"  {_at_speed(stretch, k)}, r={radii[k]:.6f}{_mode(stretch, k)})")
+        elif stretch.is_rest:
             lines.append(f"  sleep({seconds})")
         else:
             lines.append(f"  {word}({_target(stretch, k)}, t={seconds}, r={radii[k]:.6f})")
         lines += [f"  {event_line(name, draft.settings)}" for name in happens[k]]
     return lines
+
+
+def _at_speed(stretch: FeedStretch, k: int) -> str:
+    """Return a motion at a speed, but for its blend; the acceleration is that of the ramps."""
+    pace = f"a={stretch.speeds.max() / stretch.ramps.each:.4g}, v={stretch.speeds[k - 1]:.7g}"
+    if not stretch.goes_round(k):
+        return f"movel({_target(stretch, k)}, {pace}"
+    return f"movec({_target(stretch.middles, k - 1)}, {_target(stretch, k)}, {pace}"
+
+
+def _mode(stretch: FeedStretch, k: int) -> str:
+    """Return how the orientation of a circular motion turns: evenly to that of its end."""
+    return ", mode=0" if stretch.goes_round(k) else ""
 
 
 def _radii(draft: Draft, stretch: Stretch) -> Array:
@@ -89,7 +110,8 @@ def _radii(draft: Draft, stretch: Stretch) -> Array:
         places = draft.robot.chain.along(stretch.q[:, np.argsort(order)])[2]
     ways = np.linalg.norm(np.diff(places, axis=0), axis=1)
     radii = np.zeros(len(stretch.t))
-    radii[1:-1] = np.clip(_SHARE * np.minimum(ways[:-1], ways[1:]), _LEAST, _BLEND)
+    most = ZONE if isinstance(stretch, FeedStretch) else _BLEND
+    radii[1:-1] = np.clip(_SHARE * np.minimum(ways[:-1], ways[1:]), _LEAST, most)
     return radii
 
 
@@ -117,6 +139,10 @@ class UrscriptReader(ProgramReader):
         self._poses: list[Pose] = []
         self._axes: list[list[float]] = []
         self._times: list[float] = []
+        # Of motions at speeds: how fast [m/s], through where, and what is switched at which.
+        self._speeds: list[float] = []
+        self._vias: list[Pose | None] = []
+        self._happens: list[tuple[int, Sequence[str]]] = []
 
     def begin(self, _: Sequence[str]) -> None:
         """Begin the program."""
@@ -153,13 +179,34 @@ class UrscriptReader(ProgramReader):
 
     def move_linear(self, given: Sequence[str]) -> None:
         """Take a pose."""
-        if self._axes:
-            raise self.lines.fault("a pose after a joint target with a blend, expected r=0")
+        if self._axes or self._speeds:
+            raise self.lines.fault("a pose after another kind with a blend, expected r=0")
         self._poses.append(self._pose(given[0]))
         self._times.append(self.lines.duration(given[1]))
         if self.lines.number_of(given[2]) == 0.0:
             self.follow(self._poses, self._times)
             self._poses, self._times = [], []
+
+    def move_at_speed(self, given: Sequence[str]) -> None:
+        """Take a pose at a speed, straight or round."""
+        *poses, speed, radius = given
+        if self._axes or self._times:
+            raise self.lines.fault("a motion at a speed after one with a blend, expected r=0")
+        self._poses.append(self._pose(poses[-1]))
+        self._vias.append(self._pose(poses[0]) if poses[1:] else None)
+        self._speeds.append(self.lines.number_of(speed))
+        if not self._speeds[-1] > 0.0:
+            raise self.lines.fault(f"v is {self._speeds[-1]:g} m/s, expected a number above 0")
+        if self.lines.number_of(radius) == 0.0:
+            self.drive(self._poses, self._speeds, self._vias, self._happens)
+            self._poses, self._speeds, self._vias, self._happens = [], [], [], []
+
+    def switch(self, given: Sequence[str]) -> None:
+        """See `ProgramReader.switch`: between motions at speeds when these are known."""
+        if self._speeds:
+            self._happens.append((len(self._speeds), given))
+        else:
+            super().switch(given)
 
     def stream(self, _: Sequence[str]) -> None:
         """Refuse a stream."""
@@ -184,7 +231,7 @@ class UrscriptReader(ProgramReader):
         return super().clock + sum(self._times)
 
     def _check_stopped(self) -> None:
-        if self._times:
+        if self._times or self._speeds:
             raise self.lines.fault("the arm does not stop before this: the last r is not 0")
 
     def _joints(self, text: str) -> list[float]:
@@ -208,6 +255,7 @@ class UrscriptReader(ProgramReader):
 _LIST = r"\[([^\[\]]*)\]"
 _TARGET = rf"pose_trans\(feature, ?p{_LIST}\)"
 _SPEED = r"a=[\d.e-]+, ?v=[\d.e-]+"
+_RAMPED, _PACED = r"a=[\d.e-]+", r"v=([\d.e-]+), ?r=([\d.e-]+)"
 _TIMED = r"t=([\d.e-]+), ?r=([\d.e-]+)"
 UrscriptReader.grammar = (
     (("before",), r"def selfmotion\(\):", UrscriptReader.begin),
@@ -218,6 +266,16 @@ UrscriptReader.grammar = (
     (("body",), rf"movej\({_LIST}, ?{_TIMED}\)", UrscriptReader.move),
     (("body",), rf"movel\({_TARGET}, ?{_SPEED}\)", UrscriptReader.go_linear),
     (("body",), rf"movel\({_TARGET}, ?{_TIMED}\)", UrscriptReader.move_linear),
+    (
+        ("body",),
+        rf"movel\({_TARGET}, ?{_RAMPED}, ?{_PACED}\)",
+        UrscriptReader.move_at_speed,
+    ),
+    (
+        ("body",),
+        rf"movec\({_TARGET}, ?{_TARGET}, ?{_RAMPED}, ?{_PACED}, ?mode=0\)",
+        UrscriptReader.move_at_speed,
+    ),
     (("head", "body"), r"servoj\(.*\)", UrscriptReader.stream),
     (("body",), r"sleep\(([\d.e-]+)\)", UrscriptReader.wait),
     (

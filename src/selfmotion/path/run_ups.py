@@ -70,6 +70,9 @@ def with_run_ups(path: Feed) -> Stroke:
         if (missing <= 0.0).all():
             return Stroke(longer, begin, end, *ways.tolist())
         ways += path.feed * np.maximum(missing, 0.0) + _MORE * ways * (missing > 0.0)
+        if len(path.feeds) == 1:
+            # Both as long, so that what happens at the ends is on time either way.
+            ways[:] = ways.max()
     raise PathError(
         f"run-ups: the feed of {path.feed:g} m/s is not reached at the ends of the path with "
         f"{ways[0]:.3g} m before it and {ways[1]:.3g} m after it; ask for a lower feed, or larger "

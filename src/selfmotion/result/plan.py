@@ -31,7 +31,7 @@ from selfmotion.certificate import (
     approaches,
 )
 from selfmotion.collision import Obstacle
-from selfmotion.costs import Cost
+from selfmotion.costs import Cost, metres_of
 from selfmotion.motion import Trajectory
 from selfmotion.path import Path
 from selfmotion.problem.problem import Problem
@@ -198,6 +198,14 @@ class Plan:
             named. Costs that were functions are not in a plan's file: give them again.
         """
         return cost_of(self.problem.follows, self.trajectory, cost)
+
+    @property
+    def metres(self) -> Mapping[str, float]:
+        """What a metre of each joint that slides counted against a radian of the others [rad].
+
+        In the first cost of joint rates; empty for an arm of one kind of joints.
+        """
+        return metres_of(self.problem.costs, self.robot)
 
     def check(
         self,

@@ -21,7 +21,7 @@ from selfmotion.robot.inverse import solved
 from selfmotion.robot.named import home_of
 from selfmotion.robot.tree_arrays import TreeArrays, tree_arrays
 from selfmotion.robot.urdf import Urdf
-from selfmotion.robot.weights import joint_weights, part_weights
+from selfmotion.robot.weights import joint_weights, part_weights, speed_weights
 from selfmotion.task import Task
 
 # What of an arm its URDF limits, where nobody gave it other limits.
@@ -161,6 +161,16 @@ class RobotModel:
         links beyond [rad/m].
         """
         return joint_weights(self)
+
+    @property
+    def speed_weights(self) -> Array:
+        """What a unit of each joint counts by the limits of speed, (n,).
+
+        1 for a revolute joint. A metre of a prismatic one counts as many radians as revolute
+        joints turn in the same time, each at its limit of speed: the mean of their limits over its
+        own [rad/m]. One without a limit counts as in `joint_weights`.
+        """
+        return speed_weights(self)
 
     def part_weights(self, weights: Mapping[str, float]) -> Array:
         """Return `joint_weights`, those of some parts or joints times a number, (n,).

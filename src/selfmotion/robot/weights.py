@@ -16,6 +16,17 @@ def joint_weights(robot: "RobotModel") -> Array:
     return np.where(robot.is_revolute, 1.0, 1.0 / mean_lever(robot))
 
 
+def speed_weights(robot: "RobotModel") -> Array:
+    """Return what a unit of each joint counts, (n,); see `RobotModel.speed_weights`."""
+    turns, limits = robot.is_revolute, robot.velocity_limit
+    known = np.isfinite(limits) & (limits > 0.0)
+    if not (turns & known).any():
+        return joint_weights(robot)
+    fastest = float(limits[turns & known].mean())
+    by_speed = fastest / np.where(known, limits, 1.0)
+    return np.where(turns, 1.0, np.where(known, by_speed, joint_weights(robot)))
+
+
 def mean_lever(robot: "RobotModel") -> float:
     """Return how far [m] the tool goes where a revolute joint turns by a radian: their mean."""
     arrays = robot.chain.arrays
