@@ -49,7 +49,11 @@ OTHERWISE: dict[str, dict[str, str]] = {
         "warm_start": "is of a run, not of a job: job --from",
     },
     "Clearance": {},
-    "load_robot": {"urdf": "is name or file, or parts", "package_dirs": "are beside the file"},
+    "load_robot": {
+        "urdf": "is name or file, or parts",
+        "package_dirs": "are beside the file",
+        "geometry": "is of a pinocchio.Model, which is in no file",
+    },
     "TwistPath": {"twist": "is a function: breaks and coefficients", "knots": "are the breaks"},
 }
 

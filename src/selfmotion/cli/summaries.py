@@ -35,6 +35,8 @@ def show_plan(plan: Plan, console: Console) -> None:
         ignores = ", which ignores the constraints" if share > 0.0 else ""
         change = f" ({100.0 * share:+.2g} % from the minimum-norm motion{ignores})"
     _print(console, f"cost {report.cost:.6g}{change}, {duration}")
+    if plan.metres:
+        _print(console, metres_told(plan))
     said = report.status in _ENDED_WELL and report.message == report.status.message
     if certificate.verified and not said:
         _print(console, f"{report.status.value}: {in_shell(report.message)}")
@@ -43,6 +45,18 @@ def show_plan(plan: Plan, console: Console) -> None:
         share = first.saving / abs(report.cost)
         if share >= _WORTH:
             _print(console, f"{first.easing} would lower the cost by about {100.0 * share:.2g} %")
+
+
+def metres_told(plan: Plan) -> str:
+    """Return what metres counted against radians, and how to have it otherwise."""
+    counted = ", ".join(f"1 m of '{name}' as {rad:.3g} rad" for name, rad in plan.metres.items())
+    names = plan.robot.joint_names
+    squares = [f"{plan.metres[name] ** 2:.3g}" if name in plan.metres else "1" for name in names]
+    return (
+        f"the cost counts {counted}; another number: in the file [[costs]] kind = "
+        f'"JointVelocity", weight = [{", ".join(squares)}] (squares, joint by joint), in Python '
+        f"JointVelocity(weight=…)"
+    )
 
 
 def show_certificate(

@@ -14,6 +14,7 @@ from rich.table import Table
 
 from selfmotion.certificate import LIMIT_NAMES, Certificate, Extreme, Finding
 from selfmotion.cli.remedies import in_shell
+from selfmotion.cli.summaries import metres_told
 from selfmotion.job import Program
 from selfmotion.result import Gap, Plan, Report, compare
 from selfmotion.robot import RobotModel
@@ -71,23 +72,11 @@ def show(plan: Plan, console: Console) -> None:
         console.print(told, markup=False, soft_wrap=not console.is_terminal)
     console.print(f"joint reversals: {plan.reversals}", markup=False)
     if plan.metres:
-        console.print(_metres(plan), markup=False, soft_wrap=not console.is_terminal)
+        console.print(metres_told(plan), markup=False, soft_wrap=not console.is_terminal)
 
 
 # A look at single poses, starts, and the proof: what more was tried is told.
 _USUAL_ATTEMPTS = 3
-
-
-def _metres(plan: Plan) -> str:
-    """Return what metres counted against radians, and how to have it otherwise."""
-    counted = ", ".join(f"1 m of '{name}' as {rad:.3g} rad" for name, rad in plan.metres.items())
-    names = plan.robot.joint_names
-    squares = [f"{plan.metres[name] ** 2:.3g}" if name in plan.metres else "1" for name in names]
-    return (
-        f"the cost counts {counted}; another number: in the file [[costs]] kind = "
-        f'"JointVelocity", weight = [{", ".join(squares)}] (squares, joint by joint), in Python '
-        f"JointVelocity(weight=…)"
-    )
 
 
 def _tried(report: Report) -> Table:

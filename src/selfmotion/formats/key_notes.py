@@ -99,6 +99,10 @@ _IN_FILES: Mapping[str, Mapping[str, str]] = {
     },
     "circle": {"radius": "[m], where the centre follows from the start; or give the centre."},
     "line": {"by": "How far it goes from the start [m]; or give the end."},
+    **dict.fromkeys(
+        ("waypoints", "polyline"),
+        {"quaternions": "w, x, y, z of each pose, as `quaternions_wxyz`; or 3 × 3 matrices."},
+    ),
     "twist": {
         "breaks": "Times at which the polynomials change [s].",
         "coefficients": "Of the twist's six components between them, lowest order first.",
