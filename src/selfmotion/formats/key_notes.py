@@ -42,6 +42,7 @@ _GIVEN_TO: Mapping[str, tuple[Callable[..., Any], ...]] = {
 }
 # What files say otherwise than the classes, in tables of a name; "" for all others.
 _ORIENTATION = "of the axes; one of rotation, quaternion, rpy, rotation_vector and normal"
+_QUATERNIONS = "w, x, y, z of each pose, as `quaternions_wxyz`; or 3 × 3 matrices."
 _IN_FILES: Mapping[str, Mapping[str, str]] = {
     "": {
         "kind": "Which of these it is.",
@@ -99,10 +100,8 @@ _IN_FILES: Mapping[str, Mapping[str, str]] = {
     },
     "circle": {"radius": "[m], where the centre follows from the start; or give the centre."},
     "line": {"by": "How far it goes from the start [m]; or give the end."},
-    **dict.fromkeys(
-        ("waypoints", "polyline"),
-        {"quaternions": "w, x, y, z of each pose, as `quaternions_wxyz`; or 3 × 3 matrices."},
-    ),
+    "waypoints": {"quaternions": _QUATERNIONS},
+    "polyline": {"quaternions": _QUATERNIONS},
     "twist": {
         "breaks": "Times at which the polynomials change [s].",
         "coefficients": "Of the twist's six components between them, lowest order first.",
