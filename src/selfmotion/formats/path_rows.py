@@ -20,7 +20,6 @@ from selfmotion.basics import (
     shown,
 )
 from selfmotion.formats.documents import read_values
-from selfmotion.formats.ros import nanoseconds
 from selfmotion.formats.rotary import Rotary
 
 _POSITION = ("x", "y", "z")
@@ -474,3 +473,9 @@ READERS: Mapping[str, Callable[[FilePath, Reading], Mapping[str, PoseRows]]] = {
     ".yml": lambda file, _: _read_ros(file),
     ".json": lambda file, _: _read_ros(file),
 }
+
+
+def nanoseconds(stamp: Mapping[str, Any]) -> int:
+    """Return a time of ROS 2, or of ROS 1, whose names differ [ns]; KeyError for what is none."""
+    seconds, rest = ("secs", "nsecs") if "secs" in stamp else ("sec", "nanosec")
+    return int(stamp[seconds]) * 1_000_000_000 + int(stamp[rest])

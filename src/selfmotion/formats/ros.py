@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from selfmotion.basics import Array, FileFormatError
+from selfmotion.formats.path_rows import nanoseconds
 from selfmotion.formats.samples import MotionSamples
 from selfmotion.motion import Trajectory
 
@@ -86,12 +87,6 @@ def robot_trajectory(motion: MotionSamples) -> dict[str, Any]:
 
 def _header() -> dict[str, Any]:
     return {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": ""}
-
-
-def nanoseconds(stamp: Mapping[str, Any]) -> int:
-    """Return a time of ROS 2, or of ROS 1, whose names differ [ns]; KeyError for what is none."""
-    seconds, rest = ("secs", "nsecs") if "secs" in stamp else ("sec", "nanosec")
-    return int(stamp[seconds]) * _NANO + int(stamp[rest])
 
 
 def trajectory(file: Path, document: Mapping[str, Any]) -> Trajectory:
