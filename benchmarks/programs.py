@@ -29,7 +29,7 @@ from rich.table import Table
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
 import selfmotion as sm
-from selfmotion.formats import PROGRAMS, program_miss, read_program
+from selfmotion.controllers import PROGRAMS, program_miss, read_program
 from selfmotion.task import SE3, exp3
 from support.industrial import industrial_arm
 from support.played_programs import Read, off, read_poses

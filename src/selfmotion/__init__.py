@@ -36,8 +36,8 @@ from selfmotion.certificate import (
     Tolerance as Tolerance,
     certify as certify,
 )
+from selfmotion.documents import read_problem as read_problem
 from selfmotion.follow import Follow as Follow, Follows as Follows
-from selfmotion.formats import read_problem as read_problem
 from selfmotion.job import (
     Program as Program,
     Seam as Seam,

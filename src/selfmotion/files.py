@@ -4,19 +4,21 @@ What can be loaded again, without loss, has `save`: plans, moves, parts and prog
 else is written by a function ``write_…(thing, file)``; replays by `selfmotion.replay.write_replay`.
 """
 
-from selfmotion.formats import (
-    Job,
+from selfmotion.cam import read_path
+from selfmotion.controllers import (
     ProgramSettings,
+    read_motion,
+    read_parts,
+    read_program_settings,
+    write_motion,
+    write_parts,
+)
+from selfmotion.documents import (
+    Job,
     SeamJob,
     read_job,
     read_joint_limits,
-    read_motion,
-    read_parts,
-    read_path,
-    read_program_settings,
     read_seam_job,
-    write_motion,
-    write_parts,
     write_problem,
 )
 from selfmotion.job import write_timetable

@@ -21,7 +21,7 @@ import trimesh
 import selfmotion as sm
 from selfmotion.batch import BatchProgress, Item, grid_items, plan_items, run
 from selfmotion.cli.runs import is_answered
-from selfmotion.formats import write_combination
+from selfmotion.documents import write_combination
 from support.arms import PANDA_HOME, robot_named
 from support.places import ROOT, TESTS
 from support.shell import complaint, invoke

@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 
 import selfmotion as sm
 from selfmotion.cli import app, commands, documents
-from selfmotion.formats import example_text, job_of
+from selfmotion.documents import example_text, job_of
 from support.arms import robot_named
 from support.shell import complaint, invoke
 

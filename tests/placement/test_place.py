@@ -8,7 +8,7 @@ import pinocchio as pin
 import pytest
 
 import selfmotion as sm
-from selfmotion.formats import read_problem
+from selfmotion.documents import read_problem
 from selfmotion.placement import search
 from selfmotion.placement.places import Places, Tried, places_of
 from selfmotion.placement.search import Box, Descent, finalists

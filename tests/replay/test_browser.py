@@ -10,7 +10,7 @@ import pytest
 
 from selfmotion.collision import Box, CollisionModel
 from selfmotion.constraints import Clearance
-from selfmotion.formats import read_motion
+from selfmotion.controllers import read_motion
 from selfmotion.replay import notebook_html, write_replay
 from selfmotion.robot import NAMED_ARMS
 from support.layouts import chromium

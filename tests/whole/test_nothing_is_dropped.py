@@ -14,8 +14,9 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.formats import json_schema, read_document
-from selfmotion.formats.seam_job import SHARED
+from selfmotion.basics import read_document
+from selfmotion.documents import json_schema
+from selfmotion.documents.seam_job import SHARED
 from selfmotion.problem import problem_to_dict
 from selfmotion.task import SE3
 from support.arms import PANDA_HOME, robot_named

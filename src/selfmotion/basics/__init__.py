@@ -74,6 +74,17 @@ from selfmotion.basics.jit import (
     kernel as kernel,
 )
 from selfmotion.basics.names import nearest as nearest
+from selfmotion.basics.nested_tables import (
+    ANGLES as ANGLES,
+    FORMER_CLEARANCE as FORMER_CLEARANCE,
+    LENGTHS as LENGTHS,
+    PER_JOINT as PER_JOINT,
+    in_si as in_si,
+    is_share as is_share,
+    read_document as read_document,
+    read_values as read_values,
+    write_document as write_document,
+)
 from selfmotion.basics.progress import Progress as Progress, silent as silent
 from selfmotion.basics.saved import (
     Saved as Saved,

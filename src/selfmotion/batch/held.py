@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 from selfmotion.certificate import USUAL
-from selfmotion.formats import Job
+from selfmotion.documents import Job
 from selfmotion.path import Path, Retimed
 from selfmotion.problem import Problem
 from selfmotion.result import Asked, Plan

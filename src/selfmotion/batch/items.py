@@ -6,9 +6,9 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from selfmotion.basics import FileFormatError, ProblemError, SelfmotionError
+from selfmotion.basics import FileFormatError, ProblemError, SelfmotionError, read_document
 from selfmotion.costs import FunctionCost
-from selfmotion.formats import Job, grid_documents, job_of, read_document
+from selfmotion.documents import Job, grid_documents, job_of
 from selfmotion.problem import Problem, problem_to_dict
 from selfmotion.result import files_of, key_of, own_modules, told
 

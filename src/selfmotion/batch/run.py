@@ -25,7 +25,7 @@ from selfmotion.batch.folder import Folder
 from selfmotion.batch.items import Item, problem_items
 from selfmotion.batch.row import Row
 from selfmotion.batch.worker import begin_process, plan_task
-from selfmotion.formats import Job, write_combination
+from selfmotion.documents import Job, write_combination
 from selfmotion.problem import Problem
 
 # Each worker has this many problems at hand, so that none waits for the next one.

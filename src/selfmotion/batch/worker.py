@@ -12,7 +12,7 @@ from typing import Any
 
 from selfmotion.basics import InverseKinematicsError, NoSequenceError, SelfmotionError
 from selfmotion.batch.row import measured
-from selfmotion.formats import Job
+from selfmotion.documents import Job
 from selfmotion.problem import problem_from_dict
 from selfmotion.result import Made
 

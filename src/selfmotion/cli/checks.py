@@ -9,7 +9,7 @@ import numpy as np
 import typer
 
 import selfmotion as sm
-from selfmotion import formats
+from selfmotion import controllers
 from selfmotion.basics import Progress
 from selfmotion.certificate import Extreme, approaches
 from selfmotion.cli import options
@@ -24,7 +24,7 @@ def read(
     """Return the motion of a file, and what it may miss its path by: what a program states."""
     motion = sm.files.read_motion(file, degrees=degrees, robot=robot)
     if within is None and is_program(file):
-        within = formats.stated_deviation(file, robot)
+        within = controllers.stated_deviation(file, robot)
         if within is not None:
             text = (
                 f"note: judged within the {1e3 * within.position:.3g} mm and {within.rotation:.2g} "
@@ -36,13 +36,13 @@ def read(
 
 def is_program(file: Path) -> bool:
     """Whether a file is a program of a controller."""
-    return file.suffix.lower() in formats.READ_PROGRAMS
+    return file.suffix.lower() in controllers.READ_PROGRAMS
 
 
 def tell_of_controller(file: Path, robot: sm.RobotModel) -> None:
     """Print what a verdict on a program of seams at their feeds leaves to the controller."""
-    if is_program(file) and formats.read_program(file, robot).within is not None:
-        text = formats.of_the_controller(file, robot)
+    if is_program(file) and controllers.read_program(file, robot).within is not None:
+        text = controllers.of_the_controller(file, robot)
         terminal.print(text, markup=False, soft_wrap=True)
 
 
@@ -104,14 +104,14 @@ def of_problem(
     problem = job.problem
     motion, within = read(file, degrees, within, problem.robot)
     if is_program(file):
-        problem = formats.by_targets(problem)
-        program = formats.read_program(file, problem.robot)
+        problem = controllers.by_targets(problem)
+        program = controllers.read_program(file, problem.robot)
         motion = program.along(problem.path)
         begin = motion.of_joints(problem.robot.joint_names).q[0]
-        problem = formats.as_shifted(problem, program, begin)
-        if formats.shift_told(program):
-            stages.print(f"note: {formats.shift_told(program)}", markup=False, soft_wrap=True)
-    motion = formats.without_followers(motion, problem.robot)
+        problem = controllers.as_shifted(problem, program, begin)
+        if controllers.shift_told(program):
+            stages.print(f"note: {controllers.shift_told(program)}", markup=False, soft_wrap=True)
+    motion = controllers.without_followers(motion, problem.robot)
     if calibration is not None:
         problem = on_calibrated(problem, calibration)
         tell_difference(problem.robot, motion)
@@ -138,7 +138,7 @@ def of_program(
         raise sm.errors.ProblemError(
             f"{file}: is no program of a controller, which {job} could judge"
         )
-    found = formats.judged_program(file, sm.load_program(job), within)
+    found = controllers.judged_program(file, sm.load_program(job), within)
     steps, verified = found.steps, found.verified
     if as_json:
         data = {

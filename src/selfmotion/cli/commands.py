@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 
 import selfmotion as sm
-from selfmotion import formats
+from selfmotion import controllers
 from selfmotion.basics import write_text
 from selfmotion.cli import checks, documents, jobs, json_tables, options, outputs, tables
 from selfmotion.cli.app import (
@@ -24,6 +24,7 @@ from selfmotion.cli.app import (
     terminal,
 )
 from selfmotion.cli.stage_display import StageDisplay
+from selfmotion.documents import example_texts, json_schema
 
 
 @app.command(
@@ -137,7 +138,7 @@ def init(
     file = Path(f"{Path(robot).stem}.toml") if out is None else out
     if os.path.exists(file) and not force:
         raise sm.errors.FileFormatError(f"{file}: is there already; give --out or --force")
-    texts = formats.example_texts(
+    texts = example_texts(
         robot,
         file,
         tool=tool,
@@ -158,7 +159,7 @@ def schema(
     out: Annotated[Path | None, typer.Option(help="File; by default the terminal.")] = None,
 ) -> None:
     """Write the JSON Schema of problem files, for completion in an editor."""
-    text = json.dumps(formats.json_schema(), indent=1)
+    text = json.dumps(json_schema(), indent=1)
     if out is None:
         typer.echo(text)
         return
@@ -256,11 +257,11 @@ def check(
                 calibration=calibration,
             )
             motion, stated = checks.read(file, degrees, within, arm)
-            motion = formats.without_followers(motion, arm)
+            motion = controllers.without_followers(motion, arm)
             asked = options.requirements(arm, *judged)
             followed = documents.followed(path, context.params, arm)
             if checks.is_program(file):
-                motion = formats.read_program(file, arm).along(followed)
+                motion = controllers.read_program(file, arm).along(followed)
             certificate = sm.certify(
                 arm, followed, task or "pose", motion, stated, asked, progress=display.stage
             )

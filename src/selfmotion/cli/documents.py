@@ -10,22 +10,20 @@ import numpy as np
 import typer
 
 import selfmotion as sm
+from selfmotion.basics import read_document
+from selfmotion.cam import PATH_SUFFIXES, events_of, has_normals
 from selfmotion.cli import options
 from selfmotion.cli.app import plan_with_progress, stages
 from selfmotion.cli.stage_display import StageDisplay
-from selfmotion.formats import (
-    PATH_SUFFIXES,
-    events_of,
+from selfmotion.documents import (
     grid_documents,
-    has_normals,
     job_of,
     parse_setting,
     path_of,
-    pose_of,
-    read_document,
     seam_job_of,
     set_key,
 )
+from selfmotion.path import pose_of
 
 # Of problem files.
 SUFFIXES = (".toml", ".json")

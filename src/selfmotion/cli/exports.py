@@ -8,10 +8,11 @@ import numpy as np
 import typer
 
 import selfmotion as sm
-from selfmotion import formats
+from selfmotion import controllers
 from selfmotion.cli import jobs, options, outputs, program_options
 from selfmotion.cli.app import FILES, NOT_VERIFIED, VERIFIED, app, stages, terminal
 from selfmotion.cli.stage_display import StageDisplay
+from selfmotion.controllers import FORMS
 from selfmotion.result import is_move
 
 _Made = sm.Plan | sm.Parts | sm.Move | sm.Program
@@ -40,7 +41,7 @@ def export(
     ] = None,
     form: Annotated[
         str | None,
-        typer.Option("--format", help=f"Format, whatever the suffix: {', '.join(formats.FORMS)}."),
+        typer.Option("--format", help=f"Format, whatever the suffix: {', '.join(FORMS)}."),
     ] = None,
     parts: Annotated[
         bool,
@@ -102,7 +103,7 @@ def export(
     messages = any(_is_message(target, form) for target in out)
     coarsest = None
     if messages and rate is None and isinstance(made, sm.Plan):
-        coarsest = formats.coarsest_rate(made)
+        coarsest = controllers.coarsest_rate(made)
     sound = True
     for target in out:
         given: dict[str, Any] = {"format": form, "force": force}
@@ -142,13 +143,15 @@ def export(
 
 
 def _is_message(target: Path, form: str | None) -> bool:
-    return (form or formats.SUFFIXES.get(target.suffix.lower())) in formats.MESSAGES
+    return (form or controllers.SUFFIXES.get(target.suffix.lower())) in controllers.MESSAGES
 
 
 def _tell_followers(robot: sm.RobotModel, out: list[Path], form: str | None) -> None:
     """Print which joints are in no file, because they mimic others."""
-    following = formats.followers(robot)
-    if following and any((form or formats.SUFFIXES.get(file.suffix)) != "mujoco" for file in out):
+    following = controllers.followers(robot)
+    if following and any(
+        (form or controllers.SUFFIXES.get(file.suffix)) != "mujoco" for file in out
+    ):
         pairs = ", ".join(f"'{name}' '{other}'" for name, other in following.items())
         stages.print(
             f"note: joints that mimic others are left out ({pairs}): controllers of ROS and MoveIt "
@@ -163,7 +166,7 @@ def _check_verified(made: _Made, force: bool, as_json: bool) -> None:
     if force:
         return
     if _verified(made):
-        verdict = formats.moving_ends(made)
+        verdict = controllers.moving_ends(made)
         if not verdict:
             return
     else:
@@ -178,18 +181,18 @@ def _check_verified(made: _Made, force: bool, as_json: bool) -> None:
 
 def _is_program(target: Path, form: str | None, asked: sm.files.ProgramSettings | None) -> bool:
     """Whether a file is a program of targets, which has no rate."""
-    name = form or formats.SUFFIXES.get(target.suffix.lower())
+    name = form or controllers.SUFFIXES.get(target.suffix.lower())
     linear = asked is not None and asked.by_poses
-    return name in formats.PROGRAMS.values() or (name == "urscript" and linear)
+    return name in controllers.PROGRAMS.values() or (name == "urscript" and linear)
 
 
 def _is_of_controller(target: Path, form: str | None) -> bool:
-    name = form or formats.SUFFIXES.get(target.suffix.lower())
-    return name == "urscript" or name in formats.PROGRAMS.values()
+    name = form or controllers.SUFFIXES.get(target.suffix.lower())
+    return name == "urscript" or name in controllers.PROGRAMS.values()
 
 
 def _is_readable(target: Path, form: str | None) -> bool:
-    return form in formats.READABLE or (
+    return form in controllers.READABLE or (
         form is None and target.suffix.lower() not in (".xml", ".script")
     )
 
@@ -207,7 +210,7 @@ def _read_back(
 
     The `whole` verdict, or its summary.
     """
-    if _is_program(target, form, asked) and target.suffix.lower() in formats.READ_PROGRAMS:
+    if _is_program(target, form, asked) and target.suffix.lower() in controllers.READ_PROGRAMS:
         return _confirmed(made, target)
     if not _is_readable(target, form):
         return _verified(made), ""
@@ -222,7 +225,7 @@ def _read_back(
             # Steps meet between its samples: there is no motion of each that rests at its ends.
             return _verified(made), _told_of_samples(made.trajectory, motion, rate)
         case sm.Program():
-            found = formats.judged_motion(motion, made)
+            found = controllers.judged_motion(motion, made)
             return found.verified, f"read back: {found.verdict}"
     return _judged_parts(made, motion, whole=whole)
 
@@ -244,11 +247,11 @@ def _judged_parts(made: sm.Parts, motion: sm.Trajectory, *, whole: bool) -> tupl
     plans, moves = [], []
     for k, (plan, begin) in enumerate(zip(made.plans, made.begins, strict=True)):
         end = begin + plan.trajectory.duration
-        read = replace(plan, trajectory=formats.part_of(every, begin, end))
+        read = replace(plan, trajectory=controllers.part_of(every, begin, end))
         plans.append(replace(read, certificate=read.check()))
         if k < len(made.moves):
             after = stops[k + 1]
-            part = formats.part_of(every, end, float(after))
+            part = controllers.part_of(every, end, float(after))
             moves.append(sm.Move(made.robot, made.moves[k].constraints, part))
     found = replace(made, plans=tuple(plans), moves=tuple(moves))
     return found.verified, _told(found, whole)
@@ -256,7 +259,7 @@ def _judged_parts(made: sm.Parts, motion: sm.Trajectory, *, whole: bool) -> tupl
 
 def _confirmed(made: _Made, target: Path) -> tuple[bool, str]:
     """Return whether a program keeps what it states, and that in words."""
-    count, stated, found = formats.program_miss(made, target)
+    count, stated, found = controllers.program_miss(made, target)
     told, kept = [], _verified(made)
     for miss, said, where in zip(found, stated, ("off the plan", "in free moves"), strict=True):
         # The file states nine digits.
@@ -266,10 +269,10 @@ def _confirmed(made: _Made, target: Path) -> tuple[bool, str]:
                 f"{1e3 * miss.position:.3g} mm and {miss.rotation:.2g} rad {where} "
                 f"({1e3 * said.position:.3g} mm are stated in the file)"
             )
-    switched = formats.misswitched(target, made) if isinstance(made, sm.Program) else ()
+    switched = controllers.misswitched(target, made) if isinstance(made, sm.Program) else ()
     kept &= not switched
     far = f", between which the tool is at most {', and '.join(told)}" if told else ""
-    read = formats.read_program(target, made.robot)
+    read = controllers.read_program(target, made.robot)
     remark, at_feeds = read.remark, read.within is not None
     targets = "target" if count == 1 else "targets"
     paced = ["seams are at their feeds, with ramps of the controller's own"] if at_feeds else []
@@ -303,7 +306,7 @@ def _finish(
     """Print what was written, and end."""
     miss = None
     if sampled and isinstance(made, sm.Plan):
-        miss = formats.linear_miss(made, rate)
+        miss = controllers.linear_miss(made, rate)
     if as_json:
         data: dict[str, Any] = {"verified": sound, "written": verdicts}
         terminal.print_json(data=data if miss is None else data | {"linear_miss": miss._asdict()})

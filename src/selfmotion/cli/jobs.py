@@ -8,7 +8,7 @@ from typing import Annotated, Any, NoReturn
 import typer
 
 import selfmotion as sm
-from selfmotion import formats
+from selfmotion import controllers
 from selfmotion.cli import (
     documents,
     json_tables,
@@ -79,11 +79,11 @@ def job(
     if asked is not None or any(_switches(target) for target in wanted):
         # Before anything is planned.
         happens = {event: seam.name for seam in work.seams for event, _ in seam.events}
-        formats.check_signals(happens, asked or sm.files.ProgramSettings())
+        controllers.check_signals(happens, asked or sm.files.ProgramSettings())
         for target in wanted:
-            if target.suffix.lower() in formats.PROGRAMS:
-                form = formats.PROGRAMS[target.suffix.lower()]
-                formats.check_controller(work.robot, form, asked or sm.files.ProgramSettings())
+            if target.suffix.lower() in controllers.PROGRAMS:
+                form = controllers.PROGRAMS[target.suffix.lower()]
+                controllers.check_controller(work.robot, form, asked or sm.files.ProgramSettings())
     remarks = work.remarks
     outputs.tell(remarks)
     kept = folder or Path("out") / f"{file.stem}.job"
@@ -105,7 +105,7 @@ def job(
         terminal.print(text, markup=False, soft_wrap=True)
     _show(program, as_json, verbose, remarks)
     # What is only of programs of targets is said for these, where there are some.
-    has_targets = any(target.suffix.lower() in formats.PROGRAMS for target in wanted)
+    has_targets = any(target.suffix.lower() in controllers.PROGRAMS for target in wanted)
     for target in wanted:
         unsound = outputs.left_out(program)
         if unsound and outputs.is_motion(target) and not _is_timetable(target):
@@ -121,8 +121,8 @@ def job(
 
 
 def _check(file: Path) -> None:
-    if not (file.suffix in (PROGRAM, ".html", *formats.SUFFIXES) or _is_timetable(file)):
-        known = ", ".join(formats.SUFFIXES)
+    if not (file.suffix in (PROGRAM, ".html", *controllers.SUFFIXES) or _is_timetable(file)):
+        known = ", ".join(controllers.SUFFIXES)
         raise sm.errors.FileFormatError(
             f"{file}: --out writes .program, .timetable.csv, .html (a replay) or the motion "
             f"({known})"
@@ -131,7 +131,7 @@ def _check(file: Path) -> None:
 
 def _switches(file: Path) -> bool:
     """Whether a file says what events switch."""
-    return file.suffix.lower() in (*formats.PROGRAMS, ".script")
+    return file.suffix.lower() in (*controllers.PROGRAMS, ".script")
 
 
 def _is_timetable(file: Path) -> bool:
@@ -160,8 +160,8 @@ def finish_parts(job: sm.files.Job, out: list[Path], as_json: bool, verbose: boo
     """Plan a motion in parts, print it, write its files, and end."""
     wanted = [*job.outputs, *out]
     for file in wanted:
-        if file.suffix not in (PARTS, ".html", *formats.SUFFIXES):
-            known = ", ".join(formats.SUFFIXES)
+        if file.suffix not in (PARTS, ".html", *controllers.SUFFIXES):
+            known = ", ".join(controllers.SUFFIXES)
             raise sm.errors.FileFormatError(
                 f"{file}: of parts --out writes {PARTS} (all of it), .html or the motion ({known})"
             )

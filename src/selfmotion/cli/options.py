@@ -8,7 +8,7 @@ import numpy as np
 import typer
 
 import selfmotion as sm
-from selfmotion import formats
+from selfmotion import basics, documents
 from selfmotion.basics import TURN, Array
 
 TaskName = Literal["pose", "position", "pointing", "planar", "planar_pose"]
@@ -384,7 +384,7 @@ def requirements(
             sm.constraints.JointAccelerationLimits(one_or_each(acceleration, "--acceleration"))
         )
     if joint_limits is not None:
-        asked += formats.read_joint_limits(joint_limits, robot)
+        asked += documents.read_joint_limits(joint_limits, robot)
     if obstacles is not None or clearance != 0.0 or srdf is not None:
         bodies = () if obstacles is None else read_obstacles(obstacles)
         asked.append(sm.constraints.Clearance(bodies, clearance, srdf))
@@ -414,7 +414,7 @@ def read_obstacles(file: Path) -> tuple[sm.obstacles.Obstacle, ...]:
     found = []
     for k, item in enumerate(obstacle_tables(file)):
         try:
-            found.append(formats.obstacle(item, lambda name: Path(name)))
+            found.append(documents.obstacle(item, lambda name: Path(name)))
         except sm.SelfmotionError as error:
             raise sm.errors.FileFormatError(f"{file}: [{k}]: {error}") from error
     return tuple(found)
@@ -430,7 +430,7 @@ def obstacle_tables(file: Path) -> list[dict[str, Any]]:
         raise sm.errors.FileFormatError(
             f"{file}: expected a list of obstacles, each a table of values"
         )
-    found = [formats.in_si(item, f"{file}: [{k}].") for k, item in enumerate(listed)]
+    found = [basics.in_si(item, f"{file}: [{k}].") for k, item in enumerate(listed)]
     for item in found:
         if isinstance(item.get("file"), str):
             item["file"] = str(file.parent / item["file"])
@@ -438,5 +438,5 @@ def obstacle_tables(file: Path) -> list[dict[str, Any]]:
 
 
 def _listed(file: Path) -> Any:
-    found = formats.read_values(file)
+    found = basics.read_values(file)
     return found.get("obstacles") if isinstance(found, dict) else found

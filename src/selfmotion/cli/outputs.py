@@ -9,7 +9,7 @@ import typer
 from rich.console import Console
 
 import selfmotion as sm
-from selfmotion import formats
+from selfmotion import controllers
 from selfmotion.certificate import Extreme
 from selfmotion.cli import json_tables, summaries, tables
 from selfmotion.cli.app import NOT_VERIFIED, VERIFIED, stages, terminal
@@ -101,13 +101,13 @@ def show_certificate(
 
 def is_motion(file: Path) -> bool:
     """Whether a file is a motion that a controller may be given."""
-    return file.suffix in formats.SUFFIXES and file.suffix != ".npz"
+    return file.suffix in controllers.SUFFIXES and file.suffix != ".npz"
 
 
 def left_out(made: sm.Plan | sm.Parts | sm.Program) -> str:
     """Return why a motion is given to no controller, "" where nothing speaks against it."""
     verified = made.certificate.verified if isinstance(made, sm.Plan) else made.verified
-    return formats.moving_ends(made) if verified else "it is not verified"
+    return controllers.moving_ends(made) if verified else "it is not verified"
 
 
 def tell_left_out(file: Path, console: Console, reason: str, *, quiet: bool) -> None:
@@ -150,8 +150,8 @@ def _replay(result: sm.Plan, file: Path) -> None:
 def check_suffixes(files: list[Path]) -> None:
     """Raise FileFormatError for a file that --out cannot write."""
     for file in files:
-        if file.suffix not in (".npz", ".html", *formats.SUFFIXES):
-            known = ", ".join(formats.SUFFIXES)
+        if file.suffix not in (".npz", ".html", *controllers.SUFFIXES):
+            known = ", ".join(controllers.SUFFIXES)
             raise sm.errors.FileFormatError(
                 f"{file}: --out writes .npz (the plan), .html (its replay) or its motion ({known})"
             )

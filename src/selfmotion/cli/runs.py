@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 import selfmotion as sm
-from selfmotion import formats, realtime
+from selfmotion import basics, realtime
 from selfmotion.cli import json_tables, options, outputs, summaries, tables
 from selfmotion.cli.app import (
     BEGIN,
@@ -89,7 +89,7 @@ def batch(
     check_cluster(dask, workers)
     several = [grid_items(file, allow_code=allow_code) for file in files]
     for file in files:
-        if formats.read_document(file).get("outputs"):
+        if basics.read_document(file).get("outputs"):
             _told_apart(f"note: {file}: outputs are left out: the plans of a batch go to '{out}'")
     items = [item for each in several for item in each]
     names = [item.name for item in items]
@@ -209,7 +209,7 @@ def follow(
     from selfmotion.cli import following
 
     problem = sm.read_problem(file, allow_code=allow_code)
-    left = [key for key in formats.read_document(file) if key in _OF_PLANS]
+    left = [key for key in basics.read_document(file) if key in _OF_PLANS]
     if left:
         _told_apart(f"note: {file}: {', '.join(left)}: of plans, and left out while the arm moves")
     asked = {"horizon": horizon, "period": period, "cycle": cycle, "latency": latency}

@@ -29,3 +29,8 @@ from selfmotion.path.time_law import TimeLaw as TimeLaw
 from selfmotion.path.twist import TwistPath as TwistPath
 from selfmotion.path.waypoints import Waypoints as Waypoints
 from selfmotion.path.weave import Weave as Weave
+from selfmotion.path.written_poses import (
+    ORIENTATIONS as ORIENTATIONS,
+    from_normal as from_normal,
+    pose_of as pose_of,
+)

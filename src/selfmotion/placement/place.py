@@ -26,7 +26,7 @@ from selfmotion.basics import (
     silent,
 )
 from selfmotion.batch import Item
-from selfmotion.formats import Job
+from selfmotion.documents import Job
 from selfmotion.placement.found import Placement, on_bounds
 from selfmotion.placement.places import (
     COORDINATES,

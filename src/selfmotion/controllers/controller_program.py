@@ -1,0 +1,270 @@
+"""A joint motion as programs of robot controllers say it, whichever language they speak."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import partial
+from itertools import combinations
+from typing import NamedTuple
+
+import numpy as np
+
+from selfmotion.basics import FileFormatError, ProblemError, Progress, nearest, silent
+from selfmotion.certificate import Tolerance
+from selfmotion.controllers.feed_stretches import FeedStretch
+from selfmotion.controllers.feed_thinning import FeedSpan
+from selfmotion.controllers.pieces import pieces_of
+from selfmotion.controllers.pose_numbers import ROUNDINGS
+from selfmotion.controllers.pose_thinning import NotByPosesError, PoseSpan
+from selfmotion.controllers.program_axes import Axis, axes_of, in_order, tool_from_flange
+from selfmotion.controllers.program_settings import ProgramSettings, Signal
+from selfmotion.controllers.program_texts import plain
+from selfmotion.controllers.stretches import NO_MISS, Misses, Stretch, miss_of
+from selfmotion.controllers.targets import stretches_of
+from selfmotion.controllers.tool_frames import WORLD, ToolFrames, own_joint
+from selfmotion.job import Program, are_opposite
+from selfmotion.motion import Trajectory
+from selfmotion.path import Path
+from selfmotion.result import Move, Parts, Plan
+from selfmotion.robot import RobotModel
+from selfmotion.task import SE3
+
+
+class Switch(NamedTuple):
+    """What a program does besides moving.
+
+    Attributes
+    ----------
+    at : float
+        From the begin of its motion [s].
+    output : str
+        What is switched; of an event that is a comment only its name.
+    value : bool or None
+        To what; None for a comment.
+    """
+
+    at: float
+    output: str
+    value: bool | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class ControllerProgram:
+    """What a program file says of a motion.
+
+    Attributes
+    ----------
+    name : str
+        Of the module.
+    axes : tuple of Axis
+        In the order of the file: A1 … A6, E1 … E6.
+    stretches : tuple of Stretch
+        From rest to rest, coordinates in the order of the axes.
+    miss : Misses
+        How far targets are off the motion, as the file states it.
+    switches : tuple of Switch
+        What is switched when, in order.
+    shift : SE3 or None
+        By how much the work object is elsewhere than it was planned, in the frame of its carrier;
+        None where it is not.
+    carrier : str
+        The link that the work object is fixed to, or ``"world"``.
+    remark : str
+        Why targets are joints though poses were asked for.
+    within : Tolerance or None
+        Within what seams at speeds keep what is prescribed, by their certificates; None where none
+        is at a speed.
+    timed : tuple of str
+        Why seams with a feed have times all the same, each reason once.
+    """
+
+    name: str
+    axes: tuple[Axis, ...]
+    stretches: tuple[Stretch, ...]
+    miss: Misses
+    switches: tuple[Switch, ...] = ()
+    shift: SE3 | None = None
+    carrier: str = WORLD
+    remark: str = ""
+    within: Tolerance | None = None
+    timed: tuple[str, ...] = ()
+
+    @property
+    def targets(self) -> int:
+        """How many targets it has."""
+        return sum(len(stretch.t) - 1 for stretch in self.stretches if not stretch.is_rest)
+
+    @property
+    def trajectory(self) -> Trajectory:
+        """The motion as the cubic spline through the targets of each stretch, at rest in between.
+
+        Raises
+        ------
+        FileFormatError
+            There is none.
+        """
+        return self._motion(None)
+
+    def along(self, path: Path) -> Trajectory:
+        """Return the motion at the pace of the path of its seam: ramps are those of the plan.
+
+        Raises
+        ------
+        FileFormatError
+            A speed is another one than the path has.
+        """
+        return self._motion(path)
+
+    def _motion(self, path: Path | None) -> Trajectory:
+        t, q, qd = [np.zeros(1)], [self.stretches[0].q[:1]], [0.0 * self.stretches[0].q[:1]]
+        for stretch in self.stretches:
+            times, places, rates = stretch.t, stretch.q, 0.0 * stretch.q
+            if path is not None and isinstance(stretch, FeedStretch):
+                times, places, rates = stretch.along(path, float(t[-1][-1]))
+            elif not stretch.is_rest:
+                times, places, rates = stretch.knots()
+            rates[[0, -1]] = 0.0
+            t.append(t[-1][-1] + times[1:])
+            q.append(places[1:])
+            qd.append(rates[1:])
+        names = tuple(axis.joint for axis in self.axes)
+        return Trajectory(np.concatenate(t), np.concatenate(q), np.concatenate(qd), names)
+
+    def miss_of(self, plan: Plan | Parts | Move | Program) -> Misses:
+        """Return how far it is off the motion of a plan, parts, a move or a program.
+
+        Raises
+        ------
+        FileFormatError
+            It has other joints, or other stretches.
+        """
+        pieces = pieces_of(plan)
+        names = [axis.joint for axis in self.axes]
+        known = plan.robot.joint_names
+        if sorted(names) != sorted(known):
+            raise FileFormatError(f"has joints {', '.join(names)}, expected {', '.join(known)}")
+        order = [names.index(name) for name in known]
+        worst, at, k = Misses(NO_MISS, NO_MISS), 0.0, 0
+        for stretch in self.stretches:
+            same = stretch.in_order(order)
+            piece = pieces[min(k, len(pieces) - 1)]
+            found = miss_of(same, piece.motion, piece.chains, piece.motion.t[0] + at)
+            both = Misses(NO_MISS, found) if piece.is_move else Misses(found, NO_MISS)
+            worst = worst.worse(both)
+            at += stretch.duration
+            if at >= piece.motion.duration - _MOMENT:
+                at, k = 0.0, k + 1
+        if k != len(pieces):
+            raise FileFormatError(f"ends {len(pieces) - k} seams or moves before the motion does")
+        return worst
+
+
+# A piece is over where less of it is left than this [s].
+_MOMENT = 1e-4
+
+
+@dataclass(frozen=True, eq=False)
+class Draft:
+    """All that a writer needs: the program, the arm, what else is said; frames of tool poses."""
+
+    program: ControllerProgram
+    robot: RobotModel
+    tool: SE3
+    settings: ProgramSettings
+    verdict: str
+    frames: ToolFrames | None = None
+
+    def signal(self, event: str) -> Signal | None:
+        """Return what an event switches."""
+        return self.settings.signal(event)
+
+
+def drafted(
+    plan: Plan | Parts | Move | Program,
+    name: str,
+    form: str,
+    settings: ProgramSettings,
+    verdict: str,
+    progress: Progress = silent,
+) -> Draft:
+    """Return the program of a motion, named as its file is.
+
+    Raises
+    ------
+    ProblemError
+        The arm has axes that controllers have not, an event has no signal, or the motion does not
+        rest where it should.
+    PlanError
+        A move was not found.
+    """
+    check_controller(plan.robot, form, settings)
+    robot, pieces = plan.robot, pieces_of(plan)
+    axes = axes_of(robot, settings)
+    check_signals({event: item.name for item in pieces for _, event in item.events}, settings)
+    slides = np.array([axis.slides for axis in axes])
+    given = pieces, slides, settings.deviation, settings.move_deviation, progress
+    frames, why = None, ""
+    if settings.by_poses:
+        frames = ToolFrames.of(robot, axes, settings).rounded(ROUNDINGS[form])
+        why = frames.undetermined()
+    if frames is not None and not why:
+        try:
+            spans = PoseSpan if settings.targets == "timed-poses" else FeedSpan
+            stretches, miss = stretches_of(*given, partial(spans.by, frames, ROUNDINGS[form]))
+        except NotByPosesError as error:
+            why = str(error)
+    if frames is None or why:
+        frames = None
+        stretches, miss = stretches_of(*given)
+    order = in_order(axes)
+    sorted_ones = tuple(item.in_order(order) for item in stretches)
+    ordered = tuple(axes[k] for k in order)
+    stated = Misses(miss.path.stated, miss.moves.stated)
+    at_speeds = any(isinstance(item, FeedStretch) for item in sorted_ones)
+    within = settings.deviation if at_speeds else None
+    program = ControllerProgram(
+        name, ordered, sorted_ones, stated, remark=plain(why), within=within
+    )
+    tool = tool_from_flange(robot, settings)
+    return Draft(program, robot, tool, settings, verdict, frames)
+
+
+def check_controller(robot: RobotModel, form: str, settings: ProgramSettings) -> None:
+    """Refuse what a controller has no program for, or what its program has to say and does not.
+
+    Raises
+    ------
+    ProblemError
+        An arm of seven joints as KRL, or no mass for a controller of ABB.
+    """
+    if form == "rapid" and settings.mass is None:
+        raise ProblemError(
+            f"{robot.name}: a tooldata has the mass of what the flange carries, and a controller "
+            f"of ABB moves by it; give export --mass KG, or mass in the file of --settings "
+            f"(ProgramSettings(mass=…))"
+        )
+    joint = own_joint(robot, axes_of(robot, settings)) if form == "krl" else ""
+    if joint:
+        raise ProblemError(
+            f"{robot.name}: joint '{joint}' is in the arm itself: KRL is for arms of six axes with "
+            f"external ones, and KUKA's arms of seven (LBR iiwa) are programmed in Java (Sunrise); "
+            f"write .yaml (ROS 2) or .csv for the driver of such an arm"
+        )
+
+
+def check_signals(seams: Mapping[str, str], settings: ProgramSettings) -> None:
+    """Refuse events (event → seam) of which nothing says what they switch."""
+    spare = [event for event in settings.signals or {} if event not in seams]
+    for event, seam in seams.items():
+        if not settings.knows(event):
+            raise ProblemError(
+                f"seam '{seam}': event '{event}' has no signal{nearest(event, spare)}; say in the "
+                f"file of --settings what it switches, [signals] '{event}' = [output, true], or "
+                f"false for a comment only (ProgramSettings(signals=…))"
+            )
+    for one, other in combinations(seams, 2):
+        first = settings.signal(one)
+        if first is not None and first == settings.signal(other) and are_opposite(one, other):
+            raise ProblemError(
+                f"signals: '{one}' and '{other}' both switch {first[0]!r} to {first[1]}; one of "
+                f"them has to be {not first[1]}, or of another output"
+            )

@@ -1,0 +1,66 @@
+"""Joint motions as tables: columns, arrays or lists by name."""
+
+import io
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from selfmotion.basics import (
+    FileFormatError,
+    nearest,
+    read_arrays,
+    write_bytes,
+    write_csv,
+    write_text,
+)
+from selfmotion.controllers.samples import MotionSamples
+from selfmotion.motion import Trajectory, column_names
+from selfmotion.robot import RobotModel
+
+
+def write_columns(file: Path, motion: MotionSamples, robot: RobotModel, rate: float | None) -> None:
+    """Write a table with a row for each sample."""
+    table = np.column_stack([motion.t, motion.q, motion.qd, motion.qdd])
+    write_csv(file, column_names(motion.joint_names), table)
+
+
+def write_arrays(file: Path, motion: MotionSamples, robot: RobotModel, rate: float | None) -> None:
+    """Write arrays by name."""
+    stream = io.BytesIO()
+    arrays: dict[str, Any] = {"t": motion.t, "q": motion.q, "qd": motion.qd, "qdd": motion.qdd}
+    np.savez_compressed(stream, joint_names=np.array(motion.joint_names), **arrays)
+    write_bytes(file, stream.getvalue())
+
+
+def write_lists(file: Path, motion: MotionSamples, robot: RobotModel, rate: float | None) -> None:
+    """Write lists by name."""
+    table: dict[str, Any] = {"joint_names": list(motion.joint_names)}
+    table |= {name: getattr(motion, name).tolist() for name in ("t", "q", "qd", "qdd")}
+    write_text(file, json.dumps(table) + "\n")
+
+
+def read_npz(file: Path) -> Trajectory:
+    """Return the motion of a file of arrays; FileFormatError where one is missing."""
+    return of_tables(file, read_arrays(file))
+
+
+def of_tables(file: Path, tables: Mapping[str, Any]) -> Trajectory:
+    """Return the motion of arrays or lists; FileFormatError where one is missing or wrong."""
+    missing = [name for name in ("t", "q", "qd", "joint_names") if name not in tables]
+    if missing:
+        raise FileFormatError(f"{file}: '{missing[0]}' is missing, expected t, q, qd, joint_names")
+    known = ("t", "q", "qd", "qdd", "joint_names")
+    unknown = [name for name in tables if name not in known]
+    if unknown:
+        raise FileFormatError(
+            f"{file}: '{unknown[0]}' is not read{nearest(unknown[0], known)}; expected "
+            f"{', '.join(known)}"
+        )
+    try:
+        names = tuple(map(str, tables["joint_names"]))
+        return Trajectory(tables["t"], tables["q"], tables["qd"], names, tables.get("qdd"))
+    except (FileFormatError, TypeError, ValueError) as error:
+        raise FileFormatError(f"{file}: {error}") from error

@@ -1,0 +1,177 @@
+"""Programs of controllers, read line by line by the grammar of the subset that is written."""
+
+import re
+from collections.abc import Sequence
+from pathlib import Path as FilePath
+from typing import Any, ClassVar
+
+import numpy as np
+
+from selfmotion.controllers.commented_lines import Lines
+from selfmotion.controllers.controller_program import ControllerProgram, Switch
+from selfmotion.controllers.feed_stretches import Ramps, times_at
+from selfmotion.controllers.program_texts import PLANNED
+from selfmotion.controllers.read_stretches import (
+    Pose,
+    PoseRow,
+    Row,
+    SlowRow,
+)
+from selfmotion.robot import RobotModel
+from selfmotion.task import SE3
+
+
+def switched(at: float, given: Sequence[str]) -> Switch:
+    """Return what an output and its value, or the name of an event, are at a time [s]."""
+    if len(given) == 1:
+        return Switch(at, given[0].strip())
+    output, value = given
+    return Switch(at, output, value.upper() in ("TRUE", "1"))
+
+
+class ProgramReader:
+    """Reads a program line by line; `state` says where it is.
+
+    Attributes
+    ----------
+    grammar : tuple of (states, pattern, method)
+        What is read: in which states, a pattern of the whole line, and the method that takes its
+        groups. All else is refused.
+    comment, last : str
+        What a comment begins with, and what ends the file.
+    """
+
+    grammar: ClassVar[tuple[tuple[tuple[str, ...], str, Any], ...]] = ()
+    comment, last = "", ""
+
+    def __init__(self, file: FilePath, robot: RobotModel | None = None) -> None:
+        self.lines = Lines(file, self.comment)
+        self.robot = robot
+        self.name, self.state = "", "before"
+        self.present: list[str] = []
+        self.rows: list[Row | PoseRow | SlowRow] = []
+        # Where the arm is: by its axes, by a pose, or by both.
+        self.at: list[float] | None = None
+        self.pose_at: Pose | None = None
+        self.tool: SE3 | None = None
+        self.work: SE3 | None = None
+        self.switches: list[Switch] = []
+
+    def program(self) -> ControllerProgram:
+        """Read all of it.
+
+        Raises
+        ------
+        FileFormatError
+            A line is none of those that are read, or something is missing.
+        """
+        for line in self.lines:
+            text = " ".join(line.split())
+            for states, pattern, method in self.grammar:
+                found = re.fullmatch(pattern, text, re.IGNORECASE) if self.state in states else None
+                if found:
+                    method(self, found.groups())
+                    break
+            else:
+                raise self.lines.fault(
+                    f"'{text[:60]}' is not read: page 'Files' of the docs lists what is "
+                    f"(read_motion)"
+                )
+        if self.state != "after":
+            raise self.lines.fault(f"is the last one, expected {self.last}")
+        places = self.lines.places(self.tool, self.work)
+        rows, present = self.rows, self.present
+        return self.lines.program(self.name, present, rows, self.switches, places, self.robot)
+
+    @property
+    def clock(self) -> float:
+        """How long the motion takes up to here [s]."""
+        return sum(sum(row.seconds) for row in self.rows)
+
+    def switch(self, given: Sequence[str]) -> None:
+        """Take what is switched now: an output and its value, or the name of an event."""
+        self.switches.append(switched(self.clock, given))
+
+    def skip(self, _: Sequence[str]) -> None:
+        """Take a line that says nothing of the motion."""
+
+    def end(self, _: Sequence[str]) -> None:
+        """End the module."""
+        self.state = "after"
+
+    def wait(self, given: Sequence[str]) -> None:
+        """Take a rest."""
+        seconds = self.lines.duration(given[0])
+        self.rows.append(Row(self.lines.step(), [], [seconds]))
+
+    def begin_at(self, axes: list[float]) -> None:
+        """Take where the arm begins, or goes slowly before it goes on by axis targets."""
+        self.rows.append(SlowRow(axes))
+        self.at, self.pose_at = axes, None
+
+    def slowly(self, pose: Pose) -> None:
+        """Take a pose that the arm goes to slowly before it goes on by poses."""
+        self.rows.append(SlowRow(pose))
+        self.at, self.pose_at = None, pose
+
+    def drive(
+        self,
+        poses: list[Pose],
+        speeds: list[float],
+        vias: list[Pose | None],
+        happens: Sequence[tuple[int, Sequence[str]]] = (),
+    ) -> None:
+        """Take a stretch of poses at speeds [m/s], and what is switched at which of them."""
+        planned = self.lines.planned()
+        if self.pose_at is None:
+            raise self.lines.fault("a pose after axis targets, expected a slow motion there first")
+        if planned is None:
+            raise self.lines.fault(
+                f"a motion at a speed needs the comment '{PLANNED}… s' before it, which says how "
+                f"long all up to the next stop was planned to take"
+            )
+        every = [self.pose_at, *poses]
+        round_ones = np.array([[np.nan] * 3 if via is None else via.place for via in vias])
+        own = times_at(np.array([pose.place for pose in every]), round_ones, speeds)
+        if not 0.0 < own[-1] < planned:
+            raise self.lines.fault(
+                f"at these speeds it takes {own[-1]:.6g} s without ramps, planned are "
+                f"{planned:.6g} s; after a change of speeds plan anew, with the feed that is wanted"
+            )
+        at = Ramps(float(own[-1]), planned).times(own)
+        for number, what in happens:
+            self.switches.append(switched(self.clock + float(at[number]), what))
+        self.rows.append(PoseRow(self.lines.step(), every, [planned], speeds, round_ones))
+        self.at, self.pose_at = None, poses[-1]
+
+    def follow(self, poses: list[Pose], seconds: list[float]) -> None:
+        """Take a stretch of poses."""
+        if self.pose_at is None:
+            raise self.lines.fault("a pose after axis targets, expected a slow motion there first")
+        self.rows.append(PoseRow(self.lines.step(), [self.pose_at, *poses], seconds))
+        self.at, self.pose_at = None, poses[-1]
+
+    def join(self, targets: list[list[float]], seconds: list[float]) -> None:
+        """Take a stretch of axis targets."""
+        if self.at is None:
+            raise self.lines.fault("axis targets after a pose, expected a slow motion there first")
+        self.rows.append(Row(self.lines.step(), [self.at, *targets], seconds))
+        self.at, self.pose_at = targets[-1], None
+
+    def others_of(self, values: dict[str, float]) -> list[float]:
+        """Return the external axes of a pose, which are those of the axis target before."""
+        asked = [name for name in self.present if name.startswith("E")]
+        if sorted(values) != sorted(asked):
+            raise self.lines.fault(
+                f"has external axes {', '.join(values) or 'none'}, expected "
+                f"{', '.join(asked) or 'none'}"
+            )
+        return [values[name] for name in asked]
+
+    def same_axes(self, present: list[str]) -> None:
+        """Refuse a target with other axes than those before."""
+        self.present = self.present or present
+        if present != self.present:
+            raise self.lines.fault(
+                f"has axes {', '.join(present)}, expected {', '.join(self.present)}"
+            )

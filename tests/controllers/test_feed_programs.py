@@ -1,0 +1,366 @@
+"""Seams at a feed as poses with speeds, judged by an interpolation and kinematics of ours.
+
+See `support.played_programs` for the oracle.
+"""
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import selfmotion as sm
+from selfmotion.controllers import judged_program, program_miss, read_program
+from selfmotion.controllers.circular import arc_through
+from selfmotion.controllers.feed_stretches import FeedStretch, Ramps
+from selfmotion.controllers.program_axes import axes_of
+from selfmotion.task import SE3, exp3
+from support.arms import robot_named
+from support.industrial import industrial_arm
+from support.played_programs import Off, off, read_poses
+from support.shell import invoke
+
+FILES = ("weld.mod", "weld.src", "weld.script")
+ROUND = {"weld.mod": "MoveC ", "weld.src": "SCIRC ", "weld.script": "movec("}
+SLIDES = {"E1": True, "E2": False}
+FEED = 0.03
+# What is prescribed is kept within this, by default.
+WITHIN = sm.Tolerance(1e-4, 1e-3)
+# Newton's method of the oracle, its chords, and digits of its numbers, leave this [m, rad].
+ROUNDED = 2e-8
+
+
+def settings(name: str, **more: object) -> sm.files.ProgramSettings:
+    signals = {"gun on": (7, True), "gun off": (7, False)}
+    if name.endswith(".mod"):
+        signals = {"gun on": ("doGun", True), "gun off": ("doGun", False)}
+    given = {"mass": 3.0, "signals": signals, "targets": "poses", **more}
+    return sm.files.ProgramSettings(**given)
+
+
+def named(plan: sm.Plan | sm.Program) -> dict[str, str]:
+    """Return joint → axis as six axes and external ones are counted."""
+    return {axis.joint: axis.name for axis in axes_of(plan.robot, sm.files.ProgramSettings())}
+
+
+def measured(plan: sm.Plan, file: Path) -> Off:
+    """Return how far the oracle finds a program off its plan, where the tool has gone as far."""
+    read = read_poses(file, SLIDES)
+    return off(plan.robot, read, plan.trajectory, None, "flange", named(plan), (), 400)
+
+
+@pytest.fixture(scope="module")
+def abb(tmp_path_factory: pytest.TempPathFactory) -> sm.RobotModel:
+    return industrial_arm(tmp_path_factory.mktemp("abb"), "abb")
+
+
+@pytest.fixture(scope="module")
+def line(abb: sm.RobotModel) -> sm.Plan:
+    """A straight seam of an arm of six axes whose rotation about the tool's axis is free."""
+    start = np.radians([10.0, -20.0, 30.0, 20.0, 60.0, 15.0])
+    begin = abb.pose(start)
+    end = SE3(begin.rotation, begin.translation + np.array([0.02, 0.15, -0.03]))
+    seam = sm.paths.Feed(sm.paths.Line(begin, end, 3.0), FEED)
+    return sm.plan(sm.Problem(abb, seam, "pointing", start, clearance=None)).require()
+
+
+@pytest.fixture(scope="module")
+def ring(tmp_path_factory: pytest.TempPathFactory) -> sm.Plan:
+    """A full turn of an arm on a rail, which is its redundancy."""
+    kuka = industrial_arm(tmp_path_factory.mktemp("kuka"), "kuka", rail=True)
+    start = np.append(0.3, np.radians([10.0, -80.0, 100.0, 20.0, 60.0, 15.0]))
+    circle = sm.paths.Circle.around(kuka.pose(start), 0.06, 4.0, normal=(0.0, 0.3, 1.0))
+    seam = sm.paths.Feed(circle, FEED)
+    return sm.plan(sm.Problem(kuka, seam, "pose", start, clearance=None)).require()
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_a_straight_seam_is_one_motion_at_its_feed(
+    line: sm.Plan, tmp_path: Path, name: str
+) -> None:
+    file, cell = tmp_path / name, tmp_path / "cell.toml"
+    sm.files.write_motion(line, file, settings=settings(name))
+    count, stated, found = program_miss(line, file)
+    assert count == 1
+    (stretch,) = read_poses(file, SLIDES).stretches
+    np.testing.assert_allclose(stretch.speeds, [FEED], rtol=1e-6)
+    # The tool is where it should be, its axis is, and all else is off by what is stated.
+    far = measured(line, file)
+    assert far.position <= stated.path.position + ROUNDED
+    assert stated.path.position < WITHIN.position
+    assert far.axis <= WITHIN.rotation
+    assert far.joint <= stated.path.joint + ROUNDED
+    assert found.path.joint <= stated.path.joint
+    # Times are those of who asks for them.
+    sm.files.write_motion(line, file, settings=settings(name, targets="timed-poses"))
+    assert program_miss(line, file)[0] > 20
+    assert program_miss(line, file)[1].path.joint <= WITHIN.rotation
+    # And the shell judges it by the problem, and says what it does not judge.
+    limits = (sm.constraints.JointPositionLimits(), sm.constraints.JointVelocityLimits())
+    sm.files.write_problem(replace(line.problem, constraints=limits), cell)
+    line.save(tmp_path / "plan.npz")
+    asked = ("--targets", "poses", "--mass", "3")
+    code, text = invoke("export", tmp_path / "plan.npz", "--out", file, *asked)
+    assert code == 0, text
+    assert "1 target, between which" in text
+    assert "seams are at their feeds, with ramps of the controller's own" in text
+    code, text = invoke("check", file, "--robot", cell)
+    assert code == 0, text
+    assert "how the controller runs up and down, and so when it is where, is its own" in text
+    assert "(0.0001 m and 0.001 rad are allowed)" in text
+
+
+@pytest.mark.parametrize("name", FILES[:2])
+def test_a_full_turn_is_two_circular_motions(ring: sm.Plan, tmp_path: Path, name: str) -> None:
+    file = tmp_path / name
+    sm.files.write_motion(ring, file, settings=settings(name))
+    count, stated, found = program_miss(ring, file)
+    assert count == file.read_text().count(ROUND[name]) == 2
+    far = measured(ring, file)
+    assert far.position <= stated.path.position + ROUNDED
+    assert far.rotation <= min(stated.path.rotation + ROUNDED, WITHIN.rotation)
+    assert far.joint <= stated.path.joint + ROUNDED
+    assert found.path.position <= stated.path.position < 5e-6
+    # Through another point it is another circle.
+    lines = file.read_text().splitlines()
+    k = next(k for k, text in enumerate(lines) if ROUND[name].strip() in text)
+    y = re.search(r"(MoveC \[\[\S+ |SCIRC \{X \S+ Y )(-?[\d.]+)", lines[k])
+    assert y is not None
+    lines[k] = lines[k].replace(y[0], f"{y[1]}{float(y[2]) + 0.5:.4f}", 1)
+    file.write_text("\n".join([*lines, ""]))
+    assert program_miss(ring, file)[2].path.position > 1e-4
+
+
+def test_a_tool_that_turns_along_goes_round_as_well(ring: sm.Plan, tmp_path: Path) -> None:
+    """Its orientation turns evenly about the circle's axis, as each maker says that it does."""
+    start = ring.trajectory.q[0]
+    circle = sm.paths.Circle.around(
+        ring.robot.pose(start), 0.05, 4.0, normal=(0.1, 0.0, 1.0), turns=0.4, turn_tool=True
+    )
+    problem = sm.Problem(ring.robot, sm.paths.Feed(circle, FEED), "pose", start, clearance=None)
+    plan = sm.plan(problem).require()
+    for name in FILES[:2]:
+        file = tmp_path / name
+        sm.files.write_motion(plan, file, settings=settings(name))
+        assert program_miss(plan, file)[0] == file.read_text().count(ROUND[name]) == 1
+        far = measured(plan, file)
+        assert far.position < 1e-6
+        assert far.rotation < 1e-6
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_a_seam_that_was_touched_up_is_judged(line: sm.Plan, tmp_path: Path, name: str) -> None:
+    """Its end half a millimetre elsewhere, and the file is off by as much."""
+    file = tmp_path / name
+    sm.files.write_motion(line, file, settings=settings(name))
+    lines = file.read_text().splitlines()
+    k = [k for k, text in enumerate(lines) if re.match(r"\s+(MoveL|SLIN|movel)\b", text)][-1]
+    x = re.search(r"(MoveL \[\[|\{X |, p\[)(-?[\d.]+)", lines[k])
+    assert x is not None
+    more = 5e-4 * (1.0 if name == "weld.script" else 1e3)
+    lines[k] = lines[k].replace(x[0], f"{x[1]}{float(x[2]) + more:.9f}", 1)
+    file.write_text("\n".join([*lines, ""]))
+    _, stated, found = program_miss(line, file)
+    assert found.path.position == pytest.approx(5e-4, rel=0.05)
+    assert found.path.position > stated.path.position
+
+
+@pytest.mark.parametrize(
+    ("name", "old", "new"),
+    [
+        ("weld.mod", ":= [30, 500", ":= [40, 500"),
+        ("weld.src", "$VEL.CP = 0.03", "$VEL.CP = 0.04"),
+        ("weld.script", "v=0.03,", "v=0.04,"),
+    ],
+)
+def test_another_speed_than_the_feed_is_refused(
+    line: sm.Plan, tmp_path: Path, name: str, old: str, new: str
+) -> None:
+    file, cell = tmp_path / name, tmp_path / "cell.toml"
+    sm.files.write_problem(line.problem, cell)
+    sm.files.write_motion(line, file, settings=settings(name))
+    text = file.read_text()
+    assert old in text
+    file.write_text(text.replace(old, new))
+    with pytest.raises(
+        sm.errors.FileFormatError, match=r"'path' is at 40 mm/s .* its path at 30 mm/s: nothing has"
+    ):
+        invoke("check", file, "--robot", cell)
+    # So slow that it takes longer than was planned.
+    file.write_text(text.replace(old, new.replace("40", "20").replace("0.04", "0.02")))
+    with pytest.raises(sm.errors.FileFormatError, match="after a change of speeds plan anew"):
+        sm.files.read_motion(file, robot=line.robot)
+    file.write_text(re.sub(r".*planned time.*\n", "", text))
+    with pytest.raises(sm.errors.FileFormatError, match=r"needs the comment 'planned time: … s'"):
+        sm.files.read_motion(file, robot=line.robot)
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_strokes_switch_where_their_feed_begins(tmp_path: Path, name: str) -> None:
+    """Each in three motions: run-up, the stroke between its events, run-down."""
+    ur10 = robot_named("ur10")
+    start = ur10.dexterous_configuration("pointing")
+    first, seams = ur10.pose(start), []
+    for k in range(2):
+        begin, end = first.copy(), first.copy()
+        begin.translation = first.translation + np.array([0.0, 0.04 * k, 0.0])
+        end.translation = begin.translation + np.array([0.0, 0.0, 0.15])
+        stroke = sm.paths.with_run_ups(
+            sm.paths.Feed(sm.paths.Line(begin, end, 1.0), 0.1, acceleration=2.0)
+        )
+        switched = [("gun on", stroke.begin), ("gun off", stroke.end)]
+        seams.append(sm.Seam(f"stroke {k}", stroke.path, "pointing", events=switched))
+    program = sm.plan_job(ur10, seams, order="given", branches=1, clearance=None).require()
+    file, job = tmp_path / name, tmp_path / "paint.program"
+    sm.files.write_motion(program, file, settings=settings(name))
+    strokes = [
+        stretch
+        for stretch in read_program(file, ur10).stretches
+        if isinstance(stretch, FeedStretch)
+    ]
+    assert [len(stretch.speeds) for stretch in strokes] == [3, 3]
+    found = judged_program(file, program)
+    assert found.verified, found.verdict
+    read = read_poses(file, SLIDES)
+    moves = tuple(step.name.replace("→", "->") for step in program.steps if not step.is_seam)
+    far = off(ur10, read, program.trajectory, "base", "tool0", named(program), moves)
+    assert far.position <= program_miss(program, file)[1].path.position + ROUNDED
+    assert far.axis <= WITHIN.rotation
+    # The arm stands elsewhere, and is judged along the shifted strokes.
+    program.save(job)
+    code, text = invoke("check", file, "--robot", job)
+    assert code == 0, text
+    assert "seams at their feeds are judged with the ramps of the plan" in text
+
+
+def test_leads_take_their_time_with_ramps(abb: sm.RobotModel, tmp_path: Path) -> None:
+    start = np.radians([10.0, -20.0, 30.0, 20.0, 60.0, 15.0])
+    # Where the lead begins the arm is at its start.
+    begin = abb.pose(start) * SE3(np.eye(3), np.array([0.0, 0.0, 0.05]))
+    end = SE3(begin.rotation, begin.translation + np.array([0.0, 0.1, 0.0]))
+    seam = sm.paths.with_leads(sm.paths.Feed(sm.paths.Line(begin, end, 3.0), FEED), 0.05, 1.0)
+    plan = sm.plan(sm.Problem(abb, seam, "pointing", constraints=(), clearance=None)).require()
+    file = tmp_path / "weld.mod"
+    sm.files.write_motion(plan, file, settings=settings("weld.mod"))
+    stretches = read_poses(file, SLIDES).stretches
+    speeds = [float(stretch.speeds[0]) for stretch in stretches]
+    np.testing.assert_allclose(speeds, [0.05 / 0.75, FEED, 0.05 / 0.75], rtol=1e-4)
+    far = measured(plan, file)
+    assert far.position <= program_miss(plan, file)[1].path.position + ROUNDED
+
+
+def test_clearances_decide_how_far_the_arm_may_be_off(abb: sm.RobotModel, tmp_path: Path) -> None:
+    """Where the seam's certificate does not hold of few poses there are more, or times."""
+    start = np.radians([10.0, -20.0, 30.0, 20.0, 60.0, 15.0])
+    begin = abb.pose(start)
+    end = SE3(begin.rotation, begin.translation + np.array([0.0, 0.2, 0.0]))
+    seam = sm.paths.Feed(sm.paths.Line(begin, end, 3.0), FEED)
+    plan = sm.plan(sm.Problem(abb, seam, "pointing", start, clearance=None)).require()
+    file = tmp_path / "weld.mod"
+    sm.files.write_motion(plan, file, settings=settings("weld.mod"))
+    free = program_miss(plan, file)[1].path.joint
+    # Joint 6 has as much room as its own plan takes, and no more.
+    q = plan.trajectory.q
+    room = 0.01 * free
+    limits = sm.constraints.JointPositionLimits(q.min(axis=0) - room, q.max(axis=0) + room)
+    held = sm.Problem(abb, seam, "pointing", start, constraints=[limits], clearance=None)
+    tight = replace(plan, problem=held)
+    tight = replace(tight, certificate=tight.check()).require()
+    sm.files.write_motion(tight, file, settings=settings("weld.mod"))
+    motion = read_program(file, abb).along(seam)
+    assert (motion.q >= q.min(axis=0) - room - 1e-6).all()
+    assert (motion.q <= q.max(axis=0) + room + 1e-6).all()
+
+
+@pytest.mark.parametrize("seconds", [1.05, 1.5, 4.0])
+def test_even_ramps_take_what_is_planned(seconds: float) -> None:
+    ramps = Ramps(1.0, seconds)
+    times = np.linspace(0.0, seconds, 501)
+    passed = ramps.passed(times)
+    assert passed[0] == 0.0
+    assert passed[-1] == pytest.approx(1.0, abs=1e-12)
+    assert (np.diff(passed) > 0.0).all()
+    np.testing.assert_allclose(ramps.times(passed), times, atol=1e-6)
+    # At both ends it rests, and it is fastest in the middle.
+    rates = np.gradient(passed, times)
+    assert max(rates[0], rates[-1]) < 0.1 * rates.max()
+    assert rates[250] == pytest.approx(rates.max(), rel=1e-2)
+
+
+def test_an_arc_is_the_circle_through_three_points() -> None:
+    rng = np.random.default_rng(3)
+    for _ in range(20):
+        turn, radius = exp3(rng.normal(size=3)), float(rng.uniform(0.01, 2.0))
+        angle, center = float(rng.uniform(0.1, 3.4)), rng.normal(size=3)
+
+        ways = angle * np.array([0.0, float(rng.uniform(0.2, 0.8)), 1.0, 0.3])
+        flat = np.stack([np.cos(ways), np.sin(ways), 0.0 * ways], axis=1)
+        points = center + radius * flat @ turn.T
+        arc = arc_through(*points[:3])
+        assert arc is not None
+        assert arc.length == pytest.approx(radius * angle, rel=1e-9)
+        np.testing.assert_allclose(arc.at(np.array([0.3]))[0], points[3], atol=1e-9)
+    first, last = np.zeros(3), np.array([1.0, 2.0, 3.0])
+    assert arc_through(first, 0.4 * last, last) is None
+
+
+def test_slow_motions_to_a_shifted_seam_are_judged(tmp_path: Path) -> None:
+    """Moves from a stretched arm are joint targets: from there it goes slowly to shifted poses."""
+    ur10 = robot_named("ur10")
+    first = ur10.pose(ur10.dexterous_configuration("pointing"))
+    last = SE3(first.rotation, first.translation + np.array([0.0, 0.1, 0.0]))
+    seam = sm.Seam("seam", sm.paths.Feed(sm.paths.Line(first, last, 1.0), 0.05), "pointing")
+    home, low = ur10.home, sm.obstacles.Box("floor", [0.0, 0.0, -1.0], [3.0, 3.0, 0.1])
+    clear = sm.constraints.Clearance([low], 0.01)
+    made = sm.plan_job(ur10, [seam], start=home, end=home, branches=1, clearance=clear)
+    program, file = made.require(), tmp_path / "weld.mod"
+    sm.files.write_motion(program, file, settings=settings("weld.mod"))
+    text = file.read_text()
+    assert text.count("MoveAbsJ") > 10
+    assert len(re.findall(r"MoveL .*_f1", text)) == 1
+    file.write_text(text.replace('TRUE, "", [[0.0000,', 'TRUE, "", [[30.0000,'))
+    found = judged_program(file, program)
+    assert found.verified, found.verdict
+    slow = [step for step in found.steps if step.name.startswith("slowly to")]
+    assert [step.name for step in slow] == ["slowly to 'seam'", "slowly to 'seam → job end'"]
+    # By what the moves have to keep: a floor that a seam may come nearer to than they.
+    floor = sm.obstacles.Box("floor", [0.0, 0.0, 0.0], [3.0, 3.0, 0.1])
+    steps = [
+        replace(step, made=replace(step.made, constraints=(sm.constraints.Clearance([floor]),)))
+        if isinstance(step.made, sm.Move)
+        else step
+        for step in program.steps
+    ]
+    strict = judged_program(file, replace(program, steps=tuple(steps)))
+    told = {step.name: step.verified for step in strict.steps}
+    assert not told["slowly to 'seam'"]
+    assert told["seam"]
+
+
+def test_an_event_in_a_ramp_keeps_its_time(tmp_path: Path) -> None:
+    """Where the tool is then only the controller knows: the seam has times, and is told why."""
+    ur5 = robot_named("ur5")
+    first = ur5.pose(ur5.dexterous_configuration("pointing"))
+    last = SE3(first.rotation, first.translation + np.array([0.0, 0.0, 0.1]))
+    path = sm.paths.Feed(sm.paths.Line(first, last, 1.0), 0.2)
+    events = [("gun on", 0.1), ("gun off", path.duration - 0.1)]
+    seam = sm.Seam("seam", path, "pointing", events=events)
+    made = sm.plan_job(ur5, [seam], order="given", branches=1, clearance=None)
+    program, file = made.require(), tmp_path / "weld.mod"
+    program.save(tmp_path / "a.program")
+    sm.files.write_motion(program, file, settings=settings("weld.mod"))
+    read = read_program(file, ur5)
+    assert read.within is None
+    assert read.timed == (
+        "an event is where the tool is slower than its feed, or it is at no feed",
+    )
+    assert judged_program(file, program).verified
+    (tmp_path / "cell.toml").write_text(
+        'mass = 3\ntargets = "poses"\n'
+        '[signals]\n"gun on" = ["doGun", true]\n"gun off" = ["doGun", false]\n'
+    )
+    asked = ("--out", file, "--settings", tmp_path / "cell.toml")
+    code, text = invoke("export", tmp_path / "a.program", *asked)
+    assert code == 0, text
+    assert "a seam has times all the same: an event is where the tool is slower" in text

@@ -1,0 +1,190 @@
+"""Whatever Python can say, a file can: a public parameter is a key, or has a reason not to be."""
+
+import dataclasses
+import inspect
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import selfmotion as sm
+from selfmotion.collision import obstacle_shapes
+from selfmotion.documents import json_schema
+from selfmotion.documents.seam_job import JOB, OF_PROBLEM, SEAM
+from support.arms import robot_named
+
+SCHEMA = json_schema()
+# Parameters that no file has, and why.
+WHILE_IT_RUNS = "is of the run, and an option of the command"
+EXCEPTIONS = {
+    "warm_start": "is another plan: --from",
+    "deadline": WHILE_IT_RUNS,
+    "callback": WHILE_IT_RUNS,
+    "progress": WHILE_IT_RUNS,
+    "executor": WHILE_IT_RUNS + ": --workers, --dask",
+    "folder": WHILE_IT_RUNS + ": --folder",
+    "robot": "is the robot of the file",
+    "problem": "is the file",
+    "plan": "is what goal = 'retimed' makes",
+    "seams": "are the tables [[seams]]",
+}
+# Of certain tables: said otherwise in files.
+OTHERWISE: dict[str, dict[str, str]] = {
+    "Problem": {"follows": "are path, task and [[also]]"},
+    "plan": {"optimizer": "is the table optimiser"},
+    "fastest": {
+        "acceleration": "is a constraint JointAccelerationLimits",
+        "velocity": "is a constraint JointVelocityLimits",
+    },
+    "retime": {
+        "acceleration": "is a constraint JointAccelerationLimits",
+        "velocity": "is a constraint JointVelocityLimits",
+    },
+    "plan_in_parts": {"rng": "shifts seeds; the rest of the problem says all"},
+    "plan_job": {
+        "constraints": "are the tables [[constraints]]",
+        "clearance": "is the Clearance among them, or collision",
+        "warm_start": "is of a run, not of a job: job --from",
+    },
+    "Clearance": {},
+    "load_robot": {
+        "urdf": "is name or file, or parts",
+        "package_dirs": "are beside the file",
+        "geometry": "is of a pinocchio.Model, which is in no file",
+    },
+    "TwistPath": {"twist": "is a function: breaks and coefficients", "knots": "are the breaks"},
+}
+
+
+def keys_of(definition: str) -> set[str]:
+    # Two of a name are told apart by what stands before it.
+    found = [name for name in SCHEMA["$defs"] if definition in name.split("__")]
+    return set.intersection(*(set(SCHEMA["$defs"][name]["properties"]) for name in found))
+
+
+def parameters(thing: Callable[..., Any]) -> set[str]:
+    found = inspect.signature(thing).parameters
+    context = set(getattr(thing, "context", ()))
+    return {name for name in found if name not in context and name != "kind"}
+
+
+def tables() -> list[tuple[str, Callable[..., Any], set[str]]]:
+    """Return name, what has the parameters, and the keys that say them."""
+    top = set(SCHEMA["properties"])
+    path_file = keys_of("file")
+    found: list[tuple[str, Callable[..., Any], set[str]]] = [
+        ("Problem", sm.Problem, top),
+        ("plan", sm.plan, top),
+        ("fastest", sm.fastest, top),
+        ("retime", sm.retime, top),
+        ("plan_in_parts", sm.plan_in_parts, top | keys_of("InParts")),
+        ("Search", sm.Search, keys_of("Search")),
+        ("QuasiNewton", sm.QuasiNewton, keys_of("QuasiNewton")),
+        ("Tolerance", sm.Tolerance, keys_of("Tolerance")),
+        ("Damping", sm.Damping, keys_of("Damping")),
+        ("Relaxation", sm.Relaxation, keys_of("Relaxation")),
+        ("Clearance", sm.constraints.Clearance, keys_of("Clearance")),
+        ("Follow", sm.Follow, keys_of("Follow")),
+        ("Feed", sm.paths.Feed, keys_of("feed")),
+        ("feed of a circle", sm.paths.Feed, keys_of("circle") | {"path", "stretches"}),
+        ("Circle.around", sm.paths.Circle.around, keys_of("circle") | {"options"}),
+        ("read_path", sm.files.read_path, path_file),
+        ("load_robot", sm.load_robot, keys_of("Robot") | keys_of("RobotPart")),
+        ("plan_job", sm.plan_job, {*JOB}),
+        ("Seam", sm.Seam, {*SEAM, *OF_PROBLEM}),
+    ]
+    families = (sm.costs.Cost, sm.constraints.Constraint, sm.motion.NullMotion, sm.paths.Path)
+    for family in families:
+        for kind, cls in family.kinds().items():
+            ours = cls.__module__.startswith("selfmotion.") and kind in SCHEMA["$defs"]
+            if ours and kind != "twist":
+                found.append((kind, cls, keys_of(kind)))
+    for shape, cls in obstacle_shapes():
+        if cls.__module__.startswith("selfmotion."):
+            known = keys_of(shape) | {"pose", "center"}
+            found.append((shape, cls, known))
+    return found
+
+
+@pytest.mark.parametrize(
+    ("name", "thing", "keys"), [pytest.param(*item, id=item[0]) for item in tables()]
+)
+def test_every_parameter_is_a_key(name: str, thing: Callable[..., Any], keys: set[str]) -> None:
+    own = OTHERWISE.get(name, {})
+    missing = parameters(thing) - keys - set(EXCEPTIONS) - set(own)
+    assert not missing, f"{name}: {sorted(missing)} cannot be said in a file"
+
+
+def test_every_exception_has_a_reason_and_a_user() -> None:
+    listed = {name: parameters(thing) - keys for name, thing, keys in tables()}
+    used = set().union(*listed.values())
+    assert set(EXCEPTIONS) <= used
+    assert all(EXCEPTIONS.values())
+
+
+def test_what_is_written_is_planned_the_same_again(tmp_path: Path) -> None:
+    """With its search, its optimiser and its goal."""
+    job = sm.files.Job(
+        sm.sample_problem(),
+        search=sm.Search(starts=7, finalists=2, mode="local", rng=3),
+        optimizer=sm.QuasiNewton(),
+        tolerance=sm.Tolerance(1e-5, 2e-5),
+        max_evaluations=9,
+        outputs=(tmp_path / "out" / "a.csv",),
+        goal="retimed",
+    )
+    for name in ("job.toml", "job.json"):
+        sm.files.write_problem(job, tmp_path / name)
+        again = sm.files.read_job(tmp_path / name)
+        assert again.search == job.search
+        assert again.tolerance == job.tolerance
+        assert dataclasses.asdict(again.optimizer) == dataclasses.asdict(job.optimizer)  # type: ignore[call-overload]
+        assert (again.max_evaluations, again.goal) == (9, "retimed")
+        assert [file.resolve() for file in again.outputs] == [tmp_path / "out" / "a.csv"]
+    by_chance = dataclasses.replace(job, search=sm.Search(rng=np.random.default_rng(1)))
+    with pytest.raises(sm.errors.ProblemError, match="search: rng is a generator"):
+        sm.files.write_problem(by_chance, tmp_path / "a.toml")
+
+
+def test_a_goal_says_what_is_looked_for() -> None:
+    arm = robot_named("planar_3r")
+    start = np.array([0.4, 0.6, 0.5])
+    end = arm.pose(start)
+    end.translation = end.translation + np.array([-0.3, 0.2, 0.0])
+    limits = [sm.constraints.JointVelocityLimits(2.0), sm.constraints.JointAccelerationLimits(4.0)]
+    line = sm.paths.Line(arm.pose(start), end, 8.0)
+    problem = sm.Problem(arm, line, "planar", start, constraints=limits)
+    own, retimed = (sm.files.Job(problem, goal=goal).plan() for goal in ("best", "retimed"))
+    assert retimed.certificate.verified
+    assert retimed.trajectory.duration < 0.5 * own.trajectory.duration
+    parts = sm.files.Job(problem, goal="parts", parts={"ramp": 0.2})
+    with pytest.raises(sm.errors.ProblemError, match=r"goal: is 'parts'"):
+        parts.plan()
+    with pytest.raises(sm.errors.ProblemError, match="search: has no effect on a motion in parts"):
+        dataclasses.replace(parts, search=sm.Search()).in_parts()
+
+
+def test_what_has_no_effect_on_a_goal_is_refused(tmp_path: Path) -> None:
+    robot = robot_named("planar_3r")
+    start = np.array([0.1, 0.9, 0.9])
+    line = sm.paths.Line(robot.pose(start), robot.pose(start + 0.1), 2.0)
+    problem = sm.Problem(robot, line, "planar", start)
+    keep, parts = {"JointVelocity": 1.1}, {"retreat": 0.1}
+    for goal, given, said in (
+        ("best", {"keep": keep}, "keep: has no effect on the best motion"),
+        ("retimed", {"parts": parts}, "parts: has no effect on the retimed motion"),
+        ("fastest", {"parts": parts}, "parts: has no effect on the fastest motion"),
+        ("parts", {"keep": keep}, "keep: has no effect on a motion in parts"),
+    ):
+        job = sm.files.Job(problem, goal=goal, **given)
+        with pytest.raises(sm.errors.ProblemError, match=said):
+            job.in_parts() if goal == "parts" else job.plan()
+    with pytest.raises(sm.errors.ProblemError, match="goal is 'quick', expected one of"):
+        sm.files.Job(problem, goal="quick")
+    file = tmp_path / "cell.toml"
+    sm.files.write_problem(problem, file)
+    file.write_text(file.read_text() + '\n[grid]\n"path.duration" = [3, 4]\n')
+    with pytest.raises(sm.errors.FileFormatError, match="grid: stands for many problems"):
+        sm.read_problem(file)
