@@ -136,7 +136,7 @@ def test_a_positioner_carries_its_work_object(
     turned: sm.Plan, tmp_path: Path, name: str, unit: str | int
 ) -> None:
     file = tmp_path / name
-    with pytest.raises(sm.errors.ProblemError, match="give positioner = "):
+    with pytest.raises(sm.errors.ProblemError, match="say positioner = "):
         sm.files.write_motion(turned, file, settings=settings(name))
     sm.files.write_motion(turned, file, settings=settings(name, positioner=unit))
     _, stated, _ = program_miss(turned, file)
@@ -384,6 +384,11 @@ def test_settings_of_poses_say_what_is_wrong(alone: sm.Plan, tmp_path: Path) -> 
     read = sm.files.read_program_settings(tmp_path / "cell.toml")
     assert isinstance(read.work_object, SE3)
     np.testing.assert_allclose(read.work_object.translation, [1e-3, 2e-3, 3e-3])
+    # What a file cannot say by itself, an option may make right.
+    (tmp_path / "unit.toml").write_text("positioner = 2\n")
+    with pytest.raises(sm.errors.FileFormatError, match="positioner: has no effect on joint"):
+        sm.files.read_program_settings(tmp_path / "unit.toml")
+    assert sm.files.read_program_settings(tmp_path / "unit.toml", targets="poses").positioner == 2
     alone.save(tmp_path / "plan.npz")
     out = tmp_path / "a.src"
     asked = ("export", tmp_path / "plan.npz", "--out", out, "--targets", "poses", "--wobj")

@@ -172,8 +172,8 @@ def _work(draft: Draft, name: str) -> list[str]:
         if not isinstance(unit, str):
             raise ProblemError(
                 f"{draft.robot.name}: an axis carries work object '{frames.name}', and a wobjdata "
-                f'names its mechanical unit; give positioner = "STN1" or what it is called '
-                f"(ProgramSettings(positioner=…))"
+                f'names its mechanical unit; say positioner = "STN1", or what it is called, in the '
+                f"file of --settings (ProgramSettings(positioner=…))"
             )
         told = f'FALSE, "{unit}", {nowhere}, {place}'
     return [f"  TASK PERS wobjdata {name}_w := [FALSE, {told}];"]
