@@ -206,8 +206,8 @@ def _base(draft: Draft) -> str:
     if not isinstance(unit, int):
         raise ProblemError(
             f"{draft.robot.name}: an axis carries work object '{frames.name}', and $BASE names its "
-            f"kinematic system by its number in MACHINE_DEF; say positioner = 2, or which it is, in "
-            f"the file of --settings (ProgramSettings(positioner=…))"
+            f"kinematic system by its number in MACHINE_DEF; say positioner = 2, or which it is, "
+            f"in the file of --settings (ProgramSettings(positioner=…))"
         )
     machine = f"MACHINE_DEF[{unit}]"
     return f"EK({machine}.ROOT, {machine}.MECH_TYPE, {_frame(frames.work)})"
