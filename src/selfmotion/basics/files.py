@@ -105,6 +105,13 @@ def write_archive(file: Path, description: Mapping[str, Any], arrays: Mapping[st
     write_atomically(file, write)
 
 
+# Files of several plans, by what reads them.
+_OTHERS = {
+    ".program": "the program of a job, which load_program, check, export and replay read",
+    ".parts": "a motion in parts, which load_parts, check, export and replay read",
+}
+
+
 def read_archive(file: Path) -> tuple[dict[str, Any], dict[str, Array]]:
     """Read what `write_archive` wrote.
 
@@ -113,6 +120,8 @@ def read_archive(file: Path) -> tuple[dict[str, Any], dict[str, Array]]:
     FileFormatError
         The file is missing or is no such archive.
     """
+    if file.suffix in _OTHERS:
+        raise FileFormatError(f"{file}: is {_OTHERS[file.suffix]}, expected one plan (.npz)")
     if os.path.exists(file) and not zipfile.is_zipfile(file):
         raise FileFormatError(f"{file}: is no plan written by selfmotion (.npz)")
     arrays = read_arrays(file)
