@@ -39,6 +39,18 @@ def test_what_was_not_checked_is_said_unless_all_was() -> None:
     assert repr(every) == f"Certificate({every.verdict})"
 
 
+def test_limits_of_some_joints_are_told_apart_from_those_of_all() -> None:
+    some = sm.constraints.JointAccelerationLimits([1.0] + [np.inf] * 6, replace=True)
+    every = sm.constraints.JointAccelerationLimits(5.0)
+    robot = robot_named("panda")
+    part = still(some.requirement(robot))
+    assert "accelerations of some joints" in part.covers
+    assert part.not_checked == ("accelerations of the other joints", "self-collision")
+    whole = still(some.requirement(robot), every.requirement(robot))
+    assert "accelerations of some joints" not in whole.covers
+    assert whole.not_checked == ("self-collision",)
+
+
 def test_notes_and_failures_are_told_in_this_order() -> None:
     noted = replace(still(), notes=("one", "two"))
     assert noted.verdict.endswith("self-collision; one; two")

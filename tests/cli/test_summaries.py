@@ -60,7 +60,7 @@ def test_of_what_is_not_verified_the_first_reason_and_how_many_more(slow: sm.Pla
     failures = plan.certificate.failures
     assert len(failures) > 1
     lines = told(summaries.show_plan, plan)
-    assert lines[0] == f"not verified: {failures[0]}; and {len(failures) - 1} more"
+    assert lines[0] == f"not verified: {failures[0]}; and {len(failures) - 1} more (--verbose)"
     assert len(lines) <= MOST_LINES
 
 

@@ -150,6 +150,10 @@ def test_what_cannot_be_asked_is_refused(plan: sm.Plan) -> None:
         sm.margin(other)
 
 
+def test_of_a_program_margins_are_those_of_its_plans(tmp_path: Path) -> None:
+    assert "holds several plans, expected one" in complaint("margin", tmp_path / "a.program")
+
+
 def test_margins_are_rounded_down() -> None:
     for size, text in (
         (0.00999999, "9.99 mm"),

@@ -16,6 +16,8 @@ from selfmotion.basics.arrays import Array, shown
 from selfmotion.basics.errors import FileFormatError
 
 _DESCRIPTION = "description"
+# Files that hold several plans.
+_OF_MANY = (".program", ".parts")
 # Files of arrays beyond this many bytes are not read: 250,000 samples of a plan are a tenth.
 _LARGEST = 250_000_000
 # What texts have besides letters: blanks, ends of lines and pages, of tapes and files.
@@ -113,6 +115,11 @@ def read_archive(file: Path) -> tuple[dict[str, Any], dict[str, Array]]:
     FileFormatError
         The file is missing or is no such archive.
     """
+    if file.suffix in _OF_MANY:
+        raise FileFormatError(
+            f"{file}: holds several plans, expected one (.npz); of a program they are "
+            f"[step.made for step in sm.load_program(file).steps if step.is_seam]"
+        )
     if os.path.exists(file) and not zipfile.is_zipfile(file):
         raise FileFormatError(f"{file}: is no plan written by selfmotion (.npz)")
     arrays = read_arrays(file)

@@ -7,6 +7,7 @@ import numpy as np
 
 from selfmotion.certificate.findings import USUAL, DampedStretch, Extreme, Finding, Tolerance
 from selfmotion.certificate.limits import LIMIT_NAMES
+from selfmotion.certificate.requirement import of_some
 
 # What a reader of a verdict would take to have been checked, unless told otherwise.
 NOT_JUDGED = (
@@ -120,7 +121,11 @@ class Certificate:
     @property
     def not_checked(self) -> tuple[str, ...]:
         """What a motion should keep and nothing here has looked at."""
-        return tuple(name for name in _EXPECTED if name not in self.covers)
+        return tuple(
+            f"{name} of the other joints" if of_some(name) in self.covers else name
+            for name in _EXPECTED
+            if name not in self.covers
+        )
 
     @property
     def on_path(self) -> bool:

@@ -46,11 +46,16 @@ NormalOption = Annotated[
 ]
 DurationOption = Annotated[
     float | None,
-    typer.Option(help="Of circle or line (s; 4 by default), or of poses without times."),
+    typer.Option(
+        help="Of circle or line (s; 4 by default without --feed), or of poses without times."
+    ),
 ]
 FeedOption = Annotated[
     float | None,
-    typer.Option(help="Constant tool speed from rest to rest (m/s), for poses without times."),
+    typer.Option(
+        help="Constant tool speed from rest to rest (m/s), of circle or line, or of poses without "
+        "times."
+    ),
 ]
 JumpOption = Annotated[
     float | None,
@@ -130,7 +135,11 @@ RelaxOption = Annotated[
     ),
 ]
 StartOption = Annotated[
-    str | None, typer.Option(help="q1,q2,… (rad or m); by default the best that is found.")
+    str | None,
+    typer.Option(
+        help="q1,q2,… (rad or m), home, dexterous (far from limits and singular poses) or free "
+        "(the best that is found); by default free with --path, dexterous otherwise."
+    ),
 ]
 FromOption = Annotated[
     Path | None,
@@ -205,7 +214,7 @@ OutOption = Annotated[
     list[Path] | None,
     typer.Option(
         help="Write the plan (.npz), its replay (.html) or motion (.csv, .json, .yaml, .mcap, "
-        ".xml, .script; see `selfmotion export`). Repeatable."
+        ".xml, .script, .src, .mod; see `selfmotion export`). Repeatable."
     ),
 ]
 HtmlOption = Annotated[Path | None, typer.Option(help="Write a replay to open in a browser.")]

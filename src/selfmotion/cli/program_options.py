@@ -1,6 +1,5 @@
 """Options of commands that write programs of controllers."""
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -48,13 +47,14 @@ def program_settings(
     ProblemError
         A work object is neither a name nor six numbers.
     """
-    asked = None if file is None else sm.files.read_program_settings(file)
     given: dict[str, Any] = {} if targets is None else {"targets": targets}
     if mass is not None:
         given["mass"] = mass
     if wobj is not None:
         given["work_object"] = _work_object(wobj)
-    return replace(asked or sm.files.ProgramSettings(), **given) if given else asked
+    if file is not None:
+        return sm.files.read_program_settings(file, **given)
+    return sm.files.ProgramSettings(**given) if given else None
 
 
 def _work_object(text: str) -> str | SE3:

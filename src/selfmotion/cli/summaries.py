@@ -1,5 +1,6 @@
 """What commands print unless everything is asked for: the verdict, one number, one remedy."""
 
+import re
 from collections.abc import Mapping
 
 from rich.console import Console
@@ -50,7 +51,7 @@ def show_certificate(
 ) -> None:
     """Print the verdict, how near bodies come, and how much else is to be known."""
     style = "green" if certificate.verified else "bold red"
-    _print(console, in_shell(certificate.summary), style)
+    _print(console, with_hint(in_shell(certificate.summary)), style)
     if approaches:
         name, nearest = min(approaches.items(), key=lambda item: item[1].value)
         told = f"clearance {1e3 * nearest.value:.4g} mm at {nearest.time:.4g} s: {nearest.name}"
@@ -62,7 +63,9 @@ def show_certificate(
 
 def show_program(program: Program, console: Console) -> None:
     """Print the verdict, and how long seams and moves take."""
-    _print(console, in_shell(program.summary), "green" if program.verified else "bold red")
+    _print(
+        console, with_hint(in_shell(program.summary)), "green" if program.verified else "bold red"
+    )
     _print(
         console,
         f"{program.extent} in {program.duration:.2f} s, of it {program.transfer_time:.2f} s moves "
@@ -71,6 +74,11 @@ def show_program(program: Program, console: Console) -> None:
     count = len(program.notes)
     if count:
         _print(console, f"{count} note{'s' * (count != 1)}: {_MORE}")
+
+
+def with_hint(text: str) -> str:
+    """Return a summary that says how to see what it only counts."""
+    return re.sub(r"(; and \d+ more)\b", rf"\1 ({_MORE})", text, count=1)
 
 
 def _print(console: Console, text: str, style: str | None = None) -> None:

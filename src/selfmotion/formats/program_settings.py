@@ -170,13 +170,19 @@ class ProgramSettings:
         return event in (self.signals or {})
 
 
-def read_program_settings(file: str | FilePath) -> ProgramSettings:
+def read_program_settings(file: str | FilePath, **changes: Any) -> ProgramSettings:
     """Read the settings of a controller's program: TOML or JSON, keys as in `ProgramSettings`.
 
     ``deviation`` and ``move_deviation`` are tables with ``position`` (or ``position_mm``) and
     ``rotation`` (or ``rotation_deg``); a signal is a list of an output and true or false; a work
     object is the name of a link, or a table as poses of problem files are (``position`` or
     ``position_mm``, and ``rpy_deg`` or another orientation).
+
+    Parameters
+    ----------
+    file : path
+    **changes
+        Settings that count in place of the file's, as in `ProgramSettings`.
 
     Raises
     ------
@@ -203,7 +209,7 @@ def read_program_settings(file: str | FilePath) -> ProgramSettings:
             values[key] = Tolerance(**{**dataclasses.asdict(_DEVIATION), **given})
         if not isinstance(values.get("work_object", ""), str):
             values["work_object"] = pose_of(values["work_object"])
-        return ProgramSettings(**values)
+        return ProgramSettings(**{**values, **changes})
     except SelfmotionError as error:
         raise FileFormatError(f"{path}: {error}") from error
     except ValueError as error:

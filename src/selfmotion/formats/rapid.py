@@ -158,7 +158,7 @@ def _work(draft: Draft, name: str) -> list[str]:
             raise ProblemError(
                 f"{draft.robot.name}: an axis carries work object '{frames.name}', and a wobjdata "
                 f'names its mechanical unit; give positioner = "STN1" or what it is called '
-                f"(ProgramSettings(positioner=…))"
+                f"(ProgramSettings(positioner=…), or in the file of --settings)"
             )
         told = f'FALSE, "{unit}", {nowhere}, {place}'
     return [f"  TASK PERS wobjdata {name}_w := [FALSE, {told}];"]
