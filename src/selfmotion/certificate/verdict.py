@@ -152,7 +152,7 @@ class Certificate:
             return (
                 f"verified at all times ({', '.join(self.covers)}): at most "
                 f"{self.position_error.value:.1e} m and {self.rotation_error.value:.1e} rad off "
-                f"the path{', tolerances not counted' if self.deviations else ''}"
+                f"the path{' beyond its tolerances' if self.deviations else ''}"
                 f"{allowed_text(self.tolerance)}"
                 f"{self._others_text}"
                 f"{self._besides}"
@@ -171,7 +171,7 @@ class Certificate:
         rotation = max(one.value for _, one in self._errors)
         return (
             f"verified at all times: at most {position:.1e} m and {rotation:.1e} rad off the path"
-            f"{', tolerances not counted' if self.deviations else ''}{allowed_text(self.tolerance)}"
+            f"{' beyond its tolerances' if self.deviations else ''}{allowed_text(self.tolerance)}"
             f"{self._besides}"
         )
 

@@ -118,20 +118,22 @@ CornerToleranceOption = Annotated[
     float | None,
     typer.Option(help="Largest deviation at rounded corners (m; 0.001 by default).", min=1e-6),
 ]
-TaskOption = Annotated[TaskName, typer.Option(help="Task: what the path prescribes.")]
-CheckedTaskOption = Annotated[
-    TaskName | None, typer.Option(help="Task: what the path prescribes; pose by default.")
-]
+_TASK = (
+    "Task: what the path prescribes, the pose of the tool, its position, or pointing: all but its "
+    "rotation about its own z axis; planar and planar_pose are for planar arms"
+)
+TaskOption = Annotated[TaskName, typer.Option(help=f"{_TASK}.")]
+CheckedTaskOption = Annotated[TaskName | None, typer.Option(help=f"{_TASK}; pose by default.")]
 PlannedTaskOption = Annotated[
     TaskName | None,
-    typer.Option(help="Task: what the path prescribes; pose by default, planar for a planar arm."),
+    typer.Option(help=f"{_TASK}; pose by default, planar for a planar arm."),
 ]
 RelaxOption = Annotated[
     list[str] | None,
     typer.Option(
-        help="Tolerances of the task: ROWS[=BAND]\\[@FROM:TO], rows of x,y,z or of "
-        "rx,ry,rz (tool axes), BAND in m or rad (free without), times in s. Examples: z=0.002, "
-        "rx,ry=0.2 (a cone), rz@1:2.5. Repeatable."
+        help="Tolerances of the task: ROWS[=BAND]\\[@FROM:TO]; ROWS are x,y,z, or rotations "
+        "rx,ry,rz about the tool's axes, BAND in m or rad (free without), times in s. "
+        "Examples: z=0.002, rx,ry=0.2 (a cone), rz@1:2.5. Repeatable."
     ),
 ]
 StartOption = Annotated[
@@ -144,7 +146,7 @@ StartOption = Annotated[
 FromOption = Annotated[
     Path | None,
     typer.Option(
-        "--from", help="Warm start: begin with the start and the null motion of this plan (.npz)."
+        "--from", help="Warm start: begin with the start and the self-motion of this plan (.npz)."
     ),
 ]
 ToolOption = Annotated[str | None, typer.Option(help="Tool frame (a link).")]
@@ -155,8 +157,8 @@ ReferenceOption = Annotated[
 DegreeOption = Annotated[
     int | None,
     typer.Option(
-        help="The published method: ε(t) is a polynomial of this degree, and no constraint is kept "
-        "but closure. By default ε(t) is unrestricted."
+        help="The published method: the self-motion ε(t) is a polynomial of this degree, and no "
+        "constraint is kept but closure. By default ε(t) is any function."
     ),
 ]
 MuOption = Annotated[
