@@ -14,6 +14,8 @@ from selfmotion.result import Plan
 
 # What else a summary leaves out is said by this.
 _MORE = "--verbose"
+# How a message begins to say what a look at single poses has found.
+_HELP = "what would help: "
 # A saving of less than this share of the cost is not worth a line.
 _WORTH = 0.01
 # After these there is nothing to do, unless the message says more than they do.
@@ -29,6 +31,8 @@ def show_plan(plan: Plan, console: Console) -> None:
         # The cost of a part of the path compares with nothing, and that of another pace is no cost
         # of this motion.
         _print(console, duration)
+        if "out of reach" in report.ending:
+            _print(console, _help_of(report.message))
         return
     change = ""
     if report.initial_cost:
@@ -74,6 +78,17 @@ def show_program(program: Program, console: Console) -> None:
     count = len(program.notes)
     if count:
         _print(console, f"{count} note{'s' * (count != 1)}: {_MORE}")
+
+
+def _help_of(message: str) -> str:
+    """Return what would help where a path leaves the reach, as far as it is known."""
+    _, found, told = message.partition(_HELP)
+    if found:
+        return found + told.partition("; ")[0]
+    return (
+        "what may help: another --start; a --task that prescribes less; --relax; the path "
+        "in another place (selfmotion place)"
+    )
 
 
 def with_hint(text: str) -> str:
