@@ -97,7 +97,8 @@ def test_limits_that_nobody_knows_are_told_of() -> None:
     problem = sm.Problem(robot, short_line(robot, start), "pointing", start, constraints=[asked])
     told = [text for text in problem.remarks if "none are known" in text]
     assert told == [
-        "joint acceleration limits: none are known of ur10, so none are kept; give limit"
+        "joint acceleration limits: none are known of ur10, so none are kept; "
+        "give --acceleration, limit = …"
     ]
     for quiet in ({"constraints": [sm.constraints.JointAccelerationLimits(5.0)]}, {}):
         usual = sm.Problem(robot, problem.path, "pointing", start, **quiet)
