@@ -51,8 +51,8 @@ def test_shares_of_rates_say_how_much_longer_it_takes(order: int, longer: float)
     assert f"{found.amount:.5g} times its limit of " in found.text
     assert f"give it {longer:.5g} times the duration" in found.text
     known = ("speeds", "accelerations", "jerks")[order - 1]
-    # Not of all joints, so that nothing is said to have been checked.
-    assert limits.covers == ()
+    # Not of all joints, so that no more is said to have been checked.
+    assert limits.covers == (f"{known} of some joints",)
     assert limits.remarks == (f"{limits.name}: 1 of 3 joints are not limited",)
     exact = JointLimits(order, np.full(3, -most), np.full(3, most))
     assert exact.covers == (known,)

@@ -23,9 +23,9 @@ def finding(name: str, amount: float) -> Finding:
 
 
 def test_what_is_relaxed_is_said_where_something_is() -> None:
-    assert "tolerances not counted" not in still().verdict
+    assert "beyond its tolerances" not in still().verdict
     relaxed = still(relaxations=[sm.Relaxation("x", 1e-3)])
-    assert "rad off the path, tolerances not counted" in relaxed.verdict
+    assert "rad off the path beyond its tolerances" in relaxed.verdict
     assert [item.name for item in relaxed.deviations] == ["(x)"]
 
 
@@ -37,6 +37,18 @@ def test_what_was_not_checked_is_said_unless_all_was() -> None:
     assert every.not_checked == ()
     assert "not checked" not in every.verdict
     assert repr(every) == f"Certificate({every.verdict})"
+
+
+def test_limits_of_some_joints_are_told_apart_from_those_of_all() -> None:
+    some = sm.constraints.JointAccelerationLimits([1.0] + [np.inf] * 6, replace=True)
+    every = sm.constraints.JointAccelerationLimits(5.0)
+    robot = robot_named("panda")
+    part = still(some.requirement(robot))
+    assert "accelerations of some joints" in part.covers
+    assert part.not_checked == ("accelerations of the other joints", "self-collision")
+    whole = still(some.requirement(robot), every.requirement(robot))
+    assert "accelerations of some joints" not in whole.covers
+    assert whole.not_checked == ("self-collision",)
 
 
 def test_notes_and_failures_are_told_in_this_order() -> None:

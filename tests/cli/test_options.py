@@ -10,7 +10,7 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.cli.options import relaxation, search_of
-from support.arms import PANDA_HOME
+from support.arms import PANDA_HOME, robot_named
 from support.shell import complaint, invoke
 
 HOME = ",".join(map(str, PANDA_HOME.tolist()))
@@ -43,6 +43,14 @@ def test_limits_and_closed_paths(tmp_path: Path) -> None:
     }  # fmt: skip
     assert asked["JointVelocityLimits"]["limit"] == 2.0
     assert asked["JointAccelerationLimits"]["limit"] == [9, 9, 9, 9, 9, 9, 8]
+
+
+def test_a_start_by_its_name(tmp_path: Path) -> None:
+    plan = planned(tmp_path, "--start", "home")  # the last one counts
+    np.testing.assert_allclose(plan.trajectory.q[0], robot_named("panda").home, atol=1e-12)
+    assert "--start is 'there', expected numbers" in complaint(
+        "plan", "panda", "--circle", "0.05", "--start", "there"
+    )
 
 
 def test_costs_by_name(tmp_path: Path) -> None:

@@ -53,6 +53,20 @@ def test_of_a_plan_the_verdict_comes_first_then_cost_duration_and_what_would_hel
     )
 
 
+@pytest.mark.parametrize("free", [False, True])
+def test_where_a_path_leaves_the_reach_what_helps_is_told(free: bool) -> None:
+    arm = robot_named("planar_3r")
+    q = [0.0, 0.5, 0.5]
+    end = arm.pose(q)
+    end.translation *= 1.1
+    line = sm.paths.Line(arm.pose(q), end, 4.0)
+    plan = sm.plan(sm.Problem(arm, line, "planar", None if free else q))
+    assert "out of reach" in plan.report.ending
+    lines = told(summaries.show_plan, plan)
+    assert lines[-1].startswith("what would help: the path moved" if free else "what may help: ")
+    assert len(lines) <= MOST_LINES
+
+
 def test_of_what_is_not_verified_the_first_reason_and_how_many_more(slow: sm.Plan) -> None:
     moved = replace(slow.trajectory, q=slow.trajectory.q + 0.3, qd=3.0 * slow.trajectory.qd)
     plan = replace(slow, trajectory=moved)
@@ -60,7 +74,7 @@ def test_of_what_is_not_verified_the_first_reason_and_how_many_more(slow: sm.Pla
     failures = plan.certificate.failures
     assert len(failures) > 1
     lines = told(summaries.show_plan, plan)
-    assert lines[0] == f"not verified: {failures[0]}; and {len(failures) - 1} more"
+    assert lines[0] == f"not verified: {failures[0]}; and {len(failures) - 1} more (--verbose)"
     assert len(lines) <= MOST_LINES
 
 

@@ -95,10 +95,11 @@ def test_limits_that_nobody_knows_are_told_of() -> None:
     start = robot.dexterous_configuration("pointing")
     asked = sm.constraints.JointAccelerationLimits()
     problem = sm.Problem(robot, short_line(robot, start), "pointing", start, constraints=[asked])
-    told = [text for text in problem.remarks if "asked for" in text]
+    told = [text for text in problem.remarks if "none are known" in text]
     assert told == [
-        "joint acceleration limits are asked for, but none are known of ur10: give limit"
+        "joint acceleration limits: none are known of ur10, so none are kept; "
+        "give --acceleration, limit = …"
     ]
     for quiet in ({"constraints": [sm.constraints.JointAccelerationLimits(5.0)]}, {}):
         usual = sm.Problem(robot, problem.path, "pointing", start, **quiet)
-        assert not any("asked for" in text for text in usual.remarks)
+        assert not any("none are known" in text for text in usual.remarks)

@@ -480,6 +480,9 @@ def test_programs_have_no_parts_and_other_files_beside_them_do(
     asked = ("export", tmp_path / "plan.npz", "--parts", "--out")
     with pytest.raises(sm.errors.ProblemError, match="--parts has no effect on programs"):
         invoke(*asked, program)
+    with pytest.raises(sm.errors.ProblemError, match="part 'left': URScript is for arms of 6"):
+        sm.files.write_parts(carried, tmp_path / "m.script")
+    assert not (tmp_path / "m.left.script").exists()
     assert invoke(*asked, motion, "--out", tmp_path / "m.csv")[0] == 0
     assert (tmp_path / "m.left.yaml").exists()
     assert (tmp_path / "m.right.csv").exists()

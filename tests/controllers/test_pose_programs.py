@@ -389,6 +389,13 @@ def test_settings_of_poses_say_what_is_wrong(alone: sm.Plan, tmp_path: Path) -> 
     with pytest.raises(sm.errors.FileFormatError, match="positioner: has no effect on joint"):
         sm.files.read_program_settings(tmp_path / "unit.toml")
     assert sm.files.read_program_settings(tmp_path / "unit.toml", targets="poses").positioner == 2
+    held = tmp_path / "held.toml"
+    held.write_text('positioner = "STN1"\ncenter = [0, 0, 0.1]\n')
+    # What is given besides counts before the file is judged.
+    given = sm.files.read_program_settings(held, targets="poses", mass=3.0)
+    assert (given.targets, given.positioner, given.mass) == ("poses", "STN1", 3.0)
+    with pytest.raises(sm.errors.FileFormatError, match="has no effect without a mass"):
+        sm.files.read_program_settings(held, targets="poses")
     alone.save(tmp_path / "plan.npz")
     out = tmp_path / "a.src"
     asked = ("export", tmp_path / "plan.npz", "--out", out, "--targets", "poses", "--wobj")

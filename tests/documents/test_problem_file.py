@@ -289,6 +289,7 @@ def test_examples_of_files_jobs_and_cells_are_read(tmp_path: Path) -> None:
         )
         assert cell.dof == 9
         assert cell.reference == "table/plate"
+        assert '# frame = "arm/panda_hand_tcp"' in file.read_text()
 
 
 def test_what_init_writes_runs_where_the_most_dexterous_pose_is_stretched(tmp_path: Path) -> None:

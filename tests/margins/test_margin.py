@@ -1,6 +1,7 @@
 """Margins: everything within them is survived, by a judge that knows Pinocchio and coal alone."""
 
 import dataclasses
+import json
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -148,6 +149,29 @@ def test_what_cannot_be_asked_is_refused(plan: sm.Plan) -> None:
     other = dataclasses.replace(plan, trajectory=moved)
     with pytest.raises(sm.errors.PlanError, match="of another motion"):
         sm.margin(other)
+
+
+def test_of_a_program_margins_are_those_of_its_seams(plan: sm.Plan, tmp_path: Path) -> None:
+    with pytest.raises(sm.errors.FileFormatError, match="holds several plans, expected one"):
+        sm.load_plan(tmp_path / "a.program")
+    problem = plan.problem
+    seam = sm.Seam("one", problem.path, problem.task)
+    (clear,) = (x for x in problem.constraints if isinstance(x, sm.constraints.Clearance))
+    others = [x for x in problem.constraints if x is not clear]
+    start = plan.trajectory.q[0]
+    program = sm.plan_job(
+        problem.robot, [seam], start=start, branches=1, constraints=others, clearance=clear
+    )
+    file = tmp_path / "a.program"
+    program.save(file)
+    (step,) = [step for step in program.steps if step.is_seam]
+    code, told = invoke("margin", file)
+    assert code == 0
+    assert f"seam 'one': {sm.margin(step.made)}" in told
+    assert "not judged: the moves between the seams" in told
+    code, told = invoke("margin", file, "--json")
+    assert json.loads(told)["seams"]["one"]["sentence"] == sm.margin(step.made).sentence
+    assert "--corrected is of a single plan" in complaint("margin", file, "--corrected")
 
 
 def test_margins_are_rounded_down() -> None:

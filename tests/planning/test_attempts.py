@@ -94,7 +94,7 @@ def test_what_costs_more_freely_is_not_optimised_with_limits(
     effort = Effort(None, None, None, Counts())
     assert problem.given_start is not None
     candidate = Candidate(problem, effort, problem.given_start, free=False)
-    candidate.polish(dearest=free.report.cost * (0.5 if dearer else 2.0))
+    candidate.polish(cost_to_beat=free.report.cost * (0.5 if dearer else 2.0))
     assert candidate.is_hopeless == dearer
     assert dearer or not candidate.violations
 
@@ -109,7 +109,9 @@ def test_what_conditions_did_not_count_for_is_none_that_keeps_them(panda_circle:
     bound = problem.bind_constraints(start, start)
     effort = Effort(None, lambda iteration: True, None, Counts())
     polisher = Polisher(problem, effort, bound, free=False)
-    found = polisher.near([free.trajectory], first_nodes(problem), dearest=10.0 * free.report.cost)
+    found = polisher.near(
+        [free.trajectory], first_nodes(problem), cost_to_beat=10.0 * free.report.cost
+    )
     assert polisher.history
     assert found is not None
     assert found.violations

@@ -84,7 +84,10 @@ def test_speed_limits_end_it_earlier_and_are_named(planar: sm.RobotModel) -> Non
     plan = sm.plan(sm.Problem(planar, line, "planar", [0.0, 0.5, 0.5]))
     check_part(plan, time_at(line, 5.0))
     assert plan.certificate.velocity_ratio.value > 0.9
-    for words in ("gets nearer to that: joint velocity limits", "the pose is out of reach"):
+    for words in (
+        "the next longer motion fails: joint velocity limits",
+        "the pose is out of reach",
+    ):
         assert words in plan.certificate.verdict
 
 
@@ -172,7 +175,9 @@ def test_without_a_part_the_errors_stay(planar: sm.RobotModel) -> None:
     pose = planar.pose(start)
     end = pose.copy()
     end.translation = pose.translation * 1.5
-    with pytest.raises(sm.errors.BreakdownError, match="singular pose near t ="):
+    with pytest.raises(
+        sm.errors.BreakdownError, match=r"out of reach.*; and no motion was found that"
+    ):
         sm.plan(
             sm.Problem(planar, sm.paths.Line(pose, end, 1.0, time_law="constant"), "planar", start)
         )

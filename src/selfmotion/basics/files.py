@@ -16,6 +16,8 @@ from selfmotion.basics.arrays import Array, shown
 from selfmotion.basics.errors import FileFormatError
 
 _DESCRIPTION = "description"
+# Files that hold several plans.
+_OF_MANY = (".program", ".parts")
 # Files of arrays beyond this many bytes are not read: 250,000 samples of a plan are a tenth.
 _LARGEST = 250_000_000
 # What texts have besides letters: blanks, ends of lines and pages, of tapes and files.
@@ -105,13 +107,6 @@ def write_archive(file: Path, description: Mapping[str, Any], arrays: Mapping[st
     write_atomically(file, write)
 
 
-# Files of several plans, by what reads them.
-_OTHERS = {
-    ".program": "the program of a job, which load_program, check, export and replay read",
-    ".parts": "a motion in parts, which load_parts, check, export and replay read",
-}
-
-
 def read_archive(file: Path) -> tuple[dict[str, Any], dict[str, Array]]:
     """Read what `write_archive` wrote.
 
@@ -120,8 +115,11 @@ def read_archive(file: Path) -> tuple[dict[str, Any], dict[str, Array]]:
     FileFormatError
         The file is missing or is no such archive.
     """
-    if file.suffix in _OTHERS:
-        raise FileFormatError(f"{file}: is {_OTHERS[file.suffix]}, expected one plan (.npz)")
+    if file.suffix in _OF_MANY:
+        raise FileFormatError(
+            f"{file}: holds several plans, expected one (.npz); of a program they are "
+            f"[step.made for step in sm.load_program(file).steps if step.is_seam]"
+        )
     if os.path.exists(file) and not zipfile.is_zipfile(file):
         raise FileFormatError(f"{file}: is no plan written by selfmotion (.npz)")
     arrays = read_arrays(file)

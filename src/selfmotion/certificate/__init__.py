@@ -33,6 +33,7 @@ from selfmotion.certificate.requirement import (
     FinishedMotion as FinishedMotion,
     Requirement as Requirement,
     approaches as approaches,
+    covered_by as covered_by,
 )
 from selfmotion.certificate.separation import Separation as Separation
 from selfmotion.certificate.verdict import (

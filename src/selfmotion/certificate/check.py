@@ -21,7 +21,7 @@ from selfmotion.certificate.feed import FeedReached, possible_feeds
 from selfmotion.certificate.findings import DampedStretch, Extreme, Finding, Tolerance
 from selfmotion.certificate.limits import arm_limits
 from selfmotion.certificate.path_error import PathCheck, bound_errors
-from selfmotion.certificate.requirement import FinishedMotion, Requirement
+from selfmotion.certificate.requirement import FinishedMotion, Requirement, covered_by
 from selfmotion.certificate.verdict import Certificate
 from selfmotion.follow import BoundFollow, Follow, Follows
 from selfmotion.motion import Trajectory
@@ -124,7 +124,7 @@ def certify(
             *_told(findings),
             *possible_feeds(feeds, findings),
         ),
-        covers=tuple(dict.fromkeys(["path", *(what for item in wanted for what in item.covers)])),
+        covers=("path", *covered_by(wanted)),
         remarks=tuple(remark for item in wanted for remark in item.remarks),
         deviations=path_check.deviations,
         damped=damped,

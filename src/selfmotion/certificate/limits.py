@@ -7,7 +7,7 @@ import numpy as np
 
 from selfmotion.basics import Array, ProblemError, read_only
 from selfmotion.certificate.findings import Finding
-from selfmotion.certificate.requirement import FinishedMotion, Requirement
+from selfmotion.certificate.requirement import FinishedMotion, Requirement, of_some
 from selfmotion.robot import RobotModel
 
 # A jump of acceleration counts as one within this time [s]: no controller looks closer.
@@ -21,6 +21,8 @@ LIMIT_NAMES = (
     "joint acceleration limits",
     "joint jerk limits",
 )
+# What a verdict calls them.
+_COVERED = ("joint limits", "speeds", "accelerations", "jerks")
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,10 +65,12 @@ class JointLimits(Requirement):
     def covers(self) -> tuple[str, ...]:
         """See `Requirement.covers`."""
         limited = np.isfinite(self.upper) | np.isfinite(self.lower)
-        # Of the arm's makers nobody may have said; joints that turn for ever have no end.
-        if not (limited.all() if self.order else limited.any()):
+        if not limited.any():
             return ()
-        return (("joint limits", "speeds", "accelerations", "jerks")[self.order],)
+        # Joints that turn for ever have no end.
+        every = self.order == 0 or limited.all()
+        name = _COVERED[self.order]
+        return (name if every else of_some(name),)
 
     @property
     def remarks(self) -> tuple[str, ...]:

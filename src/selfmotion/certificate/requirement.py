@@ -108,3 +108,14 @@ def approaches(
             if name not in found or each.value < found[name].value:
                 found[name] = each
     return dict(sorted(found.items(), key=lambda item: item[1].value))
+
+
+def of_some(name: str) -> str:
+    """Return what is covered of such rates where not every joint has a limit."""
+    return f"{name} of some joints"
+
+
+def covered_by(requirements: Sequence[Requirement]) -> tuple[str, ...]:
+    """Return what requirements cover together; what one covers of all joints is not of some."""
+    found = dict.fromkeys(what for item in requirements for what in item.covers)
+    return tuple(what for what in found if what not in map(of_some, found))

@@ -7,6 +7,7 @@ import numpy as np
 
 from selfmotion.certificate.findings import USUAL, DampedStretch, Extreme, Finding, Tolerance
 from selfmotion.certificate.limits import LIMIT_NAMES
+from selfmotion.certificate.requirement import of_some
 
 # What a reader of a verdict would take to have been checked, unless told otherwise.
 NOT_JUDGED = (
@@ -120,7 +121,11 @@ class Certificate:
     @property
     def not_checked(self) -> tuple[str, ...]:
         """What a motion should keep and nothing here has looked at."""
-        return tuple(name for name in _EXPECTED if name not in self.covers)
+        return tuple(
+            f"{name} of the other joints" if of_some(name) in self.covers else name
+            for name in _EXPECTED
+            if name not in self.covers
+        )
 
     @property
     def on_path(self) -> bool:
@@ -147,7 +152,7 @@ class Certificate:
             return (
                 f"verified at all times ({', '.join(self.covers)}): at most "
                 f"{self.position_error.value:.1e} m and {self.rotation_error.value:.1e} rad off "
-                f"the path{', tolerances not counted' if self.deviations else ''}"
+                f"the path{' beyond its tolerances' if self.deviations else ''}"
                 f"{allowed_text(self.tolerance)}"
                 f"{self._others_text}"
                 f"{self._besides}"
@@ -166,7 +171,7 @@ class Certificate:
         rotation = max(one.value for _, one in self._errors)
         return (
             f"verified at all times: at most {position:.1e} m and {rotation:.1e} rad off the path"
-            f"{', tolerances not counted' if self.deviations else ''}{allowed_text(self.tolerance)}"
+            f"{' beyond its tolerances' if self.deviations else ''}{allowed_text(self.tolerance)}"
             f"{self._besides}"
         )
 

@@ -131,6 +131,8 @@ class Shell:
         return table
 
     def _start(self, warm_start: sm.Plan | None) -> Any:
+        if self.start in _STARTS:
+            return self.start
         if self.start is not None:
             return options.numbers(self.start, "--start").tolist()
         if self.path is not None:
@@ -200,6 +202,8 @@ OF_PATH = (
 )
 
 
+# Starts that have a name, as in problem files.
+_STARTS = ("home", "dexterous", "free")
 # Those that a shape has as well.
 _OF_SHAPE = ("feed", "duration")
 

@@ -1,6 +1,7 @@
 """The commands that say how wrong a cell may be."""
 
 import dataclasses
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -33,7 +34,7 @@ _Part = Annotated[
     epilog="Example: selfmotion margin plan.npz --tolerance 5e-4 --turn 0.02", rich_help_panel=LOOK
 )
 def margin(
-    file: Annotated[Path, typer.Argument(help="A plan saved as .npz.")],
+    file: Annotated[Path, typer.Argument(help="A plan saved as .npz, or a .program.")],
     tolerance: _Tolerance = None,
     turn: _Turn = None,
     clearance: Annotated[
@@ -62,17 +63,17 @@ def margin(
     """Measure by how much part, tool and base may be displaced before a plan fails."""
     within = _process(tolerance, turn)
     about = None if center is None else options.numbers(center, "--center", 3)
+    asked: dict[str, Any] = {"clearance": clearance, "center": about}
+    asked |= {"part": part or None, "tool": tool or None}
+    if file.suffix == ".program":
+        if corrected:
+            raise sm.errors.ProblemError("--corrected is of a single plan (.npz); leave it out")
+        _margins_of_seams(sm.load_program(file), within, asked, as_json)
+        return
     plan = sm.load_plan(file)
     with StageDisplay(stages) as display:
         display.stage("measuring margins", 1, 1)
-        found = sm.margin(
-            plan,
-            within,
-            clearance=clearance,
-            part=part or None,
-            tool=tool or None,
-            center=about,
-        )
+        found = sm.margin(plan, within, **asked)
     again = []
     if corrected:
         with StageDisplay(stages) as display:
@@ -140,6 +141,24 @@ def sheet(
             margins = sm.margin(plan, within, part=part or None)
     written = sm.files.write_sheet(plan, out, margins, title=title)
     terminal.print(f"wrote {written}", markup=False, soft_wrap=True)
+
+
+def _margins_of_seams(
+    program: sm.Program, within: sm.Tolerance | None, asked: Mapping[str, Any], as_json: bool
+) -> None:
+    """Print the margins of each seam; those of moves are not known."""
+    plans = {step.name: step.made for step in program.steps if isinstance(step.made, sm.Plan)}
+    found = {}
+    with StageDisplay(stages) as display:
+        for number, (name, plan) in enumerate(plans.items(), 1):
+            display.stage(f"measuring margins of seam '{name}'", number, len(plans))
+            found[name] = sm.margin(plan, within, **asked)
+    if as_json:
+        terminal.print_json(data={"seams": {name: margins_json(it) for name, it in found.items()}})
+        return
+    for name, each in found.items():
+        terminal.print(f"seam '{name}': {each}\n", markup=False, soft_wrap=True)
+    terminal.print("not judged: the moves between the seams", markup=False, soft_wrap=True)
 
 
 def _process(tolerance: float | None, turn: float | None) -> sm.Tolerance | None:

@@ -46,11 +46,16 @@ NormalOption = Annotated[
 ]
 DurationOption = Annotated[
     float | None,
-    typer.Option(help="Of circle or line (s; 4 by default), or of poses without times."),
+    typer.Option(
+        help="Of circle or line (s; 4 by default without --feed), or of poses without times."
+    ),
 ]
 FeedOption = Annotated[
     float | None,
-    typer.Option(help="Constant tool speed from rest to rest (m/s), for poses without times."),
+    typer.Option(
+        help="Constant tool speed from rest to rest (m/s), of circle or line, or of poses without "
+        "times."
+    ),
 ]
 JumpOption = Annotated[
     float | None,
@@ -113,29 +118,35 @@ CornerToleranceOption = Annotated[
     float | None,
     typer.Option(help="Largest deviation at rounded corners (m; 0.001 by default).", min=1e-6),
 ]
-TaskOption = Annotated[TaskName, typer.Option(help="Task: what the path prescribes.")]
-CheckedTaskOption = Annotated[
-    TaskName | None, typer.Option(help="Task: what the path prescribes; pose by default.")
-]
+_TASK = (
+    "Task: what the path prescribes, the pose of the tool, its position, or pointing: all but its "
+    "rotation about its own z axis; planar and planar_pose are for planar arms"
+)
+TaskOption = Annotated[TaskName, typer.Option(help=f"{_TASK}.")]
+CheckedTaskOption = Annotated[TaskName | None, typer.Option(help=f"{_TASK}; pose by default.")]
 PlannedTaskOption = Annotated[
     TaskName | None,
-    typer.Option(help="Task: what the path prescribes; pose by default, planar for a planar arm."),
+    typer.Option(help=f"{_TASK}; pose by default, planar for a planar arm."),
 ]
 RelaxOption = Annotated[
     list[str] | None,
     typer.Option(
-        help="Tolerances of the task: ROWS[=BAND]\\[@FROM:TO], rows of x,y,z or of "
-        "rx,ry,rz (tool axes), BAND in m or rad (free without), times in s. Examples: z=0.002, "
-        "rx,ry=0.2 (a cone), rz@1:2.5. Repeatable."
+        help="Tolerances of the task: ROWS[=BAND]\\[@FROM:TO]; ROWS are x,y,z, or rotations "
+        "rx,ry,rz about the tool's axes, BAND in m or rad (free without), times in s. "
+        "Examples: z=0.002, rx,ry=0.2 (a cone), rz@1:2.5. Repeatable."
     ),
 ]
 StartOption = Annotated[
-    str | None, typer.Option(help="q1,q2,… (rad or m); by default the best that is found.")
+    str | None,
+    typer.Option(
+        help="q1,q2,… (rad or m), home, dexterous (far from limits and singular poses) or free "
+        "(the best that is found); by default free with --path, dexterous otherwise."
+    ),
 ]
 FromOption = Annotated[
     Path | None,
     typer.Option(
-        "--from", help="Warm start: begin with the start and the null motion of this plan (.npz)."
+        "--from", help="Warm start: begin with the start and the self-motion of this plan (.npz)."
     ),
 ]
 ToolOption = Annotated[str | None, typer.Option(help="Tool frame (a link).")]
@@ -146,8 +157,8 @@ ReferenceOption = Annotated[
 DegreeOption = Annotated[
     int | None,
     typer.Option(
-        help="The published method: ε(t) is a polynomial of this degree, and no constraint is kept "
-        "but closure. By default ε(t) is unrestricted."
+        help="The published method: the self-motion ε(t) is a polynomial of this degree, and no "
+        "constraint is kept but closure. By default ε(t) is any function."
     ),
 ]
 MuOption = Annotated[
@@ -205,7 +216,7 @@ OutOption = Annotated[
     list[Path] | None,
     typer.Option(
         help="Write the plan (.npz), its replay (.html) or motion (.csv, .json, .yaml, .mcap, "
-        ".xml, .script; see `selfmotion export`). Repeatable."
+        ".xml, .script, .src, .mod; see `selfmotion export`). Repeatable."
     ),
 ]
 HtmlOption = Annotated[Path | None, typer.Option(help="Write a replay to open in a browser.")]

@@ -1,5 +1,6 @@
 """What commands print unless everything is asked for: the verdict, one number, one remedy."""
 
+import re
 from collections.abc import Mapping
 
 from rich.console import Console
@@ -13,6 +14,8 @@ from selfmotion.result import Plan
 
 # What else a summary leaves out is said by this.
 _MORE = "--verbose"
+# How a message begins to say what a look at single poses has found.
+_HELP = "what would help: "
 # A saving of less than this share of the cost is not worth a line.
 _WORTH = 0.01
 # After these there is nothing to do, unless the message says more than they do.
@@ -28,6 +31,8 @@ def show_plan(plan: Plan, console: Console) -> None:
         # The cost of a part of the path compares with nothing, and that of another pace is no cost
         # of this motion.
         _print(console, duration)
+        if "out of reach" in report.ending:
+            _print(console, _help_of(report.message))
         return
     change = ""
     if report.initial_cost:
@@ -64,7 +69,7 @@ def show_certificate(
 ) -> None:
     """Print the verdict, how near bodies come, and how much else is to be known."""
     style = "green" if certificate.verified else "bold red"
-    _print(console, in_shell(certificate.summary), style)
+    _print(console, with_hint(in_shell(certificate.summary)), style)
     if approaches:
         name, nearest = min(approaches.items(), key=lambda item: item[1].value)
         told = f"clearance {1e3 * nearest.value:.4g} mm at {nearest.time:.4g} s: {nearest.name}"
@@ -76,7 +81,9 @@ def show_certificate(
 
 def show_program(program: Program, console: Console) -> None:
     """Print the verdict, and how long seams and moves take."""
-    _print(console, in_shell(program.summary), "green" if program.verified else "bold red")
+    _print(
+        console, with_hint(in_shell(program.summary)), "green" if program.verified else "bold red"
+    )
     _print(
         console,
         f"{program.extent} in {program.duration:.2f} s, of it {program.transfer_time:.2f} s moves "
@@ -85,6 +92,22 @@ def show_program(program: Program, console: Console) -> None:
     count = len(program.notes)
     if count:
         _print(console, f"{count} note{'s' * (count != 1)}: {_MORE}")
+
+
+def _help_of(message: str) -> str:
+    """Return what would help where a path leaves the reach, as far as it is known."""
+    _, found, told = message.partition(_HELP)
+    if found:
+        return found + told.partition("; ")[0]
+    return (
+        "what may help: another --start; a --task that prescribes less; --relax; the path "
+        "in another place (selfmotion place)"
+    )
+
+
+def with_hint(text: str) -> str:
+    """Return a summary that says how to see what it only counts."""
+    return re.sub(r"(; and \d+ more)\b", rf"\1 ({_MORE})", text, count=1)
 
 
 def _print(console: Console, text: str, style: str | None = None) -> None:

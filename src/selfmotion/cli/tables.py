@@ -54,7 +54,7 @@ def show(plan: Plan, console: Console) -> None:
     console.print(
         f"{report.evaluations} evaluations of the cost, {report.gradient_evaluations} of its "
         f"gradient;\n{report.jacobian_evaluations} Jacobians, {report.steps} steps, "
-        f"{report.seconds:.2f} s\n{report.status.value}: {report.message}",
+        f"{report.seconds:.2f} s\noutcome: {report.message}",
         markup=False,
     )
     if len(report.attempts) > _USUAL_ATTEMPTS:

@@ -9,6 +9,7 @@ from selfmotion.basics import FileFormatError, ProblemError, as_flag, as_path, s
 from selfmotion.controllers.motions import STREAM, WRITERS, check_verified, form_of, read_motion
 from selfmotion.controllers.moving_ends import check_ends
 from selfmotion.controllers.samples import MotionSamples
+from selfmotion.controllers.urscript import check_joints
 from selfmotion.motion import Trajectory
 from selfmotion.result import Plan
 
@@ -52,7 +53,12 @@ def write_parts(
     write = WRITERS[name]
     rate = STREAM if name == "urscript" and rate is None else rate
     samples, written = MotionSamples.of(plan.trajectory, rate), {}
-    for part in dict.fromkeys(name.partition("/")[0] for name in names):
+    parts = list(dict.fromkeys(name.partition("/")[0] for name in names))
+    if name == "urscript":
+        # Before the first file is written.
+        for part in parts:
+            check_joints(plan.robot, samples.of_part(part).robot_joints, f"part '{part}'")
+    for part in parts:
         written[part] = path.with_name(f"{path.stem}.{part}{path.suffix}")
         write(written[part], samples.of_part(part), plan.robot, rate)
     return written

@@ -179,7 +179,7 @@ class ProgramSettings:
         return event in (self.signals or {})
 
 
-def read_program_settings(file: str | FilePath, **given: Any) -> ProgramSettings:
+def read_program_settings(file: str | FilePath, **changes: Any) -> ProgramSettings:
     """Read the settings of a controller's program: TOML or JSON, keys as in `ProgramSettings`.
 
     ``deviation`` and ``move_deviation`` are tables with ``position`` (or ``position_mm``) and
@@ -190,8 +190,8 @@ def read_program_settings(file: str | FilePath, **given: Any) -> ProgramSettings
     Parameters
     ----------
     file : path
-    **given
-        What counts instead of the file's, as in `ProgramSettings`.
+    **changes
+        Settings that count in place of the file's, as in `ProgramSettings`.
 
     Raises
     ------
@@ -218,7 +218,7 @@ def read_program_settings(file: str | FilePath, **given: Any) -> ProgramSettings
             values[key] = Tolerance(**{**dataclasses.asdict(_DEVIATION), **given})
         if not isinstance(values.get("work_object", ""), str):
             values["work_object"] = pose_of(values["work_object"])
-        return ProgramSettings(**{**values, **given})
+        return ProgramSettings(**{**values, **changes})
     except SelfmotionError as error:
         raise FileFormatError(f"{path}: {error}") from error
     except ValueError as error:

@@ -82,13 +82,15 @@ def script(
     return "\n".join([*lines, "  stopj(2.0)", "end", ""])
 
 
-def check_joints(robot: RobotModel, joints: Sequence[str]) -> None:
-    """Refuse joints that are not those of an arm of Universal Robots."""
+def check_joints(robot: RobotModel, joints: Sequence[str], what: str = "") -> None:
+    """Refuse joints, of the robot or of `what`, that are not those of an arm of UR."""
     slides = [name for name in joints if robot.is_prismatic(name)]
     if len(joints) != _JOINTS or slides:
         raise ProblemError(
-            f"{robot.name}: URScript is for arms of {_JOINTS} revolute joints, this one has "
-            f"{len(joints)} joints" + (f", of which '{slides[0]}' slides" if slides else "")
+            f"{what or robot.name}: URScript is for arms of {_JOINTS} revolute joints, this one "
+            f"has {len(joints)} joints"
+            + (f", of which '{slides[0]}' slides" if slides else "")
+            + "; tables (.csv) and ROS 2 messages (.yaml) are for any joints"
         )
 
 

@@ -119,16 +119,12 @@ feed_mm = 50
 
 """
 _REST = """\
-# [null_motion]        # by default unrestricted; or one with few coefficients:
-# kind = "PolynomialNullMotion"
-# degree = 3
-
-[[costs]]
+[[costs]]              # what is to be low
 kind = "JointVelocity"
 
 [[costs]]
-kind = "InverseManipulability"
-mu = 1e-3
+kind = "InverseManipulability"    # keeps away from singular configurations
+mu = 1e-3              # its weight
 
 [[constraints]]
 kind = "JointPositionLimits"
@@ -153,11 +149,15 @@ kind = "JointJerkLimits"
 # position = [0.0, -0.6, 0.6]
 # rpy_deg = [0, 0, 0]
 # size_mm = [100, 100, 1200]
-# frame = "{tool}"     # the link that carries it; without, it stands in the world
+# frame = "{link}"     # the link that carries it; without, it stands in the world
 
-# [[relaxations]]      # rows that may leave the path
-# rows = ["rx", "ry"]
+# [[relaxations]]      # what the tool may do besides: lean by 10 degrees to any side
+# rows = ["rx", "ry"]  # x, y, z, or turns rx, ry, rz about the tool's axes
 # band_deg = 10
+
+# [null_motion]        # only for the published method, which keeps fewer constraints
+# kind = "PolynomialNullMotion"
+# degree = 3
 """
 _OF_ONE = """\
 
@@ -234,6 +234,7 @@ def example_texts(
     whole = _HEAD + (_CELL if positioner else _ROBOT) + where + _REST + ("" if job else _OF_ONE)
     given = _said_of_robot(robot, target, loaded, positioner) | {
         "tool": arm.tool,
+        "link": f"arm/{arm.tool}" if positioner else arm.tool,
         "file": target.name,
         "command": "job" if job else "plan",
         "task": task.value,

@@ -55,6 +55,7 @@ _IN_FILES: Mapping[str, Mapping[str, str]] = {
         "start": "The tool's first pose; by default that of the start configuration.",
         "position": "Of the origin [m].",
         "rotation": f"3 × 3 matrix {_ORIENTATION}.",
+        "quaternions": "Orientations w, x, y, z, one for each point.",
         "quaternion": f"w, x, y, z {_ORIENTATION}.",
         "rpy": f"Roll, pitch and yaw [rad] {_ORIENTATION}.",
         "rotation_vector": f"Axis times angle [rad] {_ORIENTATION}.",

@@ -164,11 +164,11 @@ class Candidate:
         """Begin at a motion that is known."""
         self._known = trajectory
 
-    def polish(self, dearest: float = np.inf) -> None:
+    def polish(self, cost_to_beat: float = np.inf) -> None:
         """Optimise from the motion that there is.
 
-        Where a motion is known that costs `dearest`: it ends where it becomes clear that this one
-        will cost more.
+        Where a motion is known that costs `cost_to_beat`, it ends as soon as it is clear that this
+        one will cost more.
         """
         if self._ended is not None or self.is_of_chain:
             return
@@ -177,7 +177,7 @@ class Candidate:
         if is_published(self.problem, self.effort):
             self._polish_as_published()
         elif is_on_nodes(self.problem, self.effort):
-            self._polish_on_nodes(dearest)
+            self._polish_on_nodes(cost_to_beat)
 
     def settle(self) -> None:
         """Go on until more nodes save nothing; the published method has done so on its grids."""
@@ -242,7 +242,7 @@ class Candidate:
         x = np.concatenate([z, near])
         return x if objective.value(x) <= self.still.cost else none
 
-    def _polish_on_nodes(self, dearest: float) -> None:
+    def _polish_on_nodes(self, cost_to_beat: float) -> None:
         """Go to the optimum on nodes near the motion."""
         before = self._found
 
@@ -250,12 +250,12 @@ class Candidate:
             if isinstance(before, NodeSolution):
                 return polisher.again(before)
             motions, t = self._first_motions()
-            return polisher.near(motions, t, dearest)
+            return polisher.near(motions, t, cost_to_beat)
 
         self._by_nodes(optimum)
         found = self._found
         # One that costs more already is none to take either way.
-        if found is not None and found.cost < dearest and not found.keeps_off_itself:
+        if found is not None and found.cost < cost_to_beat and not found.keeps_off_itself:
             self.keep_off_itself()
         if self.status is Status.GRADIENT:
             # A gradient that is not finite is named with its time.

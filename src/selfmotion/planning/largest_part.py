@@ -173,9 +173,8 @@ def _part(problem: Problem, found: _Attempt, reach: Reach, further: str) -> Part
     """Return the part, with the reason why nothing goes `further` in words."""
     if found.candidate is None:
         raise RuntimeError("a part is made of a motion that was found")
-    nearer = "gets nearer to that" if reach.reason else "goes further"
     reasons = [reach.reason] if reach.reason else []
-    reasons += [f"no motion found {nearer}: {further}"] if further else []
+    reasons += [f"the next longer motion fails: {further}"] if further else []
     return _ending_at(problem, found.problem, found.candidate, "; ".join(reasons))
 
 

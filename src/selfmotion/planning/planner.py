@@ -136,7 +136,7 @@ class Planner:
         return is_published(self.problem, self.effort)
 
     @property
-    def dearest(self) -> float:
+    def cost_to_beat(self) -> float:
         """What a motion costs that is known and will do; inf where there is none."""
         best = self.best
         return best.solution.cost if best is not None and best.will_do else np.inf
@@ -161,9 +161,9 @@ class Planner:
     def polish(self, candidate: Candidate, *, chosen: bool = True) -> None:
         """Optimise a candidate; keep it if it is the best one and may be chosen."""
         # What is only compared with is optimised to the end.
-        dearest = self.dearest if chosen else np.inf
+        cost_to_beat = self.cost_to_beat if chosen else np.inf
         try:
-            candidate.polish(dearest)
+            candidate.polish(cost_to_beat)
         except KeyboardInterrupt:
             candidate.end(Status.INTERRUPTED)
         if candidate.is_hopeless:

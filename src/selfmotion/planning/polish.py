@@ -93,7 +93,7 @@ class Polisher:
         self,
         motions: Sequence[Trajectory],
         t: Array,
-        dearest: float = np.inf,
+        cost_to_beat: float = np.inf,
     ) -> NodeSolution | None:
         """Return the best motion near the cheapest of some, on nodes at times t (N + 1,).
 
@@ -113,25 +113,25 @@ class Polisher:
         # What an earlier plan has found need not begin far from what binds.
         is_plan = len(motions) > 1 and motion is near[0]
         multipliers = np.zeros(len(motion.h)) if is_plan else None
-        return self.best_near(motion, dearest, multipliers)
+        return self.best_near(motion, cost_to_beat, multipliers)
 
     def best_near(
-        self, motion: NodeMotion, dearest: float = np.inf, multipliers: Array | None = None
+        self, motion: NodeMotion, cost_to_beat: float = np.inf, multipliers: Array | None = None
     ) -> NodeSolution | None:
         """Return the best motion near one of nodes; `multipliers` (R,) of its rows may be known.
 
         Where that breaks conditions, also near the free optimum, and near motions from its start
         whose self-motion goes towards the middle of the joints' limits; where all do, the one that
         does so least. None where the cost there is not finite, or it would cost more than
-        `dearest`.
+        `cost_to_beat`.
         """
         if not np.isfinite(motion.aim):
             return None
         free = None
-        if dearest < np.inf:
+        if cost_to_beat < np.inf:
             free = self._freely(motion)
             # On the way to an optimum, what it costs says nothing.
-            if free.status in _ARRIVED and free.motion.cost >= dearest:
+            if free.status in _ARRIVED and free.motion.cost >= cost_to_beat:
                 # With conditions it would cost more still.
                 self.is_hopeless = True
                 return None

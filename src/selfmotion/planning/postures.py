@@ -79,14 +79,14 @@ def _optimise(planner: Planner, posture: Array, ended: Status | None) -> None:
     if motion is None:
         return
     try:
-        found = polisher.best_near(motion, planner.dearest)
+        found = polisher.best_near(motion, planner.cost_to_beat)
     except KeyboardInterrupt:
         found, ended = polisher.latest, Status.INTERRUPTED
         if found is None:
             raise
     if polisher.is_stopped:
         ended = Status.STOPPED
-    will_do = found is not None and not found.violations and found.cost < planner.dearest
+    will_do = found is not None and not found.violations and found.cost < planner.cost_to_beat
     if found is None or not (will_do or (ended is not None and planner.best is None)):
         if ended is not None:
             _end(planner, ended)

@@ -215,7 +215,16 @@ def _plan_largest_part(planner: Planner) -> bool:
         raise failure
     # Chains of configurations end at obstacles and step limits as well: these stay errors.
     blocked = isinstance(failure, NoSequenceError) and not planner.reach(failure.time).reason
-    if blocked or not planner.judge_part(failure.time):
+    if blocked:
+        raise failure
+    if not planner.judge_part(failure.time):
+        reason = planner.reach(failure.time).reason
+        if isinstance(failure, BreakdownError) and reason:
+            raise BreakdownError(
+                f"{planner.problem.asked.robot.name}: {reason}; and no motion was found that "
+                f"keeps what is asked for on the part before, from this start (start=)",
+                time=failure.time,
+            ) from failure
         raise failure
     return True
 

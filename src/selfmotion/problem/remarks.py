@@ -48,9 +48,10 @@ def remarks_on(
     for item in constraints:
         # What nobody asked for by name is not missed.
         if not item.applies(robot) and not any(item is usual for usual in KEPT):
+            option = "--acceleration, " * isinstance(item, JointAccelerationLimits)
             yield (
-                f"{item.requirement(robot).name} are asked for, but none are known of "
-                f"{robot.name}: give limit"
+                f"{item.requirement(robot).name}: none are known of {robot.name}, so none are "
+                f"kept; give {option}limit = …"
             )
     bodies = [body for item in requirements for body in item.obstacles]
     yield from inside_remarks(robot, follows, bodies)

@@ -15,7 +15,14 @@ from selfmotion.basics import (
     read_archive,
     write_archive,
 )
-from selfmotion.certificate import AtRest, Finding, FinishedMotion, Requirement, arm_limits
+from selfmotion.certificate import (
+    AtRest,
+    Finding,
+    FinishedMotion,
+    Requirement,
+    arm_limits,
+    covered_by,
+)
 from selfmotion.collision import Obstacle
 from selfmotion.constraints import Constraint
 from selfmotion.motion import Trajectory
@@ -83,8 +90,7 @@ class Move:
         """One line: verified, with what was checked at all times, or what is wrong."""
         if not self.verified:
             return f"not verified: {self.trouble}"
-        covers = dict.fromkeys(what for item in self.requirements for what in item.covers)
-        return f"verified at all times ({', '.join(covers)})"
+        return f"verified at all times ({', '.join(covered_by(self.requirements))})"
 
     @property
     def requirements(self) -> tuple[Requirement, ...]:

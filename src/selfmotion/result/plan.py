@@ -290,7 +290,7 @@ def reached_text(plans: Sequence[Plan], tolerance: Tolerance) -> str:
     beyond = any(plan.certificate.deviations for plan in plans)
     return (
         f"at most {position:.1e} m and {rotation:.1e} rad off the path"
-        f"{', tolerances not counted' if beyond else ''}{allowed_text(tolerance)}"
+        f"{' beyond its tolerances' if beyond else ''}{allowed_text(tolerance)}"
     )
 
 

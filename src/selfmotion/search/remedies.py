@@ -32,8 +32,8 @@ def remedies(poses: SinglePoses, t: float, times: Array) -> list[str]:
     if shift is not None:
         # Rounded away from where the path is: what is told has to suffice.
         far = np.copysign(np.ceil(1e4 * np.abs(shift) - 1e-3) / 10.0, shift) + 0.0
-        told = ", ".join(f"{x:.4g}" for x in far)
-        found.append(f"the path moved by {np.linalg.norm(far):.3g} mm ([{told}])")
+        told = ", ".join(f"{axis} {x:+.4g}" for axis, x in zip("xyz", far, strict=True) if x)
+        found.append(f"the path moved by {np.linalg.norm(far):.3g} mm ({told})")
     turn = least_deviation(poses, t, _ROTATION_ROWS)
     if turn is not None:
         found.append(f"the tool turned by {np.degrees(np.linalg.norm(turn)):.1f}° there")
