@@ -176,7 +176,8 @@ def test_without_a_part_the_errors_stay(planar: sm.RobotModel) -> None:
     end = pose.copy()
     end.translation = pose.translation * 1.5
     with pytest.raises(
-        sm.errors.BreakdownError, match=r"out of reach.*; and no motion was found that"
+        sm.errors.BreakdownError,
+        match=r"out of reach.*; and of the path before that no part was found",
     ):
         sm.plan(
             sm.Problem(planar, sm.paths.Line(pose, end, 1.0, time_law="constant"), "planar", start)

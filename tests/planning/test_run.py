@@ -171,7 +171,7 @@ def test_breakdown_names_the_time(planar: sm.RobotModel) -> None:
     end = pose.copy()
     end.translation = pose.translation * 1.5
     line = sm.paths.Line(pose, end, 1.0, time_law="constant")
-    with pytest.raises(sm.errors.BreakdownError, match="singular pose near t =") as caught:
+    with pytest.raises(sm.errors.BreakdownError, match="the pose is out of reach") as caught:
         sm.plan(sm.Problem(planar, line, "planar", start))
     assert 0.0 < caught.value.time < 0.01
 

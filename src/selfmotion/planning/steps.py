@@ -221,8 +221,8 @@ def _plan_largest_part(planner: Planner) -> bool:
         reason = planner.reach(failure.time).reason
         if isinstance(failure, BreakdownError) and reason:
             raise BreakdownError(
-                f"{planner.problem.asked.robot.name}: {reason}; and no motion was found that "
-                f"keeps what is asked for on the part before, from this start (start=)",
+                f"{planner.problem.asked.robot.name}: {reason}; and of the path before that no "
+                f"part was found that can be followed; start elsewhere (start=), or move the path",
                 time=failure.time,
             ) from failure
         raise failure
