@@ -54,12 +54,14 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
     """Add what is not in the folder of the pages."""
     for name in BESIDE:
         files.append(File.generated(config, name, abs_src_path=str(DOCS / name)))
+    # Before pages make classes of their own, which files would know as well.
+    all_keys = keys.keys_page()
     ran = shown.run_all()
     with shown.run_pages() as pages:
         drawn = drawings.draw_all(pages)
     made: dict[str, str] = {
         "examples.md": examples_page(ran),
-        "keys.md": keys.keys_page(),
+        "keys.md": all_keys,
         "gallery.md": gallery_page(ran),
         **{f"replays/{name}.html": ran[name].replay() for name in GALLERY},
         **{f"drawings/{name}.svg": text for name, text in drawn.items()},

@@ -64,6 +64,8 @@ _IN_FILES: Mapping[str, Mapping[str, str]] = {
     "Problem": {
         "robot": "The arm, or the cell.",
         "path": "The tool motion.",
+        "task": "Which rows of the tool's pose are prescribed.",
+        "start": "The start configuration [rad or m], or which; by default free: many are tried.",
         "workpiece": "What paths and bodies are placed with.",
         "joint_limits": "A MoveIt file of joint limits that count besides the arm's own.",
         "optimiser": "The published method's quasi-Newton method, and its numbers.",
