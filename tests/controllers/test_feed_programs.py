@@ -196,6 +196,58 @@ def test_another_speed_than_the_feed_is_refused(
         sm.files.read_motion(file, robot=line.robot)
 
 
+@pytest.mark.parametrize(
+    ("name", "old", "new", "told"),
+    [
+        ("weld.mod", "_f1, z0", "_f1, z200", "zone is z200, expected fine or z0"),
+        ("weld.mod", ":=weld_w", ":=wobj0", "work object is 'wobj0', expected 'weld_w'"),
+        ("weld.mod", r"weld_t\WObj", r"tool0\WObj", "tool is 'tool0', expected 'weld_t'"),
+        ("weld.mod", r"    CirPathMode \ObjectFrame;", "", r"MoveC needs CirPathMode"),
+        ("weld.mod", "[30, 500,", "[30, 5,", r"has 5, 5000, 1000 for turning .* at least 500"),
+        ("weld.mod", 'TRUE, ""', 'FALSE, "STN1"', "its work object is carried by an axis"),
+        ("weld.src", "  SPLINE", "  BAS(#VEL_CP, 1)\n  SPLINE", "is not read"),
+        ("weld.src", "  SPLINE", "  BAS(#BASE, 3)\n  SPLINE", "is not read"),
+        ("weld.src", "$VEL.ORI1 = 400", "$VEL.ORI1 = 4", r"\$VEL.ORI1 is 4°/s, expected at least"),
+        ("weld.src", "  $CIRC_TYPE = #BASE", "", r"SCIRC needs \$ORI_TYPE = #VAR and"),
+        ("weld.script", "r=0.000000", "r=0.050000", "r is 0.050000 m, expected 0 to 0.0003"),
+    ],
+)
+def test_what_makes_another_motion_of_a_file_is_refused(
+    ring: sm.Plan, line: sm.Plan, tmp_path: Path, name: str, old: str, new: str, told: str
+) -> None:
+    plan, file = line if name == "weld.script" else ring, tmp_path / name
+    sm.files.write_motion(plan, file, settings=settings(name))
+    text = file.read_text()
+    assert old in text
+    read_program(file, plan.robot)
+    file.write_text(text.replace(old, new))
+    with pytest.raises(sm.errors.FileFormatError, match=told):
+        read_program(file, plan.robot)
+
+
+def test_only_one_work_object_and_one_tool_are_read(line: sm.Plan, tmp_path: Path) -> None:
+    """Poses of another one than the last would be somewhere else."""
+    file = tmp_path / "weld.mod"
+    sm.files.write_motion(line, file, settings=settings("weld.mod"))
+    text = file.read_text()
+    for kind in ("tooldata", "wobjdata"):
+        (one,) = [item for item in text.splitlines() if f"PERS {kind}" in item]
+        file.write_text(text.replace(one, f"{one.replace('weld_', 'other_')}\n{one}"))
+        told = f"there is a {kind} 'other_{kind[0]}' already, expected one"
+        with pytest.raises(sm.errors.FileFormatError, match=told):
+            read_program(file, line.robot)
+
+
+def test_smooth_segments_beside_round_ones_are_refused(ring: sm.Plan, tmp_path: Path) -> None:
+    file = tmp_path / "weld.src"
+    sm.files.write_motion(ring, file, settings=settings("weld.src"))
+    text = file.read_text()
+    arc = re.findall(r"    SCIRC \{[^}]*\}, (\{[^}]*\})\n", text)[0]
+    file.write_text(text.replace("  ENDSPLINE", f"    SPL {arc}\n  ENDSPLINE"))
+    with pytest.raises(sm.errors.FileFormatError, match="SPL beside SCIRC is not judged"):
+        read_program(file, ring.robot)
+
+
 @pytest.mark.parametrize("name", FILES)
 def test_strokes_switch_where_their_feed_begins(tmp_path: Path, name: str) -> None:
     """Each in three motions: run-up, the stroke between its events, run-down."""

@@ -55,6 +55,8 @@ class ProgramReader:
         self.pose_at: Pose | None = None
         self.tool: SE3 | None = None
         self.work: SE3 | None = None
+        # Whether an axis carries the work object, where a program says it.
+        self.is_carried: bool | None = None
         self.switches: list[Switch] = []
 
     def program(self) -> ControllerProgram:
@@ -80,6 +82,7 @@ class ProgramReader:
         if self.state != "after":
             raise self.lines.fault(f"is the last one, expected {self.last}")
         places = self.lines.places(self.tool, self.work)
+        places.is_carried = self.is_carried
         rows, present = self.rows, self.present
         return self.lines.program(self.name, present, rows, self.switches, places, self.robot)
 

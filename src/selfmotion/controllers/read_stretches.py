@@ -75,7 +75,10 @@ class SlowRow:
 
 @dataclass
 class Places:
-    """What a file says of its frames: the tool in the flange, the work object in its carrier."""
+    """What a file says of its frames: the tool in the flange, the work object in its carrier.
+
+    And whether it says that an axis carries the work object; None where it does not say.
+    """
 
     carrier: str = ""
     work_name: str = ""
@@ -83,6 +86,7 @@ class Places:
     planned: SE3 | None = None
     tool: SE3 | None = None
     work: SE3 | None = None
+    is_carried: bool | None = None
 
     @property
     def shift(self) -> SE3 | None:
@@ -122,6 +126,13 @@ class Places:
             raise FileFormatError(f"{file}: {error}") from error
         if why:
             raise FileFormatError(f"{file}: has poses, but {why}")
+        if self.is_carried not in (None, found.is_carried):
+            stands, carried = "stands in the world", "is carried by an axis"
+            says, expected = (carried, stands) if self.is_carried else (stands, carried)
+            raise FileFormatError(
+                f"{file}: its work object {says}, expected one that {expected}: its comments "
+                f"say that it is of '{self.carrier}'"
+            )
         return found
 
 
