@@ -13,7 +13,7 @@ import pytest
 import selfmotion as sm
 from selfmotion.controllers import judged_program, program_miss, read_program
 from selfmotion.controllers.circular import arc_through
-from selfmotion.controllers.feed_stretches import FeedStretch, Ramps
+from selfmotion.controllers.feed_stretches import FeedStretch, Ramps, times_at
 from selfmotion.controllers.program_axes import axes_of
 from selfmotion.task import SE3, exp3
 from support.arms import robot_named
@@ -416,3 +416,39 @@ def test_an_event_in_a_ramp_keeps_its_time(tmp_path: Path) -> None:
     code, text = invoke("export", tmp_path / "a.program", *asked)
     assert code == 0, text
     assert "a seam has times all the same: an event is where the tool is slower" in text
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_feeds_that_change_are_a_motion_each(abb: sm.RobotModel, tmp_path: Path, name: str) -> None:
+    """However much faster one is than the other: the way is the same."""
+    start = np.radians([10.0, -20.0, 30.0, 20.0, 60.0, 15.0])
+    begin = abb.pose(start)
+    end = SE3(begin.rotation, begin.translation + np.array([0.02, 0.15, -0.03]))
+    line, slower = sm.paths.Line(begin, end, 3.0), [(1.2, FEED), (1.5, 2.0 * FEED)]
+    seam = sm.paths.Feed(line, 2.0 * FEED, stretches=slower)
+    plan = sm.plan(sm.Problem(abb, seam, "pointing", start, clearance=None)).require()
+    file = tmp_path / name
+    sm.files.write_motion(plan, file, settings=settings(name))
+    (stretch,) = read_poses(file, SLIDES).stretches
+    np.testing.assert_allclose(stretch.speeds, [2.0 * FEED, FEED, 2.0 * FEED], rtol=1e-6)
+    assert measured(plan, file).position <= program_miss(plan, file)[1].path.position + ROUNDED
+    read_program(file, abb).along(seam)
+    # Without the targets where they change all of it is as fast as at its ends.
+    whole = stretch_of(file, abb)
+    alone = replace(
+        whole,
+        t=times_at(whole.places[[0, -1]], whole.vias[:1], whole.speeds[:1]),
+        q=whole.q[[0, -1]],
+        places=whole.places[[0, -1]],
+        turns=whole.turns[[0, -1]],
+        speeds=whole.speeds[:1],
+        vias=whole.vias[:1],
+    )
+    with pytest.raises(sm.errors.FileFormatError, match=r"at 60 mm/s .* its path at 30 mm/s"):
+        alone.along(seam, 0.0)
+
+
+def stretch_of(file: Path, robot: sm.RobotModel) -> FeedStretch:
+    (stretch,) = read_program(file, robot).stretches
+    assert isinstance(stretch, FeedStretch)
+    return stretch
