@@ -244,7 +244,7 @@ def test_smooth_segments_beside_round_ones_are_refused(ring: sm.Plan, tmp_path: 
     text = file.read_text()
     arc = re.findall(r"    SCIRC \{[^}]*\}, (\{[^}]*\})\n", text)[0]
     file.write_text(text.replace("  ENDSPLINE", f"    SPL {arc}\n  ENDSPLINE"))
-    with pytest.raises(sm.errors.FileFormatError, match="SPL beside SCIRC is not judged"):
+    with pytest.raises(sm.errors.FileFormatError, match="SPL beside SLIN or SCIRC is not judged"):
         read_program(file, ring.robot)
 
 
@@ -452,3 +452,35 @@ def stretch_of(file: Path, robot: sm.RobotModel) -> FeedStretch:
     (stretch,) = read_program(file, robot).stretches
     assert isinstance(stretch, FeedStretch)
     return stretch
+
+
+def test_lines_are_judged_as_lines(abb: sm.RobotModel, tmp_path: Path) -> None:
+    """Straight motions in place of a circular one are as far off as their chords."""
+    start = np.radians([10.0, -20.0, 30.0, 20.0, 60.0, 15.0])
+    circle = sm.paths.Circle.around(abb.pose(start), 0.1, 4.0, normal=(0.0, 0.0, 1.0), turns=0.2)
+    limits = [sm.constraints.JointPositionLimits(), sm.constraints.JointVelocityLimits()]
+    seam = sm.paths.Feed(circle, FEED)
+    problem = sm.Problem(abb, seam, "pointing", start, constraints=limits, clearance=None)
+    plan = sm.plan(problem).require()
+    file, cell, count = tmp_path / "weld.mod", tmp_path / "cell.toml", 8
+    sm.files.write_problem(plan.problem, cell)
+    sm.files.write_motion(plan, file, settings=settings("weld.mod"))
+    text, whole = file.read_text(), stretch_of(file, abb)
+    (arc,) = [item for item in text.splitlines() if "MoveC" in item]
+    # Through as many points of it.
+    times = np.linspace(0.0, whole.t[-1], 2 * count + 1)
+    lines, place = [], arc_through(whole.places[0], whole.vias[0], whole.places[1])
+    assert place is not None
+    turn = re.findall(r"\], (\[[^\[\]]*\]), \[0, 0", text)[-1]
+    for k, (x, y, z) in enumerate(1e3 * place.at(times / whole.t[-1])[2::2], 1):
+        pose = (
+            f"[[{x:.4f}, {y:.4f}, {z:.4f}], {turn}, [0, 0, 0, 0], [9E9, 9E9, 9E9, 9E9, 9E9, 9E9]]"
+        )
+        zone = "fine" if k == count else "z0"
+        lines.append(f"    MoveL {pose}, weld_f1, {zone}, weld_t\\WObj:=weld_w;")
+    file.write_text(text.replace(arc, "\n".join(lines)))
+    far = 0.1 * (1.0 - np.cos(0.2 * np.pi / count))
+    assert far > 3.0 * WITHIN.position
+    code, told = invoke("check", file, "--robot", cell)
+    assert code == 1, told
+    assert told.startswith("not verified: 'torch' is")

@@ -84,11 +84,14 @@ class FeedStretch(PoseStretch):
         Through where a circular step goes [m]; no numbers where it is straight.
     seconds : float
         How long it was planned to take [s].
+    is_spline : bool
+        Whether a program says that it goes smoothly through its targets, not straight between them.
     """
 
     speeds: Array
     vias: Array
     seconds: float
+    is_spline: bool = False
 
     @property
     def duration(self) -> float:
@@ -212,7 +215,7 @@ class FeedStretch(PoseStretch):
     def _driven(self, times: Array, own: Array) -> tuple[Array, Array, Array]:
         from scipy.interpolate import CubicSpline
 
-        rows = self._stepped(own) if np.isfinite(self.vias).any() else self._spline(own)
+        rows = self._spline(own) if self.is_spline else self._stepped(own)
         q = self._joints(rows, own)[:, self.order]
         if not np.isfinite(q).all():
             return times, q, q

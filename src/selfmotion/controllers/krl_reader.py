@@ -192,11 +192,12 @@ class KrlReader(ProgramReader):
         if self.state == "block":
             if not self._speeds:
                 raise self.lines.fault("the spline block has no segments")
-            if any(self._smooth) and any(via is not None for via in self._vias):
-                raise self.lines.fault("SPL beside SCIRC is not judged, expected SLIN")
+            if len(set(self._smooth)) > 1:
+                raise self.lines.fault("SPL beside SLIN or SCIRC is not judged, expected SLIN")
             if any(number > len(self._speeds) for number, _ in self._triggers):
                 raise self.lines.fault("a trigger has no target after it")
-            self.drive(self._poses, self._speeds, self._vias, self._triggers)
+            given = self._poses, self._speeds, self._vias, self._triggers
+            self.drive(*given, is_spline=all(self._smooth))
         self.state = "body"
 
     def _target(self, text: str) -> list[float]:

@@ -123,6 +123,8 @@ class ProgramReader:
         speeds: list[float],
         vias: list[Pose | None],
         happens: Sequence[tuple[int, Sequence[str]]] = (),
+        *,
+        is_spline: bool = False,
     ) -> None:
         """Take a stretch of poses at speeds [m/s], and what is switched at which of them."""
         planned = self.lines.planned()
@@ -144,7 +146,8 @@ class ProgramReader:
         at = Ramps(float(own[-1]), planned).times(own)
         for number, what in happens:
             self.switches.append(switched(self.clock + float(at[number]), what))
-        self.rows.append(PoseRow(self.lines.step(), every, [planned], speeds, round_ones))
+        row = PoseRow(self.lines.step(), every, [planned], speeds, round_ones, is_spline)
+        self.rows.append(row)
         self.at, self.pose_at = None, poses[-1]
 
     def follow(self, poses: list[Pose], seconds: list[float]) -> None:

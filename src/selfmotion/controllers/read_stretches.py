@@ -54,8 +54,8 @@ class Pose:
 class PoseRow:
     """A stretch of poses while it is read: where it begins, its targets, times between [s].
 
-    Of one at speeds the time that was planned for all of it, the speed of each step [m/s], and
-    through where it goes round.
+    Of one at speeds the time that was planned for all of it, the speed of each step [m/s], through
+    where it goes round, and whether it goes smoothly through its targets.
     """
 
     name: str
@@ -63,6 +63,7 @@ class PoseRow:
     seconds: list[float]
     speeds: list[float] = field(default_factory=list)
     vias: Array = field(default_factory=lambda: np.zeros((0, 3)))
+    is_spline: bool = False
 
 
 @dataclass
@@ -257,7 +258,8 @@ class Follower:
         )
         if at_speeds:
             speeds, seconds = np.array(row.speeds), sum(row.seconds)
-            stretch = FeedStretch(**vars(stretch), speeds=speeds, vias=row.vias, seconds=seconds)
+            paced = {"speeds": speeds, "vias": row.vias, "seconds": seconds}
+            stretch = FeedStretch(**vars(stretch), **paced, is_spline=row.is_spline)
         return stretch.in_order(order)
 
     def _followed(
