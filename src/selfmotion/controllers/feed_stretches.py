@@ -210,7 +210,7 @@ class FeedStretch(PoseStretch):
     @property
     def _shares(self) -> Array:
         """How far the tool has gone where it is looked at, of the whole."""
-        return self._gone(self.looked_at()) / self.lengths[-1]
+        return np.asarray(self._gone(self.looked_at()) / self.lengths[-1])
 
     def _driven(self, times: Array, own: Array) -> tuple[Array, Array, Array]:
         from scipy.interpolate import CubicSpline

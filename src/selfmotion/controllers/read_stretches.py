@@ -258,8 +258,13 @@ class Follower:
         )
         if at_speeds:
             speeds, seconds = np.array(row.speeds), sum(row.seconds)
-            paced = {"speeds": speeds, "vias": row.vias, "seconds": seconds}
-            stretch = FeedStretch(**vars(stretch), **paced, is_spline=row.is_spline)
+            stretch = FeedStretch(
+                **vars(stretch),
+                speeds=speeds,
+                vias=row.vias,
+                seconds=seconds,
+                is_spline=row.is_spline,
+            )
         return stretch.in_order(order)
 
     def _followed(
