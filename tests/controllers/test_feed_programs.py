@@ -484,3 +484,24 @@ def test_lines_are_judged_as_lines(abb: sm.RobotModel, tmp_path: Path) -> None:
     code, told = invoke("check", file, "--robot", cell)
     assert code == 1, told
     assert told.startswith("not verified: 'torch' is")
+
+
+@pytest.mark.parametrize("targets", ["poses", "timed-poses"])
+@pytest.mark.parametrize("name", FILES)
+def test_a_begin_that_was_changed_is_not_verified(
+    line: sm.Plan, tmp_path: Path, name: str, targets: str
+) -> None:
+    """From there the arm goes to the first pose on a way that nothing has judged."""
+    file, cell = tmp_path / name, tmp_path / "cell.toml"
+    limits = (sm.constraints.JointPositionLimits(), sm.constraints.JointVelocityLimits())
+    sm.files.write_problem(replace(line.problem, constraints=limits), cell)
+    sm.files.write_motion(line, file, settings=settings(name, targets=targets))
+    text = file.read_text()
+    first = re.search(r"(MoveAbsJ \[\[|PTP \{A1 |movej\(\[)([-\d.]+)", text)
+    assert first is not None
+    for more, code in ((0.1, 0), (20.0, 1)):
+        value = float(first[2]) + (np.radians(more) if name == "weld.script" else more)
+        file.write_text(text.replace(first[0], f"{first[1]}{value:.6f}", 1))
+        found, told = invoke("check", file, "--robot", cell)
+        assert found == code, told
+    assert "its first axis target is 0.349 rad or m from where its first pose has the arm" in told

@@ -103,10 +103,11 @@ def of_problem(
     job = sm.files.read_job(asked)
     problem = job.problem
     motion, within = read(file, degrees, within, problem.robot)
+    elsewhere = ""
     if is_program(file):
         problem = controllers.by_targets(problem)
         program = controllers.read_program(file, problem.robot)
-        motion = program.along(problem.path)
+        motion, elsewhere = program.along(problem.path), program.begins_elsewhere
         begin = motion.of_joints(problem.robot.joint_names).q[0]
         problem = controllers.as_shifted(problem, program, begin)
         if controllers.shift_told(program):
@@ -118,6 +119,8 @@ def of_problem(
     besides = options.requirements(problem.robot, *judged)
     allowed, robot = within or job.tolerance, problem.robot
     certificate = problem.certify(motion, allowed, besides=besides, progress=progress)
+    if elsewhere:
+        certificate = replace(certificate, failures=(*certificate.failures, elsewhere))
     return certificate, near(robot, motion, (*problem.requirements, *besides)), robot
 
 

@@ -152,6 +152,12 @@ class Follower:
         In the order of the file.
     frames : ToolFrames or None
         None where there are no poses.
+    stretches : list of Stretch
+        What is made so far.
+    at : (n,) or None
+        Where the arm is.
+    approach : float
+        How far it goes slowly from its first axis target to its first pose [rad or m].
     """
 
     file: object
@@ -159,6 +165,7 @@ class Follower:
     frames: ToolFrames | None
     stretches: list[Stretch] = field(default_factory=list)
     at: Array | None = None
+    approach: float = 0.0
 
     def take(self, row: Row | PoseRow | SlowRow) -> None:
         """Take a row.
@@ -209,6 +216,8 @@ class Follower:
         moves = bool(self.stretches) and max(far, angle) > _THERE
         here = Pose(place[0], turn[0], self._others(before), row.target.line)
         stretch = self._stretch(PoseRow(SLOWLY, [here, row.target], [seconds]))
+        if not self.stretches:
+            self.approach = float(np.abs(stretch.q[-1] - before).max())
         if moves:
             self.stretches.append(stretch)
         self.at = stretch.q[-1]
