@@ -13,7 +13,7 @@ import pytest
 import selfmotion as sm
 from selfmotion.controllers import judged_program, program_miss, read_program
 from selfmotion.controllers.circular import arc_through
-from selfmotion.controllers.feed_stretches import FeedStretch, Ramps, times_at
+from selfmotion.controllers.feed_stretches import ZONE, FeedStretch, Ramps, times_at
 from selfmotion.controllers.program_axes import axes_of
 from selfmotion.task import SE3, exp3
 from support.arms import robot_named
@@ -505,3 +505,21 @@ def test_a_begin_that_was_changed_is_not_verified(
         found, told = invoke("check", file, "--robot", cell)
         assert found == code, told
     assert "its first axis target is 0.349 rad or m from where its first pose has the arm" in told
+
+
+def test_seams_with_weaves_are_read_as_they_are_written(abb: sm.RobotModel, tmp_path: Path) -> None:
+    """Their steps may be shorter than a zone."""
+    start = np.radians([10.0, -20.0, 30.0, 20.0, 60.0, 15.0])
+    begin = abb.pose(start)
+    end = SE3(begin.rotation, begin.translation + np.array([0.02, 0.05, -0.01]))
+    woven = sm.paths.Weave(sm.paths.Line(begin, end, 3.0), amplitude=0.003, pitch=0.02)
+    seam = sm.paths.Feed(woven, 0.02)
+    plan = sm.plan(sm.Problem(abb, seam, "pointing", start, clearance=None)).require()
+    file = tmp_path / "weld.mod"
+    sm.files.write_motion(plan, file, settings=settings("weld.mod"))
+    stretch = stretch_of(file, abb)
+    assert np.diff(stretch.lengths).min() < ZONE
+    certificate = plan.problem.certify(read_program(file, abb).along(seam), WITHIN)
+    assert certificate.position_error.value < WITHIN.position
+    far = measured(plan, file)
+    assert far.position <= program_miss(plan, file)[1].path.position + ROUNDED

@@ -189,11 +189,13 @@ class FeedStretch(PoseStretch):
         here = (gone.t >= during[0]) & (gone.t <= during[1])
         fastest, slowest = float(gone.speed[here].max(initial=0.0)), 0.0
         at = 0.5 * sum(during)
+        # Where less of a step than this is at another feed, its zone is.
+        least = min(ZONE, 0.4 * float(np.ptp(gone.at(np.array(during)))))
         asked = [
             (feed, *np.clip(window, *during))
             for feed in path.feeds
             for window in feed.during
-            if np.ptp(gone.at(np.clip(window, *during))) > ZONE
+            if np.ptp(gone.at(np.clip(window, *during))) > least
         ]
         for feed, first, last in asked:
             fastest, slowest = feed.asked, (1.0 - feed.within) * feed.asked
