@@ -3,6 +3,7 @@
 See `support.played_programs` for the oracle.
 """
 
+import json
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -109,6 +110,8 @@ def test_a_straight_seam_is_one_motion_at_its_feed(
     assert code == 0, text
     assert "how the controller runs up and down, and so when it is where, is its own" in text
     assert "(0.0001 m and 0.001 rad are allowed)" in text
+    code, text = invoke("check", file, "--robot", cell, "--json")
+    assert "how the controller runs up and down" in json.loads(text)["not_judged"]
 
 
 @pytest.mark.parametrize("name", FILES[:2])
@@ -284,6 +287,8 @@ def test_strokes_switch_where_their_feed_begins(tmp_path: Path, name: str) -> No
     code, text = invoke("check", file, "--robot", job)
     assert code == 0, text
     assert "seams at their feeds are judged with the ramps of the plan" in text
+    code, text = invoke("check", file, "--robot", job, "--json")
+    assert json.loads(text)["verdict"] == found.verdict
 
 
 def test_leads_take_their_time_with_ramps(abb: sm.RobotModel, tmp_path: Path) -> None:
