@@ -102,3 +102,42 @@ def test_the_worst_of_several_findings_is_told() -> None:
     assert plain.acceleration_ratio is None
     with pytest.raises(RuntimeError, match="always judges joint position limits"):
         _ = replace(plain, findings=()).limit_margin
+
+
+def test_what_takes_the_longest_motion_is_told_first() -> None:
+    """Whoever makes it as much longer as the first sentence says has the rest as well."""
+    robot = robot_named("panda")
+    t = np.linspace(0.0, 0.1, 11)
+    share = t / t[-1]
+    turned = 0.5 * (10.0 * share**3 - 15.0 * share**4 + 6.0 * share**5)
+    rates = 0.5 * (30.0 * share**2 - 60.0 * share**3 + 30.0 * share**4) / t[-1]
+    q = np.array([PANDA_HOME] * len(t))
+    q[:, 6] += turned
+    qd = np.zeros_like(q)
+    qd[:, 6] = rates
+    motion = sm.Trajectory(t, q, qd, robot.joint_names)
+    limits = [
+        item.requirement(robot)
+        for item in (
+            sm.constraints.JointVelocityLimits(),
+            sm.constraints.JointAccelerationLimits(),
+        )
+    ]
+    found = sm.certify(
+        robot, sm.paths.Dwell(robot.pose(PANDA_HOME), 0.1), "position", motion, None, limits
+    )
+    broken = [item for item in found.findings if not item.satisfied]
+    assert len(broken) == 2
+    most = max(broken, key=lambda item: item.factor)
+    assert most is not broken[0]
+    assert found.summary == f"not verified: {most.text}; and 1 more"
+
+
+def test_where_the_tool_is_off_digits_of_time_are_not_told_first() -> None:
+    robot = robot_named("panda")
+    away = np.array(PANDA_HOME)
+    away[3] += 0.01
+    motion = sm.Trajectory([0.0, 1.0 + 1e-6], [away] * 2, np.zeros((2, 7)), robot.joint_names)
+    found = sm.certify(robot, sm.paths.Dwell(robot.pose(PANDA_HOME), 1.0), "pose", motion)
+    assert "off the path" in found.failures[0]
+    assert "the motion lasts" in found.failures[-1]

@@ -3,6 +3,7 @@
 See `support.played_programs` for the oracle.
 """
 
+import json
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -13,7 +14,7 @@ import pytest
 import selfmotion as sm
 from selfmotion.controllers import judged_program, program_miss, read_program
 from selfmotion.controllers.circular import arc_through
-from selfmotion.controllers.feed_stretches import FeedStretch, Ramps
+from selfmotion.controllers.feed_stretches import ZONE, FeedStretch, Ramps, times_at
 from selfmotion.controllers.program_axes import axes_of
 from selfmotion.task import SE3, exp3
 from support.arms import robot_named
@@ -109,6 +110,8 @@ def test_a_straight_seam_is_one_motion_at_its_feed(
     assert code == 0, text
     assert "how the controller runs up and down, and so when it is where, is its own" in text
     assert "(0.0001 m and 0.001 rad are allowed)" in text
+    code, text = invoke("check", file, "--robot", cell, "--json")
+    assert "how the controller runs up and down" in json.loads(text)["not_judged"]
 
 
 @pytest.mark.parametrize("name", FILES[:2])
@@ -196,6 +199,58 @@ def test_another_speed_than_the_feed_is_refused(
         sm.files.read_motion(file, robot=line.robot)
 
 
+@pytest.mark.parametrize(
+    ("name", "old", "new", "told"),
+    [
+        ("weld.mod", "_f1, z0", "_f1, z200", "zone is z200, expected fine or z0"),
+        ("weld.mod", ":=weld_w", ":=wobj0", "work object is 'wobj0', expected 'weld_w'"),
+        ("weld.mod", r"weld_t\WObj", r"tool0\WObj", "tool is 'tool0', expected 'weld_t'"),
+        ("weld.mod", r"    CirPathMode \ObjectFrame;", "", r"MoveC needs CirPathMode"),
+        ("weld.mod", "[30, 500,", "[30, 5,", r"has 5, 5000, 1000 for turning .* at least 500"),
+        ("weld.mod", 'TRUE, ""', 'FALSE, "STN1"', "its work object is carried by an axis"),
+        ("weld.src", "  SPLINE", "  BAS(#VEL_CP, 1)\n  SPLINE", "is not read"),
+        ("weld.src", "  SPLINE", "  BAS(#BASE, 3)\n  SPLINE", "is not read"),
+        ("weld.src", "$VEL.ORI1 = 400", "$VEL.ORI1 = 4", r"\$VEL.ORI1 is 4°/s, expected at least"),
+        ("weld.src", "  $CIRC_TYPE = #BASE", "", r"SCIRC needs \$ORI_TYPE = #VAR and"),
+        ("weld.script", "r=0.000000", "r=0.050000", "r is 0.050000 m, expected 0 to 0.0003"),
+    ],
+)
+def test_what_makes_another_motion_of_a_file_is_refused(
+    ring: sm.Plan, line: sm.Plan, tmp_path: Path, name: str, old: str, new: str, told: str
+) -> None:
+    plan, file = line if name == "weld.script" else ring, tmp_path / name
+    sm.files.write_motion(plan, file, settings=settings(name))
+    text = file.read_text()
+    assert old in text
+    read_program(file, plan.robot)
+    file.write_text(text.replace(old, new))
+    with pytest.raises(sm.errors.FileFormatError, match=told):
+        read_program(file, plan.robot)
+
+
+def test_only_one_work_object_and_one_tool_are_read(line: sm.Plan, tmp_path: Path) -> None:
+    """Poses of another one than the last would be somewhere else."""
+    file = tmp_path / "weld.mod"
+    sm.files.write_motion(line, file, settings=settings("weld.mod"))
+    text = file.read_text()
+    for kind in ("tooldata", "wobjdata"):
+        (one,) = [item for item in text.splitlines() if f"PERS {kind}" in item]
+        file.write_text(text.replace(one, f"{one.replace('weld_', 'other_')}\n{one}"))
+        told = f"there is a {kind} 'other_{kind[0]}' already, expected one"
+        with pytest.raises(sm.errors.FileFormatError, match=told):
+            read_program(file, line.robot)
+
+
+def test_smooth_segments_beside_round_ones_are_refused(ring: sm.Plan, tmp_path: Path) -> None:
+    file = tmp_path / "weld.src"
+    sm.files.write_motion(ring, file, settings=settings("weld.src"))
+    text = file.read_text()
+    arc = re.findall(r"    SCIRC \{[^}]*\}, (\{[^}]*\})\n", text)[0]
+    file.write_text(text.replace("  ENDSPLINE", f"    SPL {arc}\n  ENDSPLINE"))
+    with pytest.raises(sm.errors.FileFormatError, match="SPL beside SLIN or SCIRC is not judged"):
+        read_program(file, ring.robot)
+
+
 @pytest.mark.parametrize("name", FILES)
 def test_strokes_switch_where_their_feed_begins(tmp_path: Path, name: str) -> None:
     """Each in three motions: run-up, the stroke between its events, run-down."""
@@ -232,6 +287,8 @@ def test_strokes_switch_where_their_feed_begins(tmp_path: Path, name: str) -> No
     code, text = invoke("check", file, "--robot", job)
     assert code == 0, text
     assert "seams at their feeds are judged with the ramps of the plan" in text
+    code, text = invoke("check", file, "--robot", job, "--json")
+    assert json.loads(text)["verdict"] == found.verdict
 
 
 def test_leads_take_their_time_with_ramps(abb: sm.RobotModel, tmp_path: Path) -> None:
@@ -364,3 +421,110 @@ def test_an_event_in_a_ramp_keeps_its_time(tmp_path: Path) -> None:
     code, text = invoke("export", tmp_path / "a.program", *asked)
     assert code == 0, text
     assert "a seam has times all the same: an event is where the tool is slower" in text
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_feeds_that_change_are_a_motion_each(abb: sm.RobotModel, tmp_path: Path, name: str) -> None:
+    """However much faster one is than the other: the way is the same."""
+    start = np.radians([10.0, -20.0, 30.0, 20.0, 60.0, 15.0])
+    begin = abb.pose(start)
+    end = SE3(begin.rotation, begin.translation + np.array([0.02, 0.15, -0.03]))
+    line, slower = sm.paths.Line(begin, end, 3.0), [(1.2, FEED), (1.5, 2.0 * FEED)]
+    seam = sm.paths.Feed(line, 2.0 * FEED, stretches=slower)
+    plan = sm.plan(sm.Problem(abb, seam, "pointing", start, clearance=None)).require()
+    file = tmp_path / name
+    sm.files.write_motion(plan, file, settings=settings(name))
+    (stretch,) = read_poses(file, SLIDES).stretches
+    np.testing.assert_allclose(stretch.speeds, [2.0 * FEED, FEED, 2.0 * FEED], rtol=1e-6)
+    assert measured(plan, file).position <= program_miss(plan, file)[1].path.position + ROUNDED
+    read_program(file, abb).along(seam)
+    # Without the targets where they change all of it is as fast as at its ends.
+    whole = stretch_of(file, abb)
+    alone = replace(
+        whole,
+        t=times_at(whole.places[[0, -1]], whole.vias[:1], whole.speeds[:1]),
+        q=whole.q[[0, -1]],
+        places=whole.places[[0, -1]],
+        turns=whole.turns[[0, -1]],
+        speeds=whole.speeds[:1],
+        vias=whole.vias[:1],
+    )
+    with pytest.raises(sm.errors.FileFormatError, match=r"at 60 mm/s .* its path at 30 mm/s"):
+        alone.along(seam, 0.0)
+
+
+def stretch_of(file: Path, robot: sm.RobotModel) -> FeedStretch:
+    (stretch,) = read_program(file, robot).stretches
+    assert isinstance(stretch, FeedStretch)
+    return stretch
+
+
+def test_lines_are_judged_as_lines(abb: sm.RobotModel, tmp_path: Path) -> None:
+    """Straight motions in place of a circular one are as far off as their chords."""
+    start = np.radians([10.0, -20.0, 30.0, 20.0, 60.0, 15.0])
+    circle = sm.paths.Circle.around(abb.pose(start), 0.1, 4.0, normal=(0.0, 0.0, 1.0), turns=0.2)
+    limits = [sm.constraints.JointPositionLimits(), sm.constraints.JointVelocityLimits()]
+    seam = sm.paths.Feed(circle, FEED)
+    problem = sm.Problem(abb, seam, "pointing", start, constraints=limits, clearance=None)
+    plan = sm.plan(problem).require()
+    file, cell, count = tmp_path / "weld.mod", tmp_path / "cell.toml", 8
+    sm.files.write_problem(plan.problem, cell)
+    sm.files.write_motion(plan, file, settings=settings("weld.mod"))
+    text, whole = file.read_text(), stretch_of(file, abb)
+    (arc,) = [item for item in text.splitlines() if "MoveC" in item]
+    # Through as many points of it.
+    times = np.linspace(0.0, whole.t[-1], 2 * count + 1)
+    lines, place = [], arc_through(whole.places[0], whole.vias[0], whole.places[1])
+    assert place is not None
+    turn = re.findall(r"\], (\[[^\[\]]*\]), \[0, 0", text)[-1]
+    for k, (x, y, z) in enumerate(1e3 * place.at(times / whole.t[-1])[2::2], 1):
+        pose = (
+            f"[[{x:.4f}, {y:.4f}, {z:.4f}], {turn}, [0, 0, 0, 0], [9E9, 9E9, 9E9, 9E9, 9E9, 9E9]]"
+        )
+        zone = "fine" if k == count else "z0"
+        lines.append(f"    MoveL {pose}, weld_f1, {zone}, weld_t\\WObj:=weld_w;")
+    file.write_text(text.replace(arc, "\n".join(lines)))
+    far = 0.1 * (1.0 - np.cos(0.2 * np.pi / count))
+    assert far > 3.0 * WITHIN.position
+    code, told = invoke("check", file, "--robot", cell)
+    assert code == 1, told
+    assert told.startswith("not verified: 'torch' is")
+
+
+@pytest.mark.parametrize("targets", ["poses", "timed-poses"])
+@pytest.mark.parametrize("name", FILES)
+def test_a_begin_that_was_changed_is_not_verified(
+    line: sm.Plan, tmp_path: Path, name: str, targets: str
+) -> None:
+    """From there the arm goes to the first pose on a way that nothing has judged."""
+    file, cell = tmp_path / name, tmp_path / "cell.toml"
+    limits = (sm.constraints.JointPositionLimits(), sm.constraints.JointVelocityLimits())
+    sm.files.write_problem(replace(line.problem, constraints=limits), cell)
+    sm.files.write_motion(line, file, settings=settings(name, targets=targets))
+    text = file.read_text()
+    first = re.search(r"(MoveAbsJ \[\[|PTP \{A1 |movej\(\[)([-\d.]+)", text)
+    assert first is not None
+    for more, code in ((0.1, 0), (20.0, 1)):
+        value = float(first[2]) + (np.radians(more) if name == "weld.script" else more)
+        file.write_text(text.replace(first[0], f"{first[1]}{value:.6f}", 1))
+        found, told = invoke("check", file, "--robot", cell)
+        assert found == code, told
+    assert "its first axis target is 0.349 rad or m from where its first pose has the arm" in told
+
+
+def test_seams_with_weaves_are_read_as_they_are_written(abb: sm.RobotModel, tmp_path: Path) -> None:
+    """Their steps may be shorter than a zone."""
+    start = np.radians([10.0, -20.0, 30.0, 20.0, 60.0, 15.0])
+    begin = abb.pose(start)
+    end = SE3(begin.rotation, begin.translation + np.array([0.02, 0.05, -0.01]))
+    woven = sm.paths.Weave(sm.paths.Line(begin, end, 3.0), amplitude=0.003, pitch=0.02)
+    seam = sm.paths.Feed(woven, 0.02)
+    plan = sm.plan(sm.Problem(abb, seam, "pointing", start, clearance=None)).require()
+    file = tmp_path / "weld.mod"
+    sm.files.write_motion(plan, file, settings=settings("weld.mod"))
+    stretch = stretch_of(file, abb)
+    assert np.diff(stretch.lengths).min() < ZONE
+    certificate = plan.problem.certify(read_program(file, abb).along(seam), WITHIN)
+    assert certificate.position_error.value < WITHIN.position
+    far = measured(plan, file)
+    assert far.position <= program_miss(plan, file)[1].path.position + ROUNDED

@@ -70,3 +70,8 @@ def test_files_without_a_weight_have_it_and_the_shell_tells(on_rail: Path, tmp_p
     cell.write_text(text + "weight = [4, 1, 1, 1, 1, 1, 1]\n")
     (cost,) = sm.files.read_job(cell).problem.costs
     np.testing.assert_allclose(cost.weight, [4.0, *[1.0] * 6])
+    # What it is called says nothing of its weight.
+    cell.write_text(text + 'name = "speed"\n')
+    (cost,) = sm.files.read_job(cell).problem.costs
+    assert cost.name == "speed"
+    np.testing.assert_allclose(cost.weight, [(JOINTS / SLOW) ** 2, *[1.0] * 6])

@@ -2,6 +2,7 @@
 
 import copy
 import json
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -164,6 +165,36 @@ def test_every_key_says_what_it_is() -> None:
     found = list(keys_of(SCHEMA))
     assert len(found) > 500
     assert [(table, key) for table, key, value in found if not value.get("description")] == []
+
+
+def test_units_of_descriptions_are_those_of_their_keys() -> None:
+    told = {key: value["description"] for _, key, value in keys_of(SCHEMA)}
+    assert "[mm]" in told["radius_mm"]
+    assert "[mm/s]" in told["feed_mm"]
+    assert SCHEMA["properties"]["start_deg"]["description"].startswith("q(0) [° or m]")
+    for key, text in told.items():
+        units = re.findall(r"\[([^\[\]]*)\]", text)
+        wrong = {"_deg": r"\brad\b", "_mm": r"\bm\b"}.get(key[key.rfind("_") :])
+        assert wrong is None or not any(re.search(wrong, unit) for unit in units), key
+
+
+@pytest.mark.parametrize("key", ["after", "after_any", "may_meet"])
+def test_names_of_seams_are_lists(key: str, tmp_path: Path) -> None:
+    from selfmotion.basics import write_document
+
+    one, file = SEAMS["seams"][0], tmp_path / "job.json"
+    first = {**one, "name": "zero", "leaves": [{"shape": "sphere", "name": "a", "radius": 0.01}]}
+    for names, is_read in ((["zero"], True), ("zero", False)):
+        document = {**SEAMS, "seams": [first, {**one, key: names}]}
+        if key == "may_meet":
+            document["seams"][1][key] = ["a"] if is_read else "a"
+        assert CHECK.is_valid(document) == is_read
+        write_document(file, document)
+        if is_read:
+            sm.files.read_seam_job(file)
+        else:
+            with pytest.raises(sm.SelfmotionError, match=f"{key} is .* expected a list of names"):
+                sm.files.read_seam_job(file)
 
 
 def test_no_pose_is_offered_in_degrees() -> None:

@@ -53,6 +53,8 @@ def test_one_time_is_one_of_many(plan: sm.Plan) -> None:
     )
     with pytest.raises(ValueError, match="outside the motion"):
         plan.null_motion(99.0)
+    with pytest.raises(ValueError, match=r"t has shape \(1, 2\), expected a time or times"):
+        plan.null_motion([[0.0, 1.0]])
 
 
 def test_its_coordinates_do_not_jump(plan: sm.Plan) -> None:

@@ -157,3 +157,34 @@ def test_bodies_that_a_urdf_cannot_say_are_refused() -> None:
         sm.load_robot("panda", geometry=geometry)
     with pytest.raises(sm.errors.RobotError, match=r"expected a pinocchio\.GeometryModel"):
         sm.load_robot(model, tool="tool", geometry=3)
+
+
+@pytest.mark.parametrize(
+    ("kind", "limits", "told"),
+    [
+        (pin.JointModelRZ(), (-np.inf, 3.0), r"'first' may go from -inf to 3 rad, expected limits"),
+        (
+            pin.JointModelRZ(),
+            (-1.0, 1e6),
+            r"from -1 to 1e\+06 rad, .* both ends or at neither, as a",
+        ),
+        (
+            pin.JointModelPX(),
+            (-np.inf, np.inf),
+            "from -inf to inf m, expected limits at both ends,",
+        ),
+        (pin.JointModelPX(), (0.0, np.inf), "from 0 to inf m, expected limits at both ends, as"),
+    ],
+)
+def test_limits_that_a_urdf_has_not_are_refused(
+    kind: object, limits: tuple[float, float], told: str
+) -> None:
+    """Not dropped: a motion beyond the one that is there would be verified."""
+    model, lower, upper = pin.Model(), *(np.array([x]) for x in limits)
+    rates = np.array([1.0])
+    place = pin.SE3(np.eye(3), np.array([0.0, 0.0, 0.3]))
+    first = model.addJoint(0, kind, place, "first", rates, rates, lower, upper)
+    last = model.addJoint(first, pin.JointModelRY(), place, "last", rates, rates, -rates, rates)
+    model.addFrame(pin.Frame("tool", last, place, pin.FrameType.OP_FRAME))
+    with pytest.raises(sm.errors.RobotError, match=told):
+        sm.load_robot(model)

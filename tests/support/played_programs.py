@@ -374,10 +374,8 @@ def _paced_ways(stretch: Played, gone: Array) -> list[tuple[Array, Rotation, Arr
             turns = stretch.turns.as_quat()
             for k in range(1, len(turns)):
                 turns[k] *= np.sign(turns[k] @ turns[k - 1]) or 1.0
-            # As fast as its speeds say.
-            own = np.append(0.0, np.cumsum(np.diff(t) / stretch.speeds))
-            when = np.interp(gone, t, own)
-            smooth = [CubicSpline(own, x)(when) for x in (stretch.places, turns, stretch.others)]
+            # A smooth way is the same at all speeds.
+            smooth = [CubicSpline(t, x)(gone) for x in (stretch.places, turns, stretch.others)]
             found.append((smooth[0], Rotation.from_quat(smooth[1]), smooth[2]))
     return found
 

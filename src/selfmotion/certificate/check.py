@@ -109,6 +109,10 @@ def certify(
     feeds = tuple(FeedReached(feed, item) for item in follows.items for feed in item.path.feeds)
     wanted = (*arm_limits(robot, requirements), *requirements, *feeds)
     findings = tuple(_judged(item, motion) for item in wanted)
+    cut = _cut_short(ending, follows, trajectory, checks, tolerance)
+    off = tuple(text for check in checks for text in _off_path(check, tolerance, damped))
+    # A time that differs by digits is not what is wrong first where the tool is off its path.
+    by_digits = not ending and abs(trajectory.duration - path.duration) <= _CLOCK
     return Certificate(
         path_check.position,
         path_check.rotation,
@@ -118,8 +122,7 @@ def certify(
         tolerance=tolerance,
         findings=findings,
         failures=(
-            *_cut_short(ending, follows, trajectory, checks, tolerance),
-            *(text for check in checks for text in _off_path(check, tolerance, damped)),
+            *(off + cut if by_digits else cut + off),
             *(text for check in checks for text in _undecided(check)),
             *_told(findings),
             *possible_feeds(feeds, findings),
@@ -137,10 +140,16 @@ def certify(
 
 def _told(findings: Sequence[Finding]) -> Iterator[str]:
     """Yield what is not kept: first what no slower motion would mend."""
-    for of_pace in (False, True):
-        yield from (
-            item.text for item in findings if not item.satisfied and item.of_pace is of_pace
-        )
+    broken = [item for item in findings if not item.satisfied]
+    yield from (item.text for item in broken if not item.of_pace)
+    # Of the others first what takes the longest motion, with which the rest is kept as well.
+    slower = [item for item in broken if item.of_pace]
+    yield from (item.text for item in sorted(slower, key=_takes, reverse=True))
+
+
+def _takes(item: Finding) -> float:
+    """Return by what factor a motion has to be longer, as far as that is known."""
+    return item.factor if np.isfinite(item.factor) else 0.0
 
 
 def _check_arguments(robot: RobotModel, path: Path, trajectory: Trajectory, ending: str) -> None:

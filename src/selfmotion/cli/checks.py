@@ -39,6 +39,18 @@ def is_program(file: Path) -> bool:
     return file.suffix.lower() in controllers.READ_PROGRAMS
 
 
+def with_failure(certificate: sm.Certificate, text: str) -> sm.Certificate:
+    """Return a certificate with what else speaks against a motion; the same for ""."""
+    if not text:
+        return certificate
+    return replace(certificate, failures=(*certificate.failures, text))
+
+
+def left_to_controller(file: Path, robot: sm.RobotModel) -> dict[str, str]:
+    """Return what a verdict on a program leaves to the controller, for JSON; of others nothing."""
+    return {"not_judged": controllers.of_the_controller(file, robot)} if is_program(file) else {}
+
+
 def tell_of_controller(file: Path, robot: sm.RobotModel) -> None:
     """Print what a verdict on a program of seams at their feeds leaves to the controller."""
     if is_program(file) and controllers.read_program(file, robot).within is not None:
@@ -103,10 +115,11 @@ def of_problem(
     job = sm.files.read_job(asked)
     problem = job.problem
     motion, within = read(file, degrees, within, problem.robot)
+    elsewhere = ""
     if is_program(file):
         problem = controllers.by_targets(problem)
         program = controllers.read_program(file, problem.robot)
-        motion = program.along(problem.path)
+        motion, elsewhere = program.along(problem.path), program.begins_elsewhere
         begin = motion.of_joints(problem.robot.joint_names).q[0]
         problem = controllers.as_shifted(problem, program, begin)
         if controllers.shift_told(program):
@@ -118,6 +131,7 @@ def of_problem(
     besides = options.requirements(problem.robot, *judged)
     allowed, robot = within or job.tolerance, problem.robot
     certificate = problem.certify(motion, allowed, besides=besides, progress=progress)
+    certificate = with_failure(certificate, elsewhere)
     return certificate, near(robot, motion, (*problem.requirements, *besides)), robot
 
 
@@ -143,6 +157,7 @@ def of_program(
     if as_json:
         data = {
             "verified": verified,
+            "verdict": found.verdict,
             "failures": list(found.failures),
             "steps": [step._asdict() for step in steps],
         }

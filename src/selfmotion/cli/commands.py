@@ -260,14 +260,18 @@ def check(
             motion = controllers.without_followers(motion, arm)
             asked = options.requirements(arm, *judged)
             followed = documents.followed(path, context.params, arm)
+            elsewhere = ""
             if checks.is_program(file):
-                motion = controllers.read_program(file, arm).along(followed)
+                program = controllers.read_program(file, arm)
+                motion, elsewhere = program.along(followed), program.begins_elsewhere
             certificate = sm.certify(
                 arm, followed, task or "pose", motion, stated, asked, progress=display.stage
             )
+            certificate = checks.with_failure(certificate, elsewhere)
             near = checks.near(arm, motion, asked)
     if as_json:
-        terminal.print_json(data=json_tables.certificate_json(certificate, near))
+        data = json_tables.certificate_json(certificate, near)
+        terminal.print_json(data=data | checks.left_to_controller(file, arm))
     else:
         outputs.show_certificate(certificate, near, arm, verbose)
         checks.tell_of_controller(file, arm)

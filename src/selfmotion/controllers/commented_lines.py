@@ -217,6 +217,7 @@ class Lines:
             remark.removeprefix(BECAUSE),
             self.within(),
             tuple(dict.fromkeys(self._after(TIMED))),
+            follower.approach,
         )
 
 

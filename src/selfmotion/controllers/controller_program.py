@@ -75,6 +75,8 @@ class ControllerProgram:
         is at a speed.
     timed : tuple of str
         Why seams with a feed have times all the same, each reason once.
+    approach : float
+        How far joints go slowly from the axis target at its begin to its first pose [rad or m].
     """
 
     name: str
@@ -87,11 +89,25 @@ class ControllerProgram:
     remark: str = ""
     within: Tolerance | None = None
     timed: tuple[str, ...] = ()
+    approach: float = 0.0
 
     @property
     def targets(self) -> int:
         """How many targets it has."""
         return sum(len(stretch.t) - 1 for stretch in self.stretches if not stretch.is_rest)
+
+    @property
+    def begins_elsewhere(self) -> str:
+        """What speaks against the axis target that it begins with, in words; empty for nothing.
+
+        Of a shifted work object the way to the shifted begin is to be expected.
+        """
+        if self.shift is not None or self.approach <= _TAUGHT:
+            return ""
+        return (
+            f"its first axis target is {self.approach:.3g} rad or m from where its first pose has "
+            f"the arm, and nothing has judged the way between: begin it where that pose is"
+        )
 
     @property
     def trajectory(self) -> Trajectory:
@@ -158,6 +174,8 @@ class ControllerProgram:
         return worst
 
 
+# A first pose that was taught anew is as near to the axis target before it [rad or m].
+_TAUGHT = 0.02
 # A piece is over where less of it is left than this [s].
 _MOMENT = 1e-4
 

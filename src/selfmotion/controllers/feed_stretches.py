@@ -84,11 +84,14 @@ class FeedStretch(PoseStretch):
         Through where a circular step goes [m]; no numbers where it is straight.
     seconds : float
         How long it was planned to take [s].
+    is_spline : bool
+        Whether a program says that it goes smoothly through its targets, not straight between them.
     """
 
     speeds: Array
     vias: Array
     seconds: float
+    is_spline: bool = False
 
     @property
     def duration(self) -> float:
@@ -182,15 +185,26 @@ class FeedStretch(PoseStretch):
     def _check_speed(
         self, path: Path, gone: PassedLength, speed: float, during: tuple[float, float]
     ) -> None:
-        """Refuse a speed that is faster than all of the path, or no feed that it asks for."""
-        middle, slowest = 0.5 * sum(during), 0.0
-        fastest = float(gone.speed[(gone.t >= during[0]) & (gone.t <= during[1])].max(initial=0.0))
-        for feed in path.feeds:
-            if ((feed.during[:, 0] <= middle) & (middle <= feed.during[:, 1])).any():
-                fastest, slowest = feed.asked, (1.0 - feed.within) * feed.asked
+        """Refuse a speed that is faster than all of the path, or none of the feeds it asks for."""
+        here = (gone.t >= during[0]) & (gone.t <= during[1])
+        fastest, slowest = float(gone.speed[here].max(initial=0.0)), 0.0
+        at = 0.5 * sum(during)
+        # Where less of a step than this is at another feed, its zone is.
+        least = min(ZONE, 0.4 * float(np.ptp(gone.at(np.array(during)))))
+        asked = [
+            (feed, *np.clip(window, *during))
+            for feed in path.feeds
+            for window in feed.during
+            if np.ptp(gone.at(np.clip(window, *during))) > least
+        ]
+        for feed, first, last in asked:
+            fastest, slowest = feed.asked, (1.0 - feed.within) * feed.asked
+            if not slowest <= speed <= (1.0 + _SAME) * fastest:
+                at = 0.5 * (first + last)
+                break
         if not slowest <= speed <= (1.0 + _SAME) * fastest:
             raise FileFormatError(
-                f"'{self.name}' is at {1e3 * speed:.5g} mm/s near t = {middle:.4g} s, its path at "
+                f"'{self.name}' is at {1e3 * speed:.5g} mm/s near t = {at:.4g} s, its path at "
                 f"{1e3 * fastest:.5g} mm/s: nothing has judged that speed; plan anew with it as "
                 f"the feed"
             )
@@ -198,13 +212,12 @@ class FeedStretch(PoseStretch):
     @property
     def _shares(self) -> Array:
         """How far the tool has gone where it is looked at, of the whole."""
-        gone = np.interp(self.looked_at(), self.t, self.lengths)
-        return np.asarray(gone / self.lengths[-1])
+        return np.asarray(self._gone(self.looked_at()) / self.lengths[-1])
 
     def _driven(self, times: Array, own: Array) -> tuple[Array, Array, Array]:
         from scipy.interpolate import CubicSpline
 
-        rows = self._stepped(own) if np.isfinite(self.vias).any() else self._spline(own)
+        rows = self._spline(own) if self.is_spline else self._stepped(own)
         q = self._joints(rows, own)[:, self.order]
         if not np.isfinite(q).all():
             return times, q, q
@@ -217,24 +230,25 @@ class FeedStretch(PoseStretch):
 
     def _rounded(self, times: Array) -> Array:
         """Return rows at times where corners are cut as far from their targets as zones reach."""
-        steps = np.diff(self.t)
-        reach = np.minimum(0.5 * steps, ZONE / self.speeds)
-        cuts = [
-            self.t[1:-1] - reach[:-1],
-            self.t[1:-1] + reach[1:],
-        ]
-        edges = np.sort(np.concatenate(cuts))
+        reach = np.minimum(0.5 * np.diff(self.lengths), ZONE)
+        cuts = [self.lengths[1:-1] - reach[:-1], self.lengths[1:-1] + reach[1:]]
+        edges, gone = np.sort(np.concatenate(cuts)), self._gone(times)
         # Between two cuts of one target it goes straight, else as it does.
         rows = self._stepped(times)
-        inside = np.searchsorted(edges, times) % 2 == 1
+        inside = np.searchsorted(edges, gone) % 2 == 1
         if inside.any():
-            rows[inside] = straight(times[inside], edges, self._stepped(edges))
+            at_edges = self._stepped(np.interp(edges, self.lengths, self.t))
+            rows[inside] = straight(gone[inside], edges, at_edges)
         return rows
+
+    def _gone(self, times: Array) -> Array:
+        """Return how far the tool has gone at times [m]: its way is the same at all speeds."""
+        return np.interp(times, self.t, self.lengths)
 
     def _spline(self, times: Array) -> Array:
         from scipy.interpolate import CubicSpline
 
-        rows: Array = CubicSpline(self.t, self._rows())(times)
+        rows: Array = CubicSpline(self.lengths, self._rows())(self._gone(times))
         rows[:, 3:7] /= np.linalg.norm(rows[:, 3:7], axis=1, keepdims=True)
         return rows
 

@@ -126,6 +126,7 @@ def judged_program(file: FilePath, job: Program, within: Tolerance | None = None
         *(f"the job itself: {text}" for text in job.failures),
         *gaps(job.robot, pieces, digits),
         *(() if program.shift is not None else _elsewhere(job, pieces, digits)),
+        *([program.begins_elsewhere] if program.begins_elsewhere else []),
         *_otherwise_switched(job, program.switches),
     )
     return JudgedProgram((*steps, *slow), failures, within, shift_told(program), _unjudged(program))

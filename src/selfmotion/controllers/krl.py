@@ -49,7 +49,7 @@ _WORDS = (
 # Characters in a name.
 NAME = 24
 # The fastest approach [m/s, °/s], and speeds above all that times ask for.
-_FASTEST, _TURNING, _UNBOUND, _UNBOUND_TURNING = 0.5, 100.0, 2.0, 400.0
+_FASTEST, _TURNING, _UNBOUND, UNBOUND_TURNING = 0.5, 100.0, 2.0, 400.0
 # Ways shorter than this have no direction [m]; digits leave poses of a line this far off it.
 _SHORT, _ON_LINE = 1e-3, 4e-7
 
@@ -178,7 +178,7 @@ def _slow_and_fast(draft: Draft) -> tuple[list[str], list[str]]:
     if draft.frames is None:
         return [], []
     share = draft.settings.approach
-    both = ((share * _FASTEST, share * _TURNING), (_UNBOUND, _UNBOUND_TURNING))
+    both = ((share * _FASTEST, share * _TURNING), (_UNBOUND, UNBOUND_TURNING))
     slow, fast = (
         [f"  $VEL.CP = {speed:g}", f"  $VEL.ORI1 = {turn:g}", f"  $VEL.ORI2 = {turn:g}"]
         for speed, turn in both

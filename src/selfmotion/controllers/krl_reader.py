@@ -6,7 +6,7 @@ from pathlib import Path as FilePath
 import numpy as np
 
 from selfmotion.basics import Array
-from selfmotion.controllers.krl import NAME
+from selfmotion.controllers.krl import NAME, UNBOUND_TURNING
 from selfmotion.controllers.pose_numbers import krl_pose
 from selfmotion.controllers.program_lines import ProgramReader, switched
 from selfmotion.controllers.program_settings import AXES
@@ -16,6 +16,8 @@ from selfmotion.task import SE3
 
 # Parts whose sum is as near to their block's time as this [s] are seconds.
 _ABOVE = 1e-4
+# How the tool turns in circular segments is said by so many variables.
+_KINDS = 2
 
 
 class KrlReader(ProgramReader):
@@ -34,6 +36,11 @@ class KrlReader(ProgramReader):
         self._triggers: list[tuple[int, Sequence[str]]] = []
         # Of segments at speeds: $VEL.CP [m/s], that of each, and through where they go.
         self._speed = 0.0
+        # How fast the tool turns at most [°/s], and what is said of how it turns.
+        self._turning: dict[str, float] = {}
+        self._turns: set[str] = set()
+        # Which of the segments are smooth.
+        self._smooth: list[bool] = []
         self._speeds: list[float] = []
         self._vias: list[Pose | None] = []
 
@@ -46,8 +53,12 @@ class KrlReader(ProgramReader):
         self.tool = self._frame(given[0])
 
     def work_is(self, given: Sequence[str]) -> None:
-        """Take what poses are counted in."""
-        self.work = self._frame(given[0])
+        """Take what poses are counted in, where it stands in the world."""
+        self.work, self.is_carried = self._frame(given[0]), False
+
+    def carried_work_is(self, given: Sequence[str]) -> None:
+        """Take what poses are counted in, where an external kinematic system carries it."""
+        self.work, self.is_carried = self._frame(given[0]), True
 
     def go(self, given: Sequence[str]) -> None:
         """Take where the motion begins, or where it slowly goes on by axis targets."""
@@ -62,24 +73,39 @@ class KrlReader(ProgramReader):
         """Begin a spline block."""
         self.state, self._parts, self._triggers = "block", [], []
         self._targets, self._poses = [], []
-        self._speeds, self._vias = [], []
+        self._speeds, self._vias, self._smooth = [], [], []
         self._by_poses = given[0].upper() == "SPLINE"
 
     def speed_is(self, given: Sequence[str]) -> None:
         """Take how fast segments are that do not say it themselves."""
         self._speed = self._speed_of(given[0])
 
+    def turning_is(self, given: Sequence[str]) -> None:
+        """Take how fast the tool turns at most."""
+        self._turning[given[0].upper()] = self.lines.number_of(given[1])
+
+    def turns(self, given: Sequence[str]) -> None:
+        """Take what is said of how the tool turns."""
+        self._turns.add(given[0].upper())
+
     def segment(self, given: Sequence[str]) -> None:
         """Take a straight or smooth segment at a speed, in a block or alone."""
-        pose, speed = given
-        self._at_speed(self._pose(pose), None, speed)
+        kind, pose, speed = given
+        self._at_speed(self._pose(pose), None, speed, is_smooth=kind.upper() == "SPL")
 
     def round_segment(self, given: Sequence[str]) -> None:
         """Take a circular segment at a speed, in a block or alone."""
         via, pose, speed = given
+        if len(self._turns) < _KINDS:
+            raise self.lines.fault(
+                "SCIRC needs $ORI_TYPE = #VAR and $CIRC_TYPE = #BASE at the head: else the tool "
+                "turns otherwise"
+            )
         self._at_speed(self._pose(pose), self._pose(via), speed)
 
-    def _at_speed(self, pose: Pose, via: Pose | None, speed: str | None) -> None:
+    def _at_speed(
+        self, pose: Pose, via: Pose | None, speed: str | None, *, is_smooth: bool = False
+    ) -> None:
         alone = self.state == "body"
         if alone:
             self.block(["SPLINE"])
@@ -90,6 +116,13 @@ class KrlReader(ProgramReader):
         self._speeds.append(self._speed if speed is None else self._speed_of(speed))
         if not self._speeds[-1] > 0.0:
             raise self.lines.fault("a segment without a time, expected $VEL.CP before it")
+        slow = [f"$VEL.{name}" for name, x in self._turning.items() if x < UNBOUND_TURNING]
+        if slow:
+            raise self.lines.fault(
+                f"{slow[0]} is {self._turning[slow[0][5:]]:g}°/s, expected at least "
+                f"{UNBOUND_TURNING:g}: a slower one holds the tool back from its speed"
+            )
+        self._smooth.append(is_smooth)
         if alone:
             self.close([])
 
@@ -159,9 +192,12 @@ class KrlReader(ProgramReader):
         if self.state == "block":
             if not self._speeds:
                 raise self.lines.fault("the spline block has no segments")
+            if len(set(self._smooth)) > 1:
+                raise self.lines.fault("SPL beside SLIN or SCIRC is not judged, expected SLIN")
             if any(number > len(self._speeds) for number, _ in self._triggers):
                 raise self.lines.fault("a trigger has no target after it")
-            self.drive(self._poses, self._speeds, self._vias, self._triggers)
+            given = self._poses, self._speeds, self._vias, self._triggers
+            self.drive(*given, is_spline=all(self._smooth))
         self.state = "body"
 
     def _target(self, text: str) -> list[float]:
@@ -209,16 +245,18 @@ _UNIT = r"MACHINE_DEF ?\[ ?\d+ ?\]"
 KrlReader.grammar = (
     (("before",), r"&(?:ACCESS|REL|PARAM|COMMENT)\b.*", KrlReader.skip),
     (("before",), rf"DEF ([A-Z]\w{{0,{NAME - 1}}}) ?\( ?\)", KrlReader.begin),
-    (("head", "body"), r"BAS ?\( ?#\w+ ?, ?[\d.]+ ?\)", KrlReader.skip),
+    (("head",), r"BAS ?\( ?#INITMOV ?, ?0 ?\)", KrlReader.skip),
+    (_IN_BODY, r"BAS ?\( ?#(?:VEL|ACC)_PTP ?, ?[\d.]+ ?\)", KrlReader.skip),
     (_IN_BODY, r"\$VEL\.CP ?= ?([\d.e-]+)", KrlReader.speed_is),
-    (_IN_BODY, r"\$VEL\.(?:ORI1|ORI2) ?= ?[\d.]+", KrlReader.skip),
-    (("head",), r"\$(?:ORI_TYPE ?= ?#VAR|CIRC_TYPE ?= ?#BASE)", KrlReader.skip),
+    (_IN_BODY, r"\$VEL\.(ORI1|ORI2) ?= ?([\d.]+)", KrlReader.turning_is),
+    (("head",), r"(\$ORI_TYPE) ?= ?#VAR", KrlReader.turns),
+    (("head",), r"(\$CIRC_TYPE) ?= ?#BASE", KrlReader.turns),
     (("head",), rf"\$TOOL ?= ?{_POSE}", KrlReader.tool_is),
     (("head",), rf"\$BASE ?= ?{_POSE}", KrlReader.work_is),
     (
         ("head",),
         rf"\$BASE ?= ?EK ?\( ?{_UNIT}\.ROOT ?, ?{_UNIT}\.MECH_TYPE ?, ?{_POSE} ?\)",
-        KrlReader.work_is,
+        KrlReader.carried_work_is,
     ),
     (("head",), rf"\$LOAD ?= ?\{{{_ANY}\{{{_ANY}\}}{_ANY}\{{{_ANY}\}}{_ANY}\}}", KrlReader.skip),
     (_IN_BODY, rf"PTP {_TARGET}", KrlReader.go),
@@ -230,7 +268,7 @@ KrlReader.grammar = (
     (("block",), r"TIME_BLOCK START", KrlReader.start),
     (("time",), rf"SPTP {_TARGET}", KrlReader.target),
     (("time",), rf"(?:SPL|SLIN) {_POSE}", KrlReader.pose),
-    (("block", "body"), rf"(?:SPL|SLIN) {_POSE}{_WITH}", KrlReader.segment),
+    (("block", "body"), rf"(SPL|SLIN) {_POSE}{_WITH}", KrlReader.segment),
     (("block", "body"), rf"SCIRC {_POSE} ?, ?{_POSE}{_WITH}", KrlReader.round_segment),
     (("time",), r"TIME_BLOCK PART ?= ?(\S+)", KrlReader.part),
     (

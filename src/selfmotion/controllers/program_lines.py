@@ -55,6 +55,8 @@ class ProgramReader:
         self.pose_at: Pose | None = None
         self.tool: SE3 | None = None
         self.work: SE3 | None = None
+        # Whether an axis carries the work object, where a program says it.
+        self.is_carried: bool | None = None
         self.switches: list[Switch] = []
 
     def program(self) -> ControllerProgram:
@@ -80,6 +82,7 @@ class ProgramReader:
         if self.state != "after":
             raise self.lines.fault(f"is the last one, expected {self.last}")
         places = self.lines.places(self.tool, self.work)
+        places.is_carried = self.is_carried
         rows, present = self.rows, self.present
         return self.lines.program(self.name, present, rows, self.switches, places, self.robot)
 
@@ -120,6 +123,8 @@ class ProgramReader:
         speeds: list[float],
         vias: list[Pose | None],
         happens: Sequence[tuple[int, Sequence[str]]] = (),
+        *,
+        is_spline: bool = False,
     ) -> None:
         """Take a stretch of poses at speeds [m/s], and what is switched at which of them."""
         planned = self.lines.planned()
@@ -141,7 +146,8 @@ class ProgramReader:
         at = Ramps(float(own[-1]), planned).times(own)
         for number, what in happens:
             self.switches.append(switched(self.clock + float(at[number]), what))
-        self.rows.append(PoseRow(self.lines.step(), every, [planned], speeds, round_ones))
+        row = PoseRow(self.lines.step(), every, [planned], speeds, round_ones, is_spline)
+        self.rows.append(row)
         self.at, self.pose_at = None, poses[-1]
 
     def follow(self, poses: list[Pose], seconds: list[float]) -> None:

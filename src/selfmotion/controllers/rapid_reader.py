@@ -5,6 +5,7 @@ from pathlib import Path as FilePath
 
 import numpy as np
 
+from selfmotion.controllers.feed_stretches import ZONE
 from selfmotion.controllers.pose_numbers import rapid_pose
 from selfmotion.controllers.program_lines import ProgramReader
 from selfmotion.controllers.program_settings import AXES
@@ -14,6 +15,10 @@ from selfmotion.task import SE3
 
 # What the speed of slow motions is called by at its end.
 SLOW = "_v"
+# Zones of seams at speeds, in which corners are rounded by as much as is judged.
+_ZONES = ("fine", "z0")
+# How fast the tool turns at most, and external axes [°/s, mm/s, °/s]: none of it slows a seam down.
+TURNING = (500.0, 5000.0, 1000.0)
 # From where on a number means that there is no such axis.
 _ABSENT_FROM = 8.9e9
 
@@ -30,7 +35,9 @@ class RapidReader(ProgramReader):
         self._poses: list[Pose] = []
         self._times: list[float] = []
         # Of motions at speeds: how fast [m/s], through where, and what is switched at which.
-        self._known: dict[str, float] = {}
+        self._known: dict[str, list[float]] = {}
+        # What tool and work object of the module are called, and whether arcs turn as is judged.
+        self._tool_name, self._work_name, self._turns_evenly = "", "", False
         self._speeds: list[float] = []
         self._vias: list[Pose | None] = []
         self._happens: list[tuple[int, Sequence[str]]] = []
@@ -41,11 +48,18 @@ class RapidReader(ProgramReader):
 
     def tool_is(self, given: Sequence[str]) -> None:
         """Take the tool in the flange."""
-        self.tool = self._frame(given[0], given[1])
+        if self._tool_name:
+            raise self.lines.fault(f"there is a tooldata '{self._tool_name}' already, expected one")
+        self._tool_name = given[0].lower()
+        self.tool = self._frame(given[1], given[2])
 
     def work_is(self, given: Sequence[str]) -> None:
         """Take the work object: user frame and object frame, the first one of a unit its own."""
-        fixed, user, object_ = given[0].upper() == "TRUE", given[1:3], given[3:5]
+        if self._work_name:
+            raise self.lines.fault(f"there is a wobjdata '{self._work_name}' already, expected one")
+        self._work_name = given[0].lower()
+        fixed, user, object_ = given[1].upper() == "TRUE", given[2:4], given[4:6]
+        self.is_carried = not fixed
         own = self._frame(*object_)
         self.work = self._frame(*user) * own if fixed else own
 
@@ -64,11 +78,16 @@ class RapidReader(ProgramReader):
         values = [self.lines.number_of(item) for item in self._texts(given[1], 4, "speeddata")]
         if not values[0] > 0.0:
             raise self.lines.fault(f"v_tcp is {values[0]:g} mm/s, expected a number above 0")
-        self._known[given[0].lower()] = 1e-3 * values[0]
+        self._known[given[0].lower()] = values
+
+    def arcs_turn_evenly(self, _: Sequence[str]) -> None:
+        """Take how the tool turns in circular motions."""
+        self._turns_evenly = True
 
     def move_at_speed(self, given: Sequence[str]) -> None:
         """Take a pose at a speed, straight or round; one that is called …_v is a slow motion."""
-        *poses, speed, zone = given
+        *poses, speed, zone, tool, work = given
+        self._check_names(tool, work)
         if not poses[4:] and speed.lower().endswith(SLOW):
             if zone.lower() != "fine":
                 raise self.lines.fault(f"a slow motion has zone {zone}, expected fine")
@@ -80,12 +99,43 @@ class RapidReader(ProgramReader):
             )
         if speed.lower() not in self._known:
             raise self.lines.fault(f"speed '{speed}' is no speeddata of the module")
+        self._check_judged(speed, zone, is_round=bool(poses[4:]))
         self._poses.append(self._pose(poses[-4:]))
         self._vias.append(self._pose(poses[:4]) if poses[4:] else None)
-        self._speeds.append(self._known[speed.lower()])
+        self._speeds.append(1e-3 * self._known[speed.lower()][0])
         if zone.lower() == "fine":
             self.drive(self._poses, self._speeds, self._vias, self._happens)
             self._poses, self._speeds, self._vias, self._happens = [], [], [], []
+
+    def _check_names(self, tool: str, work: str) -> None:
+        """Refuse a pose of another tool or work object than those of the module."""
+        for kind, name, known in (
+            ("tool", tool, self._tool_name),
+            ("work object", work, self._work_name),
+        ):
+            if name.lower() != known:
+                raise self.lines.fault(
+                    f"{kind} is '{name}', expected '{known}', the one that the module has"
+                )
+
+    def _check_judged(self, speed: str, zone: str, *, is_round: bool) -> None:
+        """Refuse what makes another motion of a seam at its speed than the one that is judged."""
+        if zone.lower() not in _ZONES:
+            raise self.lines.fault(
+                f"zone is {zone}, expected fine or z0: corners of seams at speeds are judged as "
+                f"rounded by {1e3 * ZONE:g} mm at most"
+            )
+        turning = self._known[speed.lower()][1:]
+        if any(own < least for own, least in zip(turning, TURNING, strict=True)):
+            raise self.lines.fault(
+                f"speeddata '{speed}' has {', '.join(f'{x:g}' for x in turning)} for turning and "
+                f"external axes, expected at least {', '.join(f'{x:g}' for x in TURNING)}: slower "
+                f"ones hold the tool back from its speed"
+            )
+        if is_round and not self._turns_evenly:
+            raise self.lines.fault(
+                "MoveC needs CirPathMode \\ObjectFrame before it: else the tool turns otherwise"
+            )
 
     def switch(self, given: Sequence[str]) -> None:
         """See `ProgramReader.switch`: between motions at speeds when these are known."""
@@ -117,7 +167,8 @@ class RapidReader(ProgramReader):
 
     def move_linear(self, given: Sequence[str]) -> None:
         """Take a pose."""
-        *target, seconds, zone = given
+        *target, seconds, zone, tool, work = given
+        self._check_names(tool, work)
         if self._axes or self._speeds:
             raise self.lines.fault("a pose after another kind of target whose zone is not fine")
         self._poses.append(self._pose(target))
@@ -188,24 +239,25 @@ _TARGET = rf"\[ ?{_LIST} ?, ?{_LIST} ?\]"
 _POSE = rf"\[ ?{_LIST} ?, ?{_LIST} ?, ?{_LIST} ?, ?{_LIST} ?\]"
 _FRAME = rf"\[ ?{_LIST} ?, ?{_LIST} ?\]"
 _TIMED = rf"{_WORD} ?\\T ?:= ?([^,]+), ?(fine|z[0-9]{{1,3}})"
-_AT_SPEED = rf"({_WORD}) ?, ?(fine|z[0-9]{{1,3}}) ?, ?{_WORD} ?\\WObj ?:= ?{_WORD} ?;"
+_FRAMES = rf"({_WORD}) ?\\WObj ?:= ?({_WORD}) ?;"
+_AT_SPEED = rf"({_WORD}) ?, ?(fine|z[0-9]{{1,3}}) ?, ?{_FRAMES}"
 RapidReader.grammar = (
     (("before",), rf"MODULE ({_WORD})", RapidReader.begin),
     (
         ("data",),
-        rf"(?:TASK )?PERS tooldata {_WORD} ?:= ?\[ ?TRUE ?, ?{_FRAME}[^;!]*\];",
+        rf"(?:TASK )?PERS tooldata ({_WORD}) ?:= ?\[ ?TRUE ?, ?{_FRAME}[^;!]*\];",
         RapidReader.tool_is,
     ),
     (
         ("data",),
-        rf"(?:TASK )?PERS wobjdata {_WORD} ?:= ?\[ ?FALSE ?, ?(TRUE|FALSE) ?, ?\"\w*\" ?, ?"
+        rf"(?:TASK )?PERS wobjdata ({_WORD}) ?:= ?\[ ?FALSE ?, ?(TRUE|FALSE) ?, ?\"\w*\" ?, ?"
         rf"{_FRAME} ?, ?{_FRAME} ?\];",
         RapidReader.work_is,
     ),
     (("data",), rf"CONST speeddata ({_WORD}) ?:= ?{_LIST};", RapidReader.speed_is),
     (("data",), rf"PROC {_WORD} ?\( ?\)", RapidReader.procedure),
     (("start", "body"), r"ConfL ?\\ ?(?:On|Off) ?;", RapidReader.skip),
-    (("start", "body"), r"CirPathMode ?\\ ?ObjectFrame ?;", RapidReader.skip),
+    (("start", "body"), r"CirPathMode ?\\ ?ObjectFrame ?;", RapidReader.arcs_turn_evenly),
     (
         ("start", "body"),
         rf"MoveAbsJ {_TARGET} ?\\NoEOffs ?, ?{_WORD} ?, ?fine ?, ?{_WORD} ?;",
@@ -220,7 +272,7 @@ RapidReader.grammar = (
     (("body",), rf"MoveC {_POSE} ?, ?{_POSE} ?, ?{_AT_SPEED}", RapidReader.move_at_speed),
     (
         ("body",),
-        rf"MoveL {_POSE} ?, ?{_TIMED} ?, ?{_WORD} ?\\WObj ?:= ?{_WORD} ?;",
+        rf"MoveL {_POSE} ?, ?{_TIMED} ?, ?{_FRAMES}",
         RapidReader.move_linear,
     ),
     (("body",), r"WaitTime ([^;\s]+) ?;", RapidReader.wait),

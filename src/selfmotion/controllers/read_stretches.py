@@ -54,8 +54,8 @@ class Pose:
 class PoseRow:
     """A stretch of poses while it is read: where it begins, its targets, times between [s].
 
-    Of one at speeds the time that was planned for all of it, the speed of each step [m/s], and
-    through where it goes round.
+    Of one at speeds the time that was planned for all of it, the speed of each step [m/s], through
+    where it goes round, and whether it goes smoothly through its targets.
     """
 
     name: str
@@ -63,6 +63,7 @@ class PoseRow:
     seconds: list[float]
     speeds: list[float] = field(default_factory=list)
     vias: Array = field(default_factory=lambda: np.zeros((0, 3)))
+    is_spline: bool = False
 
 
 @dataclass
@@ -75,7 +76,10 @@ class SlowRow:
 
 @dataclass
 class Places:
-    """What a file says of its frames: the tool in the flange, the work object in its carrier."""
+    """What a file says of its frames: the tool in the flange, the work object in its carrier.
+
+    And whether it says that an axis carries the work object; None where it does not say.
+    """
 
     carrier: str = ""
     work_name: str = ""
@@ -83,6 +87,7 @@ class Places:
     planned: SE3 | None = None
     tool: SE3 | None = None
     work: SE3 | None = None
+    is_carried: bool | None = None
 
     @property
     def shift(self) -> SE3 | None:
@@ -122,6 +127,13 @@ class Places:
             raise FileFormatError(f"{file}: {error}") from error
         if why:
             raise FileFormatError(f"{file}: has poses, but {why}")
+        if self.is_carried not in (None, found.is_carried):
+            stands, carried = "stands in the world", "is carried by an axis"
+            says, expected = (carried, stands) if self.is_carried else (stands, carried)
+            raise FileFormatError(
+                f"{file}: its work object {says}, expected one that {expected}: its comments "
+                f"say that it is of '{self.carrier}'"
+            )
         return found
 
 
@@ -140,6 +152,12 @@ class Follower:
         In the order of the file.
     frames : ToolFrames or None
         None where there are no poses.
+    stretches : list of Stretch
+        What is made so far.
+    at : (n,) or None
+        Where the arm is.
+    approach : float
+        How far it goes slowly from its first axis target to its first pose [rad or m].
     """
 
     file: object
@@ -147,6 +165,7 @@ class Follower:
     frames: ToolFrames | None
     stretches: list[Stretch] = field(default_factory=list)
     at: Array | None = None
+    approach: float = 0.0
 
     def take(self, row: Row | PoseRow | SlowRow) -> None:
         """Take a row.
@@ -197,6 +216,8 @@ class Follower:
         moves = bool(self.stretches) and max(far, angle) > _THERE
         here = Pose(place[0], turn[0], self._others(before), row.target.line)
         stretch = self._stretch(PoseRow(SLOWLY, [here, row.target], [seconds]))
+        if not self.stretches:
+            self.approach = float(np.abs(stretch.q[-1] - before).max())
         if moves:
             self.stretches.append(stretch)
         self.at = stretch.q[-1]
@@ -246,7 +267,13 @@ class Follower:
         )
         if at_speeds:
             speeds, seconds = np.array(row.speeds), sum(row.seconds)
-            stretch = FeedStretch(**vars(stretch), speeds=speeds, vias=row.vias, seconds=seconds)
+            stretch = FeedStretch(
+                **vars(stretch),
+                speeds=speeds,
+                vias=row.vias,
+                seconds=seconds,
+                is_spline=row.is_spline,
+            )
         return stretch.in_order(order)
 
     def _followed(

@@ -197,6 +197,11 @@ class UrscriptReader(ProgramReader):
         self._speeds.append(self.lines.number_of(speed))
         if not self._speeds[-1] > 0.0:
             raise self.lines.fault(f"v is {self._speeds[-1]:g} m/s, expected a number above 0")
+        if not 0.0 <= self.lines.number_of(radius) <= ZONE:
+            raise self.lines.fault(
+                f"r is {radius} m, expected 0 to {ZONE:g}: corners of seams at speeds are judged "
+                f"as rounded by that at most"
+            )
         if self.lines.number_of(radius) == 0.0:
             self.drive(self._poses, self._speeds, self._vias, self._happens)
             self._poses, self._speeds, self._vias, self._happens = [], [], [], []

@@ -113,9 +113,9 @@ class JointVelocity(_Derivative):
     def from_dict(cls, values: Mapping[str, Any], **context: Any) -> Self:
         """See `Saved.from_dict`: without a weight it is the usual one of the robot."""
         robot = context.get("robot")
-        if isinstance(robot, RobotModel) and not {"weight", "name"} & set(values):
-            values = {**values, **cls.usual(robot).to_dict()}
-            del values["kind"]
+        if isinstance(robot, RobotModel) and "weight" not in values:
+            usual = cls.usual(robot)
+            values = {"name": usual.name, **values, "weight": usual.weight}
         return super().from_dict(values, **context)
 
 

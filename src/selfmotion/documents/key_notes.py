@@ -72,18 +72,24 @@ _IN_FILES: Mapping[str, Mapping[str, str]] = {
         "grid": "Values to try for keys, for `selfmotion batch`: a list for each.",
         "seams": "Seams of a job, for `selfmotion job`: a list, or one table with a file of them.",
         "job": "How a job is planned.",
-        "collision": "Which bodies keep apart, and how far; false for none.",
+        "also": "What else of the arm follows a path at the same time: their rows are prescribed.",
+        "clearance": "How far bodies keep apart, and which; by default links must not overlap. "
+        "False to leave that out.",
     },
     "Robot": {
         "name": "An arm that is known by name; see `selfmotion robots`.",
         "file": "A URDF or xacro file.",
         "parts": "Robots that make a cell, by name.",
         "bodies": "Bodies that links carry, each with the link as its frame.",
+        "base": "Pose of its root link in the world; of parts, each has its own.",
+        "arguments": "Of a xacro file; of parts, each has its own.",
     },
     "RobotPart": {
         "name": "An arm that is known by name, or a positioner.",
         "file": "A URDF or xacro file.",
         "on": "The link of another part that carries it.",
+        "base": "Pose of its root link in the world, or in the link that carries it.",
+        "arguments": "Of a xacro file.",
     },
     "Workpiece": {
         "frame": "Where it stands: a pose in the world, or in the frame of `on`.",
@@ -112,6 +118,8 @@ _IN_FILES: Mapping[str, Mapping[str, str]] = {
     "Seam": {
         "file": "The file of all seams.",
         "leaves": "Bodies that are there from then on.",
+        "events": "What happens how long after its start [s], whichever way it is made: "
+        '`["arc on", 0.1]`.',
         "run_up": "Whether the tool runs up before the seam and stops behind it.",
         "most_feed": 'With feed = "highest": no more than this [m/s].',
     },

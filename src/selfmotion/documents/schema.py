@@ -1,6 +1,7 @@
 """The JSON Schema of problem and job files, for editors."""
 
 import math
+import re
 from collections.abc import Mapping
 from typing import Any
 
@@ -14,7 +15,7 @@ _MOTION = "ToolMotion"
 # Paths that are made of others, and the key of these.
 _INNER = ("path", "pieces")
 _TEXT, _NUMBER, _FLAG = {"type": "string"}, {"type": "number"}, {"type": "boolean"}
-_NAMES = {"anyOf": [_TEXT, {"type": "array", "items": _TEXT}]}
+_NAMES = {"type": "array", "items": _TEXT}
 # What a seam says besides its problem, and a job besides its seams.
 _OF_SEAM: Mapping[str, Any] = {
     "name": _TEXT,
@@ -139,12 +140,15 @@ def _with_units(node: Any) -> Any:
         return found
     if found.get("title") == QuasiNewton.__name__:
         return found
-    for suffix, names, scale in (("_deg", ANGLES, 180.0 / math.pi), ("_mm", LENGTHS, 1e3)):
+    for suffix, names, scale, units in (
+        ("_deg", ANGLES, 180.0 / math.pi, ("rad", "°")),
+        ("_mm", LENGTHS, 1e3, ("m", "mm")),
+    ):
         for name in sorted(names & set(keys)):
             # A table, whose own keys have units; or a number that has none here.
             if _is_table(keys[name]) or is_share(name, keys.get("kind", {}).get("const")):
                 continue
-            keys[name + suffix] = _scaled(keys[name], scale)
+            keys[name + suffix] = _scaled(keys[name], scale, units)
             if name in found.get("required", []):
                 found["required"].remove(name)
     return found
@@ -154,9 +158,16 @@ def _is_table(node: Mapping[str, Any]) -> bool:
     return "$ref" in node or any(item.get("type") == "object" for item in node.get("anyOf", ()))
 
 
-def _scaled(node: Mapping[str, Any], scale: float) -> dict[str, Any]:
-    """Return the schema of a value in another unit, with its default in that."""
+def _scaled(node: Mapping[str, Any], scale: float, units: tuple[str, str]) -> dict[str, Any]:
+    """Return the schema of a value in another unit, with its default and description in that."""
     found = dict(node)
+    if "description" in found:
+        old, new = units
+        found["description"] = re.sub(
+            r"\[[^\[\]]*\]",
+            lambda unit: re.sub(rf"(?<!\w){old}(?!\w)", new, unit[0]),
+            found["description"],
+        )
     default = found.get("default")
     if isinstance(default, int | float) and not isinstance(default, bool):
         found["default"] = float(f"{default * scale:.12g}")

@@ -41,6 +41,8 @@ def null_space_velocity(
     follows: Follows, motion: Trajectory, t: npt.ArrayLike
 ) -> NullSpaceVelocity:
     """Return the part of q̇ in the null space at times within the motion; see `Plan.null_motion`."""
+    if np.ndim(t) > 1:
+        raise ValueError(f"t has shape {np.shape(t)}, expected a time or times (K,) [s]")
     qd = motion(t, 1)
     if qd.ndim == 1:
         basis = null_space(follows.jacobian(motion(t)))

@@ -181,7 +181,7 @@ class Plan:
         Raises
         ------
         ValueError
-            A time is outside the motion.
+            A time is outside the motion, or times have another shape.
         """
         return null_space_velocity(self.problem.follows, self.trajectory, t)
 

@@ -158,7 +158,15 @@ def _moving_joint(model: Any, joint: int, links: _Links, source: str) -> Element
             f"expected a revolute or prismatic one"
         )
     lower, upper, velocity, effort = _limits(model, kind)
-    endless = turns and (kind.nq == 2 or not (lower > -_ENDLESS and upper < _ENDLESS))
+    ends = lower > -_ENDLESS, upper < _ENDLESS
+    if kind.nq == 1 and (ends[0] != ends[1] or not (turns or any(ends))):
+        unit = "rad" if turns else "m"
+        raise RobotError(
+            f"{source}: joint '{name}' may go from {lower:g} to {upper:g} {unit}, "
+            f"expected limits at both ends{' or at neither' if turns else ''}, as a URDF has them: "
+            f"set lowerPositionLimit and upperPositionLimit of the model"
+        )
+    endless = turns and (kind.nq == 2 or not any(ends))
     form = "continuous" if endless else "revolute" if turns else "prismatic"
     element = ElementTree.Element("joint", name=name, type=form)
     parent = links.of_joint[model.parents[joint]]
