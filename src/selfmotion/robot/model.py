@@ -168,7 +168,7 @@ class RobotModel:
 
         1 for a revolute joint. A metre of a prismatic one counts as many radians as revolute
         joints turn in the same time, each at its limit of speed: the mean of their limits over its
-        own [rad/m]. One without a limit counts as in `joint_weights`.
+        own, at most 10 [rad/m]. One without a limit counts as in `joint_weights`.
         """
         return speed_weights(self)
 

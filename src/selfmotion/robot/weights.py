@@ -11,6 +11,11 @@ if TYPE_CHECKING:
     from selfmotion.robot.model import RobotModel
 
 
+# A metre counts so many radians at most: a lift that is slower still is left alone by as much
+# already, and a weight of hundreds makes optima badly conditioned.
+_MOST = 10.0
+
+
 def joint_weights(robot: "RobotModel") -> Array:
     """Return what a unit of each joint counts, (n,); see `RobotModel.joint_weights`."""
     return np.where(robot.is_revolute, 1.0, 1.0 / mean_lever(robot))
@@ -23,7 +28,7 @@ def speed_weights(robot: "RobotModel") -> Array:
     if not (turns & known).any():
         return joint_weights(robot)
     fastest = float(limits[turns & known].mean())
-    by_speed = fastest / np.where(known, limits, 1.0)
+    by_speed = np.minimum(fastest / np.where(known, limits, 1.0), _MOST)
     return np.where(turns, 1.0, np.where(known, by_speed, joint_weights(robot)))
 
 
