@@ -40,6 +40,10 @@ def test_a_metre_counts_what_joints_turn_in_its_time(on_rail: Path) -> None:
     unknown.write_text(text)
     other = sm.load_robot(unknown, tool="torch")
     np.testing.assert_allclose(other.speed_weights, other.joint_weights)
+    # A crawling one counts ten times at most.
+    unknown.write_text(on_rail.read_text().replace(f'velocity="{SLOW:g}"', 'velocity="0.001"'))
+    crawling = sm.load_robot(unknown, tool="torch")
+    np.testing.assert_array_equal(crawling.speed_weights, [10.0, *[1.0] * 6])
 
 
 def test_files_without_a_weight_have_it_and_the_shell_tells(on_rail: Path, tmp_path: Path) -> None:
