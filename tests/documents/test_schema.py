@@ -171,7 +171,9 @@ def test_units_of_descriptions_are_those_of_their_keys() -> None:
     told = {key: value["description"] for _, key, value in keys_of(SCHEMA)}
     assert "[mm]" in told["radius_mm"]
     assert "[mm/s]" in told["feed_mm"]
-    assert SCHEMA["properties"]["start_deg"]["description"].startswith("The start configuration [° or m]")
+    assert SCHEMA["properties"]["start_deg"]["description"].startswith(
+        "The start configuration [° or m]"
+    )
     for key, text in told.items():
         units = re.findall(r"\[([^\[\]]*)\]", text)
         wrong = {"_deg": r"\brad\b", "_mm": r"\bm\b"}.get(key[key.rfind("_") :])
