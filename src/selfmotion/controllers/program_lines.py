@@ -181,3 +181,65 @@ class ProgramReader:
             raise self.lines.fault(
                 f"has axes {', '.join(present)}, expected {', '.join(self.present)}"
             )
+
+
+class StopReader(ProgramReader):
+    """Reads a program whose targets belong together up to the next one that the arm stops at.
+
+    They are of one kind, which the first of them decides: axis targets or poses with times, or
+    poses at speeds.
+    """
+
+    def __init__(self, file: FilePath, robot: RobotModel | None = None) -> None:
+        super().__init__(file, robot)
+        self.axes: list[list[float]] = []
+        self.poses: list[Pose] = []
+        self.times: list[float] = []
+        # Of motions at speeds: how fast [m/s], through where, and what is switched at which.
+        self.speeds: list[float] = []
+        self.vias: list[Pose | None] = []
+        self.happens: list[tuple[int, Sequence[str]]] = []
+
+    @property
+    def is_moving(self) -> bool:
+        """Whether the arm has not stopped at the target that was read last."""
+        return bool(self.times or self.speeds)
+
+    @property
+    def clock(self) -> float:
+        """See `ProgramReader.clock`: with the targets since the last stop."""
+        return super().clock + sum(self.times)
+
+    def take_axes(self, axes: list[float], seconds: float, *, stops: bool) -> None:
+        """Take an axis target with its time [s]."""
+        self.axes.append(axes)
+        self.times.append(seconds)
+        if stops:
+            self.join(self.axes, self.times)
+            self.axes, self.times = [], []
+
+    def take_pose(self, pose: Pose, seconds: float, *, stops: bool) -> None:
+        """Take a pose with its time [s]."""
+        self.poses.append(pose)
+        self.times.append(seconds)
+        if stops:
+            self.follow(self.poses, self.times)
+            self.poses, self.times = [], []
+
+    def take_pose_at_speed(
+        self, pose: Pose, via: Pose | None, speed: float, *, stops: bool
+    ) -> None:
+        """Take a pose at a speed [m/s], straight or round through another one."""
+        self.poses.append(pose)
+        self.vias.append(via)
+        self.speeds.append(speed)
+        if stops:
+            self.drive(self.poses, self.speeds, self.vias, self.happens)
+            self.poses, self.speeds, self.vias, self.happens = [], [], [], []
+
+    def switch(self, given: Sequence[str]) -> None:
+        """See `ProgramReader.switch`: between motions at speeds when these are known."""
+        if self.speeds:
+            self.happens.append((len(self.speeds), given))
+        else:
+            super().switch(given)

@@ -7,7 +7,7 @@ import numpy as np
 
 from selfmotion.controllers.feed_stretches import ZONE
 from selfmotion.controllers.pose_numbers import rapid_pose
-from selfmotion.controllers.program_lines import ProgramReader
+from selfmotion.controllers.program_lines import StopReader
 from selfmotion.controllers.program_settings import AXES
 from selfmotion.controllers.read_stretches import Pose, pose_of_values
 from selfmotion.robot import RobotModel
@@ -23,24 +23,17 @@ TURNING = (500.0, 5000.0, 1000.0)
 _ABSENT_FROM = 8.9e9
 
 
-class RapidReader(ProgramReader):
+class RapidReader(StopReader):
     """Reads a module: what `write_rapid` writes, spaces, names and numbers aside."""
 
     comment, last = "!", "ENDMODULE"
 
     def __init__(self, file: FilePath, robot: RobotModel | None = None) -> None:
         super().__init__(file, robot)
-        # Targets since the last stop: of one kind, which the first of them decides.
-        self._axes: list[list[float]] = []
-        self._poses: list[Pose] = []
-        self._times: list[float] = []
-        # Of motions at speeds: how fast [m/s], through where, and what is switched at which.
+        # Speeds by the names of their speeddata: of the tool [mm/s], and of what turns.
         self._known: dict[str, list[float]] = {}
         # What tool and work object of the module are called, and whether arcs turn as is judged.
         self._tool_name, self._work_name, self._turns_evenly = "", "", False
-        self._speeds: list[float] = []
-        self._vias: list[Pose | None] = []
-        self._happens: list[tuple[int, Sequence[str]]] = []
 
     def begin(self, given: Sequence[str]) -> None:
         """Begin the module."""
@@ -93,19 +86,16 @@ class RapidReader(ProgramReader):
                 raise self.lines.fault(f"a slow motion has zone {zone}, expected fine")
             self.go_linear(poses)
             return
-        if self._axes or self._times:
+        if self.axes or self.times:
             raise self.lines.fault(
                 "a motion at a speed after one with a time, expected fine before"
             )
         if speed.lower() not in self._known:
             raise self.lines.fault(f"speed '{speed}' is no speeddata of the module")
         self._check_judged(speed, zone, is_round=bool(poses[4:]))
-        self._poses.append(self._pose(poses[-4:]))
-        self._vias.append(self._pose(poses[:4]) if poses[4:] else None)
-        self._speeds.append(1e-3 * self._known[speed.lower()][0])
-        if zone.lower() == "fine":
-            self.drive(self._poses, self._speeds, self._vias, self._happens)
-            self._poses, self._speeds, self._vias, self._happens = [], [], [], []
+        pose, via = self._pose(poses[-4:]), self._pose(poses[:4]) if poses[4:] else None
+        fast = 1e-3 * self._known[speed.lower()][0]
+        self.take_pose_at_speed(pose, via, fast, stops=zone.lower() == "fine")
 
     def _check_names(self, tool: str, work: str) -> None:
         """Refuse a pose of another tool or work object than those of the module."""
@@ -137,13 +127,6 @@ class RapidReader(ProgramReader):
                 "MoveC needs CirPathMode \\ObjectFrame before it: else the tool turns otherwise"
             )
 
-    def switch(self, given: Sequence[str]) -> None:
-        """See `ProgramReader.switch`: between motions at speeds when these are known."""
-        if self._speeds:
-            self._happens.append((len(self._speeds), given))
-        else:
-            super().switch(given)
-
     def go_linear(self, given: Sequence[str]) -> None:
         """Take the pose from which the motion goes on by poses."""
         self._check_stopped("a slow motion")
@@ -157,39 +140,28 @@ class RapidReader(ProgramReader):
     def move(self, given: Sequence[str]) -> None:
         """Take an axis target."""
         robot, others, seconds, zone = given
-        if self._poses:
+        if self.poses:
             raise self.lines.fault("an axis target after a pose whose zone is not fine")
-        self._axes.append(self._target(robot, others))
-        self._times.append(self.lines.duration(seconds))
-        if zone.lower() == "fine":
-            self.join(self._axes, self._times)
-            self._axes, self._times = [], []
+        axes, taken = self._target(robot, others), self.lines.duration(seconds)
+        self.take_axes(axes, taken, stops=zone.lower() == "fine")
 
     def move_linear(self, given: Sequence[str]) -> None:
         """Take a pose."""
         *target, seconds, zone, tool, work = given
         self._check_names(tool, work)
-        if self._axes or self._speeds:
+        if self.axes or self.speeds:
             raise self.lines.fault("a pose after another kind of target whose zone is not fine")
-        self._poses.append(self._pose(target))
-        self._times.append(self.lines.duration(seconds))
-        if zone.lower() == "fine":
-            self.follow(self._poses, self._times)
-            self._poses, self._times = [], []
-
-    @property
-    def clock(self) -> float:
-        """See `ProgramReader.clock`: with the targets since the last stop."""
-        return super().clock + sum(self._times)
+        pose, taken = self._pose(target), self.lines.duration(seconds)
+        self.take_pose(pose, taken, stops=zone.lower() == "fine")
 
     def leave(self, _: Sequence[str]) -> None:
         """End the procedure."""
-        if self._times or self._speeds:
+        if self.is_moving:
             raise self.lines.fault("the last target has a zone, expected fine")
         self.state = "left"
 
     def _check_stopped(self, what: str) -> None:
-        if self._times or self._speeds:
+        if self.is_moving:
             raise self.lines.fault(f"{what} where it does not stop: zone is not fine")
 
     def _frame(self, place: str, turn: str) -> SE3:

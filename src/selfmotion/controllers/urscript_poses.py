@@ -19,14 +19,13 @@ from selfmotion.controllers.feed_stretches import ZONE, FeedStretch
 from selfmotion.controllers.pose_numbers import urscript_numbers, urscript_pose
 from selfmotion.controllers.pose_stretches import PoseStretch
 from selfmotion.controllers.program_heads import before, head, with_begins
-from selfmotion.controllers.program_lines import ProgramReader
+from selfmotion.controllers.program_lines import StopReader
 from selfmotion.controllers.program_settings import AXES
 from selfmotion.controllers.program_texts import pin_values, plain
 from selfmotion.controllers.read_stretches import Pose, pose_of_values
 from selfmotion.controllers.stretches import Stretch
 from selfmotion.controllers.thinning import TIME_DIGITS
 from selfmotion.controllers.urscript import check_joints, event_line, slow_joints
-from selfmotion.robot import RobotModel
 from selfmotion.task import SE3
 
 # The fastest approach [m/s], its acceleration [m/s²]; blends reach so far [m], and at most so much
@@ -128,21 +127,10 @@ def _pose(pose: SE3) -> str:
     return f"p[{', '.join(f'{value:.9f}' for value in numbers)}]"
 
 
-class UrscriptReader(ProgramReader):
+class UrscriptReader(StopReader):
     """Reads a program of linear motions: what `write_urscript` writes, spaces and numbers aside."""
 
     comment, last = "#", "end"
-
-    def __init__(self, file: FilePath, robot: RobotModel | None = None) -> None:
-        super().__init__(file, robot)
-        # Targets since the last stop, of one kind.
-        self._poses: list[Pose] = []
-        self._axes: list[list[float]] = []
-        self._times: list[float] = []
-        # Of motions at speeds: how fast [m/s], through where, and what is switched at which.
-        self._speeds: list[float] = []
-        self._vias: list[Pose | None] = []
-        self._happens: list[tuple[int, Sequence[str]]] = []
 
     def begin(self, _: Sequence[str]) -> None:
         """Begin the program."""
@@ -169,49 +157,33 @@ class UrscriptReader(ProgramReader):
 
     def move(self, given: Sequence[str]) -> None:
         """Take a joint target."""
-        if self._poses:
+        if self.poses:
             raise self.lines.fault("a joint target after a pose with a blend, expected r=0")
-        self._axes.append(self._joints(given[0]))
-        self._times.append(self.lines.duration(given[1]))
-        if self.lines.number_of(given[2]) == 0.0:
-            self.join(self._axes, self._times)
-            self._axes, self._times = [], []
+        axes, taken = self._joints(given[0]), self.lines.duration(given[1])
+        self.take_axes(axes, taken, stops=self.lines.number_of(given[2]) == 0.0)
 
     def move_linear(self, given: Sequence[str]) -> None:
         """Take a pose."""
-        if self._axes or self._speeds:
+        if self.axes or self.speeds:
             raise self.lines.fault("a pose after another kind with a blend, expected r=0")
-        self._poses.append(self._pose(given[0]))
-        self._times.append(self.lines.duration(given[1]))
-        if self.lines.number_of(given[2]) == 0.0:
-            self.follow(self._poses, self._times)
-            self._poses, self._times = [], []
+        pose, taken = self._pose(given[0]), self.lines.duration(given[1])
+        self.take_pose(pose, taken, stops=self.lines.number_of(given[2]) == 0.0)
 
     def move_at_speed(self, given: Sequence[str]) -> None:
         """Take a pose at a speed, straight or round."""
         *poses, speed, radius = given
-        if self._axes or self._times:
+        if self.axes or self.times:
             raise self.lines.fault("a motion at a speed after one with a blend, expected r=0")
-        self._poses.append(self._pose(poses[-1]))
-        self._vias.append(self._pose(poses[0]) if poses[1:] else None)
-        self._speeds.append(self.lines.number_of(speed))
-        if not self._speeds[-1] > 0.0:
-            raise self.lines.fault(f"v is {self._speeds[-1]:g} m/s, expected a number above 0")
-        if not 0.0 <= self.lines.number_of(radius) <= ZONE:
+        pose, via = self._pose(poses[-1]), self._pose(poses[0]) if poses[1:] else None
+        fast, blend = self.lines.number_of(speed), self.lines.number_of(radius)
+        if not fast > 0.0:
+            raise self.lines.fault(f"v is {fast:g} m/s, expected a number above 0")
+        if not 0.0 <= blend <= ZONE:
             raise self.lines.fault(
                 f"r is {radius} m, expected 0 to {ZONE:g}: corners of seams at speeds are judged "
                 f"as rounded by that at most"
             )
-        if self.lines.number_of(radius) == 0.0:
-            self.drive(self._poses, self._speeds, self._vias, self._happens)
-            self._poses, self._speeds, self._vias, self._happens = [], [], [], []
-
-    def switch(self, given: Sequence[str]) -> None:
-        """See `ProgramReader.switch`: between motions at speeds when these are known."""
-        if self._speeds:
-            self._happens.append((len(self._speeds), given))
-        else:
-            super().switch(given)
+        self.take_pose_at_speed(pose, via, fast, stops=blend == 0.0)
 
     def stream(self, _: Sequence[str]) -> None:
         """Refuse a stream."""
@@ -230,13 +202,8 @@ class UrscriptReader(ProgramReader):
         self._check_stopped()
         self.state = "after"
 
-    @property
-    def clock(self) -> float:
-        """See `ProgramReader.clock`: with the targets since the last stop."""
-        return super().clock + sum(self._times)
-
     def _check_stopped(self) -> None:
-        if self._times or self._speeds:
+        if self.is_moving:
             raise self.lines.fault("the arm does not stop before this: the last r is not 0")
 
     def _joints(self, text: str) -> list[float]:
