@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
 import typer
@@ -18,20 +18,29 @@ from selfmotion.cli.app import NOT_VERIFIED, VERIFIED, stages, terminal
 _Near = Mapping[str, Extreme]
 
 
-def read(
-    file: Path, degrees: bool, within: sm.Tolerance | None, robot: sm.RobotModel
-) -> tuple[sm.Trajectory, sm.Tolerance | None]:
-    """Return the motion of a file, and what it may miss its path by: what a program states."""
-    motion = sm.files.read_motion(file, degrees=degrees, robot=robot)
-    if within is None and is_program(file):
-        within = controllers.stated_deviation(file, robot)
+class Read(NamedTuple):
+    """A motion of a file, what it may miss its path by, and the program that it is of, if any."""
+
+    motion: sm.Trajectory
+    within: sm.Tolerance | None
+    program: controllers.ControllerProgram | None = None
+
+
+def read(file: Path, degrees: bool, within: sm.Tolerance | None, robot: sm.RobotModel) -> Read:
+    """Read a motion; of a program, what it may miss its path by is what it states."""
+    if degrees or not is_program(file):
+        return Read(sm.files.read_motion(file, degrees=degrees, robot=robot), within)
+    program = controllers.read_program(file, robot)
+    motion = controllers.motion_of_program(file, program)
+    if within is None:
+        within = controllers.stated_deviation(program)
         if within is not None:
             text = (
                 f"note: judged within the {1e3 * within.position:.3g} mm and {within.rotation:.2g} "
                 f"rad that the file states; accelerations are the controller's, and not judged"
             )
             stages.print(text, markup=False, soft_wrap=True)
-    return motion, within
+    return Read(motion, within, program)
 
 
 def is_program(file: Path) -> bool:
@@ -46,16 +55,15 @@ def with_failure(certificate: sm.Certificate, text: str) -> sm.Certificate:
     return replace(certificate, failures=(*certificate.failures, text))
 
 
-def left_to_controller(file: Path, robot: sm.RobotModel) -> dict[str, str]:
+def left_to_controller(program: controllers.ControllerProgram | None) -> dict[str, str]:
     """Return what a verdict on a program leaves to the controller, for JSON; of others nothing."""
-    return {"not_judged": controllers.of_the_controller(file, robot)} if is_program(file) else {}
+    return {} if program is None else {"not_judged": controllers.of_the_controller(program)}
 
 
-def tell_of_controller(file: Path, robot: sm.RobotModel) -> None:
+def tell_of_controller(program: controllers.ControllerProgram | None) -> None:
     """Print what a verdict on a program of seams at their feeds leaves to the controller."""
-    if is_program(file) and controllers.read_program(file, robot).within is not None:
-        text = controllers.of_the_controller(file, robot)
-        terminal.print(text, markup=False, soft_wrap=True)
+    if program is not None and program.within is not None:
+        terminal.print(controllers.of_the_controller(program), markup=False, soft_wrap=True)
 
 
 def on_calibrated(problem: sm.Problem, calibration: Path) -> sm.Problem:
@@ -110,15 +118,14 @@ def of_problem(
     judged: tuple[Any, ...],
     progress: Progress,
     calibration: Path | None = None,
-) -> tuple[sm.Certificate, _Near, sm.RobotModel]:
-    """Return the same of a motion by all that a problem file asks, and what else is."""
+) -> tuple[sm.Certificate, _Near, sm.RobotModel, controllers.ControllerProgram | None]:
+    """Return the same of a motion by all that a problem file asks, and the program that it is."""
     job = sm.files.read_job(asked)
     problem = job.problem
-    motion, within = read(file, degrees, within, problem.robot)
+    motion, within, program = read(file, degrees, within, problem.robot)
     elsewhere = ""
-    if is_program(file):
+    if program is not None:
         problem = controllers.by_targets(problem)
-        program = controllers.read_program(file, problem.robot)
         motion, elsewhere = program.along(problem.path), program.begins_elsewhere
         begin = motion.of_joints(problem.robot.joint_names).q[0]
         problem = controllers.as_shifted(problem, program, begin)
@@ -132,7 +139,8 @@ def of_problem(
     allowed, robot = within or job.tolerance, problem.robot
     certificate = problem.certify(motion, allowed, besides=besides, progress=progress)
     certificate = with_failure(certificate, elsewhere)
-    return certificate, near(robot, motion, (*problem.requirements, *besides)), robot
+    close = near(robot, motion, (*problem.requirements, *besides))
+    return certificate, close, robot, program
 
 
 def near(

@@ -229,6 +229,7 @@ def check(
         options.refuse(own | measured | {"degrees": degrees or None}, robot, "the program's")
         options.refuse({"limits": any(judged) or None}, robot, "the program's")
         checks.of_program(file, Path(robot), within, as_json, verbose)
+    program = None
     with StageDisplay(stages) as display:
         if file.suffix == ".npz":
             options.refuse(own | {"robot": robot, "degrees": degrees or None}, file, "the plan's")
@@ -237,7 +238,7 @@ def check(
             )
         elif robot is not None and Path(robot).suffix in documents.SUFFIXES:
             options.refuse(own, robot, "the problem's")
-            certificate, near, arm = checks.of_problem(
+            certificate, near, arm, program = checks.of_problem(
                 file, robot, degrees, within, judged, display.stage, calibration
             )
         else:
@@ -256,13 +257,12 @@ def check(
                 packages=packages or (),
                 calibration=calibration,
             )
-            motion, stated = checks.read(file, degrees, within, arm)
+            motion, stated, program = checks.read(file, degrees, within, arm)
             motion = controllers.without_followers(motion, arm)
             asked = options.requirements(arm, *judged)
             followed = documents.followed(path, context.params, arm)
             elsewhere = ""
-            if checks.is_program(file):
-                program = controllers.read_program(file, arm)
+            if program is not None:
                 motion, elsewhere = program.along(followed), program.begins_elsewhere
             certificate = sm.certify(
                 arm, followed, task or "pose", motion, stated, asked, progress=display.stage
@@ -271,10 +271,10 @@ def check(
             near = checks.near(arm, motion, asked)
     if as_json:
         data = json_tables.certificate_json(certificate, near)
-        terminal.print_json(data=data | checks.left_to_controller(file, arm))
+        terminal.print_json(data=data | checks.left_to_controller(program))
     else:
         outputs.show_certificate(certificate, near, arm, verbose)
-        checks.tell_of_controller(file, arm)
+        checks.tell_of_controller(program)
     raise typer.Exit(VERIFIED if certificate.verified else NOT_VERIFIED)
 
 

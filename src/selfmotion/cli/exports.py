@@ -259,7 +259,8 @@ def _judged_parts(made: sm.Parts, motion: sm.Trajectory, *, whole: bool) -> tupl
 
 def _confirmed(made: _Made, target: Path) -> tuple[bool, str]:
     """Return whether a program keeps what it states, and that in words."""
-    count, stated, found = controllers.program_miss(made, target)
+    read = controllers.read_program(target, made.robot)
+    count, stated, found = controllers.program_miss(made, target, read)
     told, kept = [], _verified(made)
     for miss, said, where in zip(found, stated, ("off the plan", "in free moves"), strict=True):
         # The file states nine digits.
@@ -269,10 +270,9 @@ def _confirmed(made: _Made, target: Path) -> tuple[bool, str]:
                 f"{1e3 * miss.position:.3g} mm and {miss.rotation:.2g} rad {where} "
                 f"({1e3 * said.position:.3g} mm are stated in the file)"
             )
-    switched = controllers.misswitched(target, made) if isinstance(made, sm.Program) else ()
+    switched = controllers.misswitched(read, made) if isinstance(made, sm.Program) else ()
     kept &= not switched
     far = f", between which the tool is at most {', and '.join(told)}" if told else ""
-    read = controllers.read_program(target, made.robot)
     remark, at_feeds = read.remark, read.within is not None
     targets = "target" if count == 1 else "targets"
     paced = ["seams are at their feeds, with ramps of the controller's own"] if at_feeds else []

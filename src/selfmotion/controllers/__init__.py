@@ -1,6 +1,7 @@
 """Joint motions for controllers and simulators, written, read back and judged."""
 
 from selfmotion.controllers.controller_program import (
+    ControllerProgram as ControllerProgram,
     check_controller as check_controller,
     check_signals as check_signals,
 )
@@ -27,6 +28,7 @@ from selfmotion.controllers.motions import (
     MESSAGES as MESSAGES,
     READABLE as READABLE,
     SUFFIXES as SUFFIXES,
+    motion_of_program as motion_of_program,
     read_motion as read_motion,
     write_motion as write_motion,
 )

@@ -27,8 +27,6 @@ from selfmotion.path import Path
 ZONE = 3e-4
 # Times of a ramp that are looked at; of a whole stretch at least, and of a step.
 _OF_RAMP, _LOOKS, _OF_STEP = 24, 3200, 16
-# Motions that are made of it are so much denser, as cubics go between.
-_DENSER = 1
 # A path that goes less is at rest [m]; speeds are the same up to this share, which digits take.
 _LEAST, _SAME = 1e-6, 1e-4
 
@@ -146,8 +144,7 @@ class FeedStretch(PoseStretch):
 
     def smooth(self) -> tuple[Array, Array, Array]:
         """See `Stretch.smooth`: with its ramps."""
-        every = finer(self.looked_at(), np.linspace(0.0, 1.0, _DENSER, endpoint=False))
-        times = self.ramps.times(every)
+        times = self.ramps.times(self.looked_at())
         ends = np.linspace(0.0, self.ramps.each, _OF_RAMP)
         times = np.unique(np.concatenate([times, ends, self.seconds - ends]))
         times = times[np.append(np.diff(times) > 1e-9, True)]

@@ -23,7 +23,6 @@ from selfmotion.motion import Trajectory
 from selfmotion.path import Placed
 from selfmotion.problem import Problem
 from selfmotion.result import Move, Piece, elsewhere, gaps
-from selfmotion.robot import RobotModel
 from selfmotion.task import log3
 
 # Files have so many digits of time [s], and of angles [rad].
@@ -35,12 +34,8 @@ _DIGITS, _OF_POSES, _PROMPT = 1e-6, 1e-5, 1e-3
 _INSTANT = 1e-9
 
 
-def stated_deviation(file: FilePath, robot: RobotModel | None = None) -> Tolerance | None:
+def stated_deviation(program: ControllerProgram) -> Tolerance | None:
     """Return how far off its path a program of a controller says it is; None where it does not."""
-    return _stated(read_program(file, robot))
-
-
-def _stated(program: ControllerProgram) -> Tolerance | None:
     if program.within is not None:
         return program.within
     miss = program.miss.path
@@ -115,7 +110,7 @@ def judged_program(file: FilePath, job: Program, within: Tolerance | None = None
         The file cannot be read, or is of another job.
     """
     program = read_program(file, job.robot)
-    within = within or _stated(program)
+    within = within or stated_deviation(program)
     parts = parts_of(file, program, job)
     steps, pieces = _judged_steps(job, parts.motions, within, what_targets_keep, program)
     slow, between = slow_steps(parts, job)
@@ -129,15 +124,12 @@ def judged_program(file: FilePath, job: Program, within: Tolerance | None = None
         *([program.begins_elsewhere] if program.begins_elsewhere else []),
         *_otherwise_switched(job, program.switches),
     )
-    return JudgedProgram((*steps, *slow), failures, within, shift_told(program), _unjudged(program))
+    left = of_the_controller(program)
+    return JudgedProgram((*steps, *slow), failures, within, shift_told(program), left)
 
 
-def of_the_controller(file: FilePath, robot: RobotModel | None = None) -> str:
+def of_the_controller(program: ControllerProgram) -> str:
     """Return what of a program is the controller's own, and not judged, in words."""
-    return _unjudged(read_program(file, robot))
-
-
-def _unjudged(program: ControllerProgram) -> str:
     if program.within is None:
         return "accelerations are the controller's, and not judged"
     return (
@@ -189,15 +181,9 @@ def as_shifted(problem: Problem, program: ControllerProgram, begin: Array) -> Pr
     return replace(problem, path=path, start=start)
 
 
-def misswitched(file: FilePath, job: Program) -> tuple[str, ...]:
-    """Return what of a job's events a controller's program does not switch, or otherwise.
-
-    Raises
-    ------
-    FileFormatError
-        The file cannot be read.
-    """
-    return tuple(_otherwise_switched(job, read_program(file, job.robot).switches))
+def misswitched(program: ControllerProgram, job: Program) -> tuple[str, ...]:
+    """Return what of a job's events a controller's program does not switch, or otherwise."""
+    return tuple(_otherwise_switched(job, program.switches))
 
 
 def judged_motion(motion: Trajectory, job: Program) -> JudgedProgram:

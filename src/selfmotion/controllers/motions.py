@@ -23,7 +23,7 @@ from selfmotion.basics import (
 )
 from selfmotion.controllers import ros
 from selfmotion.controllers.bag import bag, motion_of_bag
-from selfmotion.controllers.controller_program import check_signals
+from selfmotion.controllers.controller_program import ControllerProgram, check_signals
 from selfmotion.controllers.motion_tables import (
     of_tables,
     read_npz,
@@ -215,7 +215,7 @@ def read_motion(
     if path.suffix.lower() in READ_PROGRAMS:
         if degrees:
             raise FileFormatError(f"{path}: is in degrees by itself; drop degrees")
-        return _of_program(path, robot)
+        return motion_of_program(path, read_program(path, robot))
     if path.suffix.lower() == ".csv":
         return Trajectory.from_csv(path, degrees=degrees)
     if path.suffix.lower() == ".npz":
@@ -233,8 +233,8 @@ def read_motion(
     return _in_radians(read(path, document), degrees)
 
 
-def _of_program(path: Path, robot: RobotModel | None) -> Trajectory:
-    program = read_program(path, robot)
+def motion_of_program(path: Path, program: ControllerProgram) -> Trajectory:
+    """Return the motion of a program that was read; FileFormatError where its targets are none."""
     try:
         return program.trajectory
     # Numbers that no controller holds make splines that none follows.

@@ -55,15 +55,19 @@ def read_program(file: FilePath, robot: RobotModel | None = None) -> ControllerP
     return _READERS[file.suffix.lower()](file, robot).program()
 
 
-def program_miss(plan: Plan | Parts | Move | Program, file: FilePath) -> tuple[int, Misses, Misses]:
+def program_miss(
+    plan: Plan | Parts | Move | Program, file: FilePath, read: ControllerProgram | None = None
+) -> tuple[int, Misses, Misses]:
     """Return what a program file holds: targets, the deviations it states, and what it is.
+
+    The file is read unless it was `read` before.
 
     Raises
     ------
     FileFormatError
         The file cannot be read, or is of another motion.
     """
-    found = read_program(file, plan.robot)
+    found = read or read_program(file, plan.robot)
     try:
         return found.targets, found.miss, found.miss_of(plan)
     except FileFormatError as error:

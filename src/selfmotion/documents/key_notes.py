@@ -2,7 +2,7 @@
 
 import inspect
 from collections.abc import Callable, Mapping
-from functools import lru_cache
+from functools import cache
 from typing import Any
 
 from selfmotion.basics import Saved
@@ -127,8 +127,8 @@ _IN_FILES: Mapping[str, Mapping[str, str]] = {
 }
 
 
-@lru_cache(maxsize=1)
 def _classes() -> dict[str, type]:
+    # Classes of the user's own may come to be known later.
     families: tuple[type[Saved], ...] = (Path, NullMotion, Cost, Constraint)
     known = {kind: cls for family in families for kind, cls in family.kinds().items()}
     return {**known, **dict(obstacle_shapes())}
@@ -144,6 +144,7 @@ def notes_of(table: str) -> dict[str, str]:
     return {**_IN_FILES[""], **found, **_IN_FILES.get(table, {})}
 
 
+@cache
 def _parameters(source: Callable[..., Any]) -> dict[str, str]:
     """Return what a docstring says of parameters, and those of the classes that it is made of."""
     from docstring_parser import DocstringStyle, parse
