@@ -6,7 +6,7 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.placement import corners
-from selfmotion.placement.places import COORDINATES, Places, Tried, places_of
+from selfmotion.placement.places import Places, Tried
 from support.arms import robot_named
 from support.shell import invoke
 
@@ -47,15 +47,6 @@ def test_each_corner_is_a_verified_motion_by_its_own(plan: sm.Plan) -> None:
             there = plan.problem.changed(path=sm.paths.Placed(plan.path, frame), start="free")
             assert sm.plan(there).certificate.verified
     assert "confirmed at 12 corners" in str(found)
-
-
-def test_where_nothing_moved_the_plan_is_what_it_was(plan: sm.Plan) -> None:
-    places = places_of([plan.problem], "part", None, None, COORDINATES)
-    tried = places.corrected(np.zeros(6), (plan,))
-    assert tried.plans == (plan,)
-    assert tried.cost == plan.report.cost
-    moved = places.corrected(np.array([1e-3, 0.0, 0.0, 0.0, 0.0, 0.0]), (plan,))
-    assert moved.plans[0] is not plan
 
 
 def test_no_more_than_the_reach_is_claimed() -> None:

@@ -124,12 +124,7 @@ class Places:
         return self._each(place, planned)
 
     def corrected(self, place: Array, near: Sequence[Plan]) -> Tried:
-        """Plan at a place from plans near by; a start that is given moves onto the path there.
-
-        Where nothing has moved, they are the plans.
-        """
-        if not place.any() and all(plan.certificate.verified for plan in near):
-            return Tried(place, sum(plan.report.cost for plan in near), "", tuple(near))
+        """Plan at a place from plans near by; a start that is given moves onto the path there."""
 
         def planned(k: int, problem: Problem) -> Plan:
             start = near[k].problem.given_start
