@@ -228,6 +228,24 @@ def test_what_makes_another_motion_of_a_file_is_refused(
         read_program(file, plan.robot)
 
 
+@pytest.mark.parametrize(("share", "is_read"), [(1e-3, False), (0.9, True), (2.0, True)])
+def test_a_feed_that_is_never_reached_is_refused(
+    line: sm.Plan, tmp_path: Path, share: float, is_read: bool
+) -> None:
+    """Ramps are the controller's; but with so little acceleration there is nothing between them."""
+    file = tmp_path / "weld.script"
+    sm.files.write_motion(line, file, settings=settings(file.name))
+    text, slowed = file.read_text(), lambda found: f"a={share * float(found[1]):.6g}{found[2]}"
+    changed, count = re.subn(r"a=([\d.e-]+)(, v=[\d.e-]+, r=)", slowed, text)
+    assert count > 0
+    file.write_text(changed)
+    if is_read:
+        read_program(file, line.robot)
+        return
+    with pytest.raises(sm.errors.FileFormatError, match="never is at its speed"):
+        read_program(file, line.robot)
+
+
 def test_only_one_work_object_and_one_tool_are_read(line: sm.Plan, tmp_path: Path) -> None:
     """Poses of another one than the last would be somewhere else."""
     file = tmp_path / "weld.mod"

@@ -20,6 +20,9 @@ from selfmotion.controllers.read_stretches import (
 from selfmotion.robot import RobotModel
 from selfmotion.task import SE3
 
+# Accelerations have so few digits that they may be off by this share.
+_ROUNDED = 1e-2
+
 
 def switched(at: float, given: Sequence[str]) -> Switch:
     """Return what an output and its value, or the name of an event, are at a time [s]."""
@@ -125,8 +128,13 @@ class ProgramReader:
         happens: Sequence[tuple[int, Sequence[str]]] = (),
         *,
         is_spline: bool = False,
+        acceleration: float = np.inf,
     ) -> None:
-        """Take a stretch of poses at speeds [m/s], and what is switched at which of them."""
+        """Take a stretch of poses at speeds [m/s], and what is switched at which of them.
+
+        With the `acceleration` [m/s²] that a program gives the tool has to come to its speed:
+        ramps are the controller's, but the seam between them is judged at its feed.
+        """
         planned = self.lines.planned()
         if self.pose_at is None:
             raise self.lines.fault("a pose after axis targets, expected a slow motion there first")
@@ -142,6 +150,13 @@ class ProgramReader:
             raise self.lines.fault(
                 f"at these speeds it takes {own[-1]:.6g} s without ramps, planned are "
                 f"{planned:.6g} s; after a change of speeds plan anew, with the feed that is wanted"
+            )
+        # Half of the way to come to the slowest of its speeds, half to stop.
+        least = min(speeds) ** 2 / float(np.diff(own) @ np.array(speeds))
+        if not acceleration >= (1.0 - _ROUNDED) * least:
+            raise self.lines.fault(
+                f"its acceleration is {acceleration:g} m/s², expected {least:.4g} or more: with "
+                f"less the tool never is at its speed"
             )
         at = Ramps(float(own[-1]), planned).times(own)
         for number, what in happens:
@@ -199,6 +214,8 @@ class StopReader(ProgramReader):
         self.speeds: list[float] = []
         self.vias: list[Pose | None] = []
         self.happens: list[tuple[int, Sequence[str]]] = []
+        # The least that the program gives of them [m/s²].
+        self.acceleration = np.inf
 
     @property
     def is_moving(self) -> bool:
@@ -227,15 +244,24 @@ class StopReader(ProgramReader):
             self.poses, self.times = [], []
 
     def take_pose_at_speed(
-        self, pose: Pose, via: Pose | None, speed: float, *, stops: bool
+        self,
+        pose: Pose,
+        via: Pose | None,
+        speed: float,
+        *,
+        stops: bool,
+        acceleration: float = np.inf,
     ) -> None:
         """Take a pose at a speed [m/s], straight or round through another one."""
+        self.acceleration = min(self.acceleration, acceleration)
         self.poses.append(pose)
         self.vias.append(via)
         self.speeds.append(speed)
         if stops:
-            self.drive(self.poses, self.speeds, self.vias, self.happens)
+            given = self.poses, self.speeds, self.vias, self.happens
+            self.drive(*given, acceleration=self.acceleration)
             self.poses, self.speeds, self.vias, self.happens = [], [], [], []
+            self.acceleration = np.inf
 
     def switch(self, given: Sequence[str]) -> None:
         """See `ProgramReader.switch`: between motions at speeds when these are known."""

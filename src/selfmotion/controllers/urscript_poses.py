@@ -171,7 +171,7 @@ class UrscriptReader(StopReader):
 
     def move_at_speed(self, given: Sequence[str]) -> None:
         """Take a pose at a speed, straight or round."""
-        *poses, speed, radius = given
+        *poses, ramp, speed, radius = given
         if self.axes or self.times:
             raise self.lines.fault("a motion at a speed after one with a blend, expected r=0")
         pose, via = self._pose(poses[-1]), self._pose(poses[0]) if poses[1:] else None
@@ -183,7 +183,8 @@ class UrscriptReader(StopReader):
                 f"r is {radius} m, expected 0 to {ZONE:g}: corners of seams at speeds are judged "
                 f"as rounded by that at most"
             )
-        self.take_pose_at_speed(pose, via, fast, stops=blend == 0.0)
+        acceleration = self.lines.number_of(ramp)
+        self.take_pose_at_speed(pose, via, fast, stops=blend == 0.0, acceleration=acceleration)
 
     def stream(self, _: Sequence[str]) -> None:
         """Refuse a stream."""
@@ -227,7 +228,7 @@ class UrscriptReader(StopReader):
 _LIST = r"\[([^\[\]]*)\]"
 _TARGET = rf"pose_trans\(feature, ?p{_LIST}\)"
 _SPEED = r"a=[\d.e-]+, ?v=[\d.e-]+"
-_RAMPED, _PACED = r"a=[\d.e-]+", r"v=([\d.e-]+), ?r=([\d.e-]+)"
+_RAMPED, _PACED = r"a=([\d.e-]+)", r"v=([\d.e-]+), ?r=([\d.e-]+)"
 _TIMED = r"t=([\d.e-]+), ?r=([\d.e-]+)"
 UrscriptReader.grammar = (
     (("before",), r"def selfmotion\(\):", UrscriptReader.begin),
