@@ -6,7 +6,7 @@ READY := $(VENV)/.ready
 # What is imported by many processes is compiled to bytecode once.
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: demo test lint format bench bench-constrained bench-remaining bench-relaxed bench-batch bench-peers bench-starts bench-places bench-margins bench-corrections bench-place bench-first bench-fastest bench-feeds bench-job bench-moved bench-moves bench-raster bench-rails bench-lifts bench-spirals bench-latency docs errors suite suite-made fuzz fuzz-tasks fuzz-cells fuzz-certificate fuzz-deceptions fuzz-generated fuzz-realtime fuzz-files fuzz-job fuzz-kept fuzz-programs arms mutants memory acceptance distances study clean
+.PHONY: demo test lint format bench bench-constrained bench-remaining bench-relaxed bench-batch bench-peers bench-starts bench-places bench-margins bench-bought bench-corrections bench-place bench-first bench-fastest bench-feeds bench-job bench-moved bench-moves bench-raster bench-rails bench-lifts bench-spirals bench-latency docs errors suite suite-made fuzz fuzz-tasks fuzz-cells fuzz-certificate fuzz-deceptions fuzz-generated fuzz-realtime fuzz-files fuzz-job fuzz-kept fuzz-programs arms mutants memory acceptance distances study clean
 
 demo: $(READY)  ## plan, check and replay the paper's planar arm and a Panda, into out/
 	$(BIN)/selfmotion demo --out out
@@ -55,8 +55,11 @@ bench-corrections: $(READY)  ## how far parts may stand elsewhere when planned a
 bench-margins: $(READY)  ## by how much part, tool and base may be displaced: 200 plans, 10,000 displacements, judged
 	OMP_NUM_THREADS=1 $(BIN)/python benchmarks/margins.py
 
-bench-place: $(READY)  ## where to put the part, against a grid of 400 places, 10 seams
-	OMP_NUM_THREADS=1 $(BIN)/python benchmarks/place.py
+bench-bought: $(READY)  ## margins of 5 mm and 0.5° of 40 plans, displaced and judged; what they have to cost
+	OMP_NUM_THREADS=1 $(BIN)/python benchmarks/bought_margins.py
+
+bench-place: $(READY)  ## where to put the part, against places all over the box: 30 problems
+	OMP_NUM_THREADS=1 $(BIN)/python benchmarks/place.py --many 400
 
 bench-fastest: $(READY)  ## 60 paces against linear programmes; the fastest motions of 20 paths, against retimed plans
 	$(BIN)/python benchmarks/paces.py

@@ -3,6 +3,7 @@
 import numpy as np
 import pinocchio as pin
 import pytest
+from scipy.spatial import ConvexHull
 
 import selfmotion as sm
 from selfmotion.placement import corners
@@ -29,24 +30,35 @@ def plan() -> sm.Plan:
     return plan_to(2.0)
 
 
+def direction_of(name: str) -> np.ndarray:
+    """The unit vector (3,) of a corner's name."""
+    signs = [float(f"{before}1") for before in name if before in "+-"]
+    axes = [axis for axis in name if axis not in "+-"]
+    found = np.zeros(3)
+    found[["xyz".index(axis) for axis in axes]] = signs
+    return found / np.linalg.norm(found)
+
+
+def test_what_is_claimed_is_within_the_corners(plan: sm.Plan) -> None:
+    found = sm.correction(plan, farthest=0.02, most_turned=0.02).translation
+    corners = np.array([each.size * direction_of(each.name) for each in found.corners])
+    # Distances of the faces of their hull from the middle.
+    hull = ConvexHull(corners)
+    assert found.size == pytest.approx(np.min(-hull.equations[:, -1]), rel=1e-12)
+
+
 def test_each_corner_is_a_verified_motion_by_its_own(plan: sm.Plan) -> None:
     found = sm.correction(plan, farthest=0.05, most_turned=0.05)
-    assert found.translation.size == 0.05
-    assert [corner.name for corner in found.translation.corners] == [
-        "+x",
-        "-x",
-        "+y",
-        "-y",
-        "+z",
-        "-z",
-    ]
+    away = np.array([corner.size for corner in found.translation.corners])
+    assert (away == 0.05).all()
+    assert len({corner.name for corner in found.translation.corners}) == 14
     assert not any(corner.reason for corner in found.translation.corners)
-    for sign in (1.0, -1.0):
-        for k in range(2):
-            frame = pin.SE3(np.eye(3), sign * found.translation.size * np.eye(3)[k])
-            there = plan.problem.changed(path=sm.paths.Placed(plan.path, frame), start="free")
-            assert sm.plan(there).certificate.verified
-    assert "confirmed at 12 corners" in str(found)
+    for corner in found.translation.corners:
+        # The arm is planar: it does not see z.
+        frame = pin.SE3(np.eye(3), corner.size * direction_of(corner.name) * [1.0, 1.0, 0.0])
+        there = plan.problem.changed(path=sm.paths.Placed(plan.path, frame), start="free")
+        assert sm.plan(there).certificate.verified
+    assert "confirmed at 28 corners" in str(found)
 
 
 def test_no_more_than_the_reach_is_claimed() -> None:
@@ -56,7 +68,8 @@ def test_no_more_than_the_reach_is_claimed() -> None:
     found = sm.correction(plan, farthest=0.2, most_turned=1e-3)
     # Towards y, where the seam ends nearly.
     most = 0.04 / np.sin(0.9)
-    assert 0.3 * most < found.translation.size <= most * 1.02
+    corner = found.translation.corners[0].size
+    assert 0.3 * most < corner <= most * 1.02
     assert found.translation.stops
 
 
@@ -70,8 +83,9 @@ def test_a_corner_that_fails_is_not_claimed(plan: sm.Plan, monkeypatch: pytest.M
 
     monkeypatch.setattr(Places, "corrected", failing)
     found = sm.correction(plan, farthest=0.05, most_turned=0.01)
-    assert 0.009 < found.translation.size <= 0.01
-    assert found.translation.stops.startswith("-y")
+    # Those towards -y and into the octants there.
+    assert 0.009 < found.translation.corners[0].size <= 0.01
+    assert "-y" in found.translation.stops.split(" by ")[0]
     monkeypatch.setattr(corners, "NEAR", 1e-9)
     none = sm.correction(plan, farthest=0.05, most_turned=0.01)
     assert none.translation.size == 0.0

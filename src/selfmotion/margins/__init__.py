@@ -9,6 +9,7 @@ from selfmotion.margins.margin import margin as margin
 from selfmotion.margins.shortfall import (
     Margin as Margin,
     Shortfall as Shortfall,
+    Shortfalls as Shortfalls,
     shortfalls as shortfalls,
 )
 

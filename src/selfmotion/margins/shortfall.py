@@ -14,8 +14,8 @@ from selfmotion.margins.least import Size, least_scale
 from selfmotion.margins.subjects import base_of, models_of, part_of, tool_of
 from selfmotion.result import Plan
 
-# So many times a wanted margin is looked for: what is proved is a little less than what is found.
-_BEYOND = 1.05
+# So many times a wanted margin is looked for: by what is there too much, too, a motion is told.
+_BEYOND = 1.3
 
 
 @dataclass(frozen=True)
@@ -79,15 +79,24 @@ class Shortfall:
 
 
 class Shortfalls(NamedTuple):
-    """What falls short, and how far the path is from what is turned about at most [m]."""
+    """What is met first, and how far the path is from what is turned about at most [m].
 
-    items: tuple[Shortfall, ...]
+    Of each subject the pair that meets first, where displacements that are little larger than
+    wanted do so.
+    """
+
+    nearest: tuple[Shortfall, ...]
     lever: float
 
     @property
+    def items(self) -> tuple[Shortfall, ...]:
+        """What falls short."""
+        return tuple(item for item in self.nearest if item.scale < 1.0)
+
+    @property
     def least(self) -> float:
-        """What the wanted displacements may be multiplied by, 1 at most."""
-        return min((item.scale for item in self.items), default=1.0)
+        """What the wanted displacements may be multiplied by, 1.3 at most."""
+        return min((item.scale for item in self.nearest), default=_BEYOND)
 
 
 def shortfalls(
@@ -112,9 +121,8 @@ def shortfalls(
         lever = max([lever, *(miss.lever for miss in subject.misses)])
         for model in models_of(plan):
             bodies = DisplacedBodies(model, subject.bodies, subject.joint, subject.center)
-            # A little more is looked for: what is proved is a share less.
             least = least_scale(bodies, plan.trajectory, size, clearance, _BEYOND)
-            if least.scale < 1.0 and least.pair and least.moment is not None:
+            if least.pair and least.moment is not None:
                 first, second = least.pair
                 turned = float(np.linalg.norm(least.moment))
                 used = wanted.position + turned * wanted.rotation

@@ -21,6 +21,7 @@ import numpy as np
 from selfmotion.basics import Array
 from selfmotion.costs import Cost, Partials, PlacedLater, Samples
 from selfmotion.follow import Follows
+from selfmotion.motion import Sampling
 from selfmotion.nodes.charts import Bases, Charts, Place, orthonormal
 from selfmotion.nodes.samples import CurveSamples
 from selfmotion.nodes.smoothness import Smoothing
@@ -35,6 +36,8 @@ _NEAR = 1e-6
 _NAMES = ("q", "qd", "qdd", "qddd")
 # Intervals whose matrices are multiplied at once: what that takes is several times what it leaves.
 _LOT = 2048
+# Samples that are looked at together, of several directions.
+_TOGETHER = 4096
 
 
 class NodeCost:
@@ -154,45 +157,67 @@ class NodeCost:
         along[np.repeat(np.isin(np.arange(count), spline.gaps), each)] = np.eye(n)[:, :r]
         along = orthonormal(along)
         turned = np.swapaxes(along, 1, 2)
-        moved = turned @ by[0]
-        found = np.zeros((count * each, size, size))
-        for x in range(r):
-            changed = self._changed(samples, here, {"q": along[:, :, x]})
-            if changed.q is not None:
-                row = (turned @ changed.q[:, :, None])[:, :, 0]
-                found += _outer(np.einsum("sr,srw->sw", row, moved), moved[:, x])
-            for order, name in enumerate(_NAMES[1:], 1):
-                part = getattr(changed, name)
-                if part is not None:
-                    cross = _outer(np.einsum("sn,snw->sw", part, by[order]), moved[:, x])
-                    found += cross + np.swapaxes(cross, 1, 2)
+        moved, weights = turned @ by[0], samples.weights[:, None, None]
+        ways = [("q", along[:, :, x]) for x in range(r)]
+        changed = self._changes(samples, here, ways)
+        found = np.zeros((count, size, size))
+        if "q" in changed:
+            found += _squared(count, moved, weights * (turned @ changed["q"]) @ moved)
+        for order, name in enumerate(_NAMES[1:], 1):
+            if name in changed:
+                found += 2.0 * _squared(count, by[order], weights * changed[name] @ moved)
         rates = [o for o, name in enumerate(_NAMES) if o and getattr(here, name) is not None]
         for order in rates:
-            for j, axis in enumerate(np.eye(n)):
-                faster = self._changed(samples, here, {_NAMES[order]: axis})
-                for other in rates:
-                    part = getattr(faster, _NAMES[other])
-                    if part is not None:
-                        found += _outer(np.einsum("sn,snw->sw", part, by[other]), by[order][:, j])
-        found = (samples.weights[:, None, None] * found).reshape(count, -1, size, size)
-        found = found.sum(axis=1)
+            axes = [(_NAMES[order], axis) for axis in np.eye(n)]
+            faster = self._changes(samples, here, axes)
+            for other in rates:
+                if _NAMES[other] in faster:
+                    turned_by = weights * faster[_NAMES[other]] @ by[order]
+                    found += _squared(count, by[other], turned_by)
         return np.asarray(0.5 * (found + np.swapaxes(found, 1, 2)))
 
+    def _changes(
+        self, samples: CurveSamples, here: Partials, ways: Sequence[tuple[str, Array]]
+    ) -> dict[str, Array]:
+        """Return how the derivatives `here` of bent costs change in directions, (S, n, D) each.
+
+        A direction is of q or one of its rates, (S, n) or (n,). Those of which there are few
+        samples are looked at together.
+        """
+        together = max(1, _TOGETHER // len(samples.t))
+        found: dict[str, list[Array]] = {}
+        for first in range(0, len(ways), together):
+            for name, part in self._changed(samples, here, ways[first : first + together]).items():
+                found.setdefault(name, []).append(part)
+        return {name: np.concatenate(parts, axis=2) for name, parts in found.items()}
+
     def _changed(
-        self, samples: CurveSamples, here: Partials, directions: dict[str, Array]
-    ) -> Partials:
-        """Return how the derivatives `here` of bent costs change in a direction."""
-        known = {"q": samples.q, "qd": samples.qd, "qdd": samples.qdd, "qddd": samples.qddd}
-        for name, way in directions.items():
-            known[name] = known[name] + _NEAR * way
-        shifted = PlacedLater(samples.follows, samples.sampling, **known)
+        self, samples: CurveSamples, here: Partials, ways: Sequence[tuple[str, Array]]
+    ) -> dict[str, Array]:
+        """Return what `_changes` does, all directions at once."""
+        count, copies = len(samples.t), len(ways)
+        known = {name: np.stack([getattr(samples, name)] * copies) for name in _NAMES}
+        for k, (name, way) in enumerate(ways):
+            known[name][k] += _NEAR * way
+        flat = {name: values.reshape(copies * count, -1) for name, values in known.items()}
+        t, weights = (np.tile(values, copies) for values in (samples.t, samples.weights))
+        sampling = Sampling(t, weights, np.arange(len(t)))
+        shifted = PlacedLater(samples.follows, sampling, **flat)
         there = _summed([cost.gradient(shifted) for cost in self._bent])
         parts = {}
         for name in _NAMES:
             before, after = getattr(here, name), getattr(there, name)
             if before is not None and after is not None:
-                parts[name] = (after - before) / _NEAR
-        return Partials(**parts)
+                change = (after.reshape(copies, count, -1) - before) / _NEAR
+                parts[name] = np.moveaxis(change, 0, 2)
+        return parts
+
+
+def _squared(count: int, left: Array, right: Array) -> Array:
+    """Return Σ leftᵀ right over the samples of each interval, (N, d, d), of (S, k, d) each."""
+    size = left.shape[2]
+    flat = left.reshape(count, -1, size)
+    return np.asarray(np.swapaxes(flat, 1, 2) @ right.reshape(count, -1, size))
 
 
 def _bent_by(forms: Sequence[tuple[Array, Array]], part: slice, both: Array) -> Array:
@@ -215,11 +240,6 @@ def _summed(each: Sequence[Partials]) -> Partials:
         if own:
             parts[name] = own[0] if len(own) == 1 else np.sum(own, axis=0)
     return Partials(**parts)
-
-
-def _outer(a: Array, b: Array) -> Array:
-    """Return a bᵀ for each row, (S, k, k)."""
-    return np.asarray(a[:, :, None] * b[:, None, :])
 
 
 @dataclass(frozen=True, eq=False)

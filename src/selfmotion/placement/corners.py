@@ -1,7 +1,7 @@
 """How far the part, or the arm, may stand elsewhere when the motion is planned again for that.
 
-An estimate from the room that the joints have, and what is confirmed: motions planned again at the
-corners, each from the one that there is.
+An estimate from the room that the joints have, and what is confirmed: motions planned again at
+places all around, each from the one that there is.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 import numpy.typing as npt
@@ -32,6 +33,13 @@ from selfmotion.result import Plan
 NEAR = 0.5
 # Times at which the room of the joints is looked at.
 _LOOKS = 60
+# Directions all around: the axes, and the diagonals of their octants.
+_AROUND = np.vstack(
+    [np.eye(3), -np.eye(3), np.array(list(product((1.0, -1.0), repeat=3))) / 3**0.5]
+)
+# The largest ball within the hull of these, of length 1: a face of it is spanned by an axis and two
+# diagonals beside it, all at this distance from its plane's normal (1, √3 - 1, 0).
+_WITHIN = 1.0 / math.hypot(1.0, math.sqrt(3.0) - 1.0)
 # A size that is confirmed everywhere is tried larger by this, and then halved so often between.
 _GROWTH, _HALVINGS = 1.6, 5
 # Sizes below this share of the largest one that is looked at are none.
@@ -45,7 +53,7 @@ class Corner:
     Attributes
     ----------
     name : str
-        Such as "+x" or "-yaw".
+        Such as "+x", "-yaw", or "+x-y+z" for the diagonal of an octant.
     size : float
         How far it is moved or turned [m or rad].
     reason : str
@@ -64,9 +72,10 @@ class CorrectionSide:
     Attributes
     ----------
     size : float
-        At all corners of this size motions are verified [m or rad].
+        Displacements up to this, in any direction, are in the hull of the corners [m or rad]:
+        0.807 of how far these are.
     corners : tuple of Corner
-        These corners; empty where none was confirmed.
+        Where motions were verified, in 14 directions; empty where none was confirmed.
     estimate : float
         What the room of the joints at the planned motion gives, to first order [m or rad].
     stops : str
@@ -100,10 +109,13 @@ class Correction:
         count = sum(len(side.corners) for _, side in sides)
         lines = [f"planned again, the {self.of} may be (confirmed at {count} corners)"]
         for what, side in sides:
-            told = " ".join(corner.name for corner in side.corners) or "nowhere"
+            told = "nowhere"
+            if side.corners:
+                farthest = _told(what, side.corners[0].size)
+                told = f"in {len(side.corners)} directions by {farthest}"
             stops = side.stops or "nothing in the range that was searched"
             lines.append(
-                f"{what} by {_told(what, side.size)}: verified at {told}; estimate "
+                f"{what} by {_told(what, side.size)}: verified {told}; estimate "
                 f"{_told(what, side.estimate)}; stops: {stops}"
             )
         return "\n".join(lines)
@@ -121,9 +133,10 @@ def correction(
 ) -> Correction:
     """Return how far part or base may stand elsewhere when the motion is planned again for that.
 
-    Only what was planned again is claimed: at the corners ±x, ±y, ±z, and ±roll, ±pitch, ±yaw, a
-    verified motion was found no joint of which is farther than 0.5 rad or m from the plan's.
-    Between corners, and at smaller sizes, nothing is proved.
+    What is claimed was planned again: in 14 directions, along all axes and into all octants, a
+    verified motion was found no joint of which is farther than 0.5 rad or m from the plan's. The
+    size is that of the largest ball within these corners: 0.807 of their distance. Between corners
+    nothing is proved; `make bench-corrections` plans again there.
 
     Parameters
     ----------
@@ -136,7 +149,7 @@ def correction(
     center : (3,), optional
         What it is turned about, in world axes [m]; by default the middle of the path, or the base.
     farthest, most_turned : float
-        No larger corrections are looked at [m], [rad].
+        No corners farther away are looked at [m], [rad].
     progress : callable, optional
         Called with ``("corners", done, 0)``.
 
@@ -184,9 +197,9 @@ class _Corners:
         self._places, self._plan, self._progress, self._done = places, plan, progress, 0
 
     def side(self, axes: range, most: float) -> CorrectionSide:
-        """Return the largest size that is confirmed at both corners of all axes."""
-        ways = [sign * np.eye(6)[k] for k in axes for sign in (1.0, -1.0)]
-        names = [f"{sign}{COORDINATES[k]}" for k in axes for sign in "+-"]
+        """Return the largest size that is confirmed at the corners around."""
+        ways = [np.eye(6)[:, list(axes)] @ way for way in _AROUND]
+        names = [_named([COORDINATES[k] for k in axes], way) for way in _AROUND]
         estimate = min(_room(self._places, self._plan, way) for way in ways)
         size = min(max(estimate, _LEAST * most), most)
         low, high, stops = 0.0, math.inf, ""
@@ -205,7 +218,7 @@ class _Corners:
             if low >= most or high <= _LEAST * most or high - low <= high / 2**_HALVINGS:
                 break
             size = min(_GROWTH * low, most) if math.isinf(high) else 0.5 * (low + high)
-        return CorrectionSide(low, confirmed, estimate, stops)
+        return CorrectionSide(_WITHIN * low, confirmed, estimate, stops)
 
     def _at(self, ways: Sequence[Array], names: Sequence[str], size: float) -> list[Corner]:
         """Plan at corners of a size, until one fails."""
@@ -218,6 +231,15 @@ class _Corners:
             if found[-1].reason:
                 break
         return found
+
+
+def _named(axes: Sequence[str], way: Array) -> str:
+    """Return a direction (3,) in words."""
+    return "".join(
+        f"{'+' if share > 0.0 else '-'}{axis}"
+        for axis, share in zip(axes, way.tolist(), strict=True)
+        if share
+    )
 
 
 def _far(plan: Plan, tried: Tried) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -20,6 +21,7 @@ from selfmotion.basics import (
 from selfmotion.collision import Obstacle
 from selfmotion.constraints import Clearance
 from selfmotion.follow import BoundFollow
+from selfmotion.optimise import Iteration
 from selfmotion.path import Path, Placed
 from selfmotion.planning import Search, plan
 from selfmotion.problem import Problem, problem_from_dict, start_on_path
@@ -30,7 +32,8 @@ from selfmotion.task import SE3
 # How motions are looked for where some are known near by, and where none is: among many places a
 # quick 'no' is worth more than the last start.
 _NEAR, _QUICK = Search(1, 1, "local"), Search(16, 2, "local")
-# So long a place is worked at [s]: near known motions, what comes at all comes in a tenth of that.
+# So long a place is worked at [s of the processor, so that it is the same on a busy machine]: near
+# known motions, what comes at all comes in a tenth of that.
 _PATIENCE_NEAR, _PATIENCE = 0.3, 0.6
 # What a place is told by: a shift [m] and roll, pitch and yaw [rad], as URDFs have them.
 COORDINATES = ("x", "y", "z", "roll", "pitch", "yaw")
@@ -237,19 +240,19 @@ def restored(values: Mapping[str, Any], known: dict[str, Any]) -> Places:
 
 def _quickly(problem: Problem, known: Plan | None, search: Search | None, patience: float) -> Plan:
     """Plan, from what is known if anything is, or give up soon."""
-    return plan(
-        problem,
-        warm_start=known,
-        search=search,
-        deadline=patience,
-        progress=_stop_where_blocked,
-    )
+    end = time.process_time() + patience
 
+    def over(_: Iteration) -> bool:
+        return time.process_time() >= end
 
-def _stop_where_blocked(stage: str, number: int, count: int) -> None:
-    """Raise PlanError where it is known that no motion passes: what comes before is not asked."""
-    if not count:
-        raise PlanError(stage)
+    def told(stage: str, number: int, count: int) -> None:
+        if not count:
+            # No motion passes, and what comes before is not asked.
+            raise PlanError(stage)
+        if time.process_time() >= end:
+            raise KeyboardInterrupt
+
+    return plan(problem, warm_start=known, search=search, callback=over, progress=told)
 
 
 def _stands(item: BoundFollow) -> bool:

@@ -25,14 +25,15 @@ from selfmotion.basics import (
 )
 from selfmotion.collision import CollisionModel
 from selfmotion.constraints import Clearance
-from selfmotion.margins import Margin, Shortfall, shortfalls
+from selfmotion.margins import Margin, Shortfall, Shortfalls, shortfalls
 from selfmotion.planning import plan
 from selfmotion.problem import Problem, check_problem
 from selfmotion.result import Plan
 
-# How often pairs are kept farther apart; and by how much more than what is lacking [m], [share]:
-# what is proved of a margin is a fiftieth less than it is.
-_ROUNDS, _MORE, _SHARE = 8, 2e-4, 0.04
+# How often pairs are kept farther apart, or less far; and by how much more than what lacks [m].
+_ROUNDS, _MORE = 12, 2e-5
+# What is proved of a margin is a share less than it is; that much more than is wanted will do.
+_SHARE, _ENOUGH = 0.02, 0.01
 _SUBJECTS = ("part", "tool", "base")
 
 
@@ -151,38 +152,61 @@ def plan_with_margin(
     narrow = problem.changed(
         relaxations=_narrowed(problem, margin, shortfalls(first, margin, named, **asked).lever)
     )
-    best, apart, refused = first, dict[tuple[str, str], float](), ""
-    found = shortfalls(best, margin, named, **asked)
-    for number in range(_ROUNDS):
-        if not found.items and (number or not problem.relaxations):
-            break
+    apart = dict[tuple[str, str], float]()
+    last, best, refused = first, None, ""
+    found = shortfalls(first, margin, named, **asked)
+    if not found.items and not problem.relaxations:
+        best = first, found, dict(apart)
+    for number in range(0 if best else _ROUNDS):
         progress("margin", number + 1, _ROUNDS)
-        for item in found.items:
-            wanted = clearance + (1.0 + _SHARE) * item.used + _MORE
-            pair = (min(item.pair), max(item.pair))
-            apart[pair] = max(apart.get(pair, 0.0), wanted)
+        _adjust(apart, found, clearance)
         raised = narrow.changed(constraints=(*narrow.constraints, *_kept(problem, apart)))
-        before = best
-        again = plan(raised, warm_start=best, **options)
-        best = replace(
-            again, problem=problem, certificate=problem.certify(again.trajectory, first.tolerance)
-        )
+        again = plan(raised, warm_start=last, **options)
+        if not number:
+            # Past bodies there are several ways, and the one of before may have become the longer.
+            again = min(again, plan(raised, **options), key=_rank)
+        certificate = problem.certify(again.trajectory, first.tolerance)
+        made = replace(again, problem=problem, certificate=certificate)
         if not again.certificate.verified:
             refused = again.certificate.verdict.removeprefix("not verified: ")
-            if not best.certificate.verified:
-                best = before
-                break
             # The attempt may be nearer to it all the same.
-            more = shortfalls(best, margin, named, **asked)
-            if more.least > found.least:
-                found = more
-            else:
-                best = before
+            if certificate.verified:
+                more = shortfalls(made, margin, named, **asked)
+                if more.least > found.least:
+                    last, found = made, more
             break
-        found = shortfalls(best, margin, named, **asked)
+        last, found = made, shortfalls(made, margin, named, **asked)
+        if found.items:
+            continue
+        if best is None or made.report.cost < best[0].report.cost:
+            best = made, found, dict(apart)
+        if not apart or found.least <= 1.0 + _ENOUGH:
+            break
+    last, found, apart = best or (last, found, apart)
+    refused = "" if best else refused
     return PlanWithMargin(
-        best, margin, named, found.items, best.report.cost, first.report.cost, apart, refused
+        last, margin, named, found.items, last.report.cost, first.report.cost, apart, refused
     )
+
+
+def _rank(found: Plan) -> tuple[bool, float]:
+    return not found.certificate.verified, found.report.cost
+
+
+def _adjust(apart: dict[tuple[str, str], float], found: Shortfalls, clearance: float) -> None:
+    """Keep pairs farther apart where a margin is missing, and less far where it is more.
+
+    To first order a displacement that is a share larger uses that share more of the distance.
+    """
+    spare = found.least - 1.0
+    for pair in apart if spare > 0.0 else ():
+        apart[pair] -= spare * (apart[pair] - clearance)
+    for item in found.items:
+        pair = (min(item.pair), max(item.pair))
+        if pair in apart:
+            apart[pair] += (1.0 - item.scale) * item.used + _MORE
+        else:
+            apart[pair] = clearance + (1.0 + _SHARE) * item.used
 
 
 def _narrowed(problem: Problem, margin: Margin, lever: float) -> tuple[Any, ...]:
