@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation, RotationSpline
 
-from selfmotion.path.turns import Turning
+from selfmotion.path.waypoints import Turning
 
 # Sums of some products of numbers below 10.
 ROUNDING = 1e-12
