@@ -19,16 +19,21 @@ from pathlib import Path as FilePath
 import numpy as np
 
 from selfmotion.basics import ProblemError, write_text
-from selfmotion.controllers.arm_configurations import status_and_turn
-from selfmotion.controllers.controller_program import ControllerProgram, Draft
+from selfmotion.controllers.controller_program import (
+    ControllerProgram,
+    Draft,
+    before,
+    goes_round,
+    head,
+    speeds_of,
+    with_begins,
+)
 from selfmotion.controllers.feed_stretches import FeedStretch
-from selfmotion.controllers.pose_numbers import krl_numbers
-from selfmotion.controllers.pose_stretches import PoseStretch, straight
-from selfmotion.controllers.program_axes import written
-from selfmotion.controllers.program_heads import before, goes_round, head, speeds_of, with_begins
+from selfmotion.controllers.program_settings import written
 from selfmotion.controllers.program_texts import module_name, plain
-from selfmotion.controllers.stretches import Stretch
+from selfmotion.controllers.stretches import PoseStretch, Stretch, straight
 from selfmotion.controllers.thinning import TIME_DIGITS
+from selfmotion.controllers.tool_frames import krl_numbers, status_and_turn
 from selfmotion.task import SE3, Quaternion
 
 # What no module may be called.

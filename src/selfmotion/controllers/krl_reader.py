@@ -7,10 +7,10 @@ import numpy as np
 
 from selfmotion.basics import Array
 from selfmotion.controllers.krl import NAME, UNBOUND_TURNING
-from selfmotion.controllers.pose_numbers import krl_pose
 from selfmotion.controllers.program_lines import ProgramReader, switched
 from selfmotion.controllers.program_settings import AXES
 from selfmotion.controllers.read_stretches import Pose, pose_of_values
+from selfmotion.controllers.tool_frames import krl_pose
 from selfmotion.robot import RobotModel
 from selfmotion.task import SE3
 

@@ -18,17 +18,21 @@ from pathlib import Path as FilePath
 import numpy as np
 
 from selfmotion.basics import ProblemError, write_text
-from selfmotion.controllers.arm_configurations import confdata
-from selfmotion.controllers.controller_program import ControllerProgram, Draft
+from selfmotion.controllers.controller_program import (
+    ControllerProgram,
+    Draft,
+    before,
+    goes_round,
+    head,
+    speeds_of,
+    with_begins,
+)
 from selfmotion.controllers.feed_stretches import FeedStretch
-from selfmotion.controllers.pose_numbers import rapid_numbers
-from selfmotion.controllers.pose_stretches import PoseStretch
-from selfmotion.controllers.program_axes import written
-from selfmotion.controllers.program_heads import before, goes_round, head, speeds_of, with_begins
-from selfmotion.controllers.program_settings import AXES
+from selfmotion.controllers.program_settings import AXES, written
 from selfmotion.controllers.program_texts import module_name, plain
-from selfmotion.controllers.stretches import Stretch
+from selfmotion.controllers.stretches import PoseStretch, Stretch
 from selfmotion.controllers.thinning import TIME_DIGITS
+from selfmotion.controllers.tool_frames import confdata, rapid_numbers
 from selfmotion.task import SE3, Quaternion
 
 # Characters in a name, those of the procedure included.

@@ -6,10 +6,10 @@ from pathlib import Path as FilePath
 import numpy as np
 
 from selfmotion.controllers.feed_stretches import ZONE
-from selfmotion.controllers.pose_numbers import rapid_pose
 from selfmotion.controllers.program_lines import StopReader
 from selfmotion.controllers.program_settings import AXES
 from selfmotion.controllers.read_stretches import Pose, pose_of_values
+from selfmotion.controllers.tool_frames import rapid_pose
 from selfmotion.robot import RobotModel
 from selfmotion.task import SE3
 

@@ -1,0 +1,437 @@
+"""Programs of controllers as files, cut into the steps of their job, and judged."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from itertools import combinations, pairwise
+from pathlib import Path as FilePath
+from typing import NamedTuple
+
+import numpy as np
+
+from selfmotion.basics import Array, FileFormatError, Progress, silent
+from selfmotion.certificate import Tolerance
+from selfmotion.constraints import Constraint
+from selfmotion.controllers.controller_program import ControllerProgram, Draft, Switch, drafted
+from selfmotion.controllers.krl import write_krl
+from selfmotion.controllers.krl_reader import KrlReader
+from selfmotion.controllers.program_lines import ProgramReader
+from selfmotion.controllers.program_settings import ProgramSettings
+from selfmotion.controllers.program_texts import plain
+from selfmotion.controllers.rapid import write_rapid
+from selfmotion.controllers.rapid_reader import RapidReader
+from selfmotion.controllers.read_stretches import SLOWLY
+from selfmotion.controllers.stretches import Misses, PoseStretch, Stretch
+from selfmotion.controllers.thinning import what_targets_keep
+from selfmotion.controllers.tool_frames import WORLD
+from selfmotion.controllers.urscript import UrscriptReader, write_urscript
+from selfmotion.job import Program, are_opposite
+from selfmotion.motion import Trajectory
+from selfmotion.path import Placed
+from selfmotion.problem import Problem
+from selfmotion.result import Move, Parts, Piece, Plan, elsewhere, gaps
+from selfmotion.robot import RobotModel
+from selfmotion.task import log3
+
+# Programs of controllers as files: which suffix is which language.
+
+_WRITERS: Mapping[str, Callable[[FilePath, Draft], None]] = {
+    "krl": write_krl,
+    "rapid": write_rapid,
+    "urscript": write_urscript,
+}
+_READERS: Mapping[str, type[ProgramReader]] = {
+    ".src": KrlReader,
+    ".mod": RapidReader,
+    ".script": UrscriptReader,
+}
+# Suffixes of programs of targets; those that are read as such, which linear URScript is as well.
+PROGRAMS = {".src": "krl", ".mod": "rapid"}
+READ_PROGRAMS = tuple(_READERS)
+
+
+def write_program(
+    plan: Plan | Parts | Move | Program,
+    file: FilePath,
+    form: str,
+    settings: ProgramSettings,
+    progress: Progress = silent,
+) -> None:
+    """Write a motion as a program of a controller; see `write_motion`."""
+    verdict = plan.certificate.verdict if isinstance(plan, Plan) else plan.verdict
+    _WRITERS[form](file, drafted(plan, file.stem, form, settings, verdict, progress))
+
+
+def read_program(file: FilePath, robot: RobotModel | None = None) -> ControllerProgram:
+    """Read a program of a controller, by its suffix; tool poses by the robot that moves to them.
+
+    Raises
+    ------
+    FileFormatError
+        The file cannot be read, or says what is not read; the line is named.
+    """
+    return _READERS[file.suffix.lower()](file, robot).program()
+
+
+def program_miss(
+    plan: Plan | Parts | Move | Program, file: FilePath, read: ControllerProgram | None = None
+) -> tuple[int, Misses, Misses]:
+    """Return what a program file holds: targets, the deviations it states, and what it is.
+
+    The file is read unless it was `read` before.
+
+    Raises
+    ------
+    FileFormatError
+        The file cannot be read, or is of another motion.
+    """
+    found = read or read_program(file, plan.robot)
+    try:
+        return found.targets, found.miss, found.miss_of(plan)
+    except FileFormatError as error:
+        raise FileFormatError(f"{file}: {error}") from error
+
+
+# A controller's program cut into the steps of its job, and slow motions in between judged.
+
+
+class JudgedStep(NamedTuple):
+    """What a certificate says of the targets of a seam or move.
+
+    Attributes
+    ----------
+    name : str
+    verified : bool
+    verdict : str
+    """
+
+    name: str
+    verified: bool
+    verdict: str
+
+
+class ProgramParts(NamedTuple):
+    """What of a program each step of its job is.
+
+    Attributes
+    ----------
+    motions : list of Trajectory
+        Of each step; of a seam at the pace of its path.
+    slow : sequence of (int, Trajectory)
+        Slow motions to where a shifted program goes on: before which step, and what.
+    """
+
+    motions: list[Trajectory]
+    slow: Sequence[tuple[int, Trajectory]]
+
+
+def parts_of(file: FilePath, program: ControllerProgram, job: Program) -> ProgramParts:
+    """Return what of a program each step of its job is.
+
+    Raises
+    ------
+    FileFormatError
+        It is of another job.
+    """
+    names = job.robot.joint_names
+    known = [axis.joint for axis in program.axes]
+    if sorted(known) != sorted(names):
+        raise FileFormatError(f"{file}: has joints {', '.join(known)}, expected {', '.join(names)}")
+    left, found = list(program.stretches), ProgramParts([], slow := [])
+
+    def part(stretches: Sequence[Stretch]) -> ControllerProgram:
+        return replace(program, stretches=tuple(stretches))
+
+    for number, step in enumerate(job.steps):
+        taken, seconds = [], 0.0
+        while left and left[0].name == SLOWLY:
+            slow.append((number, part([left.pop(0)]).trajectory.of_joints(names)))
+        while left and seconds < step.motion.duration - _MOMENT:
+            taken.append(left.pop(0))
+            seconds += taken[-1].duration
+        if abs(seconds - step.motion.duration) > _MOMENT:
+            raise FileFormatError(
+                f"{file}: its targets of '{step.name}' take {seconds:.6g} s, the job's "
+                f"{step.motion.duration:.6g} s: it is of another one"
+            )
+        own, made = part(taken), step.made
+        motion = own.trajectory if isinstance(made, Move) else own.along(made.problem.path)
+        found.motions.append(motion.of_joints(names))
+    if left:
+        raise FileFormatError(f"{file}: goes on with '{left[0].name}' when the job has ended")
+    return found
+
+
+def slow_steps(
+    parts: ProgramParts, job: Program
+) -> tuple[tuple[JudgedStep, ...], Mapping[int, Sequence[Piece]]]:
+    """Return what is found of slow motions, and these by the step that they are before.
+
+    Each has to keep what the nearest free move has to.
+    """
+    moves = [(k, step.made) for k, step in enumerate(job.steps) if isinstance(step.made, Move)]
+    steps, pieces = list[JudgedStep](), dict[int, list[Piece]]()
+    for number, motion in parts.slow:
+        name = f"slowly to '{job.steps[number].name}'"
+        pieces.setdefault(number, []).append(Piece(name, motion))
+        if not moves:
+            steps.append(JudgedStep(name, False, "not verified: the job has no free moves"))
+            continue
+        _, near = min(moves, key=lambda move: abs(move[0] - number))
+        judged = Move(near.robot, what_targets_keep(near.constraints), motion)
+        steps.append(JudgedStep(name, judged.verified, judged.verdict))
+    return tuple(steps), pieces
+
+
+# Programs of controllers, judged by what they were made from.
+
+# Files have so many digits of time [s], and of angles [rad].
+_MOMENT, _LEAST = 1e-4, 1e-6
+# Where a program begins and ends is written to so many digits [rad or m], by poses to fewer; what
+# it switches is switched at a target, as near to its time [s].
+_DIGITS, _OF_POSES, _PROMPT = 1e-6, 1e-5, 1e-3
+# Times as near as this are one [s].
+_INSTANT = 1e-9
+
+
+def stated_deviation(program: ControllerProgram) -> Tolerance | None:
+    """Return how far off its path a program of a controller says it is; None where it does not."""
+    if program.within is not None:
+        return program.within
+    miss = program.miss.path
+    sound = np.isfinite([miss.position, miss.rotation]).all() and miss.position > 0.0
+    return Tolerance(miss.position, max(miss.rotation, _LEAST)) if sound else None
+
+
+class JudgedProgram(NamedTuple):
+    """What is known of a controller's program, by the job that it is of.
+
+    Attributes
+    ----------
+    steps : tuple of JudgedStep
+    failures : tuple of str
+        What speaks against the whole: its ends, its order, its outputs, the job itself.
+    within : Tolerance or None
+        What seams may miss their paths by, where that is not the job's own.
+    shifted : str
+        By how much the work object was shifted, in words; empty for not at all.
+    unjudged : str
+        What of a program that is verified is the controller's own, in words.
+    """
+
+    steps: tuple[JudgedStep, ...]
+    failures: tuple[str, ...]
+    within: Tolerance | None = None
+    shifted: str = ""
+    unjudged: str = ""
+
+    @property
+    def verified(self) -> bool:
+        """Whether each step is, and nothing speaks against the whole."""
+        return all(step.verified for step in self.steps) and not self.failures
+
+    @property
+    def verdict(self) -> str:
+        """One line: verified, or how many steps are not, and what speaks against the whole."""
+        if self.verified:
+            own = f"; {self.unjudged}" if self.unjudged else ""
+            return f"verified: each step, and the whole{self._allowed}{self._told}{own}"
+        count = sum(not step.verified for step in self.steps)
+        told = [*([f"{count} of {len(self.steps)} steps"] if count else []), *self.failures]
+        return f"not verified: {'; '.join(told)}{self._told}"
+
+    @property
+    def _told(self) -> str:
+        return f"; {self.shifted}" if self.shifted else ""
+
+    @property
+    def _allowed(self) -> str:
+        if self.within is None:
+            return ""
+        return (
+            f"; seams within {1e3 * self.within.position:.3g} mm and {self.within.rotation:.2g} "
+            f"rad of their paths"
+        )
+
+
+def judged_program(file: FilePath, job: Program, within: Tolerance | None = None) -> JudgedProgram:
+    """Judge a controller's program by the job that it is of: each step, and the whole.
+
+    Seams by all that their plans had to keep, at the deviation that the file states; moves by all
+    of theirs. Accelerations are the controller's, and not judged. The whole has to begin and end
+    where the job does, and to switch what its events say, when they say it: an output or a comment
+    for each, the same for each event of one name, and nothing else. Where the work object was
+    shifted, seams have to be on their paths shifted with it, and the whole begins and ends
+    elsewhere; slow motions to where it goes on have to keep what the move beside them has to.
+
+    Raises
+    ------
+    FileFormatError
+        The file cannot be read, or is of another job.
+    """
+    program = read_program(file, job.robot)
+    within = within or stated_deviation(program)
+    parts = parts_of(file, program, job)
+    steps, pieces = _judged_steps(job, parts.motions, within, what_targets_keep, program)
+    slow, between = slow_steps(parts, job)
+    pieces = [piece for k, own in enumerate(pieces) for piece in (*between.get(k, ()), own)]
+    # From axis targets to poses there are digits of both, which the arm's kinematics may magnify.
+    digits = _OF_POSES if any(isinstance(s, PoseStretch) for s in program.stretches) else _DIGITS
+    failures = (
+        *(f"the job itself: {text}" for text in job.failures),
+        *gaps(job.robot, pieces, digits),
+        *(() if program.shift is not None else _elsewhere(job, pieces, digits)),
+        *([program.begins_elsewhere] if program.begins_elsewhere else []),
+        *_otherwise_switched(job, program.switches),
+    )
+    left = of_the_controller(program)
+    return JudgedProgram((*steps, *slow), failures, within, shift_told(program), left)
+
+
+def of_the_controller(program: ControllerProgram) -> str:
+    """Return what of a program is the controller's own, and not judged, in words."""
+    if program.within is None:
+        return "accelerations are the controller's, and not judged"
+    return (
+        "seams at their feeds are judged with the ramps of the plan: how the controller runs up "
+        "and down, and so when it is where, is its own, and not judged"
+    )
+
+
+def shift_told(program: ControllerProgram) -> str:
+    """Return by how much the work object is elsewhere than planned, in words; empty for not."""
+    if program.shift is None:
+        return ""
+    way = 1e3 * float(np.linalg.norm(program.shift.translation))
+    turn = float(np.degrees(np.linalg.norm(log3(program.shift.rotation))))
+    return (
+        f"the work object is {way:.4g} mm and {turn:.3g}° from where it was planned: judged along "
+        f"the path shifted with it"
+    )
+
+
+def as_shifted(problem: Problem, program: ControllerProgram, begin: Array) -> Problem:
+    """Return a problem whose path is shifted as the work object of a program is.
+
+    Parameters
+    ----------
+    problem : Problem
+    program : ControllerProgram
+    begin : (n,)
+        Where the motion begins.
+
+    Raises
+    ------
+    FileFormatError
+        The path is given in a frame that moves past the work object.
+    """
+    if program.shift is None:
+        return problem
+    robot = problem.robot
+    carrier = None if program.carrier == WORLD else program.carrier
+    between = robot.chain_to(carrier or robot.urdf.root, robot.reference)
+    if len(between.joints) or problem.also:
+        raise FileFormatError(
+            f"its work object is shifted, and the path is given in '{robot.reference or WORLD}', "
+            f"which moves past it: plan again with the part where it is"
+        )
+    place = between.place(np.zeros(robot.dof))
+    path = Placed(problem.path, place * program.shift * place.inverse())
+    start = None if problem.start is None else begin
+    return replace(problem, path=path, start=start)
+
+
+def misswitched(program: ControllerProgram, job: Program) -> tuple[str, ...]:
+    """Return what of a job's events a controller's program does not switch, or otherwise."""
+    return tuple(_otherwise_switched(job, program.switches))
+
+
+def judged_motion(motion: Trajectory, job: Program) -> JudgedProgram:
+    """Judge a motion that was read by the job that it is of: each step, and the whole.
+
+    By all that the job asks for; its outputs are none of a motion's.
+
+    Raises
+    ------
+    FileFormatError
+        It is of other joints.
+    """
+    whole = motion.of_joints(job.robot.joint_names)
+    if abs(whole.duration - job.duration) > _MOMENT:
+        told = f"it lasts {whole.duration:.6g} s, the job {job.duration:.6g} s"
+        return JudgedProgram((), (told,))
+    ends = [*job.begins, job.duration]
+    motions = [part_of(whole, first, last) for first, last in pairwise(ends)]
+    steps, pieces = _judged_steps(job, motions, None, tuple)
+    failures = (
+        *(f"the job itself: {text}" for text in job.failures),
+        *gaps(job.robot, pieces),
+        *_elsewhere(job, pieces),
+    )
+    return JudgedProgram(steps, failures)
+
+
+def part_of(motion: Trajectory, first: float, last: float) -> Trajectory:
+    """Return what a motion is from one of its times to another [s], from t = 0 on."""
+    first, last = motion.t[0] + first, min(motion.t[0] + last, motion.t[-1])
+    inside = motion.t[(motion.t > first + _INSTANT) & (motion.t < last - _INSTANT)]
+    t = np.concatenate([[first], inside, [last]])
+    faster = None if motion.qdd is None else motion(t, 2)
+    return Trajectory(t - first, motion(t), motion(t, 1), motion.joint_names, faster)
+
+
+def _judged_steps(
+    job: Program,
+    motions: Sequence[Trajectory],
+    within: Tolerance | None,
+    kept: Callable[[Sequence[Constraint]], tuple[Constraint, ...]],
+    program: ControllerProgram | None = None,
+) -> tuple[tuple[JudgedStep, ...], list[Piece]]:
+    """Return what certificates say of the motions of a job's steps, by what of it is `kept`."""
+    found, pieces = list[JudgedStep](), list[Piece]()
+    for step, motion in zip(job.steps, motions, strict=True):
+        made = step.made
+        if isinstance(made, Move):
+            move = Move(made.robot, kept(made.constraints), motion)
+            found.append(JudgedStep(step.name, move.verified, move.verdict))
+        else:
+            problem = replace(made.problem, constraints=kept(made.problem.constraints))
+            if program is not None:
+                problem = as_shifted(problem, program, motion.q[0])
+            certificate = problem.certify(motion, within or made.tolerance)
+            found.append(JudgedStep(step.name, certificate.verified, certificate.verdict))
+        pieces.append(Piece(f"'{step.name}'", motion))
+    return tuple(found), pieces
+
+
+def _elsewhere(job: Program, pieces: Sequence[Piece], digits: float = _DIGITS) -> Iterator[str]:
+    """Yield where a program does not begin or end as its job does."""
+    for end in (0, -1) if pieces else ():
+        asked = job.steps[end].motion.q[end]
+        yield from elsewhere(job.robot, pieces[end], end, asked, digits)
+
+
+def _otherwise_switched(job: Program, switches: Sequence[Switch]) -> Iterator[str]:
+    """Yield what of a job's events a program does not switch, or switches otherwise."""
+    asked = sorted(job.events, key=lambda event: event[0])
+    made = sorted(switches, key=lambda switch: switch.at)
+    if len(asked) != len(made):
+        yield f"it switches {len(made)} times, the job {len(asked)} times"
+        return
+    known: dict[str, Switch] = {}
+    for (at, seam, event), switch in zip(asked, made, strict=True):
+        if abs(at - switch.at) > _PROMPT:
+            yield (
+                f"event '{event}' of '{seam}' is at {at:.4f} s, but '{switch.output}' is switched "
+                f"at {switch.at:.4f} s"
+            )
+        if switch.value is None and switch.output != plain(event):
+            yield f"event '{event}' of '{seam}' is called '{switch.output}'"
+        before = known.setdefault(event, switch)
+        if before[1:] != switch[1:]:
+            yield (
+                f"event '{event}' switches '{before.output}' to {before.value} once, and "
+                f"'{switch.output}' to {switch.value} at {switch.at:.4f} s"
+            )
+    for (one, first), (other, second) in combinations(known.items(), 2):
+        if first.value is not None and first[1:] == second[1:] and are_opposite(one, other):
+            yield f"events '{one}' and '{other}' both switch '{first.output}' to {first.value}"

@@ -1,0 +1,316 @@
+"""Stretches of a motion from rest to rest, as targets of joints or as tool poses."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from selfmotion.basics import Array, Ints
+from selfmotion.certificate import Tolerance
+from selfmotion.controllers.tool_frames import ToolFrames
+from selfmotion.motion import Trajectory
+from selfmotion.robot import Chain
+
+# Joint targets of a motion from rest to rest, and how far off it they take a controller.
+
+# The worst is no more than so many times what is found at times that are so near to each other.
+SURE = 1.02
+# Where between two targets, and how near to each, the error is looked at.
+_BETWEEN = np.array([0.0, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875])
+
+
+class Event(NamedTuple):
+    """What happens when a target is reached: its number in the stretch, and what."""
+
+    target: int
+    name: str
+
+
+@dataclass(frozen=True, eq=False)
+class Stretch:
+    """A motion from rest to rest by its targets, or a rest.
+
+    Attributes
+    ----------
+    name : str
+        Of the seam or move.
+    t : (K + 1,)
+        When each target is reached, from 0 [s].
+    q : (K + 1, n)
+        Where it begins, and its targets [rad or m].
+    events : tuple of Event
+    remark : str
+        What there is to say of it.
+    """
+
+    name: str
+    t: Array
+    q: Array
+    events: tuple[Event, ...] = ()
+    remark: str = ""
+
+    @property
+    def duration(self) -> float:
+        """How long it takes [s]."""
+        return float(self.t[-1])
+
+    @property
+    def is_rest(self) -> bool:
+        """Whether the arm rests all the while."""
+        return bool((self.q == self.q[0]).all())
+
+    def in_order(self, order: Sequence[int]) -> "Stretch":
+        """Return the same with coordinates in another order."""
+        return replace(self, q=self.q[:, order])
+
+    def looked_at(self) -> Array:
+        """Return times at targets and between them (K,) [s]."""
+        return finer(self.t, _BETWEEN)
+
+    def ways(self, times: Array) -> list[Array]:
+        """Return joint positions (K, n) at times by each way in which controllers join targets."""
+        return ways(self.t, self.q, times)
+
+    def matched(self, motion: Trajectory, first: float) -> Array:
+        """Return what is to be where it is looked at: a motion (K, n), begun at `first`."""
+        return motion(np.clip(first + self.looked_at(), motion.t[0], motion.t[-1]))
+
+    def smooth(self) -> tuple[Array, Array, Array]:
+        """Return times (K,) [s], positions and velocities (K, n) of a spline through the targets.
+
+        It begins and ends at rest.
+        """
+        from scipy.interpolate import CubicSpline
+
+        times = self.looked_at()
+        spline = CubicSpline(self.t, self.q, bc_type="clamped")
+        return times, spline(times), spline(times, 1)
+
+    def knots(self) -> tuple[Array, Array, Array]:
+        """Return as many of these as it takes that cubics through them are the spline."""
+        from scipy.interpolate import CubicSpline
+
+        return self.t, self.q, CubicSpline(self.t, self.q, bc_type="clamped")(self.t, 1)
+
+
+class Miss(NamedTuple):
+    """How far targets take a controller off the motion, at the time where it is farthest.
+
+    Attributes
+    ----------
+    position, rotation : float
+        Of the tool [m, rad].
+    joint : float
+        Of a joint [rad or m].
+    """
+
+    position: float
+    rotation: float
+    joint: float
+
+    def share(self, allowed: Tolerance) -> float:
+        """Return how much of what is allowed it takes: above 1 too much."""
+        rotation = max(self.rotation, self.joint) / allowed.rotation
+        return SURE * max(self.position / allowed.position, rotation)
+
+    @property
+    def stated(self) -> "Miss":
+        """As files state it: the worst lies between the times that are looked at."""
+        return Miss(SURE * self.position, SURE * self.rotation, SURE * self.joint)
+
+
+class Misses(NamedTuple):
+    """How far targets take a controller off what it makes, and off moves through the air.
+
+    Attributes
+    ----------
+    path, moves : Miss
+    """
+
+    path: Miss
+    moves: Miss
+
+    def worse(self, other: "Misses") -> "Misses":
+        """Return the larger ones of both."""
+        return Misses(*(Miss(*map(max, *pair)) for pair in zip(self, other, strict=True)))
+
+
+NO_MISS = Miss(0.0, 0.0, 0.0)
+
+
+def miss_of(
+    stretch: Stretch, motion: Trajectory, chains: Sequence[Chain], first: float = 0.0
+) -> Miss:
+    """Return how far a controller is off a motion at most, whichever way it joins the targets.
+
+    In between it may go straight in joint space, past each corner on the line between the middles
+    of the two sides, which is the largest corner that controllers round, or along the cubic spline
+    through all targets that begins and ends at rest; at the times of the motion, which holds it to
+    its speeds as well. Stretches at a speed are held to where it goes alone.
+    """
+    times, exact = stretch.looked_at(), stretch.matched(motion, first)
+    worst = NO_MISS
+    for line in stretch.ways(times):
+        worst = Miss(*map(max, worst, miss_between(line, exact, chains)))
+    return worst
+
+
+def miss_between(q: Array, exact: Array, chains: Sequence[Chain]) -> Miss:
+    """Return how far configurations (K, n) are off others at most, one by one."""
+    from scipy.spatial.transform import Rotation
+
+    position = rotation = 0.0
+    for chain in chains:
+        _, here, there = chain.along(q)
+        _, turned, placed = chain.along(exact)
+        position = max(position, float(np.linalg.norm(there - placed, axis=1).max()))
+        turns = Rotation.from_matrix(np.einsum("kji,kjl->kil", here, turned)).magnitude()
+        rotation = max(rotation, float(turns.max()))
+    return Miss(position, rotation, float(np.abs(q - exact).max()))
+
+
+def finer(t: Array, between: Array) -> Array:
+    """Return times with others between each two, `between` as shares from 0 on."""
+    return np.append((t[:-1, None] + between * np.diff(t)[:, None]).ravel(), t[-1])
+
+
+def ways(t: Array, q: Array, times: Array) -> list[Array]:
+    """Return joint positions (K, n) at times by each way of joining targets."""
+    from scipy.interpolate import CubicSpline
+
+    lines = _straight(times, t, q)
+    if len(t) < 3:
+        return [lines]
+    middles = 0.5 * (t[:-1] + t[1:])
+    knots = np.concatenate([t[:1], middles, t[-1:]])
+    corners = _straight(times, knots, _straight(knots, t, q))
+    spline = CubicSpline(t, q, bc_type="clamped")(times)
+    return [lines, corners, spline]
+
+
+def _straight(times: Array, t: Array, q: Array) -> Array:
+    return np.stack([np.interp(times, t, column) for column in q.T], axis=1)
+
+
+# Tool poses as targets, and the joint motion that a controller makes of them.
+#
+# Between two poses the position is linear in the path parameter, the orientation turns about one
+# axis evenly (slerp; Shoemake, "Animating rotation with quaternion curves", 1985), and external
+# axes are linear; the arm's joints follow by inverse kinematics from where they are. That is what
+# ``MoveL``, ``LIN`` and ``movel`` are documented to do. ``SPLINE`` goes smoothly through all
+# poses.
+
+# How often it is looked at what is between two targets: their inverse kinematics bends.
+_BETWEEN_POSES = np.linspace(0.0, 1.0, 16, endpoint=False)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class PoseStretch(Stretch):
+    """A motion from rest to rest by tool poses.
+
+    Attributes
+    ----------
+    places, turns : (K + 1, 3), (K + 1, 4)
+        The tool in the work object: positions [m], and quaternions x, y, z, w, each on the side of
+        the one before.
+    frames : ToolFrames
+    near : callable
+        Times → joint positions (K, n) in the robot's order, from which inverse kinematics begins.
+    order : (n,)
+        Which of the robot's joints each column of `q` is.
+    """
+
+    places: Array
+    turns: Array
+    frames: ToolFrames
+    near: Callable[[Array], Array]
+    order: Ints
+
+    def in_order(self, order: Sequence[int]) -> "PoseStretch":
+        """See `Stretch.in_order`."""
+        return replace(self, q=self.q[:, order], order=self.order[list(order)])
+
+    def looked_at(self) -> Array:
+        """See `Stretch.looked_at`."""
+        return finer(self.t, _BETWEEN_POSES)
+
+    def ways(self, times: Array) -> list[Array]:
+        """See `Stretch.ways`: straight lines, rounded corners, a smooth curve; in tool poses.
+
+        Where no joints are known they are not numbers.
+        """
+        targets = self._rows()
+        lines = straight(times, self.t, targets)
+        found = [lines]
+        if len(self.t) > 2:
+            middles = 0.5 * (self.t[:-1] + self.t[1:])
+            knots = np.concatenate([self.t[:1], middles, self.t[-1:]])
+            found.append(straight(times, knots, straight(knots, self.t, targets)))
+            found.append(self._spline(times))
+        return [self._joints(rows, times)[:, self.order] for rows in found]
+
+    def smooth(self) -> tuple[Array, Array, Array]:
+        """See `Stretch.smooth`."""
+        from scipy.interpolate import CubicSpline
+
+        times = self.looked_at()
+        q = self._joints(self._spline(times), times)[:, self.order]
+        if not np.isfinite(q).all():
+            return times, q, q
+        return times, q, CubicSpline(times, q, bc_type="clamped")(times, 1)
+
+    def knots(self) -> tuple[Array, Array, Array]:
+        """See `Stretch.knots`."""
+        return self.smooth()
+
+    def _spline(self, times: Array) -> Array:
+        from scipy.interpolate import CubicSpline
+
+        rows: Array = CubicSpline(self.t, self._rows(), bc_type="clamped")(times)
+        rows[:, 3:7] /= np.linalg.norm(rows[:, 3:7], axis=1, keepdims=True)
+        return rows
+
+    def _rows(self) -> Array:
+        """Return positions, quaternions and external axes, (K + 1, 7 + m)."""
+        own = self.q[:, np.argsort(self.order)]
+        return np.hstack([self.places, self.turns, own[:, self.frames.external]])
+
+    def _joints(self, rows: Array, times: Array) -> Array:
+        q = np.array(self.near(times))
+        q[:, self.frames.external] = rows[:, 7:]
+        found, arrived = self.frames.solved(rows[:, :3], rows[:, 3:7], q)
+        return np.where(arrived[:, None], found, np.nan)
+
+
+def straight(times: Array, t: Array, rows: Array) -> Array:
+    """Return rows (K, 7 + m) at times between those at t: linear, orientations by slerp."""
+    k = np.clip(np.searchsorted(t, times, side="right") - 1, 0, len(t) - 2)
+    share = ((times - t[k]) / (t[k + 1] - t[k]))[:, None]
+    found: Array = (1.0 - share) * rows[k] + share * rows[k + 1]
+    first, last = rows[k, 3:7], rows[k + 1, 3:7]
+    # Below 90°, as each is on the side of the one before.
+    apart, together = (
+        np.linalg.norm(each, axis=1, keepdims=True) for each in (first - last, first + last)
+    )
+    angle = 2.0 * np.arctan2(apart, together)
+    sine = np.sin(angle)
+    near = sine < _SMALL
+    sine = np.where(near, 1.0, sine)
+    one, other = np.sin((1.0 - share) * angle) / sine, np.sin(share * angle) / sine
+    turned = np.where(near, found[:, 3:7], one * first + other * last)
+    found[:, 3:7] = turned / np.linalg.norm(turned, axis=1, keepdims=True)
+    return found
+
+
+# Below this sine of the angle slerp and a straight line are the same.
+_SMALL = 1e-9
+
+
+def on_one_side(turns: Array) -> Array:
+    """Return quaternions (K, 4), each on the side of the one before."""
+    found = np.array(turns)
+    for k in range(1, len(found)):
+        if found[k] @ found[k - 1] < 0.0:
+            found[k] *= -1.0
+    return found
