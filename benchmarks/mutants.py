@@ -108,7 +108,7 @@ PARTS = (
     ),
     Part(
         "objective",
-        ("paper/objective.py", "paper/cost_integrals.py", "constraints/kept.py"),
+        ("paper/objective.py", "paper/cost_integrals.py", "constraints/conditions.py"),
         (
             "constraints/test_kept.py",
             "constraints/test_base.py -k 'equality or finite or rows'",
