@@ -10,8 +10,7 @@ import trimesh
 import selfmotion as sm
 from selfmotion.basics import silent
 from selfmotion.job import work
-from selfmotion.job.earlier import Earlier
-from selfmotion.job.files import Shelf
+from selfmotion.job.files import Earlier, Shelf
 from selfmotion.task import SE3
 from selfmotion.transfer import FreeMotions, free_motion
 from support.arms import robot_named

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 from selfmotion.certificate import USUAL
 from selfmotion.documents import Job
-from selfmotion.path import Path, Retimed
+from selfmotion.path import Path as ToolPath, Retimed
 from selfmotion.problem import Problem
 from selfmotion.result import Asked, Plan
 
@@ -41,7 +41,7 @@ def _at_its_own_pace(problem: Problem, asked: Problem) -> Problem:
     return replace(problem, **problem.along(_original), relaxations=tuple(asked.relaxations))
 
 
-def _original(path: Path) -> Path:
+def _original(path: ToolPath) -> ToolPath:
     while isinstance(path, Retimed):
         path = path.original
     return path
