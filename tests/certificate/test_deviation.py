@@ -9,7 +9,7 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.basics import Array
-from selfmotion.certificate.deviation import (
+from selfmotion.certificate.path_error import (
     deviation_from,
     deviation_size,
     excess,

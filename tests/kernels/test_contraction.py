@@ -4,12 +4,12 @@ import numpy as np
 
 import selfmotion as sm
 from selfmotion import kernels
-from selfmotion.kernels import contraction, damping
+from selfmotion.kernels import stages, tool
 from support.arms import Case, central_difference
 from support.compiled import compiled
 from support.followed import standing
 
-contract, damp = compiled(contraction.contract), compiled(damping.damp)
+contract, damp = compiled(tool.contract), compiled(stages.damp)
 
 
 def test_contraction_with_the_hessian_and_a_twist(panda: sm.RobotModel) -> None:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from selfmotion.basics import Array
-from selfmotion.kernels import contraction, damping
+from selfmotion.kernels import stages, tool
 from support.compiled import compiled
 
 # Well-conditioned algebra with entries of order 1.
@@ -18,7 +18,7 @@ GRADIENT = 1e-6
 SIZES = range(1, 7)
 
 
-contract, damp = compiled(contraction.contract), compiled(damping.damp)
+contract, damp = compiled(tool.contract), compiled(stages.damp)
 
 
 @pytest.mark.parametrize("m", SIZES)

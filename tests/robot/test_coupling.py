@@ -9,7 +9,7 @@ import yourdfpy
 
 import selfmotion as sm
 from selfmotion.basics import Array
-from selfmotion.certificate import deviation
+from selfmotion.certificate import path_error
 from selfmotion.motion import NullMotionTable, PolynomialNullMotion
 from selfmotion.paper.start import FixedStart
 from selfmotion.robot import Dynamics, Energy, ToolRates
@@ -87,9 +87,9 @@ def test_all_kinematics_agree_with_differences(robot: sm.RobotModel) -> None:
         np.testing.assert_allclose(places[0], robot.pose(q).translation, atol=EXACT)
         # The certificate's own, and that of every joint on its own.
         np.testing.assert_allclose(
-            deviation.jacobians(robot.chain, q[None])[0][0], jacobian, atol=EXACT
+            path_error.jacobians(robot.chain, q[None])[0][0], jacobian, atol=EXACT
         )
-        np.testing.assert_allclose(deviation.poses(robot.chain, q[None])[0], rotations, atol=EXACT)
+        np.testing.assert_allclose(path_error.poses(robot.chain, q[None])[0], rotations, atol=EXACT)
         every = robot.chain.every_along(q[None])[0]
         whole = np.zeros_like(jacobian)
         own = robot.chain.table[:-1, JOINT, 0].astype(int)

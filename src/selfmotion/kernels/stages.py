@@ -1,14 +1,230 @@
-"""All stages of eq. 4 backward: the exact derivative of the discrete scheme."""
+"""The stages of eq. 4, compiled: forward, and backward as the exact derivative."""
 
+from math import isfinite
 from typing import NamedTuple
+
+import numpy as np
 
 from selfmotion.basics import Array, called, inlined, kernel
 from selfmotion.basics.layout import KIND, POINTING, Layout
-from selfmotion.kernels.algebra import add_angular, angular, angular_part, cross, plus, respond
-from selfmotion.kernels.contraction import Every, contract, contract_every
-from selfmotion.kernels.damping import Law, damping_slope, pull_damping
-from selfmotion.kernels.table import Stage, Tip, stage_of, tip_of, view
-from selfmotion.kernels.tool import pull_error, rows_of, unselect
+from selfmotion.kernels.algebra import (
+    add_angular,
+    add_scaled,
+    angular,
+    angular_part,
+    cholesky,
+    cross,
+    finite,
+    gram,
+    linear,
+    plus,
+    respond,
+    smallest_eigenvector,
+)
+from selfmotion.kernels.table import Stage, Tip, q_of, qd_of, stage_of, tip_of, view
+from selfmotion.kernels.tool import (
+    Every,
+    contract,
+    contract_every,
+    pose_error,
+    pull_error,
+    rows_of,
+    select,
+    task_rows,
+    unselect,
+)
+
+# Damping near singular poses, compiled: forward and backward.
+
+# The threshold σ0 and the strength λ0 [m, rad].
+Law = tuple[float, float]
+
+
+@inlined
+def damp(gram: Array, law: Law, out: Array) -> float:
+    """Add λ²I to JJᵀ (its lower triangle `gram`) near singular poses; return 1 - f.
+
+    λ² = λ0² f with f = (1 - σ²/σ0²)² where the smallest singular value σ of J is below the
+    threshold σ0, exactly 0 elsewhere. `out` (3 + m,) becomes λ0², f, df/dσ² and the unit vector v
+    of σ² = vᵀJJᵀv, all 0 where there is no damping.
+    """
+    m = gram.shape[0]
+    square = law[0] * law[0]
+    for i in range(3 + m):
+        out[i] = 0.0
+    full, spare, trace = np.empty((m, m)), np.empty((m, m)), 0.0
+    for i in range(m):
+        trace += gram[i, i]
+        for j in range(i + 1):
+            full[i, j] = full[j, i] = spare[i, j] = gram[i, j]
+        spare[i, i] -= square
+    # Mostly σ > σ0, which a Cholesky factor tells at a fraction of the price of eigenvalues. NaN is
+    # left to the factor of `gram` itself.
+    if cholesky(spare) or not isfinite(trace):
+        return 1.0
+    v = view(out, 3, (m,))
+    rest = 1.0 - max(smallest_eigenvector(full, spare, v), 0.0) / square
+    if rest <= 0.0:
+        for i in range(m):
+            v[i] = 0.0
+        return 1.0
+    out[0], out[1], out[2] = law[1] * law[1], rest * rest, -2.0 * rest / square
+    for i in range(m):
+        gram[i, i] += out[0] * out[1]
+    return 1.0 - rest * rest
+
+
+@inlined
+def damping_slope(row: Array, n: int, layout: Layout, gain: float, z: Array) -> float:
+    """Return 2 df/dσ² (λ0² zᵀy + K zᵀS e): what ⟨v (Jᵀv)ᵀ, ∂J⟩ has to be multiplied by."""
+    m = rows_of(layout)
+    at, full = stage_of(row, n, m), np.empty(6)
+    slope = 0.0
+    for i in range(m):
+        slope += at.damping[0] * z[i] * at.y[i]
+    for f in range(layout.shape[0]):
+        tip = tip_of(row, f, n, m)
+        unselect(layout, f, tip.rotation, z, full)
+        for i in range(6):
+            slope += gain * full[i] * tip.error[i]
+    return float(2.0 * at.damping[2] * slope)
+
+
+@inlined
+def pull_damping(
+    at: Stage,
+    tip: Tip,
+    layout: Layout,
+    f: int,
+    factor: float,
+    weights: Array,
+    twist: Array,
+) -> None:
+    """Add what `factor` ⟨v (Jᵀv)ᵀ, ∂J⟩ leaves: on J6 to `weights` (6, n), on S to `twist` (6,).
+
+    For tip f; see `damping_slope`.
+    """
+    m, n = at.task_jacobian.shape
+    v = view(at.damping, 3, (m,))
+    left, turn = np.empty(6), (0.0, 0.0, 0.0)
+    unselect(layout, f, tip.rotation, v, left)
+    for k in range(n):
+        right = 0.0
+        for i in range(m):
+            right += at.task_jacobian[i, k] * v[i]
+        turn = plus(turn, right, angular(tip.jacobian, k))
+        for i in range(6):
+            weights[i, k] += factor * left[i] * right
+    if layout[f, KIND] == POINTING:
+        add_angular(twist, factor, cross(angular_part(left), turn))
+
+
+# One stage of eq. 4 forward.
+
+
+@kernel
+def advance(
+    s: int,
+    f: int,
+    base_jacobian: Array,
+    rotation: Array,
+    translation: Array,
+    table: Array,
+    layout: Layout,
+    gain: float,
+    law: Law | None,
+) -> bool:
+    """Note where tip f is at stage s; after the last one evaluate eq. 4, and set the next q.
+
+    `base_jacobian` (6, n) is that of the point at the base's origin, `rotation` and `translation`
+    the tip's pose. False where the motion breaks down, see `evaluate`.
+    """
+    n, m, row = base_jacobian.shape[1], rows_of(layout), table[s]
+    observe(base_jacobian, rotation, translation, tip_of(row, f, n, m))
+    if f + 1 < layout.shape[0]:
+        return True
+    if not evaluate(row, n, layout, gain, law):
+        return False
+    step(table, s, n, stage_of(row, n, m).step[0])
+    return True
+
+
+@called
+def evaluate(row: Array, n: int, layout: Layout, gain: float, law: Law | None) -> bool:
+    """Evaluate eq. 4: q̇ = J⁺u + (I - J⁺J) ε, with u = S(ẋ_d + K e) of all tips.
+
+    With a `law`, A = JJᵀ + λ²I is damped near singular poses, see `damp`, and the pose feedback K
+    fades out as damping fades in: speeds would otherwise grow with an error that the arm cannot
+    take out. False where A is not positive definite (a singular pose), or q̇ is not finite.
+    """
+    m = rows_of(layout)
+    at = stage_of(row, n, m)
+    for f in range(layout.shape[0]):
+        tip = tip_of(row, f, n, m)
+        task_rows(layout, f, tip.rotation, tip.jacobian, at.task_jacobian)  # J = S J6
+    gram(at.task_jacobian, at.factor)  # A = JJᵀ
+    if law is not None:
+        gain *= damp(at.factor, law, at.damping)  # A = JJᵀ + λ²I
+    for f in range(layout.shape[0]):
+        tip = tip_of(row, f, n, m)
+        aim(layout[f, KIND], gain, tip)  # ẋ_d + K e
+        select(layout, f, tip.rotation, tip.command, at.y)  # y = u
+    if not cholesky(at.factor):
+        return False
+    respond(at.task_jacobian, at.factor, at.y, at.epsilon, at.qd)  # y = A⁻¹(u - Jε), q̇ = Jᵀy + ε
+    return finite(at.qd)
+
+
+@inlined
+def aim(kind: int, gain: float, tip: Tip) -> None:
+    """Set a tip's pose error e, and its command ẋ_d + K e."""
+    pose_error(
+        kind, tip.target_translation, tip.target_rotation, tip.translation, tip.rotation, tip.error
+    )
+    add_scaled(tip.target_twist, gain, tip.error, tip.command)
+
+
+@inlined
+def observe(base_jacobian: Array, rotation: Array, translation: Array, tip: Tip) -> None:
+    """Set a tip's pose and its Jacobian J6."""
+    for i in range(3):
+        tip.translation[i] = translation[i]
+        for j in range(3):
+            tip.rotation[i, j] = rotation[i, j]
+    at_tip(base_jacobian, translation, tip.jacobian)
+
+
+@inlined
+def at_tip(base_jacobian: Array, translation: Array, out: Array) -> None:
+    """Set `out` (6, n) to the Jacobian of the tip's origin x: v = v_0 + ω × x."""
+    x = (translation[0], translation[1], translation[2])
+    for k in range(out.shape[1]):
+        turning = angular(base_jacobian, k)
+        v = plus(linear(base_jacobian, k), 1.0, cross(turning, x))
+        out[0, k], out[1, k], out[2, k] = v
+        out[3, k], out[4, k], out[5, k] = turning
+
+
+@inlined
+def step(table: Array, s: int, n: int, h: float) -> None:
+    """Set q of stage s + 1 from the slopes so far (classical fourth-order Runge-Kutta).
+
+    Stages come four to a step, then one for the end.
+    """
+    if s + 1 == table.shape[0]:
+        return
+    i = s % 4
+    start, slope, q = q_of(table, s - i, n), qd_of(table, s, n), q_of(table, s + 1, n)
+    if i < 3:
+        add_scaled(start, h if i == 2 else 0.5 * h, slope, q)
+    else:
+        first, second = qd_of(table, s - 3, n), qd_of(table, s - 2, n)
+        third = qd_of(table, s - 1, n)
+        for k in range(n):
+            q[k] = start[k] + h / 6.0 * (first[k] + 2.0 * (second[k] + third[k]) + slope[k])
+
+
+# All stages of eq. 4 backward: the exact derivative of the discrete scheme.
 
 
 class Space(NamedTuple):
