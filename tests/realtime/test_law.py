@@ -8,8 +8,7 @@ import selfmotion as sm
 from selfmotion.basics import Array
 from selfmotion.basics.layout import layout_of
 from selfmotion.realtime import law
-from selfmotion.realtime.law import saturated_rates
-from selfmotion.realtime.viable import tightened
+from selfmotion.realtime.law import saturated_rates, tightened
 from support.arms import PANDA_HOME
 
 # Segments meet in the same numbers, computed in the same way but for one shift of an index.

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from selfmotion.realtime.viable import braking_distance, fastest, viable_accelerations
+from selfmotion.realtime.law import braking_distance, fastest, viable_accelerations
 
 
 @pytest.mark.parametrize("seed", range(50))

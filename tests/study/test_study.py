@@ -14,7 +14,7 @@ import selfmotion as sm
 from selfmotion.costs.samples import Samples
 from selfmotion.motion import Sampling
 from selfmotion.study import Claim, Scale, Study, Verdict, run, write
-from selfmotion.study.engine import bind, optimum
+from selfmotion.study.context import bind, optimum
 from selfmotion.study.published import (
     PublishedFunction,
     flops_per_rate,

@@ -5,23 +5,20 @@ from collections.abc import Callable
 
 from selfmotion.study import (
     claims,
-    comparison,
     expense,
     questions,
-    surging,
     trajectory,
 )
-from selfmotion.study.context import Context
-from selfmotion.study.engine import Scale
+from selfmotion.study.context import Context, Scale
 from selfmotion.study.results import Chapter, Study
 
 _PARTS: dict[str, Callable[[Context], Chapter]] = {
     "sample trajectory": trajectory.chapter,
     "claims": claims.chapter,
-    "surging": surging.chapter,
+    "surging": questions.surging,
     "cost of the method": expense.chapter,
     "open questions": questions.chapter,
-    "other works": comparison.chapter,
+    "other works": claims.other_works,
 }
 
 # Part names in order, for a progress bar.
