@@ -8,7 +8,7 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.replay.links import bake
-from selfmotion.replay.payload import Payload
+from selfmotion.replay.meshes import Payload
 from selfmotion.robot.urdf_text import Packages
 from support.files_of_people import arm, described_package, with_arguments
 from support.shell import complaint, invoke
