@@ -8,7 +8,7 @@ import pytest
 from rich.console import Console
 
 import selfmotion as sm
-from selfmotion.cli.remedies import in_shell
+from selfmotion.cli.summaries import in_shell
 from selfmotion.cli.tables import show_certificate
 from support.shell import complaint, invoke
 

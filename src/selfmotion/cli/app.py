@@ -10,8 +10,8 @@ from rich.console import Console
 import selfmotion as sm
 from selfmotion.basics import version
 from selfmotion.cli import tables
-from selfmotion.cli.remedies import in_shell
-from selfmotion.cli.stage_display import StageDisplay
+from selfmotion.cli.display import StageDisplay
+from selfmotion.cli.summaries import in_shell
 
 # Under which commands are listed.
 PLAN, LOOK, FILES = "Plan", "Inspect plans", "Files"

@@ -14,7 +14,7 @@ from selfmotion.basics import read_document
 from selfmotion.cam import PATH_SUFFIXES, events_of, has_normals
 from selfmotion.cli import options
 from selfmotion.cli.app import plan_with_progress, stages
-from selfmotion.cli.stage_display import StageDisplay
+from selfmotion.cli.display import StageDisplay
 from selfmotion.documents import (
     grid_documents,
     job_of,
