@@ -35,49 +35,11 @@ from selfmotion.documents import example_texts, json_schema
     "; or: selfmotion plan cell.toml",
     rich_help_panel=PLAN,
 )
+@options.of_table(documents.Shell, after="problem")
 def plan(
     context: typer.Context,
     problem: options.ProblemArgument,
-    path: options.PathOption = None,
-    circle: options.CircleOption = None,
-    line: options.LineOption = None,
-    normal: options.NormalOption = None,
-    duration: options.DurationOption = None,
-    feed: options.FeedOption = None,
-    jump: options.JumpOption = None,
-    seam: options.SeamOption = None,
-    columns: options.ColumnsOption = None,
-    flip_normals: options.FlipOption = False,
-    standoff: options.StandoffOption = None,
-    rotary: options.RotaryOption = None,
-    rotary_axes: options.RotaryAxesOption = None,
-    rotary_center: options.RotaryCenterOption = None,
-    unit: options.UnitOption = None,
-    frame: options.FrameOption = None,
-    ramp: options.RampOption = None,
-    corners: options.CornersOption = None,
-    corner_tolerance: options.CornerToleranceOption = None,
-    task: options.PlannedTaskOption = None,
-    relax: options.RelaxOption = None,
-    start: options.StartOption = None,
     warm: options.FromOption = None,
-    tool: options.ToolOption = None,
-    reference: options.ReferenceOption = None,
-    lock: options.LockOption = None,
-    argument: options.ArgumentOption = None,
-    packages: options.PackagesOption = None,
-    degree: options.DegreeOption = None,
-    mu: options.MuOption = 0.0,
-    cost: options.CostOption = None,
-    velocity: options.VelocityOption = None,
-    acceleration: options.AccelerationOption = None,
-    joint_limits: options.JointLimitsOption = None,
-    closed: options.ClosedOption = False,
-    obstacles: options.ObstaclesOption = None,
-    clearance: options.ClearanceOption = 0.0,
-    srdf: options.SrdfOption = None,
-    no_collision: options.NoCollisionOption = False,
-    damped: options.DampedOption = False,
     settings: options.SetOption = None,
     max_evaluations: options.LimitOption = None,
     search: options.SearchOption = None,
@@ -147,7 +109,7 @@ def init(
         tool=tool,
         job=job,
         positioner=positioner,
-        lock=options.locks(lock or []),
+        lock=options.locks(lock),
         arguments=options.arguments(argument),
         packages=packages or (),
         clearance=not no_collision,
@@ -174,26 +136,11 @@ def schema(
     epilog="Example: selfmotion check motion.csv --robot panda --path seam.csv --acceleration 10",
     rich_help_panel=LOOK,
 )
+@options.of_table(documents.Shell, after="robot", names=("path", *documents.OF_PATH))
 def check(
     context: typer.Context,
     file: options.CheckedArgument,
     robot: options.RobotOption = None,
-    path: options.PathOption = None,
-    duration: options.DurationOption = None,
-    feed: options.FeedOption = None,
-    jump: options.JumpOption = None,
-    seam: options.SeamOption = None,
-    columns: options.ColumnsOption = None,
-    flip_normals: options.FlipOption = False,
-    standoff: options.StandoffOption = None,
-    rotary: options.RotaryOption = None,
-    rotary_axes: options.RotaryAxesOption = None,
-    rotary_center: options.RotaryCenterOption = None,
-    unit: options.UnitOption = None,
-    frame: options.FrameOption = None,
-    ramp: options.RampOption = None,
-    corners: options.CornersOption = None,
-    corner_tolerance: options.CornerToleranceOption = None,
     task: options.CheckedTaskOption = None,
     tool: options.ToolOption = None,
     reference: options.ReferenceOption = None,
@@ -215,8 +162,9 @@ def check(
     """Verify a motion by forward kinematics: a saved plan, or one made elsewhere."""
     judged = velocity, acceleration, joint_limits, obstacles, clearance, srdf
     within = None if tolerance is None else sm.Tolerance(tolerance, tolerance)
+    path = context.params["path"]
     typed = {"path": path, **{name: context.params[name] for name in documents.OF_PATH}}
-    typed["flip_normals"] = flip_normals or None
+    typed["flip_normals"] = typed["flip_normals"] or None
     own: dict[str, Any] = {name.replace("_", "-"): value for name, value in typed.items()}
     own |= {"task": task, "tool": tool, "reference": reference, "lock": lock or None}
     own |= {"argument": argument or None, "packages": packages or None}
@@ -250,7 +198,7 @@ def check(
                     f"{file}: a motion is checked against a robot and a path: give --robot and "
                     f"--path, or a problem file as --robot (a job's .program for its program)"
                 )
-            held = options.locks(lock or [])
+            held = options.locks(lock)
             arm = sm.load_robot(
                 robot,
                 tool=tool,
