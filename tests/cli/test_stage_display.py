@@ -6,7 +6,7 @@ import time
 import pytest
 from rich.console import Console
 
-from selfmotion.cli.display import StageDisplay
+from selfmotion.cli.app import StageDisplay
 
 
 @pytest.mark.parametrize("terminal", [True, False])
@@ -48,9 +48,9 @@ def test_long_stages_say_how_long_they_will_last(monkeypatch: pytest.MonkeyPatch
 
 def test_a_log_is_never_silent_for_long(monkeypatch: pytest.MonkeyPatch) -> None:
     """A stage that tells nothing while it lasts has its line all the same."""
-    monkeypatch.setattr("selfmotion.cli.display._SILENT", 0.05)
-    monkeypatch.setattr("selfmotion.cli.display._TICK", 0.01)
-    monkeypatch.setattr("selfmotion.cli.display._WORTH_SAYING", 0.0)
+    monkeypatch.setattr("selfmotion.cli.app._SILENT", 0.05)
+    monkeypatch.setattr("selfmotion.cli.app._TICK", 0.01)
+    monkeypatch.setattr("selfmotion.cli.app._WORTH_SAYING", 0.0)
     shown = io.StringIO()
     with StageDisplay(Console(force_terminal=False, width=100, file=shown)) as display:
         display.stage("refining", 1, 1)

@@ -18,13 +18,13 @@ from selfmotion.cli.app import (
     NOT_VERIFIED,
     PLAN,
     VERIFIED,
+    StageDisplay,
     app,
     fastest_with_progress,
     plan_with_progress,
     stages,
     terminal,
 )
-from selfmotion.cli.display import StageDisplay
 from selfmotion.documents import example_texts, json_schema
 
 # The commands around one plan: parse, call, print.

@@ -13,8 +13,7 @@ import selfmotion as sm
 from selfmotion.basics import read_document
 from selfmotion.cam import PATH_SUFFIXES, events_of, has_normals
 from selfmotion.cli import options
-from selfmotion.cli.app import plan_with_progress, stages
-from selfmotion.cli.display import StageDisplay
+from selfmotion.cli.app import StageDisplay, plan_with_progress, stages
 from selfmotion.documents import (
     grid_documents,
     job_of,

@@ -10,8 +10,7 @@ import typer
 import selfmotion as sm
 from selfmotion import controllers
 from selfmotion.cli import jobs, options, outputs
-from selfmotion.cli.app import FILES, NOT_VERIFIED, VERIFIED, app, stages, terminal
-from selfmotion.cli.display import StageDisplay
+from selfmotion.cli.app import FILES, NOT_VERIFIED, VERIFIED, StageDisplay, app, stages, terminal
 from selfmotion.controllers import FORMS
 from selfmotion.result import is_move
 

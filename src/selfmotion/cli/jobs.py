@@ -16,8 +16,18 @@ from selfmotion.cli import (
     summaries,
     tables,
 )
-from selfmotion.cli.app import NOT_VERIFIED, PLAN, VERIFIED, app, complain, stages, terminal
-from selfmotion.cli.display import StageDisplay, check_cluster, executor_at
+from selfmotion.cli.app import (
+    NOT_VERIFIED,
+    PLAN,
+    VERIFIED,
+    StageDisplay,
+    app,
+    check_cluster,
+    complain,
+    executor_at,
+    stages,
+    terminal,
+)
 
 PROGRAM, PARTS = ".program", ".parts"
 TIMETABLE = ".timetable.csv"

@@ -17,12 +17,12 @@ from selfmotion.cli.app import (
     NOT_VERIFIED,
     PLAN,
     VERIFIED,
+    StageDisplay,
     app,
     plan_with_progress,
     stages,
     terminal,
 )
-from selfmotion.cli.display import StageDisplay
 
 # The commands that say how wrong a cell may be.
 

@@ -20,13 +20,16 @@ from selfmotion.cli.app import (
     NOT_VERIFIED,
     PLAN,
     VERIFIED,
+    BatchDisplay,
+    StageDisplay,
     app,
+    check_cluster,
     complain,
+    executor_at,
     plan_with_progress,
     stages,
     terminal,
 )
-from selfmotion.cli.display import BatchDisplay, StageDisplay, check_cluster, executor_at
 from selfmotion.warm import Compiled, small_works
 
 if TYPE_CHECKING:

@@ -12,13 +12,11 @@ from selfmotion.basics import Array, FileFormatError, Progress, silent
 from selfmotion.certificate import Tolerance
 from selfmotion.constraints import Constraint
 from selfmotion.controllers.controller_program import ControllerProgram, Draft, Switch, drafted
-from selfmotion.controllers.krl import write_krl
-from selfmotion.controllers.krl_reader import KrlReader
+from selfmotion.controllers.krl import KrlReader, write_krl
 from selfmotion.controllers.program_lines import ProgramReader
 from selfmotion.controllers.program_settings import ProgramSettings
 from selfmotion.controllers.program_texts import plain
-from selfmotion.controllers.rapid import write_rapid
-from selfmotion.controllers.rapid_reader import RapidReader
+from selfmotion.controllers.rapid import RapidReader, write_rapid
 from selfmotion.controllers.read_stretches import SLOWLY
 from selfmotion.controllers.stretches import Misses, PoseStretch, Stretch
 from selfmotion.controllers.thinning import what_targets_keep
