@@ -293,10 +293,10 @@ def costs(problem: Problem, motion: Motion, grid: Grid) -> dict[str, float]:
     return {cost.name: float(samples.weights @ cost.value(samples)) for cost in problem.costs}
 
 
-def along_rate(problem: Problem, rate: Rate, message: str, *, evaluations: int = 1) -> Motion:
+def along_rate(problem: Problem, rate: Rate, message: str) -> Motion:
     """Return the motion that follows a velocity field q̇(t, q) from the problem's start."""
     run = integrate(problem, rate)
-    return Motion(run.at, message, evaluations, run.rates)
+    return Motion(run.at, message, 1, run.rates)
 
 
 def pseudo_inverse(problem: Problem) -> Motion:

@@ -9,7 +9,6 @@ from selfmotion.constraints.clearance import (
 from selfmotion.constraints.conditions import (
     ActiveConstraint as ActiveConstraint,
     BoundConstraint as BoundConstraint,
-    Linearised as Linearised,
     Multipliers as Multipliers,
     NodeTangents as NodeTangents,
     active_of as active_of,

@@ -1,7 +1,6 @@
 """What the arm follows: chains, their paths, and the rows of them that are prescribed."""
 
 from selfmotion.follow.augmented import (
-    AugmentedArm as AugmentedArm,
     AugmentedFollows as AugmentedFollows,
 )
 from selfmotion.follow.follow import (

@@ -125,9 +125,9 @@ def _copies(vertices: Array, faces: Indices, points: Array, rotations: Array | N
     return moved, indices
 
 
-def capsule_profile(radius: float, half_length: float, steps: int = 12) -> list[dict[str, float]]:
+def capsule_profile(radius: float, half_length: float) -> list[dict[str, float]]:
     """Return the outline of a capsule about the y axis, bottom to top, for a lathe."""
-    quarter = np.linspace(0.0, np.pi / 2, steps)
+    quarter = np.linspace(0.0, np.pi / 2, 12)
     x = radius * np.concatenate([np.sin(quarter), np.cos(quarter)])
     y = np.concatenate(
         [-half_length - radius * np.cos(quarter), half_length + radius * np.sin(quarter)]

@@ -34,8 +34,6 @@ from selfmotion.robot.full_model import mesh_digests as mesh_digests
 from selfmotion.robot.loading import load_robot as load_robot
 from selfmotion.robot.model import LIMITS as LIMITS, RobotModel as RobotModel
 from selfmotion.robot.mounting import (
-    CarriedBody as CarriedBody,
-    Mounting as Mounting,
     UrdfShape as UrdfShape,
     is_placement as is_placement,
     mounting_of as mounting_of,
@@ -51,8 +49,6 @@ from selfmotion.robot.placements import (
     placements as placements,
 )
 from selfmotion.robot.tree_arrays import (
-    Coupling as Coupling,
-    TreeArrays as TreeArrays,
     follower_of as follower_of,
 )
 from selfmotion.robot.urdf import (

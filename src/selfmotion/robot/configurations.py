@@ -167,6 +167,8 @@ def null_space_at(robot: RobotModel, q: Array, task: Task) -> Array:
 
 # What a solution may miss by, far below what a certificate accepts.
 _IK_TOLERANCE = 1e-10
+# Steps from one start at most.
+_IK_STEPS = 100
 
 
 def solved(
@@ -200,12 +202,12 @@ def solved(
 
 
 def _levenberg_marquardt(
-    robot: RobotModel, pose: pin.SE3, task: Task, start: Array, iterations: int = 100
+    robot: RobotModel, pose: pin.SE3, task: Task, start: Array
 ) -> tuple[Array, tuple[float, float]]:
     q, damping = np.clip(start, robot.lower, robot.upper), 1e-3
     actual = robot.pose(q)
     error = task.select(task.twist_error(pose, actual)[:, None], actual.rotation)[:, 0]
-    for _ in range(iterations):
+    for _ in range(_IK_STEPS):
         if np.linalg.norm(error) < 0.01 * _IK_TOLERANCE:
             break
         jacobian = robot.task_jacobian(q, task)

@@ -170,12 +170,10 @@ def finely(problem: Problem, x: Array) -> Result:
     return Result(terms, smallest, objective.rollout.grid.nodes, q, qd)
 
 
-def run_published(
-    problem: Problem, *, sigma: float = 0.1, max_iterations: int = 60
-) -> PublishedRun:
+def run_published(problem: Problem, *, max_iterations: int = 60) -> PublishedRun:
     """Optimise from x = 0 by the scheme as published."""
     function = PublishedFunction(problem)
-    optimizer = published_optimizer(sigma, max_iterations)
+    optimizer = published_optimizer(max_iterations)
     minimum = optimizer.minimize(function, np.zeros(function.size))
     return PublishedRun(problem, minimum, function.evaluations, function.jacobian_evaluations)
 

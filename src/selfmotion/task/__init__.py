@@ -7,13 +7,10 @@ from selfmotion.task.damping import (
 )
 from selfmotion.task.poses import (
     SE3 as SE3,
-    SMALL_TURN as SMALL_TURN,
     Jexp3 as Jexp3,
     Quaternion as Quaternion,
     as_pose as as_pose,
     exp3 as exp3,
-    left_derivative as left_derivative,
-    left_matrices as left_matrices,
     log3 as log3,
     rpy as rpy,
     skew as skew,
