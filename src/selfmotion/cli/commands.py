@@ -27,8 +27,6 @@ from selfmotion.cli.app import (
 )
 from selfmotion.documents import example_texts, json_schema
 
-# The commands around one plan: parse, call, print.
-
 
 @app.command(
     epilog="Example: selfmotion plan panda --circle 0.15 --duration 4 --out plan.npz --html a.html"

@@ -35,8 +35,6 @@ from selfmotion.warm import Compiled, small_works
 if TYPE_CHECKING:
     from selfmotion.batch import Item
 
-# Commands that plan many problems, or what is shown of the project itself.
-
 # Keys of problem files that are about a whole plan.
 _OF_PLANS = (
     *("null_motion", "rest", "goal", "keep", "parts", "search", "optimiser", "tolerance"),

@@ -24,8 +24,6 @@ from selfmotion.basics import (
 from selfmotion.robot import UrdfShape
 from selfmotion.task import SE3, as_pose
 
-# Obstacles: bodies of the world, or on a link. An own shape is a subclass of `Obstacle`.
-
 # An obstacle so large, or so far away [m], may be one in millimetres.
 _HUGE = 100.0
 # What every obstacle has besides the lengths of its shape.

@@ -41,8 +41,6 @@ from selfmotion.result import Move, Parts, Plan
 from selfmotion.robot import RobotModel
 from selfmotion.task import SE3
 
-# A joint motion as programs of robot controllers say it, whichever language they speak.
-
 
 class Switch(NamedTuple):
     """What a program does besides moving.

@@ -46,8 +46,6 @@ from selfmotion.motion import Trajectory
 from selfmotion.result import Move, Parts, Plan
 from selfmotion.robot import RobotModel
 
-# Joint motions as the files that controllers and simulators read.
-
 
 def write_motion(
     plan: Plan | Parts | Move | Program,

@@ -13,8 +13,6 @@ from selfmotion.basics import Array, ProblemError, Saved, as_number, as_numbers,
 from selfmotion.costs.samples import Samples
 from selfmotion.follow import Follows
 
-# What a cost is: an integrand G of samples, with its derivatives.
-
 # In place of an order of derivative: the pose error e, in the rows of the task.
 ERROR = -1
 

@@ -18,8 +18,6 @@ from selfmotion.motion import Trajectory, joined_motions
 from selfmotion.result import Move, Piece, Plan, another_tool, gaps, moving_end, reached_text
 from selfmotion.robot import RobotModel
 
-# A whole job as one motion: seams, moves between them, and what is known of all of it.
-
 # Events may be outside their step by rounding [s].
 _ROUNDING = 1e-9
 

@@ -1,4 +1,8 @@
-"""What a job plans: branches of seams and moves, here or in other processes, kept when finished."""
+"""What a job plans: branches of seams and moves, here or in other processes, kept when finished.
+
+Each piece of work depends on what it is asked alone, its random numbers too: so the same comes
+of it wherever it is done, and whenever.
+"""
 
 import tempfile
 import zlib
@@ -30,11 +34,6 @@ from selfmotion.problem import (
 from selfmotion.result import Made, Move, Plan, load_move, load_plan
 from selfmotion.robot import RobotModel
 from selfmotion.transfer import FreeMotions
-
-# What a job plans: branches of seams and moves, here or in other processes, kept when finished.
-#
-# Each piece of work depends on what it is asked alone, its random numbers too: so the same comes
-# of it wherever it is done, and whenever.
 
 # Clearances that are remembered: of a seam, and of the moves around it.
 _REMEMBERED = 8

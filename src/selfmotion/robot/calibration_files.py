@@ -12,8 +12,6 @@ import pinocchio as pin
 
 from selfmotion.basics import Array, RobotError, is_number, nearest, shown
 
-# Files that say how one arm differs from its drawing.
-
 # What Universal Robots' kinematics file has for each of its six frames, and their names.
 FRAMES = ("shoulder", "upper_arm", "forearm", "wrist_1", "wrist_2", "wrist_3")
 _COORDINATES = ("x", "y", "z", "roll", "pitch", "yaw")
