@@ -22,10 +22,12 @@ from selfmotion.basics import RobotError, is_file, is_folder, nearest
 # paths of the machine that wrote a file, and relative paths: all are looked up here, in this
 # order, the nearest first:
 #
-# 1. folders that are given (``packages=``, ``--packages``), and three levels below them 2. the
-# folders above the file: one of that name, or whose ``package.xml`` says so, or one beside it 3.
-# ``AMENT_PREFIX_PATH`` (``share/NAME``), and ``ROS_PACKAGE_PATH`` with three levels below 4.
-# three levels below the folders above the file, up to six of them, or to the root of a repository
+# 1. folders that are given (``packages=``, ``--packages``), and three levels below them
+# 2. the folders above the file: one of that name, or whose ``package.xml`` says so, or one
+#    beside it
+# 3. ``AMENT_PREFIX_PATH`` (``share/NAME``), and ``ROS_PACKAGE_PATH`` with three levels below
+# 4. three levels below the folders above the file, up to six of them, or to the root of a
+#    repository
 
 # How many levels below a folder are looked at, below how many folders above a file, and at how many
 # folders in all: a home is larger than any workspace.
@@ -101,7 +103,7 @@ class Packages:
         return tuple(found)
 
     def _places(self, name: str) -> Iterator[Path]:
-        """Yield the folders that have a package's name, in the order of the module's text."""
+        """Yield the folders that have a package's name, in the order at the head of the file."""
         for given in self.given:
             yield from _named(name, [Path(given)])
         for folder in self._above:
