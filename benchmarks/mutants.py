@@ -126,7 +126,7 @@ PARTS = (
         (
             "certificate/test_made_to_deceive.py",
             "certificate -k 'not default and not deception'",
-            "constraints/test_torque.py -k 'judged or whole_turns'",
+            "constraints/test_limits.py -k 'judged or whole_turns'",
             "whole/test_verdicts.py -k 'not threads'",
         ),
         own_first=True,

@@ -5,6 +5,7 @@ import pinocchio as pin
 import pytest
 
 import selfmotion as sm
+from selfmotion import realtime
 from selfmotion.realtime import Flag, MovingPose, Replanner
 from selfmotion.testing import check_path
 from support.arms import PANDA_HOME
@@ -96,3 +97,10 @@ def test_a_path_and_a_target_at_once_are_refused(panda: sm.RobotModel) -> None:
     ):
         with pytest.raises(sm.errors.ProblemError, match="give target= with them, and no path"):
             replanner.step(0.0, PANDA_HOME, np.zeros(7), **given)
+
+
+# A conveyed path is a path.
+
+
+def test_a_conveyed_path_is_a_path(panda: sm.RobotModel, slow_circle: sm.paths.Circle) -> None:
+    check_path(realtime.Conveyed(slow_circle, (0.1, 0.0, 0.02), (0.0, 0.3, 0.0)))
