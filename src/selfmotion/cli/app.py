@@ -7,7 +7,6 @@ import traceback
 from collections.abc import Iterator
 from concurrent.futures import Executor
 from contextlib import contextmanager
-from types import TracebackType
 from typing import TYPE_CHECKING, Annotated, Any, Self
 
 import typer
@@ -85,12 +84,7 @@ class Display:
         self._progress.start()
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *raised: object) -> None:
         """Leave the terminal as it was."""
         self._progress.stop()
 
@@ -124,15 +118,10 @@ class StageDisplay(Display):
             threading.Thread(target=self._keep_saying, daemon=True).start()
         return super().__enter__()
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *raised: object) -> None:
         """Leave the terminal as it was."""
         self._ended.set()
-        super().__exit__(kind, error, traceback)
+        super().__exit__(*raised)
 
     def stage(self, stage: str, done: int, total: int) -> None:
         """Show that number `done` of `total` in a stage has begun.
