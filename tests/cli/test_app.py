@@ -242,9 +242,11 @@ def test_long_stages_say_how_long_they_will_last(monkeypatch: pytest.MonkeyPatch
 
 def test_a_log_is_never_silent_for_long(monkeypatch: pytest.MonkeyPatch) -> None:
     """A stage that tells nothing while it lasts has its line all the same."""
-    monkeypatch.setattr("selfmotion.cli.app._SILENT", 0.05)
-    monkeypatch.setattr("selfmotion.cli.app._TICK", 0.01)
-    monkeypatch.setattr("selfmotion.cli.app._WORTH_SAYING", 0.0)
+    # By this name the package has the application.
+    module = sys.modules["selfmotion.cli.app"]
+    monkeypatch.setattr(module, "_SILENT", 0.05)
+    monkeypatch.setattr(module, "_TICK", 0.01)
+    monkeypatch.setattr(module, "_WORTH_SAYING", 0.0)
     shown = io.StringIO()
     with StageDisplay(Console(force_terminal=False, width=100, file=shown)) as display:
         display.stage("refining", 1, 1)
