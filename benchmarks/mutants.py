@@ -110,7 +110,7 @@ PARTS = (
         "objective",
         ("paper/objective.py", "paper/cost_integrals.py", "constraints/conditions.py"),
         (
-            "constraints/test_kept.py",
+            "constraints/test_conditions.py",
             "constraints/test_base.py -k 'equality or finite or rows'",
             "paper/test_objective.py -k 'metric or gradient_equals and (planar_3r or panda-pose)'",
         ),
