@@ -22,7 +22,7 @@ from rich.console import Console
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
 import selfmotion as sm
-from selfmotion.certificate.deviation import deviation_from, smallest_singular_values
+from selfmotion.certificate.path_error import deviation_from, smallest_singular_values
 from support.scenes import Scene, among_plates, carrying, near_limits, seams
 
 REPEATS = 9

@@ -183,7 +183,7 @@ def main() -> None:
                 elif way != "version":
                     WAYS[way](kept, rng)
                 said = "another" if way == "version" else sm.basics.version()
-                with mock.patch("selfmotion.result.kept.version", lambda said=said: said):
+                with mock.patch("selfmotion.result.archive.version", lambda said=said: said):
                     again = run(kept, mesh, shift)
                     once_more = run(kept, mesh, shift)
                 expected = run(fresh, mesh, shift)

@@ -108,9 +108,9 @@ PARTS = (
     ),
     Part(
         "objective",
-        ("paper/objective.py", "paper/cost_integrals.py", "constraints/kept.py"),
+        ("paper/objective.py", "paper/cost_integrals.py", "constraints/conditions.py"),
         (
-            "constraints/test_kept.py",
+            "constraints/test_conditions.py",
             "constraints/test_base.py -k 'equality or finite or rows'",
             "paper/test_objective.py -k 'metric or gradient_equals and (planar_3r or panda-pose)'",
         ),
@@ -126,7 +126,7 @@ PARTS = (
         (
             "certificate/test_made_to_deceive.py",
             "certificate -k 'not default and not deception'",
-            "constraints/test_torque.py -k 'judged or whole_turns'",
+            "constraints/test_limits.py -k 'judged or whole_turns'",
             "whole/test_verdicts.py -k 'not threads'",
         ),
         own_first=True,

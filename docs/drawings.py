@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 
 import selfmotion as sm
 from selfmotion.replay.motion import curves
-from selfmotion.study.engine import optimum
+from selfmotion.study.context import optimum
 from selfmotion.study.published import published_null_motion
 
 if TYPE_CHECKING:

@@ -5,7 +5,7 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 import selfmotion as sm
-from selfmotion.study.engine import optimum
+from selfmotion.study.context import optimum
 from selfmotion.study.published import published_null_motion
 
 searches = {

@@ -13,7 +13,7 @@ import selfmotion as sm
 from selfmotion import realtime
 from selfmotion.basics import FIRST_WORKS, Counts, compile_alone, read_only
 from selfmotion.collision.kernels import winding_number
-from selfmotion.job.exchange import improved
+from selfmotion.job.order import improved
 from selfmotion.job.stops import Stops
 from selfmotion.nodes import NodeGrid
 from selfmotion.task import SE3

@@ -60,3 +60,23 @@ def test_damping_costs_path_and_certificates_say_so() -> None:
     assert "off the path" in found.certificate.verdict
     far = sm.plan_by(sm.sample_problem(), sm.baselines.DampedLeastSquares(0.3, threshold=1e-6))
     assert far.certificate.verified
+
+
+# The extended Jacobian keeps the pose stationary, or breaks down by name.
+
+
+def test_extended_jacobian_keeps_the_pose_stationary(panda_circle: Circle) -> None:
+    problem = panda_circle("pose")
+    found = sm.plan_by(problem, sm.baselines.ExtendedJacobian())
+    assert found.certificate.verified
+    q = found.trajectory.q[-1]
+    null = np.linalg.svd(problem.robot.task_jacobian(q, problem.task))[2][6:]
+    slope = pose_gradient(problem, sm.costs.Manipulability(), 0.0, q)
+    start = pose_gradient(problem, sm.costs.Manipulability(), 0.0, problem.given_start)
+    assert np.abs(null @ slope).max() < 1e-6 * np.linalg.norm(start)
+
+
+def test_extended_jacobian_breaks_down_by_name() -> None:
+    with pytest.raises(sm.errors.BreakdownError, match=r"without bound|singular") as caught:
+        sm.plan_by(sm.sample_problem(), sm.baselines.ExtendedJacobian())
+    assert 0.0 < caught.value.time < 1.0

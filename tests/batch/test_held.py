@@ -9,10 +9,8 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.batch.folder import Folder
-from selfmotion.batch.held import is_made_for
-from selfmotion.batch.items import problem_items
-from selfmotion.batch.row import Row
+from selfmotion.batch.folder import Folder, is_made_for
+from selfmotion.batch.items import Row, problem_items
 from selfmotion.task import SE3
 from support.arms import robot_named
 

@@ -11,8 +11,7 @@ import selfmotion as sm
 from selfmotion.basics import Array
 from selfmotion.certificate import check
 from selfmotion.certificate.check import _because, _damped_stretches, _told, _undecided
-from selfmotion.certificate.deviation import smallest_singular_values
-from selfmotion.certificate.path_error import PathCheck
+from selfmotion.certificate.path_error import PathCheck, smallest_singular_values
 from selfmotion.task import DampingLaw
 from support.arms import PANDA_HOME, robot_named
 from support.motions import motion_of

@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from selfmotion import warm
-from selfmotion.cli import warm_up
+from selfmotion.cli import runs
 from support.shell import invoke
 
 
@@ -35,8 +35,8 @@ def test_each_work_is_done_and_what_was_compiled_is_said(
     names = [name for name, _ in warm.small_works()]
     assert len(set(names)) == len(names)
     works = [(name, lambda name=name: done.append(name)) for name in names]
-    monkeypatch.setattr(warm_up, "small_works", lambda: iter(works))
-    monkeypatch.setattr(warm_up, "companion", lambda _: other)
+    monkeypatch.setattr(runs, "small_works", lambda: iter(works))
+    monkeypatch.setattr(runs, "companion", lambda _: other)
     code, printed = invoke("warm-up")
     assert code == 0
     assert done == names

@@ -10,7 +10,7 @@ import pytest
 from selfmotion.basics.errors import CollisionError
 from selfmotion.collision import distances as module
 from selfmotion.collision.distances import HullDistances
-from selfmotion.collision.meshes import MeshDistances
+from selfmotion.collision.pair_distances import MeshDistances
 from selfmotion.collision.solids import Solid
 from selfmotion.robot import RobotModel
 from support.independent_distances import (

@@ -22,8 +22,8 @@ from selfmotion.collision import (
     obstacle_from_dict,
     obstacles as module,
 )
-from selfmotion.replay import obstacles as drawn_obstacles
-from selfmotion.replay.payload import Payload
+from selfmotion.replay import scene
+from selfmotion.replay.meshes import Payload
 from selfmotion.robot import load_robot
 
 POSE = pin.SE3(pin.rpy.rpyToMatrix(0.3, -0.2, 1.1), np.array([0.1, 0.2, 0.3]))
@@ -138,7 +138,7 @@ def test_an_own_shape_is_one_class(monkeypatch: pytest.MonkeyPatch) -> None:
     dot = np.array([ball.pairs.index(name) for name in names])
     # The cone's base is 0.25 m below its middle.
     assert first[hat].min() == pytest.approx(second[dot].min() - 0.25, abs=0.05)
-    drawn = drawn_obstacles.obstacle_commands("/plan", panda, [cone], Payload())
+    drawn = scene.obstacle_commands("/plan", panda, [cone], Payload())
     assert [command["path"] for command in drawn] == ["/plan/obstacles/hat/0"]
 
 

@@ -1,13 +1,19 @@
 """Limits of joints are kept between samples, or named where they cannot be."""
 
+import re
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.certificate import JointLimits
+from selfmotion import testing
+from selfmotion.certificate import FinishedMotion, JointLimits
+from selfmotion.robot import Dynamics
 from support.arms import robot_named, short_line
+from support.circles import upright_circle
+from support.files_of_people import finger
 
 Circle = Callable[..., sm.Problem]
 
@@ -103,3 +109,147 @@ def test_limits_that_nobody_knows_are_told_of() -> None:
     for quiet in ({"constraints": [sm.constraints.JointAccelerationLimits(5.0)]}, {}):
         usual = sm.Problem(robot, problem.path, "pointing", start, **quiet)
         assert not any("none are known" in text for text in usual.remarks)
+
+
+# Joint torques: kept, judged and refused.
+
+
+def test_the_constraint_keeps_the_laws(panda: sm.RobotModel) -> None:
+    testing.check_constraint(
+        sm.constraints.JointTorqueLimits(limit=20.0), upright_circle(panda, task="position")
+    )
+
+
+def test_torques_are_kept_and_judged_at_all_times(panda: sm.RobotModel, tmp_path) -> None:
+    free = sm.plan(upright_circle(panda, task="position"))
+    dynamics, t = Dynamics(panda, 3.0), np.linspace(0.0, 4.0, 20_001)
+    motion = free.trajectory
+    needed = np.abs(dynamics.torques(motion(t), motion(t, 1), motion(t, 2)))
+    asked = sm.constraints.JointTorqueLimits(panda.effort_limit, payload=3.0)
+    found = asked.requirement(panda).judge(_finished(free))
+    exact = float((needed / panda.effort_limit).max())
+    assert exact <= found.amount <= exact * (1.0 + 1e-4)
+    # Less than the free motion takes of the joint that is loaded most.
+    joint = int(np.argmax(needed.max(axis=0)))
+    limit = np.array(panda.effort_limit)
+    limit[joint] = 0.985 * needed[:, joint].max()
+    asked = sm.constraints.JointTorqueLimits(limit, payload=3.0)
+    constraints = [
+        sm.constraints.JointPositionLimits(),
+        sm.constraints.JointVelocityLimits(),
+        asked,
+    ]
+    plan = sm.plan(upright_circle(panda, task="position", constraints=constraints))
+    assert plan.certificate.verified, plan.certificate.verdict
+    assert "torques" in plan.certificate.covers
+    motion = plan.trajectory
+    kept = np.abs(dynamics.torques(motion(t), motion(t, 1), motion(t, 2)))
+    assert (kept / limit).max() <= 1.0
+    assert plan.report.cost > free.report.cost
+    plan.save(tmp_path / "plan.npz")
+    assert sm.load_plan(tmp_path / "plan.npz").certificate.verified
+
+
+def test_whole_turns_between_samples_hide_nothing(panda: sm.RobotModel) -> None:
+    # At a quarter, the half and three quarters of the way the arm stands upright each time.
+    upright = np.array([0.0, 0.0, 0.0, -0.1, 0.0, 0.1, 0.0])
+    turned = upright + 8.0 * np.pi * np.eye(7)[1]
+    speed = (turned - upright) / 100.0
+    at_ends = np.array([upright, turned]), np.array([speed, speed])
+    still = np.zeros((2, 7))
+    motion = sm.Trajectory(np.array([0.0, 100.0]), *at_ends, panda.joint_names, still)
+    dynamics, t = Dynamics(panda), np.linspace(0.0, 100.0, 4001)
+    needed = np.abs(dynamics.torques(motion(t), motion(t, 1), motion(t, 2))).max(axis=0)
+    assert needed[1] > 30.0
+    limit = np.full(7, 2.0 * needed.max())
+    assert (
+        sm.constraints.JointTorqueLimits(limit)
+        .requirement(panda)
+        .judge(FinishedMotion(panda, motion))
+        .satisfied
+    )
+    limit[1] = 0.5 * needed[1]
+    found = (
+        sm.constraints.JointTorqueLimits(limit)
+        .requirement(panda)
+        .judge(FinishedMotion(panda, motion))
+    )
+    assert (found.satisfied, found.subject) == (False, panda.joint_names[1])
+    assert found.amount == pytest.approx(2.0, rel=1e-3)
+    # Too long a way to be looked at is not kept either.
+    endless = sm.Trajectory(
+        motion.t, np.array([upright, upright + 1e6]), np.full((2, 7), 1e4), panda.joint_names, still
+    )
+    found = (
+        sm.constraints.JointTorqueLimits(limit)
+        .requirement(panda)
+        .judge(FinishedMotion(panda, endless))
+    )
+    assert not found.satisfied
+
+
+def test_a_payload_that_is_too_heavy_is_refused(panda: sm.RobotModel) -> None:
+    heavy = sm.constraints.JointTorqueLimits(payload=30.0)
+    plan = sm.plan(upright_circle(panda, constraints=[heavy]), max_evaluations=30)
+    assert not plan.certificate.verified
+    assert re.search(
+        r"torque of joint 'panda_joint\d' is \S+ Nm at t = \S+ s, \S+ times its limit of (12|87)",
+        plan.certificate.verdict,
+    )
+
+
+def _finished(plan: sm.Plan) -> FinishedMotion:
+    return FinishedMotion(plan.robot, plan.trajectory)
+
+
+def test_joints_that_mimic_keep_the_limits_of_whatever_turns_them(tmp_path: Path) -> None:
+    """One motor turns all of them, Cᵀτ, or each has its own, τ: no URDF says which."""
+    file = tmp_path / "finger.urdf"
+    file.write_text(finger('lower="-2" upper="2" velocity="2" effort="4"'))
+    robot = sm.load_robot(file, tool="tip")
+    quantity, asked = sm.constraints.JointTorqueLimits().quantity(robot), robot.dof + 2
+    assert [column.subject for column in quantity.columns[-2:]] == ["j3", "j4"]
+    np.testing.assert_array_equal(quantity.bounds, [5.0] * robot.dof + [5.0, 4.0])
+    rng = np.random.default_rng(1)
+    motion = rng.uniform(-1.0, 1.0, (3, 6, robot.dof))
+    found = quantity.values(*motion)
+    # The fourth joint goes the other way than the third, which moves both.
+    np.testing.assert_allclose(found[:, 2], found[:, -2] - found[:, -1], atol=1e-12)
+    for k, slopes in enumerate(quantity.derivatives(*motion)):
+        assert slopes.shape == (6, asked, robot.dof)
+        way, step = rng.normal(size=motion[k].shape), 1e-6 * (np.arange(3) == k)[:, None, None]
+        ends = [quantity.values(*(motion + sign * step * way)) for sign in (1.0, -1.0)]
+        by_steps = (ends[0] - ends[1]) / 2e-6
+        np.testing.assert_allclose(slopes @ way[..., None], by_steps[..., None], atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("effort", "said"),
+    [("9", None), ("2.5", "torque of joint 'j4' alone is"), ("0", None)],
+)
+def test_a_joint_that_mimics_is_judged_by_its_own_effort(
+    effort: str, said: str | None, tmp_path: Path
+) -> None:
+    file = tmp_path / "finger.urdf"
+    text = finger(f'lower="-2" upper="2" velocity="2" effort="{effort}"')
+    file.write_text(text.replace('velocity="2" effort="5"', 'velocity="2" effort="30"'))
+    robot = sm.load_robot(file, tool="tip")
+    # Stretched out: what hangs on the fourth joint is at its largest lever.
+    q = np.zeros((2, robot.dof))
+    motion = sm.Trajectory(np.array([0.0, 1.0]), q, q, robot.joint_names, q)
+    # Links 4 and 5 weigh 0.9 and 1 kg, at 0.2 and 0.1 + 0.25 m.
+    weight = 9.81 * (0.9 * 0.2 + 1.0 * 0.35)
+    found = (
+        sm.constraints.JointTorqueLimits().requirement(robot).judge(FinishedMotion(robot, motion))
+    )
+    assert found.satisfied is (said is None)
+    if said is not None:
+        assert (found.subject, said in found.text) == ("j4", True)
+        assert found.amount == pytest.approx(weight / 2.5, rel=1e-6)
+    # Limits of one's own are of what is asked of the joint that is mimicked.
+    own = (
+        sm.constraints.JointTorqueLimits(30.0)
+        .requirement(robot)
+        .judge(FinishedMotion(robot, motion))
+    )
+    assert own.satisfied

@@ -13,9 +13,9 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.controllers import judged_program, program_miss, read_program
-from selfmotion.controllers.circular import arc_through
 from selfmotion.controllers.feed_stretches import ZONE, FeedStretch, Ramps, times_at
-from selfmotion.controllers.program_axes import axes_of
+from selfmotion.controllers.program_settings import axes_of
+from selfmotion.controllers.steps import arc_through
 from selfmotion.task import SE3, exp3
 from support.arms import robot_named
 from support.industrial import industrial_arm

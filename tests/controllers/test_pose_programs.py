@@ -12,10 +12,8 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.controllers import judged_program, program_miss, read_program
-from selfmotion.controllers.arm_configurations import confdata, status_and_turn
-from selfmotion.controllers.pose_numbers import ROUNDINGS
-from selfmotion.controllers.program_axes import axes_of
-from selfmotion.controllers.tool_frames import ToolFrames
+from selfmotion.controllers.program_settings import axes_of
+from selfmotion.controllers.tool_frames import ROUNDINGS, ToolFrames, confdata, status_and_turn
 from selfmotion.task import SE3, Quaternion, exp3
 from support.arms import PANDA_HOME, robot_named
 from support.industrial import industrial_arm, two_seams

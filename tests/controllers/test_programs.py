@@ -14,8 +14,8 @@ from selfmotion.basics import Array
 from selfmotion.certificate import Separation
 from selfmotion.cli import exports
 from selfmotion.controllers import judged_program, program_miss
-from selfmotion.controllers.program_axes import axes_of, tool_from_flange
-from selfmotion.controllers.program_files import read_program
+from selfmotion.controllers.judged_programs import read_program
+from selfmotion.controllers.program_settings import axes_of, tool_from_flange
 from selfmotion.controllers.stretches import NO_MISS, ways
 from selfmotion.job import Step
 from support.arms import PANDA_HOME, robot_named

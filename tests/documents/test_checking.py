@@ -12,7 +12,7 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.basics import read_document
-from selfmotion.basics.nested_tables import ANGLES, LENGTHS, in_si
+from selfmotion.basics.tables import ANGLES, LENGTHS, in_si
 from selfmotion.documents import job_of
 from selfmotion.documents.schema import json_schema
 from selfmotion.robot import Coordinate

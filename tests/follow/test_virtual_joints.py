@@ -8,7 +8,7 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.basics import Array
-from selfmotion.certificate.deviation import deviation_from
+from selfmotion.certificate.path_error import deviation_from
 from selfmotion.constraints import NodeTangents
 from selfmotion.costs import Samples
 from selfmotion.follow import AugmentedFollows, Follows

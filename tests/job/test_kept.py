@@ -153,7 +153,7 @@ def test_another_version_plans_again(kept, tmp_path: Path, monkeypatch) -> None:
     folder, _ = kept
     shutil.copytree(folder, tmp_path, dirs_exist_ok=True)
     count = len(list(tmp_path.glob("*.json")))
-    monkeypatch.setattr("selfmotion.result.kept.version", lambda: "another")
+    monkeypatch.setattr("selfmotion.result.archive.version", lambda: "another")
     assert again(tmp_path).verified
     assert len(list(tmp_path.glob("*.json"))) > count
 

@@ -6,8 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from selfmotion.job.exchange import improved, lower_bound
-from selfmotion.job.order import best_round, exact
+from selfmotion.job.order import best_round, exact, improved, lower_bound
 from selfmotion.job.stops import Stops, along
 
 # Sums of a dozen costs in another order differ by this share.

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from selfmotion import kernels
-from selfmotion.kernels import backward, table
+from selfmotion.kernels import stages, table
 from support.compiled import compiled
 
 
@@ -17,7 +17,7 @@ def test_parts_tile_what_they_are_parts_of(n: int, m: int, tips: int) -> None:
     of_tips = [part for f in range(tips) for part in table.tip_of(row, f, n, m)]
     for numbers, parts in (
         (row, [*table.stage_of(row, n, m), *of_tips]),
-        (space, backward.space_of(space, n, m)),
+        (space, stages.space_of(space, n, m)),
     ):
         found = np.concatenate([part.ravel() for part in parts])
         np.testing.assert_array_equal(np.sort(found), numbers)

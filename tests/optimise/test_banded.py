@@ -6,7 +6,7 @@ from scipy.optimize import linprog
 from scipy.sparse import lil_array
 
 from selfmotion.optimise import BandedRows, banded_optimum
-from selfmotion.result.squares import basis
+from selfmotion.result.pace_rows import basis
 
 # The optimum is reached to this share.
 GAP = 1e-6

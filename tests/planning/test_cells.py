@@ -10,7 +10,7 @@ import pytest
 import selfmotion as sm
 from selfmotion.certificate import FinishedMotion
 from selfmotion.collision import CollisionModel
-from selfmotion.replay.facts import describe, facts
+from selfmotion.replay.whole import describe, facts
 from support.own_kinematics import Arm, along
 from support.random_cells import LEFT, RIGHT, random_cell, random_follows
 

@@ -8,8 +8,13 @@ import selfmotion as sm
 from selfmotion.basics import Array
 from selfmotion.basics.layout import layout_of
 from selfmotion.realtime import law
-from selfmotion.realtime.law import saturated_rates
-from selfmotion.realtime.viable import tightened
+from selfmotion.realtime.law import (
+    braking_distance,
+    fastest,
+    saturated_rates,
+    tightened,
+    viable_accelerations,
+)
 from support.arms import PANDA_HOME
 
 # Segments meet in the same numbers, computed in the same way but for one shift of an index.
@@ -120,3 +125,20 @@ def test_a_stop_from_any_viable_state_stays_within_limits() -> None:
         assert end < len(states) - 1
         assert np.all(states[end, 1:] == 0.0)
         assert beyond(limits, states[: end + 1]) <= 0.0
+
+
+# Commands that can always be stopped: how fast is viable.
+
+
+@pytest.mark.parametrize("seed", range(50))
+def test_the_fastest_rate_uses_all_the_room(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    room, most, h = 10.0 ** rng.uniform(-8, 1), rng.uniform(0.5, 20.0), 10.0 ** rng.uniform(-3, -2)
+    w = fastest(room, most, h)
+    # Rounding, where thousands of cycles are added up.
+    assert h * w + braking_distance(w, most, h) == pytest.approx(room, rel=1e-9)
+
+
+def test_a_box_without_any_acceleration_to_choose_is_no_trouble() -> None:
+    low, high = viable_accelerations(1.0, 0.0, -1.0, 1.0, 1.0, 5.0, 1e-3)
+    assert low <= high <= 0.0

@@ -16,13 +16,12 @@ import yourdfpy
 
 import selfmotion as sm
 from selfmotion.basics.errors import RobotError
-from selfmotion.replay import shapes
+from selfmotion.replay import three
 from selfmotion.replay.content import page_content
-from selfmotion.replay.facts import facts
 from selfmotion.replay.links import bake
-from selfmotion.replay.meshes import make_mesh, read_meshes
+from selfmotion.replay.meshes import Payload, face_codes, grid_codes, make_mesh, read_meshes
 from selfmotion.replay.motion import curves, key_frames
-from selfmotion.replay.payload import Payload, face_codes, grid_codes
+from selfmotion.replay.whole import facts
 from selfmotion.robot import NAMED_ARMS, load_robot
 from support.files_of_people import finger
 from support.replay_plans import arm_plan, planar_plan
@@ -57,7 +56,7 @@ def test_a_cube_is_split_at_its_edges():
 
 
 def test_a_smooth_surface_shares_its_vertices():
-    vertices, faces = shapes.tube(np.linspace([0, 0, 0], [1, 0, 0], 5), 0.1, sides=24)
+    vertices, faces = three.tube(np.linspace([0, 0, 0], [1, 0, 0], 5), 0.1, sides=24)
     soup = make_mesh(vertices[faces].reshape(-1, 3), np.arange(faces.size).reshape(-1, 3))
     assert len(soup.grid) == len(vertices)
 
@@ -213,7 +212,7 @@ def test_manipulability_is_the_root_of_the_determinant():
 def test_tube_keeps_its_radius():
     angle = np.linspace(0, 4, 60)
     line = np.stack([np.cos(angle), np.sin(angle), 0.2 * angle], axis=1)
-    vertices, faces = shapes.tube(line, 0.05, sides=8)
+    vertices, faces = three.tube(line, 0.05, sides=8)
     distance = np.linalg.norm(vertices.reshape(60, 8, 3) - line[:, None], axis=2)
     np.testing.assert_allclose(distance, 0.05, atol=1e-12)
     assert faces.max() == len(vertices) - 1
@@ -221,13 +220,13 @@ def test_tube_keeps_its_radius():
 
 def test_a_tube_follows_a_path_that_turns_back():
     there = np.linspace([0.0, 0, 0], [1.0, 0, 0], 11)
-    vertices, _ = shapes.tube(np.vstack([there, there[-2::-1]]), 0.05)
+    vertices, _ = three.tube(np.vstack([there, there[-2::-1]]), 0.05)
     assert np.all(np.isfinite(vertices))
     np.testing.assert_allclose(np.linalg.norm(vertices[:, 1:], axis=1), 0.05, atol=1e-12)
 
 
 def test_colors_span_the_scale():
-    colors = shapes.colors_of(np.array([-1.0, 0.0, 1.0, 2.0]), 0.0, 1.0)
+    colors = three.colors_of(np.array([-1.0, 0.0, 1.0, 2.0]), 0.0, 1.0)
     np.testing.assert_allclose(255 * colors[0], [0x44, 0x01, 0x54])
     np.testing.assert_array_equal(colors[0], colors[1])
     np.testing.assert_array_equal(colors[2], colors[3])

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.replay import replay_html, shapes
+from selfmotion.replay import replay_html, three
+from selfmotion.replay.meshes import Payload
 from selfmotion.replay.motion import curves
-from selfmotion.replay.payload import Payload
 from selfmotion.replay.whole import Whole
 from support.replay_plans import two_seams
 
@@ -45,13 +45,13 @@ def test_a_program_becomes_a_page_and_what_is_missing_none(program) -> None:
 
 
 def test_seams_are_drawn_thicker_than_moves(program, monkeypatch) -> None:
-    tube, drawn = shapes.tube, []
+    tube, drawn = three.tube, []
 
     def recorded(points, radius):
         drawn.append((radius, np.ptp(points, axis=0).max()))
         return tube(points, radius)
 
-    monkeypatch.setattr(shapes, "tube", recorded)
+    monkeypatch.setattr(three, "tube", recorded)
     replay_html(program)
     thick = max(radius for radius, _ in drawn)
     seams = [length for radius, length in drawn if radius == thick]

@@ -10,7 +10,7 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.replay.content import page_content
-from selfmotion.replay.payload import Payload
+from selfmotion.replay.meshes import Payload
 from selfmotion.robot import full_model as gate
 from selfmotion.robot.urdf import parse_urdf
 from support.arms import robot_named

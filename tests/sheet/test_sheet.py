@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.sheet import sections
+from selfmotion.sheet.page import sections
 from support.arms import robot_named
 from support.shell import complaint, invoke
 

@@ -14,7 +14,7 @@ import selfmotion as sm
 from selfmotion.costs.samples import Samples
 from selfmotion.motion import Sampling
 from selfmotion.study import Claim, Scale, Study, Verdict, run, write
-from selfmotion.study.engine import bind, optimum
+from selfmotion.study.context import bind, optimum
 from selfmotion.study.published import (
     PublishedFunction,
     flops_per_rate,
@@ -127,7 +127,7 @@ def test_verdicts_follow_the_numbers() -> None:
     pages = []
     for shown in (claim, turned):
         parts = (Chapter("s", "S", claims=(shown,)),)
-        from selfmotion.study.page import html
+        from selfmotion.study.run import html
 
         pages.append(html(Study(parts, 0.0, "test")))
     assert 'class="refuted"' in pages[0]

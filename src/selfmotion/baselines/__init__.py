@@ -1,11 +1,15 @@
 """Other works' ways to resolve redundancy, each usable as ``plan(problem, method=…)``."""
 
-from selfmotion.baselines.base import Method as Method, Motion as Motion, plan_by as plan_by
-from selfmotion.baselines.extended import ExtendedJacobian as ExtendedJacobian
-from selfmotion.baselines.integration import start_of as start_of
+from selfmotion.baselines.base import (
+    Method as Method,
+    Motion as Motion,
+    plan_by as plan_by,
+    start_of as start_of,
+)
 from selfmotion.baselines.lagrange import LagrangianOptimum as LagrangianOptimum
 from selfmotion.baselines.local import (
     DampedLeastSquares as DampedLeastSquares,
+    ExtendedJacobian as ExtendedJacobian,
     GradientProjection as GradientProjection,
     PseudoInverse as PseudoInverse,
 )

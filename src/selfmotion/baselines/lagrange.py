@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from selfmotion.baselines.base import Motion, pseudo_inverse
-from selfmotion.baselines.integration import start_of
+from selfmotion.baselines.base import Motion, pseudo_inverse, start_of
 from selfmotion.basics import Array, ProblemError
 from selfmotion.costs import Cost, JointVelocity, Samples, weight_matrix
 from selfmotion.motion import Sampling

@@ -2,19 +2,24 @@
 
 from selfmotion.basics import series as series
 from selfmotion.basics.arrays import (
+    TURN as TURN,
     Array as Array,
     Flags as Flags,
     Ints as Ints,
+    as_called as as_called,
+    as_choice as as_choice,
+    as_flag as as_flag,
+    as_number as as_number,
+    as_numbers as as_numbers,
+    as_several as as_several,
+    as_whole as as_whole,
+    check_executor as check_executor,
+    is_number as is_number,
     per_joint as per_joint,
     plain_numbers as plain_numbers,
+    random_numbers as random_numbers,
     read_only as read_only,
     shown as shown,
-)
-from selfmotion.basics.counts import Counts as Counts
-from selfmotion.basics.digests import (
-    digest_of as digest_of,
-    digest_of_file as digest_of_file,
-    version as version,
 )
 from selfmotion.basics.errors import (
     BreakdownError as BreakdownError,
@@ -31,38 +36,23 @@ from selfmotion.basics.errors import (
     RobotError as RobotError,
     SelfmotionError as SelfmotionError,
     StartError as StartError,
+    nearest as nearest,
 )
 from selfmotion.basics.files import (
     as_path as as_path,
+    digest_of as digest_of,
+    digest_of_file as digest_of_file,
     is_file as is_file,
     is_folder as is_folder,
     read_archive as read_archive,
     read_arrays as read_arrays,
     text_of as text_of,
+    version as version,
     write_archive as write_archive,
     write_atomically as write_atomically,
     write_bytes as write_bytes,
     write_csv as write_csv,
     write_text as write_text,
-)
-from selfmotion.basics.inputs import (
-    TURN as TURN,
-    as_called as as_called,
-    as_choice as as_choice,
-    as_flag as as_flag,
-    as_number as as_number,
-    as_numbers as as_numbers,
-    as_several as as_several,
-    as_whole as as_whole,
-    check_executor as check_executor,
-    is_number as is_number,
-    random_numbers as random_numbers,
-)
-from selfmotion.basics.interruption import (
-    held_interruption as held_interruption,
-    obey_interruption as obey_interruption,
-    obeying as obeying,
-    was_interrupted as was_interrupted,
 )
 from selfmotion.basics.jit import (
     ALL_WORKS as ALL_WORKS,
@@ -73,19 +63,16 @@ from selfmotion.basics.jit import (
     inlined as inlined,
     kernel as kernel,
 )
-from selfmotion.basics.names import nearest as nearest
-from selfmotion.basics.nested_tables import (
-    ANGLES as ANGLES,
-    FORMER_CLEARANCE as FORMER_CLEARANCE,
-    LENGTHS as LENGTHS,
-    PER_JOINT as PER_JOINT,
-    in_si as in_si,
-    is_share as is_share,
-    read_document as read_document,
-    read_values as read_values,
-    write_document as write_document,
+from selfmotion.basics.progress import (
+    Counts as Counts,
+    Progress as Progress,
+    held_interruption as held_interruption,
+    obey_interruption as obey_interruption,
+    obeying as obeying,
+    one_blas_thread as one_blas_thread,
+    silent as silent,
+    was_interrupted as was_interrupted,
 )
-from selfmotion.basics.progress import Progress as Progress, silent as silent
 from selfmotion.basics.saved import (
     Saved as Saved,
     description_of as description_of,
@@ -93,8 +80,16 @@ from selfmotion.basics.saved import (
     restore as restore,
 )
 from selfmotion.basics.tables import (
+    ANGLES as ANGLES,
+    FORMER_CLEARANCE as FORMER_CLEARANCE,
     LEFT_OUT as LEFT_OUT,
+    LENGTHS as LENGTHS,
+    PER_JOINT as PER_JOINT,
+    in_si as in_si,
+    is_share as is_share,
+    read_document as read_document,
     read_rows as read_rows,
     read_table as read_table,
+    read_values as read_values,
+    write_document as write_document,
 )
-from selfmotion.basics.threads import one_blas_thread as one_blas_thread

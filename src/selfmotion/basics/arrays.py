@@ -1,14 +1,18 @@
-"""The array type of the package, arrays that cannot be written to, and numbers per joint."""
+"""Arrays that cannot be written to, and what users give, made into them or refused."""
 
 from __future__ import annotations
 
 import reprlib
-from typing import Any
+from abc import ABCMeta
+from collections.abc import Callable
+from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
 from selfmotion.basics.errors import ProblemError
+
+# The array type of the package, arrays that cannot be written to, and numbers per joint.
 
 Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.intp]
@@ -71,3 +75,173 @@ def shown(value: Any) -> str:
     if isinstance(value, np.ndarray):
         return f"an array of shape {value.shape}" if value.size > 16 else str(value.tolist())
     return " ".join(_short.repr(value).split())
+
+
+# What users give, made into numbers, or refused in one sentence that says what was given.
+
+_Kind = TypeVar("_Kind")
+_Called = TypeVar("_Called", bound=Callable[..., Any])
+
+# A larger angle [rad] can only be meant in degrees.
+TURN = 2.0 * np.pi + 1e-6
+
+
+def as_numbers(
+    values: Any,
+    what: str,
+    expected: str = "finite numbers",
+    shape: tuple[int, ...] | None = None,
+    error: type[Exception] = ProblemError,
+) -> Array:
+    """Return `values` as finite numbers, read-only.
+
+    Parameters
+    ----------
+    values : array_like
+    what : str
+        What messages call them.
+    expected : str
+        What they should be, for messages.
+    shape : tuple of int, optional
+    error : type
+        What is raised.
+
+    Raises
+    ------
+    error
+        They are texts, booleans, ragged, of another shape, or one is not finite: it is named.
+    """
+    array = plain_numbers(values)
+    if array is None or (shape is not None and array.shape != shape):
+        found = "" if array is None or array.size <= 1 else f" of shape {array.shape}"
+        if array is None and is_ragged(values):
+            found = ", whose rows have different lengths"
+        raise error(f"{what} is {shown(values)}{found}, expected {expected}")
+    bad = np.argwhere(~np.isfinite(array))
+    if len(bad):
+        where = f"[{', '.join(map(str, bad[0]))}]" if array.ndim else ""
+        raise error(f"{what}{where} is {array[tuple(bad[0])]}, expected {expected}")
+    return read_only(array)
+
+
+def as_number(
+    value: Any,
+    what: str,
+    *,
+    above: float = -np.inf,
+    least: float = -np.inf,
+    most: float = 1e100,
+    error: type[Exception] = ProblemError,
+) -> float:
+    """Return `value` as a float that is > `above`, ≥ `least` and ≤ `most`.
+
+    Raises
+    ------
+    error
+        It is no such number; `what` is what the message calls it.
+    """
+    array = plain_numbers(value)
+    number = float(array) if array is not None and array.ndim == 0 else np.nan
+    # Written so that NaN is refused too.
+    if not (above < number <= most and number >= least):
+        asked = {f"> {above:g}": np.isfinite(above), f"≥ {least:g}": np.isfinite(least)}
+        asked[f"≤ {most:g}"] = np.isfinite(number) and number > most
+        bounds = [bound for bound, told in asked.items() if told]
+        kind = "number" if bounds and number != np.inf else "finite number"
+        expected = " ".join(["a", kind, " and ".join(bounds)]).strip()
+        raise error(f"{what} is {shown(value)}, expected {expected}")
+    return number
+
+
+def as_whole(
+    value: Any, what: str, least: int, most: int, error: type[Exception] = ProblemError
+) -> int:
+    """Return `value` as an int from `least` to `most`.
+
+    Raises
+    ------
+    error
+        It is no whole number, or out of these bounds.
+    """
+    whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
+    if not (whole and least <= value <= most):
+        bounds = f"≥ {least}" if not whole or value < least else f"from {least} to {most}"
+        raise error(f"{what} is {shown(value)}, expected a whole number {bounds}")
+    return int(value)
+
+
+def is_number(value: Any) -> bool:
+    """Whether a value of a document is a number; True and False are none."""
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def as_flag(value: Any, what: str, error: type[Exception] = ProblemError) -> bool:
+    """Return `value`, True or False; `error` otherwise, whose message calls it `what`."""
+    if not isinstance(value, bool | np.bool_):
+        raise error(f"{what} is {shown(value)}, expected True or False")
+    return bool(value)
+
+
+def as_called(value: _Called, what: str) -> _Called:
+    """Return `value`, which can be called; ProblemError otherwise, which calls it `what`."""
+    if not callable(value):
+        raise ProblemError(f"{what} is {shown(value)}, expected a function")
+    return value
+
+
+def check_executor(value: Any) -> None:
+    """Raise ProblemError for what is neither an executor nor None."""
+    if value is not None and not callable(getattr(value, "submit", None)):
+        raise ProblemError(
+            f"executor is {shown(value)}, expected one of concurrent.futures, or None"
+        )
+
+
+def as_choice(
+    value: Any, what: str, choices: tuple[str, ...], error: type[Exception] = ProblemError
+) -> str:
+    """Return `value`, one of `choices`.
+
+    Raises
+    ------
+    error
+        It is none of them.
+    """
+    if not (isinstance(value, str) and value in choices):
+        names = ", ".join(f"'{choice}'" for choice in choices)
+        raise error(f"{what} is {shown(value)}, expected one of: {names}")
+    return value
+
+
+def as_several(items: Any, name: str, kind: type[_Kind]) -> tuple[_Kind, ...]:
+    """Return one item or several of a kind as a tuple; ProblemError for anything else."""
+    listed = (items,) if isinstance(items, kind) else items
+    if not isinstance(listed, list | tuple):
+        raise ProblemError(f"{name} are {shown(items)}, expected a list of {name}")
+    for item in listed:
+        if not isinstance(item, kind):
+            remedy = (
+                f"is no {kind.__name__}; derive a class of your own from "
+                f"selfmotion.{kind.__name__}, which says what it has to give"
+                if isinstance(kind, ABCMeta)
+                else f"expected a {kind.__name__}"
+            )
+            parted = " " if isinstance(kind, ABCMeta) else ", "
+            raise ProblemError(f"{name}: {shown(item)}{parted}{remedy}")
+    return tuple(listed)
+
+
+def random_numbers(rng: Any) -> np.random.Generator:
+    """Return a generator of random numbers: itself, or one with that seed.
+
+    Raises
+    ------
+    ProblemError
+        It is neither a generator nor a seed.
+    """
+    try:
+        return np.random.default_rng(rng)
+    except (TypeError, ValueError):
+        raise ProblemError(
+            f"rng is {shown(rng)}, expected a whole number ≥ 0 or a numpy Generator"
+        ) from None

@@ -1,26 +1,39 @@
-"""The exceptions of the package; besides them, ValueError for a time, order or rate out of range.
-
-::
-
-    SelfmotionError
-    ├── RobotError                a URDF, frame, joint or configuration that cannot be used
-    ├── PathError                 a tool motion that is malformed or not followable as given
-    │   └── FeedError             a feed that no motion along the path has, whatever the arm
-    ├── ProblemError              robot, path, task and start do not fit together
-    │   ├── RedundancyError       no self-motion is left by the task
-    │   └── StartError            the start configuration is off the path
-    ├── InverseKinematicsError    no configuration found for a pose
-    ├── CollisionError            an obstacle, SRDF or geometry that cannot be checked
-    ├── BreakdownError            the motion runs into a singular pose
-    ├── NoSequenceError           no chain of configurations follows the path
-    ├── FileFormatError           a file that is not what it should be
-    ├── RenderError               no browser to draw a picture of a replay with
-    └── PlanError                 a plan without the quality asked for (`Plan.require`)
-
-Each message names the thing, what was found, what was expected and what to do about it.
-"""
+"""The exceptions of the package, and names that were probably meant."""
 
 import re
+from collections.abc import Iterable
+from difflib import get_close_matches
+
+# Names that were probably meant.
+
+
+def nearest(name: str, names: Iterable[str], alike: float = 0.5) -> str:
+    """Return "; nearest: 'a', 'b'" with the names that are like `name`, "" where none is."""
+    by_lower = {each.lower(): each for each in names}
+    near = get_close_matches(str(name).lower(), by_lower, cutoff=alike)
+    return f"; nearest: {', '.join(repr(by_lower[each]) for each in near)}" if near else ""
+
+
+# The exceptions of the package; besides them, ValueError for a time, order or rate out of range.
+#
+# ::
+#
+#     SelfmotionError
+#     ├── RobotError                a URDF, frame, joint or configuration that cannot be used
+#     ├── PathError                 a tool motion that is malformed or not followable as given
+#     │   └── FeedError             a feed that no motion along the path has, whatever the arm
+#     ├── ProblemError              robot, path, task and start do not fit together
+#     │   ├── RedundancyError       no self-motion is left by the task
+#     │   └── StartError            the start configuration is off the path
+#     ├── InverseKinematicsError    no configuration found for a pose
+#     ├── CollisionError            an obstacle, SRDF or geometry that cannot be checked
+#     ├── BreakdownError            the motion runs into a singular pose
+#     ├── NoSequenceError           no chain of configurations follows the path
+#     ├── FileFormatError           a file that is not what it should be
+#     ├── RenderError               no browser to draw a picture of a replay with
+#     └── PlanError                 a plan without the quality asked for (`Plan.require`)
+#
+# Each message names the thing, what was found, what was expected and what to do about it.
 
 # Words and messages that are longer come from damaged files; of them the ends are shown.
 _WORD, _MESSAGE = 120, 1500

@@ -1,12 +1,16 @@
-"""Archives and tables on disk: written atomically, read with errors that name the place."""
+"""Files written atomically and read with errors that name the place, and digests of values."""
 
 import codecs
+import hashlib
 import json
+import marshal
 import math
 import os
 import tempfile
 import zipfile
 from collections.abc import Callable, Mapping, Sequence
+from functools import cache
+from importlib import metadata
 from pathlib import Path
 from typing import IO, Any
 
@@ -14,6 +18,8 @@ import numpy as np
 
 from selfmotion.basics.arrays import Array, shown
 from selfmotion.basics.errors import FileFormatError
+
+# Archives and tables on disk: written atomically, read with errors that name the place.
 
 _DESCRIPTION = "description"
 # Files that hold several plans.
@@ -199,3 +205,47 @@ def as_path(file: Any) -> Path:
     if not isinstance(file, str | Path):
         raise FileFormatError(f"file is {shown(file)}, expected the path of a file")
     return Path(file)
+
+
+# What tells values apart, and the version of the package that made them.
+
+# Of the format of marshal: the last one that writes equal values as equal bytes.
+_PLAIN = 2
+
+
+def digest_of(*values: Any) -> str:
+    """Return a digest of numbers, texts, arrays, and lists and mappings of them: 64 characters.
+
+    Equal values have equal digests, to the last bit of each number.
+    """
+    found = hashlib.sha256()
+    for value in values:
+        found.update(marshal.dumps(_plain(value), _PLAIN))
+    return found.hexdigest()
+
+
+def digest_of_file(file: Path) -> str:
+    """Return the SHA-256 of a file; "" for one that is missing."""
+    return hashlib.sha256(file.read_bytes()).hexdigest() if is_file(file) else ""
+
+
+def _plain(value: Any) -> Any:
+    """Return a value in which everything equal is written alike."""
+    if isinstance(value, np.ndarray):
+        return str(value.dtype), value.shape, np.ascontiguousarray(value).tobytes()
+    if isinstance(value, np.generic):
+        return value.item()
+    if isinstance(value, Mapping):
+        return tuple((str(key), _plain(value[key])) for key in sorted(value, key=str))
+    if isinstance(value, list | tuple):
+        # Long lists are of numbers: looking at each would take longer than all the rest.
+        if all(type(item) is float for item in value):
+            return tuple(value)
+        return tuple(_plain(item) for item in value)
+    return value
+
+
+@cache
+def version() -> str:
+    """Return the version of the package."""
+    return metadata.version("selfmotion")

@@ -1,8 +1,7 @@
 """Many problems at once: on the cores of this machine, or on a cluster."""
 
-from selfmotion.batch.items import Item as Item, grid_items as grid_items
+from selfmotion.batch.items import Item as Item, Row as Row, grid_items as grid_items
 from selfmotion.batch.maps import labels as labels, maps as maps
-from selfmotion.batch.row import Row as Row
 from selfmotion.batch.run import (
     Batch as Batch,
     BatchProgress as BatchProgress,

@@ -8,9 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from selfmotion.basics import Array
-from selfmotion.cam.arcs import arc_points
-from selfmotion.cam.cuts import Machine, unit_axis
-from selfmotion.cam.holes import Pecks, drill
+from selfmotion.cam.cuts import Machine, Pecks, arc_points, drill, unit_axis
 from selfmotion.cam.path_rows import PoseRows
 
 # Suffixes of files of cutter locations: of APT, CATIA, NX and Creo.

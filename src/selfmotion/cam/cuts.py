@@ -1,14 +1,17 @@
-"""What programs of machine tools do: cuts at a feed, and rapids in between."""
+"""What programs of machine tools do: cuts at a feed, rapids in between, arcs and holes."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path as FilePath
+from typing import NamedTuple
 
 import numpy as np
 
 from selfmotion.basics import Array, FileFormatError, text_of
 from selfmotion.cam.path_rows import PoseRows
 from selfmotion.path import from_normal
+
+# What programs of machine tools do: cuts at a feed, and rapids in between.
 
 # A file of a machine tool has less than so many bytes, a cut less than so many poses; nothing is
 # farther away than this [m].
@@ -215,3 +218,192 @@ def unit_axis(values: Sequence[float], machine: Machine) -> Array:
     if not 1e-6 < length < 1e6:
         raise machine.fault(f"tool axis {axis.tolist()} has no direction")
     return axis / length
+
+
+# Arcs of machines as points: circles about an axis, and helices along it.
+
+# Chords of arcs are off by this at most [m].
+_CHORD = 1e-5
+# Both ends of an arc are as far from its centre, and no farther apart than its circle is wide, but
+# for this [m].
+_ROUND = 2e-4
+# Arcs of a larger radius [m] are a fault of what wrote them, and so are more chords.
+_LARGEST, _POINTS = 1e5, 100_000
+
+
+def arc_points(
+    machine: Machine, start: Array, goal: Array, center: Array, axis: Array, more_turns: int = 0
+) -> Array:
+    """Return points (K, 3) of an arc, its end the last one.
+
+    It goes right-handed about an axis through the centre, and evenly along it; where both ends are
+    in one direction it is a whole turn.
+
+    Parameters
+    ----------
+    machine : Machine
+        Whose line is read.
+    start, goal, center, axis : (3,)
+    more_turns : int
+        Whole turns besides.
+
+    Raises
+    ------
+    FileFormatError
+        The ends are not as far from the axis as each other, or the arc is too large.
+    """
+    if np.isnan(start).any() or np.isnan(goal).any():
+        raise machine.fault(
+            "an arc begins where X, Y or Z is not known yet: give X, Y and Z in a rapid before"
+        )
+    axis = axis / np.linalg.norm(axis)
+    heights = (start - center) @ axis, (goal - center) @ axis
+    arms = start - center - heights[0] * axis, goal - center - heights[1] * axis
+    radius, other = (float(np.linalg.norm(arm)) for arm in arms)
+    if radius < _SAME or abs(radius - other) > _ROUND:
+        raise machine.fault(
+            f"the arc begins {1e3 * radius:.4g} mm from its centre and ends "
+            f"{1e3 * other:.4g} mm from it"
+        )
+    if radius > _LARGEST:
+        raise machine.fault(f"the arc has a radius of {radius:.4g} m")
+    x = arms[0] / radius
+    y = np.cross(axis, x)
+    turn = float(np.arctan2(arms[1] @ y, arms[1] @ x)) % (2.0 * np.pi)
+    if turn < 1e-9:
+        turn = 2.0 * np.pi
+    turn += 2.0 * np.pi * more_turns
+    count = max(2, int(np.ceil(turn / (2.0 * np.arccos(max(0.0, 1.0 - _CHORD / radius))))))
+    if count > _POINTS:
+        raise machine.fault(f"the arc takes {count} chords, expected {_POINTS} at most")
+    share = np.arange(1, count + 1)[:, None] / count
+    angle, radii = turn * share, radius + (other - radius) * share
+    found = center + radii * (np.cos(angle) * x + np.sin(angle) * y)
+    found = found + (heights[0] + (heights[1] - heights[0]) * share) * axis
+    found[-1] = goal
+    return np.asarray(found)
+
+
+def center_by_radius(
+    machine: Machine, start: Array, goal: Array, radius: float, sense: float
+) -> Array:
+    """Return the centre (2,) of an arc in its plane.
+
+    Parameters
+    ----------
+    machine : Machine
+        Whose line is read.
+    start, goal : (2,)
+    radius : float
+        [m]; below 0 for an arc of more than half a turn.
+    sense : float
+        1 for an arc that goes right-handed, -1 for one that does not.
+
+    Raises
+    ------
+    FileFormatError
+        No such arc joins the ends.
+    """
+    chord = goal - start
+    length = float(np.linalg.norm(chord))
+    if length < _SAME or length > 2.0 * abs(radius) + _ROUND:
+        raise machine.fault(
+            f"no arc of radius {1e3 * radius:.4g} mm joins points {1e3 * length:.4g} mm apart"
+        )
+    height = np.sqrt(max(0.0, radius**2 - 0.25 * length**2))
+    side = sense if radius > 0.0 else -sense
+    normal = np.array([-chord[1], chord[0]]) / length
+    return np.asarray(start + 0.5 * chord + side * height * normal)
+
+
+# Holes that cycles of machines drill: down at the feed, and straight out again.
+
+# How fast the tool goes where it is in a hole that is there already [m/s], unless it cuts faster;
+# and how far it stays off the bottom then, or comes back to break chips [m].
+OUT = 0.05
+_OFF = 5e-4
+_PECKS = 10_000
+
+
+class Pecks(NamedTuple):
+    """How a deep hole is drilled: so far at once [m], and out in between, or only a little back."""
+
+    first: float
+    others: float
+    is_out: bool
+
+
+def drill(
+    machine: Machine,
+    above: Array,
+    bottom: Array,
+    axis: Array,
+    *,
+    pecks: Pecks | None = None,
+    dwell: str = "",
+    feeds_out: bool = False,
+) -> None:
+    """Drill a hole, which is a cut of its own: from a place above it to its bottom and back.
+
+    Parameters
+    ----------
+    machine : Machine
+        Whose line is read; its feed is that of the cut.
+    above, bottom : (3,)
+        Where the feed begins, and the bottom [m].
+    axis : (3,)
+        From the bottom to above it.
+    pecks : Pecks, optional
+    dwell : str
+        What happens at the bottom, if anything.
+    feeds_out : bool
+        Whether it comes out at the feed, not faster.
+
+    Raises
+    ------
+    FileFormatError
+        The hole has no depth, or needs too many pecks.
+    """
+    depth = float((above - bottom) @ axis)
+    if not depth > 0.0:
+        raise machine.fault(
+            f"the hole ends {-1e3 * depth:.4g} mm above where it begins, expected a depth"
+        )
+    machine.rapid(above, axis)
+    feed = machine.feed
+    out = feed if feeds_out or feed == 0.0 else max(feed, OUT)
+    done = 0.0
+    for reached in _depths(machine, depth, pecks):
+        if done > 0.0 and pecks is not None and pecks.is_out:
+            _go(machine, above, axis, out)
+            _go(machine, above - max(0.0, done - _OFF) * axis, axis, out)
+        elif done > 0.0:
+            _go(machine, above - max(0.0, done - _OFF) * axis, axis, feed)
+        _go(machine, above - reached * axis, axis, feed)
+        done = reached
+    if dwell:
+        machine.happens(dwell)
+    _go(machine, above, axis, out)
+    # What follows is no part of the hole.
+    machine.rapid(above, axis)
+
+
+def _depths(machine: Machine, depth: float, pecks: Pecks | None) -> list[float]:
+    """Return how deep it is after each peck."""
+    if pecks is None:
+        return [depth]
+    if not min(pecks.first, pecks.others) > 0.0 or depth / pecks.others > _PECKS:
+        raise machine.fault(
+            f"drills by {1e3 * pecks.others:.4g} mm at once, expected a step above 0 (Q, STEP)"
+        )
+    found, here = list[float](), pecks.first
+    while here < depth:
+        found.append(here)
+        here += pecks.others
+    return [*found, depth]
+
+
+def _go(machine: Machine, place: Array, axis: Array, feed: float) -> None:
+    cutting, machine.feed = machine.feed, feed
+    machine.cut(place, axis)
+    machine.feed = cutting

@@ -10,10 +10,18 @@ from pathlib import Path as FilePath
 import numpy as np
 
 from selfmotion.basics import Array
-from selfmotion.cam.arcs import arc_points, center_by_radius
-from selfmotion.cam.cuts import PRIME, RETRACT, STOPS, Machine, unit_axis
+from selfmotion.cam.cuts import (
+    PRIME,
+    RETRACT,
+    STOPS,
+    Machine,
+    Pecks,
+    arc_points,
+    center_by_radius,
+    drill,
+    unit_axis,
+)
 from selfmotion.cam.gcode_words import bare_line, extrudes, lifts, values_of, words_of
-from selfmotion.cam.holes import Pecks, drill
 from selfmotion.cam.path_rows import PoseRows, Reading
 from selfmotion.cam.rotary import HEAD, Rotary
 

@@ -1,14 +1,24 @@
-"""Tool motions from files: tables, arrays, what ROS writes, programs of machine tools, drawings."""
+"""Tool motions from files: tables, arrays, lists of poses, programs of machine tools, drawings."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path as FilePath
 from typing import Any
 
+import numpy as np
 import numpy.typing as npt
 
-from selfmotion.basics import FileFormatError, as_flag, as_number, as_path
+from selfmotion.basics import (
+    FileFormatError,
+    as_flag,
+    as_number,
+    as_path,
+    is_number,
+    read_values,
+    shown,
+)
 from selfmotion.cam.cldata import CLDATA, read_cldata
 from selfmotion.cam.drawing import read_drawing
 from selfmotion.cam.gcode import read_gcode
@@ -21,10 +31,153 @@ from selfmotion.cam.path_rows import (
     TABLES,
     PoseRows,
     Reading,
+    named,
     no_such_seam,
+    rows_of_table,
 )
-from selfmotion.cam.pose_lists import READ
 from selfmotion.path import Path
+
+# Poses as configurations of robots hold them: lists and names, of tables or matrices.
+
+# What lists of poses are called, and what parameters of ROS 2 nodes are in.
+_LISTS = ("poses", "waypoints", "points", "frames", "targets", "path")
+_PARAMETERS = "ros__parameters"
+# So many tables are around the poses at most.
+_DEEPEST = 5
+# Numbers in a list → what they are called; of quaternions the order is not known.
+_QUATERNIONS, _ANGLES = ("orientation", "quaternion", "quat"), ("rpy", "euler")
+_ORDERS = {
+    **dict.fromkeys(("position", "pos", "translation", "xyz"), ("x", "y", "z")),
+    **dict.fromkeys(_ANGLES, ("roll", "pitch", "yaw")),
+}
+_TABLES = ("position", "pos", "translation", *_QUATERNIONS, *_ANGLES)
+_WRITTEN = (".yaml", ".yml", ".json")
+
+
+def read_poses(file: FilePath, reading: Reading) -> Mapping[str, PoseRows]:
+    """Return the poses of a message of ROS, or of a list or table of poses; see `read_path`.
+
+    Raises
+    ------
+    FileFormatError
+        The file cannot be read, holds no poses, or a pose lacks something; it is named.
+    """
+    found = _poses_in(read_values(file))
+    if found is None:
+        return READERS[file.suffix.lower()](file, reading)
+    places, items = [place for place, _ in found], [item for _, item in found]
+    if all(_is_matrix(item) for item in items):
+        matrices = np.array([[[_number(file, place, value) for value in row] for row in item]
+                             for place, item in found])  # fmt: skip
+        rows = PoseRows(places, matrices[:, :3, 3], "rotation", matrices[:, :3, :3], None)
+        return {"": rows}
+    flat = [dict(_numbers_of(file, place, item)) for place, item in found]
+    for place, row in zip(places, flat, strict=True):
+        if set(row) != set(flat[0]):
+            odd = sorted(set(row) ^ set(flat[0]))[0]
+            raise FileFormatError(
+                f"{file}: {place}: '{odd}' is in some poses only, expected the same of all"
+            )
+    header = list(flat[0])
+    table = np.array([[row[name] for name in header] for row in flat])
+    return {"": replace(rows_of_table(file, header, table, range(len(flat)), {}), places=places)}
+
+
+READ: Mapping[str, Callable[[FilePath, Reading], Mapping[str, PoseRows]]] = dict.fromkeys(
+    _WRITTEN, read_poses
+)
+
+
+def _poses_in(document: Any) -> list[tuple[str, Any]] | None:
+    """Return poses by what they are called, None where they are messages or there are none."""
+    inner, key = document, ""
+    for _ in range(_DEEPEST):
+        if not isinstance(inner, Mapping) or "header" in inner or _are_poses(inner.values()):
+            break
+        keys = [name for name in (_PARAMETERS, *_LISTS) if isinstance(inner.get(name), dict | list)]
+        keys = keys or (list(inner) if len(inner) == 1 else [])
+        if not keys:
+            break
+        key, inner = str(keys[0]), inner[keys[0]]
+    if isinstance(inner, Mapping) and _are_poses(inner.values()):
+        return [(f"'{name}'", item) for name, item in inner.items()]
+    is_message = key in ("", "poses") and isinstance(inner, list) and all(map(_is_of_ros, inner))
+    if isinstance(inner, list) and _are_poses(inner) and not is_message:
+        return [(f"{key}[{k}]", item) for k, item in enumerate(inner)]
+    return None
+
+
+def _are_poses(items: Any) -> bool:
+    several = list(items)
+    return bool(several) and all(_is_pose(item) for item in several)
+
+
+def _is_pose(item: Any) -> bool:
+    if not isinstance(item, Mapping):
+        return _is_matrix(item)
+    inner = item.get("pose", item)
+    has_place = isinstance(inner, Mapping) and bool({*_ORDERS, "x", "x_mm"} & set(inner))
+    return has_place and "poses" not in item
+
+
+def _is_of_ros(item: Any) -> bool:
+    """Whether an item is a Pose or PoseStamped, which messages have lists of."""
+    inner = item.get("pose", item) if isinstance(item, Mapping) else None
+    return isinstance(inner, Mapping) and isinstance(inner.get("position"), Mapping)
+
+
+def _is_matrix(item: Any) -> bool:
+    rows = item if isinstance(item, list) and len(item) == 4 else []
+    return bool(rows) and all(
+        isinstance(row, list) and len(row) == 4 and all(map(is_number, row)) for row in rows
+    )
+
+
+def _numbers_of(file: FilePath, place: str, item: Mapping[str, Any]) -> Iterator[tuple[str, float]]:
+    """Yield the numbers of a pose by what columns of a table are called.
+
+    Texts are passed over, and tables of anything else, such as joints; of two orientations the
+    quaternion is taken.
+    """
+    turned = any(key in item for key in _QUATERNIONS)
+    for key, value in item.items():
+        if key == "pose" and isinstance(value, Mapping):
+            yield from _numbers_of(file, place, value)
+        elif turned and key in _ANGLES:
+            continue
+        elif isinstance(value, Mapping):
+            stem = "" if key in _ANGLES else f"{key}."
+            for name, number in value.items() if key in _TABLES else ():
+                yield named(f"{stem}{name}"), _number(file, f"{place}: {key}.{name}", number)
+        elif isinstance(value, list):
+            yield from _listed(file, f"{place}: {key}", str(key), value)
+        elif is_number(value):
+            yield named(str(key)), _number(file, f"{place}: {key}", value)
+
+
+def _listed(
+    file: FilePath, where: str, key: str, value: Sequence[Any]
+) -> Iterator[tuple[str, float]]:
+    names = _ORDERS.get(key)
+    if names is None or len(value) != len(names):
+        raise FileFormatError(
+            f"{file}: {where} is a list of {len(value)}, whose order is not known; expected "
+            f"numbers by name, such as x, y, z and qw, qx, qy, qz, or lists of 3: position, rpy"
+        )
+    for name, number in zip(names, value, strict=True):
+        yield name, _number(file, f"{where}.{name}", number)
+
+
+def _number(file: FilePath, where: str, value: Any) -> float:
+    try:
+        if is_number(value):
+            return float(value)
+    except OverflowError:
+        pass
+    raise FileFormatError(f"{file}: {where} is {shown(value)}, expected a number")
+
+
+# Tool motions from files: tables, arrays, what ROS writes, programs of machine tools, drawings.
 
 _READERS: Mapping[str, Callable[[FilePath, Reading], Mapping[str, PoseRows]]] = {
     **READERS,

@@ -2,23 +2,14 @@
 
 from selfmotion.certificate.bounding import Bounded as Bounded, Stretch as Stretch
 from selfmotion.certificate.check import certify as certify
-from selfmotion.certificate.ends import (
+from selfmotion.certificate.limits import (
     ARRIVED as ARRIVED,
+    LIMIT_NAMES as LIMIT_NAMES,
     QUANTITIES as QUANTITIES,
     STILL_ACCELERATION as STILL_ACCELERATION,
     AtRest as AtRest,
     ClosedMotion as ClosedMotion,
     EndState as EndState,
-)
-from selfmotion.certificate.findings import (
-    USUAL as USUAL,
-    DampedStretch as DampedStretch,
-    Extreme as Extreme,
-    Finding as Finding,
-    Tolerance as Tolerance,
-)
-from selfmotion.certificate.limits import (
-    LIMIT_NAMES as LIMIT_NAMES,
     JointLimits as JointLimits,
     arm_limits as arm_limits,
 )
@@ -30,8 +21,13 @@ from selfmotion.certificate.quantity import (
     Shares as Shares,
 )
 from selfmotion.certificate.requirement import (
+    USUAL as USUAL,
+    DampedStretch as DampedStretch,
+    Extreme as Extreme,
+    Finding as Finding,
     FinishedMotion as FinishedMotion,
     Requirement as Requirement,
+    Tolerance as Tolerance,
     approaches as approaches,
     covered_by as covered_by,
 )

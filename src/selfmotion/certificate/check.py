@@ -16,12 +16,18 @@ from selfmotion.basics import (
     silent,
     version,
 )
-from selfmotion.certificate.deviation import smallest_singular_values
 from selfmotion.certificate.feed import FeedReached, possible_feeds
-from selfmotion.certificate.findings import DampedStretch, Extreme, Finding, Tolerance
 from selfmotion.certificate.limits import arm_limits
-from selfmotion.certificate.path_error import PathCheck, bound_errors
-from selfmotion.certificate.requirement import FinishedMotion, Requirement, covered_by
+from selfmotion.certificate.path_error import PathCheck, bound_errors, smallest_singular_values
+from selfmotion.certificate.requirement import (
+    DampedStretch,
+    Extreme,
+    Finding,
+    FinishedMotion,
+    Requirement,
+    Tolerance,
+    covered_by,
+)
 from selfmotion.certificate.verdict import Certificate
 from selfmotion.follow import BoundFollow, Follow, Follows
 from selfmotion.motion import Trajectory

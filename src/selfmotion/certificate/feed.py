@@ -9,10 +9,8 @@ import numpy as np
 
 from selfmotion.basics import Array, Flags, series
 from selfmotion.certificate.bounding import Bounded, Bounds, Stretch, bounded
-from selfmotion.certificate.deviation import jacobians
-from selfmotion.certificate.findings import Finding
-from selfmotion.certificate.path_error import smooth_between
-from selfmotion.certificate.requirement import FinishedMotion, Requirement
+from selfmotion.certificate.path_error import jacobians, smooth_between
+from selfmotion.certificate.requirement import Finding, FinishedMotion, Requirement
 from selfmotion.follow import BoundFollow
 from selfmotion.path import FeedKept, FeedPossible, Path, path_series
 

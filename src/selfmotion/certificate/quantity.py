@@ -11,8 +11,7 @@ import numpy.typing as npt
 
 from selfmotion.basics import Array, Ints, ProblemError, as_number, read_only
 from selfmotion.certificate.bounding import Bounded, Bounds, Stretch, bounded
-from selfmotion.certificate.findings import Finding
-from selfmotion.certificate.requirement import FinishedMotion, Requirement
+from selfmotion.certificate.requirement import Finding, FinishedMotion, Requirement
 
 # Shares of limits are interpolated this well at least.
 _FINE = 1e-6

@@ -11,8 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from selfmotion.basics import Array
-from selfmotion.certificate.findings import Extreme, Finding
-from selfmotion.certificate.requirement import FinishedMotion, Requirement
+from selfmotion.certificate.requirement import Extreme, Finding, FinishedMotion, Requirement
 from selfmotion.collision import Closest, CollisionModel, Obstacle, how_near, srdf_line
 from selfmotion.motion import Trajectory
 

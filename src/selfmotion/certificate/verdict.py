@@ -5,9 +5,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from selfmotion.certificate.findings import USUAL, DampedStretch, Extreme, Finding, Tolerance
 from selfmotion.certificate.limits import LIMIT_NAMES
-from selfmotion.certificate.requirement import of_some
+from selfmotion.certificate.requirement import (
+    USUAL,
+    DampedStretch,
+    Extreme,
+    Finding,
+    Tolerance,
+    of_some,
+)
 
 # What a reader of a verdict would take to have been checked, unless told otherwise.
 NOT_JUDGED = (

@@ -1,17 +1,244 @@
-"""The command line: where commands are registered, and how they end."""
+"""The command line: where commands are registered, what shows how far they are, how they end."""
 
 import sys
+import threading
+import time
 import traceback
-from typing import Annotated, Any
+from collections.abc import Iterator
+from concurrent.futures import Executor
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Annotated, Any, Self
 
 import typer
 from rich.console import Console
+from rich.progress import (
+    BarColumn,
+    Progress,
+    ProgressColumn,
+    SpinnerColumn,
+    TextColumn,
+    TimeElapsedColumn,
+)
 
 import selfmotion as sm
 from selfmotion.basics import version
 from selfmotion.cli import tables
-from selfmotion.cli.remedies import in_shell
-from selfmotion.cli.stage_display import StageDisplay
+from selfmotion.cli.summaries import in_shell
+from selfmotion.optimise import Iteration
+
+if TYPE_CHECKING:
+    from selfmotion.batch import BatchProgress
+
+# Which stage is running, and how far a batch is.
+
+# Which stage is running: a bar on a terminal, a line per stage in a log.
+
+# Of shorter stages it is not said how long they will last [s].
+_WORTH_SAYING = 2.0
+# A log has a line at least this often [s], which is looked at in between.
+_SILENT, _TICK = 10.0, 1.0
+# Stages as they are told to callbacks → in words, where they are not already.
+_IN_WORDS = {
+    "start": "optimising start",
+    "branch": "looking for another branch of inverse kinematics, try",
+    "posture": "trying posture",
+    "part": "planning part",
+    "fastest": "improving the pace, round",
+    "seam": "planning seam",
+    "other ways": "planning in other configurations, seam",
+    "nearby": "planning in nearby configurations, seam",
+    "program": "trying order",
+    "feed": "trying feed",
+    "move": "planning a move",
+    "places": "trying place",
+    "corners": "planning at corner",
+    "margin": "planning with margin, round",
+    "targets": "choosing targets of piece",
+    "picture": "drawing picture",
+    "refining": "refining the motion",
+    "checking": "checking the motion",
+    "warm start": "starting from the given plan",
+}
+
+
+class Display:
+    """A bar on a terminal, gone when it ends; what a log shows instead is for who derives it.
+
+    Parameters
+    ----------
+    console : Console
+    columns : ProgressColumn
+        Of the bar.
+    """
+
+    def __init__(self, console: Console, *columns: ProgressColumn) -> None:
+        self._console = console
+        # A log would get the bar once, when all is over.
+        self._progress = Progress(
+            *columns, console=console, transient=True, disable=not console.is_terminal
+        )
+        self._bar = self._progress.add_task("", total=None)
+
+    def __enter__(self) -> Self:
+        """Begin to show."""
+        self._progress.start()
+        return self
+
+    def __exit__(self, *raised: object) -> None:
+        """Leave the terminal as it was."""
+        self._progress.stop()
+
+
+class StageDisplay(Display):
+    """Shows what `plan` tells: its `stage` is a progress callback, its `iteration` the other one.
+
+    In a log a stage has a line where it begins, and one more every ten seconds that it lasts.
+
+    Parameters
+    ----------
+    console : Console
+    """
+
+    def __init__(self, console: Console) -> None:
+        super().__init__(
+            console,
+            SpinnerColumn(),
+            TextColumn("{task.description}", markup=False),
+            BarColumn(),
+            TimeElapsedColumn(),
+        )
+        self._stage = self._about = self._cost = ""
+        self._done = self._total = 0
+        self._began = self._said = 0.0
+        self._ended = threading.Event()
+
+    def __enter__(self) -> Self:
+        """Begin to show."""
+        if not self._console.is_terminal:
+            threading.Thread(target=self._keep_saying, daemon=True).start()
+        return super().__enter__()
+
+    def __exit__(self, *raised: object) -> None:
+        """Leave the terminal as it was."""
+        self._ended.set()
+        super().__exit__(*raised)
+
+    def stage(self, stage: str, done: int, total: int) -> None:
+        """Show that number `done` of `total` in a stage has begun.
+
+        Of 0 where it is not known how many there will be; number 0 of 0 is news that stay.
+        """
+        if total == done == 0:
+            self._print(stage)
+            return
+        stage, quote, about = stage.partition(" '")
+        is_new = stage != self._stage
+        if is_new:
+            self._stage, self._cost, self._began = stage, "", time.monotonic()
+        self._about, self._done, self._total = quote + about, done, total
+        if is_new and not self._console.is_terminal:
+            self._print(self._line())
+        self._progress.update(
+            self._bar, completed=max(done - 1, 0), total=total if total > 1 else None
+        )
+        self._describe()
+
+    def iteration(self, iteration: Iteration) -> None:
+        """Show the cost so far."""
+        self._cost = f", cost {iteration.cost:.6g}"
+        self._describe()
+
+    def _describe(self) -> None:
+        self._progress.update(self._bar, description=self._line())
+
+    def _line(self) -> str:
+        """Return what is done, for how long, and for how much longer, in words."""
+        several = self._total != 1
+        count = (
+            f" {max(self._done, 1)}{f' of {self._total}' if self._total else ''}" if several else ""
+        )
+        words = _IN_WORDS.get(self._stage, self._stage)
+        return f"{words}{count}{self._about}{self._times()}{self._cost}"
+
+    def _times(self) -> str:
+        """Return how long a stage has taken, and how long it will if as long as before."""
+        spent = time.monotonic() - self._began
+        left = 0.0
+        if self._total > 1 and self._done > 1:
+            left = spent * (self._total - self._done + 1) / (self._done - 1)
+        if spent + left <= _WORTH_SAYING:
+            return ""
+        return f", {spent:.0f} s so far{f', about {left:.0f} s to go' if left else ''}"
+
+    def _print(self, text: str) -> None:
+        self._said = time.monotonic()
+        self._console.print(text, markup=False, highlight=False, soft_wrap=True)
+
+    def _keep_saying(self) -> None:
+        """Print a line where none was for a while, until all is over."""
+        while not self._ended.wait(_TICK):
+            if self._stage and time.monotonic() - max(self._said, self._began) >= _SILENT:
+                self._print(self._line())
+
+
+# How far a batch is, and where it runs.
+
+
+class BatchDisplay(Display):
+    """A bar with rate and time left on a terminal, a line per tenth in a log."""
+
+    def __init__(self, console: Console) -> None:
+        super().__init__(console, TextColumn("{task.description}", markup=False), BarColumn())
+        self._tenth = 0
+
+    def show(self, found: "BatchProgress") -> None:
+        """Show how far it is."""
+        text = (
+            f"{found.done} of {found.total} problems, {found.failed} without a plan, "
+            f"{found.rate:.2f} per second, {found.seconds_left:.0f} s left"
+        )
+        self._progress.update(self._bar, description=text, completed=found.done, total=found.total)
+        tenth = 10 * found.done // found.total
+        if not self._console.is_terminal and tenth > self._tenth:
+            self._console.print(text, markup=False)
+        self._tenth = tenth
+
+
+def check_cluster(address: str | None, workers: int | None) -> None:
+    """Raise ProblemError where processes of this machine are asked for beside a cluster."""
+    if address is not None and workers is not None:
+        raise sm.errors.ProblemError("--workers has no effect beside --dask, whose workers plan")
+
+
+@contextmanager
+def executor_at(address: str | None) -> Iterator[Executor | None]:
+    """Give the executor of a Dask cluster; None without an address.
+
+    Raises
+    ------
+    ProblemError
+        distributed is not installed, or no scheduler answers.
+    """
+    if address is None:
+        yield None
+        return
+    try:
+        from distributed import Client
+    except ImportError:
+        raise sm.errors.ProblemError(
+            "--dask needs the package distributed: pip install 'selfmotion[cluster]'"
+        ) from None
+    try:
+        client = Client(address, timeout=10)
+    except (OSError, ValueError) as error:
+        raise sm.errors.ProblemError(
+            f"--dask: no scheduler answers at '{address}': {error}"
+        ) from error
+    with client:
+        yield client.get_executor()
+
+
+# The command line: where commands are registered, and how they end.
 
 # Under which commands are listed.
 PLAN, LOOK, FILES = "Plan", "Inspect plans", "Files"

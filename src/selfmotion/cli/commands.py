@@ -1,6 +1,7 @@
 """The commands around one plan: parse, call, print."""
 
 import json
+import math
 import os
 from pathlib import Path
 from typing import Annotated, Any
@@ -10,20 +11,20 @@ import typer
 import selfmotion as sm
 from selfmotion import controllers
 from selfmotion.basics import write_text
-from selfmotion.cli import checks, documents, jobs, json_tables, options, outputs, tables
+from selfmotion.cli import checks, documents, jobs, options, outputs, summaries, tables
 from selfmotion.cli.app import (
     FILES,
     LOOK,
     NOT_VERIFIED,
     PLAN,
     VERIFIED,
+    StageDisplay,
     app,
     fastest_with_progress,
     plan_with_progress,
     stages,
     terminal,
 )
-from selfmotion.cli.stage_display import StageDisplay
 from selfmotion.documents import example_texts, json_schema
 
 
@@ -32,49 +33,11 @@ from selfmotion.documents import example_texts, json_schema
     "; or: selfmotion plan cell.toml",
     rich_help_panel=PLAN,
 )
+@options.of_table(documents.Shell, after="problem")
 def plan(
     context: typer.Context,
     problem: options.ProblemArgument,
-    path: options.PathOption = None,
-    circle: options.CircleOption = None,
-    line: options.LineOption = None,
-    normal: options.NormalOption = None,
-    duration: options.DurationOption = None,
-    feed: options.FeedOption = None,
-    jump: options.JumpOption = None,
-    seam: options.SeamOption = None,
-    columns: options.ColumnsOption = None,
-    flip_normals: options.FlipOption = False,
-    standoff: options.StandoffOption = None,
-    rotary: options.RotaryOption = None,
-    rotary_axes: options.RotaryAxesOption = None,
-    rotary_center: options.RotaryCenterOption = None,
-    unit: options.UnitOption = None,
-    frame: options.FrameOption = None,
-    ramp: options.RampOption = None,
-    corners: options.CornersOption = None,
-    corner_tolerance: options.CornerToleranceOption = None,
-    task: options.PlannedTaskOption = None,
-    relax: options.RelaxOption = None,
-    start: options.StartOption = None,
     warm: options.FromOption = None,
-    tool: options.ToolOption = None,
-    reference: options.ReferenceOption = None,
-    lock: options.LockOption = None,
-    argument: options.ArgumentOption = None,
-    packages: options.PackagesOption = None,
-    degree: options.DegreeOption = None,
-    mu: options.MuOption = 0.0,
-    cost: options.CostOption = None,
-    velocity: options.VelocityOption = None,
-    acceleration: options.AccelerationOption = None,
-    joint_limits: options.JointLimitsOption = None,
-    closed: options.ClosedOption = False,
-    obstacles: options.ObstaclesOption = None,
-    clearance: options.ClearanceOption = 0.0,
-    srdf: options.SrdfOption = None,
-    no_collision: options.NoCollisionOption = False,
-    damped: options.DampedOption = False,
     settings: options.SetOption = None,
     max_evaluations: options.LimitOption = None,
     search: options.SearchOption = None,
@@ -144,7 +107,7 @@ def init(
         tool=tool,
         job=job,
         positioner=positioner,
-        lock=options.locks(lock or []),
+        lock=options.locks(lock),
         arguments=options.arguments(argument),
         packages=packages or (),
         clearance=not no_collision,
@@ -171,26 +134,11 @@ def schema(
     epilog="Example: selfmotion check motion.csv --robot panda --path seam.csv --acceleration 10",
     rich_help_panel=LOOK,
 )
+@options.of_table(documents.Shell, after="robot", names=("path", *documents.OF_PATH))
 def check(
     context: typer.Context,
     file: options.CheckedArgument,
     robot: options.RobotOption = None,
-    path: options.PathOption = None,
-    duration: options.DurationOption = None,
-    feed: options.FeedOption = None,
-    jump: options.JumpOption = None,
-    seam: options.SeamOption = None,
-    columns: options.ColumnsOption = None,
-    flip_normals: options.FlipOption = False,
-    standoff: options.StandoffOption = None,
-    rotary: options.RotaryOption = None,
-    rotary_axes: options.RotaryAxesOption = None,
-    rotary_center: options.RotaryCenterOption = None,
-    unit: options.UnitOption = None,
-    frame: options.FrameOption = None,
-    ramp: options.RampOption = None,
-    corners: options.CornersOption = None,
-    corner_tolerance: options.CornerToleranceOption = None,
     task: options.CheckedTaskOption = None,
     tool: options.ToolOption = None,
     reference: options.ReferenceOption = None,
@@ -212,8 +160,9 @@ def check(
     """Verify a motion by forward kinematics: a saved plan, or one made elsewhere."""
     judged = velocity, acceleration, joint_limits, obstacles, clearance, srdf
     within = None if tolerance is None else sm.Tolerance(tolerance, tolerance)
+    path = context.params["path"]
     typed = {"path": path, **{name: context.params[name] for name in documents.OF_PATH}}
-    typed["flip_normals"] = flip_normals or None
+    typed["flip_normals"] = typed["flip_normals"] or None
     own: dict[str, Any] = {name.replace("_", "-"): value for name, value in typed.items()}
     own |= {"task": task, "tool": tool, "reference": reference, "lock": lock or None}
     own |= {"argument": argument or None, "packages": packages or None}
@@ -247,7 +196,7 @@ def check(
                     f"{file}: a motion is checked against a robot and a path: give --robot and "
                     f"--path, or a problem file as --robot (a job's .program for its program)"
                 )
-            held = options.locks(lock or [])
+            held = options.locks(lock)
             arm = sm.load_robot(
                 robot,
                 tool=tool,
@@ -270,7 +219,7 @@ def check(
             certificate = checks.with_failure(certificate, elsewhere)
             near = checks.near(arm, motion, asked)
     if as_json:
-        data = json_tables.certificate_json(certificate, near)
+        data = summaries.certificate_json(certificate, near)
         terminal.print_json(data=data | checks.left_to_controller(program))
     else:
         outputs.show_certificate(certificate, near, arm, verbose)
@@ -286,9 +235,7 @@ def compare(
     """Compare plans: costs, durations, margins and verdicts, side by side."""
     saved = {str(file): sm.load_plan(file) for file in plans}
     if as_json:
-        terminal.print_json(
-            data={name: json_tables.plan_json(plan) for name, plan in saved.items()}
-        )
+        terminal.print_json(data={name: summaries.plan_json(plan) for name, plan in saved.items()})
     else:
         tables.show_comparison(saved, terminal)
 
@@ -333,3 +280,98 @@ def replay(
             written.append(render_gif(first, gif, progress=display.stage))
     for file in written:
         terminal.print(f"wrote {file}", markup=False, soft_wrap=True)
+
+
+# The commands that change how fast motions are.
+
+
+@app.command(
+    epilog="Example: selfmotion retime plan.npz --acceleration 8 --out fast.npz",
+    rich_help_panel=PLAN,
+)
+def retime(
+    file: Annotated[Path, typer.Argument(help="A plan saved as .npz.")],
+    acceleration: options.AccelerationOption = None,
+    velocity: options.VelocityOption = None,
+    out: options.OutOption = None,
+    html: options.HtmlOption = None,
+    verbose: options.VerboseOption = False,
+    as_json: options.JsonOption = False,
+) -> None:
+    """Retime a plan: the same joint path in the least time within limits."""
+    outputs.check_suffixes(out or [])
+    with StageDisplay(stages) as display:
+        display.stage("retiming", 1, 1)
+        result = sm.retime(sm.load_plan(file), *_limits(acceleration, velocity))
+    outputs.finish(result, out or [], html, as_json, verbose)
+
+
+@app.command(
+    epilog="Example: selfmotion fastest cell.toml --deadline 60 --out fast.npz",
+    rich_help_panel=PLAN,
+)
+def fastest(
+    problem: Annotated[str, typer.Argument(help="A problem file (.toml, .json).")],
+    acceleration: options.AccelerationOption = None,
+    velocity: options.VelocityOption = None,
+    deadline: Annotated[
+        float, typer.Option(help="Stop after so many seconds, with the best so far.")
+    ] = 60.0,
+    keep: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="KIND=FACTOR", help="Most that a cost may be, as a multiple of its optimum."
+        ),
+    ] = None,
+    settings: options.SetOption = None,
+    allow_code: options.AllowCodeOption = False,
+    out: options.OutOption = None,
+    html: options.HtmlOption = None,
+    verbose: options.VerboseOption = False,
+    as_json: options.JsonOption = False,
+) -> None:
+    """Find the fastest motion along a path, whatever its own timing; Ctrl-C keeps the best."""
+    if Path(problem).suffix not in documents.SUFFIXES:
+        raise sm.errors.ProblemError(
+            f"{problem}: expected a problem file ({', '.join(documents.SUFFIXES)}); "
+            f"selfmotion init writes one"
+        )
+    job = documents.of_file(Path(problem), settings or [], allow_code)
+    outputs.check_suffixes([*job.outputs, *(out or [])])
+    given = dict(zip(("acceleration", "velocity"), _limits(acceleration, velocity), strict=True))
+    if keep:
+        pairs = [_factor(text) for text in keep]
+        options.refuse_twice("--keep", [kind for kind, _ in pairs])
+        given["keep"] = {**(job.keep or {}), **dict(pairs)}
+    remarks = job.problem.remarks
+    outputs.tell(remarks)
+    found = fastest_with_progress(job, deadline=deadline, **given)
+    if not as_json:
+        stages.print(
+            f"{found.duration:.4g} s; lowest cost, retimed: {_time(found.retimed)}, "
+            f"minimum-norm motion retimed: {_time(found.pseudo_inverse)}; {found.status.message}",
+            markup=False,
+            soft_wrap=True,
+        )
+    outputs.finish(
+        found.plan, [*job.outputs, *(out or [])], html, as_json, verbose, remarks=remarks
+    )
+
+
+def _time(seconds: float) -> str:
+    return f"{seconds:.4g} s" if math.isfinite(seconds) else "violates a constraint at any pace"
+
+
+def _factor(text: str) -> tuple[str, float]:
+    kind, _, factor = text.partition("=")
+    try:
+        return kind, float(factor)
+    except ValueError:
+        raise sm.errors.ProblemError(
+            f"--keep {text}: expected a cost and a factor, such as JointVelocity=1.1"
+        ) from None
+
+
+def _limits(acceleration: str | None, velocity: str | None) -> tuple[Any, ...]:
+    named = ((acceleration, "--acceleration"), (velocity, "--velocity"))
+    return tuple(None if text is None else options.one_or_each(text, name) for text, name in named)

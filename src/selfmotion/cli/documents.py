@@ -13,8 +13,7 @@ import selfmotion as sm
 from selfmotion.basics import read_document
 from selfmotion.cam import PATH_SUFFIXES, events_of, has_normals
 from selfmotion.cli import options
-from selfmotion.cli.app import plan_with_progress, stages
-from selfmotion.cli.stage_display import StageDisplay
+from selfmotion.cli.app import StageDisplay, plan_with_progress, stages
 from selfmotion.documents import (
     grid_documents,
     job_of,
@@ -33,59 +32,54 @@ _LOOKS = 7
 _WEIGHTS = ("weight", "mu")
 
 
-_LISTS = ("lock", "argument", "packages", "cost", "relax")
-
-
 @dataclass
 class Shell:
-    """The options, as typed."""
+    """The options that say what to plan, as typed."""
 
-    path: Path | None
-    circle: float | None
-    line: str | None
-    normal: str | None
-    duration: float | None
-    feed: float | None
-    jump: float | None
-    seam: str | None
-    columns: str | None
-    flip_normals: bool
-    standoff: float | None
-    rotary: str | None
-    rotary_axes: str | None
-    rotary_center: str | None
-    unit: str | None
-    frame: str | None
-    ramp: float | None
-    corners: str | None
-    corner_tolerance: float | None
-    task: str | None
-    start: str | None
-    tool: str | None
-    reference: str | None
-    lock: list[str]
-    argument: list[str]
-    packages: list[Path]
-    degree: int | None
-    mu: float
-    cost: list[str]
-    velocity: str | None
-    acceleration: str | None
-    joint_limits: Path | None
-    closed: bool
-    obstacles: Path | None
-    clearance: float
-    srdf: Path | None
-    no_collision: bool
-    relax: list[str]
-    damped: bool
+    path: options.PathOption = None
+    circle: options.CircleOption = None
+    line: options.LineOption = None
+    normal: options.NormalOption = None
+    duration: options.DurationOption = None
+    feed: options.FeedOption = None
+    jump: options.JumpOption = None
+    seam: options.SeamOption = None
+    columns: options.ColumnsOption = None
+    flip_normals: options.FlipOption = False
+    standoff: options.StandoffOption = None
+    rotary: options.RotaryOption = None
+    rotary_axes: options.RotaryAxesOption = None
+    rotary_center: options.RotaryCenterOption = None
+    unit: options.UnitOption = None
+    frame: options.FrameOption = None
+    ramp: options.RampOption = None
+    corners: options.CornersOption = None
+    corner_tolerance: options.CornerToleranceOption = None
+    task: options.PlannedTaskOption = None
+    relax: options.RelaxOption = None
+    start: options.StartOption = None
+    tool: options.ToolOption = None
+    reference: options.ReferenceOption = None
+    lock: options.LockOption = None
+    argument: options.ArgumentOption = None
+    packages: options.PackagesOption = None
+    degree: options.DegreeOption = None
+    mu: options.MuOption = 0.0
+    cost: options.CostOption = None
+    velocity: options.VelocityOption = None
+    acceleration: options.AccelerationOption = None
+    joint_limits: options.JointLimitsOption = None
+    closed: options.ClosedOption = False
+    obstacles: options.ObstaclesOption = None
+    clearance: options.ClearanceOption = 0.0
+    srdf: options.SrdfOption = None
+    no_collision: options.NoCollisionOption = False
+    damped: options.DampedOption = False
 
     @classmethod
     def of(cls, context: typer.Context) -> "Shell":
         """Return what was typed, of a command that has all these options."""
-        given = {field.name: context.params[field.name] for field in fields(cls)}
-        lists = {name: list(given[name] or []) for name in _LISTS}
-        return cls(**{**given, **lists})
+        return cls(**{field.name: context.params[field.name] for field in fields(cls)})
 
     def document(self, robot: str, warm_start: sm.Plan | None) -> dict[str, Any]:
         """Return the table."""
@@ -98,7 +92,7 @@ class Shell:
                 held,
                 reference=self.reference,
                 arguments=arguments,
-                packages=self.packages,
+                packages=self.packages or (),
             )
         )
         task = self.task or ("planar" if planar else "pose")
@@ -113,7 +107,7 @@ class Shell:
             "path": self._path(normal),
             "costs": self._costs(),
             "constraints": self._constraints(),
-            "relaxations": [_relaxation(text) for text in self.relax],
+            "relaxations": [_relaxation(text) for text in self.relax or []],
             "damping": self.damped,
             "clearance": not self.no_collision,
         }
@@ -167,7 +161,7 @@ class Shell:
         return {"kind": "line", "by": by, **pace}
 
     def _costs(self) -> list[dict[str, Any]]:
-        costs = [_cost(text) for text in self.cost] or [{"kind": "JointVelocity"}]
+        costs = [_cost(text) for text in self.cost or []] or [{"kind": "JointVelocity"}]
         if self.mu != 0.0:
             costs.append({"kind": "InverseManipulability", "mu": self.mu})
         return costs

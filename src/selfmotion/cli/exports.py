@@ -9,9 +9,8 @@ import typer
 
 import selfmotion as sm
 from selfmotion import controllers
-from selfmotion.cli import jobs, options, outputs, program_options
-from selfmotion.cli.app import FILES, NOT_VERIFIED, VERIFIED, app, stages, terminal
-from selfmotion.cli.stage_display import StageDisplay
+from selfmotion.cli import jobs, options, outputs
+from selfmotion.cli.app import FILES, NOT_VERIFIED, VERIFIED, StageDisplay, app, stages, terminal
 from selfmotion.controllers import FORMS
 from selfmotion.result import is_move
 
@@ -50,10 +49,10 @@ def export(
             help="For a cell: also a file for each part (not of programs).",
         ),
     ] = False,
-    settings: program_options.SettingsOption = None,
-    targets: program_options.TargetsOption = None,
-    wobj: program_options.WorkObjectOption = None,
-    mass: program_options.MassOption = None,
+    settings: outputs.SettingsOption = None,
+    targets: outputs.TargetsOption = None,
+    wobj: outputs.WorkObjectOption = None,
+    mass: outputs.MassOption = None,
     force: Annotated[
         bool,
         typer.Option("--force", help="Write it even if it is not verified, or moves at an end."),
@@ -62,7 +61,7 @@ def export(
     as_json: options.JsonOption = False,
 ) -> None:
     """Write a plan's motion for controllers and simulators, and verify the file."""
-    asked = program_options.program_settings(settings, targets, wobj, mass)
+    asked = outputs.program_settings(settings, targets, wobj, mass)
     if rate is not None and all(_is_program(target, form, asked) for target in out):
         raise sm.errors.ProblemError(
             "--rate has no effect on programs: targets are as many as it takes"

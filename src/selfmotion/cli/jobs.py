@@ -11,16 +11,23 @@ import selfmotion as sm
 from selfmotion import controllers
 from selfmotion.cli import (
     documents,
-    json_tables,
     options,
     outputs,
-    program_options,
     summaries,
     tables,
 )
-from selfmotion.cli.app import NOT_VERIFIED, PLAN, VERIFIED, app, complain, stages, terminal
-from selfmotion.cli.batch_display import check_cluster, executor_at
-from selfmotion.cli.stage_display import StageDisplay
+from selfmotion.cli.app import (
+    NOT_VERIFIED,
+    PLAN,
+    VERIFIED,
+    StageDisplay,
+    app,
+    check_cluster,
+    complain,
+    executor_at,
+    stages,
+    terminal,
+)
 
 PROGRAM, PARTS = ".program", ".parts"
 TIMETABLE = ".timetable.csv"
@@ -56,7 +63,7 @@ def job(
     dask: Annotated[
         str | None, typer.Option(help="Or the address of a Dask scheduler, host:port.")
     ] = None,
-    settings: program_options.SettingsOption = None,
+    settings: outputs.SettingsOption = None,
     changes: options.SetOption = None,
     allow_code: options.AllowCodeOption = False,
     verbose: options.VerboseOption = False,
@@ -189,7 +196,7 @@ def finish_parts(job: sm.files.Job, out: list[Path], as_json: bool, verbose: boo
 
 def _show(program: sm.Program, as_json: bool, verbose: bool, remarks: Sequence[str] = ()) -> None:
     if as_json:
-        data = json_tables.program_json(program) | {"remarks": list(remarks)}
+        data = summaries.program_json(program) | {"remarks": list(remarks)}
         terminal.print_json(data=data)
     else:
         (tables if verbose else summaries).show_program(program, terminal)

@@ -1,6 +1,9 @@
 """Options of the commands, and what their texts mean."""
 
-from dataclasses import replace
+import inspect
+from collections.abc import Callable, Collection
+from dataclasses import fields, replace
+from functools import wraps
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -293,6 +296,49 @@ VerboseOption = Annotated[
 JsonOption = Annotated[bool, typer.Option("--json", help="Print the outcome as JSON.")]
 
 
+def of_table(
+    table: type[Any], after: str, names: Collection[str] = ()
+) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Return a decorator that gives a command the fields of a dataclass as options.
+
+    The command reads them from its context.
+
+    Parameters
+    ----------
+    table : type
+        A dataclass whose types are options.
+    after : str
+        The parameter of the command after which they are listed.
+    names : collection of str
+        Which of the fields; by default all.
+    """
+    added = [
+        inspect.Parameter(
+            field.name,
+            inspect.Parameter.POSITIONAL_OR_KEYWORD,
+            default=field.default,
+            annotation=field.type,
+        )
+        for field in fields(table)
+        if not names or field.name in names
+    ]
+
+    def with_options(command: Callable[..., None]) -> Callable[..., None]:
+        own = inspect.signature(command).parameters
+        place = list(own).index(after) + 1
+
+        @wraps(command)
+        def run(**given: Any) -> None:
+            command(**{name: given[name] for name in own})
+
+        parameters = [*own.values()]
+        parameters[place:place] = added
+        run.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+        return run
+
+    return with_options
+
+
 def relaxation(text: str) -> sm.Relaxation:
     """Return what --relax describes."""
     rest, _, window = text.partition("@")
@@ -334,11 +380,11 @@ def numbers(text: str, option: str, count: int | None = None) -> Array:
     return numbers
 
 
-def locks(texts: list[str]) -> dict[str, float]:
+def locks(texts: list[str] | None) -> dict[str, float]:
     """Return what --lock describes."""
     held = {}
-    refuse_twice("--lock", [text.partition("=")[0] for text in texts])
-    for text in texts:
+    refuse_twice("--lock", [text.partition("=")[0] for text in texts or []])
+    for text in texts or []:
         name, _, value = text.partition("=")
         try:
             held[name] = float(value)

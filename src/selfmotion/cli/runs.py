@@ -1,14 +1,18 @@
 """Commands that plan many problems, or what is shown of the project itself."""
 
+import time
 from collections.abc import Container, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
+import numpy as np
 import typer
+from numba.core import event
 
 import selfmotion as sm
 from selfmotion import basics, realtime
-from selfmotion.cli import json_tables, options, outputs, summaries, tables
+from selfmotion.basics import ALL_WORKS, companion
+from selfmotion.cli import options, outputs, summaries, tables
 from selfmotion.cli.app import (
     BEGIN,
     FILES,
@@ -16,19 +20,20 @@ from selfmotion.cli.app import (
     NOT_VERIFIED,
     PLAN,
     VERIFIED,
+    BatchDisplay,
+    StageDisplay,
     app,
+    check_cluster,
     complain,
+    executor_at,
     plan_with_progress,
     stages,
     terminal,
 )
-from selfmotion.cli.batch_display import BatchDisplay, check_cluster, executor_at
-from selfmotion.cli.stage_display import StageDisplay
+from selfmotion.warm import Compiled, small_works
 
 if TYPE_CHECKING:
     from selfmotion.batch import Item
-
-import numpy as np
 
 # Keys of problem files that are about a whole plan.
 _OF_PLANS = (
@@ -105,7 +110,7 @@ def batch(
         complain(f"stopped; what is finished is in '{out}': run again to go on")
         raise typer.Exit(NOT_VERIFIED) from None
     if as_json:
-        terminal.print_json(data=json_tables.batch_json(result))
+        terminal.print_json(data=summaries.batch_json(result))
     else:
         tables.show_batch(result, terminal)
     verified = {row.name for row in result.rows if row.verified}
@@ -122,7 +127,7 @@ def robots(as_json: options.JsonOption = False) -> None:
     """List the arms known by name: joints, tool frame, and redundancy for each task."""
     arms = {name: sm.load_robot(name) for name in sm.NAMED_ARMS}
     if as_json:
-        terminal.print_json(data=json_tables.robots_json(arms))
+        terminal.print_json(data=summaries.robots_json(arms))
     else:
         tables.show_robots(arms, terminal)
 
@@ -161,11 +166,11 @@ def track(
     It answers late, is measured with noise, and is pushed off its command at 3 s; at 6 s a ball
     appears beside its elbow. Exit code 0 if all limits were kept.
     """
-    from selfmotion.cli import tracking
+    from selfmotion.cli import following
 
-    replanner, record, result = tracking.conveyor_run(task, seconds, seed, horizon)
-    kept = tracking.show(replanner, record, tracking.least_distance(result), terminal)
-    for file in tracking.write(record, result, out):
+    replanner, record, result = following.conveyor_run(task, seconds, seed, horizon)
+    kept = following.show_steps(replanner, record, following.least_distance(result), terminal)
+    for file in following.write(record, result, out):
         terminal.print(f"wrote {file}", markup=False)
     raise typer.Exit(VERIFIED if kept else NOT_VERIFIED)
 
@@ -229,7 +234,7 @@ def follow(
     if as_json:
         terminal.print_json(data=link.summary)
     else:
-        following.show(link, terminal)
+        following.show_link(link, terminal)
     raise typer.Exit(VERIFIED if link.is_followed else NOT_VERIFIED)
 
 
@@ -254,3 +259,22 @@ def study(
     files = write(result, out)
     tables.show_claims(result.claims, terminal)
     terminal.print(f"wrote {files[0]} and {len(files) - 1} files beside it", markup=False)
+
+
+# The command that compiles all kernels, so that nobody waits for them later.
+
+
+@app.command("warm-up", epilog="Example: selfmotion warm-up", rich_help_panel=BEGIN)
+def warm_up() -> None:
+    """Compile all numerical kernels now, once per machine, so that no plan waits for them."""
+    began = time.perf_counter()
+    counted, other = Compiled(), companion(ALL_WORKS)
+    with event.install_listener("numba:compile", counted), StageDisplay(stages) as display:
+        works = list(small_works())
+        for number, (name, work) in enumerate(works):
+            display.stage(f"kernels for {name}", number + 1, len(works))
+            work()
+    count = counted.count + (0 if other is None else int(other.communicate()[0] or 0))
+    seconds = time.perf_counter() - began
+    told = "nothing was left to compile" if not count else f"{count} kernels"
+    terminal.print(f"{told}, {seconds:.0f} s", markup=False)

@@ -1,16 +1,65 @@
-"""What commands print unless everything is asked for: the verdict, one number, one remedy."""
+"""What commands print unless everything is asked for, and what they print for programs."""
 
+import dataclasses
 import re
 from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 
 from selfmotion.certificate import Certificate, Extreme
-from selfmotion.cli.remedies import in_shell
 from selfmotion.job import Program
 from selfmotion.optimise import Status
 from selfmotion.path import Retimed
 from selfmotion.result import Plan
+from selfmotion.robot import RobotModel
+from selfmotion.task import Task
+
+if TYPE_CHECKING:
+    from selfmotion.batch import Batch
+
+# What messages of the library advise, in the words of the shell.
+
+# As the library says it → as the shell does, in this order.
+_WORDS = (
+    (r"take robot\.inverse_kinematics\(.*?\), task, seed=start\)", "give another --start"),
+    (r"\b(task|corners)='(\w+)'", r"--\1 \2"),
+    (r"\(?\brelaxations=\)?", "with --relax"),
+    (r"\b(tool|lock|start|acceleration|velocity|duration|feed)=(?=[\s;,.)]|$)", r"--\1"),
+    (r"give force=True to write it", "export --force writes it"),
+    (r"give a larger jump", "give a larger --jump"),
+    (r"either a feed \[m/s\] or a duration \[s\]", "either --feed (m/s) or --duration (s)"),
+    (
+        r"so that (feed|duration) has no effect; drop one",
+        r"so that --\1 has no effect; drop it",
+    ),
+    (r"which needs a feed \[m/s\]; give it", "which needs --feed (m/s)"),
+    (r"\(Feed\.original\)", "(a duration in its place)"),
+    (r"\(within=\)", "(--set path.within=0.5)"),
+    (r"\((acceleration|turn_acceleration|turn_rate|within)=([0-9.e+]+)\)", r"(--set path.\1=\2)"),
+    (r"\bflip_normals\b", "--flip-normals"),
+    (r"\b(rotary|unit) = '(\w+)'", r"--\1 \2"),
+    (r"\brotary_(axes|center)\b", r"--rotary-\1"),
+    (r"(?<=: )(columns|standoff|rotary|ramp|unit) (?=has|is)", r"--\1 "),
+    (r"raise max_evaluations", "raise --max-evaluations"),
+    (r"give columns \(", "give --columns ("),
+    (r"choose another task \(", "choose another --task ("),
+    (r"choose a task with fewer rows \(", "take another --task ("),
+)
+# Such a message is about a key of the file, or of a seam in it, and says what can be written there.
+_OF_PROBLEM_FILE = re.compile(r"^(\S+\.(toml|json): |seam ')")
+
+
+def in_shell(message: str) -> str:
+    """Return a message with the names of options for those of arguments."""
+    if _OF_PROBLEM_FILE.match(message):
+        return message
+    for words, option in _WORDS:
+        message = re.sub(words, option, message)
+    return message
+
+
+# What commands print unless everything is asked for: the verdict, one number, one remedy.
 
 # What else a summary leaves out is said by this.
 _MORE = "--verbose"
@@ -113,3 +162,95 @@ def with_hint(text: str) -> str:
 def _print(console: Console, text: str, style: str | None = None) -> None:
     # One line of a log; words are kept whole on a terminal.
     console.print(text, style=style, markup=False, soft_wrap=not console.is_terminal)
+
+
+# What the commands print for programs.
+
+
+def batch_json(batch: "Batch") -> dict[str, Any]:
+    """Return the rows of a batch as JSON-safe values."""
+    rows = [
+        {key: str(value) if key == "file" else value for key, value in vars(row).items()}
+        for row in batch.rows
+    ]
+    for row in rows:
+        if row["error"] or row["ends"] is not None:
+            row["cost"] = row["initial_cost"] = None
+    best = [str(file) for file in batch.best_files]
+    return {"folder": str(batch.folder), "resumed": batch.resumed, "best_files": best, "rows": rows}
+
+
+def robots_json(robots: Mapping[str, RobotModel]) -> dict[str, Any]:
+    """Return arms by name, as JSON-safe values."""
+    return {
+        name: {
+            "joints": list(robot.joint_names),
+            "tool": robot.tool,
+            "redundancy": {
+                task.value: robot.redundancy(task) for task in Task if robot.can_follow(task)
+            },
+        }
+        for name, robot in robots.items()
+    }
+
+
+def certificate_json(certificate: Certificate, approaches: Mapping[str, Extreme]) -> dict[str, Any]:
+    """Return a certificate as JSON-safe values, the verdict first; with how near bodies come."""
+    return {
+        "verified": certificate.verified,
+        "verdict": certificate.verdict,
+        **dataclasses.asdict(certificate),
+        "approaches": {name: dataclasses.asdict(near) for name, near in approaches.items()},
+    }
+
+
+def plan_json(plan: Plan) -> dict[str, Any]:
+    """Return how a plan was found and what the check says, as JSON-safe values."""
+    report = plan.report
+    return {
+        "robot": plan.robot.name,
+        "task": plan.task.value,
+        "cost": report.cost,
+        "initial_cost": report.initial_cost,
+        "terms": dict(report.terms),
+        "initial_terms": dict(report.initial_terms),
+        "evaluations": report.evaluations,
+        "iterations": report.iterations,
+        "seconds": report.seconds,
+        "status": report.status.value,
+        "message": report.message,
+        "duration": plan.trajectory.duration,
+        "limits_used": {
+            "busy": plan.limits_used.busy,
+            "shares": dict(plan.limits_used.shares),
+        },
+        "reversals": {name: times.tolist() for name, times in plan.reversals.times.items()},
+        "metres": dict(plan.metres),
+        "certificate": certificate_json(plan.certificate, plan.approaches),
+    }
+
+
+def program_json(program: Program) -> dict[str, Any]:
+    """Return the steps of a program and what is known of it, as JSON-safe values."""
+    return {
+        "verified": program.verified,
+        "verdict": program.verdict,
+        "duration": program.duration,
+        "transfer_time": program.transfer_time,
+        "bound": program.bound,
+        "missing": dict(program.missing),
+        "notes": list(program.notes),
+        "steps": [
+            {
+                "name": step.name,
+                "kind": "seam" if step.is_seam else "move",
+                "backwards": step.turned,
+                "begin": begin,
+                "duration": 0.0 if step.is_missing else step.motion.duration,
+            }
+            for begin, step in zip(program.begins, program.steps, strict=True)
+        ],
+        "events": [
+            {"time": time, "seam": seam, "event": event} for time, seam, event in program.events
+        ],
+    }

@@ -13,8 +13,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from selfmotion.certificate import LIMIT_NAMES, Certificate, Extreme, Finding
-from selfmotion.cli.remedies import in_shell
-from selfmotion.cli.summaries import metres_told
+from selfmotion.cli.summaries import in_shell, metres_told
 from selfmotion.job import Program
 from selfmotion.result import Gap, Plan, Report, compare
 from selfmotion.robot import RobotModel

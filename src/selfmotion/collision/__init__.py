@@ -10,23 +10,21 @@ from selfmotion.collision.displaced import (
     Separation as Separation,
 )
 from selfmotion.collision.exact import CollisionModel as CollisionModel
-from selfmotion.collision.found import (
-    Closest as Closest,
-    Overlap as Overlap,
-    how_near as how_near,
-    srdf_line as srdf_line,
-)
 from selfmotion.collision.obstacles import (
-    Obstacle as Obstacle,
-    obstacle_from_dict as obstacle_from_dict,
-    obstacle_shapes as obstacle_shapes,
-)
-from selfmotion.collision.pairs import disabled_links as disabled_links
-from selfmotion.collision.shapes import (
     Box as Box,
     Capsule as Capsule,
     Cylinder as Cylinder,
     Mesh as Mesh,
+    Obstacle as Obstacle,
     Sphere as Sphere,
+    obstacle_from_dict as obstacle_from_dict,
+    obstacle_shapes as obstacle_shapes,
+)
+from selfmotion.collision.pairs import (
+    Closest as Closest,
+    Overlap as Overlap,
+    disabled_links as disabled_links,
+    how_near as how_near,
+    srdf_line as srdf_line,
 )
 from selfmotion.collision.solids import Solid as Solid

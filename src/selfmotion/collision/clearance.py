@@ -11,7 +11,7 @@ from selfmotion.basics import Array, Flags
 from selfmotion.collision.bodies import place_of
 from selfmotion.collision.distances import Ints
 from selfmotion.collision.exact import CollisionModel
-from selfmotion.collision.overlaps import SAMPLES, hull_overlaps
+from selfmotion.collision.pairs import SAMPLES, hull_overlaps
 from selfmotion.task import SE3
 
 # The share of sampled configurations in which hulls of links that meet elsewhere may overlap alone.

@@ -13,15 +13,12 @@ import numpy as np
 import numpy.typing as npt
 
 from selfmotion.basics import Array, RobotError
-from selfmotion.collision import levers
+from selfmotion.collision import bodies as of_bodies
 from selfmotion.collision.bodies import Body, obstacle_bodies
-from selfmotion.collision.checked import checked_pairs
 from selfmotion.collision.distances import HullDistances, Ints
-from selfmotion.collision.found import Closest
 from selfmotion.collision.obstacles import Obstacle
-from selfmotion.collision.overlaps import count_overlaps, links_of
 from selfmotion.collision.pair_distances import PairDistances
-from selfmotion.collision.pairs import held_pairs
+from selfmotion.collision.pairs import Closest, checked_pairs, count_overlaps, held_pairs, links_of
 from selfmotion.robot import RobotModel
 
 # Bodies that are put in touch may overlap by this much [m]: rounding.
@@ -218,7 +215,7 @@ class CollisionModel:
 
     @cached_property
     def _moved(self) -> npt.NDArray[np.bool_]:
-        return levers.moved_by(self._bodies, self.robot)
+        return of_bodies.moved_by(self._bodies, self.robot)
 
     @cached_property
     def lever_arms(self) -> Array:
@@ -244,7 +241,7 @@ class CollisionModel:
     @cached_property
     def _levers(self) -> Array:
         """Those of all joints of the model, (P, N)."""
-        return levers.pair_levers(self._axis_distances, self._moved, self.hulls.pairs)
+        return of_bodies.pair_levers(self._axis_distances, self._moved, self.hulls.pairs)
 
     def pair_levers_up_to(self, farthest: Array, aside: Array | None = None) -> Array:
         """Return `pair_levers` where joints go as far as `farthest` (n,) from 0, (P, n).
@@ -252,15 +249,15 @@ class CollisionModel:
         A prismatic joint beyond its limits lengthens the levers of all revolute ones, and so does
         a body of the pair that is put `aside` by so much at most (P,) [m].
         """
-        extra: Any = levers.travel_beyond(self.robot, farthest)
+        extra: Any = of_bodies.travel_beyond(self.robot, farthest)
         if aside is not None:
             extra = extra + aside[:, None]
-        counted = levers.is_turned(self.robot) & (self._levers > 0.0)
+        counted = of_bodies.is_turned(self.robot) & (self._levers > 0.0)
         return self.robot.coupling.bounds(self._levers + np.where(counted, extra, 0.0))
 
     @cached_property
     def _axis_distances(self) -> Array:
-        return levers.axis_distances(self.robot, self._bodies)
+        return of_bodies.axis_distances(self.robot, self._bodies)
 
     def samples(self, q_samples: npt.ArrayLike) -> Array:
         """Return samples (K, n) as an array.

@@ -1,25 +1,25 @@
 """What a motion must keep: limits, end conditions, closed paths, clearance."""
 
-from selfmotion.constraints.active import (
-    ActiveConstraint as ActiveConstraint,
-    Multipliers as Multipliers,
-    active_of as active_of,
-)
 from selfmotion.constraints.band import Band as Band
-from selfmotion.constraints.base import Constraint as Constraint
-from selfmotion.constraints.bound_end import BoundEnd as BoundEnd
+from selfmotion.constraints.base import Constraint as Constraint, Envelope as Envelope
 from selfmotion.constraints.clearance import (
     BoundClearance as BoundClearance,
     Clearance as Clearance,
 )
 from selfmotion.constraints.conditions import (
+    ActiveConstraint as ActiveConstraint,
     BoundConstraint as BoundConstraint,
-    Linearised as Linearised,
+    Multipliers as Multipliers,
     NodeTangents as NodeTangents,
+    active_of as active_of,
     easing_of as easing_of,
     linearised as linearised,
+    penalised as penalised,
+    penalty as penalty,
+    violated as violated,
 )
 from selfmotion.constraints.ends import (
+    BoundEnd as BoundEnd,
     ClosedPath as ClosedPath,
     EndAcceleration as EndAcceleration,
     EndConfiguration as EndConfiguration,
@@ -27,22 +27,15 @@ from selfmotion.constraints.ends import (
     StartAcceleration as StartAcceleration,
     StartVelocity as StartVelocity,
 )
-from selfmotion.constraints.envelope import Envelope as Envelope
-from selfmotion.constraints.kept import (
-    penalised as penalised,
-    penalty as penalty,
-    violated as violated,
-)
 from selfmotion.constraints.limits import (
     BoundLimits as BoundLimits,
     JointAccelerationLimits as JointAccelerationLimits,
     JointJerkLimits as JointJerkLimits,
     JointPositionLimits as JointPositionLimits,
+    JointTorqueLimits as JointTorqueLimits,
     JointVelocityLimits as JointVelocityLimits,
 )
-from selfmotion.constraints.tilt import Tilt as Tilt
-from selfmotion.constraints.tool import ToolLimits as ToolLimits
-from selfmotion.constraints.torque import JointTorqueLimits as JointTorqueLimits
+from selfmotion.constraints.tool import Tilt as Tilt, ToolLimits as ToolLimits
 
 __all__ = [
     "ActiveConstraint",

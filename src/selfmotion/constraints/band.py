@@ -10,8 +10,7 @@ import numpy as np
 
 from selfmotion.basics import Array, ProblemError, as_number, restore, series, shown
 from selfmotion.certificate import Column, Quantity, Stretch
-from selfmotion.constraints.base import Constraint, check_changes
-from selfmotion.constraints.envelope import Envelope
+from selfmotion.constraints.base import Constraint, Envelope, check_changes
 from selfmotion.robot import Coordinate, RobotModel, SwivelAngle
 
 # Centre of the swivel angle from upwards, about the direction from shoulder to wrist [rad].

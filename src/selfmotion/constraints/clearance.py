@@ -22,9 +22,8 @@ from selfmotion.collision import (
     how_near,
     obstacle_from_dict,
 )
-from selfmotion.constraints.base import Constraint
+from selfmotion.constraints.base import Constraint, Envelope
 from selfmotion.constraints.conditions import NodeTangents, motion_of_order
-from selfmotion.constraints.envelope import Envelope
 from selfmotion.costs import Samples
 from selfmotion.follow import Follows
 from selfmotion.robot import RobotModel

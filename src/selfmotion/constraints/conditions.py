@@ -1,21 +1,23 @@
-"""Conditions h ≤ 0 or h = 0 on the motion at the nodes of the grid, as the optimiser sees them.
-
-Limits are kept with a margin, so that the motion between nodes and the last digits of the
-optimisation stay within the limits themselves.
-"""
+"""Conditions h ≤ 0 or h = 0 at the nodes of the grid: as the optimiser sees them, kept, active."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from selfmotion.basics import Array, Ints, ProblemError
+from selfmotion.basics import Array, Flags, Ints, ProblemError
 from selfmotion.certificate import Column, Quantity
 from selfmotion.costs import Samples
 from selfmotion.motion import Sampling
+
+# Conditions h ≤ 0 or h = 0 on the motion at the nodes of the grid, as the optimiser sees them.
+#
+# Limits are kept with a margin, so that the motion between nodes and the last digits of the
+# optimisation stay within the limits themselves.
 
 
 @dataclass(frozen=True, eq=False)
@@ -235,3 +237,128 @@ class BoundQuantity:
         """Return shares of limits at the nodes, (N + 1, m) or of vectors (N + 1, m, c)."""
         away = self.quantity.away(*motion_at_nodes(samples))[:, self.quantity.limited]
         return np.asarray(away / (self._limit if away.ndim == 2 else self._limit[:, None]))
+
+
+# How far a motion keeps what is asked of it, in words and as one number.
+
+# A constraint whose violation, squared and integrated, is above this counts as much as ten times
+# the cost.
+_NOTICED = 2e-3
+
+
+def violated(constraints: Sequence[BoundConstraint], samples: Samples) -> tuple[str, ...]:
+    """Return a message for each constraint that is not kept, on its worst place."""
+    messages = []
+    for item in constraints:
+        h = item.residual(samples)
+        size = np.abs(h) if item.equality else h
+        # Written so that NaN counts as violated.
+        if not np.max(size, initial=-np.inf) <= item.tolerance:
+            row, column = np.unravel_index(int(np.argmax(size)), h.shape)
+            text = item.describe(samples, int(row), int(column))
+            messages.append(f"{item.name}: {text}")
+    return tuple(messages)
+
+
+def penalised(cost: float, constraints: Sequence[BoundConstraint], samples: Samples) -> float:
+    """Return a cost, much larger where constraints are violated: for ranking motions."""
+    return cost + max(abs(cost), 1e-3) * penalty(constraints, samples)
+
+
+def penalty(constraints: Sequence[BoundConstraint], samples: Samples) -> float:
+    """Return up to 10 for each constraint that is violated, 0 where all are kept."""
+    steps, total = np.diff(samples.sampling.node_times), 0.0
+    shares = 0.5 * (np.append(steps, 0.0) + np.append(0.0, steps))
+    for item in constraints:
+        h = item.residual(samples)
+        bad = np.abs(h) if item.equality else np.maximum(h, 0.0)
+        weights = np.ones(1) if len(h) == 1 else shares
+        total += 10.0 * min(1.0, float(np.sum(weights[:, None] * bad**2)) / _NOTICED)
+    return total
+
+
+# Active constraints, from the multipliers of conditions.
+
+# A condition is active where its multiplier is above this share of its largest one: interior points
+# leave a little everywhere.
+_ACTIVE = 1e-3
+
+
+@dataclass(frozen=True)
+class ActiveConstraint:
+    """An active constraint: one that keeps the plan from a lower cost.
+
+    Attributes
+    ----------
+    constraint : str
+        Its name.
+    easing : str
+        A small relaxation of it in words, with the joint or the pair.
+    saving : float
+        What that relaxation would take off F, to first order: the sum of the Lagrange multipliers
+        times its amount.
+    spans : tuple of (float, float)
+        First and last time [s] of each stretch on which it is active.
+    """
+
+    constraint: str
+    easing: str
+    saving: float
+    spans: tuple[tuple[float, float], ...]
+
+
+class Multipliers(NamedTuple):
+    """What the conditions of a constraint cost.
+
+    Attributes
+    ----------
+    item : BoundConstraint
+    multipliers : (K, C)
+    times : (K,)
+        When [s], increasing; one for what is asked of the whole motion.
+    used : (K, C)
+        Where what is asked for is used up, as far as multipliers say.
+    """
+
+    item: BoundConstraint
+    multipliers: Array
+    times: Array
+    used: Flags
+
+
+def active_of(
+    each: Sequence[Multipliers], span: Array, least: float
+) -> tuple[ActiveConstraint, ...]:
+    """Return what is active, what saves most first; what would save less than `least` is left out.
+
+    `span` (2,) is when the motion begins and ends [s].
+    """
+    found: dict[tuple[str, str], tuple[float, Array, Array, Array]] = {}
+    for item, signed, times, used in each:
+        multipliers = np.abs(signed)
+        for column in np.flatnonzero(multipliers.any(axis=0)):
+            amount, words = easing_of(item, int(column))
+            none = 0.0, np.zeros(len(multipliers)), np.zeros(len(multipliers)), times
+            saving, multiplier, at, _ = found.get((item.name, words), none)
+            own = multipliers[:, column]
+            at = np.maximum(at, np.where(used[:, column], own, 0.0))
+            found[item.name, words] = (
+                *(saving + amount * float(own.sum()), np.maximum(multiplier, own)),
+                *(at, times),
+            )
+    kept = []
+    for (name, words), (saving, multiplier, at, times) in found.items():
+        if saving >= least:
+            active = (at if at.any() else multiplier) > _ACTIVE * multiplier.max()
+            spans = _spans(active if active.any() else multiplier == multiplier.max(), times, span)
+            kept.append(ActiveConstraint(name, words, saving, spans))
+    return tuple(sorted(kept, key=lambda item: -item.saving))
+
+
+def _spans(active: Flags, times: Array, span: Array) -> tuple[tuple[float, float], ...]:
+    """Return the stretches of active times, `span` of one; one free time between is none."""
+    if len(active) == 1:
+        return ((float(span[0]), float(span[-1])),)
+    nodes = np.flatnonzero(active)
+    parts = np.split(nodes, np.flatnonzero(np.diff(nodes) > 2) + 1)
+    return tuple((float(times[part[0]]), float(times[part[-1]])) for part in parts)

@@ -1,12 +1,4 @@
-"""Conditions on the end of the motion: a configuration, rest, repetition.
-
-The tool's rows of q(T) and q̇(T) are given by the path already. What is left to ask for are the r
-coordinates along the self-motion: h = Nᵀ(x(T) - target), with N an orthonormal null-space basis at
-the target configuration, at the start for closed paths, or at the end of the motion that the
-optimisation begins with. Two configurations on the same pose with equal coordinates are equal, near
-the reference, and so are two velocities with the same tool velocity; the residual is free of what
-the integration leaves of the path error.
-"""
+"""Conditions on the end of the motion: a configuration, rest, repetition."""
 
 from __future__ import annotations
 
@@ -19,10 +11,72 @@ import numpy.typing as npt
 from selfmotion.basics import Array, ProblemError, as_flag, as_numbers, per_joint, read_only
 from selfmotion.certificate import QUANTITIES, ClosedMotion, EndState
 from selfmotion.constraints.base import Constraint
-from selfmotion.constraints.bound_end import BoundEnd
+from selfmotion.constraints.conditions import NodeTangents, motion_of_order
+from selfmotion.costs import Samples
 from selfmotion.follow import Follows
 from selfmotion.path import STILL
 from selfmotion.robot import RobotModel
+
+# What is asked of an end of the motion, bound to an arm.
+
+# The optimiser need only come near [rad, rad/s]: Newton's method then closes the rest.
+_NEAR = 1e-4
+
+
+@dataclass(frozen=True, eq=False)
+class BoundEnd:
+    """Nᵀ(x - target) = 0 at an end (`row`), or Nᵀ(x(T) - x(0)) = 0 without a target.
+
+    x is q, q̇ or both.
+    """
+
+    name: str
+    orders: tuple[int, ...]
+    target: Array | None
+    null: Array
+    row: int = -1
+    equality = True
+    tolerance = _NEAR
+
+    def residual(self, samples: Samples) -> Array:
+        """See `BoundConstraint.residual`."""
+        parts = []
+        for order in self.orders:
+            x = motion_of_order(samples, order)
+            reached, wanted = (x[-1], x[0]) if self.target is None else (x[self.row], self.target)
+            parts.append(self.null.T @ (reached - wanted))
+        return np.concatenate(parts)[None, :]
+
+    def tangents(self, samples: Samples, motion: NodeTangents) -> Array:
+        """See `BoundConstraint.tangents`."""
+        parts = []
+        for order in self.orders:
+            x = motion.of_order(order)
+            parts.append(self.null.T @ (x[-1] - x[0] if self.target is None else x[self.row]))
+        return np.concatenate(parts)[None]
+
+    def describe(self, samples: Samples, row: int, column: int) -> str:
+        """See `BoundConstraint.describe`."""
+        order = self.orders[column // self.null.shape[1]]
+        quantity = QUANTITIES[order]
+        goal = "that of the start" if self.target is None else "the one asked for"
+        miss = np.abs(self.residual(samples)).max()
+        where = "end" if self.row else "start"
+        unit = ("rad or m", "rad/s or m/s", "rad/s² or m/s²")[order]
+        return (
+            f"the {quantity} at the {where} is {miss:.3g} {unit} away from {goal} "
+            f"({self.tolerance:g} allowed)"
+        )
+
+
+# Conditions on the end of the motion: a configuration, rest, repetition.
+#
+# The tool's rows of q(T) and q̇(T) are given by the path already. What is left to ask for are the
+# r coordinates along the self-motion: h = Nᵀ(x(T) - target), with N an orthonormal null-space
+# basis at the target configuration, at the start for closed paths, or at the end of the motion
+# that the optimisation begins with. Two configurations on the same pose with equal coordinates
+# are equal, near the reference, and so are two velocities with the same tool velocity; the
+# residual is free of what the integration leaves of the path error.
 
 # An end configuration may be this far off [m, rad]: what the certificate grants it.
 _NEAR_END = 1e-6

@@ -5,23 +5,23 @@ from selfmotion.controllers.controller_program import (
     check_controller as check_controller,
     check_signals as check_signals,
 )
-from selfmotion.controllers.followers import (
-    followers as followers,
-    without_followers as without_followers,
-)
 from selfmotion.controllers.judged_programs import (
+    PROGRAMS as PROGRAMS,
+    READ_PROGRAMS as READ_PROGRAMS,
     as_shifted as as_shifted,
     judged_motion as judged_motion,
     judged_program as judged_program,
     misswitched as misswitched,
     of_the_controller as of_the_controller,
     part_of as part_of,
+    program_miss as program_miss,
+    read_program as read_program,
     shift_told as shift_told,
     stated_deviation as stated_deviation,
 )
-from selfmotion.controllers.motion_parts import (
-    read_parts as read_parts,
-    write_parts as write_parts,
+from selfmotion.controllers.motion_tables import (
+    followers as followers,
+    without_followers as without_followers,
 )
 from selfmotion.controllers.motions import (
     FORMS as FORMS,
@@ -30,26 +30,19 @@ from selfmotion.controllers.motions import (
     SUFFIXES as SUFFIXES,
     motion_of_program as motion_of_program,
     read_motion as read_motion,
+    read_parts as read_parts,
     write_motion as write_motion,
-)
-from selfmotion.controllers.moving_ends import (
-    moving_ends as moving_ends,
-)
-from selfmotion.controllers.pieces import (
-    by_targets as by_targets,
-)
-from selfmotion.controllers.program_files import (
-    PROGRAMS as PROGRAMS,
-    READ_PROGRAMS as READ_PROGRAMS,
-    program_miss as program_miss,
-    read_program as read_program,
+    write_parts as write_parts,
 )
 from selfmotion.controllers.program_settings import (
     ProgramSettings as ProgramSettings,
     read_program_settings as read_program_settings,
 )
 from selfmotion.controllers.samples import (
-    LinearMiss as LinearMiss,
     coarsest_rate as coarsest_rate,
     linear_miss as linear_miss,
+    moving_ends as moving_ends,
+)
+from selfmotion.controllers.thinning import (
+    by_targets as by_targets,
 )

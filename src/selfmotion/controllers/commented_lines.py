@@ -9,7 +9,7 @@ import numpy as np
 from selfmotion.basics import FileFormatError, text_of
 from selfmotion.certificate import Tolerance
 from selfmotion.controllers.controller_program import ControllerProgram, Switch
-from selfmotion.controllers.program_axes import Axis
+from selfmotion.controllers.program_settings import Axis
 from selfmotion.controllers.program_texts import BECAUSE, KEPT, PLANNED, TIMED
 from selfmotion.controllers.read_stretches import (
     Follower,

@@ -1,27 +1,113 @@
-"""Tool poses with the speed between them in place of times: what a shop touches up.
+"""Tool poses with the speed between them, and how far along its path a tool is."""
 
-A controller goes along each straight or circular step at its speed, rounds corners within its
-zone, and runs up and down by its own acceleration. So a stretch is compared with a motion where
-the tool has gone as far, not at equal times. Where times are needed, ramps that are even and as
-long as the planned time leaves stand for those of the controller.
-"""
-
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 from math import ceil
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from selfmotion.basics import Array, FileFormatError
-from selfmotion.controllers.circular import put_on_arcs, step_lengths
-from selfmotion.controllers.passed_lengths import PassedLength
-from selfmotion.controllers.pose_stretches import PoseStretch, straight
-from selfmotion.controllers.stretches import finer
+from selfmotion.controllers.steps import put_on_arcs, step_lengths
+from selfmotion.controllers.stretches import PoseStretch, finer, straight
+from selfmotion.controllers.tool_frames import ToolFrames
 from selfmotion.motion import Trajectory
-from selfmotion.path import Path
+from selfmotion.path import Path, times_when
+
+# How far a tool has gone along its path, as a function of time, and back.
+
+# Speeds are looked at so often between two samples, and so often in all at least.
+_BETWEEN, _FEWEST = 4, 1600
+
+
+@dataclass(frozen=True, eq=False)
+class PassedLength:
+    """The length that a tool has passed, at times.
+
+    Attributes
+    ----------
+    t : (K,)
+        Times [s].
+    length : (K,)
+        How far it has gone since the first [m].
+    speed : (K,)
+        How fast it is [m/s].
+    """
+
+    t: Array
+    length: Array
+    speed: Array
+
+    @classmethod
+    def of_motion(
+        cls, frames: ToolFrames, motion: Trajectory, first: float, last: float
+    ) -> "PassedLength":
+        """Return that of a joint motion, in the work object, from one time to another [s]."""
+
+        def speeds(times: Array) -> Array:
+            at = np.clip(times, motion.t[0], motion.t[-1])
+            return frames.speeds(motion(at), motion(at, 1))
+
+        return cls._integrated(speeds, motion.t, first, last)
+
+    @classmethod
+    def of_path(cls, path: Path, first: float, last: float) -> "PassedLength":
+        """Return that of a path, in its own frame."""
+
+        def speeds(times: Array) -> Array:
+            twist = path.samples(np.clip(times, 0.0, path.duration)).twist
+            return np.asarray(np.linalg.norm(twist[:, :3], axis=1))
+
+        return cls._integrated(speeds, path.marks, first, last)
+
+    @classmethod
+    def _integrated(
+        cls, speeds: Callable[[Array], Array], marks: Array, first: float, last: float
+    ) -> "PassedLength":
+        """Return the integral of a speed by Simpson's rule."""
+        inside = marks[(marks > first) & (marks < last)]
+        marks = np.concatenate([[first], inside, [last]])
+        count = _BETWEEN * (len(marks) - 1) + 1
+        t = np.interp(np.linspace(0, len(marks) - 1, count), np.arange(len(marks)), marks)
+        t = np.union1d(t, np.linspace(first, last, _FEWEST))
+        # Two that rounding puts beside each other are one.
+        t = t[np.append(np.diff(t) > 1e-9 * (last - first), True)]
+        here, middle = speeds(t), speeds(0.5 * (t[1:] + t[:-1]))
+        steps = np.diff(t) * (here[:-1] + 4.0 * middle + here[1:]) / 6.0
+        return cls(t, np.append(0.0, np.cumsum(steps)), here)
+
+    @property
+    def whole(self) -> float:
+        """How far it goes in all [m]."""
+        return float(self.length[-1])
+
+    def at(self, times: Array) -> Array:
+        """Return how far it has gone at times (K,) [m]."""
+        found: Array = self._spline(np.clip(times, self.t[0], self.t[-1]))
+        return np.clip(found, 0.0, self.whole)
+
+    def when(self, lengths: Array) -> Array:
+        """Return when it has gone as far as lengths (K,) [s]; at both ends the first and last."""
+        k = np.clip(np.searchsorted(self.length, lengths) - 1, 0, len(self.t) - 2)
+        found = times_when(self._spline, lengths, self.t[k], self.t[k + 1])
+        found = np.where(lengths <= 0.0, self.t[0], found)
+        return np.asarray(np.where(lengths >= self.whole, self.t[-1], found))
+
+    @cached_property
+    def _spline(self) -> Any:
+        from scipy.interpolate import CubicHermiteSpline
+
+        return CubicHermiteSpline(self.t, self.length, self.speed)
+
+
+# Tool poses with the speed between them in place of times: what a shop touches up.
+#
+# A controller goes along each straight or circular step at its speed, rounds corners within its
+# zone, and runs up and down by its own acceleration. So a stretch is compared with a motion where
+# the tool has gone as far, not at equal times. Where times are needed, ramps that are even and as
+# long as the planned time leaves stand for those of the controller.
 
 # Corners are rounded within this of a target at most [m]: ABB's z0, and as much in the others.
 ZONE = 3e-4

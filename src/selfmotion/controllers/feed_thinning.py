@@ -14,18 +14,20 @@ import numpy as np
 
 from selfmotion.basics import Array, Flags
 from selfmotion.certificate import Tolerance
-from selfmotion.controllers.circular import arc_through, step_lengths
-from selfmotion.controllers.feed_stretches import FeedStretch, times_at
-from selfmotion.controllers.longest_steps import Allowed, Places, Steps, StepSearch
-from selfmotion.controllers.passed_lengths import PassedLength
-from selfmotion.controllers.pieces import Piece
-from selfmotion.controllers.pose_numbers import Rounding
-from selfmotion.controllers.pose_stretches import on_one_side
-from selfmotion.controllers.pose_thinning import NotByPosesError, PoseSpan, largest
+from selfmotion.controllers.feed_stretches import FeedStretch, PassedLength, times_at
 from selfmotion.controllers.program_texts import TIMED
-from selfmotion.controllers.stretches import SURE, Event, Miss, Stretch
-from selfmotion.controllers.thinning import events_within, rests
-from selfmotion.controllers.tool_frames import WORLD, ToolFrames
+from selfmotion.controllers.steps import (
+    Allowed,
+    Places,
+    Steps,
+    StepSearch,
+    arc_through,
+    step_lengths,
+)
+from selfmotion.controllers.stretches import SURE, Event, Miss, Stretch, on_one_side
+from selfmotion.controllers.targets import NotByPosesError, PoseSpan, largest
+from selfmotion.controllers.thinning import Piece, events_within, rests
+from selfmotion.controllers.tool_frames import WORLD, Rounding, ToolFrames
 from selfmotion.motion import Trajectory
 
 # What turning and self-motion may be off, from the most that is tried on [rad or m], the last as

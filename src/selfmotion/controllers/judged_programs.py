@@ -1,6 +1,6 @@
-"""Programs of controllers, judged by what they were made from."""
+"""Programs of controllers as files, cut into the steps of their job, and judged."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import combinations, pairwise
 from pathlib import Path as FilePath
@@ -8,22 +8,179 @@ from typing import NamedTuple
 
 import numpy as np
 
-from selfmotion.basics import Array, FileFormatError
+from selfmotion.basics import Array, FileFormatError, Progress, silent
 from selfmotion.certificate import Tolerance
 from selfmotion.constraints import Constraint
-from selfmotion.controllers.controller_program import ControllerProgram, Switch
-from selfmotion.controllers.pieces import what_targets_keep
-from selfmotion.controllers.pose_stretches import PoseStretch
-from selfmotion.controllers.program_files import read_program
-from selfmotion.controllers.program_parts import JudgedStep, parts_of, slow_steps
+from selfmotion.controllers.controller_program import ControllerProgram, Draft, Switch, drafted
+from selfmotion.controllers.krl import KrlReader, write_krl
+from selfmotion.controllers.program_lines import ProgramReader
+from selfmotion.controllers.program_settings import ProgramSettings
 from selfmotion.controllers.program_texts import plain
+from selfmotion.controllers.rapid import RapidReader, write_rapid
+from selfmotion.controllers.read_stretches import SLOWLY
+from selfmotion.controllers.stretches import Misses, PoseStretch, Stretch
+from selfmotion.controllers.thinning import what_targets_keep
 from selfmotion.controllers.tool_frames import WORLD
+from selfmotion.controllers.urscript import UrscriptReader, write_urscript
 from selfmotion.job import Program, are_opposite
 from selfmotion.motion import Trajectory
 from selfmotion.path import Placed
 from selfmotion.problem import Problem
-from selfmotion.result import Move, Piece, elsewhere, gaps
+from selfmotion.result import Move, Parts, Piece, Plan, elsewhere, gaps
+from selfmotion.robot import RobotModel
 from selfmotion.task import log3
+
+# Programs of controllers as files: which suffix is which language.
+
+_WRITERS: Mapping[str, Callable[[FilePath, Draft], None]] = {
+    "krl": write_krl,
+    "rapid": write_rapid,
+    "urscript": write_urscript,
+}
+_READERS: Mapping[str, type[ProgramReader]] = {
+    ".src": KrlReader,
+    ".mod": RapidReader,
+    ".script": UrscriptReader,
+}
+# Suffixes of programs of targets; those that are read as such, which linear URScript is as well.
+PROGRAMS = {".src": "krl", ".mod": "rapid"}
+READ_PROGRAMS = tuple(_READERS)
+
+
+def write_program(
+    plan: Plan | Parts | Move | Program,
+    file: FilePath,
+    form: str,
+    settings: ProgramSettings,
+    progress: Progress = silent,
+) -> None:
+    """Write a motion as a program of a controller; see `write_motion`."""
+    verdict = plan.certificate.verdict if isinstance(plan, Plan) else plan.verdict
+    _WRITERS[form](file, drafted(plan, file.stem, form, settings, verdict, progress))
+
+
+def read_program(file: FilePath, robot: RobotModel | None = None) -> ControllerProgram:
+    """Read a program of a controller, by its suffix; tool poses by the robot that moves to them.
+
+    Raises
+    ------
+    FileFormatError
+        The file cannot be read, or says what is not read; the line is named.
+    """
+    return _READERS[file.suffix.lower()](file, robot).program()
+
+
+def program_miss(
+    plan: Plan | Parts | Move | Program, file: FilePath, read: ControllerProgram | None = None
+) -> tuple[int, Misses, Misses]:
+    """Return what a program file holds: targets, the deviations it states, and what it is.
+
+    The file is read unless it was `read` before.
+
+    Raises
+    ------
+    FileFormatError
+        The file cannot be read, or is of another motion.
+    """
+    found = read or read_program(file, plan.robot)
+    try:
+        return found.targets, found.miss, found.miss_of(plan)
+    except FileFormatError as error:
+        raise FileFormatError(f"{file}: {error}") from error
+
+
+# A controller's program cut into the steps of its job, and slow motions in between judged.
+
+
+class JudgedStep(NamedTuple):
+    """What a certificate says of the targets of a seam or move.
+
+    Attributes
+    ----------
+    name : str
+    verified : bool
+    verdict : str
+    """
+
+    name: str
+    verified: bool
+    verdict: str
+
+
+class ProgramParts(NamedTuple):
+    """What of a program each step of its job is.
+
+    Attributes
+    ----------
+    motions : list of Trajectory
+        Of each step; of a seam at the pace of its path.
+    slow : sequence of (int, Trajectory)
+        Slow motions to where a shifted program goes on: before which step, and what.
+    """
+
+    motions: list[Trajectory]
+    slow: Sequence[tuple[int, Trajectory]]
+
+
+def parts_of(file: FilePath, program: ControllerProgram, job: Program) -> ProgramParts:
+    """Return what of a program each step of its job is.
+
+    Raises
+    ------
+    FileFormatError
+        It is of another job.
+    """
+    names = job.robot.joint_names
+    known = [axis.joint for axis in program.axes]
+    if sorted(known) != sorted(names):
+        raise FileFormatError(f"{file}: has joints {', '.join(known)}, expected {', '.join(names)}")
+    left, found = list(program.stretches), ProgramParts([], slow := [])
+
+    def part(stretches: Sequence[Stretch]) -> ControllerProgram:
+        return replace(program, stretches=tuple(stretches))
+
+    for number, step in enumerate(job.steps):
+        taken, seconds = [], 0.0
+        while left and left[0].name == SLOWLY:
+            slow.append((number, part([left.pop(0)]).trajectory.of_joints(names)))
+        while left and seconds < step.motion.duration - _MOMENT:
+            taken.append(left.pop(0))
+            seconds += taken[-1].duration
+        if abs(seconds - step.motion.duration) > _MOMENT:
+            raise FileFormatError(
+                f"{file}: its targets of '{step.name}' take {seconds:.6g} s, the job's "
+                f"{step.motion.duration:.6g} s: it is of another one"
+            )
+        own, made = part(taken), step.made
+        motion = own.trajectory if isinstance(made, Move) else own.along(made.problem.path)
+        found.motions.append(motion.of_joints(names))
+    if left:
+        raise FileFormatError(f"{file}: goes on with '{left[0].name}' when the job has ended")
+    return found
+
+
+def slow_steps(
+    parts: ProgramParts, job: Program
+) -> tuple[tuple[JudgedStep, ...], Mapping[int, Sequence[Piece]]]:
+    """Return what is found of slow motions, and these by the step that they are before.
+
+    Each has to keep what the nearest free move has to.
+    """
+    moves = [(k, step.made) for k, step in enumerate(job.steps) if isinstance(step.made, Move)]
+    steps, pieces = list[JudgedStep](), dict[int, list[Piece]]()
+    for number, motion in parts.slow:
+        name = f"slowly to '{job.steps[number].name}'"
+        pieces.setdefault(number, []).append(Piece(name, motion))
+        if not moves:
+            steps.append(JudgedStep(name, False, "not verified: the job has no free moves"))
+            continue
+        _, near = min(moves, key=lambda move: abs(move[0] - number))
+        judged = Move(near.robot, what_targets_keep(near.constraints), motion)
+        steps.append(JudgedStep(name, judged.verified, judged.verdict))
+    return tuple(steps), pieces
+
+
+# Programs of controllers, judged by what they were made from.
 
 # Files have so many digits of time [s], and of angles [rad].
 _MOMENT, _LEAST = 1e-4, 1e-6

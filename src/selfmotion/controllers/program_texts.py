@@ -9,6 +9,8 @@ from selfmotion.basics import FileFormatError
 from selfmotion.controllers.stretches import Miss
 from selfmotion.task import SE3, Quaternion
 
+# Characters in a line of comments.
+_WIDTH = 100
 # What a comment begins with that says why targets are joints.
 BECAUSE = "targets are joints, as poses do not keep the motion: "
 # What a comment begins with that says why a seam with a feed has times all the same.
@@ -41,11 +43,11 @@ def plain(text: str) -> str:
     return " ".join(text.replace("→", "->").encode("ascii", "replace").decode().split())
 
 
-def folded(text: str, width: int = 100) -> list[str]:
+def folded(text: str) -> list[str]:
     """Return a text in lines, those after the first with two dots ahead."""
     lines, words = [""], text.split(" ")
     for word in words:
-        if lines[-1] and len(lines[-1]) + len(word) > width:
+        if lines[-1] and len(lines[-1]) + len(word) > _WIDTH:
             lines.append("..")
         lines[-1] = f"{lines[-1]} {word}".strip()
     return lines

@@ -6,12 +6,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from selfmotion.basics import Array, FileFormatError, Flags, RobotError
-from selfmotion.controllers.circular import put_on_arcs
 from selfmotion.controllers.feed_stretches import FeedStretch, times_at
-from selfmotion.controllers.pose_stretches import PoseStretch, on_one_side, straight
-from selfmotion.controllers.program_axes import Axis, tool_from_flange
-from selfmotion.controllers.program_settings import ProgramSettings
-from selfmotion.controllers.stretches import Stretch, finer
+from selfmotion.controllers.program_settings import Axis, ProgramSettings, tool_from_flange
+from selfmotion.controllers.steps import put_on_arcs
+from selfmotion.controllers.stretches import PoseStretch, Stretch, finer, on_one_side, straight
 from selfmotion.controllers.tool_frames import ToolFrames
 from selfmotion.robot import RobotModel
 from selfmotion.task import SE3, Quaternion

@@ -4,9 +4,9 @@ from selfmotion.costs.base import (
     ERROR as ERROR,
     Cost as Cost,
     Partials as Partials,
+    Scaled as Scaled,
     weight_matrix as weight_matrix,
 )
-from selfmotion.costs.beyond_limits import BeyondLimits as BeyondLimits
 from selfmotion.costs.dynamics import (
     GravityTorque as GravityTorque,
     KineticEnergy as KineticEnergy,
@@ -20,26 +20,28 @@ from selfmotion.costs.joints import (
     JointAcceleration as JointAcceleration,
     JointJerk as JointJerk,
     JointLimitDistance as JointLimitDistance,
+    JointReversals as JointReversals,
     JointVelocity as JointVelocity,
+    PathLength as PathLength,
     Posture as Posture,
     metres_of as metres_of,
 )
-from selfmotion.costs.limit_use import LimitUse as LimitUse
 from selfmotion.costs.manipulability import (
     DirectionalManipulability as DirectionalManipulability,
     InverseManipulability as InverseManipulability,
     Manipulability as Manipulability,
     SmallestSingularValue as SmallestSingularValue,
 )
-from selfmotion.costs.off_path import OffPath as OffPath
-from selfmotion.costs.path_length import PathLength as PathLength
-from selfmotion.costs.reversals import JointReversals as JointReversals
+from selfmotion.costs.penalties import (
+    BeyondLimits as BeyondLimits,
+    LimitUse as LimitUse,
+    OffPath as OffPath,
+)
 from selfmotion.costs.samples import (
     PlacedLater as PlacedLater,
     Samples as Samples,
     TipSamples as TipSamples,
 )
-from selfmotion.costs.scaled import Scaled as Scaled
 from selfmotion.costs.towards import Towards as Towards
 
 __all__ = [

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import ClassVar
 
 import numpy as np
@@ -130,3 +130,45 @@ def weighted(weight: Array, x: Array) -> Array:
 def half_square(weight: Array, x: Array) -> Array:
     """Return ½ xᵀWx for each row of x (S, n), (S,)."""
     return np.asarray(0.5 * np.einsum("si,si->s", x, weighted(weight, x)))
+
+
+# A cost that counts more, or less.
+
+
+@dataclass(frozen=True, eq=False)
+class Scaled(Cost):
+    """Another cost, G times a factor.
+
+    Parameters
+    ----------
+    cost : Cost
+        The other cost.
+    factor : float
+        What it is multiplied by.
+    """
+
+    cost: Cost
+    factor: float
+    name: str = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "name", self.cost.name)
+
+    def value(self, samples: Samples) -> Array:
+        """See `Cost.value`."""
+        return self.factor * self.cost.value(samples)
+
+    def gradient(self, samples: Samples) -> Partials:
+        """See `Cost.gradient`."""
+        found = self.cost.gradient(samples)
+        parts = (found.q, found.qd, found.qdd, found.qddd, found.error)
+        return Partials(*(None if part is None else self.factor * part for part in parts))
+
+    def curvature(self, dof: int) -> dict[int, Array]:
+        """See `Cost.curvature`."""
+        own = self.cost.curvature(dof)
+        return {order: self.factor * matrix for order, matrix in own.items()}
+
+    def check(self, follows: Follows) -> None:
+        """See `Cost.check`."""
+        self.cost.check(follows)

@@ -1,4 +1,4 @@
-"""Quadratic forms of the motion and its derivatives, and other costs of the joints alone."""
+"""Costs of the joints alone: quadratic forms of motion, length of the way, reversals."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ import numpy.typing as npt
 from selfmotion.basics import (
     Array,
     ProblemError,
+    as_number,
     as_numbers,
     as_whole,
     plain_numbers,
@@ -23,6 +24,7 @@ from selfmotion.costs.base import (
     Partials,
     as_weight,
     check_mu,
+    check_name,
     check_weight,
     half_square,
     weight_matrix,
@@ -31,6 +33,8 @@ from selfmotion.costs.base import (
 from selfmotion.costs.samples import Samples
 from selfmotion.follow import Follows
 from selfmotion.robot import RobotModel, check_radians
+
+# Quadratic forms of the motion and its derivatives, and other costs of the joints alone.
 
 
 @dataclass(frozen=True, eq=False)
@@ -301,3 +305,117 @@ def _limits(values: npt.ArrayLike, what: str) -> Array:
             f"{what} is {shown(values)}, expected a number for each joint, ±inf for none"
         )
     return read_only(array)
+
+
+# The length of the way in joint space.
+
+
+@dataclass(frozen=True, eq=False)
+class PathLength(Cost):
+    """Length of the joint path, joint by joint: G = Σ_i w_i (√(q̇_i² + δ²) - δ) [rad/s].
+
+    Its integral is Σ_i w_i ∫ |q̇_i| dt, the sum over joints of what each travels, but smooth where
+    a joint turns round.
+
+    Parameters
+    ----------
+    smoothing : float
+        δ [rad/s]; the integral is too small by at most nδT.
+    joint_weights : (n,), optional
+        w ≥ 0, such as `RobotModel.joint_weights`; 1 for every joint by default, which adds up
+        radians only: an arm with prismatic joints has to be given some.
+    """
+
+    is_pointwise: ClassVar[bool] = True
+
+    smoothing: float = 1e-2
+    joint_weights: npt.ArrayLike | None = None
+    name: str = "path length"
+
+    def __post_init__(self) -> None:
+        if self.joint_weights is not None:
+            object.__setattr__(self, "joint_weights", read_only(self.joint_weights))
+
+    def value(self, samples: Samples) -> Array:
+        """See `Cost.value`."""
+        lengths = np.hypot(samples.qd, self.smoothing) - self.smoothing
+        return np.asarray(np.sum(self._w * lengths, axis=1))
+
+    def gradient(self, samples: Samples) -> Partials:
+        """See `Cost.gradient`: w_i q̇_i / √(q̇_i² + δ²)."""
+        return Partials(qd=self._w * samples.qd / np.hypot(samples.qd, self.smoothing))
+
+    def check(self, follows: Follows) -> None:
+        """See `Cost.check`."""
+        robot = follows.robot
+        check_name(self.name)
+        as_number(self.smoothing, f"cost '{self.name}': smoothing", above=0.0)
+        weights = self._w
+        if weights.shape not in ((), (robot.dof,)) or not np.all(weights >= 0.0):
+            raise ProblemError(
+                f"cost '{self.name}': joint_weights are {weights}, expected {robot.dof} numbers ≥ 0"
+            )
+        slides = [name for name in robot.joint_names if robot.is_prismatic(name)]
+        if slides and self.joint_weights is None:
+            raise ProblemError(
+                f"cost '{self.name}': joint '{slides[0]}' moves in metres, others turn in radians; "
+                f"say what they count with joint_weights=robot.joint_weights, or your own"
+            )
+
+    @property
+    def _w(self) -> Array:
+        return np.asarray(1.0 if self.joint_weights is None else self.joint_weights)
+
+
+# How often joints turn round, as something smooth.
+
+
+@dataclass(frozen=True, eq=False)
+class JointReversals(Cost):
+    """Changes of direction of the joints: G = w / π Σ_i (√(u_i² + δ²) - δ) [1/s].
+
+    u_i = q̈_i v / (v² + q̇_i²) is the rate of atan(q̇_i / v), which goes from -π/2 to π/2 where a
+    joint turns round from speeds far above v: the integral of G is about w for each reversal, and
+    half of that for each joint that begins or ends at rest. Gears have their play there, and
+    polished surfaces their marks. It belongs beside another cost, such as `JointVelocity`: alone it
+    has many optima, and takes long. `Plan.reversals` counts what is left.
+
+    Parameters
+    ----------
+    weight : float
+        w, what a reversal costs.
+    speed : float
+        v [rad/s or m/s]: a joint that is slower nearly rests.
+    smoothing : float
+        δ [1/s]: changes slower than that cost next to nothing.
+    """
+
+    weight: float = 1.0
+    speed: float = 0.02
+    smoothing: float = 0.05
+    name: str = "joint reversals"
+
+    def value(self, samples: Samples) -> Array:
+        """See `Cost.value`."""
+        rate = samples.qdd * self._share(samples)
+        turns = np.hypot(rate, self.smoothing) - self.smoothing
+        return np.asarray(self.weight / np.pi * turns.sum(axis=1))
+
+    def gradient(self, samples: Samples) -> Partials:
+        """See `Cost.gradient`."""
+        share = self._share(samples)
+        rate = samples.qdd * share
+        slope = self.weight / np.pi * rate / np.hypot(rate, self.smoothing)
+        # ∂u/∂q̇ = -2 q̈ q̇ v / (v² + q̇²)².
+        by_speed = -2.0 / self.speed * samples.qdd * samples.qd * share**2
+        return Partials(qd=slope * by_speed, qdd=slope * share)
+
+    def check(self, follows: Follows) -> None:
+        """See `Cost.check`."""
+        check_name(self.name)
+        as_number(self.weight, f"cost '{self.name}': weight", least=0.0)
+        as_number(self.speed, f"cost '{self.name}': speed", above=0.0)
+        as_number(self.smoothing, f"cost '{self.name}': smoothing", above=0.0)
+
+    def _share(self, samples: Samples) -> Array:
+        return np.asarray(self.speed / (self.speed**2 + samples.qd**2))

@@ -23,7 +23,6 @@ from selfmotion.certificate import Tolerance
 from selfmotion.collision import Mesh, Obstacle, obstacle_shapes
 from selfmotion.constraints import Clearance, Constraint
 from selfmotion.costs import Cost
-from selfmotion.documents.code import FUNCTION
 from selfmotion.documents.field_types import (
     Axis,
     Coordinates,
@@ -39,8 +38,8 @@ from selfmotion.documents.field_types import (
     Weave,
     Whole,
 )
-from selfmotion.documents.job import GOALS
-from selfmotion.documents.problem_parts import FEED_BOUNDS
+from selfmotion.documents.problem_file import GOALS
+from selfmotion.documents.problem_parts import FEED_BOUNDS, FUNCTION
 from selfmotion.motion import NullMotion
 from selfmotion.optimise import QuasiNewton
 from selfmotion.path import ORIENTATIONS, Path, TimeLaw

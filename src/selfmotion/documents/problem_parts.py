@@ -1,5 +1,7 @@
-"""What the tables of a problem file describe: tool motions, obstacles, starts."""
+"""What tables of a problem file describe: own classes, motions, obstacles, starts, workpieces."""
 
+import importlib
+import sys
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path as FilePath
@@ -7,14 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from selfmotion.basics import (
-    Array,
-    FileFormatError,
-    ProblemError,
-    restore,
-)
+from selfmotion.basics import Array, FileFormatError, ProblemError, Saved, in_si, restore
 from selfmotion.cam import read_path
-from selfmotion.collision import Mesh, obstacle_from_dict
+from selfmotion.collision import Mesh, Obstacle, obstacle_from_dict
+from selfmotion.constraints import Constraint
+from selfmotion.costs import Cost
+from selfmotion.motion import NullMotion
 from selfmotion.path import (
     ORIENTATIONS,
     Circle,
@@ -24,13 +24,106 @@ from selfmotion.path import (
     Placed,
     Spiral,
     Weave,
+    pose_of,
     with_leads,
 )
 from selfmotion.robot import RobotModel
-from selfmotion.task import Task
+from selfmotion.task import SE3, Task
 
 if TYPE_CHECKING:
     from selfmotion.task import SE3
+
+# Classes and functions of a user's own, which a file names as ``module:attribute``.
+
+# The kind of a cost that is a function.
+FUNCTION = "function"
+
+_FAMILIES: Mapping[str, type[Saved]] = {
+    "path": Path,
+    "null_motion": NullMotion,
+    "costs": Cost,
+    "constraints": Constraint,
+}
+
+
+def name_kinds(
+    table: dict[str, Any], folder: FilePath, allowed: bool
+) -> dict[str, Callable[..., Any]]:
+    """Import what kinds and shapes name as ``module:attribute``, and put the kinds there instead.
+
+    Modules are looked for in `folder`, too.
+
+    Returns
+    -------
+    dict
+        The functions among them, by the name that the file gives; only costs may be functions.
+
+    Raises
+    ------
+    FileFormatError
+        Code is not allowed, or cannot be imported, or is nothing of that family.
+    """
+    functions: dict[str, Callable[..., Any]] = {}
+    for section, family in _FAMILIES.items():
+        found = table.get(section)
+        for k, item in enumerate(found if isinstance(found, list) else [found]):
+            where = f"{section}[{k}]" if isinstance(found, list) else section
+            if not isinstance(item, dict):
+                continue
+            value = _code(item.get("kind"), f"{where}.kind", folder, allowed)
+            if isinstance(value, type) and issubclass(value, family):
+                item["kind"] = value.kind
+            elif section == "costs" and callable(value) and not isinstance(value, type):
+                functions[item["kind"]] = value
+                item |= {"code": item["kind"], "kind": FUNCTION}
+            elif value is not None:
+                raise FileFormatError(
+                    f"{where}.kind: '{item['kind']}' is {value!r}, expected a class derived from "
+                    f"selfmotion.{family.__name__}" + (" or a function" * (section == "costs"))
+                )
+            if isinstance(item.get("obstacles"), list):
+                _name_shapes(item["obstacles"], where, folder, allowed)
+    return functions
+
+
+def _name_shapes(listed: list[Any], where: str, folder: FilePath, allowed: bool) -> None:
+    for k, item in enumerate(listed):
+        if isinstance(item, dict):
+            place = f"{where}.obstacles[{k}].shape"
+            value = _code(item.get("shape"), place, folder, allowed)
+            if isinstance(value, type) and issubclass(value, Obstacle):
+                item["shape"] = value.shape
+            elif value is not None:
+                raise FileFormatError(
+                    f"{place}: '{item['shape']}' is {value!r}, expected a class derived from "
+                    f"selfmotion.obstacles.Obstacle"
+                )
+
+
+def _code(name: Any, where: str, folder: FilePath, allowed: bool) -> Any:
+    """Return what ``module:attribute`` names; None where the name is none of that form."""
+    if not isinstance(name, str) or ":" not in name:
+        return None
+    if not allowed:
+        raise FileFormatError(
+            f"{where}: '{name}' is code, which is run only where you ask for it: --allow-code, or "
+            f"allow_code=True"
+        )
+    module, _, attribute = name.partition(":")
+    place = str(folder.resolve())
+    if place not in sys.path:
+        sys.path.insert(0, place)
+    try:
+        return getattr(importlib.import_module(module), attribute)
+    # A module of the user's may raise anything.
+    except Exception as error:
+        raise FileFormatError(
+            f"{where}: '{name}' cannot be imported: {error}; expected module:attribute, the module "
+            f"in {folder} or installed"
+        ) from error
+
+
+# What the tables of a problem file describe: tool motions, obstacles, starts.
 
 # Tool motions that may begin where the arm does, and have a feed.
 _SHAPES = ("circle", "line", "spiral")
@@ -205,3 +298,102 @@ def _exactly_one(values: Mapping[str, Any], *names: str) -> None:
     if len(given) != 1:
         found = " and ".join(given) or "neither"
         raise ProblemError(f"has {found}, expected either {' or '.join(names)}")
+
+
+# A workpiece in a file: a frame, and the paths and bodies that are placed with it.
+
+# What its mesh is called.
+NAME = "workpiece"
+
+
+def placed_table(table: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a checked table of a problem with its workpiece where it stands.
+
+    Paths and bodies of the workpiece are in its frame: they become what a file without one says,
+    paths with a ``frame``, and bodies among the obstacles of the problem's clearance.
+
+    Raises
+    ------
+    ProblemError
+        A path has no place in it, or its bodies are looked at by nothing.
+    """
+    found = dict(table)
+    if NAME not in found:
+        return found
+    piece = found.pop(NAME)
+    frame, carrier = piece.get("frame", SE3.Identity()), piece.get("on")
+    if carrier is not None and found["robot"].get("reference") != carrier:
+        raise ProblemError(
+            f"workpiece: is on '{carrier}', so that paths are in its frame: expected "
+            f"robot.reference = '{carrier}'"
+        )
+    found["path"] = placed_path(found["path"], frame)
+    if "also" in found:
+        found["also"] = [_placed_follow(item, frame, carrier) for item in found["also"]]
+    bodies = [placed_body(item, frame, carrier) for item in piece.get("obstacles", [])]
+    if "mesh" in piece:
+        scale = {"scale": piece["scale"]} if "scale" in piece else {}
+        mesh = {"shape": "mesh", "name": NAME, "file": piece["mesh"]}
+        bodies.append(placed_body({**mesh, **scale}, frame, carrier))
+    elif "scale" in piece:
+        raise ProblemError("workpiece: scale has no effect without a mesh")
+    return _with_bodies(found, bodies) if bodies else found
+
+
+def placed_path(values: Mapping[str, Any], frame: SE3) -> dict[str, Any]:
+    """Return the table of a path that is in a frame, as one in the world."""
+    if values["kind"] in ("circle", "line") and "start" not in values:
+        raise ProblemError("workpiece: path.start is missing: the tool's first pose in its frame")
+    return {**values, "frame": frame * values.get("frame", SE3.Identity())}
+
+
+def placed_body(values: Mapping[str, Any], frame: SE3, carrier: str | None) -> dict[str, Any]:
+    """Return the table of an obstacle that is in a frame, as one in the world or on a link."""
+    found = placed_if_mesh(values)
+    keys = [key for key in ("position", *ORIENTATIONS) if key in found]
+    try:
+        pose = frame * pose_of({key: found.pop(key) for key in keys})
+    except ValueError as error:
+        raise FileFormatError(f"workpiece: obstacle '{values.get('name')}': {error}") from error
+    if "frame" in found:
+        raise ProblemError(
+            f"workpiece: obstacle '{values.get('name')}' rides on '{found['frame']}'; what belongs "
+            f"to the workpiece moves with it"
+        )
+    if carrier is not None:
+        found["frame"] = carrier
+    rotation = pose.rotation.tolist()
+    return {**found, "position": pose.translation.tolist(), "rotation": rotation}
+
+
+def _placed_follow(values: Mapping[str, Any], frame: SE3, carrier: str | None) -> dict[str, Any]:
+    # What follows in the frame of another link is not where the workpiece is.
+    if values.get("reference", carrier) != carrier:
+        return dict(values)
+    rides = {} if carrier is None else {"reference": carrier}
+    if "path" in values:
+        return {**values, **rides, "path": placed_path(values["path"], frame)}
+    return {**values, **rides, "pose": frame * values["pose"]}
+
+
+def _with_bodies(table: dict[str, Any], bodies: list[dict[str, Any]]) -> dict[str, Any]:
+    """Return a table whose clearance looks at more bodies."""
+    constraints = list(table.get("constraints", []))
+    for k, item in enumerate(constraints):
+        if item["kind"] == "Clearance":
+            constraints[k] = {**item, "obstacles": [*item.get("obstacles", []), *bodies]}
+            return {**table, "constraints": constraints}
+    clearance = table.get("clearance", {})
+    if clearance is None:
+        raise ProblemError(
+            "workpiece: has bodies, but clearance is false, and no constraint is a Clearance"
+        )
+    several = [*clearance.get("obstacles", []), *bodies]
+    return {**table, "clearance": {"distance": 0.0, **clearance, "obstacles": several}}
+
+
+def standing(document: Mapping[str, Any]) -> tuple[SE3, str | None]:
+    """Return where the workpiece of a document stands that was read before, and on what."""
+    piece = document.get(NAME, {})
+    frame = in_si(piece).get("frame")
+    return SE3.Identity() if frame is None else pose_of(frame), piece.get("on")

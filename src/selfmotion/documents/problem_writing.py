@@ -17,7 +17,7 @@ from selfmotion.basics import (
     shown,
     write_document,
 )
-from selfmotion.documents.job import Job
+from selfmotion.documents.problem_file import Job
 from selfmotion.optimise import QuasiNewton
 from selfmotion.problem import Problem, check_problem, problem_to_dict
 from selfmotion.robot import (

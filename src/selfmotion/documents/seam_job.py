@@ -20,10 +20,17 @@ from selfmotion.basics import (
 )
 from selfmotion.cam import READING, Reading, one_seam, read_path, read_seams, times_of_events
 from selfmotion.constraints import Clearance
-from selfmotion.documents.job import Job
-from selfmotion.documents.problem_file import job_of
-from selfmotion.documents.problem_parts import FEED_BOUNDS, led, obstacle, start_of, woven
-from selfmotion.documents.workpiece import NAME, placed_body, standing
+from selfmotion.documents.problem_file import Job, job_of
+from selfmotion.documents.problem_parts import (
+    FEED_BOUNDS,
+    NAME,
+    led,
+    obstacle,
+    placed_body,
+    standing,
+    start_of,
+    woven,
+)
 from selfmotion.job import FASTEST_FEED, Program, Seam, highest_feed, plan_job
 from selfmotion.path import Feed, Path, Placed, pose_of, with_run_ups
 from selfmotion.problem import NO_OVERLAP, Problem

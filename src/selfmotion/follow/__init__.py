@@ -1,9 +1,11 @@
 """What the arm follows: chains, their paths, and the rows of them that are prescribed."""
 
 from selfmotion.follow.augmented import (
-    AugmentedArm as AugmentedArm,
     AugmentedFollows as AugmentedFollows,
 )
-from selfmotion.follow.follow import BoundFollow as BoundFollow, Follow as Follow
-from selfmotion.follow.follows import Follows as Follows
+from selfmotion.follow.follow import (
+    BoundFollow as BoundFollow,
+    Follow as Follow,
+    Follows as Follows,
+)
 from selfmotion.follow.virtual_joints import VirtualJoints as VirtualJoints

@@ -7,8 +7,7 @@ from typing import Any, cast
 import numpy as np
 
 from selfmotion.basics import Array, Flags, read_only
-from selfmotion.follow.follow import BoundFollow
-from selfmotion.follow.follows import Follows
+from selfmotion.follow.follow import BoundFollow, Follows
 from selfmotion.follow.table_chain import TableChain
 from selfmotion.follow.virtual_joints import VirtualJoints
 from selfmotion.path import Dwell

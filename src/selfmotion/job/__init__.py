@@ -6,11 +6,9 @@ from selfmotion.job.highest_feed import (
     FeedFound as FeedFound,
     highest_feed as highest_feed,
 )
-from selfmotion.job.program import Program as Program
+from selfmotion.job.program import Program as Program, write_timetable as write_timetable
 from selfmotion.job.run import plan_job as plan_job
-from selfmotion.job.seam import Seam as Seam, are_opposite as are_opposite
+from selfmotion.job.seam import Seam as Seam, Step as Step, are_opposite as are_opposite
 from selfmotion.job.specification import Specification as Specification
-from selfmotion.job.step import Step as Step
-from selfmotion.job.timetable import write_timetable as write_timetable
 
 __all__ = ["FeedFound", "Specification", "Step", "highest_feed"]

@@ -10,10 +10,8 @@ from selfmotion.certificate import FinishedMotion
 from selfmotion.collision import Obstacle
 from selfmotion.job.ordering import Ordering
 from selfmotion.job.program import Program
-from selfmotion.job.seam import Seam
-from selfmotion.job.seam_steps import seam_steps
-from selfmotion.job.step import Step
-from selfmotion.job.work import Asked, Work
+from selfmotion.job.seam import Seam, Step
+from selfmotion.job.work import Asked, Work, seam_steps
 from selfmotion.result import Move, Plan
 
 # For a seam other ways are looked for so often; those whose ends are so near [rad or m] are one.

@@ -1,17 +1,19 @@
 """A whole job as one motion: seams, moves between them, and what is known of all of it."""
 
+from __future__ import annotations
+
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import accumulate
-from pathlib import Path as FilePath
+from pathlib import Path, Path as FilePath
 
-from selfmotion.basics import PlanError, as_path
+from selfmotion.basics import PlanError, ProblemError, as_path, shown, write_text
 from selfmotion.certificate import Tolerance, first_of
 from selfmotion.collision import Obstacle
 from selfmotion.constraints import Clearance
+from selfmotion.job.seam import Step
 from selfmotion.job.specification import Specification
-from selfmotion.job.step import Step
 from selfmotion.motion import Trajectory, joined_motions
 from selfmotion.result import Move, Piece, Plan, another_tool, gaps, moving_end, reached_text
 from selfmotion.robot import RobotModel
@@ -199,7 +201,7 @@ class Program:
         if self.specification is not None:
             yield from self.specification.failures(self.robot, self.steps, self.missing)
 
-    def require(self) -> "Program":
+    def require(self) -> Program:
         """Return the program itself if all of it is verified.
 
         Raises
@@ -220,3 +222,34 @@ class Program:
 
 # Names in a printed program.
 _SHOWN = 12
+
+
+# When the steps of a program begin and end, and what happens when, as a table.
+
+
+def write_timetable(program: Program, file: str | Path) -> None:
+    """Write when each step begins and ends, and each event is [s], as CSV; atomically.
+
+    Events at one time are in the order in which they were given.
+
+    Raises
+    ------
+    ProblemError
+        It is no program.
+    FileFormatError
+        The file cannot be written.
+    """
+    if not isinstance(program, Program):
+        raise ProblemError(f"program is {shown(program)}, expected a Program")
+    rows = list[tuple[float, float, str, str]]()
+    for begin, step in zip(program.begins, program.steps, strict=True):
+        kind = "seam" if step.is_seam else "move"
+        rows.append((begin, begin + step.duration, kind, step.name))
+        for event, at in step.happenings:
+            rows.append((begin + at, begin + at, "event", f"{step.name}: {event}"))
+    lines = ["begin,end,kind,name"]
+    lines += [
+        f'{begin:.6f},{end:.6f},{kind},"{name.replace(chr(34), chr(34) * 2)}"'
+        for begin, end, kind, name in rows
+    ]
+    write_text(as_path(file), "\n".join(lines) + "\n")

@@ -6,11 +6,14 @@ import math
 from collections.abc import Sequence
 from concurrent.futures import Executor
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
+import numpy as np
 import numpy.typing as npt
 
 from selfmotion.basics import (
+    Array,
     PlanError,
     ProblemError,
     Progress,
@@ -27,17 +30,139 @@ from selfmotion.basics import (
 )
 from selfmotion.certificate import Tolerance
 from selfmotion.constraints import Clearance, Constraint
-from selfmotion.job.building import Builder
-from selfmotion.job.earlier import Earlier, check_earlier
-from selfmotion.job.files import Shelf
+from selfmotion.job.files import Earlier, Shelf, check_earlier
+from selfmotion.job.growing import Growing
+from selfmotion.job.order import EXACT
 from selfmotion.job.ordering import Ordering
 from selfmotion.job.program import Program
-from selfmotion.job.seam import Seam
+from selfmotion.job.seam import Seam, Step
 from selfmotion.job.specification import Specification
-from selfmotion.job.work import Asked, Work, check_can_be_sent
+from selfmotion.job.work import Asked, Work, check_can_be_sent, seam_steps
 from selfmotion.problem import KEPT, NO_OVERLAP, check_all_times, check_feeds
-from selfmotion.result import arm_digest
+from selfmotion.result import Move, arm_digest
 from selfmotion.robot import RobotModel
+
+# From an order to a program: moves are planned, and the order again where they disappoint.
+
+# Orders that are tried at most: exact ones, and those of many seams.
+_ORDERS, _ORDERS_OF_MANY = 200, 12
+# What a move that is not found counts where no order does without [s].
+_GAP = 1e6
+# From which state to which one; None is the start or the end of the program.
+Pair = tuple[int | None, int | None]
+
+
+class Builder:
+    """Builds the program of a job.
+
+    Parameters
+    ----------
+    ordering : Ordering
+    work : Work
+    ends : ((n,) or None, (n,) or None)
+        Where the program begins and ends.
+    """
+
+    def __init__(self, ordering: Ordering, work: Work, ends: tuple[Array | None, ...]) -> None:
+        self._ordering, self._work, self._ends = ordering, work, ends
+        self._notes: list[str] = []
+
+    def program(self) -> Program:
+        """Return the program; what could not be made is named."""
+        if any(seam.leaves for seam in self._ordering.seams):
+            return Growing(self._ordering, self._work, self._ends).program()
+        return self._of_moves()
+
+    def _of_moves(self) -> Program:
+        ordering, moves = self._ordering, dict[Pair, Move]()
+        bound = ordering.best().bound
+        best: tuple[float, tuple[int, ...]] = (np.inf, ())
+        exact = len(ordering.made) <= EXACT
+        for _ in range(_ORDERS if exact else _ORDERS_OF_MANY):
+            found = ordering.best()
+            if not found.states:
+                break
+            wanted = [pair for pair in self._pairs(found.states) if pair not in moves]
+            self._plan(wanted, moves)
+            cost = self._cost(found.states, moves)
+            bound = max(bound, found.bound) if exact else bound
+            if np.isfinite(cost):
+                best = min(best, (cost, found.states))
+            # Moves not planned yet are estimated below what they take: no other order is better.
+            if not wanted or (np.isfinite(cost) and not exact):
+                break
+        states = best[1] or self._with_gaps(moves)
+        return Program(
+            self._work.asked.robot,
+            tuple(self._steps(states, moves)),
+            dict(ordering.missing),
+            bound,
+            tuple(self._notes),
+        )
+
+    def _with_gaps(self, moves: dict[Pair, Move]) -> tuple[int, ...]:
+        """Return the order with the fewest moves that are not found."""
+        for pair, move in moves.items():
+            if not move.verified:
+                self._ordering.learn(*pair, _GAP)
+        states = self._ordering.best().states
+        self._plan([pair for pair in self._pairs(states) if pair not in moves], moves)
+        return states
+
+    def _pairs(self, states: Sequence[int]) -> list[Pair]:
+        start, end = self._ends
+        first = [] if start is None else [(None, states[0])]
+        last = [] if end is None else [(states[-1], None)]
+        return [*first, *pairwise(states), *last]
+
+    def _plan(
+        self,
+        wanted: Sequence[Pair],
+        moves: dict[Pair, Move],
+    ) -> None:
+        """Plan moves, and let the order know what they take."""
+        asked = [(*self._ends_of(pair), ()) for pair in wanted]
+        named = [self._ordering.name_of_move(*pair) for pair in wanted]
+        for pair, move in zip(wanted, self._work.moves(asked, named), strict=True):
+            moves[pair] = move
+            seconds = move.motion.duration if move.verified else np.inf
+            self._ordering.learn(*pair, seconds)
+            if not move.verified:
+                names = self._ordering.name_of_move(*pair)
+                self._notes.append(f"'{names}' is dropped: {move.trouble}")
+
+    def _ends_of(self, pair: Pair) -> tuple[Array, Array]:
+        """Return where a move begins and ends, (n,) each."""
+        states, (one, other) = self._ordering.states, pair
+        first = self._ends[0] if one is None else states[one].ends[1]
+        last = self._ends[1] if other is None else states[other].ends[0]
+        if first is None or last is None:
+            raise RuntimeError("no move leads to where nothing was asked for")
+        return first, last
+
+    def _cost(self, states: Sequence[int], moves: dict[Pair, Move]) -> float:
+        found = [moves[pair] for pair in self._pairs(states)]
+        if not all(move.verified for move in found):
+            return float(np.inf)
+        own = sum(self._ordering.own(state) for state in states)
+        return own + sum(move.motion.duration for move in found)
+
+    def _steps(self, states: Sequence[int], moves: dict[Pair, Move]) -> list[Step]:
+        pairs, steps = self._pairs(states), list[Step]()
+        by_last = {pair[1]: pair for pair in pairs}
+        for state in states:
+            if state in by_last:
+                pair = by_last[state]
+                steps.append(Step(self._ordering.name_of_move(*pair), moves[pair]))
+            here = self._ordering.states[state]
+            seam = self._ordering.seams[here.seam]
+            steps += seam_steps(seam, here.made, here.turned, self._work)
+        if None in by_last:
+            steps.append(Step(self._ordering.name_of_move(*by_last[None]), moves[by_last[None]]))
+        return steps
+
+
+# From seams to a program.
 
 
 def plan_job(

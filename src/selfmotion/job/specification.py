@@ -13,8 +13,7 @@ from selfmotion.certificate import USUAL, Tolerance
 from selfmotion.collision import Obstacle, obstacle_from_dict
 from selfmotion.constraints import Clearance, Constraint
 from selfmotion.costs import cost_from_dict
-from selfmotion.job.seam import JOB_END, JOB_START, Seam, one_way, reversing
-from selfmotion.job.step import Step
+from selfmotion.job.seam import JOB_END, JOB_START, Seam, Step, one_way, reversing
 from selfmotion.path import Path, Reversed
 from selfmotion.result import Asked, Piece, Plan, arm_digest, elsewhere, not_judged_by
 from selfmotion.robot import RobotModel

@@ -1,7 +1,7 @@
 """What a job plans: branches of seams and moves, here or in other processes, kept when finished.
 
-Each piece of work depends on what it is asked alone, its random numbers too: so the same comes of
-it wherever it is done, and whenever.
+Each piece of work depends on what it is asked alone, its random numbers too: so the same comes
+of it wherever it is done, and whenever.
 """
 
 import tempfile
@@ -17,11 +17,12 @@ from typing import Any, TypeVar
 import numpy as np
 
 from selfmotion.basics import Array, ProblemError, Progress, digest_of, one_blas_thread
+from selfmotion.collision import Obstacle
 from selfmotion.constraints import Clearance, Constraint
 from selfmotion.costs import FunctionCost
-from selfmotion.job.earlier import Earlier, way_along
-from selfmotion.job.files import Shelf, leads
-from selfmotion.job.seam import Seam, backwards
+from selfmotion.job.files import Earlier, Shelf, leads, way_along
+from selfmotion.job.seam import Seam, Step, backwards
+from selfmotion.motion import Trajectory
 from selfmotion.planning import branches, from_start, like_before, near_start
 from selfmotion.problem import (
     Problem,
@@ -381,3 +382,31 @@ def _unpacked(data: bytes, load: Any, known: dict[str, Any]) -> Any:
         file = Path(folder, "made.npz")
         file.write_bytes(data)
         return load(file, known=known)
+
+
+# The steps of a program that a seam becomes.
+
+
+def seam_steps(
+    seam: Seam, plan: Plan, turned: bool, work: Work, standing: Sequence[Obstacle] = ()
+) -> list[Step]:
+    """Return the steps of a seam: itself, and the wait after it."""
+    steps = [
+        Step(
+            seam.name,
+            plan,
+            turned,
+            tuple(seam.events),
+            tuple(seam.leaves),
+            tuple(seam.may_meet),
+        )
+    ]
+    if seam.wait > 0.0:
+        q = np.tile(plan.trajectory.q[-1], (2, 1))
+        times, names = np.array([0.0, seam.wait]), plan.robot.joint_names
+        still = Trajectory(times, q, np.zeros_like(q), names, np.zeros_like(q))
+        # What it leaves stands there by then.
+        left = [item for item in seam.leaves if item.name not in seam.may_meet]
+        wait = Move(plan.robot, work.asked.of_moves((*standing, *left)), still)
+        steps.append(Step(f"{seam.name}, wait", wait, may_meet=tuple(seam.may_meet)))
+    return steps

@@ -14,27 +14,22 @@ given: who has no damping, or a path that does not move, does not wait for their
 """
 
 from selfmotion.kernels.algebra import (
+    carried as carried,
     cholesky as cholesky,
+    factor_damped as factor_damped,
     finite as finite,
     gram as gram,
     respond as respond,
     solve_cholesky as solve_cholesky,
+    transport as transport,
 )
-from selfmotion.kernels.backward import (
+from selfmotion.kernels.stages import (
+    Law as Law,
+    advance as advance,
+    at_tip as at_tip,
     pullback as pullback,
     sensitivities as sensitivities,
     space_size as space_size,
-)
-from selfmotion.kernels.contraction import Every as Every, contract_task as contract_task
-from selfmotion.kernels.damping import Law as Law
-from selfmotion.kernels.forward import (
-    advance as advance,
-    at_tip as at_tip,
-)
-from selfmotion.kernels.null_space import (
-    carried as carried,
-    factor_damped as factor_damped,
-    transport as transport,
 )
 from selfmotion.kernels.start import approach as approach, approach_start as approach_start
 from selfmotion.kernels.table import (
@@ -48,6 +43,8 @@ from selfmotion.kernels.table import (
     view as view,
 )
 from selfmotion.kernels.tool import (
+    Every as Every,
+    contract_task as contract_task,
     errors_and_rows as errors_and_rows,
     pose_error as pose_error,
     rows_of as rows_of,

@@ -313,7 +313,7 @@ def _needed(
 def _turned(layout: Layout, f: int, jacobian: Array, rates: Array, out: Array) -> Vector:
     """Set `out` (6,) to J̇6 q̇ of tip f, and return the tip's angular velocity.
 
-    By two running sums along the chain, see `selfmotion.kernels.contraction`: with s_i, w_i the
+    By two running sums along the chain, see `selfmotion.kernels.tool`: with s_i, w_i the
     shares of joint i in the tip's velocities and W_<i the sum of w before it,
 
         J̇6 q̇ = Σ_i [(2 W_<i + w_i) × s_i; W_<i × w_i].

@@ -11,21 +11,30 @@ from selfmotion.path.base import (
     path_series as path_series,
     rotations_about as rotations_about,
 )
-from selfmotion.path.feed import Feed as Feed
+from selfmotion.path.derived import (
+    Placed as Placed,
+    Retimed as Retimed,
+    Reversed as Reversed,
+    Section as Section,
+    section_at_rest as section_at_rest,
+)
+from selfmotion.path.feed import Feed as Feed, FeedPossible as FeedPossible
 from selfmotion.path.feed_kept import FeedKept as FeedKept
-from selfmotion.path.feed_possible import FeedPossible as FeedPossible
-from selfmotion.path.joined import Dwell as Dwell, Joined as Joined, with_leads as with_leads
-from selfmotion.path.merging import merged as merged
+from selfmotion.path.joined import (
+    Dwell as Dwell,
+    Joined as Joined,
+    Stroke as Stroke,
+    with_leads as with_leads,
+    with_run_ups as with_run_ups,
+)
 from selfmotion.path.pace import Pace as Pace, times_when as times_when
-from selfmotion.path.placed import Placed as Placed
-from selfmotion.path.polyline import Polyline as Polyline
-from selfmotion.path.retimed import Retimed as Retimed
-from selfmotion.path.reversed import Reversed as Reversed
-from selfmotion.path.run_ups import Stroke as Stroke, with_run_ups as with_run_ups
-from selfmotion.path.section import Section as Section, section_at_rest as section_at_rest
-from selfmotion.path.shapes import Circle as Circle, Line as Line
-from selfmotion.path.spiral import Spiral as Spiral
-from selfmotion.path.time_law import TimeLaw as TimeLaw
+from selfmotion.path.polyline import Polyline as Polyline, merged as merged
+from selfmotion.path.shapes import (
+    Circle as Circle,
+    Line as Line,
+    Spiral as Spiral,
+    TimeLaw as TimeLaw,
+)
 from selfmotion.path.twist import TwistPath as TwistPath
 from selfmotion.path.waypoints import Waypoints as Waypoints
 from selfmotion.path.weave import Weave as Weave

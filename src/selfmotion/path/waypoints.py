@@ -1,4 +1,4 @@
-"""A tool motion through given poses at given times."""
+"""A smooth tool motion through given poses at given times."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ from selfmotion.basics import (
     PathError,
     as_choice,
     as_number,
+    as_numbers,
     as_path,
     read_only,
     read_table,
@@ -25,18 +26,112 @@ from selfmotion.basics import (
     shown,
 )
 from selfmotion.path.base import Path, PathSamples, PathSeries, path_pose, rotvecs, unit
-from selfmotion.path.turns import Turning
-from selfmotion.path.waypoint_arguments import (
-    as_table,
-    bends,
-    check_waypoints,
-    of_file,
-    scalar_first,
-)
-from selfmotion.task import SE3, Quaternion
+from selfmotion.task import SE3, Quaternion, turn, turning
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
+
+# What waypoints are given, checked; and where they bend.
+
+# What quaternions are called in files, and as an argument.
+_IN_FILES, _ARGUMENT = "quaternions", "quaternions_wxyz"
+
+
+def bends(legs: Array, angle: float, least: float) -> npt.NDArray[np.bool_]:
+    """Return where legs (N - 1, 3) change their direction by more than `angle`, (N - 2,)."""
+    lengths = np.linalg.norm(legs, axis=1)
+    cosine = np.einsum("ki,ki->k", legs[:-1], legs[1:])
+    # What hardly moves on one side has no direction there, hence no kink.
+    moves = (lengths[:-1] > least) & (lengths[1:] > least)
+    return np.asarray((cosine < np.cos(angle) * lengths[:-1] * lengths[1:]) & moves)
+
+
+def as_table(values: npt.ArrayLike, name: str) -> Array:
+    """Return numbers of waypoints; PathError names what is none."""
+    return as_numbers(values, f"waypoints: {name}", error=PathError)
+
+
+def scalar_first(orientations: npt.ArrayLike | Rotation) -> npt.ArrayLike:
+    """Return orientations as quaternions [w, x, y, z]: SciPy's know their own order."""
+    if hasattr(orientations, "as_quat"):
+        return np.asarray(orientations.as_quat(scalar_first=True), dtype=np.float64)
+    return orientations
+
+
+def of_file(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what a file says as arguments: its `quaternions` are w, x, y, z."""
+    given = dict(values)
+    if _IN_FILES in given:
+        if _ARGUMENT in given:
+            raise PathError(f"{_IN_FILES} and {_ARGUMENT} are one thing; give one of them")
+        given[_ARGUMENT] = given.pop(_IN_FILES)
+    return given
+
+
+def check_waypoints(t: Array, points: Array, turns: Array) -> None:
+    """Raise PathError unless times (N,) increase, with positions and quaternions for each."""
+    if t.ndim != 1 or len(t) < 2:
+        raise PathError(f"waypoints: t has shape {t.shape}, expected (N,) with N ≥ 2")
+    for name, array, width in (("positions", points, 3), ("quaternions", turns, 4)):
+        if array.shape != (len(t), width):
+            raise PathError(
+                f"waypoints: {name} has shape {array.shape}, expected ({len(t)}, {width})"
+            )
+    late = np.flatnonzero(np.diff(t) <= 0)
+    if late.size:
+        row = int(late[0]) + 1
+        raise PathError(
+            f"waypoints: t[{row}] = {t[row]} does not come after t[{row - 1}] = {t[row - 1]}"
+        )
+    zero = np.flatnonzero(np.linalg.norm(turns, axis=1) < 1e-9)
+    if zero.size:
+        raise PathError(f"waypoints: quaternions[{zero[0]}] is zero")
+
+
+# A smooth turning through given orientations, and its rate.
+
+
+class Turning:
+    """scipy's `RotationSpline` (C²): from each orientation on by a cubic rotation vector.
+
+    Orientation and rate come from one rotation vector, of which scipy's would make two.
+
+    Parameters
+    ----------
+    t : (N,)
+        Times [s].
+    quaternions : (N, 4)
+        [w, x, y, z].
+
+    Attributes
+    ----------
+    x : (N,)
+        The times.
+    c : (4, N - 1, 3)
+        Coefficients of the rotation vectors, the highest first.
+    """
+
+    def __init__(self, t: Array, quaternions: Array) -> None:
+        from scipy.spatial.transform import Rotation, RotationSpline
+
+        spline = RotationSpline(t, Rotation.from_quat(quaternions, scalar_first=True))
+        self.x: Array = spline.interpolator.x
+        self.c: Array = spline.interpolator.c
+        self._first: Array = spline.rotations.as_matrix()
+
+    def at(self, t: Array) -> tuple[Array, Array]:
+        """Return orientations (K, 3, 3) and angular velocities (K, 3) at times, world axes."""
+        k: npt.NDArray[np.intp] = np.searchsorted(self.x[1:-1], t, side="right")
+        s = (t - self.x[k])[:, None]
+        cubic, square, slope, none = self.c.take(k, axis=1)
+        vectors = ((cubic * s + square) * s + slope) * s + none
+        rates = (3.0 * cubic * s + 2.0 * square) * s + slope
+        first = self._first[k]
+        turned, angular = turning(vectors, rates)
+        return first @ turned, turn(first, angular)
+
+
+# A tool motion through given poses at given times.
 
 _COLUMNS = ("t", "x", "y", "z")
 _QUATERNION = ("qw", "qx", "qy", "qz")
@@ -236,12 +331,12 @@ class Waypoints(Path, kind="waypoints"):
         piece = np.searchsorted(self._t[starts], tau, side="right") - 1
         position, rotation = np.empty((len(t), 3)), np.empty((len(t), 3, 3))
         twist = np.empty((len(t), 6))
-        for index, (line, turn) in enumerate(splines):
+        for index, (line, turned) in enumerate(splines):
             here: Any = slice(None) if len(splines) == 1 else np.flatnonzero(piece == index)
             own = tau[here]
             if len(own):
                 position[here], twist[here, :3] = line(own), line(own, 1)
-                rotation[here], twist[here, 3:] = turn.at(own)
+                rotation[here], twist[here, 3:] = turned.at(own)
         return PathSamples(t, position, rotation, twist * slope[:, None])
 
     def series(self, middle: Array, half: Array) -> PathSeries:
@@ -258,11 +353,11 @@ class Waypoints(Path, kind="waypoints"):
         starts, splines = self._pieces
         piece = np.searchsorted(self._t[starts], at, side="right") - 1
         found = PathSeries(np.empty_like(tau), np.empty_like(tau))
-        for index, (line, turn) in enumerate(splines):
+        for index, (line, turned) in enumerate(splines):
             here = piece == index
             if not np.any(here):
                 continue
-            for spline, whole in zip((line, turn), found, strict=True):
+            for spline, whole in zip((line, turned), found, strict=True):
                 part = series.of_pieces(spline.x, spline.c[::-1], at[here], reach[here])
                 bounds = series.of_vectors(part)
                 if whole is found.rotation:

@@ -36,23 +36,29 @@ from selfmotion.costs import BeyondLimits, Cost, JointVelocity, OffPath
 from selfmotion.follow import Follow, Follows
 from selfmotion.motion import NullMotion, Trajectory, fading_window
 from selfmotion.path import Path
-from selfmotion.problem.defaults import ANY_NULL_MOTION, KEPT, NO_OVERLAP, USUAL_COSTS
-from selfmotion.problem.envelopes import asked_envelope, with_own_limits
-from selfmotion.problem.feeds import check_feeds
-from selfmotion.problem.fit import check_fit
-from selfmotion.problem.given import (
+from selfmotion.problem.along import (
+    arm_rest_orders,
+    asked_envelope,
+    smooth_knots,
+    way_of,
+    with_own_limits,
+)
+from selfmotion.problem.fit import (
+    ANY_NULL_MOTION,
+    KEPT,
+    NO_OVERLAP,
     SEQUENCES,
     START_MISS,
+    USUAL_COSTS,
     check_costs,
+    check_feeds,
+    check_fit,
     check_judged,
     check_kinds,
     check_start,
     first_tool,
 )
-from selfmotion.problem.knots import smooth_knots
 from selfmotion.problem.remarks import remarks_on
-from selfmotion.problem.rest import arm_rest_orders
-from selfmotion.problem.way import way_of
 from selfmotion.robot import RobotModel, mesh_digests
 from selfmotion.task import Damping, DampingLaw, Relaxation, Task, feedback_rate
 

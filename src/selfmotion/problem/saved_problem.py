@@ -13,7 +13,7 @@ from selfmotion.costs import cost_from_dict
 from selfmotion.follow import Follow
 from selfmotion.motion import NullMotion
 from selfmotion.path import Path
-from selfmotion.problem.defaults import NO_OVERLAP
+from selfmotion.problem.fit import NO_OVERLAP
 from selfmotion.problem.problem import Problem
 from selfmotion.robot import LIMITS, RobotModel, rebuild_robot
 from selfmotion.task import Damping, Relaxation, Task

@@ -1,15 +1,176 @@
-"""What is commanded: a state for each cycle, from which the arm can always be stopped."""
+"""What is commanded: limits of the joints, segments, a state for each cycle."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import Enum
+from functools import reduce
+from operator import and_
 
 import numpy as np
+import numpy.typing as npt
 
-from selfmotion.basics import Array, ProblemError
+from selfmotion.basics import Array, ProblemError, StartError, read_only
 from selfmotion.basics.layout import Layout
+from selfmotion.constraints import (
+    Constraint,
+    JointAccelerationLimits,
+    JointPositionLimits,
+    JointVelocityLimits,
+)
 from selfmotion.realtime import law
-from selfmotion.realtime.limits import stoppable
-from selfmotion.realtime.segment import Flag, Segment
-from selfmotion.realtime.settings import FARTHEST, GAIN
-from selfmotion.realtime.viable import tightened
+from selfmotion.realtime.law import braking_distance, tightened
+from selfmotion.realtime.settings import ACCELERATION, ENDS, FARTHEST, GAIN, SPEED
 from selfmotion.robot import Kinematics, RobotModel
+
+# Limits of the joints, as the loop keeps them.
+
+_USUAL = (JointPositionLimits, JointVelocityLimits, JointAccelerationLimits)
+
+
+def joint_limits(robot: RobotModel, constraints: Sequence[Constraint]) -> Array:
+    """Return lower, upper, speed and acceleration limits of an arm, (4, n).
+
+    Those of the arm and its maker, and of the constraints.
+
+    Raises
+    ------
+    ProblemError
+        A constraint is not of the kinds that are kept while moving; a joint has no limit of
+        acceleration.
+    """
+    for item in constraints:
+        if not item.kept_moving:
+            raise ProblemError(
+                f"constraint {type(item).__name__} is not kept while moving, expected limits of "
+                f"joint position, velocity and acceleration, or a Clearance"
+            )
+    kinds = {type(item) for item in constraints}
+    # Where none are given, those of the arm and its maker.
+    asked = [*constraints, *(kind() for kind in _USUAL if kind not in kinds)]
+    envelope = reduce(and_, (item.envelope(robot) for item in asked))
+    limits = np.array([envelope.lower, envelope.upper, envelope.speed, envelope.acceleration])
+    endless = np.flatnonzero(~np.isfinite(limits[2:]).all(axis=0))
+    if endless.size:
+        raise ProblemError(
+            f"{robot.name}: joint '{robot.joint_names[int(endless[0])]}' has no limit of speed or "
+            f"acceleration, which a stop in time needs; give JointVelocityLimits(…) and "
+            f"JointAccelerationLimits(…)"
+        )
+    return limits
+
+
+def planned_limits(limits: Array) -> Array:
+    """Return what plans aim at, within the limits (4, n) of commands."""
+    lower, upper = limits[:2]
+    margin = np.minimum(ENDS, 0.1 * (upper - lower))
+    return np.stack([lower + margin, upper - margin, SPEED * limits[2], ACCELERATION * limits[3]])
+
+
+def stoppable(robot: RobotModel, limits: Array, q: Array, qd: Array, cycle: float) -> Array:
+    """Return the control point c (n,) of a motion that begins at q with q̇, see `viable`.
+
+    Raises
+    ------
+    StartError
+        A joint cannot stop within the limits (4, n) from there.
+    """
+    c = q + cycle * qd
+    lower, upper, speed, hardest = limits[:4]
+    room = np.where(qd > 0.0, upper - c, c - lower)
+    need = np.array(
+        [braking_distance(abs(w), most, cycle) for w, most in zip(qd, hardest, strict=True)]
+    )
+    bad = np.flatnonzero((c < lower) | (c > upper) | (np.abs(qd) > speed) | (need > room))
+    if bad.size:
+        k = int(bad[0])
+        name = robot.joint_names[k]
+        unit = robot.unit_of(name)
+        is_outside = not lower[k] <= q[k] <= upper[k]
+        asks = is_outside and unit == "rad" and abs(q[k]) > 2.0 * np.pi
+        raise StartError(
+            f"joint '{name}' is at {q[k]:.6g} {unit}, {qd[k]:.6g} {unit}/s, from where it cannot "
+            f"stop within {lower[k]:.6g}..{upper[k]:.6g} {unit} at up to {speed[k]:.6g} {unit}/s; "
+            f"bring the arm within its limits first"
+            f"{'; are its angles in degrees? expected rad' if asks else ''}",
+            position_miss=0.0,
+            rotation_miss=0.0,
+        )
+    return np.asarray(c)
+
+
+# What a step hands to the controller.
+
+
+class Flag(Enum):
+    """By what a segment follows the path, from the best to the last resort."""
+
+    PLANNED = "planned"
+    KEPT = "kept"
+    TRACKING = "tracking"
+    STOPPING = "stopping"
+
+    @property
+    def message(self) -> str:
+        """What it means."""
+        return _MESSAGES[self]
+
+
+_MESSAGES = {
+    Flag.PLANNED: "planned from where the arm is",
+    Flag.KEPT: "the rest of the last plan",
+    Flag.TRACKING: "the tool is tracked without a plan of the self-motion",
+    Flag.STOPPING: "the arm is brought to rest",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Segment:
+    """The commanded motion from a step on, one sample for each control cycle.
+
+    It goes on where the segment before is at its first sample, with the same position, velocity
+    and acceleration, and keeps the limits at all times. It covers more than one period: when the
+    next one is late, the rest of this one is commanded, which follows the path for a while and
+    then brings the arm to rest. At its end the arm rests.
+
+    Attributes
+    ----------
+    t : (M,)
+        Times [s].
+    q, qd, qdd : (M, n)
+        Positions, velocities and accelerations [rad or m, and per s, per s²].
+    flag : Flag
+        By what it follows the path.
+    reasons : tuple of str
+        Why it is not planned as usual, or what was noticed; empty where nothing was.
+    follows : bool
+        Whether the tool moves as asked: not where limits of the joints are in the way.
+    tool_error : (2,)
+        How far the tool is from the path where the segment begins, by the measured state [m, rad].
+    """
+
+    t: Array
+    q: Array
+    qd: Array
+    qdd: Array
+    flag: Flag
+    reasons: tuple[str, ...]
+    follows: bool
+    tool_error: Array
+
+    def __post_init__(self) -> None:
+        for name in ("t", "q", "qd", "qdd", "tool_error"):
+            object.__setattr__(self, name, read_only(getattr(self, name)))
+
+    def index(self, t: npt.ArrayLike) -> int:
+        """Return the sample to command at a time [s]: the last one from the end on."""
+        step = self.t[1] - self.t[0]
+        last = len(self.t) - 1
+        return min(max(round((float(t) - float(self.t[0])) / float(step)), 0), last)  # type: ignore[arg-type]
+
+
+# What is commanded: a state for each cycle, from which the arm can always be stopped.
 
 
 class Commands:

@@ -1,17 +1,30 @@
-"""The loop around a replanner: reads states, writes segments, knows no transport."""
+"""The loop around a replanner: states in, segments out; simulated, and recorded."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import time
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Protocol
 
+import numpy as np
 import numpy.typing as npt
 
-from selfmotion.basics import ProblemError
-from selfmotion.path import Path
+from selfmotion.basics import Array, ProblemError, as_number, read_only
+from selfmotion.certificate import Tolerance
+from selfmotion.constraints import Constraint
+from selfmotion.costs import Cost, JointVelocity, Samples
+from selfmotion.motion import Sampling, Trajectory
+from selfmotion.optimise import Status
+from selfmotion.path import Line, Path, Waypoints
+from selfmotion.problem import Problem
+from selfmotion.realtime.commands import Segment
 from selfmotion.realtime.replanner import Replanner
-from selfmotion.realtime.segment import Segment
+from selfmotion.result import Plan, Report
 from selfmotion.task import SE3
+
+# The loop around a replanner: reads states, writes segments, knows no transport.
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,3 +104,275 @@ def follow(
         write(segment)
         count += 1
     return count
+
+
+# A simulated arm to close the loop with: it follows its command late, and is measured badly.
+
+
+@dataclass(frozen=True)
+class Plant:
+    """How a simulated arm answers.
+
+    Attributes
+    ----------
+    lag : float
+        Time constant with which each joint goes to its command [s].
+    delay : float
+        Age of a command when it begins to act [s].
+    noise : float
+        Standard deviation of measured positions [rad or m].
+    """
+
+    lag: float = 0.01
+    delay: float = 2e-3
+    noise: float = 5e-5
+
+    def __post_init__(self) -> None:
+        for name in ("lag", "delay", "noise"):
+            as_number(getattr(self, name), f"plant: {name}", least=0.0)
+
+
+class SimulatedArm:
+    """Plays segments, cycle by cycle, as a controller would: the last one it was given.
+
+    Parameters
+    ----------
+    q : (n,)
+        Where it stands at first.
+    cycle : float
+        Time between commands [s].
+    plant : Plant
+    rng : Generator or int
+        Source of the noise.
+
+    Attributes
+    ----------
+    t : float
+        Time [s].
+    q : (n,)
+        Where the arm is.
+    pushed : (n,)
+        What pushes it off its command, by now [rad or m]; to be set.
+    commanded : list of (q, qd, qdd)
+        All commands so far.
+    """
+
+    def __init__(
+        self,
+        q: Array,
+        cycle: float,
+        plant: Plant | None = None,
+        rng: np.random.Generator | int = 0,
+    ) -> None:
+        self.t, self.q, self.cycle = 0.0, np.array(q, dtype=np.float64), cycle
+        self._plant = plant or Plant()
+        self._rng = np.random.default_rng(rng)
+        self.pushed = np.zeros_like(self.q)
+        self._moved = self.q.copy()
+        self._waiting = [self.q.copy()] * (round(self._plant.delay / cycle) + 1)
+        self._segment: Segment | None = None
+        self.commanded: list[tuple[Array, Array, Array]] = []
+
+    def write(self, segment: Segment) -> None:
+        """Play this segment from now on."""
+        self._segment = segment
+
+    def measure(self) -> tuple[Array, Array]:
+        """Return measured positions and velocities, (n,) each."""
+        noise = self._plant.noise * self._rng.standard_normal(len(self.q))
+        rate = np.zeros(len(self.q)) if not self.commanded else self.commanded[-1][1]
+        return self.q + noise, np.array(rate)
+
+    def run(self, seconds: float) -> None:
+        """Let time pass.
+
+        Raises
+        ------
+        ProblemError
+            There is no segment to play.
+        """
+        if self._segment is None:
+            raise ProblemError("the simulated arm has no segment to play; write one first")
+        share = 1.0 if self._plant.lag == 0.0 else 1.0 - np.exp(-self.cycle / self._plant.lag)
+        for _ in range(round(seconds / self.cycle)):
+            self.t += self.cycle
+            segment = self._segment
+            k = segment.index(self.t)
+            self.commanded.append((segment.q[k], segment.qd[k], segment.qdd[k]))
+            self._waiting = [*self._waiting[1:], segment.q[k]]
+            self._moved += share * (self._waiting[0] - self._moved)
+            self.q = self._moved + self.pushed
+
+
+# A closed loop with a simulated arm, recorded.
+
+# What counts as on the path for an arm that is measured [m, rad].
+_BACK = 1e-3, 1e-2
+
+
+class Scene(Protocol):
+    """What happens around the arm; all times [s]."""
+
+    def path(self, t: float) -> Path:
+        """Return the tool's motion, as it is known at a time."""
+
+    def obstacles(self, t: float) -> Mapping[str, SE3]:
+        """Return where obstacles are by then."""
+
+    def pushed(self, t: float) -> Array:
+        """Return what pushes the arm off its command, (n,) [rad or m]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Record:
+    """What a closed loop did, a sample per period.
+
+    Attributes
+    ----------
+    t : (K,)
+        Times [s].
+    q : (K, n)
+        Where the arm was [rad or m].
+    targets : tuple of SE3
+        Where its tool should have been.
+    error : (K, 2)
+        How far it was off, in the rows of the task [m, rad].
+    seconds : (K,)
+        How long each step took, by the clock [s].
+    flags : Counter
+        How many segments had which flag.
+    reasons : Counter
+        How often something was noticed.
+    commanded : (M, 3, n)
+        All commands: positions, velocities, accelerations.
+    """
+
+    t: Array
+    q: Array
+    targets: tuple[SE3, ...]
+    error: Array
+    seconds: Array
+    flags: Counter[str]
+    reasons: Counter[str]
+    commanded: Array
+
+    def __post_init__(self) -> None:
+        for name in ("t", "q", "error", "seconds", "commanded"):
+            object.__setattr__(self, name, read_only(getattr(self, name)))
+
+    def as_plan(
+        self,
+        replanner: Replanner,
+        costs: Sequence[Cost] = (JointVelocity(),),
+        constraints: Sequence[Constraint] = (),
+    ) -> Plan:
+        """Return the arm's motion as a plan, judged by the certificate, to show and to save.
+
+        Its path is what the target did; where that jumped, as fast as between two samples.
+        """
+        robot, task = replanner.robot, replanner.task
+        path = Waypoints.from_poses(self.t, list(self.targets))
+        problem = Problem(robot, path, task, costs=tuple(costs), constraints=tuple(constraints))
+        rates = np.gradient(self.q, self.t, axis=0)
+        motion = Trajectory(self.t, self.q, rates, robot.joint_names)
+        samples = Samples.along(problem.follows, Sampling.trapezoidal(self.t), self.q, rates)
+        terms = {cost.name: float(samples.weights @ cost.value(samples)) for cost in costs}
+        steps = len(self.t)
+        report = Report(
+            cost=sum(terms.values()),
+            initial_cost=sum(terms.values()),
+            terms=terms,
+            initial_terms=terms,
+            evaluations=steps,
+            gradient_evaluations=steps,
+            jacobian_evaluations=0,
+            steps=steps - 1,
+            iterations=steps,
+            history=(),
+            status=Status.STOPPED,
+            message="tracked in a closed loop, replanned at each step",
+            seconds=float(self.seconds.sum()),
+        )
+        certificate = problem.certify(motion, Tolerance(*_BACK))
+        return Plan(problem, motion, motion, read_only([]), report, certificate)
+
+
+def track(replanner: Replanner, arm: SimulatedArm, scene: Scene, seconds: float) -> Record:
+    """Close the loop between a replanner and a simulated arm for so many seconds.
+
+    Time stands still while a step is made: `Record.seconds` tells how long it would have.
+    """
+    robot, task = replanner.robot, replanner.task
+    times: list[float] = []
+    places, targets, errors, took = [], [], [], []
+    flags: Counter[str] = Counter()
+    reasons: Counter[str] = Counter()
+    began = 0.0
+
+    def read() -> State | None:
+        nonlocal began
+        t = arm.t
+        if t > seconds - 0.5 * replanner.period:
+            return None
+        arm.pushed = scene.pushed(t)
+        path = scene.path(t)
+        target = path.pose(min(t, path.duration))
+        times.append(t)
+        places.append(arm.q.copy())
+        targets.append(target)
+        errors.append(task.miss(target, robot.pose(arm.q)))
+        state = State(t, *arm.measure(), path, scene.obstacles(t))
+        began = time.perf_counter()
+        return state
+
+    def write(segment: Segment) -> None:
+        took.append(time.perf_counter() - began)
+        flags[segment.flag.value] += 1
+        reasons.update(reason.split(":")[0] for reason in segment.reasons)
+        arm.write(segment)
+        arm.run(replanner.period)
+
+    follow(replanner, read, write)
+    return Record(
+        np.array(times),
+        np.array(places),
+        tuple(targets),
+        np.array(errors),
+        np.array(took),
+        flags,
+        reasons,
+        np.array(arm.commanded),
+    )
+
+
+# Everything compiled and allocated before the arm moves.
+
+# Steps until what a step needs is made: the first ones begin a plan, the others shift it.
+_STEPS = 5
+
+
+def warm_up(replanner: Replanner) -> None:
+    """Let a replanner do all that it may have to do, and forget it: no step compiles later.
+
+    Kernels are compiled once per machine and loaded once per process, which takes seconds where
+    the first step of a moving arm would wait for it.
+
+    Parameters
+    ----------
+    replanner : Replanner
+        As it will be used; it must not have begun.
+    """
+    robot = replanner.robot
+    q = robot.dexterous_configuration(replanner.task)
+    pose = robot.pose(q)
+    later = SE3(pose.rotation, pose.translation + np.array([0.0, 0.0, 0.01]))
+    far = SE3(pose.rotation, pose.translation + 10.0 * robot.reach)
+    still = np.zeros(robot.dof)
+    # On the path, then without a state, then towards what is out of reach.
+    for goal, measured in ((later, q), (later, np.full(robot.dof, np.nan)), (far, q)):
+        replanner.reset()
+        path = Line(pose, goal, 1.0)
+        replanner.step(0.0, q, still, path)
+        for k in range(1, _STEPS):
+            replanner.step(k * replanner.period, measured, still, path)
+    replanner.reset()

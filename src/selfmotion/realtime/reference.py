@@ -1,15 +1,123 @@
-"""What the tool is to do over the horizon: from where it is now, back to its path."""
+"""What the tool is to do over the horizon, on paths and poses that move."""
 
+from __future__ import annotations
+
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any, Self
 
 import numpy as np
+import numpy.typing as npt
 
-from selfmotion.basics import Array, as_number
+from selfmotion.basics import Array, PathError, as_number, as_numbers, restore
 from selfmotion.follow import Follows
-from selfmotion.path import Path, PathSamples
+from selfmotion.path import Path, PathSamples, check_duration, path_pose, rotations_about
 from selfmotion.realtime import law
 from selfmotion.realtime.settings import OFFSET_STEP
 from selfmotion.task import SE3, Jexp3, exp3
+
+# A pose that goes on as it was seen to move.
+
+# Who follows it has another pose long before [s].
+LONG = 1e9
+
+
+@dataclass(frozen=True, eq=False)
+class MovingPose(Path):
+    """A pose of the tool that moves on at a constant twist, as a camera sees it.
+
+    ``p(t) = p + v (t - seen)``, ``R(t) = exp([ω] (t - seen)) R``.
+
+    Parameters
+    ----------
+    at : SE3 or (4, 4)
+        Where the tool is to be when it was seen [m], world axes.
+    rate : (6,)
+        How it moves: velocity of its origin [m/s] and angular velocity [rad/s], world axes.
+    seen : float
+        When [s].
+    duration : float
+        When it comes to rest [s].
+
+    Raises
+    ------
+    PathError
+        A number is not finite, or the pose is none.
+    """
+
+    at: SE3
+    rate: npt.ArrayLike = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    seen: float = 0.0
+    duration: float = LONG
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "at", path_pose(self.at, "target"))
+        what = "6 finite numbers: a velocity [m/s] and an angular velocity [rad/s]"
+        object.__setattr__(self, "rate", as_numbers(self.rate, "twist", what, (6,), PathError))
+        object.__setattr__(self, "seen", as_number(self.seen, "seen", error=PathError))
+        object.__setattr__(self, "duration", check_duration(self.duration))
+
+    def evaluate(self, t: Array) -> PathSamples:
+        """See `Path.evaluate`."""
+        twist, since = np.asarray(self.rate), t - self.seen
+        turning = float(np.linalg.norm(twist[3:]))
+        axis = twist[3:] / turning if turning > 0.0 else np.zeros(3)
+        return PathSamples(
+            t,
+            self.at.translation + since[:, None] * twist[:3],
+            rotations_about(axis, turning * since) @ self.at.rotation,
+            np.tile(twist, (len(t), 1)),
+        )
+
+
+# A tool motion on something that moves, such as a conveyor.
+
+
+@dataclass(frozen=True, eq=False)
+class Conveyed(Path):
+    """A path that is carried along at a constant velocity.
+
+    Where the velocity changes, or is measured anew, another one takes over: `Replanner.step` is
+    given the path as it is known by then.
+
+    Parameters
+    ----------
+    carried : Path
+        The tool's motion where nothing moves.
+    velocity : (3,)
+        Of what carries it [m/s].
+    offset : (3,)
+        How far it would have been carried at time 0 [m].
+    """
+
+    carried: Path
+    velocity: npt.ArrayLike
+    offset: npt.ArrayLike = (0.0, 0.0, 0.0)
+
+    @property
+    def duration(self) -> float:  # type: ignore[override]
+        """See `Path.duration`."""
+        return self.carried.duration
+
+    @property
+    def knots(self) -> Array:
+        """See `Path.knots`."""
+        return self.carried.knots
+
+    def evaluate(self, t: Array) -> PathSamples:
+        """See `Path.evaluate`."""
+        inner, velocity = self.carried.evaluate(t), np.asarray(self.velocity, dtype=np.float64)
+        translation = inner.translation + np.asarray(self.offset) + t[:, None] * velocity
+        twist = inner.twist + np.concatenate([velocity, np.zeros(3)])
+        return PathSamples(t, translation, inner.rotation, twist)
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any], **context: Any) -> Self:
+        """See `Saved.from_dict`."""
+        return cls(**{**values, "carried": restore(Path, values["carried"])})
+
+
+# What the tool is to do over the horizon: from where it is now, back to its path.
 
 
 @dataclass(frozen=True)
@@ -126,3 +234,46 @@ def resting(path: Path, t: Array) -> PathSamples:
 def _left_jacobian(phi: Array) -> Array:
     """Return Jl(φ), which takes φ̇ to the angular velocity of exp(φ), world axes."""
     return np.asarray(Jexp3(-phi))
+
+
+# The path that was given last: what is followed for a while where a new one fails.
+
+
+class LastPath:
+    """Looks at a path, or at the last one that could be looked at.
+
+    Parameters
+    ----------
+    patience : float
+        For how long that will do [s].
+    """
+
+    def __init__(self, patience: float) -> None:
+        self._patience = patience
+        self._path: Path | None = None
+        self._without = 0.0
+
+    def samples(
+        self, path: Path | None, t: Array, waited: float, reasons: list[str]
+    ) -> PathSamples | None:
+        """Return the path at times (K,); the last one where it fails, and add the reason.
+
+        The last one, too, where none is given: targets come at their own rate. None after too long,
+        of which `waited` [s] have passed since it was asked last.
+        """
+        if path is not None:
+            try:
+                found = resting(path, t)
+                self._path, self._without = path, 0.0
+                return found
+            # A path is the user's code: whatever it raises must not leave the arm without a
+            # command.
+            except Exception as error:
+                reasons.append(f"the path failed: {type(error).__name__}: {error}")
+        self._without += waited
+        if self._path is not None and self._without <= self._patience:
+            return resting(self._path, t)
+        if path is None:
+            told = f"for {self._without:.3g} s (patience: {self._patience:.3g} s)"
+            reasons.append(f"there was no target {told if self._path else 'yet'}")
+        return None

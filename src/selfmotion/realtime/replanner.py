@@ -3,35 +3,123 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from selfmotion.basics import Array, as_number, as_whole, one_blas_thread
+from selfmotion.basics import (
+    Array,
+    PathError,
+    ProblemError,
+    RobotError,
+    as_number,
+    as_numbers,
+    as_several,
+    as_whole,
+    one_blas_thread,
+    plain_numbers,
+    shown,
+)
 from selfmotion.constraints import Constraint
 from selfmotion.costs import Cost, JointVelocity
 from selfmotion.follow import Follows
 from selfmotion.motion import NullMotion, PolynomialNullMotion
 from selfmotion.path import Dwell, Path, PathSamples
 from selfmotion.realtime import law
-from selfmotion.realtime.arguments import (
-    as_asked,
-    as_begun,
-    as_measured,
-    as_seen,
-    check_kinds,
-    in_null_space,
-)
 from selfmotion.realtime.clear import Surroundings
-from selfmotion.realtime.commands import Commands
+from selfmotion.realtime.commands import Commands, Flag, Segment, joint_limits, planned_limits
 from selfmotion.realtime.horizon import Horizon
-from selfmotion.realtime.last_path import LastPath
-from selfmotion.realtime.limits import joint_limits, planned_limits
-from selfmotion.realtime.reference import Approach, Reference
-from selfmotion.realtime.segment import Flag, Segment
+from selfmotion.realtime.reference import Approach, LastPath, MovingPose, Reference
 from selfmotion.realtime.settings import AHEAD, SOON
 from selfmotion.robot import RobotModel
 from selfmotion.task import SE3, Task
+
+# What a replanner is given, checked before the first step.
+
+
+def check_kinds(robot: Any, null_motion: Any, approach: Any) -> None:
+    """Refuse what is no arm, no null motion or no approach."""
+    for name, given, kind, example in (
+        ("robot", robot, RobotModel, "a RobotModel (load_robot)"),
+        ("null_motion", null_motion, NullMotion | None, "a NullMotion or None"),
+        ("approach", approach, Approach | None, "an Approach or None"),
+    ):
+        if not isinstance(given, kind):
+            raise ProblemError(f"{name} is {shown(given)}, expected {example}")
+
+
+def as_asked(
+    follows: Follows, costs: Any, constraints: Any
+) -> tuple[Sequence[Cost], Sequence[Constraint]]:
+    """Return costs and constraints as tuples, of kinds that fit the arm and a task it can follow.
+
+    Raises
+    ------
+    ProblemError
+        They do not.
+    """
+    robot, task = follows.robot, follows.task
+    if not robot.can_follow(task):
+        able = [other.value for other in Task if robot.can_follow(other)]
+        raise ProblemError(
+            f"{robot.name}: cannot move the tool in every row of task '{task.value}'; "
+            f"expected one of those that it can: {', '.join(able) or 'none'}"
+        )
+    wanted = as_several(costs, "costs", Cost)  # type: ignore[type-abstract]
+    for cost in wanted:
+        cost.check(follows)
+    kept = as_several(constraints, "constraints", Constraint)
+    return wanted, kept
+
+
+def as_begun(values: Any, what: str, dof: int) -> Array:
+    """Return the state (n,) that the command begins with; RobotError where it is none."""
+    return as_numbers(values, what, f"{dof} finite numbers, one for each joint", (dof,), RobotError)
+
+
+def as_measured(values: Any, dof: int) -> Array:
+    """Return a measured state (n,) as it is, or NaN where it is no numbers at all."""
+    numbers = plain_numbers(values)
+    return np.full(dof, np.nan) if numbers is None else numbers
+
+
+def as_seen(
+    path: object, target: Any, twist: Any, seen: float, reasons: list[str]
+) -> MovingPose | None:
+    """Return the motion of a target as it was seen; None where it is none, and add the reason.
+
+    A camera that sees nothing, or what is not finite, must not leave the arm without a command.
+
+    Raises
+    ------
+    ProblemError
+        There is a path, too, or no target.
+    """
+    if path is not None or target is None:
+        named = "path and target" if path is not None else "twist and seen"
+        raise ProblemError(
+            f"{named}: a target moves by its twist from when it was seen, in place of a path; "
+            f"give target= with them, and no path"
+        )
+    try:
+        return MovingPose(target, np.zeros(6) if twist is None else twist, seen)
+    except PathError as error:
+        reasons.append(f"the target is of no use: {error}")
+        return None
+
+
+def in_null_space(motion: NullMotion) -> NullMotion:
+    """Return a null motion; ProblemError unless it is one in the null space."""
+    if motion.space != "null":
+        raise ProblemError(
+            f"null motion: space is '{motion.space}', expected 'null': while the arm moves, "
+            f"self-motions are in the null space"
+        )
+    return motion
+
+
+# Plans the next seconds again and again while the arm moves.
 
 
 class Replanner:
@@ -44,7 +132,7 @@ class Replanner:
     up for it.
 
     Limits of position, velocity and acceleration hold for every command, at all times and whatever
-    happens (`selfmotion.realtime.viable`): where they are in the way of the path, the path gives.
+    happens (`selfmotion.realtime.law`): where they are in the way of the path, the path gives.
 
     Parameters
     ----------

@@ -5,9 +5,9 @@ from selfmotion.replay.browser import (
     render_gif as render_gif,
     render_png as render_png,
 )
-from selfmotion.replay.figure import figure as figure
 from selfmotion.replay.page import (
     notebook_html as notebook_html,
     replay_html as replay_html,
     write_replay as write_replay,
 )
+from selfmotion.replay.still import figure as figure

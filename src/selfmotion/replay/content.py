@@ -7,13 +7,20 @@ import numpy.typing as npt
 
 from selfmotion.basics import Array
 from selfmotion.follow import BoundFollow
-from selfmotion.replay import links, obstacles, scene, shapes
-from selfmotion.replay.clearance import ClearanceCurve, clearance_curve
-from selfmotion.replay.facts import describe, table
-from selfmotion.replay.motion import Curves, KeyFrames, curves, key_frames, torque_limits
-from selfmotion.replay.payload import Json, Payload
-from selfmotion.replay.self_motion import SelfMotion, self_motion
-from selfmotion.replay.whole import Whole
+from selfmotion.replay import links, scene, three
+from selfmotion.replay.meshes import Json, Payload
+from selfmotion.replay.motion import (
+    ClearanceCurve,
+    Curves,
+    KeyFrames,
+    SelfMotion,
+    clearance_curve,
+    curves,
+    key_frames,
+    self_motion,
+    torque_limits,
+)
+from selfmotion.replay.whole import Whole, describe, table
 from selfmotion.result import Plan
 
 # What can be shown and hidden: with its key, and whether it is shown at first.
@@ -99,9 +106,7 @@ def page_content(
     box = scene.Extent(hull.min(axis=0), hull.max(axis=0))
     # A part is seen whole, a floor is not.
     around = [
-        corners
-        for motion in motions
-        for corners in obstacles.outlines(motion.obstacles, box.radius)
+        corners for motion in motions for corners in scene.outlines(motion.obstacles, box.radius)
     ]
     scale = _scale(motions)
     longest = max(float(np.linalg.norm(m.shown.ellipsoid, axis=(1, 2)).max()) for m in motions)
@@ -112,14 +117,14 @@ def page_content(
             *links.arm_commands(robot, arm),
             *links.ghost_commands(robot, arm),
             scene.ellipsoid_command(),
-            *obstacles.body_commands(robot, payload),
+            *scene.body_commands(robot, payload),
         ],
         "meshes": arm.meshes,
         "joints": _joints(plans[0]),
         # What is drawn moves with the model's joints: those that mimic others are among them.
         "movers": [links.joint_name(robot, k) for k in range(robot.model.nv)],
         "layers": _layers(motions),
-        "scale": {**scale, "colors": shapes.COLOR_SCALE},
+        "scale": {**scale, "colors": three.COLOR_SCALE},
         "ellipsoidSize": _ELLIPSOID_LENGTH * box.radius / longest,
         "frameSize": _FRAME_LENGTH * box.radius,
         "links": {visual.link: links.link_node(robot, visual) for visual in arm.visuals},
@@ -206,10 +211,10 @@ def _plan(
             "tool": payload.array(shown.tool_in_world),
         },
         "clearance": None if motion.clearance is None else _clearance(motion.clearance, payload),
-        "obstacles": {item.name: obstacles.obstacle_node(root, item) for item in motion.obstacles},
-        "riders": obstacles.riders(root, motion.plan.robot, motion.obstacles),
+        "obstacles": {item.name: scene.obstacle_node(root, item) for item in motion.obstacles},
+        "riders": scene.riders(root, motion.plan.robot, motion.obstacles),
         "commands": [
-            *obstacles.obstacle_commands(root, motion.plan.robot, motion.obstacles, payload),
+            *scene.obstacle_commands(root, motion.plan.robot, motion.obstacles, payload),
             *(
                 command
                 for f, tip in enumerate(motion.tips)

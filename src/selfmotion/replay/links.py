@@ -9,8 +9,7 @@ import numpy as np
 
 from selfmotion.basics import Array, RobotError
 from selfmotion.replay import three
-from selfmotion.replay.meshes import Color, DrawnMesh, read_meshes
-from selfmotion.replay.payload import Json, Payload
+from selfmotion.replay.meshes import Color, DrawnMesh, Json, Payload, read_meshes
 from selfmotion.robot import RobotModel
 
 ROBOT, GHOST = "/selfmotion/robot", "/selfmotion/ghost"

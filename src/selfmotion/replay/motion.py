@@ -1,5 +1,6 @@
-"""A plan's motion, sampled for a page: key frames of the links, and curves over time."""
+"""A plan's motion, sampled for a page: links, curves, clearance, and its self-motion."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -7,12 +8,17 @@ import numpy.typing as npt
 from scipy.ndimage import maximum_filter1d
 
 from selfmotion.basics import Array
+from selfmotion.collision import CollisionModel
 from selfmotion.constraints import JointTorqueLimits
 from selfmotion.follow import BoundFollow
 from selfmotion.motion import Trajectory
+from selfmotion.problem import Problem
 from selfmotion.result import Plan
-from selfmotion.robot import RobotModel
+from selfmotion.robot import RobotModel, null_space
+from selfmotion.search import Manifold
 from selfmotion.task import SE3, Task
+
+# A plan's motion, sampled for a page: key frames of the links, and curves over time.
 
 # Between key frames a page interpolates; it may be off by this much at most [m, and per entry of
 # the rotation matrix]. Below what a screen resolves and half of what our tests ask for.
@@ -227,3 +233,131 @@ def _velocity_ellipsoid(jacobian: Array, task: Task) -> Array:
     lengths = np.sqrt(np.maximum(values, 0.0))
     # Flat where the tool cannot move; a little thickness gives the surface a normal.
     return np.asarray((vectors * np.maximum(lengths, 0.02 * lengths[-1])) @ vectors.T)
+
+
+# The closest pair of bodies over time, for a page.
+
+# A distance query costs milliseconds, a hundred times one point of the other curves.
+_POINTS = 121
+
+
+@dataclass(frozen=True, eq=False)
+class ClearanceCurve:
+    """Clearance on a uniform grid of times.
+
+    Attributes
+    ----------
+    t : (K,)
+        Times from the start of the motion [s].
+    value : (K,)
+        Smallest distance over all pairs of bodies [m].
+    pairs : tuple of (str, str)
+        The pair at each time.
+    """
+
+    t: Array
+    value: Array
+    pairs: tuple[tuple[str, str], ...]
+
+
+def clearance_curve(
+    trajectory: Trajectory, models: Sequence[CollisionModel]
+) -> ClearanceCurve | None:
+    """Return the clearance along a motion, or None where there is no pair of bodies to check."""
+    watched = [model for model in models if model.pairs]
+    if not watched:
+        return None
+    times = np.linspace(0.0, trajectory.duration, _POINTS)
+    clock = np.minimum(trajectory.t[0] + times, trajectory.t[-1])
+    found = [
+        min((model.distance(q) for model in watched), key=lambda closest: closest.value)
+        for q in trajectory(clock)
+    ]
+    return ClearanceCurve(
+        times,
+        np.array([each.value for each in found]),
+        tuple((each.first, each.second) for each in found),
+    )
+
+
+# How the arm can move while its tool stays: for the slider of a page.
+
+# Times of a motion at which the arm is moved along its self-motion; steps to either side of it, and
+# how far the chosen joint turns in each [rad or m].
+_TIMES, _STEPS, _STEP = 41, 10, 0.1
+# How far links go is told by steps so short [rad or m].
+_SHORT = 1e-3
+# What a step may move any joint by, as a multiple of it: beyond, it is another branch.
+_FAR = 8.0
+
+
+@dataclass(frozen=True, eq=False)
+class SelfMotion:
+    """The arm along its self-motion at several times of a motion.
+
+    Attributes
+    ----------
+    joint : str
+        The joint that turns by even steps.
+    frames : tuple of KeyFrames
+        Poses of the links over time, one for each step, from the farthest on one side to that on
+        the other.
+    """
+
+    joint: str
+    frames: tuple[KeyFrames, ...]
+
+
+def self_motion(problem: Problem, trajectory: Trajectory) -> SelfMotion | None:
+    """Return the self-motions of an arm along its motion; None where it has none.
+
+    Where several joint motions leave the tool where it is, one is shown: a joint is turned, the
+    others move as little as they have to. Steps end where a joint meets its limit.
+    """
+    follows = problem.follows
+    if follows.redundancy < 1 or not follows.is_plain:
+        return None
+    robot = problem.robot
+    times = np.linspace(0.0, trajectory.duration, _TIMES)
+    q = trajectory(clock_of(trajectory, times))
+    joint = _chosen(problem, q)
+    sides = [_stepped(problem, times, q, joint, way * _STEP) for way in (-1.0, 1.0)]
+    steps = [*reversed(sides[0]), q, *sides[1]]
+    return SelfMotion(
+        robot.joint_names[joint], tuple(poses_of(robot, step, times) for step in steps)
+    )
+
+
+def _chosen(problem: Problem, q: Array) -> int:
+    """Return the joint by whose self-motions the links of configurations (K, n) go farthest."""
+    robot, moved = problem.robot, np.zeros(problem.robot.dof)
+    basis, here = null_space(problem.follows.jacobians(q)), robot.joint_poses(q)[..., :3]
+    for joint in range(robot.dof):
+        along = np.einsum("knr,kr->kn", basis, basis[:, joint])
+        speed = np.linalg.norm(along, axis=1, keepdims=True)
+        there = robot.joint_poses(q + _SHORT * along / np.maximum(speed, _SHORT))[..., :3]
+        # Of a joint that hardly moves itself, steps would be long.
+        moved[joint] = (np.linalg.norm(there - here, axis=2).max(axis=1) * speed[:, 0]).mean()
+    return int(np.argmax(moved))
+
+
+def _stepped(problem: Problem, times: Array, q: Array, joint: int, step: float) -> list[Array]:
+    """Return configurations (K, n) step by step to one side; those at a limit stay there."""
+    robot, follows = problem.robot, problem.follows
+    manifold = Manifold(follows, robot.lower, robot.upper)
+    targets, held = follows.targets(times), follows.held(times)
+    found, moves = list[Array](), np.full(len(q), fill_value=True)
+    for _ in range(_STEPS):
+        basis = null_space(follows.jacobians(q))
+        # The least joint speed at which the joint turns by one: N Nᵀ e / (eᵀ N Nᵀ e).
+        along = np.einsum("knr,kr->kn", basis, basis[:, joint])
+        share = along[:, joint]
+        moves &= share > 1e-6
+        ahead = q + step * along / np.where(moves, share, 1.0)[:, None]
+        reached, arrived = manifold.project(ahead, targets, held=held)
+        inside = np.all((reached >= robot.lower) & (reached <= robot.upper), axis=1)
+        near = np.abs(reached - q).max(axis=1) <= _FAR * abs(step)
+        moves &= arrived & inside & near
+        q = np.where(moves[:, None], reached, q)
+        found.append(q)
+    return found

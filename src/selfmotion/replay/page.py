@@ -28,10 +28,9 @@ from selfmotion.basics import (
 )
 from selfmotion.job import Program
 from selfmotion.replay.content import page_content
-from selfmotion.replay.facts import describe
-from selfmotion.replay.payload import Payload
+from selfmotion.replay.meshes import Payload
 from selfmotion.replay.still import still
-from selfmotion.replay.whole import Whole
+from selfmotion.replay.whole import Whole, describe
 from selfmotion.result import Move, Parts, Plan
 
 # What a page can show.

@@ -1,22 +1,6 @@
 """What came of a problem: plans, how they were found, their files, and other paces."""
 
-from selfmotion.result.asked import (
-    Asked as Asked,
-    another_tool as another_tool,
-    arm_digest as arm_digest,
-    described as described,
-    keeps_as_far as keeps_as_far,
-    not_judged_by as not_judged_by,
-)
-from selfmotion.result.bundle import read_bundle as read_bundle, write_bundle as write_bundle
-from selfmotion.result.comparison import Comparison as Comparison, compare as compare
-from selfmotion.result.joints import (
-    Piece as Piece,
-    elsewhere as elsewhere,
-    gaps as gaps,
-    moving_end as moving_end,
-)
-from selfmotion.result.kept import (
+from selfmotion.result.archive import (
     Made as Made,
     files_of as files_of,
     key_of as key_of,
@@ -25,15 +9,34 @@ from selfmotion.result.kept import (
     told as told,
     write_kept as write_kept,
 )
-from selfmotion.result.limits_used import (
+from selfmotion.result.asked import (
+    Asked as Asked,
+    Piece as Piece,
+    another_tool as another_tool,
+    arm_digest as arm_digest,
+    described as described,
+    elsewhere as elsewhere,
+    gaps as gaps,
+    keeps_as_far as keeps_as_far,
+    moving_end as moving_end,
+    not_judged_by as not_judged_by,
+)
+from selfmotion.result.comparison import Comparison as Comparison, compare as compare
+from selfmotion.result.measured import (
     LimitsUsed as LimitsUsed,
+    NullSpaceVelocity as NullSpaceVelocity,
+    Reversals as Reversals,
     quantities_of_pace as quantities_of_pace,
 )
-from selfmotion.result.measured import NullSpaceVelocity as NullSpaceVelocity
 from selfmotion.result.move import Move as Move, is_move as is_move, load_move as load_move
 from selfmotion.result.pace_rows import PaceLimits as PaceLimits
 from selfmotion.result.pacing import Ends as Ends, along as along, fastest_pace as fastest_pace
-from selfmotion.result.parts import Parts as Parts, load_parts as load_parts
+from selfmotion.result.parts import (
+    Parts as Parts,
+    load_parts as load_parts,
+    read_bundle as read_bundle,
+    write_bundle as write_bundle,
+)
 from selfmotion.result.plan import (
     Plan as Plan,
     Views as Views,
@@ -47,7 +50,6 @@ from selfmotion.result.retiming import (
     retime as retime,
     slowdown as slowdown,
 )
-from selfmotion.result.reversals import Reversals as Reversals
 
 __all__ = [
     "Attempt",

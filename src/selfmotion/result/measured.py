@@ -1,17 +1,86 @@
-"""What can be asked of a finished motion: its part in the null space, and its cost by any cost."""
+"""What can be asked of a finished motion: limits that it uses, its null motion, reversals."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 import numpy.typing as npt
 
-from selfmotion.basics import Array, ProblemError, shown
+from selfmotion.basics import Array, ProblemError, read_only, shown
+from selfmotion.certificate import Quantity, QuantityWithinLimits, Requirement
 from selfmotion.costs import Cost, PlacedLater, Samples
 from selfmotion.follow import Follows
 from selfmotion.motion import Sampling, Trajectory
+from selfmotion.problem import Problem
+from selfmotion.result.pace_rows import PaceLimits
 from selfmotion.robot import null_space
+
+# Which limits a motion uses, and for how long: whether it could be faster.
+
+# A limit is used fully from this share of it on.
+FULLY = 0.95
+# Times that are looked at, so many per sample of the motion and at least.
+_PER_SAMPLE, _FEWEST = 3, 2000
+_RATES = ("speed", "acceleration", "jerk")
+
+
+@dataclass(frozen=True)
+class LimitsUsed:
+    """For what share of a motion's time limits of its pace are used fully, by 95 % or more.
+
+    Attributes
+    ----------
+    busy : float
+        Some limit is: at 1 the motion is as fast as its joint path allows.
+    shares : tuple of (str, float)
+        Which limit is used most then, "acceleration of joint 'elbow'", and for what share of the
+        time; the longest first.
+    """
+
+    busy: float
+    shares: tuple[tuple[str, float], ...]
+
+    def __str__(self) -> str:
+        """Return both in words."""
+        told = f"{self.busy:.1%} of the time"
+        if not self.shares:
+            return told
+        return f"{told}: " + ", ".join(f"{name} {share:.1%}" for name, share in self.shares)
+
+
+def quantities_of_pace(requirements: Sequence[Requirement]) -> tuple[Quantity, ...]:
+    """Return the quantities within limits that a slower pace may keep."""
+    kept = (item.quantity for item in requirements if isinstance(item, QuantityWithinLimits))
+    return tuple(item for item in kept if item.of_pace and len(item.limited))
+
+
+def limits_used(problem: Problem, motion: Trajectory) -> LimitsUsed:
+    """Return how long a motion uses which of the limits of its pace that a problem asks for."""
+    envelope = problem.envelope
+    quantities = quantities_of_pace(problem.requirements)
+    limits = PaceLimits(envelope.speed, envelope.acceleration, envelope.jerk, quantities)
+    count = max(_PER_SAMPLE * len(motion.t), _FEWEST)
+    # In the middle of equal parts of the time.
+    t = motion.t[0] + motion.duration * (np.arange(count) + 0.5) / count
+    used = np.concatenate(limits.shares_at(motion, t), axis=1)
+    names = [f"{rate} of joint '{name}'" for rate in _RATES for name in motion.joint_names]
+    names += [column.label for item in quantities for column in item.columns]
+    most = np.argmax(used, axis=1)
+    full = used.max(axis=1) >= FULLY
+    shares = _shares(most[full], len(names)) / count
+    order = np.argsort(-shares, kind="stable")
+    found = tuple((names[k], float(shares[k])) for k in order if shares[k] > 0.0)
+    return LimitsUsed(float(full.mean()), found)
+
+
+def _shares(which: Array, count: int) -> Array:
+    return np.bincount(which, minlength=count).astype(np.float64)
+
+
+# What can be asked of a finished motion: its part in the null space, and its cost by any cost.
 
 # Gauss-Legendre points on each interval: squares of a quintic's derivatives are integrated exactly.
 _ROOTS, _SHARES = np.polynomial.legendre.leggauss(5)
@@ -87,3 +156,74 @@ def _samples(follows: Follows, motion: Trajectory) -> Samples:
     sampling = Sampling(t, (steps * 0.5 * _SHARES).ravel(), np.arange(len(t)))
     q, qd, qdd, qddd = (motion(t, order) for order in range(4))
     return PlacedLater(follows, sampling, q=q, qd=qd, qdd=qdd, qddd=qddd)
+
+
+# Where the joints of a motion change their direction.
+
+# A joint that goes back by less than this [rad or m] did not turn round.
+LEAST = 1e-3
+# Times that are looked at for each sample of the motion, and halvings to find when one turns round.
+_BETWEEN, _HALVINGS = 4, 40
+
+
+@dataclass(frozen=True, eq=False)
+class Reversals:
+    """When the joints of a motion turn round, each by more than 1 mrad or 1 mm.
+
+    Attributes
+    ----------
+    times : mapping
+        Joint → times [s], (K,).
+    """
+
+    times: Mapping[str, Array]
+
+    @classmethod
+    def of(cls, motion: Trajectory) -> Reversals:
+        """Return those of a motion."""
+        shares = np.arange(_BETWEEN) / _BETWEEN
+        steps = np.diff(motion.t)[:, None] * shares
+        t = np.append((motion.t[:-1, None] + steps).ravel(), motion.t[-1])
+        speeds = motion(t, 1)
+        turns = {
+            name: read_only(_turns(motion, number, t, speeds[:, number]))
+            for number, name in enumerate(motion.joint_names)
+        }
+        return cls(MappingProxyType(turns))
+
+    @property
+    def count(self) -> int:
+        """How many there are, of all joints together."""
+        return sum(map(len, self.times.values()))
+
+    def __str__(self) -> str:
+        """Return how many times, and which joints do, those first that do most often."""
+        order = sorted(self.times, key=lambda name: -len(self.times[name]))
+        turning = [f"{name} {len(self.times[name])}" for name in order if len(self.times[name])]
+        return f"{self.count} ({', '.join(turning)})" if turning else "0"
+
+
+def _turns(motion: Trajectory, number: int, t: Array, speed: Array) -> Array:
+    """Return when one joint turns round."""
+    moving = np.flatnonzero(speed)
+    change = np.flatnonzero(np.diff(np.sign(speed[moving])))
+    early, late, sign = t[moving[change]], t[moving[change + 1]], np.sign(speed[moving[change]])
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (early + late)
+        before = motion(middle, 1)[:, number] * sign > 0.0 if len(middle) else sign > 0.0
+        early, late = np.where(before, middle, early), np.where(before, late, middle)
+    places = motion(np.concatenate([t[:1], late, t[-1:]]))[:, number]
+    # Of turns with less than LEAST in between both go, the nearest first.
+    kept = list(range(len(places)))
+    while len(kept) > 2:
+        ways = np.abs(np.diff(places[kept]))
+        least = int(np.argmin(ways))
+        if ways[least] > LEAST:
+            break
+        if least == 0:
+            del kept[1]
+        elif least == len(ways) - 1:
+            del kept[-2]
+        else:
+            del kept[least : least + 2]
+    return np.asarray(late[np.array(kept[1:-1], dtype=int) - 1])

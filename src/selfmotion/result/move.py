@@ -27,8 +27,13 @@ from selfmotion.collision import Obstacle
 from selfmotion.constraints import Constraint
 from selfmotion.motion import Trajectory
 from selfmotion.problem import arm_and_constraints, describe_arm
-from selfmotion.result.archive import arrays_of, check_version, file_digest, trajectory_of
-from selfmotion.result.joint_order import in_order_of
+from selfmotion.result.archive import (
+    arrays_of,
+    check_version,
+    file_digest,
+    in_order_of,
+    trajectory_of,
+)
 from selfmotion.robot import RobotModel
 
 # Raised with every change that older versions cannot read.

@@ -35,12 +35,16 @@ from selfmotion.costs import Cost, metres_of
 from selfmotion.motion import Trajectory
 from selfmotion.path import Path
 from selfmotion.problem.problem import Problem
-from selfmotion.result.archive import Archive
-from selfmotion.result.joint_order import in_order_of
-from selfmotion.result.limits_used import LimitsUsed, limits_used
-from selfmotion.result.measured import NullSpaceVelocity, cost_of, null_space_velocity
+from selfmotion.result.archive import Archive, in_order_of
+from selfmotion.result.measured import (
+    LimitsUsed,
+    NullSpaceVelocity,
+    Reversals,
+    cost_of,
+    limits_used,
+    null_space_velocity,
+)
 from selfmotion.result.report import Report
-from selfmotion.result.reversals import Reversals
 from selfmotion.robot import RobotModel
 from selfmotion.task import Task
 

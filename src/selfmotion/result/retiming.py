@@ -29,7 +29,7 @@ from selfmotion.constraints import (
 from selfmotion.motion import Trajectory
 from selfmotion.path import STILL, Pace, Path, Retimed
 from selfmotion.problem import Problem
-from selfmotion.result.limits_used import quantities_of_pace
+from selfmotion.result.measured import quantities_of_pace
 from selfmotion.result.pace_rows import PaceLimits
 from selfmotion.result.pacing import Ends, along, fastest_pace
 from selfmotion.result.plan import Plan

@@ -1,6 +1,5 @@
 """The arm: a URDF loaded into Pinocchio as a chain with one coordinate per joint."""
 
-from selfmotion.robot.angles import check_radians as check_radians
 from selfmotion.robot.building import (
     moving_joints as moving_joints,
     rebuild_robot as rebuild_robot,
@@ -17,27 +16,26 @@ from selfmotion.robot.chain import (
     Kinematics as Kinematics,
     null_space as null_space,
 )
-from selfmotion.robot.chain_series import ChainSeries as ChainSeries
-from selfmotion.robot.composing import is_placement as is_placement
+from selfmotion.robot.chain_series import ChainSeries as ChainSeries, ToolRates as ToolRates
+from selfmotion.robot.configurations import mean_lever as mean_lever
 from selfmotion.robot.coordinates import (
     Coordinate as Coordinate,
     FrameCoordinate as FrameCoordinate,
     JointCoordinate as JointCoordinate,
     SwivelAngle as SwivelAngle,
+    check_radians as check_radians,
 )
-from selfmotion.robot.coupling import Coupling as Coupling, follower_of as follower_of
 from selfmotion.robot.dynamics import (
     Dynamics as Dynamics,
     Energy as Energy,
     has_masses as has_masses,
 )
+from selfmotion.robot.full_model import mesh_digests as mesh_digests
 from selfmotion.robot.loading import load_robot as load_robot
-from selfmotion.robot.mesh_files import mesh_digests as mesh_digests
 from selfmotion.robot.model import LIMITS as LIMITS, RobotModel as RobotModel
 from selfmotion.robot.mounting import (
-    CarriedBody as CarriedBody,
-    Mounting as Mounting,
     UrdfShape as UrdfShape,
+    is_placement as is_placement,
     mounting_of as mounting_of,
 )
 from selfmotion.robot.named import (
@@ -47,11 +45,12 @@ from selfmotion.robot.named import (
 )
 from selfmotion.robot.placements import (
     compose as compose,
+    place_tips as place_tips,
     placements as placements,
 )
-from selfmotion.robot.tip_places import place_tips as place_tips
-from selfmotion.robot.tool_rates import ToolRates as ToolRates
-from selfmotion.robot.tree_arrays import TreeArrays as TreeArrays
+from selfmotion.robot.tree_arrays import (
+    follower_of as follower_of,
+)
 from selfmotion.robot.urdf import (
     BASE_JOINT as BASE_JOINT,
     TOOL_JOINT as TOOL_JOINT,
@@ -59,7 +58,6 @@ from selfmotion.robot.urdf import (
     UrdfJoint as UrdfJoint,
     UrdfPart as UrdfPart,
 )
-from selfmotion.robot.weights import mean_lever as mean_lever
 
 __all__ = [
     "Coordinate",

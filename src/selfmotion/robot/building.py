@@ -8,12 +8,11 @@ import numpy as np
 import pinocchio as pin
 
 from selfmotion.basics import Array, RobotError, as_number, nearest, read_only
-from selfmotion.robot.coupling import Follower, coupling_of, follower_of, tighter_limits
-from selfmotion.robot.full_model import full_model, name_links
-from selfmotion.robot.held import locked_configuration
+from selfmotion.robot.full_model import full_model, locked_configuration, name_links
 from selfmotion.robot.model import LIMITS, RobotModel
 from selfmotion.robot.mounting import moved_base
 from selfmotion.robot.named import names_of
+from selfmotion.robot.tree_arrays import Follower, coupling_of, follower_of, tighter_limits
 from selfmotion.robot.urdf import BASE_JOINT, Urdf, UrdfJoint, parse_urdf
 
 # A joint that is held may be this far beyond its limits [rad or m]: rounding of a file.

@@ -15,9 +15,14 @@ import pinocchio as pin
 
 from selfmotion.basics import Array, RobotError, as_path, nearest, shown
 from selfmotion.robot.building import with_urdf
-from selfmotion.robot.calibration_files import CalibrationFile, read_calibration
+from selfmotion.robot.calibration_files import (
+    JOINTS,
+    CalibrationFile,
+    UrdfAxis,
+    maker_placements,
+    read_calibration,
+)
 from selfmotion.robot.model import RobotModel
-from selfmotion.robot.universal_robots import JOINTS, UrdfAxis, maker_placements
 from selfmotion.robot.urdf import CALIBRATION, NOMINAL, Urdf
 
 _TOOL = "tool0"

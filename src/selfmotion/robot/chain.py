@@ -18,10 +18,8 @@ import numpy as np
 import pinocchio as pin
 
 from selfmotion.basics import Array, Ints
-from selfmotion.robot.coupling import Coupling
-from selfmotion.robot.placements import rebase
-from selfmotion.robot.tip_places import place_along
-from selfmotion.robot.tree_arrays import JOINT, ChainArrays, serial_arrays
+from selfmotion.robot.placements import place_along, rebase
+from selfmotion.robot.tree_arrays import JOINT, ChainArrays, Coupling, serial_arrays
 
 # The frame that does not move.
 WORLD = 0

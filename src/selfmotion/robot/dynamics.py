@@ -8,8 +8,8 @@ import pinocchio as pin
 
 from selfmotion.basics import Array, ProblemError, series
 from selfmotion.robot.chain_series import ChainSeries
-from selfmotion.robot.coupling import Coupling
 from selfmotion.robot.model import RobotModel
+from selfmotion.robot.tree_arrays import Coupling
 
 
 class Dynamics:

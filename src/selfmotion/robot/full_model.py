@@ -1,9 +1,4 @@
-"""Pinocchio's model of a whole URDF, before joints are locked: complete, or refused.
-
-urdfdom, which reads for Pinocchio, writes its complaints to the terminal and often goes on without
-the part that it could not read; here they are caught, and each is an error. Where a link has the
-name of a joint, Pinocchio cannot tell which is meant: such links have other names inside of it.
-"""
+"""Pinocchio's model of a whole URDF, and its geometry, before and after joints are locked."""
 
 import contextlib
 import os
@@ -11,15 +6,140 @@ import sys
 import tempfile
 import threading
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Iterator
-from typing import Any
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import replace
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import coal
+import numpy as np
 import pinocchio as pin
 
-from selfmotion.basics import RobotError
-from selfmotion.robot.mesh_files import bad_meshes
+from selfmotion.basics import Array, RobotError, digest_of_file, is_file
 from selfmotion.robot.urdf import Urdf
+from selfmotion.robot.urdf_text import Packages
+
+# Joints that are held, in Pinocchio's terms.
+
+
+def locked_configuration(model: Any, locked: Mapping[str, float]) -> tuple[Array, list[int]]:
+    """Return a full configuration with the locked joints set, and the indices of those joints."""
+    reference: Array = pin.neutral(model)
+    ids = []
+    for index in range(1, model.njoints):
+        name, joint = model.names[index], model.joints[index]
+        if name in locked:
+            reference[joint.idx_q] = locked[name]
+            ids.append(index)
+        elif joint.nq != 1:
+            ids.append(index)
+    return reference, ids
+
+
+# Mesh files of a URDF that are missing or cannot be read.
+
+
+class BadMesh(NamedTuple):
+    """A mesh that is not there.
+
+    Attributes
+    ----------
+    link : str
+        The link that it is of.
+    file : str
+        Its address in the URDF.
+    reason : str
+        Why, in words.
+    """
+
+    link: str
+    file: str
+    reason: str
+
+    def __str__(self) -> str:
+        """Return link, file and reason in words."""
+        return f"link '{self.link}': {self.reason}: {self.file}"
+
+
+def bad_meshes(urdf: Urdf, tag: str) -> tuple[BadMesh, ...]:
+    """Return the meshes of all ``<visual>`` or ``<collision>`` elements (`tag`) that are bad."""
+    known: dict[str, str] = {}
+    found = []
+    for link in ElementTree.fromstring(urdf.text).findall("link"):
+        for mesh in link.iterfind(f"{tag}/geometry/mesh"):
+            file = mesh.get("filename", "")
+            if file not in known:
+                known[file] = _fault(urdf, file)
+            if known[file]:
+                found.append(BadMesh(link.get("name", ""), file, known[file]))
+    return tuple(found)
+
+
+def mesh_digests(urdf: Urdf, tag: str) -> dict[str, str]:
+    """Return the SHA-256 of the mesh files of all ``<visual>`` or ``<collision>`` elements."""
+    places = (_place(urdf, file) for file in _mesh_names(urdf.text, tag))
+    return {str(place): digest_of_file(place) for place in places if place is not None}
+
+
+# Each plan asks for them, and reading the text takes as long as a seventh of a plan.
+@lru_cache(maxsize=16)
+def _mesh_names(text: str, tag: str) -> tuple[str, ...]:
+    """Return the addresses of the meshes of all such elements."""
+    found = ElementTree.fromstring(text).iterfind(f"link/{tag}/geometry/mesh")
+    return tuple(dict.fromkeys(mesh.get("filename", "") for mesh in found))
+
+
+def _place(urdf: Urdf, file: str) -> Path | None:
+    """Return where a mesh is on this machine, if it is there."""
+    scheme, _, rest = file.rpartition("://")
+    folders = urdf.package_dirs if scheme in ("package", "model") else ("",)
+    return next((Path(folder, rest) for folder in folders if is_file(Path(folder, rest))), None)
+
+
+# Of an address on another machine.
+_ELSEWHERE = " here; name the folder that has its package: --packages DIR (packages=)"
+
+
+def without_meshes(text: str, tag: str, files: Collection[str]) -> str:
+    """Return a URDF's text without the elements (`tag`) whose meshes are in these `files`."""
+    root = ElementTree.fromstring(text)
+    for link in root.findall("link"):
+        for element in link.findall(tag):
+            if any(mesh.get("filename") in files for mesh in element.iterfind("geometry/mesh")):
+                link.remove(element)
+    return ElementTree.tostring(root, encoding="unicode")
+
+
+def _fault(urdf: Urdf, file: str) -> str:
+    """Return why a mesh cannot be read, "" where it can."""
+    if file.rpartition("://")[0] in ("http", "https", "ftp"):
+        return "the mesh is not on this machine, download it"
+    found = _place(urdf, file)
+    if found is None:
+        scheme, _, rest = file.rpartition("://")
+        if scheme not in ("package", "model"):
+            return f"no such mesh file{_ELSEWHERE * bool(scheme)}"
+        near, name = Packages(Path(urdf.source), urdf.packages), rest.partition("/")[0]
+        folder = near.folder(name)
+        if folder is not None:
+            return f"no such mesh file in package '{name}', {folder}"
+        return f"no such mesh file, {near.searched(name)}"
+    try:
+        coal.MeshLoader().load(str(found), np.ones(3))
+    except (RuntimeError, ValueError) as error:
+        # What comes before is where in the source of coal it was found, after it a guess.
+        said = str(error).rpartition("message:")[2].partition("Hint:")[0]
+        return f"the mesh file cannot be read ({' '.join(said.split()[5:])})"
+    return ""
+
+
+# Pinocchio's model of a whole URDF, before joints are locked: complete, or refused.
+#
+# urdfdom, which reads for Pinocchio, writes its complaints to the terminal and often goes on
+# without the part that it could not read; here they are caught, and each is an error. Where a
+# link has the name of a joint, Pinocchio cannot tell which is meant: such links have other names
+# inside of it.
 
 # The terminal's file descriptor belongs to the process: one thread at a time may take it.
 _terminal = threading.Lock()
@@ -139,3 +259,83 @@ def _complaints() -> Iterator[list[str]]:
             places = ("at line ", "Error:")
             rest = [line for line in lines if not line.strip().startswith(places)]
             os.write(2, "".join(f"{line}\n" for line in rest).encode())
+
+
+# The visual or collision geometry of a robot whose joints are locked in part.
+#
+# An arm without visuals is drawn by its bodies, and one without bodies by its joints and axes.
+
+
+def reduced_geometry(urdf: Urdf, locked: Mapping[str, float], kind: pin.GeometryType) -> Any:
+    """Return the ``pinocchio.GeometryModel`` of all links; see `RobotModel.geometry`."""
+    full = full_model(urdf)
+    geometry = link_geometry(urdf, full, kind)
+    reference, locked_ids = locked_configuration(full, locked)
+    _, reduced = pin.buildReducedModel(full, [geometry], locked_ids, reference)
+    return reduced[0]
+
+
+# What stands in for visuals is drawn in this; bones are as thick as a share of the arm's reach.
+_GREY = np.array([0.6, 0.62, 0.66, 1.0])
+_THICK = 0.015
+
+
+def readable_visuals(
+    urdf: Urdf, locked: Mapping[str, float], tag: str = "visual"
+) -> tuple[Any, tuple[str, ...]]:
+    """Return visual geometry as far as it can be read, and the rest; see `RobotModel.visuals`."""
+    kind = pin.GeometryType.VISUAL if tag == "visual" else pin.GeometryType.COLLISION
+    try:
+        return reduced_geometry(urdf, locked, kind), ()
+    except RobotError:
+        bad = bad_meshes(urdf, tag)
+        if not bad:
+            raise
+    text = without_meshes(urdf.text, tag, {item.file for item in bad})
+    return reduced_geometry(replace(urdf, text=text), locked, kind), tuple(map(str, bad))
+
+
+def stand_in(urdf: Urdf, locked: Mapping[str, float], model: Any, tip: int) -> tuple[Any, str]:
+    """Return what draws an arm without visuals, and what that is, in words."""
+    bodies, _ = readable_visuals(urdf, locked, "collision")
+    for item in bodies.geometryObjects:
+        item.meshColor = _GREY
+    if bodies.ngeoms:
+        return bodies, "the arm has no visuals to draw: its collision bodies are drawn instead"
+    return _bones(
+        model, tip
+    ), "the arm has neither visuals nor bodies: its joints are drawn instead"
+
+
+def _bones(model: Any, tip: int) -> Any:
+    """Return cylinders from joint to joint, and along their axes."""
+    found, frame = pin.GeometryModel(), model.frames[tip]
+    places = [
+        (model.parents[k], model.jointPlacements[k].translation) for k in range(1, model.njoints)
+    ]
+    places.append((frame.parentJoint, frame.placement.translation))
+    lengths = [float(np.linalg.norm(place)) for _, place in places]
+    radius = _THICK * max(sum(lengths), 1e-2)
+    for k, ((joint, place), length) in enumerate(zip(places, lengths, strict=True)):
+        if length > radius:
+            _add(found, model, f"bone {k}", int(joint), 0.5 * place, place / length, radius, length)
+    columns = pin.computeJointJacobians(model, model.createData(), pin.neutral(model))
+    data = model.createData()
+    pin.computeJointJacobians(model, data, pin.neutral(model))
+    for k, column in enumerate(columns.reshape(6, -1).T):
+        twist = data.oMi[k + 1].actInv(pin.Motion(column))
+        axis = twist.angular if np.any(twist.angular) else twist.linear
+        _add(found, model, f"axis {k}", k + 1, np.zeros(3), axis, 2.0 * radius, 5.0 * radius)
+    return found
+
+
+def _add(
+    found: Any, model: Any, name: str, joint: int, at: Any, along: Any, radius: float, length: float
+) -> None:
+    """Add a cylinder along a direction in the frame of a joint."""
+    turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), np.asarray(along)).matrix()
+    shape, place = coal.Cylinder(radius, length), pin.SE3(turn, np.asarray(at))
+    frame = model.getFrameId(model.names[joint]) if joint else 0
+    item = pin.GeometryObject(name, joint, frame, place, shape)
+    item.meshColor = _GREY
+    found.addGeometryObject(item)

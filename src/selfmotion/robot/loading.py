@@ -15,14 +15,18 @@ import pinocchio as pin
 from selfmotion.basics import RobotError, is_folder, nearest, read_only, shown
 from selfmotion.robot.building import build_robot
 from selfmotion.robot.calibration import calibrated_urdf
-from selfmotion.robot.composing import composed
-from selfmotion.robot.expansion import expand
 from selfmotion.robot.model import RobotModel
-from selfmotion.robot.mounting import CarriedBody, with_base, with_bodies, with_tool_offset
+from selfmotion.robot.mounting import (
+    CarriedBody,
+    composed,
+    with_base,
+    with_bodies,
+    with_tool_offset,
+)
 from selfmotion.robot.named import NAMED_ARMS, NAMED_PARTS, published, read_named
-from selfmotion.robot.packages import Packages
 from selfmotion.robot.pinocchio_model import urdf_text_of
 from selfmotion.robot.urdf import Urdf, UrdfPart, read_urdf, urdf_of_file
+from selfmotion.robot.urdf_text import Packages, expand
 from selfmotion.task import as_pose
 
 # What the text of a URDF is called in messages.

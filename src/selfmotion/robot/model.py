@@ -13,15 +13,22 @@ import pinocchio as pin
 
 from selfmotion.basics import Array, Flags, random_numbers
 from selfmotion.robot.chain import WORLD, Chain
-from selfmotion.robot.configurations import as_configuration, as_configurations
-from selfmotion.robot.coupling import Coupling
-from selfmotion.robot.freedom import can_follow, most_dexterous, null_space_at, redundancy
-from selfmotion.robot.geometry import readable_visuals, reduced_geometry, stand_in
-from selfmotion.robot.inverse import solved
+from selfmotion.robot.configurations import (
+    as_configuration,
+    as_configurations,
+    can_follow,
+    joint_weights,
+    most_dexterous,
+    null_space_at,
+    part_weights,
+    redundancy,
+    solved,
+    speed_weights,
+)
+from selfmotion.robot.full_model import readable_visuals, reduced_geometry, stand_in
 from selfmotion.robot.named import home_of
-from selfmotion.robot.tree_arrays import TreeArrays, tree_arrays
+from selfmotion.robot.tree_arrays import Coupling, TreeArrays, tree_arrays
 from selfmotion.robot.urdf import Urdf
-from selfmotion.robot.weights import joint_weights, part_weights, speed_weights
 from selfmotion.task import Task
 
 # What of an arm its URDF limits, where nobody gave it other limits.

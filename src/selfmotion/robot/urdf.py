@@ -17,15 +17,16 @@ from pathlib import Path
 from typing import Any
 
 from selfmotion.basics import RobotError, is_file, nearest
-from selfmotion.robot.cosmetic_elements import (
+from selfmotion.robot.urdf_elements import (
+    check_joint_elements,
+    check_link_elements,
+    check_shape,
     lacking_inertials,
     mend_cosmetics,
     without_lacking,
 )
-from selfmotion.robot.joint_elements import check_joint_elements
-from selfmotion.robot.link_elements import check_link_elements, check_shape
-from selfmotion.robot.packages import Packages
 from selfmotion.robot.urdf_text import (
+    Packages,
     check_expanded,
     make_meshes_absolute,
     make_single_angles,

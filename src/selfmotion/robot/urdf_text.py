@@ -1,15 +1,333 @@
-"""The text of a URDF: what is no URDF at all, and what is written in it for Pinocchio."""
+"""From a file to the text of a URDF: packages that it names, xacro, and what is no URDF."""
 
 import contextlib
 import io
 import logging
+import os
+import re
+import tempfile
+import threading
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from selfmotion.basics import RobotError, is_file
-from selfmotion.robot.packages import Packages
+from selfmotion.basics import RobotError, is_file, is_folder, nearest
+
+# Packages and files that robot descriptions name, found on this machine without ROS.
+#
+# ``$(find NAME)`` of xacro, ``package://NAME/…``, ``model://NAME/…``, ``file://`` and absolute
+# paths of the machine that wrote a file, and relative paths: all are looked up here, in this
+# order, the nearest first:
+#
+# 1. folders that are given (``packages=``, ``--packages``), and three levels below them
+# 2. the folders above the file: one of that name, or whose ``package.xml`` says so, or one
+#    beside it
+# 3. ``AMENT_PREFIX_PATH`` (``share/NAME``), and ``ROS_PACKAGE_PATH`` with three levels below
+# 4. three levels below the folders above the file, up to six of them, or to the root of a
+#    repository
+
+# How many levels below a folder are looked at, below how many folders above a file, and at how many
+# folders in all: a home is larger than any workspace.
+_BELOW, _ABOVE, _MOST = 3, 6, 5000
+_SKIPPED = {"node_modules", "__pycache__", "build", "log"}
+
+
+@dataclass(frozen=True)
+class Packages:
+    """Where a file's packages are looked for.
+
+    Attributes
+    ----------
+    file : Path
+        The description that names them.
+    given : tuple of str
+        Folders that the user names.
+    """
+
+    file: Path
+    given: tuple[str, ...] = ()
+
+    def folder(self, name: str) -> Path | None:
+        """Return the folder of a package, None where there is none."""
+        return next(self._places(name), None)
+
+    def place(self, address: str) -> Path | None:
+        """Return the file that an address means, None where it is not on this machine."""
+        scheme, mark, rest = address.partition("://")
+        if not mark:
+            scheme, rest = "", address
+        if scheme in ("package", "model"):
+            name, _, inside = rest.partition("/")
+            places = (folder / inside for folder in self._places(name))
+            return next((place for place in places if is_file(place)), None)
+        if scheme not in ("", "file"):
+            return None
+        path = Path(rest)
+        if not path.is_absolute():
+            places = (folder / path for folder in self._above)
+            return next((place for place in places if is_file(place)), None)
+        return path if is_file(path) else self._moved(path)
+
+    def searched(self, name: str) -> str:
+        """Return in words where a package was looked for, and what helps."""
+        given = "".join(f"{folder}, " for folder in self.given)
+        variables = ("AMENT_PREFIX_PATH", "ROS_PACKAGE_PATH")
+        known = " and ".join(
+            key if os.environ.get(key) else f"{key} (not set)" for key in variables
+        )
+        return (
+            f"package '{name}' is in none of {given}{self.file.resolve().parent} and the folders "
+            f"above it, {_BELOW} levels below the nearest of these, {known}; name the folder that "
+            f"has it: --packages DIR (packages=)"
+        )
+
+    @cached_property
+    def _above(self) -> tuple[Path, ...]:
+        """All folders above the file but the root, nearest first."""
+        return tuple(folder for folder in self.file.resolve().parents if folder.parts[1:])
+
+    @cached_property
+    def _up(self) -> tuple[Path, ...]:
+        """The folders above the file that are searched downwards, nearest first."""
+        found: list[Path] = []
+        shared = {Path.home(), Path(tempfile.gettempdir()).resolve()}
+        for folder in self._above[:_ABOVE]:
+            if len(folder.parts) < 3 or folder in shared:
+                break
+            found.append(folder)
+            if (folder / ".git").exists():
+                break
+        return tuple(found)
+
+    def _places(self, name: str) -> Iterator[Path]:
+        """Yield the folders that have a package's name, in the order at the head of the file."""
+        for given in self.given:
+            yield from _named(name, [Path(given)])
+        for folder in self._above:
+            yield from (place for place in (folder, folder / name) if _is(place, name))
+        for prefix in _folders_of("AMENT_PREFIX_PATH"):
+            if is_folder(prefix / "share" / name):
+                yield prefix / "share" / name
+        yield from _named(name, _folders_of("ROS_PACKAGE_PATH"))
+        yield from _named(name, self._up)
+
+    def _moved(self, path: Path) -> Path | None:
+        """Return a file of another machine: each folder of its path may be a package's."""
+        for k, name in enumerate(path.parts[1:-1], 1):
+            inside = Path(*path.parts[k + 1 :])
+            for folder in self._near(name):
+                if is_file(folder / inside):
+                    return folder / inside
+        return None
+
+    def _near(self, name: str) -> Iterator[Path]:
+        # Any word of a path would be looked for: below folders only where it is a package's.
+        if "_" in name or name.endswith("description"):
+            yield from self._places(name)
+            return
+        for folder in self._above:
+            yield from (place for place in (folder, folder / name) if _is(place, name))
+
+
+def _folders_of(variable: str) -> list[Path]:
+    return [Path(item) for item in os.environ.get(variable, "").split(os.pathsep) if item]
+
+
+def _is(folder: Path, name: str) -> bool:
+    """Return whether a folder is the package of that name."""
+    if not is_folder(folder):
+        return False
+    said = _package_name(folder)
+    return said == name or folder.name == name
+
+
+def _package_name(folder: Path) -> str | None:
+    """Return what a folder's ``package.xml`` calls it; None where it has none."""
+    try:
+        found = ElementTree.parse(folder / "package.xml").findtext("name")
+    except (OSError, ElementTree.ParseError):
+        return None
+    return None if found is None else found.strip()
+
+
+def _named(name: str, tops: Sequence[Path]) -> Iterator[Path]:
+    """Yield packages of a name at folders and below them, level by level."""
+    seen: set[Path] = set()
+    for top in tops:
+        level = [top]
+        for depth in range(_BELOW + 1):
+            below: list[Path] = []
+            for folder in level:
+                if folder in seen or len(seen) > _MOST:
+                    continue
+                seen.add(folder)
+                if _is(folder, name):
+                    yield folder
+                if depth < _BELOW:
+                    below += _inside(folder)
+            level = below
+
+
+def _inside(folder: Path) -> list[Path]:
+    try:
+        with os.scandir(folder) as entries:
+            found = [
+                entry.path
+                for entry in entries
+                if entry.is_dir() and not entry.name.startswith(".") and entry.name not in _SKIPPED
+            ]
+    except OSError:
+        return []
+    return [Path(path) for path in sorted(found)]
+
+
+# Xacro files, expanded by the package xacro.
+
+# Xacro keeps its state in its modules: one file at a time.
+_alone = threading.Lock()
+_FIND = re.compile(r"\$\(find\s+([^)\s]+)\s*\)")
+# Files that include each other are followed so deep when their arguments are listed.
+_DEEPEST_INCLUDE = 10
+
+
+def expand(path: Path, arguments: Mapping[str, str], packages: Packages) -> str:
+    """Return the URDF text of a xacro file.
+
+    Parameters
+    ----------
+    path : Path
+    arguments : dict
+        Values of its ``<xacro:arg>``.
+    packages : Packages
+        Where ``$(find NAME)`` is looked up.
+
+    Raises
+    ------
+    RobotError
+        The file is missing or cannot be expanded, or has no such argument; the message says why.
+    """
+    import xacro
+
+    for key, value in arguments.items():
+        if not (isinstance(key, str) and isinstance(value, str | int | float)):
+            raise RobotError(f"{path}: arguments has {key!r}: {value!r}, expected a text or number")
+    if not is_file(path):
+        raise RobotError(f"{path}: no such xacro file")
+    declared = _Declared(packages)
+    declared.read(path)
+    for key in arguments:
+        if declared.complete and key not in declared.defaults:
+            raise RobotError(
+                f"{path}: has no argument '{key}'{nearest(key, declared.defaults)}; {declared}"
+            )
+    mappings = {key: _text(value) for key, value in arguments.items()}
+    try:
+        with contextlib.redirect_stderr(io.StringIO()), _finding(packages):
+            document = xacro.process_file(str(path), mappings=mappings)
+    # A xacro file holds expressions of Python, which may raise anything.
+    except Exception as error:
+        said = " ".join(str(error).split()) or type(error).__name__
+        # What was not found is said as it is, once, without what passed it on.
+        missing = said.split("package '")
+        reason = f"package '{missing[1].strip()}" if missing[1:] else said
+        empty = [key for key, value in declared.defaults.items() if not value]
+        known = f"; {declared}" if "argument" in reason or set(empty) - set(arguments) else ""
+        raise RobotError(f"{path}: cannot be expanded by xacro: {reason}{known}") from error
+    text: str = document.toxml()
+    return text
+
+
+def _text(value: Any) -> str:
+    """Return a value as xacro reads it: True of Python and TOML is true."""
+    return str(value).lower() if isinstance(value, bool) else str(value)
+
+
+class _Declared:
+    """The arguments of a xacro file and of what it includes.
+
+    Attributes
+    ----------
+    complete : bool
+        Whether all files that it includes are known.
+    """
+
+    def __init__(self, packages: Packages) -> None:
+        self._given: dict[str, str | None] = {}
+        self._used: dict[str, None] = {}
+        self.complete = True
+        self._packages, self._passed = packages, set[Path]()
+
+    @property
+    def defaults(self) -> dict[str, str | None]:
+        """Name → default; None where there is none."""
+        return {**self._used, **self._given}
+
+    def read(self, file: Path, depth: int = 0) -> None:
+        """Take those of a file."""
+        if file.resolve() in self._passed:
+            return
+        self._passed.add(file.resolve())
+        try:
+            root = ElementTree.parse(file).getroot()
+        except (OSError, ElementTree.ParseError):
+            self.complete = False
+            return
+        for element in root.iter():
+            tag = element.tag.rpartition("}")[2] if isinstance(element.tag, str) else ""
+            if tag == "arg" and element.get("name"):
+                self._given.setdefault(element.get("name", ""), element.get("default"))
+            elif tag == "include" and depth < _DEEPEST_INCLUDE:
+                place = self._place(element.get("filename", ""), file)
+                if place is None:
+                    self.complete = False
+                else:
+                    self.read(place, depth + 1)
+            for text in (*element.attrib.values(), element.text or ""):
+                for name in re.findall(r"\$\(arg\s+([^)\s]+)\s*\)", text):
+                    self._used[name] = None
+
+    def _place(self, name: str, file: Path) -> Path | None:
+        found = _FIND.match(name)
+        if found:
+            folder = self._packages.folder(found[1])
+            name = name if folder is None else str(folder) + name[found.end() :]
+        return None if "$" in name else file.parent / name
+
+    def __str__(self) -> str:
+        """Return them in words."""
+        if not self.defaults:
+            return "it declares no arguments"
+        listed = ", ".join(
+            f"{name} (no default)" if default is None else f'{name} (default "{default}")'
+            for name, default in self.defaults.items()
+        )
+        return f"its arguments: {listed}; give them with --argument NAME=VALUE (arguments=)"
+
+
+@contextlib.contextmanager
+def _finding(packages: Packages) -> Iterator[None]:
+    """Let xacro find packages without ROS: its own way asks for a module of ROS 2."""
+    from xacro import substitution_args
+
+    def find(name: str) -> str:
+        folder = packages.folder(name)
+        if folder is None:
+            raise substitution_args.SubstitutionException(packages.searched(name))
+        return str(folder)
+
+    with _alone:
+        own, known = substitution_args._eval_find, substitution_args._eval_dict
+        substitution_args._eval_find = known["find"] = find
+        try:
+            yield
+        finally:
+            substitution_args._eval_find = known["find"] = own
+
+
+# The text of a URDF: what is no URDF at all, and what is written in it for Pinocchio.
 
 # A limit that no motion reaches; Pinocchio wants finite numbers for a revolute joint.
 _UNLIMITED = 1e6

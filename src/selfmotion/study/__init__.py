@@ -1,7 +1,10 @@
 """The paper, whole: every figure, table and claim re-run, its open questions answered."""
 
-from selfmotion.study.engine import Scale as Scale
-from selfmotion.study.figures import require_matplotlib as require_matplotlib
-from selfmotion.study.page import write as write
+from selfmotion.study.context import Scale as Scale
 from selfmotion.study.results import Claim as Claim, Study as Study, Verdict as Verdict
-from selfmotion.study.run import PARTS as PARTS, run as run
+from selfmotion.study.run import (
+    PARTS as PARTS,
+    require_matplotlib as require_matplotlib,
+    run as run,
+    write as write,
+)

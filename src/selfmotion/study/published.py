@@ -116,16 +116,16 @@ class PublishedFunction:
         return np.asarray(rows.T @ y + epsilon)
 
 
-def published_null_motion(degree: int = 3) -> PolynomialNullMotion:
+def published_null_motion() -> PolynomialNullMotion:
     """Return the paper's ε(t): powers of t in joint space (eq. 6 to 8)."""
-    return PolynomialNullMotion(degree, space="joint", basis="monomial")
+    return PolynomialNullMotion(3, space="joint", basis="monomial")
 
 
-def published_optimizer(sigma: float = 0.1, max_iterations: int = 60) -> QuasiNewton:
+def published_optimizer(max_iterations: int = 60) -> QuasiNewton:
     """Return the paper's optimiser: Broyden family, Fletcher's switch and line search."""
     return QuasiNewton(
         "fletcher",
-        line_search=LineSearch(sigma=sigma),
+        line_search=LineSearch(sigma=0.1),
         max_iterations=max_iterations,
         initial_metric="identity",
     )

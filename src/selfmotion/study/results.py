@@ -83,7 +83,7 @@ class PlottedCurve:
 
 @dataclass(frozen=True)
 class Plot:
-    """A picture of curves; drawn by `study.figures`.
+    """A picture of curves; drawn by `study.run`.
 
     Attributes
     ----------

@@ -4,8 +4,7 @@ import numpy as np
 
 from selfmotion.basics import Array
 from selfmotion.costs import Cost, InverseManipulability, JointVelocity, Manipulability
-from selfmotion.study.context import Context, Result, finely
-from selfmotion.study.engine import optimum
+from selfmotion.study.context import Context, Result, finely, optimum
 from selfmotion.study.results import Chapter, Claim, Plot, PlottedCurve, Table, Verdict
 
 _LINKS = np.array([2.0, 2.0, 1.0])

@@ -1,4 +1,4 @@
-"""The singularity-robust inverse: how much damping, and where."""
+"""The singularity-robust inverse, and how fast the tool is brought back to its path."""
 
 from __future__ import annotations
 
@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from selfmotion.basics import Array, as_number
+
+# The singularity-robust inverse: how much damping, and where.
 
 
 @dataclass(frozen=True)
@@ -89,3 +91,14 @@ class DampingLaw:
         """Return λ [m, rad] for smallest singular values σ [m, rad] of any shape."""
         rest = 1.0 - np.square(singular_value / self.threshold)
         return self.strength * np.maximum(rest, 0.0)
+
+
+# How fast the tool is brought back to its path where integration or damping let it off.
+
+# The pose feedback removes an error e at the rate K e; this is K times the motion's duration.
+_FEEDBACK = 20.0
+
+
+def feedback_rate(duration: float) -> float:
+    """Return the rate K [1/s] of the pose feedback in a motion of that duration [s]."""
+    return _FEEDBACK / duration

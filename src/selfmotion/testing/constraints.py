@@ -22,7 +22,7 @@ from selfmotion.paper import Objective, StillMotion
 from selfmotion.problem import Problem
 from selfmotion.robot import RobotModel
 from selfmotion.search import start_candidates
-from selfmotion.testing.checks import GRADIENT, require, require_gradient, saved
+from selfmotion.testing.laws import GRADIENT, require, require_gradient, saved
 
 # So many starts are looked for where none is given.
 _STARTS = 8

@@ -1,0 +1,202 @@
+"""A job that is like an earlier one keeps what did not change, and begins at its motions."""
+
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import trimesh
+
+import selfmotion as sm
+from selfmotion.basics import silent
+from selfmotion.job import work
+from selfmotion.job.files import Earlier, Shelf
+from selfmotion.task import SE3
+from selfmotion.transfer import FreeMotions, free_motion
+from support.arms import robot_named
+
+DOWN = np.diag([1.0, -1.0, -1.0])
+HOME = np.array(sm.NAMED_ARMS["panda"].home)
+# A part that is moved by 20 mm turns no joint by more than this [rad].
+NEAR = 0.3
+
+
+def seams(shift: float = 0.0, count: int = 3) -> list[sm.Seam]:
+    """Return parallel seams, all of them moved by a shift [m]."""
+    found = []
+    for k, y in enumerate(np.linspace(-0.2, 0.2, 3)[:count]):
+        ends = [SE3(DOWN, np.array([x, y + shift, 0.3])) for x in (0.4, 0.5)]
+        found.append(sm.Seam(f"seam {k}", sm.paths.Line(*ends, 1.0), "pointing"))
+    return found
+
+
+@pytest.fixture(scope="module")
+def program() -> sm.Program:
+    panda = robot_named("panda")
+    return sm.plan_job(panda, seams(), start=HOME, end=HOME, branches=1).require()
+
+
+def planned_again(program, listed, **given) -> sm.Program:
+    """Return a job planned from an earlier program."""
+    return sm.plan_job(
+        robot_named("panda"),
+        listed,
+        start=HOME,
+        end=HOME,
+        branches=1,
+        warm_start=program,
+        **given,
+    )
+
+
+def test_of_the_same_job_nothing_is_planned(program, monkeypatch) -> None:
+    def never(*_, **__) -> None:
+        raise AssertionError("something was planned")
+
+    monkeypatch.setattr(work, "from_start", never)
+    monkeypatch.setattr(work, "branches", never)
+    monkeypatch.setattr(FreeMotions, "through", never)
+    again = planned_again(program, seams()).require()
+    assert again.order == program.order
+    np.testing.assert_array_equal(again.trajectory.q, program.trajectory.q)
+    np.testing.assert_array_equal(again.trajectory.t, program.trajectory.t)
+
+
+def test_a_part_that_was_moved_is_made_near_the_earlier_motions(program) -> None:
+    again = planned_again(program, seams(0.02)).require()
+    assert again.order == program.order
+    for step, before in zip(again.steps, program.steps, strict=True):
+        assert step.turned == before.turned
+        shares = np.linspace(0.0, 1.0, 9)
+        q, known = (one.motion(shares * one.motion.t[-1]) for one in (step, before))
+        assert np.abs(q - known).max() < NEAR
+    # Nothing of the earlier part is left: each seam is where it is asked for now.
+    for seam in seams(0.02):
+        plan = again.plans[seam.name]
+        tip = plan.robot.pose(plan.trajectory.q[0]).translation
+        ends = [seam.path.pose(t).translation for t in (0.0, seam.path.duration)]
+        assert min(np.abs(tip - end).max() for end in ends) < 1e-6
+
+
+def test_of_other_seams_those_that_are_known_are_kept(program) -> None:
+    fewer = planned_again(program, seams(count=2)).require()
+    assert set(fewer.order) == {"seam 0", "seam 1"}
+    more = planned_again(fewer, seams()).require()
+    assert set(more.order) == set(program.order)
+    for name in fewer.order:
+        kept, known = more.plans[name].trajectory, fewer.plans[name].trajectory
+        np.testing.assert_array_equal(kept.q, known.q)
+
+
+def test_a_seam_that_cannot_begin_there_is_planned_like_any_other(program, monkeypatch) -> None:
+    monkeypatch.setattr(work, "like_before", lambda *_: None)
+    again = planned_again(program, seams(0.02)).require()
+    assert set(again.order) == set(program.order)
+
+
+def test_where_no_program_comes_of_it_all_is_planned_anew(program, monkeypatch) -> None:
+    panda = robot_named("panda")
+    cold = sm.plan_job(panda, seams(0.02), start=HOME, end=HOME, branches=1)
+    # Moves that nobody finds, as long as something is begun at what is known.
+    found = FreeMotions.between
+
+    def between(self, first, last, seconds, known=None):
+        if known is not None:
+            return self._missing("not this way")
+        return found(self, first, last, seconds)
+
+    monkeypatch.setattr(FreeMotions, "between", between)
+    again = planned_again(program, seams(0.02)).require()
+    np.testing.assert_array_equal(again.trajectory.q, cold.trajectory.q)
+
+
+def test_bodies_whose_file_has_changed_are_looked_at_anew(tmp_path, monkeypatch) -> None:
+    """A motion that was kept clear of a mesh is not of what its file holds by now."""
+    panda, file = robot_named("panda"), tmp_path / "part.stl"
+
+    def clear_of(size) -> sm.constraints.Clearance:
+        trimesh.creation.box(size).export(file)
+        part = sm.obstacles.Mesh("part", SE3(np.eye(3), np.array([0.45, 0.0, 0.1])), file)
+        return sm.constraints.Clearance([part], distance=0.0)
+
+    def planned(apart, **given) -> sm.Program:
+        return sm.plan_job(panda, seams(count=1), start=HOME, branches=1, clearance=apart, **given)
+
+    low, high = [0.1, 0.1, 0.1], [0.3, 0.6, 0.6]
+    before = planned(clear_of(low)).require()
+    again = planned(clear_of(low), warm_start=before).require()
+    np.testing.assert_array_equal(again.trajectory.q, before.trajectory.q)
+    # Nothing else is tried than what is known.
+    monkeypatch.setattr(work, "branches", lambda *_: ([], "nothing else is tried"))
+    monkeypatch.setattr(FreeMotions, "through", lambda self, *_: self._missing("nothing else"))
+    with pytest.raises(sm.errors.PlanError, match="nothing else is tried"):
+        planned(clear_of(high), warm_start=before)
+    # Nor is a move kept that goes through it.
+    apart = clear_of(high)
+    asked = work.Asked(panda, (), apart, 1, 1.0, 0)
+    at_work = work.Work(asked, Shelf(None, sm.Tolerance(), {}), None, silent, Earlier(before))
+    move = next(step.made for step in before.steps if not step.is_seam)
+    (found,) = at_work.moves([(*move.motion.q[[0, -1]], ())], ["move"])
+    assert not found.verified
+
+
+def test_other_costs_are_planned_for(program) -> None:
+    """A motion that is best by other costs is not kept for nothing having moved."""
+    costs = [sm.costs.JointVelocity([1.0, 50.0, 1.0, 1.0, 1.0, 1.0, 1.0])]
+    other = [replace(seam, costs=costs) for seam in seams()]
+    again = planned_again(program, other).require()
+    for name, plan in again.plans.items():
+        assert plan.problem.costs[0] is costs[0]
+        known = program.plans[name].trajectory
+        assert len(plan.trajectory.t) != len(known.t) or np.any(plan.trajectory.q != known.q)
+
+
+def test_another_process_comes_to_the_same_program(program) -> None:
+    here = planned_again(program, seams(0.02))
+    with ProcessPoolExecutor(1) as executor:
+        there = planned_again(program, seams(0.02), executor=executor)
+    np.testing.assert_array_equal(there.trajectory.q, here.trajectory.q)
+
+
+def test_a_way_that_is_known_is_taken_where_it_is_free(monkeypatch) -> None:
+    panda = robot_named("panda")
+    # Between these the straight leg goes through the post.
+    aside = np.array([0.8, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    first, last = HOME + aside, HOME - aside
+    post = sm.obstacles.Cylinder("post", [0.35, 0.0, 0.5], 0.04, 1.0)
+    asked = [
+        sm.constraints.JointPositionLimits(),
+        sm.constraints.JointVelocityLimits(),
+        sm.constraints.Clearance((post,)),
+    ]
+    free = FreeMotions(panda, asked, np.random.default_rng(0))
+    # Back, round behind the post, and out again.
+    back = np.array([0.0, -0.8, 0.0, 0.0, 0.0, 0.0, 0.0])
+    way = np.stack([first, first + back, last + back, last])
+    looked = []
+    found = free_motion.find_way
+
+    def find_way(*given):
+        looked.append(given)
+        return found(*given)
+
+    monkeypatch.setattr(free_motion, "find_way", find_way)
+    free.between(first, last, known=way).require()
+    assert not looked
+    # One that is blocked is not taken: others are looked for.
+    through = np.stack([first, 0.5 * (first + last), last])
+    free.between(first, last, known=through).require()
+    assert looked
+
+
+@pytest.mark.parametrize("given", ["job.program", None])
+def test_what_is_no_program_of_the_arm_is_refused(program, given) -> None:
+    if given is not None:
+        with pytest.raises(
+            sm.errors.ProblemError, match="expected a Program; load_program reads one"
+        ):
+            planned_again(given, seams())
+        return
+    xarm = robot_named("xarm7")
+    with pytest.raises(sm.errors.ProblemError, match="warm_start: its joints are panda_joint1"):
+        sm.plan_job(xarm, seams(), warm_start=program)
