@@ -237,13 +237,15 @@ def test_a_start_deep_inside_a_body_is_no_dead_end(panda: sm.RobotModel) -> None
 
 def test_known_prices_spare_iterations(panda: sm.RobotModel) -> None:
     path = sm.paths.Circle.around(panda.pose(PANDA_HOME), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
-    slow = (sm.constraints.JointVelocityLimits(0.7),)
+    # Slow enough to bind; slower motions there are none.
+    slow = (sm.constraints.JointVelocityLimits(1.2),)
     problem = sm.Problem(
         panda, path, "pose", PANDA_HOME, constraints=slow, rest=False, clearance=None
     )
     steps: list[list[Step]] = [[], []]
     first = minimise(nodes_of(problem, 16), lambda step: bool(steps[0].append(step)), roughly=True)
     assert first.multipliers.max() > 0.0
+    assert first.motion.violation <= 0.0
     again = minimise(first.motion, lambda step: bool(steps[1].append(step)), first.multipliers)
     cold = minimise(nodes_of(problem, 16), never)
     assert again.motion.cost <= cold.motion.cost * (1.0 + 1e-5)

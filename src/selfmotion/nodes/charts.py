@@ -1,5 +1,6 @@
 """All nodes of a motion at once: where they are on their self-motion manifolds, and eq. 4 there."""
 
+from copy import copy
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -104,6 +105,13 @@ class Charts:
         found = self._looked(*given, centred=False, full=True)
         return None if found is None or found[1] is None else (found[0], found[1])
 
+    def repeated(self, count: int) -> "Charts":
+        """Return the charts so many times, one after the other: looked at in one pass."""
+        if count == 1:
+            return self
+        tiled = np.tile(self.q, (count, 1)), np.tile(self.bases, (count, 1, 1))
+        return Charts(self.manifolds.repeated(count), *tiled)
+
     def bases_at(self, place: Place) -> Bases:
         """Return how the motion at a place at the reference changes with ν and α."""
         other = replace(place, qdd=np.empty_like(place.qdd))
@@ -184,6 +192,21 @@ class Manifolds:
         self.targets = np.ascontiguousarray(np.hstack([path[:, :12] for path in self._paths]))
         # ẍ of the paths, (N + 1, 6 F).
         self._asked = np.ascontiguousarray(np.tile(np.hstack(asked), (copies, 1)))
+        self._repeated: dict[int, Manifolds] = {}
+
+    def repeated(self, count: int) -> "Manifolds":
+        """Return the same so many times, one after the other."""
+        if count == 1:
+            return self
+        if count not in self._repeated:
+            found = copy(self)
+            found.copies, found.t = count * self.copies, np.tile(self.t, count)
+            for name in ("held", "targets", "_asked"):
+                setattr(found, name, np.tile(getattr(self, name), (count, 1)))
+            found._paths = [np.tile(path, (count, 1)) for path in self._paths]
+            found._repeated = {}
+            self._repeated[count] = found
+        return self._repeated[count]
 
     def table(self) -> Array:
         """Return a table with nothing in it but the paths."""

@@ -36,7 +36,7 @@ _NEAR = 1e-6
 _NAMES = ("q", "qd", "qdd", "qddd")
 # Intervals whose matrices are multiplied at once: what that takes is several times what it leaves.
 _LOT = 2048
-# Samples that are looked at together, of several directions.
+# Samples, or nodes, that are looked at together, of several directions.
 _TOGETHER = 4096
 
 
@@ -196,10 +196,9 @@ class NodeCost:
     ) -> dict[str, Array]:
         """Return what `_changes` does, all directions at once."""
         count, copies = len(samples.t), len(ways)
-        known = {name: np.stack([getattr(samples, name)] * copies) for name in _NAMES}
+        flat = {name: np.tile(getattr(samples, name), (copies, 1)) for name in _NAMES}
         for k, (name, way) in enumerate(ways):
-            known[name][k] += _NEAR * way
-        flat = {name: values.reshape(copies * count, -1) for name, values in known.items()}
+            flat[name][k * count : (k + 1) * count] += _NEAR * way
         t, weights = (np.tile(values, copies) for values in (samples.t, samples.weights))
         sampling = Sampling(t, weights, np.arange(len(t)))
         shifted = PlacedLater(samples.follows, sampling, **flat)
@@ -271,31 +270,30 @@ class LocalModel:
         changes[:, 0, :, :r] = charts.bases
         changes[:, 1, :, r : 2 * r] = changes[:, 2, :, 2 * r :] = here.by_rate
         changes[:, 2, :, r : 2 * r] = here.by_both
-        middle = _along(force, place)
-        for x in range(r):
-            sides, values = [], []
-            for side in (_REACH, -_REACH):
-                z = np.zeros((count, r))
-                z[:, x] = side
-                found = charts.around(z, nu, alpha)
-                if found is None:
-                    return None
-                sides.append(found)
-                values.append(_along(force, found[0]))
-            above, below = sides
-            changes[:, 1, :, x] = (above[0].qd - below[0].qd) / (2.0 * _REACH)
-            changes[:, 2, :, x] = (above[0].qdd - below[0].qdd) / (2.0 * _REACH)
-            curvature[:, x, x] = (values[0] - 2.0 * middle + values[1]) / _REACH**2
-            by_nu, by_alpha = (
-                (one - other) / (2.0 * _REACH)
-                for one, other in zip(
-                    _pulled(force, above[1]), _pulled(force, below[1]), strict=True
-                )
-            )
-            curvature[:, x, r : 2 * r] = curvature[:, r : 2 * r, x] = by_nu
-            curvature[:, x, 2 * r :] = curvature[:, 2 * r :, x] = by_alpha
-        if not cls._mixed(charts, nu, alpha, force, middle, curvature):
+        middle, axes = _along(force, place.nodes), np.eye(r)
+        sides = _looked(charts, np.concatenate([axes, -axes]), nu, alpha)
+        if sides is None:
             return None
+        nodes, bases = sides
+        apart = (nodes[:r] - nodes[r:]) / (2.0 * _REACH)
+        changes[:, 1:, :, :r] = np.moveaxis(apart[:, :, 1:], 0, -1)
+        values = _along(force, nodes)
+        bends = (values[:r] - 2.0 * middle + values[r:]) / _REACH**2
+        curvature[:, np.arange(r), np.arange(r)] = bends.T
+        for first, each in zip((r, 2 * r), _pulled(force, bases), strict=True):
+            mixed = np.moveaxis((each[:r] - each[r:]) / (2.0 * _REACH), 0, 1)
+            curvature[:, :r, first : first + r] = mixed
+            curvature[:, first : first + r, :r] = np.swapaxes(mixed, 1, 2)
+        if r > 1:
+            x, y = np.tril_indices(r, -1)
+            both = axes[x] + axes[y]
+            sides = _looked(charts, np.concatenate([both, -both]), nu, alpha)
+            if sides is None:
+                return None
+            values = _along(force, sides[0])
+            second = (values[: len(x)] - 2.0 * middle + values[len(x) :]) / _REACH**2
+            own = 0.5 * (second - bends[x] - bends[y])
+            curvature[:, x, y] = curvature[:, y, x] = own.T
         cls._by_rates(charts, place, here, force, curvature)
         return cls(changes, curvature)
 
@@ -308,27 +306,6 @@ class LocalModel:
         count, _, n, size = self.changes.shape
         flat = self.changes.reshape(count, 3 * n, size)
         return np.asarray((force.reshape(count, 1, 3 * n) @ flat)[:, 0])
-
-    @staticmethod
-    def _mixed(
-        charts: Charts, nu: Array, alpha: Array, force: Array, middle: Array, curvature: Array
-    ) -> bool:
-        """Set the second derivatives by two of z; return whether that could be done."""
-        count, _, r = charts.bases.shape
-        for x in range(r):
-            for y in range(x):
-                values = []
-                for side in (_REACH, -_REACH):
-                    z = np.zeros((count, r))
-                    z[:, [x, y]] = side
-                    place = charts.at(z, nu, alpha)
-                    if place is None:
-                        return False
-                    values.append(_along(force, place))
-                both = (values[0] - 2.0 * middle + values[1]) / _REACH**2
-                own = 0.5 * (both - curvature[:, x, x] - curvature[:, y, y])
-                curvature[:, x, y] = curvature[:, y, x] = own
-        return True
 
     @staticmethod
     def _by_rates(
@@ -347,13 +324,36 @@ class LocalModel:
             curvature[:, r + y, r + x] += mixed
 
 
-def _along(force: Array, place: Place) -> Array:
-    """Return λᵀ(q, q̇, q̈) of nodes, (N + 1,)."""
-    return np.asarray(np.sum(force * place.nodes, axis=(1, 2)))
+def _looked(charts: Charts, ways: Array, nu: Array, alpha: Array) -> tuple[Array, Bases] | None:
+    """Return all nodes a little along ways (K, r): (q, q̇, q̈) (K, N + 1, 3, n), and their bases.
+
+    None where one is not to be had. Ways along which there are few nodes are looked at together.
+    """
+    count = len(nu)
+    together = max(1, _TOGETHER // count)
+    found = []
+    for first in range(0, len(ways), together):
+        own = ways[first : first + together]
+        z = np.repeat(_REACH * own, count, axis=0)
+        rates = (np.tile(each, (len(own), 1)) for each in (nu, alpha))
+        there = charts.repeated(len(own)).around(z, *rates)
+        if there is None:
+            return None
+        found.append((there[0].nodes, *there[1]))
+    nodes, by_rate, by_both = (
+        np.concatenate(parts).reshape(len(ways), count, *parts[0].shape[1:])
+        for parts in zip(*found, strict=True)
+    )
+    return nodes, Bases(by_rate, by_both)
+
+
+def _along(force: Array, nodes: Array) -> Array:
+    """Return λᵀ(q, q̇, q̈) of nodes (…, N + 1, 3, n), (…, N + 1)."""
+    return np.asarray(np.sum(force * nodes, axis=(-2, -1)))
 
 
 def _pulled(force: Array, bases: Bases) -> tuple[Array, Array]:
-    """Return λᵀ∂(q̇, q̈)/∂ν and λᵀ∂q̈/∂α, (N + 1, r) each."""
+    """Return λᵀ∂(q̇, q̈)/∂ν and λᵀ∂q̈/∂α, (…, N + 1, r) each."""
     of_qd, of_qdd = force[:, 1, None, :], force[:, 2, None, :]
     by_nu = of_qd @ bases.by_rate + of_qdd @ bases.by_both
-    return by_nu[:, 0], (of_qdd @ bases.by_rate)[:, 0]
+    return by_nu[..., 0, :], (of_qdd @ bases.by_rate)[..., 0, :]
