@@ -9,7 +9,7 @@ import pinocchio as pin
 import pytest
 
 import selfmotion as sm
-from selfmotion.planning.kept_costs import KeptCosts
+from selfmotion.planning.fastest import KeptCosts
 from support.arms import PANDA_HOME, robot_named
 
 # What the fastest motion uses of a limit somewhere at all times but where the jerk takes over, by

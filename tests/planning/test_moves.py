@@ -5,7 +5,7 @@ import pinocchio as pin
 
 import selfmotion as sm
 import selfmotion.testing
-from selfmotion.planning.moves import Mover, between_parts
+from selfmotion.planning.parts import Mover, between_parts
 from support.arms import robot_named
 from support.oracle import Judge
 from support.own_kinematics import Arm

@@ -6,7 +6,7 @@ import pytest
 import selfmotion as sm
 from selfmotion.basics import Array
 from selfmotion.search import Stretch, Stretches, stretches as stretches_module
-from selfmotion.search.jumps import jumps_of
+from selfmotion.search.stretches import jumps_of
 from support.arms import robot_named
 
 # Arms and tasks: redundancy 1, by a joint or by a row that is free.

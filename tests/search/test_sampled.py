@@ -7,9 +7,8 @@ import selfmotion as sm
 from selfmotion.basics import Array
 from selfmotion.basics.errors import NoSequenceError
 from selfmotion.follow import Follows
-from selfmotion.search.manifold import Manifold
+from selfmotion.search.manifold import Manifold, OnPath
 from selfmotion.search.sampled import sampled_sequences
-from selfmotion.search.waypoints import OnPath
 from support.arms import robot_named
 from support.followed import standing
 from support.paths import line_of

@@ -8,10 +8,10 @@ import numpy as np
 from selfmotion.basics import Array, Progress, SelfmotionError, description_of, silent
 from selfmotion.costs import Cost, FunctionCost
 from selfmotion.optimise import Status
+from selfmotion.planning.effort import Search
 from selfmotion.planning.grids import rough_grid
-from selfmotion.planning.posture import wound_back
 from selfmotion.planning.run import plan
-from selfmotion.planning.search import Search
+from selfmotion.planning.screening import wound_back
 from selfmotion.planning.settings import (
     BRANCH_EVALUATIONS,
     BRANCH_STARTS,

@@ -14,20 +14,21 @@ from selfmotion.basics import (
     Array,
     PathError,
     PlanError,
+    ProblemError,
     Progress,
     as_number,
     held_interruption,
+    shown,
     silent,
 )
 from selfmotion.certificate import Tolerance
 from selfmotion.constraints import Constraint
-from selfmotion.costs import LimitUse
+from selfmotion.costs import Cost, LimitUse, Samples, Scaled
+from selfmotion.motion import Grid
 from selfmotion.optimise import Status
-from selfmotion.path import Path, Retimed
-from selfmotion.planning.effort import Deadline
-from selfmotion.planning.kept_costs import KeptCosts
+from selfmotion.path import Pace, Path, Retimed, times_when
+from selfmotion.planning.effort import Deadline, Search
 from selfmotion.planning.run import plan, told_of
-from selfmotion.planning.search import Search
 from selfmotion.planning.settings import (
     COARSE,
     DEGREE,
@@ -41,8 +42,91 @@ from selfmotion.planning.settings import (
 from selfmotion.problem import Problem, check_problem
 from selfmotion.result import Plan, check_no_feed, rate_limits, retime
 
+# Steps at which costs are measured, at least.
+_STEPS = 300
+
+
+@dataclass(frozen=True, eq=False)
+class KeptCosts:
+    """Costs of a problem, and by which factor a motion may cost more than the best by all costs.
+
+    What a motion costs depends on its pace, and all faster ones cost more by their joint speeds. So
+    joint paths are compared: each costs what it does at the time law of the problem's own path.
+
+    Attributes
+    ----------
+    problem : Problem
+    costs : tuple of Cost
+        Those of the problem's that are kept.
+    factors : tuple of float
+        How many times as much they may be, at least 1; of what is negative, by how many times its
+        size less 1 it may rise.
+    """
+
+    problem: Problem
+    costs: tuple[Cost, ...]
+    factors: tuple[float, ...]
+
+    @classmethod
+    def of(cls, problem: Problem, keep: Mapping[str, float]) -> KeptCosts:
+        """Return those of kinds or names, ProblemError where the problem has no such cost."""
+        if not isinstance(keep, Mapping):
+            raise ProblemError(f"keep is {shown(keep)}, expected a factor for each kind of cost")
+        costs, factors = [], []
+        for key, factor in keep.items():
+            found = [item for item in problem.costs if key in (item.kind, item.name)]
+            if not found:
+                known = ", ".join(dict.fromkeys(item.kind for item in problem.costs))
+                raise ProblemError(f"keep: the problem has no cost {shown(key)}, but {known}")
+            number = as_number(factor, f"keep: {key}", least=1.0)
+            costs += found
+            factors += [number] * len(found)
+        return cls(problem, tuple(costs), tuple(factors))
+
+    def values(self, plan: Plan) -> Array:
+        """Return what the joint path of a plan costs at the time law of the problem's path, (K,).
+
+        Parameters
+        ----------
+        plan : Plan
+            Along the problem's path, or along a `Retimed` one of it.
+        """
+        motion, grid = plan.trajectory, Grid.aligned(self.problem.path.knots, _STEPS)
+        paces = _paces(plan.path)
+        t = grid.nodes
+        for pace in paces[len(_paces(self.problem.path)) :]:
+            t = times_when(pace, t, np.zeros(len(t)), np.full(len(t), pace.t[-1]))
+        passed = motion(motion.t[0] + np.minimum(t, motion.duration))
+        q, qd = _by(grid.nodes, passed, grid.stage_times)
+        samples = Samples.along(self.problem.follows, grid.sampling, q, qd)
+        return np.array([samples.weights @ cost.value(samples) for cost in self.costs])
+
+    def bounds(self, best: Array) -> Array:
+        """Return what costs may be, (K,), where the motion that is best by them costs `best`."""
+        return np.asarray(best + (np.array(self.factors) - 1.0) * np.abs(best))
+
+    def weighted(self, costs: Array, weight: float) -> tuple[Cost, ...]:
+        """Return the costs so that each counts about as a weight [s], of what they are."""
+        sizes = np.maximum(np.abs(costs), 1e-12)
+        each = zip(self.costs, sizes.tolist(), strict=True)
+        return tuple(Scaled(cost, weight / size) for cost, size in each)
+
+
+def _paces(path: Path) -> list[Pace]:
+    """Return the paces of a path that is retimed, maybe again and again, the first one first."""
+    return [*_paces(path.original), path.pace] if isinstance(path, Retimed) else []
+
+
+def _by(nodes: Array, q: Array, t: Array) -> tuple[Array, Array]:
+    """Return a motion through q (N, n) at nodes (N,), and its velocities, at times t (S,)."""
+    from scipy.interpolate import CubicSpline
+
+    spline = CubicSpline(nodes, q)
+    return np.asarray(spline(t)), np.asarray(spline(t, 1))
+
+
 # What brings a path to another pace.
-Pace = Callable[[Path], Path]
+_Repaced = Callable[[Path], Path]
 
 
 @dataclass(frozen=True, eq=False)
@@ -231,7 +315,7 @@ class _Rounds:
         if planned.report.status.is_cut_short:
             raise KeyboardInterrupt
         use, weight = LimitUse(self._v, self._a, POWER), 0.0
-        pace: Pace = _own
+        pace: _Repaced = _own
         for number in range(ROUNDS):
             options.progress("fastest", number, ROUNDS)
             before = self._duration
@@ -284,7 +368,7 @@ def _at_its_fastest(planned: Plan, problem: Problem, v: Array, a: Array) -> Plan
     return retime(whole, a, v)
 
 
-def _at_pace(problem: Problem, pace: Pace) -> Problem:
+def _at_pace(problem: Problem, pace: _Repaced) -> Problem:
     """Return a problem along a path at another pace, with the windows of its tolerances there."""
     path = pace(problem.path)
     when = path.when if isinstance(path, Retimed) else np.asarray
@@ -295,7 +379,7 @@ def _own(path: Path) -> Path:
     return path
 
 
-def _stand_in(original: Path, current: Path, found: Path) -> Pace:
+def _stand_in(original: Path, current: Path, found: Path) -> _Repaced:
     """Return what brings a path to about the pace of `found`, which is a pace of `current`.
 
     As smooth as the path: its accelerations do not jump from limit to limit.

@@ -1,4 +1,4 @@
-"""What is known of one plan while it is made."""
+"""What is known of one plan while it is made, and how its motion is judged."""
 
 import time
 from collections.abc import Sequence
@@ -7,21 +7,151 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from selfmotion.basics import Array, BreakdownError, Progress, SelfmotionError
-from selfmotion.certificate import Tolerance
-from selfmotion.motion import Grid, Trajectory
+from selfmotion.certificate import LIMIT_NAMES, Certificate, Tolerance
+from selfmotion.motion import Evaluation, Grid, Trajectory
 from selfmotion.optimise import Status
-from selfmotion.paper import Guide
+from selfmotion.paper import MOST_HALVINGS, Guide
 from selfmotion.planning.candidate import Candidate
-from selfmotion.planning.effort import Effort
+from selfmotion.planning.effort import Effort, Search
 from selfmotion.planning.grids import is_published
-from selfmotion.planning.judge import Judged, judge
 from selfmotion.planning.largest_part import Part, largest_part, shorter_part
 from selfmotion.planning.screening import Ranking
-from selfmotion.planning.search import Search
-from selfmotion.planning.settings import FREE_PART_EVALUATIONS, PART_EVALUATIONS, SHORTER_PARTS
+from selfmotion.planning.settings import (
+    FALLS,
+    FINER,
+    FREE_PART_EVALUATIONS,
+    PART_EVALUATIONS,
+    RESOLVED,
+    ROUGH_GRIDS,
+    SHORTER_PARTS,
+)
 from selfmotion.problem import Problem
 from selfmotion.result import Attempt, Plan
 from selfmotion.search import Obstruction, Reach, SequenceGuide, reachable
+
+
+@dataclass(frozen=True, eq=False)
+class Judged:
+    """What a plan is made of: a motion along all of the path or a part of it, and its check.
+
+    Attributes
+    ----------
+    part : Part
+    motion, still : Evaluation
+        The motion, and the minimum-norm one on the same grid.
+    certificate : Certificate
+    rival_cost : float or None
+        That of the best motion from the chains of the search, where it keeps the constraints.
+    """
+
+    part: Part
+    motion: Evaluation
+    still: Evaluation
+    certificate: Certificate
+    rival_cost: float | None = None
+
+
+def judge(problem: Problem, part: Part, tolerance: Tolerance, progress: Progress) -> Judged:
+    """Return what there is on the first grid on which the motion holds the tolerance."""
+    candidate = part.candidate
+    judged: Judged | None = None
+    coarse: Trajectory | None = None
+    misses: list[float] = []
+    roughs, first = 0, candidate.solution.steps
+    for _ in range(MOST_HALVINGS):
+        try:
+            progress("checking", 1, 1)
+            judged = _check(problem, part, tolerance)
+            if _meets_itself(problem, judged.certificate) and candidate.keep_off_itself():
+                candidate.settle()
+                continue
+            rough = _rough(problem, judged, candidate)
+            roughs += rough
+            # Where no evaluations are left, finer grids change nothing.
+            out = candidate.status is Status.MAX_EVALUATIONS
+            spent = out or roughs > ROUGH_GRIDS or candidate.solution.steps > FINER * first
+            if judged.certificate.on_path and (spent or not rough):
+                break
+            trajectory = judged.motion.trajectory
+            # What damping costs stays on any grid: there, the motion stands when the tool does.
+            if coarse is not None and _same(problem, coarse, trajectory, tolerance):
+                break
+            coarse = trajectory if judged.motion.damped else None
+            # What is out of reach is so on any grid.
+            check = judged.certificate
+            misses.append(check.position_error.value + check.rotation_error.value)
+            if coarse is None and len(misses) > 2 and misses[-1] > 0.5 * misses[-3]:
+                break
+            if candidate.solution.steps >= candidate.most_steps:
+                break
+            candidate.refine()
+            if rough and not candidate.cut_short:
+                candidate.polish()
+        except KeyboardInterrupt:
+            candidate.end(Status.INTERRUPTED)
+            break
+    # No plan goes without a certificate, interrupted or not.
+    return judged or _check(problem, part, tolerance)
+
+
+def _resolved(problem: Problem, candidate: Candidate, tolerance: Tolerance) -> Evaluation:
+    """Return the motion, steps halved between whose nodes the tool was off the path."""
+    allowed, before = np.array([tolerance.position, tolerance.rotation]), np.inf
+    motion = candidate.evaluation()
+    for _ in range(MOST_HALVINGS):
+        errors = problem.errors_between(motion.trajectory) / allowed
+        worst = float(errors.max())
+        # Written so that NaN is no progress. Damping's error is not that of the steps.
+        stuck = not worst < FALLS * before or len(errors) > candidate.most_steps
+        if motion.damped or worst <= RESOLVED or stuck:
+            break
+        before = worst
+        candidate.refine((errors > RESOLVED).any(axis=1))
+        motion = candidate.evaluation()
+    return motion
+
+
+def _meets_itself(problem: Problem, certificate: Certificate) -> bool:
+    """Whether nothing else is wrong than that the arm meets itself, which only the default asks."""
+    asked = problem.own_collision is not None and len(certificate.failures) == 1
+    return asked and not certificate.findings[-1].satisfied
+
+
+def _rough(problem: Problem, judged: Judged, candidate: Candidate) -> bool:
+    """Whether what was asked for and is kept at the nodes is not so between them."""
+    if candidate.violations or not judged.certificate.on_path:
+        return False
+    asked = {item.name for item in problem.requirements}
+    if problem.own_collision is not None:
+        # Where only the default asks it, it was not asked of the nodes either.
+        asked.discard(problem.requirements[-1].name)
+    nodes = judged.motion.trajectory.t
+    # Rates are judged on both sides of a node; anything else that is wrong there stays so.
+    return any(
+        item.requirement in LIMIT_NAMES or item.time not in nodes
+        for item in judged.certificate.findings
+        if not item.satisfied and item.requirement in asked
+    )
+
+
+def _same(problem: Problem, coarse: Trajectory, fine: Trajectory, tolerance: Tolerance) -> bool:
+    """Whether two motions put all that is followed in the same place in the prescribed rows."""
+    pairs = list(zip(coarse(fine.t), fine.q, strict=True))
+    misses = np.array(
+        [
+            item.miss(item.chain.place(first), second)
+            for item in problem.follows.items
+            for first, second in pairs
+        ]
+    )
+    position, rotation = misses.max(axis=0)
+    return bool(position <= tolerance.position and rotation <= tolerance.rotation)
+
+
+def _check(problem: Problem, part: Part, tolerance: Tolerance) -> Judged:
+    motion = _resolved(problem, part.candidate, tolerance)
+    certificate = problem.certify(motion.trajectory, tolerance, part.ending)
+    return Judged(part, motion, part.candidate.still_evaluation(), certificate)
 
 
 @dataclass(eq=False)

@@ -5,14 +5,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from selfmotion.basics import Array, Flags, Ints, Progress
+from selfmotion.basics import Array, Flags, Ints, Progress, RobotError
 from selfmotion.constraints import penalised
 from selfmotion.costs import Samples
 from selfmotion.motion import Sampling
 from selfmotion.nodes import Batch, NodeGrid, NodeMotion, minimise
 from selfmotion.planning.effort import Effort
 from selfmotion.planning.grids import resolves, rough_grid
-from selfmotion.planning.posture import far_from_usual, wound_back
 from selfmotion.planning.settings import (
     ABOUT_AS_GOOD,
     AS_CHEAP,
@@ -28,6 +27,44 @@ from selfmotion.planning.settings import (
 from selfmotion.problem import Problem
 from selfmotion.robot import RobotModel
 from selfmotion.search import carried
+
+_WHOLE, _ROUNDING = 2.0 * np.pi, 1e-9
+
+
+def usual_posture(robot: RobotModel) -> Array:
+    """Return home (n,) where it is known, else the middle of the joints' limits [rad or m]."""
+    try:
+        return robot.home
+    except RobotError:
+        return np.asarray(0.5 * np.add(*robot.finite_limits()))
+
+
+def far_from_usual(robot: RobotModel, motions: Array) -> Array:
+    """Return how far motions (K, N, n) are from the usual posture on average, (K,) [rad]."""
+    away = np.abs(motions - usual_posture(robot)) @ robot.joint_weights
+    return np.asarray(away.mean(axis=1))
+
+
+def wound_back(robot: RobotModel, motion: Array) -> Array:
+    """Return a motion (N, n) with joints turned by whole turns, as near to usual as limits allow.
+
+    The tool is where it was. What fits nowhere within its limits is put in the middle of them.
+    """
+    lowest, highest = motion.min(axis=0), motion.max(axis=0)
+    middle, shift = 0.5 * (lowest + highest), np.zeros(robot.dof)
+    usual = usual_posture(robot)
+    for joint in np.flatnonzero(robot.is_revolute):
+        lower, upper = robot.lower[joint], robot.upper[joint]
+        wanted = round((usual[joint] - middle[joint]) / _WHOLE)
+        # Rounding must not take a joint that stands on its limit round to the other side.
+        least = np.ceil((lower - lowest[joint]) / _WHOLE - _ROUNDING)
+        most = np.floor((upper - highest[joint]) / _WHOLE + _ROUNDING)
+        if least <= most:
+            shift[joint] = np.clip(wanted, least, most)
+        elif np.isfinite(lower) and np.isfinite(upper):
+            shift[joint] = round((0.5 * (lower + upper) - middle[joint]) / _WHOLE)
+    return np.asarray(motion + _WHOLE * shift)
+
 
 Apart = Callable[[Array, Array], Array]
 """How far a motion (N, n) is from each of others (K, N, n), (K,) [rad or m]."""

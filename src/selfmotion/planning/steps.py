@@ -16,14 +16,16 @@ from selfmotion.basics import (
     NoSequenceError,
     SelfmotionError,
 )
-from selfmotion.planning.candidate import Candidate
-from selfmotion.planning.chains import optimise_sequences
+from selfmotion.planning.candidate import Candidate, on_start
+from selfmotion.planning.effort import Search
 from selfmotion.planning.planner import Planner
-from selfmotion.planning.postures import is_long, keep_to_posture
-from selfmotion.planning.search import Search
+from selfmotion.planning.proposals import (
+    is_long,
+    keep_to_posture,
+    optimise_sequences,
+    optimise_starts,
+)
 from selfmotion.planning.settings import SECOND_EFFORT, VERY_LONG_WAY
-from selfmotion.planning.starts import optimise_starts
-from selfmotion.planning.warm_start import on_start
 from selfmotion.problem import Problem
 from selfmotion.result import Attempt
 from selfmotion.search import Obstruction, guides, obstruction

@@ -13,8 +13,12 @@ from selfmotion.search.guides import (
     shortest_along as shortest_along,
 )
 from selfmotion.search.manifold import Manifold as Manifold
-from selfmotion.search.obstruction import Obstruction as Obstruction, obstruction as obstruction
-from selfmotion.search.reach import Reach as Reach, reachable as reachable
+from selfmotion.search.obstruction import (
+    Obstruction as Obstruction,
+    Reach as Reach,
+    obstruction as obstruction,
+    reachable as reachable,
+)
 from selfmotion.search.sequences import (
     Sequence as Sequence,
     best_sequences as best_sequences,

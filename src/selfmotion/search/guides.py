@@ -10,6 +10,7 @@ from selfmotion.basics import Array, Progress
 from selfmotion.costs import PathLength
 from selfmotion.path import Path
 from selfmotion.problem import Problem
+from selfmotion.search.manifold import OnPath
 from selfmotion.search.measures import Length, measure_of
 from selfmotion.search.nodes import Admissible
 from selfmotion.search.sampled import sampled_sequences
@@ -29,7 +30,6 @@ from selfmotion.search.settings import (
     TURN,
 )
 from selfmotion.search.shortest import Shortest
-from selfmotion.search.waypoints import OnPath
 from selfmotion.task import log3
 
 

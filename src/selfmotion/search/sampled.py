@@ -7,9 +7,9 @@ import numpy as np
 
 from selfmotion.basics import Array, NoSequenceError, Progress, silent
 from selfmotion.collision import CollisionModel
-from selfmotion.search import edges
 from selfmotion.search.chains import best_chains, diverse_chains
-from selfmotion.search.measures import Length, Measure
+from selfmotion.search.manifold import OnPath
+from selfmotion.search.measures import Length, Measure, spread_out
 from selfmotion.search.nodes import Admissible
 from selfmotion.search.sequences import Sequence, connected, ranked
 from selfmotion.search.settings import (
@@ -29,7 +29,6 @@ from selfmotion.search.settings import (
 )
 from selfmotion.search.shortest import Shortest
 from selfmotion.search.starts import spread
-from selfmotion.search.waypoints import OnPath
 
 
 @dataclass(frozen=True, eq=False)
@@ -226,7 +225,7 @@ def _smooth_motions(
 def _spread_out(q: Array, cost: Array, count: int) -> Array:
     """Return up to `count` of q (K, n), far from each other first, the cheaper of near ones."""
     ranked = np.ascontiguousarray(q[np.argsort(cost, kind="stable")])
-    return np.asarray(ranked[edges.spread_out(ranked, np.array(PARENTS_APART), count)])
+    return np.asarray(ranked[spread_out(ranked, np.array(PARENTS_APART), count)])
 
 
 def _sorted(q: Array) -> Array:

@@ -18,11 +18,10 @@ from selfmotion.basics import (
 from selfmotion.collision import CollisionModel
 from selfmotion.follow import Follows
 from selfmotion.robot import RobotModel
-from selfmotion.search.chains import best_chains, diverse_chains, unlike, unturned
+from selfmotion.search.chains import best_chains, diverse_chains, unlike, unturned, why_blocked
 from selfmotion.search.curves import CurveSet, SelfMotion, curves_along
 from selfmotion.search.measures import Length, Measure
 from selfmotion.search.nodes import Admissible, place_nodes
-from selfmotion.search.reasons import why_blocked
 from selfmotion.search.settings import ANEW_EVERY, ANEW_SEEDS, FINELY, ROUGHLY, SPACING
 from selfmotion.search.starts import spread
 from selfmotion.search.tighten import tighten

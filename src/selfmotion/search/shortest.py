@@ -16,6 +16,7 @@ from selfmotion.basics import Array, Flags, Ints
 from selfmotion.collision import ClearanceModel, CollisionModel
 from selfmotion.optimise import Banded
 from selfmotion.problem import BodiesOfArm
+from selfmotion.search.manifold import OnPath
 from selfmotion.search.nodes import Admissible
 from selfmotion.search.settings import (
     AT_LIMIT,
@@ -31,7 +32,6 @@ from selfmotion.search.settings import (
     STEP_KEPT,
     STEPS_STIFF,
 )
-from selfmotion.search.waypoints import OnPath
 
 # Of directions along which nothing changes.
 _DAMPING = 1e-3

@@ -30,7 +30,6 @@ from selfmotion.result import Ends, Move, PaceLimits, along, fastest_pace, quant
 from selfmotion.robot import RobotModel
 from selfmotion.search import start_candidates
 from selfmotion.task import SE3, Task
-from selfmotion.transfer.rounding import rounded
 from selfmotion.transfer.settings import (
     BRIEFEST_MOVE,
     END_CONFIGURATIONS,
@@ -51,7 +50,7 @@ from selfmotion.transfer.settings import (
     USUAL_SPEED,
     WIDER,
 )
-from selfmotion.transfer.ways import Room, find_way, shortened, straight_way
+from selfmotion.transfer.ways import Room, find_way, rounded, shortened, straight_way
 
 # Roundings that a motion may add up to.
 _ROUNDINGS = 16.0
