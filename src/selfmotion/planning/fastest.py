@@ -29,18 +29,22 @@ from selfmotion.optimise import Status
 from selfmotion.path import Pace, Path, Retimed, times_when
 from selfmotion.planning.effort import Deadline, Search
 from selfmotion.planning.run import plan, told_of
-from selfmotion.planning.settings import (
-    COARSE,
-    DEGREE,
-    FASTEST_DEADLINE,
-    KEPT_GROWTH,
-    KEPT_WEIGHT,
-    POWER,
-    ROUND_GAIN,
-    ROUNDS,
-)
 from selfmotion.problem import Problem, check_problem
 from selfmotion.result import Plan, check_no_feed, rate_limits, retime
+
+# After so many seconds the best so far has to do.
+_FASTEST_DEADLINE = 60.0
+# Rounds end when one gains less than this share, or after so many.
+_ROUND_GAIN = 2e-3
+ROUNDS = 8
+# Costs that are to be kept and are not count as so many times the motion's time, then more.
+_KEPT_WEIGHT, _KEPT_GROWTH = 0.05, 4.0
+# The power of the cost: the larger, the nearer to the largest share, and the harder to minimise.
+_POWER = 16.0
+# Intervals of the pace at which a round plans, and its degree.
+_COARSE = 32
+_DEGREE = 5
+
 
 # Steps at which costs are measured, at least.
 _STEPS = 300
@@ -168,7 +172,7 @@ def fastest(
     keep: Mapping[str, float] | None = None,
     search: Search | None = None,
     tolerance: Tolerance | None = None,
-    deadline: float | None = FASTEST_DEADLINE,
+    deadline: float | None = _FASTEST_DEADLINE,
     progress: Progress = silent,
 ) -> Fastest:
     """Return the fastest motion along the problem's path, whatever its own pace and costs.
@@ -314,7 +318,7 @@ class _Rounds:
             self._taken("x = 0", still)
         if planned.report.status.is_cut_short:
             raise KeyboardInterrupt
-        use, weight = LimitUse(self._v, self._a, POWER), 0.0
+        use, weight = LimitUse(self._v, self._a, _POWER), 0.0
         pace: _Repaced = _own
         for number in range(ROUNDS):
             options.progress("fastest", number, ROUNDS)
@@ -334,10 +338,10 @@ class _Rounds:
                 raise KeyboardInterrupt
             self.times.append(self._duration)
             kept = self._keeps(planned)
-            if number and kept and self._duration > (1.0 - ROUND_GAIN) * before:
+            if number and kept and self._duration > (1.0 - _ROUND_GAIN) * before:
                 return
             # Costs that are passed count more in the next round.
-            weight = weight if kept else max(KEPT_WEIGHT, KEPT_GROWTH * weight)
+            weight = weight if kept else max(_KEPT_WEIGHT, _KEPT_GROWTH * weight)
             pace = _stand_in(self._problem.path, planned.path, found.path)
 
     @property
@@ -388,13 +392,13 @@ def _stand_in(original: Path, current: Path, found: Path) -> _Repaced:
 
     if not isinstance(found, Retimed):
         raise TypeError(f"a retimed motion has a {type(found).__name__}")
-    t = np.linspace(0.0, found.duration, COARSE + 1)
+    t = np.linspace(0.0, found.duration, _COARSE + 1)
     sigma = np.clip(found.pace(t), 0.0, current.duration)
     if isinstance(current, Retimed) and current is not original:
         sigma = current.pace(sigma)
     sigma = np.maximum.accumulate(sigma)
     sigma[0], sigma[-1] = 0.0, original.duration
     still: Any = [(1, 0.0), (2, 0.0)]
-    spline = make_interp_spline(t, sigma, DEGREE, bc_type=(still, still))
+    spline = make_interp_spline(t, sigma, _DEGREE, bc_type=(still, still))
     rate, bend = np.maximum(spline(t, 1), 0.0), spline(t, 2)
     return lambda path: Retimed(path, t, sigma, rate, bend)

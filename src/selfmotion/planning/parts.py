@@ -30,14 +30,6 @@ from selfmotion.motion import Trajectory, joined_motions, reversed_motion
 from selfmotion.path import Line, Retimed, Section, section_at_rest
 from selfmotion.planning.effort import Search
 from selfmotion.planning.run import plan, plan_along
-from selfmotion.planning.settings import (
-    ATTEMPTS,
-    BRIEFEST_RETREAT,
-    ELSEWHERE,
-    GUIDE_SAMPLES,
-    MISSED_CUTS,
-    RETREAT_SPEED,
-)
 from selfmotion.problem import (
     Problem,
     asked_of_part,
@@ -58,6 +50,19 @@ from selfmotion.search import (
 )
 from selfmotion.task import SE3
 from selfmotion.transfer import FreeMotions
+
+# Where samples do not tell for sure how many parts are needed, a single motion is looked for before
+# as many cuts.
+_MISSED_CUTS = 1
+# Other cuts are tried where parts could not be planned, so often; they are so far away at least, as
+# a share of the path's waypoints.
+_ATTEMPTS = 4
+_ELSEWHERE = 0.03
+# A guide has at least so many samples.
+_GUIDE_SAMPLES = 13
+# A retreat goes at this speed on average [m/s], and takes no less than this [s].
+_RETREAT_SPEED = 0.1
+_BRIEFEST_RETREAT = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,7 +122,7 @@ class Mover:
         """Return the motion of the tool away from where q has it; SelfmotionError for none."""
         pose = self._problem.robot.pose(q)
         away = pose * SE3(np.eye(3), retreat.length * retreat.axis)
-        duration = max(retreat.length / RETREAT_SPEED, BRIEFEST_RETREAT)
+        duration = max(retreat.length / _RETREAT_SPEED, _BRIEFEST_RETREAT)
         line = Line(pose, away, duration)
         return plan(replace(self._problem, path=line, start=q)).require().trajectory
 
@@ -203,7 +208,7 @@ class PartPlanner:
     def _around(self, stretch: Stretch) -> set[int]:
         """Return the waypoints at which the parts to both sides of a stretch's ends are not cut."""
         last = len(self._stretches.t) - 1
-        width = max(1, round(ELSEWHERE * last))
+        width = max(1, round(_ELSEWHERE * last))
         cuts = {stretch.first, stretch.last} - {0, last}
         return {i for cut in cuts for i in range(cut - width, cut + width + 1)}
 
@@ -221,8 +226,8 @@ class PartPlanner:
         """Return the plan along a chain q (W, n) at the path's times t (W,)."""
         if isinstance(problem.path, Retimed):
             t = problem.path.when(t - t[0])
-        if len(t) < GUIDE_SAMPLES:
-            t, few = np.linspace(0.0, problem.path.duration, GUIDE_SAMPLES), t
+        if len(t) < _GUIDE_SAMPLES:
+            t, few = np.linspace(0.0, problem.path.duration, _GUIDE_SAMPLES), t
             q = np.stack([np.interp(t, few, joint) for joint in q.T], axis=1)
         guide = SequenceGuide(Sequence(t, q, 0.0))
         return plan_along(problem, guide, self._tolerance, self._progress)
@@ -328,7 +333,7 @@ def _parts(
     progress: Progress,
 ) -> Parts:
     # Samples of curves tell whether parts are needed; those of larger spaces may miss a way or two.
-    missed = 0 if has_curves(problem) else MISSED_CUTS
+    missed = 0 if has_curves(problem) else _MISSED_CUTS
     refused, chains = None, []
     try:
         stretches = Stretches.of(problem, rng, progress)
@@ -351,7 +356,7 @@ def _best_of(planner: PartPlanner, stretches: Stretches, chains: list[Stretch]) 
     """Return the parts along chains, or along others where some of these fail."""
     best: Parts | None = None
     forbidden: set[int] = set()
-    for _ in range(ATTEMPTS):
+    for _ in range(_ATTEMPTS):
         found, failed = planner.plan(chains)
         if found is not None and (best is None or _standing(found) < _standing(best)):
             best = found

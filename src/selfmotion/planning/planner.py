@@ -16,18 +16,25 @@ from selfmotion.planning.effort import Effort, Search
 from selfmotion.planning.grids import is_published
 from selfmotion.planning.largest_part import Part, largest_part, shorter_part
 from selfmotion.planning.screening import Ranking
-from selfmotion.planning.settings import (
-    FALLS,
-    FINER,
-    FREE_PART_EVALUATIONS,
-    PART_EVALUATIONS,
-    RESOLVED,
-    ROUGH_GRIDS,
-    SHORTER_PARTS,
-)
 from selfmotion.problem import Problem
 from selfmotion.result import Attempt, Plan
 from selfmotion.search import Obstruction, Reach, SequenceGuide, reachable
+
+# Between its nodes a motion may be off the path by this share of the tolerance where that is looked
+# at, in the middle; and by this share of what it was before steps were halved.
+_RESOLVED = 0.3
+_FALLS = 0.7
+# Limits that are exceeded between the nodes on more grids than this are so on any; and nothing is
+# optimised again on grids with more than so many times the steps.
+_ROUGH_GRIDS = 3
+_FINER = 4
+# Evaluations of the cost on each of many parts of the path.
+_PART_EVALUATIONS = 150
+# The same where the start is free: of many, the one that gets farthest needs no more, and who tries
+# many places waits for it.
+_FREE_PART_EVALUATIONS = 30
+# So many such parts, one shorter than the other, at most.
+_SHORTER_PARTS = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +76,7 @@ def judge(problem: Problem, part: Part, tolerance: Tolerance, progress: Progress
             roughs += rough
             # Where no evaluations are left, finer grids change nothing.
             out = candidate.status is Status.MAX_EVALUATIONS
-            spent = out or roughs > ROUGH_GRIDS or candidate.solution.steps > FINER * first
+            spent = out or roughs > _ROUGH_GRIDS or candidate.solution.steps > _FINER * first
             if judged.certificate.on_path and (spent or not rough):
                 break
             trajectory = judged.motion.trajectory
@@ -102,11 +109,11 @@ def _resolved(problem: Problem, candidate: Candidate, tolerance: Tolerance) -> E
         errors = problem.errors_between(motion.trajectory) / allowed
         worst = float(errors.max())
         # Written so that NaN is no progress. Damping's error is not that of the steps.
-        stuck = not worst < FALLS * before or len(errors) > candidate.most_steps
-        if motion.damped or worst <= RESOLVED or stuck:
+        stuck = not worst < _FALLS * before or len(errors) > candidate.most_steps
+        if motion.damped or worst <= _RESOLVED or stuck:
             break
         before = worst
-        candidate.refine((errors > RESOLVED).any(axis=1))
+        candidate.refine((errors > _RESOLVED).any(axis=1))
         motion = candidate.evaluation()
     return motion
 
@@ -359,7 +366,7 @@ class Planner:
         """Let the largest part be it, a time [s] looked at closely; return whether there is one."""
         effort = self.effort
         if effort.max_evaluations is None:
-            most = FREE_PART_EVALUATIONS if self.is_free else PART_EVALUATIONS
+            most = _FREE_PART_EVALUATIONS if self.is_free else _PART_EVALUATIONS
             effort = replace(effort, max_evaluations=most)
         known = self.reach(suspect)
         self.progress("longest part that can be followed", 1, 1)
@@ -368,7 +375,7 @@ class Planner:
             return False
         _settle_both(found.candidate, None, self.progress)
         self.judged = self._judged(found)
-        for _ in range(SHORTER_PARTS):
+        for _ in range(_SHORTER_PARTS):
             # Besides that it ends, nothing should be wrong with it.
             if len(self.judged.certificate.failures) < 2 or found.candidate.cut_short:
                 break

@@ -33,18 +33,7 @@ from selfmotion.planning.effort import Effort
 from selfmotion.planning.grids import is_on_nodes, most_nodes, resolves, rough_grid
 from selfmotion.planning.planner import Planner
 from selfmotion.planning.polish import Polisher
-from selfmotion.planning.screening import Ranking, apart_of, most_promising
-from selfmotion.planning.settings import (
-    CHAIN_ROUNDS,
-    DEARER,
-    DEARER_CHAIN,
-    FINER_CHAIN,
-    FIRST_NODES,
-    LONG_AGREEMENT,
-    LONG_WAY,
-    ONE_VALLEY,
-    STRETCH_WAY,
-)
+from selfmotion.planning.screening import ONE_VALLEY, Ranking, apart_of, most_promising
 from selfmotion.planning.solutions import NodeSolution
 from selfmotion.problem import Problem, asked_of_part
 from selfmotion.search import (
@@ -55,6 +44,22 @@ from selfmotion.search import (
     shortest_along,
     start_candidates,
 )
+
+# A path is long where the tool goes more than so many times the arm's reach: x = 0 begins to drift
+# away. Of one that is longer than the second, rough motions from many starts tell nothing any more.
+LONG_WAY, VERY_LONG_WAY = 5.0, 12.0
+# What a stretch of it is long that tells the posture, likewise.
+_STRETCH_WAY = 2.0
+# Nodes to begin with; the cost on them is right to this share.
+_FIRST_NODES, _LONG_AGREEMENT = 64, 1e-2
+# The shortest chain of a sequence becomes a motion of so many times its waypoints, with more where
+# it does not keep the conditions between them, so often.
+_FINER_CHAIN = 3
+_CHAIN_ROUNDS = 4
+# Sequences are not worth refining when dearer by this factor than one that keeps all constraints.
+_DEARER = 1.25
+# The same where that is the chain of a sequence itself, on which optimising gains next to nothing.
+_DEARER_CHAIN = 1.005
 
 
 def optimise_starts(planner: Planner, count: int, finalists: int) -> None:
@@ -176,7 +181,7 @@ def _is_hopeless(
     if best.violations:
         return False
     least = planner.sequences[0].sequence.cost
-    share = DEARER_CHAIN if best.is_of_chain else DEARER
+    share = _DEARER_CHAIN if best.is_of_chain else _DEARER
     dearer = guide.sequence.cost > least + (share - 1.0) * abs(least)
     return dearer and candidate.solution.merit() > best.score()[-1]
 
@@ -199,8 +204,8 @@ def along_chain(
         # The search's sequences know nothing of given ends.
         return None
     t, q = guide.sequence.t, guide.sequence.q
-    finer = Grid.aligned(problem.knots, FINER_CHAIN * len(t))
-    for number in range(CHAIN_ROUNDS):
+    finer = Grid.aligned(problem.knots, _FINER_CHAIN * len(t))
+    for number in range(_CHAIN_ROUNDS):
         # A few nodes more change little.
         stages = LAST_SMOOTHINGS[2:] if number else LAST_SMOOTHINGS
         found = shortest_along(problem, t, q, finer.nodes, stages)
@@ -326,7 +331,7 @@ def _postures(planner: Planner) -> tuple[list[Array], Status | None]:
     And what ended the search for them, if the user did.
     """
     problem = planner.problem
-    middle, half = 0.5, 0.5 * STRETCH_WAY / problem.way_in_reaches
+    middle, half = 0.5, 0.5 * _STRETCH_WAY / problem.way_in_reaches
     first, last = (problem.path.duration * share for share in (middle - half, middle + half))
     stretch = problem.changed(
         **problem.along(lambda path: Section(path, first, last)),
@@ -360,10 +365,10 @@ def _near(polisher: Polisher, problem: Problem, start: Array, posture: Array) ->
     """
     # As long as it takes the tool to go as far as the arm reaches.
     time = problem.path.duration / problem.way_in_reaches
-    grid, most = Grid.aligned(problem.knots, FIRST_NODES), most_nodes(problem)
+    grid, most = Grid.aligned(problem.knots, _FIRST_NODES), most_nodes(problem)
     while grid.steps <= most:
         motion = polisher.grid(grid.nodes).motion_towards(start, posture, time)
-        if motion is not None and resolves(motion, LONG_AGREEMENT):
+        if motion is not None and resolves(motion, _LONG_AGREEMENT):
             return motion
         grid = grid.halved()
     return None

@@ -26,11 +26,13 @@ from selfmotion.planning.candidate import check_warm_start
 from selfmotion.planning.effort import Deadline, Effort, Search
 from selfmotion.planning.grids import is_published
 from selfmotion.planning.planner import Judged, Planner
-from selfmotion.planning.settings import DAMPED_EVALUATIONS
 from selfmotion.planning.steps import go_through
 from selfmotion.problem import Problem, check_feeds_of, check_problem
 from selfmotion.result import Gap, Plan, Report
 from selfmotion.search import SPACING, SequenceGuide
+
+# Evaluations of the cost that a damped motion may take.
+_DAMPED_EVALUATIONS = 400
 
 
 def gathered(planner: Planner, deadline: Deadline) -> Plan:
@@ -238,7 +240,7 @@ def plan(
     seconds = None if deadline is None else as_number(deadline, "deadline", above=0.0)
     clock = Deadline.after(seconds)
     if problem.damping is not None and max_evaluations is None:
-        max_evaluations = DAMPED_EVALUATIONS
+        max_evaluations = _DAMPED_EVALUATIONS
     effort = Effort(optimizer, callback, max_evaluations, clock)
     if problem.relaxations and is_published(problem, effort):
         raise ProblemError(

@@ -11,22 +11,28 @@ from selfmotion.costs import Samples
 from selfmotion.motion import Sampling
 from selfmotion.nodes import Batch, NodeGrid, NodeMotion, minimise
 from selfmotion.planning.effort import Effort
-from selfmotion.planning.grids import resolves, rough_grid
-from selfmotion.planning.settings import (
-    ABOUT_AS_GOOD,
-    AS_CHEAP,
-    ONE_VALLEY,
-    ROUGH_AGREEMENT,
-    ROUGH_MOTIONS,
-    ROUGH_ROUNDS,
-    SAME_OPTIMUM,
-    SAME_TO_DIGITS,
-    UNKEPT,
-    WITH_CONDITIONS,
-)
+from selfmotion.planning.grids import UNKEPT, resolves, rough_grid
 from selfmotion.problem import Problem
 from selfmotion.robot import RobotModel
 from selfmotion.search import carried
+
+# Agreement of the cost on few nodes and on twice as many, at which a rough motion tells what its
+# start is worth.
+_ROUGH_AGREEMENT = 1e-2
+# On nodes: steps of Newton's method.
+_ROUGH_ROUNDS = 30
+# Rough optima on nodes whose costs differ by less than this share are worth the same; by less than
+# the second, they are mirror images.
+_ABOUT_AS_GOOD, _SAME_TO_DIGITS = 1e-2, 1e-9
+# Of those that differ by less than this, the one nearest to home comes first [share].
+_AS_CHEAP = 1e-4
+# So many rough motions at most; where conditions count, with so many steps more that know them.
+_ROUGH_MOTIONS, _WITH_CONDITIONS = 16, 12
+# Motions at x = 0 that are this near at all times [rad or m] lie in one valley of the cost, as a
+# rule; rough optima this near are the same.
+ONE_VALLEY = 0.6
+_SAME_OPTIMUM = 0.1
+
 
 _WHOLE, _ROUNDING = 2.0 * np.pi, 1e-9
 
@@ -121,7 +127,7 @@ class Ranking:
         if not self._ranked:
             # Optima lie where nothing was asked: what keeps everything may begin elsewhere.
             order = most_promising(problem, starts, motions, arrived, self._t, self._apart)
-            near = (self._near(motions[k]) for k in order[: max(ROUGH_MOTIONS, finalists)])
+            near = (self._near(motions[k]) for k in order[: max(_ROUGH_MOTIONS, finalists)])
             begun = [motion for motion in near if motion is not None]
             self._ranked = self._with_conditions(free, begun, finalists)
         return bool(self._ranked)
@@ -145,14 +151,14 @@ class Ranking:
         """
         problem = self._problem
         nodes = self._grid(problem)
-        total = 1 + ROUGH_ROUNDS
+        total = 1 + _ROUGH_ROUNDS
         self._progress("screening start", 1, total)
         found = self._found = Batch.near(nodes, motions)
         soft = problem.softened(float(found.costs.min()))
         if soft is not problem:
             found = self._found = Batch.near(self._grid(soft), motions)
         alone, near = unlike(found.q, _cheapest(found), self._apart, ONE_VALLEY)
-        which = [*alone, *near][: max(ROUGH_MOTIONS, finalists)]
+        which = [*alone, *near][: max(_ROUGH_MOTIONS, finalists)]
         if not which:
             return None
         found = self._found = found.picked(np.array(which, dtype=np.int64))
@@ -161,7 +167,7 @@ class Ranking:
             if _hopeful(found).any():
                 found = self._found = found.advanced()
         self._ranked = self._decisive(found, finalists)
-        order = unlike(found.q, self._expected(found), self._apart, SAME_OPTIMUM)[0]
+        order = unlike(found.q, self._expected(found), self._apart, _SAME_OPTIMUM)[0]
         each = [] if self._ranked else [self._motion(found, k) for k in order]
         return [motion for motion in each if motion is not None]
 
@@ -177,17 +183,17 @@ class Ranking:
         kept: list[NodeMotion] = []
         others: list[NodeMotion] = []
         dearest = np.inf
-        for k in unlike(found.q, self._expected(found), self._apart, SAME_OPTIMUM)[0]:
+        for k in unlike(found.q, self._expected(found), self._apart, _SAME_OPTIMUM)[0]:
             if found.costs[k] > dearest or len(kept) + len(others) == finalists:
                 break
             motion = self._motion(found, k)
             # What costs the same to the last digits is one of the arm's mirror images.
             if motion is None or any(_same(motion.cost, one.cost) for one in kept):
                 continue
-            if found.going[k] or not resolves(motion, ROUGH_AGREEMENT):
+            if found.going[k] or not resolves(motion, _ROUGH_AGREEMENT):
                 return []
             # What got stuck may become better as well.
-            stuck = found.promised[k] > ABOUT_AS_GOOD * abs(motion.cost)
+            stuck = found.promised[k] > _ABOUT_AS_GOOD * abs(motion.cost)
             if stuck or motion.breaks_hard():
                 others.append(motion)
             elif self._clear(motion):
@@ -196,7 +202,7 @@ class Ranking:
                 # An optimum that takes the arm into itself goes on doing that.
                 continue
             cost = float(found.costs[k])
-            dearest = min(dearest, cost + ABOUT_AS_GOOD * abs(cost))
+            dearest = min(dearest, cost + _ABOUT_AS_GOOD * abs(cost))
         return [*kept, *others] if kept and not _hopeful(found).any() else []
 
     def _with_conditions(
@@ -217,12 +223,12 @@ class Ranking:
                 continue
             self._progress("start", number, total)
             # It is a long way from where there is no self-motion.
-            most = WITH_CONDITIONS if number <= len(free) else ROUGH_ROUNDS
+            most = _WITH_CONDITIONS if number <= len(free) else _ROUGH_ROUNDS
             better = minimise(motion, lambda _: False, roughly=True, most=most).motion
             found = sorted([*found, (self._rank(better), better)], key=lambda each: each[0])
             self._ranked = [one for _, one in found]
         q = np.array([motion.place.q for motion in self._ranked])
-        alone, _ = unlike(q, np.arange(len(q)), self._apart, SAME_OPTIMUM)
+        alone, _ = unlike(q, np.arange(len(q)), self._apart, _SAME_OPTIMUM)
         return [self._ranked[k] for k in alone[:finalists]]
 
     def _rank(self, motion: NodeMotion) -> tuple[bool, float]:
@@ -239,7 +245,7 @@ class Ranking:
         q = found.q[k]
         motion = self._near(wound_back(self._problem.robot, q), found.qd[k], found.qdd[k])
         # Costs may know one turn from another.
-        if motion is not None and motion.cost <= (1.0 + SAME_TO_DIGITS) * found.costs[k]:
+        if motion is not None and motion.cost <= (1.0 + _SAME_TO_DIGITS) * found.costs[k]:
             return motion
         return self._near(self._turned_inside(q), found.qd[k], found.qdd[k])
 
@@ -252,7 +258,7 @@ class Ranking:
         # Each motion belongs with the cheapest one that is about as cheap.
         group, first = np.zeros(len(order), dtype=np.int64), 0
         for k in range(1, len(order)):
-            if costs[k] - costs[first] > AS_CHEAP * abs(costs[first]):
+            if costs[k] - costs[first] > _AS_CHEAP * abs(costs[first]):
                 first = k
             group[k] = first
         far = far_from_usual(robot, np.array([wound_back(robot, found.q[k]) for k in order]))
@@ -287,12 +293,12 @@ def _cheapest(found: Batch) -> Ints:
 def _hopeful(found: Batch) -> Flags:
     """Return which motions are on their way, and may come to cost less than what has arrived."""
     least = found.costs[~found.going].min(initial=np.inf)
-    dearest = least + ABOUT_AS_GOOD * abs(least) if np.isfinite(least) else least
+    dearest = least + _ABOUT_AS_GOOD * abs(least) if np.isfinite(least) else least
     return np.asarray(found.going & (found.costs - found.promised < dearest))
 
 
 def _same(a: float, b: float | None) -> bool:
-    return b is not None and abs(a - b) <= SAME_TO_DIGITS * abs(a)
+    return b is not None and abs(a - b) <= _SAME_TO_DIGITS * abs(a)
 
 
 def most_promising(

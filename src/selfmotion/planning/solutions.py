@@ -21,9 +21,13 @@ from selfmotion.costs import Samples
 from selfmotion.motion import Evaluation, Grid, NodeNullMotion, NullMotion
 from selfmotion.nodes import NodeMotion, Optimum
 from selfmotion.optimise import Status
-from selfmotion.planning.settings import ENDS_MET, LEAST_SAVING
 from selfmotion.problem import Problem
 from selfmotion.search import BESIDE
+
+# What is asked of the ends is met to this [rad, rad/s].
+ENDS_MET = 1e-8
+# What would save less than this share of the cost does not bind.
+_LEAST_SAVING = 1e-6
 
 
 class Solution(Protocol):
@@ -314,4 +318,4 @@ def _active(optimum: Optimum) -> tuple[ActiveConstraint, ...]:
             each.append(Multipliers(item, own, np.zeros(1), np.ones(own.shape, dtype=np.bool_)))
         else:
             each.append(next(inner))
-    return active_of(each, grid.t[[0, -1]], LEAST_SAVING * abs(motion.cost))
+    return active_of(each, grid.t[[0, -1]], _LEAST_SAVING * abs(motion.cost))

@@ -20,15 +20,18 @@ from selfmotion.planning.candidate import Candidate, on_start
 from selfmotion.planning.effort import Search
 from selfmotion.planning.planner import Planner
 from selfmotion.planning.proposals import (
+    VERY_LONG_WAY,
     is_long,
     keep_to_posture,
     optimise_sequences,
     optimise_starts,
 )
-from selfmotion.planning.settings import SECOND_EFFORT, VERY_LONG_WAY
 from selfmotion.problem import Problem
 from selfmotion.result import Attempt
 from selfmotion.search import Obstruction, guides, obstruction
+
+# Where nothing else leads to a motion that keeps the constraints, this many times more are tried.
+_SECOND_EFFORT = 4
 
 
 def go_through(planner: Planner) -> None:
@@ -189,7 +192,7 @@ def _search_globally(planner: Planner) -> bool:
 
 def _draw_more_starts(planner: Planner) -> bool:
     """Draw many more starts; they do not help where the search knows that nothing will."""
-    search, more = planner.search, SECOND_EFFORT
+    search, more = planner.search, _SECOND_EFFORT
     wanted = planner.is_unmet and not planner.notes
     if not (planner.is_sought and planner.takes_starts and wanted) or planner.is_out_of_reach():
         return False

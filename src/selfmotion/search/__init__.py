@@ -1,11 +1,14 @@
 """Where to begin: start configurations, self-motion curves, chains over them, reach."""
 
 from selfmotion.search.curves import (
+    SPACING as SPACING,
     Curve as Curve,
     CurveSet as CurveSet,
     SelfMotion as SelfMotion,
 )
 from selfmotion.search.guides import (
+    BESIDE as BESIDE,
+    LAST_SMOOTHINGS as LAST_SMOOTHINGS,
     SequenceGuide as SequenceGuide,
     asks_length as asks_length,
     guides as guides,
@@ -22,11 +25,6 @@ from selfmotion.search.obstruction import (
 from selfmotion.search.sequences import (
     Sequence as Sequence,
     best_sequences as best_sequences,
-)
-from selfmotion.search.settings import (
-    BESIDE as BESIDE,
-    LAST_SMOOTHINGS as LAST_SMOOTHINGS,
-    SPACING as SPACING,
 )
 from selfmotion.search.single_poses import SinglePoses as SinglePoses
 from selfmotion.search.starts import (

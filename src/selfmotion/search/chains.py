@@ -10,7 +10,16 @@ from selfmotion.collision import Closest, CollisionModel
 from selfmotion.search.curves import CurveSet, SelfMotion
 from selfmotion.search.measures import Length, Measure
 from selfmotion.search.nodes import Admissible
-from selfmotion.search.settings import MOST_CHAINS, SAME_TRAVEL, STATIONS, UNLIKE, UNLIKE_FOR
+
+# Chains are unlike when some joint differs by this [rad or m] at this share of the waypoints.
+_UNLIKE = 0.3
+_UNLIKE_FOR = 0.1
+# Mirror images have moved each joint by the same amount, up to this [rad or m].
+_SAME_TRAVEL = 0.2
+# Chains looked at, mirror images included, before these have to do.
+_MOST_CHAINS = 60
+# Nodes through which other chains are looked for: at so many waypoints, evenly.
+_STATIONS = 7
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +97,7 @@ def diverse_chains(
     backwards = largest_step if largest_step.ndim == 1 else largest_step[::-1]
     back = None if measure is None else measure.backwards()
     reverse = best_chains(layers[::-1], backwards, turning, back)
-    stations = np.unique(np.linspace(0, len(layers) - 1, STATIONS).round().astype(int))
+    stations = np.unique(np.linspace(0, len(layers) - 1, _STATIONS).round().astype(int))
     through = [
         (float(forward.cost[i][k] + reverse.cost[-1 - i][k]), int(i), k)
         for i in stations
@@ -100,7 +109,7 @@ def diverse_chains(
     # A chain through a node near a chosen one is rarely unlike it, and another node finds it.
     covered = {int(i): np.zeros(len(layers[i]), dtype=bool) for i in stations}
     for total, i, node in sorted(through):
-        if not np.isfinite(total) or len(chosen) == count or len(taken) == MOST_CHAINS:
+        if not np.isfinite(total) or len(chosen) == count or len(taken) == _MOST_CHAINS:
             break
         if covered[i][node]:
             continue
@@ -111,13 +120,13 @@ def diverse_chains(
             (mirrored if images else chosen).append(chain)
             taken.append(q)
             for station, near in covered.items():
-                near |= _apart(layers[station], q[station], turning) <= UNLIKE
+                near |= _apart(layers[station], q[station], turning) <= _UNLIKE
     return (chosen + mirrored)[:count]
 
 
 def unlike(q: Array, other: Array, turning: Flags) -> bool:
     """Whether two motions (W, n) differ by much for long."""
-    return bool(np.mean(_apart(q, other, turning) > UNLIKE) >= UNLIKE_FOR)
+    return bool(np.mean(_apart(q, other, turning) > _UNLIKE) >= _UNLIKE_FOR)
 
 
 def _mirrors(q: Array, other: Array, turning: Flags) -> bool:
@@ -126,7 +135,7 @@ def _mirrors(q: Array, other: Array, turning: Flags) -> bool:
         np.cumsum(np.abs(unturned(np.diff(motion, axis=0), turning)), axis=0)
         for motion in (q, other)
     )
-    return bool(np.abs(moved - also).max() < SAME_TRAVEL)
+    return bool(np.abs(moved - also).max() < _SAME_TRAVEL)
 
 
 def _apart(q: Array, other: Array, turning: Flags) -> Array:

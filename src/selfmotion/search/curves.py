@@ -10,17 +10,25 @@ from selfmotion.basics import Array, Flags, Ints, Progress, inlined, kernel, rea
 from selfmotion.basics.layout import Layout
 from selfmotion.follow import Follows
 from selfmotion.robot import place_tips
-from selfmotion.search.manifold import CONVERGED, Manifold, correct
+from selfmotion.search.manifold import CONVERGED, LONGEST_CORRECTION, Manifold, correct
 from selfmotion.search.measures import wrapped
-from selfmotion.search.settings import (
-    ALIGNED,
-    CARRIED,
-    CORRECTIONS,
-    LONGEST_CORRECTION,
-    MOST_SAMPLES,
-    ON_CURVE,
-    SMALLEST_STEP,
-)
+
+# Largest distance of samples along a curve [rad or m], configuration norm.
+SPACING = 0.1
+# Corrections of a sample before its step is halved, and the share of the largest step below which
+# a curve ends.
+_CORRECTIONS = 6
+_SMALLEST_STEP = 1.0 / 64.0
+# Neighbours whose tangents differ by more than acos of this are too far apart to be trusted to
+# lie on the same branch.
+_ALIGNED = 0.93
+# A configuration this near [rad or m] to a curve's polyline is on the curve.
+_ON_CURVE = 0.02
+# Samples after which a curve is given up.
+_MOST_SAMPLES = 5000
+# Of the samples of a curve, every so manieth looks for the curve at the next waypoint.
+_CARRIED = 6
+
 
 # What is known of a curve on the way.
 GOING, CLOSED, ENDED = 0, 1, 2
@@ -91,7 +99,7 @@ def _advance(
     last = samples[count - 1]
     length = correct(q, jacobians, rotations, translations, target, layout, tangents[1], state[3])
     state[1] += 1
-    if length > CONVERGED and state[1] < CORRECTIONS:
+    if length > CONVERGED and state[1] < _CORRECTIONS:
         return GOING
     moved, cosine = 0.0, 0.0
     for k in range(n):
@@ -99,7 +107,7 @@ def _advance(
         cosine += tangents[0, k] * tangents[1, k]
     moved = np.sqrt(moved)
     # NaN fails these comparisons, too.
-    sound = 0.0 <= length <= CONVERGED and cosine > ALIGNED
+    sound = 0.0 <= length <= CONVERGED and cosine > _ALIGNED
     if sound and 0.3 * state[0] < moved < 1.2 * state[0]:
         for k in range(n):
             samples[count, k] = q[k]
@@ -114,7 +122,7 @@ def _advance(
         last = samples[count]
     else:
         state[0] *= 0.5
-        if state[0] < SMALLEST_STEP * state[3]:
+        if state[0] < _SMALLEST_STEP * state[3]:
             return ENDED
         for k in range(n):
             tangents[1, k] = tangents[0, k]
@@ -235,7 +243,7 @@ class CurveSet:
         self.curves: list[Curve] = []
         self._revolute = revolute
         # Segments are at most 1.2 spacings long.
-        self._near = 1.5 * spacing + ON_CURVE
+        self._near = 1.5 * spacing + _ON_CURVE
         self._samples = np.empty((0, len(revolute)))
         self._arcs = np.empty(0)
         self._curve = np.empty(0, dtype=np.intp)
@@ -255,7 +263,7 @@ class CurveSet:
         if not self.curves or not len(q):
             return np.full(len(q), -1), np.zeros(len(q))
         i, share, distance = locate_all(q, self._samples, self._curve, self._revolute, self._near)
-        found = distance < ON_CURVE
+        found = distance < _ON_CURVE
         # Of what is on no curve any segment will do.
         i = np.where(found, i, 0)
         arc = self._arcs[i] + share * (self._arcs[i + 1] - self._arcs[i])
@@ -278,7 +286,7 @@ class CurveSet:
     def seeds(self) -> Iterable[Array]:
         """Yield configurations from which to find these curves at a pose nearby."""
         for curve in self.curves:
-            yield from curve.q[::CARRIED]
+            yield from curve.q[::_CARRIED]
 
 
 class SelfMotion:
@@ -372,7 +380,7 @@ class SelfMotion:
 
     def _walk(self, start: Array, tangent: Array, target: Array) -> tuple[Array, bool]:
         """Return the samples (K, n) from `start` on, and whether they lead back to it."""
-        samples, on = np.empty((MOST_SAMPLES, self.robot.dof)), self._manifold
+        samples, on = np.empty((_MOST_SAMPLES, self.robot.dof)), self._manifold
         count, closed = walk(
             start, tangent, target, on.chains, on.revolute, on.layout, self.spacing, samples
         )

@@ -14,14 +14,16 @@ from selfmotion.kernels import (
     solve_cholesky,
 )
 from selfmotion.robot import null_space, place_tips
-from selfmotion.search.settings import (
-    FAR_STEPS,
-    ITERATIONS,
-    LITTLE_GAIN,
-    LITTLE_GAINS,
-    LONGEST_CORRECTION,
-    NEAR_STEPS,
-)
+
+# Longest single correction [rad or m]: a far start wanders where J is nearly singular.
+LONGEST_CORRECTION = 0.5
+# Newton's steps onto the path, from near it and from anywhere.
+_NEAR_STEPS = 10
+_FAR_STEPS = 60
+# The slower method takes so many iterations. Steps that gain less than this share of what is left,
+# so often in turn, are the last ones: what arrives gains nearly all of it in each.
+_ITERATIONS, _LITTLE_GAIN, _LITTLE_GAINS = 60, 1e-3, 5
+
 
 # A Newton correction of this size [rad or m] leaves an error of its square.
 CONVERGED = 1e-6
@@ -179,7 +181,7 @@ def approach_all(
             for i in range(m):
                 size += step[i] ** 2
             if size < best:
-                idle = idle + 1 if size > (1.0 - LITTLE_GAIN) * best else 0
+                idle = idle + 1 if size > (1.0 - _LITTLE_GAIN) * best else 0
                 best, damping = size, max(0.1 * damping, 1e-14)
                 error[:], jacobian[:], q[k] = step, steep, trial
                 hold(q[k], lower, upper, error, jacobian)
@@ -188,7 +190,7 @@ def approach_all(
                 # Before anything is known it is not a number: there is no way on from there.
                 if damping > 1e6 or best == np.inf:
                     break
-            if best < NOTHING_LEFT**2 or idle == LITTLE_GAINS:
+            if best < NOTHING_LEFT**2 or idle == _LITTLE_GAINS:
                 break
             gram(jacobian, factor)
             for i in range(m):
@@ -272,18 +274,18 @@ class Manifold:
         """
         wanted = np.array(np.broadcast_to(target, (len(q), np.shape(target)[-1])), order="C")
         still = np.array(np.broadcast_to(False if held is None else held, q.shape))
-        found, arrived = self._within(q, wanted, still, FAR_STEPS if far else NEAR_STEPS)
+        found, arrived = self._within(q, wanted, still, _FAR_STEPS if far else _NEAR_STEPS)
         # Near singular poses Newton's method takes many steps, from near as well.
         alone = ~arrived if np.ndim(target) == 2 else np.full(len(q), not arrived.any())
         if not far and alone.any():
             found[alone], arrived[alone] = self._within(
-                q[alone], wanted[alone], still[alone], FAR_STEPS
+                q[alone], wanted[alone], still[alone], _FAR_STEPS
             )
         # Joints that share a band may be within their limits, and beyond that together.
         within = np.where(self._limited, self.follows.within_bands(found), np.inf)
         beyond = arrived & (np.abs(found) > within).any(axis=1)
         if beyond.any():
-            given = found[beyond], wanted[beyond], still[beyond], FAR_STEPS, within[beyond]
+            given = found[beyond], wanted[beyond], still[beyond], _FAR_STEPS, within[beyond]
             found[beyond], arrived[beyond] = self._within(*given)
         return found, arrived
 
@@ -301,7 +303,7 @@ class Manifold:
         """
         found, left = np.array(q), np.zeros((len(q), self.follows.dimension))
         limits = *self._limits, np.array(held)
-        approach_all(found, target, self.chains, self.layout, *limits, ITERATIONS, left)
+        approach_all(found, target, self.chains, self.layout, *limits, _ITERATIONS, left)
         linear = self.follows.linear > 0.0
         parts = np.where(linear, left, 0.0), np.where(linear, 0.0, left)
         misses = [np.sqrt(np.einsum("km,km->k", part, part)) for part in parts]
@@ -340,7 +342,7 @@ class Manifold:
                 [part for pose in poses for part in (pose.translation, pose.rotation.ravel())]
             )
             still = np.zeros((1, len(q)), dtype=np.bool_)
-            found, arrived = self._within(q[None], target[None], still, NEAR_STEPS)
+            found, arrived = self._within(q[None], target[None], still, _NEAR_STEPS)
             for item, pose in zip(items, poses, strict=True):
                 miss = max(item.miss(pose, found[0]))
                 if not (arrived[0] and miss < _AGREE):

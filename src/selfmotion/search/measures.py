@@ -11,7 +11,12 @@ from selfmotion.basics import Array, Flags, Ints, kernel
 from selfmotion.costs import Cost, PathLength, Samples
 from selfmotion.follow import Follows
 from selfmotion.motion import Sampling
-from selfmotion.search.settings import FAST, LAYERS_KEPT
+
+# Steps faster than this many times the mean speed of the shortest chain are changes from sample to
+# sample, which the finished motion spreads over more time.
+_FAST = 2.0
+# Layers whose kinematics are kept, per waypoint: memory, not what is found.
+_LAYERS_KEPT = 3
 
 
 @kernel
@@ -273,7 +278,7 @@ class RunningCost(Measure):
             first, second = near_pairs(before, after, longest, turning)
             price = self._prices(k, before, after, first, second, turning)
             known = _Steps(before, after, first, second, price)
-            _note(self._steps, (id(before), id(after)), known, LAYERS_KEPT * len(self.t))
+            _note(self._steps, (id(before), id(after)), known, _LAYERS_KEPT * len(self.t))
         return known
 
     def of(self, q: Array) -> float:
@@ -293,7 +298,7 @@ class RunningCost(Measure):
         """See `Measure.at_pace_of`."""
         moved = np.linalg.norm(self.weights * np.diff(q, axis=0), axis=1).sum()
         mean = float(moved) / (self.t[-1] - self.t[0])
-        return replace(self, speed=FAST * mean if mean > 0.0 else np.inf, _steps={})
+        return replace(self, speed=_FAST * mean if mean > 0.0 else np.inf, _steps={})
 
     def _prices(
         self, k: int, before: Array, after: Array, first: Ints, second: Ints, turning: Flags
@@ -331,7 +336,7 @@ class RunningCost(Measure):
             samples = Samples.along(self.follows, sampling, q, np.zeros_like(q))
             cost = sum((cost.value(samples) for cost in self.placed), np.zeros(len(q)))
             known = _Places(q, samples, cost)
-            _note(self._places, id(q), known, LAYERS_KEPT * len(self.t))
+            _note(self._places, id(q), known, _LAYERS_KEPT * len(self.t))
         return known
 
 

@@ -10,7 +10,14 @@ import numpy.typing as npt
 from selfmotion.basics import Array, Flags, Ints
 from selfmotion.collision import CollisionModel
 from selfmotion.search.curves import CurveSet, SelfMotion
-from selfmotion.search.settings import BORDER, MERGED, SURELY_OUTSIDE
+
+# Where samples are free or not by turns, the border is enclosed to this share of the spacing.
+_BORDER = 0.25
+# Carried samples nearer to each other than this share of the spacing are merged.
+_MERGED = 0.4
+# Samples outside the limits by more than this [rad or m] before Newton's correction stay outside.
+_SURELY_OUTSIDE = 0.02
+
 
 _TURN = 2.0 * np.pi
 
@@ -169,7 +176,7 @@ class _Sampler:
         for k, curve in enumerate(self.curves.curves):
             here = np.flatnonzero(on == k)
             here = here[np.argsort(places[here], kind="stable")]
-            kept = here[_thinned(places[here], MERGED * self.spacing)]
+            kept = here[_thinned(places[here], _MERGED * self.spacing)]
             gaps = _between(places[kept].tolist(), curve.length, self.spacing)
             arcs += [places[kept], gaps]
             rows += [kept, np.full(len(gaps), -1)]
@@ -179,7 +186,7 @@ class _Sampler:
         fresh = row < 0
         q = np.empty((len(row), self.motion.robot.dof))
         q[~fresh], q[fresh] = carried[row[~fresh]], self.curves.at(number[fresh], arc[fresh])
-        near = np.all(self.bounds.excess(q) < SURELY_OUTSIDE, axis=1)
+        near = np.all(self.bounds.excess(q) < _SURELY_OUTSIDE, axis=1)
         new = np.flatnonzero(near & fresh)
         q[new], near[new] = self.motion.project_all(q[new], self.target)
         free = near.copy()
@@ -192,7 +199,7 @@ class _Sampler:
         lengths = np.array([curve.length for curve in self.curves.curves])
         found: list[Array] = []
         while True:
-            wide = np.abs(outside - inside) > BORDER * self.spacing
+            wide = np.abs(outside - inside) > _BORDER * self.spacing
             on, inside, outside = on[wide], inside[wide], outside[wide]
             if not len(on):
                 return found
@@ -233,7 +240,7 @@ def _thinned(arcs: Array, apart: float) -> list[int]:
 def _between(arcs: Sequence[float], length: float, spacing: float) -> Array:
     """Return arc lengths that fill the gaps between sorted `arcs`, the start included."""
     fill: list[float] = []
-    if not arcs or arcs[0] > MERGED * spacing:
+    if not arcs or arcs[0] > _MERGED * spacing:
         fill.append(0.0)
     stops = [0.0, *arcs, length]
     for first, last in itertools.pairwise(stops):

@@ -10,25 +10,31 @@ from selfmotion.basics import Array
 from selfmotion.collision import how_near
 from selfmotion.follow import AugmentedFollows
 from selfmotion.problem import Problem
-from selfmotion.search.settings import (
-    ABOUT,
-    AT_LIMIT,
-    BISECTIONS,
-    COARSE_POSES,
-    FARTHEST,
-    LOOKS,
-    MOST_LOOKED_AT,
-    MOVE_TRIES,
-    OVERSHOOT,
-    POSES,
-    REMEDY_SEEDS,
-    SHRINKS,
-    SHRUNK,
-    STRETCHED,
-)
-from selfmotion.search.single_poses import Found, SinglePoses
+from selfmotion.search.single_poses import MOST_LOOKED_AT, Found, SinglePoses
 from selfmotion.search.starts import start_candidates
 from selfmotion.task import POSITION_ROWS, ROW_NAMES, Relaxation
+
+# Poses along the path that are looked at, bisections of the time at which no branch goes on, and
+# poses at which it is looked at how far they are out of reach.
+_POSES = 64
+_BISECTIONS = 16
+_LOOKS = 6
+# Poses about a time of trouble, in shares of the path's duration.
+_ABOUT = (-1e-3, 0.0, 1e-3, 4e-3)
+# A singular value below this share of the dexterous configuration's counts as stretched or folded,
+# a joint this near to its limit [rad or m] as at it.
+_STRETCHED = 0.1
+_AT_LIMIT = 1e-3
+# Poses along a path at which to look before anything else.
+_COARSE_POSES = 9
+# What would help is looked for from so many of the nearest configurations; and in so many rounds,
+# in each of which a deviation has to be this share of the least before.
+_REMEDY_SEEDS = 8
+_SHRINKS, _SHRUNK = 6, 0.75
+# A path is moved so often, each time a bit farther than needed at the pose where nothing was found,
+# and no farther than this [m].
+_MOVE_TRIES, _OVERSHOOT, _FARTHEST = 4, 0.05, 0.5
+
 
 _ROTATION_ROWS = ROW_NAMES[len(POSITION_ROWS) :]
 
@@ -64,7 +70,7 @@ def nearest_place(poses: SinglePoses, times: Array) -> Array | None:
     then on. Bodies stay where they are.
     """
     shift = np.zeros(3)
-    for _ in range(MOVE_TRIES):
+    for _ in range(_MOVE_TRIES):
         moved = poses.shifted(shift)
         blocked = moved.first_blocked(times)
         if blocked is None:
@@ -72,8 +78,8 @@ def nearest_place(poses: SinglePoses, times: Array) -> Array | None:
         more = least_deviation(moved, blocked, POSITION_ROWS)
         if more is None:
             return None
-        shift = shift + (1.0 + OVERSHOOT) * more
-        if np.linalg.norm(shift) > FARTHEST:
+        shift = shift + (1.0 + _OVERSHOOT) * more
+        if np.linalg.norm(shift) > _FARTHEST:
             return None
     return None
 
@@ -89,7 +95,7 @@ def least_deviation(poses: SinglePoses, t: float, rows: tuple[str, ...]) -> Arra
     rows = tuple(row for row in rows if row in prescribed)
     if not rows:
         return None
-    more = Relaxation(rows, FARTHEST if rows[0] in POSITION_ROWS else np.pi)
+    more = Relaxation(rows, _FARTHEST if rows[0] in POSITION_ROWS else np.pi)
     others = (
         replace(item, rows=tuple(row for row in item.rows if row not in rows))
         for item in asked.relaxations
@@ -97,10 +103,10 @@ def least_deviation(poses: SinglePoses, t: float, rows: tuple[str, ...]) -> Arra
     )
     wider, n = poses.of(replace(asked, relaxations=(*others, more))), asked.robot.dof
     follows = cast(AugmentedFollows, wider.problem.follows)
-    q = poses.some(t, REMEDY_SEEDS)[:, :n]
+    q = poses.some(t, _REMEDY_SEEDS)[:, :n]
     q = np.hstack([q, np.zeros((len(q), follows.robot.dof - n))])
     best: Array | None = None
-    for _ in range(SHRINKS):
+    for _ in range(_SHRINKS):
         q, arrived = wider.project(q, t, far=True)
         q = q[arrived]
         q = q[wider.bounds.keep(q)]
@@ -113,7 +119,7 @@ def least_deviation(poses: SinglePoses, t: float, rows: tuple[str, ...]) -> Arra
         if best is None or size < np.linalg.norm(best):
             best = np.zeros(6)
             best[more.indices] = away[order[0]]
-        limits = follows.limits_within(more, SHRUNK * size)
+        limits = follows.limits_within(more, _SHRUNK * size)
         if not limits.max() > 0.0:
             break
         wider = wider.with_limits(
@@ -130,7 +136,7 @@ def least_excess(poses: SinglePoses, t: float) -> tuple[str, float] | None:
     None where no single joint is in the way.
     """
     lower, upper = poses.bounds.lower, poses.bounds.upper
-    seeds = poses.some(t, REMEDY_SEEDS)
+    seeds = poses.some(t, _REMEDY_SEEDS)
     found: list[tuple[float, str]] = []
     for k, name in enumerate(poses.problem.asked.robot.joint_names):
         if not (np.isfinite(lower[k]) or np.isfinite(upper[k])):
@@ -229,7 +235,7 @@ def obstruction(problem: Problem, rng: np.random.Generator) -> Obstruction | Non
     what met bodies least, moved aside.
     """
     poses = SinglePoses(problem, rng)
-    times = np.linspace(0.0, problem.path.duration, COARSE_POSES)
+    times = np.linspace(0.0, problem.path.duration, _COARSE_POSES)
     known: dict[float, Array] = {}
     order = _worst_first(problem, times)
     for t in order:
@@ -259,7 +265,7 @@ def _worst_first(problem: Problem, times: Array) -> list[float]:
 def cause(poses: SinglePoses, q: Array) -> str:
     """Return what keeps the arm from reaching further at q (n,); "" where nothing shows."""
     robot, follows, causes = poses.robot, poses.follows, []
-    near = np.minimum(q - robot.lower, robot.upper - q)[: poses.problem.asked.robot.dof] < AT_LIMIT
+    near = np.minimum(q - robot.lower, robot.upper - q)[: poses.problem.asked.robot.dof] < _AT_LIMIT
     if np.any(near):
         names = ", ".join(f"'{robot.joint_names[k]}'" for k in np.flatnonzero(near))
         causes.append(f"at its limit: joint {names}")
@@ -267,7 +273,7 @@ def cause(poses: SinglePoses, q: Array) -> str:
     here, there = (
         float(np.linalg.svd(follows.jacobian(x), compute_uv=False)[-1]) for x in (q, best)
     )
-    if here < STRETCHED * there:
+    if here < _STRETCHED * there:
         causes.append(f"arm stretched or folded, smallest singular value {here:.2g}")
     return f" ({'; '.join(causes)})" if causes else ""
 
@@ -304,8 +310,8 @@ def reachable(
     poses = SinglePoses(problem, rng, clear=False)
     path, given = problem.path, poses.problem.given_start
     first = [given] if given is not None else start_candidates(poses.follows, starts, rng)
-    about = np.clip(suspect / path.duration + np.array(ABOUT), 0.0, 1.0)
-    times = path.duration * np.union1d(np.linspace(0.0, 1.0, POSES + 1), about)
+    about = np.clip(suspect / path.duration + np.array(_ABOUT), 0.0, 1.0)
+    times = path.duration * np.union1d(np.linspace(0.0, 1.0, _POSES + 1), about)
     known, last = np.array(first), 0.0
     for t in times[1:]:
         found = poses.look(t, known)
@@ -324,7 +330,7 @@ def reachable(
 def _edge(poses: SinglePoses, interval: tuple[float, float], known: Array) -> tuple[Array, float]:
     """Return solutions at the last time of an interval that there are any, and this time."""
     last, beyond = interval
-    for _ in range(BISECTIONS):
+    for _ in range(_BISECTIONS):
         middle = 0.5 * (last + beyond)
         found = poses.look(middle, known)
         if len(found.free):
@@ -343,7 +349,7 @@ def _out_of_reach(poses: SinglePoses, time: float, q: Array, beyond: Array) -> s
     if len(poses.problem.asked.follows.items) > 1:
         names = poses.follows.names
         return f"{begin}: no configuration was found that puts {names} on their paths"
-    looks = beyond[np.unique(np.linspace(0, len(beyond) - 1, LOOKS).round().astype(int))]
+    looks = beyond[np.unique(np.linspace(0, len(beyond) - 1, _LOOKS).round().astype(int))]
     misses = [(*poses.nearest(float(t))[1][0], float(t)) for t in looks]
     position, rotation, when = max(misses, key=lambda miss: miss[0] + miss[1])
     turned = f" and {rotation:.2g} rad" if poses.problem.asked.task.angular else ""

@@ -12,23 +12,31 @@ from selfmotion.search.manifold import OnPath
 from selfmotion.search.measures import Length, Measure, spread_out
 from selfmotion.search.nodes import Admissible
 from selfmotion.search.sequences import Sequence, connected, ranked
-from selfmotion.search.settings import (
-    BEGINNING_SEEDS,
-    BEGINNINGS,
-    BEGUN,
-    DRIFT,
-    LOOKED_AT,
-    PARENTS,
-    PARENTS_APART,
-    RING_GAIN,
-    RING_ROUNDS,
-    RINGS,
-    SMOOTHINGS,
-    STRAYED,
-    STRAYS,
-)
-from selfmotion.search.shortest import Shortest
+from selfmotion.search.shortest import SMOOTHINGS, Shortest
 from selfmotion.search.starts import spread
+
+# Motions begin at so many times, evenly, from so many configurations each: of those that inverse
+# kinematics finds from so many seeds.
+_BEGINNINGS = 7
+_BEGUN = 45
+_BEGINNING_SEEDS = 200
+# Constant null motions drift so far over the whole path [rad or m], one standard deviation; every
+# other motion has none.
+_DRIFT = 1.0
+# Of the samples that a chain reaches, so many are followed to the next waypoint, those that are so
+# far from each other [rad or m] first.
+_PARENTS = 80
+_PARENTS_APART = (1.6, 0.8, 0.4, 0.2, 0.1)
+# So many tries around each of them, about this far off [rad].
+_STRAYS = 2
+_STRAYED = 0.15
+# Around a chain, samples at these distances [rad or m], one after the other, so often each at most;
+# a round that shortens the chain by less than this share is the last one of its ring.
+_RINGS = (0.3, 0.1, 0.03, 0.01)
+_RING_ROUNDS = 5
+_RING_GAIN = 5e-3
+# So many chains go through the first stage, after which it shows which are worth the others.
+_LOOKED_AT = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,7 +150,7 @@ def sampled_sequences(
             reason=reason,
         )
     if isinstance(measure, Length):
-        found = diverse_chains(layers, chains, largest_step, turning, LOOKED_AT, measure)
+        found = diverse_chains(layers, chains, largest_step, turning, _LOOKED_AT, measure)
         rough = [connected(layers, chain, turning) for chain in found]
         shortest = Shortest(waypoints, bounds, largest_step, measure.weights)
         for number, q in enumerate(rough):
@@ -182,9 +190,9 @@ def _layers(
         progress("search: sampling waypoint", i + 1, waypoints.count)
         before = layers[-1]
         cost = np.zeros(len(before)) if i == 1 else cost
-        parents = _spread_out(before[np.isfinite(cost)], cost[np.isfinite(cost)], PARENTS)
-        strays = np.repeat(parents, STRAYS, axis=0)
-        away = rng.normal(scale=STRAYED, size=strays.shape) / weights
+        parents = _spread_out(before[np.isfinite(cost)], cost[np.isfinite(cost)], _PARENTS)
+        strays = np.repeat(parents, _STRAYS, axis=0)
+        away = rng.normal(scale=_STRAYED, size=strays.shape) / weights
         step = 0.5 * largest_step[i - 1]
         guesses = np.concatenate([parents, strays + np.clip(away, -step, step)])
         q, arrived = waypoints.project(guesses, i)
@@ -205,11 +213,11 @@ def _smooth_motions(
     """Return at all waypoints where motions with constant null motions are, each (K, n)."""
     dof, last = waypoints.robot.dof, waypoints.count - 1
     nodes = [[np.empty((0, dof))] for _ in range(waypoints.count)]
-    stations = np.unique(np.linspace(0, last, BEGINNINGS).round().astype(int))
+    stations = np.unique(np.linspace(0, last, _BEGINNINGS).round().astype(int))
     for number, station in enumerate(stations.tolist(), 1):
         progress("search: motions from waypoint", number, len(stations))
         begun = _starts(waypoints, bounds, station, rng)
-        drift = rng.normal(scale=DRIFT / max(last, 1), size=begun.shape)
+        drift = rng.normal(scale=_DRIFT / max(last, 1), size=begun.shape)
         drift[::2] = 0.0
         nodes[station].append(begun)
         for direction in (1, -1):
@@ -225,7 +233,7 @@ def _smooth_motions(
 def _spread_out(q: Array, cost: Array, count: int) -> Array:
     """Return up to `count` of q (K, n), far from each other first, the cheaper of near ones."""
     ranked = np.ascontiguousarray(q[np.argsort(cost, kind="stable")])
-    return np.asarray(ranked[spread_out(ranked, np.array(PARENTS_APART), count)])
+    return np.asarray(ranked[spread_out(ranked, np.array(_PARENTS_APART), count)])
 
 
 def _sorted(q: Array) -> Array:
@@ -234,11 +242,11 @@ def _sorted(q: Array) -> Array:
 
 def _starts(waypoints: OnPath, bounds: Admissible, station: int, rng: np.random.Generator) -> Array:
     """Return configurations within the limits, free where there are such, (K, n)."""
-    seeds = np.array(list(spread(waypoints.robot, BEGINNING_SEEDS, rng)))
+    seeds = np.array(list(spread(waypoints.robot, _BEGINNING_SEEDS, rng)))
     q, arrived = waypoints.project(seeds, station, far=True)
     q = q[arrived]
     free = bounds.keep(q)
-    return np.concatenate([q[free], q[~free]])[:BEGUN]
+    return np.concatenate([q[free], q[~free]])[:_BEGUN]
 
 
 def _shortened(
@@ -253,14 +261,14 @@ def _shortened(
         return Shortest(waypoints, bounds, largest_step, measure.weights).near(q)
     fixed = np.zeros(q.shape[1], dtype=bool)
     cost = measure.of(q)
-    for ring in RINGS:
-        for _ in range(RING_ROUNDS):
+    for ring in _RINGS:
+        for _ in range(_RING_ROUNDS):
             layers = _around(waypoints, bounds, q, ring)
             chains = best_chains(layers, largest_step, fixed, measure)
             before, cost = cost, float(chains.cost[-1].min())
             chain = chains.back(len(q) - 1, int(np.argmin(chains.cost[-1])))
             q = connected(layers, chain, fixed)
-            if cost > before - RING_GAIN * abs(before):
+            if cost > before - _RING_GAIN * abs(before):
                 break
     return q
 

@@ -19,12 +19,15 @@ from selfmotion.collision import CollisionModel
 from selfmotion.follow import Follows
 from selfmotion.robot import RobotModel
 from selfmotion.search.chains import best_chains, diverse_chains, unlike, unturned, why_blocked
-from selfmotion.search.curves import CurveSet, SelfMotion, curves_along
+from selfmotion.search.curves import SPACING, CurveSet, SelfMotion, curves_along
 from selfmotion.search.measures import Length, Measure
 from selfmotion.search.nodes import Admissible, place_nodes
-from selfmotion.search.settings import ANEW_EVERY, ANEW_SEEDS, FINELY, ROUGHLY, SPACING
 from selfmotion.search.starts import spread
-from selfmotion.search.tighten import tighten
+from selfmotion.search.tighten import FINELY, ROUGHLY, tighten
+
+# Inverse kinematics starts anew at every so manieth waypoint, from so many seeds.
+_ANEW_EVERY = 10
+_ANEW_SEEDS = 100
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,8 +91,8 @@ class CurveLayers:
         motion = SelfMotion(follows, SPACING)
         bounds = Admissible(*limits, motion.revolute, bodies)
         x = follows.targets(t)
-        seeds = list(spread(follows.robot, ANEW_SEEDS, np.random.default_rng(rng)))
-        curves = curves_along(motion, x, seeds, ANEW_EVERY, progress)
+        seeds = list(spread(follows.robot, _ANEW_SEEDS, np.random.default_rng(rng)))
+        curves = curves_along(motion, x, seeds, _ANEW_EVERY, progress)
         samples = _free_samples(motion, x, curves, bounds, progress)
         return cls(motion, x, curves, bounds, samples)
 

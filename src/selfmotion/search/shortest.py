@@ -18,20 +18,26 @@ from selfmotion.optimise import Banded
 from selfmotion.problem import BodiesOfArm
 from selfmotion.search.manifold import OnPath
 from selfmotion.search.nodes import Admissible
-from selfmotion.search.settings import (
-    AT_LIMIT,
-    BODIES_STIFF,
-    FARTHEST,
-    FIRST_FARTHEST,
-    FURTHER,
-    LIMITS_HELD,
-    NEAR_BODIES,
-    SHORTENING_GAIN,
-    SHORTENING_ROUNDS,
-    SMOOTHINGS,
-    STEP_KEPT,
-    STEPS_STIFF,
-)
+
+# δ, one stage after the other, as multiples of the chain's mean step.
+SMOOTHINGS = (10.0, 3.0, 1.0, 0.3, 0.1)
+# Rounds of each stage at most, and the gain below which it ends [share].
+_SHORTENING_ROUNDS = 20
+_SHORTENING_GAIN = 1e-3
+# Rounds go so many times as far as their quadratics say, which are never below what they stand for.
+_FURTHER = 1.6
+# No joint moves farther in a round than this [rad or m].
+_LONGEST_MOVE = 0.5
+# Joints as near to a limit as this [rad or m] stay there if they would leave it; rounds of that.
+_BESIDE_LIMIT = 1e-3
+_LIMITS_HELD = 4
+# Steps are kept below this share of the largest; more counts as length times this [1/rad].
+_STEP_KEPT = 0.97
+_STEPS_STIFF = 30.0
+# Bodies are kept apart by so much more than asked for [m]; less counts as length times this [1/m²].
+_NEAR_BODIES = 1e-4
+_BODIES_STIFF = 1e6
+
 
 # Of directions along which nothing changes.
 _DAMPING = 1e-3
@@ -61,7 +67,7 @@ class Shortest:
         self, waypoints: OnPath, bounds: Admissible, largest_step: Array, weights: Array
     ) -> None:
         self._waypoints, self._bounds, self._weights = waypoints, bounds, weights
-        self._largest, self._kept = largest_step, STEP_KEPT * largest_step
+        self._largest, self._kept = largest_step, _STEP_KEPT * largest_step
         self._models: list[tuple[ClearanceModel, float]] | None = None
 
     def near(self, q: Array, smoothings: Sequence[float] = SMOOTHINGS) -> Array:
@@ -72,11 +78,11 @@ class Shortest:
         """
         self._free = self._bounds.keep(q)
         self._watched = ~self._free
-        best, here, reach, free = q, q, FIRST_FARTHEST, self._free.sum()
+        best, here, reach, free = q, q, _LONGEST_MOVE, self._free.sum()
         mean = self._length(q) / max(np.diff(q, axis=0).size, 1)
         for smoothing in smoothings:
             blocked = np.zeros(len(q), dtype=bool)
-            for _ in range(SHORTENING_ROUNDS):
+            for _ in range(_SHORTENING_ROUNDS):
                 before = self._state(here, smoothing * mean)
                 after, reach = self._moved(before, blocked, reach)
                 if after is None:
@@ -84,7 +90,7 @@ class Shortest:
                 here = after.q
                 if self._free.sum() > free or self._better(best, here):
                     best, free = here, self._free.sum()
-                if after.merit > (1.0 - SHORTENING_GAIN) * before.merit:
+                if after.merit > (1.0 - _SHORTENING_GAIN) * before.merit:
                     break
         return best
 
@@ -106,10 +112,10 @@ class Shortest:
         every, step = np.arange(len(before.q)), self._step(before, blocked)
         for _ in range(_TRIES):
             longest = float(np.abs(step).max())
-            moved = min(FURTHER * longest, reach)
+            moved = min(_FURTHER * longest, reach)
             guess = before.q + (moved / longest if longest > 0.0 else 0.0) * step
             q, arrived = self._waypoints.project_each(guess, every)
-            arrived &= np.abs(q - guess).max(axis=1) < max(reach, AT_LIMIT)
+            arrived &= np.abs(q - guess).max(axis=1) < max(reach, _BESIDE_LIMIT)
             free = arrived.copy()
             free[arrived] = self._bounds.keep(q[arrived])
             arrived &= free | ~self._free
@@ -121,7 +127,7 @@ class Shortest:
             after = self._state(np.where(arrived[:, None], q, before.q), before.smoothing)
             if after.merit < before.merit:
                 self._free = np.where(arrived, free, self._free)
-                return after, min(FARTHEST, max(reach, 2.0 * moved))
+                return after, min(_LONGEST_MOVE, max(reach, 2.0 * moved))
             reach = _SHORTER * moved
         return None, reach
 
@@ -131,8 +137,8 @@ class Shortest:
         lengths = np.hypot(self._weights * steps, smoothing)
         over = np.maximum(np.abs(steps) - self._kept, 0.0) * self._weights
         rows, lack, slopes = self._lacking(q)
-        merit = (lengths - smoothing).sum() + 0.5 * STEPS_STIFF * (over**2).sum()
-        merit += 0.5 * BODIES_STIFF * (lack**2).sum()
+        merit = (lengths - smoothing).sum() + 0.5 * _STEPS_STIFF * (over**2).sum()
+        merit += 0.5 * _BODIES_STIFF * (lack**2).sum()
         return _State(q, smoothing, steps, lengths, over, rows, lack, slopes, float(merit))
 
     def _lacking(self, q: Array) -> tuple[Ints, Array, Array]:
@@ -172,7 +178,7 @@ class Shortest:
         own[1:] += curvature
         held = np.repeat(blocked[:, None], state.q.shape[1], axis=1)
         step = np.zeros_like(state.q)
-        for _ in range(LIMITS_HELD):
+        for _ in range(_LIMITS_HELD):
             step = _least(bases, slope, own + _HELD * held, curvature, state)
             leaving = self._leaving(state.q, step) & ~held
             if not leaving.any():
@@ -183,8 +189,8 @@ class Shortest:
     def _leaving(self, q: Array, step: Array) -> Flags:
         """Return which joints that are near a limit would pass it, (W, n)."""
         lower, upper, ahead = self._bounds.lower, self._bounds.upper, q + step
-        above = (ahead > upper) & (q > upper - AT_LIMIT)
-        below = (ahead < lower) & (q < lower + AT_LIMIT)
+        above = (ahead > upper) & (q > upper - _BESIDE_LIMIT)
+        below = (ahead < lower) & (q < lower + _BESIDE_LIMIT)
         return np.asarray(above | below)
 
 
@@ -205,16 +211,16 @@ class _State:
     def slope(self, weights: Array) -> Array:
         """Return the merit's slope by each configuration, (W, n)."""
         pull = weights**2 * self.steps / self.lengths
-        pull += STEPS_STIFF * weights * self.over * np.sign(self.steps)
+        pull += _STEPS_STIFF * weights * self.over * np.sign(self.steps)
         slope = np.zeros_like(self.q)
         slope[:-1] -= pull
         slope[1:] += pull
-        np.add.at(slope, self.rows, -BODIES_STIFF * self.lack[:, None] * self.slopes)
+        np.add.at(slope, self.rows, -_BODIES_STIFF * self.lack[:, None] * self.slopes)
         return slope
 
     def curvature(self, weights: Array) -> Array:
         """Return that of each step, (W - 1, n)."""
-        return np.asarray(weights**2 * (1.0 / self.lengths + STEPS_STIFF * (self.over > 0.0)))
+        return np.asarray(weights**2 * (1.0 / self.lengths + _STEPS_STIFF * (self.over > 0.0)))
 
 
 def _least(bases: Array, slope: Array, own: Array, between: Array, state: _State) -> Array:
@@ -226,7 +232,7 @@ def _least(bases: Array, slope: Array, own: Array, between: Array, state: _State
     turned = bases.transpose(0, 2, 1)
     blocks = turned @ (own[:, :, None] * bases) + _DAMPING * np.eye(size)
     along = np.einsum("ln,lnd->ld", state.slopes, bases[state.rows])
-    np.add.at(blocks, state.rows, BODIES_STIFF * along[:, :, None] * along[:, None, :])
+    np.add.at(blocks, state.rows, _BODIES_STIFF * along[:, :, None] * along[:, None, :])
     matrix = Banded(count, size, 1)
     matrix.add(0, 0, blocks)
     matrix.add(1, 0, -(turned[:-1] @ (between[:, :, None] * bases[1:])))
@@ -238,6 +244,6 @@ def _least(bases: Array, slope: Array, own: Array, between: Array, state: _State
 
 def _smooth(model: CollisionModel | BodiesOfArm, distance: float) -> tuple[ClearanceModel, float]:
     """Return the distances that have slopes, and what is wanted of them [m]."""
-    wanted = distance + NEAR_BODIES
+    wanted = distance + _NEAR_BODIES
     own = model.own if isinstance(model, BodiesOfArm) else model
     return ClearanceModel(own, wanted, width=_LEVELLED), wanted

@@ -8,17 +8,20 @@ import numpy.typing as npt
 from selfmotion.basics import Array, InverseKinematicsError
 from selfmotion.follow import Follows
 from selfmotion.robot import RobotModel
-from selfmotion.search.curves import SelfMotion
+from selfmotion.search.curves import SPACING, SelfMotion
 from selfmotion.search.manifold import Manifold
 from selfmotion.search.nodes import Admissible
-from selfmotion.search.settings import (
-    ENOUGH_STARTS,
-    SAME_START,
-    SPACING,
-    START_ROUNDS,
-    TRACING_SEEDS,
-    TRIES,
-)
+
+# Solutions nearer than this [rad or m, Euclidean] lead to the same plan once the start may move.
+_SAME_START = 0.3
+# Where all self-motions of the first pose can be traced: from so many seeds.
+TRACING_SEEDS = 60
+# Where they cannot: so many seeds for each configuration that is asked for.
+_TRIES = 2
+# Where most of them do not keep what else is asked of a configuration: so many rounds of these at
+# most, until there is this share of the starts.
+_START_ROUNDS, _ENOUGH_STARTS = 12, 0.5
+
 
 Admits = Callable[[Array], npt.NDArray[np.bool_]]
 
@@ -105,16 +108,16 @@ def _scattered(
     manifold = Manifold(follows, robot.lower, robot.upper)
     target, found = follows.targets(np.zeros(1))[0], list[Array]()
     held = follows.held(np.zeros(1))[0]
-    for _ in range(START_ROUNDS):
-        seeds = np.array(list(spread(robot, TRIES * count, rng)))
+    for _ in range(_START_ROUNDS):
+        seeds = np.array(list(spread(robot, _TRIES * count, rng)))
         q, arrived = manifold.project(seeds, target, far=True, held=held)
         for one in q[arrived][admits(q[arrived])]:
             if len(found) < count and all(
-                np.linalg.norm(one - other) > SAME_START for other in found
+                np.linalg.norm(one - other) > _SAME_START for other in found
             ):
                 found.append(one)
         # Without anything else to keep, one round tells what there is.
-        if admits is _all or len(found) >= ENOUGH_STARTS * count:
+        if admits is _all or len(found) >= _ENOUGH_STARTS * count:
             break
     return found
 

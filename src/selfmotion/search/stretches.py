@@ -9,20 +9,20 @@ import numpy as np
 from selfmotion.basics import Array, Flags, Ints, NoSequenceError, Progress, silent
 from selfmotion.problem import Problem
 from selfmotion.search.chains import best_chains, unturned
-from selfmotion.search.guides import has_curves, waypoint_times
+from selfmotion.search.guides import MARGIN, has_curves, waypoint_times
 from selfmotion.search.manifold import OnPath
 from selfmotion.search.measures import Length, cheapest, near_pairs
 from selfmotion.search.nodes import Admissible
 from selfmotion.search.sampled import SampledLayers
 from selfmotion.search.sequences import CurveLayers, connected
-from selfmotion.search.settings import (
-    BREAK,
-    JUMP_LOOKS,
-    JUMP_ROUNDS,
-    JUMP_SHARE,
-    LEAST_JUMP,
-    MARGIN,
-)
+
+# What a change to another configuration counts: more than any motion in between.
+_BREAK = 1e6
+# A step is put onto the path in so many places, less one. What an arm can follow has no part that
+# is more than this share of it, nor farther than this [rad or m].
+_JUMP_LOOKS, _JUMP_SHARE, _LEAST_JUMP = 8, 0.4, 0.05
+# Chains are looked for again without the jumps they have, so often.
+_JUMP_ROUNDS = 12
 
 
 class Jumps:
@@ -96,7 +96,7 @@ def jumps_of(problem: Problem, early: Array, late: Array, here: Array, there: Ar
     that way, these are about evenly apart; between two branches most of the step is left between
     two of them, or nothing arrives.
     """
-    share = np.arange(1, JUMP_LOOKS) / JUMP_LOOKS
+    share = np.arange(1, _JUMP_LOOKS) / _JUMP_LOOKS
     times = (early[:, None] + (late - early)[:, None] * share).ravel()
     straight = here[:, None] + (there - here)[:, None] * share[:, None]
     where = OnPath(problem.follows, times, problem.envelope.lower, problem.envelope.upper)
@@ -105,7 +105,7 @@ def jumps_of(problem: Problem, early: Array, late: Array, here: Array, there: Ar
     between = found.reshape(len(here), len(share), n)
     whole = np.concatenate([here[:, None], between, there[:, None]], axis=1)
     parts = np.linalg.norm(np.diff(whole, axis=1), axis=2).max(axis=1)
-    most = np.maximum(JUMP_SHARE * np.linalg.norm(there - here, axis=1), LEAST_JUMP)
+    most = np.maximum(_JUMP_SHARE * np.linalg.norm(there - here, axis=1), _LEAST_JUMP)
     return np.asarray((parts > most) | ~arrived.reshape(len(here), -1).all(axis=1))
 
 
@@ -196,7 +196,7 @@ class Stretches:
         NoSequenceError
             No chains, however many, follow the path; tells the time and why.
         """
-        for _ in range(JUMP_ROUNDS):
+        for _ in range(_JUMP_ROUNDS):
             found = self._found(forbidden)
             if not self._jumps.note([(item.first, item.q) for item in found]):
                 break
@@ -279,9 +279,9 @@ class Stretches:
             change = np.arange(len(cost))
             if i < len(layers) - 1 and i not in forbidden:
                 changed, source = length.extended(i, after, cost, after, anywhere, turning)
-                better = changed + BREAK < cost
+                better = changed + _BREAK < cost
                 change = np.where(better, source, change)
-                cost = np.where(better, changed + BREAK, cost)
+                cost = np.where(better, changed + _BREAK, cost)
             changes.append(change)
         return _traced_back(parents, changes, int(np.argmin(cost)))
 

@@ -7,7 +7,17 @@ from selfmotion.search.chains import best_chains
 from selfmotion.search.curves import SelfMotion
 from selfmotion.search.measures import Measure
 from selfmotion.search.nodes import Admissible
-from selfmotion.search.settings import FINELY, ROUGHLY, SIDE, TIGHTENING_GAIN, TIGHTENING_ROUNDS
+
+# Distances of neighbouring samples [rad or m], each a third of the last, from half of that of the
+# search on. A chain's excess length is about in proportion to the finest: 3 to 6 % at 0.01, 1 % at
+# 0.003, and at 0.001 less than what smoothing the motion changes.
+ROUGHLY = (0.03, 0.01)
+FINELY = (0.003, 0.001)
+# So many samples to each side are looked at in one round, in so many rounds at most; one that
+# improves the chain by less than this share is the last one of its spacing.
+_SIDE = 6
+_TIGHTENING_ROUNDS = 40
+_TIGHTENING_GAIN = 2e-4
 
 
 def tighten(
@@ -43,12 +53,12 @@ def tighten(
     for spacing in spacings:
         tangents = [motion.tangent(here, target) for target, here in zip(x, q, strict=True)]
         strips = _Strips(q, tangents, spacing)
-        for _ in range(TIGHTENING_ROUNDS):
+        for _ in range(_TIGHTENING_ROUNDS):
             _grow(motion, x, strips, bounds)
             chains = best_chains(strips.layers(), largest_step, fixed, measure)
             strips.choose(chains.back(len(q) - 1, int(np.argmin(chains.cost[-1]))))
             before, cost = cost, float(chains.cost[-1].min())
-            if cost > before - TIGHTENING_GAIN * abs(before):
+            if cost > before - _TIGHTENING_GAIN * abs(before):
                 break
         q = strips.chosen
     return q
@@ -79,7 +89,7 @@ class _Strips:
         self.spacing = spacing
         count, n = q.shape
         # No centre moves farther in all rounds.
-        self._middle = SIDE * (TIGHTENING_ROUNDS + 1)
+        self._middle = _SIDE * (_TIGHTENING_ROUNDS + 1)
         size = 2 * self._middle + 1
         self._samples = np.full((count, size, n), np.nan)
         self._free = np.zeros((count, size), dtype=np.bool_)
@@ -107,7 +117,7 @@ class _Strips:
         """Return the next samples that are needed: their waypoints, numbers, and about where."""
         parts = []
         for side, far in self._reach.items():
-            need = self._goes_on[side] & (far < SIDE + side * self._centres)
+            need = self._goes_on[side] & (far < _SIDE + side * self._centres)
             own = np.flatnonzero(need)
             last = self._at(own, side * far[own])
             step = side * self.spacing * self._tangents[own]
@@ -129,7 +139,7 @@ class _Strips:
 
     def layers(self) -> list[Array]:
         """Return the free samples about the centres, (K, n) each, sorted by the first joint."""
-        near = np.arange(-SIDE, SIDE + 1)
+        near = np.arange(-_SIDE, _SIDE + 1)
         self._indices, found = [], []
         for waypoint, centre in enumerate(self._centres):
             indices = centre + near
