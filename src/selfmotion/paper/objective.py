@@ -16,7 +16,7 @@ from selfmotion.problem import Problem
 _LOT = 4096
 
 
-class CostIntegrals:
+class _CostIntegrals:
     """∫ Σ G dt over the motions on a grid.
 
     Parameters
@@ -160,7 +160,7 @@ class Objective:
                 )
         self.rollout, self.null_motion, self.start = rollout, null_motion, start
         self.ends, self.counts = tuple(ends), counts
-        self._costs = CostIntegrals(costs, rollout.grid)
+        self._costs = _CostIntegrals(costs, rollout.grid)
         self._at: Array | None = None
         # ∂q/∂x and ∂q̇/∂x there, gradient and evaluation, once they were asked for.
         self._tangents: tuple[Array, Array] | None = None

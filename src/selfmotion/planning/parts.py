@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
@@ -42,7 +42,6 @@ from selfmotion.problem import (
 from selfmotion.result import Move, Parts, Plan
 from selfmotion.search import (
     Sequence,
-    SequenceGuide,
     Stretch,
     Stretches,
     has_curves,
@@ -65,22 +64,6 @@ _RETREAT_SPEED = 0.1
 _BRIEFEST_RETREAT = 0.5
 
 
-@dataclass(frozen=True, eq=False)
-class Retreat:
-    """How the tool leaves the path before a move, and comes back to it.
-
-    Attributes
-    ----------
-    length : float
-        How far [m].
-    axis : (3,)
-        Where to, in tool axes, of length 1.
-    """
-
-    length: float
-    axis: Array
-
-
 class Mover:
     """Finds moves between configurations of a problem.
 
@@ -88,7 +71,8 @@ class Mover:
     ----------
     problem : Problem
         What it asks of all times is asked of moves as well.
-    retreat : Retreat or None
+    retreat : (3,) or None
+        How far the tool leaves the path before a move, and comes back after, in tool axes [m].
     rng : Generator
     progress : Progress
     """
@@ -96,7 +80,7 @@ class Mover:
     def __init__(
         self,
         problem: Problem,
-        retreat: Retreat | None,
+        retreat: Array | None,
         rng: np.random.Generator,
         progress: Progress,
     ) -> None:
@@ -118,11 +102,11 @@ class Mover:
         whole = joined_motions([away, between.trajectory, reversed_motion(back)])
         return Move(self._free.robot, self._free.constraints, whole)
 
-    def _lead(self, q: Array, retreat: Retreat) -> Trajectory:
+    def _lead(self, q: Array, retreat: Array) -> Trajectory:
         """Return the motion of the tool away from where q has it; SelfmotionError for none."""
         pose = self._problem.robot.pose(q)
-        away = pose * SE3(np.eye(3), retreat.length * retreat.axis)
-        duration = max(retreat.length / _RETREAT_SPEED, _BRIEFEST_RETREAT)
+        away = pose * SE3(np.eye(3), retreat)
+        duration = max(float(np.linalg.norm(retreat)) / _RETREAT_SPEED, _BRIEFEST_RETREAT)
         line = Line(pose, away, duration)
         return plan(replace(self._problem, path=line, start=q)).require().trajectory
 
@@ -143,7 +127,7 @@ def between_parts(problem: Problem) -> Problem:
 _AT_REST = 2
 
 
-class PartPlanner:
+class _PartPlanner:
     """Plans the parts along chains, and the moves between them.
 
     Attributes
@@ -156,7 +140,7 @@ class PartPlanner:
         self,
         problem: Problem,
         stretches: Stretches,
-        retreat: Retreat | None,
+        retreat: Array | None,
         ramp: float,
         rng: np.random.Generator | int,
         tolerance: Tolerance,
@@ -229,7 +213,7 @@ class PartPlanner:
         if len(t) < _GUIDE_SAMPLES:
             t, few = np.linspace(0.0, problem.path.duration, _GUIDE_SAMPLES), t
             q = np.stack([np.interp(t, few, joint) for joint in q.T], axis=1)
-        guide = SequenceGuide(Sequence(t, q, 0.0))
+        guide = Sequence(t, q, 0.0)
         return plan_along(problem, guide, self._tolerance, self._progress)
 
     def _part_problem(self, stretch: Stretch) -> Problem:
@@ -326,7 +310,7 @@ def plan_in_parts(
 
 def _parts(
     problem: Problem,
-    retreats: Retreat | None,
+    retreats: Array | None,
     ramp: float,
     rng: np.random.Generator | int,
     tolerance: Tolerance,
@@ -348,11 +332,11 @@ def _parts(
             return Parts(problem, (whole,), tolerance=tolerance)
     if refused is not None:
         raise refused
-    planner = PartPlanner(problem, stretches, retreats, ramp, rng, tolerance, progress)
+    planner = _PartPlanner(problem, stretches, retreats, ramp, rng, tolerance, progress)
     return _best_of(planner, stretches, chains)
 
 
-def _best_of(planner: PartPlanner, stretches: Stretches, chains: list[Stretch]) -> Parts:
+def _best_of(planner: _PartPlanner, stretches: Stretches, chains: list[Stretch]) -> Parts:
     """Return the parts along chains, or along others where some of these fail."""
     best: Parts | None = None
     forbidden: set[int] = set()
@@ -372,7 +356,7 @@ def _best_of(planner: PartPlanner, stretches: Stretches, chains: list[Stretch]) 
     return best
 
 
-def _checked(problem: Problem, retreat: float, axis: npt.ArrayLike | None) -> Retreat | None:
+def _checked(problem: Problem, retreat: float, axis: npt.ArrayLike | None) -> Array | None:
     check_problem(problem)
     if problem.damping is not None:
         raise ProblemError(
@@ -396,7 +380,7 @@ def _checked(problem: Problem, retreat: float, axis: npt.ArrayLike | None) -> Re
         raise ProblemError("axis is zero, expected a direction in tool axes")
     if axis is not None and length == 0.0:
         raise ProblemError("axis has no effect without a retreat; give retreat=, or leave it out")
-    return Retreat(length, direction / np.linalg.norm(direction)) if length > 0.0 else None
+    return length * direction / np.linalg.norm(direction) if length > 0.0 else None
 
 
 def _whole(

@@ -1,7 +1,7 @@
 """What is known of one plan while it is made, and how its motion is judged."""
 
 import time
-from collections.abc import Sequence
+from collections import abc
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -18,7 +18,7 @@ from selfmotion.planning.largest_part import Part, largest_part, shorter_part
 from selfmotion.planning.screening import Ranking
 from selfmotion.problem import Problem
 from selfmotion.result import Attempt, Plan
-from selfmotion.search import Obstruction, Reach, SequenceGuide, reachable
+from selfmotion.search import Obstruction, Reach, Sequence, reachable
 
 # Between its nodes a motion may be off the path by this share of the tolerance where that is looked
 # at, in the middle; and by this share of what it was before steps were halved.
@@ -176,7 +176,7 @@ class Planner:
     progress : Progress
     warm_start : Plan or None
         Of this problem or of one like it: tried first; where its motion will do, nothing else is.
-    guide : SequenceGuide or None
+    guide : Sequence or None
         Likewise a motion that a search over the whole path has found.
     attempts : list of Attempt
         What was tried, in order.
@@ -186,7 +186,7 @@ class Planner:
         A pose that no configuration was found for.
     best : Candidate or None
         The best so far.
-    sequences : list of SequenceGuide
+    sequences : list of Sequence
         What the global search found; empty where it was not asked for or in vain.
     rival : Candidate or None
         The best motion from these. It is not chosen where the start is given or the search local,
@@ -209,16 +209,16 @@ class Planner:
     tolerance: Tolerance
     progress: Progress
     warm_start: Plan | None = None
-    guide: SequenceGuide | None = None
+    guide: Sequence | None = None
     attempts: list[Attempt] = field(default_factory=list)
     began: float = field(default_factory=time.perf_counter)
     blocked: Obstruction | None = None
     best: Candidate | None = None
-    sequences: list[SequenceGuide] = field(default_factory=list)
+    sequences: list[Sequence] = field(default_factory=list)
     rival: Candidate | None = None
     failure: SelfmotionError | None = None
     notes: list[str] = field(default_factory=list)
-    waiting: Sequence[Candidate] = ()
+    waiting: abc.Sequence[Candidate] = ()
     ranking: Ranking | None = None
     judged: Judged | None = None
 

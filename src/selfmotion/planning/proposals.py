@@ -9,7 +9,8 @@ followed, too: from a motion whose self-motion goes back to it, Newton's method 
 handful of iterations, however many loops there are.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections import abc
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from functools import partial
 
@@ -38,7 +39,7 @@ from selfmotion.planning.solutions import NodeSolution
 from selfmotion.problem import Problem, asked_of_part
 from selfmotion.search import (
     LAST_SMOOTHINGS,
-    SequenceGuide,
+    Sequence,
     asks_length,
     carried,
     shortest_along,
@@ -85,7 +86,7 @@ def optimise_starts(planner: Planner, count: int, finalists: int) -> None:
     _optimise_each(planner, candidates, len(candidates))
 
 
-def _best(problem: Problem, starts: Sequence[Array]) -> list[Array]:
+def _best(problem: Problem, starts: abc.Sequence[Array]) -> list[Array]:
     """Return starts, the best first, by their motions without self-motion."""
     t = rough_grid(problem).nodes
     motions, arrived = carried(problem.follows, np.array(starts), t)
@@ -125,7 +126,7 @@ def _optimise_each(planner: Planner, candidates: Iterable[Candidate], count: int
     planner.waiting = ()
 
 
-def _resumed(planner: Planner, rough: Sequence[NodeMotion]) -> Iterator[Candidate]:
+def _resumed(planner: Planner, rough: abc.Sequence[NodeMotion]) -> Iterator[Candidate]:
     """Yield candidates that begin at rough motions, only when their turn comes."""
     for motion in rough:
         candidate = None if planner.is_over else planner.taken_up(motion.trajectory)
@@ -139,7 +140,7 @@ _LEAST, _STILL = 1e-2, 1e-9
 # Limits are looked at so often between two nodes.
 _LOOKS = 16
 
-_Searched = Callable[[Problem, np.random.Generator | int, Progress], list[SequenceGuide]]
+_Searched = Callable[[Problem, np.random.Generator | int, Progress], list[Sequence]]
 
 
 def optimise_sequences(planner: Planner, searched: _Searched, *, chosen: bool) -> None:
@@ -171,26 +172,24 @@ def optimise_sequences(planner: Planner, searched: _Searched, *, chosen: bool) -
         planner.rival = begun[0]
 
 
-def _is_hopeless(
-    planner: Planner, guide: SequenceGuide, candidate: Candidate, best: Candidate
-) -> bool:
+def _is_hopeless(planner: Planner, guide: Sequence, candidate: Candidate, best: Candidate) -> bool:
     """Whether a sequence is much dearer than the best, and costs more than what there is.
 
     Optimising gains some percent on a sequence.
     """
     if best.violations:
         return False
-    least = planner.sequences[0].sequence.cost
+    least = planner.sequences[0].cost
     share = _DEARER_CHAIN if best.is_of_chain else _DEARER
-    dearer = guide.sequence.cost > least + (share - 1.0) * abs(least)
+    dearer = guide.cost > least + (share - 1.0) * abs(least)
     return dearer and candidate.solution.merit() > best.score()[-1]
 
 
 def along_chain(
     problem: Problem,
     effort: Effort,
-    guide: SequenceGuide,
-    constraints: Sequence[BoundConstraint],
+    guide: Sequence,
+    constraints: abc.Sequence[BoundConstraint],
 ) -> NodeSolution | None:
     """Return the motion through the shortest chain near a sequence; None where it will not do.
 
@@ -203,7 +202,7 @@ def along_chain(
     if any(item.equality for item in constraints):
         # The search's sequences know nothing of given ends.
         return None
-    t, q = guide.sequence.t, guide.sequence.q
+    t, q = guide.t, guide.q
     finer = Grid.aligned(problem.knots, _FINER_CHAIN * len(t))
     for number in range(_CHAIN_ROUNDS):
         # A few nodes more change little.

@@ -1,7 +1,7 @@
 """From a problem to a plan, and what is said of it."""
 
 import time
-from collections.abc import Sequence
+from collections import abc
 from dataclasses import replace
 
 import numpy as np
@@ -29,7 +29,7 @@ from selfmotion.planning.planner import Judged, Planner
 from selfmotion.planning.steps import go_through
 from selfmotion.problem import Problem, check_feeds_of, check_problem
 from selfmotion.result import Gap, Plan, Report
-from selfmotion.search import SPACING, SequenceGuide
+from selfmotion.search import SPACING, Sequence
 
 # Evaluations of the cost that a damped motion may take.
 _DAMPED_EVALUATIONS = 400
@@ -95,7 +95,7 @@ def _gap(planner: Planner, judged: Judged) -> Gap | None:
     if not planner.sequences or judged.part.candidate is not planner.best:
         return None
     motion, rival, rival_cost = judged.motion, planner.rival, judged.rival_cost
-    shortest = min((each.sequence for each in planner.sequences), key=lambda each: each.length)
+    shortest = min(planner.sequences, key=lambda each: each.length)
     weights = planner.problem.robot.joint_weights
     if rival is not None and rival is planner.best and not rival.violations:
         rival_cost = motion.cost
@@ -117,11 +117,11 @@ def status_of(status: Status, certificate: Certificate) -> Status:
 
 def message_of(
     status: Status,
-    violations: Sequence[str],
+    violations: abc.Sequence[str],
     certificate: Certificate,
     *,
     ending: str = "",
-    notes: Sequence[str] = (),
+    notes: abc.Sequence[str] = (),
     published: bool = False,
 ) -> str:
     """Return in words how the optimisation ended, and what came of it."""
@@ -271,14 +271,12 @@ def plan(
         ) from None
 
 
-def plan_along(
-    problem: Problem, guide: SequenceGuide, tolerance: Tolerance, progress: Progress
-) -> Plan:
+def plan_along(problem: Problem, guide: Sequence, tolerance: Tolerance, progress: Progress) -> Plan:
     """Plan as `plan` does, but try a motion first that is known, near which there should be one."""
     clock = Deadline()
     effort = Effort(None, None, None, clock)
-    problem, chain = problem.augmented, guide.sequence
-    guide = SequenceGuide(replace(chain, q=problem.at(chain.t, chain.q)))
+    problem = problem.augmented
+    guide = replace(guide, q=problem.at(guide.t, guide.q))
     planner = Planner(problem, effort, Search(), tolerance, progress, guide=guide)
     with one_blas_thread(), held_interruption():
         return _planned(planner, clock)

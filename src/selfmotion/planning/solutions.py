@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Protocol
 
 import numpy as np
 
@@ -28,67 +27,6 @@ from selfmotion.search import BESIDE
 ENDS_MET = 1e-8
 # What would save less than this share of the cost does not bind.
 _LEAST_SAVING = 1e-6
-
-
-class Solution(Protocol):
-    """What is asked of a motion, however it was found."""
-
-    @property
-    def status(self) -> Status:
-        """How the last minimisation ended."""
-
-    @property
-    def violations(self) -> tuple[str, ...]:
-        """What is wrong for each constraint that it could not meet."""
-
-    @property
-    def active(self) -> tuple[ActiveConstraint, ...]:
-        """What kept it from a lower cost."""
-
-    @property
-    def remaining(self) -> float | None:
-        """What any other motion could still save, as far as is known [cost]."""
-
-    @property
-    def null_motion(self) -> NullMotion:
-        """The parameterisation of its null motion."""
-
-    @property
-    def coefficients(self) -> Array:
-        """The null motion's coefficients."""
-
-    @property
-    def steps(self) -> int:
-        """Of its grid."""
-
-    @property
-    def cost(self) -> float:
-        """F."""
-
-    @property
-    def keeps_off_itself(self) -> bool:
-        """Whether the arm does where only the default asks it to, at the nodes and by meshes."""
-
-    def merit(self) -> float:
-        """Return the cost, much larger where constraints are violated: for ranking."""
-
-    def evaluation(self) -> Evaluation:
-        """Return the motion with its costs."""
-
-    def refined(self, where: Flags | None = None) -> "Solution":
-        """Return it with half the step length, everywhere or for some of the steps (N,)."""
-
-
-def score(solution: Solution) -> tuple[bool, bool, float]:
-    """Return what ranks motions, the smaller, the better.
-
-    Whether constraints are violated, whether the arm meets itself, which would be refused in the
-    end, and the cost. Of two that violate constraints, the one that does so less is nearer to a
-    motion.
-    """
-    if solution.violations:
-        return True, False, solution.merit()
-    return False, not solution.keeps_off_itself, solution.cost
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,7 +56,7 @@ class PublishedSolution:
 
     @cached_property
     def violations(self) -> tuple[str, ...]:
-        """See `Solution.violations`."""
+        """What is wrong for each constraint that it could not meet."""
         return violated(self.constraints, self._samples)
 
     @property
@@ -132,17 +70,17 @@ class PublishedSolution:
 
     @property
     def null_motion(self) -> NullMotion:
-        """See `Solution.null_motion`."""
+        """The parameterisation of its null motion."""
         return self.solution.null_motion
 
     @property
     def coefficients(self) -> Array:
-        """See `Solution.coefficients`."""
+        """The null motion's coefficients."""
         return self.solution.coefficients
 
     @property
     def steps(self) -> int:
-        """See `Solution.steps`."""
+        """Of its grid."""
         return self.solution.steps
 
     @property
@@ -152,7 +90,7 @@ class PublishedSolution:
 
     @cached_property
     def keeps_off_itself(self) -> bool:
-        """See `Solution.keeps_off_itself`."""
+        """Whether the arm does where only the default asks it to, at the nodes and by meshes."""
         return self.problem.keeps_off_itself(self.solution.nodes)
 
     @property
@@ -160,7 +98,7 @@ class PublishedSolution:
         return self.solution.objective.samples(self.solution.x)
 
     def merit(self) -> float:
-        """See `Solution.merit`."""
+        """Return the cost, much larger where constraints are violated: for ranking."""
         if not np.isfinite(self.cost):
             return np.inf
         return penalised(self.cost, self.constraints, self._samples)
@@ -255,7 +193,7 @@ class NodeSolution:
 
     @cached_property
     def violations(self) -> tuple[str, ...]:
-        """See `Solution.violations`."""
+        """What is wrong for each constraint that it could not meet."""
         motion = self.motion
         ends = np.abs(motion.c).max(initial=0.0)
         # Written so that NaN is not kept.
@@ -265,7 +203,7 @@ class NodeSolution:
         return violated(motion.grid.constraints, motion.checked)
 
     def merit(self) -> float:
-        """See `Solution.merit`."""
+        """Return the cost, much larger where constraints are violated: for ranking."""
         motion = self.motion
         if motion.violation <= 0.0:
             return self.cost
@@ -302,6 +240,22 @@ class NodeSolution:
     def refined(self, where: Flags | None = None) -> "NodeSolution":
         """Return it with all intervals halved, or some (N,); as it is where that cannot be."""
         return self.on(Grid(self.motion.grid.t).halved(where).nodes) or self
+
+
+Solution = PublishedSolution | NodeSolution
+"""A motion, however it was found."""
+
+
+def score(solution: Solution) -> tuple[bool, bool, float]:
+    """Return what ranks motions, the smaller, the better.
+
+    Whether constraints are violated, whether the arm meets itself, which would be refused in the
+    end, and the cost. Of two that violate constraints, the one that does so less is nearer to a
+    motion.
+    """
+    if solution.violations:
+        return True, False, solution.merit()
+    return False, not solution.keeps_off_itself, solution.cost
 
 
 def _active(optimum: Optimum) -> tuple[ActiveConstraint, ...]:

@@ -1,5 +1,6 @@
 """Where to begin: start configurations, self-motion curves, chains over them, reach."""
 
+from selfmotion.search.chains import Sequence as Sequence
 from selfmotion.search.curves import (
     SPACING as SPACING,
     Curve as Curve,
@@ -9,7 +10,6 @@ from selfmotion.search.curves import (
 from selfmotion.search.guides import (
     BESIDE as BESIDE,
     LAST_SMOOTHINGS as LAST_SMOOTHINGS,
-    SequenceGuide as SequenceGuide,
     asks_length as asks_length,
     guides as guides,
     has_curves as has_curves,
@@ -22,10 +22,7 @@ from selfmotion.search.obstruction import (
     obstruction as obstruction,
     reachable as reachable,
 )
-from selfmotion.search.sequences import (
-    Sequence as Sequence,
-    best_sequences as best_sequences,
-)
+from selfmotion.search.sequences import best_sequences as best_sequences
 from selfmotion.search.single_poses import SinglePoses as SinglePoses
 from selfmotion.search.starts import (
     Admits as Admits,

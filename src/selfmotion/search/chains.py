@@ -1,16 +1,20 @@
 """Dynamic programming over the waypoints: the best chains of nodes, and why there is none."""
 
 import itertools
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from selfmotion.basics import Array, Flags, Ints
+from selfmotion.basics import Array, Flags, Ints, read_only
 from selfmotion.collision import Closest, CollisionModel
 from selfmotion.search.curves import CurveSet, SelfMotion
 from selfmotion.search.measures import Length, Measure
 from selfmotion.search.nodes import Admissible
 
+# The jagged chain of samples is smoothed by a spline with this many of them per interval.
+_SMOOTHING = 3
 # Chains are unlike when some joint differs by this [rad or m] at this share of the waypoints.
 _UNLIKE = 0.3
 _UNLIKE_FOR = 0.1
@@ -20,6 +24,51 @@ _SAME_TRAVEL = 0.2
 _MOST_CHAINS = 60
 # Nodes through which other chains are looked for: at so many waypoints, evenly.
 _STATIONS = 7
+
+
+@dataclass(frozen=True, eq=False)
+class Sequence:
+    """Configurations along a path, and the smooth motion near them: a `Guide`.
+
+    Attributes
+    ----------
+    t : (W,)
+        Times of the waypoints [s].
+    q : (W, n)
+        Configurations [rad or m], each with the tool on the path.
+    length : float
+        Σ w|Δq| over waypoints and joints, w being the joints' weights (`RobotModel.joint_weights`).
+    cost : float
+        What it was chosen by; see `Measure`.
+    """
+
+    t: Array
+    q: Array
+    length: float
+    cost: float = np.nan
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "t", read_only(self.t))
+        object.__setattr__(self, "q", read_only(self.q))
+
+    @property
+    def start(self) -> Array:
+        """Its first configuration, (n,)."""
+        return np.asarray(self.q[0])
+
+    @cached_property
+    def _rate(self) -> Callable[[Array], Array]:
+        from scipy.interpolate import make_lsq_spline
+
+        t = self.t
+        # Where samples are dense in time, so are knots.
+        inner = np.append(t[:-_SMOOTHING:_SMOOTHING], t[-1])
+        knots = np.concatenate([[t[0]] * 3, inner, [t[-1]] * 3])
+        return make_lsq_spline(t, self.q, knots).derivative()
+
+    def __call__(self, t: Array) -> Array:
+        """Return q̇ at times `t` (S,), (S, n): what stands for x = 0 where it is a guide."""
+        return np.asarray(self._rate(t))
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,6 +171,31 @@ def diverse_chains(
             for station, near in covered.items():
                 near |= _apart(layers[station], q[station], turning) <= _UNLIKE
     return (chosen + mirrored)[:count]
+
+
+def connected(layers: list[Array], chain: list[int], turning: Flags) -> Array:
+    """Return a chain's configurations (W, n); joints that turn without end do not jump."""
+    q = np.array([layer[k] for layer, k in zip(layers, chain, strict=True)])
+    steps = unturned(np.diff(q, axis=0), turning)
+    return np.where(turning, np.vstack([q[:1], q[0] + np.cumsum(steps, axis=0)]), q)
+
+
+def ranked(
+    times: Array, motions: list[Array], turning: Flags, weights: Array, measure: Measure
+) -> list[Sequence]:
+    """Return the sequences, the best first, without those that became like a better one."""
+    length = Length(weights)
+    sequences = [Sequence(times, q, length.of(q), measure.of(q)) for q in motions]
+    kept: list[Sequence] = []
+    for sequence in sorted(sequences, key=lambda sequence: sequence.cost):
+        if all(unlike(sequence.q, other.q, turning) for other in kept):
+            kept.append(sequence)
+    return kept
+
+
+def in_order(q: Array) -> Array:
+    """Return nodes (K, n) of one waypoint, sorted by the first joint."""
+    return np.ascontiguousarray(q[np.argsort(q[:, 0], kind="stable")])
 
 
 def unlike(q: Array, other: Array, turning: Flags) -> bool:

@@ -2,7 +2,6 @@
 
 import itertools
 from collections import abc
-from typing import Any
 
 import numpy as np
 
@@ -10,11 +9,12 @@ from selfmotion.basics import Array, Progress
 from selfmotion.costs import PathLength
 from selfmotion.path import Path
 from selfmotion.problem import Problem
+from selfmotion.search.chains import Sequence
 from selfmotion.search.manifold import OnPath
 from selfmotion.search.measures import Length, measure_of
 from selfmotion.search.nodes import Admissible
-from selfmotion.search.sampled import sampled_sequences
-from selfmotion.search.sequences import Sequence, best_sequences
+from selfmotion.search.sampled import sampled_layers
+from selfmotion.search.sequences import Layers, curve_layers, sequences_over
 from selfmotion.search.shortest import Shortest
 from selfmotion.task import log3
 
@@ -32,7 +32,7 @@ _MOST = 400
 # The path is looked at so often to see how far the tool moves.
 _PATH_LOOKS = 2000
 # What the sequences keep beyond the clearance asked for, since they are only checked at waypoints.
-MARGIN = 2.5e-4
+_MARGIN = 2.5e-4
 # Where the best chain itself is made the motion, it moves aside in the stages with the least δ, so
 # far from limits [rad or m] and at this share of the largest speeds: between waypoints it bulges.
 _CHAIN_EDGE = 5e-4
@@ -41,39 +41,11 @@ _CHAIN_SPEED = 0.95
 # where a halved grid would have one of the same times again.
 BESIDE = 0.3
 LAST_SMOOTHINGS = (3.0, 1.0, 0.3, 0.1, 0.03)
-# The jagged chain of samples is smoothed by a spline with this many of them per interval.
-_SMOOTHING = 3
-
-
-class SequenceGuide:
-    """A sequence as a smooth motion: what `Session` takes as x = 0.
-
-    Attributes
-    ----------
-    sequence : Sequence
-    start : (n,)
-        Its first configuration.
-    """
-
-    def __init__(self, sequence: Sequence) -> None:
-        from scipy.interpolate import make_lsq_spline
-
-        t, q = sequence.t, sequence.q
-        # Where samples are dense in time, so are knots.
-        inner = np.append(t[:-_SMOOTHING:_SMOOTHING], t[-1])
-        knots = np.concatenate([[t[0]] * 3, inner, [t[-1]] * 3])
-        self._rate = make_lsq_spline(t, q, knots).derivative()
-        self.sequence = sequence
-        self.start: Array = q[0]
-
-    def __call__(self, t: Array) -> Array:
-        """Return q̇ at times `t` (S,), (S, n)."""
-        return np.asarray(self._rate(t))
 
 
 def guides(
     problem: Problem, rng: np.random.Generator | int | None, progress: Progress
-) -> list[SequenceGuide]:
+) -> list[Sequence]:
     """Return guides from the best sequences over the self-motions, by the problem's own costs.
 
     Raises
@@ -81,16 +53,33 @@ def guides(
     NoSequenceError
         No chain of configurations follows the path; says where it ends and why.
     """
-    t, asked = waypoint_times(problem), problem.envelope
-    options = _options(problem, t, rng, progress)
+    weights = _weights(problem)
+    layers = layers_of(problem, weights, 0 if rng is None else rng, progress)
+    measure = measure_of(problem.follows, problem.costs, layers.t, weights)
+    return sequences_over(layers, _REFINED, measure, progress)
+
+
+def layers_of(
+    problem: Problem, weights: Array, rng: np.random.Generator | int, progress: Progress
+) -> Layers:
+    """Return the nodes of a problem: samples of all self-motions, free and within limits.
+
+    Parameters
+    ----------
+    problem : Problem
+    weights : (n,)
+        What a unit of each joint counts.
+    rng : Generator or int
+    progress : Progress
+    """
+    asked, t = problem.envelope, waypoint_times(problem)
+    steps = np.minimum(asked.speed * np.diff(t)[:, None], np.pi)
+    bodies = tuple((model, distance + _MARGIN) for model, distance in asked.bodies)
+    limits = asked.lower, asked.upper
     if has_curves(problem):
-        sequences = best_sequences(
-            problem.follows, t, lower=asked.lower, upper=asked.upper, **options
-        )
-    else:
-        waypoints = OnPath(problem.follows, t, asked.lower, asked.upper)
-        sequences = _sampled(problem, waypoints, t, options)
-    return [SequenceGuide(sequence) for sequence in sequences]
+        return curve_layers(problem.follows, t, steps, limits, bodies, rng, progress)
+    waypoints = OnPath(problem.follows, t, *limits)
+    return sampled_layers(waypoints, t, steps, limits, bodies, weights, rng, progress)
 
 
 def shortest_along(
@@ -115,7 +104,7 @@ def shortest_along(
         here, arrived = waypoints.project_each(_between(t, q, where), np.arange(len(where)))
         if not arrived.all():
             return None
-    bodies = tuple((model, distance + MARGIN) for model, distance in asked.bodies)
+    bodies = tuple((model, distance + _MARGIN) for model, distance in asked.bodies)
     bounds = Admissible(*limits, problem.robot.is_revolute, bodies)
     largest = np.minimum(_CHAIN_SPEED * asked.speed * np.diff(where)[:, None], np.pi)
     here = Shortest(waypoints, bounds, largest, weights).near(here, smoothings)
@@ -131,35 +120,6 @@ def asks_length(problem: Problem) -> bool:
     """Whether sequences are chosen by their length."""
     t, weights = np.array([0.0, problem.path.duration]), _weights(problem)
     return isinstance(measure_of(problem.follows, problem.costs, t, weights), Length)
-
-
-def _sampled(
-    problem: Problem, waypoints: OnPath, t: Array, options: dict[str, Any]
-) -> list[Sequence]:
-    asked = problem.envelope
-    return sampled_sequences(
-        waypoints,
-        t,
-        lower=asked.lower,
-        upper=asked.upper,
-        weights=_weights(problem),
-        **options,
-    )
-
-
-def _options(
-    problem: Problem, t: Array, rng: np.random.Generator | int | None, progress: Progress
-) -> dict[str, Any]:
-    """Return what a search over waypoints at times t (W,) is asked besides."""
-    asked = problem.envelope
-    return {
-        "largest_step": np.minimum(asked.speed * np.diff(t)[:, None], np.pi),
-        "bodies": [(model, distance + MARGIN) for model, distance in asked.bodies],
-        "count": _REFINED,
-        "measure": measure_of(problem.follows, problem.costs, t, _weights(problem)),
-        "rng": 0 if rng is None else rng,
-        "progress": progress,
-    }
 
 
 def has_curves(problem: Problem) -> bool:

@@ -367,7 +367,7 @@ class OnPath:
     def __init__(self, follows: Follows, t: Array, lower: Array, upper: Array) -> None:
         self._follows, self._manifold = follows, Manifold(follows, lower, upper)
         self._targets, self.robot, self.count = follows.targets(t), follows.robot, len(t)
-        self._held = follows.held(t)
+        self._held, self.redundancy = follows.held(t), follows.redundancy
 
     def project(self, q: Array, i: int, *, far: bool = False) -> tuple[Array, Flags]:
         """Return what Newton's method makes of q (K, n) at waypoint i, and where it arrives."""

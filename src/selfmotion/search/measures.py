@@ -1,6 +1,5 @@
 """What a chain of configurations costs: its length, or what the problem minimises."""
 
-from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Self
@@ -140,10 +139,18 @@ def lower_to_cheapest(
             reach[second[k]], parent[second[k]] = total, first[k]
 
 
-class Measure(ABC):
-    """Adds up along chains of configurations, from one waypoint to the next."""
+@dataclass(frozen=True, eq=False)
+class Length:
+    """Σ w|Δq|.
 
-    @abstractmethod
+    Attributes
+    ----------
+    weights : (n,)
+        w of the joints.
+    """
+
+    weights: Array
+
     def extended(
         self, k: int, before: Array, cost: Array, after: Array, step: Array, turning: Flags
     ) -> tuple[Array, Ints]:
@@ -166,52 +173,22 @@ class Measure(ABC):
         (M,), (M,)
             inf and -1 where no step is short enough.
         """
-
-    @abstractmethod
-    def of(self, q: Array) -> float:
-        """Return what a motion (W, n) costs."""
-
-    @abstractmethod
-    def backwards(self) -> "Measure":
-        """Return that of the same path from its end to its start."""
-
-    def at_pace_of(self, q: Array) -> "Measure":
-        """Return that for motions about as fast as the shortest one, (W, n)."""
-        return self
-
-
-@dataclass(frozen=True, eq=False)
-class Length(Measure):
-    """Σ w|Δq|.
-
-    Attributes
-    ----------
-    weights : (n,)
-        w of the joints.
-    """
-
-    weights: Array
-
-    def extended(
-        self, k: int, before: Array, cost: Array, after: Array, step: Array, turning: Flags
-    ) -> tuple[Array, Ints]:
-        """See `Measure.extended`."""
         reach, source = np.empty(len(after)), np.empty(len(after), dtype=np.intp)
         longest = np.ascontiguousarray(step)
         extend(before, cost, after, longest, turning, self.weights, reach, source)
         return reach, source
 
     def of(self, q: Array) -> float:
-        """See `Measure.of`."""
+        """Return what a motion (W, n) costs."""
         return float((np.abs(np.diff(q, axis=0)) * self.weights).sum())
 
     def backwards(self) -> Self:
-        """See `Measure.backwards`."""
+        """Return that of the same path from its end to its start."""
         return self
 
 
 @dataclass(frozen=True, eq=False)
-class RunningCost(Measure):
+class RunningCost:
     """∫ G dt of a problem's costs, as far as chains of samples tell it.
 
     A step from q to q + Δq within Δt costs ½Δt (G(0, q) + G(0, q + Δq)) for being where it is, and
@@ -234,6 +211,8 @@ class RunningCost(Measure):
         Of the joints in |Δq|.
     speed : float
         v [rad/s].
+    is_backwards : bool
+        Whether chains go from the last waypoint to the first.
     """
 
     follows: Follows
@@ -242,6 +221,7 @@ class RunningCost(Measure):
     moving: tuple[Cost, ...]
     weights: Array
     speed: float = np.inf
+    is_backwards: bool = False
     _places: dict[int, "_Places"] = field(default_factory=dict, repr=False)
     _steps: dict[tuple[int, int], "_Steps"] = field(default_factory=dict, repr=False)
 
@@ -266,7 +246,10 @@ class RunningCost(Measure):
     def extended(
         self, k: int, before: Array, cost: Array, after: Array, step: Array, turning: Flags
     ) -> tuple[Array, Ints]:
-        """See `Measure.extended`."""
+        """See `Length.extended`."""
+        if self.is_backwards:
+            steps = self.steps(len(self.t) - 2 - k, after, before, step, turning)
+            return cheapest(steps.second, steps.first, steps.price, cost, len(after))
         steps = self.steps(k, before, after, step, turning)
         return cheapest(steps.first, steps.second, steps.price, cost, len(after))
 
@@ -282,7 +265,7 @@ class RunningCost(Measure):
         return known
 
     def of(self, q: Array) -> float:
-        """See `Measure.of`."""
+        """See `Length.of`."""
         fixed, one = np.zeros(q.shape[1], dtype=bool), np.zeros(1, dtype=np.intp)
         steps = (
             self._prices(k, q[k : k + 1], q[k + 1 : k + 2], one, one, fixed)[0]
@@ -290,12 +273,12 @@ class RunningCost(Measure):
         )
         return float(sum(steps))
 
-    def backwards(self) -> "Backwards":
-        """See `Measure.backwards`."""
-        return Backwards(self)
+    def backwards(self) -> Self:
+        """See `Length.backwards`."""
+        return replace(self, is_backwards=True)
 
     def at_pace_of(self, q: Array) -> "RunningCost":
-        """See `Measure.at_pace_of`."""
+        """Return that for motions about as fast as the shortest one, (W, n)."""
         moved = np.linalg.norm(self.weights * np.diff(q, axis=0), axis=1).sum()
         mean = float(moved) / (self.t[-1] - self.t[0])
         return replace(self, speed=_FAST * mean if mean > 0.0 else np.inf, _steps={})
@@ -370,33 +353,14 @@ def _note(known: dict[Any, Any], key: Any, value: Any, most: int) -> None:
 def cheapest(
     first: Ints, second: Ints, price: Array, cost: Array, count: int
 ) -> tuple[Array, Ints]:
-    """Return what `Measure.extended` does, of pairs of nodes (P,), (P,) and the price of each."""
+    """Return what `Length.extended` does, of pairs of nodes (P,), (P,) and the price of each."""
     reach, source = np.full(count, np.inf), np.full(count, -1, dtype=np.intp)
     lower_to_cheapest(first, second, price, cost, reach, source)
     return reach, source
 
 
-@dataclass(frozen=True, eq=False)
-class Backwards(Measure):
-    """A running cost of chains from the last waypoint to the first."""
-
-    measure: RunningCost
-
-    def extended(
-        self, k: int, before: Array, cost: Array, after: Array, step: Array, turning: Flags
-    ) -> tuple[Array, Ints]:
-        """See `Measure.extended`."""
-        last = len(self.measure.t) - 2
-        steps = self.measure.steps(last - k, after, before, step, turning)
-        return cheapest(steps.second, steps.first, steps.price, cost, len(after))
-
-    def of(self, q: Array) -> float:
-        """See `Measure.of`."""
-        return self.measure.of(q[::-1])
-
-    def backwards(self) -> RunningCost:
-        """See `Measure.backwards`."""
-        return self.measure
+Measure = Length | RunningCost
+"""Adds up along chains of configurations, from one waypoint to the next."""
 
 
 def measure_of(follows: Follows, costs: Sequence[Cost], t: Array, weights: Array) -> Measure:

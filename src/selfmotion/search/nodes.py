@@ -59,6 +59,14 @@ class Admissible:
             upper=np.where(wide, np.inf, self.upper),
         )
 
+    def counting_turns(self, which: Flags, bounds: "Admissible") -> "Admissible":
+        """Return it with the limits of others for some joints (n,), whose turns count again."""
+        return replace(
+            self,
+            lower=np.where(which, bounds.lower, self.lower),
+            upper=np.where(which, bounds.upper, self.upper),
+        )
+
     def turned_inside(self, q: Array) -> Array:
         """Return a motion (W, n) with each revolute joint by whole turns nearest to mid-range."""
         bounded = self.revolute & np.isfinite(self.lower) & np.isfinite(self.upper)

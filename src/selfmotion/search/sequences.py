@@ -1,7 +1,7 @@
 """The global search: curves at all waypoints, nodes on them, the shortest chains of nodes."""
 
-from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -12,96 +12,93 @@ from selfmotion.basics import (
     NoSequenceError,
     ProblemError,
     Progress,
-    read_only,
     silent,
 )
 from selfmotion.collision import CollisionModel
 from selfmotion.follow import Follows
 from selfmotion.robot import RobotModel
-from selfmotion.search.chains import best_chains, diverse_chains, unlike, unturned, why_blocked
+from selfmotion.search.chains import (
+    Sequence,
+    best_chains,
+    connected,
+    diverse_chains,
+    ranked,
+    why_blocked,
+)
 from selfmotion.search.curves import SPACING, CurveSet, SelfMotion, curves_along
-from selfmotion.search.measures import Length, Measure
+from selfmotion.search.manifold import OnPath
+from selfmotion.search.measures import Length, Measure, RunningCost
 from selfmotion.search.nodes import Admissible, place_nodes
+from selfmotion.search.shortest import improved_by
 from selfmotion.search.starts import spread
-from selfmotion.search.tighten import FINELY, ROUGHLY, tighten
 
 # Inverse kinematics starts anew at every so manieth waypoint, from so many seeds.
 _ANEW_EVERY = 10
 _ANEW_SEEDS = 100
+# So many chains go through the first stage, after which it shows which are worth the others.
+_LOOKED_AT = 8
 
 
 @dataclass(frozen=True, eq=False)
-class Sequence:
-    """Configurations along a path.
+class Layers:
+    """The nodes of a search: free configurations at the waypoints of a path.
 
     Attributes
     ----------
+    waypoints : OnPath
     t : (W,)
-        Times of the waypoints [s].
-    q : (W, n)
-        Configurations [rad or m], each with the tool on the path.
-    length : float
-        Σ w|Δq| over waypoints and joints, w being the joints' weights (`RobotModel.joint_weights`).
-    cost : float
-        What it was chosen by; see `Measure`.
-    """
-
-    t: Array
-    q: Array
-    length: float
-    cost: float = np.nan
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "t", read_only(self.t))
-        object.__setattr__(self, "q", read_only(self.q))
-
-
-@dataclass(frozen=True, eq=False)
-class CurveLayers:
-    """The self-motion curves at the waypoints of a path, and their free samples.
-
-    Attributes
-    ----------
-    motion : SelfMotion
-    x : (W, 12)
-        The tool at the waypoints.
-    curves : list of CurveSet
+        Their times [s].
+    steps : (W - 1, n)
+        No joint may move more from one waypoint to the next [rad or m].
     bounds : Admissible
     samples : list of (K, n)
-        Without turns.
+        Each at one of its turns.
+    why : callable
+        Returns why no chain reaches a waypoint, by its number, what chains reach before it (A, n),
+        the nodes there (K, n), and the bounds that these keep.
     """
 
-    motion: SelfMotion
-    x: Array
-    curves: list[CurveSet]
+    waypoints: OnPath
+    t: Array
+    steps: Array
     bounds: Admissible
     samples: list[Array]
+    why: Callable[[int, Array, Array, Admissible], str]
 
-    @classmethod
-    def of(
-        cls,
-        follows: Follows,
-        t: Array,
-        limits: tuple[Array, Array],
-        bodies: tuple[tuple[CollisionModel, float], ...],
-        rng: np.random.Generator | int,
-        progress: Progress,
-    ) -> "CurveLayers":
-        """Return those of a task that leaves redundancy 1; see `best_sequences`."""
-        motion = SelfMotion(follows, SPACING)
-        bounds = Admissible(*limits, motion.revolute, bodies)
-        x = follows.targets(t)
-        seeds = list(spread(follows.robot, _ANEW_SEEDS, np.random.default_rng(rng)))
-        curves = curves_along(motion, x, seeds, _ANEW_EVERY, progress)
-        samples = _free_samples(motion, x, curves, bounds, progress)
-        return cls(motion, x, curves, bounds, samples)
+    def refused(self, i: int, reason: str, parts: str = "") -> NoSequenceError:
+        """Return the error that no motion, in however many parts, passes waypoint i."""
+        time = float(self.t[i])
+        return NoSequenceError(
+            f"{self.waypoints.robot.name}: no motion along the path{parts} passes "
+            f"t = {time:.6g} s: {reason}",
+            time=time,
+            reason=reason,
+        )
 
-    def why_blocked(
-        self, i: int, alive: Array, layer: Array, bounds: Admissible, steps: Array
-    ) -> str:
-        """Return why no chain reaches waypoint i, with what chains reach before it (A, n)."""
-        step = steps[max(i - 1, 0)]
-        return why_blocked(self.motion, self.x[i], self.curves[i], alive, layer, bounds, step)
+
+def curve_layers(
+    follows: Follows,
+    t: Array,
+    steps: Array,
+    limits: tuple[Array, Array],
+    bodies: tuple[tuple[CollisionModel, float], ...],
+    rng: np.random.Generator | int,
+    progress: Progress,
+) -> Layers:
+    """Return the free samples of all self-motion curves of a task that leaves redundancy 1.
+
+    See `best_sequences`.
+    """
+    motion, x = SelfMotion(follows, SPACING), follows.targets(t)
+    bounds = Admissible(*limits, motion.revolute, bodies)
+    seeds = list(spread(follows.robot, _ANEW_SEEDS, np.random.default_rng(rng)))
+    curves = curves_along(motion, x, seeds, _ANEW_EVERY, progress)
+    samples = _free_samples(motion, x, curves, bounds, progress)
+
+    def why(i: int, alive: Array, layer: Array, kept: Admissible) -> str:
+        return why_blocked(motion, x[i], curves[i], alive, layer, kept, steps[max(i - 1, 0)])
+
+    return Layers(OnPath(follows, t, *limits), t, steps, bounds, samples, why)
 
 
 def best_sequences(
@@ -174,77 +171,60 @@ def best_sequences(
     ]
     check_asked(follows, limits, count)
     lower, upper, steps = limits
-    layers = CurveLayers.of(follows, times, (lower, upper), tuple(bodies), rng, progress)
-    motion, x, bounds = layers.motion, layers.x, layers.bounds
-    rough, turning, measure = _rough_motions(layers, steps, times, count, measure)
-    # All of them roughly, to see which are worth the rest.
-    for stage, spacings, kept in (
-        ("search: optimising sequence", ROUGHLY, len(rough)),
-        ("search: optimising finalist", FINELY, count),
+    layers = curve_layers(follows, times, steps, (lower, upper), tuple(bodies), rng, progress)
+    return sequences_over(layers, count, measure, progress)
+
+
+def sequences_over(
+    layers: Layers, count: int, asked: Measure | None, progress: Progress
+) -> list[Sequence]:
+    """Return the best chains of nodes that are unlike each other, moved to where they are better.
+
+    By default by their length; see `best_sequences`.
+    """
+    rough, turning, measure = _rough_motions(layers, asked)
+    better = improved_by(layers.waypoints, layers.bounds, layers.steps, measure)
+    # What a chain of samples costs says little of the best one near it, a rough look says much.
+    for stage, roughly in (
+        ("search: optimising sequence", True),
+        ("search: optimising finalist", False),
     ):
-        del rough[kept:]
         for number, q in enumerate(rough):
             progress(stage, number + 1, len(rough))
-            rough[number] = tighten(motion, x, q, bounds, steps, measure, spacings)
-        best = ranked(times, rough, turning, robot.joint_weights, measure)
+            rough[number] = better(q, roughly)
+        best = ranked(layers.t, rough, turning, layers.waypoints.robot.joint_weights, measure)
+        best = best[:count]
         rough = [np.array(sequence.q) for sequence in best]
     return best
 
 
-def _rough_motions(
-    nodes: CurveLayers, steps: Array, times: Array, count: int, asked: Measure | None
-) -> tuple[list[Array], Flags, Measure]:
+def _rough_motions(nodes: Layers, asked: Measure | None) -> tuple[list[Array], Flags, Measure]:
     """Return the best unlike motions (W, n) over samples, whose turns did not count, and by what.
 
     Turns of joints with room for several are left out at first, and the motion put inside the
     limits as a whole; where it does not fit, it is looked for among all turns of these joints.
     """
-    bounds, length = nodes.bounds, Length(nodes.motion.robot.joint_weights)
-    if isinstance(asked, Length):
-        length = asked
+    bounds = nodes.bounds
+    length = asked if isinstance(asked, Length) else Length(nodes.waypoints.robot.joint_weights)
     relaxed = bounds.without_turns()
     while True:
         layers, turning = [relaxed.layer(q) for q in nodes.samples], relaxed.turning
-        chains = best_chains(layers, steps, turning, length)
+        chains = best_chains(layers, nodes.steps, turning, length)
         if chains.blocked is not None:
             i = chains.blocked
             alive = layers[i - 1][np.isfinite(chains.cost[i - 1])] if i else layers[0][:0]
-            reason = nodes.why_blocked(i, alive, layers[i], relaxed, steps)
-            raise NoSequenceError(
-                f"{nodes.motion.robot.name}: no motion along the path passes t = {times[i]:.6g} s: "
-                f"{reason}",
-                time=float(times[i]),
-                reason=reason,
-            )
+            raise nodes.refused(i, nodes.why(i, alive, layers[i], relaxed))
         measure: Measure = length
-        if asked is not None and asked is not length:
+        if isinstance(asked, RunningCost):
             shortest = chains.back(len(layers) - 1, int(np.argmin(chains.cost[-1])))
             measure = asked.at_pace_of(connected(layers, shortest, turning))
-            chains = best_chains(layers, steps, turning, measure)
-        # Unlike chains may become the same one when they are tightened.
-        found = diverse_chains(layers, chains, steps, turning, 2 * count, measure)
+            chains = best_chains(layers, nodes.steps, turning, measure)
+        found = diverse_chains(layers, chains, nodes.steps, turning, _LOOKED_AT, measure)
         rough = [bounds.turned_inside(connected(layers, q, turning)) for q in found]
         beyond = bounds.beyond(rough[0])
         if not np.any(beyond):
             return [q for q in rough if not np.any(bounds.beyond(q))], turning, measure
-        relaxed = replace(
-            relaxed,
-            lower=np.where(beyond, bounds.lower, relaxed.lower),
-            upper=np.where(beyond, bounds.upper, relaxed.upper),
-        )
-
-
-def ranked(
-    times: Array, motions: list[Array], turning: Flags, weights: Array, measure: Measure
-) -> list[Sequence]:
-    """Return the sequences, the best first, without those that became like a better one."""
-    length = Length(weights)
-    sequences = [Sequence(times, q, length.of(q), measure.of(q)) for q in motions]
-    kept: list[Sequence] = []
-    for sequence in sorted(sequences, key=lambda sequence: sequence.cost):
-        if all(unlike(sequence.q, other.q, turning) for other in kept):
-            kept.append(sequence)
-    return kept
+        relaxed = relaxed.counting_turns(beyond, bounds)
 
 
 def _free_samples(
@@ -259,13 +239,6 @@ def _free_samples(
         before = place_nodes(motion, target, here, carried[arrived], bounds, SPACING)
         found.append(before)
     return found
-
-
-def connected(layers: list[Array], chain: list[int], turning: Flags) -> Array:
-    """Return a chain's configurations (W, n); joints that turn without end do not jump."""
-    q = np.array([layer[k] for layer, k in zip(layers, chain, strict=True)])
-    steps = unturned(np.diff(q, axis=0), turning)
-    return np.where(turning, np.vstack([q[:1], q[0] + np.cumsum(steps, axis=0)]), q)
 
 
 def as_times(t: npt.ArrayLike) -> Array:

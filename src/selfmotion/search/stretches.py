@@ -2,19 +2,18 @@
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from selfmotion.basics import Array, Flags, Ints, NoSequenceError, Progress, silent
 from selfmotion.problem import Problem
-from selfmotion.search.chains import best_chains, unturned
-from selfmotion.search.guides import MARGIN, has_curves, waypoint_times
+from selfmotion.search.chains import best_chains, connected, unturned
+from selfmotion.search.guides import layers_of
 from selfmotion.search.manifold import OnPath
 from selfmotion.search.measures import Length, cheapest, near_pairs
 from selfmotion.search.nodes import Admissible
-from selfmotion.search.sampled import SampledLayers
-from selfmotion.search.sequences import CurveLayers, connected
+from selfmotion.search.sequences import Layers
 
 # What a change to another configuration counts: more than any motion in between.
 _BREAK = 1e6
@@ -25,7 +24,7 @@ _JUMP_LOOKS, _JUMP_SHARE, _LEAST_JUMP = 8, 0.4, 0.05
 _JUMP_ROUNDS = 12
 
 
-class Jumps:
+class _Jumps:
     """What is known of jumps along a path: chains are looked for again without them.
 
     Parameters
@@ -134,21 +133,16 @@ class Stretch:
 
 @dataclass(frozen=True, eq=False)
 class Stretches:
-    """Nodes along a path, over which the fewest chains are looked for; made by `Stretches.of`.
-
-    Attributes
-    ----------
-    t : (W,)
-        Times of the waypoints [s].
-    """
+    """Nodes along a path, over which the fewest chains are looked for; made by `Stretches.of`."""
 
     problem: Problem
-    t: Array
-    _nodes: CurveLayers | SampledLayers
-    _bounds: Admissible
-    _steps: Array
-    _samples: list[Array]
-    _jumps: Jumps
+    _layers: Layers
+    _jumps: _Jumps
+
+    @property
+    def t(self) -> Array:
+        """Times of the waypoints [s], (W,)."""
+        return self._layers.t
 
     @classmethod
     def of(
@@ -161,21 +155,8 @@ class Stretches:
         NoSequenceError
             A pose of the path has no node at all; tells the time and why.
         """
-        asked, t = problem.envelope, waypoint_times(problem)
-        steps = np.minimum(asked.speed * np.diff(t)[:, None], np.pi)
-        bodies = tuple((model, distance + MARGIN) for model, distance in asked.bodies)
-        limits, weights = (asked.lower, asked.upper), problem.robot.joint_weights
-        if has_curves(problem):
-            curves = CurveLayers.of(problem.follows, t, limits, bodies, rng, progress)
-            found = cls(
-                problem, t, curves, curves.bounds, steps, curves.samples, Jumps(problem, t, steps)
-            )
-        else:
-            where = OnPath(problem.follows, t, *limits)
-            samples = SampledLayers.of(where, limits, bodies, steps, weights, rng, progress)
-            found = cls(
-                problem, t, samples, samples.bounds, steps, samples.layers, Jumps(problem, t, steps)
-            )
+        layers = layers_of(problem, problem.robot.joint_weights, rng, progress)
+        found = cls(problem, layers, _Jumps(problem, layers.t, layers.steps))
         found._pin_ends()
         found._check()
         return found
@@ -204,11 +185,11 @@ class Stretches:
 
     def _found(self, forbidden: set[int]) -> list[Stretch]:
         """Return the fewest chains without the jumps that are known; see `fewest`."""
-        bounds = self._bounds
+        bounds = self._layers.bounds
         # Joints with room for several turns turn without end at first: see `best_sequences`.
         relaxed = bounds.without_turns()
         while True:
-            layers = [relaxed.layer(q) for q in self._samples]
+            layers = [relaxed.layer(q) for q in self._layers.samples]
             turning = relaxed.turning
             chains = self._chains(layers, relaxed, forbidden)
             motions = [
@@ -218,11 +199,7 @@ class Stretches:
             beyond = np.any([bounds.beyond(q) for q in motions], axis=0)
             if not np.any(beyond):
                 break
-            relaxed = replace(
-                relaxed,
-                lower=np.where(beyond, bounds.lower, relaxed.lower),
-                upper=np.where(beyond, bounds.upper, relaxed.upper),
-            )
+            relaxed = relaxed.counting_turns(beyond, bounds)
         return [
             Stretch(
                 first,
@@ -236,7 +213,7 @@ class Stretches:
 
     def _pin_ends(self) -> None:
         """Let nothing but a given start, and a given end, be a node there."""
-        start, samples = self.problem.given_start, self._samples
+        start, samples = self.problem.given_start, self._layers.samples
         if start is not None:
             samples[0] = start[None]
         for item in self.problem.constraints:
@@ -248,18 +225,22 @@ class Stretches:
             self._keep_given(0, "given start")
 
     def _keep_given(self, i: int, name: str) -> None:
-        q = self._samples[i]
-        if np.any(self._bounds.beyond(q)):
-            k = int(np.argmax(self._bounds.beyond(q)))
+        q = self._layers.samples[i]
+        if np.any(self._layers.bounds.beyond(q)):
+            k = int(np.argmax(self._layers.bounds.beyond(q)))
             joint = self.problem.robot.joint_names[k]
-            self._refuse(i, f"the {name} has joint '{joint}' at {q[0, k]:.4g}, outside its limits")
-        if not self._bounds.keep(q)[0]:
-            self._refuse(i, f"the {name} is in collision, or nearer than asked for")
+            raise self._refused(
+                i, f"the {name} has joint '{joint}' at {q[0, k]:.4g}, outside its limits"
+            )
+        if not self._layers.bounds.keep(q)[0]:
+            raise self._refused(i, f"the {name} is in collision, or nearer than asked for")
 
     def _check(self) -> None:
-        for i, samples in enumerate(self._samples):
+        for i, samples in enumerate(self._layers.samples):
             if len(samples) == 0:
-                self._refuse(i, self._why(i, samples, samples, self._bounds.without_turns()))
+                raise self._refused(
+                    i, self._layers.why(i, samples, samples, self._layers.bounds.without_turns())
+                )
 
     def _chains(
         self, layers: list[Array], bounds: Admissible, forbidden: set[int]
@@ -274,7 +255,7 @@ class Stretches:
         for i, (before, after) in enumerate(itertools.pairwise(layers), 1):
             cost, parent = self._jumps.extended(i - 1, length, before, cost, after, turning)
             if not np.any(np.isfinite(cost)):
-                self._refuse(i, self._why(i, before, after, bounds))
+                raise self._refused(i, self._layers.why(i, before, after, bounds))
             parents.append(parent)
             change = np.arange(len(cost))
             if i < len(layers) - 1 and i not in forbidden:
@@ -287,27 +268,16 @@ class Stretches:
 
     def _ending(self, first: int, layers: list[Array], relaxed: Admissible) -> str:
         """Return why no chain from a waypoint on follows the rest of the path."""
-        chains = best_chains(layers[first:], self._steps[first:], relaxed.turning)
+        chains = best_chains(layers[first:], self._layers.steps[first:], relaxed.turning)
         if chains.blocked is None:
             return "what goes on from there among the samples did not keep all constraints"
         i = first + chains.blocked
         alive = layers[i - 1][np.isfinite(chains.cost[chains.blocked - 1])]
-        reason = self._why(i, alive, layers[i], relaxed)
+        reason = self._layers.why(i, alive, layers[i], relaxed)
         return f"no motion from t = {self.t[first]:.6g} s passes t = {self.t[i]:.6g} s: {reason}"
 
-    def _why(self, i: int, alive: Array, layer: Array, bounds: Admissible) -> str:
-        if isinstance(self._nodes, CurveLayers):
-            return self._nodes.why_blocked(i, alive, layer, bounds, self._steps)
-        return self._nodes.why_blocked(i)
-
-    def _refuse(self, waypoint: int, reason: str) -> None:
-        time = float(self.t[waypoint])
-        raise NoSequenceError(
-            f"{self.problem.robot.name}: no motion along the path, in however many parts, passes "
-            f"t = {time:.6g} s: {reason}",
-            time=time,
-            reason=reason,
-        )
+    def _refused(self, i: int, reason: str) -> NoSequenceError:
+        return self._layers.refused(i, reason, ", in however many parts,")
 
 
 def _traced_back(
