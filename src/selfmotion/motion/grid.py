@@ -128,26 +128,11 @@ class Grid:
         ]
         return cls(read_only(np.append(np.concatenate(pieces), knots[-1])))
 
-    def halved(self, where: npt.NDArray[np.bool_] | None = None, share: float = 0.5) -> "Grid":
-        """Return the grid with every step cut in two, or those `where` (N,) says so.
-
-        The first part of each is this share of it.
-        """
-        middles = (1.0 - share) * self.nodes[:-1] + share * self.nodes[1:]
+    def halved(self, where: npt.NDArray[np.bool_] | None = None) -> "Grid":
+        """Return the grid with every step cut in two, or those `where` (N,) says so."""
+        middles = 0.5 * self.nodes[:-1] + 0.5 * self.nodes[1:]
         cut = middles if where is None else middles[where]
         return Grid(read_only(np.sort(np.concatenate([self.nodes, cut]))))
-
-    def graded(self, most: float) -> "Grid":
-        """Return the grid with steps halved until none is so many times one beside it."""
-        steps = np.diff(self.nodes)
-        beside = np.minimum(np.append(steps[1:], np.inf), np.append(np.inf, steps[:-1]))
-        # Rounding makes no step longer.
-        long = steps > most * (1.0 + 1e-6) * beside
-        return self.halved(long).graded(most) if long.any() else self
-
-    def with_steps(self, fewest: int) -> "Grid":
-        """Return the grid halved until it has so many steps."""
-        return self if self.steps >= fewest else self.halved().with_steps(fewest)
 
     @property
     def steps(self) -> int:

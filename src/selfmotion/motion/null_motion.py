@@ -284,11 +284,11 @@ class NullMotionTable:
             inner = np.einsum("snr,sn->sr", self._frame, inner)
         return np.asarray((inner.T @ self.functions).ravel())
 
-    def matrix(self, before: int = 0, after: int = 0) -> Array:
-        """Return ∂ε/∂x at the stages, (S, n, size), between as many columns of zeros."""
+    def matrix(self, before: int = 0) -> Array:
+        """Return ∂ε/∂x at the stages, (S, n, size), after as many columns of zeros."""
         frame = np.eye(self.rows)[None] if self._frame is None else self._frame
         (stages, count), n = self.functions.shape, frame.shape[1]
-        full = np.zeros((stages, n, before + self.size + after))
-        own = full[:, :, before : before + self.size].reshape(stages, n, self.rows, count)
+        full = np.zeros((stages, n, before + self.size))
+        own = full[:, :, before:].reshape(stages, n, self.rows, count)
         np.multiply(frame[:, :, :, None], self.functions[:, None, None, :], out=own)
         return full

@@ -21,6 +21,8 @@ _REAL = 1e-6
 _NEAR = 1e-3
 # Newton's steps that a root gets.
 _STEPS = 3
+# Intervals that are looked at together.
+_LOT = 16_384
 
 
 def evaluated(coefficients: Array, s: Array) -> Array:
@@ -132,10 +134,6 @@ def hermite(h: Array, *given: tuple[Array, Array]) -> Array:
         6.0 * rise - 3.0 * gain + surge,
     )
     return np.stack([start, rate, bend, *higher])
-
-
-# Intervals that are looked at together.
-_LOT = 16_384
 
 
 @dataclass(frozen=True, eq=False)

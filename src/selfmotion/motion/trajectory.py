@@ -27,6 +27,10 @@ from selfmotion.motion.spline import Spline, differentiated, evaluated, inner_ro
 # What follows a joint's name in the header of the columns of its velocity and acceleration.
 _MANY = {"_velocity": "velocities", "_acceleration": "accelerations"}
 _RATES = tuple(_MANY)
+# A last sample as near to its end as this [s] is at its end.
+_MOMENT = 0.5e-9
+# More samples than this do not fit into memory, and no controller wants them.
+MOST_SAMPLES = 1e7
 
 
 def column_names(joint_names: Sequence[str]) -> list[str]:
@@ -73,12 +77,6 @@ def read_columns(
             f"{file}: has accelerations but no velocities; give NAME{_RATES[0]} as well"
         )
     return column["t"], names, (table_of(""), rates[0], rates[1])
-
-
-# A last sample as near to its end as this [s] is at its end.
-_MOMENT = 0.5e-9
-# More samples than this do not fit into memory, and no controller wants them.
-MOST_SAMPLES = 1e7
 
 
 @dataclass(frozen=True, eq=False)

@@ -35,6 +35,16 @@ _POOR, _CENTRED = 0.1, 0.5
 _STUCK = 1e-8
 # Stands on the diagonal for an unknown that stays, and rounding on that of the others.
 _STAYS, _ROUNDING = 1e200, 1e-14
+# Unknowns that a row touches.
+WIDTH = 3
+# Rows with less room than this share of their limit are looked at, and then near an optimum these;
+# where some are broken by more, those that are by this share of the worst.
+_BESIDE, _NEARER, _AMONG = 0.5, 0.2, 0.5
+# So often; then all rows are.
+_ROUNDS = 12
+# Rows that are left out may be broken by this share of their limits, and so many places beside one
+# that is come in with it: with few, what is broken only moves on.
+_BROKEN, _WIDE = 1e-5, 20
 
 
 @kernel
@@ -303,18 +313,6 @@ def _products(
         total += product
         least = min(least, product)
     return total, least
-
-
-# Unknowns that a row touches.
-WIDTH = 3
-# Rows with less room than this share of their limit are looked at, and then near an optimum these;
-# where some are broken by more, those that are by this share of the worst.
-_BESIDE, _NEARER, _AMONG = 0.5, 0.2, 0.5
-# So often; then all rows are.
-_ROUNDS = 12
-# Rows that are left out may be broken by this share of their limits, and so many places beside one
-# that is come in with it: with few, what is broken only moves on.
-_BROKEN, _WIDE = 1e-5, 20
 
 
 @dataclass(frozen=True, eq=False)

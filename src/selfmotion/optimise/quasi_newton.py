@@ -20,6 +20,11 @@ from selfmotion.optimise.base import (
 
 # Evaluations of one search, by far.
 _MOST = 60
+# The difference is taken over this share of the step that the method wanted, and means something
+# where it is so many times its own rounding.
+_SHARE, _ABOVE_ROUNDING = 1e-4, 1e3
+# The slope and the difference are taken for the same within this factor.
+_FACTOR = 2.0
 
 
 @dataclass(frozen=True)
@@ -185,13 +190,6 @@ def _minimizer(a: _Point, b: _Point, nearest: float, farthest: float) -> float:
 
 
 _FLETCHER = LineSearch()
-
-
-# The difference is taken over this share of the step that the method wanted, and means something
-# where it is so many times its own rounding.
-_SHARE, _ABOVE_ROUNDING = 1e-4, 1e3
-# The slope and the difference are taken for the same within this factor.
-_FACTOR = 2.0
 
 
 def renewed(h: Array, s: Array, y: Array, update: str) -> tuple[Array, str]:

@@ -18,6 +18,18 @@ from selfmotion.robot import null_space
 # Newton's method onto the start of the path is quadratic: few steps, and the one after an error of
 # this is exact. Far moves fail and say so.
 _STEPS, _ARRIVED = 20, 1e-9
+# Steps to begin with; halved until the motion at x = 0 drifts off the path by less than this,
+# relative to the extent of the path. Costs are then right to about the same.
+_FEWEST_STEPS, _DRIFT = 32, 1e-3
+# Trouble that three grids in turn place within this share of the motion, and of which the last has
+# at least half as much as the first, is the motion's own.
+_SAME_PLACE, _SAME_AMOUNT = 1e-3, 0.5
+# A motion in which a joint goes so far [rad or m] has been thrown out of a singular pose.
+_WILD = 1e3
+# The finest grid has 2 to this power times the steps of the first.
+MOST_HALVINGS = 8
+# A path shorter than this [m] is as good as a point.
+_SHORTEST = 1e-3
 
 
 class FixedStart:
@@ -95,19 +107,6 @@ Start = FixedStart | FreeStart
 
 Guide = Callable[[Array], Array]
 """t (S,) → a null motion (S, n) that stands for x = 0."""
-
-# Steps to begin with; halved until the motion at x = 0 drifts off the path by less than this,
-# relative to the extent of the path. Costs are then right to about the same.
-_FEWEST_STEPS, _DRIFT = 32, 1e-3
-# Trouble that three grids in turn place within this share of the motion, and of which the last has
-# at least half as much as the first, is the motion's own.
-_SAME_PLACE, _SAME_AMOUNT = 1e-3, 0.5
-# A motion in which a joint goes so far [rad or m] has been thrown out of a singular pose.
-_WILD = 1e3
-# The finest grid has 2 to this power times the steps of the first.
-MOST_HALVINGS = 8
-# A path shorter than this [m] is as good as a point.
-_SHORTEST = 1e-3
 
 
 @dataclass(frozen=True, eq=False)

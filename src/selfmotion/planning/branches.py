@@ -17,10 +17,9 @@ from selfmotion.result import Plan
 from selfmotion.search import carried, start_candidates
 from selfmotion.transfer import Room
 
-# So many starts are looked at, and so many for each branch that is asked for, until so many have
-# failed; plans from each take so many evaluations at most, and are the same where both their ends
-# are as near as this [rad or m].
-_BRANCH_STARTS = 48
+# So many starts are tried for each branch that is asked for, until so many have failed; plans from
+# each take so many evaluations at most, and are the same where both their ends are as near as this
+# [rad or m].
 _BRANCH_TRIES = 4
 _BRANCH_EVALUATIONS = 60
 _SAME_ENDS = 0.2
@@ -152,7 +151,7 @@ def _spread(problem: Problem, rng: np.random.Generator) -> list[Array]:
     follows = problem.follows.for_robot(robot)
     room = _room(problem)
     try:
-        starts = np.array(start_candidates(follows, _BRANCH_STARTS, rng, room.free))
+        starts = np.array(start_candidates(follows, Search().starts, rng, room.free))
     except SelfmotionError:
         return []
     starts = starts[room.free(starts)]

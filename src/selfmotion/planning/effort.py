@@ -33,8 +33,8 @@ class Search:
         nodes. With as many as `starts`, starts are not screened.
     mode : {"auto", "local", "global"}
         Optimise from many starts (local), or from the best sequences over all self-motions: sampled
-        evenly where the redundancy is 1 (`best_sequences`), at random where it is more
-        (`sampled_sequences`). ``"auto"``: from many starts first, and from
+        evenly where the redundancy is 1, at random where it is more.
+        ``"auto"``: from many starts first, and from
         sequences where none of them leads to a motion that keeps the constraints.
     compare : bool
         Search globally whatever the other search finds, also where the start is given, so that

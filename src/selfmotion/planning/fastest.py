@@ -51,7 +51,7 @@ _STEPS = 300
 
 
 @dataclass(frozen=True, eq=False)
-class KeptCosts:
+class _KeptCosts:
     """Costs of a problem, and by which factor a motion may cost more than the best by all costs.
 
     What a motion costs depends on its pace, and all faster ones cost more by their joint speeds. So
@@ -72,7 +72,7 @@ class KeptCosts:
     factors: tuple[float, ...]
 
     @classmethod
-    def of(cls, problem: Problem, keep: Mapping[str, float]) -> KeptCosts:
+    def of(cls, problem: Problem, keep: Mapping[str, float]) -> _KeptCosts:
         """Return those of kinds or names, ProblemError where the problem has no such cost."""
         if not isinstance(keep, Mapping):
             raise ProblemError(f"keep is {shown(keep)}, expected a factor for each kind of cost")
@@ -220,7 +220,7 @@ def fastest(
     """
     check_problem(problem)
     check_no_feed(problem)
-    kept = KeptCosts.of(problem, {} if keep is None else keep)
+    kept = _KeptCosts.of(problem, {} if keep is None else keep)
     rounds = _Rounds(problem, *rate_limits(problem, acceleration, velocity), kept)
     seconds = None if deadline is None else as_number(deadline, "deadline", above=0.0)
     clock = Deadline.after(seconds)
@@ -286,10 +286,10 @@ class _Rounds:
     problem : Problem
     v, a : (n,)
         Limits of velocity and acceleration.
-    kept : KeptCosts
+    kept : _KeptCosts
     """
 
-    def __init__(self, problem: Problem, v: Array, a: Array, kept: KeptCosts) -> None:
+    def __init__(self, problem: Problem, v: Array, a: Array, kept: _KeptCosts) -> None:
         self._problem, self._v, self._a = problem, v, a
         self._kept, self._bounds = kept, np.full(len(kept.costs), np.inf)
         geometric = tuple(item for item in problem.constraints if not item.of_pace)

@@ -17,6 +17,9 @@ _STARTING = (-0.03, -0.01, 0.01, 0.03)
 _MOST_NODES = 1024
 # Steps of the rough motions.
 _ROUGH_STEPS = 12
+# Costs that differ by less than this share are worth the same, and a motion whose cost is known to
+# this tells what its start is worth. What saves less than the second share saves nothing.
+ABOUT_AS_GOOD, NOTHING = 1e-2, 1e-4
 # Where a condition is not kept yet, each unit of it counts as so many times the cost.
 UNKEPT = 10.0
 
@@ -59,7 +62,7 @@ def rough_grid(problem: Problem) -> Grid:
     return Grid.aligned(knots, _ROUGH_STEPS)
 
 
-def resolves(motion: NodeMotion, agreement: float) -> bool:
-    """Whether a motion costs the same on twice as many nodes, to this share of it."""
+def resolves(motion: NodeMotion) -> bool:
+    """Whether a motion costs about the same on twice as many nodes."""
     finer = motion.on(motion.grid.on(Grid(motion.grid.t).halved().nodes))
-    return finer is not None and abs(finer.cost - motion.cost) <= agreement * abs(finer.cost)
+    return finer is not None and abs(finer.cost - motion.cost) <= ABOUT_AS_GOOD * abs(finer.cost)

@@ -62,9 +62,13 @@ _GUIDE_SAMPLES = 13
 # A retreat goes at this speed on average [m/s], and takes no less than this [s].
 _RETREAT_SPEED = 0.1
 _BRIEFEST_RETREAT = 0.5
+# How smoothly a tool motion has to rest that needs no ramp; see `rest_orders`.
+_AT_REST = 2
+# Where the tool leaves the path to, in its own axes.
+_BACK = (0.0, 0.0, -1.0)
 
 
-class Mover:
+class _Mover:
     """Finds moves between configurations of a problem.
 
     Parameters
@@ -123,10 +127,6 @@ def between_parts(problem: Problem) -> Problem:
     )
 
 
-# How smoothly a tool motion has to rest that needs no ramp; see `rest_orders`.
-_AT_REST = 2
-
-
 class _PartPlanner:
     """Plans the parts along chains, and the moves between them.
 
@@ -150,7 +150,7 @@ class _PartPlanner:
         self._tolerance, self._progress = tolerance, progress
         self._closed = any(item.closes for item in problem.constraints)
         generator = np.random.default_rng(rng)
-        self._mover = Mover(between_parts(problem), retreat, generator, progress)
+        self._mover = _Mover(between_parts(problem), retreat, generator, progress)
         self.failure: SelfmotionError = PlanError("no part was planned")
         # Other chains have many parts in common.
         self._known: dict[tuple[int, bytes], Plan] = {}
@@ -233,10 +233,6 @@ class _PartPlanner:
             constraints=list(asked_of_part(whole, stretch.first == 0, stretch.last == last)),
             rest=True,
         )
-
-
-# Where the tool leaves the path to, in its own axes.
-_BACK = (0.0, 0.0, -1.0)
 
 
 def plan_in_parts(

@@ -13,7 +13,7 @@ from selfmotion.motion import Grid, Trajectory
 from selfmotion.nodes import NodeGrid, NodeMotion, Optimum, Step, minimise
 from selfmotion.optimise import Iteration, Status
 from selfmotion.planning.effort import Effort
-from selfmotion.planning.grids import UNKEPT, most_nodes
+from selfmotion.planning.grids import NOTHING, UNKEPT, most_nodes
 from selfmotion.planning.solutions import ENDS_MET, NodeSolution
 from selfmotion.problem import Problem
 from selfmotion.search import BESIDE
@@ -22,8 +22,6 @@ from selfmotion.search import BESIDE
 # are divided so that it is by that, as the error falls with their third power or more; at most into
 # so many parts.
 _NEAR_PATH, _WANTED_NEAR_PATH, _FINER_POWER, _MOST_PARTS = 2e-7, 1e-7, 0.3, 8.0
-# What control points give away of the cost, or what finer nodes save, is nothing [share].
-_GIVEN_AWAY = 1e-4
 # More of them are put in so often, at most.
 _NODE_ROUNDS = 14
 # Where nodes keep bodies apart and the motion between them does not, they are kept so much farther
@@ -243,7 +241,7 @@ class Polisher:
             if self._ended is not None:
                 break
             t = self._finer(known)
-            if t is None and before - known.cost > _GIVEN_AWAY * abs(known.cost):
+            if t is None and before - known.cost > NOTHING * abs(known.cost):
                 # Where limits of q̈ or jerk begin and end to bind, the best motion has a kink: finer
                 # there, while it pays.
                 t, before = _at_kinks(known.motion), known.cost
@@ -254,7 +252,7 @@ class Polisher:
             found = self.again(finer or known, roughly=not polishes)
             if found is None:
                 break
-            gains = known.cost - found.cost > _GIVEN_AWAY * abs(known.cost)
+            gains = known.cost - found.cost > NOTHING * abs(known.cost)
             if not (found.has_arrived or gains) and self._ended is None:
                 # More nodes lead nowhere, and multipliers on the way say nothing.
                 found = None if polishes else self.again(known)
@@ -294,7 +292,7 @@ class Polisher:
         parts = np.ceil((errors / wanted) ** _FINER_POWER - 1e-9)
         parts = np.clip(parts, 1.0, _MOST_PARTS).astype(int)
         away = grid.rows.given_away(known.multipliers, motion.curve_ends)
-        least = _GIVEN_AWAY * abs(motion.aim)
+        least = NOTHING * abs(motion.aim)
         if away.sum() > least:
             parts[(away > least / spline.count) & (parts == 1)] = 2
         parts[motion.broken_between() & (parts == 1)] = 2

@@ -51,8 +51,8 @@ from selfmotion.search import (
 LONG_WAY, VERY_LONG_WAY = 5.0, 12.0
 # What a stretch of it is long that tells the posture, likewise.
 _STRETCH_WAY = 2.0
-# Nodes to begin with; the cost on them is right to this share.
-_FIRST_NODES, _LONG_AGREEMENT = 64, 1e-2
+# Nodes to begin with.
+_FIRST_NODES = 64
 # The shortest chain of a sequence becomes a motion of so many times its waypoints, with more where
 # it does not keep the conditions between them, so often.
 _FINER_CHAIN = 3
@@ -61,6 +61,11 @@ _CHAIN_ROUNDS = 4
 _DEARER = 1.25
 # The same where that is the chain of a sequence itself, on which optimising gains next to nothing.
 _DEARER_CHAIN = 1.005
+# What a joint at rest takes of a velocity that is lacking, where the fastest takes 1; and where all
+# are as slow as this [rad/s or m/s], none is.
+_LEAST, _STILL = 1e-2, 1e-9
+# Limits are looked at so often between two nodes.
+_LOOKS = 16
 
 
 def optimise_starts(planner: Planner, count: int, finalists: int) -> None:
@@ -133,12 +138,6 @@ def _resumed(planner: Planner, rough: abc.Sequence[NodeMotion]) -> Iterator[Cand
         if candidate is not None:
             yield candidate
 
-
-# What a joint at rest takes of a velocity that is lacking, where the fastest takes 1; and where all
-# are as slow as this [rad/s or m/s], none is.
-_LEAST, _STILL = 1e-2, 1e-9
-# Limits are looked at so often between two nodes.
-_LOOKS = 16
 
 _Searched = Callable[[Problem, np.random.Generator | int, Progress], list[Sequence]]
 
@@ -367,7 +366,7 @@ def _near(polisher: Polisher, problem: Problem, start: Array, posture: Array) ->
     grid, most = Grid.aligned(problem.knots, _FIRST_NODES), most_nodes(problem)
     while grid.steps <= most:
         motion = polisher.grid(grid.nodes).motion_towards(start, posture, time)
-        if motion is not None and resolves(motion, _LONG_AGREEMENT):
+        if motion is not None and resolves(motion):
             return motion
         grid = grid.halved()
     return None

@@ -11,30 +11,23 @@ from selfmotion.costs import Samples
 from selfmotion.motion import Sampling
 from selfmotion.nodes import Batch, NodeGrid, NodeMotion, minimise
 from selfmotion.planning.effort import Effort
-from selfmotion.planning.grids import UNKEPT, resolves, rough_grid
+from selfmotion.planning.grids import ABOUT_AS_GOOD, NOTHING, UNKEPT, resolves, rough_grid
 from selfmotion.problem import Problem
 from selfmotion.robot import RobotModel
 from selfmotion.search import carried
 
-# Agreement of the cost on few nodes and on twice as many, at which a rough motion tells what its
-# start is worth.
-_ROUGH_AGREEMENT = 1e-2
 # On nodes: steps of Newton's method.
 _ROUGH_ROUNDS = 30
-# Rough optima on nodes whose costs differ by less than this share are worth the same; by less than
-# the second, they are mirror images.
-_ABOUT_AS_GOOD, _SAME_TO_DIGITS = 1e-2, 1e-9
-# Of those that differ by less than this, the one nearest to home comes first [share].
-_AS_CHEAP = 1e-4
+# Rough optima on nodes whose costs differ by less than this share are mirror images; and joints are
+# within their limits to this share of a turn.
+_SAME_TO_DIGITS = 1e-9
 # So many rough motions at most; where conditions count, with so many steps more that know them.
 _ROUGH_MOTIONS, _WITH_CONDITIONS = 16, 12
 # Motions at x = 0 that are this near at all times [rad or m] lie in one valley of the cost, as a
 # rule; rough optima this near are the same.
 ONE_VALLEY = 0.6
 _SAME_OPTIMUM = 0.1
-
-
-_WHOLE, _ROUNDING = 2.0 * np.pi, 1e-9
+_TURN = 2.0 * np.pi
 
 
 def usual_posture(robot: RobotModel) -> Array:
@@ -61,15 +54,15 @@ def wound_back(robot: RobotModel, motion: Array) -> Array:
     usual = usual_posture(robot)
     for joint in np.flatnonzero(robot.is_revolute):
         lower, upper = robot.lower[joint], robot.upper[joint]
-        wanted = round((usual[joint] - middle[joint]) / _WHOLE)
+        wanted = round((usual[joint] - middle[joint]) / _TURN)
         # Rounding must not take a joint that stands on its limit round to the other side.
-        least = np.ceil((lower - lowest[joint]) / _WHOLE - _ROUNDING)
-        most = np.floor((upper - highest[joint]) / _WHOLE + _ROUNDING)
+        least = np.ceil((lower - lowest[joint]) / _TURN - _SAME_TO_DIGITS)
+        most = np.floor((upper - highest[joint]) / _TURN + _SAME_TO_DIGITS)
         if least <= most:
             shift[joint] = np.clip(wanted, least, most)
         elif np.isfinite(lower) and np.isfinite(upper):
-            shift[joint] = round((0.5 * (lower + upper) - middle[joint]) / _WHOLE)
-    return np.asarray(motion + _WHOLE * shift)
+            shift[joint] = round((0.5 * (lower + upper) - middle[joint]) / _TURN)
+    return np.asarray(motion + _TURN * shift)
 
 
 Apart = Callable[[Array, Array], Array]
@@ -190,10 +183,10 @@ class Ranking:
             # What costs the same to the last digits is one of the arm's mirror images.
             if motion is None or any(_same(motion.cost, one.cost) for one in kept):
                 continue
-            if found.going[k] or not resolves(motion, _ROUGH_AGREEMENT):
+            if found.going[k] or not resolves(motion):
                 return []
             # What got stuck may become better as well.
-            stuck = found.promised[k] > _ABOUT_AS_GOOD * abs(motion.cost)
+            stuck = found.promised[k] > ABOUT_AS_GOOD * abs(motion.cost)
             if stuck or motion.breaks_hard():
                 others.append(motion)
             elif self._clear(motion):
@@ -202,7 +195,7 @@ class Ranking:
                 # An optimum that takes the arm into itself goes on doing that.
                 continue
             cost = float(found.costs[k])
-            dearest = min(dearest, cost + _ABOUT_AS_GOOD * abs(cost))
+            dearest = min(dearest, cost + ABOUT_AS_GOOD * abs(cost))
         return [*kept, *others] if kept and not _hopeful(found).any() else []
 
     def _with_conditions(
@@ -258,7 +251,7 @@ class Ranking:
         # Each motion belongs with the cheapest one that is about as cheap.
         group, first = np.zeros(len(order), dtype=np.int64), 0
         for k in range(1, len(order)):
-            if costs[k] - costs[first] > _AS_CHEAP * abs(costs[first]):
+            if costs[k] - costs[first] > NOTHING * abs(costs[first]):
                 first = k
             group[k] = first
         far = far_from_usual(robot, np.array([wound_back(robot, found.q[k]) for k in order]))
@@ -293,7 +286,7 @@ def _cheapest(found: Batch) -> Ints:
 def _hopeful(found: Batch) -> Flags:
     """Return which motions are on their way, and may come to cost less than what has arrived."""
     least = found.costs[~found.going].min(initial=np.inf)
-    dearest = least + _ABOUT_AS_GOOD * abs(least) if np.isfinite(least) else least
+    dearest = least + ABOUT_AS_GOOD * abs(least) if np.isfinite(least) else least
     return np.asarray(found.going & (found.costs - found.promised < dearest))
 
 

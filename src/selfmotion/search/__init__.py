@@ -22,7 +22,6 @@ from selfmotion.search.obstruction import (
     obstruction as obstruction,
     reachable as reachable,
 )
-from selfmotion.search.sequences import best_sequences as best_sequences
 from selfmotion.search.single_poses import SinglePoses as SinglePoses
 from selfmotion.search.starts import (
     Admits as Admits,

@@ -16,13 +16,13 @@ from selfmotion.search.nodes import Admissible
 # The jagged chain of samples is smoothed by a spline with this many of them per interval.
 _SMOOTHING = 3
 # Chains are unlike when some joint differs by this [rad or m] at this share of the waypoints.
-_UNLIKE = 0.3
+UNLIKE = 0.3
 _UNLIKE_FOR = 0.1
 # Mirror images have moved each joint by the same amount, up to this [rad or m].
 _SAME_TRAVEL = 0.2
 # Chains looked at, mirror images included, before these have to do.
 _MOST_CHAINS = 60
-# Nodes through which other chains are looked for: at so many waypoints, evenly.
+# Stations: so many waypoints, evenly.
 _STATIONS = 7
 
 
@@ -146,9 +146,9 @@ def diverse_chains(
     backwards = largest_step if largest_step.ndim == 1 else largest_step[::-1]
     back = None if measure is None else measure.backwards()
     reverse = best_chains(layers[::-1], backwards, turning, back)
-    stations = np.unique(np.linspace(0, len(layers) - 1, _STATIONS).round().astype(int))
+    stations = stations_of(len(layers))
     through = [
-        (float(forward.cost[i][k] + reverse.cost[-1 - i][k]), int(i), k)
+        (float(forward.cost[i][k] + reverse.cost[-1 - i][k]), i, k)
         for i in stations
         for k in range(len(layers[i]))
     ]
@@ -156,7 +156,7 @@ def diverse_chains(
     mirrored: list[list[int]] = []
     taken: list[Array] = []
     # A chain through a node near a chosen one is rarely unlike it, and another node finds it.
-    covered = {int(i): np.zeros(len(layers[i]), dtype=bool) for i in stations}
+    covered = {i: np.zeros(len(layers[i]), dtype=bool) for i in stations}
     for total, i, node in sorted(through):
         if not np.isfinite(total) or len(chosen) == count or len(taken) == _MOST_CHAINS:
             break
@@ -169,7 +169,7 @@ def diverse_chains(
             (mirrored if images else chosen).append(chain)
             taken.append(q)
             for station, near in covered.items():
-                near |= _apart(layers[station], q[station], turning) <= _UNLIKE
+                near |= _apart(layers[station], q[station], turning) <= UNLIKE
     return (chosen + mirrored)[:count]
 
 
@@ -193,6 +193,11 @@ def ranked(
     return kept
 
 
+def stations_of(count: int) -> list[int]:
+    """Return a few waypoints of so many, first and last included, as evenly as can be."""
+    return sorted({round(k) for k in np.linspace(0, count - 1, _STATIONS).tolist()})
+
+
 def in_order(q: Array) -> Array:
     """Return nodes (K, n) of one waypoint, sorted by the first joint."""
     return np.ascontiguousarray(q[np.argsort(q[:, 0], kind="stable")])
@@ -200,7 +205,7 @@ def in_order(q: Array) -> Array:
 
 def unlike(q: Array, other: Array, turning: Flags) -> bool:
     """Whether two motions (W, n) differ by much for long."""
-    return bool(np.mean(_apart(q, other, turning) > _UNLIKE) >= _UNLIKE_FOR)
+    return bool(np.mean(_apart(q, other, turning) > UNLIKE) >= _UNLIKE_FOR)
 
 
 def _mirrors(q: Array, other: Array, turning: Flags) -> bool:

@@ -23,7 +23,7 @@ _SMALLEST_STEP = 1.0 / 64.0
 # lie on the same branch.
 _ALIGNED = 0.93
 # A configuration this near [rad or m] to a curve's polyline is on the curve.
-_ON_CURVE = 0.02
+ON_CURVE = 0.02
 # Samples after which a curve is given up.
 _MOST_SAMPLES = 5000
 # Of the samples of a curve, every so manieth looks for the curve at the next waypoint.
@@ -243,7 +243,7 @@ class CurveSet:
         self.curves: list[Curve] = []
         self._revolute = revolute
         # Segments are at most 1.2 spacings long.
-        self._near = 1.5 * spacing + _ON_CURVE
+        self._near = 1.5 * spacing + ON_CURVE
         self._samples = np.empty((0, len(revolute)))
         self._arcs = np.empty(0)
         self._curve = np.empty(0, dtype=np.intp)
@@ -263,7 +263,7 @@ class CurveSet:
         if not self.curves or not len(q):
             return np.full(len(q), -1), np.zeros(len(q))
         i, share, distance = locate_all(q, self._samples, self._curve, self._revolute, self._near)
-        found = distance < _ON_CURVE
+        found = distance < ON_CURVE
         # Of what is on no curve any segment will do.
         i = np.where(found, i, 0)
         arc = self._arcs[i] + share * (self._arcs[i + 1] - self._arcs[i])
@@ -315,26 +315,18 @@ class SelfMotion:
         # Any direction that is not a row of the Jacobian gives the tangent by projection.
         self._direction = np.random.default_rng(0).normal(size=robot.dof)
 
-    def project(self, q: Array, target: Array, *, far: bool = False) -> Array | None:
-        """Return the configuration that Newton's method reaches from q, None where it does not.
-
-        Parameters
-        ----------
-        q : (n,)
-        target : (12,)
-            The tool's translation and rotation (see `Follows.targets`).
-        far : bool
-            Whether q is any configuration instead of one near the solution.
-        """
-        found, arrived = self._manifold.project(q[None], target, far=far)
-        return np.array(found[0]) if arrived[0] else None
-
     def project_all(
         self, q: Array, target: Array, *, far: bool = False
     ) -> tuple[Array, npt.NDArray[np.bool_]]:
         """Return what Newton's method reaches from configurations (K, n), and where it does, (K,).
 
-        As `project`, for many at once; `target` is (12,), or (K, 12).
+        Parameters
+        ----------
+        q : (K, n)
+        target : (12,) or (K, 12)
+            The tool's translation and rotation (see `Follows.targets`).
+        far : bool
+            Whether q are any configurations instead of ones near solutions.
         """
         return self._manifold.project(q, target, far=far)
 

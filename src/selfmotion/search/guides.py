@@ -14,7 +14,7 @@ from selfmotion.search.manifold import OnPath
 from selfmotion.search.measures import Length, measure_of
 from selfmotion.search.nodes import Admissible
 from selfmotion.search.sampled import sampled_layers
-from selfmotion.search.sequences import Layers, curve_layers, sequences_over
+from selfmotion.search.sequences import Layers, best_sequences, curve_layers
 from selfmotion.search.shortest import Shortest
 from selfmotion.task import log3
 
@@ -56,7 +56,7 @@ def guides(
     weights = _weights(problem)
     layers = layers_of(problem, weights, 0 if rng is None else rng, progress)
     measure = measure_of(problem.follows, problem.costs, layers.t, weights)
-    return sequences_over(layers, _REFINED, measure, progress)
+    return best_sequences(layers, _REFINED, measure, progress)
 
 
 def layers_of(

@@ -20,15 +20,17 @@ LONGEST_CORRECTION = 0.5
 # Newton's steps onto the path, from near it and from anywhere.
 _NEAR_STEPS = 10
 _FAR_STEPS = 60
-# The slower method takes so many iterations. Steps that gain less than this share of what is left,
-# so often in turn, are the last ones: what arrives gains nearly all of it in each.
-_ITERATIONS, _LITTLE_GAIN, _LITTLE_GAINS = 60, 1e-3, 5
+# Of the slower method, which has as many, those that gain less than this share of what is left, so
+# often in turn, are the last ones: what arrives gains nearly all of it in each.
+_LITTLE_GAIN, _LITTLE_GAINS = 1e-3, 5
 
 
 # A Newton correction of this size [rad or m] leaves an error of its square.
 CONVERGED = 1e-6
 # What a solution may miss by [m, rad].
 NOTHING_LEFT = 1e-12
+# Compiled kinematics and Pinocchio's differ by rounding alone [m, or rows of a rotation].
+_AGREE = 1e-9
 
 
 @kernel
@@ -218,10 +220,6 @@ def hold(q: Array, lower: Array, upper: Array, error: Array, jacobian: Array) ->
             jacobian[:, j] = 0.0
 
 
-# Compiled kinematics and Pinocchio's differ by rounding alone [m, or rows of a rotation].
-_AGREE = 1e-9
-
-
 class Manifold:
     """Projects configurations onto {q : F(q) = x} within limits, each by Newton's method.
 
@@ -303,7 +301,7 @@ class Manifold:
         """
         found, left = np.array(q), np.zeros((len(q), self.follows.dimension))
         limits = *self._limits, np.array(held)
-        approach_all(found, target, self.chains, self.layout, *limits, _ITERATIONS, left)
+        approach_all(found, target, self.chains, self.layout, *limits, _FAR_STEPS, left)
         linear = self.follows.linear > 0.0
         parts = np.where(linear, left, 0.0), np.where(linear, 0.0, left)
         misses = [np.sqrt(np.einsum("km,km->k", part, part)) for part in parts]

@@ -9,16 +9,14 @@ import numpy.typing as npt
 
 from selfmotion.basics import Array, Flags, Ints
 from selfmotion.collision import CollisionModel
-from selfmotion.search.curves import CurveSet, SelfMotion
+from selfmotion.search.curves import ON_CURVE, CurveSet, SelfMotion
 
 # Where samples are free or not by turns, the border is enclosed to this share of the spacing.
 _BORDER = 0.25
+# A joint this near to its limit [rad or m] is at it.
+AT_LIMIT = 1e-3
 # Carried samples nearer to each other than this share of the spacing are merged.
 _MERGED = 0.4
-# Samples outside the limits by more than this [rad or m] before Newton's correction stay outside.
-_SURELY_OUTSIDE = 0.02
-
-
 _TURN = 2.0 * np.pi
 
 
@@ -80,7 +78,8 @@ class Admissible:
 
     def layer(self, q: Array) -> Array:
         """Return free samples (K, n) at all their turns, sorted by the first joint, (K', n)."""
-        nodes = self.all_turns(q)
+        # A turn there and back may round a joint that stands at its limit beyond that.
+        nodes = np.clip(self.all_turns(q), self.lower, self.upper)
         return np.ascontiguousarray(nodes[np.argsort(nodes[:, 0], kind="stable")])
 
     def representative(self, q: Array) -> Array:
@@ -194,7 +193,8 @@ class _Sampler:
         fresh = row < 0
         q = np.empty((len(row), self.motion.robot.dof))
         q[~fresh], q[fresh] = carried[row[~fresh]], self.curves.at(number[fresh], arc[fresh])
-        near = np.all(self.bounds.excess(q) < _SURELY_OUTSIDE, axis=1)
+        # What is farther outside of the limits stays there when it is put onto its curve.
+        near = np.all(self.bounds.excess(q) < ON_CURVE, axis=1)
         new = np.flatnonzero(near & fresh)
         q[new], near[new] = self.motion.project_all(q[new], self.target)
         free = near.copy()

@@ -10,6 +10,7 @@ from selfmotion.basics import Array
 from selfmotion.collision import how_near
 from selfmotion.follow import AugmentedFollows
 from selfmotion.problem import Problem
+from selfmotion.search.nodes import AT_LIMIT
 from selfmotion.search.single_poses import MOST_LOOKED_AT, Found, SinglePoses
 from selfmotion.search.starts import start_candidates
 from selfmotion.task import POSITION_ROWS, ROW_NAMES, Relaxation
@@ -21,10 +22,8 @@ _BISECTIONS = 16
 _LOOKS = 6
 # Poses about a time of trouble, in shares of the path's duration.
 _ABOUT = (-1e-3, 0.0, 1e-3, 4e-3)
-# A singular value below this share of the dexterous configuration's counts as stretched or folded,
-# a joint this near to its limit [rad or m] as at it.
+# A singular value below this share of the dexterous configuration's counts as stretched or folded.
 _STRETCHED = 0.1
-_AT_LIMIT = 1e-3
 # Poses along a path at which to look before anything else.
 _COARSE_POSES = 9
 # What would help is looked for from so many of the nearest configurations; and in so many rounds,
@@ -265,7 +264,7 @@ def _worst_first(problem: Problem, times: Array) -> list[float]:
 def cause(poses: SinglePoses, q: Array) -> str:
     """Return what keeps the arm from reaching further at q (n,); "" where nothing shows."""
     robot, follows, causes = poses.robot, poses.follows, []
-    near = np.minimum(q - robot.lower, robot.upper - q)[: poses.problem.asked.robot.dof] < _AT_LIMIT
+    near = np.minimum(q - robot.lower, robot.upper - q)[: poses.problem.asked.robot.dof] < AT_LIMIT
     if np.any(near):
         names = ", ".join(f"'{robot.joint_names[k]}'" for k in np.flatnonzero(near))
         causes.append(f"at its limit: joint {names}")

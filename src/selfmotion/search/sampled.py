@@ -1,21 +1,18 @@
 """The search for two and more degrees of redundancy: samples of smooth motions as nodes."""
 
-from collections.abc import Iterable
-
 import numpy as np
 
-from selfmotion.basics import Array, Progress, silent
+from selfmotion.basics import Array, Progress
 from selfmotion.collision import CollisionModel
-from selfmotion.search.chains import Sequence, in_order
+from selfmotion.search.chains import in_order, stations_of
 from selfmotion.search.manifold import OnPath
-from selfmotion.search.measures import Length, Measure, spread_out
+from selfmotion.search.measures import Length, spread_out
 from selfmotion.search.nodes import Admissible
-from selfmotion.search.sequences import Layers, sequences_over
+from selfmotion.search.sequences import Layers
 from selfmotion.search.starts import spread
 
-# Motions begin at so many times, evenly, from so many configurations each: of those that inverse
-# kinematics finds from so many seeds.
-_BEGINNINGS = 7
+# Motions begin at stations, from so many configurations each: of those that inverse kinematics
+# finds from so many seeds.
 _BEGUN = 45
 _BEGINNING_SEEDS = 200
 # Constant null motions drift so far over the whole path [rad or m], one standard deviation; every
@@ -30,64 +27,6 @@ _STRAYS = 2
 _STRAYED = 0.15
 
 
-def sampled_sequences(
-    waypoints: OnPath,
-    t: Array,
-    *,
-    lower: Array,
-    upper: Array,
-    largest_step: Array,
-    bodies: Iterable[tuple[CollisionModel, float]] = (),
-    weights: Array,
-    count: int,
-    measure: Measure | None = None,
-    rng: np.random.Generator | int = 0,
-    progress: Progress = silent,
-) -> list[Sequence]:
-    """Return good joint sequences along a path that are unlike each other, for any redundancy.
-
-    Self-motions of two and more dimensions are too large to be sampled evenly at every waypoint.
-    The nodes are those of many smooth motions instead, which begin all over the self-motions of
-    some waypoints and follow the path both ways, with different constant null motions; dynamic
-    programming changes from one to another where that is cheaper, or where one ends or meets
-    something. Then samples around the best chains take their place, nearer and nearer.
-
-    Parameters
-    ----------
-    waypoints : OnPath
-    t : (W,)
-        Their times [s].
-    lower, upper : (n,)
-        Joint limits [rad or m].
-    largest_step : (W - 1, n)
-        Largest change of each joint from one waypoint to the next [rad or m].
-    bodies : sequence of (CollisionModel, float)
-        Bodies to keep apart at the waypoints, and the distance [m].
-    weights : (n,)
-        Of the joints in a sequence's length.
-    count : int
-        How many sequences at most.
-    measure : Measure, optional
-        What they are chosen by; by default their length.
-    rng : Generator or int
-    progress : Progress
-
-    Returns
-    -------
-    list of Sequence
-        The best first, at least one.
-
-    Raises
-    ------
-    NoSequenceError
-        No chain exists among the samples; tells the waypoint at which the last one ends.
-    """
-    layers = sampled_layers(
-        waypoints, t, largest_step, (lower, upper), tuple(bodies), weights, rng, progress
-    )
-    return sequences_over(layers, count, measure or Length(weights), progress)
-
-
 def sampled_layers(
     waypoints: OnPath,
     t: Array,
@@ -100,7 +39,26 @@ def sampled_layers(
 ) -> Layers:
     """Return samples of smooth motions of a task that leaves any redundancy.
 
-    See `sampled_sequences`.
+    Self-motions of two and more dimensions are too large to be sampled evenly at every waypoint.
+    The nodes are those of many smooth motions instead, which begin all over the self-motions of
+    some waypoints and follow the path both ways, with different constant null motions: chains
+    change from one to another where that is cheaper, or where one ends or meets something.
+
+    Parameters
+    ----------
+    waypoints : OnPath
+    t : (W,)
+        Their times [s].
+    steps : (W - 1, n)
+        Largest change of each joint from one waypoint to the next [rad or m].
+    limits : (n,), (n,)
+        Joint limits [rad or m].
+    bodies : tuple of (CollisionModel, float)
+        Bodies to keep apart at the waypoints, and the distance [m].
+    weights : (n,)
+        Of the joints in a chain's length.
+    rng : Generator or int
+    progress : Progress
     """
     bounds = Admissible(*limits, waypoints.robot.is_revolute, bodies)
     generator = np.random.default_rng(rng)
@@ -160,8 +118,8 @@ def _smooth_motions(
     """Return at all waypoints where motions with constant null motions are, each (K, n)."""
     dof, last = waypoints.robot.dof, waypoints.count - 1
     nodes = [[np.empty((0, dof))] for _ in range(waypoints.count)]
-    stations = np.unique(np.linspace(0, last, _BEGINNINGS).round().astype(int))
-    for number, station in enumerate(stations.tolist(), 1):
+    stations = stations_of(waypoints.count)
+    for number, station in enumerate(stations, 1):
         progress("search: motions from waypoint", number, len(stations))
         begun = _starts(waypoints, bounds, station, rng)
         drift = rng.normal(scale=_DRIFT / max(last, 1), size=begun.shape)

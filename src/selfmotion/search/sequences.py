@@ -1,22 +1,18 @@
 """The global search: curves at all waypoints, nodes on them, the shortest chains of nodes."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from selfmotion.basics import (
     Array,
     Flags,
     NoSequenceError,
-    ProblemError,
     Progress,
-    silent,
 )
 from selfmotion.collision import CollisionModel
 from selfmotion.follow import Follows
-from selfmotion.robot import RobotModel
 from selfmotion.search.chains import (
     Sequence,
     best_chains,
@@ -87,7 +83,24 @@ def curve_layers(
 ) -> Layers:
     """Return the free samples of all self-motion curves of a task that leaves redundancy 1.
 
-    See `best_sequences`.
+    At every waypoint all curves are traced by numerical continuation, from inverse kinematics at
+    many seeds and from the curves of the neighbouring waypoints; samples are about 0.1 rad apart.
+
+    Parameters
+    ----------
+    follows : Follows
+    t : (W,)
+        Times of the waypoints [s], increasing, within the path.
+    steps : (W - 1, n)
+        Largest change of each joint from one waypoint to the next [rad or m].
+    limits : (n,), (n,)
+        Joint limits [rad or m]; ±inf for joints without. An angle is what it is: turns count.
+    bodies : tuple of (CollisionModel, float)
+        Bodies to keep apart at the waypoints, and the distance [m].
+    rng : Generator or int
+        Shifts the seeds of the inverse kinematics.
+    progress : Progress
+        Told the waypoint that is worked on.
     """
     motion, x = SelfMotion(follows, SPACING), follows.targets(t)
     bounds = Admissible(*limits, motion.revolute, bodies)
@@ -102,49 +115,24 @@ def curve_layers(
 
 
 def best_sequences(
-    follows: Follows,
-    t: npt.ArrayLike,
-    *,
-    lower: npt.ArrayLike,
-    upper: npt.ArrayLike,
-    largest_step: npt.ArrayLike,
-    bodies: Iterable[tuple[CollisionModel, float]] = (),
-    count: int = 3,
-    measure: Measure | None = None,
-    rng: np.random.Generator | int = 0,
-    progress: Progress = silent,
+    layers: Layers, count: int, asked: Measure | None, progress: Progress
 ) -> list[Sequence]:
-    """Return the best joint sequences along a path that are unlike each other.
+    """Return the best joint sequences over nodes that are unlike each other.
 
-    At every waypoint all self-motion curves are sampled by numerical continuation, from inverse
-    kinematics at many seeds and from the curves of the neighbouring waypoints. The samples inside
-    the limits and free of collision are the nodes of a graph; dynamic programming finds the chain
-    of least Σ w|Δq|, or of the least of another measure, with every step within `largest_step`:
-    the global optimum over samples about 0.1 rad apart. Each is then moved along the curves,
-    locally and with finer samples, to where it is better; it stays a few per cent above the
-    continuous problem's optimum. Hence several chains, unlike each other by 0.3 rad in some joint
-    at a tenth of the waypoints: refine them all and keep the best.
+    Dynamic programming finds the chain of least Σ w|Δq|, or of the least of another measure, with
+    every step within the largest: the global optimum over the nodes. The best chains, unlike each
+    other by 0.3 rad in some joint at a tenth of the waypoints, are then moved aside, locally, to
+    where they are better: see `shortest.py`.
 
     Parameters
     ----------
-    follows : Follows
-        Must leave redundancy 1.
-    t : (W,)
-        Times of the waypoints [s], increasing, within the path.
-    lower, upper : (n,)
-        Joint limits [rad or m]; ±inf for joints without. An angle is what it is: turns count.
-    largest_step : (n,), (W - 1, n) or float
-        Largest change of each joint from one waypoint to the next [rad or m].
-    bodies : sequence of (CollisionModel, float)
-        Bodies to keep apart at the waypoints, and the distance [m].
+    layers : Layers
     count : int
         How many sequences at most.
-    measure : Measure, optional
+    asked : Measure or None
         What they are chosen by; by default their length.
-    rng : Generator or int
-        Shifts the seeds of the inverse kinematics; the same one gives the same sequences.
     progress : Progress
-        Told the waypoint or sequence that is worked on.
+        Told the sequence that is worked on.
 
     Returns
     -------
@@ -153,34 +141,8 @@ def best_sequences(
 
     Raises
     ------
-    ProblemError
-        The task does not leave redundancy 1, or an argument has the wrong shape or sign.
-    PathError
-        A time is outside the path.
     NoSequenceError
-        No chain exists among the samples; tells the waypoint at which the last one ends, and why.
-    """
-    robot, times = follows.robot, as_times(t)
-    limits = [
-        as_joint_values(robot, values, name, shape)
-        for values, name, shape in (
-            (lower, "lower", (robot.dof,)),
-            (upper, "upper", (robot.dof,)),
-            (largest_step, "largest_step", (len(times) - 1, robot.dof)),
-        )
-    ]
-    check_asked(follows, limits, count)
-    lower, upper, steps = limits
-    layers = curve_layers(follows, times, steps, (lower, upper), tuple(bodies), rng, progress)
-    return sequences_over(layers, count, measure, progress)
-
-
-def sequences_over(
-    layers: Layers, count: int, asked: Measure | None, progress: Progress
-) -> list[Sequence]:
-    """Return the best chains of nodes that are unlike each other, moved to where they are better.
-
-    By default by their length; see `best_sequences`.
+        No chain exists among the nodes; tells the waypoint at which the last one ends, and why.
     """
     rough, turning, measure = _rough_motions(layers, asked)
     better = improved_by(layers.waypoints, layers.bounds, layers.steps, measure)
@@ -239,40 +201,3 @@ def _free_samples(
         before = place_nodes(motion, target, here, carried[arrived], bounds, SPACING)
         found.append(before)
     return found
-
-
-def as_times(t: npt.ArrayLike) -> Array:
-    """Return increasing times (W,), checked."""
-    times = np.asarray(t, dtype=np.float64)
-    if times.ndim != 1 or len(times) < 2 or not np.all(np.diff(times) > 0):
-        raise ProblemError(f"t has shape {times.shape}, expected at least two increasing times [s]")
-    return times
-
-
-def as_joint_values(
-    robot: RobotModel, values: npt.ArrayLike, name: str, shape: tuple[int, ...]
-) -> Array:
-    """Return numbers for each joint in a shape, given as such, for each joint, or one for all."""
-    array = np.asarray(values, dtype=np.float64)
-    if array.shape not in ((), (robot.dof,), shape) or np.any(np.isnan(array)):
-        raise ProblemError(
-            f"{name} has shape {array.shape}, expected a number for each of {robot.dof} joints"
-        )
-    return np.ascontiguousarray(np.broadcast_to(array, shape))
-
-
-def check_asked(follows: Follows, limits: list[Array], count: int) -> None:
-    """Refuse what the search over curves cannot do; `limits` are lower, upper, largest step."""
-    robot, redundancy = follows.robot, follows.redundancy
-    if redundancy != 1:
-        raise ProblemError(
-            f"{robot.name} has redundancy {redundancy} for task '{follows.task.value}'; the search "
-            f"over self-motion curves needs 1, use multiple starts instead"
-        )
-    if np.any(limits[0] > limits[1]):
-        k = int(np.flatnonzero(limits[0] > limits[1])[0])
-        raise ProblemError(f"joint '{robot.joint_names[k]}' has its lower limit above the upper")
-    if not np.all(limits[2] > 0.0):
-        raise ProblemError("largest_step has numbers that are not positive")
-    if count < 1:
-        raise ProblemError(f"count is {count}, expected at least 1")

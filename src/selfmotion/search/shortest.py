@@ -19,19 +19,18 @@ from selfmotion.problem import BodiesOfArm
 from selfmotion.search.chains import best_chains, connected, in_order
 from selfmotion.search.manifold import OnPath
 from selfmotion.search.measures import Length, Measure
-from selfmotion.search.nodes import Admissible
+from selfmotion.search.nodes import AT_LIMIT, Admissible
 
 # δ, one stage after the other, as multiples of the chain's mean step.
 SMOOTHINGS = (10.0, 3.0, 1.0, 0.3, 0.1)
-# Rounds of each stage at most, and the gain below which it ends [share].
-_SHORTENING_ROUNDS = 20
-_SHORTENING_GAIN = 1e-3
+# Rounds of each stage or ring at most, and the gain below which it ends [share].
+_ROUNDS = 20
+_GAIN = 1e-3
 # Rounds go so many times as far as their quadratics say, which are never below what they stand for.
 _FURTHER = 1.6
 # No joint moves farther in a round than this [rad or m].
 _LONGEST_MOVE = 0.5
-# Joints as near to a limit as this [rad or m] stay there if they would leave it; rounds of that.
-_BESIDE_LIMIT = 1e-3
+# Joints at a limit stay there if they would leave it; rounds of that.
 _LIMITS_HELD = 4
 # Steps are kept below this share of the largest; more counts as length times this [1/rad].
 _STEP_KEPT = 0.97
@@ -49,13 +48,10 @@ _HELD = 1e6
 _LEVELLED = 1e-9
 # Shorter steps are tried so often, each by this factor.
 _TRIES, _SHORTER = 5, 0.4
-# Around a chain, samples at these distances [rad or m], one after the other, so often each at most;
-# a round that shortens the chain by less than this share is the last one of its ring. Chains along
-# curves end up to 0.3 % longer with 0.01 as the finest, and up to 0.1 % with 0.001 (`make suite`).
+# Around a chain, samples at these distances [rad or m], one after the other. Chains along curves
+# end up to 0.3 % longer with 0.01 as the finest, and up to 0.1 % with 0.001 (`make suite`).
 _ROUGH_RINGS = (0.3, 0.1)
 _FINE_RINGS = (0.1, 0.03, 0.01, 0.003, 0.001)
-_RING_ROUNDS = 20
-_RING_GAIN = 1e-3
 
 
 class Shortest:
@@ -91,7 +87,7 @@ class Shortest:
         mean = self._length(q) / max(np.diff(q, axis=0).size, 1)
         for smoothing in smoothings:
             blocked = np.zeros(len(q), dtype=bool)
-            for _ in range(_SHORTENING_ROUNDS):
+            for _ in range(_ROUNDS):
                 before = self._state(here, smoothing * mean)
                 after, reach = self._moved(before, blocked, reach)
                 if after is None:
@@ -99,7 +95,7 @@ class Shortest:
                 here = after.q
                 if self._free.sum() > free or self._better(best, here):
                     best, free = here, self._free.sum()
-                if after.merit > (1.0 - _SHORTENING_GAIN) * before.merit:
+                if after.merit > (1.0 - _GAIN) * before.merit:
                     break
         return best
 
@@ -124,7 +120,7 @@ class Shortest:
             moved = min(_FURTHER * longest, reach)
             guess = before.q + (moved / longest if longest > 0.0 else 0.0) * step
             q, arrived = self._waypoints.project_each(guess, every)
-            arrived &= np.abs(q - guess).max(axis=1) < max(reach, _BESIDE_LIMIT)
+            arrived &= np.abs(q - guess).max(axis=1) < max(reach, AT_LIMIT)
             free = arrived.copy()
             free[arrived] = self._bounds.keep(q[arrived])
             arrived &= free | ~self._free
@@ -198,8 +194,8 @@ class Shortest:
     def _leaving(self, q: Array, step: Array) -> Flags:
         """Return which joints that are near a limit would pass it, (W, n)."""
         lower, upper, ahead = self._bounds.lower, self._bounds.upper, q + step
-        above = (ahead > upper) & (q > upper - _BESIDE_LIMIT)
-        below = (ahead < lower) & (q < lower + _BESIDE_LIMIT)
+        above = (ahead > upper) & (q > upper - AT_LIMIT)
+        below = (ahead < lower) & (q < lower + AT_LIMIT)
         return np.asarray(above | below)
 
 
@@ -292,13 +288,13 @@ def _cheaper(
     fixed = np.zeros(q.shape[1], dtype=bool)
     cost = measure.of(q)
     for ring in rings:
-        for _ in range(_RING_ROUNDS):
+        for _ in range(_ROUNDS):
             layers = _around(waypoints, bounds, q, ring)
             chains = best_chains(layers, largest_step, fixed, measure)
             before, cost = cost, float(chains.cost[-1].min())
             chain = chains.back(len(q) - 1, int(np.argmin(chains.cost[-1])))
             q = connected(layers, chain, fixed)
-            if cost > before - _RING_GAIN * abs(before):
+            if cost > before - _GAIN * abs(before):
                 break
     return q
 

@@ -8,12 +8,11 @@ import numpy.typing as npt
 from selfmotion.basics import Array, InverseKinematicsError
 from selfmotion.follow import Follows
 from selfmotion.robot import RobotModel
+from selfmotion.search.chains import UNLIKE
 from selfmotion.search.curves import SPACING, SelfMotion
 from selfmotion.search.manifold import Manifold
 from selfmotion.search.nodes import Admissible
 
-# Solutions nearer than this [rad or m, Euclidean] lead to the same plan once the start may move.
-_SAME_START = 0.3
 # Where all self-motions of the first pose can be traced: from so many seeds.
 TRACING_SEEDS = 60
 # Where they cannot: so many seeds for each configuration that is asked for.
@@ -111,10 +110,9 @@ def _scattered(
     for _ in range(_START_ROUNDS):
         seeds = np.array(list(spread(robot, _TRIES * count, rng)))
         q, arrived = manifold.project(seeds, target, far=True, held=held)
+        # Near ones lead to the same plan once the start may move.
         for one in q[arrived][admits(q[arrived])]:
-            if len(found) < count and all(
-                np.linalg.norm(one - other) > _SAME_START for other in found
-            ):
+            if len(found) < count and all(np.linalg.norm(one - other) > UNLIKE for other in found):
                 found.append(one)
         # Without anything else to keep, one round tells what there is.
         if admits is _all or len(found) >= _ENOUGH_STARTS * count:

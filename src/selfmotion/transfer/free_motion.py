@@ -32,6 +32,7 @@ from selfmotion.search import start_candidates
 from selfmotion.task import SE3, Task
 from selfmotion.transfer.ways import (
     MOVE_MARGIN,
+    PATH_SAMPLES,
     ROUNDING,
     Room,
     find_way,
@@ -48,7 +49,7 @@ _USED = 0.95
 _UP_TO_SPEED = 0.25
 _USUAL_SPEED = 1.0
 # Controllers want accelerations without jumps from arms of any make: where nobody limits the jerk,
-# they are reached in this time [s]. Knots of a pace are so far apart [s].
+# they are reached in this time [s], and no move is briefer. Knots of a pace are so far apart [s].
 _SOFT = 0.02
 _STEP_OF_PACE = 4e-3
 # Requirements that depend on the pace may be kept by a slower one, tried so often.
@@ -61,11 +62,8 @@ _FINER_LOOKS = 2.0
 _TRIES_OF_MOVE = 4
 # Where the straight leg is blocked, trees begin so far back along the tool's axis as well [m].
 _RETREATS = (0.01, 0.03, 0.08)
-# No move is briefer than this [s], also one that leads nowhere. One that is shorter than this
-# [rad or m] goes by one smooth law of time, with so many samples.
-_BRIEFEST_MOVE = 0.02
+# A move that is shorter than this [rad or m] goes by one smooth law of time.
 _SHORTEST_PACED = 2e-3
-_UNHURRIED_SAMPLES = 65
 # Configurations for an end that is a pose of the tool, at most.
 _END_CONFIGURATIONS = 16
 
@@ -321,7 +319,7 @@ class FreeMotions:
 
         σ = 10τ³ - 15τ⁴ + 6τ⁵, as fast as the limits allow.
         """
-        tau = np.linspace(0.0, 1.0, _UNHURRIED_SAMPLES)
+        tau = np.linspace(0.0, 1.0, PATH_SAMPLES + 1)
         sigma = np.clip(tau**3 * (10.0 - 15.0 * tau + 6.0 * tau**2), 0.0, 1.0)
         rate = 30.0 * tau**2 * (1.0 - tau) ** 2
         bend = 60.0 * tau * (1.0 - 3.0 * tau + 2.0 * tau**2)
@@ -330,7 +328,7 @@ class FreeMotions:
         unit = Trajectory(tau, q, qd * rate[:, None], self.robot.joint_names, qdd)
         limits = self._limits
         needed = slowdown_of(unit, (limits.speed, limits.acceleration, limits.jerk))
-        longest = max(needed, _BRIEFEST_MOVE)
+        longest = max(needed, _SOFT)
         faster = qdd / longest**2
         return Trajectory(longest * tau, q, unit.qd / longest, unit.joint_names, faster)
 

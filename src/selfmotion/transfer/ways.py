@@ -45,13 +45,14 @@ _MISSED = 30
 # as a share of the path. Samples of a path at least.
 _FIRST_POINTS = 12
 _FINEST = 1e-3
-_PATH_SAMPLES = 64
+PATH_SAMPLES = 64
 
 
 # Samples keep this share of the range from a limit.
 _INSIDE = 1e-6
 # Configurations this near are the same [rad or m].
 _SAME = 1e-9
+_DEGREE = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -290,9 +291,6 @@ def _spread_out(count: int) -> Array:
     return order[(order > 0) & (order <= count)].astype(np.float64)
 
 
-_DEGREE = 3
-
-
 def rounded(room: Room, way: Array, passed: Sequence[int] = ()) -> Trajectory | None:
     """Return a way (m, n) as a smooth joint path over a time of its own from 0 to 1.
 
@@ -354,7 +352,7 @@ def _spline(points: Array) -> Trajectory:
     knots = np.concatenate([np.zeros(_DEGREE), inner, np.ones(_DEGREE)])
     spline = BSpline(knots, points, _DEGREE)
     # Between knots a quintic with these ends is the cubic itself.
-    split = max(1, -(-_PATH_SAMPLES // (len(inner) - 1)))
+    split = max(1, -(-PATH_SAMPLES // (len(inner) - 1)))
     t = np.linspace(0.0, 1.0, split * (len(inner) - 1) + 1)
     names = tuple(map(str, range(joints)))
     q = spline(t)
