@@ -18,20 +18,18 @@ from selfmotion.search import Reach
 # bound towards it.
 _EDGE_MARGIN = 1e-4
 # The end of the part is found to this share of it, and a part below this share of the path is none.
-_END_AGREEMENT = 1e-3
-_FREE_END_AGREEMENT = 4e-3
+_END_AGREEMENT = 4e-3
 _LEAST_PART = 1e-2
-# Ends that are tried, at most; and where the start is free.
-_PROBES = 16
-_FREE_PROBES = 5
+# Ends that are tried, at most.
+_PROBES = 10
 # Motions that are optimised, of all that are followed; these with so many steps, until they are off
 # the path by this share of its extent.
 _PART_FINALISTS = 3
-_FOLLOWED_STEPS = 256
+_FOLLOWED_STEPS = 128
 # Where the last bit of a part is too rough, parts that end by this share earlier.
 _PART_BACK = 0.02
-# Where the start is free: of so many starts, and in so many steps, only the best one.
-_PART_STARTS, _FREE_FOLLOWED_STEPS = 16, 128
+# Where the start is free: of so many starts only the best one.
+_PART_STARTS = 16
 _OFF_PATH = 1e-2
 # Constant null motions that stand for x = 0 where that breaks down: joint angles over the path.
 _PUSHES = (0.5, 2.0)
@@ -152,17 +150,15 @@ def _bisect(problem: Problem, failed: _Attempt, reach: Reach, effort: Effort) ->
     arrived: _Attempt | None = None
     edge: _Attempt | None = None
     low, high = 0.0, failed.problem.path.duration
-    free = problem.given_start is None
-    agreement = _FREE_END_AGREEMENT if free else _END_AGREEMENT
-    back = agreement
-    for _ in range(_FREE_PROBES if free else _PROBES):
+    back = _END_AGREEMENT
+    for _ in range(_PROBES):
         if arrived is None:
             # What was kept until then is a good guess; where it is not, further and further back.
             probe = max(min(failed.kept_until, high * (1.0 - back)), 0.5 * high)
             back *= 2.0
         else:
             probe = 0.5 * (low + high)
-        if probe < _LEAST_PART * problem.path.duration or high - low < agreement * high:
+        if probe < _LEAST_PART * problem.path.duration or high - low < _END_AGREEMENT * high:
             break
         part = _until(problem, probe)
         attempt = _attempt(part, _begin_of(part, failed), effort)
@@ -295,8 +291,8 @@ def _rank(problem: Problem, start: Array, guide: Guide | None) -> tuple[float, f
     That without self-motion, from a start; the smaller, the better.
     """
     path = problem.path
-    steps = _FREE_FOLLOWED_STEPS if problem.given_start is None else _FOLLOWED_STEPS
-    still = StillMotion.on(problem, start, Grid.aligned(path.knots, steps), guide)
+    grid = Grid.aligned(path.knots, _FOLLOWED_STEPS)
+    still = StillMotion.on(problem, start, grid, guide)
     trouble = still.off_path(_OFF_PATH)
     far = path.duration if trouble is None else trouble
     kept = _kept_until(problem, still.grid.nodes, still.q, still.qd)

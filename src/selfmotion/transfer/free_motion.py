@@ -56,9 +56,8 @@ _STEP_OF_PACE = 4e-3
 _SLOWER_FACTOR = 1.2
 _SLOWER_TRIES = 12
 # Where the certificate finds what looks have missed, bodies are kept so many times farther apart
-# and looked at so many times more often, and a way is looked for again, so often.
-_WIDER = 3.0
-_FINER_LOOKS = 2.0
+# and looked at as many times more often, and a way is looked for again, so often.
+_WIDER = 2.0
 _TRIES_OF_MOVE = 4
 # Where the straight leg is blocked, trees begin so far back along the tool's axis as well [m].
 _RETREATS = (0.01, 0.03, 0.08)
@@ -165,7 +164,7 @@ class FreeMotions:
                 if move.verified:
                     return move
                 worst = worst or f", where {move.trouble}"
-            margin, finer = _WIDER * margin, _FINER_LOOKS * finer
+            margin, finer = _WIDER * margin, _WIDER * finer
         waited = time.thread_time() - began
         return self._missing(
             f"no way was found between the configurations in {waited:.1f} s{worst}"

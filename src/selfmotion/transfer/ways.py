@@ -25,12 +25,10 @@ ROUNDING = 1e-12
 # Bodies are looked at a bit farther apart than asked for [m], since only at some times.
 MOVE_MARGIN = 5e-4
 # Legs are looked at in steps in which no point of a body moves farther than this [m], finished
-# paths closely; and in steps of joints [rad] where there are no bodies. So many looks
-# at once to begin with.
+# paths closely; and in steps of joints [rad] where there are no bodies.
 _LEG_STEP = 0.02
 _FINE_STEP = 0.005
 _TURN_STEP = 0.05
-_FIRST_LOT = 4
 # Trees grow by legs of so many seconds at full speed; this share of the samples lies around the
 # middle, so far around, in shares of the distance; others are anywhere.
 _LEG_RANGE = 1.0
@@ -276,7 +274,7 @@ def _connected(
 
 def _lots(count: int) -> Iterator[slice]:
     """Yield slices of 0 to count - 1, small ones first: most of what is blocked shows early."""
-    first, size = 0, _FIRST_LOT
+    first, size = 0, 1
     while first < count:
         yield slice(first, first + size)
         first, size = first + size, 2 * size
