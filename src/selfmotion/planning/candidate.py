@@ -21,7 +21,6 @@ from selfmotion.paper import (
     Guide,
     Method,
     Objective,
-    Solution as PaperSolution,
     settled_still_motion,
 )
 from selfmotion.planning.effort import Effort
@@ -188,8 +187,11 @@ class Candidate:
             problem, begun, free=free, ends=ends, counts=counts, rollout=begun.rollout
         )
         method = Method(problem, begun, free, ends, own, counts, None, None)
-        solution = PaperSolution(method, objective, np.zeros(objective.size))
-        self.still = PublishedSolution(self.problem, self.constraints, solution)
+        # Without self-motion it is the only one; else nothing better was found.
+        ended = Status.INFEASIBLE if problem.follows.redundancy > 0 else Status.CONVERGED
+        self.still = PublishedSolution(
+            method, objective, np.zeros(objective.size), None, ended, (), self.constraints
+        )
         self.history: list[Iteration] = []
         self.is_hopeless = False
         self._found: Solution | None = None
@@ -244,7 +246,7 @@ class Candidate:
         """Return the minimum-norm motion, on the grid of the best one where that has one."""
         found = self._found
         known = found if isinstance(found, PublishedSolution) else self.still
-        return known.solution.still_evaluation()
+        return known.still_evaluation()
 
     def score(self) -> tuple[bool, bool, float]:
         """Return what ranks it among others: the smaller, the better; see `score`."""
@@ -272,7 +274,7 @@ class Candidate:
         if self._ended is not None or self.is_of_chain:
             return
         if not np.isfinite(self.still.cost):
-            self.still.solution.objective.require_finite(self.still.solution.x)
+            self.still.objective.require_finite(self.still.x)
         if is_published(self.problem, self.effort):
             self._polish_as_published()
         elif is_on_nodes(self.problem, self.effort):
@@ -318,21 +320,21 @@ class Candidate:
         """Go to the optimum of the published method."""
         effort, before = self.effort, self._found
         if isinstance(before, PublishedSolution):
-            solution = before.solution.again()
+            found = before.again()
         else:
-            begun, most = self.still.solution, effort.max_evaluations
+            begun, most = self.still, effort.max_evaluations
             limit = None if most is None else effort.counts.evaluations + most
             method = replace(begun.method, limit=limit, callback=effort.callback)
-            solution = replace(begun, method=method, x=self._first_coefficients()).settled()
-        self._found = replace(self.still, solution=solution)
-        self.history = list(solution.history)
-        if solution.status is Status.INTERRUPTED:
+            found = replace(begun, method=method, x=self._first_coefficients()).settled()
+        self._found = found
+        self.history = list(found.history)
+        if found.status is Status.INTERRUPTED:
             self.end(Status.INTERRUPTED)
 
     def _first_coefficients(self) -> Array:
         """Return the decision vector that is nearest to a known plan, if no worse than x = 0."""
         plan, problem = self._warm, self.problem
-        objective, none = self.still.solution.objective, self.still.solution.x
+        objective, none = self.still.objective, self.still.x
         if plan is None:
             return none
         t, pace = objective.grid.stage_times, pace_of(plan, problem)
@@ -358,7 +360,7 @@ class Candidate:
             self.keep_off_itself()
         if self.status is Status.GRADIENT:
             # A gradient that is not finite is named with its time.
-            self.still.solution.objective.gradient(self.still.solution.x)
+            self.still.objective.gradient(self.still.x)
 
     def _first_motions(self) -> tuple[list[Trajectory], Array]:
         """Return motions to begin near, and the times of the first nodes (N + 1,)."""

@@ -111,7 +111,7 @@ class Polisher:
         for times in (t, beside):
             grid = self.grid(times)
             near = [grid.near(*(motion(times, k) for k in range(3))) for motion in motions]
-            motion = min((one for one in near if one), key=_aim_of, default=None)
+            motion = min((one for one in near if one), key=lambda one: one.aim, default=None)
             if motion is not None:
                 break
         else:
@@ -365,11 +365,6 @@ def _rank_of(motion: NodeMotion, begun: NodeMotion) -> tuple[bool, bool, float]:
 def _unmet(motion: NodeMotion) -> float:
     """Return by how much conditions are broken."""
     return motion.violation + float(np.abs(motion.c).max(initial=0.0))
-
-
-def _aim_of(motion: NodeMotion) -> float:
-    """Return what is minimised, to sort by."""
-    return motion.aim
 
 
 def _divided(t: Array, parts: Ints) -> Array:

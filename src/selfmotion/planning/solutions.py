@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 
@@ -20,7 +21,6 @@ from selfmotion.costs import Samples
 from selfmotion.motion import Evaluation, Grid, NodeNullMotion, NullMotion
 from selfmotion.nodes import NodeMotion, Optimum
 from selfmotion.optimise import Status
-from selfmotion.problem import Problem
 from selfmotion.search import BESIDE
 
 # What is asked of the ends is met to this [rad, rad/s].
@@ -30,29 +30,16 @@ _LEAST_SAVING = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class PublishedSolution:
+class PublishedSolution(paper.Solution):
     """A motion of the published method: at x = 0, the minimum-norm motion, or optimised.
 
     Attributes
     ----------
-    problem : Problem
     constraints : sequence of BoundConstraint
         Judged, not asked.
-    solution : selfmotion.paper.Solution
     """
 
-    problem: Problem
-    constraints: Sequence[BoundConstraint]
-    solution: paper.Solution
-
-    @property
-    def status(self) -> Status:
-        """How the optimisation ended."""
-        if self.solution.is_optimised:
-            return self.solution.status
-        # Without self-motion it is the only one; else nothing better was found.
-        free = self.problem.follows.redundancy > 0
-        return Status.INFEASIBLE if free else Status.CONVERGED
+    constraints: Sequence[BoundConstraint] = ()
 
     @cached_property
     def violations(self) -> tuple[str, ...]:
@@ -68,34 +55,14 @@ class PublishedSolution:
     def remaining(self) -> None:
         """Not known."""
 
-    @property
-    def null_motion(self) -> NullMotion:
-        """The parameterisation of its null motion."""
-        return self.solution.null_motion
-
-    @property
-    def coefficients(self) -> Array:
-        """The null motion's coefficients."""
-        return self.solution.coefficients
-
-    @property
-    def steps(self) -> int:
-        """Of its grid."""
-        return self.solution.steps
-
-    @property
-    def cost(self) -> float:
-        """F."""
-        return self.solution.cost
-
     @cached_property
     def keeps_off_itself(self) -> bool:
         """Whether the arm does where only the default asks it to, at the nodes and by meshes."""
-        return self.problem.keeps_off_itself(self.solution.nodes)
+        return self.method.problem.keeps_off_itself(self.nodes)
 
     @property
     def _samples(self) -> Samples:
-        return self.solution.objective.samples(self.solution.x)
+        return self.objective.samples(self.x)
 
     def merit(self) -> float:
         """Return the cost, much larger where constraints are violated: for ranking."""
@@ -103,17 +70,13 @@ class PublishedSolution:
             return np.inf
         return penalised(self.cost, self.constraints, self._samples)
 
-    def evaluation(self) -> Evaluation:
-        """Return the motion with its costs."""
-        return self.solution.evaluation()
-
-    def refined(self, where: Flags | None = None) -> "PublishedSolution":
+    def refined(self, where: Flags | None = None) -> Self:
         """Return it with half the step length, everywhere or for some of the steps (N,).
 
         As it is where it breaks down on that grid.
         """
         try:
-            return replace(self, solution=self.solution.refined(where))
+            return super().refined(where)
         except BreakdownError:
             return self
 

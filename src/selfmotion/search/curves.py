@@ -1,6 +1,6 @@
 """Self-motion curves: all configurations with the tool in a given pose, for redundancy 1."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -382,7 +382,7 @@ class SelfMotion:
 def curves_along(
     motion: SelfMotion,
     target: Array,
-    seeds: Sequence[Array],
+    seeds: Array,
     every: int,
     progress: Progress = silent,
 ) -> list[CurveSet]:
@@ -396,7 +396,7 @@ def curves_along(
     ----------
     motion : SelfMotion
     target : (W, 12)
-    seeds : sequence of (n,)
+    seeds : (K, n)
     every : int
     progress : Progress
     """

@@ -143,7 +143,7 @@ def _spread_out(q: Array, cost: Array, count: int) -> Array:
 
 def _starts(waypoints: OnPath, bounds: Admissible, station: int, rng: np.random.Generator) -> Array:
     """Return configurations within the limits, free where there are such, (K, n)."""
-    seeds = np.array(list(spread(waypoints.robot, _BEGINNING_SEEDS, rng)))
+    seeds = spread(waypoints.robot, _BEGINNING_SEEDS, rng)
     q, arrived = waypoints.project(seeds, station, far=True)
     q = q[arrived]
     free = bounds.keep(q)

@@ -104,7 +104,7 @@ def curve_layers(
     """
     motion, x = SelfMotion(follows, SPACING), follows.targets(t)
     bounds = Admissible(*limits, motion.revolute, bodies)
-    seeds = list(spread(follows.robot, _ANEW_SEEDS, np.random.default_rng(rng)))
+    seeds = spread(follows.robot, _ANEW_SEEDS, np.random.default_rng(rng))
     curves = curves_along(motion, x, seeds, _ANEW_EVERY, progress)
     samples = _free_samples(motion, x, curves, bounds, progress)
 

@@ -79,7 +79,7 @@ class SinglePoses:
         self.bounds = Admissible(
             asked.lower, asked.upper, self.robot.is_revolute, asked.bodies if clear else ()
         )
-        self._seeds = np.array(list(spread(self.robot, _SEEDS, rng)))
+        self._seeds = spread(self.robot, _SEEDS, rng)
         self._shift = np.zeros(3)
         # A path takes a millisecond to say where it is, and is asked again and again.
         self._targets: dict[float, Array] = {}
@@ -146,7 +146,7 @@ class SinglePoses:
 
     def look_closely(self, t: float, before: Found) -> Found:
         """Return what is found by everything that is known, where a look found nothing free."""
-        seeds = np.array(list(spread(self.robot, _MORE_SEEDS, self._rng)))
+        seeds = spread(self.robot, _MORE_SEEDS, self._rng)
         far = self._reached(t, seeds, far=True)
         tries = before.tries + len(seeds)
         free = far[self.bounds.keep(far)]
@@ -181,7 +181,7 @@ class SinglePoses:
 
     def nearest(self, t: float, count: int = _APPROACHED) -> tuple[Array, Array]:
         """Return configurations as near to a pose as limits let them (K, n), misses [m, rad]."""
-        seeds = np.array(list(spread(self.robot, count, self._rng)))
+        seeds = spread(self.robot, count, self._rng)
         q, misses = self._manifold.approach(seeds, self.target(t), self._held(t))
         order = np.argsort(misses.sum(axis=1), kind="stable")
         return q[order], misses[order]

@@ -1,6 +1,6 @@
 """Start configurations worth trying."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 
 import numpy as np
 import numpy.typing as npt
@@ -108,7 +108,7 @@ def _scattered(
     target, found = follows.targets(np.zeros(1))[0], list[Array]()
     held = follows.held(np.zeros(1))[0]
     for _ in range(_START_ROUNDS):
-        seeds = np.array(list(spread(robot, _TRIES * count, rng)))
+        seeds = spread(robot, _TRIES * count, rng)
         q, arrived = manifold.project(seeds, target, far=True, held=held)
         # Near ones lead to the same plan once the start may move.
         for one in q[arrived][admits(q[arrived])]:
@@ -136,8 +136,8 @@ def carried(follows: Follows, starts: Array, t: Array) -> tuple[Array, npt.NDArr
     return np.stack(motions, axis=1), going
 
 
-def spread(robot: RobotModel, count: int, rng: np.random.Generator) -> Iterator[Array]:
-    """Yield configurations that fill the limits evenly.
+def spread(robot: RobotModel, count: int, rng: np.random.Generator) -> Array:
+    """Return configurations that fill the limits evenly, (count, n).
 
     The additive recurrence with the generalised golden ratio: fractions of k g^-1 … k g^-n, where
     g > 1 solves g^(n+1) = g + 1 (M. Roberts, "The unreasonable effectiveness of quasirandom
@@ -149,5 +149,5 @@ def spread(robot: RobotModel, count: int, rng: np.random.Generator) -> Iterator[
         ratio = (1.0 + ratio) ** (1.0 / (robot.dof + 1.0))
     steps = ratio ** -np.arange(1.0, robot.dof + 1.0)
     shift = rng.uniform(size=robot.dof)
-    for k in range(count):
-        yield lower + (upper - lower) * ((shift + (k + 1) * steps) % 1.0)
+    shares = (shift + np.arange(1, count + 1)[:, None] * steps) % 1.0
+    return np.asarray(lower + (upper - lower) * shares)
