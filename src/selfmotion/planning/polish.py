@@ -35,10 +35,6 @@ _TOWARDS_MIDDLE = (1.0 / 16.0, 1.0 / 64.0, 1.0 / 4.0)
 # And to either side of the start by so much along its self-motion, after this share of the
 # duration; so many of these at most.
 _ASIDE, _ASIDE_AFTER, _MOST_ASIDE = (0.4, -0.4, 0.8, -0.8), 1.0 / 4.0, 4
-# One towards the middle that breaks nothing comes before the motion at x = 0, where that breaks
-# something and it costs no more than so many times as much: what costs more leads past bodies on
-# the wrong side.
-_KEPT_FIRST = 1.5
 
 
 _ARRIVED = (Status.CONVERGED, Status.PRECISION)
@@ -143,9 +139,8 @@ class Polisher:
                 return None
         if multipliers is None and not _is_kept(motion):
             # One that breaks nothing is at its optimum before this one breaks nothing.
-            most = _KEPT_FIRST * abs(motion.aim)
-            tried = (begin for begin in self._beginnings(motion) if begin and begin.aim <= most)
-            motion = next(filter(_is_kept, tried), motion)
+            kept = (begin for begin in self._beginnings(motion) if begin and _is_kept(begin))
+            motion = next(kept, motion)
         # What takes long is seldom kept in the end: other beginnings come before the rest of it.
         first = best = minimise(motion, self._report, multipliers, roughly=True, most=_FEWER)
         rank = partial(_rank, begun=motion)

@@ -18,10 +18,6 @@ _SMOOTHING = 3
 # Chains are unlike when some joint differs by this [rad or m] at this share of the waypoints.
 UNLIKE = 0.3
 _UNLIKE_FOR = 0.1
-# Mirror images have moved each joint by the same amount, up to this [rad or m].
-_SAME_TRAVEL = 0.2
-# Chains looked at, mirror images included, before these have to do.
-_MOST_CHAINS = 60
 # Stations: so many waypoints, evenly.
 _STATIONS = 7
 
@@ -158,7 +154,7 @@ def diverse_chains(
     # A chain through a node near a chosen one is rarely unlike it, and another node finds it.
     covered = {i: np.zeros(len(layers[i]), dtype=bool) for i in stations}
     for total, i, node in sorted(through):
-        if not np.isfinite(total) or len(chosen) == count or len(taken) == _MOST_CHAINS:
+        if not np.isfinite(total) or len(chosen) == count:
             break
         if covered[i][node]:
             continue
@@ -214,7 +210,7 @@ def _mirrors(q: Array, other: Array, turning: Flags) -> bool:
         np.cumsum(np.abs(unturned(np.diff(motion, axis=0), turning)), axis=0)
         for motion in (q, other)
     )
-    return bool(np.abs(moved - also).max() < _SAME_TRAVEL)
+    return bool(np.abs(moved - also).max() < UNLIKE)
 
 
 def _apart(q: Array, other: Array, turning: Flags) -> Array:

@@ -26,11 +26,10 @@ from selfmotion.search.manifold import OnPath
 from selfmotion.search.measures import Length, Measure, RunningCost
 from selfmotion.search.nodes import Admissible, place_nodes
 from selfmotion.search.shortest import improved_by
-from selfmotion.search.starts import spread
+from selfmotion.search.starts import TRACING_SEEDS, spread
 
-# Inverse kinematics starts anew at every so manieth waypoint, from so many seeds.
+# Inverse kinematics starts anew at every so manieth waypoint.
 _ANEW_EVERY = 10
-_ANEW_SEEDS = 100
 # So many chains go through the first stage, after which it shows which are worth the others.
 _LOOKED_AT = 8
 
@@ -104,7 +103,7 @@ def curve_layers(
     """
     motion, x = SelfMotion(follows, SPACING), follows.targets(t)
     bounds = Admissible(*limits, motion.revolute, bodies)
-    seeds = spread(follows.robot, _ANEW_SEEDS, np.random.default_rng(rng))
+    seeds = spread(follows.robot, TRACING_SEEDS, np.random.default_rng(rng))
     curves = curves_along(motion, x, seeds, _ANEW_EVERY, progress)
     samples = _free_samples(motion, x, curves, bounds, progress)
 

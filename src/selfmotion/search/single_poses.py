@@ -26,8 +26,6 @@ _NEARLY = 1e-5
 # The slower method brings so many seeds nearer; and so many where a pose would be given up: near
 # limits it arrives from a third of them, Newton's from one in 300.
 _APPROACHED, _MORE_APPROACHED = 48, 400
-# For what is only proposed, so many do.
-_ROUGHLY_APPROACHED = 120
 # Of those that meet something, so many are looked at, and so many of these, which meet the least,
 # moved aside at random, by less and less [rad].
 MOST_LOOKED_AT, _CLIMBERS = 80, 8
@@ -127,7 +125,7 @@ class SinglePoses:
         for t in times.tolist():
             found = self.look(t, known)
             if not len(found.free):
-                q = self._by_damped_steps(t, _ROUGHLY_APPROACHED)
+                q = self._by_damped_steps(t, _APPROACHED)
                 found = replace(found, free=q[self.bounds.keep(q)])
             if not len(found.free):
                 return float(t)
