@@ -10,7 +10,8 @@ from selfmotion.optimise import Status
 from selfmotion.paper import Guide, StillMotion
 from selfmotion.path import Section
 from selfmotion.planning.candidate import Candidate
-from selfmotion.planning.effort import Effort
+from selfmotion.planning.effort import Effort, Search
+from selfmotion.planning.screening import ROUGH_MOTIONS
 from selfmotion.problem import Problem
 from selfmotion.search import Reach
 
@@ -22,14 +23,10 @@ _END_AGREEMENT = 4e-3
 _LEAST_PART = 1e-2
 # Ends that are tried, at most.
 _PROBES = 10
-# Motions that are optimised, of all that are followed; these with so many steps, until they are off
-# the path by this share of its extent.
-_PART_FINALISTS = 3
+# Motions are followed in so many steps, until they are off the path by this share of its extent.
 _FOLLOWED_STEPS = 128
 # Where the last bit of a part is too rough, parts that end by this share earlier.
 _PART_BACK = 0.02
-# Where the start is free: of so many starts only the best one.
-_PART_STARTS = 16
 _OFF_PATH = 1e-2
 # Constant null motions that stand for x = 0 where that breaks down: joint angles over the path.
 _PUSHES = (0.5, 2.0)
@@ -131,10 +128,10 @@ def _largest_part(problem: Problem, reach: Reach, effort: Effort) -> Part | None
     first = _until(problem, goal)
     attempts = []
     given = problem.given_start is not None
-    few = reach.starts if given else reach.starts[:: -(-len(reach.starts) // _PART_STARTS)]
+    few = reach.starts if given else reach.starts[:: -(-len(reach.starts) // ROUGH_MOTIONS)]
     few = [_start_of(first, problem, q) for q in few]
     starts = _apart(first, few) if effort.apart else few
-    for begin in _beginnings(first, starts)[: _PART_FINALISTS if given else 1]:
+    for begin in _beginnings(first, starts)[: Search().finalists if given else 1]:
         attempts.append(_attempt(first, begin, effort))
         if attempts[-1].cut_short:
             return _part(problem, attempts[-1], reach, "")

@@ -22,7 +22,7 @@ _ROUGH_ROUNDS = 30
 # within their limits to this share of a turn.
 _SAME_TO_DIGITS = 1e-9
 # So many rough motions at most; where conditions count, with so many steps more that know them.
-_ROUGH_MOTIONS, _WITH_CONDITIONS = 16, 12
+ROUGH_MOTIONS, _WITH_CONDITIONS = 16, 12
 # Motions at x = 0 that are this near at all times [rad or m] lie in one valley of the cost, as a
 # rule; rough optima this near are the same.
 ONE_VALLEY = 0.6
@@ -120,7 +120,7 @@ class Ranking:
         if not self._ranked:
             # Optima lie where nothing was asked: what keeps everything may begin elsewhere.
             order = most_promising(problem, starts, motions, arrived, self._t, self._apart)
-            near = (self._near(motions[k]) for k in order[: max(_ROUGH_MOTIONS, finalists)])
+            near = (self._near(motions[k]) for k in order[: max(ROUGH_MOTIONS, finalists)])
             begun = [motion for motion in near if motion is not None]
             self._ranked = self._with_conditions(free, begun, finalists)
         return bool(self._ranked)
@@ -151,7 +151,7 @@ class Ranking:
         if soft is not problem:
             found = self._found = Batch.near(self._grid(soft), motions)
         alone, near = unlike(found.q, _cheapest(found), self._apart, ONE_VALLEY)
-        which = [*alone, *near][: max(_ROUGH_MOTIONS, finalists)]
+        which = [*alone, *near][: max(ROUGH_MOTIONS, finalists)]
         if not which:
             return None
         found = self._found = found.picked(np.array(which, dtype=np.int64))

@@ -15,7 +15,7 @@ from selfmotion.kernels import (
 )
 from selfmotion.robot import null_space, place_tips
 
-# Longest single correction [rad or m]: a far start wanders where J is nearly singular.
+# Longest single correction or round [rad or m]: a far start wanders where J is nearly singular.
 LONGEST_CORRECTION = 0.5
 # Newton's steps onto the path, from near it and from anywhere.
 _NEAR_STEPS = 10

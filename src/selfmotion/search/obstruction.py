@@ -11,7 +11,7 @@ from selfmotion.collision import how_near
 from selfmotion.follow import AugmentedFollows
 from selfmotion.problem import Problem
 from selfmotion.search.nodes import AT_LIMIT
-from selfmotion.search.single_poses import MOST_LOOKED_AT, Found, SinglePoses
+from selfmotion.search.single_poses import CLIMBERS, MOST_LOOKED_AT, Found, SinglePoses
 from selfmotion.search.starts import start_candidates
 from selfmotion.task import POSITION_ROWS, ROW_NAMES, Relaxation
 
@@ -26,9 +26,8 @@ _ABOUT = (-1e-3, 0.0, 1e-3, 4e-3)
 _STRETCHED = 0.1
 # Poses along a path at which to look before anything else.
 _COARSE_POSES = 9
-# What would help is looked for from so many of the nearest configurations; and in so many rounds,
-# in each of which a deviation has to be this share of the least before.
-_REMEDY_SEEDS = 8
+# What would help is looked for in so many rounds, in each of which a deviation has to be this share
+# of the least before.
 _SHRINKS, _SHRUNK = 6, 0.75
 # A path is moved so often, each time a bit farther than needed at the pose where nothing was found,
 # and no farther than this [m].
@@ -102,7 +101,7 @@ def least_deviation(poses: SinglePoses, t: float, rows: tuple[str, ...]) -> Arra
     )
     wider, n = poses.of(replace(asked, relaxations=(*others, more))), asked.robot.dof
     follows = cast(AugmentedFollows, wider.problem.follows)
-    q = poses.some(t, _REMEDY_SEEDS)[:, :n]
+    q = poses.some(t, CLIMBERS)[:, :n]
     q = np.hstack([q, np.zeros((len(q), follows.robot.dof - n))])
     best: Array | None = None
     for _ in range(_SHRINKS):
@@ -135,7 +134,7 @@ def least_excess(poses: SinglePoses, t: float) -> tuple[str, float] | None:
     None where no single joint is in the way.
     """
     lower, upper = poses.bounds.lower, poses.bounds.upper
-    seeds = poses.some(t, _REMEDY_SEEDS)
+    seeds = poses.some(t, CLIMBERS)
     found: list[tuple[float, str]] = []
     for k, name in enumerate(poses.problem.asked.robot.joint_names):
         if not (np.isfinite(lower[k]) or np.isfinite(upper[k])):

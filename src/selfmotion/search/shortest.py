@@ -17,7 +17,7 @@ from selfmotion.collision import ClearanceModel, CollisionModel
 from selfmotion.optimise import Banded
 from selfmotion.problem import BodiesOfArm
 from selfmotion.search.chains import best_chains, connected, in_order
-from selfmotion.search.manifold import OnPath
+from selfmotion.search.manifold import LONGEST_CORRECTION, OnPath
 from selfmotion.search.measures import Length, Measure
 from selfmotion.search.nodes import AT_LIMIT, Admissible
 
@@ -28,22 +28,19 @@ _ROUNDS = 20
 _GAIN = 1e-3
 # Rounds go so many times as far as their quadratics say, which are never below what they stand for.
 _FURTHER = 1.6
-# No joint moves farther in a round than this [rad or m].
-_LONGEST_MOVE = 0.5
 # Joints at a limit stay there if they would leave it; rounds of that.
 _LIMITS_HELD = 4
 # Steps are kept below this share of the largest; more counts as length times this [1/rad].
 _STEP_KEPT = 0.97
 _STEPS_STIFF = 30.0
-# Bodies are kept apart by so much more than asked for [m]; less counts as length times this [1/m²].
+# Bodies are kept apart by so much more than asked for [m]; less counts as length times this [1/m²];
+# and a joint that is held at its limit is as stiff.
 _NEAR_BODIES = 1e-4
-_BODIES_STIFF = 1e6
+_STIFF = 1e6
 
 
 # Of directions along which nothing changes.
 _DAMPING = 1e-3
-# A joint that is held at its limit.
-_HELD = 1e6
 # Distances beyond what is wanted do not count: over so little they level off [m].
 _LEVELLED = 1e-9
 # Shorter steps are tried so often, each by this factor.
@@ -83,7 +80,7 @@ class Shortest:
         """
         self._free = self._bounds.keep(q)
         self._watched = ~self._free
-        best, here, reach, free = q, q, _LONGEST_MOVE, self._free.sum()
+        best, here, reach, free = q, q, LONGEST_CORRECTION, self._free.sum()
         mean = self._length(q) / max(np.diff(q, axis=0).size, 1)
         for smoothing in smoothings:
             blocked = np.zeros(len(q), dtype=bool)
@@ -132,7 +129,7 @@ class Shortest:
             after = self._state(np.where(arrived[:, None], q, before.q), before.smoothing)
             if after.merit < before.merit:
                 self._free = np.where(arrived, free, self._free)
-                return after, min(_LONGEST_MOVE, max(reach, 2.0 * moved))
+                return after, min(LONGEST_CORRECTION, max(reach, 2.0 * moved))
             reach = _SHORTER * moved
         return None, reach
 
@@ -143,7 +140,7 @@ class Shortest:
         over = np.maximum(np.abs(steps) - self._kept, 0.0) * self._weights
         rows, lack, slopes = self._lacking(q)
         merit = (lengths - smoothing).sum() + 0.5 * _STEPS_STIFF * (over**2).sum()
-        merit += 0.5 * _BODIES_STIFF * (lack**2).sum()
+        merit += 0.5 * _STIFF * (lack**2).sum()
         return _State(q, smoothing, steps, lengths, over, rows, lack, slopes, float(merit))
 
     def _lacking(self, q: Array) -> tuple[Ints, Array, Array]:
@@ -184,7 +181,7 @@ class Shortest:
         held = np.repeat(blocked[:, None], state.q.shape[1], axis=1)
         step = np.zeros_like(state.q)
         for _ in range(_LIMITS_HELD):
-            step = _least(bases, slope, own + _HELD * held, curvature, state)
+            step = _least(bases, slope, own + _STIFF * held, curvature, state)
             leaving = self._leaving(state.q, step) & ~held
             if not leaving.any():
                 break
@@ -220,7 +217,7 @@ class _State:
         slope = np.zeros_like(self.q)
         slope[:-1] -= pull
         slope[1:] += pull
-        np.add.at(slope, self.rows, -_BODIES_STIFF * self.lack[:, None] * self.slopes)
+        np.add.at(slope, self.rows, -_STIFF * self.lack[:, None] * self.slopes)
         return slope
 
     def curvature(self, weights: Array) -> Array:
@@ -237,7 +234,7 @@ def _least(bases: Array, slope: Array, own: Array, between: Array, state: _State
     turned = bases.transpose(0, 2, 1)
     blocks = turned @ (own[:, :, None] * bases) + _DAMPING * np.eye(size)
     along = np.einsum("ln,lnd->ld", state.slopes, bases[state.rows])
-    np.add.at(blocks, state.rows, _BODIES_STIFF * along[:, :, None] * along[:, None, :])
+    np.add.at(blocks, state.rows, _STIFF * along[:, :, None] * along[:, None, :])
     matrix = Banded(count, size, 1)
     matrix.add(0, 0, blocks)
     matrix.add(1, 0, -(turned[:-1] @ (between[:, :, None] * bases[1:])))

@@ -28,7 +28,7 @@ _NEARLY = 1e-5
 _APPROACHED, _MORE_APPROACHED = 48, 400
 # Of those that meet something, so many are looked at, and so many of these, which meet the least,
 # moved aside at random, by less and less [rad].
-MOST_LOOKED_AT, _CLIMBERS = 80, 8
+MOST_LOOKED_AT, CLIMBERS = 80, 8
 # Random walks along the self-motions, so many at a time, so often, in steps of these sizes [rad].
 _WALKERS, _WALKS, _WALK_STEPS = 64, 12, (0.1, 0.3, 0.8)
 _CLIMBS = (0.3, 0.3, 0.2, 0.2, 0.1, 0.1, 0.05, 0.05, 0.02, 0.02)
@@ -221,7 +221,7 @@ class SinglePoses:
     def _climbed(self, t: float, met: Array) -> Array:
         """Return configurations that are less near to bodies than those that were found, (K, n)."""
         some = met[:: -(-len(met) // MOST_LOOKED_AT)]
-        best = some[np.argsort([-self.room(q)[0] for q in some])[:_CLIMBERS]]
+        best = some[np.argsort([-self.room(q)[0] for q in some])[:CLIMBERS]]
         room = np.array([self.room(q)[0] for q in best])
         for size in _CLIMBS:
             away = self._rng.normal(scale=size, size=best.shape) / self.robot.joint_weights
