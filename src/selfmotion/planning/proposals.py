@@ -10,7 +10,7 @@ handful of iterations, however many loops there are.
 """
 
 from collections import abc
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from functools import partial
 
@@ -21,7 +21,6 @@ from selfmotion.basics import (
     Flags,
     InverseKinematicsError,
     NoSequenceError,
-    Progress,
     SelfmotionError,
 )
 from selfmotion.constraints import BoundConstraint
@@ -42,6 +41,7 @@ from selfmotion.search import (
     Sequence,
     asks_length,
     carried,
+    guides,
     shortest_along,
     start_candidates,
 )
@@ -139,16 +139,13 @@ def _resumed(planner: Planner, rough: abc.Sequence[NodeMotion]) -> Iterator[Cand
             yield candidate
 
 
-_Searched = Callable[[Problem, np.random.Generator | int, Progress], list[Sequence]]
-
-
-def optimise_sequences(planner: Planner, searched: _Searched, *, chosen: bool) -> None:
+def optimise_sequences(planner: Planner, *, chosen: bool) -> None:
     """Search, and optimise from the best sequences, one after another; note a search in vain.
 
     What is found is compared with what stands, and `chosen` only if it may be.
     """
     try:
-        planner.sequences = searched(planner.problem, planner.search.rng, planner.progress)
+        planner.sequences = guides(planner.problem, planner.search.rng, planner.progress)
     except NoSequenceError as error:
         planner.failure = error
         planner.notes.append(f"global search: {error}")

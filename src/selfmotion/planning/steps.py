@@ -28,7 +28,7 @@ from selfmotion.planning.proposals import (
 )
 from selfmotion.problem import Problem
 from selfmotion.result import Attempt
-from selfmotion.search import Obstruction, guides, obstruction
+from selfmotion.search import Obstruction, obstruction
 
 # Where nothing else leads to a motion that keeps the constraints, this many times more are tried.
 _SECOND_EFFORT = 4
@@ -186,7 +186,7 @@ def _search_globally(planner: Planner) -> bool:
     can = planner.is_searchable and (planner.is_free or planner.best)
     if not (planner.is_sought and wanted and can) or planner.is_out_of_reach():
         return False
-    optimise_sequences(planner, guides, chosen=planner.chooses_globally)
+    optimise_sequences(planner, chosen=planner.chooses_globally)
     return True
 
 

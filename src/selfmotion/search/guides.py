@@ -43,9 +43,7 @@ BESIDE = 0.3
 LAST_SMOOTHINGS = (3.0, 1.0, 0.3, 0.1, 0.03)
 
 
-def guides(
-    problem: Problem, rng: np.random.Generator | int | None, progress: Progress
-) -> list[Sequence]:
+def guides(problem: Problem, rng: np.random.Generator | int, progress: Progress) -> list[Sequence]:
     """Return guides from the best sequences over the self-motions, by the problem's own costs.
 
     Raises
@@ -54,7 +52,7 @@ def guides(
         No chain of configurations follows the path; says where it ends and why.
     """
     weights = _weights(problem)
-    layers = layers_of(problem, weights, 0 if rng is None else rng, progress)
+    layers = layers_of(problem, weights, rng, progress)
     measure = measure_of(problem.follows, problem.costs, layers.t, weights)
     return best_sequences(layers, _REFINED, measure, progress)
 

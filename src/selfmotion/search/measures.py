@@ -100,35 +100,6 @@ def near_pairs(
 
 
 @kernel
-def spread_out(q: Array, apart: Array, most: int) -> Ints:
-    """Return the rows of q (K, n) to keep, at most so many: the earlier ones of near ones.
-
-    First those farther from all kept ones in some coordinate than apart[0], then apart[1], ….
-    """
-    n, many = q.shape[1], len(q)
-    kept, count = np.empty(min(most, many), dtype=np.intp), 0
-    taken = np.zeros(many, dtype=np.bool_)
-    for distance in apart:
-        for k in range(many):
-            if taken[k] or count == len(kept):
-                continue
-            alone = True
-            for other in range(count):
-                far = False
-                for i in range(n):
-                    if abs(q[k, i] - q[kept[other], i]) > distance:
-                        far = True
-                        break
-                if not far:
-                    alone = False
-                    break
-            if alone:
-                taken[k], kept[count] = True, k
-                count += 1
-    return kept[:count]
-
-
-@kernel
 def lower_to_cheapest(
     first: Ints, second: Ints, price: Array, cost: Array, reach: Array, parent: Ints
 ) -> None:

@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from selfmotion.basics import Array, Progress
+from selfmotion.basics import Array, Ints, Progress, kernel
 from selfmotion.collision import CollisionModel
 from selfmotion.search.chains import in_order, stations_of
 from selfmotion.search.manifold import OnPath
-from selfmotion.search.measures import Length, spread_out
+from selfmotion.search.measures import Length
 from selfmotion.search.nodes import Admissible
 from selfmotion.search.sequences import Layers
 from selfmotion.search.starts import spread
@@ -148,3 +148,32 @@ def _starts(waypoints: OnPath, bounds: Admissible, station: int, rng: np.random.
     q = q[arrived]
     free = bounds.keep(q)
     return np.concatenate([q[free], q[~free]])[:_BEGUN]
+
+
+@kernel
+def spread_out(q: Array, apart: Array, most: int) -> Ints:
+    """Return the rows of q (K, n) to keep, at most so many: the earlier ones of near ones.
+
+    First those farther from all kept ones in some coordinate than apart[0], then apart[1], ….
+    """
+    n, many = q.shape[1], len(q)
+    kept, count = np.empty(min(most, many), dtype=np.intp), 0
+    taken = np.zeros(many, dtype=np.bool_)
+    for distance in apart:
+        for k in range(many):
+            if taken[k] or count == len(kept):
+                continue
+            alone = True
+            for other in range(count):
+                far = False
+                for i in range(n):
+                    if abs(q[k, i] - q[kept[other], i]) > distance:
+                        far = True
+                        break
+                if not far:
+                    alone = False
+                    break
+            if alone:
+                taken[k], kept[count] = True, k
+                count += 1
+    return kept[:count]
