@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -221,14 +221,14 @@ def fastest(
     check_problem(problem)
     check_no_feed(problem)
     kept = _KeptCosts.of(problem, {} if keep is None else keep)
-    rounds = _Rounds(problem, *rate_limits(problem, acceleration, velocity), kept)
+    limits = rate_limits(problem, acceleration, velocity)
     seconds = None if deadline is None else as_number(deadline, "deadline", above=0.0)
     clock = Deadline.after(seconds)
-    options = _Options(search, tolerance, clock, clock.checked_by(progress))
+    rounds = _Rounds(problem, limits, kept, search, tolerance, clock, progress)
     status = Status.CONVERGED
     try:
         with held_interruption():
-            rounds.run(options)
+            rounds.run()
     except KeyboardInterrupt:
         # A plan in between may have seen first that it is late.
         late = time.perf_counter() >= clock.end - rounds.longest
@@ -243,54 +243,34 @@ def fastest(
     return Fastest(best, found["x = 0"], found["costs"], tuple(rounds.times), status)
 
 
-class _Options(NamedTuple):
-    """How each plan is made."""
-
-    search: Search | None
-    tolerance: Tolerance | None
-    clock: Deadline
-    progress: Progress
-
-    def left(self, kept: float = 0.0) -> float:
-        """Return the time that is left but for what is kept [s]; KeyboardInterrupt for none."""
-        self.clock.check()
-        left = self.clock.end - time.perf_counter() - kept
-        if left <= 0.0:
-            raise KeyboardInterrupt
-        return left
-
-    def plan(self, problem: Problem, kept: float = 0.0) -> Plan:
-        """Plan, in the time that is left but for what is kept for its pace [s].
-
-        KeyboardInterrupt where something stopped it, or there is none.
-        """
-        left = self.left(kept)
-        try:
-            return plan(
-                problem,
-                search=self.search,
-                tolerance=self.tolerance,
-                deadline=left if np.isfinite(left) else None,
-                progress=self.progress,
-            )
-        except PlanError:
-            self.clock.check()
-            raise
-
-
 class _Rounds:
     """The best so far, and what it is looked for with.
 
     Parameters
     ----------
     problem : Problem
-    v, a : (n,)
-        Limits of velocity and acceleration.
+    limits : (n,), (n,)
+        Of velocity and acceleration.
     kept : _KeptCosts
+    search : Search or None
+    tolerance : Tolerance or None
+    clock : Deadline
+    progress : Progress
     """
 
-    def __init__(self, problem: Problem, v: Array, a: Array, kept: _KeptCosts) -> None:
-        self._problem, self._v, self._a = problem, v, a
+    def __init__(
+        self,
+        problem: Problem,
+        limits: tuple[Array, Array],
+        kept: _KeptCosts,
+        search: Search | None,
+        tolerance: Tolerance | None,
+        clock: Deadline,
+        progress: Progress,
+    ) -> None:
+        self._problem, (self._v, self._a) = problem, limits
+        self._search, self._tolerance, self._clock = search, tolerance, clock
+        self._progress = clock.checked_by(progress)
         self._kept, self._bounds = kept, np.full(len(kept.costs), np.inf)
         geometric = tuple(item for item in problem.constraints if not item.of_pace)
         self._free = replace(problem, constraints=geometric)
@@ -301,9 +281,9 @@ class _Rounds:
         # What the pace of a motion took at most [s].
         self.longest = 0.0
 
-    def run(self, options: _Options) -> None:
+    def run(self) -> None:
         """Go on while rounds gain; KeyboardInterrupt where they were stopped."""
-        planned = options.plan(self._free)
+        planned = self._plan(self._free)
         if planned.report.ending or not planned.certificate.on_path:
             # At no pace can it be followed to its end: what else is wrong says nothing.
             self.verdict = planned.report.ending or planned.certificate.verdict
@@ -314,14 +294,14 @@ class _Rounds:
         still = replace(planned, trajectory=planned.initial_trajectory)
         still = replace(still, certificate=still.check())
         if still.certificate.on_path:
-            options.left(self.longest)
+            self._left(self.longest)
             self._taken("x = 0", still)
         if planned.report.status.is_cut_short:
             raise KeyboardInterrupt
         use, weight = LimitUse(self._v, self._a, _POWER), 0.0
         pace: _Repaced = _own
         for number in range(ROUNDS):
-            options.progress("fastest", number, ROUNDS)
+            self._progress("fastest", number, ROUNDS)
             before = self._duration
             weighted = self._kept.weighted(costs, weight * self._duration) if weight else ()
             asked = replace(self._free, costs=(use, *weighted))
@@ -330,7 +310,7 @@ class _Rounds:
             except PathError:
                 # No pace as smooth as the path is near the one found: that one stands.
                 return
-            planned = options.plan(paced, self.longest)
+            planned = self._plan(paced, self.longest)
             self.verdict = planned.certificate.verdict
             if planned.certificate.on_path and not planned.report.ending:
                 found = self._taken("rounds", planned)
@@ -343,6 +323,32 @@ class _Rounds:
             # Costs that are passed count more in the next round.
             weight = weight if kept else max(_KEPT_WEIGHT, _KEPT_GROWTH * weight)
             pace = _stand_in(self._problem.path, planned.path, found.path)
+
+    def _left(self, kept: float = 0.0) -> float:
+        """Return the time that is left but for what is kept [s]; KeyboardInterrupt for none."""
+        self._clock.check()
+        left = self._clock.end - time.perf_counter() - kept
+        if left <= 0.0:
+            raise KeyboardInterrupt
+        return left
+
+    def _plan(self, problem: Problem, kept: float = 0.0) -> Plan:
+        """Plan, in the time that is left but for what is kept for its pace [s].
+
+        KeyboardInterrupt where something stopped it, or there is none.
+        """
+        left = self._left(kept)
+        try:
+            return plan(
+                problem,
+                search=self._search,
+                tolerance=self._tolerance,
+                deadline=left if np.isfinite(left) else None,
+                progress=self._progress,
+            )
+        except PlanError:
+            self._clock.check()
+            raise
 
     @property
     def _duration(self) -> float:
