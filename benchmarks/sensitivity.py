@@ -3,8 +3,8 @@
 The numbers at the heads of files of `planning`, `search` and `transfer` are doubled and halved, one
 at a time, and a few problems are planned that lead through these: prints how many plans change,
 which are lost or found, how their costs change, and the time of the processor. A number that
-changes nothing may go, or follow from another one. Numbers that are compiled into kernels stay as
-they are.
+changes nothing may go, or follow from another one. Of those that are compiled into kernels nothing
+is told.
 """
 
 from __future__ import annotations

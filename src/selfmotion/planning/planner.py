@@ -33,7 +33,7 @@ _PART_EVALUATIONS = 150
 # The same where the start is free: of many, the one that gets farthest needs no more, and who tries
 # many places waits for it.
 _FREE_PART_EVALUATIONS = 30
-# So many such parts, one shorter than the other, at most.
+# Where the last bit of a part is too rough, so many shorter ones are tried, at most.
 _SHORTER_PARTS = 3
 
 

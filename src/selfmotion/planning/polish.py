@@ -22,7 +22,7 @@ from selfmotion.search import BESIDE
 # are divided so that it is by that, as the error falls with their third power or more; at most into
 # so many parts.
 _NEAR_PATH, _WANTED_NEAR_PATH, _FINER_POWER, _MOST_PARTS = 2e-7, 1e-7, 0.3, 8.0
-# More of them are put in so often, at most.
+# More nodes are put in so often, at most.
 _NODE_ROUNDS = 14
 # Where nodes keep bodies apart and the motion between them does not, they are kept so much farther
 # apart at the points [m].

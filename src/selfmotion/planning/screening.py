@@ -16,7 +16,7 @@ from selfmotion.problem import Problem
 from selfmotion.robot import RobotModel
 from selfmotion.search import carried
 
-# On nodes: steps of Newton's method.
+# Steps of Newton's method for rough motions.
 _ROUGH_ROUNDS = 30
 # Rough optima on nodes whose costs differ by less than this share are mirror images; and joints are
 # within their limits to this share of a turn.

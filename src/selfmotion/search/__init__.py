@@ -3,8 +3,6 @@
 from selfmotion.search.chains import Sequence as Sequence
 from selfmotion.search.curves import (
     SPACING as SPACING,
-    Curve as Curve,
-    CurveSet as CurveSet,
     SelfMotion as SelfMotion,
 )
 from selfmotion.search.guides import (
@@ -22,9 +20,7 @@ from selfmotion.search.obstruction import (
     obstruction as obstruction,
     reachable as reachable,
 )
-from selfmotion.search.single_poses import SinglePoses as SinglePoses
 from selfmotion.search.starts import (
-    Admits as Admits,
     carried as carried,
     spread as spread,
     start_candidates as start_candidates,
