@@ -145,11 +145,13 @@ def best_sequences(
     """
     rough, turning, measure = _rough_motions(layers, asked)
     better = improved_by(layers.waypoints, layers.bounds, layers.steps, measure)
-    # What a chain of samples costs says little of the best one near it, a rough look says much.
-    for stage, roughly in (
-        ("search: optimising sequence", True),
-        ("search: optimising finalist", False),
-    ):
+    stages = [("search: optimising finalist", False)]
+    if isinstance(measure, Length):
+        # A chain's length says little of that of the shortest one near it, a rough look says much.
+        stages.insert(0, ("search: optimising sequence", True))
+    else:
+        del rough[count:]
+    for stage, roughly in stages:
         for number, q in enumerate(rough):
             progress(stage, number + 1, len(rough))
             rough[number] = better(q, roughly)

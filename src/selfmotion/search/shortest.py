@@ -254,14 +254,14 @@ def _smooth(model: CollisionModel | BodiesOfArm, distance: float) -> tuple[Clear
 def improved_by(
     waypoints: OnPath, bounds: Admissible, largest_step: Array, measure: Measure
 ) -> Callable[[Array, bool], Array]:
-    """Return what makes a better chain near q (W, n), never a worse one; and maybe but roughly.
+    """Return what makes a better chain near q (W, n), never a worse one; shorter ones also roughly.
 
     Where something else than length counts, Newton's method goes on from there, and chains only
     have to be near enough.
     """
     asked = waypoints, bounds, largest_step, measure
     if not isinstance(measure, Length):
-        return lambda q, roughly: q if roughly else _cheaper(*asked, q, _ROUGH_RINGS)
+        return lambda q, _: _cheaper(*asked, q, _ROUGH_RINGS)
     shortest = Shortest(waypoints, bounds, largest_step, measure.weights)
 
     def shorter(q: Array, roughly: bool) -> Array:
