@@ -6,7 +6,7 @@ READY := $(VENV)/.ready
 # What is imported by many processes is compiled to bytecode once.
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: demo test lint format bench bench-constrained bench-remaining bench-relaxed bench-batch bench-peers bench-starts bench-places bench-margins bench-bought bench-corrections bench-place bench-first bench-fastest bench-feeds bench-job bench-moved bench-moves bench-raster bench-rails bench-lifts bench-spirals bench-latency docs errors suite suite-made fuzz fuzz-tasks fuzz-cells fuzz-certificate fuzz-deceptions fuzz-generated fuzz-realtime fuzz-files fuzz-job fuzz-kept fuzz-programs arms mutants memory acceptance distances study clean
+.PHONY: demo test lint format bench bench-constrained bench-remaining bench-relaxed bench-batch bench-peers bench-starts bench-places bench-margins bench-bought bench-corrections bench-place bench-first bench-fastest bench-feeds bench-job bench-moved bench-moves bench-raster bench-rails bench-lifts bench-numbers bench-spirals bench-latency docs errors suite suite-made fuzz fuzz-tasks fuzz-cells fuzz-certificate fuzz-deceptions fuzz-generated fuzz-realtime fuzz-files fuzz-job fuzz-kept fuzz-programs arms mutants memory acceptance distances study clean
 
 demo: $(READY)  ## plan, check and replay the paper's planar arm and a Panda, into out/
 	$(BIN)/selfmotion demo --out out
@@ -78,6 +78,9 @@ bench-raster: $(READY)  ## rasters of 700 poses that no single motion follows, i
 
 bench-rails: $(READY)  ## what a metre of a rail is to count: three rails, four weights
 	OMP_NUM_THREADS=1 $(BIN)/python benchmarks/rails.py
+
+bench-numbers: $(READY)  ## what each number of the planner decides: doubled and halved, what changes
+	OMP_NUM_THREADS=1 $(BIN)/python benchmarks/sensitivity.py
 
 bench-lifts: $(READY)  ## paths of an arm on a torso lift, each with a known motion
 	OMP_NUM_THREADS=1 $(BIN)/python benchmarks/lifts.py

@@ -108,7 +108,7 @@ PARTS = (
     ),
     Part(
         "objective",
-        ("paper/objective.py", "paper/cost_integrals.py", "constraints/conditions.py"),
+        ("paper/objective.py", "constraints/conditions.py"),
         (
             "constraints/test_conditions.py",
             "constraints/test_base.py -k 'equality or finite or rows'",
@@ -133,7 +133,7 @@ PARTS = (
     ),
     Part(
         "bounds",
-        ("basics/series.py", "robot/chain_series.py", "motion/polynomials.py"),
+        ("basics/series.py", "robot/chain_series.py", "motion/spline.py"),
         (
             "basics/test_series.py",
             "robot/test_chain_series.py",

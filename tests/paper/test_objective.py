@@ -12,7 +12,7 @@ from selfmotion.motion import NullMotionTable, PolynomialNullMotion
 from selfmotion.motion.grid import Grid
 from selfmotion.paper import Objective, StillMotion
 from selfmotion.paper.rollout import Rollout
-from selfmotion.paper.start import FixedStart
+from selfmotion.paper.still import FixedStart
 from support.arms import (
     PANDA_HOME,
     Case,

@@ -10,7 +10,7 @@ from selfmotion.follow import Follows
 from selfmotion.motion import NullMotionTable
 from selfmotion.motion.grid import Grid
 from selfmotion.paper.rollout import Rollout
-from selfmotion.paper.start import FixedStart
+from selfmotion.paper.still import FixedStart
 from support.arms import Case, central_difference, objective_of, robot_named, short_line, start_of
 from support.rollouts import random_epsilon, rollout_of
 

@@ -5,7 +5,7 @@ import pytest
 
 from selfmotion.basics import Array
 from selfmotion.follow import Follows
-from selfmotion.paper.start import FreeStart
+from selfmotion.paper.still import FreeStart
 from support.arms import robot_named, short_line, start_of
 from support.two_arms import both_arms
 

@@ -9,7 +9,7 @@ import pinocchio as pin
 import pytest
 
 import selfmotion as sm
-from selfmotion.planning.kept_costs import KeptCosts
+from selfmotion.planning.fastest import _KeptCosts
 from support.arms import PANDA_HOME, robot_named
 
 # What the fastest motion uses of a limit somewhere at all times but where the jerk takes over, by
@@ -101,7 +101,7 @@ def test_costs_are_kept_at_the_time_law_of_the_path() -> None:
     """No cheaper than asked, no slower than retiming; what nothing costs is named."""
     problem = slow_line()
     best, cost = sm.plan(problem), sm.costs.JointVelocity()
-    kept = KeptCosts.of(problem, {cost.kind: KEPT})
+    kept = _KeptCosts.of(problem, {cost.kind: KEPT})
 
     def twice(stage: str, done: int, total: int) -> None:
         if stage == "fastest" and done == 2:

@@ -9,8 +9,7 @@ import selfmotion as sm
 from selfmotion.basics import Counts, silent
 from selfmotion.planning.effort import Effort
 from selfmotion.planning.planner import Planner
-from selfmotion.planning.postures import is_long
-from selfmotion.planning.settings import VERY_LONG_WAY
+from selfmotion.planning.proposals import VERY_LONG_WAY, is_long
 from support.arms import robot_named
 
 NAME = "posture of a stretch"

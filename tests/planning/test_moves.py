@@ -5,7 +5,7 @@ import pinocchio as pin
 
 import selfmotion as sm
 import selfmotion.testing
-from selfmotion.planning.moves import Mover, between_parts
+from selfmotion.planning.parts import _Mover, between_parts
 from support.arms import robot_named
 from support.oracle import Judge
 from support.own_kinematics import Arm
@@ -29,7 +29,7 @@ def test_moves_go_round_what_is_in_the_way(tmp_path) -> None:
         sm.constraints.JointAccelerationLimits(20.0),
     ]
     problem = sm.Problem(robot, path, "pose", constraints=[*limits, clearance])
-    mover = Mover(between_parts(problem), None, np.random.default_rng(0), lambda *_: None)
+    mover = _Mover(between_parts(problem), None, np.random.default_rng(0), lambda *_: None)
 
     def refuted(motion: sm.Trajectory) -> tuple[str, ...]:
         followed = Followed(kinematics, motion, motion.duration)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.planning.posture import far_from_usual, usual_posture, wound_back
+from selfmotion.planning.screening import far_from_usual, usual_posture, wound_back
 from support.arms import robot_named
 
 WHOLE = 2.0 * np.pi

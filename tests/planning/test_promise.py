@@ -5,8 +5,7 @@ import numpy as np
 import selfmotion as sm
 from selfmotion.basics import Array
 from selfmotion.motion import Grid
-from selfmotion.planning.screening import most_promising
-from selfmotion.planning.settings import ONE_VALLEY
+from selfmotion.planning.screening import ONE_VALLEY, most_promising
 from selfmotion.search import carried, start_candidates
 from support.arms import robot_named
 from support.paths import line_of

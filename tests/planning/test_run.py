@@ -12,8 +12,8 @@ import yourdfpy
 import selfmotion as sm
 from selfmotion.certificate import Certificate, Extreme
 from selfmotion.optimise import Status
-from selfmotion.planning.outcome import message_of, status_of
 from selfmotion.planning.polish import Polisher
+from selfmotion.planning.run import message_of, status_of
 from support.arms import robot_named
 
 # Share of the cost that finer nodes may still save.

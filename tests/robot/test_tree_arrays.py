@@ -11,7 +11,7 @@ import selfmotion as sm
 from selfmotion.basics import Array
 from selfmotion.certificate import path_error
 from selfmotion.motion import NullMotionTable, PolynomialNullMotion
-from selfmotion.paper.start import FixedStart
+from selfmotion.paper.still import FixedStart
 from selfmotion.robot import Dynamics, Energy, ToolRates
 from selfmotion.robot.tree_arrays import JOINT
 from support.arms import Case, central_difference, objective_of, short_line

@@ -1,12 +1,14 @@
 """Steps that no motion takes are found, and chains do without them."""
 
+import sys
+
 import numpy as np
 import pytest
 
 import selfmotion as sm
 from selfmotion.basics import Array
-from selfmotion.search import Stretch, Stretches, stretches as stretches_module
-from selfmotion.search.jumps import jumps_of
+from selfmotion.search import Stretch, Stretches
+from selfmotion.search.stretches import jumps_of
 from support.arms import robot_named
 
 # Arms and tasks: redundancy 1, by a joint or by a row that is free.
@@ -70,7 +72,7 @@ def test_chains_do_without_jumps(monkeypatch: pytest.MonkeyPatch) -> None:
     def few(problem: sm.Problem) -> np.ndarray:
         return np.linspace(0.0, problem.path.duration, WAYPOINTS)
 
-    monkeypatch.setattr(stretches_module, "waypoint_times", few)
+    monkeypatch.setattr(sys.modules["selfmotion.search.guides"], "waypoint_times", few)
     stretches = Stretches.of(wound())
     # What the samples alone would do.
     assert any(_jumps(stretches, item) for item in stretches._found(set()))

@@ -6,8 +6,13 @@ from scipy.interpolate import make_interp_spline
 
 import selfmotion as sm
 from selfmotion.basics import Array
-from selfmotion.search.obstruction import Obstruction, obstruction
-from selfmotion.search.remedies import least_deviation, least_excess, nearest_place
+from selfmotion.search.obstruction import (
+    Obstruction,
+    least_deviation,
+    least_excess,
+    nearest_place,
+    obstruction,
+)
 from support.arms import robot_named
 
 # Remedies are as tight as their last round, and the path is moved a bit farther than it has to be.

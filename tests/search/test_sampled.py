@@ -4,12 +4,13 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.basics import Array
+from selfmotion.basics import Array, silent
 from selfmotion.basics.errors import NoSequenceError
 from selfmotion.follow import Follows
-from selfmotion.search.manifold import Manifold
-from selfmotion.search.sampled import sampled_sequences
-from selfmotion.search.waypoints import OnPath
+from selfmotion.search.manifold import Manifold, OnPath
+from selfmotion.search.nodes import Admissible
+from selfmotion.search.sampled import sampled_layers
+from selfmotion.search.sequences import best_sequences
 from support.arms import robot_named
 from support.followed import standing
 from support.paths import line_of
@@ -18,19 +19,16 @@ STEP = 0.5
 
 
 def searched(
-    robot: sm.RobotModel, path: sm.paths.Path, **options: object
+    robot: sm.RobotModel,
+    path: sm.paths.Path,
+    bodies: tuple[tuple[sm.obstacles.CollisionModel, float], ...] = (),
 ) -> list[sm.search.Sequence]:
-    values = {
-        "lower": robot.lower,
-        "upper": robot.upper,
-        "largest_step": np.full((20, robot.dof), STEP),
-        "weights": robot.joint_weights,
-        "count": 2,
-    }
     t = np.linspace(0.0, path.duration, 21)
-    follows = Follows.of(robot, path, sm.Task.POSITION)
-    waypoints = OnPath(follows, t, robot.lower, robot.upper)
-    return sampled_sequences(waypoints, t, **(values | options))
+    follows, limits = Follows.of(robot, path, sm.Task.POSITION), (robot.lower, robot.upper)
+    waypoints, steps = OnPath(follows, t, *limits), np.full((20, robot.dof), STEP)
+    weights = robot.joint_weights
+    layers = sampled_layers(waypoints, t, steps, limits, bodies, weights, 0, silent)
+    return best_sequences(layers, 2, None, silent)
 
 
 def test_sequences_follow_the_path_keep_all_and_are_as_long_as_they_say() -> None:
@@ -38,7 +36,7 @@ def test_sequences_follow_the_path_keep_all_and_are_as_long_as_they_say() -> Non
     path = line_of(robot, "position")
     post = sm.obstacles.Sphere("post", path.pose(1.0).translation - [0.0, 0.25, 0.0], 0.05)
     model = sm.obstacles.CollisionModel(robot, [post])
-    found = searched(robot, path, bodies=[(model, 2e-3)])
+    found = searched(robot, path, bodies=((model, 2e-3),))
     lengths = [sequence.length for sequence in found]
     assert lengths == sorted(lengths)
     for sequence in found:
@@ -49,7 +47,7 @@ def test_sequences_follow_the_path_keep_all_and_are_as_long_as_they_say() -> Non
         assert np.all((q >= robot.lower) & (q <= robot.upper))
         assert np.abs(np.diff(q, axis=0)).max() <= STEP
         assert sequence.length == pytest.approx(np.abs(np.diff(q, axis=0)).sum())
-    again = searched(robot, path, bodies=[(model, 2e-3)])
+    again = searched(robot, path, bodies=((model, 2e-3),))
     assert all(np.array_equal(a.q, b.q) for a, b in zip(found, again, strict=True))
 
 
@@ -101,3 +99,15 @@ def test_metres_are_not_added_to_radians_unasked() -> None:
     panda = robot_named("panda")
     (plain,) = sm.Problem(panda, line_of(panda, "pose")).costs
     assert (plain.name, float(plain.weight)) == ("joint velocity", 1.0)
+
+
+def test_joints_that_stand_at_their_limits_are_nodes_within_these() -> None:
+    rng = np.random.default_rng(0)
+    lower = -rng.uniform(0.1, 3.0, 5000)
+    upper = rng.uniform(0.1, 3.0, 5000)
+    bounds = Admissible(lower, upper, np.ones(5000, dtype=bool), ())
+    # A turn there and back rounds some of them beyond.
+    assert (bounds.representative(upper) > upper).any()
+    nodes = bounds.layer(np.stack([lower, upper]))
+    assert np.all((nodes >= lower) & (nodes <= upper))
+    np.testing.assert_allclose(np.sort(nodes, axis=0), np.stack([lower, upper]), atol=1e-14)

@@ -6,9 +6,9 @@ import pytest
 import selfmotion as sm
 from selfmotion.basics import Array
 from selfmotion.follow import Follows
+from selfmotion.search.manifold import OnPath
 from selfmotion.search.nodes import Admissible
 from selfmotion.search.shortest import Shortest
-from selfmotion.search.waypoints import OnPath
 from support.arms import robot_named
 from support.paths import line_of
 

@@ -14,7 +14,7 @@ from selfmotion.follow import Follows
 from selfmotion.motion import NullMotionTable, PolynomialNullMotion
 from selfmotion.motion.grid import Grid
 from selfmotion.paper.rollout import Rollout
-from selfmotion.paper.start import FixedStart
+from selfmotion.paper.still import FixedStart
 from selfmotion.task.damping import DampingLaw
 from support.arms import Case, central_difference, objective_of
 from support.rollouts import assert_sensitivities

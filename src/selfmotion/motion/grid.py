@@ -1,14 +1,106 @@
-"""The times at which a motion is integrated."""
+"""When a motion is looked at, and the times at which it is integrated."""
 
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from selfmotion.basics import Array, read_only
-from selfmotion.motion.sampling import Sampling
+
+_STENCIL = 5
+
+
+@dataclass(frozen=True, eq=False)
+class Sampling:
+    """Sample times with their quadrature weights, and the nodes among them.
+
+    Attributes
+    ----------
+    t : (S,)
+        Times [s], not decreasing.
+    weights : (S,)
+        Quadrature weights [s]: ∫ G dt ≈ weights · G.
+    nodes : (N + 1,)
+        Indices of the samples that are nodes: there each time comes once, and between them the
+        motion is smooth.
+    """
+
+    t: Array
+    weights: Array
+    nodes: npt.NDArray[np.intp]
+
+    def __post_init__(self) -> None:
+        # Costs are handed these times.
+        object.__setattr__(self, "t", read_only(self.t))
+
+    @classmethod
+    def trapezoidal(cls, t: Array) -> "Sampling":
+        """Return samples that are all nodes, joined by straight lines."""
+        steps = np.diff(t)
+        weights = 0.5 * (np.append(steps, 0.0) + np.append(0.0, steps))
+        return cls(t, weights, np.arange(len(t)))
+
+    @property
+    def node_times(self) -> Array:
+        """Times of the nodes [s], (N + 1,)."""
+        return self.t[self.nodes]
+
+    def differentiation(self, order: int) -> Any:
+        """Return the sparse matrix (S, N + 1) from values at the nodes to a derivative at samples.
+
+        Five-point finite differences (weights of B. Fornberg, Math. Comp. 51, 1988).
+
+        Parameters
+        ----------
+        order : {1, 2}
+            Of the derivative.
+        """
+        if order not in self._operators:
+            self._operators[order] = _differentiation(self.node_times, self.t, order)
+        return self._operators[order]
+
+    def node_differentiation(self, order: int) -> Any:
+        """Return the rows of `differentiation` for the nodes, sparse (N + 1, N + 1)."""
+        if order not in self._at_nodes:
+            self._at_nodes[order] = self.differentiation(order)[self.nodes]
+        return self._at_nodes[order]
+
+    @cached_property
+    def _at_nodes(self) -> dict[int, Any]:
+        return {}
+
+    @cached_property
+    def _operators(self) -> dict[int, Any]:
+        return {}
+
+
+def _differentiation(nodes: Array, times: Array, order: int) -> Any:
+    from scipy.sparse import csr_array
+
+    count = min(_STENCIL, len(nodes))
+    nearest = np.searchsorted(nodes, times) - count // 2
+    first = np.clip(nearest, 0, len(nodes) - count)
+    columns = first[:, None] + np.arange(count)
+    weights = _fornberg(nodes[columns] - times[:, None], order)
+    rows = np.repeat(np.arange(len(times)), count)
+    shape = (len(times), len(nodes))
+    return csr_array((weights.ravel(), (rows, columns.ravel())), shape=shape)
+
+
+def _fornberg(offsets: Array, order: int) -> Array:
+    """Return weights (S, k) of the derivative at 0 from values at `offsets` (S, k).
+
+    Exact for polynomials of degree < k: a small Vandermonde system, scaled against rounding.
+    """
+    scale = np.abs(offsets).max(axis=1, keepdims=True)
+    powers = np.arange(offsets.shape[1])
+    vandermonde = (offsets / scale)[:, None, :] ** powers[None, :, None]
+    target = np.zeros((len(offsets), len(powers), 1))
+    target[:, order, 0] = float(np.prod(np.arange(1, order + 1))) / scale[:, 0] ** order
+    return np.asarray(np.linalg.solve(vandermonde, target)[:, :, 0])
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,26 +128,11 @@ class Grid:
         ]
         return cls(read_only(np.append(np.concatenate(pieces), knots[-1])))
 
-    def halved(self, where: npt.NDArray[np.bool_] | None = None, share: float = 0.5) -> "Grid":
-        """Return the grid with every step cut in two, or those `where` (N,) says so.
-
-        The first part of each is this share of it.
-        """
-        middles = (1.0 - share) * self.nodes[:-1] + share * self.nodes[1:]
+    def halved(self, where: npt.NDArray[np.bool_] | None = None) -> "Grid":
+        """Return the grid with every step cut in two, or those `where` (N,) says so."""
+        middles = 0.5 * self.nodes[:-1] + 0.5 * self.nodes[1:]
         cut = middles if where is None else middles[where]
         return Grid(read_only(np.sort(np.concatenate([self.nodes, cut]))))
-
-    def graded(self, most: float) -> "Grid":
-        """Return the grid with steps halved until none is so many times one beside it."""
-        steps = np.diff(self.nodes)
-        beside = np.minimum(np.append(steps[1:], np.inf), np.append(np.inf, steps[:-1]))
-        # Rounding makes no step longer.
-        long = steps > most * (1.0 + 1e-6) * beside
-        return self.halved(long).graded(most) if long.any() else self
-
-    def with_steps(self, fewest: int) -> "Grid":
-        """Return the grid halved until it has so many steps."""
-        return self if self.steps >= fewest else self.halved().with_steps(fewest)
 
     @property
     def steps(self) -> int:

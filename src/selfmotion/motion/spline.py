@@ -1,22 +1,139 @@
-"""The polynomials of a motion between its samples, and the ways that joints make on them."""
+"""The polynomials of a motion between its samples: many at once, and the ways that joints make.
+
+p(s) = Σ c_k s^k on 0 ≤ s ≤ 1, coefficients (m + 1, …) lowest first.
+"""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
+from math import comb
 
 import numpy as np
+import numpy.typing as npt
 
 from selfmotion.basics import Array, Ints
-from selfmotion.motion.polynomials import (
-    differentiated,
-    evaluated,
-    hermite,
-    inner_roots,
-    may_vanish,
-)
 
+# A leading coefficient of no more than this share of the largest one is none.
+_NOTHING = 1e-13
+# Roots with a smaller imaginary part are real ones, or two that rounding keeps apart.
+_REAL = 1e-6
+# How far outside a root is still looked at.
+_NEAR = 1e-3
+# Newton's steps that a root gets.
+_STEPS = 3
 # Intervals that are looked at together.
 _LOT = 16_384
+
+
+def evaluated(coefficients: Array, s: Array) -> Array:
+    """Return p(s), by Horner's rule; `s` broadcasts with one coefficient of all polynomials."""
+    value = np.zeros(np.broadcast_shapes(coefficients.shape[1:], np.shape(s)))
+    for coefficient in coefficients[::-1]:
+        value = value * s + coefficient
+    return value
+
+
+def differentiated(coefficients: Array) -> Array:
+    """Return the coefficients of dp/ds, one fewer, but at least one."""
+    if len(coefficients) == 1:
+        return np.zeros_like(coefficients)
+    powers = np.arange(1.0, len(coefficients))
+    return np.asarray(coefficients[1:] * powers.reshape(-1, *np.ones(coefficients.ndim - 1, int)))
+
+
+def may_pass(coefficients: Array, least: Array, largest: Array) -> npt.NDArray[np.bool_]:
+    """Return which polynomials (m + 1, P, n) may leave least..largest (n,) inside, (P, n).
+
+    A polynomial lies in the hull of its Bernstein coefficients, the first and last of which are
+    its ends.
+    """
+    inner = np.tensordot(_bernstein(len(coefficients) - 1), coefficients, 1)
+    if not len(inner):
+        return np.zeros(coefficients.shape[1:], dtype=bool)
+    return np.asarray((inner.max(axis=0) > largest) | (inner.min(axis=0) < least))
+
+
+def may_vanish(coefficients: Array) -> npt.NDArray[np.bool_]:
+    """Return which polynomials (m + 1, …) may be 0 somewhere inside: not those of one sign."""
+    inner = np.tensordot(_bernstein(len(coefficients) - 1), coefficients, 1)
+    hull = np.concatenate([coefficients[:1], inner, coefficients.sum(axis=0, keepdims=True)])
+    return np.asarray((hull.max(axis=0) >= 0.0) & (hull.min(axis=0) <= 0.0))
+
+
+def inner_roots(coefficients: Array) -> Array:
+    """Return the real roots of M polynomials (m + 1, M) in 0 < s < 1, (m, M); 0 stands for none."""
+    degree, count = len(coefficients) - 1, coefficients.shape[1]
+    roots = np.zeros((degree, count))
+    if not degree or not count:
+        return roots
+    size = np.abs(coefficients).max(axis=0)
+    scaled = coefficients / np.where(size > 0.0, size, 1.0)
+    lower = np.abs(scaled[-1]) <= _NOTHING
+    roots[:-1, lower] = inner_roots(scaled[:-1, lower])
+    rest = scaled[:, ~lower]
+    found = _all_roots(rest / rest[-1])
+    real = np.where(np.abs(found.imag) <= _REAL, found.real, 0.0)
+    real = _polished(rest, np.where((real > -_NEAR) & (real < 1.0 + _NEAR), real, 0.0))
+    roots[:, ~lower] = np.where((real > 0.0) & (real < 1.0), real, 0.0)
+    return roots
+
+
+def _polished(coefficients: Array, roots: Array) -> Array:
+    """Return roots (m, M), but for zeros, after Newton's steps that make |p| smaller.
+
+    Small leading coefficients cost the companion matrix digits.
+    """
+    slopes = differentiated(coefficients)
+    value = evaluated(coefficients, roots)
+    for _ in range(_STEPS):
+        slope = evaluated(slopes, roots)
+        moved = roots - value / np.where(slope == 0.0, np.inf, slope)
+        there = evaluated(coefficients, moved)
+        better = (np.abs(there) < np.abs(value)) & (roots != 0.0)
+        roots, value = np.where(better, moved, roots), np.where(better, there, value)
+    return roots
+
+
+def _all_roots(monic: Array) -> npt.NDArray[np.complexfloating]:
+    """Return the roots of polynomials (m + 1, M) with leading coefficient 1, (m, M)."""
+    degree, count = len(monic) - 1, monic.shape[1]
+    if degree == 1:
+        return -monic[:1] + 0.0j
+    companion = np.zeros((count, degree, degree))
+    companion[:, 1:, :-1] = np.eye(degree - 1)
+    companion[:, :, -1] = -monic[:-1].T
+    return np.asarray(np.linalg.eigvals(companion).T)
+
+
+@cache
+def _bernstein(degree: int) -> Array:
+    """Return the matrix from coefficients to the inner Bernstein coefficients, (m - 1, m + 1)."""
+    rows = range(1, degree)
+    return np.array(
+        [[comb(i, k) / comb(degree, k) for k in range(degree + 1)] for i in rows]
+    ).reshape(-1, degree + 1)
+
+
+def hermite(h: Array, *given: tuple[Array, Array]) -> Array:
+    """Return the coefficients of 1, s, s² … that meet both ends of intervals, (4 or 6, I, n).
+
+    Of intervals h (I, 1) long: values and slopes at both ends, (I, n) each, and for a quintic
+    second derivatives; s goes from 0 to 1.
+    """
+    (start, end), (rate, last) = given[0], (h * side for side in given[1])
+    if len(given) == 2:
+        rise, gain = end - start - rate, last - rate
+        return np.stack([start, rate, 3.0 * rise - gain, gain - 2.0 * rise])
+    bend, bent = (0.5 * h**2 * side for side in given[2])
+    rise = end - start - rate - bend
+    gain = last - rate - 2.0 * bend
+    surge = bent - bend
+    higher = (
+        10.0 * rise - 4.0 * gain + surge,
+        7.0 * gain - 15.0 * rise - 2.0 * surge,
+        6.0 * rise - 3.0 * gain + surge,
+    )
+    return np.stack([start, rate, bend, *higher])
 
 
 @dataclass(frozen=True, eq=False)

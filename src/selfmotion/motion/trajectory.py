@@ -1,4 +1,4 @@
-"""A joint motion over time."""
+"""A joint motion over time: what it is, how it is read, joined and turned round."""
 
 from __future__ import annotations
 
@@ -14,20 +14,69 @@ from selfmotion.basics import (
     Array,
     FileFormatError,
     as_number,
+    as_path,
     digest_of,
     plain_numbers,
     read_only,
+    read_table,
     series,
     shown,
 )
-from selfmotion.motion.columns import read_columns
-from selfmotion.motion.polynomials import differentiated, evaluated, inner_roots, may_pass
-from selfmotion.motion.spline import Spline
+from selfmotion.motion.spline import Spline, differentiated, evaluated, inner_roots, may_pass
 
+# What follows a joint's name in the header of the columns of its velocity and acceleration.
+_MANY = {"_velocity": "velocities", "_acceleration": "accelerations"}
+_RATES = tuple(_MANY)
 # A last sample as near to its end as this [s] is at its end.
 _MOMENT = 0.5e-9
 # More samples than this do not fit into memory, and no controller wants them.
 MOST_SAMPLES = 1e7
+
+
+def column_names(joint_names: Sequence[str]) -> list[str]:
+    """Return what the columns of a motion's table are called: t, and each joint's q, q̇ and q̈."""
+    return ["t", *(name + ending for ending in ("", *_RATES) for name in joint_names)]
+
+
+def read_columns(
+    file: str | Path, degrees: bool
+) -> tuple[Array, tuple[str, ...], tuple[Array, Array | None, Array | None]]:
+    """Return times (N,), the joints' names, and q, q̇, q̈ (N, n) as far as they are given.
+
+    Raises
+    ------
+    FileFormatError
+        The file cannot be read, or a column is missing.
+    """
+    header, table = read_table(as_path(file))
+    column = {name: table[:, i] for i, name in enumerate(header)}
+    names = tuple(name for name in header if name != "t" and not name.endswith(_RATES))
+    if "t" not in column or not names:
+        raise FileFormatError(
+            f"{file}: the header is {','.join(header)}, expected t and a column per joint"
+        )
+    scale = np.pi / 180.0 if degrees else 1.0
+
+    def table_of(ending: str) -> Array:
+        return scale * np.stack([column[name + ending] for name in names], axis=1)
+
+    rates: list[Array | None] = [None, None]
+    for order, ending in enumerate(_RATES):
+        given = {name for name in header if name.endswith(ending)}
+        if not given:
+            continue
+        wanted = {name + ending for name in names}
+        if given != wanted:
+            raise FileFormatError(
+                f"{file}: column '{min(given ^ wanted)}' does not match; {_MANY[ending]} are given "
+                f"for all joints or for none, as NAME{ending}"
+            )
+        rates[order] = table_of(ending)
+    if rates[0] is None and rates[1] is not None:
+        raise FileFormatError(
+            f"{file}: has accelerations but no velocities; give NAME{_RATES[0]} as well"
+        )
+    return column["t"], names, (table_of(""), rates[0], rates[1])
 
 
 @dataclass(frozen=True, eq=False)
@@ -304,3 +353,72 @@ class Trajectory:
     @cached_property
     def _spline(self) -> Spline:
         return Spline(self.t, self.q, self.qd, self.qdd)
+
+
+@dataclass(frozen=True, eq=False)
+class Evaluation:
+    """A motion of the objective, on its own: nothing done later changes it.
+
+    Attributes
+    ----------
+    x : (size,)
+        The decision vector.
+    terms : dict
+        What each cost contributes to F.
+    trajectory : Trajectory
+        Its nodes put onto the path, unless damped.
+    damped : bool
+        Whether the inverse was damped anywhere.
+    """
+
+    x: Array
+    terms: dict[str, float]
+    trajectory: Trajectory
+    damped: bool
+
+    @property
+    def cost(self) -> float:
+        """F."""
+        return sum(self.terms.values())
+
+
+def joined_motions(motions: Sequence[Trajectory]) -> Trajectory:
+    """Return motions one after the other as one, from t = 0 on.
+
+    Each begins in the configuration in which the one before it ends, as fast, and accelerating as
+    much. Cubic where all of them are; where some are, these are quintic in the whole, and so not
+    quite the same between their samples.
+    """
+    orders = _orders(motions)
+    t, tables = [motions[0].t[:1] * 0.0], [[motions[0](motions[0].t[:1], k)] for k in orders]
+    for motion in motions:
+        t.append(t[-1][-1] + motion.t[1:] - motion.t[0])
+        for order, table in enumerate(tables):
+            table.append(motion(motion.t[1:], order))
+    q, qd, *faster = (np.concatenate(table) for table in tables)
+    return Trajectory(np.concatenate(t), q, qd, motions[0].joint_names, *faster)
+
+
+def reversed_motion(motion: Trajectory) -> Trajectory:
+    """Return a motion backwards in time, from t = 0 on."""
+    t = motion.t
+    q, qd, *faster = (motion(t, order)[::-1] for order in _orders([motion]))
+    return Trajectory(t[-1] - t[::-1], q, -qd, motion.joint_names, *faster)
+
+
+def _orders(motions: Sequence[Trajectory]) -> range:
+    """Return which derivatives say what motions are between their samples."""
+    return range(2 if all(motion.qdd is None for motion in motions) else 3)
+
+
+def slowdown_of(motion: Trajectory, limits: Sequence[Array]) -> float:
+    """Return how many times as long a motion would have to take to keep limits at all times.
+
+    Of q̇, q̈, … in turn, (n,) each; inf where there is none. Below 1 it might be faster.
+    """
+    shares = (
+        float((np.abs(motion.extremes(order)[1]) / limit).max()) ** (1.0 / order)
+        for order, limit in enumerate(limits, 1)
+        if np.isfinite(limit).any()
+    )
+    return max(shares, default=0.0)

@@ -11,9 +11,8 @@ from selfmotion.optimise.base import (
     inverse_metric as inverse_metric,
 )
 from selfmotion.optimise.blocks import Banded as Banded
-from selfmotion.optimise.line_search import LineSearch as LineSearch
 from selfmotion.optimise.quadratic import minimize_quadratic as minimize_quadratic
-from selfmotion.optimise.quasi_newton import QuasiNewton as QuasiNewton
+from selfmotion.optimise.quasi_newton import LineSearch as LineSearch, QuasiNewton as QuasiNewton
 
 __all__ = [
     "Function",

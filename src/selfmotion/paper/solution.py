@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Self, TypeVar
 
 import numpy as np
 
@@ -147,11 +148,6 @@ class Solution:
     history: tuple[Iteration, ...] = ()
 
     @property
-    def is_optimised(self) -> bool:
-        """Whether an optimisation has ended, however it did: it need not tell of its way."""
-        return self.inverse_hessian is not None or self.status is not Status.STOPPED
-
-    @property
     def null_motion(self) -> NullMotion:
         """The parameterisation of the null motion."""
         return self.method.problem.null_motion
@@ -189,7 +185,7 @@ class Solution:
         """Return the motion at x = 0 on this grid."""
         return self.objective.at(np.zeros_like(self.x))
 
-    def refined(self, where: Flags | None = None) -> "Solution":
+    def refined(self, where: Flags | None = None) -> Self:
         """Return it with half the step length, everywhere or for some of the steps (N,).
 
         With its ends met there, but not optimised anew.
@@ -201,7 +197,7 @@ class Solution:
         """
         return self._on(self.method.on(self.objective.grid.halved(where)))
 
-    def again(self) -> "Solution":
+    def again(self) -> Self:
         """Return the optimum on its grid, from here; interrupted, the best so far."""
         if self.unmet:
             return replace(self, status=Status.INFEASIBLE)
@@ -219,14 +215,14 @@ class Solution:
             return replace(found, status=Status.INTERRUPTED)
         return found
 
-    def settled(self) -> "Solution":
+    def settled(self) -> Self:
         """Return the optimum on its grid, and on halved ones until the cost agrees."""
         try:
             return _settled(self._on(self.objective).again())
         except KeyboardInterrupt:
             return replace(self, status=Status.INTERRUPTED)
 
-    def _optimised(self, before: int | None) -> tuple["Solution", int | None]:
+    def _optimised(self, before: int | None) -> tuple[Self, int | None]:
         """Return the optimum as far as the unknowns lead, and their number; None for x itself.
 
         `before` is the number of those that led here: the callback knows the start then.
@@ -254,12 +250,15 @@ class Solution:
         better = replace(self, x=x, inverse_hessian=inverse, status=status, history=history)
         return better, size
 
-    def _on(self, objective: Objective) -> "Solution":
+    def _on(self, objective: Objective) -> Self:
         """Return it by another objective of the same unknowns, with its ends met."""
         if not np.isfinite(objective.value(self.x)):
             objective.require_finite(self.x)
         x = closed(objective, self.x) if objective.ends and len(self.x) else self.x
         return replace(self, objective=objective, x=x)
+
+
+_Solution = TypeVar("_Solution", bound=Solution)
 
 
 def solve(
@@ -323,7 +322,7 @@ def solve(
     return Solution(method, objective, x).settled()
 
 
-def _settled(found: Solution) -> Solution:
+def _settled(found: _Solution) -> _Solution:
     """Return the optimum on halved grids, once its cost agrees with that on the one before."""
     rises, most = 0, found.method.still.grid.steps * 2**MOST_HALVINGS
     try:

@@ -6,8 +6,8 @@ from selfmotion.planning.branches import (
     like_before as like_before,
     near_start as near_start,
 )
+from selfmotion.planning.candidate import check_joints as check_joints
+from selfmotion.planning.effort import Search as Search
 from selfmotion.planning.fastest import Fastest as Fastest, fastest as fastest
 from selfmotion.planning.parts import plan_in_parts as plan_in_parts
 from selfmotion.planning.run import plan as plan
-from selfmotion.planning.search import Search as Search
-from selfmotion.planning.warm_start import check_joints as check_joints

@@ -8,20 +8,21 @@ import numpy as np
 from selfmotion.basics import Array, Progress, SelfmotionError, description_of, silent
 from selfmotion.costs import Cost, FunctionCost
 from selfmotion.optimise import Status
+from selfmotion.planning.effort import Search
 from selfmotion.planning.grids import rough_grid
-from selfmotion.planning.posture import wound_back
 from selfmotion.planning.run import plan
-from selfmotion.planning.search import Search
-from selfmotion.planning.settings import (
-    BRANCH_EVALUATIONS,
-    BRANCH_STARTS,
-    BRANCH_TRIES,
-    SAME_ENDS,
-)
+from selfmotion.planning.screening import wound_back
 from selfmotion.problem import Problem
 from selfmotion.result import Plan
 from selfmotion.search import carried, start_candidates
 from selfmotion.transfer import Room
+
+# So many starts are tried for each branch that is asked for, until so many have failed; plans from
+# each take so many evaluations at most, and are the same where both their ends are as near as this
+# [rad or m].
+_BRANCH_TRIES = 4
+_BRANCH_EVALUATIONS = 60
+_SAME_ENDS = 0.2
 
 
 def branches(
@@ -57,13 +58,13 @@ def branches(
     found: list[Plan] = []
     reason, failed = "", 0
     for number, start in enumerate(_spread(allowed or problem, rng), 1):
-        if len(found) == count or failed == BRANCH_TRIES or number > BRANCH_TRIES * count:
+        if len(found) == count or failed == _BRANCH_TRIES or number > _BRANCH_TRIES * count:
             break
-        progress("branch", number, BRANCH_TRIES * count)
+        progress("branch", number, _BRANCH_TRIES * count)
         made, why = from_start(problem, start)
         failed += made is None
         reason = reason or why
-        if made is not None and all(_apart(made, other) > SAME_ENDS for other in found):
+        if made is not None and all(_apart(made, other) > _SAME_ENDS for other in found):
             found.append(made)
     if found or allowed is not None:
         return found, "" if found else reason or _nowhere(allowed or problem)
@@ -101,7 +102,7 @@ def from_start(
     """
     given = replace(problem, start=start)
     try:
-        made = _whole(plan(given, warm_start=before, max_evaluations=BRANCH_EVALUATIONS))
+        made = _whole(plan(given, warm_start=before, max_evaluations=_BRANCH_EVALUATIONS))
     except SelfmotionError as error:
         return None, str(error)
     if made.certificate.verified:
@@ -150,7 +151,7 @@ def _spread(problem: Problem, rng: np.random.Generator) -> list[Array]:
     follows = problem.follows.for_robot(robot)
     room = _room(problem)
     try:
-        starts = np.array(start_candidates(follows, BRANCH_STARTS, rng, room.free))
+        starts = np.array(start_candidates(follows, Search().starts, rng, room.free))
     except SelfmotionError:
         return []
     starts = starts[room.free(starts)]
@@ -180,7 +181,7 @@ def _nowhere(problem: Problem) -> str:
     """Return why a path cannot even be begun."""
     asked, follows = problem.envelope, problem.follows.for_robot(problem.robot)
     try:
-        starts = np.array(start_candidates(follows, BRANCH_TRIES, np.random.default_rng(0)))
+        starts = np.array(start_candidates(follows, _BRANCH_TRIES, np.random.default_rng(0)))
     except SelfmotionError as error:
         return str(error)
     for model, far in asked.bodies:

@@ -5,25 +5,123 @@ from dataclasses import replace
 
 import numpy as np
 
-from selfmotion.basics import Array, Flags, ProblemError
+from selfmotion.basics import Array, Flags, InverseKinematicsError, ProblemError, shown
 from selfmotion.constraints import BoundConstraint, BoundEnd
-from selfmotion.motion import Evaluation, FreeNullMotion, Grid, PolynomialNullMotion, Trajectory
+from selfmotion.motion import (
+    Evaluation,
+    FreeNullMotion,
+    Grid,
+    NullMotionTable,
+    PolynomialNullMotion,
+    Trajectory,
+)
 from selfmotion.optimise import Iteration, QuasiNewton, Status
 from selfmotion.paper import (
     MOST_HALVINGS,
     Guide,
     Method,
     Objective,
-    Solution as PaperSolution,
     settled_still_motion,
 )
 from selfmotion.planning.effort import Effort
 from selfmotion.planning.grids import first_nodes, is_on_nodes, is_published, most_nodes
 from selfmotion.planning.polish import Polisher
 from selfmotion.planning.solutions import NodeSolution, PublishedSolution, Solution, score
-from selfmotion.planning.warm_start import coefficients_of, moved_to, pace_of, slower
 from selfmotion.problem import Problem
 from selfmotion.result import Plan
+from selfmotion.robot import RobotModel, null_space
+from selfmotion.search import Manifold
+
+
+def check_warm_start(plan: object, problem: Problem) -> None:
+    """Raise ProblemError where a plan is none, or one of another arm."""
+    if not isinstance(plan, Plan):
+        raise ProblemError(f"warm_start is {shown(plan)}, expected a Plan; load_plan reads one")
+    check_joints(plan.robot, problem.robot)
+
+
+def check_joints(theirs: RobotModel, ours: RobotModel) -> None:
+    """Raise ProblemError where what is known has another arm's joints."""
+    if theirs.joint_names != ours.joint_names:
+        raise ProblemError(
+            f"warm_start: its joints are {', '.join(theirs.joint_names)}, expected those of "
+            f"{ours.name}: {', '.join(ours.joint_names)}"
+        )
+
+
+def on_start(problem: Problem, seed: Array) -> Array:
+    """Return the configuration (n,) near another one that is on the start of all paths.
+
+    Raises
+    ------
+    InverseKinematicsError
+        There is none.
+    """
+    follows, robot = problem.follows, problem.robot
+    if not follows.is_plain:
+        manifold = Manifold(follows, robot.lower, robot.upper)
+        held = follows.held(np.zeros(1))
+        q, arrived = manifold.project(seed[None], follows.targets(np.zeros(1)), far=True, held=held)
+        if not arrived[0]:
+            misses = np.array([item.miss(item.path.pose(0.0), q[0]) for item in follows.items])
+            position, rotation = misses.max(axis=0)
+            raise InverseKinematicsError(
+                f"{robot.name}: from the configuration that is known none was found in which all "
+                f"frames are where their paths begin",
+                position_miss=float(position),
+                rotation_miss=float(rotation),
+            )
+        return np.asarray(q[0])
+    return problem.robot.inverse_kinematics(problem.path.pose(0.0), problem.task, seed)
+
+
+def pace_of(plan: Plan, problem: Problem) -> float:
+    """Return the duration of a plan's path over that of the problem's."""
+    return plan.path.duration / problem.path.duration
+
+
+def slower(trajectory: Trajectory, pace: float) -> Trajectory:
+    """Return the same motion so many times as fast; `pace` is its duration over the new one."""
+    qdd = None if trajectory.qdd is None else pace**2 * trajectory.qdd
+    t, qd = trajectory.t / pace, pace * trajectory.qd
+    return Trajectory(t, trajectory.q, qd, trajectory.joint_names, qdd)
+
+
+def moved_to(trajectory: Trajectory, start: Array) -> Trajectory:
+    """Return the same motion from another start (n,); where it is off the path, it is put there."""
+    q = trajectory.q + (start - trajectory.q[0])
+    return Trajectory(trajectory.t, q, trajectory.qd, trajectory.joint_names, trajectory.qdd)
+
+
+def coefficients_of(
+    trajectory: Trajectory, pace: float, problem: Problem, t: Array, table: NullMotionTable
+) -> Array:
+    """Return the coefficients x whose null motion is nearest to that of another motion, (size,).
+
+    By least squares over the times. Of a null motion only Nᵀε acts, with N (n, r) a basis of the
+    null space of the task: it is fitted to Nᵀq̇, with N and q̇ those of the other motion at the same
+    share of its path.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+    pace : float
+        The duration of its path over that of the problem's.
+    problem : Problem
+    t : (S,)
+        Times on its path [s].
+    table : NullMotionTable
+        Its null motion at these times.
+    """
+    # A plan of a part of its path ends earlier.
+    theirs = np.minimum(t * pace, trajectory.t[-1])
+    q, qd = trajectory(theirs), pace * trajectory(theirs, 1)
+    null = np.swapaxes(null_space(problem.follows.jacobians(q)), 1, 2)
+    acting = null @ table.matrix()
+    wanted = np.einsum("srn,sn->sr", null, qd)
+    if not wanted.size:
+        return np.zeros(table.size)
+    return np.asarray(np.linalg.lstsq(acting.reshape(-1, table.size), wanted.ravel())[0])
 
 
 class Candidate:
@@ -89,8 +187,11 @@ class Candidate:
             problem, begun, free=free, ends=ends, counts=counts, rollout=begun.rollout
         )
         method = Method(problem, begun, free, ends, own, counts, None, None)
-        solution = PaperSolution(method, objective, np.zeros(objective.size))
-        self.still = PublishedSolution(self.problem, self.constraints, solution)
+        # Without self-motion it is the only one; else nothing better was found.
+        ended = Status.INFEASIBLE if problem.follows.redundancy > 0 else Status.CONVERGED
+        self.still = PublishedSolution(
+            method, objective, np.zeros(objective.size), None, ended, (), self.constraints
+        )
         self.history: list[Iteration] = []
         self.is_hopeless = False
         self._found: Solution | None = None
@@ -145,7 +246,7 @@ class Candidate:
         """Return the minimum-norm motion, on the grid of the best one where that has one."""
         found = self._found
         known = found if isinstance(found, PublishedSolution) else self.still
-        return known.solution.still_evaluation()
+        return known.still_evaluation()
 
     def score(self) -> tuple[bool, bool, float]:
         """Return what ranks it among others: the smaller, the better; see `score`."""
@@ -173,7 +274,7 @@ class Candidate:
         if self._ended is not None or self.is_of_chain:
             return
         if not np.isfinite(self.still.cost):
-            self.still.solution.objective.require_finite(self.still.solution.x)
+            self.still.objective.require_finite(self.still.x)
         if is_published(self.problem, self.effort):
             self._polish_as_published()
         elif is_on_nodes(self.problem, self.effort):
@@ -219,21 +320,21 @@ class Candidate:
         """Go to the optimum of the published method."""
         effort, before = self.effort, self._found
         if isinstance(before, PublishedSolution):
-            solution = before.solution.again()
+            found = before.again()
         else:
-            begun, most = self.still.solution, effort.max_evaluations
+            begun, most = self.still, effort.max_evaluations
             limit = None if most is None else effort.counts.evaluations + most
             method = replace(begun.method, limit=limit, callback=effort.callback)
-            solution = replace(begun, method=method, x=self._first_coefficients()).settled()
-        self._found = replace(self.still, solution=solution)
-        self.history = list(solution.history)
-        if solution.status is Status.INTERRUPTED:
+            found = replace(begun, method=method, x=self._first_coefficients()).settled()
+        self._found = found
+        self.history = list(found.history)
+        if found.status is Status.INTERRUPTED:
             self.end(Status.INTERRUPTED)
 
     def _first_coefficients(self) -> Array:
         """Return the decision vector that is nearest to a known plan, if no worse than x = 0."""
         plan, problem = self._warm, self.problem
-        objective, none = self.still.solution.objective, self.still.solution.x
+        objective, none = self.still.objective, self.still.x
         if plan is None:
             return none
         t, pace = objective.grid.stage_times, pace_of(plan, problem)
@@ -259,7 +360,7 @@ class Candidate:
             self.keep_off_itself()
         if self.status is Status.GRADIENT:
             # A gradient that is not finite is named with its time.
-            self.still.solution.objective.gradient(self.still.solution.x)
+            self.still.objective.gradient(self.still.x)
 
     def _first_motions(self) -> tuple[list[Trajectory], Array]:
         """Return motions to begin near, and the times of the first nodes (N + 1,)."""

@@ -6,8 +6,22 @@ from selfmotion.basics import Array
 from selfmotion.motion import FreeNullMotion, Grid
 from selfmotion.nodes import NodeMotion
 from selfmotion.planning.effort import Effort
-from selfmotion.planning.settings import FIRST_INTERVALS, MOST_NODES, ROUGH_STEPS, STARTING
 from selfmotion.problem import Problem
+
+# Intervals of the first nodes, and so many for each time that the tool goes as far as the arm
+# reaches.
+_FIRST_INTERVALS = 16
+# More of them where self-motions start and stop: as shares of the duration from there.
+_STARTING = (-0.03, -0.01, 0.01, 0.03)
+# Nodes of Newton's method: at most so many for each stretch of the path on which it is smooth.
+_MOST_NODES = 1024
+# Steps of the rough motions.
+_ROUGH_STEPS = 12
+# Costs that differ by less than this share are worth the same, and a motion whose cost is known to
+# this tells what its start is worth. What saves less than the second share saves nothing.
+ABOUT_AS_GOOD, NOTHING = 1e-2, 1e-4
+# Where a condition is not kept yet, each unit of it counts as so many times the cost.
+UNKEPT = 10.0
 
 
 def is_published(problem: Problem, effort: Effort) -> bool:
@@ -25,18 +39,18 @@ def is_on_nodes(problem: Problem, effort: Effort) -> bool:
 
 def most_nodes(problem: Problem) -> int:
     """Return how many nodes are as many as a path may need: more, the longer it is."""
-    return int(MOST_NODES * (len(problem.knots) + problem.way_in_reaches))
+    return int(_MOST_NODES * (len(problem.knots) + problem.way_in_reaches))
 
 
 def first_nodes(problem: Problem) -> Array:
     """Return the times of the nodes to begin with, (N + 1,)."""
-    steps = int(np.ceil(FIRST_INTERVALS * max(1.0, problem.way_in_reaches)))
+    steps = int(np.ceil(_FIRST_INTERVALS * max(1.0, problem.way_in_reaches)))
     t, duration = Grid.aligned(problem.knots, steps).nodes, problem.path.duration
     # Where the arm rests, or a joint begins or ends to be held, the self-motion starts and stops.
     ends = [end for rest, end in zip(problem.rests, (0.0, duration), strict=True) if rest]
-    near = np.array([*ends, *problem.follows.edges])[:, None] + duration * np.array(STARTING)
+    near = np.array([*ends, *problem.follows.edges])[:, None] + duration * np.array(_STARTING)
     inside = near[(near > 0.0) & (near < duration)]
-    least = 0.5 * duration * min(map(abs, STARTING))
+    least = 0.5 * duration * min(map(abs, _STARTING))
     apart = np.abs(inside[:, None] - t).min(axis=1, initial=np.inf) > least
     return np.sort(np.concatenate([t, inside[apart]]))
 
@@ -44,11 +58,11 @@ def first_nodes(problem: Problem) -> Array:
 def rough_grid(problem: Problem) -> Grid:
     """Return the grid of rough motions."""
     # A path of many waypoints is crossed in strides: what is rough needs not stop at each.
-    knots = problem.knots if len(problem.knots) <= ROUGH_STEPS else problem.knots[[0, -1]]
-    return Grid.aligned(knots, ROUGH_STEPS)
+    knots = problem.knots if len(problem.knots) <= _ROUGH_STEPS else problem.knots[[0, -1]]
+    return Grid.aligned(knots, _ROUGH_STEPS)
 
 
-def resolves(motion: NodeMotion, agreement: float) -> bool:
-    """Whether a motion costs the same on twice as many nodes, to this share of it."""
+def resolves(motion: NodeMotion) -> bool:
+    """Whether a motion costs about the same on twice as many nodes."""
     finer = motion.on(motion.grid.on(Grid(motion.grid.t).halved().nodes))
-    return finer is not None and abs(finer.cost - motion.cost) <= agreement * abs(finer.cost)
+    return finer is not None and abs(finer.cost - motion.cost) <= ABOUT_AS_GOOD * abs(finer.cost)

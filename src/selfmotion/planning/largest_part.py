@@ -10,24 +10,27 @@ from selfmotion.optimise import Status
 from selfmotion.paper import Guide, StillMotion
 from selfmotion.path import Section
 from selfmotion.planning.candidate import Candidate
-from selfmotion.planning.effort import Effort
-from selfmotion.planning.settings import (
-    EDGE_MARGIN,
-    END_AGREEMENT,
-    FOLLOWED_STEPS,
-    FREE_END_AGREEMENT,
-    FREE_FOLLOWED_STEPS,
-    FREE_PROBES,
-    LEAST_PART,
-    OFF_PATH,
-    PART_BACK,
-    PART_FINALISTS,
-    PART_STARTS,
-    PROBES,
-    PUSHES,
-)
+from selfmotion.planning.effort import Effort, Search
+from selfmotion.planning.screening import ROUGH_MOTIONS
 from selfmotion.problem import Problem
 from selfmotion.search import Reach
+
+# Share of the time to the edge of the workspace that is given up, since joint speeds grow without
+# bound towards it.
+_EDGE_MARGIN = 1e-4
+# The end of the part is found to this share of it, and a part below this share of the path is none.
+_END_AGREEMENT = 4e-3
+_LEAST_PART = 1e-2
+# Ends that are tried, at most.
+_PROBES = 10
+# Motions are followed in so many steps, until they are off the path by this share of its extent.
+_FOLLOWED_STEPS = 128
+# Where the last bit of a part is too rough, parts that end by this share earlier.
+_PART_BACK = 0.02
+_OFF_PATH = 1e-2
+# Constant null motions that stand for x = 0 where that breaks down: joint angles over the path.
+_PUSHES = (0.5, 2.0)
+
 
 _Begin = tuple[Array, Guide | None]
 """A start, and a null motion in place of x = 0."""
@@ -119,16 +122,16 @@ def largest_part(problem: Problem, reach: Reach, effort: Effort) -> Part | None:
 
 
 def _largest_part(problem: Problem, reach: Reach, effort: Effort) -> Part | None:
-    goal = reach.time * (1.0 - EDGE_MARGIN) if reach.reason else reach.time
-    if goal < LEAST_PART * problem.path.duration:
+    goal = reach.time * (1.0 - _EDGE_MARGIN) if reach.reason else reach.time
+    if goal < _LEAST_PART * problem.path.duration:
         return None
     first = _until(problem, goal)
     attempts = []
     given = problem.given_start is not None
-    few = reach.starts if given else reach.starts[:: -(-len(reach.starts) // PART_STARTS)]
+    few = reach.starts if given else reach.starts[:: -(-len(reach.starts) // ROUGH_MOTIONS)]
     few = [_start_of(first, problem, q) for q in few]
     starts = _apart(first, few) if effort.apart else few
-    for begin in _beginnings(first, starts)[: PART_FINALISTS if given else 1]:
+    for begin in _beginnings(first, starts)[: Search().finalists if given else 1]:
         attempts.append(_attempt(first, begin, effort))
         if attempts[-1].cut_short:
             return _part(problem, attempts[-1], reach, "")
@@ -144,17 +147,15 @@ def _bisect(problem: Problem, failed: _Attempt, reach: Reach, effort: Effort) ->
     arrived: _Attempt | None = None
     edge: _Attempt | None = None
     low, high = 0.0, failed.problem.path.duration
-    free = problem.given_start is None
-    agreement = FREE_END_AGREEMENT if free else END_AGREEMENT
-    back = agreement
-    for _ in range(FREE_PROBES if free else PROBES):
+    back = _END_AGREEMENT
+    for _ in range(_PROBES):
         if arrived is None:
             # What was kept until then is a good guess; where it is not, further and further back.
             probe = max(min(failed.kept_until, high * (1.0 - back)), 0.5 * high)
             back *= 2.0
         else:
             probe = 0.5 * (low + high)
-        if probe < LEAST_PART * problem.path.duration or high - low < agreement * high:
+        if probe < _LEAST_PART * problem.path.duration or high - low < _END_AGREEMENT * high:
             break
         part = _until(problem, probe)
         attempt = _attempt(part, _begin_of(part, failed), effort)
@@ -183,7 +184,7 @@ def shorter_part(problem: Problem, part: Part, effort: Effort) -> Part | None:
 
     For one whose last bit is too rough: near a singular pose rates grow between its nodes.
     """
-    first = _until(problem, part.problem.path.duration * (1.0 - PART_BACK))
+    first = _until(problem, part.problem.path.duration * (1.0 - _PART_BACK))
     start = _start_of(first, part.problem, part.candidate.evaluation().trajectory.q[0])
     attempt = _attempt(first, (start, None), effort)
     if attempt.candidate is None or not attempt.arrived:
@@ -277,7 +278,7 @@ class _Push:
 def _pushes(problem: Problem, start: Array) -> list[Guide]:
     """Return null motions to either side: x = 0 may keep to a plane that has no way on."""
     basis = problem.follows.null_basis(start) / problem.path.duration
-    angles = [sign * angle for angle in PUSHES for sign in (1.0, -1.0)]
+    angles = [sign * angle for angle in _PUSHES for sign in (1.0, -1.0)]
     return [_Push(angle * direction) for direction in basis.T for angle in angles]
 
 
@@ -287,9 +288,9 @@ def _rank(problem: Problem, start: Array, guide: Guide | None) -> tuple[float, f
     That without self-motion, from a start; the smaller, the better.
     """
     path = problem.path
-    steps = FREE_FOLLOWED_STEPS if problem.given_start is None else FOLLOWED_STEPS
-    still = StillMotion.on(problem, start, Grid.aligned(path.knots, steps), guide)
-    trouble = still.off_path(OFF_PATH)
+    grid = Grid.aligned(path.knots, _FOLLOWED_STEPS)
+    still = StillMotion.on(problem, start, grid, guide)
+    trouble = still.off_path(_OFF_PATH)
     far = path.duration if trouble is None else trouble
     kept = _kept_until(problem, still.grid.nodes, still.q, still.qd)
     # Beyond the place where it broke down, speeds may be anything.

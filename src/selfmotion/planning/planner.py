@@ -1,27 +1,164 @@
-"""What is known of one plan while it is made."""
+"""What is known of one plan while it is made, and how its motion is judged."""
 
 import time
-from collections.abc import Sequence
+from collections import abc
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from selfmotion.basics import Array, BreakdownError, Progress, SelfmotionError
-from selfmotion.certificate import Tolerance
-from selfmotion.motion import Grid, Trajectory
+from selfmotion.certificate import LIMIT_NAMES, Certificate, Tolerance
+from selfmotion.motion import Evaluation, Grid, Trajectory
 from selfmotion.optimise import Status
-from selfmotion.paper import Guide
+from selfmotion.paper import MOST_HALVINGS, Guide
 from selfmotion.planning.candidate import Candidate
-from selfmotion.planning.effort import Effort
+from selfmotion.planning.effort import Effort, Search
 from selfmotion.planning.grids import is_published
-from selfmotion.planning.judge import Judged, judge
 from selfmotion.planning.largest_part import Part, largest_part, shorter_part
 from selfmotion.planning.screening import Ranking
-from selfmotion.planning.search import Search
-from selfmotion.planning.settings import FREE_PART_EVALUATIONS, PART_EVALUATIONS, SHORTER_PARTS
 from selfmotion.problem import Problem
 from selfmotion.result import Attempt, Plan
-from selfmotion.search import Obstruction, Reach, SequenceGuide, reachable
+from selfmotion.search import Obstruction, Reach, Sequence, reachable
+
+# Between its nodes a motion may be off the path by this share of the tolerance where that is looked
+# at, in the middle; and by this share of what it was before steps were halved.
+_RESOLVED = 0.3
+_FALLS = 0.7
+# Limits that are exceeded between the nodes on more grids than this are so on any; and nothing is
+# optimised again on grids with more than so many times the steps.
+_ROUGH_GRIDS = 3
+_FINER = 4
+# Evaluations of the cost on each of many parts of the path.
+_PART_EVALUATIONS = 150
+# The same where the start is free: of many, the one that gets farthest needs no more, and who tries
+# many places waits for it.
+_FREE_PART_EVALUATIONS = 30
+# Where the last bit of a part is too rough, so many shorter ones are tried, at most.
+_SHORTER_PARTS = 3
+
+
+@dataclass(frozen=True, eq=False)
+class Judged:
+    """What a plan is made of: a motion along all of the path or a part of it, and its check.
+
+    Attributes
+    ----------
+    part : Part
+    motion, still : Evaluation
+        The motion, and the minimum-norm one on the same grid.
+    certificate : Certificate
+    rival_cost : float or None
+        That of the best motion from the chains of the search, where it keeps the constraints.
+    """
+
+    part: Part
+    motion: Evaluation
+    still: Evaluation
+    certificate: Certificate
+    rival_cost: float | None = None
+
+
+def judge(problem: Problem, part: Part, tolerance: Tolerance, progress: Progress) -> Judged:
+    """Return what there is on the first grid on which the motion holds the tolerance."""
+    candidate = part.candidate
+    judged: Judged | None = None
+    coarse: Trajectory | None = None
+    misses: list[float] = []
+    roughs, first = 0, candidate.solution.steps
+    for _ in range(MOST_HALVINGS):
+        try:
+            progress("checking", 1, 1)
+            judged = _check(problem, part, tolerance)
+            if _meets_itself(problem, judged.certificate) and candidate.keep_off_itself():
+                candidate.settle()
+                continue
+            rough = _rough(problem, judged, candidate)
+            roughs += rough
+            # Where no evaluations are left, finer grids change nothing.
+            out = candidate.status is Status.MAX_EVALUATIONS
+            spent = out or roughs > _ROUGH_GRIDS or candidate.solution.steps > _FINER * first
+            if judged.certificate.on_path and (spent or not rough):
+                break
+            trajectory = judged.motion.trajectory
+            # What damping costs stays on any grid: there, the motion stands when the tool does.
+            if coarse is not None and _same(problem, coarse, trajectory, tolerance):
+                break
+            coarse = trajectory if judged.motion.damped else None
+            # What is out of reach is so on any grid.
+            check = judged.certificate
+            misses.append(check.position_error.value + check.rotation_error.value)
+            if coarse is None and len(misses) > 2 and misses[-1] > 0.5 * misses[-3]:
+                break
+            if candidate.solution.steps >= candidate.most_steps:
+                break
+            candidate.refine()
+            if rough and not candidate.cut_short:
+                candidate.polish()
+        except KeyboardInterrupt:
+            candidate.end(Status.INTERRUPTED)
+            break
+    # No plan goes without a certificate, interrupted or not.
+    return judged or _check(problem, part, tolerance)
+
+
+def _resolved(problem: Problem, candidate: Candidate, tolerance: Tolerance) -> Evaluation:
+    """Return the motion, steps halved between whose nodes the tool was off the path."""
+    allowed, before = np.array([tolerance.position, tolerance.rotation]), np.inf
+    motion = candidate.evaluation()
+    for _ in range(MOST_HALVINGS):
+        errors = problem.errors_between(motion.trajectory) / allowed
+        worst = float(errors.max())
+        # Written so that NaN is no progress. Damping's error is not that of the steps.
+        stuck = not worst < _FALLS * before or len(errors) > candidate.most_steps
+        if motion.damped or worst <= _RESOLVED or stuck:
+            break
+        before = worst
+        candidate.refine((errors > _RESOLVED).any(axis=1))
+        motion = candidate.evaluation()
+    return motion
+
+
+def _meets_itself(problem: Problem, certificate: Certificate) -> bool:
+    """Whether nothing else is wrong than that the arm meets itself, which only the default asks."""
+    asked = problem.own_collision is not None and len(certificate.failures) == 1
+    return asked and not certificate.findings[-1].satisfied
+
+
+def _rough(problem: Problem, judged: Judged, candidate: Candidate) -> bool:
+    """Whether what was asked for and is kept at the nodes is not so between them."""
+    if candidate.violations or not judged.certificate.on_path:
+        return False
+    asked = {item.name for item in problem.requirements}
+    if problem.own_collision is not None:
+        # Where only the default asks it, it was not asked of the nodes either.
+        asked.discard(problem.requirements[-1].name)
+    nodes = judged.motion.trajectory.t
+    # Rates are judged on both sides of a node; anything else that is wrong there stays so.
+    return any(
+        item.requirement in LIMIT_NAMES or item.time not in nodes
+        for item in judged.certificate.findings
+        if not item.satisfied and item.requirement in asked
+    )
+
+
+def _same(problem: Problem, coarse: Trajectory, fine: Trajectory, tolerance: Tolerance) -> bool:
+    """Whether two motions put all that is followed in the same place in the prescribed rows."""
+    pairs = list(zip(coarse(fine.t), fine.q, strict=True))
+    misses = np.array(
+        [
+            item.miss(item.chain.place(first), second)
+            for item in problem.follows.items
+            for first, second in pairs
+        ]
+    )
+    position, rotation = misses.max(axis=0)
+    return bool(position <= tolerance.position and rotation <= tolerance.rotation)
+
+
+def _check(problem: Problem, part: Part, tolerance: Tolerance) -> Judged:
+    motion = _resolved(problem, part.candidate, tolerance)
+    certificate = problem.certify(motion.trajectory, tolerance, part.ending)
+    return Judged(part, motion, part.candidate.still_evaluation(), certificate)
 
 
 @dataclass(eq=False)
@@ -39,7 +176,7 @@ class Planner:
     progress : Progress
     warm_start : Plan or None
         Of this problem or of one like it: tried first; where its motion will do, nothing else is.
-    guide : SequenceGuide or None
+    guide : Sequence or None
         Likewise a motion that a search over the whole path has found.
     attempts : list of Attempt
         What was tried, in order.
@@ -49,7 +186,7 @@ class Planner:
         A pose that no configuration was found for.
     best : Candidate or None
         The best so far.
-    sequences : list of SequenceGuide
+    sequences : list of Sequence
         What the global search found; empty where it was not asked for or in vain.
     rival : Candidate or None
         The best motion from these. It is not chosen where the start is given or the search local,
@@ -72,16 +209,16 @@ class Planner:
     tolerance: Tolerance
     progress: Progress
     warm_start: Plan | None = None
-    guide: SequenceGuide | None = None
+    guide: Sequence | None = None
     attempts: list[Attempt] = field(default_factory=list)
     began: float = field(default_factory=time.perf_counter)
     blocked: Obstruction | None = None
     best: Candidate | None = None
-    sequences: list[SequenceGuide] = field(default_factory=list)
+    sequences: list[Sequence] = field(default_factory=list)
     rival: Candidate | None = None
     failure: SelfmotionError | None = None
     notes: list[str] = field(default_factory=list)
-    waiting: Sequence[Candidate] = ()
+    waiting: abc.Sequence[Candidate] = ()
     ranking: Ranking | None = None
     judged: Judged | None = None
 
@@ -229,7 +366,7 @@ class Planner:
         """Let the largest part be it, a time [s] looked at closely; return whether there is one."""
         effort = self.effort
         if effort.max_evaluations is None:
-            most = FREE_PART_EVALUATIONS if self.is_free else PART_EVALUATIONS
+            most = _FREE_PART_EVALUATIONS if self.is_free else _PART_EVALUATIONS
             effort = replace(effort, max_evaluations=most)
         known = self.reach(suspect)
         self.progress("longest part that can be followed", 1, 1)
@@ -238,7 +375,7 @@ class Planner:
             return False
         _settle_both(found.candidate, None, self.progress)
         self.judged = self._judged(found)
-        for _ in range(SHORTER_PARTS):
+        for _ in range(_SHORTER_PARTS):
             # Besides that it ends, nothing should be wrong with it.
             if len(self.judged.certificate.failures) < 2 or found.candidate.cut_short:
                 break

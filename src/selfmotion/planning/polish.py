@@ -13,27 +13,29 @@ from selfmotion.motion import Grid, Trajectory
 from selfmotion.nodes import NodeGrid, NodeMotion, Optimum, Step, minimise
 from selfmotion.optimise import Iteration, Status
 from selfmotion.planning.effort import Effort
-from selfmotion.planning.grids import most_nodes
-from selfmotion.planning.settings import (
-    ASIDE,
-    ASIDE_AFTER,
-    ENDS_MET,
-    FARTHER_APART,
-    FEWER,
-    FINER_POWER,
-    GIVEN_AWAY,
-    KEPT_FIRST,
-    MOST_ASIDE,
-    MOST_PARTS,
-    NEAR_PATH,
-    NODE_ROUNDS,
-    TOWARDS_MIDDLE,
-    UNKEPT,
-    WANTED_NEAR_PATH,
-)
-from selfmotion.planning.solutions import NodeSolution
+from selfmotion.planning.grids import NOTHING, UNKEPT, most_nodes
+from selfmotion.planning.solutions import ENDS_MET, NodeSolution
 from selfmotion.problem import Problem
 from selfmotion.search import BESIDE
+
+# Between its nodes a motion may be off its path by this [m, rad]. Where it is by more, intervals
+# are divided so that it is by that, as the error falls with their third power or more; at most into
+# so many parts.
+_NEAR_PATH, _WANTED_NEAR_PATH, _FINER_POWER, _MOST_PARTS = 2e-7, 1e-7, 0.3, 8.0
+# More nodes are put in so often, at most.
+_NODE_ROUNDS = 14
+# Where nodes keep bodies apart and the motion between them does not, they are kept so much farther
+# apart at the points [m].
+_FARTHER_APART = (5e-4, 1e-3, 2e-3)
+# Steps of Newton's method from each of several beginnings: what takes longer mostly leads nowhere.
+_FEWER = 25
+# Where the motion at x = 0 does not lead to what keeps the conditions: the self-motion goes towards
+# the middle of the limits in such shares of the duration.
+_TOWARDS_MIDDLE = (1.0 / 16.0, 1.0 / 64.0, 1.0 / 4.0)
+# And to either side of the start by so much along its self-motion, after this share of the
+# duration; so many of these at most.
+_ASIDE, _ASIDE_AFTER, _MOST_ASIDE = (0.4, -0.4, 0.8, -0.8), 1.0 / 4.0, 4
+
 
 _ARRIVED = (Status.CONVERGED, Status.PRECISION)
 
@@ -105,7 +107,7 @@ class Polisher:
         for times in (t, beside):
             grid = self.grid(times)
             near = [grid.near(*(motion(times, k) for k in range(3))) for motion in motions]
-            motion = min((one for one in near if one), key=_aim_of, default=None)
+            motion = min((one for one in near if one), key=lambda one: one.aim, default=None)
             if motion is not None:
                 break
         else:
@@ -137,11 +139,10 @@ class Polisher:
                 return None
         if multipliers is None and not _is_kept(motion):
             # One that breaks nothing is at its optimum before this one breaks nothing.
-            most = KEPT_FIRST * abs(motion.aim)
-            tried = (begin for begin in self._beginnings(motion) if begin and begin.aim <= most)
-            motion = next(filter(_is_kept, tried), motion)
+            kept = (begin for begin in self._beginnings(motion) if begin and _is_kept(begin))
+            motion = next(kept, motion)
         # What takes long is seldom kept in the end: other beginnings come before the rest of it.
-        first = best = minimise(motion, self._report, multipliers, roughly=True, most=FEWER)
+        first = best = minimise(motion, self._report, multipliers, roughly=True, most=_FEWER)
         rank = partial(_rank, begun=motion)
         if not _is_kept(best.motion) and self._ended is None:
             best = self._other(motion, best, free)
@@ -176,7 +177,7 @@ class Polisher:
         best = min(first, unbound, key=rank)
         for begin in chain([open_one], self._beginnings(begun), self._aside(begun)):
             if begin is not None:
-                found = minimise(begin, self._report, roughly=True, most=FEWER)
+                found = minimise(begin, self._report, roughly=True, most=_FEWER)
                 best = min(best, found, key=rank)
             if self._ended is not None or _is_kept(best.motion):
                 break
@@ -191,7 +192,7 @@ class Polisher:
         limited = np.isfinite(robot.lower) & np.isfinite(robot.upper)
         middle = start.copy()
         middle[limited] = 0.5 * (robot.lower[limited] + robot.upper[limited])
-        for share in TOWARDS_MIDDLE:
+        for share in _TOWARDS_MIDDLE:
             yield grid.motion_towards(start, middle, share * self._problem.path.duration)
 
     def _aside(self, begun: NodeMotion) -> Iterator[NodeMotion]:
@@ -202,11 +203,11 @@ class Polisher:
         if self._free:
             return
         grid, start = begun.grid, begun.place.q[0]
-        time = ASIDE_AFTER * self._problem.path.duration
-        goals = [start + far * way for way in begun.charts.bases[0].T for far in ASIDE]
+        time = _ASIDE_AFTER * self._problem.path.duration
+        goals = [start + far * way for way in begun.charts.bases[0].T for far in _ASIDE]
         found = [grid.motion_towards(start, goal, time) for goal in goals]
         rank = partial(_rank_of, begun=begun)
-        yield from sorted((motion for motion in found if motion), key=rank)[:MOST_ASIDE]
+        yield from sorted((motion for motion in found if motion), key=rank)[:_MOST_ASIDE]
 
     def _on_halved(self, optimum: Optimum) -> Optimum:
         """Return the optimum on twice as many nodes, or what there is."""
@@ -231,11 +232,11 @@ class Polisher:
     def _resolved(self, known: NodeSolution) -> NodeSolution:
         """Return the optimum on nodes so near to each other that more change nothing, if it may."""
         before, most, is_rough = np.inf, most_nodes(self._problem), True
-        for _ in range(NODE_ROUNDS):
+        for _ in range(_NODE_ROUNDS):
             if self._ended is not None:
                 break
             t = self._finer(known)
-            if t is None and before - known.cost > GIVEN_AWAY * abs(known.cost):
+            if t is None and before - known.cost > NOTHING * abs(known.cost):
                 # Where limits of q̈ or jerk begin and end to bind, the best motion has a kink: finer
                 # there, while it pays.
                 t, before = _at_kinks(known.motion), known.cost
@@ -246,7 +247,7 @@ class Polisher:
             found = self.again(finer or known, roughly=not polishes)
             if found is None:
                 break
-            gains = known.cost - found.cost > GIVEN_AWAY * abs(known.cost)
+            gains = known.cost - found.cost > NOTHING * abs(known.cost)
             if not (found.has_arrived or gains) and self._ended is None:
                 # More nodes lead nowhere, and multipliers on the way say nothing.
                 found = None if polishes else self.again(known)
@@ -263,7 +264,7 @@ class Polisher:
         if self._ended is not None or not known.motion.broken_between().any():
             return None
         grid = known.motion.grid
-        for far in FARTHER_APART:
+        for far in _FARTHER_APART:
             asked = [
                 replace(item, distance=item.distance + far, _last=[])
                 if isinstance(item, BoundClearance)
@@ -282,11 +283,11 @@ class Polisher:
         grid, spline = motion.grid, motion.grid.spline
         errors = self._problem.errors_between(motion.trajectory).max(axis=1)
         # Where one is too far apart, so is what is nearly so: on the next nodes it would be.
-        wanted = WANTED_NEAR_PATH if errors.max() > NEAR_PATH else NEAR_PATH
-        parts = np.ceil((errors / wanted) ** FINER_POWER - 1e-9)
-        parts = np.clip(parts, 1.0, MOST_PARTS).astype(int)
+        wanted = _WANTED_NEAR_PATH if errors.max() > _NEAR_PATH else _NEAR_PATH
+        parts = np.ceil((errors / wanted) ** _FINER_POWER - 1e-9)
+        parts = np.clip(parts, 1.0, _MOST_PARTS).astype(int)
         away = grid.rows.given_away(known.multipliers, motion.curve_ends)
-        least = GIVEN_AWAY * abs(motion.aim)
+        least = NOTHING * abs(motion.aim)
         if away.sum() > least:
             parts[(away > least / spline.count) & (parts == 1)] = 2
         parts[motion.broken_between() & (parts == 1)] = 2
@@ -359,11 +360,6 @@ def _rank_of(motion: NodeMotion, begun: NodeMotion) -> tuple[bool, bool, float]:
 def _unmet(motion: NodeMotion) -> float:
     """Return by how much conditions are broken."""
     return motion.violation + float(np.abs(motion.c).max(initial=0.0))
-
-
-def _aim_of(motion: NodeMotion) -> float:
-    """Return what is minimised, to sort by."""
-    return motion.aim
 
 
 def _divided(t: Array, parts: Ints) -> Array:

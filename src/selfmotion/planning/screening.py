@@ -5,29 +5,65 @@ from dataclasses import replace
 
 import numpy as np
 
-from selfmotion.basics import Array, Flags, Ints, Progress
+from selfmotion.basics import Array, Flags, Ints, Progress, RobotError
 from selfmotion.constraints import penalised
 from selfmotion.costs import Samples
 from selfmotion.motion import Sampling
 from selfmotion.nodes import Batch, NodeGrid, NodeMotion, minimise
 from selfmotion.planning.effort import Effort
-from selfmotion.planning.grids import resolves, rough_grid
-from selfmotion.planning.posture import far_from_usual, wound_back
-from selfmotion.planning.settings import (
-    ABOUT_AS_GOOD,
-    AS_CHEAP,
-    ONE_VALLEY,
-    ROUGH_AGREEMENT,
-    ROUGH_MOTIONS,
-    ROUGH_ROUNDS,
-    SAME_OPTIMUM,
-    SAME_TO_DIGITS,
-    UNKEPT,
-    WITH_CONDITIONS,
-)
+from selfmotion.planning.grids import ABOUT_AS_GOOD, NOTHING, UNKEPT, resolves, rough_grid
 from selfmotion.problem import Problem
 from selfmotion.robot import RobotModel
 from selfmotion.search import carried
+
+# Steps of Newton's method for rough motions.
+_ROUGH_ROUNDS = 30
+# Rough optima on nodes whose costs differ by less than this share are mirror images; and joints are
+# within their limits to this share of a turn.
+_SAME_TO_DIGITS = 1e-9
+# So many rough motions at most; where conditions count, with so many steps more that know them.
+ROUGH_MOTIONS, _WITH_CONDITIONS = 16, 12
+# Motions at x = 0 that are this near at all times [rad or m] lie in one valley of the cost, as a
+# rule; rough optima this near are the same.
+ONE_VALLEY = 0.6
+_SAME_OPTIMUM = 0.1
+_TURN = 2.0 * np.pi
+
+
+def usual_posture(robot: RobotModel) -> Array:
+    """Return home (n,) where it is known, else the middle of the joints' limits [rad or m]."""
+    try:
+        return robot.home
+    except RobotError:
+        return np.asarray(0.5 * np.add(*robot.finite_limits()))
+
+
+def far_from_usual(robot: RobotModel, motions: Array) -> Array:
+    """Return how far motions (K, N, n) are from the usual posture on average, (K,) [rad]."""
+    away = np.abs(motions - usual_posture(robot)) @ robot.joint_weights
+    return np.asarray(away.mean(axis=1))
+
+
+def wound_back(robot: RobotModel, motion: Array) -> Array:
+    """Return a motion (N, n) with joints turned by whole turns, as near to usual as limits allow.
+
+    The tool is where it was. What fits nowhere within its limits is put in the middle of them.
+    """
+    lowest, highest = motion.min(axis=0), motion.max(axis=0)
+    middle, shift = 0.5 * (lowest + highest), np.zeros(robot.dof)
+    usual = usual_posture(robot)
+    for joint in np.flatnonzero(robot.is_revolute):
+        lower, upper = robot.lower[joint], robot.upper[joint]
+        wanted = round((usual[joint] - middle[joint]) / _TURN)
+        # Rounding must not take a joint that stands on its limit round to the other side.
+        least = np.ceil((lower - lowest[joint]) / _TURN - _SAME_TO_DIGITS)
+        most = np.floor((upper - highest[joint]) / _TURN + _SAME_TO_DIGITS)
+        if least <= most:
+            shift[joint] = np.clip(wanted, least, most)
+        elif np.isfinite(lower) and np.isfinite(upper):
+            shift[joint] = round((0.5 * (lower + upper) - middle[joint]) / _TURN)
+    return np.asarray(motion + _TURN * shift)
+
 
 Apart = Callable[[Array, Array], Array]
 """How far a motion (N, n) is from each of others (K, N, n), (K,) [rad or m]."""
@@ -108,7 +144,7 @@ class Ranking:
         """
         problem = self._problem
         nodes = self._grid(problem)
-        total = 1 + ROUGH_ROUNDS
+        total = 1 + _ROUGH_ROUNDS
         self._progress("screening start", 1, total)
         found = self._found = Batch.near(nodes, motions)
         soft = problem.softened(float(found.costs.min()))
@@ -124,7 +160,7 @@ class Ranking:
             if _hopeful(found).any():
                 found = self._found = found.advanced()
         self._ranked = self._decisive(found, finalists)
-        order = unlike(found.q, self._expected(found), self._apart, SAME_OPTIMUM)[0]
+        order = unlike(found.q, self._expected(found), self._apart, _SAME_OPTIMUM)[0]
         each = [] if self._ranked else [self._motion(found, k) for k in order]
         return [motion for motion in each if motion is not None]
 
@@ -140,14 +176,14 @@ class Ranking:
         kept: list[NodeMotion] = []
         others: list[NodeMotion] = []
         dearest = np.inf
-        for k in unlike(found.q, self._expected(found), self._apart, SAME_OPTIMUM)[0]:
+        for k in unlike(found.q, self._expected(found), self._apart, _SAME_OPTIMUM)[0]:
             if found.costs[k] > dearest or len(kept) + len(others) == finalists:
                 break
             motion = self._motion(found, k)
             # What costs the same to the last digits is one of the arm's mirror images.
             if motion is None or any(_same(motion.cost, one.cost) for one in kept):
                 continue
-            if found.going[k] or not resolves(motion, ROUGH_AGREEMENT):
+            if found.going[k] or not resolves(motion):
                 return []
             # What got stuck may become better as well.
             stuck = found.promised[k] > ABOUT_AS_GOOD * abs(motion.cost)
@@ -180,12 +216,12 @@ class Ranking:
                 continue
             self._progress("start", number, total)
             # It is a long way from where there is no self-motion.
-            most = WITH_CONDITIONS if number <= len(free) else ROUGH_ROUNDS
+            most = _WITH_CONDITIONS if number <= len(free) else _ROUGH_ROUNDS
             better = minimise(motion, lambda _: False, roughly=True, most=most).motion
             found = sorted([*found, (self._rank(better), better)], key=lambda each: each[0])
             self._ranked = [one for _, one in found]
         q = np.array([motion.place.q for motion in self._ranked])
-        alone, _ = unlike(q, np.arange(len(q)), self._apart, SAME_OPTIMUM)
+        alone, _ = unlike(q, np.arange(len(q)), self._apart, _SAME_OPTIMUM)
         return [self._ranked[k] for k in alone[:finalists]]
 
     def _rank(self, motion: NodeMotion) -> tuple[bool, float]:
@@ -202,7 +238,7 @@ class Ranking:
         q = found.q[k]
         motion = self._near(wound_back(self._problem.robot, q), found.qd[k], found.qdd[k])
         # Costs may know one turn from another.
-        if motion is not None and motion.cost <= (1.0 + SAME_TO_DIGITS) * found.costs[k]:
+        if motion is not None and motion.cost <= (1.0 + _SAME_TO_DIGITS) * found.costs[k]:
             return motion
         return self._near(self._turned_inside(q), found.qd[k], found.qdd[k])
 
@@ -215,7 +251,7 @@ class Ranking:
         # Each motion belongs with the cheapest one that is about as cheap.
         group, first = np.zeros(len(order), dtype=np.int64), 0
         for k in range(1, len(order)):
-            if costs[k] - costs[first] > AS_CHEAP * abs(costs[first]):
+            if costs[k] - costs[first] > NOTHING * abs(costs[first]):
                 first = k
             group[k] = first
         far = far_from_usual(robot, np.array([wound_back(robot, found.q[k]) for k in order]))
@@ -255,7 +291,7 @@ def _hopeful(found: Batch) -> Flags:
 
 
 def _same(a: float, b: float | None) -> bool:
-    return b is not None and abs(a - b) <= SAME_TO_DIGITS * abs(a)
+    return b is not None and abs(a - b) <= _SAME_TO_DIGITS * abs(a)
 
 
 def most_promising(

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Protocol
+from typing import Self
 
 import numpy as np
 
@@ -21,100 +21,29 @@ from selfmotion.costs import Samples
 from selfmotion.motion import Evaluation, Grid, NodeNullMotion, NullMotion
 from selfmotion.nodes import NodeMotion, Optimum
 from selfmotion.optimise import Status
-from selfmotion.planning.settings import ENDS_MET, LEAST_SAVING
-from selfmotion.problem import Problem
 from selfmotion.search import BESIDE
 
-
-class Solution(Protocol):
-    """What is asked of a motion, however it was found."""
-
-    @property
-    def status(self) -> Status:
-        """How the last minimisation ended."""
-
-    @property
-    def violations(self) -> tuple[str, ...]:
-        """What is wrong for each constraint that it could not meet."""
-
-    @property
-    def active(self) -> tuple[ActiveConstraint, ...]:
-        """What kept it from a lower cost."""
-
-    @property
-    def remaining(self) -> float | None:
-        """What any other motion could still save, as far as is known [cost]."""
-
-    @property
-    def null_motion(self) -> NullMotion:
-        """The parameterisation of its null motion."""
-
-    @property
-    def coefficients(self) -> Array:
-        """The null motion's coefficients."""
-
-    @property
-    def steps(self) -> int:
-        """Of its grid."""
-
-    @property
-    def cost(self) -> float:
-        """F."""
-
-    @property
-    def keeps_off_itself(self) -> bool:
-        """Whether the arm does where only the default asks it to, at the nodes and by meshes."""
-
-    def merit(self) -> float:
-        """Return the cost, much larger where constraints are violated: for ranking."""
-
-    def evaluation(self) -> Evaluation:
-        """Return the motion with its costs."""
-
-    def refined(self, where: Flags | None = None) -> "Solution":
-        """Return it with half the step length, everywhere or for some of the steps (N,)."""
-
-
-def score(solution: Solution) -> tuple[bool, bool, float]:
-    """Return what ranks motions, the smaller, the better.
-
-    Whether constraints are violated, whether the arm meets itself, which would be refused in the
-    end, and the cost. Of two that violate constraints, the one that does so less is nearer to a
-    motion.
-    """
-    if solution.violations:
-        return True, False, solution.merit()
-    return False, not solution.keeps_off_itself, solution.cost
+# What is asked of the ends is met to this [rad, rad/s].
+ENDS_MET = 1e-8
+# What would save less than this share of the cost does not bind.
+_LEAST_SAVING = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class PublishedSolution:
+class PublishedSolution(paper.Solution):
     """A motion of the published method: at x = 0, the minimum-norm motion, or optimised.
 
     Attributes
     ----------
-    problem : Problem
     constraints : sequence of BoundConstraint
         Judged, not asked.
-    solution : selfmotion.paper.Solution
     """
 
-    problem: Problem
-    constraints: Sequence[BoundConstraint]
-    solution: paper.Solution
-
-    @property
-    def status(self) -> Status:
-        """How the optimisation ended."""
-        if self.solution.is_optimised:
-            return self.solution.status
-        # Without self-motion it is the only one; else nothing better was found.
-        free = self.problem.follows.redundancy > 0
-        return Status.INFEASIBLE if free else Status.CONVERGED
+    constraints: Sequence[BoundConstraint] = ()
 
     @cached_property
     def violations(self) -> tuple[str, ...]:
-        """See `Solution.violations`."""
+        """What is wrong for each constraint that it could not meet."""
         return violated(self.constraints, self._samples)
 
     @property
@@ -126,52 +55,28 @@ class PublishedSolution:
     def remaining(self) -> None:
         """Not known."""
 
-    @property
-    def null_motion(self) -> NullMotion:
-        """See `Solution.null_motion`."""
-        return self.solution.null_motion
-
-    @property
-    def coefficients(self) -> Array:
-        """See `Solution.coefficients`."""
-        return self.solution.coefficients
-
-    @property
-    def steps(self) -> int:
-        """See `Solution.steps`."""
-        return self.solution.steps
-
-    @property
-    def cost(self) -> float:
-        """F."""
-        return self.solution.cost
-
     @cached_property
     def keeps_off_itself(self) -> bool:
-        """See `Solution.keeps_off_itself`."""
-        return self.problem.keeps_off_itself(self.solution.nodes)
+        """Whether the arm does where only the default asks it to, at the nodes and by meshes."""
+        return self.method.problem.keeps_off_itself(self.nodes)
 
     @property
     def _samples(self) -> Samples:
-        return self.solution.objective.samples(self.solution.x)
+        return self.objective.samples(self.x)
 
     def merit(self) -> float:
-        """See `Solution.merit`."""
+        """Return the cost, much larger where constraints are violated: for ranking."""
         if not np.isfinite(self.cost):
             return np.inf
         return penalised(self.cost, self.constraints, self._samples)
 
-    def evaluation(self) -> Evaluation:
-        """Return the motion with its costs."""
-        return self.solution.evaluation()
-
-    def refined(self, where: Flags | None = None) -> "PublishedSolution":
+    def refined(self, where: Flags | None = None) -> Self:
         """Return it with half the step length, everywhere or for some of the steps (N,).
 
         As it is where it breaks down on that grid.
         """
         try:
-            return replace(self, solution=self.solution.refined(where))
+            return super().refined(where)
         except BreakdownError:
             return self
 
@@ -251,7 +156,7 @@ class NodeSolution:
 
     @cached_property
     def violations(self) -> tuple[str, ...]:
-        """See `Solution.violations`."""
+        """What is wrong for each constraint that it could not meet."""
         motion = self.motion
         ends = np.abs(motion.c).max(initial=0.0)
         # Written so that NaN is not kept.
@@ -261,7 +166,7 @@ class NodeSolution:
         return violated(motion.grid.constraints, motion.checked)
 
     def merit(self) -> float:
-        """See `Solution.merit`."""
+        """Return the cost, much larger where constraints are violated: for ranking."""
         motion = self.motion
         if motion.violation <= 0.0:
             return self.cost
@@ -300,6 +205,22 @@ class NodeSolution:
         return self.on(Grid(self.motion.grid.t).halved(where).nodes) or self
 
 
+Solution = PublishedSolution | NodeSolution
+"""A motion, however it was found."""
+
+
+def score(solution: Solution) -> tuple[bool, bool, float]:
+    """Return what ranks motions, the smaller, the better.
+
+    Whether constraints are violated, whether the arm meets itself, which would be refused in the
+    end, and the cost. Of two that violate constraints, the one that does so less is nearer to a
+    motion.
+    """
+    if solution.violations:
+        return True, False, solution.merit()
+    return False, not solution.keeps_off_itself, solution.cost
+
+
 def _active(optimum: Optimum) -> tuple[ActiveConstraint, ...]:
     """Return what kept an optimum from a lower cost."""
     if not (optimum.multipliers.any() or optimum.end_multipliers.size):
@@ -314,4 +235,4 @@ def _active(optimum: Optimum) -> tuple[ActiveConstraint, ...]:
             each.append(Multipliers(item, own, np.zeros(1), np.ones(own.shape, dtype=np.bool_)))
         else:
             each.append(next(inner))
-    return active_of(each, grid.t[[0, -1]], LEAST_SAVING * abs(motion.cost))
+    return active_of(each, grid.t[[0, -1]], _LEAST_SAVING * abs(motion.cost))

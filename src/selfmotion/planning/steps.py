@@ -16,17 +16,22 @@ from selfmotion.basics import (
     NoSequenceError,
     SelfmotionError,
 )
-from selfmotion.planning.candidate import Candidate
-from selfmotion.planning.chains import optimise_sequences
+from selfmotion.planning.candidate import Candidate, on_start
+from selfmotion.planning.effort import Search
 from selfmotion.planning.planner import Planner
-from selfmotion.planning.postures import is_long, keep_to_posture
-from selfmotion.planning.search import Search
-from selfmotion.planning.settings import SECOND_EFFORT, VERY_LONG_WAY
-from selfmotion.planning.starts import optimise_starts
-from selfmotion.planning.warm_start import on_start
+from selfmotion.planning.proposals import (
+    VERY_LONG_WAY,
+    is_long,
+    keep_to_posture,
+    optimise_sequences,
+    optimise_starts,
+)
 from selfmotion.problem import Problem
 from selfmotion.result import Attempt
-from selfmotion.search import Obstruction, guides, obstruction
+from selfmotion.search import Obstruction, obstruction
+
+# Where nothing else leads to a motion that keeps the constraints, this many times more are tried.
+_SECOND_EFFORT = 4
 
 
 def go_through(planner: Planner) -> None:
@@ -181,13 +186,13 @@ def _search_globally(planner: Planner) -> bool:
     can = planner.is_searchable and (planner.is_free or planner.best)
     if not (planner.is_sought and wanted and can) or planner.is_out_of_reach():
         return False
-    optimise_sequences(planner, guides, chosen=planner.chooses_globally)
+    optimise_sequences(planner, chosen=planner.chooses_globally)
     return True
 
 
 def _draw_more_starts(planner: Planner) -> bool:
     """Draw many more starts; they do not help where the search knows that nothing will."""
-    search, more = planner.search, SECOND_EFFORT
+    search, more = planner.search, _SECOND_EFFORT
     wanted = planner.is_unmet and not planner.notes
     if not (planner.is_sought and planner.takes_starts and wanted) or planner.is_out_of_reach():
         return False

@@ -1,32 +1,26 @@
 """Where to begin: start configurations, self-motion curves, chains over them, reach."""
 
+from selfmotion.search.chains import Sequence as Sequence
 from selfmotion.search.curves import (
-    Curve as Curve,
-    CurveSet as CurveSet,
+    SPACING as SPACING,
     SelfMotion as SelfMotion,
 )
 from selfmotion.search.guides import (
-    SequenceGuide as SequenceGuide,
+    BESIDE as BESIDE,
+    LAST_SMOOTHINGS as LAST_SMOOTHINGS,
     asks_length as asks_length,
     guides as guides,
     has_curves as has_curves,
     shortest_along as shortest_along,
 )
 from selfmotion.search.manifold import Manifold as Manifold
-from selfmotion.search.obstruction import Obstruction as Obstruction, obstruction as obstruction
-from selfmotion.search.reach import Reach as Reach, reachable as reachable
-from selfmotion.search.sequences import (
-    Sequence as Sequence,
-    best_sequences as best_sequences,
+from selfmotion.search.obstruction import (
+    Obstruction as Obstruction,
+    Reach as Reach,
+    obstruction as obstruction,
+    reachable as reachable,
 )
-from selfmotion.search.settings import (
-    BESIDE as BESIDE,
-    LAST_SMOOTHINGS as LAST_SMOOTHINGS,
-    SPACING as SPACING,
-)
-from selfmotion.search.single_poses import SinglePoses as SinglePoses
 from selfmotion.search.starts import (
-    Admits as Admits,
     carried as carried,
     spread as spread,
     start_candidates as start_candidates,

@@ -1,13 +1,70 @@
-"""Dynamic programming over the waypoints: the best chains of nodes, and others unlike them."""
+"""Dynamic programming over the waypoints: the best chains of nodes, and why there is none."""
 
 import itertools
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from selfmotion.basics import Array, Flags, Ints
+from selfmotion.basics import Array, Flags, Ints, read_only
+from selfmotion.collision import Closest, CollisionModel
+from selfmotion.search.curves import CurveSet, SelfMotion
 from selfmotion.search.measures import Length, Measure
-from selfmotion.search.settings import MOST_CHAINS, SAME_TRAVEL, STATIONS, UNLIKE, UNLIKE_FOR
+from selfmotion.search.nodes import Admissible
+
+# The jagged chain of samples is smoothed by a spline with this many of them per interval.
+_SMOOTHING = 3
+# Chains are unlike when some joint differs by this [rad or m] at this share of the waypoints.
+UNLIKE = 0.3
+_UNLIKE_FOR = 0.1
+# Stations: so many waypoints, evenly.
+_STATIONS = 7
+
+
+@dataclass(frozen=True, eq=False)
+class Sequence:
+    """Configurations along a path, and the smooth motion near them: a `Guide`.
+
+    Attributes
+    ----------
+    t : (W,)
+        Times of the waypoints [s].
+    q : (W, n)
+        Configurations [rad or m], each with the tool on the path.
+    length : float
+        Σ w|Δq| over waypoints and joints, w being the joints' weights (`RobotModel.joint_weights`).
+    cost : float
+        What it was chosen by; see `Measure`.
+    """
+
+    t: Array
+    q: Array
+    length: float
+    cost: float = np.nan
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "t", read_only(self.t))
+        object.__setattr__(self, "q", read_only(self.q))
+
+    @property
+    def start(self) -> Array:
+        """Its first configuration, (n,)."""
+        return np.asarray(self.q[0])
+
+    @cached_property
+    def _rate(self) -> Callable[[Array], Array]:
+        from scipy.interpolate import make_lsq_spline
+
+        t = self.t
+        # Where samples are dense in time, so are knots.
+        inner = np.append(t[:-_SMOOTHING:_SMOOTHING], t[-1])
+        knots = np.concatenate([[t[0]] * 3, inner, [t[-1]] * 3])
+        return make_lsq_spline(t, self.q, knots).derivative()
+
+    def __call__(self, t: Array) -> Array:
+        """Return q̇ at times `t` (S,), (S, n): what stands for x = 0 where it is a guide."""
+        return np.asarray(self._rate(t))
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,9 +142,9 @@ def diverse_chains(
     backwards = largest_step if largest_step.ndim == 1 else largest_step[::-1]
     back = None if measure is None else measure.backwards()
     reverse = best_chains(layers[::-1], backwards, turning, back)
-    stations = np.unique(np.linspace(0, len(layers) - 1, STATIONS).round().astype(int))
+    stations = stations_of(len(layers))
     through = [
-        (float(forward.cost[i][k] + reverse.cost[-1 - i][k]), int(i), k)
+        (float(forward.cost[i][k] + reverse.cost[-1 - i][k]), i, k)
         for i in stations
         for k in range(len(layers[i]))
     ]
@@ -95,9 +152,9 @@ def diverse_chains(
     mirrored: list[list[int]] = []
     taken: list[Array] = []
     # A chain through a node near a chosen one is rarely unlike it, and another node finds it.
-    covered = {int(i): np.zeros(len(layers[i]), dtype=bool) for i in stations}
+    covered = {i: np.zeros(len(layers[i]), dtype=bool) for i in stations}
     for total, i, node in sorted(through):
-        if not np.isfinite(total) or len(chosen) == count or len(taken) == MOST_CHAINS:
+        if not np.isfinite(total) or len(chosen) == count:
             break
         if covered[i][node]:
             continue
@@ -112,9 +169,39 @@ def diverse_chains(
     return (chosen + mirrored)[:count]
 
 
+def connected(layers: list[Array], chain: list[int], turning: Flags) -> Array:
+    """Return a chain's configurations (W, n); joints that turn without end do not jump."""
+    q = np.array([layer[k] for layer, k in zip(layers, chain, strict=True)])
+    steps = unturned(np.diff(q, axis=0), turning)
+    return np.where(turning, np.vstack([q[:1], q[0] + np.cumsum(steps, axis=0)]), q)
+
+
+def ranked(
+    times: Array, motions: list[Array], turning: Flags, weights: Array, measure: Measure
+) -> list[Sequence]:
+    """Return the sequences, the best first, without those that became like a better one."""
+    length = Length(weights)
+    sequences = [Sequence(times, q, length.of(q), measure.of(q)) for q in motions]
+    kept: list[Sequence] = []
+    for sequence in sorted(sequences, key=lambda sequence: sequence.cost):
+        if all(unlike(sequence.q, other.q, turning) for other in kept):
+            kept.append(sequence)
+    return kept
+
+
+def stations_of(count: int) -> list[int]:
+    """Return a few waypoints of so many, first and last included, as evenly as can be."""
+    return sorted({round(k) for k in np.linspace(0, count - 1, _STATIONS).tolist()})
+
+
+def in_order(q: Array) -> Array:
+    """Return nodes (K, n) of one waypoint, sorted by the first joint."""
+    return np.ascontiguousarray(q[np.argsort(q[:, 0], kind="stable")])
+
+
 def unlike(q: Array, other: Array, turning: Flags) -> bool:
     """Whether two motions (W, n) differ by much for long."""
-    return bool(np.mean(_apart(q, other, turning) > UNLIKE) >= UNLIKE_FOR)
+    return bool(np.mean(_apart(q, other, turning) > UNLIKE) >= _UNLIKE_FOR)
 
 
 def _mirrors(q: Array, other: Array, turning: Flags) -> bool:
@@ -123,7 +210,7 @@ def _mirrors(q: Array, other: Array, turning: Flags) -> bool:
         np.cumsum(np.abs(unturned(np.diff(motion, axis=0), turning)), axis=0)
         for motion in (q, other)
     )
-    return bool(np.abs(moved - also).max() < SAME_TRAVEL)
+    return bool(np.abs(moved - also).max() < UNLIKE)
 
 
 def _apart(q: Array, other: Array, turning: Flags) -> Array:
@@ -135,3 +222,92 @@ def unturned(difference: Array, turning: Flags) -> Array:
     """Return differences (…, n) modulo turns in the joints that turn without end."""
     turn = 2.0 * np.pi
     return np.where(turning, difference - turn * np.round(difference / turn), difference)
+
+
+def why_blocked(
+    motion: SelfMotion,
+    target: Array,
+    curves: CurveSet,
+    alive: Array,
+    nodes: Array,
+    bounds: Admissible,
+    largest_step: Array,
+) -> str:
+    """Return why no chain reaches a waypoint.
+
+    Parameters
+    ----------
+    motion : SelfMotion
+    target : (12,)
+        The tool at the waypoint.
+    curves : CurveSet
+        All configurations there.
+    alive : (A, n)
+        Nodes of the waypoint before that chains reach; empty at the first waypoint.
+    nodes : (N, n)
+        Nodes at the waypoint.
+    bounds : Admissible
+    largest_step : (n,)
+    """
+    if not curves.curves:
+        return f"no configuration puts '{motion.robot.tool}' on the path there"
+    if len(nodes) == 0:
+        samples = np.vstack([curve.q for curve in curves.curves])
+        return f"of all configurations there, {_refusals(samples, bounds, motion)}"
+    continued, arrived = motion.project_all(alive, target)
+    ending = continued[arrived]
+    ending = ending[~bounds.free(ending)]
+    step = _step(alive, nodes, bounds, largest_step, motion)
+    if not len(ending):
+        return step
+    # What ends is the cause; that the others are out of reach only follows.
+    return (
+        f"of the configurations that continue what was reached before, "
+        f"{_refusals(ending, bounds, motion)}; to the others there is {step}"
+    )
+
+
+def _refusals(samples: Array, bounds: Admissible, motion: SelfMotion) -> str:
+    """Say what excludes configurations: the joint or the pair nearest to allowing one."""
+    excess = bounds.excess(samples)
+    outside = excess.max(axis=1) > 0.0
+    parts = []
+    if np.any(outside):
+        least = excess[outside][np.argmin(excess[outside].sum(axis=1))]
+        joint = motion.robot.joint_names[int(np.argmax(least))]
+        parts.append(
+            f"{int(outside.sum())} of {len(samples)} are outside the joint limits, the nearest "
+            f"by {least.max():.3g} in joint '{joint}'"
+        )
+    inside = samples[~outside]
+    if len(inside) and bounds.bodies:
+        configurations = bounds.representative(inside)
+        distance, best = min(
+            ((asked, _roomiest(model, configurations)) for model, asked in bounds.bodies),
+            key=lambda found: found[1].value - found[0],
+        )
+        parts.append(
+            f"{len(inside)} of {len(samples)} are in collision or nearer than "
+            f"{1e3 * distance:.3g} mm, at best '{best.first}' and '{best.second}' with "
+            f"{1e3 * best.value:.3g} mm"
+        )
+    return "; ".join(parts)
+
+
+def _roomiest(model: CollisionModel, configurations: Array) -> Closest:
+    """Return the closest pair of the configuration (of K, n) where that pair is farthest apart."""
+    return max((model.distance(q) for q in configurations), key=lambda closest: closest.value)
+
+
+def _step(
+    alive: Array, nodes: Array, bounds: Admissible, largest_step: Array, motion: SelfMotion
+) -> str:
+    """Name the joint whose step limit keeps the nearest node away."""
+    steps = np.abs(unturned(nodes[None] - alive[:, None], bounds.turning))
+    ratios = (steps / largest_step).max(axis=-1)
+    a, b = np.unravel_index(int(np.argmin(ratios)), ratios.shape)
+    k = int(np.argmax(steps[a, b] / largest_step))
+    return (
+        f"the step limit: joint '{motion.robot.joint_names[k]}' would have to move by "
+        f"{steps[a, b, k]:.3g} in one step, allowed are {largest_step[k]:.3g}"
+    )

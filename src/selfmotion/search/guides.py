@@ -2,7 +2,6 @@
 
 import itertools
 from collections import abc
-from typing import Any
 
 import numpy as np
 
@@ -10,58 +9,41 @@ from selfmotion.basics import Array, Progress
 from selfmotion.costs import PathLength
 from selfmotion.path import Path
 from selfmotion.problem import Problem
+from selfmotion.search.chains import Sequence
+from selfmotion.search.manifold import OnPath
 from selfmotion.search.measures import Length, measure_of
 from selfmotion.search.nodes import Admissible
-from selfmotion.search.sampled import sampled_sequences
-from selfmotion.search.sequences import Sequence, best_sequences
-from selfmotion.search.settings import (
-    BESIDE,
-    CHAIN_EDGE,
-    CHAIN_SPEED,
-    FEWEST,
-    FEWEST_OF_CURVES,
-    MARGIN,
-    MOST,
-    PATH_LOOKS,
-    REFINED,
-    SMOOTHING,
-    STRIDE,
-    TURN,
-)
+from selfmotion.search.sampled import sampled_layers
+from selfmotion.search.sequences import Layers, best_sequences, curve_layers
 from selfmotion.search.shortest import Shortest
-from selfmotion.search.waypoints import OnPath
 from selfmotion.task import log3
 
-
-class SequenceGuide:
-    """A sequence as a smooth motion: what `Session` takes as x = 0.
-
-    Attributes
-    ----------
-    sequence : Sequence
-    start : (n,)
-        Its first configuration.
-    """
-
-    def __init__(self, sequence: Sequence) -> None:
-        from scipy.interpolate import make_lsq_spline
-
-        t, q = sequence.t, sequence.q
-        # Where samples are dense in time, so are knots.
-        inner = np.append(t[:-SMOOTHING:SMOOTHING], t[-1])
-        knots = np.concatenate([[t[0]] * 3, inner, [t[-1]] * 3])
-        self._rate = make_lsq_spline(t, q, knots).derivative()
-        self.sequence = sequence
-        self.start: Array = q[0]
-
-    def __call__(self, t: Array) -> Array:
-        """Return q̇ at times `t` (S,), (S, n)."""
-        return np.asarray(self._rate(t))
+# Sequences refined; the best among the samples is not always that of the best motion.
+_REFINED = 3
+# From one of the search's times to the next the tool moves by so much [m, rad], whatever the path's
+# own waypoints: more times would take longer, and what comes of them is smoothed anyway.
+_STRIDE = 0.02
+_TURN = 0.1
+# At fewer times than these a search would miss obstacles: self-motion curves allow for more than
+# samples of larger spaces do in the same time. More would take too long.
+_FEWEST_OF_CURVES = 150
+_FEWEST = 60
+_MOST = 400
+# The path is looked at so often to see how far the tool moves.
+_PATH_LOOKS = 2000
+# What the sequences keep beyond the clearance asked for, since they are only checked at waypoints.
+_MARGIN = 2.5e-4
+# Where the best chain itself is made the motion, it moves aside in the stages with the least δ, so
+# far from limits [rad or m] and at this share of the largest speeds: between waypoints it bulges.
+_CHAIN_EDGE = 5e-4
+_CHAIN_SPEED = 0.95
+# A node that does not come onto the path is put so far towards the next one; not in the middle,
+# where a halved grid would have one of the same times again.
+BESIDE = 0.3
+LAST_SMOOTHINGS = (3.0, 1.0, 0.3, 0.1, 0.03)
 
 
-def guides(
-    problem: Problem, rng: np.random.Generator | int | None, progress: Progress
-) -> list[SequenceGuide]:
+def guides(problem: Problem, rng: np.random.Generator | int, progress: Progress) -> list[Sequence]:
     """Return guides from the best sequences over the self-motions, by the problem's own costs.
 
     Raises
@@ -69,16 +51,33 @@ def guides(
     NoSequenceError
         No chain of configurations follows the path; says where it ends and why.
     """
-    t, asked = waypoint_times(problem), problem.envelope
-    options = _options(problem, t, rng, progress)
+    weights = _weights(problem)
+    layers = layers_of(problem, weights, rng, progress)
+    measure = measure_of(problem.follows, problem.costs, layers.t, weights)
+    return best_sequences(layers, _REFINED, measure, progress)
+
+
+def layers_of(
+    problem: Problem, weights: Array, rng: np.random.Generator | int, progress: Progress
+) -> Layers:
+    """Return the nodes of a problem: samples of all self-motions, free and within limits.
+
+    Parameters
+    ----------
+    problem : Problem
+    weights : (n,)
+        What a unit of each joint counts.
+    rng : Generator or int
+    progress : Progress
+    """
+    asked, t = problem.envelope, waypoint_times(problem)
+    steps = np.minimum(asked.speed * np.diff(t)[:, None], np.pi)
+    bodies = tuple((model, distance + _MARGIN) for model, distance in asked.bodies)
+    limits = asked.lower, asked.upper
     if has_curves(problem):
-        sequences = best_sequences(
-            problem.follows, t, lower=asked.lower, upper=asked.upper, **options
-        )
-    else:
-        waypoints = OnPath(problem.follows, t, asked.lower, asked.upper)
-        sequences = _sampled(problem, waypoints, t, options)
-    return [SequenceGuide(sequence) for sequence in sequences]
+        return curve_layers(problem.follows, t, steps, limits, bodies, rng, progress)
+    waypoints = OnPath(problem.follows, t, *limits)
+    return sampled_layers(waypoints, t, steps, limits, bodies, weights, rng, progress)
 
 
 def shortest_along(
@@ -91,7 +90,7 @@ def shortest_along(
     None where that does not help, or one meets something.
     """
     weights, asked = _weights(problem), problem.envelope
-    edge = np.minimum(CHAIN_EDGE, 1e-2 * (asked.upper - asked.lower))
+    edge = np.minimum(_CHAIN_EDGE, 1e-2 * (asked.upper - asked.lower))
     limits = asked.lower + edge, asked.upper - edge
     waypoints = OnPath(problem.follows, where, *limits)
     here, arrived = waypoints.project_each(_between(t, q, where), np.arange(len(where)))
@@ -103,9 +102,9 @@ def shortest_along(
         here, arrived = waypoints.project_each(_between(t, q, where), np.arange(len(where)))
         if not arrived.all():
             return None
-    bodies = tuple((model, distance + MARGIN) for model, distance in asked.bodies)
+    bodies = tuple((model, distance + _MARGIN) for model, distance in asked.bodies)
     bounds = Admissible(*limits, problem.robot.is_revolute, bodies)
-    largest = np.minimum(CHAIN_SPEED * asked.speed * np.diff(where)[:, None], np.pi)
+    largest = np.minimum(_CHAIN_SPEED * asked.speed * np.diff(where)[:, None], np.pi)
     here = Shortest(waypoints, bounds, largest, weights).near(here, smoothings)
     return (where, here) if bounds.keep(here).all() else None
 
@@ -121,35 +120,6 @@ def asks_length(problem: Problem) -> bool:
     return isinstance(measure_of(problem.follows, problem.costs, t, weights), Length)
 
 
-def _sampled(
-    problem: Problem, waypoints: OnPath, t: Array, options: dict[str, Any]
-) -> list[Sequence]:
-    asked = problem.envelope
-    return sampled_sequences(
-        waypoints,
-        t,
-        lower=asked.lower,
-        upper=asked.upper,
-        weights=_weights(problem),
-        **options,
-    )
-
-
-def _options(
-    problem: Problem, t: Array, rng: np.random.Generator | int | None, progress: Progress
-) -> dict[str, Any]:
-    """Return what a search over waypoints at times t (W,) is asked besides."""
-    asked = problem.envelope
-    return {
-        "largest_step": np.minimum(asked.speed * np.diff(t)[:, None], np.pi),
-        "bodies": [(model, distance + MARGIN) for model, distance in asked.bodies],
-        "count": REFINED,
-        "measure": measure_of(problem.follows, problem.costs, t, _weights(problem)),
-        "rng": 0 if rng is None else rng,
-        "progress": progress,
-    }
-
-
 def has_curves(problem: Problem) -> bool:
     """Whether the self-motions of a problem are curves, at all times."""
     return problem.follows.redundancy == 1 and not problem.follows.holds
@@ -157,18 +127,18 @@ def has_curves(problem: Problem) -> bool:
 
 def waypoint_times(problem: Problem) -> Array:
     """Return times (W,) [s] at which to search for a problem's configurations."""
-    return search_times(problem.path, FEWEST_OF_CURVES if has_curves(problem) else FEWEST)
+    return search_times(problem.path, _FEWEST_OF_CURVES if has_curves(problem) else _FEWEST)
 
 
 def search_times(path: Path, fewest: int) -> Array:
     """Return times (W,) [s] at which to search for configurations, as the tool moves on."""
-    t = np.linspace(0.0, path.duration, PATH_LOOKS)
+    t = np.linspace(0.0, path.duration, _PATH_LOOKS)
     tool = path.samples(t)
-    moved = np.linalg.norm(np.diff(tool.translation, axis=0), axis=1) / STRIDE
+    moved = np.linalg.norm(np.diff(tool.translation, axis=0), axis=1) / _STRIDE
     turned = np.array([np.linalg.norm(log3(a.T @ b)) for a, b in itertools.pairwise(tool.rotation)])
-    travel = np.concatenate([[0.0], np.cumsum(moved + turned / TURN)])
+    travel = np.concatenate([[0.0], np.cumsum(moved + turned / _TURN)])
     # Where the tool stands still, time counts, so that there is always one time after another.
-    count = int(np.clip(np.ceil(travel[-1]), fewest, MOST))
+    count = int(np.clip(np.ceil(travel[-1]), fewest, _MOST))
     travel += t * (1e-3 * count / path.duration)
     times = np.interp(np.linspace(0.0, travel[-1], count + 1), travel, t)
     times[-1] = path.duration

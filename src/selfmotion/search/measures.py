@@ -1,24 +1,127 @@
 """What a chain of configurations costs: its length, or what the problem minimises."""
 
-from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Self
 
 import numpy as np
 
-from selfmotion.basics import Array, Flags, Ints
+from selfmotion.basics import Array, Flags, Ints, kernel
 from selfmotion.costs import Cost, PathLength, Samples
 from selfmotion.follow import Follows
 from selfmotion.motion import Sampling
-from selfmotion.search import edges
-from selfmotion.search.settings import FAST, LAYERS_KEPT
+
+# Steps faster than this many times the mean speed of the shortest chain are changes from sample to
+# sample, which the finished motion spreads over more time.
+_FAST = 2.0
+# Layers whose kinematics are kept, per waypoint: memory, not what is found.
+_LAYERS_KEPT = 3
 
 
-class Measure(ABC):
-    """Adds up along chains of configurations, from one waypoint to the next."""
+@kernel
+def wrapped(difference: float, revolute: bool) -> float:
+    """Return the difference of two coordinates, modulo a turn where the joint is revolute."""
+    if revolute:
+        turns = np.floor(difference / (2.0 * np.pi) + 0.5)
+        return float(difference - 2.0 * np.pi * turns)
+    return difference
 
-    @abstractmethod
+
+@kernel
+def extend(
+    before: Array,
+    cost: Array,
+    after: Array,
+    largest_step: Array,
+    turning: Flags,
+    weights: Array,
+    reach: Array,
+    parent: Ints,
+) -> None:
+    """Set `reach` (M,), the least cost at `after` (M, n) over steps from `before` (N, n).
+
+    The cost of a step is Σ w|Δq| with `weights` (n,); `turning` joints count modulo turns. `before`
+    is sorted by its first joint unless that one turns. `parent` is -1 where no step is short
+    enough.
+    """
+    n, many = after.shape[1], before.shape[0]
+    for j in range(after.shape[0]):
+        reach[j], parent[j] = np.inf, -1
+        first = 0
+        if not turning[0]:
+            first = int(np.searchsorted(before[:, 0], after[j, 0] - largest_step[0]))
+        for i in range(first, many):
+            if not turning[0] and before[i, 0] > after[j, 0] + largest_step[0]:
+                break
+            total = cost[i]
+            for k in range(n):
+                step = abs(wrapped(after[j, k] - before[i, k], turning[k]))
+                total += weights[k] * step
+                if step > largest_step[k] or total >= reach[j]:
+                    total = np.inf
+                    break
+            if total < reach[j]:
+                reach[j], parent[j] = total, i
+
+
+@kernel
+def near_pairs(
+    before: Array, after: Array, largest_step: Array, turning: Flags
+) -> tuple[Ints, Ints]:
+    """Return the pairs of nodes (P,), (P,) from `before` (N, n) to `after` (M, n) that are near.
+
+    No joint may move by more than `largest_step`; otherwise as `extend`.
+    """
+    n, many = after.shape[1], before.shape[0]
+    room = 4 * (many + after.shape[0])
+    first, second = np.empty(room, dtype=np.intp), np.empty(room, dtype=np.intp)
+    count = 0
+    for j in range(after.shape[0]):
+        begin = 0
+        if not turning[0]:
+            begin = int(np.searchsorted(before[:, 0], after[j, 0] - largest_step[0]))
+        for i in range(begin, many):
+            if not turning[0] and before[i, 0] > after[j, 0] + largest_step[0]:
+                break
+            near = True
+            for k in range(n):
+                if abs(wrapped(after[j, k] - before[i, k], turning[k])) > largest_step[k]:
+                    near = False
+                    break
+            if near:
+                if count == room:
+                    room *= 2
+                    longer = np.empty((2, room), dtype=np.intp)
+                    longer[0, :count], longer[1, :count] = first, second
+                    first, second = longer[0], longer[1]
+                first[count], second[count] = i, j
+                count += 1
+    return first[:count].copy(), second[:count].copy()
+
+
+@kernel
+def lower_to_cheapest(
+    first: Ints, second: Ints, price: Array, cost: Array, reach: Array, parent: Ints
+) -> None:
+    """Lower `reach` (M,) to the least cost over steps with prices (P,), and set `parent`."""
+    for k in range(len(first)):
+        total = cost[first[k]] + price[k]
+        if total < reach[second[k]]:
+            reach[second[k]], parent[second[k]] = total, first[k]
+
+
+@dataclass(frozen=True, eq=False)
+class Length:
+    """Σ w|Δq|.
+
+    Attributes
+    ----------
+    weights : (n,)
+        w of the joints.
+    """
+
+    weights: Array
+
     def extended(
         self, k: int, before: Array, cost: Array, after: Array, step: Array, turning: Flags
     ) -> tuple[Array, Ints]:
@@ -41,52 +144,22 @@ class Measure(ABC):
         (M,), (M,)
             inf and -1 where no step is short enough.
         """
-
-    @abstractmethod
-    def of(self, q: Array) -> float:
-        """Return what a motion (W, n) costs."""
-
-    @abstractmethod
-    def backwards(self) -> "Measure":
-        """Return that of the same path from its end to its start."""
-
-    def at_pace_of(self, q: Array) -> "Measure":
-        """Return that for motions about as fast as the shortest one, (W, n)."""
-        return self
-
-
-@dataclass(frozen=True, eq=False)
-class Length(Measure):
-    """Σ w|Δq|.
-
-    Attributes
-    ----------
-    weights : (n,)
-        w of the joints.
-    """
-
-    weights: Array
-
-    def extended(
-        self, k: int, before: Array, cost: Array, after: Array, step: Array, turning: Flags
-    ) -> tuple[Array, Ints]:
-        """See `Measure.extended`."""
         reach, source = np.empty(len(after)), np.empty(len(after), dtype=np.intp)
         longest = np.ascontiguousarray(step)
-        edges.extend(before, cost, after, longest, turning, self.weights, reach, source)
+        extend(before, cost, after, longest, turning, self.weights, reach, source)
         return reach, source
 
     def of(self, q: Array) -> float:
-        """See `Measure.of`."""
+        """Return what a motion (W, n) costs."""
         return float((np.abs(np.diff(q, axis=0)) * self.weights).sum())
 
     def backwards(self) -> Self:
-        """See `Measure.backwards`."""
+        """Return that of the same path from its end to its start."""
         return self
 
 
 @dataclass(frozen=True, eq=False)
-class RunningCost(Measure):
+class RunningCost:
     """∫ G dt of a problem's costs, as far as chains of samples tell it.
 
     A step from q to q + Δq within Δt costs ½Δt (G(0, q) + G(0, q + Δq)) for being where it is, and
@@ -109,6 +182,8 @@ class RunningCost(Measure):
         Of the joints in |Δq|.
     speed : float
         v [rad/s].
+    is_backwards : bool
+        Whether chains go from the last waypoint to the first.
     """
 
     follows: Follows
@@ -117,6 +192,7 @@ class RunningCost(Measure):
     moving: tuple[Cost, ...]
     weights: Array
     speed: float = np.inf
+    is_backwards: bool = False
     _places: dict[int, "_Places"] = field(default_factory=dict, repr=False)
     _steps: dict[tuple[int, int], "_Steps"] = field(default_factory=dict, repr=False)
 
@@ -141,7 +217,10 @@ class RunningCost(Measure):
     def extended(
         self, k: int, before: Array, cost: Array, after: Array, step: Array, turning: Flags
     ) -> tuple[Array, Ints]:
-        """See `Measure.extended`."""
+        """See `Length.extended`."""
+        if self.is_backwards:
+            steps = self.steps(len(self.t) - 2 - k, after, before, step, turning)
+            return cheapest(steps.second, steps.first, steps.price, cost, len(after))
         steps = self.steps(k, before, after, step, turning)
         return cheapest(steps.first, steps.second, steps.price, cost, len(after))
 
@@ -150,14 +229,14 @@ class RunningCost(Measure):
         known = self._steps.get((id(before), id(after)))
         if known is None or known.before is not before or known.after is not after:
             longest = np.ascontiguousarray(step)
-            first, second = edges.near_pairs(before, after, longest, turning)
+            first, second = near_pairs(before, after, longest, turning)
             price = self._prices(k, before, after, first, second, turning)
             known = _Steps(before, after, first, second, price)
-            _note(self._steps, (id(before), id(after)), known, LAYERS_KEPT * len(self.t))
+            _note(self._steps, (id(before), id(after)), known, _LAYERS_KEPT * len(self.t))
         return known
 
     def of(self, q: Array) -> float:
-        """See `Measure.of`."""
+        """See `Length.of`."""
         fixed, one = np.zeros(q.shape[1], dtype=bool), np.zeros(1, dtype=np.intp)
         steps = (
             self._prices(k, q[k : k + 1], q[k + 1 : k + 2], one, one, fixed)[0]
@@ -165,15 +244,15 @@ class RunningCost(Measure):
         )
         return float(sum(steps))
 
-    def backwards(self) -> "Backwards":
-        """See `Measure.backwards`."""
-        return Backwards(self)
+    def backwards(self) -> Self:
+        """See `Length.backwards`."""
+        return replace(self, is_backwards=True)
 
     def at_pace_of(self, q: Array) -> "RunningCost":
-        """See `Measure.at_pace_of`."""
+        """Return that for motions about as fast as the shortest one, (W, n)."""
         moved = np.linalg.norm(self.weights * np.diff(q, axis=0), axis=1).sum()
         mean = float(moved) / (self.t[-1] - self.t[0])
-        return replace(self, speed=FAST * mean if mean > 0.0 else np.inf, _steps={})
+        return replace(self, speed=_FAST * mean if mean > 0.0 else np.inf, _steps={})
 
     def _prices(
         self, k: int, before: Array, after: Array, first: Ints, second: Ints, turning: Flags
@@ -211,7 +290,7 @@ class RunningCost(Measure):
             samples = Samples.along(self.follows, sampling, q, np.zeros_like(q))
             cost = sum((cost.value(samples) for cost in self.placed), np.zeros(len(q)))
             known = _Places(q, samples, cost)
-            _note(self._places, id(q), known, LAYERS_KEPT * len(self.t))
+            _note(self._places, id(q), known, _LAYERS_KEPT * len(self.t))
         return known
 
 
@@ -245,33 +324,14 @@ def _note(known: dict[Any, Any], key: Any, value: Any, most: int) -> None:
 def cheapest(
     first: Ints, second: Ints, price: Array, cost: Array, count: int
 ) -> tuple[Array, Ints]:
-    """Return what `Measure.extended` does, of pairs of nodes (P,), (P,) and the price of each."""
+    """Return what `Length.extended` does, of pairs of nodes (P,), (P,) and the price of each."""
     reach, source = np.full(count, np.inf), np.full(count, -1, dtype=np.intp)
-    edges.cheapest(first, second, price, cost, reach, source)
+    lower_to_cheapest(first, second, price, cost, reach, source)
     return reach, source
 
 
-@dataclass(frozen=True, eq=False)
-class Backwards(Measure):
-    """A running cost of chains from the last waypoint to the first."""
-
-    measure: RunningCost
-
-    def extended(
-        self, k: int, before: Array, cost: Array, after: Array, step: Array, turning: Flags
-    ) -> tuple[Array, Ints]:
-        """See `Measure.extended`."""
-        last = len(self.measure.t) - 2
-        steps = self.measure.steps(last - k, after, before, step, turning)
-        return cheapest(steps.second, steps.first, steps.price, cost, len(after))
-
-    def of(self, q: Array) -> float:
-        """See `Measure.of`."""
-        return self.measure.of(q[::-1])
-
-    def backwards(self) -> RunningCost:
-        """See `Measure.backwards`."""
-        return self.measure
+Measure = Length | RunningCost
+"""Adds up along chains of configurations, from one waypoint to the next."""
 
 
 def measure_of(follows: Follows, costs: Sequence[Cost], t: Array, weights: Array) -> Measure:

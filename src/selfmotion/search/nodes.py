@@ -9,9 +9,14 @@ import numpy.typing as npt
 
 from selfmotion.basics import Array, Flags, Ints
 from selfmotion.collision import CollisionModel
-from selfmotion.search.curves import CurveSet, SelfMotion
-from selfmotion.search.settings import BORDER, MERGED, SURELY_OUTSIDE
+from selfmotion.search.curves import ON_CURVE, CurveSet, SelfMotion
 
+# Where samples are free or not by turns, the border is enclosed to this share of the spacing.
+_BORDER = 0.25
+# A joint this near to its limit [rad or m] is at it.
+AT_LIMIT = 1e-3
+# Carried samples nearer to each other than this share of the spacing are merged.
+_MERGED = 0.4
 _TURN = 2.0 * np.pi
 
 
@@ -52,6 +57,14 @@ class Admissible:
             upper=np.where(wide, np.inf, self.upper),
         )
 
+    def counting_turns(self, which: Flags, bounds: "Admissible") -> "Admissible":
+        """Return it with the limits of others for some joints (n,), whose turns count again."""
+        return replace(
+            self,
+            lower=np.where(which, bounds.lower, self.lower),
+            upper=np.where(which, bounds.upper, self.upper),
+        )
+
     def turned_inside(self, q: Array) -> Array:
         """Return a motion (W, n) with each revolute joint by whole turns nearest to mid-range."""
         bounded = self.revolute & np.isfinite(self.lower) & np.isfinite(self.upper)
@@ -65,7 +78,8 @@ class Admissible:
 
     def layer(self, q: Array) -> Array:
         """Return free samples (K, n) at all their turns, sorted by the first joint, (K', n)."""
-        nodes = self.all_turns(q)
+        # A turn there and back may round a joint that stands at its limit beyond that.
+        nodes = np.clip(self.all_turns(q), self.lower, self.upper)
         return np.ascontiguousarray(nodes[np.argsort(nodes[:, 0], kind="stable")])
 
     def representative(self, q: Array) -> Array:
@@ -169,7 +183,7 @@ class _Sampler:
         for k, curve in enumerate(self.curves.curves):
             here = np.flatnonzero(on == k)
             here = here[np.argsort(places[here], kind="stable")]
-            kept = here[_thinned(places[here], MERGED * self.spacing)]
+            kept = here[_thinned(places[here], _MERGED * self.spacing)]
             gaps = _between(places[kept].tolist(), curve.length, self.spacing)
             arcs += [places[kept], gaps]
             rows += [kept, np.full(len(gaps), -1)]
@@ -179,7 +193,8 @@ class _Sampler:
         fresh = row < 0
         q = np.empty((len(row), self.motion.robot.dof))
         q[~fresh], q[fresh] = carried[row[~fresh]], self.curves.at(number[fresh], arc[fresh])
-        near = np.all(self.bounds.excess(q) < SURELY_OUTSIDE, axis=1)
+        # What is farther outside of the limits stays there when it is put onto its curve.
+        near = np.all(self.bounds.excess(q) < ON_CURVE, axis=1)
         new = np.flatnonzero(near & fresh)
         q[new], near[new] = self.motion.project_all(q[new], self.target)
         free = near.copy()
@@ -192,7 +207,7 @@ class _Sampler:
         lengths = np.array([curve.length for curve in self.curves.curves])
         found: list[Array] = []
         while True:
-            wide = np.abs(outside - inside) > BORDER * self.spacing
+            wide = np.abs(outside - inside) > _BORDER * self.spacing
             on, inside, outside = on[wide], inside[wide], outside[wide]
             if not len(on):
                 return found
@@ -233,7 +248,7 @@ def _thinned(arcs: Array, apart: float) -> list[int]:
 def _between(arcs: Sequence[float], length: float, spacing: float) -> Array:
     """Return arc lengths that fill the gaps between sorted `arcs`, the start included."""
     fill: list[float] = []
-    if not arcs or arcs[0] > MERGED * spacing:
+    if not arcs or arcs[0] > _MERGED * spacing:
         fill.append(0.0)
     stops = [0.0, *arcs, length]
     for first, last in itertools.pairwise(stops):

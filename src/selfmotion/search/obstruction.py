@@ -1,16 +1,158 @@
-"""What keeps every motion from following a path: a pose that the arm cannot be at."""
+"""Poses of a path that the arm cannot be at: which, why, what would help, how far it gets."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import cast
 
 import numpy as np
 
 from selfmotion.basics import Array
 from selfmotion.collision import how_near
+from selfmotion.follow import AugmentedFollows
 from selfmotion.problem import Problem
-from selfmotion.search.remedies import remedies
-from selfmotion.search.settings import AT_LIMIT, COARSE_POSES, MOST_LOOKED_AT, STRETCHED
-from selfmotion.search.single_poses import Found, SinglePoses
+from selfmotion.search.nodes import AT_LIMIT
+from selfmotion.search.single_poses import CLIMBERS, MOST_LOOKED_AT, Found, SinglePoses
+from selfmotion.search.starts import start_candidates
+from selfmotion.task import POSITION_ROWS, ROW_NAMES, Relaxation
+
+# Poses along the path that are looked at, bisections of the time at which no branch goes on, and
+# poses at which it is looked at how far they are out of reach.
+_POSES = 64
+_BISECTIONS = 16
+_LOOKS = 6
+# Poses about a time of trouble, in shares of the path's duration.
+_ABOUT = (-1e-3, 0.0, 1e-3, 4e-3)
+# A singular value below this share of the dexterous configuration's counts as stretched or folded.
+_STRETCHED = 0.1
+# Poses along a path at which to look before anything else.
+_COARSE_POSES = 9
+# What would help is looked for in so many rounds, in each of which a deviation has to be this share
+# of the least before.
+_SHRINKS, _SHRUNK = 6, 0.75
+# A path is moved so often, each time a bit farther than needed at the pose where nothing was found,
+# and no farther than this [m].
+_MOVE_TRIES, _OVERSHOOT, _FARTHEST = 4, 0.05, 0.5
+
+
+_ROTATION_ROWS = ROW_NAMES[len(POSITION_ROWS) :]
+
+
+def remedies(poses: SinglePoses, t: float, times: Array) -> list[str]:
+    """Return in words what would let the arm be at the pose at t [s], each by itself.
+
+    The path moved as a whole, so that at the other times [s], too, there are configurations; the
+    tool turned away from its path at t; and one joint that goes farther, also at t.
+    """
+    found = []
+    shift = nearest_place(poses, times)
+    if shift is not None:
+        # Rounded away from where the path is: what is told has to suffice.
+        far = np.copysign(np.ceil(1e4 * np.abs(shift) - 1e-3) / 10.0, shift) + 0.0
+        told = ", ".join(f"{axis} {x:+.4g}" for axis, x in zip("xyz", far, strict=True) if x)
+        found.append(f"the path moved by {np.linalg.norm(far):.3g} mm ({told})")
+    turn = least_deviation(poses, t, _ROTATION_ROWS)
+    if turn is not None:
+        found.append(f"the tool turned by {np.degrees(np.linalg.norm(turn)):.1f}° there")
+    joint = least_excess(poses, t)
+    if joint is not None:
+        name, excess = joint
+        unit = poses.problem.asked.robot.unit_of(name)
+        found.append(f"joint '{name}' going {excess:.3g} {unit} beyond its limit")
+    return found
+
+
+def nearest_place(poses: SinglePoses, times: Array) -> Array | None:
+    """Return a short way (3,) [m] by which the path has to be moved, None where none is found.
+
+    So that at all the times [s] something is found: by as much as the first that is not needs, and
+    then on. Bodies stay where they are.
+    """
+    shift = np.zeros(3)
+    for _ in range(_MOVE_TRIES):
+        moved = poses.shifted(shift)
+        blocked = moved.first_blocked(times)
+        if blocked is None:
+            return shift
+        more = least_deviation(moved, blocked, POSITION_ROWS)
+        if more is None:
+            return None
+        shift = shift + (1.0 + _OVERSHOOT) * more
+        if np.linalg.norm(shift) > _FARTHEST:
+            return None
+    return None
+
+
+def least_deviation(poses: SinglePoses, t: float, rows: tuple[str, ...]) -> Array | None:
+    """Return the least deviation of some rows (3,) at t [s] with which something free is found.
+
+    As far as tries tell: the least of many, and then less and less. None where nothing is found, or
+    the task does not prescribe these rows.
+    """
+    asked = poses.problem.asked
+    prescribed = [ROW_NAMES[k] for k in asked.task.rows]
+    rows = tuple(row for row in rows if row in prescribed)
+    if not rows:
+        return None
+    more = Relaxation(rows, _FARTHEST if rows[0] in POSITION_ROWS else np.pi)
+    others = (
+        replace(item, rows=tuple(row for row in item.rows if row not in rows))
+        for item in asked.relaxations
+        if not set(item.rows) <= set(rows)
+    )
+    wider, n = poses.of(replace(asked, relaxations=(*others, more))), asked.robot.dof
+    follows = cast(AugmentedFollows, wider.problem.follows)
+    q = poses.some(t, CLIMBERS)[:, :n]
+    q = np.hstack([q, np.zeros((len(q), follows.robot.dof - n))])
+    best: Array | None = None
+    for _ in range(_SHRINKS):
+        q, arrived = wider.project(q, t, far=True)
+        q = q[arrived]
+        q = q[wider.bounds.keep(q)]
+        if not len(q):
+            break
+        away = follows.deviation(more, q)
+        sizes = np.linalg.norm(away, axis=1)
+        order = np.argsort(sizes)
+        q, size = q[order], float(sizes[order[0]])
+        if best is None or size < np.linalg.norm(best):
+            best = np.zeros(6)
+            best[more.indices] = away[order[0]]
+        limits = follows.limits_within(more, _SHRUNK * size)
+        if not limits.max() > 0.0:
+            break
+        wider = wider.with_limits(
+            np.maximum(wider.bounds.lower, -limits), np.minimum(wider.bounds.upper, limits)
+        )
+    if best is None:
+        return None
+    return best[:3] if rows[0] in POSITION_ROWS else best[3:]
+
+
+def least_excess(poses: SinglePoses, t: float) -> tuple[str, float] | None:
+    """Return the joint that would have to leave its limits least for a pose, and how far.
+
+    None where no single joint is in the way.
+    """
+    lower, upper = poses.bounds.lower, poses.bounds.upper
+    seeds = poses.some(t, CLIMBERS)
+    found: list[tuple[float, str]] = []
+    for k, name in enumerate(poses.problem.asked.robot.joint_names):
+        if not (np.isfinite(lower[k]) or np.isfinite(upper[k])):
+            continue
+        wide = poses.with_limits(
+            np.where(np.arange(len(lower)) == k, -np.inf, lower),
+            np.where(np.arange(len(upper)) == k, np.inf, upper),
+        )
+        q, arrived = wide.project(seeds, t, far=True)
+        q = q[arrived]
+        q = q[wide.bounds.keep(q)]
+        excess = np.maximum(q[:, k] - upper[k], lower[k] - q[:, k])
+        if len(q):
+            found.append((float(excess.min()), name))
+    if not found:
+        return None
+    excess, name = min(found)
+    return name, excess
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +233,7 @@ def obstruction(problem: Problem, rng: np.random.Generator) -> Obstruction | Non
     what met bodies least, moved aside.
     """
     poses = SinglePoses(problem, rng)
-    times = np.linspace(0.0, problem.path.duration, COARSE_POSES)
+    times = np.linspace(0.0, problem.path.duration, _COARSE_POSES)
     known: dict[float, Array] = {}
     order = _worst_first(problem, times)
     for t in order:
@@ -129,6 +271,87 @@ def cause(poses: SinglePoses, q: Array) -> str:
     here, there = (
         float(np.linalg.svd(follows.jacobian(x), compute_uv=False)[-1]) for x in (q, best)
     )
-    if here < STRETCHED * there:
+    if here < _STRETCHED * there:
         causes.append(f"arm stretched or folded, smallest singular value {here:.2g}")
     return f" ({'; '.join(causes)})" if causes else ""
+
+
+@dataclass(frozen=True, eq=False)
+class Reach:
+    """How far along the path single poses can be reached at all.
+
+    Attributes
+    ----------
+    time : float
+        The last time up to which every pose has a configuration within the limits [s].
+    starts : list of (n,)
+        Configurations at the start of the path.
+    reason : str
+        What is beyond; "" where nothing is.
+    """
+
+    time: float
+    starts: list[Array]
+    reason: str
+
+
+def reachable(
+    problem: Problem, starts: int, rng: np.random.Generator, suspect: float = 0.0
+) -> Reach:
+    """Return how far single poses of the path can be reached, within the joint limits.
+
+    With what tolerances allow. Inverse kinematics from the solutions of the pose before, and from
+    elsewhere where these do not go on: a pose that nothing leads to is out of reach, as far as can
+    be told. Poses all along the path, and more about the time `suspect` [s], where a motion had
+    trouble.
+    """
+    poses = SinglePoses(problem, rng, clear=False)
+    path, given = problem.path, poses.problem.given_start
+    first = [given] if given is not None else start_candidates(poses.follows, starts, rng)
+    about = np.clip(suspect / path.duration + np.array(_ABOUT), 0.0, 1.0)
+    times = path.duration * np.union1d(np.linspace(0.0, 1.0, _POSES + 1), about)
+    known, last = np.array(first), 0.0
+    for t in times[1:]:
+        found = poses.look(t, known)
+        if not len(found.free):
+            known, last = _edge(poses, (last, t), known)
+            # From right before it, a pose that only seemed out of reach is found.
+            found = poses.look(t, known)
+        if not len(found.free):
+            found = poses.look_closely(t, found)
+        if not len(found.free):
+            return Reach(last, first, _out_of_reach(poses, last, known[0], times[times > last]))
+        known, last = found.free, float(t)
+    return Reach(path.duration, first, "")
+
+
+def _edge(poses: SinglePoses, interval: tuple[float, float], known: Array) -> tuple[Array, float]:
+    """Return solutions at the last time of an interval that there are any, and this time."""
+    last, beyond = interval
+    for _ in range(_BISECTIONS):
+        middle = 0.5 * (last + beyond)
+        found = poses.look(middle, known)
+        if len(found.free):
+            known, last = found.free, middle
+        else:
+            beyond = middle
+    return known, last
+
+
+def _out_of_reach(poses: SinglePoses, time: float, q: Array, beyond: Array) -> str:
+    """Return in words that later poses are out of reach, by how much, and what the arm looks like.
+
+    q (n,) is its configuration at `time`, the last one; `beyond` are later times.
+    """
+    begin = f"from t = {time:.6g} s on the pose is out of reach{cause(poses, q)}"
+    if len(poses.problem.asked.follows.items) > 1:
+        names = poses.follows.names
+        return f"{begin}: no configuration was found that puts {names} on their paths"
+    looks = beyond[np.unique(np.linspace(0, len(beyond) - 1, _LOOKS).round().astype(int))]
+    misses = [(*poses.nearest(float(t))[1][0], float(t)) for t in looks]
+    position, rotation, when = max(misses, key=lambda miss: miss[0] + miss[1])
+    turned = f" and {rotation:.2g} rad" if poses.problem.asked.task.angular else ""
+    return (
+        f"{begin}: the nearest configuration found misses it by up to "
+        f"{1e3 * position:.3g} mm{turned}, at t = {when:.4g} s"
+    )

@@ -7,7 +7,7 @@ minimum over how far each configuration moves along its self-motion is one block
 δ becomes smaller from stage to stage.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,31 +16,41 @@ from selfmotion.basics import Array, Flags, Ints
 from selfmotion.collision import ClearanceModel, CollisionModel
 from selfmotion.optimise import Banded
 from selfmotion.problem import BodiesOfArm
-from selfmotion.search.nodes import Admissible
-from selfmotion.search.settings import (
-    AT_LIMIT,
-    BODIES_STIFF,
-    FARTHEST,
-    FIRST_FARTHEST,
-    FURTHER,
-    LIMITS_HELD,
-    NEAR_BODIES,
-    SHORTENING_GAIN,
-    SHORTENING_ROUNDS,
-    SMOOTHINGS,
-    STEP_KEPT,
-    STEPS_STIFF,
-)
-from selfmotion.search.waypoints import OnPath
+from selfmotion.search.chains import best_chains, connected, in_order
+from selfmotion.search.manifold import LONGEST_CORRECTION, OnPath
+from selfmotion.search.measures import Length, Measure
+from selfmotion.search.nodes import AT_LIMIT, Admissible
+
+# δ, one stage after the other, as multiples of the chain's mean step.
+SMOOTHINGS = (10.0, 3.0, 1.0, 0.3, 0.1)
+# Rounds of each stage or ring at most, and the gain below which it ends [share].
+_ROUNDS = 20
+_GAIN = 1e-3
+# Rounds go so many times as far as their quadratics say, which are never below what they stand for.
+_FURTHER = 1.6
+# Joints at a limit stay there if they would leave it; rounds of that.
+_LIMITS_HELD = 4
+# Steps are kept below this share of the largest; more counts as length times this [1/rad].
+_STEP_KEPT = 0.97
+_STEPS_STIFF = 30.0
+# Bodies are kept apart by so much more than asked for [m]; less counts as length times this [1/m²];
+# and a joint that is held at its limit is as stiff.
+_NEAR_BODIES = 1e-4
+_STIFF = 1e6
+
 
 # Of directions along which nothing changes.
 _DAMPING = 1e-3
-# A joint that is held at its limit.
-_HELD = 1e6
 # Distances beyond what is wanted do not count: over so little they level off [m].
 _LEVELLED = 1e-9
 # Shorter steps are tried so often, each by this factor.
 _TRIES, _SHORTER = 5, 0.4
+# Around a chain, samples at these distances [rad or m], one after the other. Chains along curves
+# end up to 0.3 % longer with 0.01 as the finest (`make suite`, `make suite-made`).
+_ROUGH_RINGS = (0.3, 0.1)
+_FINE_RINGS = (0.03, 0.01, 0.003, 0.001)
+# So many of them to each side; of fine ones more, or `make suite-made` has a chain 0.13 % longer.
+_ROUGH_SIDE, _FINE_SIDE = 2, 4
 
 
 class Shortest:
@@ -61,7 +71,7 @@ class Shortest:
         self, waypoints: OnPath, bounds: Admissible, largest_step: Array, weights: Array
     ) -> None:
         self._waypoints, self._bounds, self._weights = waypoints, bounds, weights
-        self._largest, self._kept = largest_step, STEP_KEPT * largest_step
+        self._largest, self._kept = largest_step, _STEP_KEPT * largest_step
         self._models: list[tuple[ClearanceModel, float]] | None = None
 
     def near(self, q: Array, smoothings: Sequence[float] = SMOOTHINGS) -> Array:
@@ -72,11 +82,11 @@ class Shortest:
         """
         self._free = self._bounds.keep(q)
         self._watched = ~self._free
-        best, here, reach, free = q, q, FIRST_FARTHEST, self._free.sum()
+        best, here, reach, free = q, q, LONGEST_CORRECTION, self._free.sum()
         mean = self._length(q) / max(np.diff(q, axis=0).size, 1)
         for smoothing in smoothings:
             blocked = np.zeros(len(q), dtype=bool)
-            for _ in range(SHORTENING_ROUNDS):
+            for _ in range(_ROUNDS):
                 before = self._state(here, smoothing * mean)
                 after, reach = self._moved(before, blocked, reach)
                 if after is None:
@@ -84,7 +94,7 @@ class Shortest:
                 here = after.q
                 if self._free.sum() > free or self._better(best, here):
                     best, free = here, self._free.sum()
-                if after.merit > (1.0 - SHORTENING_GAIN) * before.merit:
+                if after.merit > (1.0 - _GAIN) * before.merit:
                     break
         return best
 
@@ -106,7 +116,7 @@ class Shortest:
         every, step = np.arange(len(before.q)), self._step(before, blocked)
         for _ in range(_TRIES):
             longest = float(np.abs(step).max())
-            moved = min(FURTHER * longest, reach)
+            moved = min(_FURTHER * longest, reach)
             guess = before.q + (moved / longest if longest > 0.0 else 0.0) * step
             q, arrived = self._waypoints.project_each(guess, every)
             arrived &= np.abs(q - guess).max(axis=1) < max(reach, AT_LIMIT)
@@ -121,7 +131,7 @@ class Shortest:
             after = self._state(np.where(arrived[:, None], q, before.q), before.smoothing)
             if after.merit < before.merit:
                 self._free = np.where(arrived, free, self._free)
-                return after, min(FARTHEST, max(reach, 2.0 * moved))
+                return after, min(LONGEST_CORRECTION, max(reach, 2.0 * moved))
             reach = _SHORTER * moved
         return None, reach
 
@@ -131,8 +141,8 @@ class Shortest:
         lengths = np.hypot(self._weights * steps, smoothing)
         over = np.maximum(np.abs(steps) - self._kept, 0.0) * self._weights
         rows, lack, slopes = self._lacking(q)
-        merit = (lengths - smoothing).sum() + 0.5 * STEPS_STIFF * (over**2).sum()
-        merit += 0.5 * BODIES_STIFF * (lack**2).sum()
+        merit = (lengths - smoothing).sum() + 0.5 * _STEPS_STIFF * (over**2).sum()
+        merit += 0.5 * _STIFF * (lack**2).sum()
         return _State(q, smoothing, steps, lengths, over, rows, lack, slopes, float(merit))
 
     def _lacking(self, q: Array) -> tuple[Ints, Array, Array]:
@@ -172,8 +182,8 @@ class Shortest:
         own[1:] += curvature
         held = np.repeat(blocked[:, None], state.q.shape[1], axis=1)
         step = np.zeros_like(state.q)
-        for _ in range(LIMITS_HELD):
-            step = _least(bases, slope, own + _HELD * held, curvature, state)
+        for _ in range(_LIMITS_HELD):
+            step = _least(bases, slope, own + _STIFF * held, curvature, state)
             leaving = self._leaving(state.q, step) & ~held
             if not leaving.any():
                 break
@@ -205,16 +215,16 @@ class _State:
     def slope(self, weights: Array) -> Array:
         """Return the merit's slope by each configuration, (W, n)."""
         pull = weights**2 * self.steps / self.lengths
-        pull += STEPS_STIFF * weights * self.over * np.sign(self.steps)
+        pull += _STEPS_STIFF * weights * self.over * np.sign(self.steps)
         slope = np.zeros_like(self.q)
         slope[:-1] -= pull
         slope[1:] += pull
-        np.add.at(slope, self.rows, -BODIES_STIFF * self.lack[:, None] * self.slopes)
+        np.add.at(slope, self.rows, -_STIFF * self.lack[:, None] * self.slopes)
         return slope
 
     def curvature(self, weights: Array) -> Array:
         """Return that of each step, (W - 1, n)."""
-        return np.asarray(weights**2 * (1.0 / self.lengths + STEPS_STIFF * (self.over > 0.0)))
+        return np.asarray(weights**2 * (1.0 / self.lengths + _STEPS_STIFF * (self.over > 0.0)))
 
 
 def _least(bases: Array, slope: Array, own: Array, between: Array, state: _State) -> Array:
@@ -226,7 +236,7 @@ def _least(bases: Array, slope: Array, own: Array, between: Array, state: _State
     turned = bases.transpose(0, 2, 1)
     blocks = turned @ (own[:, :, None] * bases) + _DAMPING * np.eye(size)
     along = np.einsum("ln,lnd->ld", state.slopes, bases[state.rows])
-    np.add.at(blocks, state.rows, BODIES_STIFF * along[:, :, None] * along[:, None, :])
+    np.add.at(blocks, state.rows, _STIFF * along[:, :, None] * along[:, None, :])
     matrix = Banded(count, size, 1)
     matrix.add(0, 0, blocks)
     matrix.add(1, 0, -(turned[:-1] @ (between[:, :, None] * bases[1:])))
@@ -238,6 +248,75 @@ def _least(bases: Array, slope: Array, own: Array, between: Array, state: _State
 
 def _smooth(model: CollisionModel | BodiesOfArm, distance: float) -> tuple[ClearanceModel, float]:
     """Return the distances that have slopes, and what is wanted of them [m]."""
-    wanted = distance + NEAR_BODIES
+    wanted = distance + _NEAR_BODIES
     own = model.own if isinstance(model, BodiesOfArm) else model
     return ClearanceModel(own, wanted, width=_LEVELLED), wanted
+
+
+def improved_by(
+    waypoints: OnPath, bounds: Admissible, largest_step: Array, measure: Measure
+) -> Callable[[Array, bool], Array]:
+    """Return what makes a better chain near q (W, n), never a worse one; shorter ones also roughly.
+
+    Where something else than length counts, Newton's method goes on from there, and chains only
+    have to be near enough.
+    """
+    asked = waypoints, bounds, largest_step, measure
+    if not isinstance(measure, Length):
+        return lambda q, _: _cheaper(*asked, q, _ROUGH_RINGS, _ROUGH_SIDE)
+    shortest = Shortest(waypoints, bounds, largest_step, measure.weights)
+
+    def shorter(q: Array, roughly: bool) -> Array:
+        q = shortest.near(q, SMOOTHINGS[:1] if roughly else SMOOTHINGS)
+        # Along curves samples are few: they lead over what quadratics do not see beyond.
+        is_last = roughly or waypoints.redundancy > 1
+        return q if is_last else _cheaper(*asked, q, _FINE_RINGS, _FINE_SIDE)
+
+    return shorter
+
+
+def _cheaper(
+    waypoints: OnPath,
+    bounds: Admissible,
+    largest_step: Array,
+    measure: Measure,
+    q: Array,
+    rings: Sequence[float],
+    side: int,
+) -> Array:
+    """Return a cheaper chain by dynamic programming over samples around q (W, n), ever nearer."""
+    fixed = np.zeros(q.shape[1], dtype=bool)
+    cost = measure.of(q)
+    for ring in rings:
+        for _ in range(_ROUNDS):
+            layers = _around(waypoints, bounds, q, ring * np.arange(1.0, side + 1.0))
+            chains = best_chains(layers, largest_step, fixed, measure)
+            before, cost = cost, float(chains.cost[-1].min())
+            chain = chains.back(len(q) - 1, int(np.argmin(chains.cost[-1])))
+            q = connected(layers, chain, fixed)
+            if cost > before - _GAIN * abs(before):
+                break
+    return q
+
+
+def _around(waypoints: OnPath, bounds: Admissible, q: Array, away: Array) -> list[Array]:
+    """Return q (W, n) and the free samples around it at each waypoint, each (K, n).
+
+    As far `away` (S,) to both sides along each axis of a basis of the null space that is carried
+    along q: so a chain can move aside as a whole, without zigzag.
+    """
+    basis = waypoints.bases(q)
+    offsets = np.concatenate([-away[::-1], away])
+    moves = np.einsum("wnr,k->wrkn", basis, offsets).reshape(len(q), -1, q.shape[1])
+    guesses = q[:, None] + moves
+    flat = guesses.reshape(-1, q.shape[1])
+    found, arrived = waypoints.project_each(flat, np.repeat(np.arange(len(q)), moves.shape[1]))
+    # Far corrections lead elsewhere.
+    arrived &= np.linalg.norm(found - flat, axis=1) < 1.5 * away[0]
+    arrived[arrived] = bounds.keep(found[arrived])
+    found, kept = found.reshape(guesses.shape), arrived.reshape(guesses.shape[:2])
+    layers = [
+        np.concatenate([here[None], near[free]])
+        for here, near, free in zip(q, found, kept, strict=True)
+    ]
+    return [in_order(layer) for layer in layers]

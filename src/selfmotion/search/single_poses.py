@@ -9,28 +9,31 @@ from selfmotion.basics import Array, Flags
 from selfmotion.collision import Closest
 from selfmotion.problem import Problem
 from selfmotion.robot import RobotModel
-from selfmotion.search.curves import SelfMotion
+from selfmotion.search.curves import SPACING, SelfMotion
 from selfmotion.search.manifold import Manifold
 from selfmotion.search.nodes import Admissible
-from selfmotion.search.settings import (
-    APPROACHED,
-    BRANCHES,
-    CLIMBERS,
-    CLIMBS,
-    CLOSE,
-    MORE_APPROACHED,
-    MORE_SEEDS,
-    MOST_LOOKED_AT,
-    NEARLY,
-    ROUGHLY_APPROACHED,
-    SEEDS,
-    SPACING,
-    TRACING_SEEDS,
-    WALK_STEPS,
-    WALKERS,
-    WALKS,
-)
-from selfmotion.search.starts import spread
+from selfmotion.search.starts import TRACING_SEEDS, spread
+
+# Branches of solutions that are followed from one pose to the next, and seeds where none of them
+# goes on.
+_BRANCHES = 12
+_SEEDS = 24
+# Before a pose counts as out of reach, so many seeds more are tried, and a slower method from some:
+# poses at joint limits are missed from 24.
+_MORE_SEEDS = 300
+# Who gets so near [m + rad] counts as there.
+_NEARLY = 1e-5
+# The slower method brings so many seeds nearer; and so many where a pose would be given up: near
+# limits it arrives from a third of them, Newton's from one in 300.
+_APPROACHED, _MORE_APPROACHED = 48, 400
+# Of those that meet something, so many are looked at, and so many of these, which meet the least,
+# moved aside at random, by less and less [rad].
+MOST_LOOKED_AT, CLIMBERS = 80, 8
+# Random walks along the self-motions, so many at a time, so often, in steps of these sizes [rad].
+_WALKERS, _WALKS, _WALK_STEPS = 64, 12, (0.1, 0.3, 0.8)
+_CLIMBS = (0.3, 0.3, 0.2, 0.2, 0.1, 0.1, 0.05, 0.05, 0.02, 0.02)
+# Seeds near a pose are its nearest configurations, each so far off [rad], and some others.
+_CLOSE = (0.0, 0.03, 0.1, 0.3)
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +77,7 @@ class SinglePoses:
         self.bounds = Admissible(
             asked.lower, asked.upper, self.robot.is_revolute, asked.bodies if clear else ()
         )
-        self._seeds = np.array(list(spread(self.robot, SEEDS, rng)))
+        self._seeds = spread(self.robot, _SEEDS, rng)
         self._shift = np.zeros(3)
         # A path takes a millisecond to say where it is, and is asked again and again.
         self._targets: dict[float, Array] = {}
@@ -122,7 +125,7 @@ class SinglePoses:
         for t in times.tolist():
             found = self.look(t, known)
             if not len(found.free):
-                q = self._by_damped_steps(t, ROUGHLY_APPROACHED)
+                q = self._by_damped_steps(t, _APPROACHED)
                 found = replace(found, free=q[self.bounds.keep(q)])
             if not len(found.free):
                 return float(t)
@@ -131,25 +134,25 @@ class SinglePoses:
 
     def look(self, t: float, known: Array) -> Found:
         """Return what is found at t [s] from configurations nearby (K, n), and from anywhere."""
-        near = self._reached(t, known[:BRANCHES])
+        near = self._reached(t, known[:_BRANCHES])
         free = near[self.bounds.keep(near)]
         if len(free):
-            return Found(free, near[:0], len(known[:BRANCHES]))
+            return Found(free, near[:0], len(known[:_BRANCHES]))
         far = self._reached(t, self._seeds, far=True)
         free = far[self.bounds.keep(far)]
-        return Found(free, np.concatenate([near, far]), len(known[:BRANCHES]) + len(self._seeds))
+        return Found(free, np.concatenate([near, far]), len(known[:_BRANCHES]) + len(self._seeds))
 
     def look_closely(self, t: float, before: Found) -> Found:
         """Return what is found by everything that is known, where a look found nothing free."""
-        seeds = np.array(list(spread(self.robot, MORE_SEEDS, self._rng)))
+        seeds = spread(self.robot, _MORE_SEEDS, self._rng)
         far = self._reached(t, seeds, far=True)
         tries = before.tries + len(seeds)
         free = far[self.bounds.keep(far)]
         met = np.concatenate([before.met, far])
         if len(free):
             return Found(free, met, tries)
-        slowly = self._by_damped_steps(t, MORE_APPROACHED)
-        tries += MORE_APPROACHED
+        slowly = self._by_damped_steps(t, _MORE_APPROACHED)
+        tries += _MORE_APPROACHED
         free, met = slowly[self.bounds.keep(slowly)], np.concatenate([met, slowly])
         if len(free) or not len(met):
             return Found(free, met, tries)
@@ -169,14 +172,14 @@ class SinglePoses:
     def _by_damped_steps(self, t: float, count: int) -> Array:
         """Return what the slower method finds, which comes to limits and edges, (K, n)."""
         q, misses = self.nearest(t, count)
-        near = q[misses.sum(axis=1) < NEARLY]
+        near = q[misses.sum(axis=1) < _NEARLY]
         within = (np.abs(near) <= self.follows.within_bands(near)).all(axis=1)
         pulled, arrived = self.project(near[~within], t)
         return np.concatenate([near[within], pulled[arrived]])
 
-    def nearest(self, t: float, count: int = APPROACHED) -> tuple[Array, Array]:
+    def nearest(self, t: float, count: int = _APPROACHED) -> tuple[Array, Array]:
         """Return configurations as near to a pose as limits let them (K, n), misses [m, rad]."""
-        seeds = np.array(list(spread(self.robot, count, self._rng)))
+        seeds = spread(self.robot, count, self._rng)
         q, misses = self._manifold.approach(seeds, self.target(t), self._held(t))
         order = np.argsort(misses.sum(axis=1), kind="stable")
         return q[order], misses[order]
@@ -184,8 +187,8 @@ class SinglePoses:
     def some(self, t: float, count: int) -> Array:
         """Return seeds (K, n) from which something may be found near the pose at t [s]."""
         q, _ = self.nearest(t)
-        near = np.repeat(q[:count], len(CLOSE), axis=0)
-        noise = self._rng.normal(size=near.shape) * np.tile(CLOSE, count)[: len(near), None]
+        near = np.repeat(q[:count], len(_CLOSE), axis=0)
+        noise = self._rng.normal(size=near.shape) * np.tile(_CLOSE, count)[: len(near), None]
         return np.concatenate([near + noise / self.robot.joint_weights, self._seeds])
 
     def _along_curves(self, t: float, met: Array) -> Array:
@@ -205,9 +208,9 @@ class SinglePoses:
         From anywhere Newton's method may lead to few of them only, where limits are near.
         """
         known = met
-        for _ in range(WALKS):
-            here = known[self._rng.integers(len(known), size=WALKERS)]
-            size = self._rng.choice(WALK_STEPS, size=(WALKERS, 1))
+        for _ in range(_WALKS):
+            here = known[self._rng.integers(len(known), size=_WALKERS)]
+            size = self._rng.choice(_WALK_STEPS, size=(_WALKERS, 1))
             away = self._rng.normal(size=here.shape) * size / self.robot.joint_weights
             found, arrived = self.project(here + away, t)
             known = np.concatenate([known, found[arrived]])
@@ -220,7 +223,7 @@ class SinglePoses:
         some = met[:: -(-len(met) // MOST_LOOKED_AT)]
         best = some[np.argsort([-self.room(q)[0] for q in some])[:CLIMBERS]]
         room = np.array([self.room(q)[0] for q in best])
-        for size in CLIMBS:
+        for size in _CLIMBS:
             away = self._rng.normal(scale=size, size=best.shape) / self.robot.joint_weights
             found, arrived = self.project(best + away, t)
             for k in np.flatnonzero(arrived):

@@ -1,6 +1,6 @@
 """Start configurations worth trying."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 
 import numpy as np
 import numpy.typing as npt
@@ -8,17 +8,19 @@ import numpy.typing as npt
 from selfmotion.basics import Array, InverseKinematicsError
 from selfmotion.follow import Follows
 from selfmotion.robot import RobotModel
-from selfmotion.search.curves import SelfMotion
+from selfmotion.search.chains import UNLIKE
+from selfmotion.search.curves import SPACING, SelfMotion
 from selfmotion.search.manifold import Manifold
 from selfmotion.search.nodes import Admissible
-from selfmotion.search.settings import (
-    ENOUGH_STARTS,
-    SAME_START,
-    SPACING,
-    START_ROUNDS,
-    TRACING_SEEDS,
-    TRIES,
-)
+
+# Where all self-motions of the first pose can be traced: from so many seeds.
+TRACING_SEEDS = 60
+# Where they cannot: so many seeds for each configuration that is asked for.
+_TRIES = 2
+# Where most of them do not keep what else is asked of a configuration: so many rounds of these at
+# most, until there is this share of the starts.
+_START_ROUNDS, _ENOUGH_STARTS = 12, 0.5
+
 
 Admits = Callable[[Array], npt.NDArray[np.bool_]]
 
@@ -105,16 +107,15 @@ def _scattered(
     manifold = Manifold(follows, robot.lower, robot.upper)
     target, found = follows.targets(np.zeros(1))[0], list[Array]()
     held = follows.held(np.zeros(1))[0]
-    for _ in range(START_ROUNDS):
-        seeds = np.array(list(spread(robot, TRIES * count, rng)))
+    for _ in range(_START_ROUNDS):
+        seeds = spread(robot, _TRIES * count, rng)
         q, arrived = manifold.project(seeds, target, far=True, held=held)
+        # Near ones lead to the same plan once the start may move.
         for one in q[arrived][admits(q[arrived])]:
-            if len(found) < count and all(
-                np.linalg.norm(one - other) > SAME_START for other in found
-            ):
+            if len(found) < count and all(np.linalg.norm(one - other) > UNLIKE for other in found):
                 found.append(one)
         # Without anything else to keep, one round tells what there is.
-        if admits is _all or len(found) >= ENOUGH_STARTS * count:
+        if admits is _all or len(found) >= _ENOUGH_STARTS * count:
             break
     return found
 
@@ -135,8 +136,8 @@ def carried(follows: Follows, starts: Array, t: Array) -> tuple[Array, npt.NDArr
     return np.stack(motions, axis=1), going
 
 
-def spread(robot: RobotModel, count: int, rng: np.random.Generator) -> Iterator[Array]:
-    """Yield configurations that fill the limits evenly.
+def spread(robot: RobotModel, count: int, rng: np.random.Generator) -> Array:
+    """Return configurations that fill the limits evenly, (count, n).
 
     The additive recurrence with the generalised golden ratio: fractions of k g^-1 … k g^-n, where
     g > 1 solves g^(n+1) = g + 1 (M. Roberts, "The unreasonable effectiveness of quasirandom
@@ -148,5 +149,5 @@ def spread(robot: RobotModel, count: int, rng: np.random.Generator) -> Iterator[
         ratio = (1.0 + ratio) ** (1.0 / (robot.dof + 1.0))
     steps = ratio ** -np.arange(1.0, robot.dof + 1.0)
     shift = rng.uniform(size=robot.dof)
-    for k in range(count):
-        yield lower + (upper - lower) * ((shift + (k + 1) * steps) % 1.0)
+    shares = (shift + np.arange(1, count + 1)[:, None] * steps) % 1.0
+    return np.asarray(lower + (upper - lower) * shares)

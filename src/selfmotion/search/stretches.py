@@ -1,21 +1,111 @@
 """The fewest chains of nodes that together follow a path which no single one follows."""
 
 import itertools
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from selfmotion.basics import Array, Flags, Ints, NoSequenceError, Progress, silent
 from selfmotion.problem import Problem
-from selfmotion.search.chains import best_chains, unturned
-from selfmotion.search.guides import has_curves, waypoint_times
-from selfmotion.search.jumps import Jumps
-from selfmotion.search.measures import Length
+from selfmotion.search.chains import best_chains, connected, unturned
+from selfmotion.search.guides import layers_of
+from selfmotion.search.manifold import OnPath
+from selfmotion.search.measures import Length, cheapest, near_pairs
 from selfmotion.search.nodes import Admissible
-from selfmotion.search.sampled import SampledLayers
-from selfmotion.search.sequences import CurveLayers, connected
-from selfmotion.search.settings import BREAK, JUMP_ROUNDS, MARGIN
-from selfmotion.search.waypoints import OnPath
+from selfmotion.search.sequences import Layers
+
+# What a change to another configuration counts: more than any motion in between.
+_BREAK = 1e6
+# A step is put onto the path in so many places, less one. What an arm can follow has no part that
+# is more than this share of it, nor farther than this [rad or m].
+_JUMP_LOOKS, _JUMP_SHARE, _LEAST_JUMP = 8, 0.4, 0.05
+# Chains are looked for again without the jumps they have, so often.
+_JUMP_ROUNDS = 12
+
+
+class _Jumps:
+    """What is known of jumps along a path: chains are looked for again without them.
+
+    Parameters
+    ----------
+    problem : Problem
+    t : (W,)
+        Times of the waypoints [s].
+    steps : (W - 1, n)
+        Largest change of each joint from one waypoint to the next [rad or m].
+    """
+
+    def __init__(self, problem: Problem, t: Array, steps: Array) -> None:
+        self._problem, self._t, self._steps = problem, t, steps
+        # The largest share of these that is no jump, as far as is known.
+        self._most = 1.0
+        # Waypoints at which each step is looked at, and what was found there.
+        self._at: set[int] = set()
+        self._known: dict[tuple[int, bytes], tuple[Ints, Ints]] = {}
+
+    def note(self, chains: Sequence[tuple[int, Array]]) -> bool:
+        """Note where chains jump: their first waypoints, and configurations (W, n); whether any."""
+        jumping: list[float] = []
+        others = 0.0
+        for first, q in chains:
+            steps = self._steps[first : first + len(q) - 1]
+            share = (np.abs(np.diff(q, axis=0)) / steps).max(axis=1)
+            t = self._t[first : first + len(q)]
+            (jumps,) = np.nonzero(jumps_of(self._problem, t[:-1], t[1:], q[:-1], q[1:]))
+            jumping += share[jumps].tolist()
+            others = max(others, float(np.delete(share, jumps).max(initial=0.0)))
+            self._at |= {first + k for k in jumps.tolist()}
+        if jumping and max(jumping) > others:
+            # The next ones would be much like these, a waypoint earlier or later.
+            self._most = 0.5 * (max(others, min(jumping)) + others)
+        return bool(jumping)
+
+    def extended(
+        self, k: int, length: Length, before: Array, cost: Array, after: Array, turning: Flags
+    ) -> tuple[Array, Ints]:
+        """Return `Length.extended` from waypoint k to the next, without steps that jump."""
+        step = self._most * self._steps[k]
+        if k not in self._at:
+            return length.extended(k, before, cost, after, step, turning)
+        first, second = self._taken(k, before, after, turning)
+        moved = unturned(after[second] - before[first], turning)
+        price = np.abs(moved) @ length.weights
+        price[(np.abs(moved) > step).any(axis=1)] = np.inf
+        return cheapest(first, second, price, cost, len(after))
+
+    def _taken(self, k: int, before: Array, after: Array, turning: Flags) -> tuple[Ints, Ints]:
+        """Return the steps from waypoint k to the next that are no jumps, (P,), (P,)."""
+        key = k, turning.tobytes()
+        if key not in self._known:
+            step = np.ascontiguousarray(self._most * self._steps[k])
+            first, second = near_pairs(before, after, step, turning)
+            here = before[first]
+            there = here + unturned(after[second] - here, turning)
+            early, late = (np.full(len(first), time) for time in self._t[k : k + 2])
+            jump = jumps_of(self._problem, early, late, here, there)
+            self._known[key] = first[~jump], second[~jump]
+        return self._known[key]
+
+
+def jumps_of(problem: Problem, early: Array, late: Array, here: Array, there: Array) -> Flags:
+    """Return which steps from q (K, n) at times (K,) to others, (K, n) at (K,), no motion takes.
+
+    Between its ends a step is put onto the path in a few places, within limits. Where arms can go
+    that way, these are about evenly apart; between two branches most of the step is left between
+    two of them, or nothing arrives.
+    """
+    share = np.arange(1, _JUMP_LOOKS) / _JUMP_LOOKS
+    times = (early[:, None] + (late - early)[:, None] * share).ravel()
+    straight = here[:, None] + (there - here)[:, None] * share[:, None]
+    where = OnPath(problem.follows, times, problem.envelope.lower, problem.envelope.upper)
+    n = here.shape[1]
+    found, arrived = where.project_each(straight.reshape(-1, n), np.arange(len(times)))
+    between = found.reshape(len(here), len(share), n)
+    whole = np.concatenate([here[:, None], between, there[:, None]], axis=1)
+    parts = np.linalg.norm(np.diff(whole, axis=1), axis=2).max(axis=1)
+    most = np.maximum(_JUMP_SHARE * np.linalg.norm(there - here, axis=1), _LEAST_JUMP)
+    return np.asarray((parts > most) | ~arrived.reshape(len(here), -1).all(axis=1))
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,21 +133,16 @@ class Stretch:
 
 @dataclass(frozen=True, eq=False)
 class Stretches:
-    """Nodes along a path, over which the fewest chains are looked for; made by `Stretches.of`.
-
-    Attributes
-    ----------
-    t : (W,)
-        Times of the waypoints [s].
-    """
+    """Nodes along a path, over which the fewest chains are looked for; made by `Stretches.of`."""
 
     problem: Problem
-    t: Array
-    _nodes: CurveLayers | SampledLayers
-    _bounds: Admissible
-    _steps: Array
-    _samples: list[Array]
-    _jumps: Jumps
+    _layers: Layers
+    _jumps: _Jumps
+
+    @property
+    def t(self) -> Array:
+        """Times of the waypoints [s], (W,)."""
+        return self._layers.t
 
     @classmethod
     def of(
@@ -70,21 +155,8 @@ class Stretches:
         NoSequenceError
             A pose of the path has no node at all; tells the time and why.
         """
-        asked, t = problem.envelope, waypoint_times(problem)
-        steps = np.minimum(asked.speed * np.diff(t)[:, None], np.pi)
-        bodies = tuple((model, distance + MARGIN) for model, distance in asked.bodies)
-        limits, weights = (asked.lower, asked.upper), problem.robot.joint_weights
-        if has_curves(problem):
-            curves = CurveLayers.of(problem.follows, t, limits, bodies, rng, progress)
-            found = cls(
-                problem, t, curves, curves.bounds, steps, curves.samples, Jumps(problem, t, steps)
-            )
-        else:
-            where = OnPath(problem.follows, t, *limits)
-            samples = SampledLayers.of(where, limits, bodies, steps, weights, rng, progress)
-            found = cls(
-                problem, t, samples, samples.bounds, steps, samples.layers, Jumps(problem, t, steps)
-            )
+        layers = layers_of(problem, problem.robot.joint_weights, rng, progress)
+        found = cls(problem, layers, _Jumps(problem, layers.t, layers.steps))
         found._pin_ends()
         found._check()
         return found
@@ -105,7 +177,7 @@ class Stretches:
         NoSequenceError
             No chains, however many, follow the path; tells the time and why.
         """
-        for _ in range(JUMP_ROUNDS):
+        for _ in range(_JUMP_ROUNDS):
             found = self._found(forbidden)
             if not self._jumps.note([(item.first, item.q) for item in found]):
                 break
@@ -113,11 +185,11 @@ class Stretches:
 
     def _found(self, forbidden: set[int]) -> list[Stretch]:
         """Return the fewest chains without the jumps that are known; see `fewest`."""
-        bounds = self._bounds
+        bounds = self._layers.bounds
         # Joints with room for several turns turn without end at first: see `best_sequences`.
         relaxed = bounds.without_turns()
         while True:
-            layers = [relaxed.layer(q) for q in self._samples]
+            layers = [relaxed.layer(q) for q in self._layers.samples]
             turning = relaxed.turning
             chains = self._chains(layers, relaxed, forbidden)
             motions = [
@@ -127,11 +199,7 @@ class Stretches:
             beyond = np.any([bounds.beyond(q) for q in motions], axis=0)
             if not np.any(beyond):
                 break
-            relaxed = replace(
-                relaxed,
-                lower=np.where(beyond, bounds.lower, relaxed.lower),
-                upper=np.where(beyond, bounds.upper, relaxed.upper),
-            )
+            relaxed = relaxed.counting_turns(beyond, bounds)
         return [
             Stretch(
                 first,
@@ -145,7 +213,7 @@ class Stretches:
 
     def _pin_ends(self) -> None:
         """Let nothing but a given start, and a given end, be a node there."""
-        start, samples = self.problem.given_start, self._samples
+        start, samples = self.problem.given_start, self._layers.samples
         if start is not None:
             samples[0] = start[None]
         for item in self.problem.constraints:
@@ -157,18 +225,22 @@ class Stretches:
             self._keep_given(0, "given start")
 
     def _keep_given(self, i: int, name: str) -> None:
-        q = self._samples[i]
-        if np.any(self._bounds.beyond(q)):
-            k = int(np.argmax(self._bounds.beyond(q)))
+        q = self._layers.samples[i]
+        if np.any(self._layers.bounds.beyond(q)):
+            k = int(np.argmax(self._layers.bounds.beyond(q)))
             joint = self.problem.robot.joint_names[k]
-            self._refuse(i, f"the {name} has joint '{joint}' at {q[0, k]:.4g}, outside its limits")
-        if not self._bounds.keep(q)[0]:
-            self._refuse(i, f"the {name} is in collision, or nearer than asked for")
+            raise self._refused(
+                i, f"the {name} has joint '{joint}' at {q[0, k]:.4g}, outside its limits"
+            )
+        if not self._layers.bounds.keep(q)[0]:
+            raise self._refused(i, f"the {name} is in collision, or nearer than asked for")
 
     def _check(self) -> None:
-        for i, samples in enumerate(self._samples):
+        for i, samples in enumerate(self._layers.samples):
             if len(samples) == 0:
-                self._refuse(i, self._why(i, samples, samples, self._bounds.without_turns()))
+                raise self._refused(
+                    i, self._layers.why(i, samples, samples, self._layers.bounds.without_turns())
+                )
 
     def _chains(
         self, layers: list[Array], bounds: Admissible, forbidden: set[int]
@@ -183,40 +255,29 @@ class Stretches:
         for i, (before, after) in enumerate(itertools.pairwise(layers), 1):
             cost, parent = self._jumps.extended(i - 1, length, before, cost, after, turning)
             if not np.any(np.isfinite(cost)):
-                self._refuse(i, self._why(i, before, after, bounds))
+                raise self._refused(i, self._layers.why(i, before, after, bounds))
             parents.append(parent)
             change = np.arange(len(cost))
             if i < len(layers) - 1 and i not in forbidden:
                 changed, source = length.extended(i, after, cost, after, anywhere, turning)
-                better = changed + BREAK < cost
+                better = changed + _BREAK < cost
                 change = np.where(better, source, change)
-                cost = np.where(better, changed + BREAK, cost)
+                cost = np.where(better, changed + _BREAK, cost)
             changes.append(change)
         return _traced_back(parents, changes, int(np.argmin(cost)))
 
     def _ending(self, first: int, layers: list[Array], relaxed: Admissible) -> str:
         """Return why no chain from a waypoint on follows the rest of the path."""
-        chains = best_chains(layers[first:], self._steps[first:], relaxed.turning)
+        chains = best_chains(layers[first:], self._layers.steps[first:], relaxed.turning)
         if chains.blocked is None:
             return "what goes on from there among the samples did not keep all constraints"
         i = first + chains.blocked
         alive = layers[i - 1][np.isfinite(chains.cost[chains.blocked - 1])]
-        reason = self._why(i, alive, layers[i], relaxed)
+        reason = self._layers.why(i, alive, layers[i], relaxed)
         return f"no motion from t = {self.t[first]:.6g} s passes t = {self.t[i]:.6g} s: {reason}"
 
-    def _why(self, i: int, alive: Array, layer: Array, bounds: Admissible) -> str:
-        if isinstance(self._nodes, CurveLayers):
-            return self._nodes.why_blocked(i, alive, layer, bounds, self._steps)
-        return self._nodes.why_blocked(i)
-
-    def _refuse(self, waypoint: int, reason: str) -> None:
-        time = float(self.t[waypoint])
-        raise NoSequenceError(
-            f"{self.problem.robot.name}: no motion along the path, in however many parts, passes "
-            f"t = {time:.6g} s: {reason}",
-            time=time,
-            reason=reason,
-        )
+    def _refused(self, i: int, reason: str) -> NoSequenceError:
+        return self._layers.refused(i, reason, ", in however many parts,")
 
 
 def _traced_back(

@@ -2,5 +2,4 @@
 
 from selfmotion.transfer.free_motion import FreeMotions as FreeMotions
 from selfmotion.transfer.free_move import move as move
-from selfmotion.transfer.rounding import rounded as rounded
-from selfmotion.transfer.ways import Room as Room
+from selfmotion.transfer.ways import Room as Room, rounded as rounded

@@ -30,28 +30,42 @@ from selfmotion.result import Ends, Move, PaceLimits, along, fastest_pace, quant
 from selfmotion.robot import RobotModel
 from selfmotion.search import start_candidates
 from selfmotion.task import SE3, Task
-from selfmotion.transfer.rounding import rounded
-from selfmotion.transfer.settings import (
-    BRIEFEST_MOVE,
-    END_CONFIGURATIONS,
-    FINER_LOOKS,
-    MOVE_DEADLINE,
+from selfmotion.transfer.ways import (
     MOVE_MARGIN,
-    RETREATS,
+    PATH_SAMPLES,
     ROUNDING,
-    SHORTEST_PACED,
-    SLOWER_FACTOR,
-    SLOWER_TRIES,
-    SOFT,
-    STEP_OF_PACE,
-    TRIES_OF_MOVE,
-    UNHURRIED_SAMPLES,
-    UP_TO_SPEED,
-    USED,
-    USUAL_SPEED,
-    WIDER,
+    Room,
+    find_way,
+    rounded,
+    shortened,
+    straight_way,
 )
-from selfmotion.transfer.ways import Room, find_way, shortened, straight_way
+
+# After so many seconds a move counts as not found.
+MOVE_DEADLINE = 10.0
+# Shares of the limits that are used; and the acceleration where nobody limits it: up to full speed
+# in so many seconds, which is this one where nobody limits it either [rad/s or m/s].
+_USED = 0.95
+_UP_TO_SPEED = 0.25
+_USUAL_SPEED = 1.0
+# Controllers want accelerations without jumps from arms of any make: where nobody limits the jerk,
+# they are reached in this time [s], and no move is briefer. Knots of a pace are so far apart [s].
+_SOFT = 0.02
+_STEP_OF_PACE = 4e-3
+# Requirements that depend on the pace may be kept by a slower one, tried so often.
+_SLOWER_FACTOR = 1.2
+_SLOWER_TRIES = 12
+# Where the certificate finds what looks have missed, bodies are kept so many times farther apart
+# and looked at as many times more often, and a way is looked for again, so often.
+_WIDER = 2.0
+_TRIES_OF_MOVE = 4
+# Where the straight leg is blocked, trees begin so far back along the tool's axis as well [m].
+_RETREATS = (0.01, 0.03, 0.08)
+# A move that is shorter than this [rad or m] goes by one smooth law of time.
+_SHORTEST_PACED = 2e-3
+# Configurations for an end that is a pose of the tool, at most.
+_END_CONFIGURATIONS = 16
+
 
 # Roundings that a motion may add up to.
 _ROUNDINGS = 16.0
@@ -88,7 +102,7 @@ class FreeMotions:
         arm = self.asked.arm(self.robot)
         follows = Follows.of(arm, Dwell(end, 1.0), task)
         room = Room(self.asked, self.robot)
-        found = np.array(start_candidates(follows, END_CONFIGURATIONS, self._rng, room.free))
+        found = np.array(start_candidates(follows, _END_CONFIGURATIONS, self._rng, room.free))
         free = found[room.free(found)]
         if not len(free):
             raise InverseKinematicsError(
@@ -136,7 +150,7 @@ class FreeMotions:
         began = time.thread_time()
         ends = [self._inside(several) for several in ends]
         worst, margin, finer = "", MOVE_MARGIN, 1.0
-        for _ in range(TRIES_OF_MOVE):
+        for _ in range(_TRIES_OF_MOVE):
             room = Room(self.asked, self.robot, margin, finer)
             way = self._known_way(room, ends, known) or self._way(room, ends, began + seconds)
             if way is None:
@@ -150,7 +164,7 @@ class FreeMotions:
                 if move.verified:
                     return move
                 worst = worst or f", where {move.trouble}"
-            margin, finer = WIDER * margin, FINER_LOOKS * finer
+            margin, finer = _WIDER * margin, _WIDER * finer
         waited = time.thread_time() - began
         return self._missing(
             f"no way was found between the configurations in {waited:.1f} s{worst}"
@@ -245,7 +259,7 @@ class FreeMotions:
         """Return where the tool is back along its axis, and from where a free leg leads there."""
         robot, found, origins = self.robot, list[Array](), list[Array]()
         for q in several:
-            for length in RETREATS:
+            for length in _RETREATS:
                 away = robot.pose(q) * SE3(np.eye(3), np.array([0.0, 0.0, -length]))
                 try:
                     there = robot.inverse_kinematics(away, seed=q, attempts=1)
@@ -260,14 +274,14 @@ class FreeMotions:
     def _limits(self) -> Envelope:
         """The limits of the pace: all of speed and acceleration are finite."""
         asked = self.asked
-        speed = np.where(np.isfinite(asked.speed), asked.speed, USUAL_SPEED)
-        usual = speed / UP_TO_SPEED
+        speed = np.where(np.isfinite(asked.speed), asked.speed, _USUAL_SPEED)
+        usual = speed / _UP_TO_SPEED
         faster = np.where(np.isfinite(asked.acceleration), asked.acceleration, usual)
         return replace(
             asked,
-            speed=read_only(USED * speed),
-            acceleration=read_only(USED * faster),
-            jerk=read_only(USED * asked.jerk),
+            speed=read_only(_USED * speed),
+            acceleration=read_only(_USED * faster),
+            jerk=read_only(_USED * asked.jerk),
         )
 
     @cached_property
@@ -278,20 +292,20 @@ class FreeMotions:
     def _fast(self, path: Trajectory) -> Trajectory:
         """Return a joint path at the fastest pace that the limits allow, from rest to rest."""
         limits = self._limits
-        jerk = np.where(np.isfinite(limits.jerk), limits.jerk, limits.acceleration / SOFT)
+        jerk = np.where(np.isfinite(limits.jerk), limits.jerk, limits.acceleration / _SOFT)
         kept = PaceLimits(limits.speed, limits.acceleration, jerk, self._quantities)
-        return along(fastest_pace(path, kept, Ends(), STEP_OF_PACE), path)
+        return along(fastest_pace(path, kept, Ends(), _STEP_OF_PACE), path)
 
     def at_its_pace(self, path: Trajectory) -> Move:
         """Return the move along a joint path, as fast as it may be."""
         # Of the shortest ones a search for the fastest pace sees rounding only.
-        short = path.travelled(path.t[-1:]).max() < SHORTEST_PACED
+        short = path.travelled(path.t[-1:]).max() < _SHORTEST_PACED
         motion = self._unhurried(path) if short else self._fast(path)
         q, qd = motion.q.copy(), motion.qd.copy()
         # Exactly where it should begin and end.
         q[0], q[-1], qd[0], qd[-1] = path.q[0], path.q[-1], 0.0, 0.0
         faster = motion(motion.t, 2)
-        for slower in SLOWER_FACTOR ** np.arange(SLOWER_TRIES):
+        for slower in _SLOWER_FACTOR ** np.arange(_SLOWER_TRIES):
             t, names = slower * motion.t, self.robot.joint_names
             whole = Trajectory(t, q, qd / slower, names, faster / slower**2)
             found = Move(self.robot, self.constraints, whole)
@@ -304,7 +318,7 @@ class FreeMotions:
 
         σ = 10τ³ - 15τ⁴ + 6τ⁵, as fast as the limits allow.
         """
-        tau = np.linspace(0.0, 1.0, UNHURRIED_SAMPLES)
+        tau = np.linspace(0.0, 1.0, PATH_SAMPLES + 1)
         sigma = np.clip(tau**3 * (10.0 - 15.0 * tau + 6.0 * tau**2), 0.0, 1.0)
         rate = 30.0 * tau**2 * (1.0 - tau) ** 2
         bend = 60.0 * tau * (1.0 - 3.0 * tau + 2.0 * tau**2)
@@ -313,7 +327,7 @@ class FreeMotions:
         unit = Trajectory(tau, q, qd * rate[:, None], self.robot.joint_names, qdd)
         limits = self._limits
         needed = slowdown_of(unit, (limits.speed, limits.acceleration, limits.jerk))
-        longest = max(needed, BRIEFEST_MOVE)
+        longest = max(needed, _SOFT)
         faster = qdd / longest**2
         return Trajectory(longest * tau, q, unit.qd / longest, unit.joint_names, faster)
 

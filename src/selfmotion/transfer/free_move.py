@@ -24,8 +24,7 @@ from selfmotion.problem import KEPT, NO_OVERLAP, check_all_times
 from selfmotion.result import Move
 from selfmotion.robot import RobotModel
 from selfmotion.task import SE3, Task
-from selfmotion.transfer.free_motion import FreeMotions, is_pose
-from selfmotion.transfer.settings import MOVE_DEADLINE
+from selfmotion.transfer.free_motion import MOVE_DEADLINE, FreeMotions, is_pose
 
 
 def move(

@@ -1,12 +1,15 @@
-"""Ways of straight legs between configurations: two trees that grow towards each other.
+"""Ways of straight legs between configurations, and the smooth paths that round their corners.
 
-RRT-Connect (J. Kuffner, S. LaValle, "RRT-Connect: an efficient approach to single-query path
-planning", ICRA 2000). The best of a few ways is shortened by straight shortcuts.
+Two trees grow towards each other: RRT-Connect (J. Kuffner, S. LaValle, "RRT-Connect: an efficient
+approach to single-query path planning", ICRA 2000). The best of a few ways is shortened by straight
+shortcuts. A smooth path is a cubic B-spline whose control points lie on the legs: it stays within
+the hulls of four neighbours, so that it differs from the legs near corners only, the less the
+denser the points are.
 """
 
 import math
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,25 +17,40 @@ import numpy.typing as npt
 
 from selfmotion.basics import Array, Ints
 from selfmotion.constraints import Envelope
+from selfmotion.motion import Trajectory
 from selfmotion.robot import RobotModel
-from selfmotion.transfer.settings import (
-    AROUND_MIDDLE,
-    FIRST_LOT,
-    LEG_RANGE,
-    LEG_STEP,
-    MISSED,
-    MOVE_MARGIN,
-    ROUNDING,
-    SHORTCUTS,
-    SPREAD,
-    TURN_STEP,
-    WAYS,
-)
+
+# What is beyond a limit by no more than this is within it to rounding, as the certificate has it.
+ROUNDING = 1e-12
+# Bodies are looked at a bit farther apart than asked for [m], since only at some times.
+MOVE_MARGIN = 5e-4
+# Legs are looked at in steps in which no point of a body moves farther than this [m], finished
+# paths closely; and in steps of joints [rad] where there are no bodies.
+_LEG_STEP = 0.02
+_FINE_STEP = 0.005
+_TURN_STEP = 0.05
+# Trees grow by legs of so many seconds at full speed; this share of the samples lies around the
+# middle, so far around, in shares of the distance; others are anywhere.
+_LEG_RANGE = 1.0
+_AROUND_MIDDLE = 0.2
+_SPREAD = 0.5
+# The best of so many ways is taken; so many shortcuts are tried on each at most, until so many in
+# turn are blocked.
+_WAYS = 4
+_SHORTCUTS = 120
+_MISSED = 30
+# Control points of a path to begin with; and how near to each other they may come around corners,
+# as a share of the path. Samples of a path at least.
+_FIRST_POINTS = 12
+_FINEST = 1e-3
+PATH_SAMPLES = 64
+
 
 # Samples keep this share of the range from a limit.
 _INSIDE = 1e-6
 # Configurations this near are the same [rad or m].
 _SAME = 1e-9
+_DEGREE = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,13 +85,13 @@ class Room:
             allowed[rows] = ~model.colliding(q[rows], far + self.margin)
         return allowed
 
-    def steps(self, way: Array, step: float = LEG_STEP) -> Ints:
+    def steps(self, way: Array, step: float = _LEG_STEP) -> Ints:
         """Return in how many steps to look at legs from each of configurations (K, n) to the next.
 
         In each no point of a body moves farther than `step` [m].
         """
         turned = np.abs(np.diff(way, axis=0))
-        count = (turned * self.robot.joint_weights).max(axis=1) / TURN_STEP
+        count = (turned * self.robot.joint_weights).max(axis=1) / _TURN_STEP
         for model, _ in self.asked.bodies:
             count = np.maximum(count, (turned @ model.lever_arms.T).max(axis=1) / step)
         return np.asarray(np.maximum(1, np.ceil(self.finer * count)), dtype=np.int64)
@@ -89,7 +107,7 @@ class Room:
                 return float((lot.start + blocked[0]) / count)
         return 1.0
 
-    def is_open(self, first: Array, last: Array, step: float = LEG_STEP) -> bool:
+    def is_open(self, first: Array, last: Array, step: float = _LEG_STEP) -> bool:
         """Whether all of a straight leg is free; what is in the way shows early."""
         count = int(self.steps(np.stack([first, last]), step)[0])
         order = _spread_out(count)
@@ -128,7 +146,7 @@ def find_way(
     if way is not None:
         return way
     found: list[Array] = []
-    while len(found) < WAYS:
+    while len(found) < _WAYS:
         way = _connected(room, starts, goals, end, rng)
         if way is None:
             break
@@ -149,8 +167,8 @@ def straight_way(room: Room, starts: Array, goals: Array) -> Array | None:
 def shortened(room: Room, way: Array, rng: np.random.Generator) -> Array:
     """Return a way (m, n) with straight shortcuts between points of it, where these are free."""
     missed = 0
-    for _ in range(SHORTCUTS):
-        if len(way) < 3 or missed >= MISSED:
+    for _ in range(_SHORTCUTS):
+        if len(way) < 3 or missed >= _MISSED:
             break
         lengths = (np.abs(np.diff(way, axis=0)) * room.rates).max(axis=1)
         ends = np.concatenate([[0.0], np.cumsum(lengths)])
@@ -241,11 +259,11 @@ def _connected(
     lower, upper = lower + inside, upper - inside
     one, other, forward = _Tree(starts, rates), _Tree(goals, rates), True
     middle = 0.5 * (starts[0] + goals[0])
-    spread = SPREAD * float((np.abs(goals[0] - starts[0]) * rates).max()) / rates
+    spread = _SPREAD * float((np.abs(goals[0] - starts[0]) * rates).max()) / rates
     while time.thread_time() < end:
-        near = rng.uniform() < AROUND_MIDDLE
+        near = rng.uniform() < _AROUND_MIDDLE
         sample = rng.normal(middle, spread) if near else rng.uniform(lower, upper)
-        k, _ = one.grow(room, np.clip(sample, lower, upper), LEG_RANGE)
+        k, _ = one.grow(room, np.clip(sample, lower, upper), _LEG_RANGE)
         j, met = other.grow(room, one.at(k), math.inf)
         if met:
             halves = (one.way(k), other.way(j)) if forward else (other.way(j), one.way(k))
@@ -256,7 +274,7 @@ def _connected(
 
 def _lots(count: int) -> Iterator[slice]:
     """Yield slices of 0 to count - 1, small ones first: most of what is blocked shows early."""
-    first, size = 0, FIRST_LOT
+    first, size = 0, 1
     while first < count:
         yield slice(first, first + size)
         first, size = first + size, 2 * size
@@ -269,3 +287,83 @@ def _spread_out(count: int) -> Array:
     for bit in range(bits):
         order |= ((np.arange(2**bits) >> bit) & 1) << (bits - 1 - bit)
     return order[(order > 0) & (order <= count)].astype(np.float64)
+
+
+def rounded(room: Room, way: Array, passed: Sequence[int] = ()) -> Trajectory | None:
+    """Return a way (m, n) as a smooth joint path over a time of its own from 0 to 1.
+
+    It begins and ends where the way does, and goes through those of its corners that are to be
+    `passed`. None where it is not free even when it hardly leaves the legs.
+    """
+    lengths = (np.abs(np.diff(way, axis=0)) * room.rates).max(axis=1)
+    whole = max(float(lengths.sum()), np.finfo(float).tiny)
+    spacing = np.full(len(lengths), whole / _FIRST_POINTS)
+    # Near its ends a clamped spline goes through no other control point.
+    fewest = _DEGREE + 1 if len(passed) else 1
+    while True:
+        counts = np.maximum(fewest, np.ceil(lengths / spacing)).astype(np.int64)
+        legs = np.repeat(np.arange(len(lengths)), counts)
+        points = [
+            np.linspace(way[k], way[k + 1], count, endpoint=False)
+            for k, count in enumerate(counts.tolist())
+        ]
+        path = _spline(_through(points, way, passed))
+        blocked = _blocked(room, path)
+        if not blocked.size:
+            return path
+        # Of the legs around what is blocked.
+        at = np.clip(blocked * len(legs), 0, len(legs) - 1).astype(np.int64)
+        near = np.unique(np.clip(at[:, None] + np.arange(-2, 3), 0, len(legs) - 1))
+        tight = np.unique(legs[near])
+        if np.all(spacing[tight] <= whole * _FINEST):
+            return None
+        spacing[tight] *= 0.5
+
+
+def _through(points: Sequence[Array], way: Array, passed: Sequence[int]) -> Array:
+    """Return control points of legs as one list, with three in line around corners to pass.
+
+    The spline goes through a control point that lies halfway between its neighbours.
+    """
+    legs = list(points)
+    for corner in passed:
+        here, (one, other) = way[corner], (legs[corner - 1][-1], legs[corner][1])
+        step = 0.25 * (other - one)
+        legs[corner] = np.concatenate([[here - step, here, here + step], legs[corner][1:]])
+    return np.concatenate([*legs, way[-1:]])
+
+
+def _spline(points: Array) -> Trajectory:
+    """Return the clamped cubic B-spline of control points (k, n) over 0 to 1."""
+    from scipy.interpolate import BSpline
+
+    joints = points.shape[1]
+    if len(points) <= _DEGREE:
+        points = np.stack(
+            [
+                np.interp(np.linspace(0, 1, _DEGREE + 1), np.linspace(0, 1, len(points)), column)
+                for column in points.T
+            ],
+            axis=1,
+        )
+    inner = np.linspace(0.0, 1.0, len(points) - _DEGREE + 1)
+    knots = np.concatenate([np.zeros(_DEGREE), inner, np.ones(_DEGREE)])
+    spline = BSpline(knots, points, _DEGREE)
+    # Between knots a quintic with these ends is the cubic itself.
+    split = max(1, -(-PATH_SAMPLES // (len(inner) - 1)))
+    t = np.linspace(0.0, 1.0, split * (len(inner) - 1) + 1)
+    names = tuple(map(str, range(joints)))
+    q = spline(t)
+    q[0], q[-1] = points[0], points[-1]
+    return Trajectory(t, q, spline(t, 1), names, spline(t, 2))
+
+
+def _blocked(room: Room, path: Trajectory) -> Array:
+    """Return at which times a path is not free, looked at closely."""
+    counts = room.steps(path.q, _FINE_STEP)
+    steps = [
+        np.linspace(one, other, count, endpoint=False)
+        for one, other, count in zip(path.t[:-1], path.t[1:], counts.tolist(), strict=True)
+    ]
+    t = np.concatenate([*steps, path.t[-1:]])
+    return t[~room.free(path(t))]
