@@ -146,7 +146,7 @@ class Polisher:
         rank = partial(_rank, begun=motion)
         if not _is_kept(best.motion) and self._ended is None:
             best = self._other(motion, best, free)
-        unfinished = first.status is Status.MAX_ITERATIONS and self._ended is None
+        unfinished = first.status not in _ARRIVED and self._ended is None
         if unfinished and (best is first or not _is_kept(best.motion)):
             rest = self._minimise(first.motion, first.multipliers if best is first else None)
             best = min(best, rest, key=rank)
