@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import sys
 import time
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -38,8 +38,6 @@ STEP_SHARE = 0.995
 METRE = 10.0
 # Evaluations of the cost that are spent on one motion: more would gain tenths of a percent.
 EVALUATIONS = 40
-# Intervals of the spline that is tried where the default null motion leads to nothing verified.
-INTERVALS = 40
 
 
 @dataclass(frozen=True)
@@ -170,15 +168,12 @@ def plan(
         costs=[length],
         constraints=constraints,
     )
-    for null_motion in (asked.null_motion, sm.motion.BSplineNullMotion(INTERVALS)):
-        found = sm.plan(
-            replace(asked, null_motion=null_motion),
-            search=sm.Search(mode="global", rng=seed),
-            max_evaluations=EVALUATIONS,
-            progress=progress,
-        )
-        if found.certificate.verified:
-            break
+    found = sm.plan(
+        asked,
+        search=sm.Search(mode="global", rng=seed),
+        max_evaluations=EVALUATIONS,
+        progress=progress,
+    )
     # A motion along a part of the path is none along the path.
     found = found.require() if found.report.ending else found
     return found, found.trajectory(times)
