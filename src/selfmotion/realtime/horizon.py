@@ -167,7 +167,7 @@ class Horizon:
 
     Attributes
     ----------
-    relaxed : bool
+    elastic : bool
         Whether the last step could not keep all limits and distances.
     breakdown : float
         When the last motion ran into a singular pose [s]; inf where it did not.
@@ -216,7 +216,7 @@ class Horizon:
         self._frames = np.zeros((0, self.rollout.robot.dof, self.redundancy))
         self._coefficients = np.zeros((self.redundancy, self._functions.shape[1]))
         self._damping = 1.0
-        self.relaxed, self.breakdown = False, np.inf
+        self.elastic, self.breakdown = False, np.inf
 
     @property
     def size(self) -> int:
@@ -374,7 +374,7 @@ class Horizon:
         metric[np.diag_indices(d)] += REGULAR * (np.trace(metric) + 1e-12)
         limits = self._conditions(samples, by_q, by_qd)
         try:
-            step, self.relaxed = elastic_step(metric, gradient, *limits)
+            step, self.elastic = elastic_step(metric, gradient, *limits)
         except np.linalg.LinAlgError:
             return None
         return step, float(-gradient @ step - 0.5 * step @ metric @ step)

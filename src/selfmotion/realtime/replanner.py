@@ -377,7 +377,7 @@ class Replanner:
         flag = Flag.PLANNED
         if self._improved(place, rate, reference, reasons):
             kept = horizon.epsilon(self._ahead, self._functions)
-            if horizon.relaxed:
+            if horizon.elastic:
                 reasons.append("no self-motion keeps all limits over the horizon")
             if self._around is not None and self._around.blocked:
                 reasons.append(self._around.message)

@@ -169,14 +169,14 @@ def _rough_motions(nodes: Layers, asked: Measure | None) -> tuple[list[Array], F
     """
     bounds = nodes.bounds
     length = asked if isinstance(asked, Length) else Length(nodes.waypoints.robot.joint_weights)
-    relaxed = bounds.without_turns()
+    any_turn = bounds.without_turns()
     while True:
-        layers, turning = [relaxed.layer(q) for q in nodes.samples], relaxed.turning
+        layers, turning = [any_turn.layer(q) for q in nodes.samples], any_turn.turning
         chains = best_chains(layers, nodes.steps, turning, length)
         if chains.blocked is not None:
             i = chains.blocked
             alive = layers[i - 1][np.isfinite(chains.cost[i - 1])] if i else layers[0][:0]
-            raise nodes.refused(i, nodes.why(i, alive, layers[i], relaxed))
+            raise nodes.refused(i, nodes.why(i, alive, layers[i], any_turn))
         measure: Measure = length
         if isinstance(asked, RunningCost):
             shortest = chains.back(len(layers) - 1, int(np.argmin(chains.cost[-1])))
@@ -187,7 +187,7 @@ def _rough_motions(nodes: Layers, asked: Measure | None) -> tuple[list[Array], F
         beyond = bounds.beyond(rough[0])
         if not np.any(beyond):
             return [q for q in rough if not np.any(bounds.beyond(q))], turning, measure
-        relaxed = relaxed.counting_turns(beyond, bounds)
+        any_turn = any_turn.counting_turns(beyond, bounds)
 
 
 def _free_samples(

@@ -187,11 +187,11 @@ class Stretches:
         """Return the fewest chains without the jumps that are known; see `fewest`."""
         bounds = self._layers.bounds
         # Joints with room for several turns turn without end at first: see `best_sequences`.
-        relaxed = bounds.without_turns()
+        any_turn = bounds.without_turns()
         while True:
-            layers = [relaxed.layer(q) for q in self._layers.samples]
-            turning = relaxed.turning
-            chains = self._chains(layers, relaxed, forbidden)
+            layers = [any_turn.layer(q) for q in self._layers.samples]
+            turning = any_turn.turning
+            chains = self._chains(layers, any_turn, forbidden)
             motions = [
                 bounds.turned_inside(connected(layers[first : first + len(chain)], chain, turning))
                 for first, chain in chains
@@ -199,14 +199,14 @@ class Stretches:
             beyond = np.any([bounds.beyond(q) for q in motions], axis=0)
             if not np.any(beyond):
                 break
-            relaxed = relaxed.counting_turns(beyond, bounds)
+            any_turn = any_turn.counting_turns(beyond, bounds)
         return [
             Stretch(
                 first,
                 first + len(q) - 1,
                 self.t[first : first + len(q)],
                 q,
-                self._ending(first, layers, relaxed) if q is not motions[-1] else "",
+                self._ending(first, layers, any_turn) if q is not motions[-1] else "",
             )
             for (first, _), q in zip(chains, motions, strict=True)
         ]
@@ -266,14 +266,14 @@ class Stretches:
             changes.append(change)
         return _traced_back(parents, changes, int(np.argmin(cost)))
 
-    def _ending(self, first: int, layers: list[Array], relaxed: Admissible) -> str:
+    def _ending(self, first: int, layers: list[Array], any_turn: Admissible) -> str:
         """Return why no chain from a waypoint on follows the rest of the path."""
-        chains = best_chains(layers[first:], self._layers.steps[first:], relaxed.turning)
+        chains = best_chains(layers[first:], self._layers.steps[first:], any_turn.turning)
         if chains.blocked is None:
             return "what goes on from there among the samples did not keep all constraints"
         i = first + chains.blocked
         alive = layers[i - 1][np.isfinite(chains.cost[chains.blocked - 1])]
-        reason = self._layers.why(i, alive, layers[i], relaxed)
+        reason = self._layers.why(i, alive, layers[i], any_turn)
         return f"no motion from t = {self.t[first]:.6g} s passes t = {self.t[i]:.6g} s: {reason}"
 
     def _refused(self, i: int, reason: str) -> NoSequenceError:
