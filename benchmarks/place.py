@@ -20,7 +20,7 @@ import selfmotion as sm
 from selfmotion.placement.places import Places, Tried, places_of
 from selfmotion.placement.search import Box, Descent, beginnings
 
-ARMS = (("panda", "pose"), ("xarm7", "pose"), ("ur5", "pointing"))
+ARMS = (("panda", "pose"), ("xarm7", "pose"), ("ur5", "position"))
 WITHIN = {"x": (-0.2, 0.2), "y": (-0.25, 0.25), "yaw": (-0.6, 0.6)}
 # Places of an exhaustive grid.
 EXHAUSTIVE = 10_000
@@ -53,7 +53,7 @@ def random_seams(rng: np.random.Generator, arm: int, count: int) -> list[sm.Prob
             seam = sm.paths.Line(*ends, float(rng.uniform(3.0, 6.0)))
             problem = sm.Problem(robot, seam, task, constraints=[*limits, clear])
             try:
-                if sm.plan(problem, deadline=5.0).certificate.verified:
+                if sm.plan(problem, deadline=2.0).certificate.verified:
                     found.append(problem)
             except sm.SelfmotionError:
                 continue
