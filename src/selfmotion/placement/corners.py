@@ -159,6 +159,8 @@ def correction(
         The plan is not verified.
     ProblemError
         An argument is not what it should be, or the path is given in a frame that moves.
+    KeyboardInterrupt
+        It was interrupted.
     """
     if not isinstance(plan, Plan):
         raise ProblemError(f"correction: plan is {shown(plan)}, expected a Plan")

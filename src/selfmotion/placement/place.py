@@ -93,6 +93,8 @@ def place(
         or another.
     ProblemError
         An argument is not what it should be, or a path is given in a frame that moves.
+    KeyboardInterrupt
+        It was interrupted.
     """
     several = as_several(problems, "problems", Problem)
     if not several:

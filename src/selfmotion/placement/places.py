@@ -17,11 +17,13 @@ from selfmotion.basics import (
     ProblemError,
     SelfmotionError,
     nearest,
+    presses,
+    seconds_of_kernels,
 )
 from selfmotion.collision import Obstacle
 from selfmotion.constraints import Clearance
 from selfmotion.follow import BoundFollow
-from selfmotion.optimise import Iteration
+from selfmotion.optimise import Iteration, Status
 from selfmotion.path import Path, Placed
 from selfmotion.planning import Search, plan
 from selfmotion.problem import Problem, problem_from_dict, start_on_path
@@ -239,20 +241,42 @@ def restored(values: Mapping[str, Any], known: dict[str, Any]) -> Places:
 
 
 def _quickly(problem: Problem, known: Plan | None, search: Search | None, patience: float) -> Plan:
-    """Plan, from what is known if anything is, or give up soon."""
-    end = time.process_time() + patience
+    """Plan, from what is known if anything is, or give up soon.
+
+    Raises
+    ------
+    PlanError
+        Nothing was found in that time, or no motion passes.
+    KeyboardInterrupt
+        Ctrl-C was pressed, whatever was found by then.
+    """
+    began, pressed, given_up = time.process_time() - seconds_of_kernels(), presses(), False
+
+    def is_over() -> bool:
+        return time.process_time() - seconds_of_kernels() >= began + patience
 
     def over(_: Iteration) -> bool:
-        return time.process_time() >= end
+        return is_over()
 
     def told(stage: str, number: int, count: int) -> None:
+        nonlocal given_up
         if not count:
             # No motion passes, and what comes before is not asked.
             raise PlanError(stage)
-        if time.process_time() >= end:
+        if is_over():
+            given_up = True
             raise KeyboardInterrupt
 
-    return plan(problem, warm_start=known, search=search, callback=over, progress=told)
+    try:
+        found = plan(problem, warm_start=known, search=search, callback=over, progress=told)
+    except KeyboardInterrupt:
+        if presses() > pressed or not given_up:
+            raise
+        raise PlanError(f"no motion was found in {patience:g} s, by the processor's time") from None
+    is_user = presses() > pressed or not given_up
+    if found.report.status is Status.INTERRUPTED and is_user:
+        raise KeyboardInterrupt
+    return found
 
 
 def _stands(item: BoundFollow) -> bool:
