@@ -133,6 +133,39 @@ def test_a_tolerance_is_used_up_by_its_lever() -> None:
     assert away.part.rotation.rotation == pytest.approx(room / far, rel=0.02)
 
 
+def test_what_misses_its_path_as_it_is_has_no_margin() -> None:
+    robot = robot_named("planar_3r")
+    start = np.array([0.4, 0.7, 0.6])
+    pose = robot.pose(start)
+    end = pin.SE3(pose.rotation, pose.translation + np.array([-0.2, 0.0, 0.0]))
+    problem = sm.Problem(robot, sm.paths.Line(pose, end, 2.0), "planar", start, constraints=LIMITS)
+    plan = sm.plan(problem).require()
+    found = sm.margin(plan, sm.Tolerance(0.1 * plan.certificate.position_error.value, 0.5))
+    for subject in (found.part, found.base):
+        for _, each in subject.rows:
+            assert each.position == each.rotation == 0.0
+            assert "off its path" in each.stops
+    assert "margin 0: " in found.sentence
+
+
+def test_what_is_mounted_on_the_base_goes_with_it() -> None:
+    """A post on the base, a finger from the elbow: where the base stands does not matter."""
+    robot = robot_named("panda")
+    pose = robot.pose(PANDA_HOME)
+    elbow = robot.joint_poses(PANDA_HOME[None])[0, 3, :3]
+    post = sm.obstacles.Sphere(
+        "post", elbow - np.array([0.25, 0.0, 0.0]), 0.05, frame="panda_link0"
+    )
+    path = sm.paths.Circle.around(pose, 0.03, 2.0, normal=(1.0, 0.0, 0.0))
+    clear = sm.constraints.Clearance([post], 1e-3)
+    problem = sm.Problem(robot, path, start=PANDA_HOME, constraints=[*LIMITS, clear])
+    found = sm.margin(sm.plan(problem).require())
+    assert "post" not in found.base.bodies
+    assert "no contact" in found.base.translation.reason
+    # It is found where it is what is displaced.
+    assert "post" in found.part.translation.stops
+
+
 def test_what_cannot_be_asked_is_refused(plan: sm.Plan) -> None:
     for given, said in (
         ({"part": ["plat"]}, "there is no body 'plat'; nearest: 'plate'"),
@@ -179,7 +212,7 @@ def test_margins_are_rounded_down() -> None:
         (0.00999999, "9.99 mm"),
         (0.0123456, "12.3 mm"),
         (0.9876, "987 mm"),
-        (0.0, "0 mm"),
+        (0.0, "0"),
     ):
         assert Displacement(size, 0.0, "something").size == text
     assert Displacement(0.0, np.radians(1.23999), "something").size == "1.23°"

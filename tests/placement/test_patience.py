@@ -43,7 +43,7 @@ def pressed_at(stage: int) -> Any:
 def test_no_time_is_no_motion(monkeypatch: pytest.MonkeyPatch) -> None:
     """Also where it is over before there is a motion, as when kernels are compiled."""
     monkeypatch.setattr(places, "_PATIENCE", 0.0)
-    with pytest.raises(sm.errors.PlanError, match="no verified motion at any of 6.* places"):
+    with pytest.raises(sm.errors.PlanError, match="by the processor's time"):
         sm.place(seam(), WITHIN)
 
 

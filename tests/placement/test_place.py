@@ -216,6 +216,14 @@ def test_what_cannot_be_placed_is_refused(monkeypatch: pytest.MonkeyPatch) -> No
         sm.place(planar(), {"x": (50.0, 60.0)})
 
 
+def test_a_path_that_goes_with_the_base_is_refused() -> None:
+    """What the arm's base carries is reached from anywhere alike."""
+    arm = sm.load_robot("panda", reference="panda_link0")
+    problem = panda().changed(robot=arm)
+    with pytest.raises(sm.errors.ProblemError, match="'panda_link0', which moves along"):
+        sm.place(problem, {"x": (-0.1, 0.1)}, of="base")
+
+
 def test_places_from_the_shell(tmp_path: Path) -> None:
     cell, out, plan, page = (
         tmp_path / name for name in ("cell.toml", "out.toml", "plan.npz", "map.html")

@@ -166,11 +166,12 @@ def _of_tolerance(
         room = tolerance.position - miss.position
         text = f"'{miss.tip}' is {tolerance.position * 1e3:.3g} mm off its path"
         if moved * found[0] > room:
-            found = max(room, 0.0) / moved, text
+            # What is too far off its path as it is may be displaced by nothing.
+            found = (room / moved if room > 0.0 else 0.0), text
         room = tolerance.rotation - miss.rotation
         text = f"'{miss.tip}' is {np.degrees(tolerance.rotation):.3g}° off its path"
         if miss.angular and size.rotation * found[0] > room:
-            found = max(room, 0.0) / size.rotation, text
+            found = (room / size.rotation if room > 0.0 else 0.0), text
     return Least(found[0]), found[1]
 
 

@@ -82,7 +82,7 @@ def part_of(plan: Plan, names: Sequence[str] | None, center: Array | None) -> Su
         There is no such body, or they are carried by different joints.
     """
     chain = plan.problem.follows.items[0].chain
-    joint, where = chain.carrier + 1, "the world" if chain.carrier < 0 else chain_base(plan)
+    joint, where = chain.carrier + 1, chain_base(plan)
     if names is None:
         bodies = _on_joint(plan, joint)
     else:
@@ -95,8 +95,12 @@ def part_of(plan: Plan, names: Sequence[str] | None, center: Array | None) -> Su
                 f"middle is no place there: give center="
             )
     else:
-        about = f"({', '.join(f'{x:.4g}' for x in center)}) in the frame of {where}"
-        center = chain.base_placement.act(center) if joint == chain.carrier + 1 else center
+        told = ", ".join(f"{x:.4g}" for x in center)
+        if joint == chain.carrier + 1:
+            center = chain.base_placement.act(center)
+        else:
+            where = f"joint '{plan.robot.model.names[joint]}'" if joint else "the world"
+        about = f"({told}) in the frame of {where}"
     return Subject("part", bodies, joint, center, about, 1.0, _of_paths(plan, joint, center))
 
 
@@ -130,15 +134,18 @@ def base_of(plan: Plan) -> Subject:
     """Return the base of the arm, or of the whole cell, in the world."""
     urdf = plan.robot.urdf
     link = urdf.joints[BASE_JOINT].child if BASE_JOINT in urdf.joints else urdf.root
-    bodies = tuple(dict.fromkeys(name for model in models_of(plan) for name in model.standing))
+    # What is mounted on the base goes with it.
+    mounted = {body.name for body in plan.obstacles if body.frame is not None}
+    bodies = tuple(name for name in _on_joint(plan, 0) if name not in mounted)
     center = root_place(plan.robot)
     about = f"the origin of '{link}'"
     return Subject("base", bodies, 0, center, about, -1.0, _of_paths(plan, 0, center))
 
 
 def chain_base(plan: Plan) -> str:
-    """Return the link in whose frame the path is."""
-    return f"'{plan.robot.reference}'"
+    """Return in words in whose frame the path is."""
+    reference = plan.robot.reference
+    return f"'{reference}'" if reference else "the world"
 
 
 def _on_joint(plan: Plan, joint: int) -> tuple[str, ...]:

@@ -74,8 +74,8 @@ _ROUGHLY = 100.0
 _LITTLE = 1e-5
 # Steps after which the method is given up: it needs fifteen, forty where limits bind all over.
 _MOST = 80
-# Or where in so many what is broken most, by more than _WILD, has not fallen below this share: on the
-# way to where all is kept it falls by a tenth, in vain it does not move.
+# Or where in so many what is broken most, by more than _WILD, has not fallen below this share: on
+# the way to where all is kept it falls by a tenth, in vain it does not move.
 _STALE, _FALLS = 10, 0.97
 
 

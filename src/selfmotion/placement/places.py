@@ -200,6 +200,9 @@ def places_of(
         for body in item.obstacles
         if body.frame is None
     }
+    if of == "base":
+        for problem in problems:
+            _check_stays(problem)
     if of == "base" and part is not None:
         raise ProblemError("place: part says what belongs to the part, which stays where it is")
     if of == "part" and part is None and standing:
@@ -216,6 +219,19 @@ def places_of(
     if center is None:
         center = root_place(problems[0].robot) if of == "base" else _middle(problems)
     return Places(tuple(problems), of, frozenset(part or ()), center, names)
+
+
+def _check_stays(problem: Problem) -> None:
+    """Raise ProblemError where a path moves along with the base of the arm."""
+    moved = with_moved_base(problem.robot, pin.SE3(np.eye(3), np.ones(3)))
+    there = problem.changed(robot=moved, start="free").follows.items
+    for item, after in zip(problem.follows.items, there, strict=True):
+        if _stands(item) and not item.chain.base_placement.isApprox(after.chain.base_placement):
+            frame = item.chain.model.frames[item.chain.base].name
+            raise ProblemError(
+                f"place: a path of {problem.robot.name} is given in the frame of '{frame}', which "
+                f"moves along with the base; expected one in the world"
+            )
 
 
 def described(places: Places, problems: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
@@ -308,14 +324,13 @@ def _with_bodies(item: Any, names: frozenset[str] | None, by: SE3) -> Any:
 
 def _middle(problems: Sequence[Problem]) -> Array:
     """Return the middle of the box around all paths (3,), in world axes."""
-    points = np.concatenate(
-        [
-            problem.path.samples(np.linspace(0.0, problem.path.duration, 101)).translation
-            for problem in problems
-        ]
-    )
-    middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
-    return np.asarray(problems[0].follows.items[0].chain.base_placement.act(middle))
+    found = []
+    for problem in problems:
+        frame = problem.follows.items[0].chain.base_placement
+        places = problem.path.samples(np.linspace(0.0, problem.path.duration, 101)).translation
+        found.append(places @ frame.rotation.T + frame.translation)
+    points = np.concatenate(found)
+    return np.asarray(0.5 * (points.min(axis=0) + points.max(axis=0)))
 
 
 def _check_reach(problem: Problem) -> None:
