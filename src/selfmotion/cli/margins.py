@@ -91,7 +91,9 @@ def margin(
     if corrected:
         with StageDisplay(stages) as display:
             again = [
-                sm.correction(plan, of="part", part=part or None, progress=display.stage),
+                sm.correction(
+                    plan, of="part", part=part or None, center=about, progress=display.stage
+                ),
                 sm.correction(plan, of="base", progress=display.stage),
             ]
     if as_json:
