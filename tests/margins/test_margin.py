@@ -166,6 +166,60 @@ def test_what_is_mounted_on_the_base_goes_with_it() -> None:
     assert "post" in found.part.translation.stops
 
 
+TORCH = """<robot name="torch"><link name="tip"><collision><origin xyz="0 0 0.08"/><geometry>
+<cylinder radius="0.01" length="0.1"/></geometry></collision></link></robot>"""
+
+
+def test_a_tool_that_stands_in_the_world_is_what_is_displaced() -> None:
+    """The hand leads the part past a torch; a post beside it is no tool."""
+    home = PANDA_HOME
+    pose = robot_named("panda").pose(home)
+    place = pose * pin.SE3(np.eye(3), np.array([0.0, 0.0, 0.06]))
+    cell = sm.load_robot(
+        {"arm": "panda", "torch": TORCH},
+        tool="torch/tip",
+        reference="arm/panda_hand_tcp",
+        base={"torch": place},
+    )
+    path = sm.paths.Circle.around(cell.pose(home), 0.02, 2.0, normal=(0.0, 0.0, 1.0))
+    post = sm.obstacles.Cylinder("post", place.translation + np.array([0.2, 0.2, 0.1]), 0.03, 0.2)
+    clear = sm.constraints.Clearance([post], 1e-3)
+    plan = sm.plan(sm.Problem(cell, path, start=home, constraints=[*LIMITS, clear])).require()
+    found = sm.margin(plan)
+    assert found.tool.bodies == ("torch/tip",)
+    assert "'torch/tip' meets 'arm/panda_" in found.tool.translation.stops
+    t = np.append(np.linspace(0.0, 2.0, 20), found.tool.translation.time)
+    judge, worst = Judge(plan), found.tool.translation
+    still, direction = np.zeros(3), np.asarray(worst.direction)
+    for share, is_clear in ((1.0, True), (1.0 / PROVED, False)):
+        moved = judge.moved_by(found.tool, share * worst.position * direction, still)
+        assert (judge.least(moved, t) >= -MISSED) is is_clear
+
+
+def test_paths_in_the_frame_of_the_tool_go_with_it() -> None:
+    """A second hand holds on to what the first one leads: where the first is off, it misses."""
+    first, second = "first/panda_hand_tcp", "second/panda_hand_tcp"
+    cell = sm.load_robot(
+        {"first": "panda", "second": "panda"},
+        tool=(first, second),
+        base={"second": pin.SE3(pin.rpy.rpyToMatrix(0.0, 0.0, np.pi), np.array([0.9, 0.0, 0.0]))},
+    )
+    down = pin.SE3(np.diag([1.0, -1.0, -1.0]), np.array([0.4, 0.15, 0.3]))
+    circle = sm.paths.Circle.around(down, 0.05, 3.0, normal=(0.0, 1.0, 0.0))
+    grasp = pin.SE3(np.eye(3), np.array([0.0, 0.35, 0.0]))
+    follows = [sm.Follow(circle, tool=first), sm.Follow(grasp, tool=second, reference=first)]
+    plan = sm.plan(sm.Problem(cell, follows)).require()
+    allowed = sm.Tolerance(0.01, 0.5)
+    turn = sm.margin(plan, allowed).tool.rotation.rotation
+    _, place = cell.carrier_of(first)
+    rng, worst = np.random.default_rng(0), 0.0
+    for axis in rng.normal(size=(200, 3)):
+        by = pin.SE3(pin.exp3(turn * axis / np.linalg.norm(axis)), np.zeros(3))
+        moved = (by * place).inverse() * place * grasp
+        worst = max(worst, float(np.linalg.norm(moved.translation - grasp.translation)))
+    assert 0.9 * allowed.position < worst <= allowed.position
+
+
 def test_what_cannot_be_asked_is_refused(plan: sm.Plan) -> None:
     for given, said in (
         ({"part": ["plat"]}, "there is no body 'plat'; nearest: 'plate'"),

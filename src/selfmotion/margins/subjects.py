@@ -107,6 +107,9 @@ def part_of(plan: Plan, names: Sequence[str] | None, center: Array | None) -> Su
 def tool_of(plan: Plan, names: Sequence[str] | None) -> Subject:
     """Return the tool: bodies by name, by default all that the tool's joint carries.
 
+    Of a tool that stands in the world, all that the cell has there and that carries no joint. Paths
+    in the frame of the tool go with it, as of a second arm that holds on to the same part.
+
     Raises
     ------
     ProblemError
@@ -114,10 +117,10 @@ def tool_of(plan: Plan, names: Sequence[str] | None) -> Subject:
     """
     robot = plan.robot
     joint, _ = robot.carrier_of(robot.tool)
-    if names is None:
-        bodies = _on_joint(plan, joint)
-    else:
+    if names is not None:
         bodies, joint = _named(plan, names, "tool")
+    else:
+        bodies = _on_joint(plan, joint) if joint else _in_the_cell(plan)
     items = plan.problem.follows.items
     misses = []
     for item, (position, rotation) in zip(items, _errors(plan), strict=True):
@@ -126,7 +129,9 @@ def tool_of(plan: Plan, names: Sequence[str] | None) -> Subject:
             lever = float(np.linalg.norm(place.translation))
             angular = item.task.angular
             misses.append(Miss(item.chain.tip_name, position, rotation, angular, lever))
-    about = f"the origin of joint '{robot.model.names[joint]}'"
+    if joint:
+        misses += _of_paths(plan, joint, np.zeros(3))
+    about = f"the origin of joint '{robot.model.names[joint]}'" if joint else "the world's origin"
     return Subject("tool", bodies, joint, np.zeros(3), about, 1.0, tuple(misses))
 
 
@@ -155,6 +160,19 @@ def _on_joint(plan: Plan, joint: int) -> tuple[str, ...]:
         for model in models_of(plan)
         for body in model.every_body
         if body.joint == joint and (joint or body.is_obstacle)
+    )
+    return tuple(dict.fromkeys(found))
+
+
+def _in_the_cell(plan: Plan) -> tuple[str, ...]:
+    """Return the links that stand in the world and carry nothing that moves."""
+    joints = plan.robot.urdf.joints.values()
+    carriers = {item.parent for item in joints if item.kind != "fixed"}
+    found = (
+        body.name
+        for model in models_of(plan)
+        for body in model.every_body
+        if not body.joint and not body.is_obstacle and body.name not in carriers
     )
     return tuple(dict.fromkeys(found))
 
