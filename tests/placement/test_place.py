@@ -137,7 +137,10 @@ def test_only_what_belongs_to_the_part_moves_along() -> None:
         np.testing.assert_allclose(apart.homogeneous, same.homogeneous, atol=1e-12)
     (seen,) = places_of([panda()], "base", None, None, ("x",)).at(np.array([0.1]))
     walls = {body.name: body for body in seen.constraints[-1].obstacles}  # type: ignore[attr-defined]
-    assert walls["wall"].pose.translation[0] == pytest.approx(0.8)
+    np.testing.assert_array_equal(walls["wall"].pose, before["wall"].pose)
+    home = sm.NAMED_ARMS["panda"].home
+    shift = seen.robot.pose(home).translation - panda().robot.pose(home).translation
+    np.testing.assert_allclose(shift, [0.1, 0.0, 0.0], atol=1e-12)
 
 
 def test_several_seams_are_placed_together_and_elsewhere_alike(
@@ -242,3 +245,19 @@ def test_places_from_the_shell(tmp_path: Path) -> None:
         atol=1e-12,
     )
     assert "<svg" in page.read_text()
+
+
+def test_directions_of_the_world_stay_where_the_base_is_tilted() -> None:
+    """The hand is to point downwards, whichever way the arm stands."""
+    level = sm.constraints.Tilt("panda_hand", within=0.1)
+    problem = panda().changed(task="position", constraints=[*LIMITS, level])
+    places = places_of([problem], "base", None, None, ("roll",))
+    tried = places.tried(np.array([0.3]))
+    assert not tried.reason
+    (plan,) = tried.plans
+    tilted = pin.rpy.rpyToMatrix(0.3, 0.0, 0.0)
+    drawn = robot_named("panda")
+    for t in np.linspace(0.0, 3.0, 7):
+        # The arm as it is drawn, tilted by hand.
+        hand = drawn.chain_to("panda_hand").place(plan.trajectory(t)).rotation
+        assert -(tilted @ hand)[2, 2] >= np.cos(0.1) - 1e-6

@@ -37,7 +37,6 @@ from selfmotion.placement.places import (
     restored,
 )
 from selfmotion.placement.search import Box, Descent, best_place
-from selfmotion.planning import plan
 from selfmotion.problem import Problem
 
 # Places that this process was sent before, by their description.
@@ -113,12 +112,9 @@ def place(
             f"place: no verified motion at any of {len(tried)} places that were tried; at "
             f"{_told(names, tried[0].place)}: {tried[0].reason}; widen the box, or ask less"
         )
-    if of == "base" or not best.plans:
-        best = _planned(places, best)
+    best = _planned(places, best)
     here = next((item for item in tried if not item.place.any()), None)
     plans = best.plans
-    if of == "base":
-        plans = _at_base(places, best)
     return Placement(
         of,
         dict(zip(names, best.place.tolist(), strict=True)),
@@ -143,14 +139,6 @@ def _planned(places: Places, best: Tried) -> Tried:
     if not np.isfinite(found.cost):
         raise PlanError(f"place: the best place is not verified here: {found.reason}")
     return found
-
-
-def _at_base(places: Places, best: Tried) -> tuple[Any, ...]:
-    """Return the plans of an arm that stands there."""
-    found = []
-    for problem, near in zip(places.really_at(best.place), best.plans, strict=True):
-        found.append(plan(problem, warm_start=near).require())
-    return tuple(found)
 
 
 def _box(within: Any) -> tuple[tuple[str, ...], Box]:

@@ -96,17 +96,14 @@ class Places:
         return pin.SE3(turn, self.center + shift - turn @ self.center)
 
     def at(self, place: Array) -> list[Problem]:
-        """Return the problems at a place, as they look from the arm's base: with free starts."""
-        by = self.displacement(place)
-        if self.of == "base":
-            by = by.inverse()
-        return [self._moved(problem, by) for problem in self.problems]
+        """Return the problems at a place, the part or the arm's base moved: with free starts.
 
-    def really_at(self, place: Array) -> list[Problem]:
-        """Return the problems at a place, the arm's base moved where that is what moves."""
-        if self.of == "part":
-            return self.at(place)
+        Where the base moves, moving all else instead would not do: directions of the world, such as
+        that of gravity or of a `Tilt`, stay.
+        """
         by = self.displacement(place)
+        if self.of == "part":
+            return [self._moved(problem, by) for problem in self.problems]
         return [
             problem.changed(robot=with_moved_base(problem.robot, by), start="free")
             for problem in self.problems
@@ -159,9 +156,7 @@ class Places:
             item.along(_placed(bound, by)) if _stands(bound) else item
             for item, bound in zip(problem.also, items[1:], strict=True)
         )
-        # Of the base all moves that stands in the world.
-        bodies = None if self.of == "base" else self.bodies
-        clearance = problem.clearance
+        bodies, clearance = self.bodies, problem.clearance
         return problem.changed(
             path=_placed(items[0], by),
             also=also,
@@ -305,13 +300,13 @@ def _placed(item: BoundFollow, by: SE3) -> Path:
     return Placed(item.path, frame.inverse() * by * frame)
 
 
-def _with_bodies(item: Any, names: frozenset[str] | None, by: SE3) -> Any:
-    """Return a constraint whose obstacles stand elsewhere, by name or all that stand."""
+def _with_bodies(item: Any, names: frozenset[str], by: SE3) -> Any:
+    """Return a constraint whose obstacles stand elsewhere, by name."""
     if not isinstance(item, Clearance):
         return item
 
     def moves(body: Obstacle) -> bool:
-        return body.frame is None and (names is None or body.name in names)
+        return body.frame is None and body.name in names
 
     if not any(moves(body) for body in item.obstacles):
         # The same one: its bodies are known.
