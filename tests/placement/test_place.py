@@ -197,6 +197,22 @@ def test_downhill_ends_at_the_bottom_or_where_motions_end(edge: float) -> None:
     assert len(chosen) <= search._FINALISTS
 
 
+def test_of_the_present_place_a_quick_no_is_not_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where the first look there finds nothing, it is planned as any other problem."""
+    whole = Places.tried
+
+    def quick(self: Places, place: np.ndarray, near: object = (), thorough: bool = False) -> Tried:
+        if not place.any() and not thorough:
+            return Tried(place, np.inf, "nothing was found in time")
+        return whole(self, place, near, thorough)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(search, "_BEGINNINGS", 2)
+    monkeypatch.setattr(Places, "tried", quick)
+    found = sm.place(planar(), {"x": (-0.1, 0.1)})
+    assert found.cost_before == pytest.approx(sm.plan(planar()).report.cost, rel=1e-3)
+    assert "at the present place, " in str(found)
+
+
 def test_what_cannot_be_placed_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(search, "_BEGINNINGS", 2)
     monkeypatch.setattr(search, "_MOST_BEGINNINGS", 3)

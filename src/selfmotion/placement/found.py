@@ -170,7 +170,8 @@ class Placement:
             f"cost {self.cost:.6g} ({before}); {len(self.plans)} "
             f"motion{'s' if len(self.plans) > 1 else ''}, {'all' if self.verified else 'not'} "
             f"verified",
-            f"{len(self.tried)} places tried, {failed} of them without a verified motion",
+            f"{len(self.tried)} places tried, {failed} of them without a verified motion in the "
+            f"short time that each has",
             *(f"binds: {text}" for text in self.binds),
         ]
         return "\n".join(lines)

@@ -114,6 +114,9 @@ def place(
         )
     best = _planned(places, best)
     here = next((item for item in tried if not item.place.any()), None)
+    if here is not None and not np.isfinite(here.cost):
+        # A quick 'no' is none to be told of where the part stands.
+        here = places.tried(here.place, thorough=True)
     plans = best.plans
     return Placement(
         of,
