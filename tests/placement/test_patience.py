@@ -10,7 +10,8 @@ import selfmotion as sm
 from selfmotion.placement import places
 from support.arms import robot_named
 
-WITHIN = {"x": (-0.1, 0.1)}
+# Without the present place, which is planned at leisure, and with it.
+WITHIN, WITH_HERE = {"x": (0.01, 0.1)}, {"x": (-0.1, 0.1)}
 _real = places.plan
 
 
@@ -25,7 +26,7 @@ def seam() -> sm.Problem:
 def pressed_at(stage: int) -> Any:
     """Return `plan`, in which Ctrl-C is pressed when so many stages have begun."""
 
-    def plan(problem: sm.Problem, *, progress: Any, **options: Any) -> sm.Plan:
+    def plan(problem: sm.Problem, *, progress: Any = lambda *_: None, **options: Any) -> sm.Plan:
         count = 0
 
         def told(*stages: Any) -> None:
@@ -47,15 +48,16 @@ def test_no_time_is_no_motion(monkeypatch: pytest.MonkeyPatch) -> None:
         sm.place(seam(), WITHIN)
 
 
+@pytest.mark.parametrize("within", [WITHIN, WITH_HERE])
 @pytest.mark.parametrize(("stage", "patience"), [(1, 0.0), (1, 100.0), (3, 100.0)])
 def test_ctrl_c_ends_a_search_for_places(
-    monkeypatch: pytest.MonkeyPatch, stage: int, patience: float
+    monkeypatch: pytest.MonkeyPatch, stage: int, patience: float, within: dict[str, Any]
 ) -> None:
     """Early, where there is no motion yet, and late, where one is, whether time is over or not."""
     monkeypatch.setattr(places, "_PATIENCE", patience)
     monkeypatch.setattr(places, "plan", pressed_at(stage))
     with pytest.raises(KeyboardInterrupt):
-        sm.place(seam(), WITHIN)
+        sm.place(seam(), within)
 
 
 def test_ctrl_c_ends_a_correction(monkeypatch: pytest.MonkeyPatch) -> None:

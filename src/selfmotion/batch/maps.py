@@ -22,7 +22,7 @@ _OF_POSES = {
 _BEST, _WORST = (0, 105, 92), (255, 243, 205)
 # Of a cell [px], as wide as a reason in two words; of the frame around all of them.
 _WIDE, _HIGH = 74, 46
-_LEFT, _TOP, _RIGHT, _BOTTOM = 68, 30, 12, 64
+_LEFT, _TOP, _RIGHT, _BOTTOM = 76, 30, 12, 64
 # Letters on one line of a cell.
 _LINE = 9
 

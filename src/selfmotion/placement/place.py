@@ -106,17 +106,16 @@ def place(
     listed = None if part is None else _names(part)
     places = places_of(several, of, listed, about, names)
     run = _Here(places, box, progress) if executor is None else _There(places, box, executor)
-    best, tried = best_place(places, box, run.every, run.descents)
+    # Of where it stands a quick 'no', or a cost that took no pains, is not to be told.
+    here = np.zeros(len(names))
+    known = [places.tried(here, thorough=True)] if box.holds(here) else []
+    best, tried = best_place(places, box, run.every, run.descents, known)
     if not np.isfinite(best.cost):
         raise PlanError(
             f"place: no verified motion at any of {len(tried)} places that were tried; at "
             f"{_told(names, tried[0].place)}: {tried[0].reason}; widen the box, or ask less"
         )
     best = _planned(places, best)
-    here = next((item for item in tried if not item.place.any()), None)
-    if here is not None and not np.isfinite(here.cost):
-        # A quick 'no' is none to be told of where the part stands.
-        here = places.tried(here.place, thorough=True)
     plans = best.plans
     return Placement(
         of,
@@ -125,7 +124,7 @@ def place(
         tuple(item.problem for item in plans),
         plans,
         sum(item.report.cost for item in plans),
-        np.nan if here is None else here.cost,
+        known[0].cost if known else np.nan,
         on_bounds(places, box, best.place),
         tuple(replace(item, plans=()) for item in tried),
         places,

@@ -117,7 +117,7 @@ class Places:
 
         def planned(k: int, problem: Problem) -> Plan:
             if thorough:
-                return plan(problem)
+                return _uninterrupted(plan(problem))
             if near:
                 return _quickly(problem, near[k], _NEAR, _PATIENCE_NEAR)
             _check_reach(problem)
@@ -251,6 +251,13 @@ def restored(values: Mapping[str, Any], known: dict[str, Any]) -> Places:
     )
 
 
+def _uninterrupted(found: Plan) -> Plan:
+    """Return a plan; KeyboardInterrupt where Ctrl-C ended it."""
+    if found.report.status is Status.INTERRUPTED:
+        raise KeyboardInterrupt
+    return found
+
+
 def _quickly(problem: Problem, known: Plan | None, search: Search | None, patience: float) -> Plan:
     """Plan, from what is known if anything is, or give up soon.
 
@@ -284,10 +291,7 @@ def _quickly(problem: Problem, known: Plan | None, search: Search | None, patien
         if presses() > pressed or not given_up:
             raise
         raise PlanError(f"no motion was found in {patience:g} s, by the processor's time") from None
-    is_user = presses() > pressed or not given_up
-    if found.report.status is Status.INTERRUPTED and is_user:
-        raise KeyboardInterrupt
-    return found
+    return _uninterrupted(found) if presses() > pressed or not given_up else found
 
 
 def _stands(item: BoundFollow) -> bool:
