@@ -54,7 +54,8 @@ def margin(
         What belongs to the part. By default all obstacles that stand, or are carried, where the
         path is: never less than those that do.
     tool : sequence of str, optional
-        What is displaced with the tool tip. By default all that the tool's joint carries.
+        What is displaced with the tool tip. By default all that the tool's joint carries; of a
+        tool that stands in the world, the links there that carry no joint.
     center : (3,), optional
         What the part turns about, in the frame of the path [m]; by default the middle of the path.
         The base turns about its own origin, the tool about that of the joint that carries it.
