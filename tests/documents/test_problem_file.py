@@ -444,3 +444,12 @@ def test_the_clearance_is_given_once(tmp_path: Path) -> None:
     file.write_text(f"clearance = false\ncollision = false\n{_CLEARANCE}")
     with pytest.raises(sm.errors.FileFormatError, match="the former name of clearance"):
         sm.read_problem(file)
+
+
+def test_a_key_of_a_table_is_told_where_it_belongs(tmp_path: Path) -> None:
+    file = tmp_path / "cell.toml"
+    for key, tables in (("obstacles", "[clearance] or [workpiece]"), ("lock", "[robot]")):
+        file.write_text(f'{key} = []\ntask = "pointing"\n[robot]\nname = "panda"\n')
+        with pytest.raises(sm.errors.FileFormatError) as refused:
+            sm.read_problem(file)
+        assert f"{key}: unknown key; it belongs to {tables}" in str(refused.value)

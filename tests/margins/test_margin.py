@@ -133,6 +133,93 @@ def test_a_tolerance_is_used_up_by_its_lever() -> None:
     assert away.part.rotation.rotation == pytest.approx(room / far, rel=0.02)
 
 
+def test_what_misses_its_path_as_it_is_has_no_margin() -> None:
+    robot = robot_named("planar_3r")
+    start = np.array([0.4, 0.7, 0.6])
+    pose = robot.pose(start)
+    end = pin.SE3(pose.rotation, pose.translation + np.array([-0.2, 0.0, 0.0]))
+    problem = sm.Problem(robot, sm.paths.Line(pose, end, 2.0), "planar", start, constraints=LIMITS)
+    plan = sm.plan(problem).require()
+    found = sm.margin(plan, sm.Tolerance(0.1 * plan.certificate.position_error.value, 0.5))
+    for subject in (found.part, found.base):
+        for _, each in subject.rows:
+            assert each.position == each.rotation == 0.0
+            assert "off its path" in each.stops
+    assert "margin 0: " in found.sentence
+
+
+def test_what_is_mounted_on_the_base_goes_with_it() -> None:
+    """A post on the base, a finger from the elbow: where the base stands does not matter."""
+    robot = robot_named("panda")
+    pose = robot.pose(PANDA_HOME)
+    elbow = robot.joint_poses(PANDA_HOME[None])[0, 3, :3]
+    post = sm.obstacles.Sphere(
+        "post", elbow - np.array([0.25, 0.0, 0.0]), 0.05, frame="panda_link0"
+    )
+    path = sm.paths.Circle.around(pose, 0.03, 2.0, normal=(1.0, 0.0, 0.0))
+    clear = sm.constraints.Clearance([post], 1e-3)
+    problem = sm.Problem(robot, path, start=PANDA_HOME, constraints=[*LIMITS, clear])
+    found = sm.margin(sm.plan(problem).require())
+    assert "post" not in found.base.bodies
+    assert "no contact" in found.base.translation.reason
+    # It is found where it is what is displaced.
+    assert "post" in found.part.translation.stops
+
+
+TORCH = """<robot name="torch"><link name="tip"><collision><origin xyz="0 0 0.08"/><geometry>
+<cylinder radius="0.01" length="0.1"/></geometry></collision></link></robot>"""
+
+
+def test_a_tool_that_stands_in_the_world_is_what_is_displaced() -> None:
+    """The hand leads the part past a torch; a post beside it is no tool."""
+    home = PANDA_HOME
+    pose = robot_named("panda").pose(home)
+    place = pose * pin.SE3(np.eye(3), np.array([0.0, 0.0, 0.06]))
+    cell = sm.load_robot(
+        {"arm": "panda", "torch": TORCH},
+        tool="torch/tip",
+        reference="arm/panda_hand_tcp",
+        base={"torch": place},
+    )
+    path = sm.paths.Circle.around(cell.pose(home), 0.02, 2.0, normal=(0.0, 0.0, 1.0))
+    post = sm.obstacles.Cylinder("post", place.translation + np.array([0.2, 0.2, 0.1]), 0.03, 0.2)
+    clear = sm.constraints.Clearance([post], 1e-3)
+    plan = sm.plan(sm.Problem(cell, path, start=home, constraints=[*LIMITS, clear])).require()
+    found = sm.margin(plan)
+    assert found.tool.bodies == ("torch/tip",)
+    assert "'torch/tip' meets 'arm/panda_" in found.tool.translation.stops
+    t = np.append(np.linspace(0.0, 2.0, 20), found.tool.translation.time)
+    judge, worst = Judge(plan), found.tool.translation
+    still, direction = np.zeros(3), np.asarray(worst.direction)
+    for share, is_clear in ((1.0, True), (1.0 / PROVED, False)):
+        moved = judge.moved_by(found.tool, share * worst.position * direction, still)
+        assert (judge.least(moved, t) >= -MISSED) is is_clear
+
+
+def test_paths_in_the_frame_of_the_tool_go_with_it() -> None:
+    """A second hand holds on to what the first one leads: where the first is off, it misses."""
+    first, second = "first/panda_hand_tcp", "second/panda_hand_tcp"
+    cell = sm.load_robot(
+        {"first": "panda", "second": "panda"},
+        tool=(first, second),
+        base={"second": pin.SE3(pin.rpy.rpyToMatrix(0.0, 0.0, np.pi), np.array([0.9, 0.0, 0.0]))},
+    )
+    down = pin.SE3(np.diag([1.0, -1.0, -1.0]), np.array([0.4, 0.15, 0.3]))
+    circle = sm.paths.Circle.around(down, 0.05, 3.0, normal=(0.0, 1.0, 0.0))
+    grasp = pin.SE3(np.eye(3), np.array([0.0, 0.35, 0.0]))
+    follows = [sm.Follow(circle, tool=first), sm.Follow(grasp, tool=second, reference=first)]
+    plan = sm.plan(sm.Problem(cell, follows)).require()
+    allowed = sm.Tolerance(0.01, 0.5)
+    turn = sm.margin(plan, allowed).tool.rotation.rotation
+    _, place = cell.carrier_of(first)
+    rng, worst = np.random.default_rng(0), 0.0
+    for axis in rng.normal(size=(200, 3)):
+        by = pin.SE3(pin.exp3(turn * axis / np.linalg.norm(axis)), np.zeros(3))
+        moved = (by * place).inverse() * place * grasp
+        worst = max(worst, float(np.linalg.norm(moved.translation - grasp.translation)))
+    assert 0.9 * allowed.position < worst <= allowed.position
+
+
 def test_what_cannot_be_asked_is_refused(plan: sm.Plan) -> None:
     for given, said in (
         ({"part": ["plat"]}, "there is no body 'plat'; nearest: 'plate'"),
@@ -179,7 +266,7 @@ def test_margins_are_rounded_down() -> None:
         (0.00999999, "9.99 mm"),
         (0.0123456, "12.3 mm"),
         (0.9876, "987 mm"),
-        (0.0, "0 mm"),
+        (0.0, "0"),
     ):
         assert Displacement(size, 0.0, "something").size == text
     assert Displacement(0.0, np.radians(1.23999), "something").size == "1.23°"

@@ -103,6 +103,19 @@ def test_corrections_from_the_shell(plan: sm.Plan, tmp_path) -> None:  # type: i
     assert '"corrected"' in told
 
 
+def test_where_the_base_carries_the_path_the_part_is_corrected(tmp_path) -> None:  # type: ignore[no-untyped-def]
+    arm = sm.load_robot("panda", reference="panda_link0")
+    pose = arm.pose(sm.NAMED_ARMS["panda"].home)
+    circle = sm.paths.Circle.around(pose, 0.02, 2.0, normal=(0, 0, 1))
+    file = tmp_path / "plan.npz"
+    sm.plan(sm.Problem(arm, circle, "position", constraints=LIMITS)).save(file)
+    code, told = invoke("margin", file, "--tolerance", "1e-3", "--turn", "0.1", "--corrected")
+    assert code == 0, told
+    assert "planned again, the part may be" in told
+    assert "not planned again for another place of the base: " in told
+    assert "which moves along with the base" in told
+
+
 def test_what_cannot_be_corrected_is_refused(plan: sm.Plan) -> None:
     for given, said in (
         ({"of": "tool"}, "of is 'tool'"),

@@ -137,7 +137,10 @@ def test_only_what_belongs_to_the_part_moves_along() -> None:
         np.testing.assert_allclose(apart.homogeneous, same.homogeneous, atol=1e-12)
     (seen,) = places_of([panda()], "base", None, None, ("x",)).at(np.array([0.1]))
     walls = {body.name: body for body in seen.constraints[-1].obstacles}  # type: ignore[attr-defined]
-    assert walls["wall"].pose.translation[0] == pytest.approx(0.8)
+    np.testing.assert_array_equal(walls["wall"].pose, before["wall"].pose)
+    home = sm.NAMED_ARMS["panda"].home
+    shift = seen.robot.pose(home).translation - panda().robot.pose(home).translation
+    np.testing.assert_allclose(shift, [0.1, 0.0, 0.0], atol=1e-12)
 
 
 def test_several_seams_are_placed_together_and_elsewhere_alike(
@@ -194,6 +197,22 @@ def test_downhill_ends_at_the_bottom_or_where_motions_end(edge: float) -> None:
     assert len(chosen) <= search._FINALISTS
 
 
+def test_of_the_present_place_a_quick_no_is_not_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where the first look there finds nothing, it is planned as any other problem."""
+    whole = Places.tried
+
+    def quick(self: Places, place: np.ndarray, near: object = (), thorough: bool = False) -> Tried:
+        if not place.any() and not thorough:
+            return Tried(place, np.inf, "nothing was found in time")
+        return whole(self, place, near, thorough)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(search, "_BEGINNINGS", 2)
+    monkeypatch.setattr(Places, "tried", quick)
+    found = sm.place(planar(), {"x": (-0.1, 0.1)})
+    assert found.cost_before == pytest.approx(sm.plan(planar()).report.cost, rel=1e-3)
+    assert "at the present place, " in str(found)
+
+
 def test_what_cannot_be_placed_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(search, "_BEGINNINGS", 2)
     monkeypatch.setattr(search, "_MOST_BEGINNINGS", 3)
@@ -216,6 +235,14 @@ def test_what_cannot_be_placed_is_refused(monkeypatch: pytest.MonkeyPatch) -> No
         sm.place(planar(), {"x": (50.0, 60.0)})
 
 
+def test_a_path_that_goes_with_the_base_is_refused() -> None:
+    """What the arm's base carries is reached from anywhere alike."""
+    arm = sm.load_robot("panda", reference="panda_link0")
+    problem = panda().changed(robot=arm)
+    with pytest.raises(sm.errors.ProblemError, match="'panda_link0', which moves along"):
+        sm.place(problem, {"x": (-0.1, 0.1)}, of="base")
+
+
 def test_places_from_the_shell(tmp_path: Path) -> None:
     cell, out, plan, page = (
         tmp_path / name for name in ("cell.toml", "out.toml", "plan.npz", "map.html")
@@ -234,3 +261,19 @@ def test_places_from_the_shell(tmp_path: Path) -> None:
         atol=1e-12,
     )
     assert "<svg" in page.read_text()
+
+
+def test_directions_of_the_world_stay_where_the_base_is_tilted() -> None:
+    """The hand is to point downwards, whichever way the arm stands."""
+    level = sm.constraints.Tilt("panda_hand", within=0.1)
+    problem = panda().changed(task="position", constraints=[*LIMITS, level])
+    places = places_of([problem], "base", None, None, ("roll",))
+    tried = places.tried(np.array([0.3]))
+    assert not tried.reason
+    (plan,) = tried.plans
+    tilted = pin.rpy.rpyToMatrix(0.3, 0.0, 0.0)
+    drawn = robot_named("panda")
+    for t in np.linspace(0.0, 3.0, 7):
+        # The arm as it is drawn, tilted by hand.
+        hand = drawn.chain_to("panda_hand").place(plan.trajectory(t)).rotation
+        assert -(tilted @ hand)[2, 2] >= np.cos(0.1) - 1e-6

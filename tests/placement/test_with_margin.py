@@ -124,3 +124,76 @@ def test_margins_bought_in_the_shell(problem: sm.Problem, tmp_path) -> None:  # 
     assert code == 0, told
     assert "margin of 10 mm" in told
     assert sm.load_plan(out).certificate.verified
+
+
+def test_what_is_told_is_of_the_plan_that_is_returned(
+    problem: sm.Problem, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A round that fails leaves the plan of before, and its distances with it."""
+    whole, kept = with_margin.plan, []
+
+    def failing(asked: sm.Problem, **options: object) -> sm.Plan:
+        made = whole(asked, **options)  # type: ignore[arg-type]
+        if len(asked.constraints) > len(problem.constraints):
+            kept.append(asked.constraints[-1])
+            wrong = dataclasses.replace(made.certificate, failures=("it was made to fail",))
+            # Nearer it is not: it is the motion of before.
+            made = dataclasses.replace(first, certificate=wrong)
+        return made
+
+    first = whole(problem)
+    monkeypatch.setattr(with_margin, "plan", failing)
+    found = sm.plan_with_margin(problem, WANTED, of=("part", "base"))
+    assert kept
+    assert not found.reached
+    assert "no more was found: " in str(found)
+    assert found.kept_apart == {}
+    assert found.cost == first.report.cost
+
+
+def test_cheaper_motions_that_are_met_are_ones_without_a_margin(
+    problem: sm.Problem, found: sm.placement.PlanWithMargin, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where the first plan is a poor one, a margin has no price below none."""
+    whole, poor = with_margin.plan, []
+
+    def worse(asked: sm.Problem, **options: object) -> sm.Plan:
+        made = whole(asked, **options)  # type: ignore[arg-type]
+        if not poor:
+            report = dataclasses.replace(made.report, cost=2.0 * found.cost)
+            made = dataclasses.replace(made, report=report)
+            poor.append(made)
+        return made
+
+    monkeypatch.setattr(with_margin, "plan", worse)
+    again = sm.plan_with_margin(problem, WANTED, of=("part", "base"))
+    assert again.reached
+    assert again.cost_without <= again.cost
+    assert again.extra_cost >= 0.0
+
+
+@pytest.mark.parametrize("stopped", [0, 1])
+def test_ctrl_c_ends_all_rounds(
+    problem: sm.Problem, stopped: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole, made = with_margin.plan, []
+
+    def plan(asked: sm.Problem, **options: object) -> sm.Plan:
+        each = whole(asked, **options)  # type: ignore[arg-type]
+        if len(made) == stopped:
+            report = dataclasses.replace(each.report, status=sm.optimise.Status.INTERRUPTED)
+            each = dataclasses.replace(each, report=report)
+        made.append(each)
+        return each
+
+    monkeypatch.setattr(with_margin, "plan", plan)
+    found = sm.plan_with_margin(problem, WANTED, of=("part", "base"))
+    assert len(made) == stopped + 1
+    assert found.reached or "it was interrupted" in str(found)
+
+
+def test_a_plan_to_begin_with_is_taken(
+    problem: sm.Problem, found: sm.placement.PlanWithMargin
+) -> None:
+    again = sm.plan_with_margin(problem, WANTED, of=("part", "base"), warm_start=found.plan)
+    assert again.reached

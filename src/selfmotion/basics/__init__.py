@@ -62,6 +62,7 @@ from selfmotion.basics.jit import (
     compile_alone as compile_alone,
     inlined as inlined,
     kernel as kernel,
+    seconds_of_kernels as seconds_of_kernels,
 )
 from selfmotion.basics.progress import (
     Counts as Counts,
@@ -70,6 +71,7 @@ from selfmotion.basics.progress import (
     obey_interruption as obey_interruption,
     obeying as obeying,
     one_blas_thread as one_blas_thread,
+    presses as presses,
     silent as silent,
     was_interrupted as was_interrupted,
 )

@@ -9,6 +9,7 @@ import os
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, TypeVar
@@ -19,6 +20,34 @@ from numba.core import event
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
 
+class _Spent:
+    """Processor time that compiling and loading took; within one another it counts once."""
+
+    def __init__(self) -> None:
+        self.seconds, self._depth, self._began = 0.0, 0, 0.0
+
+    def __enter__(self) -> None:
+        if not self._depth:
+            self._began = time.process_time()
+        self._depth += 1
+
+    def __exit__(self, *_: object) -> None:
+        self._depth -= 1
+        if not self._depth:
+            self.seconds += time.process_time() - self._began
+
+
+_spent = _Spent()
+
+
+def seconds_of_kernels() -> float:
+    """Return the processor time [s] that this process took to compile and load kernels so far.
+
+    Who limits work by the processor's time leaves that out: it comes once.
+    """
+    return _spent.seconds
+
+
 class _Announcement(event.Listener):  # type: ignore[misc]  # numba ships no types
     """Says on the terminal why the first call takes seconds."""
 
@@ -26,6 +55,7 @@ class _Announcement(event.Listener):  # type: ignore[misc]  # numba ships no typ
         self._said = False
 
     def on_start(self, event: Any) -> None:
+        _spent.__enter__()
         ours = event.data["dispatcher"].py_func.__module__.startswith("selfmotion")
         if ours and not self._said:
             self._said = True
@@ -37,7 +67,7 @@ class _Announcement(event.Listener):  # type: ignore[misc]  # numba ships no typ
                 threading.Thread(target=other.communicate, daemon=True).start()
 
     def on_end(self, event: Any) -> None:
-        pass
+        _spent.__exit__()
 
 
 def kernel(function: _Function) -> _Function:
@@ -76,6 +106,10 @@ def _forgive(compiled: Any) -> None:
             return None
 
     def load_or_compile(*given: Any) -> Any:
+        with _spent:
+            return load_in_turn(*given)
+
+    def load_in_turn(*given: Any) -> Any:
         found = load_if_possible(*given)
         if found is None:
             # After an interruption it is this one's turn still.

@@ -70,10 +70,11 @@ class _Interruption:
     """Whether Ctrl-C was pressed, and is not obeyed yet."""
 
     def __init__(self) -> None:
-        self.noted = False
+        self.noted, self.count = False, 0
 
     def note(self, number: int, frame: FrameType | None) -> None:
         """Note it; the second time, obey at once."""
+        self.count += 1
         if self.noted:
             raise KeyboardInterrupt
         self.noted = True
@@ -117,6 +118,11 @@ def was_interrupted() -> bool:
     """Return, once, whether Ctrl-C was pressed and is not obeyed yet."""
     noted, _pressed.noted = _pressed.noted, False
     return noted
+
+
+def presses() -> int:
+    """Return how often Ctrl-C was held so far: who stops work himself tells it from that."""
+    return _pressed.count
 
 
 def obeying(progress: Progress) -> Progress:

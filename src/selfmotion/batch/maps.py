@@ -22,7 +22,7 @@ _OF_POSES = {
 _BEST, _WORST = (0, 105, 92), (255, 243, 205)
 # Of a cell [px], as wide as a reason in two words; of the frame around all of them.
 _WIDE, _HIGH = 74, 46
-_LEFT, _TOP, _RIGHT, _BOTTOM = 58, 30, 12, 64
+_LEFT, _TOP, _RIGHT, _BOTTOM = 76, 30, 12, 64
 # Letters on one line of a cell.
 _LINE = 9
 
@@ -148,9 +148,9 @@ def _picture(
     floor = _TOP + _HIGH * len(up)
     parts = [_said(_LEFT, _TOP - 10, title, "start", "bold")] if title else []
     for k, value in enumerate(across):
-        parts.append(_said(_LEFT + _WIDE * (k + 0.5), floor + 15, f"{value:g}"))
+        parts.append(_said(_LEFT + _WIDE * (k + 0.5), floor + 15, f"{value:.4g}"))
     for k, value in enumerate(up):
-        parts.append(_said(_LEFT - 6, floor - _HIGH * (k + 0.5) + 4, f"{value:g}", "end"))
+        parts.append(_said(_LEFT - 6, floor - _HIGH * (k + 0.5) + 4, f"{value:.4g}", "end"))
     parts.append(_said(_LEFT + 0.5 * _WIDE * len(across), floor + 31, heads[0]))
     middle = _TOP + 0.5 * _HIGH * len(up)
     parts.append(f'<g transform="rotate(-90 12 {middle:g})">{_said(12, middle, heads[1])}</g>')

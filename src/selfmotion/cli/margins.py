@@ -87,18 +87,25 @@ def margin(
     with StageDisplay(stages) as display:
         display.stage("measuring margins", 1, 1)
         found = sm.margin(plan, within, **asked)
-    again = []
-    if corrected:
-        with StageDisplay(stages) as display:
-            again = [
-                sm.correction(plan, of="part", part=part or None, progress=display.stage),
-                sm.correction(plan, of="base", progress=display.stage),
-            ]
+    again, refused = [], dict[str, str]()
+    if about is not None:
+        # Margins have it in the frame of the path, corrections in world axes.
+        about = plan.problem.follows.items[0].chain.base_placement.act(np.array(about))
+    for of in ("part", "base") if corrected else ():
+        given: dict[str, Any] = {"part": part or None, "center": about} if of == "part" else {}
+        try:
+            with StageDisplay(stages) as display:
+                again.append(sm.correction(plan, of=of, progress=display.stage, **given))
+        except sm.errors.ProblemError as error:
+            # The other one may have an answer all the same.
+            refused[of] = str(error)
     if as_json:
         planned = {item.of: _plain(dataclasses.asdict(item)) for item in again}
+        planned |= {of: {"refused": why} for of, why in refused.items()}
         terminal.print_json(data=margins_json(found) | {"corrected": planned})
         return
-    for told in (found, *again):
+    whys = (f"not planned again for another place of the {of}: {refused[of]}" for of in refused)
+    for told in (found, *again, *whys):
         terminal.print(str(told), markup=False, soft_wrap=True)
 
 

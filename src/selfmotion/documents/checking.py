@@ -134,15 +134,22 @@ def _what(error: Any, document: Mapping[str, Any]) -> str:
 
 
 def _near(error: Any) -> str:
-    known = _known_keys(error["loc"])
+    schema = document_model().model_json_schema()
+    known = _known_keys(error["loc"], schema)
     units = [name + suffix for suffix, names in _UNITS.items() for name in known if name in names]
-    near = get_close_matches(str(error["loc"][-1]), [*known, *units], 1)
+    key = str(error["loc"][-1])
+    near = get_close_matches(key, [*known, *units], 1)
+    if not near and len(error["loc"]) == 1:
+        # One of a table, at the top of the file.
+        tables = [f"[{name}]" for name in known if key in _known_keys((name, key), schema)]
+        if tables:
+            return f"; it belongs to {' or '.join(tables)}"
     return f", did you mean '{near[0]}'?" if near else f", expected one of: {', '.join(known)}"
 
 
-def _known_keys(location: tuple[int | str, ...]) -> list[str]:
+def _known_keys(location: tuple[int | str, ...], schema: Mapping[str, Any]) -> list[str]:
     """Return the keys of the table in which something stands."""
-    node: Any = document_model().model_json_schema()
+    node: Any = schema
     definitions = node["$defs"]
     for part in location[:-1]:
         node = _resolved(node, definitions)

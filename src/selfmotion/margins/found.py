@@ -42,8 +42,10 @@ class Displacement:
     @property
     def size(self) -> str:
         """How much it is, in words."""
+        if not self.position and not self.rotation:
+            return "0"
         least = "" if self.stops else "at least "
-        both = [f"{_down(self.position * 1e3)} mm"] if self.position or not self.rotation else []
+        both = [f"{_down(self.position * 1e3)} mm"] if self.position else []
         if self.rotation:
             both.append(f"{_down(math.degrees(self.rotation))}°")
         return least + " and ".join(both)

@@ -54,7 +54,8 @@ def margin(
         What belongs to the part. By default all obstacles that stand, or are carried, where the
         path is: never less than those that do.
     tool : sequence of str, optional
-        What is displaced with the tool tip. By default all that the tool's joint carries.
+        What is displaced with the tool tip. By default all that the tool's joint carries; of a
+        tool that stands in the world, the links there that carry no joint.
     center : (3,), optional
         What the part turns about, in the frame of the path [m]; by default the middle of the path.
         The base turns about its own origin, the tool about that of the joint that carries it.
@@ -166,11 +167,12 @@ def _of_tolerance(
         room = tolerance.position - miss.position
         text = f"'{miss.tip}' is {tolerance.position * 1e3:.3g} mm off its path"
         if moved * found[0] > room:
-            found = max(room, 0.0) / moved, text
+            # What is too far off its path as it is may be displaced by nothing.
+            found = (room / moved if room > 0.0 else 0.0), text
         room = tolerance.rotation - miss.rotation
         text = f"'{miss.tip}' is {np.degrees(tolerance.rotation):.3g}° off its path"
         if miss.angular and size.rotation * found[0] > room:
-            found = max(room, 0.0) / size.rotation, text
+            found = (room / size.rotation if room > 0.0 else 0.0), text
     return Least(found[0]), found[1]
 
 

@@ -82,7 +82,7 @@ def part_of(plan: Plan, names: Sequence[str] | None, center: Array | None) -> Su
         There is no such body, or they are carried by different joints.
     """
     chain = plan.problem.follows.items[0].chain
-    joint, where = chain.carrier + 1, "the world" if chain.carrier < 0 else chain_base(plan)
+    joint, where = chain.carrier + 1, chain_base(plan)
     if names is None:
         bodies = _on_joint(plan, joint)
     else:
@@ -95,13 +95,20 @@ def part_of(plan: Plan, names: Sequence[str] | None, center: Array | None) -> Su
                 f"middle is no place there: give center="
             )
     else:
-        about = f"({', '.join(f'{x:.4g}' for x in center)}) in the frame of {where}"
-        center = chain.base_placement.act(center) if joint == chain.carrier + 1 else center
+        told = ", ".join(f"{x:.4g}" for x in center)
+        if joint == chain.carrier + 1:
+            center = chain.base_placement.act(center)
+        else:
+            where = f"joint '{plan.robot.model.names[joint]}'" if joint else "the world"
+        about = f"({told}) in the frame of {where}"
     return Subject("part", bodies, joint, center, about, 1.0, _of_paths(plan, joint, center))
 
 
 def tool_of(plan: Plan, names: Sequence[str] | None) -> Subject:
     """Return the tool: bodies by name, by default all that the tool's joint carries.
+
+    Of a tool that stands in the world, all that the cell has there and that carries no joint. Paths
+    in the frame of the tool go with it, as of a second arm that holds on to the same part.
 
     Raises
     ------
@@ -110,10 +117,10 @@ def tool_of(plan: Plan, names: Sequence[str] | None) -> Subject:
     """
     robot = plan.robot
     joint, _ = robot.carrier_of(robot.tool)
-    if names is None:
-        bodies = _on_joint(plan, joint)
-    else:
+    if names is not None:
         bodies, joint = _named(plan, names, "tool")
+    else:
+        bodies = _on_joint(plan, joint) if joint else _in_the_cell(plan)
     items = plan.problem.follows.items
     misses = []
     for item, (position, rotation) in zip(items, _errors(plan), strict=True):
@@ -122,7 +129,9 @@ def tool_of(plan: Plan, names: Sequence[str] | None) -> Subject:
             lever = float(np.linalg.norm(place.translation))
             angular = item.task.angular
             misses.append(Miss(item.chain.tip_name, position, rotation, angular, lever))
-    about = f"the origin of joint '{robot.model.names[joint]}'"
+    if joint:
+        misses += _of_paths(plan, joint, np.zeros(3))
+    about = f"the origin of joint '{robot.model.names[joint]}'" if joint else "the world's origin"
     return Subject("tool", bodies, joint, np.zeros(3), about, 1.0, tuple(misses))
 
 
@@ -130,15 +139,18 @@ def base_of(plan: Plan) -> Subject:
     """Return the base of the arm, or of the whole cell, in the world."""
     urdf = plan.robot.urdf
     link = urdf.joints[BASE_JOINT].child if BASE_JOINT in urdf.joints else urdf.root
-    bodies = tuple(dict.fromkeys(name for model in models_of(plan) for name in model.standing))
+    # What is mounted on the base goes with it.
+    mounted = {body.name for body in plan.obstacles if body.frame is not None}
+    bodies = tuple(name for name in _on_joint(plan, 0) if name not in mounted)
     center = root_place(plan.robot)
     about = f"the origin of '{link}'"
     return Subject("base", bodies, 0, center, about, -1.0, _of_paths(plan, 0, center))
 
 
 def chain_base(plan: Plan) -> str:
-    """Return the link in whose frame the path is."""
-    return f"'{plan.robot.reference}'"
+    """Return in words in whose frame the path is."""
+    reference = plan.robot.reference
+    return f"'{reference}'" if reference else "the world"
 
 
 def _on_joint(plan: Plan, joint: int) -> tuple[str, ...]:
@@ -148,6 +160,19 @@ def _on_joint(plan: Plan, joint: int) -> tuple[str, ...]:
         for model in models_of(plan)
         for body in model.every_body
         if body.joint == joint and (joint or body.is_obstacle)
+    )
+    return tuple(dict.fromkeys(found))
+
+
+def _in_the_cell(plan: Plan) -> tuple[str, ...]:
+    """Return the links that stand in the world and carry nothing that moves."""
+    joints = plan.robot.urdf.joints.values()
+    carriers = {item.parent for item in joints if item.kind != "fixed"}
+    found = (
+        body.name
+        for model in models_of(plan)
+        for body in model.every_body
+        if not body.joint and not body.is_obstacle and body.name not in carriers
     )
     return tuple(dict.fromkeys(found))
 

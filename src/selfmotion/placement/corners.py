@@ -159,6 +159,8 @@ def correction(
         The plan is not verified.
     ProblemError
         An argument is not what it should be, or the path is given in a frame that moves.
+    KeyboardInterrupt
+        It was interrupted.
     """
     if not isinstance(plan, Plan):
         raise ProblemError(f"correction: plan is {shown(plan)}, expected a Plan")
@@ -204,11 +206,12 @@ class _Corners:
         size = min(max(estimate, _LEAST * most), most)
         low, high, stops = 0.0, math.inf, ""
         confirmed: tuple[Corner, ...] = ()
+        what = "moved" if axes.start == 0 else "turned"
         for _ in range(_HALVINGS + 12):
             tried = self._at(ways, names, size)
             worst = tried[-1]
             if worst.reason:
-                high, stops = size, f"{worst.name} by {size:.3g}: {worst.reason}"
+                high, stops = size, f"{worst.name} by {_told(what, size)}: {worst.reason}"
                 # What failed last is tried first: it decides, as a rule.
                 first = names.index(worst.name)
                 names.insert(0, names.pop(first))

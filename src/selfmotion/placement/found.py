@@ -88,8 +88,9 @@ class PlaceMap:
         axes = figure.subplots()
         shown = axes.pcolormesh(self.across, self.up, self.costs, shading="nearest")
         figure.colorbar(shown, label="cost")
-        i, j = np.unravel_index(int(np.nanargmin(self.costs)), self.costs.shape)
-        axes.plot(self.across[j], self.up[i], "r+", markersize=12)
+        if np.isfinite(self.costs).any():
+            i, j = np.unravel_index(int(np.nanargmin(self.costs)), self.costs.shape)
+            axes.plot(self.across[j], self.up[i], "r+", markersize=12)
         axes.set(xlabel=_label(self.names[0]), ylabel=_label(self.names[1]))
         return figure
 
@@ -152,6 +153,11 @@ class Placement:
     def __str__(self) -> str:
         """Return the place, what it gains, and what binds."""
         moved = ", ".join(f"{_label(name)} {value:+.4g}" for name, value in self.place.items())
+        turned = [name for name in self.place if name not in ("x", "y", "z")]
+        if turned:
+            degrees = ", ".join(f"{math.degrees(self.place[name]):+.4g}°" for name in turned)
+            about = ", ".join(f"{value:.4g}" for value in self._places.center.tolist())
+            moved += f" ({degrees}), turned about ({about}) of the world"
         before = "no verified motion at the present place"
         if math.isnan(self.cost_before):
             before = "the present place is not in the box"
@@ -164,7 +170,8 @@ class Placement:
             f"cost {self.cost:.6g} ({before}); {len(self.plans)} "
             f"motion{'s' if len(self.plans) > 1 else ''}, {'all' if self.verified else 'not'} "
             f"verified",
-            f"{len(self.tried)} places tried, {failed} of them without a verified motion",
+            f"{len(self.tried)} places tried, {failed} of them without a verified motion in the "
+            f"short time that each has",
             *(f"binds: {text}" for text in self.binds),
         ]
         return "\n".join(lines)

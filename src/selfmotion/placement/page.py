@@ -34,7 +34,11 @@ def write_placement(placement: Placement, file: str | Path, places: PlaceMap | N
     path = as_path(file)
     title = f"Where to put the {placement.of}"
     lines = "".join(f"<p>{html.escape(line)}</p>" for line in str(placement).splitlines())
-    drawn = "" if places is None else places.svg()
+    drawn = ""
+    if places is not None:
+        first, second = places.names
+        told = f"What it costs elsewhere, moved by {first} and {second}; all else as above."
+        drawn = f"<p>{told}</p>{places.svg()}"
     write_text(
         path,
         f'<!doctype html><html lang="en"><meta charset="utf-8"><title>{title}</title>'

@@ -37,7 +37,6 @@ from selfmotion.placement.places import (
     restored,
 )
 from selfmotion.placement.search import Box, Descent, best_place
-from selfmotion.planning import plan
 from selfmotion.problem import Problem
 
 # Places that this process was sent before, by their description.
@@ -93,6 +92,8 @@ def place(
         or another.
     ProblemError
         An argument is not what it should be, or a path is given in a frame that moves.
+    KeyboardInterrupt
+        It was interrupted.
     """
     several = as_several(problems, "problems", Problem)
     if not several:
@@ -105,18 +106,17 @@ def place(
     listed = None if part is None else _names(part)
     places = places_of(several, of, listed, about, names)
     run = _Here(places, box, progress) if executor is None else _There(places, box, executor)
-    best, tried = best_place(places, box, run.every, run.descents)
+    # Of where it stands a quick 'no', or a cost that took no pains, is not to be told.
+    here = np.zeros(len(names))
+    known = [places.tried(here, thorough=True)] if box.holds(here) else []
+    best, tried = best_place(places, box, run.every, run.descents, known)
     if not np.isfinite(best.cost):
         raise PlanError(
             f"place: no verified motion at any of {len(tried)} places that were tried; at "
             f"{_told(names, tried[0].place)}: {tried[0].reason}; widen the box, or ask less"
         )
-    if of == "base" or not best.plans:
-        best = _planned(places, best)
-    here = next((item for item in tried if not item.place.any()), None)
+    best = _planned(places, best)
     plans = best.plans
-    if of == "base":
-        plans = _at_base(places, best)
     return Placement(
         of,
         dict(zip(names, best.place.tolist(), strict=True)),
@@ -124,7 +124,7 @@ def place(
         tuple(item.problem for item in plans),
         plans,
         sum(item.report.cost for item in plans),
-        np.nan if here is None else here.cost,
+        known[0].cost if known else np.nan,
         on_bounds(places, box, best.place),
         tuple(replace(item, plans=()) for item in tried),
         places,
@@ -141,14 +141,6 @@ def _planned(places: Places, best: Tried) -> Tried:
     if not np.isfinite(found.cost):
         raise PlanError(f"place: the best place is not verified here: {found.reason}")
     return found
-
-
-def _at_base(places: Places, best: Tried) -> tuple[Any, ...]:
-    """Return the plans of an arm that stands there."""
-    found = []
-    for problem, near in zip(places.really_at(best.place), best.plans, strict=True):
-        found.append(plan(problem, warm_start=near).require())
-    return tuple(found)
 
 
 def _box(within: Any) -> tuple[tuple[str, ...], Box]:

@@ -17,11 +17,13 @@ from selfmotion.basics import (
     ProblemError,
     SelfmotionError,
     nearest,
+    presses,
+    seconds_of_kernels,
 )
 from selfmotion.collision import Obstacle
 from selfmotion.constraints import Clearance
 from selfmotion.follow import BoundFollow
-from selfmotion.optimise import Iteration
+from selfmotion.optimise import Iteration, Status
 from selfmotion.path import Path, Placed
 from selfmotion.planning import Search, plan
 from selfmotion.problem import Problem, problem_from_dict, start_on_path
@@ -94,17 +96,14 @@ class Places:
         return pin.SE3(turn, self.center + shift - turn @ self.center)
 
     def at(self, place: Array) -> list[Problem]:
-        """Return the problems at a place, as they look from the arm's base: with free starts."""
-        by = self.displacement(place)
-        if self.of == "base":
-            by = by.inverse()
-        return [self._moved(problem, by) for problem in self.problems]
+        """Return the problems at a place, the part or the arm's base moved: with free starts.
 
-    def really_at(self, place: Array) -> list[Problem]:
-        """Return the problems at a place, the arm's base moved where that is what moves."""
-        if self.of == "part":
-            return self.at(place)
+        Where the base moves, moving all else instead would not do: directions of the world, such as
+        that of gravity or of a `Tilt`, stay.
+        """
         by = self.displacement(place)
+        if self.of == "part":
+            return [self._moved(problem, by) for problem in self.problems]
         return [
             problem.changed(robot=with_moved_base(problem.robot, by), start="free")
             for problem in self.problems
@@ -118,7 +117,7 @@ class Places:
 
         def planned(k: int, problem: Problem) -> Plan:
             if thorough:
-                return plan(problem)
+                return _uninterrupted(plan(problem))
             if near:
                 return _quickly(problem, near[k], _NEAR, _PATIENCE_NEAR)
             _check_reach(problem)
@@ -157,9 +156,7 @@ class Places:
             item.along(_placed(bound, by)) if _stands(bound) else item
             for item, bound in zip(problem.also, items[1:], strict=True)
         )
-        # Of the base all moves that stands in the world.
-        bodies = None if self.of == "base" else self.bodies
-        clearance = problem.clearance
+        bodies, clearance = self.bodies, problem.clearance
         return problem.changed(
             path=_placed(items[0], by),
             also=also,
@@ -198,6 +195,9 @@ def places_of(
         for body in item.obstacles
         if body.frame is None
     }
+    if of == "base":
+        for problem in problems:
+            _check_stays(problem)
     if of == "base" and part is not None:
         raise ProblemError("place: part says what belongs to the part, which stays where it is")
     if of == "part" and part is None and standing:
@@ -214,6 +214,19 @@ def places_of(
     if center is None:
         center = root_place(problems[0].robot) if of == "base" else _middle(problems)
     return Places(tuple(problems), of, frozenset(part or ()), center, names)
+
+
+def _check_stays(problem: Problem) -> None:
+    """Raise ProblemError where a path moves along with the base of the arm."""
+    moved = with_moved_base(problem.robot, pin.SE3(np.eye(3), np.ones(3)))
+    there = problem.changed(robot=moved, start="free").follows.items
+    for item, after in zip(problem.follows.items, there, strict=True):
+        if _stands(item) and not item.chain.base_placement.isApprox(after.chain.base_placement):
+            frame = item.chain.model.frames[item.chain.base].name
+            raise ProblemError(
+                f"place: a path of {problem.robot.name} is given in the frame of '{frame}', which "
+                f"moves along with the base; expected one in the world"
+            )
 
 
 def described(places: Places, problems: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
@@ -238,21 +251,47 @@ def restored(values: Mapping[str, Any], known: dict[str, Any]) -> Places:
     )
 
 
+def _uninterrupted(found: Plan) -> Plan:
+    """Return a plan; KeyboardInterrupt where Ctrl-C ended it."""
+    if found.report.status is Status.INTERRUPTED:
+        raise KeyboardInterrupt
+    return found
+
+
 def _quickly(problem: Problem, known: Plan | None, search: Search | None, patience: float) -> Plan:
-    """Plan, from what is known if anything is, or give up soon."""
-    end = time.process_time() + patience
+    """Plan, from what is known if anything is, or give up soon.
+
+    Raises
+    ------
+    PlanError
+        Nothing was found in that time, or no motion passes.
+    KeyboardInterrupt
+        Ctrl-C was pressed, whatever was found by then.
+    """
+    began, pressed, given_up = time.process_time() - seconds_of_kernels(), presses(), False
+
+    def is_over() -> bool:
+        return time.process_time() - seconds_of_kernels() >= began + patience
 
     def over(_: Iteration) -> bool:
-        return time.process_time() >= end
+        return is_over()
 
     def told(stage: str, number: int, count: int) -> None:
+        nonlocal given_up
         if not count:
             # No motion passes, and what comes before is not asked.
             raise PlanError(stage)
-        if time.process_time() >= end:
+        if is_over():
+            given_up = True
             raise KeyboardInterrupt
 
-    return plan(problem, warm_start=known, search=search, callback=over, progress=told)
+    try:
+        found = plan(problem, warm_start=known, search=search, callback=over, progress=told)
+    except KeyboardInterrupt:
+        if presses() > pressed or not given_up:
+            raise
+        raise PlanError(f"no motion was found in {patience:g} s, by the processor's time") from None
+    return _uninterrupted(found) if presses() > pressed or not given_up else found
 
 
 def _stands(item: BoundFollow) -> bool:
@@ -265,13 +304,13 @@ def _placed(item: BoundFollow, by: SE3) -> Path:
     return Placed(item.path, frame.inverse() * by * frame)
 
 
-def _with_bodies(item: Any, names: frozenset[str] | None, by: SE3) -> Any:
-    """Return a constraint whose obstacles stand elsewhere, by name or all that stand."""
+def _with_bodies(item: Any, names: frozenset[str], by: SE3) -> Any:
+    """Return a constraint whose obstacles stand elsewhere, by name."""
     if not isinstance(item, Clearance):
         return item
 
     def moves(body: Obstacle) -> bool:
-        return body.frame is None and (names is None or body.name in names)
+        return body.frame is None and body.name in names
 
     if not any(moves(body) for body in item.obstacles):
         # The same one: its bodies are known.
@@ -284,14 +323,13 @@ def _with_bodies(item: Any, names: frozenset[str] | None, by: SE3) -> Any:
 
 def _middle(problems: Sequence[Problem]) -> Array:
     """Return the middle of the box around all paths (3,), in world axes."""
-    points = np.concatenate(
-        [
-            problem.path.samples(np.linspace(0.0, problem.path.duration, 101)).translation
-            for problem in problems
-        ]
-    )
-    middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
-    return np.asarray(problems[0].follows.items[0].chain.base_placement.act(middle))
+    found = []
+    for problem in problems:
+        frame = problem.follows.items[0].chain.base_placement
+        places = problem.path.samples(np.linspace(0.0, problem.path.duration, 101)).translation
+        found.append(places @ frame.rotation.T + frame.translation)
+    points = np.concatenate(found)
+    return np.asarray(0.5 * (points.min(axis=0) + points.max(axis=0)))
 
 
 def _check_reach(problem: Problem) -> None:

@@ -158,6 +158,7 @@ def best_place(
     box: Box,
     every: Callable[[Sequence[Array]], list[Tried]],
     descents: Callable[[Sequence[Tried]], list[tuple[Tried, list[Tried]]]],
+    known: Sequence[Tried] = (),
 ) -> tuple[Tried, list[Tried]]:
     """Return the best place that is found, and all that were tried.
 
@@ -168,11 +169,10 @@ def best_place(
         Plans at places, each on its own.
     descents : callable
         Goes downhill from places; returns where each arrives, and what it tried.
+    known : sequence of Tried
+        Places that were planned before.
     """
-    tried: list[Tried] = []
-    here = np.zeros(len(places.names))
-    if box.holds(here):
-        tried += every([here])
+    tried: list[Tried] = [*known]
     count, first = _BEGINNINGS, 0
     while first < _MOST_BEGINNINGS:
         tried += every([one for one in beginnings(box, first, count) if one.any()])

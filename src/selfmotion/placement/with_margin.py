@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -26,6 +26,7 @@ from selfmotion.basics import (
 from selfmotion.collision import CollisionModel
 from selfmotion.constraints import Clearance
 from selfmotion.margins import Margin, Shortfall, Shortfalls, shortfalls
+from selfmotion.optimise import Status
 from selfmotion.planning import plan
 from selfmotion.problem import Problem, check_problem
 from selfmotion.result import Plan
@@ -35,6 +36,8 @@ _ROUNDS, _MORE = 12, 2e-5
 # What is proved of a margin is a share less than it is; that much more than is wanted will do.
 _SHARE, _ENOUGH = 0.02, 0.01
 _SUBJECTS = ("part", "tool", "base")
+# Why there is no more of it, after Ctrl-C.
+_INTERRUPTED = "it was interrupted"
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,11 +54,11 @@ class PlanWithMargin:
     shortfalls : tuple of Shortfall
         What is left to be wished; empty where the margin is there, proved.
     cost, cost_without : float
-        Of this plan, and of the best one without a margin.
+        Of this plan, and of the best one that was found without a margin.
     kept_apart : dict
-        Pair of bodies → distance that they were kept apart by for it [m].
+        Pair of bodies → distance that they were kept apart by for this plan [m].
     refused : str
-        Why no motion keeps them that far apart; "" where one does.
+        Why no more was found, where the margin is not reached; "" where it is.
     """
 
     plan: Plan
@@ -88,7 +91,7 @@ class PlanWithMargin:
         costs = f"cost {self.cost:.6g}, {self.cost_without:.6g} without ({self.extra_cost:+.2%})"
         if self.shortfalls:
             lacks = "; ".join(str(item) for item in self.shortfalls)
-            why = f"; no motion keeps more: {self.refused}" if self.refused else ""
+            why = f"; no more was found: {self.refused}" if self.refused else ""
             return f"no margin of {wanted}: {lacks}{why}; {costs}"
         return f"margin of {wanted}, proved; {costs}"
 
@@ -124,12 +127,13 @@ def plan_with_margin(
     progress : callable, optional
         Told the round, as plans tell their stages.
     **options
-        For `plan`: search, tolerance, deadline.
+        For `plan`: search, tolerance, deadline, each time.
 
     Returns
     -------
     PlanWithMargin
-        Also where the margin is not reached: `reached` and `shortfalls` say so.
+        Also where the margin is not reached: `reached` and `shortfalls` say so. After Ctrl-C what
+        was found by then.
 
     Raises
     ------
@@ -137,6 +141,8 @@ def plan_with_margin(
         There is no verified motion without a margin.
     ProblemError
         An argument is not what it should be; or a band is narrower than what is asked.
+    KeyboardInterrupt
+        It was interrupted before there was a motion.
     """
     check_problem(problem)
     as_called(progress, "progress")
@@ -149,64 +155,91 @@ def plan_with_margin(
     about = None if center is None else as_numbers(center, "center", "(3,) [m]", (3,))
     asked: dict[str, Any] = {"part": part, "tool": tool, "center": about, "clearance": clearance}
     first = plan(problem, **options).require()
-    narrow = problem.changed(
-        relaxations=_narrowed(problem, margin, shortfalls(first, margin, named, **asked).lever)
-    )
-    apart = dict[tuple[str, str], float]()
-    last, best, refused = first, None, ""
+    # What was given to begin with is for the first one.
+    options.pop("warm_start", None)
     found = shortfalls(first, margin, named, **asked)
+    narrow = problem.changed(relaxations=_narrowed(problem, margin, found.lever))
+    now = _Made(first, found, {})
+    best, refused, without = None, "", first.report.cost
     if not found.items and not problem.relaxations:
-        best = first, found, dict(apart)
-    for number in range(0 if best else _ROUNDS):
+        best = now
+    rounds = 0 if best else _ROUNDS
+    if _is_interrupted(first):
+        rounds, refused = 0, _INTERRUPTED
+    for number in range(rounds):
         progress("margin", number + 1, _ROUNDS)
-        _adjust(apart, found, clearance)
+        apart = _adjusted(now.apart, now.found, clearance)
         raised = narrow.changed(constraints=(*narrow.constraints, *_kept(problem, apart)))
-        again = plan(raised, warm_start=last, **options)
-        if not number:
+        again = plan(raised, warm_start=now.plan, **options)
+        if not number and not _is_interrupted(again):
             # Past bodies there are several ways, and the one of before may have become the longer.
             again = min(again, plan(raised, **options), key=_rank)
         certificate = problem.certify(again.trajectory, first.tolerance)
-        made = replace(again, problem=problem, certificate=certificate)
+        plan_now = replace(again, problem=problem, certificate=certificate)
+        if certificate.verified:
+            # What keeps more is a motion without a margin, too.
+            without = min(without, again.report.cost)
         if not again.certificate.verified:
             refused = again.certificate.verdict.removeprefix("not verified: ")
             # The attempt may be nearer to it all the same.
             if certificate.verified:
-                more = shortfalls(made, margin, named, **asked)
-                if more.least > found.least:
-                    last, found = made, more
+                more = shortfalls(plan_now, margin, named, **asked)
+                if more.least > now.found.least:
+                    now = _Made(plan_now, more, apart)
             break
-        last, found = made, shortfalls(made, margin, named, **asked)
-        if found.items:
-            continue
-        if best is None or made.report.cost < best[0].report.cost:
-            best = made, found, dict(apart)
-        if not apart or found.least <= 1.0 + _ENOUGH:
+        now = _Made(plan_now, shortfalls(plan_now, margin, named, **asked), apart)
+        if not now.found.items and (best is None or again.report.cost < best.plan.report.cost):
+            best = now
+        if _is_interrupted(again):
+            refused = _INTERRUPTED
             break
-    last, found, apart = best or (last, found, apart)
-    refused = "" if best else refused
+        if not now.found.items and (not apart or now.found.least <= 1.0 + _ENOUGH):
+            break
+    told, refused = best or now, "" if best else refused
     return PlanWithMargin(
-        last, margin, named, found.items, last.report.cost, first.report.cost, apart, refused
+        told.plan,
+        margin,
+        named,
+        told.found.items,
+        told.plan.report.cost,
+        without,
+        told.apart,
+        refused,
     )
+
+
+class _Made(NamedTuple):
+    """A plan, what it lacks, and how far which pairs were kept apart for it [m]."""
+
+    plan: Plan
+    found: Shortfalls
+    apart: dict[tuple[str, str], float]
+
+
+def _is_interrupted(found: Plan) -> bool:
+    return found.report.status is Status.INTERRUPTED
 
 
 def _rank(found: Plan) -> tuple[bool, float]:
     return not found.certificate.verified, found.report.cost
 
 
-def _adjust(apart: dict[tuple[str, str], float], found: Shortfalls, clearance: float) -> None:
+def _adjusted(
+    apart: dict[tuple[str, str], float], found: Shortfalls, clearance: float
+) -> dict[tuple[str, str], float]:
     """Keep pairs farther apart where a margin is missing, and less far where it is more.
 
     To first order a displacement that is a share larger uses that share more of the distance.
     """
-    spare = found.least - 1.0
-    for pair in apart if spare > 0.0 else ():
-        apart[pair] -= spare * (apart[pair] - clearance)
+    spare = max(found.least - 1.0, 0.0)
+    kept = {pair: far - spare * (far - clearance) for pair, far in apart.items()}
     for item in found.items:
         pair = (min(item.pair), max(item.pair))
-        if pair in apart:
-            apart[pair] += (1.0 - item.scale) * item.used + _MORE
+        if pair in kept:
+            kept[pair] += (1.0 - item.scale) * item.used + _MORE
         else:
-            apart[pair] = clearance + (1.0 + _SHARE) * item.used
+            kept[pair] = clearance + (1.0 + _SHARE) * item.used
+    return kept
 
 
 def _narrowed(problem: Problem, margin: Margin, lever: float) -> tuple[Any, ...]:
