@@ -1,6 +1,7 @@
 """A place is given up in time, and Ctrl-C is not taken for that."""
 
 import signal
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,14 @@ from support.arms import robot_named
 # Without the present place, which is planned at leisure, and with it.
 WITHIN, WITH_HERE = {"x": (0.01, 0.1)}, {"x": (-0.1, 0.1)}
 _real = places.plan
+
+
+@pytest.fixture(autouse=True)
+def python_handler() -> Iterator[None]:
+    """Workers of a parallel test run ignore Ctrl-C; a program has Python's own handler."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
 
 
 def seam() -> sm.Problem:
