@@ -12,8 +12,9 @@ import numpy as np
 from selfmotion.basics import Array
 from selfmotion.placement.places import Places, Tried
 
-# Beginnings that are planned, many more if none of these can be; and how many of the best go on.
-_BEGINNINGS, _MOST_BEGINNINGS, _FINALISTS = 16, 64, 3
+# Beginnings that are planned, many more if none of these can be; and how many of the best go on:
+# with half as many one of 20 random placements was 7 % dearer than the best.
+_BEGINNINGS, _MOST_BEGINNINGS, _FINALISTS = 32, 64, 3
 # Beginnings nearer to each other than this go on once [share of the box].
 _APART = 0.15
 # Differences are taken over this share of the box.
