@@ -25,6 +25,7 @@ import selfmotion as sm
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
+from margins import random_path
 from support.displaced import MISSED, Judge, random_displacement
 
 ARMS = (("panda", "pose"), ("xarm7", "pose"), ("ur5", "position"))
@@ -66,17 +67,7 @@ def near_plan(rng: np.random.Generator, arms: list[tuple[sm.RobotModel, str]]) -
     """Return the plan of a random line or circle whose arm comes near a body."""
     while True:
         robot, task = arms[rng.integers(len(arms))]
-        lower, upper = robot.finite_limits()
-        start = lower + (upper - lower) * rng.uniform(0.25, 0.75, robot.dof)
-        pose, seconds = robot.pose(start), float(rng.uniform(2.0, 5.0))
-        path: sm.paths.Path
-        if rng.random() < 0.5:
-            end = pose.copy()
-            end.translation = pose.translation + rng.normal(0.0, 0.1, 3)
-            path = sm.paths.Line(pose, end, seconds)
-        else:
-            radius = float(rng.uniform(0.03, 0.12))
-            path = sm.paths.Circle.around(pose, radius, seconds, normal=rng.normal(size=3))
+        start, path = random_path(rng, robot)
         limits = [sm.constraints.JointPositionLimits(), sm.constraints.JointVelocityLimits()]
         try:
             bare = sm.Problem(robot, path, task, start, constraints=limits)

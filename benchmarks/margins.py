@@ -32,20 +32,24 @@ LOOKS, NEAR = 40, np.array([-0.02, 0.0, 0.02])
 MOST = 3.0
 
 
-def random_plan(rng: np.random.Generator, arms: list[tuple[sm.RobotModel, str]]) -> sm.Plan | None:
-    """Return the plan of a random line or circle among bodies; None where there is none."""
-    robot, task = arms[rng.integers(len(arms))]
+def random_path(rng: np.random.Generator, robot: sm.RobotModel) -> tuple[np.ndarray, sm.paths.Path]:
+    """Return a configuration well within the limits, and a line or circle from there."""
     lower, upper = robot.finite_limits()
     start = lower + (upper - lower) * rng.uniform(0.25, 0.75, robot.dof)
     pose, seconds = robot.pose(start), float(rng.uniform(2.0, 5.0))
-    path: sm.paths.Path
     if rng.random() < 0.5:
         end = pose.copy()
         end.translation = pose.translation + rng.normal(0.0, 0.1, 3)
-        path = sm.paths.Line(pose, end, seconds)
-    else:
-        radius = float(rng.uniform(0.03, 0.12))
-        path = sm.paths.Circle.around(pose, radius, seconds, normal=rng.normal(size=3))
+        return start, sm.paths.Line(pose, end, seconds)
+    radius = float(rng.uniform(0.03, 0.12))
+    return start, sm.paths.Circle.around(pose, radius, seconds, normal=rng.normal(size=3))
+
+
+def random_plan(rng: np.random.Generator, arms: list[tuple[sm.RobotModel, str]]) -> sm.Plan | None:
+    """Return the plan of a random line or circle among bodies; None where there is none."""
+    robot, task = arms[rng.integers(len(arms))]
+    start, path = random_path(rng, robot)
+    pose = path.pose(0.0)
     bodies: list[sm.obstacles.Obstacle] = []
     for number in range(int(rng.integers(1, 4))):
         away = rng.normal(size=3)
