@@ -89,6 +89,7 @@ if TYPE_CHECKING:
     from selfmotion.realtime import Replanner as Replanner, warm_up as warm_up
 
 _LATER = ("Replanner", "warm_up")
+_LATER_NAMESPACES = ("realtime", "replay", "testing")
 # Names that were at the top level once, and have another one since.
 _RENAMED = {"Binding": "ActiveConstraint", "BoughtMargin": "PlanWithMargin"}
 _NAMESPACES = (
@@ -180,6 +181,10 @@ def __getattr__(name: str) -> Any:
 
     What has a namespace was here in earlier states of 0.1.
     """
+    if name in _LATER_NAMESPACES:
+        from importlib import import_module
+
+        return import_module(f"selfmotion.{name}")
     if name in _LATER:
         from selfmotion import realtime
 
@@ -197,7 +202,7 @@ def __getattr__(name: str) -> Any:
 
 def __dir__() -> list[str]:
     """Return what is offered: names of the top level, and namespaces."""
-    return sorted([*__all__, "realtime", "replay", "testing"])
+    return sorted([*__all__, *_LATER_NAMESPACES])
 
 
 class _Views:

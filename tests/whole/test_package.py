@@ -24,6 +24,13 @@ def test_import_leaves_the_heavy_and_optional_packages_alone() -> None:
     assert result.stdout.strip() == "[]"
 
 
+def test_each_name_is_there_at_once() -> None:
+    # In a process in which nothing else has imported what comes later.
+    code = "import selfmotion as sm; print(*[name for name in dir(sm) if not hasattr(sm, name)])"
+    told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert told.stdout.strip() == ""
+
+
 # What a first script needs is found in one look.
 FEW = 70
 
