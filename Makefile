@@ -6,7 +6,7 @@ READY := $(VENV)/.ready
 # What is imported by many processes is compiled to bytecode once.
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: demo test lint format bench bench-constrained bench-remaining bench-relaxed bench-batch bench-peers bench-starts bench-places bench-margins bench-bought bench-corrections bench-place bench-first bench-fastest bench-feeds bench-job bench-moved bench-moves bench-raster bench-rails bench-lifts bench-numbers bench-spirals bench-latency docs errors suite suite-made fuzz fuzz-tasks fuzz-cells fuzz-certificate fuzz-deceptions fuzz-generated fuzz-realtime fuzz-files fuzz-job fuzz-kept fuzz-programs arms mutants memory acceptance distances study clean
+.PHONY: demo test lint format bench bench-constrained bench-binding bench-remaining bench-relaxed bench-batch bench-peers bench-starts bench-places bench-margins bench-bought bench-corrections bench-place bench-first bench-fastest bench-feeds bench-job bench-moved bench-moves bench-raster bench-rails bench-lifts bench-numbers bench-spirals bench-latency docs errors suite suite-made fuzz fuzz-tasks fuzz-cells fuzz-certificate fuzz-deceptions fuzz-generated fuzz-realtime fuzz-files fuzz-job fuzz-kept fuzz-programs arms mutants memory acceptance distances study clean
 
 demo: $(READY)  ## plan, check and replay the paper's planar arm and a Panda, into out/
 	$(BIN)/selfmotion demo --out out
@@ -30,6 +30,9 @@ bench: $(READY)  ## the figures of the first table in docs/pages/performance.md
 
 bench-constrained: $(READY)  ## problems whose constraints bind, against an earlier revision
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python benchmarks/constrained.py
+
+bench-binding: $(READY)  ## limits of jerk, bodies and self-collision: with what binds against without
+	$(BIN)/python benchmarks/binding.py
 
 bench-relaxed: $(READY)  ## 200 problems with tolerances, judged by kinematics of the tests, against the same without
 	OMP_NUM_THREADS=1 $(BIN)/python benchmarks/relaxed.py

@@ -1,9 +1,9 @@
 """What it takes to keep what binds: `make bench-binding`.
 
-Each problem is planned with a condition that its best motion breaks, and without: limits of jerk
-that a calmer motion keeps, balls that the best one meets beside the elbow or deep inside a link; and
-with the arm asked to keep off itself where it does so anyway. Times are those of the processor, the
-shorter one of two; what is verified is told.
+Each problem is planned with a condition that its best motion breaks, and without: limits of one
+joint's jerk or of all of them that a calmer motion keeps, balls that the best one meets beside the
+elbow or deep inside a link; and with the arm asked to keep off itself where it does so anyway.
+Times are those of the processor, the shorter one of two; what is verified is told.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from selfmotion.collision import CollisionModel
 
 ARMS = ("panda", "xarm7")
 # How many problems of each kind.
-COUNTS = {"jerk": 40, "beside": 20, "deep": 11, "itself": 60}
+COUNTS = {"jerk": 20, "all jerks": 20, "beside": 20, "deep": 11, "itself": 60}
 # Limits of jerk are so many times what the motion of least jerk has, of the joint whose best motion
 # is beyond that by the largest factor, or of all joints; it has to be beyond by this one.
 ROOM, BINDS = 1.1, 1.05
@@ -66,8 +66,8 @@ def jerks(plan: sm.Plan) -> Array:
     return np.asarray(np.abs(np.diff(plan.trajectory(t, 2), axis=0)).max(axis=0) / t[1])
 
 
-def with_jerks(number: int) -> Pair | None:
-    """Return a problem without limits of jerk, and with some that bind."""
+def with_jerks(number: int, *, of_all: bool) -> Pair | None:
+    """Return a problem without limits of jerk, and with some that bind: of one joint or of all."""
     rng = np.random.default_rng([1, number])
     free = replace(free_problem(number, rng), constraints=[sm.constraints.JointPositionLimits()])
     plan = planned(free)
@@ -81,7 +81,7 @@ def with_jerks(number: int) -> Pair | None:
     busiest = int(np.argmax(beyond))
     if beyond[busiest] <= BINDS:
         return None
-    if number % 4 < 2:
+    if not of_all:
         limits[np.arange(len(limits)) != busiest] = np.inf
     asked = sm.constraints.JointJerkLimits(np.maximum(limits, 1e-2))
     return free, replace(free, constraints=[*free.constraints, asked])
@@ -117,7 +117,8 @@ def off_itself(number: int) -> Pair | None:
 
 
 KINDS: dict[str, Callable[[int], Pair | None]] = {
-    "jerk": with_jerks,
+    "jerk": lambda number: with_jerks(number, of_all=False),
+    "all jerks": lambda number: with_jerks(number, of_all=True),
     "beside": lambda number: beside(number, deep=False),
     "deep": lambda number: beside(number, deep=True),
     "itself": off_itself,

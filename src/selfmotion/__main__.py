@@ -1,7 +1,5 @@
 """`python -m selfmotion` is the command `selfmotion`."""
 
-import sys
-
 from selfmotion.cli import main
 
-sys.exit(main())
+main()

@@ -5,12 +5,16 @@ import numpy as np
 import selfmotion as sm
 from selfmotion.basics import Counts
 from selfmotion.nodes import NodeGrid
-from support.arms import Case
+from selfmotion.nodes.objective import LocalModel
+from selfmotion.nodes.spline import AT_CONTROLS
+from support.arms import PANDA_HOME, Case
 from support.nodes import nodes_of, problem_of
 from support.stretching import DURATION, rounded_problem, stretching
 
 # The arm moves at a steady speed [rad/s²].
 CALM = 0.1
+# A step along the self-motion [rad], and what the curve may miss the path by between few nodes [m].
+FAR, ON_PATH = 0.1, 1e-3
 
 
 def test_what_is_forgotten_is_the_same_again(case: Case) -> None:
@@ -49,3 +53,50 @@ def test_beside_a_singular_pose_rounding_of_the_path_does_not_accelerate_the_arm
     assert motion is not None
     assert np.abs(motion.trajectory.qdd).max() < CALM
     assert problem.errors_between(motion.trajectory).max() < 1e-6
+
+
+def in_span(vectors: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Return the multiples (K, 1) of vectors (K, n) that are nearest to values (K, n)."""
+    return ((vectors * values).sum(axis=1) / (vectors**2).sum(axis=1))[:, None]
+
+
+def linear_and_real_jerks(panda: sm.RobotModel, count: int) -> tuple[np.ndarray, ...]:
+    """Return control points of the jerk by linear rows, and those of both kinds of steps."""
+    path = sm.paths.Circle.around(panda.pose(PANDA_HOME), 0.1, 4.0, normal=(1.0, 0.0, 0.0))
+    problem = sm.Problem(panda, path, "pose", PANDA_HOME, constraints=(), rest=False)
+    motion = nodes_of(problem, count)
+    grid, place = motion.grid, motion.place
+    around = LocalModel.of(
+        motion.charts, motion.nu, motion.alpha, place, np.zeros_like(place.nodes)
+    )
+    assert around is not None
+    changes = around.scaled(grid.scale).changes
+    # The self-motion swings to and fro, with the rates that this has to first order.
+    z = FAR * np.sin(np.pi * grid.t / path.duration)[:, None] ** 2
+    rates = grid.spline.differences(np.einsum("knd,kd->kn", changes[:, 0, :, :1], z))
+    nu = in_span(changes[:, 1, :, 1], rates[0] - changes[:, 1, :, 0] * z)
+    bent = changes[:, 2, :, 0] * z + changes[:, 2, :, 1] * nu
+    alpha = in_span(changes[:, 2, :, 2], rates[1] - bent)
+    step = np.hstack([z, nu, alpha])
+    moved = np.einsum("kond,kd->kon", changes, step)
+
+    def jerks(nodes: np.ndarray) -> np.ndarray:
+        return grid.spline.at(AT_CONTROLS, 3, grid.spline.ends(nodes))
+
+    found = motion.along(step, changes), motion.stepped(step)
+    assert found[0] is not None
+    assert found[1] is not None
+    assert grid.problem.errors_between(found[0].trajectory).max() < ON_PATH
+    return jerks(place.nodes + moved), *(jerks(one.place.nodes) for one in found)
+
+
+def test_a_step_moves_the_curve_as_linear_rows_say(panda: sm.RobotModel) -> None:
+    """However near to each other the nodes are; where their rates are their own, it does not."""
+    off = []
+    for count in (20, 160):
+        linear, along, alone = linear_and_real_jerks(panda, count)
+        off.append([np.abs(x - linear).max() for x in (along, alone)])
+    (few, few_alone), (many, many_alone) = off
+    assert many <= 1.5 * few
+    assert many_alone >= 5.0 * few_alone
+    assert many <= 0.05 * many_alone

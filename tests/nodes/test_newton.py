@@ -1,5 +1,7 @@
 """Newton's method on nodes: quadratic, as quick on many nodes as on few, and right at limits."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -145,6 +147,32 @@ def test_limits_of_acceleration_are_kept_at_all_times(
     for first, last in binding.spans:
         assert last - first < 0.5 * plan.path.duration
         assert np.median(used[(t >= first - 1e-3) & (t <= last + 1e-3)]) >= 0.98
+
+
+def largest_jerks(plan: sm.Plan) -> np.ndarray:
+    """Return the largest jerk of each joint, by differences."""
+    t = np.linspace(0.0, plan.path.duration, 2001)
+    return np.abs(np.diff(plan.trajectory(t, 2), axis=0)).max(axis=0) / t[1]
+
+
+@pytest.mark.parametrize("number", [6, 14])
+def test_limits_of_all_jerks_that_the_calmest_motion_nearly_needs_are_kept(
+    panda: sm.RobotModel, number: int
+) -> None:
+    """Little else keeps them than that motion; a rough step beside it breaks them a hundredfold."""
+    rng = np.random.default_rng([1, number])
+    start, normal = PANDA_HOME + rng.uniform(-0.3, 0.3, 7), rng.normal(size=3)
+    normal /= np.linalg.norm(normal)
+    path = sm.paths.Circle.around(panda.pose(start), rng.uniform(0.06, 0.12), 4.0, normal=normal)
+    task = "position" if rng.random() < 0.4 else "pose"
+    free = sm.Problem(panda, path, task, start, constraints=[sm.constraints.JointPositionLimits()])
+    calm = sm.plan(replace(free, costs=[sm.costs.JointJerk()])).require()
+    limits = 1.1 * largest_jerks(calm)
+    assert (largest_jerks(sm.plan(free)) > 1.5 * limits).any()
+    asked = [*free.constraints, sm.constraints.JointJerkLimits(limits)]
+    plan = sm.plan(replace(free, constraints=asked)).require()
+    assert (largest_jerks(plan) <= limits).all()
+    assert plan.report.cost <= calm.evaluate(sm.costs.JointVelocity())
 
 
 @pytest.mark.parametrize("share", [0.3, 0.6, 0.9])

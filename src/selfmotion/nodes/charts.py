@@ -134,6 +134,16 @@ class Charts:
         nu, alpha = ((turned @ each[:, :, None])[:, :, 0] for each in (own, a))
         return Centred(around, nu, alpha, place)
 
+    def places(self, z: Array) -> Array | None:
+        """Return q at z (N + 1, r), (N + 1, n); None where a node is not to be had."""
+        none = np.zeros_like(self.q)
+        q, table, tangents = (
+            np.empty_like(self.q),
+            self.manifolds.table(),
+            np.empty_like(self.bases),
+        )
+        return q if self._look(q, table, tangents, z, none, centred=False) else None
+
     def spread(self, coordinates: Array) -> Array:
         """Return ε = N0 ν or a = N0 α, (N + 1, n)."""
         return np.asarray((self.bases @ coordinates[:, :, None])[:, :, 0])
@@ -150,17 +160,31 @@ class Charts:
     ) -> tuple[Place, Bases | None] | None:
         own, bases = self.manifolds, self.bases
         q, table, tangents = np.empty_like(self.q), own.table(), np.empty_like(bases)
-        qd, null_motions = own.rates(table)
-        null_motions[:] = epsilon
-        z = np.ascontiguousarray(z)
-        given = own.targets, own.chains, own.layout
-        along = len(q) // own.copies if carried else 0
-        failed = look(q, z, bases, self.q, *given, table, tangents, own.held, centred, along)
-        if failed >= 0 and own.is_whole:
+        if not self._look(q, table, tangents, z, epsilon, centred=centred, carried=carried):
             return None
+        qd, _ = own.rates(table)
         place = Place(q, np.array(qd), np.empty_like(q), tangents, table)
         around = own.accelerated(place, a, bases if full else None)
         return place, around if full else None
+
+    def _look(
+        self,
+        q: Array,
+        table: Array,
+        tangents: Array,
+        z: Array,
+        epsilon: Array,
+        *,
+        centred: bool,
+        carried: bool = False,
+    ) -> bool:
+        """Set q, a table and tangents at z; return whether all nodes are to be had."""
+        own = self.manifolds
+        own.rates(table)[1][:] = epsilon
+        along = len(q) // own.copies if carried else 0
+        z, given = np.ascontiguousarray(z), (own.targets, own.chains, own.layout)
+        failed = look(q, z, self.bases, self.q, *given, table, tangents, own.held, centred, along)
+        return failed < 0 or not own.is_whole
 
 
 class Manifolds:

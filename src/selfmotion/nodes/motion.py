@@ -150,7 +150,7 @@ class NodeGrid:
         """
         if qdd is None:
             qdd = self._accelerations(q, qd)
-        found = self.manifolds.near(q, self._free(qd, 1), self._free(qdd, 2))
+        found = self.manifolds.near(q, self.rested(qd, 1), self.rested(qdd, 2))
         return None if found is None else self.at(found)
 
     def _accelerations(self, q: Array, qd: Array) -> Array:
@@ -171,10 +171,10 @@ class NodeGrid:
             q = np.where(own, 0.0, charts.q)
             charts = replace(charts, q=q, bases=self.manifolds.with_held_last(q, charts.bases))
         none = np.zeros((len(qd), charts.bases.shape[2]))
-        found = charts.centred(none, self._free(qd, 1), self._free(qdd, 2))
+        found = charts.centred(none, self.rested(qd, 1), self.rested(qdd, 2))
         return None if found is None else self.at(found)
 
-    def _free(self, rates: Array, order: int) -> Array:
+    def rested(self, rates: Array, order: int) -> Array:
         """Return what rates are where the arm does not rest."""
         found = np.where(self.manifolds.held, 0.0, rates)
         found[self._resting[order - 1]] = 0.0
@@ -300,12 +300,36 @@ class NodeMotion:
         return self.charts.spread(self.nu)
 
     def stepped(self, step: Array) -> "NodeMotion | None":
-        """Return the motion at a step (N + 1, 3r) of scaled coordinates; None where it is none."""
+        """Return the motion at a step (N + 1, 3r) of scaled coordinates; None where it is none.
+
+        Each node on its own: rates do as the coordinates say, whatever the nodes beside it do.
+        """
         r = self.nu.shape[1]
         z, nu, alpha = np.split(step * self.grid.scale, [r, 2 * r], axis=1)
         epsilon, a = self.charts.spread(self.nu + nu), self.charts.spread(self.alpha + alpha)
         found = self.charts.centred(z, epsilon, a)
         return None if found is None else self.grid.at(found)
+
+    def along(self, step: Array, changes: Array) -> "NodeMotion | None":
+        """Return the motion next to where a step leads to first order; None where it is none.
+
+        A step (N + 1, 3r) moves the curve by `changes` (N + 1, 3, n, 3r) times it, which is what
+        linear rows know; from there it comes onto the path by a correction c(t) that is smooth in
+        time. Rates take its derivatives along: where each node's rates were their own, they would
+        contradict the places of those beside it, by the step squared, and the jerk between nodes
+        that are near to each other would be that over the square of the time between them.
+        """
+        grid, nodes, r = self.grid, self.place.nodes, self.nu.shape[1]
+        count, size = step.shape
+        moved = (changes.reshape(count, -1, size) @ step[:, :, None]).reshape(nodes.shape)
+        line, z = nodes + moved, step[:, :r] * grid.scale[:r]
+        q = self.charts.places(z)
+        if q is None:
+            return None
+        rate, bend = grid.spline.differences(q - line[:, 0])
+        qd, qdd = grid.rested(line[:, 1] + rate, 1), grid.rested(line[:, 2] + bend, 2)
+        found = self.charts.centred(z, qd, qdd)
+        return None if found is None else grid.at(found)
 
     def broken_between(self) -> Flags:
         """Return on which intervals something is broken between the points, (N,)."""

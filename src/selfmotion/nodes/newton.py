@@ -8,7 +8,8 @@ beyond limits or inside a body is no dead end. The primal-dual interior-point me
 (J. Nocedal, S. Wright, "Numerical Optimization", 2nd ed., chapter 19; elastic variables: R.
 Fletcher, "Practical Methods of Optimization", 2nd ed., 14.3). Eliminated, the steps of s, e and λ
 leave a matrix of the nodes alone: each row knows two neighbours, so that it is block-tridiagonal,
-and a step takes as much time as there are nodes.
+and a step takes as much time as there are nodes. A step moves the curve as linear rows say, and
+comes onto the path from there, see `NodeMotion.along`.
 """
 
 from collections.abc import Callable
@@ -496,7 +497,7 @@ class _Solver:
         for values, change in ((self._slacks, step.slacks), (self._elastics, step.elastics)):
             length = min(length, _longest(values, change))
         while length >= _SHORTEST:
-            new = motion.stepped(length * step.nodes)
+            new = motion.along(length * step.nodes, model.around.changes)
             if new is not None and np.isfinite(new.aim):
                 elastics = self._elastics + length * step.elastics
                 # A gap below 0 closes for nothing; one above costs the penalty, not ρ: else the

@@ -56,6 +56,8 @@ def _controls() -> tuple[Array, ...]:
     return tuple(found)
 
 
+# Nodes that tell derivatives at one of them.
+_STENCIL = 5
 AT_GAUSS, AT_CONTROLS, AT_POINTS = unit_bases(GAUSS), _controls(), unit_bases(POINTS)
 AT_END = unit_bases(np.ones(1))
 # How (q, q̇, q̈) of both ends scale with h to become y.
@@ -108,6 +110,30 @@ class Quintic:
         """What constraints look at that are no limits of joints."""
         inner = (self.t[:-1, None] + self.steps[:, None] * POINTS).ravel()
         return Sampling.trapezoidal(np.append(inner, self.t[-1]))
+
+    @cached_property
+    def _stencils(self) -> tuple[Ints, Array]:
+        """Which nodes tell derivatives at each node, and by how much: (N + 1, S), (2, N + 1, S)."""
+        count = len(self.t)
+        width = min(_STENCIL, count)
+        first = np.clip(np.arange(count) - width // 2, 0, count - width)
+        which = first[:, None] + np.arange(width)
+        far = self.t[which] - self.t[:, None]
+        usual = np.abs(far).max(axis=1)[:, None, None]
+        powers = (far[:, None, :] / usual) ** np.arange(width)[None, :, None]
+        wanted = np.eye(width, 3)[:, 1:]
+        found = np.linalg.solve(powers, np.broadcast_to(wanted, (count, *wanted.shape)))
+        found *= np.array([1.0, 2.0]) / usual ** np.array([1.0, 2.0])
+        return which, np.moveaxis(found, 2, 0)
+
+    def differences(self, x: Array) -> tuple[Array, Array]:
+        """Return the first two derivatives at the nodes of what is x (N + 1, n) there, by time.
+
+        Of polynomials through five nodes. Of one motion only.
+        """
+        which, shares = self._stencils
+        first, second = (shares[:, :, None, :] @ x[which])[:, :, 0]
+        return first, second
 
     def times_of(self, order: int) -> Array:
         """Return where control points belong [s], (N, 6 - o)."""

@@ -8,7 +8,8 @@ from itertools import chain
 import numpy as np
 
 from selfmotion.basics import Array, Ints
-from selfmotion.constraints import BoundClearance, BoundConstraint
+from selfmotion.constraints import BoundClearance, BoundConstraint, BoundLimits
+from selfmotion.costs import Cost, JointAcceleration, JointJerk
 from selfmotion.motion import Grid, Trajectory
 from selfmotion.nodes import NodeGrid, NodeMotion, Optimum, Step, minimise
 from selfmotion.optimise import Iteration, Status
@@ -29,6 +30,14 @@ _NODE_ROUNDS = 14
 _FARTHER_APART = (5e-4, 1e-3, 2e-3)
 # Steps of Newton's method from each of several beginnings: what takes longer mostly leads nowhere.
 _FEWER = 25
+# Finer where limits of q̈ or jerk begin and end to bind only while that saves this share.
+_PAYS = 3e-4
+# Where limits of these are broken, what uses of them costs this many times what the motion does;
+# so many times on twice as many nodes: control points of few of them use more than the curve.
+_CALM, _CALM_ROUNDS, _CALMED = 1e3, 3, {2: JointAcceleration, 3: JointJerk}
+# What breaks a condition by more than this [units of h] is no beginning: on the way from there, all
+# that made it one is lost.
+_TOO_FAR = 100.0
 # Where the motion at x = 0 does not lead to what keeps the conditions: the self-motion goes towards
 # the middle of the limits in such shares of the duration.
 _TOWARDS_MIDDLE = (1.0 / 16.0, 1.0 / 64.0, 1.0 / 4.0)
@@ -148,7 +157,8 @@ class Polisher:
             best = self._other(motion, best, free)
         unfinished = first.status not in _ARRIVED and self._ended is None
         if unfinished and (best is first or not _is_kept(best.motion)):
-            rest = self._minimise(first.motion, first.multipliers if best is first else None)
+            known = best if best.status not in _ARRIVED else first
+            rest = self._minimise(known.motion, known.multipliers if best is first else None)
             best = min(best, rest, key=rank)
         if not _is_kept(best.motion) and self._ended is None:
             # What control points of few nodes cannot keep, the curve may.
@@ -175,13 +185,46 @@ class Polisher:
         unbound = Optimum(open_one, none, Status.INFEASIBLE, np.inf, np.zeros(ends))
         rank = partial(_rank, begun=begun)
         best = min(first, unbound, key=rank)
-        for begin in chain([open_one], self._beginnings(begun), self._aside(begun)):
-            if begin is not None:
+        calm = self._calm(open_one)
+        for begin in chain(calm, [open_one], self._beginnings(begun), self._aside(begun)):
+            if begin is not None and begin.violation <= _TOO_FAR:
                 found = minimise(begin, self._report, roughly=True, most=_FEWER)
                 best = min(best, found, key=rank)
             if self._ended is not None or _is_kept(best.motion):
                 break
         return best
+
+    def _calm(self, begun: NodeMotion) -> Iterator[NodeMotion]:
+        """Yield the motion that uses least of the limits that one breaks, by squares."""
+        costs = self._costs_of_limits(begun)
+        if not costs:
+            return
+        problem, motion = self._problem.changed(costs=costs), begun
+        for number in range(_CALM_ROUNDS):
+            kept = [item for item in motion.grid.constraints if item.equality]
+            grid = NodeGrid(
+                problem, motion.grid.t, kept, free=self._free, counts=self._effort.counts
+            )
+            found = minimise(grid.at(motion.centred), self._noted, roughly=True)
+            motion = motion.grid.at(found.motion.centred)
+            if _is_kept(motion) or number == _CALM_ROUNDS - 1:
+                yield motion
+                return
+            finer = motion.on(motion.grid.on(Grid(motion.grid.t).halved().nodes))
+            if finer is None:
+                return
+            motion = finer
+
+    def _costs_of_limits(self, begun: NodeMotion) -> tuple[Cost, ...]:
+        """Return what uses of the limits of q̈ and jerk that a motion breaks cost; none for none."""
+        grid, problem = begun.grid, self._problem
+        found, most = list[Cost](), _CALM * abs(begun.aim) / problem.path.duration
+        for item, h in zip(grid.rows.constraints, grid.rows.split(begun.h), strict=True):
+            if isinstance(item, BoundLimits) and item.order in _CALMED and (h > 0.0).any():
+                weight = np.zeros(problem.robot.dof)
+                weight[item.joints] = most / (0.5 * (item.upper - item.lower)) ** 2
+                found.append(_CALMED[item.order](weight, name=item.name))
+        return (*problem.costs, *found) if found else ()
 
     def _beginnings(self, begun: NodeMotion) -> Iterator[NodeMotion | None]:
         """Yield motions that go towards the middle of the limits."""
@@ -236,10 +279,12 @@ class Polisher:
             if self._ended is not None:
                 break
             t = self._finer(known)
-            if t is None and before - known.cost > NOTHING * abs(known.cost):
+            if before - known.cost > _PAYS * abs(known.cost):
                 # Where limits of q̈ or jerk begin and end to bind, the best motion has a kink: finer
                 # there, while it pays.
-                t, before = _at_kinks(known.motion), known.cost
+                kinks, before = _at_kinks(known.motion), known.cost
+                if kinks is not None:
+                    t = kinks if t is None else np.union1d(t, kinks)
             finer = None if t is None or len(t) > most else known.on(t)
             polishes = finer is None
             if polishes and not is_rough:
