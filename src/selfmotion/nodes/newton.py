@@ -73,6 +73,8 @@ _ROUGHLY = 100.0
 # After a full step that promised less than this share of the cost, the next one promises about its
 # square: there is no need to look around for it.
 _LITTLE = 1e-5
+# A gap costs this share of ρ at least: where it begins closed, a step could open it for nothing.
+_LEAST_PENALTY = 3e-3
 # Steps after which the method is given up: it needs fifteen, forty where limits bind all over.
 _MOST = 80
 # Or where in so many what is broken most, by more than _WILD, has not fallen below this share: on
@@ -490,6 +492,7 @@ class _Solver:
             # So that the step lowers the merit, whichever way the cost goes.
             dearest = 1.5 * float(np.abs(step.end_multipliers).max(initial=0.0))
             self._penalty = max(self._penalty, 2.0 * slope / gap, dearest)
+        self._penalty = max(self._penalty, _LEAST_PENALTY * self._elastic_cost)
         merit = self._merit(motion, self._slacks, self._elastics)
         promise = slope - self._penalty * gap
         farthest = float(np.abs(step.nodes[:, :r]).max())
