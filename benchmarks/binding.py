@@ -112,6 +112,8 @@ def beside(number: int, deep: bool) -> Pair | None:
 def off_itself(number: int) -> Pair | None:
     """Return a problem whose best motion keeps off itself, and the same that asks for it."""
     free = free_problem(number, np.random.default_rng([2, number]))
+    if planned(free) is None:
+        return None
     asked = sm.constraints.Clearance((), 0.0)
     return free, replace(free, constraints=[*free.constraints, asked])
 
