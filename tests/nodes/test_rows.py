@@ -4,8 +4,11 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
+from selfmotion.motion import Trajectory
 from selfmotion.nodes.spline import AT_CONTROLS, ORDERS, Quintic, unit_bases
+from selfmotion.robot import ToolRates
 from support.arms import PANDA_HOME
+from support.circles import small_circle
 from support.nodes import along, around_of, centred, moved, nodes_of, random_step
 
 NEAR, DIFFERENCE = 1e-5, 1e-6
@@ -134,3 +137,28 @@ def test_prices_are_carried_to_other_nodes_by_density(panda: sm.RobotModel) -> N
         )
         for mine, theirs in zip(*parts, strict=True):
             assert mine.sum() == pytest.approx(theirs.sum(), rel=0.25)
+
+
+def test_intervals_are_divided_where_something_is_beyond_between_points(
+    panda: sm.RobotModel,
+) -> None:
+    """And nowhere else; the more, the farther beyond it is."""
+    free = sm.plan(small_circle(panda, task="position"))
+    rates = ToolRates(panda.chain)
+
+    def turn_rates(motion: Trajectory, t: np.ndarray) -> np.ndarray:
+        velocity, _ = rates(motion(t), motion(t, 1), motion(t, 2))
+        return np.linalg.norm(velocity[:, 3:], axis=1)
+
+    whole = np.linspace(0.0, free.path.duration, 2001)
+    limit = 0.7 * float(turn_rates(free.trajectory, whole).max())
+    asked = sm.constraints.ToolLimits(turn_rate=limit)
+    motion = nodes_of(small_circle(panda, task="position", constraints=[asked]))
+    parts = motion.parts_between()
+    t = motion.grid.t
+    looks = np.linspace(t[:-1], t[1:], 8, endpoint=False, axis=1)
+    most = turn_rates(motion.trajectory, looks.ravel()).reshape(looks.shape).max(axis=1)
+    assert (most > 1.02 * limit).any()
+    assert (most < 0.98 * limit).any()
+    assert (parts[most > 1.02 * limit] == parts.max()).all()
+    assert (parts[most < 0.98 * limit] == 1).all()

@@ -331,13 +331,17 @@ class NodeMotion:
         found = self.charts.centred(z, qd, qdd)
         return None if found is None else grid.at(found)
 
-    def broken_between(self) -> Flags:
-        """Return on which intervals something is broken between the points, (N,)."""
+    def parts_between(self) -> Ints:
+        """Return into how many parts intervals have to be divided, (N,); see `NodeRows`."""
         grid = self.grid
         if not grid.rows.looks_between:
-            return np.zeros(grid.spline.count, dtype=np.bool_)
+            return np.ones(grid.spline.count, dtype=np.int64)
         curve = looked(grid.spline, grid.manifolds.follows, self.curve_ends)
-        return grid.rows.broken_between(curve)
+        return grid.rows.parts_between(curve)
+
+    def broken_between(self) -> Flags:
+        """Return on which intervals something is broken between the points, or nearly so, (N,)."""
+        return np.asarray(self.parts_between() > 1)
 
     def forget(self) -> None:
         """Let go of what can be computed anew."""

@@ -46,6 +46,9 @@ _SHARED = -1e3
 # What is refined is looked at so often on each interval.
 _LOOKS = np.linspace(0.0, 1.0, 8, endpoint=False)
 _AT_LOOKS = unit_bases(_LOOKS)
+# What is broken between points is to be within this share of what is left of its tolerance after
+# intervals are divided, into so many parts at most.
+_ROOM, _MOST_PARTS = 0.5, 4
 # Limits that bind are looked at so often there.
 _FINE = unit_bases(np.linspace(0.0, 1.0, 17))
 
@@ -293,20 +296,28 @@ class NodeRows:
                 found += (own.sum(axis=1) * np.maximum(-h, 0.0)).sum(axis=(1, 2))
         return found
 
-    def broken_between(self, curve: CurveSamples) -> Flags:
-        """Return on which intervals others than limits are beyond their tolerances, (N,).
+    def parts_between(self, curve: CurveSamples) -> Ints:
+        """Return into how many parts intervals have to be divided for others than limits, (N,).
 
-        For the curve as `looked` has it.
+        For the curve as `looked` has it: 1 where it is within their tolerances between the points
+        as well. What it is beyond that of the points falls with the square of the parts. Where one
+        interval has to be divided, so is what is nearly beyond: on the next nodes it would be.
         """
-        found = np.zeros(self.spline.count, dtype=np.bool_)
+        found, count = np.ones(self.spline.count, dtype=np.int64), self.spline.count
         for item in self.constraints:
             if isinstance(item, BoundLimits):
                 continue
             if isinstance(item, BoundClearance):
-                beyond = item.above(curve, item.tolerance)
-            else:
-                beyond = np.asarray((item.residual(curve) > item.tolerance).any(axis=1))
-            found |= np.asarray(beyond).reshape(self.spline.count, -1).any(axis=1)
+                beyond = np.asarray(item.above(curve, item.tolerance)).reshape(count, -1)
+                found[beyond.any(axis=1)] = np.maximum(found[beyond.any(axis=1)], 2)
+                continue
+            h = np.asarray(item.residual(curve)).reshape(count, -1).max(axis=1)
+            if not (h <= item.tolerance).all():
+                kept = _granted(item)
+                need = np.sqrt(np.maximum(h - kept, 0.0) / (_ROOM * (item.tolerance - kept)))
+                # Written so that NaN is divided.
+                need = np.where(h > -np.inf, need, _MOST_PARTS)
+                found = np.maximum(found, np.clip(np.ceil(need), 1, _MOST_PARTS).astype(np.int64))
         return found
 
     @property

@@ -306,9 +306,10 @@ class Polisher:
         Beside corners of bodies more nodes may lead nowhere: on these, bodies are kept farther
         apart at the points.
         """
-        if self._ended is not None or not known.motion.broken_between().any():
-            return None
         grid = known.motion.grid
+        has_bodies = any(isinstance(item, BoundClearance) for item in grid.constraints)
+        if self._ended is not None or not (has_bodies and known.motion.broken_between().any()):
+            return None
         for far in _FARTHER_APART:
             asked = [
                 replace(item, distance=item.distance + far, _last=[])
@@ -335,7 +336,7 @@ class Polisher:
         least = NOTHING * abs(motion.aim)
         if away.sum() > least:
             parts[(away > least / spline.count) & (parts == 1)] = 2
-        parts[motion.broken_between() & (parts == 1)] = 2
+        parts = np.maximum(parts, motion.parts_between())
         return None if (parts == 1).all() else _divided(spline.t, parts)
 
     def _minimise(
