@@ -315,7 +315,7 @@ def _active_constraints(report: Report) -> Table:
     """Return what each active constraint costs, by its multipliers."""
     table = _table("active constraints")
     table.add_column("if you allow")
-    table.add_column("the cost falls by about", justify="right")
+    table.add_column("the cost falls at first by about", justify="right")
     table.add_column("active at")
     for item in report.active:
         share = f"{100.0 * item.saving / abs(report.cost):.3g} %" if report.cost else ""
