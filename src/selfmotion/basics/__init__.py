@@ -17,6 +17,7 @@ from selfmotion.basics.arrays import (
     is_number as is_number,
     per_joint as per_joint,
     plain_numbers as plain_numbers,
+    public_name as public_name,
     random_numbers as random_numbers,
     read_only as read_only,
     shown as shown,
