@@ -64,6 +64,7 @@ from selfmotion.basics.jit import (
     inlined as inlined,
     kernel as kernel,
     seconds_of_kernels as seconds_of_kernels,
+    seconds_waited_for_kernels as seconds_waited_for_kernels,
 )
 from selfmotion.basics.progress import (
     Counts as Counts,
