@@ -94,7 +94,8 @@ def show_plan(plan: Plan, console: Console) -> None:
         _print(console, metres_told(plan))
     said = report.status in _ENDED_WELL and report.message == report.status.message
     if certificate.verified and not said:
-        _print(console, f"{report.status.value}: {in_shell(report.message)}")
+        told = in_shell(report.message).removeprefix(f"{report.status.value}: ")
+        _print(console, f"{report.status.value}: {told}")
     if report.active and report.cost:
         first = report.active[0]
         share = first.saving / abs(report.cost)
