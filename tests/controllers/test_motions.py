@@ -334,8 +334,9 @@ def test_plans_side_by_side(saved: Path, tmp_path: Path) -> None:
     sm.plan(sm.sample_problem()).save(other)
     code, text = invoke("compare", saved, other)
     assert code == 0
-    for word in ("joint velocity", "inverse manipulability", "total cost", "verified"):
+    for word in ("joint velocity", "inverse manipulability", "no total cost: ", "verified"):
         assert word in text
+    assert "\ntotal cost" in invoke("compare", saved, saved)[1].replace("│", "").replace(" t", "t")
     code, text = invoke("compare", saved, other, "--json")
     assert list(json.loads(text)) == [str(saved), str(other)]
 

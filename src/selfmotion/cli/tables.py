@@ -181,6 +181,8 @@ def show_comparison(plans: Mapping[str, Plan], console: Console) -> None:
     for number, row in enumerate(found.cells(), start=1):
         table.add_row(*row, end_section=number == len(found.costs))
     console.print(table)
+    if found.remark:
+        console.print(found.remark, markup=False, soft_wrap=not console.is_terminal)
     for line in found.refusals():
         console.print(line, style="bold red", markup=False, soft_wrap=not console.is_terminal)
 

@@ -69,8 +69,15 @@ class Comparison:
         every = zip(self.names, self.verdicts, self.verified, strict=True)
         return [f"{name}: {verdict}" for name, verdict, verified in every if not verified]
 
+    @property
+    def remark(self) -> str:
+        """Why there is no total; "" where there is one."""
+        return (
+            "" if _TOTAL in self.costs else "no total cost: the plans were made for different ones"
+        )
+
     def __str__(self) -> str:
-        """Return the table, then why plans are not verified."""
+        """Return the table, then why there is no total, and why plans are not verified."""
         rows = [["", *self.names], *self.cells()]
         widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
         lines = [
@@ -80,7 +87,7 @@ class Comparison:
             ).rstrip()
             for row in rows
         ]
-        return "\n".join([*lines, *self.refusals()])
+        return "\n".join([*lines, *filter(None, [self.remark]), *self.refusals()])
 
 
 def compare(
