@@ -186,7 +186,7 @@ def test_the_figure_draws_what_was_planned():
 def test_a_figure_cuts_nothing_off_and_covers_no_curve():
     """The title within the figure, legends beside the curves, a name for dashed lines."""
     drawing = figure(arm_plan("panda"))
-    drawing.canvas.draw()
+    drawing.draw_without_rendering()
     (title,) = [text for text in drawing.texts if text.get_text() == drawing.get_suptitle()]
     extent, whole = title.get_window_extent(), drawing.bbox
     assert whole.x0 <= extent.x0 < extent.x1 <= whole.x1
@@ -198,7 +198,7 @@ def test_a_figure_cuts_nothing_off_and_covers_no_curve():
     for legend in legends:
         box = legend.get_window_extent()
         assert whole.x0 <= box.x0 < box.x1 <= whole.x1
-        assert not any(box.overlaps(plot) for plot in plots)
+        assert not any(box.overlaps(other) for other in (*plots, extent))
     names = [text.get_text() for text in joints.get_texts()]
     assert names[-1] == "limit"
     assert len(names) == len(set(names)) == 8

@@ -172,7 +172,7 @@ def figure(plan: Plan) -> "Figure":
     _errors(errors, shown, plan)
     # Beside the curves, which they would cover.
     joints = _of_joints(positions, velocities)
-    drawing.legend(*joints, loc="outside right upper", fontsize="x-small")
+    drawing.legend(*joints, loc="outside right center", fontsize="x-small")
     for axes in (manipulability, errors):
         axes.legend(
             loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, fontsize="x-small", frameon=False
