@@ -13,6 +13,7 @@ import typer
 import selfmotion as sm
 from selfmotion import basics, documents
 from selfmotion.basics import TURN, Array
+from selfmotion.problem import KEPT, NO_OVERLAP
 
 TaskName = Literal["pose", "position", "pointing", "planar", "planar_pose"]
 Corners = Literal["blend", "stop", "round"]
@@ -279,7 +280,11 @@ ObstaclesOption = Annotated[
     typer.Option(help=r"Obstacles: a list of shapes in JSON, or TOML with \[\[obstacles]]."),
 ]
 ClearanceOption = Annotated[
-    float, typer.Option(help="Distance to keep from obstacles and of links from each other (m).")
+    float,
+    typer.Option(
+        help="Distance to keep from obstacles and of links from each other (m); at 0 they may not "
+        "overlap."
+    ),
 ]
 SrdfOption = Annotated[
     Path | None, typer.Option(help="SRDF: its disabled pairs of links are not checked.")
@@ -431,9 +436,19 @@ def requirements(
     obstacles: Path | None,
     clearance: float,
     srdf: Path | None,
+    *,
+    usual: bool = False,
+    apart: bool = False,
 ) -> tuple[sm.certificate.Requirement, ...]:
-    """Return what a motion of others has to keep besides its path and the arm's own limits."""
+    """Return what a motion of others has to keep besides its path and the arm's own limits.
+
+    With what `plan` keeps `usual`ly, accelerations and jerks of the arm's maker, and the arm
+    `apart` from itself.
+    """
     asked: list[sm.constraints.Constraint] = []
+    if usual:
+        makers = sm.constraints.JointAccelerationLimits, sm.constraints.JointJerkLimits
+        asked += [item for item in KEPT if isinstance(item, makers) and item.applies(robot)]
     if velocity is not None:
         asked.append(sm.constraints.JointVelocityLimits(one_or_each(velocity, "--velocity")))
     if acceleration is not None:
@@ -445,6 +460,8 @@ def requirements(
     if obstacles is not None or clearance != 0.0 or srdf is not None:
         bodies = () if obstacles is None else read_obstacles(obstacles)
         asked.append(sm.constraints.Clearance(bodies, clearance, srdf))
+    elif apart and robot.urdf.has_collisions:
+        asked.append(NO_OVERLAP)
     return tuple(item.requirement(robot) for item in asked)
 
 
