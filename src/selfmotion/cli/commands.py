@@ -214,9 +214,7 @@ def check(
             motion, stated, program = checks.read(file, degrees, within, arm)
             motion = controllers.without_followers(motion, arm)
             # Accelerations of a program are the controller's.
-            asked = options.requirements(
-                arm, *judged, usual=program is None, apart=not no_collision
-            )
+            asked = checks.requirements(arm, *judged, usual=program is None, apart=not no_collision)
             followed = documents.followed(path, context.params, arm)
             elsewhere = ""
             if program is not None:

@@ -13,7 +13,6 @@ import typer
 import selfmotion as sm
 from selfmotion import basics, documents
 from selfmotion.basics import TURN, Array
-from selfmotion.problem import KEPT, NO_OVERLAP
 
 TaskName = Literal["pose", "position", "pointing", "planar", "planar_pose"]
 Corners = Literal["blend", "stop", "round"]
@@ -426,43 +425,6 @@ def refuse(given: dict[str, Any], file: Path | str, whose: str) -> None:
     for name, value in given.items():
         if value is not None:
             raise sm.errors.ProblemError(f"{file}: --{name} is {whose} own: leave it out")
-
-
-def requirements(
-    robot: sm.RobotModel,
-    velocity: str | None,
-    acceleration: str | None,
-    joint_limits: Path | None,
-    obstacles: Path | None,
-    clearance: float,
-    srdf: Path | None,
-    *,
-    usual: bool = False,
-    apart: bool = False,
-) -> tuple[sm.certificate.Requirement, ...]:
-    """Return what a motion of others has to keep besides its path and the arm's own limits.
-
-    With what `plan` keeps `usual`ly, accelerations and jerks of the arm's maker, and the arm
-    `apart` from itself.
-    """
-    asked: list[sm.constraints.Constraint] = []
-    if usual:
-        makers = sm.constraints.JointAccelerationLimits, sm.constraints.JointJerkLimits
-        asked += [item for item in KEPT if isinstance(item, makers) and item.applies(robot)]
-    if velocity is not None:
-        asked.append(sm.constraints.JointVelocityLimits(one_or_each(velocity, "--velocity")))
-    if acceleration is not None:
-        asked.append(
-            sm.constraints.JointAccelerationLimits(one_or_each(acceleration, "--acceleration"))
-        )
-    if joint_limits is not None:
-        asked += documents.read_joint_limits(joint_limits, robot)
-    if obstacles is not None or clearance != 0.0 or srdf is not None:
-        bodies = () if obstacles is None else read_obstacles(obstacles)
-        asked.append(sm.constraints.Clearance(bodies, clearance, srdf))
-    elif apart and robot.urdf.has_collisions:
-        asked.append(NO_OVERLAP)
-    return tuple(item.requirement(robot) for item in asked)
 
 
 def one_or_each(text: str, option: str) -> list[float] | float:
