@@ -91,6 +91,12 @@ def test_a_normal_is_the_tool_axis(poses: list[pin.SE3], tmp_path: Path) -> None
     )
     path = sm.files.read_path(file)
     agree(path, poses, rotation=False)
+    # The rest of the orientation is made up, which matters to tasks that prescribe it.
+    (note,) = path.notes
+    assert note.startswith("nx,ny,nz say where the tool's z axis points, not how")
+    for task, told in (("pose", True), ("pointing", False), ("position", False)):
+        remarks = sm.Problem(robot_named("panda"), path, task, start="free").remarks
+        assert (note in remarks) is told
     for t, pose in zip(T, poses, strict=True):
         np.testing.assert_allclose(path.pose(t).rotation[:, 2], pose.rotation[:, 2], atol=ROUNDING)
 

@@ -15,6 +15,7 @@ from rich.console import Console
 from typer.testing import CliRunner
 
 import selfmotion as sm
+from selfmotion.basics import jit, seconds_waited_for_kernels
 from selfmotion.cli import app
 from selfmotion.cli.app import StageDisplay
 from support.shell import complaint, invoke
@@ -238,6 +239,27 @@ def test_long_stages_say_how_long_they_will_last(monkeypatch: pytest.MonkeyPatch
     # Three of ten took 1.5 s, so that seven will take 3.5.
     assert "long 4 of 10, 2 s so far, about 4 s to go" in shown.getvalue()
     assert "short 4 of 10 " in shown.getvalue()
+
+
+def test_kernels_that_compile_are_no_part_of_what_is_left(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The first of 31 starts took 10 s, 9.6 s of it to compile: the others take no such time."""
+    now = [0.0]
+    monkeypatch.setattr(time, "monotonic", lambda: now[0])
+    monkeypatch.setattr(jit._waited, "_clock", lambda: now[0])
+    before = seconds_waited_for_kernels()
+    shown = io.StringIO()
+    with StageDisplay(Console(force_terminal=True, width=100, file=shown)) as display:
+        display.stage("screening", 1, 31)
+        now[0] += 0.2
+        with jit._waited:
+            now[0] += 9.6
+            # What goes on counts as well; within one another once.
+            with jit._waited:
+                assert seconds_waited_for_kernels() - before == pytest.approx(9.6)
+        now[0] += 0.2
+        display.stage("screening", 2, 31)
+        display._progress.refresh()
+    assert "2 of 31, 10 s so far, about 12 s to go" in shown.getvalue()
 
 
 def test_a_log_is_never_silent_for_long(monkeypatch: pytest.MonkeyPatch) -> None:

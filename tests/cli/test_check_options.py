@@ -43,6 +43,7 @@ def plan(tmp_path_factory: pytest.TempPathFactory) -> Path:
         ["--flip-normals"],
         ["--lock", "a=1"],
         ["--degrees"],
+        ["--no-self-collision"],
     ],
 )
 def test_what_is_the_plans_own_is_refused(plan: Path, options: list[str]) -> None:
@@ -116,13 +117,44 @@ def test_a_path_is_read_by_the_options_that_it_was_planned_with(tmp_path: Path) 
     assert "names no seams, so that seam has no effect" in complaint(*run, "--seam", "a")
 
 
+def test_motions_made_elsewhere_are_judged_by_what_plan_keeps(tmp_path: Path) -> None:
+    """Accelerations and jerks of the arm's maker, and that the arm does not meet itself."""
+    panda = robot_named("panda")
+    start = panda.dexterous_configuration()
+
+    def checked(duration: float, *options: str, **given: object) -> tuple[int, str]:
+        circle = sm.paths.Circle.around(panda.pose(start), 0.05, duration)
+        made = sm.plan(sm.Problem(panda, circle, "position", start, **given), max_evaluations=3)
+        sm.files.write_motion(made, tmp_path / "a.csv", force=True)
+        t = np.linspace(0.0, duration, 201)
+        rows = [[time, *at.translation] for time, at in zip(t, circle.pose(t), strict=True)]
+        np.savetxt(tmp_path / "c.csv", rows, delimiter=",", header="t,x,y,z", comments="")
+        run = ["check", tmp_path / "a.csv", "--robot", "panda", "--path", tmp_path / "c.csv"]
+        run += ["--task", "position", "--tolerance", "1e-4", "--verbose", *options]
+        code, text = invoke(*run)
+        return code, " ".join(text.split())
+
+    code, text = checked(2.0)
+    assert code == 0, text
+    for what in ("accelerations", "jerks", "self-collision"):
+        assert what in text
+    assert "not checked" not in text
+    code, text = checked(2.0, "--no-self-collision")
+    assert code == 0
+    assert "not checked: self-collision" in text
+    # Too fast for the maker's accelerations, for a plan that asked for none.
+    code, text = checked(0.5, constraints=())
+    assert code == 1
+    assert "accelerates at" in text
+
+
 def test_no_option_is_left_without_an_effect(plan: Path) -> None:
     """Each is refused, or judged; --json, --verbose and help change what is printed."""
     (command,) = (item for item in app.registered_commands if item.callback is commands.check)
     names = set(inspect.signature(command.callback).parameters) - {"context", "file"}
     names -= {"as_json", "verbose"}
     refused = {"robot", "path", "task", "tool", "reference", "lock", "degrees"}
-    refused |= {"argument", "packages", *documents.OF_PATH}
+    refused |= {"argument", "packages", "no_collision", *documents.OF_PATH}
     judged = {"velocity", "acceleration", "joint_limits", "obstacles", "clearance", "srdf"}
     # What a calibration does is in tests/robot/test_calibration.py.
     assert names == refused | judged | {"tolerance", "calibration"}

@@ -11,6 +11,7 @@ import selfmotion as sm
 from selfmotion.basics import write_csv
 from selfmotion.cli import app, main as command
 from support.arms import PANDA_HOME
+from support.shell import complaint
 
 
 @pytest.fixture(scope="module")
@@ -178,3 +179,16 @@ def test_a_robot_file_that_changed_is_said(tmp_path: Path) -> None:
     assert file.read_text() != text
     assert "has changed since the plan was made" in changed.certificate.verdict
     assert changed.certificate.verified
+
+
+def test_options_and_files_of_options_are_named_where_they_are_wrong(tmp_path: Path) -> None:
+    """Not the keys of the table that they make."""
+    file = tmp_path / "boxes.json"
+    good = {"shape": "box", "name": "a", "size": [0.1] * 3, "position": [2.0, 0.0, 0.0]}
+    file.write_text(json.dumps([good, good | {"name": "b", "id": 3}]))
+    asked = ("plan", "panda", "--circle", "0.1")
+    said = complaint(*asked, "--obstacles", file)
+    assert f"{file}: [1].id: unknown key" in said
+    assert "constraints" not in said
+    said = complaint(*asked, "--start", "0,0,0")
+    assert "--start: configuration has shape (3,), expected (7,)" in said

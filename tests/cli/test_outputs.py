@@ -2,6 +2,7 @@
 
 import io
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -34,6 +35,31 @@ def test_results_are_there_for_programs(tmp_path: Path) -> None:
     found = json.loads(printed)
     assert found["linear_miss"]["rate"] > 0.0
     assert "read back" in found["written"][str(motion)]
+
+
+def test_a_plan_says_of_its_motions_what_export_says(tmp_path: Path) -> None:
+    plan, motion = tmp_path / "plan.npz", tmp_path / "motion.yaml"
+    asked = ("plan", "planar_3r", "--circle", "0.1", "--out", plan, "--out", motion)
+    code, planned = invoke(*asked)
+    assert code == 0, planned
+    code, exported = invoke("export", plan, "--out", motion)
+    assert code == 0, exported
+    for begin in (f"wrote {motion}; read back: verified", "joined by straight lines, "):
+        lines = [
+            [line for line in text.splitlines() if line.startswith(begin)]
+            for text in (planned, exported)
+        ]
+        assert lines[0] == lines[1]
+        assert len(lines[0]) == 1
+    assert f"wrote {plan}\n" in planned
+    # The rate that is named keeps the tolerance when it is used, and is named again.
+    found = re.search(r"--rate (\d+) keeps", exported)
+    assert found is not None
+    code, text = invoke("export", plan, "--out", motion, "--rate", found[1], "--json")
+    miss, tolerance = json.loads(text)["linear_miss"], sm.load_plan(plan).tolerance
+    assert miss["position"] <= tolerance.position
+    assert miss["rotation"] <= tolerance.rotation
+    assert miss["rate"] == float(found[1])
 
 
 def test_a_large_file_of_text_proposes_a_bag(tmp_path: Path) -> None:

@@ -120,6 +120,27 @@ def test_what_binds_is_priced_where_it_binds(grid: Grid) -> None:
     assert active_of(free, span, 1e-9) == ()
 
 
+@dataclass(frozen=True, eq=False)
+class Sized(Given):
+    """One that says how much an easing is."""
+
+    def easing(self, column: int) -> tuple[float, str]:
+        return 0.02, f"2 % more of {column}"
+
+
+def test_what_would_save_much_is_eased_by_less(grid: Grid) -> None:
+    """A multiplier is a slope: words and saving shrink alike, the order is that of the slopes."""
+    multipliers = np.zeros((len(grid.nodes), 3))
+    multipliers[2] = 50.0, 250.0, 5.0
+    item = Sized("limits", table(grid, 3))
+    each = [Multipliers(item, multipliers, grid.nodes, multipliers > 0.0)]
+    found = active_of(each, grid.nodes[[0, -1]], 1e-9, 0.5)
+    told = [(item.easing, round(item.saving, 12)) for item in found]
+    assert told == [("0.2 % more of 1", 0.5), ("1 % more of 0", 0.5), ("2 % more of 2", 0.1)]
+    whole = active_of(each, grid.nodes[[0, -1]], 1e-9)
+    assert [item.saving for item in whole] == [5.0, 1.0, 0.1]
+
+
 @pytest.mark.parametrize("equality", [False, True])
 def test_the_worst_place_is_told_of_what_is_not_kept(
     grid: Grid, samples: Samples, equality: bool

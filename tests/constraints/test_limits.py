@@ -104,7 +104,8 @@ def test_limits_that_nobody_knows_are_told_of() -> None:
     told = [text for text in problem.remarks if "none are known" in text]
     assert told == [
         "joint acceleration limits: none are known of ur10, so none are kept; "
-        "give --acceleration, limit = …"
+        'give --acceleration, or in the file [[constraints]] kind = "JointAccelerationLimits", '
+        "limit = …, in Python JointAccelerationLimits(…)"
     ]
     for quiet in ({"constraints": [sm.constraints.JointAccelerationLimits(5.0)]}, {}):
         usual = sm.Problem(robot, problem.path, "pointing", start, **quiet)

@@ -143,6 +143,13 @@ def test_figures_of_the_readme_are_those_of_the_page() -> None:
             assert re.search(rf"(?<![\d.]){re.escape(number)}(?![\d])", PERFORMANCE), number
 
 
+def test_costs_of_the_sample_problem_are_those_that_plans_have() -> None:
+    paper = sm.PolynomialNullMotion(space="joint", basis="monomial")
+    for motion in (None, paper, sm.motion.FreeNullMotion()):
+        plan = sm.plan(sm.sample_problem(null_motion=motion))
+        assert f"{plan.report.cost:.4f}" in PACKAGES
+
+
 def test_the_picture_is_of_what_the_readme_says() -> None:
     problem = two_motions.seam()
     for plan in (sm.plan_by(problem, sm.baselines.PseudoInverse()), sm.plan(problem)):

@@ -1,6 +1,7 @@
 """Every tool motion: the twist is the derivative of the pose; bad input is named."""
 
 import json
+from collections.abc import Callable
 
 import numpy as np
 import pinocchio as pin
@@ -12,6 +13,8 @@ from support.paths import pose, random_waypoints, there_and_back
 
 # Central differences with a step of 1e-6 of functions of order 1 to 30.
 DIFFERENCE = 2e-8
+# Of products of matrices, which add in another order when there are many.
+ROUNDING = 1e-13
 
 
 def tumbling(t: float) -> list[float]:
@@ -72,10 +75,47 @@ def test_description_restores_the_path_exactly(path: sm.paths.Path) -> None:
         )
 
 
+WRAPPED = {
+    "alone": lambda path: path,
+    "led at a feed": lambda path: sm.paths.Feed(path, 0.05),
+    "retimed": lambda path: sm.paths.Retimed(
+        path, [0.0, 2.0 * path.duration], [0.0, path.duration], [0.5, 0.5]
+    ),
+    "placed": lambda path: sm.paths.Placed(path, pose(3)),
+    "backwards": sm.paths.Reversed,
+    "joined": lambda path: (
+        sm.paths.section_at_rest(path, ramp=0.4) + sm.paths.Dwell(path.pose(path.duration), 0.5)
+    ),
+}
+
+
+@pytest.mark.parametrize("wrapped", WRAPPED.values(), ids=WRAPPED)
+def test_many_times_have_as_many_poses_and_twists(
+    wrapped: Callable[[sm.paths.Path], sm.paths.Path],
+) -> None:
+    path = wrapped(sm.paths.Line(pose(1), pose(2), 2.0, "constant"))
+    times = np.array([0.9, 0.2, 0.6]) * path.duration
+    poses, samples = path.pose(times), path.samples(times)
+    assert len(poses) == len(times)
+    for found, single, place in zip(
+        poses, map(path.pose, times.tolist()), samples.translation, strict=True
+    ):
+        np.testing.assert_allclose(found.homogeneous, single.homogeneous, atol=ROUNDING)
+        np.testing.assert_array_equal(found.translation, place)
+    assert np.ptp([found.translation for found in poses], axis=0).max() > 1e-3
+    np.testing.assert_array_equal(path.twist(times), samples.twist)
+    singles = [path.twist(t) for t in times.tolist()]
+    np.testing.assert_allclose(path.twist(times), singles, atol=ROUNDING)
+
+
 def test_single_and_many_times_agree(path: sm.paths.Path) -> None:
-    t = 0.3 * path.duration
-    np.testing.assert_array_equal(path.pose(t).translation, path.samples([t]).translation[0])
-    np.testing.assert_array_equal(path.twist(t), path.samples([t]).twist[0])
+    times = [0.3 * path.duration, 0.7 * path.duration]
+    poses, twists = path.pose(times), path.twist(times)
+    for k, t in enumerate(times):
+        np.testing.assert_array_equal(path.pose(t).translation, path.samples(t).translation[0])
+        np.testing.assert_allclose(path.pose(t).homogeneous, poses[k].homogeneous, atol=ROUNDING)
+        np.testing.assert_array_equal(path.twist(t), path.samples([t]).twist[0])
+        np.testing.assert_allclose(path.twist(t), twists[k], atol=ROUNDING)
 
 
 def test_times_outside_are_refused(path: sm.paths.Path) -> None:

@@ -10,6 +10,9 @@ from rich.console import Console
 import selfmotion as sm
 from selfmotion.cli import tables
 
+# The published method integrates its costs on its own grid.
+INTEGRATED = 1e-4
+
 
 @pytest.fixture(scope="module")
 def plans() -> dict[str, sm.Plan]:
@@ -23,7 +26,6 @@ def test_its_numbers_are_the_plans(plans: dict[str, sm.Plan]) -> None:
     assert found.names == ("speed", "length")
     for k, plan in enumerate(plans.values()):
         told = {name: values[k] for name, values in found.costs.items()}
-        assert told.pop("total cost") == plan.report.cost
         assert {name: value for name, value in told.items() if value is not None} == dict(
             plan.report.terms
         )
@@ -34,12 +36,51 @@ def test_its_numbers_are_the_plans(plans: dict[str, sm.Plan]) -> None:
     assert found.verdicts == tuple(plan.certificate.verdict for plan in plans.values())
 
 
+def test_a_total_is_told_of_the_same_costs_only(plans: dict[str, sm.Plan]) -> None:
+    speed = plans["speed"]
+    assert "total cost" not in sm.compare(plans).costs
+    assert str(sm.compare(plans)).splitlines()[-1].startswith("no total cost: ")
+    assert "no total" not in str(sm.compare([speed, speed]))
+    assert sm.compare([speed, speed]).costs["total cost"] == (speed.report.cost,) * 2
+    # Of one name, and something else.
+    heavier = sm.costs.JointVelocity(2.0)
+    others = [heavier, *speed.problem.costs[1:]]
+    other = replace(speed, problem=replace(speed.problem, costs=others))
+    found = sm.compare([speed, other])
+    assert "total cost" not in found.costs
+    assert "joint velocity (each plan's own)" in found.costs
+    for one, same in ((lambda qd, q, t: t, False), (abs, True)):
+        made = [
+            replace(speed, problem=replace(speed.problem, costs=[sm.costs.FunctionCost(g)]))
+            for g in (abs, abs if same else one)
+        ]
+        assert ("total cost" in sm.compare(made).costs) is same
+
+
+def test_common_costs_are_evaluated_on_all(plans: dict[str, sm.Plan]) -> None:
+    costs = [sm.costs.PathLength(), sm.costs.JointVelocity()]
+    found = sm.compare(plans, costs=costs)
+    assert list(found.costs) == ["path length", "joint velocity", "total cost"]
+    length = plans["length"].report
+    assert found.costs["total cost"][1] == pytest.approx(length.cost, rel=INTEGRATED)
+    for k, plan in enumerate(plans.values()):
+        each = [plan.evaluate(cost) for cost in costs]
+        assert [found.costs[cost.name][k] for cost in costs] == each
+        assert found.costs["total cost"][k] == sum(each)
+    # What was optimised for it is the better one.
+    assert found.costs["total cost"][1] < found.costs["total cost"][0]
+    for wrong in ([], [costs[0], costs[0]], [3]):
+        with pytest.raises(sm.errors.ProblemError, match="cost"):
+            sm.compare(plans, costs=wrong)
+
+
 def test_its_text_has_a_line_for_each_number(plans: dict[str, sm.Plan]) -> None:
-    lines = str(sm.compare(plans)).splitlines()
+    found = sm.compare(plans, costs=[sm.costs.JointVelocity()])
+    lines = str(found).splitlines()
     assert lines[0].split() == ["speed", "length"]
     assert len(set(map(len, lines))) == 1, "columns are aligned"
     cost = next(line for line in lines if line.startswith("total cost"))
-    assert cost.split()[2:] == [f"{plan.report.cost:.5g}" for plan in plans.values()]
+    assert cost.split()[2:] == [f"{value:.5g}" for value in found.costs["total cost"]]
 
 
 def test_the_shell_shows_the_same_cells(plans: dict[str, sm.Plan]) -> None:

@@ -4,12 +4,13 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 import selfmotion as sm
 from selfmotion.basics import Array
 from selfmotion.result import Reversals
-from support.arms import Case, robot_named, short_line, start_of
+from support.arms import PANDA_HOME, Case, robot_named, short_line, start_of
 
 # Roundings of velocities, by two ways to a pseudo-inverse.
 ROUNDING = 1e-9
@@ -17,6 +18,9 @@ ROUNDING = 1e-9
 BETWEEN_NODES = 1e-3
 # A motion evaluated and summed in another order: its jerks are differences of large numbers.
 SUMMED = 1e-10
+
+# By what a path is put elsewhere [m].
+MOVED = np.array([0.01, -0.02, 0.03])
 
 
 @pytest.fixture
@@ -41,6 +45,59 @@ def test_it_is_what_the_pseudo_inverse_leaves(plan: sm.Plan) -> None:
         np.testing.assert_allclose(basis.T @ basis, np.eye(basis.shape[1]), atol=ROUNDING)
         np.testing.assert_allclose(found.coordinates[k], basis.T @ qd, atol=ROUNDING)
         np.testing.assert_allclose(found.joints[k], basis @ found.coordinates[k], atol=ROUNDING)
+
+
+@pytest.mark.parametrize("task", ["pose", "pointing"])
+def test_a_deviation_is_what_poses_of_arm_and_path_differ_by(task: str) -> None:
+    """By Pinocchio's logarithm, and of axes by the angle between them."""
+    panda = robot_named("panda")
+    circle = sm.paths.Circle.around(panda.pose(PANDA_HOME), 0.1, 4.0, normal=(1, 0, 0))
+    relaxations = [
+        sm.Relaxation(("rx", "ry"), 0.1),
+        sm.Relaxation("z", 2e-3, axes="tool"),
+        *([sm.Relaxation("rz", during=(1.0, 2.5))] if task == "pose" else []),
+    ]
+    problem = sm.Problem(panda, circle, task, PANDA_HOME, relaxations=relaxations)
+    plan = sm.plan(problem).require()
+    t = np.linspace(0.0, plan.trajectory.duration, 401)
+    found = plan.deviation(t)
+    assert found.shape == (len(t), 6)
+    places = zip(found, plan.robot.pose(plan.trajectory(t)), plan.path.pose(t), strict=True)
+    for row, actual, target in places:
+        apart = target.actInv(actual)
+        np.testing.assert_allclose(row[:3], apart.translation, atol=ROUNDING)
+        if task == "pose":
+            np.testing.assert_allclose(row[3:], pin.log3(apart.rotation), atol=ROUNDING)
+        else:
+            # Aligned, the one axis is the other; nothing turns about it.
+            aligned = target.rotation @ pin.exp3(row[3:])
+            np.testing.assert_allclose(aligned[:, 2], actual.rotation[:, 2], atol=ROUNDING)
+            assert row[5] == 0.0
+    for item, worst in zip(relaxations, plan.certificate.deviations, strict=True):
+        size = np.linalg.norm(found[:, item.indices], axis=1).max()
+        assert 0.99 * worst.value < size <= worst.value + ROUNDING
+    np.testing.assert_array_equal(plan.deviation(t[7]), found[7])
+    # On another path it is another; in world axes the same length in other rows.
+    other = replace(plan.problem, relaxations=relaxations[:1])
+    world = replace(plan, problem=other).deviation(t)
+    np.testing.assert_allclose(*(np.linalg.norm(x[:, :3], axis=1) for x in (world, found)))
+    assert np.abs(world[:, :3] - found[:, :3]).max() > 1e-4
+    moved = sm.paths.Placed(circle, pin.SE3(np.eye(3), MOVED))
+    elsewhere = replace(plan.problem, path=moved, relaxations=(), start="free")
+    off = replace(plan, problem=elsewhere).deviation(t)
+    np.testing.assert_allclose(off[:, :3], world[:, :3] - MOVED, atol=ROUNDING)
+    with pytest.raises(ValueError, match="outside the motion"):
+        plan.deviation(99.0)
+    with pytest.raises(ValueError, match=r"t has shape \(1, 2\), expected a time or times"):
+        plan.deviation([[0.0, 1.0]])
+
+
+def test_a_null_space_velocity_is_told_in_a_line(plan: sm.Plan) -> None:
+    n, many = plan.robot.dof, plan.null_motion([0.1, 0.4])
+    most = np.abs(many.joints).max()
+    said = f"{n} joints, {many.coordinates.shape[1]} coordinates, at most {most:.4g} rad/s or m/s)"
+    assert repr(many) == f"NullSpaceVelocity(2 times, {said}"
+    assert repr(plan.null_motion(0.1)).startswith(f"NullSpaceVelocity({n} joints, ")
 
 
 def test_one_time_is_one_of_many(plan: sm.Plan) -> None:

@@ -356,6 +356,7 @@ def cost_rows() -> list[Row]:
                 "[3]": [3],
                 "JointVelocity (the class)": sm.costs.JointVelocity,
                 "[JointVelocity] (the class)": [sm.costs.JointVelocity],
+                "[a function of (qd, q, t)]": [sum],
                 "two of one name": [sm.costs.JointVelocity(), sm.costs.JointVelocity()],
             },
         ),

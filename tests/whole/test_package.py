@@ -1,12 +1,17 @@
 """What `import selfmotion` offers and what it leaves alone."""
 
+import ast
 import inspect
+import re
 import subprocess
 import sys
+from itertools import pairwise
+from pathlib import Path
 
 import pytest
 
 import selfmotion as sm
+from selfmotion.basics import public_name
 from support.doors import of, offered
 
 
@@ -48,6 +53,80 @@ def test_the_top_level_is_short_and_nothing_is_there_twice() -> None:
     spaced = [name.split(".")[1] for name in offered(sm) if "." in name]
     assert not set(spaced) & set(sm.__all__)
     assert len(set(spaced)) == len(spaced)
+
+
+# `sm.X` or `selfmotion.x.X`, and such a beginning before what an f-string puts in.
+_SAID = re.compile(r"\b(?:selfmotion|sm)((?:\.[A-Za-z_]\w*)+)")
+_OPEN = re.compile(r"\b(?:selfmotion|sm)\.$")
+
+
+def misnamed(source: str) -> list[str]:
+    """Return which names of ours texts of a module say that are not there, or have moved."""
+    tree, found = ast.parse(source), []
+    inside = [
+        part
+        for node in ast.walk(tree)
+        if isinstance(node, ast.JoinedStr)
+        for part in pairwise(node.values)
+    ]
+    found += [
+        text.value + "{…}"
+        for text, put in inside
+        if isinstance(text, ast.Constant)
+        and _OPEN.search(text.value)
+        and isinstance(put, ast.FormattedValue)
+    ]
+    texts = [
+        node.value
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Constant) and isinstance(node.value, str)
+    ]
+    for text in texts:
+        for said in _SAID.finditer(text):
+            names, thing = said[1].split(".")[1:], sm
+            if names[0] in FOLDERS:
+                continue
+            for name in names:
+                if name not in dir(thing):
+                    found.append(said[0])
+                    break
+                thing = getattr(thing, name)
+    return found
+
+
+# Folders and files that are no namespaces, which docstrings name.
+SOURCE = Path(sm.__file__).parent
+FOLDERS = {path.stem for path in SOURCE.iterdir()} - set(dir(sm))
+# It says of any name where it has moved to.
+MOVES = SOURCE / "__init__.py"
+
+
+def test_texts_name_what_is_there() -> None:
+    """Errors and docstrings: no name that has moved, none that never was."""
+    wrong = {
+        str(path.relative_to(SOURCE)): found
+        for path in SOURCE.rglob("*.py")
+        if path != MOVES and (found := misnamed(path.read_text("utf-8")))
+    }
+    assert wrong == {}
+    assert misnamed('f"derive from selfmotion.{kind} now"') == ["derive from selfmotion.{…}"]
+    assert misnamed('f"selfmotion.Cost, {x} or sm.costs.Cost, sm.costs.Coat"') == [
+        "selfmotion.Cost",
+        "sm.costs.Coat",
+    ]
+
+
+def test_classes_to_derive_from_are_where_errors_say() -> None:
+    for kind in (
+        sm.costs.Cost,
+        sm.constraints.Constraint,
+        sm.paths.Path,
+        sm.motion.NullMotion,
+        sm.obstacles.Obstacle,
+        sm.certificate.Requirement,
+    ):
+        _, space, name = public_name(kind).split(".")
+        assert getattr(getattr(sm, space), name) is kind
 
 
 def test_what_has_moved_is_found_for_one_version_more() -> None:

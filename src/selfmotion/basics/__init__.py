@@ -17,6 +17,7 @@ from selfmotion.basics.arrays import (
     is_number as is_number,
     per_joint as per_joint,
     plain_numbers as plain_numbers,
+    public_name as public_name,
     random_numbers as random_numbers,
     read_only as read_only,
     shown as shown,
@@ -63,6 +64,7 @@ from selfmotion.basics.jit import (
     inlined as inlined,
     kernel as kernel,
     seconds_of_kernels as seconds_of_kernels,
+    seconds_waited_for_kernels as seconds_waited_for_kernels,
 )
 from selfmotion.basics.progress import (
     Counts as Counts,

@@ -213,6 +213,22 @@ def as_choice(
     return value
 
 
+# In which namespace users find the classes that they derive their own from.
+_NAMESPACES = {
+    "Constraint": "constraints",
+    "Cost": "costs",
+    "NullMotion": "motion",
+    "Obstacle": "obstacles",
+    "Path": "paths",
+    "Requirement": "certificate",
+}
+
+
+def public_name(kind: type) -> str:
+    """Return what users call a class from which they derive: ``selfmotion.costs.Cost``."""
+    return ".".join(("selfmotion", _NAMESPACES[kind.__name__], kind.__name__))
+
+
 def as_several(items: Any, name: str, kind: type[_Kind]) -> tuple[_Kind, ...]:
     """Return one item or several of a kind as a tuple; ProblemError for anything else."""
     listed = (items,) if isinstance(items, kind) else items
@@ -220,15 +236,23 @@ def as_several(items: Any, name: str, kind: type[_Kind]) -> tuple[_Kind, ...]:
         raise ProblemError(f"{name} are {shown(items)}, expected a list of {name}")
     for item in listed:
         if not isinstance(item, kind):
-            remedy = (
-                f"is no {kind.__name__}; derive a class of your own from "
-                f"selfmotion.{kind.__name__}, which says what it has to give"
-                if isinstance(kind, ABCMeta)
-                else f"expected a {kind.__name__}"
-            )
-            parted = " " if isinstance(kind, ABCMeta) else ", "
-            raise ProblemError(f"{name}: {shown(item)}{parted}{remedy}")
+            raise ProblemError(f"{name}: {shown(item)}{_remedy(item, kind)}")
     return tuple(listed)
+
+
+def _remedy(item: Any, kind: type) -> str:
+    """Say what to give in place of an item that is not of its kind."""
+    if isinstance(item, type) and issubclass(item, kind):
+        return f", expected a {kind.__name__}: {item.__name__}(…)"
+    if not isinstance(kind, ABCMeta):
+        return f", expected a {kind.__name__}"
+    derive = f"derive a class of your own from {public_name(kind)}, which says what it has to give"
+    if kind.__name__ == "Cost" and callable(item):
+        return (
+            f" is no Cost; give selfmotion.costs.FunctionCost(f) of a function f(qd, q, t), or "
+            f"{derive}"
+        )
+    return f" is no {kind.__name__}; {derive}"
 
 
 def random_numbers(rng: Any) -> np.random.Generator:

@@ -21,23 +21,29 @@ _Function = TypeVar("_Function", bound=Callable[..., Any])
 
 
 class _Spent:
-    """Processor time that compiling and loading took; within one another it counts once."""
+    """Time that compiling and loading took by a clock; within one another it counts once."""
 
-    def __init__(self) -> None:
-        self.seconds, self._depth, self._began = 0.0, 0, 0.0
+    def __init__(self, clock: Callable[[], float]) -> None:
+        self._clock = clock
+        self._ended, self._depth, self._began = 0.0, 0, 0.0
+
+    @property
+    def seconds(self) -> float:
+        """What it took so far [s], with what goes on."""
+        return self._ended + (self._clock() - self._began if self._depth else 0.0)
 
     def __enter__(self) -> None:
         if not self._depth:
-            self._began = time.process_time()
+            self._began = self._clock()
         self._depth += 1
 
     def __exit__(self, *_: object) -> None:
         self._depth -= 1
         if not self._depth:
-            self.seconds += time.process_time() - self._began
+            self._ended += self._clock() - self._began
 
 
-_spent = _Spent()
+_spent, _waited = _Spent(time.process_time), _Spent(time.monotonic)
 
 
 def seconds_of_kernels() -> float:
@@ -48,6 +54,15 @@ def seconds_of_kernels() -> float:
     return _spent.seconds
 
 
+def seconds_waited_for_kernels() -> float:
+    """Return how long [s] this process has waited until kernels were compiled and loaded.
+
+    By the clock on the wall, with the time in which another process compiled them. Who says how
+    long work will take leaves that out.
+    """
+    return _waited.seconds
+
+
 class _Announcement(event.Listener):  # type: ignore[misc]  # numba ships no types
     """Says on the terminal why the first call takes seconds."""
 
@@ -56,10 +71,14 @@ class _Announcement(event.Listener):  # type: ignore[misc]  # numba ships no typ
 
     def on_start(self, event: Any) -> None:
         _spent.__enter__()
+        _waited.__enter__()
         ours = event.data["dispatcher"].py_func.__module__.startswith("selfmotion")
         if ours and not self._said:
             self._said = True
-            sys.stderr.write("selfmotion: compiling numerical kernels, once per machine …\n")
+            sys.stderr.write(
+                "selfmotion: compiling numerical kernels for this kind of problem, once per "
+                "machine (`selfmotion warm-up` compiles all) …\n"
+            )
             sys.stderr.flush()
             other = companion(FIRST_WORKS)
             if other is not None:
@@ -68,6 +87,7 @@ class _Announcement(event.Listener):  # type: ignore[misc]  # numba ships no typ
 
     def on_end(self, event: Any) -> None:
         _spent.__exit__()
+        _waited.__exit__()
 
 
 def kernel(function: _Function) -> _Function:
@@ -106,7 +126,7 @@ def _forgive(compiled: Any) -> None:
             return None
 
     def load_or_compile(*given: Any) -> Any:
-        with _spent:
+        with _spent, _waited:
             return load_in_turn(*given)
 
     def load_in_turn(*given: Any) -> Any:

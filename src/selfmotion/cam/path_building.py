@@ -11,6 +11,7 @@ from selfmotion.basics import TURN, Array, FileFormatError, PathError, as_choice
 from selfmotion.cam.path_rows import DRAWING, PoseRows, some_rows
 from selfmotion.path import (
     ORIENTATIONS,
+    TURN_NOTE,
     Feed,
     Joined,
     Path,
@@ -95,7 +96,8 @@ def path_of_rows(path: FilePath, rows: PoseRows, asked: Pacing) -> Path:
     # Splines refuse times that differ, but by less than they can divide by.
     except (PathError, ValueError) as error:
         raise FileFormatError(f"{path}: {error}") from error
-    return found.noted((*rows.notes, *made.notes))
+    turned = (TURN_NOTE,) if rows.orientation == "normal" else ()
+    return found.noted((*rows.notes, *made.notes, *turned))
 
 
 def _check_corners(asked: Pacing) -> None:

@@ -13,7 +13,10 @@ from selfmotion.certificate.limits import (
     JointLimits as JointLimits,
     arm_limits as arm_limits,
 )
-from selfmotion.certificate.path_error import errors_between as errors_between
+from selfmotion.certificate.path_error import (
+    deviation_from as deviation_from,
+    errors_between as errors_between,
+)
 from selfmotion.certificate.quantity import (
     Column as Column,
     Quantity as Quantity,
@@ -35,6 +38,7 @@ from selfmotion.certificate.separation import Separation as Separation
 from selfmotion.certificate.verdict import (
     Certificate as Certificate,
     allowed_text as allowed_text,
+    apart_text as apart_text,
     first_of as first_of,
 )
 

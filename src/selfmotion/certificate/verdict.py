@@ -30,6 +30,11 @@ def allowed_text(tolerance: Tolerance) -> str:
     return f" ({tolerance.position:.2g} m and {tolerance.rotation:.2g} rad are allowed)"
 
 
+def apart_text(relaxed: bool) -> str:
+    """Return what a verdict adds where rows may leave the path, "" where none may."""
+    return ", apart from its tolerances, which are kept" if relaxed else ""
+
+
 def first_of(failures: Sequence[str]) -> str:
     """Return the first of what speaks against a motion, and how much more there is."""
     more = len(failures) - 1
@@ -158,8 +163,7 @@ class Certificate:
             return (
                 f"verified at all times ({', '.join(self.covers)}): at most "
                 f"{self.position_error.value:.1e} m and {self.rotation_error.value:.1e} rad off "
-                f"the path{' beyond its tolerances' if self.deviations else ''}"
-                f"{allowed_text(self.tolerance)}"
+                f"the path{apart_text(bool(self.deviations))}{allowed_text(self.tolerance)}"
                 f"{self._others_text}"
                 f"{self._besides}"
             )
@@ -177,7 +181,7 @@ class Certificate:
         rotation = max(one.value for _, one in self._errors)
         return (
             f"verified at all times: at most {position:.1e} m and {rotation:.1e} rad off the path"
-            f"{' beyond its tolerances' if self.deviations else ''}{allowed_text(self.tolerance)}"
+            f"{apart_text(bool(self.deviations))}{allowed_text(self.tolerance)}"
             f"{self._besides}"
         )
 

@@ -21,7 +21,7 @@ from rich.progress import (
 )
 
 import selfmotion as sm
-from selfmotion.basics import version
+from selfmotion.basics import seconds_waited_for_kernels, version
 from selfmotion.cli import tables
 from selfmotion.cli.summaries import in_shell
 from selfmotion.optimise import Iteration
@@ -109,7 +109,7 @@ class StageDisplay(Display):
         )
         self._stage = self._about = self._cost = ""
         self._done = self._total = 0
-        self._began = self._said = 0.0
+        self._began = self._said = self._waited = 0.0
         self._ended = threading.Event()
 
     def __enter__(self) -> Self:
@@ -135,6 +135,7 @@ class StageDisplay(Display):
         is_new = stage != self._stage
         if is_new:
             self._stage, self._cost, self._began = stage, "", time.monotonic()
+            self._waited = seconds_waited_for_kernels()
         self._about, self._done, self._total = quote + about, done, total
         if is_new and not self._console.is_terminal:
             self._print(self._line())
@@ -161,11 +162,15 @@ class StageDisplay(Display):
         return f"{words}{count}{self._about}{self._times()}{self._cost}"
 
     def _times(self) -> str:
-        """Return how long a stage has taken, and how long it will if as long as before."""
+        """Return how long a stage has taken, and how long it will if as long as before.
+
+        Kernels are compiled once, however many there are.
+        """
         spent = time.monotonic() - self._began
         left = 0.0
         if self._total > 1 and self._done > 1:
-            left = spent * (self._total - self._done + 1) / (self._done - 1)
+            working = max(spent - (seconds_waited_for_kernels() - self._waited), 0.0)
+            left = working * (self._total - self._done + 1) / (self._done - 1)
         if spent + left <= _WORTH_SAYING:
             return ""
         return f", {spent:.0f} s so far{f', about {left:.0f} s to go' if left else ''}"

@@ -14,8 +14,47 @@ from selfmotion.basics import Progress
 from selfmotion.certificate import Extreme, approaches
 from selfmotion.cli import options
 from selfmotion.cli.app import NOT_VERIFIED, VERIFIED, stages, terminal
+from selfmotion.documents import read_joint_limits
+from selfmotion.problem import KEPT, NO_OVERLAP
 
 _Near = Mapping[str, Extreme]
+
+
+def requirements(
+    robot: sm.RobotModel,
+    velocity: str | None,
+    acceleration: str | None,
+    joint_limits: Path | None,
+    obstacles: Path | None,
+    clearance: float,
+    srdf: Path | None,
+    *,
+    usual: bool = False,
+    apart: bool = False,
+) -> tuple[sm.certificate.Requirement, ...]:
+    """Return what a motion of others has to keep besides its path and the arm's own limits.
+
+    With what `plan` keeps `usual`ly, accelerations and jerks of the arm's maker, and the arm
+    `apart` from itself.
+    """
+    asked: list[sm.constraints.Constraint] = []
+    if usual:
+        makers = sm.constraints.JointAccelerationLimits, sm.constraints.JointJerkLimits
+        asked += [item for item in KEPT if isinstance(item, makers) and item.applies(robot)]
+    if velocity is not None:
+        most = options.one_or_each(velocity, "--velocity")
+        asked.append(sm.constraints.JointVelocityLimits(most))
+    if acceleration is not None:
+        most = options.one_or_each(acceleration, "--acceleration")
+        asked.append(sm.constraints.JointAccelerationLimits(most))
+    if joint_limits is not None:
+        asked += read_joint_limits(joint_limits, robot)
+    if obstacles is not None or clearance != 0.0 or srdf is not None:
+        bodies = () if obstacles is None else options.read_obstacles(obstacles)
+        asked.append(sm.constraints.Clearance(bodies, clearance, srdf))
+    elif apart and robot.urdf.has_collisions:
+        asked.append(NO_OVERLAP)
+    return tuple(item.requirement(robot) for item in asked)
 
 
 class Read(NamedTuple):
@@ -96,14 +135,14 @@ def of_plan(
     plan = sm.load_plan(file, progress=progress)
     if calibration is not None:
         problem = on_calibrated(plan.problem, calibration)
-        besides = options.requirements(problem.robot, *judged)
+        besides = requirements(problem.robot, *judged)
         found = problem.certify(
             plan.trajectory, within or plan.tolerance, plan.report.ending, besides, progress
         )
         tell_difference(problem.robot, plan.trajectory)
         asked = (*problem.requirements, *besides)
         return found, near(problem.robot, plan.trajectory, asked), problem.robot
-    besides = options.requirements(plan.robot, *judged)
+    besides = requirements(plan.robot, *judged)
     close = near(plan.robot, plan.trajectory, (*plan.requirements, *besides))
     if within is None and not any(judged):
         return plan.certificate, close, plan.robot
@@ -135,7 +174,7 @@ def of_problem(
     if calibration is not None:
         problem = on_calibrated(problem, calibration)
         tell_difference(problem.robot, motion)
-    besides = options.requirements(problem.robot, *judged)
+    besides = requirements(problem.robot, *judged)
     allowed, robot = within or job.tolerance, problem.robot
     certificate = problem.certify(motion, allowed, besides=besides, progress=progress)
     certificate = with_failure(certificate, elsewhere)

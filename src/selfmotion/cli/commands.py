@@ -153,11 +153,15 @@ def check(
     obstacles: options.ObstaclesOption = None,
     clearance: options.ClearanceOption = 0.0,
     srdf: options.SrdfOption = None,
+    no_collision: options.NoCollisionOption = False,
     tolerance: options.ToleranceOption = None,
     verbose: options.VerboseOption = False,
     as_json: options.JsonOption = False,
 ) -> None:
-    """Verify a motion by forward kinematics: a saved plan, or one made elsewhere."""
+    """Verify a motion by forward kinematics: a saved plan, or one made elsewhere.
+
+    One made elsewhere by what plan keeps: limits of the arm and of its maker, and self-collision.
+    """
     judged = velocity, acceleration, joint_limits, obstacles, clearance, srdf
     within = None if tolerance is None else sm.Tolerance(tolerance, tolerance)
     path = context.params["path"]
@@ -166,6 +170,7 @@ def check(
     own: dict[str, Any] = {name.replace("_", "-"): value for name, value in typed.items()}
     own |= {"task": task, "tool": tool, "reference": reference, "lock": lock or None}
     own |= {"argument": argument or None, "packages": packages or None}
+    own |= {"no-self-collision": no_collision or None}
     measured = {"calibration": calibration}
     if file.suffix in (jobs.PROGRAM, jobs.PARTS):
         given = (
@@ -208,7 +213,8 @@ def check(
             )
             motion, stated, program = checks.read(file, degrees, within, arm)
             motion = controllers.without_followers(motion, arm)
-            asked = options.requirements(arm, *judged)
+            # Accelerations of a program are the controller's.
+            asked = checks.requirements(arm, *judged, usual=program is None, apart=not no_collision)
             followed = documents.followed(path, context.params, arm)
             elsewhere = ""
             if program is not None:

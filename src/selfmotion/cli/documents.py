@@ -1,7 +1,9 @@
 """What the options of ``selfmotion plan`` say, as the table of a problem file."""
 
+import re
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
@@ -124,6 +126,21 @@ class Shell:
                 table["robot"][name] = getattr(self, name)
         return table
 
+    @contextmanager
+    def named(self) -> Iterator[None]:
+        """Give errors the option, or the file and its entry, in place of a table's key."""
+        try:
+            yield
+        except sm.errors.FileFormatError as error:
+            found = _ENTRY.sub(lambda entry: f"{self.obstacles}: {entry[1]}", str(error))
+            if found == str(error):
+                raise
+            raise sm.errors.FileFormatError(found) from error
+        except sm.errors.RobotError as error:
+            if self.start is None or not str(error).startswith("configuration "):
+                raise
+            raise sm.errors.RobotError(f"--start: {error}") from error
+
     def _start(self, warm_start: sm.Plan | None) -> Any:
         if self.start in _STARTS:
             return self.start
@@ -189,6 +206,8 @@ class Shell:
         return found
 
 
+# What a table that is made of options calls an entry of --obstacles.
+_ENTRY = re.compile(r"constraints\[\d+\]\.obstacles(\[\d+\])")
 # Options of the shell that say how --path is read; those of `plan` and of `check`.
 OF_PATH = (
     *("feed", "duration", "jump", "seam", "columns", "flip_normals", "standoff", "rotary"),
@@ -249,8 +268,10 @@ def read(
             f"--path {given}"
         )
     if Path(given).suffix not in SUFFIXES:
-        document = Shell.of(context).document(given, warm_start)
-        return _with_settings(document, None, settings, allow_code)
+        shell = Shell.of(context)
+        document = shell.document(given, warm_start)
+        with shell.named():
+            return _with_settings(document, None, settings, allow_code)
     typed = _typed(context)
     if typed:
         raise sm.errors.ProblemError(

@@ -279,7 +279,11 @@ ObstaclesOption = Annotated[
     typer.Option(help=r"Obstacles: a list of shapes in JSON, or TOML with \[\[obstacles]]."),
 ]
 ClearanceOption = Annotated[
-    float, typer.Option(help="Distance to keep from obstacles and of links from each other (m).")
+    float,
+    typer.Option(
+        help="Distance to keep from obstacles and of links from each other (m); at 0 they may not "
+        "overlap."
+    ),
 ]
 SrdfOption = Annotated[
     Path | None, typer.Option(help="SRDF: its disabled pairs of links are not checked.")
@@ -421,31 +425,6 @@ def refuse(given: dict[str, Any], file: Path | str, whose: str) -> None:
     for name, value in given.items():
         if value is not None:
             raise sm.errors.ProblemError(f"{file}: --{name} is {whose} own: leave it out")
-
-
-def requirements(
-    robot: sm.RobotModel,
-    velocity: str | None,
-    acceleration: str | None,
-    joint_limits: Path | None,
-    obstacles: Path | None,
-    clearance: float,
-    srdf: Path | None,
-) -> tuple[sm.certificate.Requirement, ...]:
-    """Return what a motion of others has to keep besides its path and the arm's own limits."""
-    asked: list[sm.constraints.Constraint] = []
-    if velocity is not None:
-        asked.append(sm.constraints.JointVelocityLimits(one_or_each(velocity, "--velocity")))
-    if acceleration is not None:
-        asked.append(
-            sm.constraints.JointAccelerationLimits(one_or_each(acceleration, "--acceleration"))
-        )
-    if joint_limits is not None:
-        asked += documents.read_joint_limits(joint_limits, robot)
-    if obstacles is not None or clearance != 0.0 or srdf is not None:
-        bodies = () if obstacles is None else read_obstacles(obstacles)
-        asked.append(sm.constraints.Clearance(bodies, clearance, srdf))
-    return tuple(item.requirement(robot) for item in asked)
 
 
 def one_or_each(text: str, option: str) -> list[float] | float:

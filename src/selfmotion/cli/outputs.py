@@ -12,7 +12,7 @@ from rich.console import Console
 import selfmotion as sm
 from selfmotion import controllers
 from selfmotion.certificate import Extreme
-from selfmotion.cli import summaries, tables
+from selfmotion.cli import reread, summaries, tables
 from selfmotion.cli.app import NOT_VERIFIED, VERIFIED, stages, terminal
 from selfmotion.task import SE3, exp3
 
@@ -91,9 +91,18 @@ _TEXT, _LARGE = (".yaml", ".yml", ".json"), 10_000_000
 
 
 def write(
-    result: sm.Plan, out: list[Path], html: Path | None, console: Console, *, quiet: bool = False
-) -> None:
+    result: sm.Plan,
+    out: list[Path],
+    html: Path | None,
+    console: Console,
+    *,
+    quiet: bool = False,
+    whole: bool = False,
+) -> bool:
     """Write all files that can be written, and tell; the plan itself in any case.
+
+    Motions are read back, as `export` does; returns whether all are still those of the plan. The
+    `whole` verdicts on them, or their summaries.
 
     Raises
     ------
@@ -115,13 +124,39 @@ def write(
         rescued = Path(tempfile.mkdtemp(prefix="selfmotion-")) / "plan.npz"
         result.save(rescued)
         written.append(rescued)
-    for file in written:
-        if not quiet:
-            console.print(f"wrote {file}", markup=False, soft_wrap=True)
-            tell_large(file, console)
+    sound = _tell_written(result, written, console, quiet=quiet, whole=whole)
     if faults:
         kept = next(file for file in written if file.suffix == ".npz")
         raise sm.errors.FileFormatError(f"{'; '.join(faults)}; the plan is in {kept}")
+    return sound
+
+
+def _tell_written(
+    result: sm.Plan, files: Sequence[Path], console: Console, *, quiet: bool, whole: bool
+) -> bool:
+    """Tell which files were written, and what motions in them are when they are read back."""
+    sampled = [
+        file for file in files if is_motion(file) and not reread.is_program(file, None, None)
+    ]
+    messages = [file for file in sampled if reread.is_message(file, None)]
+    coarsest = controllers.coarsest_rate(result) if messages else None
+    sound = True
+    for file in files:
+        verdict = ""
+        if is_motion(file):
+            kept, verdict = reread.read_back(result, file, None, None, None, whole=whole)
+            sound &= kept
+        if not quiet:
+            text = f"wrote {file}{verdict and '; '}{verdict}"
+            console.print(text, markup=False, soft_wrap=True)
+            tell_large(file, console)
+    if sampled and not quiet:
+        rate = coarsest if messages == sampled else None
+        told = [reread.told_coarsest(coarsest)] if coarsest is not None else []
+        told.append(reread.told_straight(controllers.linear_miss(result, rate)))
+        for text in told:
+            console.print(text, markup=False, soft_wrap=True)
+    return sound
 
 
 def tell(remarks: Sequence[str]) -> None:
@@ -148,9 +183,10 @@ def finish(
         terminal.print_json(data=data)
     else:
         show(result, verbose)
-    write(result, out, html, terminal, quiet=as_json)
-    whole = not (left_out(result) and any(map(is_motion, out)))
-    raise typer.Exit(VERIFIED if result.certificate.verified and whole else NOT_VERIFIED)
+    sound = write(result, out, html, terminal, quiet=as_json, whole=verbose)
+    sound &= result.certificate.verified
+    sound &= not (left_out(result) and any(map(is_motion, out)))
+    raise typer.Exit(VERIFIED if sound else NOT_VERIFIED)
 
 
 def show(result: sm.Plan, verbose: bool) -> None:

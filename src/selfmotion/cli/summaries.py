@@ -65,8 +65,9 @@ def in_shell(message: str) -> str:
 _MORE = "--verbose"
 # How a message begins to say what a look at single poses has found.
 _HELP = "what would help: "
-# A saving of less than this share of the cost is not worth a line.
-_WORTH = 0.01
+# A saving of less than this share of the cost is not worth a line; larger ones are told as those of
+# a step that saves some 1 %.
+_WORTH = 0.009
 # After these there is nothing to do, unless the message says more than they do.
 _ENDED_WELL = (Status.CONVERGED, Status.PRECISION)
 
@@ -93,12 +94,17 @@ def show_plan(plan: Plan, console: Console) -> None:
         _print(console, metres_told(plan))
     said = report.status in _ENDED_WELL and report.message == report.status.message
     if certificate.verified and not said:
-        _print(console, f"{report.status.value}: {in_shell(report.message)}")
+        told = in_shell(report.message).removeprefix(f"{report.status.value}: ")
+        _print(console, f"{report.status.value}: {told}")
     if report.active and report.cost:
         first = report.active[0]
         share = first.saving / abs(report.cost)
         if share >= _WORTH:
-            _print(console, f"{first.easing} would lower the cost by about {100.0 * share:.2g} %")
+            _print(
+                console,
+                f"{first.easing} would lower the cost by about {100.0 * share:.2g} % (a slope: "
+                f"more of it saves less than in proportion)",
+            )
 
 
 def metres_told(plan: Plan) -> str:

@@ -181,6 +181,8 @@ def show_comparison(plans: Mapping[str, Plan], console: Console) -> None:
     for number, row in enumerate(found.cells(), start=1):
         table.add_row(*row, end_section=number == len(found.costs))
     console.print(table)
+    if found.remark:
+        console.print(found.remark, markup=False, soft_wrap=not console.is_terminal)
     for line in found.refusals():
         console.print(line, style="bold red", markup=False, soft_wrap=not console.is_terminal)
 
@@ -315,7 +317,7 @@ def _active_constraints(report: Report) -> Table:
     """Return what each active constraint costs, by its multipliers."""
     table = _table("active constraints")
     table.add_column("if you allow")
-    table.add_column("the cost falls by about", justify="right")
+    table.add_column("the cost falls at first by about", justify="right")
     table.add_column("active at")
     for item in report.active:
         share = f"{100.0 * item.saving / abs(report.cost):.3g} %" if report.cost else ""

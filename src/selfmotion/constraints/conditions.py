@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -144,10 +145,12 @@ def easing_of(bound: BoundConstraint, column: int) -> tuple[float, str]:
     """Return how much larger h may be to ask for a little less, and what that means in words.
 
     What a constraint's own `easing(column)` says, where it has one: ``(0.02, "2 % more speed for
-    joint 'elbow'")``. Columns with the same words are eased together.
+    joint 'elbow'")``. Columns with the same words are eased together. Words that begin with a
+    number are told with a smaller one where the cost would fall by more than a first derivative
+    knows.
     """
     own = getattr(bound, "easing", None)
-    return (0.01, f"{bound.name} eased by 0.01") if own is None else own(column)
+    return (0.01, f"0.01 more of {bound.name}") if own is None else own(column)
 
 
 def motion_of_order(samples: Samples, order: int) -> Array:
@@ -282,6 +285,8 @@ def penalty(constraints: Sequence[BoundConstraint], samples: Samples) -> float:
 # A condition is active where its multiplier is above this share of its largest one: interior points
 # leave a little everywhere.
 _ACTIVE = 1e-3
+# How the words of an easing begin: with its size.
+_SIZE = re.compile(r"\d+(\.\d+)?")
 
 
 @dataclass(frozen=True)
@@ -296,7 +301,8 @@ class ActiveConstraint:
         A small relaxation of it in words, with the joint or the pair.
     saving : float
         What that relaxation would take off F, to first order: the sum of the Lagrange multipliers
-        times its amount.
+        times its amount. A larger relaxation saves less than in proportion; the amount is so small
+        that this is some hundredth of F at most.
     spans : tuple of (float, float)
         First and last time [s] of each stretch on which it is active.
     """
@@ -327,11 +333,12 @@ class Multipliers(NamedTuple):
 
 
 def active_of(
-    each: Sequence[Multipliers], span: Array, least: float
+    each: Sequence[Multipliers], span: Array, least: float, most: float = np.inf
 ) -> tuple[ActiveConstraint, ...]:
     """Return what is active, what saves most first; what would save less than `least` is left out.
 
-    `span` (2,) is when the motion begins and ends [s].
+    `span` (2,) is when the motion begins and ends [s]. What would save more than `most` is eased
+    by less: so far a first derivative tells nothing.
     """
     found: dict[tuple[str, str], tuple[float, Array, Array, Array]] = {}
     for item, signed, times, used in each:
@@ -351,8 +358,18 @@ def active_of(
         if saving >= least:
             active = (at if at.any() else multiplier) > _ACTIVE * multiplier.max()
             spans = _spans(active if active.any() else multiplier == multiplier.max(), times, span)
-            kept.append(ActiveConstraint(name, words, saving, spans))
-    return tuple(sorted(kept, key=lambda item: -item.saving))
+            kept.append((saving, ActiveConstraint(name, *_eased(words, saving, most), spans)))
+    return tuple(item for _, item in sorted(kept, key=lambda item: -item[0]))
+
+
+def _eased(words: str, saving: float, most: float) -> tuple[str, float]:
+    """Return an easing in words and its saving, by so much less that it saves `most` at most."""
+    size = _SIZE.match(words)
+    if size is None or saving <= most:
+        return words, saving
+    whole = float(size[0])
+    told = f"{whole * most / saving:.2g}"
+    return told + words[size.end() :], saving * float(told) / whole
 
 
 def _spans(active: Flags, times: Array, span: Array) -> tuple[tuple[float, float], ...]:

@@ -39,6 +39,7 @@ from selfmotion.controllers.program_settings import (
     read_program_settings as read_program_settings,
 )
 from selfmotion.controllers.samples import (
+    LinearMiss as LinearMiss,
     coarsest_rate as coarsest_rate,
     linear_miss as linear_miss,
     moving_ends as moving_ends,

@@ -21,6 +21,8 @@ _DIGITS = 9
 _FEWEST = 4
 # Where between two samples straight lines are compared with the motion.
 _BETWEEN = (0.25, 0.5, 0.75)
+# A rate that does not keep the tolerance is raised at least so far for the next trial.
+_FASTER = 1.01
 # Cubics this near to a motion [rad or m] are as good as it; intervals are halved so often for that.
 _AS_GOOD_AS, _MOST_HALVINGS = 1e-8, 12
 
@@ -89,13 +91,14 @@ class LinearMiss(NamedTuple):
     position, rotation : float
         Of the tool in its reference, or of another frame that follows a path, where it is farthest
         off [m, rad].
-    rate : float
-        Samples per second at which it would stay within the plan's tolerance.
+    rate : float or None
+        Samples per second at which it would stay within the plan's tolerance; None where files
+        have no so many samples.
     """
 
     position: float
     rotation: float
-    rate: float
+    rate: float | None
 
 
 def linear_miss(plan: Plan, rate: float | None = None) -> LinearMiss:
@@ -106,9 +109,16 @@ def linear_miss(plan: Plan, rate: float | None = None) -> LinearMiss:
     ProblemError
         The rate is not positive, or gives no two samples.
     """
+    misses, _ = _misses(plan, rate)
+    position, rotation = misses.max(axis=0).tolist()
+    return LinearMiss(position, rotation, _rate_that_keeps(plan))
+
+
+def _misses(plan: Plan, rate: float | None) -> tuple[Array, Array]:
+    """Return by how much straight lines between samples leave a motion, (K, 2), and how long."""
     motion, chains = plan.trajectory, [item.chain for item in plan.problem.follows.items]
     samples = MotionSamples.of(motion, rate)
-    spans, tolerance = np.diff(samples.t), plan.tolerance
+    spans = np.diff(samples.t)
     misses = np.zeros((len(spans), 2))
     for share in _BETWEEN:
         t = np.minimum(motion.t[0] + samples.t[:-1] + share * spans, motion.t[-1])
@@ -120,11 +130,35 @@ def linear_miss(plan: Plan, rate: float | None = None) -> LinearMiss:
             half = np.linalg.norm(turned - facing, axis=(1, 2)) / np.sqrt(8.0)
             angle = 2.0 * np.arcsin(np.minimum(half, 1.0))
             misses = np.maximum(misses, np.stack([far, angle], axis=1))
-    # The miss of a line over a span h is that of a parabola: it grows with h².
-    share = (misses / [tolerance.position, tolerance.rotation]).max(axis=1)
-    needed = float((np.sqrt(share) / spans).max())
-    position, rotation = misses.max(axis=0).tolist()
-    return LinearMiss(position, rotation, float(np.ceil(needed)))
+    return misses, spans
+
+
+def _rate_that_keeps(plan: Plan) -> float | None:
+    """Return a whole rate [Hz] at which the miss is within the tolerance, and hardly a lower one.
+
+    It does not depend on the rate that a file has, and is tried before it is named. None where it
+    takes more samples than files have.
+    """
+    tolerance, duration = plan.tolerance, plan.trajectory.duration
+    lowest = float(np.ceil(1.0 / duration))
+
+    def needed(rate: float | None) -> tuple[float, bool]:
+        misses, spans = _misses(plan, rate)
+        share = (misses / [tolerance.position, tolerance.rotation]).max(axis=1)
+        # The miss of a line over a span h is that of a parabola: it grows with h².
+        found = float(np.ceil((np.sqrt(share) / spans).max()))
+        return max(found, lowest), bool(share.max() <= 1.0)
+
+    # The samples of the plan itself lie too far apart for more than a first guess.
+    rate, _ = needed(None)
+    if rate * duration <= MOST_SAMPLES:
+        rate = needed(rate)[0]
+    while rate * duration <= MOST_SAMPLES:
+        better, kept = needed(rate)
+        if kept:
+            return rate
+        rate = max(better, float(np.ceil(_FASTER * rate)))
+    return None
 
 
 def coarsest_rate(plan: Plan) -> float | None:
@@ -134,7 +168,10 @@ def coarsest_rate(plan: Plan) -> float | None:
     where the samples of the plan itself are no more, or nothing coarser is verified.
     """
     motion = plan.trajectory
-    rate = max(linear_miss(plan).rate, float(np.ceil(_FEWEST / motion.duration)))
+    needed = _rate_that_keeps(plan)
+    if needed is None:
+        return None
+    rate = max(needed, float(np.ceil(_FEWEST / motion.duration)))
     if rate * motion.duration >= len(motion.t) - 1:
         return None
     samples = MotionSamples.of(motion, rate)

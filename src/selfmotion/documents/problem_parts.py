@@ -9,7 +9,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from selfmotion.basics import Array, FileFormatError, ProblemError, Saved, in_si, restore
+from selfmotion.basics import (
+    Array,
+    FileFormatError,
+    ProblemError,
+    Saved,
+    in_si,
+    public_name,
+    restore,
+)
 from selfmotion.cam import read_path
 from selfmotion.collision import Mesh, Obstacle, obstacle_from_dict
 from selfmotion.constraints import Constraint
@@ -79,7 +87,7 @@ def name_kinds(
             elif value is not None:
                 raise FileFormatError(
                     f"{where}.kind: '{item['kind']}' is {value!r}, expected a class derived from "
-                    f"selfmotion.{family.__name__}" + (" or a function" * (section == "costs"))
+                    f"{public_name(family)}" + (" or a function" * (section == "costs"))
                 )
             if isinstance(item.get("obstacles"), list):
                 _name_shapes(item["obstacles"], where, folder, allowed)

@@ -14,6 +14,7 @@ from selfmotion.basics import (
     Saved,
     as_path,
     is_file,
+    public_name,
     shown,
     write_document,
 )
@@ -250,7 +251,7 @@ def _described(value: Saved) -> dict[str, Any]:
         family = next(base for base in cls.__mro__ if Saved in base.__bases__)
         raise ProblemError(
             f"{cls.__name__} '{getattr(value, 'name', '')}' holds a function, which a file cannot "
-            f"carry; derive a class from selfmotion.{family.__name__}"
+            f"carry; derive a class from {public_name(family)}"
         )
     if not cls.__module__.startswith("selfmotion."):
         if cls.__module__ == "__main__":

@@ -56,7 +56,7 @@ class Status(Enum):
 
 
 _MESSAGES = {
-    Status.CONVERGED: "the predicted decrease fell below the tolerance",
+    Status.CONVERGED: "converged: a further step would lower the cost by less than the tolerance",
     Status.PRECISION: "no step along the search direction decreases the cost any more: converged "
     "to the accuracy of its evaluation",
     Status.MAX_ITERATIONS: "the limit on iterations was reached; raise max_iterations to go on",

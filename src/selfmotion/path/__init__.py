@@ -40,6 +40,7 @@ from selfmotion.path.waypoints import Waypoints as Waypoints
 from selfmotion.path.weave import Weave as Weave
 from selfmotion.path.written_poses import (
     ORIENTATIONS as ORIENTATIONS,
+    TURN_NOTE as TURN_NOTE,
     from_normal as from_normal,
     pose_of as pose_of,
 )

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Self
+from typing import Any, NamedTuple, Self, overload
 
 import numpy as np
 import numpy.typing as npt
@@ -139,6 +139,10 @@ class Path(Saved, ABC, family="path"):
         PathError
             A time is outside [0, duration].
         """
+        return self.evaluate(self._given_times(t)[0])
+
+    def _given_times(self, t: npt.ArrayLike) -> tuple[Array, bool]:
+        """Return times (K,) within [0, duration], and whether `t` is a single one."""
         given = plain_numbers(t)
         if given is None or given.ndim > 1:
             raise PathError(f"t is {shown(t)}, expected times [s]")
@@ -148,7 +152,7 @@ class Path(Saved, ABC, family="path"):
             raise PathError(
                 f"{_said(times)} s is outside the path, which lasts from 0 to {self.duration:.6g} s"
             )
-        return self.evaluate(np.clip(times, 0.0, self.duration))
+        return np.clip(times, 0.0, self.duration), given.ndim == 0
 
     def noted(self, notes: Iterable[str]) -> Path:
         """Give the path notes, unless there are none; return it."""
@@ -168,15 +172,34 @@ class Path(Saved, ABC, family="path"):
 
         return Joined([self, other]) if isinstance(other, Path) else NotImplemented
 
-    def pose(self, t: float) -> SE3:
-        """Return the tool's pose at time `t` [s]."""
-        samples = self.samples(t)
-        return SE3(samples.rotation[0], samples.translation[0])
+    @overload
+    def pose(self, t: float) -> SE3: ...
 
-    def twist(self, t: float) -> Array:
-        """Return [v, ω] at time `t` [s], (6,) in [m/s, rad/s]."""
-        twist: Array = self.samples(t).twist[0]
-        return twist
+    @overload
+    def pose(self, t: Array | Sequence[float]) -> list[SE3]: ...
+
+    def pose(self, t: npt.ArrayLike) -> SE3 | list[SE3]:
+        """Return the tool's pose at time `t` [s]; at times (K,) a list of K.
+
+        Raises
+        ------
+        PathError
+            A time is outside [0, duration].
+        """
+        samples = self.samples(t)
+        poses = [SE3(*item) for item in zip(samples.rotation, samples.translation, strict=True)]
+        return poses[0] if np.ndim(t) == 0 else poses
+
+    def twist(self, t: npt.ArrayLike) -> Array:
+        """Return [v, ω] at time `t` [s], (6,) in [m/s, rad/s]; at times (K,) (K, 6).
+
+        Raises
+        ------
+        PathError
+            A time is outside [0, duration].
+        """
+        twists: Array = self.samples(t).twist
+        return twists[0] if np.ndim(t) == 0 else twists
 
 
 class _Derived(Path):

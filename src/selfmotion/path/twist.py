@@ -152,11 +152,11 @@ class TwistPath(Path, kind="twist"):
 
         return quaternions
 
-    def twist(self, t: float) -> Array:
+    def twist(self, t: npt.ArrayLike) -> Array:
         """See `Path.twist`; without the pose, which takes most of the time."""
-        if not 0.0 <= t <= self.duration:
-            return super().twist(t)
-        return np.asarray(self._twist(np.array([t]))[0])
+        times, single = self._given_times(t)
+        twists = self._twist(times)
+        return twists[0] if single else twists
 
     def _local(self, t: Array) -> tuple[npt.NDArray[np.intp], Array]:
         k = np.clip(np.searchsorted(self._breaks, t, side="right") - 1, 0, len(self._breaks) - 2)

@@ -25,6 +25,14 @@ def from_quaternion(values: Array) -> Array:
     return np.asarray(Quaternion(w, x, y, z).toRotationMatrix())
 
 
+# What is to be known of a path whose file says no more of orientations than the tool's z axis.
+TURN_NOTE = (
+    "nx,ny,nz say where the tool's z axis points, not how the tool is turned about it: that turn "
+    "is made up (the x axis near the world's x), and kept by task 'pose'; task 'pointing' leaves "
+    "it free"
+)
+
+
 def from_normal(normal: Array) -> Array:
     """Return a rotation (3, 3) whose z axis is along `normal`; its x axis lies near the world's x.
 

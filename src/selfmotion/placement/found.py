@@ -144,7 +144,7 @@ class Placement:
     def binds(self) -> tuple[str, ...]:
         """What keeps the cost from being lower: ends of the box, and active constraints."""
         active = [
-            f"{item.constraint}: {item.easing} would save {item.saving:.3g}"
+            f"{item.constraint}: {item.easing} would save about {item.saving:.3g}"
             for plan in self.plans
             for item in plan.report.active
         ]

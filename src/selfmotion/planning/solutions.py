@@ -27,6 +27,9 @@ from selfmotion.search import BESIDE
 ENDS_MET = 1e-8
 # What would save less than this share of the cost does not bind.
 _LEAST_SAVING = 1e-6
+# An easing that would save more than this share is told smaller: multipliers are slopes, which hold
+# very near only.
+_MOST_SAVING = 1e-2
 
 
 @dataclass(frozen=True, eq=False)
@@ -235,4 +238,5 @@ def _active(optimum: Optimum) -> tuple[ActiveConstraint, ...]:
             each.append(Multipliers(item, own, np.zeros(1), np.ones(own.shape, dtype=np.bool_)))
         else:
             each.append(next(inner))
-    return active_of(each, grid.t[[0, -1]], _LEAST_SAVING * abs(motion.cost))
+    least, most = (share * abs(motion.cost) for share in (_LEAST_SAVING, _MOST_SAVING))
+    return active_of(each, grid.t[[0, -1]], least, most)

@@ -67,8 +67,8 @@ _KINDS: dict[str, Any] = {
 _EXAMPLES = {
     "robot": "RobotModel (load_robot)",
     "path": "Path (Line, Circle, Waypoints, TwistPath, …, or a class derived from Path)",
-    "null_motion": "NullMotion (PolynomialNullMotion, BSplineNullMotion, or a class derived "
-    "from NullMotion)",
+    "null_motion": "NullMotion (selfmotion.motion.FreeNullMotion(), which is the default, "
+    "PolynomialNullMotion(), BSplineNullMotion(…), or a class derived from NullMotion)",
     "damping": "Damping or None",
     "clearance": "Clearance or None",
 }

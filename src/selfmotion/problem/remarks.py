@@ -18,6 +18,7 @@ from selfmotion.constraints import (
     ToolLimits,
 )
 from selfmotion.follow import Follows
+from selfmotion.path import TURN_NOTE
 from selfmotion.problem.fit import KEPT
 from selfmotion.robot import RobotModel, mounting_of
 
@@ -87,7 +88,9 @@ def remarks_on(
     """
     yield from robot.urdf.notes
     for followed in follows.items:
-        yield from followed.path.notes
+        task = followed.task
+        is_turned = task.angular and not task.tool_axes
+        yield from (note for note in followed.path.notes if is_turned or note != TURN_NOTE)
     for model, _ in envelope.bodies:
         for pair in model.overlapping:
             if pair.is_checked:
@@ -96,10 +99,12 @@ def remarks_on(
     for item in constraints:
         # What nobody asked for by name is not missed.
         if not item.applies(robot) and not any(item is usual for usual in KEPT):
-            option = "--acceleration, " * isinstance(item, JointAccelerationLimits)
+            option = "--acceleration, or " * isinstance(item, JointAccelerationLimits)
+            kind = type(item).__name__
             yield (
                 f"{item.requirement(robot).name}: none are known of {robot.name}, so none are "
-                f"kept; give {option}limit = …"
+                f'kept; give {option}in the file [[constraints]] kind = "{kind}", limit = …, in '
+                f"Python {kind}(…)"
             )
     bodies = [body for item in requirements for body in item.obstacles]
     yield from inside_remarks(robot, follows, bodies)

@@ -1,7 +1,8 @@
 """A plan as a picture for print: SVG, and plots by matplotlib."""
 
+import textwrap
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pinocchio as pin
@@ -133,6 +134,11 @@ def _hull(points: Array) -> Array:
 
 # The replay's plots as a matplotlib figure.
 
+# Letters of the title in a line, so that it is as wide as the figure at most.
+_TITLE = 120
+# What dashed lines are called.
+_LIMIT = "limit"
+
 
 def figure(plan: Plan) -> "Figure":
     """Return joint positions and velocities with limits, manipulability and path error over time.
@@ -151,34 +157,54 @@ def figure(plan: Plan) -> "Figure":
     robot = plan.robot
     shown, start = curves(plan, plan.trajectory), curves(plan, plan.initial_trajectory)
     drawing = Figure(figsize=(10, 6.5), layout="constrained")
-    drawing.suptitle(f"{robot.name}, {plan.task.value} task: {plan.certificate.verdict}")
+    title = f"{robot.name}, {plan.task.value} task: {plan.certificate.summary}"
+    drawing.suptitle("\n".join(textwrap.wrap(title, _TITLE)), fontsize="medium")
     (positions, velocities), (manipulability, errors) = drawing.subplots(2, 2, sharex=True)
     unit = robot.unit_of()
     _per_joint(positions, shown.t, shown.q, robot.joint_names, robot.lower, robot.upper)
     positions.set_ylabel(f"q [{unit}]")
-    positions.legend(fontsize="x-small", ncols=2)
     limit = robot.velocity_limit
     _per_joint(velocities, shown.t, shown.qd, robot.joint_names, -limit, limit)
     velocities.set_ylabel(f"q̇ [{unit.replace('rad', 'rad/s').replace('m', 'm/s')}]")
     manipulability.plot(shown.t, shown.manipulability, label="plan")
     manipulability.plot(start.t, start.manipulability, ":", label="minimum-norm")
     manipulability.set(ylabel="manipulability √det(JJᵀ)", ylim=(0, None), xlabel="t [s]")
-    manipulability.legend(fontsize="x-small")
     _errors(errors, shown, plan)
+    # Beside the curves, which they would cover.
+    joints = _of_joints(positions, velocities)
+    drawing.legend(*joints, loc="outside right center", fontsize="x-small")
+    for axes in (manipulability, errors):
+        axes.legend(
+            loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, fontsize="x-small", frameon=False
+        )
     return drawing
+
+
+def _of_joints(*several: "Axes") -> tuple[list[Any], list[str]]:
+    """Return the curves of a legend of joints and their limits, each once, and their names."""
+    found = {
+        label: handle
+        for axes in several
+        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)
+    }
+    # Limits come last, whichever joint has one in sight.
+    found |= {_LIMIT: found.pop(_LIMIT)} if _LIMIT in found else {}
+    return list(found.values()), list(found)
 
 
 def _per_joint(
     axes: "Axes", t: Array, values: Array, names: tuple[str, ...], low: Array, high: Array
 ) -> None:
     """Draw a curve per joint, and its limits where they are in sight."""
+    room = 0.06 * float(np.ptp(values)) or 1.0
+    bottom, top = float(values.min()) - room, float(values.max()) + room
     for k, name in enumerate(names):
         (line,) = axes.plot(t, values[:, k], label=name)
         for limit in (low[k], high[k]):
-            if np.isfinite(limit):
-                axes.axhline(limit, color=line.get_color(), linestyle="--", linewidth=0.8)
-    room = 0.06 * float(np.ptp(values)) or 1.0
-    axes.set_ylim(float(values.min()) - room, float(values.max()) + room)
+            if bottom <= limit <= top:
+                color = line.get_color()
+                axes.axhline(limit, color=color, linestyle="--", linewidth=0.8, label=_LIMIT)
+    axes.set_ylim(bottom, top)
 
 
 def _errors(axes: "Axes", shown: Curves, plan: Plan) -> None:

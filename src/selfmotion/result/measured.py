@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from selfmotion.basics import Array, ProblemError, read_only, shown
-from selfmotion.certificate import Quantity, QuantityWithinLimits, Requirement
+from selfmotion.certificate import Quantity, QuantityWithinLimits, Requirement, deviation_from
 from selfmotion.costs import Cost, PlacedLater, Samples
 from selfmotion.follow import Follows
 from selfmotion.motion import Sampling, Trajectory
@@ -86,7 +86,7 @@ def _shares(which: Array, count: int) -> Array:
 _ROOTS, _SHARES = np.polynomial.legendre.leggauss(5)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class NullSpaceVelocity:
     """The part of joint velocities that lies in the null space of the task's Jacobian.
 
@@ -105,13 +105,21 @@ class NullSpaceVelocity:
     coordinates: Array
     basis: Array
 
+    def __repr__(self) -> str:
+        """Return what it is of, and how large it is at most."""
+        several = "" if self.joints.ndim == 1 else f"{len(self.joints)} times, "
+        most = np.abs(self.joints).max(initial=0.0)
+        return (
+            f"NullSpaceVelocity({several}{self.joints.shape[-1]} joints, "
+            f"{self.coordinates.shape[-1]} coordinates, at most {most:.4g} rad/s or m/s)"
+        )
+
 
 def null_space_velocity(
     follows: Follows, motion: Trajectory, t: npt.ArrayLike
 ) -> NullSpaceVelocity:
     """Return the part of q̇ in the null space at times within the motion; see `Plan.null_motion`."""
-    if np.ndim(t) > 1:
-        raise ValueError(f"t has shape {np.shape(t)}, expected a time or times (K,) [s]")
+    _check_times(t)
     qd = motion(t, 1)
     if qd.ndim == 1:
         basis = null_space(follows.jacobian(motion(t)))
@@ -123,6 +131,20 @@ def null_space_velocity(
             basis[k] = basis[k] @ (left @ right)
     coordinates = np.einsum("...nr,...n->...r", basis, qd)
     return NullSpaceVelocity(np.einsum("...nr,...r->...n", basis, coordinates), coordinates, basis)
+
+
+def deviation_along(problem: Problem, motion: Trajectory, t: npt.ArrayLike) -> Array:
+    """Return how far the tool is off its path at times within the motion; see `Plan.deviation`."""
+    _check_times(t)
+    q, in_tool_axes = motion(t), any(item.in_tool_axes for item in problem.relaxations)
+    times = np.atleast_1d(np.asarray(t, dtype=np.float64))
+    found = deviation_from(problem.follows.items[0], times, np.atleast_2d(q), in_tool_axes)
+    return read_only(found if q.ndim == 2 else found[0])
+
+
+def _check_times(t: npt.ArrayLike) -> None:
+    if np.ndim(t) > 1:
+        raise ValueError(f"t has shape {np.shape(t)}, expected a time or times (K,) [s]")
 
 
 def cost_of(follows: Follows, motion: Trajectory, cost: Cost) -> float:

@@ -28,6 +28,7 @@ from selfmotion.certificate import (
     Requirement,
     Tolerance,
     allowed_text,
+    apart_text,
     approaches,
 )
 from selfmotion.collision import Obstacle
@@ -41,6 +42,7 @@ from selfmotion.result.measured import (
     NullSpaceVelocity,
     Reversals,
     cost_of,
+    deviation_along,
     limits_used,
     null_space_velocity,
 )
@@ -189,6 +191,33 @@ class Plan:
         """
         return null_space_velocity(self.problem.follows, self.trajectory, t)
 
+    def deviation(self, t: npt.ArrayLike) -> Array:
+        """Return how far the tool is off its path at `t`, as the certificate sees it.
+
+        The six rows of a `Relaxation`. x, y, z [m] are the tool's position minus the path's: in
+        world axes, or in those of the path's tool frame where a tolerance of positions is
+        (``axes="tool"``). rx, ry, rz [rad] are the rotation vector that takes the path's
+        orientation to the tool's, in the axes of the path's tool frame; of `POINTING` the shortest
+        one between the z axes. Rows that the task leaves free are zero. Poses are those of the
+        robot and of the path; nothing is of the joints by which the planner uses tolerances.
+
+        Parameters
+        ----------
+        t : float or (K,)
+            Times within the motion [s].
+
+        Returns
+        -------
+        (6,) or (K, 6)
+            Of the tool; where further frames follow paths (`also`), not of these.
+
+        Raises
+        ------
+        ValueError
+            A time is outside the motion, or times have another shape.
+        """
+        return deviation_along(self.problem, self.trajectory, t)
+
     def evaluate(self, cost: Cost) -> float:
         """Return ∫ G dt of any cost along the plan, also of one that it was not planned for.
 
@@ -291,10 +320,10 @@ def reached_text(plans: Sequence[Plan], tolerance: Tolerance) -> str:
     ]
     position = max(one.value for one, _ in found)
     rotation = max(other.value for _, other in found)
-    beyond = any(plan.certificate.deviations for plan in plans)
+    relaxed = any(plan.certificate.deviations for plan in plans)
     return (
         f"at most {position:.1e} m and {rotation:.1e} rad off the path"
-        f"{' beyond its tolerances' if beyond else ''}{allowed_text(tolerance)}"
+        f"{apart_text(relaxed)}{allowed_text(tolerance)}"
     )
 
 

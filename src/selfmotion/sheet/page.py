@@ -137,7 +137,7 @@ def _active(plan: Plan) -> Section:
         "Active constraints",
         ("", "if it were eased by", "the cost would fall by", "active"),
         tuple(rows),
-        "To first order, by the Lagrange multipliers.",
+        "To first order, by the Lagrange multipliers: more of it saves less than in proportion.",
     )
 
 
