@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.controllers import judged_program, program_miss, read_program
+from selfmotion.controllers import judged_program, judged_programs, program_miss, read_program
 from selfmotion.controllers.program_settings import axes_of
+from selfmotion.controllers.stretches import Miss, Misses, miss_between
 from selfmotion.controllers.tool_frames import ROUNDINGS, ToolFrames, confdata, status_and_turn
 from selfmotion.task import SE3, Quaternion, exp3
 from support.arms import PANDA_HOME, robot_named
@@ -430,3 +431,65 @@ def test_what_is_not_meant_is_refused(
     file.write_text(changed)
     with pytest.raises(sm.errors.FileFormatError, match=said):
         sm.files.read_motion(file, robot=alone.robot)
+
+
+@pytest.mark.parametrize("name", FILES)
+@pytest.mark.parametrize("arm", ["ur5", "ur10"])
+def test_out_of_and_into_a_singular_home_joints_are_written(
+    arm: str, name: str, tmp_path: Path
+) -> None:
+    """Home of these arms is straight up, elbow and wrist at zero: poses there say too little."""
+    robot = robot_named(arm)
+    home = np.array(sm.NAMED_ARMS[arm].home)
+    goals = home + np.random.default_rng(5).uniform(-1.2, 1.2, (3, 6))
+    for k, goal in enumerate(goals):
+        ends = (home, goal) if k % 2 == 0 else (goal, home)
+        move = sm.move(robot, *ends, clearance=None).require()
+        file = tmp_path / name
+        sm.files.write_motion(move, file, settings=settings(name))
+        assert not re.search(r"movel|MoveL|\bSPL\b|\bLIN\b", file.read_text())
+        _, stated, found = program_miss(move, file)
+        assert np.all(np.array(found.moves) <= np.array(stated.moves) + ROUNDED)
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_a_job_from_home_to_home_is_read_as_it_is_written(name: str, tmp_path: Path) -> None:
+    ur5 = robot_named("ur5")
+    home = np.array(sm.NAMED_ARMS["ur5"].home)
+    facing = np.diag([1.0, -1.0, -1.0])
+    begin, end = (SE3(facing, np.array([x, 0.1, 0.2])) for x in (0.4, 0.45))
+    seam = sm.Seam("weld", sm.paths.Feed(sm.paths.Line(begin, end, 1.0), 0.05), task="pointing")
+    given = {"start": home, "end": home, "branches": 1, "clearance": None}
+    job = sm.plan_job(ur5, [seam], **given).require()
+    file = tmp_path / name
+    sm.files.write_motion(job, file, settings=settings(name))
+    assert judged_program(file, job).verified
+    # The seam keeps its poses, which a shop can shift.
+    assert re.search(r"movel\(|MoveL |SLIN ", file.read_text())
+
+
+def test_what_is_not_read_as_it_is_written_is_written_by_joints(
+    alone: sm.Plan, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where poses are off when a file is read again, whatever for, no such file is left."""
+    read = judged_programs.program_miss
+    off = Misses(Miss(1.0, 0.0, 0.0), Miss(0.0, 0.0, 0.0))
+    asked = settings("a.mod")
+
+    def spoilt(plan: sm.Plan, file: Path) -> tuple[int, Misses, Misses]:
+        count, stated, found = read(plan, file)
+        return count, stated, off if "MoveL" in file.read_text() else found
+
+    monkeypatch.setattr(judged_programs, "program_miss", spoilt)
+    sm.files.write_motion(alone, tmp_path / "a.mod", settings=asked)
+    text = (tmp_path / "a.mod").read_text()
+    assert "MoveL" not in text
+    assert "read again" in text
+    assert list(tmp_path.iterdir()) == [tmp_path / "a.mod"]
+
+
+def test_joints_that_no_pose_gives_are_infinitely_far_off(abb: sm.RobotModel) -> None:
+    q = np.zeros((2, 6))
+    unknown = np.array([np.zeros(6), np.full(6, np.nan)])
+    assert miss_between(unknown, q, [abb.chain]).position == np.inf
+    assert miss_between(q, q, [abb.chain]).position == 0.0

@@ -75,6 +75,7 @@ class FeedSpan(PoseSpan):
         """
         if rests(self.piece.motion, self.first, self.last):
             return super().stretches(allowed)
+        self.check_regular(allowed)
         parts = [self._part(*ends) for ends in pairwise(self._stops)]
         gone = [part._gone for part in parts]
         why = "there is no feed where the tool hardly moves"

@@ -250,6 +250,14 @@ class ToolFrames:
         turned = np.hstack([rates[:, :3] @ turn.T, rates[:, 3:] @ turn.T])
         return self._rates(self._tool_along(q)[0], turned)
 
+    def regularity(self, q: Array) -> Array:
+        """Return how far the tool moves at least, of all motions of the arm of 1 rad, (K,).
+
+        The least singular value of the arm's Jacobian, in m and rad: 0 in a singular pose.
+        """
+        own = self._tool_along(q)[0][:, :, self.arm]
+        return np.asarray(np.linalg.svd(own, compute_uv=False)[:, -1])
+
     def speeds(self, q: Array, qd: Array) -> Array:
         """Return how fast the tool is in the work object at q and qd (K, n), (K,) [m/s]."""
         moved = np.einsum("kcn,kn->kc", self._tool_along(q)[0][:, :3], qd)
