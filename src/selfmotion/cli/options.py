@@ -32,8 +32,10 @@ ProblemArgument = Annotated[
 PathOption = Annotated[
     Path | None,
     typer.Option(
-        help="Poses: CSV with t,x,y,z and qw,qx,qy,qz or rx,ry,rz or roll,pitch,yaw or nx,ny,nz "
-        "(s, m, rad; x_mm, roll_deg, …), .npy, or ROS Path and PoseArray as .yaml and .json."
+        help="Poses: CSV with t,x,y,z and qw,qx,qy,qz or roll,pitch,yaw (about fixed axes) or "
+        "rx,ry,rz (rotation vector) or nx,ny,nz (s, m, rad; x_mm, roll_deg, …), .npy, or ROS Path "
+        "and PoseArray as .yaml and .json; G-code (.nc, .gcode, …), APT (.apt, .cls, …), or a "
+        "drawing (.dxf)."
     ),
 ]
 _FROM = "from the tool's pose at --start (by default a dexterous configuration)"
