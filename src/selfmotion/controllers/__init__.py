@@ -47,3 +47,6 @@ from selfmotion.controllers.samples import (
 from selfmotion.controllers.thinning import (
     by_targets as by_targets,
 )
+from selfmotion.controllers.tool_frames import (
+    turned_base as turned_base,
+)

@@ -13,6 +13,7 @@ from selfmotion.certificate import Tolerance
 from selfmotion.controllers.feed_stretches import FeedStretch
 from selfmotion.controllers.feed_thinning import FeedSpan
 from selfmotion.controllers.program_settings import (
+    OF_PATH,
     Axis,
     ProgramSettings,
     Signal,
@@ -34,7 +35,13 @@ from selfmotion.controllers.read_stretches import SLOWLY
 from selfmotion.controllers.stretches import NO_MISS, Misses, PoseStretch, Stretch, miss_of
 from selfmotion.controllers.targets import NotByPosesError, PosedSpans, PoseSpan, stretches_of
 from selfmotion.controllers.thinning import TIME_DIGITS, Piece, Span, pieces_of
-from selfmotion.controllers.tool_frames import ROUNDINGS, WORLD, ToolFrames, own_joint
+from selfmotion.controllers.tool_frames import (
+    ROUNDINGS,
+    WORLD,
+    ToolFrames,
+    frame_of_paths,
+    own_joint,
+)
 from selfmotion.job import Program, are_opposite
 from selfmotion.motion import Trajectory
 from selfmotion.path import Path
@@ -254,7 +261,9 @@ def drafted(
     given = pieces, slides, settings.deviation, settings.move_deviation, progress
     frames, why = None, ""
     if settings.by_poses:
-        frames = ToolFrames.of(robot, axes, settings).rounded(ROUNDINGS[form])
+        of_path = settings.work_object == OF_PATH
+        path_frame = frame_of_paths(_paths_of(plan)) if of_path else None
+        frames = ToolFrames.of(robot, axes, settings, path_frame).rounded(ROUNDINGS[form])
         why = frames.undetermined()
         if otherwise is not None and not otherwise.moves_only:
             why = why or otherwise.why
@@ -281,6 +290,18 @@ def drafted(
     )
     tool = tool_from_flange(robot, settings)
     return Draft(program, robot, tool, settings, verdict, frames)
+
+
+def _paths_of(plan: Plan | Parts | Move | Program) -> list[Path]:
+    """Return the paths that a motion follows; those of other tools than the first are beside it."""
+    match plan:
+        case Plan():
+            return [plan.problem.path]
+        case Move():
+            return []
+        case Program():
+            return [step.made.problem.path for step in plan.steps if isinstance(step.made, Plan)]
+    return [part.problem.path for part in plan.plans]
 
 
 def _but_of_moves(
