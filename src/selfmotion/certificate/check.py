@@ -16,7 +16,7 @@ from selfmotion.basics import (
     silent,
     version,
 )
-from selfmotion.certificate.feed import FeedReached, possible_feeds
+from selfmotion.certificate.feed import FeedReached, with_feeds
 from selfmotion.certificate.limits import arm_limits
 from selfmotion.certificate.path_error import PathCheck, bound_errors, smallest_singular_values
 from selfmotion.certificate.requirement import (
@@ -130,8 +130,7 @@ def certify(
         failures=(
             *(off + cut if by_digits else cut + off),
             *(text for check in checks for text in _undecided(check)),
-            *_told(findings),
-            *possible_feeds(feeds, findings),
+            *with_feeds(tuple(_told(findings)), feeds, findings),
         ),
         covers=("path", *covered_by(wanted)),
         remarks=tuple(remark for item in wanted for remark in item.remarks),

@@ -230,14 +230,15 @@ CheckedArgument = Annotated[
     Path,
     typer.Argument(
         help="A plan saved as .npz, a .program, .parts, or a motion: .csv (t, a column per joint), "
-        ".json, .yaml (ROS), .src (KUKA), .mod (ABB)."
+        ".json, .yaml (ROS), .mcap (ROS bag), .src (KUKA), .mod (ABB), .script (linear URScript)."
     ),
 ]
 RobotOption = Annotated[
     str | None,
     typer.Option(
         help="For a motion: name (`selfmotion robots`), .urdf file, or a problem file (.toml, "
-        ".json) with everything it asks for; for the .src or .mod of a job its .program."
+        ".json) or the plan that it comes from (.npz), with everything these ask for; for the "
+        ".src, .mod or .script of a job its .program."
     ),
 ]
 LockOption = Annotated[
