@@ -117,7 +117,7 @@ def certify(
     findings = tuple(_judged(item, motion) for item in wanted)
     cut = _cut_short(ending, follows, trajectory, checks, tolerance)
     off = tuple(text for check in checks for text in _off_path(check, tolerance, damped))
-    # A time that differs by digits is not what is wrong first where the tool is off its path.
+    # A time that differs by digits is nothing to tell where the tool is off its path.
     by_digits = not ending and abs(trajectory.duration - path.duration) <= _CLOCK
     return Certificate(
         path_check.position,
@@ -128,7 +128,7 @@ def certify(
         tolerance=tolerance,
         findings=findings,
         failures=(
-            *(off + cut if by_digits else cut + off),
+            *((off or cut) if by_digits else cut + off),
             *(text for check in checks for text in _undecided(check)),
             *with_feeds(tuple(_told(findings)), feeds, findings),
         ),
