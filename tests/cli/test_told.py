@@ -1,12 +1,16 @@
 """What the shell says of files, keys and limits that are not what they should be."""
 
+import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import selfmotion as sm
+from selfmotion.cli.summaries import blocked_told
 from selfmotion.documents import example_text
+from selfmotion.task import SE3
 from support.arms import robot_named
 from support.shell import complaint, invoke
 
@@ -113,3 +117,50 @@ def test_what_is_left_to_save_is_told_in_numbers_that_mean_something(tmp_path: P
     _, said = invoke("plan", "ur5", *line)
     (told,) = (text for text in said.splitlines() if "further saving possible" in text)
     assert "e-" not in told
+
+
+POST = sm.obstacles.Box("post", [0.1, 0.12, 0.65], [0.1, 0.1, 0.6])
+
+
+def test_where_no_motion_was_found_past_an_obstacle_it_is_said_with_what_may_help() -> None:
+    ur5 = robot_named("ur5")
+    pose = ur5.pose(ur5.dexterous_configuration("pointing"))
+    line = sm.paths.Line(
+        pose, SE3(pose.rotation, pose.translation + np.array([0.0, 0.0, 0.02])), 1.0
+    )
+    far = sm.obstacles.Box("post", [3.0, 0.0, 0.0], [0.1, 0.1, 0.1])
+    held = sm.constraints.Clearance([far], 0.005)
+    problem = sm.Problem(ur5, line, "pointing", "free", constraints=[held])
+    made = sm.plan(problem, search=sm.Search(starts=2, finalists=1))
+    assert not blocked_told(made)
+    findings = [
+        replace(item, satisfied=False, amount=-0.02, subject="panda_link2 - post", time=0.5)
+        if item.requirement == "clearance"
+        else item
+        for item in made.certificate.findings
+    ]
+    failed = replace(made.certificate, findings=tuple(findings), failures=("overlap",))
+    looked = sm.result.Attempt("look at single poses", "nothing is in the way", None, 0.0)
+    blocked = replace(made, certificate=failed, report=replace(made.report, attempts=(looked,)))
+    said = blocked_told(blocked)
+    assert "no continuous motion was found" in said
+    assert "panda_link2 - post at t = 0.500 s" in said
+    assert "what may help: a smaller clearance" in said
+    # Nothing is known of single poses where these were not looked at.
+    unknown = replace(blocked, report=replace(made.report, attempts=()))
+    assert "smaller clearance" not in blocked_told(unknown)
+
+
+def test_a_clearance_that_a_pose_has_is_told_where_it_has_not_the_one_that_was_asked() -> None:
+    panda = robot_named("panda")
+    down = np.diag([1.0, -1.0, -1.0])
+    begin, end = (SE3(down, np.array([0.5, y, 0.3])) for y in (-0.1, 0.3))
+    line = sm.paths.Line(begin, end, 10.0)
+    held = sm.constraints.Clearance([POST], 0.03)
+    with pytest.raises(sm.SelfmotionError, match=r"what would help: .*a clearance of ") as error:
+        sm.plan(sm.Problem(panda, line, "pose", "free", constraints=[held]))
+    told = re.search(r"a clearance of ([0-9.]+) mm", str(error.value))
+    apart = re.search(r"are ([0-9.]+) mm apart \(wanted: 30 mm\)", str(error.value))
+    assert told is not None
+    assert apart is not None
+    assert float(apart[1]) - 0.2 <= float(told[1]) <= float(apart[1])
