@@ -409,3 +409,68 @@ def test_lists_that_are_none_say_what_is_read(document: object, said: str, tmp_p
     file.write_text(json.dumps(document))
     with pytest.raises(sm.errors.FileFormatError, match=said):
         sm.files.read_path(file, feed=0.05)
+
+
+# Rotation vectors, which angles about axes are taken for silently.
+
+
+def turned(file: Path, titles: str, *turns: str) -> Path:
+    rows = (f"{0.05 * k},0,0,{turn}" for k, turn in enumerate(turns))
+    file.write_text("\n".join([f"x,y,z,{titles}", *rows, ""]))
+    return file
+
+
+@pytest.mark.parametrize(
+    ("titles", "second", "called"),
+    [
+        ("rx_deg,ry_deg,rz_deg", "180,5,0", "roll_deg,pitch_deg,yaw_deg"),
+        ("rx,ry,rz", "3.14159,0.0873,0", "roll,pitch,yaw"),
+        ("rx,ry,rz", "2.2,2.3,0", "roll,pitch,yaw"),
+    ],
+)
+def test_angles_about_axes_are_no_rotation_vector(
+    tmp_path: Path, titles: str, second: str, called: str
+) -> None:
+    file = turned(tmp_path / "seam.csv", titles, "0,0,0", second)
+    said = f"line 3: rx,ry,rz .*more than half a turn; .*Call them {called};"
+    with pytest.raises(sm.errors.FileFormatError, match=said):
+        sm.files.read_path(file, feed=0.02)
+    listed = tmp_path / "seam.yaml"
+    poses = [dict(zip(["x", "y", "z", *titles.split(",")], row, strict=True))
+             for row in ([0.0] * 6, [0.05, 0.0, 0.0, *map(float, second.split(","))])]  # fmt: skip
+    listed.write_text(json.dumps({"poses": poses}))
+    with pytest.raises(sm.errors.FileFormatError, match=r"poses\[1\]: rx,ry,rz .*half a turn"):
+        sm.files.read_path(listed, feed=0.02)
+
+
+@pytest.mark.parametrize("half", ["3.1416,0,0", "3.142,0,0", "2.22144,2.22144,0"])
+def test_half_a_turn_with_few_digits_is_one(tmp_path: Path, half: str) -> None:
+    file = turned(tmp_path / "seam.csv", "rx,ry,rz", half, half)
+    assert sm.files.read_path(file, feed=0.02).duration > 0.0
+
+
+def test_what_was_noted_of_a_file_is_known_of_what_is_made_of_its_path(tmp_path: Path) -> None:
+    file = turned(tmp_path / "seam.csv", "rx,ry,rz", "3,0,0", "3,0.1,0")
+    path = sm.files.read_path(file, feed=0.02)
+    (note,) = path.notes
+    assert "read as a rotation vector" in note
+    assert "roll,pitch,yaw" in note
+    for made in (
+        sm.paths.Placed(path, np.eye(4)),
+        sm.paths.with_leads(path, 0.02, 1.0),
+        sm.paths.Reversed(path),
+    ):
+        assert made.notes == (note,)
+    (tmp_path / "seams.csv").write_text(
+        "seam," + file.read_text().replace("\n0", "\na,0", 1).replace("\n0.05", "\na,0.05", 1)
+    )
+    job = tmp_path / "job.toml"
+    job.write_text(
+        '[robot]\nname = "panda"\n[seams]\nfile = "seams.csv"\nfeed = 0.02\n'
+        "frame = { position = [0.45, 0, 0.3] }\n"
+    )
+    assert any(note in remark for remark in sm.files.read_seam_job(job).remarks)
+    # Other orientations are what their titles say.
+    assert not sm.files.read_path(
+        turned(tmp_path / "a.csv", "roll,pitch,yaw", "3,0,0", "3,0.1,0"), feed=0.02
+    ).notes

@@ -236,3 +236,22 @@ def test_six_joints_with_a_window_and_a_free_start_are_planned() -> None:
         sm.Problem(robot, sm.paths.Line(pose, end, 2.0), task="pose", relaxations=[relaxed])
     )
     assert plan.certificate.on_path
+
+
+@pytest.mark.parametrize("name", ["seam.script", "seam.mod", "seam.src", "seam.csv"])
+def test_a_file_is_judged_by_the_plan_that_it_comes_from(tmp_path: Path, name: str) -> None:
+    """By all that was asked for; and what is not that motion any more is not verified."""
+    line = "--line", "0.05,0,0", "--feed", "0.02", "--task", "pointing", "--no-self-collision"
+    kept, file = tmp_path / "plan.npz", tmp_path / name
+    assert invoke("plan", "ur5", *line, "--velocity", "2", "--out", kept)[0] == 0
+    of_program = () if name.endswith("csv") else ("--targets", "poses", "--mass", "2")
+    assert invoke("export", kept, "--out", file, *of_program)[0] == 0
+    code, said = invoke("check", file, "--robot", kept)
+    assert code == 0
+    assert "verified at all times" in said
+    code, said = invoke("check", file, "--robot", kept, "--velocity", "1e-4", "--json")
+    assert code == 1
+    assert "times its limit of 0.0001 rad/s" in json.loads(said)["verdict"]
+    assert "--path is the plan's own: leave it out" in complaint(
+        "check", file, "--robot", kept, "--path", file
+    )

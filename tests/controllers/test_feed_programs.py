@@ -16,7 +16,7 @@ from selfmotion.controllers import judged_program, program_miss, read_program
 from selfmotion.controllers.feed_stretches import ZONE, FeedStretch, Ramps, times_at
 from selfmotion.controllers.program_settings import axes_of
 from selfmotion.controllers.steps import arc_through
-from selfmotion.task import SE3, exp3
+from selfmotion.task import SE3, Quaternion, exp3
 from support.arms import robot_named
 from support.industrial import industrial_arm
 from support.played_programs import Off, off, read_poses
@@ -546,3 +546,33 @@ def test_seams_with_weaves_are_read_as_they_are_written(abb: sm.RobotModel, tmp_
     assert certificate.position_error.value < WITHIN.position
     far = measured(plan, file)
     assert far.position <= program_miss(plan, file)[1].path.position + ROUNDED
+
+
+def test_where_no_poses_keep_a_feed_is_told_with_what_helps(
+    abb: sm.RobotModel, tmp_path: Path
+) -> None:
+    """A corner that is rounded within less than the zones that controllers round."""
+    start = np.radians([10.0, -20.0, 30.0, 20.0, 60.0, 15.0])
+    begin = abb.pose(start)
+    corner = begin.translation + np.array([0.0, 0.05, 0.0])
+    places = [begin.translation, corner, corner + np.array([0.0, 0.0, 0.05])]
+    turn = np.roll(Quaternion(begin.rotation).coeffs(), 1)
+    legs = sm.paths.Polyline(places, [turn] * 3, tolerance=5e-5)
+    seam = sm.paths.Feed(legs, FEED, within=0.9)
+    plan = sm.plan(sm.Problem(abb, seam, "pointing", start, clearance=None)).require()
+    file = tmp_path / "weld.mod"
+    near = sm.Tolerance(2e-6, 2e-4)
+    sm.files.write_motion(plan, file, settings=settings("weld.mod", deviation=near))
+    (told,) = read_program(file, abb).timed
+    found = re.search(r"near t = ([0-9.]+) s, at \(([-0-9., ]+)\) m, no poses", told)
+    assert found is not None
+    assert "tolerance = 0.002" in told
+    assert "corners = 'stop'" in told
+    assert "?" not in told
+    at = np.array([float(value) for value in found[2].split(",")])
+    # Three digits, and the corner's own size.
+    assert np.linalg.norm(at - corner) < 2e-3
+    assert np.linalg.norm(seam.pose(float(found[1])).translation - at) < 2e-3
+    # Where more is allowed it is at its feed.
+    sm.files.write_motion(plan, file, settings=settings("weld.mod"))
+    assert not read_program(file, abb).timed

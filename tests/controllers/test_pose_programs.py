@@ -11,15 +11,23 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.controllers import judged_program, program_miss, read_program
+from selfmotion.controllers import judged_program, judged_programs, program_miss, read_program
 from selfmotion.controllers.program_settings import axes_of
-from selfmotion.controllers.tool_frames import ROUNDINGS, ToolFrames, confdata, status_and_turn
+from selfmotion.controllers.stretches import Miss, Misses, miss_between
+from selfmotion.controllers.tool_frames import (
+    ROUNDINGS,
+    ToolFrames,
+    confdata,
+    frame_of_paths,
+    status_and_turn,
+    turned_base,
+)
 from selfmotion.task import SE3, Quaternion, exp3
 from support.arms import PANDA_HOME, robot_named
 from support.industrial import industrial_arm, two_seams
 from support.own_kinematics import Arm
 from support.played_programs import off, placed, read_poses
-from support.shell import invoke
+from support.shell import complaint, invoke
 
 FILES = ("weld.mod", "weld.src", "weld.script")
 SIGNALS = {"arc on": (7, True), "arc off": (7, False)}
@@ -430,3 +438,121 @@ def test_what_is_not_meant_is_refused(
     file.write_text(changed)
     with pytest.raises(sm.errors.FileFormatError, match=said):
         sm.files.read_motion(file, robot=alone.robot)
+
+
+@pytest.mark.parametrize("name", FILES)
+@pytest.mark.parametrize("arm", ["ur5", "ur10"])
+def test_out_of_and_into_a_singular_home_joints_are_written(
+    arm: str, name: str, tmp_path: Path
+) -> None:
+    """Home of these arms is straight up, elbow and wrist at zero: poses there say too little."""
+    robot = robot_named(arm)
+    home = np.array(sm.NAMED_ARMS[arm].home)
+    goals = home + np.random.default_rng(5).uniform(-1.2, 1.2, (3, 6))
+    for k, goal in enumerate(goals):
+        ends = (home, goal) if k % 2 == 0 else (goal, home)
+        move = sm.move(robot, *ends, clearance=None).require()
+        file = tmp_path / name
+        sm.files.write_motion(move, file, settings=settings(name))
+        assert not re.search(r"movel|MoveL|\bSPL\b|\bLIN\b", file.read_text())
+        _, stated, found = program_miss(move, file)
+        assert np.all(np.array(found.moves) <= np.array(stated.moves) + ROUNDED)
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_a_job_from_home_to_home_is_read_as_it_is_written(name: str, tmp_path: Path) -> None:
+    ur5 = robot_named("ur5")
+    home = np.array(sm.NAMED_ARMS["ur5"].home)
+    facing = np.diag([1.0, -1.0, -1.0])
+    begin, end = (SE3(facing, np.array([x, 0.1, 0.2])) for x in (0.4, 0.45))
+    seam = sm.Seam("weld", sm.paths.Feed(sm.paths.Line(begin, end, 1.0), 0.05), task="pointing")
+    given = {"start": home, "end": home, "branches": 1, "clearance": None}
+    job = sm.plan_job(ur5, [seam], **given).require()
+    file = tmp_path / name
+    sm.files.write_motion(job, file, settings=settings(name))
+    assert judged_program(file, job).verified
+    # The seam keeps its poses, which a shop can shift.
+    assert re.search(r"movel\(|MoveL |SLIN ", file.read_text())
+
+
+def test_what_is_not_read_as_it_is_written_is_written_by_joints(
+    alone: sm.Plan, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where poses are off when a file is read again, whatever for, no such file is left."""
+    read = judged_programs.program_miss
+    off = Misses(Miss(1.0, 0.0, 0.0), Miss(0.0, 0.0, 0.0))
+    asked = settings("a.mod")
+
+    def spoilt(plan: sm.Plan, file: Path) -> tuple[int, Misses, Misses]:
+        count, stated, found = read(plan, file)
+        return count, stated, off if "MoveL" in file.read_text() else found
+
+    monkeypatch.setattr(judged_programs, "program_miss", spoilt)
+    sm.files.write_motion(alone, tmp_path / "a.mod", settings=asked)
+    text = (tmp_path / "a.mod").read_text()
+    assert "MoveL" not in text
+    assert "read again" in text
+    assert list(tmp_path.iterdir()) == [tmp_path / "a.mod"]
+
+
+def test_joints_that_no_pose_gives_are_infinitely_far_off(abb: sm.RobotModel) -> None:
+    q = np.zeros((2, 6))
+    unknown = np.array([np.zeros(6), np.full(6, np.nan)])
+    assert miss_between(unknown, q, [abb.chain]).position == np.inf
+    assert miss_between(q, q, [abb.chain]).position == 0.0
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_the_frame_of_the_path_may_be_the_work_object(name: str, tmp_path: Path) -> None:
+    """In it poses are the numbers of the table, wherever the table lies, and the base is turned."""
+    ur5 = robot_named("ur5")
+    facing = np.diag([1.0, -1.0, -1.0])
+    begin, end = (SE3(facing, np.array([x, 0.02, 0.01])) for x in (0.0, 0.05))
+    lies = SE3(exp3(np.array([0.0, 0.0, 0.3])), np.array([0.4, 0.1, 0.2]))
+    path = sm.paths.Placed(sm.paths.Feed(sm.paths.Line(begin, end, 1.0), 0.05), lies)
+    plan = sm.plan(sm.Problem(ur5, path, "pointing", clearance=None)).require()
+    file = tmp_path / name
+    sm.files.write_motion(plan, file, settings=settings(name, work_object="path"))
+    (stretch,) = read_program(file, ur5).stretches
+    np.testing.assert_allclose(stretch.places[0], begin.translation, atol=2e-7)
+    np.testing.assert_allclose(stretch.places[-1], end.translation, atol=2e-7)
+    # And it is where the table lies, by a chain that the program knows nothing of.
+    base = ur5.chain_to("base").place(np.zeros(6))
+    found = base * stretch.frames.work
+    np.testing.assert_allclose(found.homogeneous, lies.homogeneous, atol=1e-6)
+
+
+def test_what_work_objects_cannot_be_is_said(alone: sm.Plan, tmp_path: Path) -> None:
+    with pytest.raises(sm.errors.ProblemError, match=r"600 m is far from any arm.*position_mm"):
+        settings("a.mod", work_object=SE3(np.eye(3), np.array([600.0, -100.0, 200.0])))
+    with pytest.raises(sm.errors.ProblemError) as error:
+        sm.files.write_motion(alone, tmp_path / "a.mod", settings=settings("a", work_object="part"))
+    assert "work_object 'part' is none of its links" in str(error.value)
+    assert ".urdf" not in str(error.value)
+    line = sm.paths.Line(np.eye(4), SE3(np.eye(3), np.array([0.1, 0.0, 0.0])), 1.0)
+    moved = SE3(np.eye(3), np.array([0.0, 0.1, 0.0]))
+    with pytest.raises(sm.errors.ProblemError, match="several frames, expected one"):
+        frame_of_paths([line, sm.paths.Placed(line, moved)])
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        (
+            "600,-100,200,0,0,0",
+            "work_object: 600 m is far from any arm, expected at most 50; in millimetres",
+        ),
+        ("0.6,-0.1,0.2,0,0,90", "--wobj has a rotation vector of 90 rad"),
+        ("0.6,-0.1,0.2,3,2,0", "more than half a turn; in degrees, or angles about axes"),
+    ],
+)
+def test_numbers_of_work_objects_in_other_units_are_refused(given: str, said: str) -> None:
+    typed = ("--out", "a.src", "--targets", "poses", "--wobj", given)
+    assert said in complaint("export", "any.npz", *typed)
+
+
+def test_a_base_that_is_turned_is_told() -> None:
+    assert "'base', the controller's frame, which is turned by 180°" in turned_base(
+        robot_named("ur5")
+    )
+    assert not turned_base(robot_named("panda"))

@@ -120,7 +120,7 @@ def constraint_rows() -> list[Row]:
                 "[1]": [1],
                 "Box (the class)": sm.obstacles.Box,
             },
-            distance={**NUMBERS, "-1": -1},
+            distance={**NUMBERS, "-1": -1, "5, in millimetres": 5},
             disabled=pairs,
             srdf={"'nowhere.srdf'": "nowhere.srdf"},
         ),

@@ -379,6 +379,14 @@ def setting_rows() -> list[Row]:
         ),
         Row(
             "Files",
+            "ProgramSettings(targets='poses', work_object=…600 m away…)",
+            lambda _: sm.files.ProgramSettings(
+                targets="poses",
+                work_object=[[1, 0, 0, 600], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]],
+            ),
+        ),
+        Row(
+            "Files",
             "read_motion('a.mod', robot='ur5')",
             lambda _: sm.files.read_motion("a.mod", robot="ur5"),
         ),

@@ -121,7 +121,7 @@ def read_archive(file: Path) -> tuple[dict[str, Any], dict[str, Array]]:
     FileFormatError
         The file is missing or is no such archive.
     """
-    if file.suffix in _OF_MANY:
+    if file.suffix in _OF_MANY and os.path.exists(file):
         raise FileFormatError(
             f"{file}: holds several plans, expected one (.npz); of a program they are "
             f"[step.made for step in sm.load_program(file).steps if step.is_seam]"

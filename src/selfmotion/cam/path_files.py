@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path as FilePath
 from typing import Any
 
@@ -80,7 +79,7 @@ def read_poses(file: FilePath, reading: Reading) -> Mapping[str, PoseRows]:
             )
     header = list(flat[0])
     table = np.array([[row[name] for name in header] for row in flat])
-    return {"": replace(rows_of_table(file, header, table, range(len(flat)), {}), places=places)}
+    return {"": rows_of_table(file, header, table, places, {})}
 
 
 READ: Mapping[str, Callable[[FilePath, Reading], Mapping[str, PoseRows]]] = dict.fromkeys(

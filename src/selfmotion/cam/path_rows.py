@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path as FilePath
 from typing import Any
 
@@ -10,6 +10,7 @@ import numpy as np
 
 from selfmotion.basics import (
     LEFT_OUT,
+    TURN,
     Array,
     FileFormatError,
     ProblemError,
@@ -36,6 +37,12 @@ _COLUMNS: Mapping[tuple[str, ...], str] = {
     ("roll", "pitch", "yaw"): "rpy",
     ("nx", "ny", "nz"): "normal",
 }
+
+
+_TURN = ("rx", "ry", "rz")
+_TURN_NOTE = "rx,ry,rz are read as a rotation vector: the axis of a turn, as long as its angle"
+# Half a turn that is written with few digits is more than that by such a share.
+_HALF_TURN = 2e-4
 
 
 # What a table without a header may be, by the number of its columns.
@@ -201,7 +208,7 @@ def read_tables(file: FilePath, reading: Reading | None = None) -> dict[str, Pos
         named=named,
         usual=_HEADERS,
     )
-    whole = rows_of_table(file, header, table, lines, texts)
+    whole = rows_of_table(file, header, table, [f"line {number}" for number in lines], texts)
     if SEAM not in texts:
         return {"": whole}
     if not lines:
@@ -235,12 +242,12 @@ def rows_of_table(
     file: FilePath,
     header: Sequence[str],
     table: Array,
-    lines: Sequence[int],
+    places: Sequence[str],
     texts: Mapping[str, Sequence[str]],
 ) -> PoseRows:
     """Return rows of poses of the columns of numbers of a table, and of its texts."""
     columns = _columns(file, header, table)
-    events = texts.get(EVENT, [""] * len(lines))
+    events = texts.get(EVENT, [""] * len(places))
     missing = [name for name in _POSITION if name not in columns]
     if missing:
         raise FileFormatError(
@@ -262,15 +269,37 @@ def rows_of_table(
                 f"{file}: column '{lacking[0]}' is missing, expected {','.join(names)}"
             )
         values = np.stack([columns[name] for name in names], axis=1)
+    notes: tuple[str, ...] = ()
+    if given == [_TURN]:
+        unit = "_deg" if any(named(title) == "rx_deg" for title in header) else ""
+        angles = ",".join(f"{name}{unit}" for name in ("roll", "pitch", "yaw"))
+        _check_turns(file, values, places, angles)
+        notes = (f"{_TURN_NOTE}; angles about fixed axes are called {angles}",)
     return PoseRows(
-        [f"line {number}" for number in lines],
+        places,
         np.stack([columns[name] for name in _POSITION], axis=1),
         _COLUMNS[given[0]] if given else "",
         values,
         columns.get("t"),
         columns.get("feed"),
         tuple((k, event) for k, text in enumerate(events) for event in _several(text)),
+        notes=notes,
     )
+
+
+def _check_turns(file: FilePath, turns: Array, places: Sequence[str], angles: str) -> None:
+    """Refuse rotation vectors (K, 3) [rad] of more than half a turn, which angles look like."""
+    sizes = np.linalg.norm(turns, axis=1)
+    # Degrees that are taken for radians are told as such later on.
+    over = (sizes > (1.0 + _HALF_TURN) * np.pi) & (np.abs(turns).max(axis=1) <= TURN)
+    if over.any():
+        k = int(np.argmax(over))
+        raise FileFormatError(
+            f"{file}: {places[k]}: rx,ry,rz is an axis times an angle of "
+            f"{np.degrees(sizes[k]):.7g}°, more than half a turn; are these angles about fixed "
+            f"axes? Call them {angles}; of a rotation vector take the shorter turn, the other way "
+            f"round"
+        )
 
 
 def named(title: str) -> str:
@@ -360,8 +389,7 @@ def _read_array(file: FilePath, reading: Reading) -> PoseRows:
         )
     kept = [k for k, name in enumerate(columns) if name != LEFT_OUT]
     numbers = array[:, kept] * 1.0
-    rows = rows_of_table(file, [columns[k] for k in kept], numbers, range(1, 1 + len(array)), {})
-    return replace(rows, places=places)
+    return rows_of_table(file, [columns[k] for k in kept], numbers, places, {})
 
 
 # What a list of messages may be called.

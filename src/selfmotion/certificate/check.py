@@ -16,7 +16,7 @@ from selfmotion.basics import (
     silent,
     version,
 )
-from selfmotion.certificate.feed import FeedReached, possible_feeds
+from selfmotion.certificate.feed import FeedReached, with_feeds
 from selfmotion.certificate.limits import arm_limits
 from selfmotion.certificate.path_error import PathCheck, bound_errors, smallest_singular_values
 from selfmotion.certificate.requirement import (
@@ -117,7 +117,7 @@ def certify(
     findings = tuple(_judged(item, motion) for item in wanted)
     cut = _cut_short(ending, follows, trajectory, checks, tolerance)
     off = tuple(text for check in checks for text in _off_path(check, tolerance, damped))
-    # A time that differs by digits is not what is wrong first where the tool is off its path.
+    # A time that differs by digits is nothing to tell where the tool is off its path.
     by_digits = not ending and abs(trajectory.duration - path.duration) <= _CLOCK
     return Certificate(
         path_check.position,
@@ -128,10 +128,9 @@ def certify(
         tolerance=tolerance,
         findings=findings,
         failures=(
-            *(off + cut if by_digits else cut + off),
+            *((off or cut) if by_digits else cut + off),
             *(text for check in checks for text in _undecided(check)),
-            *_told(findings),
-            *possible_feeds(feeds, findings),
+            *with_feeds(tuple(_told(findings)), feeds, findings),
         ),
         covers=("path", *covered_by(wanted)),
         remarks=tuple(remark for item in wanted for remark in item.remarks),

@@ -1,5 +1,6 @@
 """The feed that was asked for, and the one that is reached."""
 
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -262,25 +263,45 @@ class _Along(Bounded):
         return np.abs(values)
 
 
-def possible_feeds(feeds: Sequence[FeedReached], findings: Sequence[Finding]) -> tuple[str, ...]:
+# What limits of rates tell of motions that are too fast; a feed leaves no duration to choose.
+_LONGER = re.compile(r": give it ([0-9.e+-]+|inf) times the duration")
+
+
+def with_feeds(
+    told: Sequence[str], feeds: Sequence[FeedReached], findings: Sequence[Finding]
+) -> tuple[str, ...]:
+    """Return what is told of an arm that is too slow, of motions at feeds in words of these.
+
+    The first of it says which feed the arm can keep, where that is known.
+    """
+    if not feeds:
+        return tuple(told)
+    possible = possible_feed(feeds, findings)
+    if not possible:
+        return tuple(_LONGER.sub(r": run it \1 times slower", text) for text in told)
+    texts = [_LONGER.sub("", text) for text in told]
+    return (f"{texts[0]}: {possible}", *texts[1:])
+
+
+def possible_feed(feeds: Sequence[FeedReached], findings: Sequence[Finding]) -> str:
     """Return which feeds a motion could have whose arm is too slow for those that were asked for.
 
-    Nothing where something else is wrong, too, the path itself does not keep a feed, or none was
+    Empty where something else is wrong, too, the path itself does not keep a feed, or none was
     asked for.
     """
     broken = [item for item in findings if not item.satisfied]
     factor = max((item.factor for item in broken), default=1.0)
     kept = all(item.found.kept for item in feeds)
     if not (feeds and kept and 1.0 < factor < np.inf and all(item.of_pace for item in broken)):
-        return ()
+        return ""
     asked = sorted({item.found.asked for item in feeds})
     feed = _rounded_down(asked[-1] / factor)
     slower = asked[-1] / feed
     slowest = f"feeds of {asked[0] / slower:.3g} to" if len(asked) > 1 else "a feed of"
     return (
-        f"the arm keeps its limits at {slowest} {feed:g} m/s, accelerations of the path "
-        f"being {slower**2:.3g} times smaller and its smoothing {slower:.3g} times longer: "
-        f"Feed.slower({_rounded_up(slower)})",
+        f"the arm keeps its limits {_rounded_up(slower)} times slower, at {slowest} {feed:g} m/s "
+        f"(accelerations of the path {slower**2:.3g} times smaller, its smoothing {slower:.3g} "
+        f"times longer)"
     )
 
 

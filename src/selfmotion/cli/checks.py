@@ -158,9 +158,11 @@ def of_problem(
     progress: Progress,
     calibration: Path | None = None,
 ) -> tuple[sm.Certificate, _Near, sm.RobotModel, controllers.ControllerProgram | None]:
-    """Return the same of a motion by all that a problem file asks, and the program that it is."""
-    job = sm.files.read_job(asked)
-    problem = job.problem
+    """Return the same of a motion by all that a problem file or a plan asks.
+
+    And the program that it is.
+    """
+    problem, tolerance, ending = _asked_by(Path(asked), progress)
     motion, within, program = read(file, degrees, within, problem.robot)
     elsewhere = ""
     if program is not None:
@@ -175,11 +177,20 @@ def of_problem(
         problem = on_calibrated(problem, calibration)
         tell_difference(problem.robot, motion)
     besides = requirements(problem.robot, *judged)
-    allowed, robot = within or job.tolerance, problem.robot
-    certificate = problem.certify(motion, allowed, besides=besides, progress=progress)
+    allowed, robot = within or tolerance, problem.robot
+    certificate = problem.certify(motion, allowed, ending, besides, progress)
     certificate = with_failure(certificate, elsewhere)
     close = near(robot, motion, (*problem.requirements, *besides))
     return certificate, close, robot, program
+
+
+def _asked_by(file: Path, progress: Progress) -> tuple[sm.Problem, sm.Tolerance | None, str]:
+    """Return the problem of a problem file or of a kept plan, its tolerance, how that ended."""
+    if file.suffix == ".npz":
+        plan = sm.load_plan(file, progress=progress)
+        return plan.problem, plan.tolerance, plan.report.ending
+    job = sm.files.read_job(file)
+    return job.problem, job.tolerance, ""
 
 
 def near(

@@ -190,8 +190,9 @@ def check(
             certificate, near, arm = checks.of_plan(
                 file, within, judged, display.stage, calibration
             )
-        elif robot is not None and Path(robot).suffix in documents.SUFFIXES:
-            options.refuse(own, robot, "the problem's")
+        elif robot is not None and Path(robot).suffix in (".npz", *documents.SUFFIXES):
+            whose = "the plan's" if Path(robot).suffix == ".npz" else "the problem's"
+            options.refuse(own, robot, whose)
             certificate, near, arm, program = checks.of_problem(
                 file, robot, degrees, within, judged, display.stage, calibration
             )
@@ -199,7 +200,8 @@ def check(
             if robot is None or path is None:
                 raise sm.errors.ProblemError(
                     f"{file}: a motion is checked against a robot and a path: give --robot and "
-                    f"--path, or a problem file as --robot (a job's .program for its program)"
+                    f"--path, or a problem file or a plan (.npz) as --robot (a job's .program "
+                    f"for its program)"
                 )
             held = options.locks(lock)
             arm = sm.load_robot(

@@ -92,6 +92,7 @@ def export(
         )
     _check_verified(made, force, as_json)
     _tell_followers(made.robot, out, form)
+    outputs.tell_base(made.robot, asked)
     verdicts: dict[str, str] = {}
     # Which what is only of these is said for.
     programs = any(reread.is_program(target, form, asked) for target in out)

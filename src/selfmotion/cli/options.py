@@ -32,8 +32,10 @@ ProblemArgument = Annotated[
 PathOption = Annotated[
     Path | None,
     typer.Option(
-        help="Poses: CSV with t,x,y,z and qw,qx,qy,qz or rx,ry,rz or roll,pitch,yaw or nx,ny,nz "
-        "(s, m, rad; x_mm, roll_deg, …), .npy, or ROS Path and PoseArray as .yaml and .json."
+        help="Poses: CSV with t,x,y,z and qw,qx,qy,qz or roll,pitch,yaw (about fixed axes) or "
+        "rx,ry,rz (rotation vector) or nx,ny,nz (s, m, rad; x_mm, roll_deg, …), .npy, or ROS Path "
+        "and PoseArray as .yaml and .json; G-code (.nc, .gcode, …), APT (.apt, .cls, …), or a "
+        "drawing (.dxf)."
     ),
 ]
 _FROM = "from the tool's pose at --start (by default a dexterous configuration)"
@@ -228,14 +230,15 @@ CheckedArgument = Annotated[
     Path,
     typer.Argument(
         help="A plan saved as .npz, a .program, .parts, or a motion: .csv (t, a column per joint), "
-        ".json, .yaml (ROS), .src (KUKA), .mod (ABB)."
+        ".json, .yaml (ROS), .mcap (ROS bag), .src (KUKA), .mod (ABB), .script (linear URScript)."
     ),
 ]
 RobotOption = Annotated[
     str | None,
     typer.Option(
         help="For a motion: name (`selfmotion robots`), .urdf file, or a problem file (.toml, "
-        ".json) with everything it asks for; for the .src or .mod of a job its .program."
+        ".json) or the plan that it comes from (.npz), with everything these ask for; for the "
+        ".src, .mod or .script of a job its .program."
     ),
 ]
 LockOption = Annotated[

@@ -36,9 +36,11 @@ TargetsOption = Annotated[
 WorkObjectOption = Annotated[
     str | None,
     typer.Option(
-        help="Work object of the poses: a link, or x,y,z,rx,ry,rz \\[m, and rotation vector in "
-        "rad] in the frame of the arm's base; with --targets poses.",
-        metavar="NAME|X,Y,Z,RX,RY,RZ",
+        help="Work object of the poses: path (the frame that the path is given in), a link, or "
+        "x,y,z,rx,ry,rz \\[m, and rotation vector in rad] in the controller's frame: the link "
+        "base where there is one, of Universal Robots' arms turned by 180 degrees from that of "
+        "--frame; with --targets poses.",
+        metavar="path|NAME|X,Y,Z,RX,RY,RZ",
     ),
 ]
 MassOption = Annotated[
@@ -67,6 +69,13 @@ def program_settings(
     return sm.files.ProgramSettings(**given) if given else None
 
 
+def tell_base(robot: sm.RobotModel, asked: sm.files.ProgramSettings | None) -> None:
+    """Print how the frame that a work object in numbers is counted in is turned from the root."""
+    told = controllers.turned_base(robot)
+    if told and asked is not None and isinstance(asked.work_object, SE3):
+        stages.print(f"note: {told}", markup=False, soft_wrap=True)
+
+
 def _work_object(text: str) -> str | SE3:
     """Return the link or the pose that an option says."""
     parts = text.split(",")
@@ -80,6 +89,13 @@ def _work_object(text: str) -> str | SE3:
         raise sm.errors.ProblemError(
             f"--wobj: '{text}' is neither the name of a link nor six numbers x,y,z,rx,ry,rz "
             f"[m, rad]"
+        )
+    turn = float(np.linalg.norm(values[3:]))
+    if turn > np.pi * (1.0 + 1e-4):
+        raise sm.errors.ProblemError(
+            f"--wobj has a rotation vector of {turn:.4g} rad, more than half a turn; in degrees, "
+            f"or angles about axes? Expected x,y,z,rx,ry,rz in m, and the axis of one turn as long "
+            f"as its angle in rad: 0,0,1.5708 is 90° about z"
         )
     return SE3(exp3(np.array(values[3:])), np.array(values[:3]))
 

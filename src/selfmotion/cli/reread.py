@@ -100,7 +100,7 @@ def _confirmed(made: Made, target: Path) -> tuple[bool, str]:
     """Return whether a program keeps what it states, and that in words."""
     read = controllers.read_program(target, made.robot)
     count, stated, found = controllers.program_miss(made, target, read)
-    told, kept = [], verified(made)
+    told, kept = [], verified(made) and controllers.keeps_stated(found, stated)
     for miss, said, where in zip(found, stated, ("off the plan", "in free moves"), strict=True):
         # The file states nine digits.
         kept &= all(one <= other + 1e-9 for one, other in zip(miss, said, strict=True))

@@ -90,6 +90,8 @@ def show_plan(plan: Plan, console: Console) -> None:
         ignores = ", which ignores the constraints" if share > 0.0 else ""
         change = f" ({100.0 * share:+.2g} % from the minimum-norm motion{ignores})"
     _print(console, f"cost {report.cost:.6g}{change}, {duration}")
+    if blocked := blocked_told(plan):
+        _print(console, blocked)
     if plan.metres:
         _print(console, metres_told(plan))
     said = report.status in _ENDED_WELL and report.message == report.status.message
@@ -105,6 +107,27 @@ def show_plan(plan: Plan, console: Console) -> None:
                 f"{first.easing} would lower the cost by about {100.0 * share:.2g} % (a slope: "
                 f"more of it saves less than in proportion)",
             )
+
+
+def blocked_told(plan: Plan) -> str:
+    """Return that bodies leave no motion that was found, and what may help; "" where they do not.
+
+    Where it begins was free to choose.
+    """
+    broken = [item for item in plan.certificate.findings if item.unit == "m" and not item.satisfied]
+    met = next((item for item in broken if item.requirement == "clearance"), None)
+    if met is None or plan.problem.given_start is not None or not plan.certificate.on_path:
+        return ""
+    looks = [item.outcome for item in plan.report.attempts if item.name == "look at single poses"]
+    single = "nothing is in the way" in looks
+    poses = ", though the poses that were looked at can each be taken by itself" * single
+    smaller = ["a smaller clearance"] if single and met.allowed > 0.0 else []
+    more = "a task that leaves more free", "the path, or what is in the way, elsewhere"
+    helps = ", ".join([*smaller, *more])
+    return (
+        f"no continuous motion was found that keeps bodies apart{poses}; of the best that is known "
+        f"the tightest place is {met.subject} at t = {met.time:.3f} s; what may help: {helps}"
+    )
 
 
 def metres_told(plan: Plan) -> str:

@@ -60,7 +60,8 @@ def show(plan: Plan, console: Console) -> None:
         console.print(_tried(report))
     if report.remaining is not None and report.cost:
         share = 100.0 * report.remaining / abs(report.cost)
-        console.print(f"further saving possible: about {share:.2g} % (estimate)")
+        told = f"about {share:.2g} %" if share >= 0.01 else "less than 0.01 %"
+        console.print(f"further saving possible: {told} (estimate)")
     if report.active:
         console.print(_active_constraints(report))
     if report.gap is not None:

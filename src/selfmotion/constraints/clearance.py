@@ -28,6 +28,9 @@ from selfmotion.costs import Samples
 from selfmotion.follow import Follows
 from selfmotion.robot import RobotModel
 
+# No arm keeps farther from what it could meet [m].
+_FARTHEST = 3.0
+
 
 @dataclass(frozen=True, eq=False)
 class Clearance(Constraint):
@@ -81,7 +84,12 @@ class Clearance(Constraint):
         pairs = [_pair(item) for item in self.disabled]
         read = () if srdf is None else disabled_links(srdf)
         object.__setattr__(self, "disabled", tuple(dict.fromkeys((*pairs, *read))))
-        distance = as_number(self.distance, "clearance: distance", least=0.0, most=1e6)
+        distance = as_number(self.distance, "clearance: distance", least=0.0)
+        if distance > _FARTHEST:
+            raise ProblemError(
+                f"clearance: distance is {distance:g} m, farther than arms keep from anything, "
+                f"expected at most {_FARTHEST:g}; in millimetres? It is in m (distance_mm in files)"
+            )
         object.__setattr__(self, "distance", distance)
 
     def model(self, robot: RobotModel) -> CollisionModel:

@@ -82,7 +82,7 @@ class JointPositionLimits(Constraint):
             raise ProblemError(
                 f"{robot.name}: {LIMIT_NAMES[0]}: joint '{robot.joint_names[k]}': lower "
                 f"{lower[k]:.6g} is not below upper {upper[k]:.6g}; the arm's own limits count as "
-                f"well, unless replace=True"
+                f"well, unless these replace them (replace = true)"
             )
         return lower, upper
 

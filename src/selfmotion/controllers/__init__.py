@@ -11,6 +11,7 @@ from selfmotion.controllers.judged_programs import (
     as_shifted as as_shifted,
     judged_motion as judged_motion,
     judged_program as judged_program,
+    keeps_stated as keeps_stated,
     misswitched as misswitched,
     of_the_controller as of_the_controller,
     part_of as part_of,
@@ -46,4 +47,7 @@ from selfmotion.controllers.samples import (
 )
 from selfmotion.controllers.thinning import (
     by_targets as by_targets,
+)
+from selfmotion.controllers.tool_frames import (
+    turned_base as turned_base,
 )

@@ -8,11 +8,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from selfmotion.basics import FileFormatError, ProblemError, Progress, nearest, silent
+from selfmotion.basics import FileFormatError, Flags, ProblemError, Progress, nearest, silent
 from selfmotion.certificate import Tolerance
 from selfmotion.controllers.feed_stretches import FeedStretch
 from selfmotion.controllers.feed_thinning import FeedSpan
 from selfmotion.controllers.program_settings import (
+    OF_PATH,
     Axis,
     ProgramSettings,
     Signal,
@@ -30,10 +31,17 @@ from selfmotion.controllers.program_texts import (
     rounded_up,
     stated,
 )
+from selfmotion.controllers.read_stretches import SLOWLY
 from selfmotion.controllers.stretches import NO_MISS, Misses, PoseStretch, Stretch, miss_of
-from selfmotion.controllers.targets import NotByPosesError, PoseSpan, stretches_of
-from selfmotion.controllers.thinning import TIME_DIGITS, pieces_of
-from selfmotion.controllers.tool_frames import ROUNDINGS, WORLD, ToolFrames, own_joint
+from selfmotion.controllers.targets import NotByPosesError, PosedSpans, PoseSpan, stretches_of
+from selfmotion.controllers.thinning import TIME_DIGITS, Piece, Span, pieces_of
+from selfmotion.controllers.tool_frames import (
+    ROUNDINGS,
+    WORLD,
+    ToolFrames,
+    frame_of_paths,
+    own_joint,
+)
 from selfmotion.job import Program, are_opposite
 from selfmotion.motion import Trajectory
 from selfmotion.path import Path
@@ -173,7 +181,13 @@ class ControllerProgram:
             raise FileFormatError(f"has joints {', '.join(names)}, expected {', '.join(known)}")
         order = [names.index(name) for name in known]
         worst, at, k = Misses(NO_MISS, NO_MISS), 0.0, 0
-        for stretch in self.stretches:
+        for number, stretch in enumerate(self.stretches):
+            if stretch.name == SLOWLY and self.shift is None:
+                after = self.stretches[min(number + 1, len(self.stretches) - 1)].name
+                raise FileFormatError(
+                    f"the arm is not where '{after}' begins, by the poses before: it is singular "
+                    f"there"
+                )
             same = stretch.in_order(order)
             piece = pieces[min(k, len(pieces) - 1)]
             found = miss_of(same, piece.motion, piece.chains, piece.motion.t[0] + at)
@@ -182,7 +196,9 @@ class ControllerProgram:
             at += stretch.duration
             if at >= piece.motion.duration - _MOMENT:
                 at, k = 0.0, k + 1
-        if k != len(pieces):
+        if k > len(pieces):
+            raise FileFormatError("goes on when the motion has ended")
+        if k < len(pieces):
             raise FileFormatError(f"ends {len(pieces) - k} seams or moves before the motion does")
         return worst
 
@@ -209,6 +225,13 @@ class Draft:
         return self.settings.signal(event)
 
 
+class Joints(NamedTuple):
+    """What has joint targets where poses are asked for: free moves only, or all; and why."""
+
+    moves_only: bool
+    why: str
+
+
 def drafted(
     plan: Plan | Parts | Move | Program,
     name: str,
@@ -216,8 +239,11 @@ def drafted(
     settings: ProgramSettings,
     verdict: str,
     progress: Progress = silent,
+    otherwise: Joints | None = None,
 ) -> Draft:
     """Return the program of a motion, named as its file is.
+
+    Where poses are asked for, `otherwise` says what has joint targets all the same.
 
     Raises
     ------
@@ -235,12 +261,19 @@ def drafted(
     given = pieces, slides, settings.deviation, settings.move_deviation, progress
     frames, why = None, ""
     if settings.by_poses:
-        frames = ToolFrames.of(robot, axes, settings).rounded(ROUNDINGS[form])
+        of_path = settings.work_object == OF_PATH
+        path_frame = frame_of_paths(_paths_of(plan)) if of_path else None
+        frames = ToolFrames.of(robot, axes, settings, path_frame).rounded(ROUNDINGS[form])
         why = frames.undetermined()
+        if otherwise is not None and not otherwise.moves_only:
+            why = why or otherwise.why
     if frames is not None and not why:
         try:
             spans = PoseSpan if settings.targets == "timed-poses" else FeedSpan
-            stretches, miss = stretches_of(*given, partial(spans.by, frames, ROUNDINGS[form]))
+            posed: PosedSpans = partial(spans.by, frames, ROUNDINGS[form])
+            if otherwise is not None:
+                posed = partial(_but_of_moves, posed, otherwise.why)
+            stretches, miss = stretches_of(*given, posed)
         except NotByPosesError as error:
             why = str(error)
     if frames is None or why:
@@ -257,6 +290,27 @@ def drafted(
     )
     tool = tool_from_flange(robot, settings)
     return Draft(program, robot, tool, settings, verdict, frames)
+
+
+def _paths_of(plan: Plan | Parts | Move | Program) -> list[Path]:
+    """Return the paths that a motion follows; those of other tools than the first are beside it."""
+    match plan:
+        case Plan():
+            return [plan.problem.path]
+        case Move():
+            return []
+        case Program():
+            return [step.made.problem.path for step in plan.steps if isinstance(step.made, Plan)]
+    return [part.problem.path for part in plan.plans]
+
+
+def _but_of_moves(
+    posed: PosedSpans, why: str, piece: Piece, slides: Flags, first: float, last: float
+) -> Span:
+    """Return a span of poses of a seam; NotByPosesError of a free move."""
+    if piece.is_move:
+        raise NotByPosesError(why)
+    return posed(piece, slides, first, last)
 
 
 def check_controller(robot: RobotModel, form: str, settings: ProgramSettings) -> None:

@@ -75,9 +75,10 @@ class FeedSpan(PoseSpan):
         """
         if rests(self.piece.motion, self.first, self.last):
             return super().stretches(allowed)
+        self.check_regular(allowed)
         parts = [self._part(*ends) for ends in pairwise(self._stops)]
         gone = [part._gone for part in parts]
-        why = "there is no feed where the tool hardly moves"
+        why, stuck = "there is no feed where the tool hardly moves", None
         for free, share in product(_FREE, _OF_PLACES):
             if min(each.whole for each in gone) < _SHORT:
                 break
@@ -86,10 +87,16 @@ class FeedSpan(PoseSpan):
             made = [
                 part._fewest(each, nearer, turning) for part, each in zip(parts, gone, strict=True)
             ]
-            found = [stretch for stretch in made if stretch is not None]
-            why = "no poses keep it where the tool has gone as far"
+            found = [stretch for stretch in made if isinstance(stretch, FeedStretch)]
             if len(found) < len(parts):
+                # Where it is with the most that may be off.
+                stuck = stuck or next(at for at in made if not isinstance(at, FeedStretch))
+                why = self._lost(stuck, allowed)
                 continue
+            why = (
+                "with poses at its feed it does not keep all that it has to (limits, clearances, "
+                "the feed itself): leave more room, or take a lower feed"
+            )
             if not all(part._is_prompt(own) for part, own in zip(parts, found, strict=True)):
                 why = "an event is where the tool is slower than its feed, or it is at no feed"
             elif self._keeps(found, gone, allowed):
@@ -97,6 +104,18 @@ class FeedSpan(PoseSpan):
                 return [(stretch, part._miss(stretch)) for part, stretch in pairs]
         ((timed, miss),) = super().stretches(allowed)
         return [(replace(timed, remark=f"{TIMED}{why}"), miss)]
+
+    def _lost(self, at: float, allowed: Tolerance) -> str:
+        """Return in words where no poses at a feed keep the motion, and what would help."""
+        motion = self.piece.motion
+        tool = self.piece.chains[0].place(motion(at)).translation
+        place = ", ".join(f"{value:.3f}" for value in tool)
+        return (
+            f"near t = {at - motion.t[0]:.4g} s, at ({place}) m, no poses at its feed keep it "
+            f"within {1e3 * allowed.position:.3g} mm and {np.degrees(allowed.rotation):.3g}°: in "
+            f"corners round them more (tolerance = 0.002), or stop there (corners = 'stop'); else "
+            f"allow more (deviation), or keep away from singular poses"
+        )
 
     @property
     def _stops(self) -> list[float]:
@@ -145,28 +164,33 @@ class FeedSpan(PoseSpan):
             for event, (at, _) in zip(stretch.events, self.events, strict=True)
         )
 
-    def _fewest(self, gone: PassedLength, allowed: Tolerance, free: float) -> FeedStretch | None:
-        """Return the fewest targets; None where none keep what is allowed."""
+    def _fewest(self, gone: PassedLength, allowed: Tolerance, free: float) -> FeedStretch | float:
+        """Return the fewest targets; where none keep what is allowed, near when that is [s]."""
         fixed = self._fixed(gone)
         along = self._along(gone, fixed)
         marks = [int(np.abs(along.gone - each).argmin()) for each in fixed]
         limits = Allowed(allowed.position, allowed.rotation, free)
         steps = StepSearch(self.frames, self.piece.turns, along, limits).between(marks)
+        if not isinstance(steps, Steps):
+            return self._when(gone, along.gone[steps])
         for _ in range(_TRIES):
-            if steps is None:
-                return None
             stretch = self._stretch(gone, along, steps)
             taken = self._off(stretch, limits)
-            if taken is None:
-                return None
+            if not isinstance(taken, np.ndarray):
+                return taken
             far = taken > 1.0
             if not far.any():
                 return stretch
+            worst = steps.ends[int(taken.argmax())]
             finer = steps.halved(far)
             if len(finer.ends) == len(steps.ends):
-                return None
+                break
             steps = finer
-        return None
+        return self._when(gone, along.gone[worst])
+
+    def _when(self, gone: PassedLength, far: float) -> float:
+        """Return when the tool has gone so far [s]."""
+        return float(np.clip(gone.when(np.array([far]))[0], self.first, self.last))
 
     def _fixed(self, gone: PassedLength) -> Array:
         """Return how far the tool is at ends, events, and where feeds change [m]."""
@@ -249,21 +273,22 @@ class FeedSpan(PoseSpan):
                 found[(middles >= begin) & (middles <= end)] = item.asked
         return np.round(found, _SPEED_DIGITS)
 
-    def _off(self, stretch: FeedStretch, allowed: Allowed) -> Array | None:
+    def _off(self, stretch: FeedStretch, allowed: Allowed) -> Array | float:
         """Return how much of what is allowed each step takes, corners included, (K,).
 
-        None where joints swing between two looks, as they do near a singular pose.
+        Where joints swing between two looks, as they do near a singular pose, near when [s].
         """
         times, count = stretch.looked_at(), len(stretch.t) - 1
         exact = stretch.matched(self.piece.motion, self.first)
         at, facing = self.frames.places(exact)
         worst = np.zeros(count)
         for line in stretch.ways(times):
-            if not np.isfinite(line).all():
-                return None
             off = line - exact
-            if np.abs(np.diff(off, axis=0)).max() > max(_SWING * allowed.free, _LEAST_SWING):
-                return None
+            swing = np.abs(np.diff(off, axis=0)).max(axis=1)
+            # Written so that NaN does.
+            swings = ~(swing <= max(_SWING * allowed.free, _LEAST_SWING))
+            if swings.any():
+                return float(min(self.first + times[int(swings.argmax())], self.last))
             places, turns = self.frames.places(line)
             taken = np.linalg.norm(places - at, axis=1) / allowed.position
             taken = np.maximum(taken, np.abs(off).max(axis=1) / allowed.free)

@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import combinations, pairwise
 from pathlib import Path as FilePath
+from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
 import numpy as np
@@ -11,7 +12,13 @@ import numpy as np
 from selfmotion.basics import Array, FileFormatError, Progress, silent
 from selfmotion.certificate import Tolerance
 from selfmotion.constraints import Constraint
-from selfmotion.controllers.controller_program import ControllerProgram, Draft, Switch, drafted
+from selfmotion.controllers.controller_program import (
+    ControllerProgram,
+    Draft,
+    Joints,
+    Switch,
+    drafted,
+)
 from selfmotion.controllers.krl import KrlReader, write_krl
 from selfmotion.controllers.program_lines import ProgramReader
 from selfmotion.controllers.program_settings import ProgramSettings
@@ -54,9 +61,42 @@ def write_program(
     settings: ProgramSettings,
     progress: Progress = silent,
 ) -> None:
-    """Write a motion as a program of a controller; see `write_motion`."""
+    """Write a motion as a program of a controller; see `write_motion`.
+
+    Poses are written where the file, read again, keeps what it states: else joint targets, of free
+    moves first.
+    """
     verdict = plan.certificate.verdict if isinstance(plan, Plan) else plan.verdict
-    _WRITERS[form](file, drafted(plan, file.stem, form, settings, verdict, progress))
+    given = plan, file.stem, form, settings, verdict, progress
+    draft = drafted(*given)
+    for moves_only in (True, False):
+        if draft.frames is None:
+            break
+        why = _lost(plan, file, form, draft)
+        if not why:
+            break
+        draft = drafted(*given, Joints(moves_only, why))
+    _WRITERS[form](file, draft)
+
+
+def _lost(plan: Plan | Parts | Move | Program, file: FilePath, form: str, draft: Draft) -> str:
+    """Return why a program of poses, read again, is not the motion, in words; empty where it is."""
+    with TemporaryDirectory() as folder:
+        trial = FilePath(folder) / file.name
+        _WRITERS[form](trial, draft)
+        try:
+            _, stated, found = program_miss(plan, trial)
+        except FileFormatError as error:
+            return f"read again, {str(error).removeprefix(f'{trial}: ')}"
+    if keeps_stated(found, stated):
+        return ""
+    return "read again, poses leave the motion: the arm is singular, or nearly so"
+
+
+def keeps_stated(found: Misses, stated: Misses) -> bool:
+    """Whether a program is no farther off its motion than it states, in the digits of files."""
+    pairs = zip((*found.path, *found.moves), (*stated.path, *stated.moves), strict=True)
+    return all(one <= other + 1e-9 for one, other in pairs)
 
 
 def read_program(file: FilePath, robot: RobotModel | None = None) -> ControllerProgram:

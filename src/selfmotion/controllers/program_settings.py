@@ -33,6 +33,9 @@ Signal = tuple[str | int, bool]
 _DEVIATION = Tolerance(1e-4, 1e-3)
 # No arm carries more [kg], nor holds it farther from its flange [m].
 _HEAVIEST, _FARTHEST = 3000.0, 5.0
+# A work object stands no farther from the arm's base [m]; the word for the frame of the path.
+_FARTHEST_WORK = 50.0
+OF_PATH = "path"
 # Mechanical units that a KUKA controller has at most.
 _UNITS = 16
 # What targets may be.
@@ -79,9 +82,11 @@ class ProgramSettings:
         which takes more of them. Where poses do not keep the motion, joint targets are written all
         the same, and the head of the file says why.
     work_object : str or SE3, optional
-        What poses are counted in: a link that stands still or that an external axis carries, or a
+        What poses are counted in: a link that stands still or that an external axis carries, a
         pose [m] in the frame that the controller counts its arm from (link ``base``, else the
-        world). By default the frame that the path is given in.
+        world), or ``"path"``: the frame that the path is given in, as its table or workpiece is
+        placed. By default the link that the path rides on (`reference`), else the controller's own
+        frame.
     positioner : str or int, optional
         The mechanical unit that carries the work object: its name (ABB), or its number in
         ``MACHINE_DEF`` (KUKA).
@@ -151,6 +156,12 @@ class ProgramSettings:
             raise ProblemError(f"targets are {shown(self.targets)}, expected one of {known}")
         if not (self.work_object is None or isinstance(self.work_object, str)):
             work = as_pose(self.work_object, "work_object", ProblemError)
+            far = float(np.abs(work.translation).max())
+            if far > _FARTHEST_WORK:
+                raise ProblemError(
+                    f"work_object: {far:g} m is far from any arm, expected at most "
+                    f"{_FARTHEST_WORK:g}; in millimetres? It is in m (position_mm in files)"
+                )
             object.__setattr__(self, "work_object", work)
         unit = self.positioner
         named = isinstance(unit, str) and unit.isascii() and unit.isidentifier()

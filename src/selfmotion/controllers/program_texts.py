@@ -40,7 +40,9 @@ def rounded_up(value: float, digits: int) -> str:
 
 def plain(text: str) -> str:
     """Return a text as a comment may hold it: one line of ASCII."""
-    return " ".join(text.replace("→", "->").encode("ascii", "replace").decode().split())
+    return " ".join(
+        text.replace("→", "->").replace("°", " deg").encode("ascii", "replace").decode().split()
+    )
 
 
 def folded(text: str) -> list[str]:

@@ -200,19 +200,19 @@ class StepSearch:
     along: Places
     allowed: Allowed
 
-    def between(self, marks: list[int]) -> Steps | None:
-        """Return steps that end at marks and in between; None where none are near enough."""
+    def between(self, marks: list[int]) -> Steps | int:
+        """Return steps that end at marks and in between; where none is near enough, that place."""
         found = Steps(marks[:1], [])
         for first, last in pairwise(marks):
             part = self._joined(first, last)
-            if part is None:
-                return None
+            if not isinstance(part, Steps):
+                return part
             part = self._even(part)
             found = Steps(found.ends + part.ends[1:], found.round + part.round)
         return found
 
-    def _joined(self, first: int, last: int) -> Steps | None:
-        """Return steps as long as they can be, one after the other."""
+    def _joined(self, first: int, last: int) -> Steps | int:
+        """Return steps as long as they can be, one after the other; see `between`."""
         steps, at = Steps([first], []), first
         while at < last:
             line = self._farthest(at, last, is_round=False, least=at + 1)
@@ -223,7 +223,7 @@ class StepSearch:
                 least = max(line + 1, at + 2, int(np.searchsorted(self.along.gone, long)))
                 arc = self._farthest(at, last, is_round=True, least=min(least, last))
             if max(line, arc) <= at:
-                return None
+                return at
             steps.round.append(arc > line + 1)
             at = max(line, arc)
             steps.ends.append(at)

@@ -157,9 +157,14 @@ def miss_of(
 
 
 def miss_between(q: Array, exact: Array, chains: Sequence[Chain]) -> Miss:
-    """Return how far configurations (K, n) are off others at most, one by one."""
+    """Return how far configurations (K, n) are off others at most, one by one.
+
+    It is infinite where they are not numbers: no joints are known of a pose.
+    """
     from scipy.spatial.transform import Rotation
 
+    if not np.isfinite(q).all():
+        return Miss(np.inf, np.inf, np.inf)
     position = rotation = 0.0
     for chain in chains:
         _, here, there = chain.along(q)

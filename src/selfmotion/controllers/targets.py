@@ -16,6 +16,7 @@ from selfmotion.controllers.stretches import (
     Misses,
     PoseStretch,
     Stretch,
+    finer,
     on_one_side,
 )
 from selfmotion.controllers.thinning import TIME_DIGITS, Piece, Span, events_within, rests
@@ -37,6 +38,9 @@ _EVENLY, _MUCH = 5, 9.0
 # Times at which the motion is looked at between two of its samples; from how far the acceleration
 # is taken [s]; and how far poses may take joints that inverse kinematics finds anew [rad].
 _FINER, _AROUND = 4, 2e-3
+# What numbers of poses, and controllers that count with them, may be off [m, rad], in any language:
+# where that alone takes joints as far as is allowed, the arm is singular.
+_OF_POSES = 1e-6
 
 
 class NotByPosesError(ProblemError):
@@ -69,6 +73,30 @@ class PoseSpan(Span):
     ) -> "PoseSpan":
         """Return that of a piece, with the events that are in it."""
         return cls(piece, slides, first, last, events_within(piece, first, last), frames, rounding)
+
+    def stretches(self, allowed: Tolerance) -> list[tuple[Stretch, Miss]]:
+        """See `Span.stretches`.
+
+        Raises
+        ------
+        NotByPosesError
+            The arm is singular somewhere, as at an end: its joints do not follow from poses.
+        """
+        self.check_regular(allowed)
+        return super().stretches(allowed)
+
+    def check_regular(self, allowed: Tolerance) -> None:
+        """Raise NotByPosesError where the arm is singular within what is allowed."""
+        motion = self.piece.motion
+        if rests(motion, self.first, self.last):
+            return
+        inside = motion.t[(motion.t > self.first) & (motion.t < self.last)]
+        marks = np.concatenate([[self.first], inside, [self.last]])
+        t = finer(marks, np.linspace(0.0, 1.0, _FINER, endpoint=False))
+        far = _OF_POSES / np.maximum(self.frames.regularity(motion(t)), 1e-12)
+        if far.max() > allowed.rotation:
+            at = float(t[int(far.argmax())] - motion.t[0])
+            raise NotByPosesError(f"'{self.piece.name}': the arm is singular at t = {at:.4g} s")
 
     def thinned(self, allowed: Tolerance) -> tuple[Stretch, Miss]:
         """See `Span.thinned`.

@@ -7,8 +7,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from selfmotion.basics import Array, Flags, Ints, ProblemError
-from selfmotion.controllers.program_settings import AXES, Axis, ProgramSettings, tool_from_flange
+from selfmotion.basics import Array, Flags, Ints, ProblemError, nearest
+from selfmotion.controllers.program_settings import (
+    AXES,
+    OF_PATH,
+    Axis,
+    ProgramSettings,
+    tool_from_flange,
+)
+from selfmotion.path import Joined, Path, Placed
 from selfmotion.robot import Chain, RobotModel
 from selfmotion.task import SE3, Quaternion, exp3, log3, rpy, skews
 
@@ -140,31 +147,44 @@ class ToolFrames:
     flange_to_tool: SE3
 
     @classmethod
-    def of(cls, robot: RobotModel, axes: Sequence[Axis], settings: ProgramSettings) -> "ToolFrames":
-        """Return those that settings ask for.
+    def of(
+        cls,
+        robot: RobotModel,
+        axes: Sequence[Axis],
+        settings: ProgramSettings,
+        path_frame: SE3 | None = None,
+    ) -> "ToolFrames":
+        """Return those that settings ask for; `path_frame` is where they ask for that of the path.
+
+        It is given in the link that the path rides on.
 
         Raises
         ------
         ProblemError
-            The work object rides on what carries the tool.
-        RobotError
-            There is no such link.
+            The work object rides on what carries the tool, or there is no such link.
         """
         given, tool = settings.work_object, tool_from_flange(robot, settings)
-        carrier, work = _base_of(robot), SE3.Identity()
-        name = carrier
+        carrier, work = base_of(robot), SE3.Identity()
+        name, inside = carrier, SE3.Identity()
         if given is None:
             given = robot.reference or work
         elif isinstance(given, SE3):
             name = "given"
+        elif given == OF_PATH:
+            given, inside = robot.reference or robot.urdf.root, path_frame or inside
+            name = OF_PATH
+        else:
+            _check_link(robot, given)
+            name = given
         if isinstance(given, SE3):
             work = SE3(given)
         elif robot.carrier_of(given)[0] == 0:
-            name = given
+            name = given if name == carrier else name
             base = robot.chain_to(given, None if carrier == WORLD else carrier)
-            work = base.place(np.zeros(robot.dof))
+            work = base.place(np.zeros(robot.dof)) * inside
         else:
-            name = carrier = given
+            name = given if name == carrier else name
+            carrier, work = given, inside
             _check_beside(robot, given)
         return cls(robot, tuple(axes), carrier, work, name, tool, tool)
 
@@ -250,6 +270,14 @@ class ToolFrames:
         turned = np.hstack([rates[:, :3] @ turn.T, rates[:, 3:] @ turn.T])
         return self._rates(self._tool_along(q)[0], turned)
 
+    def regularity(self, q: Array) -> Array:
+        """Return how far the tool moves at least, of all motions of the arm of 1 rad, (K,).
+
+        The least singular value of the arm's Jacobian, in m and rad: 0 in a singular pose.
+        """
+        own = self._tool_along(q)[0][:, :, self.arm]
+        return np.asarray(np.linalg.svd(own, compute_uv=False)[:, -1])
+
     def speeds(self, q: Array, qd: Array) -> Array:
         """Return how fast the tool is in the work object at q and qd (K, n), (K,) [m/s]."""
         moved = np.einsum("kcn,kn->kc", self._tool_along(q)[0][:, :3], qd)
@@ -299,7 +327,7 @@ def own_joint(robot: RobotModel, axes: Sequence[Axis]) -> str:
     return next((axes[joint].joint for joint in inside if axes[joint].name.startswith("E")), "")
 
 
-def _base_of(robot: RobotModel) -> str:
+def base_of(robot: RobotModel) -> str:
     """Return the frame that the controller counts its fixed arm from: link ``base``, or the world.
 
     By the conventions of ROS-Industrial ``base`` is the controller's frame.
@@ -308,6 +336,70 @@ def _base_of(robot: RobotModel) -> str:
     link = f"{part}/base" if part else "base"
     known = link in robot.urdf.links and robot.carrier_of(link)[0] == 0
     return link if known else WORLD
+
+
+def turned_base(robot: RobotModel) -> str:
+    """Return how the frame that the controller counts from is turned from the root, in words.
+
+    Empty where it is not.
+    """
+    base = base_of(robot)
+    if base == WORLD:
+        return ""
+    place = robot.chain_to(base).place(np.zeros(robot.dof))
+    turn = float(np.linalg.norm(log3(place.rotation)))
+    if turn < _TURNED:
+        return ""
+    return (
+        f"work objects are counted in '{base}', the controller's frame, which is turned by "
+        f"{np.degrees(turn):.4g}° from '{robot.urdf.root}', in which --frame counts; --wobj "
+        f"{OF_PATH} is the frame of the path"
+    )
+
+
+# Turned by more than rounding [rad].
+_TURNED = 1e-6
+
+
+def frame_of_paths(paths: Sequence[Path]) -> SE3:
+    """Return the frame that paths are given in, in the link that they ride on.
+
+    Raises
+    ------
+    ProblemError
+        They are given in several frames.
+    """
+    frames = [_placed(path) for path in paths] or [SE3.Identity()]
+    for frame in frames[1:]:
+        if np.abs(frame.homogeneous - frames[0].homogeneous).max() > _SAME:
+            raise ProblemError(
+                f"work_object '{OF_PATH}': paths are given in several frames, expected one; give "
+                f"the name of a link, or a pose"
+            )
+    return frames[0]
+
+
+# Frames that differ by less than this [m, parts of a turn] are one.
+_SAME = 1e-9
+
+
+def _placed(path: Path) -> SE3:
+    """Return the frame that a path is given in."""
+    if isinstance(path, Placed):
+        return path.frame * _placed(path.original)
+    if isinstance(path, Joined):
+        return frame_of_paths(path.pieces)
+    inner = getattr(path, "original", None)
+    return SE3.Identity() if inner is None else _placed(inner)
+
+
+def _check_link(robot: RobotModel, link: str) -> None:
+    links = list(robot.urdf.links)
+    if link not in links:
+        raise ProblemError(
+            f"{robot.name}: work_object '{link}' is none of its links{nearest(link, links)}; "
+            f"expected one of {', '.join(links)}, '{OF_PATH}' (the frame of the path), or a pose"
+        )
 
 
 def _check_beside(robot: RobotModel, link: str) -> None:

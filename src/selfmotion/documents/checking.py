@@ -15,8 +15,12 @@ _TOLD = 3
 _SECTIONS = ("path", "null_motion")
 
 
-def checked(document: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the keys that a document gives, poses as SE3.
+def checked(
+    document: Mapping[str, Any], written: Mapping[str, Any] | None = None
+) -> dict[str, Any]:
+    """Return the keys that a document in SI units gives, poses as SE3.
+
+    Keys are told as `written` has them, with their units.
 
     Raises
     ------
@@ -40,7 +44,7 @@ def checked(document: Mapping[str, Any]) -> dict[str, Any]:
     try:
         found = document_model().model_validate(raw)
     except ValidationError as error:
-        raise FileFormatError(_message(error, raw)) from error
+        raise FileFormatError(_message(error, raw, written)) from error
     table = {**_given(found), **switched}
     table["path"] = _inner(table["path"], "path")
     for k, item in enumerate(table.get("also", [])):
@@ -82,10 +86,15 @@ def _given(value: Any) -> Any:
     return value
 
 
-def _message(error: ValidationError, document: Mapping[str, Any]) -> str:
+def _message(
+    error: ValidationError, document: Mapping[str, Any], written: Mapping[str, Any] | None = None
+) -> str:
     # A key that is misspelt is also missing: what was written says more.
     found = sorted(error.errors(include_url=False), key=lambda item: item["type"] == "missing")
-    told = dict.fromkeys(f"{_place(item['loc'])}: {_what(item, document)}" for item in found)
+    told = dict.fromkeys(
+        f"{_place(item['loc'])}{unit}: {_what(item, document, unit)}"
+        for item, unit in ((item, _unit(item["loc"], written)) for item in found)
+    )
     rest = f"; and {len(told) - _TOLD} more" if len(told) > _TOLD else ""
     return "; ".join(list(told)[:_TOLD]) + rest
 
@@ -109,7 +118,21 @@ def _is_plain_list(location: tuple[int | str, ...], k: int) -> bool:
     return k == 2 and location[0] in ("relaxations", "also")
 
 
-def _what(error: Any, document: Mapping[str, Any]) -> str:
+def _unit(location: tuple[int | str, ...], written: Any) -> str:
+    """Return the ending of a key that has a unit in what was written; else empty."""
+    inner = written
+    for part in location[:-1]:
+        listed = isinstance(inner, list) and isinstance(part, int) and part < len(inner)
+        # Others are kinds of what is in the table.
+        if listed or (isinstance(inner, Mapping) and part in inner):
+            inner = inner[part]
+    key = location[-1]
+    if not isinstance(inner, Mapping) or key in inner:
+        return ""
+    return next((suffix for suffix in _UNITS if f"{key}{suffix}" in inner), "")
+
+
+def _what(error: Any, document: Mapping[str, Any], unit: str = "") -> str:
     context = error.get("ctx", {})
     match error["type"]:
         case "value_error":
@@ -117,7 +140,7 @@ def _what(error: Any, document: Mapping[str, Any]) -> str:
         case "missing":
             return "is missing"
         case "extra_forbidden":
-            return "unknown key" + _near(error)
+            return "unknown key" + _near(error, unit)
         case "union_tag_not_found":
             tag = context["discriminator"].strip("'")
             return f"has no key '{tag}', which says what it is"
@@ -133,12 +156,16 @@ def _what(error: Any, document: Mapping[str, Any]) -> str:
     return str(error["msg"])
 
 
-def _near(error: Any) -> str:
+def _near(error: Any, unit: str = "") -> str:
     schema = document_model().model_json_schema()
     known = _known_keys(error["loc"], schema)
     units = [name + suffix for suffix, names in _UNITS.items() for name in known if name in names]
     key = str(error["loc"][-1])
     near = get_close_matches(key, [*known, *units], 1)
+    if unit:
+        # What has the same unit is what is meant.
+        likely = [name for name in known if name in _UNITS[unit]]
+        near = [f"{name}{unit}" for name in get_close_matches(key, likely, 1)] or near
     if not near and len(error["loc"]) == 1:
         # One of a table, at the top of the file.
         tables = [f"[{name}]" for name in known if key in _known_keys((name, key), schema)]

@@ -164,7 +164,8 @@ branches = 2           # motions in different configurations that are tried for 
 
 [[seams]]
 name = "one"
-events = [["tool on", 0.0]]  # what happens how long after its start [s]
+# events = [["tool on", 0.0]]  # what happens how long after its start [s]; a program for a
+#                              # controller needs [signals] that say what it switches
 # either_way = false   # from its start to its end only
 # after = ["two"]
 # wait = 1.0           # s, that the arm rests after it

@@ -205,7 +205,7 @@ def job_of(
             )
         raw = in_si(document)
         functions = name_kinds(raw, FilePath() if file is None else file.parent, allow_code)
-        table = placed_table(checked(raw))
+        table = placed_table(checked(raw, document))
         return _Reader(
             file, table, functions, _degrees_per_joint(document), {} if memory is None else memory
         ).job()

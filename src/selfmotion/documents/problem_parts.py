@@ -182,10 +182,9 @@ def path_of(
             inner = partial(path_of, robot=robot, start=start, beside=beside)
             path = _restored(_with_inner(values, inner))
     path = path if feed is None else Feed(path, feed, **bounds)
-    notes = path.notes
     path = path if weave is None else woven(path, weave)
     path = path if leads is None else led(path, leads)
-    return (path if frame is None else Placed(path, frame)).noted(notes)
+    return path if frame is None else Placed(path, frame)
 
 
 def led(path: Path, values: Mapping[str, Any]) -> Path:

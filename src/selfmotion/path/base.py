@@ -82,8 +82,11 @@ class Path(Saved, ABC, family="path"):
     """
 
     duration: float
-    # What to know before it is followed, in words.
-    notes: tuple[str, ...] = ()
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What to know before it is followed, in words."""
+        return tuple(self.__dict__.get("_notes", ()))
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({self.duration:.6g} s)"
@@ -159,7 +162,7 @@ class Path(Saved, ABC, family="path"):
         found = tuple(notes)
         if found:
             # Paths may be frozen; what is noted is no part of their value.
-            object.__setattr__(self, "notes", found)
+            object.__setattr__(self, "_notes", found)
         return self
 
     def at_constant_speed(self) -> Path:
@@ -215,6 +218,11 @@ class _Derived(Path):
     @abstractmethod
     def when(self, wanted: Array) -> Array:
         """Return when times of the original (K,) are passed, (K,) [s]."""
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """See `Path.notes`: those of the original as well."""
+        return tuple(dict.fromkeys((*self._path.notes, *super().notes)))
 
     @property
     def oriented(self) -> bool:

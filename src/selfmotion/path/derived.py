@@ -42,6 +42,11 @@ class Placed(_InStep, kind="placed"):
         self._frame = path_pose(frame, "placed path: frame")
         self.duration = path.duration
 
+    @property
+    def frame(self) -> SE3:
+        """Pose of the frame in the world."""
+        return SE3(self._frame)
+
     def at_constant_speed(self) -> Placed:
         """See `Path.at_constant_speed`: as the original."""
         return Placed(self._path.at_constant_speed(), self._frame)

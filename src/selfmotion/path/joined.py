@@ -131,6 +131,12 @@ class Joined(Path, kind="joined"):
             _check_joint(one, other, number)
 
     @property
+    def notes(self) -> tuple[str, ...]:
+        """See `Path.notes`: those of all pieces as well."""
+        inner = (note for piece in self.pieces for note in piece.notes)
+        return tuple(dict.fromkeys((*inner, *super().notes)))
+
+    @property
     def oriented(self) -> bool:
         """See `Path.oriented`: as all pieces."""
         return all(piece.oriented for piece in self.pieces)

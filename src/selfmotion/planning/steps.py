@@ -16,6 +16,7 @@ from selfmotion.basics import (
     NoSequenceError,
     SelfmotionError,
 )
+from selfmotion.constraints import JointPositionLimits
 from selfmotion.planning.candidate import Candidate, on_start
 from selfmotion.planning.effort import Search
 from selfmotion.planning.planner import Planner
@@ -29,6 +30,7 @@ from selfmotion.planning.proposals import (
 from selfmotion.problem import Problem
 from selfmotion.result import Attempt
 from selfmotion.search import Obstruction, obstruction
+from selfmotion.task import SE3
 
 # Where nothing else leads to a motion that keeps the constraints, this many times more are tried.
 _SECOND_EFFORT = 4
@@ -311,16 +313,31 @@ def _looked_at(problem: Problem, search: Search) -> Obstruction | None:
     return blocked
 
 
+def _is_in_own_reach(problem: Problem, pose: SE3) -> bool:
+    """Whether limits that were asked for, and not the arm's own, keep it from a pose."""
+    asked = problem.asked
+    if not any(isinstance(item, JointPositionLimits) for item in problem.constraints):
+        return False
+    try:
+        asked.robot.inverse_kinematics(pose, asked.task)
+    except InverseKinematicsError:
+        return False
+    return True
+
+
 def _no_way(problem: Problem, blocked: Obstruction) -> SelfmotionError:
     """Return the error that says what is in the way, and what would help."""
     robot, pose = problem.robot, problem.path.pose(blocked.time)
     task = problem.asked.task.value
     if not blocked.is_met and blocked.time == 0.0:
         position, rotation = blocked.misses
+        remedy = "move the pose into the workspace"
+        if _is_in_own_reach(problem, pose):
+            remedy = "the arm's own limits let it be there: widen JointPositionLimits"
         return InverseKinematicsError(
             f"{robot.name}: no configuration within the limits puts '{robot.tool}' at "
             f"{np.round(pose.translation, 4).tolist()} m for task '{task}', where "
-            f"the path begins: {blocked.reason}; move the pose into the workspace{blocked.help}",
+            f"the path begins: {blocked.reason}; {remedy}{blocked.help}",
             position_miss=position,
             rotation_miss=rotation,
         )

@@ -73,6 +73,8 @@ def _depths(obstacle: Obstacle, places: Array) -> Array:
 _FAR_ABOVE = 10.0
 _RATES = {1: ("rad/s", 50.0), 2: ("rad/s²", 200.0), 3: ("rad/s³", 5e4)}
 _FASTEST_TOOL = 50.0
+# No process is as slow as this [m/s].
+_SLOWEST_FEED = 1e-4
 
 
 def remarks_on(
@@ -91,6 +93,12 @@ def remarks_on(
         task = followed.task
         is_turned = task.angular and not task.tool_axes
         yield from (note for note in followed.path.notes if is_turned or note != TURN_NOTE)
+        slow = min((item.asked for item in followed.path.feeds), default=np.inf)
+        if slow < _SLOWEST_FEED:
+            yield (
+                f"a feed of {1e3 * slow:g} mm/s takes {followed.path.duration:.4g} s; are these "
+                f"m/s? Then it is feed = {1e3 * slow:g}, feed_mm = {1e6 * slow:g}"
+            )
     for model, _ in envelope.bodies:
         for pair in model.overlapping:
             if pair.is_checked:

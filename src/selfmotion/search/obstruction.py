@@ -7,7 +7,7 @@ from typing import cast
 import numpy as np
 
 from selfmotion.basics import Array
-from selfmotion.collision import how_near
+from selfmotion.collision import Closest, how_near
 from selfmotion.follow import AugmentedFollows
 from selfmotion.problem import Problem
 from selfmotion.search.nodes import AT_LIMIT
@@ -207,21 +207,39 @@ class Obstruction:
             f"{cause(poses, q[0])}: the nearest misses it by {1e3 * position:.3g} mm{turned}"
         )
 
+    @property
+    def _least_clearance(self) -> float:
+        """How far bodies are apart at the pose at most, where that is less than was asked [m]."""
+        if not self.is_met:
+            return 0.0
+        worst, asked = _roomiest_pair(self.poses, self.found.met)
+        # Rounded down: what is told has to suffice.
+        known = np.floor(1e4 * worst.value) / 1e4
+        return float(known) if 0.0 < worst.value < asked else 0.0
+
     @cached_property
     def help(self) -> str:
         """What would help, each by itself; "" for nothing that is known."""
         found = remedies(self.poses, self.time, self.times)
+        least = self._least_clearance
+        found += [f"a clearance of {1e3 * least:.3g} mm"] if least > 0.0 else []
         return f"; what would help: {', or '.join(found)}" if found else ""
 
 
 def _roomiest(poses: SinglePoses, met: Array) -> str:
     """Return what is met at the configuration (of K, n) that bodies are least near to."""
-    # The last ones were moved aside from what they met.
-    _, worst, asked = max((poses.room(q) for q in met[-MOST_LOOKED_AT:]), key=lambda each: each[0])
+    worst, asked = _roomiest_pair(poses, met)
     return (
         f"at best '{worst.first}' and '{worst.second}' {how_near(worst.value)} (wanted: "
         f"{1e3 * asked:.3g} mm)"
     )
+
+
+def _roomiest_pair(poses: SinglePoses, met: Array) -> tuple[Closest, float]:
+    """Return the nearest bodies where these are least near, and how far apart they should be."""
+    # The last ones were moved aside from what they met.
+    _, worst, asked = max((poses.room(q) for q in met[-MOST_LOOKED_AT:]), key=lambda each: each[0])
+    return worst, asked
 
 
 def obstruction(problem: Problem, rng: np.random.Generator) -> Obstruction | None:

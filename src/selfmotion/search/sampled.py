@@ -66,7 +66,10 @@ def sampled_layers(
 
     def why(i: int, alive: Array, layer: Array, kept: Admissible) -> str:
         if not len(samples[i]):
-            return "no sample there is within the limits and free"
+            return (
+                "no sample there is within the limits and free; what may help: a smaller "
+                "clearance, wider limits, or what is in the way or the path elsewhere"
+            )
         return (
             f"none of {len(samples[i])} samples that are within the limits and free can be "
             f"reached from those before within the step limits"
