@@ -12,7 +12,7 @@ import selfmotion as sm
 from selfmotion import controllers
 from selfmotion.basics import Array
 from selfmotion.certificate import Separation
-from selfmotion.cli import exports
+from selfmotion.cli import reread
 from selfmotion.controllers import judged_program, program_miss
 from selfmotion.controllers.judged_programs import read_program
 from selfmotion.controllers.program_settings import axes_of, tool_from_flange
@@ -678,16 +678,16 @@ def test_what_is_read_back_is_held_in_turns_joints_and_outputs_as_well(
 ) -> None:
     file = tmp_path / "weld.src"
     sm.files.write_motion(program, file, settings=settings("weld.src", 1e-3))
-    assert exports._confirmed(program, file)[0]
+    assert reread._confirmed(program, file)[0]
     count, stated, found = program_miss(program, file)
     for k in range(3):
         path = list(found.path)
         path[k] = stated.path[k] + 1e-8
         off = count, stated, found._replace(path=type(found.path)(*path))
         monkeypatch.setattr(controllers, "program_miss", lambda *_, off=off: off)
-        assert not exports._confirmed(program, file)[0]
+        assert not reread._confirmed(program, file)[0]
     monkeypatch.undo()
     file.write_text(file.read_text().replace("= FALSE", "= TRUE"))
-    kept, said = exports._confirmed(program, file)
+    kept, said = reread._confirmed(program, file)
     assert not kept
     assert "both switch '7' to True" in said

@@ -113,6 +113,9 @@ def test_files_that_are_no_plans_are_named(plan: sm.Plan, tmp_path: Path) -> Non
         sm.load_plan(tmp_path / "none.npz")
     text = tmp_path / "text.npz"
     text.write_text("not a plan")
+    with pytest.raises(sm.errors.FileFormatError, match=r"cell\.program: no such file"):
+        sm.load_plan(tmp_path / "cell.program")
+    (tmp_path / "cell.program").touch()
     with pytest.raises(sm.errors.FileFormatError, match="holds several plans"):
         sm.load_plan(tmp_path / "cell.program")
     with pytest.raises(sm.errors.FileFormatError, match=r"text\.npz: is no plan"):

@@ -76,7 +76,7 @@ def test_a_deviation_is_what_poses_of_arm_and_path_differ_by(task: str) -> None:
     for item, worst in zip(relaxations, plan.certificate.deviations, strict=True):
         size = np.linalg.norm(found[:, item.indices], axis=1).max()
         assert 0.99 * worst.value < size <= worst.value + ROUNDING
-    np.testing.assert_array_equal(plan.deviation(t[7]), found[7])
+    np.testing.assert_allclose(plan.deviation(t[7]), found[7], rtol=0.0, atol=ROUNDING)
     # On another path it is another; in world axes the same length in other rows.
     other = replace(plan.problem, relaxations=relaxations[:1])
     world = replace(plan, problem=other).deviation(t)
