@@ -270,9 +270,9 @@ def test_smooth_segments_beside_round_ones_are_refused(ring: sm.Plan, tmp_path: 
         read_program(file, ring.robot)
 
 
-@pytest.mark.parametrize("name", FILES)
-def test_strokes_switch_where_their_feed_begins(tmp_path: Path, name: str) -> None:
-    """Each in three motions: run-up, the stroke between its events, run-down."""
+@pytest.fixture(scope="module")
+def strokes_program() -> sm.Program:
+    """Two strokes with run-ups, whose events are where their feed begins and ends."""
     ur10 = robot_named("ur10")
     start = ur10.dexterous_configuration("pointing")
     first, seams = ur10.pose(start), []
@@ -285,7 +285,15 @@ def test_strokes_switch_where_their_feed_begins(tmp_path: Path, name: str) -> No
         )
         switched = [("gun on", stroke.begin), ("gun off", stroke.end)]
         seams.append(sm.Seam(f"stroke {k}", stroke.path, "pointing", events=switched))
-    program = sm.plan_job(ur10, seams, order="given", branches=1, clearance=None).require()
+    return sm.plan_job(ur10, seams, order="given", branches=1, clearance=None).require()
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_strokes_switch_where_their_feed_begins(
+    strokes_program: sm.Program, tmp_path: Path, name: str
+) -> None:
+    """Each in three motions: run-up, the stroke between its events, run-down."""
+    ur10, program = robot_named("ur10"), strokes_program
     file, job = tmp_path / name, tmp_path / "paint.program"
     sm.files.write_motion(program, file, settings=settings(name))
     strokes = [
