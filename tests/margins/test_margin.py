@@ -110,14 +110,19 @@ def test_less_of_a_part_meets_no_sooner(plan: sm.Plan, margins: sm.margins.Margi
     assert "10 mm from" in left.part.translation.stops
 
 
-def test_a_tolerance_is_used_up_by_its_lever() -> None:
-    """A straight line of 0.2 m: its ends are 0.1 m from its middle, and nothing can be met."""
+def line_plan() -> sm.Plan:
+    """A straight line of 0.2 m of the planar arm."""
     robot = robot_named("planar_3r")
     start = np.array([0.4, 0.7, 0.6])
     pose = robot.pose(start)
     end = pin.SE3(pose.rotation, pose.translation + np.array([-0.2, 0.0, 0.0]))
     problem = sm.Problem(robot, sm.paths.Line(pose, end, 2.0), "planar", start, constraints=LIMITS)
-    plan = sm.plan(problem).require()
+    return sm.plan(problem).require()
+
+
+def test_a_tolerance_is_used_up_by_its_lever() -> None:
+    """A straight line of 0.2 m: its ends are 0.1 m from its middle, and nothing can be met."""
+    plan = line_plan()
     found = sm.margin(plan, sm.Tolerance(1e-3, 0.5))
     missed = plan.certificate.position_error.value
     room = 1e-3 - missed
@@ -129,17 +134,13 @@ def test_a_tolerance_is_used_up_by_its_lever() -> None:
     assert half.position + 0.1 * half.rotation <= room
     assert "1 mm off its path" in half.stops
     away = sm.margin(plan, sm.Tolerance(1e-3, 0.5), center=[0.0, 0.0, 0.0])
-    far = max(np.linalg.norm(place.translation) for place in (pose, end))
+    ends = (plan.path.pose(t) for t in (0.0, plan.path.duration))
+    far = max(np.linalg.norm(place.translation) for place in ends)
     assert away.part.rotation.rotation == pytest.approx(room / far, rel=0.02)
 
 
 def test_what_misses_its_path_as_it_is_has_no_margin() -> None:
-    robot = robot_named("planar_3r")
-    start = np.array([0.4, 0.7, 0.6])
-    pose = robot.pose(start)
-    end = pin.SE3(pose.rotation, pose.translation + np.array([-0.2, 0.0, 0.0]))
-    problem = sm.Problem(robot, sm.paths.Line(pose, end, 2.0), "planar", start, constraints=LIMITS)
-    plan = sm.plan(problem).require()
+    plan = line_plan()
     found = sm.margin(plan, sm.Tolerance(0.1 * plan.certificate.position_error.value, 0.5))
     for subject in (found.part, found.base):
         for _, each in subject.rows:

@@ -19,6 +19,10 @@ from selfmotion.path import Joined, Path, Placed
 from selfmotion.robot import Chain, RobotModel
 from selfmotion.task import SE3, Quaternion, exp3, log3, rpy, skews
 
+# A frame is turned by more than rounding [rad]; frames that differ by less [m, parts of a turn] are
+# one.
+_TURNED, _SAME = 1e-6, 1e-9
+
 # Tool poses in the numbers that each language has for them.
 #
 # - KRL: X, Y, Z [mm], and A, B, C [deg] with R = R_z(A) R_y(B) R_x(C).
@@ -357,10 +361,6 @@ def turned_base(robot: RobotModel) -> str:
     )
 
 
-# Turned by more than rounding [rad].
-_TURNED = 1e-6
-
-
 def frame_of_paths(paths: Sequence[Path]) -> SE3:
     """Return the frame that paths are given in, in the link that they ride on.
 
@@ -377,10 +377,6 @@ def frame_of_paths(paths: Sequence[Path]) -> SE3:
                 f"the name of a link, or a pose"
             )
     return frames[0]
-
-
-# Frames that differ by less than this [m, parts of a turn] are one.
-_SAME = 1e-9
 
 
 def _placed(path: Path) -> SE3:
