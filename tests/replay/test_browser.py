@@ -431,8 +431,13 @@ def test_without_webgl_the_plots_remain(playwright_without_webgl, files):
     page = playwright_without_webgl
     page.goto(files["planar"].as_uri())
     page.wait_for_selector("html[data-replay=ready]")
-    assert "No 3-D view" in page.locator("#notice").inner_text()
+    notice = page.locator("#notice")
+    assert "No 3-D view" in notice.inner_text()
+    assert ".." not in notice.inner_text()
     assert page.locator("#still").is_visible()
+    # It stands in the lowest part of the picture, not across the arm.
+    words, picture = notice.bounding_box(), page.locator("#still").bounding_box()
+    assert words["y"] > picture["y"] + 0.85 * picture["height"]
     page.keyboard.press("End")
     assert page.locator("#clock").inner_text() == "2.00 / 2.00 s"
 

@@ -478,7 +478,9 @@ async function start() {
     get("notice").hidden = true;
     document.documentElement.classList.add("moving");
   } catch (error) {
-    get("notice").textContent = `No 3-D view: ${error.message}. The plots and numbers are complete.`;
+    const reason = error.message.replace(/\.+$/, "");
+    get("notice").textContent = `No 3-D view: ${reason}. The plots and numbers are complete.`;
+    get("notice").classList.add("below");
     get("view").hidden = true;
     console.warn(error);
   }
