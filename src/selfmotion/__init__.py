@@ -29,7 +29,7 @@ from selfmotion import (
     robot as robot,
 )
 from selfmotion.baselines import plan_by as plan_by
-from selfmotion.basics import SelfmotionError as SelfmotionError
+from selfmotion.basics import SelfmotionError as SelfmotionError, version as _version
 from selfmotion.batch import Batch as Batch, plan_many as plan_many
 from selfmotion.certificate import (
     Certificate as Certificate,
@@ -181,6 +181,8 @@ def __getattr__(name: str) -> Any:
 
     What has a namespace was here in earlier states of 0.1.
     """
+    if name == "__version__":
+        return _version()
     if name in _LATER_NAMESPACES:
         from importlib import import_module
 

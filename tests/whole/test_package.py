@@ -1,6 +1,7 @@
 """What `import selfmotion` offers and what it leaves alone."""
 
 import ast
+import importlib.metadata
 import inspect
 import re
 import subprocess
@@ -34,6 +35,10 @@ def test_each_name_is_there_at_once() -> None:
     code = "import selfmotion as sm; print(*[name for name in dir(sm) if not hasattr(sm, name)])"
     told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert told.stdout.strip() == ""
+
+
+def test_the_version_is_that_of_the_package() -> None:
+    assert sm.__version__ == importlib.metadata.version("selfmotion")
 
 
 # What a first script needs is found in one look.
