@@ -266,7 +266,7 @@ def test_prices_are_what_easing_a_limit_saves(panda_circle: Circle, kind: str) -
     assert priced == pytest.approx(saved, rel=PRICE)
     first = tight.report.active[0]
     assert first.constraint == f"joint {kind} limits"
-    dearest = {"position": "panda_joint4", "acceleration": "panda_joint6"}[kind]
+    dearest = {"position": "panda_joint4", "acceleration": "panda_joint2"}[kind]
     assert f"joint '{dearest}'" in first.easing
     assert all(0.0 <= a <= b <= 4.0 for a, b in first.spans)
 

@@ -36,7 +36,7 @@ class Band(Constraint):
     coordinate: Coordinate
     center: float
     half: float
-    margin: float = 2e-3
+    margin: float = 5e-4
 
     def __post_init__(self) -> None:
         if not isinstance(self.coordinate, Coordinate):

@@ -136,7 +136,7 @@ class Constraint(Saved, ABC, family="constraint"):
         Likewise whether it says how the arm accelerates there.
     """
 
-    margin: float = 1e-2
+    margin: float = 1e-3
     of_pace: ClassVar[bool] = False
     closes: ClassVar[bool] = False
     kept_moving: ClassVar[bool] = False

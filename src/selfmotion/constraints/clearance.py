@@ -179,7 +179,7 @@ class BoundClearance:
     distance: float
     name: str = "clearance"
     equality = False
-    margin: float = 5e-4
+    margin: float = 1e-4
     _last: list[Any] = field(default_factory=list, repr=False)
 
     @property

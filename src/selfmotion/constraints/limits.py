@@ -42,7 +42,7 @@ class JointPositionLimits(Constraint):
 
     lower: npt.ArrayLike | None = None
     upper: npt.ArrayLike | None = None
-    margin: float = 2e-4
+    margin: float = 1e-5
     replace: bool = False
 
     def __post_init__(self) -> None:
@@ -148,7 +148,7 @@ class JointVelocityLimits(_RateLimits):
     kept_moving: ClassVar[bool] = True
 
     limit: npt.ArrayLike | None = None
-    margin: float = 2e-3
+    margin: float = 1e-4
     replace: bool = False
 
 
@@ -170,7 +170,7 @@ class JointAccelerationLimits(_RateLimits):
     kept_moving: ClassVar[bool] = True
 
     limit: npt.ArrayLike | None = None
-    margin: float = 1e-2
+    margin: float = 1e-4
     replace: bool = False
 
 
@@ -191,7 +191,7 @@ class JointJerkLimits(_RateLimits):
     order: ClassVar[int] = 3
 
     limit: npt.ArrayLike | None = None
-    margin: float = 5e-2
+    margin: float = 1e-4
     replace: bool = False
 
 
@@ -316,7 +316,7 @@ class JointTorqueLimits(Constraint):
     payload: float = 0.0
     center: npt.ArrayLike = (0.0, 0.0, 0.0)
     inertia: npt.ArrayLike | None = None
-    margin: float = 1e-2
+    margin: float = 1e-3
 
     def __post_init__(self) -> None:
         as_number(self.margin, "joint torque limits: margin", above=0.0, most=1.0)

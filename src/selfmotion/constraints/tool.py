@@ -49,7 +49,7 @@ class ToolLimits(Constraint):
     turn_rate: float = np.inf
     acceleration: float = np.inf
     turn_acceleration: float = np.inf
-    margin: float = 5e-3
+    margin: float = 1e-3
 
     def __post_init__(self) -> None:
         for (name, _), value in zip(TOOL_RATES, self._given, strict=True):
@@ -140,7 +140,7 @@ class Tilt(Constraint):
     axis: str | npt.ArrayLike = "z"
     within: float = 0.1
     towards: npt.ArrayLike = (0.0, 0.0, -1.0)
-    margin: float = 2e-3
+    margin: float = 5e-4
 
     def __post_init__(self) -> None:
         if not isinstance(self.frame, str):

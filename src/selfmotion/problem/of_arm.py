@@ -18,7 +18,7 @@ from selfmotion.task import Relaxation
 
 # Share of a band that is aimed to be left unused, but at least so much [m or rad], about what a
 # certificate tells apart, and at most so large a share; half of it is left.
-_MARGIN, _LEAST, _MOST = 5e-3, 6e-7, 0.5
+_MARGIN, _LEAST, _MOST = 5e-4, 6e-7, 0.5
 
 
 class _OfArm(Cost):
