@@ -16,7 +16,7 @@ from selfmotion.nodes.kernels import follow
 from selfmotion.nodes.objective import NodeCost
 from selfmotion.nodes.rows import NodeRows, looked
 from selfmotion.nodes.samples import CurveSamples
-from selfmotion.nodes.smoothness import smoothing_of, would_be_calm
+from selfmotion.nodes.smoothness import quickness, smoothing_of, would_be_calm
 from selfmotion.nodes.spline import AT_GAUSS, Quintic
 from selfmotion.problem import Problem
 
@@ -37,6 +37,8 @@ class NodeGrid:
         Where work is added up.
     calm : bool
         Whether motions are kept from wavering everywhere, see `smoothing_of`.
+    quick : float
+        In what share of the usual time the self-motion starts and stops, see `smoothing_of`.
     copies : int, optional
         Of how many motions these are the nodes, one after the other, at times `t` each; see
         `Manifolds`.
@@ -64,14 +66,16 @@ class NodeGrid:
         free: bool,
         counts: Counts,
         calm: bool = False,
+        quick: float = 1.0,
         copies: int | None = None,
     ) -> None:
-        self.problem, self.free, self.counts, self.calm = problem, free, counts, calm
+        self.problem, self.free, self.counts = problem, free, counts
+        self.calm, self.quick = calm, quick
         follows = problem.follows
         self.manifolds = Manifolds(follows, t, copies)
         copies = self.manifolds.copies
         self.spline = Quintic(t, copies)
-        smoothing = smoothing_of(problem, self.spline, calm=calm)
+        smoothing = smoothing_of(problem, self.spline, calm=calm, quick=quick)
         self.cost = NodeCost(follows, self.spline, problem.all_costs, smoothing)
         self.ends = NodeEnds([item for item in constraints if isinstance(item, BoundEnd)])
         others = [item for item in constraints if not item.equality]
@@ -101,9 +105,9 @@ class NodeGrid:
         """Times of the nodes [s], (N + 1,)."""
         return self.spline.t
 
-    def on(self, t: Array, *, calm: bool = False) -> "NodeGrid":
-        """Return the same on other nodes, and from now on `calm` if wanted."""
-        found = self._other(t, calm=calm)
+    def on(self, t: Array, *, calm: bool = False, quick: float | None = None) -> "NodeGrid":
+        """Return the same on other nodes, and from now on `calm` and so `quick` if wanted."""
+        found = self._other(t, calm=calm, quick=quick)
         found.rows = self.rows.on(found.spline)
         return found
 
@@ -130,6 +134,7 @@ class NodeGrid:
         constraints: Sequence[BoundConstraint] | None = None,
         *,
         calm: bool = False,
+        quick: float | None = None,
         copies: int | None = None,
     ) -> "NodeGrid":
         return NodeGrid(
@@ -139,6 +144,7 @@ class NodeGrid:
             free=self.free,
             counts=self.counts,
             calm=calm or self.calm,
+            quick=self.quick if quick is None else quick,
             copies=copies,
         )
 
@@ -293,6 +299,11 @@ class NodeMotion:
     def would_be_calm(self) -> bool:
         """Whether it may be kept from wavering, see `smoothing_of`."""
         return would_be_calm(self.grid.problem, self.samples, self.cost)
+
+    @cached_property
+    def quickness(self) -> float:
+        """In what share of the usual time it should start and stop, see `quickness`."""
+        return quickness(self.grid.problem, self.samples, self.cost, self.grid.quick)
 
     @property
     def epsilon(self) -> Array:

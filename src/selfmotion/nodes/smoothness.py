@@ -19,6 +19,9 @@ _EVERYWHERE = 0.004
 # It is asked for where it is less than this share of F: what accelerates more does so for a reason,
 # beside a singular pose.
 _LITTLE = 0.02
+# What starting and stopping adds is about what it costs: where that is more than the second share
+# of F, they are made quicker until it is the first, but no more than so many times.
+_STARTS_COST, _TOO_MUCH, _QUICKEST = 1e-3, 2e-3, 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,33 +42,76 @@ class Smoothing:
     weight: Array
 
 
-def smoothing_of(problem: Problem, spline: Quintic, *, calm: bool) -> Smoothing | None:
+def smoothing_of(
+    problem: Problem, spline: Quintic, *, calm: bool, quick: float = 1.0
+) -> Smoothing | None:
     """Return what makes the self-motion start and stop as the arm does where it rests.
 
     And joints that are held for a while; and everywhere a little where the motion is to be `calm`.
-    None where there is nothing of that, or the costs ask for smoothness themselves.
+    It starts and stops in the share `quick` of the usual time. None where there is nothing of that,
+    or the costs ask for smoothness themselves.
     """
-    orders = [order for cost in problem.all_costs for order in cost.curvature(problem.robot.dof)]
-    if max(orders, default=0) > 1:
+    if _is_smooth(problem):
         return None
-    duration, t = problem.path.duration, spline.sampling.t.reshape(spline.count, -1)
-    shares = np.full_like(t, (_EVERYWHERE * duration) ** 2 if calm else 0.0)
-    of_jerks = np.zeros_like(t)
-    starting = _STARTING * duration
-    ends = [end for rest, end in zip(problem.rests, (0.0, duration), strict=True) if rest]
-    edges = problem.follows.edges
-    for end in (*ends, *edges):
+    t = spline.sampling.t.reshape(spline.count, -1)
+    shares, of_jerks = _of_starting(problem, t, quick)
+    if calm:
+        # No more than where it starts: there it would make that as slow.
+        little = min(_EVERYWHERE, quick * _STARTING) * problem.path.duration
+        shares = np.maximum(shares, little**2)
+    if not shares.any():
+        return None
+    each = {order: b for order, b in ((2, shares), (3, of_jerks)) if b.any()}
+    return Smoothing(each, np.diag(_weights(problem)))
+
+
+def starting_times(problem: Problem) -> Array:
+    """Return the times at which self-motions start or stop, (k,) [s].
+
+    Where the arm rests, or a joint begins or ends to be held.
+    """
+    both = zip(problem.rests, (0.0, problem.path.duration), strict=True)
+    return np.array([*(end for rest, end in both if rest), *problem.follows.edges])
+
+
+def quickness(problem: Problem, samples: Samples, cost: float, quick: float) -> float:
+    """Return in what share of the usual time a motion of such a cost should start and stop.
+
+    Where it does so in the share `quick` now: that, unless it costs too much.
+    """
+    if _is_smooth(problem):
+        return quick
+    shares, of_jerks = _of_starting(problem, samples.sampling.t, quick)
+    squares = sum(
+        b * (x**2 @ _weights(problem))
+        for b, x in ((shares, samples.qdd), (of_jerks, samples.qddd))
+        if b.any()
+    )
+    added = 0.5 * float(np.sum(samples.weights * squares))
+    if added <= _TOO_MUCH * abs(cost):
+        return quick
+    return max(quick * _STARTS_COST * abs(cost) / added, _QUICKEST)
+
+
+def _is_smooth(problem: Problem) -> bool:
+    """Whether the costs ask for smoothness themselves."""
+    orders = [order for cost in problem.all_costs for order in cost.curvature(problem.robot.dof)]
+    return max(orders, default=0) > 1
+
+
+def _of_starting(problem: Problem, t: Array, quick: float) -> tuple[Array, Array]:
+    """Return b of q̈ and of the jerk at times, of the shape of t, that starting and stopping has."""
+    shares, of_jerks = np.zeros_like(t), np.zeros_like(t)
+    starting = quick * _STARTING * problem.path.duration
+    for end in starting_times(problem):
         # Fading out: where it ended at once, accelerations would jump.
         far = np.abs(t - end) / (_NEAR_REST * starting)
         faded = np.maximum(1.0 - far**2, 0.0) ** 3
         shares = np.maximum(shares, starting**2 * faded)
         # What is held begins and ends to be so without jumps of accelerations, as rest does.
-        if end in edges:
+        if end in problem.follows.edges:
             of_jerks = np.maximum(of_jerks, starting**4 * faded)
-    if not shares.any():
-        return None
-    each = {order: b for order, b in ((2, shares), (3, of_jerks)) if b.any()}
-    return Smoothing(each, np.diag(_weights(problem)))
+    return shares, of_jerks
 
 
 def would_be_calm(problem: Problem, samples: Samples, cost: float) -> bool:
@@ -76,7 +122,14 @@ def would_be_calm(problem: Problem, samples: Samples, cost: float) -> bool:
 
 
 def _weights(problem: Problem) -> Array:
-    """Return what the squares of rates weigh, (n,): of virtual joints nothing, as in costs."""
-    arm, found = problem.asked.robot, np.zeros(problem.robot.dof)
+    """Return what the squares of rates weigh, (n,): of virtual joints nothing, as in costs.
+
+    As much as where speeds cost what they usually do; where they cost so many times more or less,
+    so does this: the best motion is the same whatever the unit of its cost.
+    """
+    arm, dof = problem.asked.robot, problem.robot.dof
+    found = np.zeros(dof)
     found[: arm.dof] = np.asarray(JointVelocity.usual(arm).weight)
-    return found
+    own = [cost.curvature(dof).get(1) for cost in problem.all_costs]
+    total = sum(float(np.trace(each)) for each in own if each is not None)
+    return found * (total / float(found.sum())) if total > 0.0 else found

@@ -4,15 +4,16 @@ import numpy as np
 
 from selfmotion.basics import Array
 from selfmotion.motion import FreeNullMotion, Grid
-from selfmotion.nodes import NodeMotion
+from selfmotion.nodes import NodeMotion, starting_times
 from selfmotion.planning.effort import Effort
 from selfmotion.problem import Problem
 
 # Intervals of the first nodes, and so many for each time that the tool goes as far as the arm
 # reaches.
 _FIRST_INTERVALS = 16
-# More of them where self-motions start and stop: as shares of the duration from there.
-_STARTING = (-0.03, -0.01, 0.01, 0.03)
+# More of them where self-motions start and stop: this share of the duration from there, and so many
+# times as far.
+_STARTING, _FARTHER = 0.01, 3.0
 # Nodes of Newton's method: at most so many for each stretch of the path on which it is smooth.
 _MOST_NODES = 1024
 # Steps of the rough motions.
@@ -45,13 +46,21 @@ def most_nodes(problem: Problem) -> int:
 def first_nodes(problem: Problem) -> Array:
     """Return the times of the nodes to begin with, (N + 1,)."""
     steps = int(np.ceil(_FIRST_INTERVALS * max(1.0, problem.way_in_reaches)))
-    t, duration = Grid.aligned(problem.knots, steps).nodes, problem.path.duration
-    # Where the arm rests, or a joint begins or ends to be held, the self-motion starts and stops.
-    ends = [end for rest, end in zip(problem.rests, (0.0, duration), strict=True) if rest]
-    near = np.array([*ends, *problem.follows.edges])[:, None] + duration * np.array(_STARTING)
+    return with_starts(problem, Grid.aligned(problem.knots, steps).nodes, 1.0)
+
+
+def with_starts(problem: Problem, t: Array, quick: float) -> Array:
+    """Return times of nodes with more of them where self-motions start and stop.
+
+    Which they do in the share `quick` of the usual time.
+    """
+    duration = problem.path.duration
+    least = quick * _STARTING * duration
+    farther = np.arange(2 + int(np.ceil(np.log(1.0 / quick) / np.log(_FARTHER))))
+    away = least * _FARTHER**farther
+    near = starting_times(problem)[:, None] + np.concatenate([-away[::-1], away])
     inside = near[(near > 0.0) & (near < duration)]
-    least = 0.5 * duration * min(map(abs, _STARTING))
-    apart = np.abs(inside[:, None] - t).min(axis=1, initial=np.inf) > least
+    apart = np.abs(inside[:, None] - t).min(axis=1, initial=np.inf) > 0.5 * least
     return np.sort(np.concatenate([t, inside[apart]]))
 
 

@@ -14,7 +14,7 @@ from selfmotion.motion import Grid, Trajectory
 from selfmotion.nodes import NodeGrid, NodeMotion, Optimum, Step, minimise
 from selfmotion.optimise import Iteration, Status
 from selfmotion.planning.effort import Effort
-from selfmotion.planning.grids import NOTHING, UNKEPT, most_nodes
+from selfmotion.planning.grids import NOTHING, UNKEPT, most_nodes, with_starts
 from selfmotion.planning.solutions import ENDS_MET, NodeSolution
 from selfmotion.problem import Problem
 from selfmotion.search import BESIDE
@@ -337,7 +337,10 @@ class Polisher:
         if away.sum() > least:
             parts[(away > least / spline.count) & (parts == 1)] = 2
         parts = np.maximum(parts, motion.parts_between())
-        return None if (parts == 1).all() else _divided(spline.t, parts)
+        t = spline.t if (parts == 1).all() else _divided(spline.t, parts)
+        if motion.quickness < grid.quick:
+            t = with_starts(self._problem, t, motion.quickness)
+        return t if len(t) > len(spline.t) else None
 
     def _minimise(
         self, motion: NodeMotion, multipliers: Array | None = None, *, roughly: bool = True

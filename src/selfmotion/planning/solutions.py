@@ -194,9 +194,9 @@ class NodeSolution:
         """
         beside, new = t.copy(), ~np.isin(t, self.motion.grid.t)
         beside[new] += BESIDE * np.diff(t, append=t[-1])[new]
-        calm = self.motion.would_be_calm()
+        calm, quick = self.motion.would_be_calm(), self.motion.quickness
         for times in (t, beside):
-            motion = self.motion.on(self.motion.grid.on(times, calm=calm))
+            motion = self.motion.on(self.motion.grid.on(times, calm=calm, quick=quick))
             if motion is not None:
                 multipliers = motion.grid.rows.carried(self.motion.grid.rows, self.multipliers)
                 self.motion.forget()

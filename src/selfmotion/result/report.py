@@ -113,8 +113,9 @@ class Report:
         The parameterisation that the plan's coefficients are of; None for other works' methods.
     remaining : float or None
         An estimate of what any other null motion could still take off F, the constraints kept:
-        what the nodes' distance and another step leave. None of the published method, which knows
-        no other null motion.
+        what the nodes' distance and another step leave. Without what it costs that an arm at rest
+        starts and stops smoothly, some 0.1 % of F, and what margins within limits do. None of the
+        published method, which knows no other null motion.
     attempts : tuple of Attempt
         The strategies that were tried, in order; empty for other works' methods.
     """
