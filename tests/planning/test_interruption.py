@@ -10,6 +10,7 @@ import pytest
 import selfmotion as sm
 from selfmotion.basics import Array
 from selfmotion.paper import Rollout
+from support.arms import PANDA_HOME
 
 # All stages of a plan from a free start, compared with the global search.
 STAGES = (
@@ -178,6 +179,29 @@ def test_a_callback_that_stops_is_asked_no_more_and_is_told_of(
         assert calls == most
         assert found.report.status is sm.optimise.Status.STOPPED
         assert found.certificate.position_error.value < 1e-3
+
+
+@pytest.mark.parametrize("most", [3, 5, 10])
+def test_a_stop_leaves_a_verified_motion_where_there_was_one(
+    panda: sm.RobotModel, most: int
+) -> None:
+    """On the way to an optimum tolerances may be broken between nodes, or at them."""
+    circle = sm.paths.Circle.around(panda.pose(PANDA_HOME), 0.12, 4.0, normal=(1.0, 0.0, 0.0))
+    tolerances = [
+        sm.Relaxation(("rx", "ry"), 0.17),
+        sm.Relaxation("z", 2e-3, axes="tool"),
+        sm.Relaxation("rz", during=(1.0, 2.5)),
+    ]
+    calls = 0
+
+    def stop(_: sm.optimise.Iteration) -> bool:
+        nonlocal calls
+        calls += 1
+        return calls >= most
+
+    found = sm.plan(sm.Problem(panda, circle, relaxations=tolerances), callback=stop)
+    assert found.report.status is sm.optimise.Status.STOPPED
+    assert found.certificate.verified, found.certificate.verdict
 
 
 def test_an_interruption_of_a_given_start(problem: sm.Problem) -> None:

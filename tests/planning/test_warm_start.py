@@ -4,9 +4,11 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 import selfmotion as sm
+from support.arms import PANDA_HOME
 from support.shell import invoke
 
 # Costs on a grid and on the halved one agree to this before a plan stands.
@@ -126,3 +128,42 @@ def test_a_problem_file_begins_from_a_plan(tmp_path: Path) -> None:
     assert warm.history[0].cost < cold.cost + 0.1 * saved
     assert len(warm.history) <= len(cold.history)
     assert warm.cost == pytest.approx(cold.cost, rel=AGREEMENT)
+
+
+def test_a_motion_that_keeps_the_limits_is_not_given_up_for_one_that_costs_less() -> None:
+    """Turned round, a motion keeps tight limits on the way back; from elsewhere none is found."""
+    panda = sm.load_robot("panda")
+    start = PANDA_HOME + np.array([0.1893, 0.0539, -0.0793, 0.0733, -0.0608, 0.2043, -0.1986])
+    first = panda.pose(start)
+    turned = pin.exp3(np.array([0.0674, 0.765, 0.4496])) @ first.rotation
+    last = pin.SE3(turned, first.translation + np.array([0.0081, -0.0066, 0.0326]))
+    line = sm.paths.Line(first, last, 0.8365)
+    free = sm.plan(sm.Problem(panda, line, "pose", start, clearance=None))
+    t = np.linspace(0.0, line.duration, 2001)
+    speed, acceleration, jerk = (np.abs(free.trajectory(t, order)).max() for order in (1, 2, 3))
+    limits = (
+        sm.constraints.JointPositionLimits(),
+        sm.constraints.JointVelocityLimits(0.95 * speed),
+        sm.constraints.JointAccelerationLimits(0.9 * acceleration),
+        sm.constraints.JointJerkLimits(1.5 * jerk),
+    )
+
+    def tight(path: sm.paths.Path, begin: np.ndarray, end: np.ndarray) -> sm.Problem:
+        asked = (*limits, sm.constraints.EndConfiguration(end))
+        return sm.Problem(panda, path, "pose", begin, constraints=asked, clearance=None)
+
+    end = free.trajectory.q[-1]
+    there = sm.plan(tight(line, start, end)).require()
+    motion = there.trajectory
+    back = replace(
+        motion,
+        t=motion.t[-1] - motion.t[::-1],
+        q=motion.q[::-1].copy(),
+        qd=-motion.qd[::-1],
+        qdd=motion.qdd[::-1].copy(),
+    )
+    problem = tight(sm.paths.Reversed(line), end, start)
+    assert problem.certify(back).verified
+    found = sm.plan(problem, warm_start=replace(there, trajectory=back))
+    assert found.certificate.verified, found.certificate.verdict
+    assert found.report.cost <= there.report.cost * (1.0 + 1e-3)

@@ -1,6 +1,7 @@
 """A motion from one start: the minimum-norm motion first, then what polishing makes of it."""
 
 from collections.abc import Callable, Sequence
+from copy import copy
 from dataclasses import replace
 
 import numpy as np
@@ -286,6 +287,12 @@ class Candidate:
         if self._ended is None and isinstance(found, NodeSolution) and not found.is_chain:
             self._by_nodes(lambda polisher: polisher.settled(found))
 
+    def as_begun(self) -> "Candidate":
+        """Return it as it was before anything was found: the minimum-norm motion."""
+        begun = copy(self)
+        begun._found = None
+        return begun
+
     def refine(self, where: Flags | None = None) -> None:
         """Go on with half the step length, everywhere or for some of the steps (N,)."""
         if self._found is None:
@@ -389,6 +396,8 @@ class Candidate:
         if polisher.is_stopped:
             # A motion that was better before it is left as it was, and does not say so.
             self._ended = Status.STOPPED
+            if found is not None and found.violations:
+                found = polisher.latest or found
         self.history += polisher.history
         self.is_hopeless = polisher.is_hopeless
         self._found = found or self._found

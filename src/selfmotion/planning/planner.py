@@ -186,6 +186,8 @@ class Planner:
         A pose that no configuration was found for.
     best : Candidate or None
         The best so far.
+    second : Candidate or None
+        The best one before it.
     sequences : list of Sequence
         What the global search found; empty where it was not asked for or in vain.
     rival : Candidate or None
@@ -214,6 +216,7 @@ class Planner:
     began: float = field(default_factory=time.perf_counter)
     blocked: Obstruction | None = None
     best: Candidate | None = None
+    second: Candidate | None = None
     sequences: list[Sequence] = field(default_factory=list)
     rival: Candidate | None = None
     failure: SelfmotionError | None = None
@@ -316,7 +319,7 @@ class Planner:
     def consider(self, candidate: Candidate) -> None:
         """Keep a candidate if it is the best one."""
         if self.best is None or candidate.score() < self.best.score():
-            self.best = candidate
+            self.best, self.second = candidate, self.best
 
     def reach(self, suspect: float = 0.0) -> Reach:
         """Return how far single poses are in reach, after a closer look at a time [s].
@@ -343,6 +346,12 @@ class Planner:
         """Let the best motion be what the plan is made of, on grids that are fine enough."""
         rival_cost = _settle_both(best, self.rival, self.progress)
         self.judged = self._judged(Part(self.problem, best), rival_cost)
+        if best.cut_short and not self.judged.certificate.verified:
+            # What it is on the way to an optimum may break more than what was known before.
+            for known in filter(None, (self.second, best.as_begun())):
+                known.end(best.status)
+                if self.judge_as_it_is(known):
+                    break
 
     def is_free_by_meshes(self) -> bool:
         """Whether bodies are apart by their meshes along the best motion, though not by hulls."""
@@ -360,7 +369,7 @@ class Planner:
         judged = self._judged(Part(self.problem, best))
         if judged.certificate.verified:
             self.judged = judged
-        return self.judged is not None
+        return judged.certificate.verified
 
     def judge_part(self, suspect: float = 0.0) -> bool:
         """Let the largest part be it, a time [s] looked at closely; return whether there is one."""

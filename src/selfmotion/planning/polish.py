@@ -106,7 +106,9 @@ class Polisher:
         t: Array,
         cost_to_beat: float = np.inf,
     ) -> NodeSolution | None:
-        """Return the best motion near the cheapest of some, on nodes at times t (N + 1,).
+        """Return the best motion near the best of some, on nodes at times t (N + 1,).
+
+        The best is the cheapest of those that keep the conditions, or that hardly break them.
 
         None where none of them can be had on nodes; see `best_near`.
         """
@@ -116,8 +118,9 @@ class Polisher:
         for times in (t, beside):
             grid = self.grid(times)
             near = [grid.near(*(motion(times, k) for k in range(3))) for motion in motions]
-            motion = min((one for one in near if one), key=lambda one: one.aim, default=None)
-            if motion is not None:
+            known = [one for one in near if one is not None]
+            if known:
+                motion = min(known, key=partial(_rank_of, begun=known[-1]))
                 break
         else:
             return None
