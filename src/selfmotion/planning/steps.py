@@ -193,7 +193,11 @@ def _search_globally(planner: Planner) -> bool:
 
 
 def _draw_more_starts(planner: Planner) -> bool:
-    """Draw many more starts; they do not help where the search knows that nothing will."""
+    """Draw many more starts, unless a search was in vain.
+
+    One through all self-motions knows that nothing will help; after one that samples them, more
+    starts find a motion so rarely that a 'no' should not wait several times as long for them.
+    """
     search, more = planner.search, _SECOND_EFFORT
     wanted = planner.is_unmet and not planner.notes
     if not (planner.is_sought and planner.takes_starts and wanted) or planner.is_out_of_reach():
