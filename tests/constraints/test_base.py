@@ -250,7 +250,7 @@ def test_prices_are_what_easing_a_limit_saves(panda_circle: Circle, kind: str) -
             LIMITS[1],
         )
         if kind == "acceleration":
-            limits = (*LIMITS, sm.constraints.JointAccelerationLimits(1.0 * (1.0 + 0.02 * eased)))
+            limits = (*LIMITS, sm.constraints.JointAccelerationLimits(1.2 * (1.0 + 0.02 * eased)))
         return sm.plan(panda_circle("position", constraints=limits))
 
     tight, wide = limited(0.0), limited(0.2)

@@ -54,3 +54,33 @@ def test_a_rod_between_the_prongs_of_a_fork(tmp_path: Path, gap: float, verified
     if verified:
         assert names[-1] == "proof on meshes"
         assert "violated by the optimiser's bounds, kept by the motion" in plan.report.message
+
+
+def test_a_rod_beside_a_prong_is_left_room_by_a_tolerance(tmp_path: Path) -> None:
+    """What hulls forbid all along, and meshes at first, is found with the fork in pieces."""
+    offset = np.eye(4)
+    offset[2, 3] = 0.27
+    panda = sm.load_robot("panda", "panda_hand", tool_offset=offset, bodies=[fork(tmp_path, 0.04)])
+    home = panda.pose(PANDA_HOME)
+    end = home.copy()
+    end.translation = home.translation + home.rotation @ np.array([0.0, 0.05, 0.0])
+    along = np.eye(4)
+    along[:3, :3] = home.rotation @ np.array([[1.0, 0, 0], [0, 0, -1.0], [0, 1.0, 0]])
+    # From the middle of the way on; 1 mm is left between them where the tool is on its path.
+    along[:3, 3] = home.translation + home.rotation @ np.array([0.014, 0.18, 0.0])
+    rod = sm.obstacles.Cylinder("rod", along, 0.005, 0.3)
+    limits = [sm.constraints.JointPositionLimits(), sm.constraints.Clearance([rod], 2e-3)]
+    aside = sm.Relaxation("x", 5e-3, axes="tool")
+    plan = sm.plan(
+        sm.Problem(
+            panda,
+            sm.paths.Line(home, end, 2.0),
+            "pose",
+            PANDA_HOME,
+            constraints=limits,
+            relaxations=[aside],
+        )
+    )
+    assert plan.certificate.verified, plan.certificate.verdict
+    assert "links in pieces" in [item.name for item in plan.report.attempts]
+    assert np.abs(plan.deviation(2.0)[0]) >= 1e-3 - 1e-6

@@ -86,6 +86,8 @@ class ClearanceModel:
         Up to here the values are the distances of the hulls [m].
     width : float
         Over this distance beyond, they level off [m].
+    links_in_pieces : bool, optional
+        Whether links with hollows are taken apart before obstacles, too: that is dearer.
 
     Attributes
     ----------
@@ -102,9 +104,16 @@ class ClearanceModel:
     Not for use by several threads at once.
     """
 
-    def __init__(self, exact: CollisionModel, near: float = 0.02, width: float = 0.02) -> None:
+    def __init__(
+        self,
+        exact: CollisionModel,
+        near: float = 0.02,
+        width: float = 0.02,
+        *,
+        links_in_pieces: bool = False,
+    ) -> None:
         self.robot, self._exact, self._near, self._width = exact.robot, exact, near, width
-        self._hulls, self._of = exact.in_pieces()
+        self._hulls, self._of = exact.in_pieces(links=links_in_pieces)
         self._kept = self._useful()
         self.pairs = tuple(exact.pairs[i] for i in self._of[self._kept])
         first, second = exact.hulls.pairs[self._of[self._kept]].T

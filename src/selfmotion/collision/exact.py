@@ -161,31 +161,31 @@ class CollisionModel:
         """Whether all bodies that are checked are their own convex hulls."""
         return all(self.is_convex(pair) for pair in range(len(self.pairs)))
 
-    def in_pieces(self) -> tuple[HullDistances, Ints]:
+    def in_pieces(self, *, links: bool = False) -> tuple[HullDistances, Ints]:
         """Return distances of hulls, obstacles in convex pieces, and which pair each is of, (Q,).
 
-        Links are not taken apart: those of arms are made convex as a rule. Where no obstacle is,
-        these are `hulls`.
+        Links are made convex as a rule: they are taken apart where that is asked for, and before
+        obstacles only. Where nothing is, these are `hulls`.
         """
         names = {item.name for item in self.obstacles}
-        paired = set(self._index.ravel().tolist())
-        cut = [
-            body.solid.pieces if body.name in names and b in paired else (body.solid,)
-            for b, body in enumerate(self._bodies)
+        met = [names & {self._bodies[i].name, self._bodies[j].name} for i, j in self._index]
+        apart = [
+            {b for b in pair if self._bodies[b].name in names or (links and before)}
+            for pair, before in zip(self._index.tolist(), met, strict=True)
         ]
-        if all(len(solids) == 1 for solids in cut):
+        bodies, first = list(self._bodies), dict[int, range]()
+        for b in sorted(set[int]().union(*apart)):
+            pieces = self._bodies[b].solid.pieces
+            if len(pieces) > 1:
+                first[b] = range(len(bodies), len(bodies) + len(pieces))
+                bodies += [replace(self._bodies[b], solid=solid) for solid in pieces]
+        if not first:
             return self.hulls, np.arange(len(self.pairs))
-        first = np.cumsum([0, *map(len, cut)])
-        bodies = [
-            replace(body, solid=solid)
-            for body, solids in zip(self._bodies, cut, strict=True)
-            for solid in solids
-        ]
         found = [
-            (pair, first[i] + k, first[j] + m)
+            (pair, k, m)
             for pair, (i, j) in enumerate(self._index.tolist())
-            for k in range(len(cut[i]))
-            for m in range(len(cut[j]))
+            for k in (first.get(i, [i]) if i in apart[pair] else [i])
+            for m in (first.get(j, [j]) if j in apart[pair] else [j])
         ]
         of, *index = np.array(found, dtype=np.int64).T
         return HullDistances(self.robot, bodies, np.stack(index, axis=1)), of

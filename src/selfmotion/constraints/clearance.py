@@ -104,8 +104,11 @@ class Clearance(Constraint):
 
     def bind(self, follows: Follows, start: Array, end: Array) -> BoundClearance:
         """See `Constraint.bind`."""
-        robot = follows.robot
-        return BoundClearance(self._models(robot).smooth, self.distance)
+        return BoundClearance(self._models(follows.robot).smooth, self.distance)
+
+    def bind_pieces(self, follows: Follows) -> BoundClearance:
+        """Return what `bind` does, with links in convex pieces before obstacles."""
+        return BoundClearance(self._models(follows.robot).in_pieces, self.distance)
 
     def requirement(self, robot: RobotModel) -> Separation:
         """See `Constraint.requirement`."""
@@ -165,6 +168,10 @@ class _Models:
     @cached_property
     def smooth(self) -> ClearanceModel:
         return ClearanceModel(self.exact, self._near)
+
+    @cached_property
+    def in_pieces(self) -> ClearanceModel:
+        return ClearanceModel(self.exact, self._near, links_in_pieces=True)
 
 
 # Models take a good part of a second to make, and each start of a plan needs them.

@@ -174,7 +174,9 @@ class Candidate:
         begun, jacobians = settled_still_motion(problem, start, guide, grid)
         effort.counts.jacobians += jacobians
         self.problem, self.effort, self.free = problem, effort, free
-        self.constraints = tuple(problem.bind_constraints(start, begun.end, apart=effort.apart))
+        self.constraints = problem.bind_constraints(
+            start, begun.end, apart=effort.apart, in_pieces=effort.in_pieces
+        )
         _require_known(self.constraints)
         self._ends = begun.start, begun.end
         # Beyond so many steps a grid is not refined any more.
@@ -313,7 +315,9 @@ class Candidate:
         if self._ended is not None or self.effort.apart or found.is_chain or not can:
             return False
         self.effort = replace(self.effort, apart=True)
-        self.constraints = tuple(self.problem.bind_constraints(*self._ends))
+        self.constraints = self.problem.bind_constraints(
+            *self._ends, in_pieces=self.effort.in_pieces
+        )
         self.still = replace(self.still, constraints=self.constraints)
 
         def optimum(polisher: Polisher) -> NodeSolution | None:

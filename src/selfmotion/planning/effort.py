@@ -123,6 +123,8 @@ class Effort:
         Where work is added up.
     apart : bool
         Whether the optimisation keeps the arm apart from itself where only the default asks for it.
+    in_pieces : bool
+        Whether it knows links by convex pieces before obstacles, not by their hulls.
     """
 
     optimizer: Optimizer | None
@@ -130,3 +132,4 @@ class Effort:
     max_evaluations: int | None
     counts: Counts
     apart: bool = False
+    in_pieces: bool = False

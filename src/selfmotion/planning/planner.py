@@ -353,8 +353,11 @@ class Planner:
                 if self.judge_as_it_is(known):
                     break
 
-    def is_free_by_meshes(self) -> bool:
-        """Whether bodies are apart by their meshes along the best motion, though not by hulls."""
+    def is_free_by_meshes(self, *, just: bool = False) -> bool:
+        """Whether bodies are apart by their meshes along the best motion, though not by hulls.
+
+        As far as asked for, or `just` so.
+        """
         best = self.best
         if best is None or not best.violations:
             return False
@@ -362,7 +365,7 @@ class Planner:
         if all(model.is_all_convex for model, _ in bodies):
             return False
         q = best.evaluation().trajectory.q
-        return all(model.worst(q).value >= far for model, far in bodies)
+        return all(model.worst(q).value >= (0.0 if just else far) for model, far in bodies)
 
     def judge_as_it_is(self, best: Candidate) -> bool:
         """Let a motion be it if it is verified; return whether it is."""

@@ -7,6 +7,7 @@ judged, on finer grids until its certificate finds nothing wrong, or a part of i
 
 import time
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -182,6 +183,24 @@ def _judge_on_meshes(planner: Planner) -> bool:
     return True
 
 
+def _take_links_apart(planner: Planner) -> bool:
+    """Optimise again with links in convex pieces, where only their hulls meet something."""
+    best, search, effort = planner.best, planner.search, planner.effort
+    if best is None or effort.in_pieces or not (planner.is_sought and planner.is_unmet):
+        return False
+    if not planner.is_free_by_meshes(just=True):
+        return False
+    planner.effort = replace(effort, in_pieces=True)
+    known = best.evaluation().trajectory
+    candidate = planner.begin(known.q[0], free=best.free)
+    if candidate is not None:
+        candidate.resume(known)
+        planner.polish(candidate)
+    if planner.is_unmet and planner.takes_starts and not planner.is_over:
+        optimise_starts(planner, search.starts, search.finalists)
+    return True
+
+
 def _search_globally(planner: Planner) -> bool:
     """Optimise from the best chains of configurations over all self-motions."""
     wanted = planner.search.compare or (planner.chooses_globally and planner.is_unmet)
@@ -283,6 +302,7 @@ STEPS: tuple[tuple[str, Callable[[Planner], bool]], ...] = (
     ("starts", _draw_starts),
     ("postures compared", _compare_postures),
     ("proof on meshes", _judge_on_meshes),
+    ("links in pieces", _take_links_apart),
     ("global search", _search_globally),
     ("more starts", _draw_more_starts),
     # Judge.

@@ -294,17 +294,22 @@ class Problem:
         return tuple(item for item in self.constraints if item.applies(self.robot))
 
     def bind_constraints(
-        self, start: Array, end: Array, *, apart: bool = True
+        self, start: Array, end: Array, *, apart: bool = True, in_pieces: bool = False
     ) -> tuple[BoundConstraint, ...]:
         """Return the constraints for this arm, given first and last configuration, (n,) each.
 
         Those of the motion that the optimisation begins with. Without `own_collision` where it need
-        not keep `apart` from itself.
+        not keep `apart` from itself; with links `in_pieces` where their hulls are too large.
         """
         asked = list(self.all_constraints if apart else self._asking)
         if all(self.rests):
             asked = [item.at_rest() for item in asked]
-        return tuple(item.bind(self.follows, start, end) for item in asked)
+        return tuple(
+            item.bind_pieces(self.follows)
+            if in_pieces and isinstance(item, Clearance)
+            else item.bind(self.follows, start, end)
+            for item in asked
+        )
 
     @cached_property
     def rest_orders(self) -> tuple[int, int]:
