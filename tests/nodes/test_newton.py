@@ -278,3 +278,34 @@ def test_known_prices_spare_iterations(panda: sm.RobotModel) -> None:
     cold = minimise(nodes_of(problem, 16), never)
     assert again.motion.cost <= cold.motion.cost * (1.0 + 1e-5)
     assert 2 * len(steps[1]) < len(steps[0])
+
+
+# Costs of freedoms that are not used are equal to this share.
+NO_DEARER = 5e-4
+
+
+@pytest.mark.parametrize("cost", [sm.costs.JointAcceleration, sm.costs.JointJerk])
+def test_costs_of_smoothness_are_at_their_optimum_with_and_without_a_tolerance(
+    panda: sm.RobotModel, cost: type[sm.costs.Cost]
+) -> None:
+    """More freedom is cheaper, and from the motion without it nothing better is found."""
+    circle = sm.paths.Circle.around(panda.pose(PANDA_HOME), 0.12, 4.0, normal=(1.0, 0.0, 0.0))
+    limits = [sm.constraints.JointPositionLimits()]
+
+    def planned(*tolerances: sm.Relaxation, warm: sm.Plan | None = None) -> sm.Plan:
+        problem = sm.Problem(
+            panda, circle, "pose", PANDA_HOME, costs=[cost()], constraints=limits,
+            relaxations=tolerances,
+        )  # fmt: skip
+        found = sm.plan(problem, warm_start=warm)
+        assert found.report.status is sm.optimise.Status.CONVERGED
+        return found
+
+    before = planned()
+    for band in (2e-3, 2e-2):
+        aside = sm.Relaxation("z", band, axes="tool")
+        now = planned(aside)
+        assert now.report.cost < before.report.cost
+        again = planned(aside, warm=before if band < 1e-2 else now)
+        assert again.report.cost >= now.report.cost * (1.0 - NO_DEARER)
+        before = now

@@ -16,7 +16,7 @@ def test_a_banded_system_is_the_dense_one(size: int) -> None:
     for k, block in enumerate(pairs):
         dense[k * size : (k + 2) * size, k * size : (k + 2) * size] += block
     matrix.add_pairs(0, pairs)
-    matrix.add_diagonal(0.5)
+    matrix.add_diagonal(np.full(len(matrix.dense()), 0.5))
     dense += 0.5 * np.eye(len(dense))
     np.testing.assert_allclose(matrix.dense(), dense, atol=1e-12)
     held = np.array([0, size, count * size - 1])
@@ -27,5 +27,5 @@ def test_a_banded_system_is_the_dense_one(size: int) -> None:
     solved = matrix.solve(right)
     assert solved is not None
     np.testing.assert_allclose(dense @ solved, right, atol=1e-9)
-    matrix.add_diagonal(-1e3)
+    matrix.add_diagonal(np.full(len(matrix.dense()), -1e3))
     assert matrix.solve(right) is None

@@ -37,9 +37,10 @@ _SHARE, _SHORTEST = 1e-4, 1e-7
 # this share of its usual entry, over the square of the number of nodes, more on the diagonal: above
 # what differences leave there, and below what slow motions cost.
 _FLAT = 2.5e-5
-# One that is not positive definite gets this share of its largest entry without rows on the
-# diagonal, or a third of what the last one needed; then more by this factor, again and again.
-_SHIFT, _LESS, _MORE = 1e-6, 1.0 / 3.0, 8.0
+# One that is not positive definite gets on the diagonal this share of how each coordinate bends
+# without rows, or a third of what the last one needed; then more by this factor, up to the last
+# one. The same for all would stop some of them: with costs of jerks they differ by 1e9.
+_SHIFT, _LESS, _MORE, _MOST_SHIFT = 1e-6, 1.0 / 3.0, 8.0, 1e6
 # Or this share of the largest entry of all, where nothing else bends.
 _LEAST_SHIFT = 1e-18
 # Nodes go no further than this in one step [rad or m]; one that would go beyond that is none of a
@@ -457,13 +458,14 @@ class _Solver:
         largest = float(np.abs(curved).max() + np.abs(intervals).max())
         diagonals = np.abs(np.diagonal(intervals, axis1=1, axis2=2)).ravel()
         usual = float(np.partition(diagonals, len(diagonals) // 2)[len(diagonals) // 2])
-        shift = _FLAT / count**2 * usual
+        flat, shift = _FLAT / count**2 * usual, 0.0
+        bends = _bends(model.intervals) + _LEAST_SHIFT * largest
         columns = np.column_stack([-right.T, border.columns])
-        while shift <= 1e6 * largest:
+        while flat <= _MOST_SHIFT * largest and shift <= _MOST_SHIFT:
             matrix = Banded(count, size, 1)
             matrix.add(0, 0, curved)
             matrix.add_pairs(0, intervals)
-            matrix.add_diagonal(shift)
+            matrix.add_diagonal(flat + shift * bends)
             matrix.hold(self.motion.grid.held)
             solved = matrix.solve(columns)
             if solved is not None:
@@ -471,11 +473,10 @@ class _Solver:
                 if np.abs(step.reshape(count, 3, -1)[:, 0]).max() <= _TRUSTED:
                     self._shift = shift
                     return solved
-            shift = max(_MORE * shift, _LESS * self._shift, _LEAST_SHIFT * largest)
-            if solved is None:
-                # Beside entries of stiff rows, what is added to the diagonal would leave no step.
-                bends = float(np.abs(curved).max() + np.abs(model.intervals).max())
-                shift = max(shift, _SHIFT * bends)
+            if solved is not None and not shift:
+                flat = max(_MORE * flat, _LEAST_SHIFT * largest)
+            else:
+                shift = max(_MORE * shift, _LESS * self._shift, _SHIFT)
         return None
 
     def _move(self, model: _Model, step: _Change) -> Status | None:
@@ -533,6 +534,19 @@ class _Solver:
         gap = np.abs(motion.h[self._kept] + slacks - elastics).sum() + np.abs(motion.c).sum()
         elastic = self._elastic_cost * float(elastics.sum())
         return motion.aim + elastic - barrier + self._penalty * float(gap)
+
+
+def _bends(intervals: Array) -> Array:
+    """Return how each coordinate of the nodes bends without rows, (K,): as the usual one at least.
+
+    For matrices of intervals (N, d, d) by both ends.
+    """
+    own = np.abs(np.diagonal(intervals, axis1=1, axis2=2))
+    size = own.shape[1] // 2
+    found = np.zeros((len(own) + 1, size))
+    found[:-1] += own[:, :size]
+    found[1:] += own[:, size:]
+    return np.asarray(np.maximum(found, np.median(found, axis=0)).ravel())
 
 
 def _along(both: Array, step: Array) -> Array:
