@@ -10,9 +10,12 @@ from selfmotion.basics import Counts, silent
 from selfmotion.planning.effort import Effort
 from selfmotion.planning.planner import Planner
 from selfmotion.planning.proposals import VERY_LONG_WAY, is_long
-from support.arms import robot_named
+from support.arms import PANDA_HOME, robot_named
 
 NAME = "posture of a stretch"
+# What a motion beside a long wait costs more, and how fast an arm at rest accelerates [rad/s²]:
+# the certificate grants a thousand times that.
+STARTING, RESTS = 1.05, 1e-6
 # The first and the last loop cost less than those between them; and what a given start costs more,
 # from which the arm goes to the better posture.
 ENDS, GIVEN = 0.02, 0.05
@@ -164,3 +167,26 @@ def test_who_wants_no_more_among_the_postures_of_a_stretch_waits_for_nothing(
     assert asked.count("optimising start") == stops
     assert asked[-1] == ("optimising start" if stops else "")
     assert stages[-1] == "checking"
+
+
+@pytest.mark.parametrize(
+    ("seconds", "before", "after"),
+    [(0.5, 0.0, 600.0), (1.0, 0.0, 1800.0), (0.5, 300.0, 300.0), (2.0, 900.0, 900.0)],
+)
+def test_a_short_motion_beside_a_long_wait(
+    panda: sm.RobotModel, seconds: float, before: float, after: float
+) -> None:
+    a, b = panda.pose(PANDA_HOME), panda.pose(PANDA_HOME)
+    b.translation += [0.05, 0.1, -0.05]
+    line = sm.paths.Line(a, b, seconds)
+    alone = sm.plan(sm.Problem(panda, line, start=PANDA_HOME))
+    path = line + sm.paths.Dwell(b, after)
+    if before:
+        path = sm.paths.Dwell(a, before) + path
+    plan = sm.plan(sm.Problem(panda, path, start=PANDA_HOME))
+    assert plan.certificate.verified, plan.certificate.verdict
+    # What starting and stopping a self-motion costs goes with the duration.
+    assert plan.report.cost <= STARTING * alone.report.cost
+    # It rests as the line alone does: with accelerations as well.
+    assert plan.problem.rest_orders == alone.problem.rest_orders == (2, 2)
+    assert np.abs(plan.trajectory.qdd[[0, -1]]).max() <= RESTS

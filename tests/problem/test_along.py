@@ -7,7 +7,7 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.certificate import AtRest
-from selfmotion.problem.along import rest_orders
+from selfmotion.problem.along import rest_orders, times_along
 from support.arms import PANDA_HOME, robot_named, short_line, start_of
 
 # At rest by construction: what is left is the rounding of the path's own twist.
@@ -187,3 +187,16 @@ def test_an_arm_at_rest_ends_with_the_acceleration_that_is_asked_for(panda: sm.R
     assert last.certificate.verified, last.certificate.verdict
     with pytest.raises(sm.errors.ProblemError, match="needs a given start"):
         sm.Problem(panda, path, constraints=[start])
+
+
+def test_a_short_window_of_a_long_part_stays_open(panda: sm.RobotModel) -> None:
+    start = panda.pose(PANDA_HOME)
+    path = sm.paths.Dwell(start, 300.0) + circle(panda, PANDA_HOME)
+    when = times_along(sm.paths.section_at_rest(path, ramp=0.5), (0.0, path.duration))
+    first, last = when(np.array([301.0, 303.0]))
+    assert last - first == pytest.approx(2.0)
+    # One that ends where the part begins is none there.
+    rest = sm.paths.section_at_rest(path, 299.99, 304.0, ramped=(False, True))
+    part = times_along(rest, (299.99, 304.0))
+    assert part(np.array([0.0, 300.0])).tolist() == [0.0, 0.0]
+    assert part(np.array([301.0, 303.0])) == pytest.approx([1.01, 3.01])

@@ -8,12 +8,10 @@ import numpy as np
 
 from selfmotion import kernels
 from selfmotion.basics import Array
-from selfmotion.follow import BoundFollow, Follows
+from selfmotion.follow import Follows
 from selfmotion.nodes.kernels import accelerate, bend_of, look
+from selfmotion.path import twist_rates
 from selfmotion.robot import null_space
-
-# Accelerations of paths are differences of twists over this share of their duration.
-_STEP = 1e-5
 
 
 @dataclass(frozen=True, eq=False)
@@ -211,7 +209,7 @@ class Manifolds:
             own = item.target(t)
             parts = own.translation, own.rotation.reshape(-1, 9), own.twist
             self._paths.append(np.tile(np.hstack(parts), (copies, 1)))
-            asked.append(_rates_of(item, t))
+            asked.append(twist_rates(item.path, t))
         self.held = np.tile(follows.held(t), (copies, 1))
         self.targets = np.ascontiguousarray(np.hstack([path[:, :12] for path in self._paths]))
         # ẍ of the paths, (N + 1, 6 F).
@@ -325,32 +323,6 @@ class Manifolds:
         for first in range(0, len(q), len(q) // self.copies):
             bases[first] = self.follows.null_basis(q[first])
         return Charts(self, q, bases).centred(none, epsilon, a, carried=True)
-
-
-def _rates_of(item: BoundFollow, t: Array) -> Array:
-    """Return the rates ẍ of a path's twists at times t (N + 1,), (N + 1, 6).
-
-    Central differences, which where it may jump are the means of both sides; at the ends of the
-    path differences to one side, of second order as well.
-    """
-    step, end = _STEP * t[-1], t[-1]
-    sides = np.where(t <= step, 1.0, np.where(t >= end - step, -1.0, 0.0))
-    one = np.flatnonzero(sides)
-    sign, here = sides[one], t[one]
-    times = np.concatenate(
-        [
-            np.minimum(t + step, end),
-            np.maximum(t - step, 0.0),
-            *(here, here + sign * step, here + 2.0 * sign * step),
-        ]
-    )
-    found = item.target(times).twist
-    after, before, beside = np.split(found, [len(t), 2 * len(t)])
-    rates = (after - before) / (2.0 * step)
-    first, second, third = beside.reshape(3, len(one), -1)
-    inward = (-3.0 * first + 4.0 * second - third) / (2.0 * step)
-    rates[one] = sign[:, None] * inward
-    return np.asarray(rates)
 
 
 def orthonormal(tangents: Array) -> Array:

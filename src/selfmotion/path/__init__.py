@@ -29,6 +29,11 @@ from selfmotion.path.joined import (
 )
 from selfmotion.path.pace import Pace as Pace, times_when as times_when
 from selfmotion.path.polyline import Polyline as Polyline, merged as merged
+from selfmotion.path.rates import (
+    edges_of as edges_of,
+    spread_along as spread_along,
+    twist_rates as twist_rates,
+)
 from selfmotion.path.shapes import (
     Circle as Circle,
     Line as Line,

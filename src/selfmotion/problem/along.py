@@ -11,7 +11,7 @@ from selfmotion.basics import Array, ProblemError, read_only
 from selfmotion.certificate import Requirement, arm_limits
 from selfmotion.constraints import Constraint, Envelope
 from selfmotion.follow import Follows
-from selfmotion.path import STILL, Path, Retimed
+from selfmotion.path import STILL, Path, Retimed, edges_of, spread_along
 from selfmotion.robot import RobotModel
 from selfmotion.task import Relaxation, Task
 
@@ -43,7 +43,8 @@ def _with_times(knots: list[float], times: Iterable[float], duration: float) -> 
 
 # How smoothly a tool, and the arm with it, begins and ends.
 
-# Speeds are compared this share of the duration from an end, and twice as far from it.
+# Speeds are compared this share of the path's first or last piece from an end, and twice as far
+# from it: what comes after that piece says nothing of how it begins.
 _NEAR_END = 1e-4
 # Speed that grows with at least this power of the time has no acceleration at the end.
 _SMOOTH = 1.5
@@ -72,9 +73,9 @@ def rest_orders(path: Path, task: Task) -> tuple[int, int]:
     Of each end: 0 where the tool moves, 1 where it rests, 2 where it rests and does not accelerate
     either, so that a motion from standstill is smooth there.
     """
-    step = _NEAR_END * path.duration
-    t = np.array([0.0, step, 2.0 * step])
-    first, last = (_speeds(path, task, times) for times in (t, path.duration - t))
+    pieces, away = np.diff(edges_of(path.knots)), np.arange(3.0)
+    first = _speeds(path, task, _NEAR_END * pieces[0] * away)
+    last = _speeds(path, task, path.duration - _NEAR_END * pieces[-1] * away)
     return _order(first), _order(last)
 
 
@@ -102,7 +103,7 @@ def way_of(path: Path) -> float:
     way, before, samples = 0.0, -1.0, _SAMPLES
     # Loops are many or few: the way through more and more points, of which none are the same.
     while way > _GROWS * before and samples < _MOST_SAMPLES:
-        places = path.samples(np.linspace(0.0, path.duration, samples)).translation
+        places = path.samples(spread_along(path, samples)).translation
         before, way = way, float(np.linalg.norm(np.diff(places, axis=0), axis=1).sum())
         samples = 2 * samples + 1
     return way
@@ -133,7 +134,7 @@ def with_own_limits(
 
 # What of a problem is asked along a part of its path, and of moves between parts.
 
-# A window shorter than this share of a part is none.
+# On a part, a window is none where it is open for less than this share of the part, and of itself.
 _SHORTEST_WINDOW = 1e-2
 
 
@@ -176,7 +177,8 @@ def times_along(path: Retimed, ends: tuple[float, float]) -> Callable[[Array], A
         # A ramp hardly moves at its end: when it gets there is known to some digits only.
         first = 0.0 if window[0] <= ends[0] else first
         last = path.duration if window[1] >= ends[1] else last
-        is_open = last - first > _SHORTEST_WINDOW * path.duration
+        least = _SHORTEST_WINDOW * min(path.duration, float(window[1] - window[0]))
+        is_open = last - first > least
         return np.array([first, last]) if is_open else np.zeros(2)
 
     return when
