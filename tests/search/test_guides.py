@@ -7,6 +7,7 @@ import pytest
 import selfmotion as sm
 from selfmotion.search import carried, shortest_along
 from selfmotion.search.guides import search_times
+from support.arms import PANDA_HOME
 from support.stretching import DURATION, rounded_problem, stretching
 
 
@@ -66,3 +67,19 @@ def test_chains_beside_bodies_are_shortened_with_virtual_joints(panda: sm.RobotM
     found = shortest_along(problem, t, motions[0], t, (1.0, 0.3))
     assert found is not None
     assert found[1].shape == motions[0].shape
+
+
+def test_what_is_short_is_searched_as_what_is_alone(panda: sm.RobotModel) -> None:
+    """Before a long wait, a motion of a second is looked at where it is alone."""
+    a, b = panda.pose(PANDA_HOME), panda.pose(PANDA_HOME)
+    b.translation += [0.2, 0.3, -0.2]
+    line = sm.paths.Line(a, b, 1.0)
+    alone = search_times(line, 8)
+    late = search_times(sm.paths.Dwell(a, 5000.0) + line, 8)
+    late = late[late > 5000.0] - 5000.0
+    assert len(late) >= len(alone) - 1
+    # As the tool moves on: between two times it goes as far as alone.
+    ways = [
+        np.linalg.norm(np.diff(line.samples(t).translation, axis=0), axis=1) for t in (alone, late)
+    ]
+    assert ways[1].max() < 1.1 * ways[0].max()

@@ -8,7 +8,6 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import typer
 
 import selfmotion as sm
@@ -24,7 +23,7 @@ from selfmotion.documents import (
     seam_job_of,
     set_key,
 )
-from selfmotion.path import pose_of
+from selfmotion.path import pose_of, spread_along
 
 # Of problem files.
 SUFFIXES = (".toml", ".json")
@@ -394,7 +393,7 @@ def _say_flip(what: str, table: dict[str, Any]) -> None:
 def _is_in_reach(robot: sm.RobotModel, path: sm.paths.Path, task: sm.Task) -> bool:
     """Return whether some poses of a path are in reach, each on its own."""
     q = None
-    for t in np.linspace(0.0, path.duration, _LOOKS):
+    for t in spread_along(path, _LOOKS):
         try:
             q = robot.inverse_kinematics(path.pose(t), task, q, attempts=8)
         except sm.errors.InverseKinematicsError:

@@ -9,6 +9,7 @@ from selfmotion.basics import Array, ProblemError, nearest
 from selfmotion.certificate import Separation
 from selfmotion.collision import CollisionModel
 from selfmotion.follow import BoundFollow
+from selfmotion.path import spread_along
 from selfmotion.result import Plan
 from selfmotion.robot import BASE_JOINT, root_place
 
@@ -238,7 +239,7 @@ def relaxes_rotation(plan: Plan) -> bool:
 def _middle_of_path(plan: Plan) -> Array:
     """Return the middle of the box around the path, in the frame of what carries it (3,)."""
     path, chain = plan.path, plan.problem.follows.items[0].chain
-    places = path.samples(np.linspace(0.0, path.duration, 201)).translation
+    places = path.samples(spread_along(path, 201)).translation
     middle = 0.5 * (places.min(axis=0) + places.max(axis=0))
     return np.asarray(chain.base_placement.act(middle))
 

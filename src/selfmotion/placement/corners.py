@@ -26,6 +26,7 @@ from selfmotion.basics import (
     silent,
 )
 from selfmotion.constraints import Clearance
+from selfmotion.path import spread_along
 from selfmotion.placement.places import COORDINATES, Places, Tried, places_of
 from selfmotion.result import Plan
 
@@ -261,7 +262,7 @@ def _room(places: Places, plan: Plan, way: Array) -> float:
 
     For a target moved by δx, Δq = J⁺ δx is the least change of the joints.
     """
-    follows, t = plan.problem.follows, np.linspace(0.0, plan.path.duration, _LOOKS)
+    follows, t = plan.problem.follows, spread_along(plan.path, _LOOKS)
     small = 1e-6
     by = places.displacement(small * way)
     if places.of == "base":

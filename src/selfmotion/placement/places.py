@@ -24,7 +24,7 @@ from selfmotion.collision import Obstacle
 from selfmotion.constraints import Clearance
 from selfmotion.follow import BoundFollow
 from selfmotion.optimise import Iteration, Status
-from selfmotion.path import Path, Placed
+from selfmotion.path import Path, Placed, spread_along
 from selfmotion.planning import Search, plan
 from selfmotion.problem import Problem, problem_from_dict, start_on_path
 from selfmotion.result import Plan
@@ -326,7 +326,7 @@ def _middle(problems: Sequence[Problem]) -> Array:
     found = []
     for problem in problems:
         frame = problem.follows.items[0].chain.base_placement
-        places = problem.path.samples(np.linspace(0.0, problem.path.duration, 101)).translation
+        places = problem.path.samples(spread_along(problem.path, 101)).translation
         found.append(places @ frame.rotation.T + frame.translation)
     points = np.concatenate(found)
     return np.asarray(0.5 * (points.min(axis=0) + points.max(axis=0)))
@@ -341,7 +341,7 @@ def _check_reach(problem: Problem) -> None:
     if problem.relaxations or not robot.chain.is_rooted:
         return
     seed: Array | None = None
-    for t in np.linspace(0.0, problem.path.duration, _POSES).tolist():
+    for t in spread_along(problem.path, _POSES).tolist():
         try:
             pose = item.path.pose(t)
             seed = robot.inverse_kinematics(pose, problem.task, seed, attempts=_TRIES)

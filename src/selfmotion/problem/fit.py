@@ -29,7 +29,7 @@ from selfmotion.constraints import (
 from selfmotion.costs import Cost, JointVelocity
 from selfmotion.follow import Follow, Follows, VirtualJoints
 from selfmotion.motion import FreeNullMotion, NullMotion
-from selfmotion.path import FeedPossible, Path, check_oriented
+from selfmotion.path import FeedPossible, Path, check_oriented, spread_along
 from selfmotion.robot import Chain, RobotModel
 from selfmotion.task import POSITION_ROWS, ROW_NAMES, Damping, Relaxation, Task
 
@@ -298,7 +298,7 @@ def _prescribed(path: Path, task: Task) -> list[str]:
     rows = [ROW_NAMES[k] for k in task.rows]
     if task is Task.PLANAR_POSE:
         # Its angle is about the world's z axis: only there is rz that angle.
-        axes = path.samples(np.linspace(0.0, path.duration, 9)).rotation[:, :, 2]
+        axes = path.samples(spread_along(path, 9)).rotation[:, :, 2]
         if not np.allclose(axes, [0.0, 0.0, 1.0]):
             rows.remove("rz")
     return rows

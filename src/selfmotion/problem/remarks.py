@@ -18,7 +18,7 @@ from selfmotion.constraints import (
     ToolLimits,
 )
 from selfmotion.follow import Follows
-from selfmotion.path import TURN_NOTE
+from selfmotion.path import TURN_NOTE, spread_along
 from selfmotion.problem.fit import KEPT
 from selfmotion.robot import RobotModel, mounting_of
 
@@ -35,7 +35,7 @@ def inside_remarks(
     first = follows.items[0]
     if mounting_of(robot.urdf, robot.tool).bodies:
         return
-    t = np.linspace(0.0, first.path.duration, _LOOKS)
+    t = spread_along(first.path, _LOOKS)
     places = first.path.samples(t).translation
     for item in dict.fromkeys(obstacles):
         # Of others it depends on how the arm stands.

@@ -7,7 +7,7 @@ import numpy as np
 
 from selfmotion.basics import Array, Progress
 from selfmotion.costs import PathLength
-from selfmotion.path import Path
+from selfmotion.path import Path, spread_along
 from selfmotion.problem import Problem
 from selfmotion.search.chains import Sequence
 from selfmotion.search.manifold import OnPath
@@ -132,7 +132,7 @@ def waypoint_times(problem: Problem) -> Array:
 
 def search_times(path: Path, fewest: int) -> Array:
     """Return times (W,) [s] at which to search for configurations, as the tool moves on."""
-    t = np.linspace(0.0, path.duration, _PATH_LOOKS)
+    t = spread_along(path, _PATH_LOOKS)
     tool = path.samples(t)
     moved = np.linalg.norm(np.diff(tool.translation, axis=0), axis=1) / _STRIDE
     turned = np.array([np.linalg.norm(log3(a.T @ b)) for a, b in itertools.pairwise(tool.rotation)])

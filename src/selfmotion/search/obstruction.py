@@ -9,6 +9,7 @@ import numpy as np
 from selfmotion.basics import Array
 from selfmotion.collision import Closest, how_near
 from selfmotion.follow import AugmentedFollows
+from selfmotion.path import edges_of, spread_along
 from selfmotion.problem import Problem
 from selfmotion.search.nodes import AT_LIMIT
 from selfmotion.search.single_poses import CLIMBERS, MOST_LOOKED_AT, Found, SinglePoses
@@ -20,7 +21,7 @@ from selfmotion.task import POSITION_ROWS, ROW_NAMES, Relaxation
 _POSES = 64
 _BISECTIONS = 16
 _LOOKS = 6
-# Poses about a time of trouble, in shares of the path's duration.
+# Poses about a time of trouble, in shares of the piece of the path that it is in.
 _ABOUT = (-1e-3, 0.0, 1e-3, 4e-3)
 # A singular value below this share of the dexterous configuration's counts as stretched or folded.
 _STRETCHED = 0.1
@@ -251,7 +252,7 @@ def obstruction(problem: Problem, rng: np.random.Generator) -> Obstruction | Non
     what met bodies least, moved aside.
     """
     poses = SinglePoses(problem, rng)
-    times = np.linspace(0.0, problem.path.duration, _COARSE_POSES)
+    times = spread_along(problem.path, _COARSE_POSES)
     known: dict[float, Array] = {}
     order = _worst_first(problem, times)
     for t in order:
@@ -326,8 +327,10 @@ def reachable(
     poses = SinglePoses(problem, rng, clear=False)
     path, given = problem.path, poses.problem.given_start
     first = [given] if given is not None else start_candidates(poses.follows, starts, rng)
-    about = np.clip(suspect / path.duration + np.array(_ABOUT), 0.0, 1.0)
-    times = path.duration * np.union1d(np.linspace(0.0, 1.0, _POSES + 1), about)
+    knots = edges_of(path.knots)
+    piece = np.diff(knots)[min(int(np.searchsorted(knots, suspect, "right")), len(knots) - 1) - 1]
+    about = np.clip(suspect + piece * np.array(_ABOUT), 0.0, path.duration)
+    times = np.union1d(spread_along(path, _POSES + 1), about)
     known, last = np.array(first), 0.0
     for t in times[1:]:
         found = poses.look(t, known)
