@@ -5,6 +5,7 @@ import re
 from pathlib import Path
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 import selfmotion as sm
@@ -12,12 +13,15 @@ from selfmotion.follow import Follows
 from selfmotion.motion.grid import Grid
 from selfmotion.paper import Rollout, settled_still_motion
 from selfmotion.replay import write_replay
-from support.arms import robot_named
+from support.arms import PANDA_HOME, robot_named
 
 # The end of a part that only the workspace limits, relative to the closed form.
 EDGE = 1e-3
 
 
+# A part ends so much before a motion that is known to keep its limits, at most: where bisections
+# end.
+SHORT_OF = 0.8
 # Where limits are kept with a margin, and the end is bisected, besides.
 LIMITED = 5e-3
 
@@ -263,3 +267,50 @@ def test_poses_that_limits_put_out_of_reach_end_the_search(
     assert float(told[1]) == pytest.approx(edge, rel=EDGE)
     assert "at its limit: joint 'joint2', 'joint3'" in plan.certificate.verdict
     assert not any(stage.startswith("search") for stage in stages)
+
+
+def test_how_far_it_goes_does_not_depend_on_where_the_cell_is(panda: sm.RobotModel) -> None:
+    """The same problem with the base turned, by next to nothing too: limits of all rates bind."""
+    home = panda.pose(PANDA_HOME)
+    end = home.copy()
+    end.translation += [0.7, 0.1, 0.2]
+    line = sm.paths.Line(home, end, 1.6)
+    limits = [
+        sm.constraints.JointPositionLimits(),
+        sm.constraints.JointVelocityLimits(),
+        sm.constraints.JointAccelerationLimits(),
+        sm.constraints.JointJerkLimits(),
+    ]
+    ends = []
+    for angle in (0.0, 1e-6, 0.5):
+        base = pin.SE3(pin.exp3(np.array([0.0, 0.0, angle])), np.zeros(3))
+        robot = sm.load_robot("panda", base=base) if angle else panda
+        path = sm.paths.Placed(line, base)
+        problem = sm.Problem(robot, path, "pose", PANDA_HOME, constraints=limits, clearance=None)
+        plan = sm.plan(problem)
+        # Nothing else is wrong with it.
+        (failure,) = plan.certificate.failures
+        assert "the motion ends at" in failure
+        ends.append(plan.trajectory.t[-1])
+    assert max(ends) - min(ends) < 2.0 * LIMITED * max(ends), ends
+
+
+def test_a_part_of_some_hundredths_of_a_second_is_found(panda: sm.RobotModel) -> None:
+    """A line of which accelerations are kept for a moment only, with limits of jerk as well."""
+    home, end = panda.pose(PANDA_HOME), panda.pose(PANDA_HOME)
+    end.translation += [0.7, 0.1, 0.2]
+    line = sm.paths.Line(home, end, 0.9)
+    limits = [sm.constraints.JointAccelerationLimits(), sm.constraints.JointJerkLimits()]
+    problem = sm.Problem(panda, line, "pose", PANDA_HOME, constraints=limits, clearance=None)
+    plan = sm.plan(problem)
+    (failure,) = plan.certificate.failures
+    assert "the motion ends at" in failure
+    # The motion of the least speeds, step by step, until it accelerates too fast.
+    q, step, speeds = PANDA_HOME.copy(), 1e-4, [np.zeros(7)]
+    while True:
+        t = len(speeds) * step
+        speeds.append(np.linalg.pinv(panda.task_jacobian(q, "pose")) @ line.twist(t))
+        if (np.abs(speeds[-1] - speeds[-2]) > step * panda.acceleration_limit).any():
+            break
+        q += step * speeds[-1]
+    assert 0.02 < t < plan.trajectory.t[-1] / SHORT_OF

@@ -276,6 +276,8 @@ class Retimed(_Derived, kind="retimed"):
 _CLOSE = 1e-9
 # Crowding knots: the time left is halved as often, down to 6e-5 of it.
 _HALVED = 14
+# But not below this [s]: a jerk between knots h from each other is rounded by 1e-14 rad / h³.
+_LEAST_LEFT = 1e-4
 # Of two knots this close, as a share of the time left, one is enough.
 _ENOUGH = 1e-3
 
@@ -325,6 +327,7 @@ class Section(_Derived, kind="section"):
 
     def _crowded(self, knots: Array) -> Array:
         left = self.duration * 0.5 ** np.arange(1.0, _HALVED + 1.0)
+        left = left[left >= _LEAST_LEFT]
         gaps = np.abs(self.duration - left[:, None] - knots[:-1]).min(axis=1)
         inner = knots[(knots > 0.0) & (knots < (1.0 - _ENOUGH) * self.duration)]
         graded = self.duration - left[gaps > _ENOUGH * left]

@@ -74,12 +74,6 @@ class _Attempt:
         return self.candidate is not None and not self.candidate.violations
 
     @property
-    def arrived_with_room(self) -> bool:
-        """Whether a finer grid will find a motion, too: not on the last part that is possible."""
-        candidate = self.candidate
-        return candidate is not None and self.arrived and candidate.status is not Status.PRECISION
-
-    @property
     def cost(self) -> float:
         return np.inf if self.found is None else self.found.cost
 
@@ -145,7 +139,6 @@ def _largest_part(problem: Problem, reach: Reach, effort: Effort) -> Part | None
 def _bisect(problem: Problem, failed: _Attempt, reach: Reach, effort: Effort) -> Part | None:
     """Return the motion of a start on the largest part on which it arrives."""
     arrived: _Attempt | None = None
-    edge: _Attempt | None = None
     low, high = 0.0, failed.problem.path.duration
     back = _END_AGREEMENT
     for _ in range(_PROBES):
@@ -159,14 +152,12 @@ def _bisect(problem: Problem, failed: _Attempt, reach: Reach, effort: Effort) ->
             break
         part = _until(problem, probe)
         attempt = _attempt(part, _begin_of(part, failed), effort)
-        if attempt.arrived_with_room or attempt.cut_short:
+        if attempt.arrived or attempt.cut_short:
             arrived, low = attempt, probe
         else:
-            edge = attempt if attempt.arrived and edge is None else edge
             failed, high = attempt, probe
         if attempt.cut_short:
             break
-    arrived = arrived or edge
     return None if arrived is None else _part(problem, arrived, reach, failed.reason)
 
 
