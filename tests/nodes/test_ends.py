@@ -140,3 +140,61 @@ def test_a_given_acceleration_at_an_end_is_met_on_nodes(
 def circle(panda: sm.RobotModel, start=PANDA_HOME, **options) -> sm.Problem:
     path = sm.paths.Circle.around(panda.pose(PANDA_HOME), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
     return sm.Problem(panda, path, "pose", start, **{"constraints": (), "rest": False, **options})
+
+
+# The cheapest motion from place to place on a self-motion curve costs what its arc length squared
+# does: so do rest at both ends, and what keeps it smooth there.
+SHARE_OF_ARC = 5e-3
+
+
+def self_motion(robot: sm.RobotModel, start: np.ndarray, step: float) -> np.ndarray:
+    """Return configurations along a closed self-motion curve, (K, 3), until it is round."""
+    goal, q, before = robot.pose(start).translation[:2], start.copy(), None
+    found = [q]
+    while len(found) < 10 or np.linalg.norm(q - start) > 2.0 * step:
+        way = np.linalg.svd(robot.task_jacobian(q, "planar"))[2][-1]
+        before = way if before is None or way @ before > 0.0 else -way
+        q = q + step * before
+        for _ in range(3):
+            miss = goal - robot.pose(q).translation[:2]
+            q = q + np.linalg.pinv(robot.task_jacobian(q, "planar")) @ miss
+        found.append(q)
+    return np.array(found)
+
+
+def test_the_end_is_the_configuration_asked_for_wherever_that_is(planar: sm.RobotModel) -> None:
+    """On its self-motion curve, all around: other places on the same plane are none."""
+    start = np.array([0.5, 0.8, 0.6])
+    curve = self_motion(planar, start, 5e-3)
+    lengths = np.cumsum(np.linalg.norm(np.diff(curve, axis=0, append=curve[:1]), axis=1))
+    dwell = sm.paths.Dwell(planar.pose(start), 3.0)
+    shares = []
+    for place in np.linspace(0.0, 1.0, 10)[1:-1]:
+        k = int(place * (len(curve) - 1))
+        goal = planar.inverse_kinematics(dwell.at, "planar", curve[k])
+        limits = [
+            sm.constraints.JointPositionLimits(),
+            sm.constraints.JointVelocityLimits(),
+            sm.constraints.EndConfiguration(goal),
+        ]
+        given = {"costs": [sm.costs.JointVelocity(1.0)], "constraints": limits}
+        plan = sm.plan(sm.Problem(planar, dwell, "planar", start, **given, clearance=None))
+        assert plan.certificate.verified, plan.certificate.verdict
+        arc = min(lengths[k - 1], lengths[-1] - lengths[k - 1])
+        shares.append(plan.report.cost / arc**2)
+    assert max(shares) < (1.0 + SHARE_OF_ARC) * min(shares), shares
+
+
+def test_another_configuration_on_the_same_plane_is_none(planar: sm.RobotModel) -> None:
+    start = np.array([0.5, 0.8, 0.6])
+    curve = self_motion(planar, start, 5e-3)
+    dwell = sm.paths.Dwell(planar.pose(start), 3.0)
+    problem = sm.Problem(planar, dwell, "planar", start)
+    end = sm.constraints.EndConfiguration(curve[0]).bind(problem.follows, start, start)
+    away = (curve - curve[0]) @ end.null[:, 0]
+    (others,) = np.nonzero(np.diff(np.sign(away[100:-100])))
+    assert len(others)
+    for k in others + 100:
+        assert end.elsewhere(start, curve[k]) > 1.0
+    for near in (0, 1, 10, 50, -1, -10):
+        assert end.elsewhere(start, curve[near]) == 0.0

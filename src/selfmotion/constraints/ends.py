@@ -21,13 +21,17 @@ from selfmotion.robot import RobotModel
 
 # The optimiser need only come near [rad, rad/s]: Newton's method then closes the rest.
 _NEAR = 1e-4
+# A configuration is another one than the one asked for where it is farther away than its own
+# coordinates tell, by this factor and this distance [rad or m].
+_FARTHER, _ELSEWHERE = 2.0, 1e-3
 
 
 @dataclass(frozen=True, eq=False)
 class BoundEnd:
     """Nᵀ(x - target) = 0 at an end (`row`), or Nᵀ(x(T) - x(0)) = 0 without a target.
 
-    x is q, q̇ or both.
+    x is q, q̇ or both. Where that is all that is left to ask for of q, `is_whole`, it is to be the
+    target: other configurations on the same pose may be on the plane Nᵀ(q - target) = 0 as well.
     """
 
     name: str
@@ -35,6 +39,7 @@ class BoundEnd:
     target: Array | None
     null: Array
     row: int = -1
+    is_whole: bool = False
     equality = True
     tolerance = _NEAR
 
@@ -54,6 +59,17 @@ class BoundEnd:
             x = motion.of_order(order)
             parts.append(self.null.T @ (x[-1] - x[0] if self.target is None else x[self.row]))
         return np.concatenate(parts)[None]
+
+    def elsewhere(self, first: Array, last: Array) -> float:
+        """Return how far q is from the target where it is another one on the same pose, else 0.
+
+        For q at the first and the last node, (n,) each [rad or m].
+        """
+        if not self.is_whole:
+            return 0.0
+        away = last - first if self.target is None else (last if self.row else first) - self.target
+        far, told = (float(np.linalg.norm(x)) for x in (away, self.null.T @ away))
+        return far if far > _FARTHER * told + _ELSEWHERE else 0.0
 
     def describe(self, samples: Samples, row: int, column: int) -> str:
         """See `BoundConstraint.describe`."""
@@ -101,7 +117,8 @@ class EndConfiguration(Constraint):
     def bind(self, follows: Follows, start: Array, end: Array) -> BoundEnd:
         """See `Constraint.bind`."""
         target = read_only(follows.robot.configuration(self.q))
-        return BoundEnd("end configuration", (0,), target, follows.null_basis(target))
+        null = follows.null_basis(target)
+        return BoundEnd("end configuration", (0,), target, null, is_whole=True)
 
     def requirement(self, robot: RobotModel) -> EndState:
         """See `Constraint.requirement`."""
@@ -288,7 +305,7 @@ class ClosedPath(Constraint):
     def bind(self, follows: Follows, start: Array, end: Array) -> BoundEnd:
         """See `Constraint.bind`."""
         orders = (0, 1) if self.velocity else (0,)
-        return BoundEnd("closed path", orders, None, follows.null_basis(start))
+        return BoundEnd("closed path", orders, None, follows.null_basis(start), is_whole=True)
 
     def requirement(self, robot: RobotModel) -> ClosedMotion:
         """See `Constraint.requirement`."""

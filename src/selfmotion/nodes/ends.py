@@ -67,6 +67,22 @@ class NodeEnds:
                 found.append(item.null.T @ off)
         return np.concatenate(found)
 
+    @property
+    def last(self) -> Array | None:
+        """Where the motion has to end, (n,); None where that is not asked for."""
+        for item in self._items:
+            if item.is_whole and item.row and item.target is not None:
+                return item.target
+        return None
+
+    def elsewhere(self, nodes: Array) -> dict[str, float]:
+        """Return how far an end is from the configuration that is asked for, by condition.
+
+        Of those that it is at another configuration of the same pose, for (q, q̇, q̈) of the nodes.
+        """
+        found = {item.name: item.elsewhere(nodes[0, 0], nodes[-1, 0]) for item in self._items}
+        return {name: far for name, far in found.items() if far > 0.0}
+
     def border(self, c: Array, changes: Array, held: Ints) -> Border:
         """Return what is off, c (E,), with its derivatives; nothing moves what is `held`.
 

@@ -186,15 +186,23 @@ class NodeGrid:
         found[self._resting[order - 1]] = 0.0
         return found
 
-    def motion_towards(self, start: Array, wanted: Array, time: float) -> "NodeMotion | None":
+    def motion_towards(
+        self, start: Array, wanted: Array, time: float | None = None
+    ) -> "NodeMotion | None":
         """Return a motion from a start (n,) whose self-motion goes towards `wanted` (n,).
 
-        It is there, as far as the path lets it, after about so much time [s]. None where the path
-        cannot be followed like that.
+        It is there, as far as the path lets it, after about so much time [s]; by default at the
+        end, from rest to rest. None where the path cannot be followed like that.
         """
         own = self.manifolds
         q = np.empty((len(self.t), len(start)))
-        share = np.minimum(np.append(0.0, np.diff(self.t)) / time, 1.0)
+        if time is None:
+            # What is left of the way falls as a motion of minimum jerk.
+            u = 1.0 - self.t / self.t[-1]
+            left = u**3 * (10.0 + u * (6.0 * u - 15.0))
+            share = np.append(0.0, 1.0 - left[1:] / left[:-1])
+        else:
+            share = np.minimum(np.append(0.0, np.diff(self.t)) / time, 1.0)
         if follow(start, wanted, share, own.targets, own.chains, own.layout, own.held, q) >= 0:
             return None
         qd = np.asarray(np.gradient(q, self.t, axis=0))
@@ -281,6 +289,11 @@ class NodeMotion:
     def c(self) -> Array:
         """What is off at the ends, (E,)."""
         return self.grid.ends.residuals(self.place.nodes)
+
+    @cached_property
+    def elsewhere(self) -> dict[str, float]:
+        """How far its ends are from where they should be, though `c` is 0; see `NodeEnds`."""
+        return self.grid.ends.elsewhere(self.place.nodes)
 
     @cached_property
     def violation(self) -> float:

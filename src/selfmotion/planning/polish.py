@@ -230,11 +230,13 @@ class Polisher:
         return (*problem.costs, *found) if found else ()
 
     def _beginnings(self, begun: NodeMotion) -> Iterator[NodeMotion | None]:
-        """Yield motions that go towards the middle of the limits."""
-        grid = begun.grid
+        """Yield motions that go to where they have to end, and towards the middle of the limits."""
+        grid, start = begun.grid, begun.place.q[0]
+        if grid.ends.last is not None:
+            yield grid.motion_towards(start, grid.ends.last)
         if self._free:
             return
-        robot, start = self._problem.robot, begun.place.q[0]
+        robot = self._problem.robot
         limited = np.isfinite(robot.lower) & np.isfinite(robot.upper)
         middle = start.copy()
         middle[limited] = 0.5 * (robot.lower[limited] + robot.upper[limited])
@@ -379,7 +381,9 @@ class Polisher:
 
     def _solution(self, optimum: Optimum) -> NodeSolution:
         status = optimum.status
-        if status not in (*_ARRIVED, Status.GRADIENT):
+        if optimum.motion.elsewhere:
+            status = Status.INFEASIBLE
+        elif status not in (*_ARRIVED, Status.GRADIENT):
             # What keeps the conditions, and leads no further, is as good as it gets.
             status = Status.PRECISION if _is_kept(optimum.motion) else Status.INFEASIBLE
         return NodeSolution.of(optimum, self._ended or status)
@@ -388,7 +392,8 @@ class Polisher:
 def _is_kept(motion: NodeMotion) -> bool:
     """Whether all conditions are kept."""
     # Written so that NaN is not.
-    return bool(motion.violation <= 0.0 and np.abs(motion.c).max(initial=0.0) <= ENDS_MET)
+    ends = np.abs(motion.c).max(initial=0.0) <= ENDS_MET and not motion.elsewhere
+    return bool(motion.violation <= 0.0 and ends)
 
 
 def _rank(optimum: Optimum, begun: NodeMotion) -> tuple[bool, bool, float]:
@@ -411,7 +416,8 @@ def _rank_of(motion: NodeMotion, begun: NodeMotion) -> tuple[bool, bool, float]:
 
 def _unmet(motion: NodeMotion) -> float:
     """Return by how much conditions are broken."""
-    return motion.violation + float(np.abs(motion.c).max(initial=0.0))
+    far = max(motion.elsewhere.values(), default=0.0)
+    return motion.violation + float(np.abs(motion.c).max(initial=0.0)) + far
 
 
 def _divided(t: Array, parts: Ints) -> Array:

@@ -163,17 +163,23 @@ class NodeSolution:
         motion = self.motion
         ends = np.abs(motion.c).max(initial=0.0)
         # Written so that NaN is not kept.
-        if motion.violation <= 0.0 and ends <= ENDS_MET:
+        if motion.violation <= 0.0 and ends <= ENDS_MET and not motion.elsewhere:
             return ()
         # What control points exceed, the curve may keep.
-        return violated(motion.grid.constraints, motion.checked)
+        broken = violated(motion.grid.constraints, motion.checked)
+        return broken + tuple(
+            f"{name}: the motion ends {far:.3g} rad or m away from it, in another configuration "
+            f"that puts the tool there"
+            for name, far in motion.elsewhere.items()
+        )
 
     def merit(self) -> float:
         """Return the cost, much larger where constraints are violated: for ranking."""
         motion = self.motion
-        if motion.violation <= 0.0:
+        if motion.violation <= 0.0 and not motion.elsewhere:
             return self.cost
-        return penalised(self.cost, motion.grid.constraints, motion.checked)
+        found = penalised(self.cost, motion.grid.constraints, motion.checked)
+        return found + len(motion.elsewhere) * 10.0 * max(abs(self.cost), 1e-3)
 
     def evaluation(self) -> Evaluation:
         """Return the motion with its costs."""
