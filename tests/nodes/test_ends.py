@@ -198,3 +198,23 @@ def test_another_configuration_on_the_same_plane_is_none(planar: sm.RobotModel) 
         assert end.elsewhere(start, curve[k]) > 1.0
     for near in (0, 1, 10, 50, -1, -10):
         assert end.elsewhere(start, curve[near]) == 0.0
+
+
+@pytest.mark.parametrize("share", [1.002, 1.01])
+def test_limits_hardly_above_the_mean_speed_are_kept(planar: sm.RobotModel, share: float) -> None:
+    """Joint 3 alone tells where the arm is on its curve: any motion of its own will do."""
+    start = np.array([0.5, 0.8, 0.6])
+    curve = self_motion(planar, start, 5e-3)
+    dwell = sm.paths.Dwell(planar.pose(start), 3.0)
+    goal = planar.inverse_kinematics(dwell.at, "planar", curve[100])
+    mean = np.abs(goal - start).max() / dwell.duration
+    limits = [
+        sm.constraints.JointVelocityLimits(share * mean, margin=1e-4),
+        sm.constraints.EndConfiguration(goal),
+    ]
+    plan = sm.plan(sm.Problem(planar, dwell, "planar", start, constraints=limits, clearance=None))
+    assert plan.certificate.verified, plan.certificate.verdict
+    # Nothing goes slower than that.
+    limits[0] = sm.constraints.JointVelocityLimits(0.99 * mean)
+    slow = sm.plan(sm.Problem(planar, dwell, "planar", start, constraints=limits, clearance=None))
+    assert not slow.certificate.verified

@@ -30,6 +30,9 @@ _NODE_ROUNDS = 14
 _FARTHER_APART = (5e-4, 1e-3, 2e-3)
 # Steps of Newton's method from each of several beginnings: what takes longer mostly leads nowhere.
 _FEWER = 25
+# Where nothing keeps the conditions, nodes are put in so near to rest, as shares of the first and
+# the last interval: limits hardly above the mean speed leave no more time to start and stop.
+_BESIDE_REST = 0.5 ** np.arange(2.0, 5.0)
 # Finer where limits of q̈ or jerk begin and end to bind only while that saves this share.
 _PAYS = 3e-4
 # Where limits of these are broken, what uses of them costs this many times what the motion does;
@@ -258,8 +261,11 @@ class Polisher:
         yield from sorted((motion for motion in found if motion), key=rank)[:_MOST_ASIDE]
 
     def _on_halved(self, optimum: Optimum) -> Optimum:
-        """Return the optimum on twice as many nodes, or what there is."""
-        finer = Grid(optimum.motion.grid.t).halved().nodes
+        """Return the optimum on twice as many nodes, more beside rest, or what there is."""
+        t = optimum.motion.grid.t
+        ends = t[0] + (t[1] - t[0]) * _BESIDE_REST, t[-1] - (t[-1] - t[-2]) * _BESIDE_REST
+        beside = [own for rest, own in zip(self._problem.rests, ends, strict=True) if rest]
+        finer = np.unique(np.concatenate([Grid(t).halved().nodes, *beside]))
         motion = optimum.motion.on(optimum.motion.grid.on(finer))
         return optimum if motion is None else self._minimise(motion)
 
