@@ -8,7 +8,7 @@ from selfmotion.basics import Array, BreakdownError, RedundancyError
 from selfmotion.motion import Evaluation, Grid, Sampling
 from selfmotion.optimise import Status
 from selfmotion.paper import Guide, StillMotion
-from selfmotion.path import Section
+from selfmotion.path import Section, edges_of
 from selfmotion.planning.candidate import Candidate
 from selfmotion.planning.effort import Effort, Search
 from selfmotion.planning.screening import ROUGH_MOTIONS
@@ -18,7 +18,8 @@ from selfmotion.search import Reach
 # Share of the time to the edge of the workspace that is given up, since joint speeds grow without
 # bound towards it.
 _EDGE_MARGIN = 1e-4
-# The end of the part is found to this share of it, and a part below this share of the path is none.
+# The end of the part is found to this share of it, and a part below this share of the path, and of
+# the first piece of it, is none.
 _END_AGREEMENT = 4e-3
 _LEAST_PART = 1e-2
 # Ends that are tried, at most.
@@ -117,7 +118,7 @@ def largest_part(problem: Problem, reach: Reach, effort: Effort) -> Part | None:
 
 def _largest_part(problem: Problem, reach: Reach, effort: Effort) -> Part | None:
     goal = reach.time * (1.0 - _EDGE_MARGIN) if reach.reason else reach.time
-    if goal < _LEAST_PART * problem.path.duration:
+    if goal < _least(problem):
         return None
     first = _until(problem, goal)
     attempts = []
@@ -136,6 +137,12 @@ def _largest_part(problem: Problem, reach: Reach, effort: Effort) -> Part | None
     return _bisect(problem, furthest, reach, effort)
 
 
+def _least(problem: Problem) -> float:
+    """Return how long the part of a path has to last to be one [s]."""
+    first = float(edges_of(problem.path.knots)[1])
+    return _LEAST_PART * min(first, problem.path.duration)
+
+
 def _bisect(problem: Problem, failed: _Attempt, reach: Reach, effort: Effort) -> Part | None:
     """Return the motion of a start on the largest part on which it arrives."""
     arrived: _Attempt | None = None
@@ -148,7 +155,7 @@ def _bisect(problem: Problem, failed: _Attempt, reach: Reach, effort: Effort) ->
             back *= 2.0
         else:
             probe = 0.5 * (low + high)
-        if probe < _LEAST_PART * problem.path.duration or high - low < _END_AGREEMENT * high:
+        if probe < _least(problem) or high - low < _END_AGREEMENT * high:
             break
         part = _until(problem, probe)
         attempt = _attempt(part, _begin_of(part, failed), effort)

@@ -211,7 +211,9 @@ class _PartPlanner:
         if isinstance(problem.path, Retimed):
             t = problem.path.when(t - t[0])
         if len(t) < _GUIDE_SAMPLES:
-            t, few = np.linspace(0.0, problem.path.duration, _GUIDE_SAMPLES), t
+            # As close as they are: where the tool stands still, there are few.
+            few, places = t, np.linspace(0.0, len(t) - 1.0, _GUIDE_SAMPLES)
+            t = np.interp(places, np.arange(len(few)), few)
             q = np.stack([np.interp(t, few, joint) for joint in q.T], axis=1)
         guide = Sequence(t, q, 0.0)
         return plan_along(problem, guide, self._tolerance, self._progress)

@@ -26,8 +26,8 @@ from selfmotion.constraints import (
     JointAccelerationLimits,
     JointVelocityLimits,
 )
-from selfmotion.motion import Trajectory
-from selfmotion.path import STILL, Pace, Path, Retimed
+from selfmotion.motion import Grid, Trajectory
+from selfmotion.path import STILL, Pace, Path, Retimed, edges_of
 from selfmotion.problem import Problem
 from selfmotion.result.measured import quantities_of_pace
 from selfmotion.result.pace_rows import PaceLimits
@@ -139,9 +139,10 @@ def _with_remarks(plan: Plan, original: Path, acceleration: Array, jerk: Array) 
 
 def _waited(path: Path) -> float:
     """Return how long the tool stands still on a path [s], about."""
-    middles = (np.arange(_LOOKS) + 0.5) / _LOOKS * path.duration
+    looks = Grid.aligned(edges_of(path.marks), _LOOKS).nodes
+    middles = 0.5 * (looks[:-1] + looks[1:])
     still = np.abs(path.samples(middles).twist).max(axis=1) <= STILL
-    return float(still.mean() * path.duration)
+    return float(np.diff(looks)[still].sum())
 
 
 def _swings(motion: Trajectory, limit: Array) -> Ints:
