@@ -8,6 +8,7 @@ import pytest
 import selfmotion as sm
 from selfmotion.basics import Counts, silent
 from selfmotion.planning.effort import Effort
+from selfmotion.planning.grids import first_nodes
 from selfmotion.planning.planner import Planner
 from selfmotion.planning.proposals import VERY_LONG_WAY, is_long
 from support.arms import PANDA_HOME, robot_named
@@ -190,3 +191,28 @@ def test_a_short_motion_beside_a_long_wait(
     # It rests as the line alone does: with accelerations as well.
     assert plan.problem.rest_orders == alone.problem.rest_orders == (2, 2)
     assert np.abs(plan.trajectory.qdd[[0, -1]]).max() <= RESTS
+
+
+def test_a_motion_beside_a_long_wait_has_as_many_nodes_as_its_way_is_long(
+    planar: sm.RobotModel,
+) -> None:
+    """With limits of acceleration that leave room, it costs no more than what is known of it."""
+    start = np.array([0.5, 0.8, 0.6])
+    a, b = planar.pose(start), planar.pose(start)
+    b.translation += [-0.15, 0.08, 0.0]
+    line = sm.paths.Line(a, b, 0.5)
+    alone = sm.plan(sm.Problem(planar, line, "planar", start, clearance=None))
+    fastest = np.abs(alone.trajectory(np.linspace(0.0, 0.5, 501), 2)).max()
+    limits = [
+        sm.constraints.JointVelocityLimits(),
+        sm.constraints.JointAccelerationLimits(2.0 * fastest),
+    ]
+    path = sm.paths.Dwell(a, 2500.0) + line + sm.paths.Dwell(b, 2500.0)
+    problem = sm.Problem(planar, path, "planar", start, constraints=limits, clearance=None)
+    times = first_nodes(problem)
+    assert np.sum((times >= 2500.0) & (times <= 2500.5)) > 16
+    plan = sm.plan(problem)
+    assert plan.certificate.verified, plan.certificate.verdict
+    assert plan.report.cost < alone.report.cost
+    # Where nothing waits, there are no more than there were.
+    assert len(first_nodes(alone.problem)) == 21

@@ -11,6 +11,9 @@ from selfmotion.problem import Problem
 # Intervals of the first nodes, and so many for each time that the tool goes as far as the arm
 # reaches.
 _FIRST_INTERVALS = 16
+# The way of each piece of the path is measured through so many points in all. A piece has as many
+# intervals as its way is long, where it would else have so many times fewer.
+_WAY_LOOKS, _SHORT_OF_NODES = 200, 4.0
 # More of them where self-motions start and stop: this share of the duration from there, and so many
 # times as far.
 _STARTING, _FARTHER = 0.01, 3.0
@@ -46,7 +49,8 @@ def most_nodes(problem: Problem) -> int:
 def first_nodes(problem: Problem) -> Array:
     """Return the times of the nodes to begin with, (N + 1,)."""
     steps = int(np.ceil(_FIRST_INTERVALS * max(1.0, problem.way_in_reaches)))
-    return with_starts(problem, Grid.aligned(problem.knots, steps).nodes, 1.0)
+    t = _with_short_pieces(problem, Grid.aligned(problem.knots, steps).nodes, steps)
+    return with_starts(problem, t, 1.0)
 
 
 def with_starts(problem: Problem, t: Array, quick: float) -> Array:
@@ -62,6 +66,31 @@ def with_starts(problem: Problem, t: Array, quick: float) -> Array:
     inside = near[(near > 0.0) & (near < duration)]
     apart = np.abs(inside[:, None] - t).min(axis=1, initial=np.inf) > 0.5 * least
     return np.sort(np.concatenate([t, inside[apart]]))
+
+
+def _with_short_pieces(problem: Problem, t: Array, steps: int) -> Array:
+    """Return times of nodes (N + 1,) with more where the tool goes a long way in little time.
+
+    A motion beside a long wait gets nodes by its way, where these are many times as many as its
+    time gives it. As ways count what the tool moves, in reaches of the arm, and what it turns.
+    """
+    knots, follows = np.asarray(problem.knots), problem.follows
+    looks = Grid.aligned(knots, _WAY_LOOKS).nodes
+    reach = problem.robot.reach if np.isfinite(problem.robot.reach) else 1.0
+    counts = np.where(follows.linear > 0.0, 1.0 / reach, 1.0)
+    speeds = np.linalg.norm(follows.twists(0.5 * (looks[:-1] + looks[1:])) * counts, axis=1)
+    way = np.append(0.0, np.cumsum(speeds * np.diff(looks)))
+    ways = np.diff(way[np.searchsorted(looks, knots)])
+    wanted = steps * ways / max(float(way[-1]), np.finfo(float).tiny)
+    has = np.diff(np.searchsorted(t, knots))
+    few = wanted > _SHORT_OF_NODES * has
+    more = [
+        np.linspace(knots[k], knots[k + 1], int(np.ceil(wanted[k])), endpoint=False)
+        for k in np.flatnonzero(few)
+    ]
+    if not more:
+        return t
+    return np.union1d(t, np.concatenate(more))
 
 
 def rough_grid(problem: Problem) -> Grid:
