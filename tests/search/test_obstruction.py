@@ -6,6 +6,7 @@ from scipy.interpolate import make_interp_spline
 
 import selfmotion as sm
 from selfmotion.basics import Array
+from selfmotion.search.curves import SPACING
 from selfmotion.search.obstruction import (
     Obstruction,
     least_deviation,
@@ -13,10 +14,13 @@ from selfmotion.search.obstruction import (
     nearest_place,
     obstruction,
 )
+from selfmotion.search.single_poses import SinglePoses
 from support.arms import robot_named
 
 # Remedies are as tight as their last round, and the path is moved a bit farther than it has to be.
 TIGHT = 0.35
+# Where Newton's method ends [m or rad].
+AT_POSE = 1e-9
 
 
 def looked(problem: sm.Problem) -> Obstruction | None:
@@ -132,3 +136,20 @@ def test_what_is_relaxed_extends_reach() -> None:
             more = least_deviation(found.poses, found.time, ("x", "y"))
             assert more is not None
             assert 0.01 <= np.linalg.norm(more) <= 0.01 * (1.0 + TIGHT)
+
+
+def test_self_motions_of_a_pose_in_a_window_make_use_of_it() -> None:
+    """Six joints have none but what the window frees: all turns about the tool's axis."""
+    robot = robot_named("ur5")
+    pose = robot.pose(robot.dexterous_configuration("pose"))
+    window = sm.Relaxation("rz", during=(1.0, 3.0))
+    problem = sm.Problem(robot, sm.paths.Dwell(pose, 4.0), "pose", relaxations=[window])
+    curves = SinglePoses(problem, np.random.default_rng(0))._along_curves(2.0, np.empty((0, 7)))
+    tools = [robot.pose(q[: robot.dof]) for q in curves]
+    away = [np.linalg.norm(tool.translation - pose.translation) for tool in tools]
+    tilts = [np.linalg.norm(tool.rotation[:, 2] - pose.rotation[:, 2]) for tool in tools]
+    assert max(away) < AT_POSE
+    assert max(tilts) < AT_POSE
+    turned = [(pose.rotation.T @ tool.rotation)[:2, 0] for tool in tools]
+    angles = np.sort(np.arctan2(*np.transpose(turned)[::-1]))
+    assert np.diff(angles, append=angles[0] + 2.0 * np.pi).max() < 2.0 * SPACING

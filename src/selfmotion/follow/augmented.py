@@ -1,7 +1,7 @@
 """What an arm with virtual joints follows, and the arm itself."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from typing import Any, cast
 
 import numpy as np
@@ -99,19 +99,31 @@ class AugmentedFollows(Follows):
         virtual = VirtualJoints(first.task, relaxations, follows.duration, mean_lever(arm))
         robot = AugmentedArm.of(arm, virtual)
         n, dof = arm.dof, robot.dof
-        held = np.append(np.zeros(n, dtype=np.bool_), virtual.windowed)
 
         def bound(item: BoundFollow, table: Array, task: Task) -> BoundFollow:
-            chain = TableChain(item.chain.tip_name, table, dof, held)
-            return BoundFollow(chain, item.path, task)
+            return BoundFollow(TableChain(item.chain.tip_name, table, dof), item.path, task)
 
         items = [bound(first, virtual.table(first.chain, n), virtual.task)]
         items += [bound(item, item.chain.table, item.task) for item in others]
         alike = virtual.alike(n)
         if alike is not None:
             still = Dwell(SE3.Identity(), follows.duration)
-            items.append(BoundFollow(TableChain("", alike, dof, held), still, cast(Task, _Alike())))
+            items.append(BoundFollow(TableChain("", alike, dof), still, cast(Task, _Alike())))
         return cls(robot, tuple(items), virtual=virtual)
+
+    @property
+    def with_windows_shut(self) -> "AugmentedFollows":
+        """The same where integrated motions make no use of what has a window, at any time."""
+        none = np.zeros(self.robot.dof - len(self.virtual.each), dtype=np.bool_)
+        held = np.append(none, self.virtual.windowed)
+
+        def shut(item: BoundFollow) -> BoundFollow:
+            own = item.chain
+            return BoundFollow(
+                TableChain(own.tip_name, own.table, self.robot.dof, held), item.path, item.task
+            )
+
+        return replace(self, items=tuple(shut(item) for item in self.items))
 
     def deviation(self, item: Relaxation, q: Array) -> Array:
         """Return how far the rows of a relaxation are off the path at q (K, n), (K, k) [m, rad]."""

@@ -6,7 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from selfmotion.basics import Array, Flags, InverseKinematicsError, ProblemError, shown
+from selfmotion.basics import (
+    Array,
+    BreakdownError,
+    Flags,
+    InverseKinematicsError,
+    ProblemError,
+    shown,
+)
 from selfmotion.constraints import BoundConstraint, BoundEnd
 from selfmotion.motion import (
     Evaluation,
@@ -22,6 +29,7 @@ from selfmotion.paper import (
     Guide,
     Method,
     Objective,
+    StillMotion,
     settled_still_motion,
 )
 from selfmotion.planning.effort import Effort
@@ -171,7 +179,7 @@ class Candidate:
         guide: Guide | None = None,
         grid: Grid | None = None,
     ) -> None:
-        begun, jacobians = settled_still_motion(problem, start, guide, grid)
+        begun, jacobians = _begun(problem, start, guide, grid)
         effort.counts.jacobians += jacobians
         self.problem, self.effort, self.free = problem, effort, free
         self.constraints = problem.bind_constraints(
@@ -179,6 +187,7 @@ class Candidate:
         )
         _require_known(self.constraints)
         self._ends = begun.start, begun.end
+        problem = begun.problem
         # Beyond so many steps a grid is not refined any more.
         self.most_steps = int(begun.grid.steps * 2**MOST_HALVINGS)
         if isinstance(problem.null_motion, FreeNullMotion) and is_published(problem, effort):
@@ -405,6 +414,23 @@ class Candidate:
         self.history += polisher.history
         self.is_hopeless = polisher.is_hopeless
         self._found = found or self._found
+
+
+def _begun(
+    problem: Problem, start: Array, guide: Guide | None, grid: Grid | None
+) -> tuple[StillMotion, int]:
+    """Return the motion at x = 0, see `settled_still_motion`.
+
+    It keeps out of tolerances in windows, so that it is one that may be followed. Where the path
+    cannot be followed like that, it makes use of them, at any time: to begin with, that will do.
+    """
+    shut = problem.with_windows_shut
+    try:
+        return settled_still_motion(shut, start, guide, grid)
+    except BreakdownError:
+        if shut is problem:
+            raise
+        return settled_still_motion(problem, start, guide, grid)
 
 
 def _require_known(constraints: Sequence[BoundConstraint]) -> None:

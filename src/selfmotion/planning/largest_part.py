@@ -287,7 +287,7 @@ def _rank(problem: Problem, start: Array, guide: Guide | None) -> tuple[float, f
     """
     path = problem.path
     grid = Grid.aligned(path.knots, _FOLLOWED_STEPS)
-    still = StillMotion.on(problem, start, grid, guide)
+    still = StillMotion.on(problem.with_windows_shut, start, grid, guide)
     trouble = still.off_path(_OFF_PATH)
     far = path.duration if trouble is None else trouble
     kept = _kept_until(problem, still.grid.nodes, still.q, still.qd)

@@ -85,6 +85,15 @@ class AugmentedProblem(Problem):
         found.__dict__.pop("all_costs", None)
         return found
 
+    @cached_property
+    def with_windows_shut(self) -> Problem:
+        """See `Problem.with_windows_shut`."""
+        if not self.follows.holds:
+            return self
+        found = copy(self)
+        object.__setattr__(found, "follows", self.follows.with_windows_shut)
+        return found
+
     def changed(self, **changes: Any) -> Problem:
         """See `Problem.changed`."""
         return replace(self.asked, **changes).augmented

@@ -221,6 +221,11 @@ class Problem:
         """
         return self
 
+    @property
+    def with_windows_shut(self) -> Problem:
+        """The same where motions without self-motion make no use of tolerances in windows."""
+        return self
+
     def changed(self, **changes: Any) -> Problem:
         """Return the same with other parameters."""
         return replace(self, **changes)
