@@ -129,8 +129,11 @@ class AugmentedFollows(Follows):
         """Return how far the rows of a relaxation are off the path at q (K, n), (K, k) [m, rad]."""
         return self.virtual.rows_of(item, q[:, self.robot.dof - len(self.virtual.each) :])[0]
 
-    def limits_within(self, item: Relaxation, band: float) -> Array:
-        """Return limits of |q| (n,) beyond which rows are off their path by more than a band."""
+    def limits_within(self, item: Relaxation, band: float = np.inf) -> Array:
+        """Return limits of |q| (n,) beyond which a relaxation's rows are off their path too far.
+
+        By more than a band, or by more than the relaxations let each of them be at any time.
+        """
         found = np.full(self.robot.dof, np.inf)
         first = self.robot.dof - len(self.virtual.each)
         for k, joint in enumerate(self.virtual.each):
@@ -138,18 +141,20 @@ class AugmentedFollows(Follows):
                 # Half of a tilt is what its first hinge turns by.
                 halved = self.virtual.swing is not None and k == self.virtual.swing[0]
                 share = 0.5 if halved else 1.0
-                found[first + k] = share * band / joint.scale
+                most = min(band, self.virtual.widest([joint.row]))
+                found[first + k] = share * most / joint.scale
         return found
 
     def within_bands(self, q: Array) -> Array:
         """See `Follows.within_bands`."""
         found, first = np.full_like(q, np.inf), self.robot.dof - len(self.virtual.each)
         for item in self.virtual.relaxations:
-            if len(item.rows) == 1 or not np.isfinite(item.band):
+            band = self.virtual.widest(item.indices)
+            if len(item.rows) == 1 or not np.isfinite(band):
                 continue
             size = np.linalg.norm(self.deviation(item, q), axis=1)
-            beyond = size > item.band
-            share = _INSIDE * item.band / np.where(beyond, size, 1.0)
+            beyond = size > band
+            share = _INSIDE * band / np.where(beyond, size, 1.0)
             for k, joint in enumerate(self.virtual.each, first):
                 if joint.row in item.indices:
                     found[beyond, k] = share[beyond] * np.abs(q[beyond, k])

@@ -333,7 +333,7 @@ class Follows:
     def within_bands(self, q: Array) -> Array:
         """Return limits of |q| like q (K, n), within which joints that share a band keep it.
 
-        Infinite where they do.
+        Infinite where they do. Of bands in several windows the widest one counts.
         """
         return np.full_like(q, np.inf)
 

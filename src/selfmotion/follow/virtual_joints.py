@@ -255,6 +255,23 @@ class VirtualJoints:
         """
         return np.array([joint.scale * (1.0 if joint.turns else metre) for joint in self.each])
 
+    def widest(self, rows: Sequence[int]) -> float:
+        """Return how far rows are off together at most, at the time when that is most [rad or m].
+
+        By the bands that hold then: rows that share one have another one in another window.
+        """
+        ends = sorted({x for item in self.relaxations for x in item.window(self._duration)})
+        middles = [0.5 * (a + b) for a, b in pairwise(ends)]
+        return max(self._allowed(rows, time) for time in middles)
+
+    def _allowed(self, rows: Sequence[int], time: float) -> float:
+        """Return how far rows may be off together at a time, 0 where they are not relaxed."""
+        windows = [(item, item.window(self._duration)) for item in self.relaxations]
+        here = [item for item, (first, last) in windows if first < time < last]
+        each = [min((x.band for x in here if row in x.indices), default=0.0) for row in rows]
+        shared = (item.band for item in here if set(rows) <= set(item.indices))
+        return min([float(np.linalg.norm(each)), *shared])
+
     def joint_of(self, item: Relaxation) -> tuple[int, float] | None:
         """Return the number of the joint by which a relaxation's one row is off, and its scale.
 

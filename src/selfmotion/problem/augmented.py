@@ -20,6 +20,7 @@ from selfmotion.constraints import (
     Constraint,
     Envelope,
 )
+from selfmotion.costs import Cost
 from selfmotion.follow import AugmentedFollows
 from selfmotion.motion import Trajectory
 from selfmotion.path import Path
@@ -31,6 +32,7 @@ from selfmotion.problem.of_arm import (
     cost_of_arm,
     quantity_of_arm,
     springs,
+    widest_band,
 )
 from selfmotion.problem.problem import Problem
 from selfmotion.task import DampingLaw
@@ -80,10 +82,7 @@ class AugmentedProblem(Problem):
         if not np.isfinite(virtual).any() or not 0.0 < cost < np.inf:
             return self
         weights = np.append(np.zeros(self._dof), 2.0 * cost / self.path.duration / virtual**2)
-        found = copy(self)
-        object.__setattr__(found, "costs", (*self.costs, springs(weights)))
-        found.__dict__.pop("all_costs", None)
-        return found
+        return self._with_costs((*self.costs, springs(weights)))
 
     @cached_property
     def with_windows_shut(self) -> Problem:
@@ -95,8 +94,16 @@ class AugmentedProblem(Problem):
         return found
 
     def changed(self, **changes: Any) -> Problem:
-        """See `Problem.changed`."""
-        return replace(self.asked, **changes).augmented
+        """See `Problem.changed`; costs are those of all joints, as here."""
+        costs = changes.pop("costs", None)
+        found = replace(self.asked, **changes).augmented if changes else self
+        return found if costs is None else cast(AugmentedProblem, found)._with_costs(costs)
+
+    def _with_costs(self, costs: tuple[Cost, ...]) -> "AugmentedProblem":
+        found = copy(self)
+        object.__setattr__(found, "costs", costs)
+        found.__dict__.pop("all_costs", None)
+        return found
 
     def along(
         self, other: Callable[[Path], Path], when: Callable[[Array], Array] | None = None
@@ -166,10 +173,19 @@ class AugmentedProblem(Problem):
         own = self.asked.bind_constraints(start[:n], end[:n], apart=apart, in_pieces=in_pieces)
         found = [self._bound(item, ends) for item in own]
         bands = [item for item in self.asked.relaxations if np.isfinite(item.band)]
+        limited = set[frozenset[int]]()
         for item in bands:
             of_row = RowWithinBand.of_row(item, self.follows)
-            several = WithinBand.of(item, self.follows), RowWithinBand.of_each(item, self.follows)
-            found += several if of_row is None else [of_row]
+            if of_row is not None:
+                found.append(of_row)
+                continue
+            found.append(WithinBand.of(item, self.follows))
+            each = RowWithinBand.of_each(item, self.follows)
+            # Rows with bands in several windows are limited once: nothing is asked twice at once.
+            rows = frozenset(item.indices)
+            if each is not None and rows not in limited:
+                limited.add(rows)
+                found.append(each)
         pinned = any(item.pins[1] for item in self.asked.constraints)
         given = any(item.fixed_end(self.asked.robot) is not None for item in self.asked.constraints)
         if pinned and not given:
@@ -226,9 +242,9 @@ class AugmentedProblem(Problem):
         free = np.full(robot.dof - n, np.inf)
         bodies = [(cast(CollisionModel, BodiesOfArm(model)), far) for model, far in own.bodies]
         several = [
-            WithinBand.of(item, self.follows).quantity
+            widest_band(item, self.follows)
             for item in self.asked.relaxations
-            if len(item.rows) > 1 and np.isfinite(item.band)
+            if len(item.rows) > 1 and np.isfinite(self.follows.virtual.widest(item.indices))
         ]
         speed, acceleration, jerk = (
             read_only(np.append(rate, free)) for rate in (own.speed, own.acceleration, own.jerk)

@@ -264,15 +264,19 @@ class RowWithinBand(BoundLimits):
 
     @classmethod
     def of_row(cls, item: Relaxation, follows: AugmentedFollows) -> "RowWithinBand | None":
-        """Return that of a relaxation; None where no joint's coordinate is its deviation."""
+        """Return that of a relaxation.
+
+        None where no joint's coordinate is its deviation, or that has other bands in other windows.
+        """
         joint = follows.virtual.joint_of(item)
-        if joint is None:
+        shared = [each for each in follows.virtual.relaxations if item.indices[0] in each.indices]
+        if joint is None or len(shared) > 1:
             return None
         number, scale = joint
         k = follows.robot.dof - len(follows.virtual.each) + number
         bound = np.array([item.band / scale])
         return cls(
-            name=f"relaxation {item.name}",
+            name=f"relaxation {item.told}",
             order=0,
             joints=np.array([k]),
             joint_names=(follows.robot.joint_names[k],),
@@ -284,14 +288,18 @@ class RowWithinBand(BoundLimits):
         )
 
     @classmethod
-    def of_each(cls, item: Relaxation, follows: AugmentedFollows) -> "RowWithinBand":
-        """Return limits of each of the joints of a relaxation's rows, which its band implies.
+    def of_each(cls, item: Relaxation, follows: AugmentedFollows) -> "RowWithinBand | None":
+        """Return limits of each of the joints of a relaxation's rows, which bands imply.
+
+        None where a joint is its one row's deviation, or all rows are free at some time.
 
         Near its path the length of several rows has no slope: only limits tell a step how far the
-        band goes.
+        band goes. They hold at all times: of bands in several windows the widest one counts.
         """
-        bounds = follows.limits_within(item, item.band)
+        bounds = follows.limits_within(item)
         joints = np.flatnonzero(np.isfinite(bounds))
+        if follows.virtual.joint_of(item) is not None or not joints.size:
+            return None
         return cls(
             name=f"relaxation {item.name}, each row",
             order=0,
@@ -315,6 +323,11 @@ def _margin(item: Relaxation) -> float:
     return min(max(_MARGIN, _LEAST / item.band), _MOST)
 
 
+def widest_band(item: Relaxation, follows: AugmentedFollows) -> Quantity:
+    """Return how far rows are off the path, within the widest band that they have at any time."""
+    return replace(_band(item, follows), limit=follows.virtual.widest(item.indices))
+
+
 def _band(item: Relaxation, follows: AugmentedFollows) -> Quantity:
     """Return how far rows are off the path: one number, or the length of several."""
     virtual, dof = follows.virtual, follows.robot.dof
@@ -331,9 +344,9 @@ def _band(item: Relaxation, follows: AugmentedFollows) -> Quantity:
         found[:, :, first:] = by
         return (found[:, None] if several else found,)
 
-    label, unit = f"deviation {item.name}", "rad" if item.angular else "m"
+    label, unit = f"deviation {item.told}", "rad" if item.angular else "m"
     return Quantity(
-        f"relaxation {item.name}",
+        f"relaxation {item.told}",
         (Column(item.name, label, unit),),
         values,
         derivatives,

@@ -237,6 +237,13 @@ class Relaxation:
         return f"({', '.join(self.rows)})"
 
     @property
+    def told(self) -> str:
+        """The rows and the window, for what is said of one among several."""
+        if self.during is None:
+            return self.name
+        return f"{self.name} at {self.during[0]:.6g} to {self.during[1]:.6g} s"
+
+    @property
     def indices(self) -> list[int]:
         """Which of the six rows x, y, z, rx, ry, rz."""
         return [ROW_NAMES.index(row) for row in self.rows]
