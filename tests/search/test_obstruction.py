@@ -1,5 +1,7 @@
 """A quick 'no': never where a motion exists, at once where a pose is out of reach or in the way."""
 
+import re
+
 import numpy as np
 import pytest
 from scipy.interpolate import make_interp_spline
@@ -15,7 +17,7 @@ from selfmotion.search.obstruction import (
     obstruction,
 )
 from selfmotion.search.single_poses import SinglePoses
-from support.arms import robot_named
+from support.arms import PANDA_HOME, robot_named
 
 # Remedies are as tight as their last round, and the path is moved a bit farther than it has to be.
 TIGHT = 0.35
@@ -153,3 +155,24 @@ def test_self_motions_of_a_pose_in_a_window_make_use_of_it() -> None:
     turned = [(pose.rotation.T @ tool.rotation)[:2, 0] for tool in tools]
     angles = np.sort(np.arctan2(*np.transpose(turned)[::-1]))
     assert np.diff(angles, append=angles[0] + 2.0 * np.pi).max() < 2.0 * SPACING
+
+
+def test_what_meets_something_is_within_the_limits_and_nearer_than_wanted() -> None:
+    """Beyond the limits the arm may be clear of a box that it stands in, which is no help."""
+    robot = robot_named("panda")
+    middle, (lower, upper) = PANDA_HOME, robot.finite_limits()
+    sides = np.maximum(lower, middle - 0.3), np.minimum(upper, middle + 0.3)
+    path = sm.paths.Circle.around(robot.pose(middle), 0.03, 4.0, normal=(1.0, 0.0, 0.0))
+    elbow = robot.chain_to("panda_link4", None).place(middle)
+    elbow.rotation = np.eye(3)
+    clearance = sm.constraints.Clearance([sm.obstacles.Box("box", elbow, [0.15] * 3)], 0.01)
+    limits = sm.constraints.JointPositionLimits(*sides)
+    found = looked(sm.Problem(robot, path, constraints=[limits, clearance]))
+    assert found is not None
+    assert found.is_met
+    met = found.found.met
+    assert ((met >= sides[0]) & (met <= sides[1])).all()
+    bodies = sm.obstacles.CollisionModel(robot, clearance.obstacles)
+    assert all(bodies.distance(q).value < 0.01 for q in met[::20])
+    told = re.search(r"([\d.]+) mm apart \(wanted: 10 mm", found.reason)
+    assert told is None or float(told[1]) < 10.0

@@ -192,7 +192,10 @@ class SinglePoses:
         return np.concatenate([near + noise / self.robot.joint_weights, self._seeds])
 
     def _along_curves(self, t: float, met: Array) -> Array:
-        """Return samples of all self-motions of a pose, where these are curves, (K, n)."""
+        """Return samples of all self-motions of a pose, where these are curves, (K, n).
+
+        Those within the limits: the curves go on beyond them.
+        """
         if self.follows.redundancy != 1 or self._held(t).any():
             return np.empty((0, self.robot.dof))
         motion = SelfMotion(self.follows, SPACING)
@@ -200,7 +203,10 @@ class SinglePoses:
         seeds = spread(self.robot, TRACING_SEEDS, self._rng)
         samples = [curve.q for curve in motion.curves(target, seeds).curves]
         every = np.concatenate([np.empty((0, self.robot.dof)), *samples])
-        return self.bounds.representative(every)
+        q = self.bounds.representative(every)
+        most = self.follows.within_bands(q)
+        lower, upper = np.maximum(self.bounds.lower, -most), np.minimum(self.bounds.upper, most)
+        return np.asarray(q[((q >= lower) & (q <= upper)).all(axis=1)])
 
     def _wandered(self, t: float, met: Array) -> Array:
         """Return configurations that random walks along the self-motions lead to, (K, n).
