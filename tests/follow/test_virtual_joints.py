@@ -1,6 +1,7 @@
 """Tolerances as virtual joints: where they put the tool is what the relaxations say, no more."""
 
 import dataclasses
+import re
 
 import numpy as np
 import pinocchio as pin
@@ -159,6 +160,56 @@ def test_a_problem_with_tolerances_keeps_what_its_costs_and_limits_say_of_the_ar
         if "velocity" in item.name:
             continue
         np.testing.assert_allclose(item.tangents(whole, motion), exact, atol=1e-6)
+
+
+# Poses with one row off at a time, of which a virtual joint's coordinate is in proportion.
+OFF = [0.5, 1.5, -2.0]
+
+
+@pytest.mark.parametrize(("name", "task", "relaxations"), TOLERANCES)
+def test_what_is_said_of_a_band_is_the_deviation_in_its_unit(
+    name: str, task: str, relaxations: list[sm.Relaxation]
+) -> None:
+    """And not the coordinate of a virtual joint, nor the name of one."""
+    robot = robot_named(name)
+    start = robot.dexterous_configuration(task)
+    path = sm.paths.Dwell(robot.pose(start), 4.0)
+    problem = sm.Problem(robot, path, task, relaxations=relaxations, clearance=None).augmented
+    follows = AugmentedFollows.with_tolerances(Follows.of(robot, path, task), relaxations)
+    virtual, n = follows.virtual, robot.dof
+    sampling = Sampling.trapezoidal(np.linspace(0.0, 4.0, 5))
+    said = 0
+    for k, joint in enumerate(virtual.each):
+        if joint.row is None:
+            continue
+        for off in OFF:
+            s = np.zeros(len(virtual.each))
+            s[k] = off
+            if virtual.swing is not None and k == virtual.swing[0]:
+                s[virtual.swing[1]] = off
+            q = np.tile(np.append(start, s), (5, 1))
+            samples = Samples.along(problem.follows, sampling, q, np.zeros_like(q))
+            for item in problem.bind_constraints(q[0], q[1], apart=False):
+                if not item.name.startswith("relaxation"):
+                    continue
+                h = item.residual(samples)
+                text = item.describe(samples, 0, int(h[0].argmax()))
+                assert "tilt" not in text
+                assert "relaxed" not in text
+                if h.max() <= 0.0:
+                    continue
+                rows = next(x for x in relaxations if x.name in item.name)
+                size = np.linalg.norm(follows.deviation(rows, q[:1]))
+                found = re.search(r"is (\S+) (rad|m) at", text)
+                assert found is not None
+                assert abs(float(found[1])) == pytest.approx(size, rel=1e-3)
+                assert found[2] == ("rad" if rows.angular else "m")
+                said += 1
+    bands = [item for item in relaxations if np.isfinite(item.band)]
+    assert said >= len(bands)
+    told = [follows.robot.told(n + k) for k in range(len(virtual.each))]
+    assert not any("tilt" in words or "relaxed" in words for words in told)
+    assert follows.robot.told(0) == f"joint '{robot.joint_names[0]}'"
 
 
 @pytest.mark.parametrize("relaxations", [item[2] for item in TOLERANCES[:4]])

@@ -66,6 +66,11 @@ class AugmentedArm(RobotModel):
         own = {one.name: not one.turns for one in self.virtual.each}
         return own[joint] if joint in own else self.arm.is_prismatic(joint)
 
+    def told(self, k: int) -> str:
+        """See `RobotModel.told`: virtual joints are what they let the tool do."""
+        number = k - self.arm.dof
+        return self.arm.told(k) if number < 0 else self.virtual.told(number)
+
     @property
     def joint_weights(self) -> Array:
         """See `RobotModel.joint_weights`: a virtual metre or radian counts as one of the arm."""

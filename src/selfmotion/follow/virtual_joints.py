@@ -102,6 +102,15 @@ class VirtualJoints:
         """All of them, in the order of their coordinates."""
         return (*self.under, *self.behind)
 
+    def told(self, number: int) -> str:
+        """Return in words what one of them lets the tool do."""
+        row, of = self.each[number].row, ""
+        if self.swing is not None and number in self.swing:
+            row, of = self.each[self.swing[0]].row, "half of "
+        if row is None:
+            return "a turn that is not prescribed"
+        return f"{of}the deviation {ROW_NAMES[row]}"
+
     @cached_property
     def swing(self) -> tuple[int, int] | None:
         """The places of the two hinges of a tilt that turn alike; None where there is no tilt."""

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from typing import Any, ClassVar, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -11,10 +11,10 @@ from selfmotion.basics import Array, Flags, Ints
 from selfmotion.certificate import Column, Quantity
 from selfmotion.collision import Closest, CollisionModel
 from selfmotion.constraints import BoundConstraint, BoundLimits, NodeTangents, easing_of
-from selfmotion.constraints.conditions import BoundQuantity, motion_at_nodes
+from selfmotion.constraints.conditions import BoundQuantity, motion_at_nodes, motion_of_order
 from selfmotion.costs import Cost, Partials, Samples
 from selfmotion.follow import AugmentedFollows, Follows
-from selfmotion.task import Relaxation
+from selfmotion.task import ROW_NAMES, Relaxation
 
 # Share of a band that is aimed to be left unused, but at least so much [m or rad], about what a
 # certificate tells apart, and at most so large a share; half of it is left.
@@ -258,8 +258,17 @@ class RowWithinBand(BoundLimits):
     """One row stays within its band: its virtual joint stays within limits.
 
     Outside of its window that is held at 0.
+
+    Attributes
+    ----------
+    labels : tuple of str
+        What each joint's coordinate says, in words.
+    bands : (j,)
+        How far that is where the coordinate is at its limit [rad or m].
     """
 
+    labels: tuple[str, ...]
+    bands: Array
     counts_at_once: ClassVar[bool] = True
 
     @classmethod
@@ -285,6 +294,8 @@ class RowWithinBand(BoundLimits):
             upper=bound,
             scale=bound,
             margin=_margin(item),
+            labels=(f"deviation {item.told}",),
+            bands=np.array([item.band]),
         )
 
     @classmethod
@@ -300,6 +311,8 @@ class RowWithinBand(BoundLimits):
         joints = np.flatnonzero(np.isfinite(bounds))
         if follows.virtual.joint_of(item) is not None or not joints.size:
             return None
+        each = follows.virtual.each
+        rows = [cast(int, each[k - follows.robot.dof + len(each)].row) for k in joints]
         return cls(
             name=f"relaxation {item.name}, each row",
             order=0,
@@ -311,11 +324,24 @@ class RowWithinBand(BoundLimits):
             scale=bounds[joints],
             # None: the band itself binds first.
             margin=0.0,
+            labels=tuple(f"deviation {ROW_NAMES[row]}" for row in rows),
+            bands=np.array([follows.virtual.widest([row]) for row in rows]),
         )
 
     def easing(self, column: int) -> tuple[float, str]:
         """See `easing_of`: 2 % of the band."""
         return 0.02, f"2 % more room for the deviation {self.name.removeprefix('relaxation ')}"
+
+    def describe(self, samples: Samples, row: int, column: int) -> str:
+        """See `BoundConstraint.describe`: as the deviation, which a coordinate is in proportion."""
+        k = column % len(self.joints)
+        band, unit = self.bands[k], self.units[k]
+        share = motion_of_order(samples, 0)[row, self.joints[k]] / self.upper[k]
+        return (
+            f"{self.labels[k]} is {share * band:.4g} {unit} at t = "
+            f"{samples.sampling.node_times[row]:.3f} s, {abs(share):.5g} times its limit of "
+            f"{band:.4g} {unit}"
+        )
 
 
 def _margin(item: Relaxation) -> float:

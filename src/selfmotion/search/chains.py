@@ -274,10 +274,10 @@ def _refusals(samples: Array, bounds: Admissible, motion: SelfMotion) -> str:
     parts = []
     if np.any(outside):
         least = excess[outside][np.argmin(excess[outside].sum(axis=1))]
-        joint = motion.robot.joint_names[int(np.argmax(least))]
+        k = int(np.argmax(least))
         parts.append(
             f"{int(outside.sum())} of {len(samples)} are outside the joint limits, the nearest "
-            f"by {least.max():.3g} in joint '{joint}'"
+            f"by {_amount(motion, k, least[k])} in {motion.robot.told(k)}"
         )
     inside = samples[~outside]
     if len(inside) and bounds.bodies:
@@ -307,7 +307,15 @@ def _step(
     ratios = (steps / largest_step).max(axis=-1)
     a, b = np.unravel_index(int(np.argmin(ratios)), ratios.shape)
     k = int(np.argmax(steps[a, b] / largest_step))
+    moved, allowed = (_amount(motion, k, each) for each in (steps[a, b, k], largest_step[k]))
     return (
-        f"the step limit: joint '{motion.robot.joint_names[k]}' would have to move by "
-        f"{steps[a, b, k]:.3g} in one step, allowed are {largest_step[k]:.3g}"
+        f"the step limit: {motion.robot.told(k)} would have to move by {moved} in one step, "
+        f"allowed are {allowed}"
     )
+
+
+def _amount(motion: SelfMotion, k: int, change: float) -> str:
+    """Return in words how far a joint goes where its coordinate changes by so much."""
+    robot = motion.robot
+    far = change * robot.coordinate_sizes[k]
+    return f"{far:.3g} {robot.unit_of(robot.joint_names[k])}"
