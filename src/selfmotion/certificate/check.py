@@ -277,15 +277,16 @@ def _off_path(
     check: PathCheck, tolerance: Tolerance, damped: tuple[DampedStretch, ...]
 ) -> tuple[str, ...]:
     position, rotation, failures = check.position, check.rotation, []
+    off = "off the path, beyond its tolerances," if check.deviations else "off the path"
     # Written so that NaN fails.
     if not position.value <= tolerance.position:
         failures.append(
-            f"'{position.name}' is {position.value:.2e} m off the path at t = {position.time:.3f} "
+            f"'{position.name}' is {position.value:.2e} m {off} at t = {position.time:.3f} "
             f"s (allowed: {tolerance.position:.3g} m){_because(position.time, damped)}"
         )
     if not rotation.value <= tolerance.rotation:
         failures.append(
-            f"'{rotation.name}' is {rotation.value:.2e} rad off the path at t = "
+            f"'{rotation.name}' is {rotation.value:.2e} rad {off} at t = "
             f"{rotation.time:.3f} s (allowed: {tolerance.rotation:.3g} rad)"
             f"{_because(rotation.time, damped)}"
         )

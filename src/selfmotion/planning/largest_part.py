@@ -31,6 +31,9 @@ _PART_BACK = 0.02
 _OFF_PATH = 1e-2
 # Constant null motions that stand for x = 0 where that breaks down: joint angles over the path.
 _PUSHES = (0.5, 2.0)
+# Why a part ends where its end is no limit that was broken.
+_WITHOUT_ROOM = "it leaves its limits no room, so that finer nodes would find none"
+_ROUGH = "beyond that it is off the path or past limits between its nodes"
 
 
 _Begin = tuple[Array, Guide | None]
@@ -80,7 +83,10 @@ class _Attempt:
 
     @property
     def reason(self) -> str:
-        return self.trouble if self.candidate is None else "; ".join(self.candidate.violations)
+        """Why nothing is made of it."""
+        if self.candidate is None:
+            return self.trouble
+        return "; ".join(self.candidate.violations) or _WITHOUT_ROOM
 
     @property
     def cut_short(self) -> bool:
@@ -187,7 +193,7 @@ def shorter_part(problem: Problem, part: Part, effort: Effort) -> Part | None:
     attempt = _attempt(first, (start, None), effort)
     if attempt.candidate is None or not attempt.arrived:
         return None
-    return _ending_at(problem, first, attempt.candidate, part.why)
+    return _ending_at(problem, first, attempt.candidate, part.why or _ROUGH)
 
 
 def _ending_at(problem: Problem, part: Problem, candidate: Candidate, why: str) -> Part:
