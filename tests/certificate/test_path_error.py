@@ -69,7 +69,7 @@ def test_the_error_is_bounded_at_all_times_and_hardly_more() -> None:
     within = check(5.05e-5, sm.Relaxation("y", 5e-5, during=(0.5, 1.0)))
     assert 5e-5 - 1e-9 <= within.position.value <= 5.1e-5
     assert within.deviations[0].value == pytest.approx(1e-4, rel=0.03)
-    assert (within.deviations[0].name, within.undecided) == ("(y)", ())
+    assert (within.deviations[0].name, within.undecided) == ("(y) at 0.5 to 1 s", ())
     outside = check(1e-6, sm.Relaxation("y", 1e-3, during=(0.0, 0.5)))
     # So far beyond the tolerance nothing has to be known more closely.
     assert 1e-4 - 1e-9 <= outside.position.value <= 1.2e-4

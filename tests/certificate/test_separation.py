@@ -159,19 +159,19 @@ def test_nothing_to_be_near_to_is_far_enough() -> None:
 @pytest.mark.parametrize(
     ("value", "words"),
     [
-        (0.05, "too near already: first0 - second0 are 50.00 mm"),
-        (-0.01, "in collision: first0 - second0 overlap by 10.00 mm"),
+        (0.05, "too near already: first0 - second0 are 50.00 mm apart: choose another one"),
+        (-0.01, "in collision: first0 - second0 overlap by 10.00 mm: choose another one"),
     ],
 )
-def test_a_start_that_is_too_near_is_told(value: float, words: str) -> None:
-    motion = motion_of(np.zeros((2, 3)), np.zeros((2, 3)))
+def test_a_given_start_that_is_too_near_is_told(value: float, words: str) -> None:
     bodies = Bodies(lambda q: np.full(len(q), value))
-    assert words in Separation(bodies, 0.1).judge(motion).text  # type: ignore[arg-type]
-    assert words not in Separation(bodies, -1.0).judge(motion).text  # type: ignore[arg-type]
-    # Of the start it is said, not of what comes later.
-    later = motion_of([[0.0] * 3, [1.0] * 3], np.zeros((2, 3)))
-    nearer = Bodies(lambda q: np.where(q[:, 0] > 0.5, value, 1.0))
-    assert "the start" not in Separation(nearer, 0.1).judge(later).text  # type: ignore[arg-type]
+    start = np.zeros(3)
+    told = Separation(bodies, 0.1).of_given_start(start)  # type: ignore[arg-type]
+    assert told == f"the given start is {words}"
+    assert not Separation(bodies, -1.0).of_given_start(start)  # type: ignore[arg-type]
+    # Another one does not help where links overlap as they are made.
+    bodies.overlapping = (Overlap("first0", "second0", 0.9, True),)
+    assert not Separation(bodies, 0.1).of_given_start(start)  # type: ignore[arg-type]
 
 
 # Sums of a few hundred thousand steps against an exact integral, relative to its size.

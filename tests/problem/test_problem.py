@@ -185,19 +185,35 @@ def test_one_number_is_a_tolerance_for_both() -> None:
     assert found.tolerance == plan.tolerance
 
 
-def test_a_start_in_collision_is_called_that() -> None:
+def test_a_given_start_in_collision_is_called_that() -> None:
+    """Not one that was chosen: whoever plans cannot choose another one."""
     panda = robot_named("panda")
     home = np.array(sm.NAMED_ARMS["panda"].home)
     stay = sm.paths.Dwell(panda.pose(home), 1.0)
     motion = sm.Trajectory([0.0, 1.0], [home] * 2, [0.0 * home] * 2, panda.joint_names)
 
-    def verdict(at: np.ndarray) -> str:
-        kept = sm.constraints.Clearance([sm.obstacles.Sphere("ball", at, 0.05)], distance=0.02)
-        asked = [kept.requirement(panda)]
-        return sm.certify(panda, stay, "position", motion, requirements=asked).verdict
+    def verdict(at: np.ndarray, *, given: bool = True, relaxed: bool = False) -> str:
+        ball = sm.obstacles.Sphere("ball", at, 0.05)
+        problem = sm.Problem(
+            panda,
+            stay,
+            "position",
+            home if given else None,
+            constraints=[sm.constraints.Clearance([ball], distance=0.02)],
+            relaxations=[sm.Relaxation("z", 0.01)] if relaxed else [],
+        )
+        found = problem.certify(motion)
+        # What is said of the start is no failure besides.
+        assert not any("start" in text for text in found.failures)
+        return found.verdict
 
     place = panda.pose(home).translation
-    assert "the start is in collision: " in verdict(place)
-    assert "'ball'" in verdict(place) or "ball overlap by" in verdict(place)
-    assert "the start is too near already: " in verdict(place - np.array([0.0, 0.0, 0.06]))
-    assert "the start" not in verdict(place + np.array([0.0, 2.0, 0.0]))
+    for relaxed in (False, True):
+        told = verdict(place, relaxed=relaxed)
+        assert "; the given start is in collision: " in told
+        assert "ball overlap by" in told
+    near = place - np.array([0.0, 0.0, 0.06])
+    assert "; the given start is too near already: " in verdict(near)
+    for at in (place, near):
+        assert "the given start" not in verdict(at, given=False)
+    assert "the given start" not in verdict(place + np.array([0.0, 2.0, 0.0]))

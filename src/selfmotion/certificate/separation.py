@@ -64,8 +64,6 @@ class Separation(Requirement):
                 f"{found.closest.value * 1e3:.4f} mm"
             )
         kept = found.open_until is None and bool(found.closest.value >= self.distance)
-        if not kept:
-            text += self._of_start(motion.trajectory)
         near = found.closest.value
         return Finding(
             self.name, found.names, found.time, near, self.distance, kept, text, unit="m"
@@ -114,15 +112,19 @@ class Separation(Requirement):
             said.append(f"open meshes, in which a body wholly inside may be missed: {open_}")
         return tuple(said)
 
-    def _of_start(self, trajectory: Trajectory) -> str:
-        """Return what is wrong with the start already, in words; "" where it is not."""
-        start = self.model.distance(trajectory.q[0])
-        if start.value >= self.distance:
+    def of_given_start(self, q: Array) -> str:
+        """Return in words that a start (n,) that was given is too near; "" where it is not.
+
+        Nor of links that overlap as they are made, or stand where they do: no other start helps.
+        """
+        start = self.model.distance(q)
+        made = [{pair.first, pair.second} for pair in self.model.overlapping]
+        is_made = self.model.stuck is not None or {start.first, start.second} in made
+        if start.value >= self.distance or is_made:
             return ""
-        pair = f"{start.first} - {start.second}"
-        if start.value > 0.0:
-            return f"; the start is too near already: {pair} {how_near(start.value)}"
-        return f"; the start is in collision: {pair} {how_near(start.value)}: choose another one"
+        pair = f"{start.first} - {start.second} {how_near(start.value)}"
+        what = "too near already" if start.value > 0.0 else "in collision"
+        return f"the given start is {what}: {pair}: choose another one"
 
     def _told(self, found: "Approach") -> str:
         text = (

@@ -27,6 +27,7 @@ from selfmotion.certificate import (
     AtRest,
     Certificate,
     Requirement,
+    Separation,
     Tolerance,
     certify,
     errors_between,
@@ -407,7 +408,17 @@ class Problem:
         )
         elsewhere = () if self.given_start is None else self._elsewhere(trajectory)
         failures = (*elsewhere, *certificate.failures)
-        return replace(certificate, problem=self.digest, failures=failures)
+        notes = (*certificate.notes, *self._too_near(certificate))
+        return replace(certificate, problem=self.digest, failures=failures, notes=notes)
+
+    def _too_near(self, certificate: Certificate) -> tuple[str, ...]:
+        """Return that bodies are too near at the given start already, in words."""
+        wrong = {found.requirement for found in certificate.findings if not found.satisfied}
+        apart = [item for item in self._asked if isinstance(item, Separation)]
+        start = self.given_start
+        if start is None or not any(item.name in wrong for item in apart):
+            return ()
+        return tuple(filter(None, (item.of_given_start(start) for item in apart)))
 
     def _elsewhere(self, trajectory: Trajectory) -> tuple[str, ...]:
         """Return that a motion does not begin at the given start, in words."""
