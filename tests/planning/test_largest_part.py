@@ -136,15 +136,16 @@ def test_a_panda_beyond_its_reach(task: str, free: bool) -> None:
         panda.inverse_kinematics(line.pose(1.2 * last), task)
 
 
-def test_limits_that_are_not_asked_for_cut_nothing_off(planar: sm.RobotModel) -> None:
-    """Beyond the URDF's limits the certificate says so, on the whole path."""
+def test_limits_that_are_not_asked_for_are_kept_and_cut_nothing_off(planar: sm.RobotModel) -> None:
+    """No motion beyond the URDF's is verified; where there is no other, it is of the whole path."""
     start = np.array([planar.lower[0] + 0.01, planar.lower[1] + 0.5, planar.lower[2] + 0.5])
-    pose = planar.pose(start)
-    problem = sm.Problem(
-        planar, sm.paths.Circle.around(pose, 1.0, 4.0), "planar", start, constraints=[]
-    )
-    plan = sm.plan(problem)
+    circle = sm.paths.Circle.around(planar.pose(start), 1.0, 4.0)
+    kept = sm.plan(sm.Problem(planar, circle, "planar", start, constraints=[]))
+    assert kept.certificate.verified, kept.certificate.verdict
+    narrow = dataclasses.replace(planar, lower=start - 0.02, upper=start + 0.02)
+    plan = sm.plan(sm.Problem(narrow, circle, "planar", start, constraints=[]))
     assert plan.certificate.limit_margin.value < 0.0
+    assert "joint position limits" in plan.report.message
     assert plan.trajectory.t[-1] == 4.0
 
 

@@ -86,3 +86,20 @@ def test_a_motion_that_takes_the_arm_into_itself_is_passed_over_for_another() ->
     assert plan.certificate.verified, plan.certificate.verdict
     assert plan.report.cost > careless.report.cost
     assert not any("itself" in attempt.name for attempt in plan.report.attempts)
+
+
+def test_limits_are_kept_that_nobody_spoke_of(panda: sm.RobotModel) -> None:
+    """A certificate judges the arm's own limits in any case: asked for, they cost the same."""
+    pose = panda.pose(np.array(sm.NAMED_ARMS["panda"].home))
+    circle = sm.paths.Circle.around(pose, 0.2, 4.0, normal=(1.0, 0.0, 0.0))
+    closed = sm.constraints.ClosedPath()
+    limits = sm.constraints.JointPositionLimits(), sm.constraints.JointVelocityLimits()
+    plans = [
+        sm.plan(
+            sm.Problem(panda, circle, "position", constraints=asked),
+            search=sm.Search(starts=12, finalists=2),
+        )
+        for asked in ([closed], [*limits, closed])
+    ]
+    assert all(plan.certificate.verified for plan in plans), plans[0].certificate.verdict
+    assert plans[0].report.cost == pytest.approx(plans[1].report.cost, rel=1e-4)

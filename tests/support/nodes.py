@@ -24,7 +24,8 @@ def nodes_of(problem: sm.Problem, count: int = 12, *, free: bool = False) -> Nod
     start = np.array(problem.given_start)
     still, _ = settled_still_motion(problem, start)
     trajectory = Trajectory(still.grid.nodes, still.q, still.qd, problem.robot.joint_names)
-    constraints = problem.bind_constraints(start, still.end)
+    # Where nothing is asked, these laws are those of motions without any limits.
+    constraints = problem.bind_constraints(start, still.end) if problem.constraints else ()
     t = np.linspace(0.0, problem.path.duration, count + 1)
     grid = NodeGrid(problem, t, constraints, free=free, counts=Counts())
     motion = grid.near(trajectory(t), trajectory(t, 1))

@@ -22,7 +22,7 @@ from selfmotion.basics import (
     silent,
 )
 from selfmotion.certificate import Tolerance
-from selfmotion.constraints import Constraint
+from selfmotion.constraints import Constraint, JointVelocityLimits
 from selfmotion.costs import Cost, LimitUse, Samples, Scaled
 from selfmotion.motion import Grid
 from selfmotion.optimise import Status
@@ -272,8 +272,10 @@ class _Rounds:
         self._search, self._tolerance, self._clock = search, tolerance, clock
         self._progress = clock.checked_by(progress)
         self._kept, self._bounds = kept, np.full(len(kept.costs), np.inf)
-        geometric = tuple(item for item in problem.constraints if not item.of_pace)
-        self._free = replace(problem, constraints=geometric)
+        geometric = (item for item in problem.constraints if not item.of_pace)
+        # At the pace that it comes to have, limits of speed are kept; at this one nothing is.
+        any_speed = JointVelocityLimits(np.inf, replace=True)
+        self._free = replace(problem, constraints=(*geometric, any_speed))
         self.best: Plan | None = None
         self.verdict = "nothing was planned yet"
         self.times: list[float] = []

@@ -129,6 +129,8 @@ def _rough(problem: Problem, judged: Judged, candidate: Candidate) -> bool:
     if candidate.violations or not judged.certificate.on_path:
         return False
     asked = {item.name for item in problem.requirements}
+    # The arm's own limits are always kept.
+    asked |= set(LIMIT_NAMES[:2])
     if problem.own_collision is not None:
         # Where only the default asks it, it was not asked of the nodes either.
         asked.discard(problem.requirements[-1].name)

@@ -29,10 +29,18 @@ from selfmotion.certificate import (
     Requirement,
     Separation,
     Tolerance,
+    arm_limits,
     certify,
     errors_between,
 )
-from selfmotion.constraints import BoundConstraint, Clearance, Constraint, Envelope
+from selfmotion.constraints import (
+    BoundConstraint,
+    Clearance,
+    Constraint,
+    Envelope,
+    JointPositionLimits,
+    JointVelocityLimits,
+)
 from selfmotion.costs import BeyondLimits, Cost, JointVelocity, OffPath
 from selfmotion.follow import Follow, Follows
 from selfmotion.motion import NullMotion, Trajectory, fading_window
@@ -100,7 +108,8 @@ class Problem:
     constraints : sequence of Constraint
         What the motion must keep, each judged by the certificate. By default the URDF's limits of
         joint position and velocity, and those of acceleration and jerk that the arm's maker
-        publishes (`RobotModel.acceleration_limit`).
+        publishes (`RobotModel.acceleration_limit`). The URDF's are kept, too, where these say
+        nothing of position or velocity: they are always judged.
     relaxations : sequence of Relaxation
         Rows in which the tool may leave its path, by how much and when. Each is one more joint
         between tool and path, which costs nothing, so that the deviation is part of the
@@ -305,9 +314,10 @@ class Problem:
         """Return the constraints for this arm, given first and last configuration, (n,) each.
 
         Those of the motion that the optimisation begins with. Without `own_collision` where it need
-        not keep `apart` from itself; with links `in_pieces` where their hulls are too large.
+        not keep `apart` from itself; with links `in_pieces` where their hulls are too large. With
+        the arm's own limits where nothing is said of them: no motion beyond these is verified.
         """
-        asked = list(self.all_constraints if apart else self._asking)
+        asked = [*self._own_limits, *(self.all_constraints if apart else self._asking)]
         if all(self.rests):
             asked = [item.at_rest() for item in asked]
         return tuple(
@@ -315,6 +325,18 @@ class Problem:
             if in_pieces and isinstance(item, Clearance)
             else item.bind(self.follows, start, end)
             for item in asked
+        )
+
+    @property
+    def _own_limits(self) -> tuple[Constraint, ...]:
+        """The arm's own limits of position and velocity, where constraints say nothing of them."""
+        said = {type(item) for item in self.constraints}
+        judged = {item.order for item in arm_limits(self.robot, self._asked)}
+        own = enumerate((JointPositionLimits(), JointVelocityLimits()))
+        return tuple(
+            item
+            for order, item in own
+            if order in judged and type(item) not in said and item.applies(self.robot)
         )
 
     @cached_property
