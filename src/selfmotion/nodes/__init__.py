@@ -3,4 +3,4 @@
 from selfmotion.nodes.batch import Batch as Batch
 from selfmotion.nodes.motion import NodeGrid as NodeGrid, NodeMotion as NodeMotion
 from selfmotion.nodes.newton import Optimum as Optimum, Step as Step, minimise as minimise
-from selfmotion.nodes.smoothness import starting_times as starting_times
+from selfmotion.nodes.smoothness import rest_times as rest_times

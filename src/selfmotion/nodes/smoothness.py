@@ -54,7 +54,8 @@ def smoothing_of(
     if _is_smooth(problem):
         return None
     t = spline.sampling.t.reshape(spline.count, -1)
-    shares, of_jerks = _of_starting(problem, t, quick)
+    shares, of_jerks = _of_held(problem, t)
+    shares = np.maximum(shares, _of_rest(problem, t, quick))
     if calm:
         # No more than where it starts: there it would make that as slow.
         little = min(_EVERYWHERE, quick * _STARTING) * problem.path.duration
@@ -65,13 +66,10 @@ def smoothing_of(
     return Smoothing(each, np.diag(_weights(problem)))
 
 
-def starting_times(problem: Problem) -> Array:
-    """Return the times at which self-motions start or stop, (k,) [s].
-
-    Where the arm rests, or a joint begins or ends to be held.
-    """
+def rest_times(problem: Problem) -> Array:
+    """Return the ends at which the arm rests, (k,) [s]."""
     both = zip(problem.rests, (0.0, problem.path.duration), strict=True)
-    return np.array([*(end for rest, end in both if rest), *problem.follows.edges])
+    return np.array([end for rest, end in both if rest])
 
 
 def quickness(problem: Problem, samples: Samples, cost: float, quick: float) -> float:
@@ -81,12 +79,8 @@ def quickness(problem: Problem, samples: Samples, cost: float, quick: float) -> 
     """
     if _is_smooth(problem):
         return quick
-    shares, of_jerks = _of_starting(problem, samples.sampling.t, quick)
-    squares = sum(
-        b * (x**2 @ _weights(problem))
-        for b, x in ((shares, samples.qdd), (of_jerks, samples.qddd))
-        if b.any()
-    )
+    shares = _of_rest(problem, samples.sampling.t, quick)
+    squares = shares * (samples.qdd**2 @ _weights(problem))
     added = 0.5 * float(np.sum(samples.weights * squares))
     if added <= _TOO_MUCH * abs(cost):
         return quick
@@ -99,19 +93,30 @@ def _is_smooth(problem: Problem) -> bool:
     return max(orders, default=0) > 1
 
 
-def _of_starting(problem: Problem, t: Array, quick: float) -> tuple[Array, Array]:
-    """Return b of q̈ and of the jerk at times, of the shape of t, that starting and stopping has."""
-    shares, of_jerks = np.zeros_like(t), np.zeros_like(t)
+def _of_rest(problem: Problem, t: Array, quick: float) -> Array:
+    """Return b of q̈ at times, of the shape of t, that starting and stopping has."""
     starting = quick * _STARTING * problem.path.duration
-    for end in starting_times(problem):
-        # Fading out: where it ended at once, accelerations would jump.
-        far = np.abs(t - end) / (_NEAR_REST * starting)
-        faded = np.maximum(1.0 - far**2, 0.0) ** 3
-        shares = np.maximum(shares, starting**2 * faded)
-        # What is held begins and ends to be so without jumps of accelerations, as rest does.
-        if end in problem.follows.edges:
-            of_jerks = np.maximum(of_jerks, starting**4 * faded)
-    return shares, of_jerks
+    found = np.zeros_like(t)
+    for end in rest_times(problem):
+        found = np.maximum(found, starting**2 * _faded(t - end, starting))
+    return found
+
+
+def _of_held(problem: Problem, t: Array) -> tuple[Array, Array]:
+    """Return b of q̈ and of the jerk at times where joints begin or end to be held.
+
+    They do so without jumps of accelerations, as what rests does.
+    """
+    starting = _STARTING * problem.path.duration
+    faded = np.zeros_like(t)
+    for edge in problem.follows.edges:
+        faded = np.maximum(faded, _faded(t - edge, starting))
+    return starting**2 * faded, starting**4 * faded
+
+
+def _faded(away: Array, starting: float) -> Array:
+    """Return 1, fading out: where b ended at once, accelerations would jump."""
+    return np.asarray(np.maximum(1.0 - (away / (_NEAR_REST * starting)) ** 2, 0.0) ** 3)
 
 
 def would_be_calm(problem: Problem, samples: Samples, cost: float) -> bool:

@@ -4,7 +4,7 @@ import numpy as np
 
 from selfmotion.basics import Array
 from selfmotion.motion import FreeNullMotion, Grid
-from selfmotion.nodes import NodeMotion, starting_times
+from selfmotion.nodes import NodeMotion, rest_times
 from selfmotion.planning.effort import Effort
 from selfmotion.problem import Problem
 
@@ -56,16 +56,19 @@ def first_nodes(problem: Problem) -> Array:
 def with_starts(problem: Problem, t: Array, quick: float) -> Array:
     """Return times of nodes with more of them where self-motions start and stop.
 
-    Which they do in the share `quick` of the usual time.
+    Where the arm rests they do so in the share `quick` of the usual time, and in that where a joint
+    begins or ends to be held.
     """
     duration = problem.path.duration
-    least = quick * _STARTING * duration
-    farther = np.arange(2 + int(np.ceil(np.log(1.0 / quick) / np.log(_FARTHER))))
-    away = least * _FARTHER**farther
-    near = starting_times(problem)[:, None] + np.concatenate([-away[::-1], away])
-    inside = near[(near > 0.0) & (near < duration)]
-    apart = np.abs(inside[:, None] - t).min(axis=1, initial=np.inf) > 0.5 * least
-    return np.sort(np.concatenate([t, inside[apart]]))
+    for times, share in ((rest_times(problem), quick), (problem.follows.edges, 1.0)):
+        least = share * _STARTING * duration
+        farther = np.arange(2 + int(np.ceil(np.log(1.0 / share) / np.log(_FARTHER))))
+        away = least * _FARTHER**farther
+        near = np.asarray(times)[:, None] + np.concatenate([-away[::-1], away])
+        inside = near[(near > 0.0) & (near < duration)]
+        apart = np.abs(inside[:, None] - t).min(axis=1, initial=np.inf) > 0.5 * least
+        t = np.sort(np.concatenate([t, inside[apart]]))
+    return t
 
 
 def _with_short_pieces(problem: Problem, t: Array, steps: int) -> Array:
