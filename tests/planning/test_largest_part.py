@@ -3,8 +3,6 @@
 import dataclasses
 import re
 from pathlib import Path
-from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -14,11 +12,10 @@ import selfmotion as sm
 from selfmotion.basics import Counts
 from selfmotion.follow import Follows
 from selfmotion.motion.grid import Grid
-from selfmotion.optimise import Status
 from selfmotion.paper import Rollout, settled_still_motion
 from selfmotion.planning.candidate import Candidate
 from selfmotion.planning.effort import Effort
-from selfmotion.planning.largest_part import Part, _Attempt, shorter_part
+from selfmotion.planning.largest_part import Part, shorter_part
 from selfmotion.replay import write_replay
 from support.arms import PANDA_HOME, robot_named
 
@@ -337,14 +334,8 @@ def test_a_long_wait_after_it_takes_nothing_from_a_part(planar: sm.RobotModel) -
 def test_an_end_always_has_a_reason(planar: sm.RobotModel) -> None:
     """Also where a longer motion was found, which no finer grid would keep."""
     problem = sm.Problem(planar, outward(planar, 1.01), "planar", [0.0, 0.5, 0.5])
-    begin = np.array([0.0, 0.5, 0.5]), None
-    for violations in ((), ("joint speed limits: too fast",)):
-        candidate: Any = SimpleNamespace(violations=violations, status=Status.PRECISION)
-        attempt = _Attempt(begin, problem, candidate, 0.0, None)
-        assert not attempt.arrived_with_room
-        assert attempt.reason
     effort = Effort(None, None, 20, Counts())
-    candidate = Candidate(problem, effort, begin[0], free=False)
+    candidate = Candidate(problem, effort, np.array([0.0, 0.5, 0.5]), free=False)
     shorter = shorter_part(problem, Part(problem, candidate), effort)
     assert shorter is not None
     assert re.search(r"the motion ends at t = 9.8 s of 10 s: \w", shorter.ending)

@@ -9,7 +9,7 @@ from selfmotion.path.base import Path
 _SAME = 1e-9
 # Differences are taken over this share of the piece that a time is in, however long the path
 # around it lasts: a loop is one of many, and all of them are seen.
-_STEP = 1e-5
+_STEP = 2e-5
 # But not over less than this share of the duration, beside which times are rounded, and never over
 # more than leaves room for all that a difference takes.
 _LEAST_STEP, _ROOM = 1e-8, 5.0

@@ -32,7 +32,6 @@ _OFF_PATH = 1e-2
 # Constant null motions that stand for x = 0 where that breaks down: joint angles over the path.
 _PUSHES = (0.5, 2.0)
 # Why a part ends where its end is no limit that was broken.
-_WITHOUT_ROOM = "it leaves its limits no room, so that finer nodes would find none"
 _ROUGH = "beyond that it is off the path or past limits between its nodes"
 
 
@@ -86,7 +85,7 @@ class _Attempt:
         """Why nothing is made of it."""
         if self.candidate is None:
             return self.trouble
-        return "; ".join(self.candidate.violations) or _WITHOUT_ROOM
+        return "; ".join(self.candidate.violations)
 
     @property
     def cut_short(self) -> bool:
