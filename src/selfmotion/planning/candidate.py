@@ -304,6 +304,20 @@ class Candidate:
         begun._found = None
         return begun
 
+    def as_adopted(self) -> "Candidate | None":
+        """Return it with the motion of the plan that it began with; None where there is none."""
+        motions, t = self._first_motions() if is_on_nodes(self.problem, self.effort) else ([], None)
+        if t is None or len(motions) < 2:
+            return None
+        polisher = Polisher(self.problem, self.effort, self.constraints, free=self.free)
+        motion = polisher.grid(t).near(*(motions[0](t, order) for order in range(3)))
+        if motion is None:
+            return None
+        known = copy(self)
+        # Nothing better was found.
+        known._found = replace(NodeSolution.on_the_way(motion), status=Status.PRECISION)
+        return known
+
     def refine(self, where: Flags | None = None) -> None:
         """Go on with half the step length, everywhere or for some of the steps (N,)."""
         if self._found is None:

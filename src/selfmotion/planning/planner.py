@@ -348,12 +348,17 @@ class Planner:
         """Let the best motion be what the plan is made of, on grids that are fine enough."""
         rival_cost = _settle_both(best, self.rival, self.progress)
         self.judged = self._judged(Part(self.problem, best), rival_cost)
-        if best.cut_short and not self.judged.certificate.verified:
+        if self.judged.certificate.verified:
+            return
+        known = [best.as_adopted()]
+        if best.cut_short:
             # What it is on the way to an optimum may break more than what was known before.
-            for known in filter(None, (self.second, best.as_begun())):
-                known.end(best.status)
-                if self.judge_as_it_is(known):
-                    break
+            known += [self.second, best.as_begun()]
+        for one in filter(None, known):
+            if best.cut_short:
+                one.end(best.status)
+            if self.judge_as_it_is(one):
+                return
 
     def is_free_by_meshes(self, *, just: bool = False) -> bool:
         """Whether bodies are apart by their meshes along the best motion, though not by hulls.

@@ -123,7 +123,8 @@ class Polisher:
             near = [grid.near(*(motion(times, k) for k in range(3))) for motion in motions]
             known = [one for one in near if one is not None]
             if known:
-                motion = min(known, key=partial(_rank_of, begun=known[-1]))
+                # One that breaks hardly anything, between other nodes, is as good as kept.
+                motion = min(known, key=lambda one: _rank_of(one, known[-1])[-1])
                 break
         else:
             return None
