@@ -212,7 +212,7 @@ class Polisher:
             grid = NodeGrid(
                 problem, motion.grid.t, kept, free=self._free, counts=self._effort.counts
             )
-            found = minimise(grid.at(motion.centred), self._noted, roughly=True)
+            found = minimise(grid.at(motion.centred), self._noted, roughly=True, most=_FEWER)
             motion = motion.grid.at(found.motion.centred)
             if _is_kept(motion) or number == _CALM_ROUNDS - 1:
                 yield motion
