@@ -26,7 +26,7 @@ def seams(shift: float = 0.0, count: int = 3) -> list[sm.Seam]:
     found = []
     # A little aside: of two orders that are mirror images, rounding would choose.
     for k, y in enumerate(np.linspace(-0.2, 0.2, 3)[:count] + 1e-4):
-        ends = [SE3(DOWN, np.array([x, y + shift, 0.3])) for x in (0.4, 0.5)]
+        ends = [SE3(DOWN, np.array([x, y + shift, 0.3])) for x in (0.4, 0.52)]
         found.append(sm.Seam(f"seam {k}", sm.paths.Line(*ends, 1.0), "pointing"))
     return found
 

@@ -37,6 +37,8 @@ _SHARE, _SHORTEST = 1e-4, 1e-7
 # this share of its usual entry, over the square of the number of nodes, more on the diagonal: above
 # what differences leave there, and below what slow motions cost.
 _FLAT = 2.5e-5
+# So many times that where it is not positive definite: there rounding may say anything.
+_FLATTER = 16.0
 # One that is not positive definite gets on the diagonal this share of how each coordinate bends
 # without rows, or a third of what the last one needed; then more by this factor, up to the last
 # one. The same for all would stop some of them: with costs of jerks they differ by 1e9.
@@ -459,13 +461,13 @@ class _Solver:
         diagonals = np.abs(np.diagonal(intervals, axis1=1, axis2=2)).ravel()
         usual = float(np.partition(diagonals, len(diagonals) // 2)[len(diagonals) // 2])
         flat, shift = _FLAT / count**2 * usual, 0.0
-        bends = _bends(model.intervals) + _LEAST_SHIFT * largest
+        bends = _bends(model.intervals, curved) + _LEAST_SHIFT * largest
         columns = np.column_stack([-right.T, border.columns])
         while flat <= _MOST_SHIFT * largest and shift <= _MOST_SHIFT:
             matrix = Banded(count, size, 1)
             matrix.add(0, 0, curved)
             matrix.add_pairs(0, intervals)
-            matrix.add_diagonal(flat + shift * bends)
+            matrix.add_diagonal((_FLATTER if shift else 1.0) * flat + shift * bends)
             matrix.hold(self.motion.grid.held)
             solved = matrix.solve(columns)
             if solved is not None:
@@ -536,17 +538,23 @@ class _Solver:
         return motion.aim + elastic - barrier + self._penalty * float(gap)
 
 
-def _bends(intervals: Array) -> Array:
-    """Return how each coordinate of the nodes bends without rows, (K,): as the usual one at least.
+def _bends(intervals: Array, nodes: Array) -> Array:
+    """Return how much each coordinate of the nodes bends without rows, (K,).
 
-    For matrices of intervals (N, d, d) by both ends.
+    For matrices of intervals (N, d, d) by both ends, and of nodes (N + 1, d/2, d/2): the sums of
+    their rows, in units of what each kind of coordinate usually bends by. With that on the diagonal
+    a matrix is positive definite.
     """
-    own = np.abs(np.diagonal(intervals, axis1=1, axis2=2))
-    size = own.shape[1] // 2
-    found = np.zeros((len(own) + 1, size))
-    found[:-1] += own[:, :size]
-    found[1:] += own[:, size:]
-    return np.asarray(np.maximum(found, np.median(found, axis=0)).ravel())
+    count, size = len(intervals), intervals.shape[1] // 2
+    own = np.abs(np.diagonal(intervals, axis1=1, axis2=2)).reshape(2 * count, size)
+    usual = np.maximum(np.median(own, axis=0), np.finfo(float).eps * own.max())
+    root = np.sqrt(np.maximum(usual, np.finfo(float).tiny))
+    both = np.tile(root, 2)
+    sums = (np.abs(intervals) / both).sum(axis=2) * both
+    found = (np.abs(nodes) / root).sum(axis=2) * root
+    found[:-1] += sums[:, :size]
+    found[1:] += sums[:, size:]
+    return np.asarray(np.maximum(found, usual).ravel())
 
 
 def _along(both: Array, step: Array) -> Array:
