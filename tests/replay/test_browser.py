@@ -377,7 +377,7 @@ def test_what_rides_is_drawn_on_its_link(open_page, tmp_path):
 @pytest.mark.parametrize("name", sorted(NAMED_ARMS))
 def test_every_named_arm_is_drawn(open_page, tmp_path, name):
     plan = planar_plan() if name == "planar_3r" else arm_plan(name)
-    small = {"width": 240, "height": 500}
+    small = {"width": 120, "height": 250}
     page = open_page(write_replay(plan, tmp_path / "arm.html"), viewport=small)
     page.evaluate("replay.seek(0.5 * replay.duration)")
     time = 0.5 * plan.trajectory.duration

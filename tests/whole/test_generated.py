@@ -13,7 +13,7 @@ from support.generated import Generated, end_of
 from support.strategies import problems
 
 # `make fuzz-generated` plans 5,000, with more evaluations and looking more closely.
-COUNT, EVALUATIONS, PER_INTERVAL = 200, 3, 40
+COUNT, EVALUATIONS, PER_INTERVAL = 120, 3, 40
 
 
 @hypothesis.settings(

@@ -41,6 +41,8 @@ _CALM, _CALM_ROUNDS, _CALMED = 1e3, 3, {2: JointAcceleration, 3: JointJerk}
 # What breaks a condition by more than this [units of h] is no beginning: on the way from there, all
 # that made it one is lost.
 _TOO_FAR = 100.0
+# What is broken by less than this is broken by little [units of h].
+_LITTLE = 1.0
 # Where the motion at x = 0 does not lead to what keeps the conditions: the self-motion goes towards
 # the middle of the limits in such shares of the duration.
 _TOWARDS_MIDDLE = (1.0 / 16.0, 1.0 / 64.0, 1.0 / 4.0)
@@ -192,8 +194,11 @@ class Polisher:
         unbound = Optimum(open_one, none, Status.INFEASIBLE, np.inf, np.zeros(ends))
         rank = partial(_rank, begun=begun)
         best = min(first, unbound, key=rank)
-        calm = self._calm(open_one)
-        for begin in chain(calm, [open_one], self._beginnings(begun), self._aside(begun)):
+        # Where that breaks little it is nearest; else the calmest motion is.
+        near = [[open_one], self._calm(open_one)]
+        if open_one.violation > _LITTLE:
+            near.reverse()
+        for begin in chain(*near, self._beginnings(begun), self._aside(begun)):
             if begin is not None and begin.violation <= _TOO_FAR:
                 found = minimise(begin, self._report, roughly=True, most=_FEWER)
                 best = min(best, found, key=rank)
