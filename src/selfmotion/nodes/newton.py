@@ -460,14 +460,13 @@ class _Solver:
         largest = float(np.abs(curved).max() + np.abs(intervals).max())
         diagonals = np.abs(np.diagonal(intervals, axis1=1, axis2=2)).ravel()
         usual = float(np.partition(diagonals, len(diagonals) // 2)[len(diagonals) // 2])
-        flat, shift = _FLAT / count**2 * usual, 0.0
-        bends = _bends(model.intervals, curved) + _LEAST_SHIFT * largest
+        flat, shift, bends = _FLAT / count**2 * usual, 0.0, np.zeros(0)
         columns = np.column_stack([-right.T, border.columns])
         while flat <= _MOST_SHIFT * largest and shift <= _MOST_SHIFT:
             matrix = Banded(count, size, 1)
             matrix.add(0, 0, curved)
             matrix.add_pairs(0, intervals)
-            matrix.add_diagonal((_FLATTER if shift else 1.0) * flat + shift * bends)
+            matrix.add_diagonal(_FLATTER * flat + shift * bends if shift else flat)
             matrix.hold(self.motion.grid.held)
             solved = matrix.solve(columns)
             if solved is not None:
@@ -478,6 +477,9 @@ class _Solver:
             if solved is not None and not shift:
                 flat = max(_MORE * flat, _LEAST_SHIFT * largest)
             else:
+                # Most matrices need none of it.
+                if not bends.size:
+                    bends = _bends(model.intervals, curved) + _LEAST_SHIFT * largest
                 shift = max(_MORE * shift, _LESS * self._shift, _SHIFT)
         return None
 

@@ -35,8 +35,8 @@ class Banded:
         self.add(0, first + 1, blocks[:, s:, s:])
         self.add(1, first, blocks[:, :s, s:])
 
-    def add_diagonal(self, value: Array) -> None:
-        """Add to the diagonal, (K s,)."""
+    def add_diagonal(self, value: Array | float) -> None:
+        """Add to the diagonal, (K s,) or the same everywhere."""
         self._table[self._width] += value
 
     def hold(self, which: Ints) -> None:

@@ -306,8 +306,10 @@ class Candidate:
 
     def as_adopted(self) -> "Candidate | None":
         """Return it with the motion of the plan that it began with; None where there is none."""
-        motions, t = self._first_motions() if is_on_nodes(self.problem, self.effort) else ([], None)
-        if t is None or len(motions) < 2:
+        if self._warm is None or not is_on_nodes(self.problem, self.effort):
+            return None
+        motions, t = self._first_motions()
+        if len(motions) < 2:
             return None
         polisher = Polisher(self.problem, self.effort, self.constraints, free=self.free)
         motion = polisher.grid(t).near(*(motions[0](t, order) for order in range(3)))
