@@ -1,6 +1,6 @@
 """Newton's method on nodes: quadratic, as quick on many nodes as on few, and right at limits."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -213,6 +213,41 @@ def test_what_cannot_be_kept_is_said_to_be_so(panda: sm.RobotModel) -> None:
     optimum = minimise(begin, never)
     # Elastic rows are as near to being kept as can be: that is an optimum, and says by how much.
     assert optimum.motion.violation > 0.5
+
+
+@dataclass(frozen=True)
+class OnTheMove(sm.constraints.Constraint):
+    """Joint 1 turns by no less than a speed [rad/s]."""
+
+    least: float
+
+    def quantity(self, robot: sm.RobotModel) -> sm.certificate.Quantity:
+        first = np.eye(robot.dof)[0]
+        return sm.certificate.Quantity.between(
+            "speed",
+            self.least,
+            10.0,
+            values=lambda q, qd, qdd: qd @ first,
+            derivatives=lambda q, qd, qdd: (np.zeros_like(q), np.tile(first, (len(q), 1))),
+            series=lambda stretch: stretch.chain().rates[:, 0],
+            unit="rad/s",
+        )
+
+
+@pytest.mark.parametrize("radius", [1e-2, 1e-3, 1e-4])
+def test_what_costs_next_to_nothing_keeps_what_costs_much(
+    panda: sm.RobotModel, radius: float
+) -> None:
+    """A tool that hardly moves, and a joint that has to: F is as much as a million times higher."""
+    path = sm.paths.Circle.around(panda.pose(PANDA_HOME), radius, 4.0, normal=(1.0, 0.0, 0.0))
+    moving = (OnTheMove(0.05),)
+    case = panda, "position", PANDA_HOME, path
+    begin = nodes_of(problem_of(case, constraints=moving))
+    optimum = minimise(begin, never)
+    assert begin.violation > 0.0
+    assert optimum.motion.cost > 2.0 * begin.cost
+    assert optimum.status is Status.CONVERGED
+    assert optimum.motion.violation <= 0.0
 
 
 class Backwards(sm.costs.JointVelocity):

@@ -1,10 +1,19 @@
 """Where a motion cannot be optimised from x = 0: what it is begun from instead."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 import selfmotion as sm
+from selfmotion.basics import Counts
+from selfmotion.nodes import NodeMotion, Optimum, Step, minimise
+from selfmotion.planning import polish
+from selfmotion.planning.effort import Effort
+from selfmotion.planning.solutions import NodeSolution
+from support.arms import PANDA_HOME
+from support.nodes import nodes_of, problem_of
 from support.places import DATA
 
 
@@ -33,3 +42,48 @@ def test_a_motion_that_breaks_nothing_is_begun_with() -> None:
     assert plan.report.initial_cost < first.cost
     # From x = 0 it takes several times as many.
     assert len(plan.report.history) <= 15
+
+
+def limited_circle(panda: sm.RobotModel) -> sm.Problem:
+    """Return a circle with limits of position that the cheapest motion breaks."""
+    path = sm.paths.Circle.around(panda.pose(PANDA_HOME), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
+    case = panda, "position", np.array(PANDA_HOME), path
+    q = minimise(nodes_of(problem_of(case)), lambda _: False).motion.place.q
+    upper = np.where(q.max(axis=0) > PANDA_HOME + 0.1, q.max(axis=0) - 0.02, panda.upper)
+    return problem_of(case, constraints=[sm.constraints.JointPositionLimits(upper=upper)])
+
+
+def test_what_keeps_everything_is_not_given_up_for_what_costs_less(
+    panda: sm.RobotModel, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whatever Newton's method makes of it."""
+    problem = limited_circle(panda)
+    kept = minimise(nodes_of(problem), lambda _: False).motion
+    assert kept.violation <= 0.0
+
+    def astray(begin: NodeMotion, callback: Callable[[Step], bool], *_, **__) -> Optimum:
+        callback(Step(begin, 1.0, 0.0))
+        alone = minimise(begin.grid.without_rows().at(begin.centred), lambda _: False)
+        gone = begin.grid.at(alone.motion.centred)
+        return replace(alone, motion=gone, multipliers=np.zeros(len(gone.h)))
+
+    monkeypatch.setattr(polish, "minimise", astray)
+    effort = Effort(None, None, None, Counts())
+    polisher = polish.Polisher(problem, effort, kept.grid.constraints, free=False)
+    assert astray(kept, lambda _: False).motion.violation > 0.0
+    found = polisher.best_near(kept)
+    assert found is not None
+    assert found.violations == ()
+    assert found.cost == kept.cost
+
+
+def test_where_a_motion_breaks_most_is_told(panda: sm.RobotModel) -> None:
+    problem = limited_circle(panda)
+    begin = nodes_of(replace(problem, constraints=()))
+    (limits,) = problem.constraints
+    broken = NodeSolution.on_the_way(nodes_of(problem).grid.at(begin.centred))
+    beyond = (begin.place.q - limits.upper).max(axis=1)
+    assert beyond.max() > 0.0
+    assert broken.breaks_at == begin.grid.t[np.argmax(beyond)]
+    kept = NodeSolution.on_the_way(minimise(nodes_of(problem), lambda _: False).motion)
+    assert kept.breaks_at is None

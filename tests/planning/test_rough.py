@@ -125,7 +125,7 @@ def test_starts_of_which_none_follows_the_path_at_x_0_are_all_optimised(
 ) -> None:
     problem = problem_of("panda", "pose")
 
-    def nowhere(follows, starts: Array, t: Array):
+    def nowhere(follows, starts: Array, t: Array, at: int):
         return np.tile(starts[:, None], (1, len(t), 1)), np.zeros(len(starts), dtype=bool)
 
     monkeypatch.setattr(rough_motions, "carried", nowhere)

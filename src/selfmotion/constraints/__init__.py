@@ -17,6 +17,7 @@ from selfmotion.constraints.conditions import (
     penalised as penalised,
     penalty as penalty,
     violated as violated,
+    worst_time as worst_time,
 )
 from selfmotion.constraints.ends import (
     BoundEnd as BoundEnd,

@@ -263,6 +263,18 @@ def violated(constraints: Sequence[BoundConstraint], samples: Samples) -> tuple[
     return tuple(messages)
 
 
+def worst_time(constraints: Sequence[BoundConstraint], samples: Samples) -> float | None:
+    """Return when [s] inequalities are violated most, by residuals; None where all are kept."""
+    worst, time = 0.0, None
+    for item in constraints:
+        if not item.equality:
+            h = item.residual(samples).max(axis=1)
+            row = int(np.argmax(h))
+            if h[row] > max(worst, item.tolerance):
+                worst, time = float(h[row]), float(samples.sampling.node_times[row])
+    return time
+
+
 def penalised(cost: float, constraints: Sequence[BoundConstraint], samples: Samples) -> float:
     """Return a cost, much larger where constraints are violated: for ranking motions."""
     return cost + max(abs(cost), 1e-3) * penalty(constraints, samples)

@@ -54,8 +54,11 @@ _FIRST, _LAST, _SLACK = 1e-1, 1e-6, 1e-1
 _KNOWN_FIRST, _KNOWN_SLACK = 1e-5, 1e-3
 # A row that comes in begins with so much of e.
 _ELASTIC = 1e-3
-# ρ is this many times the cost for a unit of h.
+# ρ is this many times the cost for a unit of h. Where a barrier is solved, and a row is broken by
+# more than this and its multiplier more than this share of ρ, it is cheaper to break than to keep:
+# ρ grows by this factor, so often.
 _ELASTIC_COST = 10.0
+_BROKEN, _GIVEN_UP, _DEARER, _MOST_RAISES = 1e-6, 0.9, 100.0, 4
 # A barrier is solved to this many times itself, before it falls to this share, or this power; at
 # the end products of slack and price may be this many times the barrier.
 _SOLVED, _FALL, _POWER, _CENTRED = 10.0, 0.2, 1.5, 30.0
@@ -232,6 +235,7 @@ class _Solver:
         self._roughly, last = roughly, _KNOWN_FIRST if roughly else _LAST
         self._least, self._elastic_cost = last * each, _ELASTIC_COST * self._size
         self._barrier = (_FIRST if multipliers is None else _KNOWN_FIRST) * each
+        self._raises = 0
         self._kept: Flags = np.zeros(len(h), dtype=np.bool_)
         self._slacks = self._elastics = self._multipliers = np.zeros(0)
         self._admit()
@@ -254,6 +258,15 @@ class _Solver:
         # Where multipliers are not those of the rows, as far off as they are.
         off = float(np.mean(self._slacks * self._multipliers)) if len(h) else 0.0
         self._barrier = min(max(self._barrier, off), _FIRST / _KNOWN_FIRST * self._barrier)
+
+    def _grows_dearer(self) -> bool:
+        """Let rows cost more to break where that is cheaper than to keep them; return whether."""
+        given_up = (self._h > _BROKEN) & (self._multipliers > _GIVEN_UP * self._elastic_cost)
+        if self._raises == _MOST_RAISES or not given_up.any():
+            return False
+        self._raises += 1
+        self._elastic_cost *= _DEARER
+        return True
 
     @property
     def _h(self) -> Array:
@@ -310,7 +323,13 @@ class _Solver:
             step = self._step(linear)
             last = not self._multipliers.size or self._barrier <= self._least
             self._changing = self._share_of(step.multipliers)
-            if last and self._is_there() and self._changing <= _SETTLED:
+            there = last and self._is_there() and self._changing <= _SETTLED
+            if (there or self._is_solved()) and self._grows_dearer():
+                linear = self._linear(model)
+                if linear is None:
+                    return Status.GRADIENT
+                return self._move(model, self._step(linear))
+            if there:
                 self._end_multipliers = step.end_multipliers
                 return Status.CONVERGED
             if last or not self._is_solved():

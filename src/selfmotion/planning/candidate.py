@@ -237,6 +237,11 @@ class Candidate:
         return self.solution.violations
 
     @property
+    def breaks_at(self) -> float | None:
+        """When [s] the best motion violates constraints most; None where it does not."""
+        return self._found.breaks_at if isinstance(self._found, NodeSolution) else None
+
+    @property
     def will_do(self) -> bool:
         """Whether the best motion keeps all constraints, and keeps the arm off itself."""
         return not self.violations and self.solution.keeps_off_itself

@@ -69,7 +69,7 @@ class Polisher:
     ----------
     history : list of Iteration
     latest : NodeSolution or None
-        The last motion on the way that keeps the conditions: what an interruption leaves.
+        The best motion on the way that keeps the conditions: what an interruption leaves.
     is_hopeless : bool
         Whether even what is best freely costs as much as what is known.
     """
@@ -172,6 +172,10 @@ class Polisher:
         if not _is_kept(best.motion) and self._ended is None:
             # What control points of few nodes cannot keep, the curve may.
             best = min(best, self._on_halved(best), key=rank)
+        if not _is_kept(best.motion) and self.latest is not None:
+            # What keeps them on the way is never given up for what is cheaper and does not.
+            last, ends = self.latest.motion, np.zeros(motion.grid.ends.count)
+            best = Optimum(last, np.zeros(len(last.h)), Status.PRECISION, np.inf, ends)
         return self._solution(best)
 
     def with_more(self, known: NodeSolution) -> NodeSolution | None:
@@ -366,9 +370,16 @@ class Polisher:
 
     def _report(self, step: Step) -> bool:
         """Note an iteration, and the motion if it keeps all; return whether to stop."""
-        if _is_kept(step.motion):
+        if _is_kept(step.motion) and self._is_better(step.motion):
             self.latest = NodeSolution.on_the_way(step.motion)
         return self._noted(step)
+
+    def _is_better(self, motion: NodeMotion) -> bool:
+        """Whether a motion costs less than the last one, or tells more."""
+        if self.latest is None:
+            return True
+        last = self.latest.motion
+        return len(motion.grid.t) > len(last.grid.t) or motion.aim < last.aim
 
     def _noted(self, step: Step) -> bool:
         """Note an iteration; return whether to stop."""

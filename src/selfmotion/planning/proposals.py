@@ -91,6 +91,26 @@ def optimise_starts(planner: Planner, count: int, finalists: int) -> None:
     _optimise_each(planner, candidates, len(candidates))
 
 
+def optimise_where_it_breaks(
+    planner: Planner, breaks_at: float, count: int, finalists: int
+) -> None:
+    """Draw so many configurations where the best motion breaks most, a time [s], and optimise.
+
+    There the fewest configurations keep all, as a rule: motions that begin with one of these, and
+    are carried to both ends of the path from there, need not find it.
+    """
+    problem, t = planner.problem, rough_grid(planner.problem).nodes
+    at = int(np.argmin(np.abs(t - breaks_at)))
+    try:
+        starts = _drawn(problem, planner, count, float(t[at]))
+    except InverseKinematicsError:
+        return
+    ranking = planner.ranking = Ranking(problem, planner.effort, planner.progress)
+    if ranking.run(starts, finalists, at):
+        ranked = ranking.ranked
+        _optimise_each(planner, _resumed(planner, ranked), len(ranked))
+
+
 def _best(problem: Problem, starts: abc.Sequence[Array]) -> list[Array]:
     """Return starts, the best first, by their motions without self-motion."""
     t = rough_grid(problem).nodes
@@ -103,18 +123,19 @@ def _starts(planner: Planner, count: int) -> list[Array]:
     """Return so many starts: on the path itself, or as near to it as tolerances allow."""
     problem = planner.problem
     try:
-        found = _on_start(problem.asked, planner, count)
+        found = _drawn(problem.asked, planner, count)
     except InverseKinematicsError:
         if problem.asked is problem:
             raise
-        return _on_start(problem, planner, count)
+        return _drawn(problem, planner, count)
     return list(problem.at(np.zeros(len(found)), np.array(found)))
 
 
-def _on_start(problem: Problem, planner: Planner, count: int) -> list[Array]:
+def _drawn(problem: Problem, planner: Planner, count: int, time: float = 0.0) -> list[Array]:
+    """Return so many configurations that are on the path at a time [s]."""
     arm, asked = problem.envelope.arm(problem.robot), problem.envelope
     admits = asked.admits if asked.quantities else None
-    return start_candidates(problem.follows.for_robot(arm), count, planner.rng, admits)
+    return start_candidates(problem.follows.for_robot(arm), count, planner.rng, admits, time)
 
 
 def _optimise_each(planner: Planner, candidates: Iterable[Candidate], count: int) -> None:

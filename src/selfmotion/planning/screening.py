@@ -102,13 +102,15 @@ class Ranking:
             return [] if best is None else [best]
         return self._ranked
 
-    def run(self, starts: Sequence[Array], finalists: int) -> bool:
+    def run(self, starts: Sequence[Array], finalists: int, at: int = 0) -> bool:
         """Leave the best `finalists` of the starts (n,), or fewer where they became the same.
+
+        The motions are at them where `at` of their times is, by default at the start of the path.
 
         Returns whether that tells which starts are best.
         """
         problem = self._problem
-        motions, arrived = carried(problem.follows, np.array(starts), self._t)
+        motions, arrived = carried(problem.follows, np.array(starts), self._t, at)
         if not arrived.any():
             return False
         free: list[NodeMotion] = []

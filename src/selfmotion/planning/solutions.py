@@ -16,6 +16,7 @@ from selfmotion.constraints import (
     active_of,
     penalised,
     violated,
+    worst_time,
 )
 from selfmotion.costs import Samples
 from selfmotion.motion import Evaluation, Grid, NodeNullMotion, NullMotion
@@ -172,6 +173,11 @@ class NodeSolution:
             f"that puts the tool there"
             for name, far in motion.elsewhere.items()
         )
+
+    @property
+    def breaks_at(self) -> float | None:
+        """When [s] constraints are violated most; None where those of all times are kept."""
+        return worst_time(self.motion.grid.constraints, self.motion.checked)
 
     def merit(self) -> float:
         """Return the cost, much larger where constraints are violated: for ranking."""

@@ -20,6 +20,7 @@ from selfmotion.basics import (
 from selfmotion.constraints import JointPositionLimits
 from selfmotion.planning.candidate import Candidate, on_start
 from selfmotion.planning.effort import Search
+from selfmotion.planning.grids import is_on_nodes
 from selfmotion.planning.planner import Planner
 from selfmotion.planning.proposals import (
     VERY_LONG_WAY,
@@ -27,6 +28,7 @@ from selfmotion.planning.proposals import (
     keep_to_posture,
     optimise_sequences,
     optimise_starts,
+    optimise_where_it_breaks,
 )
 from selfmotion.problem import Problem
 from selfmotion.result import Attempt
@@ -201,6 +203,19 @@ def _take_links_apart(planner: Planner) -> bool:
     return True
 
 
+def _draw_where_it_breaks(planner: Planner) -> bool:
+    """Draw configurations where the best motion breaks something most, at another time."""
+    best, search = planner.best, planner.search
+    wanted = planner.is_sought and planner.takes_starts and planner.is_unmet
+    if best is None or not wanted or planner.is_out_of_reach():
+        return False
+    breaks_at = best.breaks_at
+    if breaks_at is None or not is_on_nodes(planner.problem, planner.effort):
+        return False
+    optimise_where_it_breaks(planner, breaks_at, search.starts, search.finalists)
+    return True
+
+
 def _search_globally(planner: Planner) -> bool:
     """Optimise from the best chains of configurations over all self-motions."""
     wanted = planner.search.compare or (planner.chooses_globally and planner.is_unmet)
@@ -303,6 +318,7 @@ STEPS: tuple[tuple[str, Callable[[Planner], bool]], ...] = (
     ("postures compared", _compare_postures),
     ("proof on meshes", _judge_on_meshes),
     ("links in pieces", _take_links_apart),
+    ("starts where it breaks", _draw_where_it_breaks),
     ("global search", _search_globally),
     ("more starts", _draw_more_starts),
     # Judge.

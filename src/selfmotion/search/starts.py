@@ -26,13 +26,17 @@ Admits = Callable[[Array], npt.NDArray[np.bool_]]
 
 
 def start_candidates(
-    follows: Follows, count: int, rng: np.random.Generator, admits: Admits | None = None
+    follows: Follows,
+    count: int,
+    rng: np.random.Generator,
+    admits: Admits | None = None,
+    time: float = 0.0,
 ) -> list[Array]:
-    """Return distinct configurations that put the tool on the start of the path.
+    """Return distinct configurations that put the tool on the path at a time, its start by default.
 
-    For one degree of redundancy they are spread evenly over all self-motion curves of the first
-    pose, as far as these are within the limits, each joint by the whole turns that bring it nearest
-    to the middle of its range. For more, Newton's method from a low-discrepancy sequence over the
+    For one degree of redundancy they are spread evenly over all self-motion curves of that pose, as
+    far as these are within the limits, each joint by the whole turns that bring it nearest to the
+    middle of its range. For more, Newton's method from a low-discrepancy sequence over the
     joint limits; solutions near an earlier one are dropped.
 
     Parameters
@@ -45,6 +49,8 @@ def start_candidates(
     admits : callable, optional
         Which configurations (K, n) keep what else is asked of them, (K,). Where none is found that
         does, others are returned.
+    time : float
+        When [s].
 
     Returns
     -------
@@ -58,11 +64,11 @@ def start_candidates(
     """
     found: list[Array] = []
     if follows.redundancy == 1 and not follows.holds:
-        found = _along_curves(follows, count, rng, admits or _all)
+        found = _along_curves(follows, count, rng, admits or _all, time)
     if not found:
-        found = _scattered(follows, count, rng, admits or _all)
+        found = _scattered(follows, count, rng, admits or _all, time)
     if not found and admits is not None:
-        return start_candidates(follows, count, rng)
+        return start_candidates(follows, count, rng, None, time)
     if not found and not follows.is_plain:
         raise InverseKinematicsError(
             f"{follows.robot.name}: no configuration within the limits was found that puts "
@@ -73,7 +79,7 @@ def start_candidates(
         )
     if not found:
         # Many more attempts, and an error that names the miss.
-        found = [follows.robot.inverse_kinematics(follows.path.pose(0.0), follows.task, rng=rng)]
+        found = [follows.robot.inverse_kinematics(follows.path.pose(time), follows.task, rng=rng)]
     return found
 
 
@@ -82,13 +88,13 @@ def _all(q: Array) -> npt.NDArray[np.bool_]:
 
 
 def _along_curves(
-    follows: Follows, count: int, rng: np.random.Generator, admits: Admits
+    follows: Follows, count: int, rng: np.random.Generator, admits: Admits, time: float
 ) -> list[Array]:
     """Return up to `count` configurations within the limits, evenly over all curves."""
     robot, motion = follows.robot, SelfMotion(follows, SPACING)
     bounds = Admissible(robot.lower, robot.upper, motion.revolute, ())
     curves = motion.curves(
-        follows.targets(np.zeros(1))[0], spread(robot, TRACING_SEEDS, rng)
+        follows.targets(np.array([time]))[0], spread(robot, TRACING_SEEDS, rng)
     ).curves
     # The last sample of a closed curve is its first one.
     samples = [curve.q[: len(curve.q) - curve.closed] for curve in curves]
@@ -100,13 +106,13 @@ def _along_curves(
 
 
 def _scattered(
-    follows: Follows, count: int, rng: np.random.Generator, admits: Admits
+    follows: Follows, count: int, rng: np.random.Generator, admits: Admits, time: float
 ) -> list[Array]:
     """Return up to `count` configurations that Newton's method finds, none near another."""
     robot = follows.robot
     manifold = Manifold(follows, robot.lower, robot.upper)
-    target, found = follows.targets(np.zeros(1))[0], list[Array]()
-    held = follows.held(np.zeros(1))[0]
+    target, found = follows.targets(np.array([time]))[0], list[Array]()
+    held = follows.held(np.array([time]))[0]
     for _ in range(_START_ROUNDS):
         seeds = spread(robot, _TRIES * count, rng)
         q, arrived = manifold.project(seeds, target, far=True, held=held)
@@ -120,20 +126,30 @@ def _scattered(
     return found
 
 
-def carried(follows: Follows, starts: Array, t: Array) -> tuple[Array, npt.NDArray[np.bool_]]:
-    """Return the motions from starts (K, n) that follow the path without self-motion, (K, N, n).
+def carried(
+    follows: Follows, starts: Array, t: Array, at: int = 0
+) -> tuple[Array, npt.NDArray[np.bool_]]:
+    """Return the motions through configurations (K, n) that follow the path without self-motion.
 
-    From each of the times t (N,) [s] to the next by Newton's method, limits not regarded; and from
-    which starts that is possible, (K,).
+    (K, N, n): from each of the times t (N,) [s] to the next by Newton's method, limits not
+    regarded, and likewise back from the one of number `at`, where the configurations are; and of
+    which that is possible, (K,).
     """
     free = np.full(follows.robot.dof, np.inf)
     manifold = Manifold(follows, -free, free)
-    motions, going = [starts], np.ones(len(starts), dtype=bool)
-    for target, held in zip(follows.targets(t)[1:], follows.held(t)[1:], strict=True):
-        q, arrived = manifold.project(motions[-1], target, held=held)
-        going &= arrived
-        motions.append(q)
-    return np.stack(motions, axis=1), going
+    targets, helds = follows.targets(t), follows.held(t)
+    motions, going = (
+        np.empty((len(starts), len(t), starts.shape[1])),
+        np.ones(len(starts), dtype=bool),
+    )
+    motions[:, at] = starts
+    for step, order in ((1, range(at + 1, len(t))), (-1, range(at - 1, -1, -1))):
+        for k in order:
+            motions[:, k], arrived = manifold.project(
+                motions[:, k - step], targets[k], held=helds[k]
+            )
+            going &= arrived
+    return motions, going
 
 
 def spread(robot: RobotModel, count: int, rng: np.random.Generator) -> Array:

@@ -1,0 +1,45 @@
+"""Starts: on the path at any time, and carried from there to both of its ends."""
+
+import numpy as np
+import pytest
+
+import selfmotion as sm
+from selfmotion.search import carried, start_candidates
+from support.arms import Case
+
+# Newton's method ends at this [m].
+ON_PATH = 1e-6
+TIMES = np.linspace(0.0, 1.0, 9)
+
+
+def misses(problem: sm.Problem, q: np.ndarray, t: np.ndarray) -> float:
+    """Return how far the tool is from the path at most, in what the task prescribes [m]."""
+    (item,) = problem.follows.items
+    there = zip(q, t, strict=True)
+    return max(item.miss(problem.path.pose(at), one)[0] for one, at in there)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.5, 1.0])
+def test_starts_are_on_the_path_at_their_time(case: Case, share: float) -> None:
+    robot, task, _, path = case
+    problem = sm.Problem(robot, path, task, clearance=None)
+    time = share * path.duration
+    starts = start_candidates(problem.follows, 8, np.random.default_rng(3), time=time)
+    assert starts
+    assert misses(problem, np.array(starts), np.full(len(starts), time)) <= ON_PATH
+    assert all((q >= robot.lower).all() and (q <= robot.upper).all() for q in starts)
+
+
+@pytest.mark.parametrize("at", [0, 4, 8])
+def test_they_are_carried_to_both_ends(case: Case, at: int) -> None:
+    robot, task, start, path = case
+    problem = sm.Problem(robot, path, task, start, clearance=None)
+    t = TIMES * path.duration
+    way, arrived = carried(problem.follows, np.array(start)[None], t)
+    assert arrived.all()
+    motions, arrived = carried(problem.follows, way[:, at], t, at)
+    assert arrived.all()
+    np.testing.assert_array_equal(motions[:, at], way[:, at])
+    assert misses(problem, motions[0], t) <= ON_PATH
+    # Back along the same way, as far as steps of finite length know it.
+    assert np.abs(motions - way).max() <= 0.2
