@@ -13,7 +13,7 @@ from selfmotion.certificate import check
 from selfmotion.certificate.check import _because, _damped_stretches, _told, _undecided
 from selfmotion.certificate.path_error import PathCheck, smallest_singular_values
 from selfmotion.task import DampingLaw
-from support.arms import PANDA_HOME, robot_named
+from support.arms import PANDA_HOME, Case, robot_named
 from support.motions import motion_of
 
 
@@ -132,11 +132,11 @@ def test_a_motion_whose_times_are_rounded_is_judged_by_where_it_ends(
         assert f"{abs(apart):.2g} s too {'long' if apart > 0 else 'short'}" in late[0]
 
 
-@pytest.mark.parametrize(("most", "times"), [(1000, 11), (11, 6), (6, 6), (5, 4)])
+@pytest.mark.parametrize(("most", "times"), [(1000, [11]), (11, [6, 3]), (6, [6, 3]), (5, [4, 4])])
 def test_of_long_motions_fewer_poses_are_looked_at_for_singular_ones(
-    most: int, times: int, monkeypatch: pytest.MonkeyPatch
+    most: int, times: list[int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Two intervals of five times each, and the end: all, each second, each third."""
+    """Two intervals of five times each, and the end: all, each second, each third; then nearby."""
     robot, looked = robot_named("panda"), list[int]()
     motion = sm.Trajectory([0.0, 1.0, 2.0], [PANDA_HOME] * 3, np.zeros((3, 7)), robot.joint_names)
 
@@ -147,8 +147,18 @@ def test_of_long_motions_fewer_poses_are_looked_at_for_singular_ones(
     monkeypatch.setattr(check, "_MOST_POSES", most)
     monkeypatch.setattr(check, "smallest_singular_values", counting)
     found = sm.certify(robot, sm.paths.Dwell(robot.pose(PANDA_HOME), 2.0), "pose", motion)
-    assert looked == [times]
+    assert looked == times
     assert found.smallest_singular_value.time == 0.0
+
+
+def test_the_nearest_of_few_poses_is_that_of_all(
+    case: Case, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    robot, task, start, path = case
+    plan = sm.plan(sm.Problem(robot, path, task, start))
+    every = plan.certificate.smallest_singular_value
+    monkeypatch.setattr(check, "_MOST_POSES", 40)
+    assert plan.check().smallest_singular_value == every
 
 
 def test_long_motions_tell_how_far_their_check_is() -> None:

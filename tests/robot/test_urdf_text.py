@@ -9,6 +9,7 @@ import pytest
 import selfmotion as sm
 from selfmotion.replay.links import bake
 from selfmotion.replay.meshes import Payload
+from selfmotion.robot import urdf_text
 from selfmotion.robot.urdf_text import Packages
 from support.files_of_people import arm, described_package, with_arguments
 from support.shell import complaint, invoke
@@ -232,3 +233,27 @@ def test_an_inertial_that_lacks_something_is_missed_only_by_torques(
     ):
         with pytest.raises(sm.errors.ProblemError, match=r"link 'l4': .*: add it"):
             ask(robot)
+
+
+def test_folders_are_looked_at_once_however_many_meshes_there_are(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also where a package is nowhere: each folder around is then looked at."""
+    for k in range(5):
+        (tmp_path / "work" / f"package_{k}" / "meshes").mkdir(parents=True)
+    # Nothing above is looked at.
+    (tmp_path / "work" / ".git").mkdir()
+    file = tmp_path / "work" / "package_0" / "arm.urdf"
+    looked: list[Path] = []
+    inside = urdf_text._inside
+
+    def counted(folder: Path) -> list[Path]:
+        looked.append(folder)
+        return inside(folder)
+
+    monkeypatch.setattr(urdf_text, "_inside", counted)
+    packages = Packages(file)
+    names = ("nowhere_description", "package_3", "elsewhere")
+    found = [packages.folder(name) for name in names for _ in range(20)]
+    assert found == [*[None] * 20, *[tmp_path / "work" / "package_3"] * 20, *[None] * 20]
+    assert len(looked) == len(set(looked)) > 5

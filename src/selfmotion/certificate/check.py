@@ -35,8 +35,9 @@ from selfmotion.path import Path, check_oriented
 from selfmotion.robot import RobotModel
 from selfmotion.task import DampingLaw, Relaxation, Task
 
-# Of a long motion the distance from singular poses, which proves nothing, is looked at so often.
-_MOST_POSES = 50_000
+# Of a long motion the distance from singular poses, which proves nothing, is looked at so often,
+# and then at all times around where it is smallest.
+_MOST_POSES = 2_000
 # Files write times in some digits: a motion may end so much before or after its path [s], where all
 # is within the tolerance until both have ended.
 _CLOCK = 1e-4
@@ -108,7 +109,7 @@ def certify(
         for k, item in enumerate(follows.items)
     ]
     path_check = checks[0]
-    t = motion.t[:: 1 + len(motion.t) // _MOST_POSES] if damping is None else motion.t
+    t = motion.t if damping is not None else _near_singular(follows, trajectory, motion.t)
     singular = smallest_singular_values(follows, trajectory(t))
     damped = () if damping is None else _damped_stretches(damping, t, singular)
     _check(requirements)
@@ -210,6 +211,15 @@ def _because(time: float, damped: tuple[DampedStretch, ...]) -> str:
         return ""
     when = "where" if time <= before[-1].end else "after"
     return f", {when} damping was active, {before[-1]}"
+
+
+def _near_singular(follows: Follows, trajectory: Trajectory, t: Array) -> Array:
+    """Return those of times t (K,) around which the arm is nearest to a singular pose."""
+    every = 1 + len(t) // _MOST_POSES
+    if every == 1:
+        return t
+    nearest = int(np.argmin(smallest_singular_values(follows, trajectory(t[::every]))))
+    return t[max(0, nearest - 1) * every : (nearest + 1) * every + 1]
 
 
 def _least(values: Array, t: Array, name: str) -> Extreme:

@@ -2,6 +2,7 @@
 
 import contextlib
 import io
+import itertools
 import logging
 import os
 import re
@@ -102,17 +103,31 @@ class Packages:
                 break
         return tuple(found)
 
+    # A description names the same package for each of its meshes: folders are looked at once.
+
+    @cached_property
+    def _given(self) -> tuple["_Walk", ...]:
+        return tuple(_Walk([Path(folder)]) for folder in self.given)
+
+    @cached_property
+    def _ros(self) -> "_Walk":
+        return _Walk(_folders_of("ROS_PACKAGE_PATH"))
+
+    @cached_property
+    def _around(self) -> "_Walk":
+        return _Walk(self._up)
+
     def _places(self, name: str) -> Iterator[Path]:
         """Yield the folders that have a package's name, in the order at the head of the file."""
-        for given in self.given:
-            yield from _named(name, [Path(given)])
+        for walk in self._given:
+            yield from walk.named(name)
         for folder in self._above:
             yield from (place for place in (folder, folder / name) if _is(place, name))
         for prefix in _folders_of("AMENT_PREFIX_PATH"):
             if is_folder(prefix / "share" / name):
                 yield prefix / "share" / name
-        yield from _named(name, _folders_of("ROS_PACKAGE_PATH"))
-        yield from _named(name, self._up)
+        yield from self._ros.named(name)
+        yield from self._around.named(name)
 
     def _moved(self, path: Path) -> Path | None:
         """Return a file of another machine: each folder of its path may be a package's."""
@@ -153,8 +168,33 @@ def _package_name(folder: Path) -> str | None:
     return None if found is None else found.strip()
 
 
-def _named(name: str, tops: Sequence[Path]) -> Iterator[Path]:
-    """Yield packages of a name at folders and below them, level by level."""
+class _Walk:
+    """Folders and those below them, level by level, each looked at once and not before it counts.
+
+    Parameters
+    ----------
+    tops : sequence of Path
+    """
+
+    def __init__(self, tops: Sequence[Path]) -> None:
+        self._seen: list[tuple[Path, str | None]] = []
+        self._rest = _walk(tops)
+
+    def named(self, name: str) -> Iterator[Path]:
+        """Yield the folders that are a package of a name."""
+        for number in itertools.count():
+            if number == len(self._seen):
+                folder = next(self._rest, None)
+                if folder is None:
+                    return
+                self._seen.append((folder, _package_name(folder)))
+            folder, said = self._seen[number]
+            if name in (folder.name, said) and is_folder(folder):
+                yield folder
+
+
+def _walk(tops: Sequence[Path]) -> Iterator[Path]:
+    """Yield folders and those below them, level by level."""
     seen: set[Path] = set()
     for top in tops:
         level = [top]
@@ -164,8 +204,7 @@ def _named(name: str, tops: Sequence[Path]) -> Iterator[Path]:
                 if folder in seen or len(seen) > _MOST:
                     continue
                 seen.add(folder)
-                if _is(folder, name):
-                    yield folder
+                yield folder
                 if depth < _BELOW:
                     below += _inside(folder)
             level = below
