@@ -236,3 +236,52 @@ def test_a_part_without_self_motion_is_none() -> None:
     problem = sm.Problem(arm, line, "pose", relaxations=window)
     with pytest.raises(sm.errors.NoSequenceError, match="no motion along the path passes"):
         sm.plan(problem)
+
+
+# A deviation of the given start that is allowed, and one a little beyond.
+WITHIN, BEYOND = 0.99, 1.01
+
+
+def leaning(
+    arm: str, share: float, band: float = 0.2
+) -> tuple[sm.RobotModel, Array, sm.paths.Path]:
+    """Return an arm, its start, and a line from where the tool leans by a share of the band."""
+    robot = robot_named(arm)
+    start = start_of(robot, "pose")
+    lean = pin.SE3(pin.exp3(share * band * np.array([0.6, -0.8, 0.0])), np.zeros(3))
+    first = robot.pose(start).act(lean.inverse())
+    last = pin.SE3(first.rotation, first.translation + np.array([0.0, 0.05, 0.0]))
+    return robot, start, sm.paths.Line(first, last, 3.0)
+
+
+@pytest.mark.parametrize("arm", ["panda", "xarm7"])
+def test_a_motion_may_begin_and_end_where_tolerances_allow(arm: str) -> None:
+    cone = [sm.Relaxation(("rx", "ry"), 0.2)]
+    robot, start, path = leaning(arm, WITHIN)
+    problem = sm.Problem(robot, path, "pose", start, relaxations=cone, clearance=None)
+    plan = sm.plan(problem)
+    assert plan.certificate.verified, plan.certificate.verdict
+    np.testing.assert_allclose(plan.trajectory.q[0], start, atol=1e-12)
+    # It ends elsewhere in the cone: that may be asked for as well.
+    last = plan.trajectory.q[-1]
+    assert np.linalg.norm(plan.deviation([3.0])[0, 3:5]) > 0.01
+    asked = (*problem.constraints, sm.constraints.EndConfiguration(last))
+    again = sm.plan(dataclasses.replace(problem, constraints=asked))
+    assert again.certificate.verified, again.certificate.verdict
+    np.testing.assert_allclose(again.trajectory.q[-1], last, atol=1e-6)
+
+
+def test_a_start_or_an_end_beyond_tolerances_is_refused() -> None:
+    cone = [sm.Relaxation(("rx", "ry"), 0.2)]
+    robot, start, path = leaning("panda", BEYOND)
+    with pytest.raises(sm.errors.StartError, match=r"0.002 rad off .* beyond its tolerances"):
+        sm.Problem(robot, path, "pose", start, relaxations=cone)
+    end = [sm.constraints.EndConfiguration(start)]
+    backwards = sm.paths.Line(path.pose(3.0), path.pose(0.0), 3.0)
+    with pytest.raises(sm.errors.ProblemError, match=r"0.002 rad off the end .* its tolerances"):
+        sm.Problem(robot, backwards, "pose", relaxations=cone, constraints=end)
+    # Nor where the window is shut.
+    robot, start, path = leaning("panda", WITHIN)
+    later = [sm.Relaxation(("rx", "ry"), 0.2, during=(1.0, 2.0))]
+    with pytest.raises(sm.errors.StartError, match=r"0.198 rad off"):
+        sm.Problem(robot, path, "pose", start, relaxations=later)

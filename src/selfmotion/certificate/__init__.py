@@ -15,6 +15,7 @@ from selfmotion.certificate.limits import (
 )
 from selfmotion.certificate.path_error import (
     deviation_from as deviation_from,
+    errors_at as errors_at,
     errors_between as errors_between,
 )
 from selfmotion.certificate.quantity import (

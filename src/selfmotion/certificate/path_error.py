@@ -238,8 +238,13 @@ def errors_between(
 ) -> Array:
     """Return the errors in the middle between samples, (N, 2) [m, rad]: for planners, no proof."""
     t = 0.5 * (trajectory.t[:-1] + trajectory.t[1:])
+    return errors_at(follow, t, trajectory(t), relaxations)
+
+
+def errors_at(follow: BoundFollow, t: Array, q: Array, relaxations: Sequence[Relaxation]) -> Array:
+    """Return the errors beyond relaxations at q (K, n), at times t (K,) [s], (K, 2) [m, rad]."""
     in_tool_axes = any(item.in_tool_axes for item in relaxations)
-    miss = deviation_from(follow, t, trajectory(t), in_tool_axes)
+    miss = deviation_from(follow, t, q, in_tool_axes)
     beyond = excess(relaxations, follow.path.duration, t, miss)
     return np.stack([_length(beyond[:, :3]), _length(beyond[:, 3:])], axis=1)
 

@@ -16,7 +16,7 @@ from selfmotion.basics import (
     StartError,
     shown,
 )
-from selfmotion.certificate import Requirement
+from selfmotion.certificate import Requirement, errors_at
 from selfmotion.constraints import (
     Clearance,
     Constraint,
@@ -76,6 +76,8 @@ _EXAMPLES = {
 _ON_PATH = 1e-7
 # It is put onto it by as much at most [rad or m].
 START_MISS = 1e-5
+# An end configuration may be this far off its own [m, rad]: what the certificate grants it.
+_NEAR_END = 1e-6
 
 
 def check_kinds(problem: object) -> None:
@@ -121,20 +123,51 @@ def _beyond(robot: RobotModel, start: Array) -> str:
     return ""
 
 
-def check_start(follows: Follows, start: Array) -> None:
-    """Raise StartError where a start (n,) is off one of the paths."""
-    for item in follows.items:
-        position, rotation = item.miss(item.path.pose(0.0), start)
-        if max(position, rotation) > _ON_PATH:
-            beyond = _beyond(follows.robot, start)
-            raise StartError(
-                f"{follows.robot.name}: the start configuration {beyond}puts "
-                f"'{item.chain.tip_name}' {position:.3g} m and {rotation:.3g} rad off the start of "
-                f"the path; leave it out, or take "
-                f"robot.inverse_kinematics(path.pose(0.0), task, seed=start)",
-                position_miss=position,
-                rotation_miss=rotation,
+def check_start(follows: Follows, start: Array, relaxations: Sequence[Relaxation]) -> None:
+    """Raise StartError where a start (n,) is off one of the paths, by more than is allowed."""
+    missed = _missed(follows, start, relaxations, at_end=False)
+    if missed is not None:
+        position, rotation, text = missed
+        raise StartError(
+            f"{follows.robot.name}: the start configuration {_beyond(follows.robot, start)}{text}; "
+            f"leave it out, or take robot.inverse_kinematics(path.pose(0.0), task, seed=start)",
+            position_miss=position,
+            rotation_miss=rotation,
+        )
+
+
+def check_end(follows: Follows, end: Array, relaxations: Sequence[Relaxation]) -> None:
+    """Raise ProblemError where an end (n,) that is asked for is off one of the paths likewise."""
+    missed = _missed(follows, end, relaxations, at_end=True)
+    if missed is not None:
+        raise ProblemError(
+            f"{follows.robot.name}: the end configuration {missed[-1]}; take "
+            f"robot.inverse_kinematics(path.pose(path.duration), task, seed=q)"
+        )
+
+
+def _missed(
+    follows: Follows, q: Array, relaxations: Sequence[Relaxation], *, at_end: bool
+) -> tuple[float, float, str] | None:
+    """Return by how much an end of a motion (n,) is off its path [m, rad], in words; or None.
+
+    Relaxations are those of the first path.
+    """
+    for k, item in enumerate(follows.items):
+        t = np.array([item.path.duration if at_end else 0.0])
+        allowed = () if k else relaxations
+        position, rotation = item.miss(item.path.pose(float(t[0])), q)
+        if allowed:
+            position, rotation = errors_at(item, t, q[None], allowed)[0].tolist()
+        if max(position, rotation) > (_NEAR_END if at_end else _ON_PATH):
+            end, beyond = "end" if at_end else "start", ", beyond its tolerances" if allowed else ""
+            return (
+                position,
+                rotation,
+                f"puts '{item.chain.tip_name}' {position:.3g} m and {rotation:.3g} rad off the "
+                f"{end} of the path{beyond}",
             )
+    return None
 
 
 def first_tool(several: Sequence[Follow], robot: RobotModel) -> tuple[Follow, RobotModel]:

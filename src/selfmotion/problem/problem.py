@@ -60,6 +60,7 @@ from selfmotion.problem.fit import (
     START_MISS,
     USUAL_COSTS,
     check_costs,
+    check_end,
     check_feeds,
     check_fit,
     check_judged,
@@ -113,9 +114,9 @@ class Problem:
     relaxations : sequence of Relaxation
         Rows in which the tool may leave its path, by how much and when. Each is one more joint
         between tool and path, which costs nothing, so that the deviation is part of the
-        self-motion. By default none. A given start is on the path itself, and so is the end of a
-        path with conditions there; where a path is closed, the deviation is so, too. Of several
-        paths the first is relaxed.
+        self-motion. By default none. A given start, or an end configuration, may use them; the
+        end of a path with other conditions there is on the path itself; where a path is closed,
+        the deviation is so, too. Of several paths the first is relaxed.
     clearance : Clearance, optional
         How the arm keeps apart from itself and from obstacles, besides what constraints say: by
         default its links must not overlap, where its URDF has bodies and no constraint is a
@@ -183,12 +184,15 @@ class Problem:
         check_costs(self.follows, self.costs, self.all_costs)
         for item in self.constraints:
             item.check(self.follows)
+            end = item.fixed_end(self.robot)
+            if end is not None:
+                check_end(self.follows, end, self.relaxations)
         # Now, not when the motion is finished: without a requirement nothing judges it.
         check_judged(self.all_constraints, self._asked)
         if self.start is not None:
             start = read_only(self.robot.configuration(self.start))
             object.__setattr__(self, "start", start)
-            check_start(self.follows, start)
+            check_start(self.follows, start, self.relaxations)
         for item in self.constraints:
             item.check_start(self.follows, self.given_start)
 
@@ -516,12 +520,6 @@ class Problem:
     def way_in_reaches(self) -> float:
         """How far the tool goes along the path, as a multiple of the arm's reach."""
         return way_of(self.path) / self.robot.reach
-
-    @property
-    def pinned(self) -> tuple[bool, bool]:
-        """Whether the tool has to be on the path itself at its start and at its end."""
-        pins = [(self.start is not None, False), *(item.pins for item in self.constraints)]
-        return any(start for start, _ in pins), any(end for _, end in pins)
 
 
 # What help() shows of a field that is a descriptor.
