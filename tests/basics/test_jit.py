@@ -12,7 +12,10 @@ import numba
 import pytest
 from numba.core import caching
 
+import selfmotion as sm
 from selfmotion.basics import jit
+from selfmotion.nodes import charts
+from selfmotion.nodes.kernels import accelerate, bend_of
 
 SOURCE = """
 from selfmotion.basics.jit import kernel
@@ -68,6 +71,40 @@ def test_of_two_processes_one_compiles_and_the_other_waits(tmp_path: Path) -> No
     ]
     hits = sorted(int(one.communicate(timeout=60.0)[0]) for one in both)
     assert hits == [0, 1]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="there are no such locks")
+def test_who_waits_compiles_others_meanwhile(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import fcntl
+
+    cache = loaded(tmp_path).twice._cache
+    cache._impl.locator.ensure_cache_path()
+    with open(cache._cache_file._index_path + ".lock", "w") as file:
+        fcntl.flock(file, fcntl.LOCK_EX)
+        done: list[str] = []
+
+        def work() -> None:
+            done.append("work")
+            fcntl.flock(file, fcntl.LOCK_UN)
+
+        monkeypatch.setattr(jit, "_meanwhile", [work])
+        assert loaded(tmp_path).twice(1.5) == 3.0
+        assert done == ["work"]
+        # Once is enough.
+        assert jit._meanwhile == []
+
+
+def test_what_is_compiled_meanwhile_is_what_a_plan_needs() -> None:
+    """Arrays of other kinds would have code of their own."""
+    arm = sm.load_robot("panda")
+    home = sm.NAMED_ARMS["panda"].home
+    sm.plan(sm.Problem(arm, sm.paths.Circle.around(arm.pose(home), 0.05, 2.0), "pose", home))
+    before = [kernel.signatures for kernel in (accelerate, bend_of)]
+    charts._call_what_follows()
+    assert [kernel.signatures for kernel in (accelerate, bend_of)] == before
+    assert all(before)
 
 
 def test_another_process_compiles_where_it_can(monkeypatch: pytest.MonkeyPatch) -> None:

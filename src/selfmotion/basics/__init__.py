@@ -63,6 +63,7 @@ from selfmotion.basics.jit import (
     compile_alone as compile_alone,
     inlined as inlined,
     kernel as kernel,
+    meanwhile as meanwhile,
     seconds_of_kernels as seconds_of_kernels,
     seconds_waited_for_kernels as seconds_waited_for_kernels,
 )

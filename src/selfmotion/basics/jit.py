@@ -1,7 +1,8 @@
 """Compiling the numerical kernels with numba: once per machine, announced when it happens.
 
-No two processes compile the same kernel: the second waits for what the first one keeps. So a
-companion, a process that begins with the largest kernels, takes about half of the work.
+No two processes compile the same kernel: the second waits for what the first one keeps, and
+compiles others meanwhile. So a companion, a process that begins with the largest kernels, takes
+about half of the work.
 """
 
 import contextlib
@@ -147,6 +148,18 @@ def _forgive(compiled: Any) -> None:
     cache.load_overload, cache.save_overload = load_or_compile, save_if_possible
 
 
+_meanwhile: list[Callable[[], object]] = []
+
+
+def meanwhile(work: Callable[[], object]) -> Callable[[], object]:
+    """Have a small piece of work done where another process compiles what this one waits for.
+
+    It calls kernels that are needed soon, as they are called at all: they are compiled by then.
+    """
+    _meanwhile.append(work)
+    return work
+
+
 @contextlib.contextmanager
 def _turn(cache: Any) -> Iterator[None]:
     """Wait until no other process compiles the same kernel; a turn ends with its process."""
@@ -158,7 +171,12 @@ def _turn(cache: Any) -> Iterator[None]:
             with contextlib.suppress(OSError):
                 cache._impl.locator.ensure_cache_path()
                 file = opened.enter_context(open(cache._cache_file._index_path + ".lock", "w"))
-                fcntl.flock(file, fcntl.LOCK_EX)
+                try:
+                    fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                except BlockingIOError:
+                    while _meanwhile:
+                        _meanwhile.pop(0)()
+                    fcntl.flock(file, fcntl.LOCK_EX)
         yield
 
 

@@ -8,7 +8,7 @@ one solve:
 
     q̇ = Jᵀy + ε = J⁺u + (I - J⁺J) ε.
 
-Python calls `advance`, `approach_start`, `pullback`, `sensitivities`, `contract_task` and
+Python calls `advance`, `pullback`, `sensitivities`, `contract_task` and
 `transport`. Each is made of small kernels, which LLVM inlines, and is compiled for what it is
 given: who has no damping, or a path that does not move, does not wait for theirs.
 """
@@ -31,7 +31,7 @@ from selfmotion.kernels.stages import (
     sensitivities as sensitivities,
     space_size as space_size,
 )
-from selfmotion.kernels.start import approach as approach, approach_start as approach_start
+from selfmotion.kernels.start import approach as approach
 from selfmotion.kernels.table import (
     Stage as Stage,
     Tip as Tip,

@@ -2,40 +2,10 @@
 
 import numpy as np
 
-from selfmotion.basics import Array, inlined, kernel
+from selfmotion.basics import Array, inlined
 from selfmotion.basics.layout import Layout
 from selfmotion.kernels.algebra import cholesky, gram, solve_cholesky
 from selfmotion.kernels.tool import errors_and_rows, rows_of
-
-
-@kernel
-def approach_start(
-    q: Array,
-    jacobians: Array,
-    rotations: Array,
-    translations: Array,
-    target: Array,
-    layout: Layout,
-    null: Array,
-    reference: Array,
-    z: Array,
-) -> float:
-    """Do as `approach`, with room of its own to work in."""
-    size = rows_of(layout) + null.shape[1]
-    return approach(
-        q,
-        jacobians,
-        rotations,
-        translations,
-        target,
-        layout,
-        null,
-        reference,
-        z,
-        np.empty(size),
-        np.empty((size, q.shape[0])),
-        np.empty((size, size)),
-    )
 
 
 @inlined

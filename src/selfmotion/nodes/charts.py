@@ -7,7 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from selfmotion import kernels
-from selfmotion.basics import Array
+from selfmotion.basics import Array, meanwhile
+from selfmotion.basics.layout import layout_of
 from selfmotion.follow import Follows
 from selfmotion.nodes.kernels import accelerate, bend_of, look
 from selfmotion.path import twist_rates
@@ -323,6 +324,17 @@ class Manifolds:
         for first in range(0, len(q), len(q) // self.copies):
             bases[first] = self.follows.null_basis(q[first])
         return Charts(self, q, bases).centred(none, epsilon, a, carried=True)
+
+
+@meanwhile
+def _call_what_follows() -> None:
+    """Call the kernels that follow the largest one, `look`, for no nodes at all."""
+    layout = layout_of([(np.arange(1), False, np.arange(2))], 2)
+    table, rates = np.zeros((0, kernels.columns(2, 1, 1))), np.zeros((0, 2))
+    bases = np.zeros((0, 2, 1))
+    given = np.zeros((0, 6)), rates, bases, True, rates, bases, bases
+    accelerate(table, layout, None, *given)
+    bend_of(table, layout, None, bases, rates)
 
 
 def orthonormal(tangents: Array) -> Array:

@@ -6,7 +6,6 @@ from functools import cached_property, partial
 
 import numpy as np
 
-from selfmotion import kernels
 from selfmotion.basics import Array, BreakdownError
 from selfmotion.follow import Follows
 from selfmotion.kernels import carried
@@ -14,6 +13,7 @@ from selfmotion.motion import Grid, NullMotion, NullMotionTable
 from selfmotion.paper.rollout import Rollout
 from selfmotion.problem import Problem
 from selfmotion.robot import null_space
+from selfmotion.task import SE3
 
 # Newton's method onto the start of the path is quadratic: few steps, and the one after an error of
 # this is exact. Far moves fail and say so.
@@ -67,7 +67,6 @@ class FreeStart:
         self._null = follows.null_basis(reference)
         self._at = reference
         self._tips = follows.kinematics()
-        self._chart = np.ascontiguousarray(self._null), np.array(reference, dtype=np.float64)
 
     @property
     def size(self) -> int:
@@ -79,16 +78,36 @@ class FreeStart:
 
         These are as `Follows.targets` has them, (12 F,).
         """
-        q, layout = self._reference + self._null @ z, self._follows.layout
+        q = self._reference + self._null @ z
         for _ in range(_STEPS):
-            wrong = kernels.approach_start(q, *self._tips.at(q), target, layout, *self._chart, z)
+            system, missed = self._missed(q, z, target)
+            wrong = float(np.abs(missed).max())
             # NaN arrives nowhere.
-            if not wrong >= 0.0:
+            if not np.isfinite(wrong):
+                return None
+            try:
+                # B⁻¹ = Bᵀ(BBᵀ)⁻¹: errors of the product are taken out by the next step.
+                q = q + system.T @ np.linalg.solve(system @ system.T, missed)
+            except np.linalg.LinAlgError:
                 return None
             if wrong < _ARRIVED:
                 self._at = q
                 return q
         return None
+
+    def _missed(self, q: Array, z: Array, target: Array) -> tuple[Array, Array]:
+        """Return B = [J; N0ᵀ] (m + r, n) and b = [e; z - N0ᵀ(q - q_ref)] at q (n,)."""
+        rows, errors = list[Array](), list[Array]()
+        places = target.reshape(-1, 12)
+        for item, place, *at in zip(self._follows.items, places, *self._tips.at(q), strict=True):
+            jacobian, rotation, translation = at
+            wanted = SE3(place[3:].reshape(3, 3), place[:3])
+            error = item.task.twist_error(wanted, SE3(rotation, translation))
+            errors.append(item.task.select(error[:, None], rotation)[:, 0])
+            rows.append(item.task.select(jacobian, rotation))
+        along = self._null.T
+        missed = np.concatenate([*errors, z - along @ (q - self._reference)])
+        return np.vstack([*rows, along]), missed
 
     def tangent(self) -> Array:
         """Return ∂q(0)/∂z at the last q(0), [J; N0ᵀ]⁻¹ [0; I], (n, size)."""
