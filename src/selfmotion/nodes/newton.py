@@ -19,11 +19,9 @@ from typing import NamedTuple
 import numpy as np
 
 from selfmotion.basics import Array, Flags
-from selfmotion.nodes.ends import Border
 from selfmotion.nodes.motion import NodeMotion
-from selfmotion.nodes.objective import LocalModel
-from selfmotion.nodes.rows import LinearRows
-from selfmotion.optimise import Banded, Status
+from selfmotion.nodes.newton_system import WILD, Change, ElasticRows, Model, System
+from selfmotion.optimise import Status
 
 # The cost is right to this share of itself once a step promises no more; where rows count.
 _AGREES, _AGREES_BOUND = 1e-8, 1e-6
@@ -33,21 +31,8 @@ _ROUNDING = 1e-5
 _INWARD = 0.995
 # A step is taken if it does at least this share of what it promises, and cut by half otherwise.
 _SHARE, _SHORTEST = 1e-4, 1e-7
-# Motions that cost nothing, as of a joint whose axis the tool is on, are left alone: the matrix has
-# this share of its usual entry, over the square of the number of nodes, more on the diagonal: above
-# what differences leave there, and below what slow motions cost.
-_FLAT = 2.5e-5
-# So many times that where it is not positive definite: there rounding may say anything.
-_FLATTER = 16.0
-# One that is not positive definite gets on the diagonal this share of how each coordinate bends
-# without rows, or a third of what the last one needed; then more by this factor, up to the last
-# one. The same for all would stop some of them: with costs of jerks they differ by 1e9.
-_SHIFT, _LESS, _MORE, _MOST_SHIFT = 1e-6, 1.0 / 3.0, 8.0, 1e6
-# Or this share of the largest entry of all, where nothing else bends.
-_LEAST_SHIFT = 1e-18
-# Nodes go no further than this in one step [rad or m]; one that would go beyond that is none of a
-# matrix that says something.
-_FARTHEST, _TRUSTED = 0.5, 5.0
+# Nodes go no further than this in one step [rad or m].
+_FARTHEST = 0.5
 # Barriers begin with this share of the cost for all rows, and end with that; slacks begin with at
 # least so much [units of h]. Where multipliers are known, with these.
 _FIRST, _LAST, _SLACK = 1e-1, 1e-6, 1e-1
@@ -72,8 +57,6 @@ _SETTLED, _NO_MULTIPLIER = 1e-2, 1e-3
 _IDLE = 1e-2
 # What is asked of the ends is met to this [rad, rad/s].
 _MET_ENDS = 1e-9
-# While a row is broken by more than this, its own curvature is none to trust: Gauss-Newton.
-_WILD = 1e-2
 # Where a rough optimum will do, all of this may be so many times worse.
 _ROUGHLY = 100.0
 # After a full step that promised less than this share of the cost, the next one promises about its
@@ -83,7 +66,7 @@ _LITTLE = 1e-5
 _LEAST_PENALTY = 3e-3
 # Steps after which the method is given up: it needs fifteen, forty where limits bind all over.
 _MOST = 80
-# Or where in so many what is broken most, by more than _WILD, has not fallen below this share: on
+# Or where in so many what is broken most, by more than WILD, has not fallen below this share: on
 # the way to where all is kept it falls by more, in vain it hardly moves.
 _STALE, _FALLS = 12, 0.97
 
@@ -160,66 +143,11 @@ def minimise(
         if status is not None:
             return solver.optimum(status)
         broken, since = solver.motion.violation, since + 1
-        if broken < _FALLS * least or broken <= _WILD:
+        if broken < _FALLS * least or broken <= WILD:
             least, since = broken, 0
         if since >= _STALE:
             return solver.optimum(Status.INFEASIBLE)
     return solver.optimum(Status.MAX_ITERATIONS)
-
-
-class _Model(NamedTuple):
-    """What a motion is like near by, to second order.
-
-    Attributes
-    ----------
-    gradient : (N + 1, 3r)
-        ∂F/∂w.
-    both : (N, n, 6, 6r)
-        ∂y/∂w of both ends of each interval.
-    around : LocalModel
-        How the nodes move, to second order along what pulls at them.
-    intervals : (N, 6r, 6r)
-        What bends by costs.
-    rows : LinearRows
-    border : Border
-    """
-
-    gradient: Array
-    both: Array
-    around: LocalModel
-    intervals: Array
-    rows: LinearRows
-    border: Border
-
-
-class _Linear(NamedTuple):
-    """A model, and the step of its nodes for any barrier μ: solved[:, 0] + μ solved[:, 1].
-
-    Attributes
-    ----------
-    model : _Model
-    stiff : (R,)
-        How much a change of h changes multipliers.
-    right : (2, (N + 1) 3r)
-        What pulls at the nodes, without barrier and by each unit of it.
-    solved : ((N + 1) 3r, 2 + E)
-        Also of what is asked of the ends.
-    """
-
-    model: _Model
-    stiff: Array
-    right: Array
-    solved: Array
-
-
-class _Change(NamedTuple):
-    """A step of all unknowns."""
-
-    nodes: Array
-    slacks: Array
-    elastics: Array
-    multipliers: Array
-    end_multipliers: Array
 
 
 class _Solver:
@@ -296,39 +224,40 @@ class _Solver:
     def optimum(self, status: Status) -> Optimum:
         """Return where it is now."""
         return Optimum(
-            self.motion, self._all(self._multipliers), status, self._promised, self._end_multipliers
+            self.motion,
+            self._rows.of_all(self._multipliers),
+            status,
+            self._promised,
+            self._end_multipliers,
         )
-
-    def _all(self, own: Array) -> Array:
-        """Return what belongs to rows that count, in a row of all, (R,)."""
-        found = np.zeros(len(self._kept))
-        found[self._kept] = own
-        return found
 
     def advance(self, callback: Callback) -> Status | None:
         """Take a step; return how the method ended, if it did."""
         if self._arrived():
             callback(Step(self.motion, 0.0, self._length))
             return Status.CONVERGED
-        model = self._model()
+        model = Model.of(self.motion, self._rows, self._end_multipliers)
         if model is None:
             return Status.GRADIENT
         slope = float(np.linalg.norm(model.gradient))
         if callback(Step(self.motion, slope, self._length)):
             return Status.STOPPED
-        linear = self._linear(model)
-        if linear is None:
+        system = self._system(model)
+        if system is None:
             return Status.GRADIENT
         while True:
-            step = self._step(linear)
+            step = system.step(self._barrier)
+            self._promised = step.promised
             last = not self._multipliers.size or self._barrier <= self._least
             self._changing = self._share_of(step.multipliers)
             there = last and self._is_there() and self._changing <= _SETTLED
             if (there or self._is_solved()) and self._grows_dearer():
-                linear = self._linear(model)
-                if linear is None:
+                system = self._system(model)
+                if system is None:
                     return Status.GRADIENT
-                return self._move(model, self._step(linear))
+                step = system.step(self._barrier)
+                self._promised = step.promised
+                return self._move(model, step)
             if there:
                 self._end_multipliers = step.end_multipliers
                 return Status.CONVERGED
@@ -336,35 +265,23 @@ class _Solver:
                 return self._move(model, step)
             self._barrier = max(self._least, min(_FALL * self._barrier, self._barrier**_POWER))
 
-    def _model(self) -> _Model | None:
-        """Look around; None where a neighbour is not to be had."""
-        motion, grid = self.motion, self.motion.grid
-        grid.counts.gradients += 1
-        spline = grid.spline
-        slopes = grid.cost.slopes(motion.samples, motion.curve_ends, motion.partials)
-        by_cost = spline.scattered(slopes)
-        rows = grid.rows.linearised(motion.checked, self._kept)
-        force, multipliers = by_cost, self._all(self._multipliers)
-        wild = float(np.max(self._h, initial=0.0)) > _WILD
-        if not wild and self._multipliers.size:
-            force = force + spline.scattered(rows.pulled(multipliers))
-        if not wild and len(motion.c):
-            force = force + grid.ends.pulled(self._end_multipliers, len(force))
-        around = LocalModel.of(motion.charts, motion.nu, motion.alpha, motion.place, force)
-        if around is None:
-            return None
-        around = around.scaled(grid.scale)
-        both = spline.changes(around.changes)
-        intervals = grid.cost.curvature(motion.samples, motion.partials, both)
-        # Rows of tolerances bend as they do, however far they are broken; not past others.
-        apart = wild and motion.breaks_hard(_WILD)
-        bending = None if apart else grid.rows.bending(motion.checked, multipliers, both)
-        if bending is not None:
-            intervals = intervals + bending
-        gradient = around.pulled(by_cost)
-        gradient.reshape(-1)[grid.held] = 0.0
-        border = grid.ends.border(motion.c, around.changes, grid.held)
-        return _Model(gradient, both, around, intervals, rows, border)
+    @property
+    def _rows(self) -> ElasticRows:
+        return ElasticRows(
+            self._h,
+            self._slacks,
+            self._elastics,
+            self._multipliers,
+            self._elastic_cost,
+            self._kept,
+        )
+
+    def _system(self, model: Model) -> System | None:
+        """Solve for a step; None where the matrix says nothing."""
+        found = System.of(self.motion, model, self._rows, self._barrier, self._shift)
+        if found is not None:
+            self._shift = found.shift
+        return found
 
     def _arrived(self) -> bool:
         """Whether the last step says that another one would promise nothing."""
@@ -415,94 +332,7 @@ class _Solver:
         left = self._elastics * (self._elastic_cost - self._multipliers)
         return float(max(by_slack, np.abs(left - self._barrier).max(initial=0.0)))
 
-    def _linear(self, model: _Model) -> _Linear | None:
-        """Return the step for any barrier; None where the matrix says nothing."""
-        grid, multipliers = self.motion.grid, self._multipliers
-        left = self._elastic_cost - multipliers
-        stiff = 1.0 / (self._slacks / multipliers + self._elastics / left)
-        gradient, intervals = model.gradient, model.intervals
-        right = np.stack([gradient.ravel(), np.zeros(gradient.size)])
-        if multipliers.size:
-            by_barrier = stiff * (1.0 / multipliers - 1.0 / left)
-            for k, pulls in enumerate((multipliers + stiff * self._h, by_barrier)):
-                push = model.rows.pulled(self._all(pulls))
-                pulled = model.around.pulled(grid.spline.scattered(push))
-                pulled.reshape(-1)[grid.held] = 0.0
-                right[k] += pulled.ravel()
-            intervals = intervals + self._stiffness(model, stiff)
-        solved = self._solved(right, model, intervals)
-        return None if solved is None else _Linear(model, stiff, right, solved)
-
-    def _step(self, linear: _Linear) -> _Change:
-        """Return Newton's step of all unknowns for the present barrier."""
-        barrier, multipliers, model = self._barrier, self._multipliers, linear.model
-        slacks, elastics, left = (
-            self._slacks,
-            self._elastics,
-            self._elastic_cost - self._multipliers,
-        )
-        step, end_multipliers = self._nodes_of(linear.solved, model)
-        right = linear.right[0] + barrier * linear.right[1]
-        self._promised = float(-(right + model.border.columns @ end_multipliers) @ step)
-        nodes = step.reshape(model.gradient.shape)
-        off = self._h + barrier / multipliers - barrier / left
-        by_multipliers = linear.stiff * (model.rows.along(_along(model.both, nodes)) + off)
-        by_slacks = barrier / multipliers - slacks - slacks / multipliers * by_multipliers
-        by_elastics = barrier / left - elastics + elastics / left * by_multipliers
-        return _Change(nodes, by_slacks, by_elastics, by_multipliers, end_multipliers)
-
-    def _nodes_of(self, solved: Array, model: _Model) -> tuple[Array, Array]:
-        """Return the step of the nodes for the present barrier, and the multipliers of the ends."""
-        own = solved[:, 0] + self._barrier * solved[:, 1]
-        return model.border.met_by(np.column_stack([own, solved[:, 2:]]))
-
-    def _stiffness(self, model: _Model, stiff: Array) -> Array:
-        """Return ∂hᵀ D ∂h on each interval, (N, 6r, 6r)."""
-        weights, both = self._all(stiff), model.both
-        count, n, _, size = both.shape
-        found = np.zeros((count, size, size))
-        of_limits = model.rows.squared(weights)
-        if of_limits is not None:
-            flat = both.reshape(count, 6 * n, size)
-            turned = (of_limits @ both).reshape(count, 6 * n, size)
-            found += np.swapaxes(flat, 1, 2) @ turned
-        of_points = model.rows.squared_points(weights, both)
-        return found if of_points is None else found + of_points
-
-    def _solved(self, right: Array, model: _Model, intervals: Array) -> Array | None:
-        """Return the steps for two right sides (2, …), and of what is asked of the ends.
-
-        `intervals` (N, 6r, 6r) are those of the model with what its rows make stiff.
-        """
-        curved, border = model.around.curvature, model.border
-        count, size = model.gradient.shape
-        largest = float(np.abs(curved).max() + np.abs(intervals).max())
-        diagonals = np.abs(np.diagonal(intervals, axis1=1, axis2=2)).ravel()
-        usual = float(np.partition(diagonals, len(diagonals) // 2)[len(diagonals) // 2])
-        flat, shift, bends = _FLAT / count**2 * usual, 0.0, np.zeros(0)
-        columns = np.column_stack([-right.T, border.columns])
-        while flat <= _MOST_SHIFT * largest and shift <= _MOST_SHIFT:
-            matrix = Banded(count, size, 1)
-            matrix.add(0, 0, curved)
-            matrix.add_pairs(0, intervals)
-            matrix.add_diagonal(_FLATTER * flat + shift * bends if shift else flat)
-            matrix.hold(self.motion.grid.held)
-            solved = matrix.solve(columns)
-            if solved is not None:
-                step, _ = self._nodes_of(solved, model)
-                if np.abs(step.reshape(count, 3, -1)[:, 0]).max() <= _TRUSTED:
-                    self._shift = shift
-                    return solved
-            if solved is not None and not shift:
-                flat = max(_MORE * flat, _LEAST_SHIFT * largest)
-            else:
-                # Most matrices need none of it.
-                if not bends.size:
-                    bends = _bends(model.intervals, curved) + _LEAST_SHIFT * largest
-                shift = max(_MORE * shift, _LESS * self._shift, _SHIFT)
-        return None
-
-    def _move(self, model: _Model, step: _Change) -> Status | None:
+    def _move(self, model: Model, step: Change) -> Status | None:
         """Go along a step as far as it does what it promises."""
         motion, r = self.motion, step.nodes.shape[1] // 3
         gap = float(np.abs(motion.c).sum() + np.abs(self._gap).sum())
@@ -557,33 +387,6 @@ class _Solver:
         gap = np.abs(motion.h[self._kept] + slacks - elastics).sum() + np.abs(motion.c).sum()
         elastic = self._elastic_cost * float(elastics.sum())
         return motion.aim + elastic - barrier + self._penalty * float(gap)
-
-
-def _bends(intervals: Array, nodes: Array) -> Array:
-    """Return how much each coordinate of the nodes bends without rows, (K,).
-
-    For matrices of intervals (N, d, d) by both ends, and of nodes (N + 1, d/2, d/2): the sums of
-    their rows, in units of what each kind of coordinate usually bends by. With that on the diagonal
-    a matrix is positive definite.
-    """
-    count, size = len(intervals), intervals.shape[1] // 2
-    own = np.abs(np.diagonal(intervals, axis1=1, axis2=2)).reshape(2 * count, size)
-    usual = np.maximum(np.median(own, axis=0), np.finfo(float).eps * own.max())
-    root = np.sqrt(np.maximum(usual, np.finfo(float).tiny))
-    both = np.tile(root, 2)
-    sums = (np.abs(intervals) / both).sum(axis=2) * both
-    found = (np.abs(nodes) / root).sum(axis=2) * root
-    found[:-1] += sums[:, :size]
-    found[1:] += sums[:, size:]
-    return np.asarray(np.maximum(found, usual).ravel())
-
-
-def _along(both: Array, step: Array) -> Array:
-    """Return how y changes along a step (N + 1, 3r), (N, 6, n)."""
-    count, n, _, size = both.shape
-    pair = np.concatenate([step[:-1], step[1:]], axis=1)
-    changes = both.reshape(count, n * 6, size) @ pair[:, :, None]
-    return np.asarray(np.swapaxes(changes.reshape(count, n, 6), 1, 2))
 
 
 def _longest(values: Array, step: Array) -> float:
