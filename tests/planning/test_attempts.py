@@ -11,6 +11,7 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.basics import Counts
+from selfmotion.planning import planner
 from selfmotion.planning.candidate import Candidate
 from selfmotion.planning.effort import Effort
 from selfmotion.planning.grids import first_nodes
@@ -142,3 +143,32 @@ def test_an_optimum_that_takes_the_arm_into_itself_goes_on_at_once(panda: sm.Rob
     assert plan.certificate.verified, plan.certificate.verdict
     assert names_of(plan) == ["given start", "finer grids and proof"]
     assert plan.report.cost > careless.report.cost
+
+
+@pytest.mark.parametrize("again", [False, True])
+def test_where_a_proof_fails_starts_are_drawn(
+    again: bool, panda_circle: Circle, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What is verified then is the plan; where nothing is, the first motion stays."""
+    problem = dataclasses.replace(panda_circle(), start=None)
+    judged = planner.judge
+    costs: list[float] = []
+
+    def failing(*given) -> planner.Judged:
+        found = judged(*given)
+        costs.append(found.motion.cost)
+        if len(costs) > 1 and not again:
+            return found
+        first, *others = found.certificate.findings
+        wrong = dataclasses.replace(first, satisfied=False, time=2.0, text="by order")
+        refused = dataclasses.replace(
+            found.certificate, findings=(wrong, *others), failures=("by order",)
+        )
+        return dataclasses.replace(found, certificate=refused)
+
+    monkeypatch.setattr(planner, "judge", failing)
+    plan = sm.plan(problem, search=sm.Search(mode="local", starts=6, finalists=2))
+    assert names_of(plan)[-1] == "starts where the proof fails"
+    assert len(costs) > 1
+    assert plan.certificate.verified != again
+    assert plan.report.cost == (costs[0] if again else costs[-1])

@@ -57,6 +57,15 @@ class Judged:
     certificate: Certificate
     rival_cost: float | None = None
 
+    @property
+    def fails_at(self) -> float | None:
+        """When [s] the certificate finds something wrong; None where it finds nothing."""
+        check = self.certificate
+        failed = [item.time for item in check.findings if not item.satisfied]
+        if not check.on_path:
+            failed.append(check.position_error.time)
+        return failed[0] if failed else None
+
 
 def judge(problem: Problem, part: Part, tolerance: Tolerance, progress: Progress) -> Judged:
     """Return what there is on the first grid on which the motion holds the tolerance."""

@@ -37,6 +37,7 @@ from selfmotion.task import SE3
 
 # Where nothing else leads to a motion that keeps the constraints, this many times more are tried.
 _SECOND_EFFORT = 4
+_WHERE_IT_BREAKS = "starts where it breaks"
 
 
 def go_through(planner: Planner) -> None:
@@ -304,6 +305,31 @@ def _plan_part_instead(planner: Planner) -> bool:
     return True
 
 
+def _draw_where_proof_fails(planner: Planner) -> bool:
+    """Draw configurations where the proof fails, if nothing was known to break there before."""
+    best, judged, search = planner.best, planner.judged, planner.search
+    if best is None or judged is None or best is not judged.part.candidate or best.is_spent:
+        return False
+    fails_at, known = judged.fails_at, {item.name for item in planner.attempts}
+    if fails_at is None or _WHERE_IT_BREAKS in known or not planner.takes_starts:
+        return False
+    if not is_on_nodes(planner.problem, planner.effort) or planner.is_out_of_reach():
+        return False
+    planner.best = planner.judged = None
+    try:
+        optimise_where_it_breaks(planner, fails_at, search.starts, search.finalists)
+        found = planner.best
+        if found is not None and found.will_do:
+            planner.judge(found)
+    finally:
+        found = planner.best
+        if planner.judged is None or not planner.judged.certificate.verified:
+            planner.best, planner.judged = best, judged
+            if found is not None and found.cut_short:
+                best.end(found.status)
+    return True
+
+
 # By name, as reports have it; each says whether it was tried.
 STEPS: tuple[tuple[str, Callable[[Planner], bool]], ...] = (
     # Look: a 'no' before anything is planned.
@@ -318,13 +344,14 @@ STEPS: tuple[tuple[str, Callable[[Planner], bool]], ...] = (
     ("postures compared", _compare_postures),
     ("proof on meshes", _judge_on_meshes),
     ("links in pieces", _take_links_apart),
-    ("starts where it breaks", _draw_where_it_breaks),
+    (_WHERE_IT_BREAKS, _draw_where_it_breaks),
     ("global search", _search_globally),
     ("more starts", _draw_more_starts),
     # Judge.
     ("largest part", _plan_largest_part),
     ("finer grids and proof", _judge),
     ("largest part instead", _plan_part_instead),
+    ("starts where the proof fails", _draw_where_proof_fails),
 )
 
 
