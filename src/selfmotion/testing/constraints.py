@@ -34,8 +34,9 @@ _INTERVALS = 8
 # Nodes by which derivatives are found, of which orders, and where.
 _NODES, _ORDERS = 13, 4
 _PLACES = np.linspace(-1.0, 1.0, 41)
-# What rounding leaves of derivatives: as a share of the series, and of the largest found.
-_ROUNDING, _SMALL = 1e-6, 1e-8
+# What rounding leaves of derivatives: as a share of the series; and so many of the last digits of
+# values are wrong, which derivatives make much larger.
+_ROUNDING, _DIGITS = 1e-6, 32.0
 
 
 def check_majorants(function: Bounded, stretch: Stretch, name: str = "a function") -> None:
@@ -59,13 +60,18 @@ def check_majorants(function: Bounded, stretch: Stretch, name: str = "a function
         raise AssertionError(f"{name}: no series on this motion")
     u = np.polynomial.chebyshev.chebpts1(_NODES)
     into = np.linalg.inv(np.polynomial.chebyshev.chebvander(u, _NODES - 1))
-    taken = np.einsum("kp,ipc->kic", into, function.values(stretch, u))
+    values = function.values(stretch, u)
+    taken = np.einsum("kp,ipc->kic", into, values)
+    wrong = _DIGITS * np.finfo(float).eps * float(np.abs(values).max(initial=0.0))
     for order in range(1, _ORDERS + 1):
         # Derivatives of the polynomial through the nodes: a limit of what rounding leaves.
         slopes = np.polynomial.chebyshev.chebder(taken, order, axis=0)
         found = np.polynomial.chebyshev.chebval(_PLACES, slopes) / math.factorial(order)
         sizes = np.sqrt(np.add.reduceat(found**2, function.blocks, axis=1)).max(axis=2)
-        allowed = known[:, order].T * (1.0 + _ROUNDING) + _SMALL * (1.0 + sizes.max())
+        made = np.polynomial.chebyshev.chebder(into, order, axis=0)
+        larger = np.abs(np.polynomial.chebyshev.chebval(_PLACES, made)).sum(axis=0).max()
+        rounding = wrong * larger / math.factorial(order)
+        allowed = known[:, order].T * (1.0 + _ROUNDING) + rounding
         # Written so that NaN fails.
         if not np.all(sizes <= allowed):
             interval, block = np.unravel_index(np.argmax(sizes - allowed), sizes.shape)
