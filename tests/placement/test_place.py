@@ -156,10 +156,10 @@ def test_several_seams_are_placed_together_and_elsewhere_alike(
         elsewhere = sm.place([first, second], box, executor=executor)
     assert elsewhere.place["x"] == pytest.approx(together.place["x"], abs=2e-3)
     assert elsewhere.cost == pytest.approx(together.cost, rel=1e-3)
-    # Two workers of a cluster try the same places.
+    # Two workers of a cluster try the same places; one of processes has a test in `batch`.
     distributed = pytest.importorskip("distributed")
     cluster = distributed.LocalCluster(
-        n_workers=2, threads_per_worker=1, processes=True, host="127.0.0.1",
+        n_workers=2, threads_per_worker=1, processes=False,
         dashboard_address=None, silence_logs=50, local_directory=str(tmp_path / "dask"),
     )  # fmt: skip
     with cluster, distributed.Client(cluster) as client:
