@@ -14,6 +14,7 @@ from rich.console import Console
 
 import selfmotion as sm
 from selfmotion.cli import tables
+from support.shell import complaint, invoke
 
 # Runs several commands in one process, each as the shell does, with a mark after each.
 SEVERAL = """
@@ -103,3 +104,27 @@ def test_the_unit_of_what_is_found_is_the_joints() -> None:
         found = sm.Problem(arm, line, "planar").certify(motion).findings
         (rest,) = (item for item in found if item.requirement == "rest")
         assert rest.unit == unit
+
+
+def test_plans_are_compared_by_costs_that_the_shell_names(tmp_path: Path) -> None:
+    """By the same ones as in Python; those of a plan's own say nothing of another's."""
+    plan = sm.plan(sm.sample_problem())
+    slower = sm.retime(plan, 1.5)
+    files = [tmp_path / "plan.npz", tmp_path / "slower.npz"]
+    for one, file in zip((plan, slower), files, strict=True):
+        one.save(file)
+    asked = ("--cost", "JointVelocity", "--cost", "JointAcceleration=0.1")
+    code, text = invoke("compare", *files, *asked, "--json")
+    assert code == 0
+    told = json.loads(text)
+    costs = [sm.costs.JointVelocity(), sm.costs.JointAcceleration(0.1)]
+    for one, file in zip((plan, slower), files, strict=True):
+        measured = told[str(file)]["measured"]
+        each = [one.evaluate(cost) for cost in costs]
+        assert [*measured.values()] == pytest.approx([*each, sum(each)], rel=1e-9)
+    code, text = invoke("compare", *files, *asked)
+    assert code == 0
+    assert "joint acceleration" in text
+    assert "total cost" in text
+    assert "measured" not in invoke("compare", *files, "--json")[1]
+    assert "expected NAME or NAME=WEIGHT" in complaint("compare", *files, "--cost", "Nothing")

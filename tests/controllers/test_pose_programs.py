@@ -525,6 +525,10 @@ def test_the_frame_of_the_path_may_be_the_work_object(name: str, tmp_path: Path)
 def test_what_work_objects_cannot_be_is_said(alone: sm.Plan, tmp_path: Path) -> None:
     with pytest.raises(sm.errors.ProblemError, match=r"600 m is far from any arm.*position_mm"):
         settings("a.mod", work_object=SE3(np.eye(3), np.array([600.0, -100.0, 200.0])))
+    # Nearer than that, and still in millimetres: no arm reaches there.
+    in_mm = settings("a.mod", work_object=SE3(np.eye(3), np.array([30.0, 0.0, 0.0])))
+    with pytest.raises(sm.errors.ProblemError, match=r"30 m away, but the arm reaches .*in m"):
+        sm.files.write_motion(alone, tmp_path / "a.mod", settings=in_mm)
     with pytest.raises(sm.errors.ProblemError) as error:
         sm.files.write_motion(alone, tmp_path / "a.mod", settings=settings("a", work_object="part"))
     assert "work_object 'part' is none of its links" in str(error.value)

@@ -238,14 +238,26 @@ def check(
 @app.command(epilog="Example: selfmotion compare a.npz b.npz", rich_help_panel=LOOK)
 def compare(
     plans: Annotated[list[Path], typer.Argument(help="Plans saved as .npz.")],
+    cost: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="NAME[=WEIGHT] that all are measured by, such as JointAcceleration=0.1. "
+            "Repeatable; by default each by the costs that it was made for."
+        ),
+    ] = None,
     as_json: options.JsonOption = False,
 ) -> None:
     """Compare plans: costs, durations, margins and verdicts, side by side."""
     saved = {str(file): sm.load_plan(file) for file in plans}
+    robots = [plan.robot for plan in saved.values()]
+    found = sm.compare(saved, costs=documents.costs_of(cost, robots[0]) if cost else None)
     if as_json:
-        terminal.print_json(data={name: summaries.plan_json(plan) for name, plan in saved.items()})
+        told = {name: summaries.plan_json(plan) for name, plan in saved.items()}
+        for number, data in enumerate(told.values() if cost else ()):
+            data["measured"] = {name: each[number] for name, each in found.costs.items()}
+        terminal.print_json(data=told)
     else:
-        tables.show_comparison(saved, terminal)
+        tables.show_comparison(found, terminal)
 
 
 @app.command(

@@ -2,7 +2,7 @@
 
 import re
 import tomllib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -11,7 +11,7 @@ from typing import Any
 import typer
 
 import selfmotion as sm
-from selfmotion.basics import read_document
+from selfmotion.basics import read_document, restore
 from selfmotion.cam import PATH_SUFFIXES, events_of, has_normals
 from selfmotion.cli import options
 from selfmotion.cli.app import StageDisplay, plan_with_progress, stages
@@ -422,6 +422,11 @@ def _typed(context: typer.Context) -> list[str]:
         if parameter.name in names
         and str(context.get_parameter_source(parameter.name or "")).endswith("COMMANDLINE")
     ]
+
+
+def costs_of(texts: Sequence[str], robot: sm.RobotModel) -> list[sm.costs.Cost]:
+    """Return the costs that are named as NAME or NAME=WEIGHT, for an arm."""
+    return [restore(sm.costs.Cost, _cost(text), robot=robot) for text in texts]
 
 
 def _cost(text: str) -> dict[str, Any]:

@@ -15,7 +15,7 @@ from rich.table import Table
 from selfmotion.certificate import LIMIT_NAMES, Certificate, Extreme, Finding
 from selfmotion.cli.summaries import in_shell, metres_told
 from selfmotion.job import Program
-from selfmotion.result import Gap, Plan, Report, compare
+from selfmotion.result import Comparison, Gap, Plan, Report
 from selfmotion.robot import RobotModel
 from selfmotion.task import Task
 
@@ -172,9 +172,8 @@ def _in_mm(near: Extreme | None) -> Extreme | None:
     return None if near is None else replace(near, value=1e3 * near.value)
 
 
-def show_comparison(plans: Mapping[str, Plan], console: Console) -> None:
+def show_comparison(found: Comparison, console: Console) -> None:
     """Print a column per plan: its costs, and the worst that its check found."""
-    found = compare(plans)
     table = _table("plans side by side")
     table.add_column("")
     for name in found.names:

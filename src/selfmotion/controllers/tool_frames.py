@@ -33,6 +33,8 @@ _TURNED, _SAME = 1e-6, 1e-9
 Rounding = Callable[[Array, Array], tuple[Array, Array]]
 # Digits behind the point: of mm, degrees, parts of quaternions, and of m and rad.
 _MM, _DEGREES, _PARTS, _SI = 4, 5, 8, 9
+# A work object farther away than so many times the arm's reach is in another unit.
+_FAR_IN_REACHES = 20.0
 
 
 def krl_numbers(place: Array, turn: Array) -> list[float]:
@@ -173,6 +175,7 @@ class ToolFrames:
         if given is None:
             given = robot.reference or work
         elif isinstance(given, SE3):
+            _check_near(robot, given)
             name = "given"
         elif given == OF_PATH:
             given, inside = robot.reference or robot.urdf.root, path_frame or inside
@@ -387,6 +390,16 @@ def _placed(path: Path) -> SE3:
         return frame_of_paths(path.pieces)
     inner = getattr(path, "original", None)
     return SE3.Identity() if inner is None else _placed(inner)
+
+
+def _check_near(robot: RobotModel, work: SE3) -> None:
+    """Raise ProblemError for a work object that the arm is far from reaching."""
+    far = float(np.linalg.norm(work.translation))
+    if far > _FAR_IN_REACHES * robot.reach:
+        raise ProblemError(
+            f"{robot.name}: the work object is {far:.4g} m away, but the arm reaches "
+            f"{robot.reach:.3g} m; in millimetres? It is in m (position_mm in files)"
+        )
 
 
 def _check_link(robot: RobotModel, link: str) -> None:
