@@ -35,8 +35,6 @@ from selfmotion.result import Attempt
 from selfmotion.search import Obstruction, obstruction
 from selfmotion.task import SE3
 
-# Where nothing else leads to a motion that keeps the constraints, this many times more are tried.
-_SECOND_EFFORT = 4
 _WHERE_IT_BREAKS = "starts where it breaks"
 
 
@@ -205,14 +203,15 @@ def _take_links_apart(planner: Planner) -> bool:
 
 
 def _draw_where_it_breaks(planner: Planner) -> bool:
-    """Draw configurations where the best motion breaks something most, at another time."""
+    """Draw configurations where the best motion breaks something most."""
     best, search = planner.best, planner.search
     wanted = planner.is_sought and planner.takes_starts and planner.is_unmet
     if best is None or not wanted or planner.is_out_of_reach():
         return False
-    breaks_at = best.breaks_at
-    if breaks_at is None or not is_on_nodes(planner.problem, planner.effort):
+    if not is_on_nodes(planner.problem, planner.effort):
         return False
+    # Of what is asked of the ends, and of an arm that meets itself, no time is told: others there.
+    breaks_at = best.breaks_at or 0.0
     optimise_where_it_breaks(planner, breaks_at, search.starts, search.finalists)
     return True
 
@@ -224,20 +223,6 @@ def _search_globally(planner: Planner) -> bool:
     if not (planner.is_sought and wanted and can) or planner.is_out_of_reach():
         return False
     optimise_sequences(planner, chosen=planner.chooses_globally)
-    return True
-
-
-def _draw_more_starts(planner: Planner) -> bool:
-    """Draw many more starts, unless a search was in vain.
-
-    One through all self-motions knows that nothing will help; after one that samples them, more
-    starts find a motion so rarely that a 'no' should not wait several times as long for them.
-    """
-    search, more = planner.search, _SECOND_EFFORT
-    wanted = planner.is_unmet and not planner.notes
-    if not (planner.is_sought and planner.takes_starts and wanted) or planner.is_out_of_reach():
-        return False
-    optimise_starts(planner, more * search.starts, more * search.finalists)
     return True
 
 
@@ -346,7 +331,6 @@ STEPS: tuple[tuple[str, Callable[[Planner], bool]], ...] = (
     ("links in pieces", _take_links_apart),
     (_WHERE_IT_BREAKS, _draw_where_it_breaks),
     ("global search", _search_globally),
-    ("more starts", _draw_more_starts),
     # Judge.
     ("largest part", _plan_largest_part),
     ("finer grids and proof", _judge),
