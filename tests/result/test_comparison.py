@@ -85,7 +85,7 @@ def test_its_text_has_a_line_for_each_number(plans: dict[str, sm.Plan]) -> None:
 
 def test_the_shell_shows_the_same_cells(plans: dict[str, sm.Plan]) -> None:
     page = io.StringIO()
-    tables.show_comparison(plans, Console(file=page, width=120))
+    tables.show_comparison(sm.compare(plans), Console(file=page, width=120))
     shown = [line.split() for line in page.getvalue().splitlines()]
     for row in sm.compare(plans).cells():
         assert " ".join(row).split() in shown
