@@ -285,3 +285,12 @@ def test_a_start_or_an_end_beyond_tolerances_is_refused() -> None:
     later = [sm.Relaxation(("rx", "ry"), 0.2, during=(1.0, 2.0))]
     with pytest.raises(sm.errors.StartError, match=r"0.198 rad off"):
         sm.Problem(robot, path, "pose", start, relaxations=later)
+
+
+def test_parts_are_one_where_a_start_leans() -> None:
+    """The search for parts knows the path itself alone, which no step leads to from there."""
+    cone = [sm.Relaxation(("rx", "ry"), 0.2)]
+    robot, start, path = leaning("panda", WITHIN)
+    parts = sm.plan_in_parts(sm.Problem(robot, path, "pose", start, relaxations=cone))
+    assert len(parts.plans) == 1
+    assert parts.verified

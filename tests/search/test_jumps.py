@@ -52,6 +52,7 @@ def test_steps_of_a_motion_are_no_jumps_and_changes_of_branch_are(name: str, tas
     assert not jumps_of(problem, t[:-3], t[3:], q[:-3], q[3:]).any()
     other = turned_over(problem, t[10], q[10])
     broken = np.array([*q[:10], other, *q[11:]])
+    assert jumps_of(problem, t[:0], t[:0], q[:0], q[:0]).shape == (0,)
     found = jumps_of(problem, t[:-1], t[1:], broken[:-1], broken[1:])
     assert found[[9, 10]].any()
     assert not np.delete(found, [9, 10]).any()

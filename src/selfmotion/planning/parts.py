@@ -314,8 +314,9 @@ def _parts(
     tolerance: Tolerance,
     progress: Progress,
 ) -> Parts:
-    # Samples of curves tell whether parts are needed; those of larger spaces may miss a way or two.
-    missed = 0 if has_curves(problem) else _MISSED_CUTS
+    # Samples of curves tell whether parts are needed; those of larger spaces may miss a way or two,
+    # and all are on the path itself.
+    missed = _MISSED_CUTS if problem.relaxations or not has_curves(problem) else 0
     refused, chains = None, []
     try:
         stretches = Stretches.of(problem, rng, progress)

@@ -105,7 +105,8 @@ def jumps_of(problem: Problem, early: Array, late: Array, here: Array, there: Ar
     whole = np.concatenate([here[:, None], between, there[:, None]], axis=1)
     parts = np.linalg.norm(np.diff(whole, axis=1), axis=2).max(axis=1)
     most = np.maximum(_JUMP_SHARE * np.linalg.norm(there - here, axis=1), _LEAST_JUMP)
-    return np.asarray((parts > most) | ~arrived.reshape(len(here), -1).all(axis=1))
+    # Also where there are no steps at all.
+    return np.asarray((parts > most) | ~arrived.reshape(len(here), len(share)).all(axis=1))
 
 
 @dataclass(frozen=True, eq=False)
