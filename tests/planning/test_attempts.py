@@ -10,7 +10,7 @@ import pinocchio as pin
 import pytest
 
 import selfmotion as sm
-from selfmotion.basics import Counts
+from selfmotion.basics import BreakdownError, Counts
 from selfmotion.planning import planner
 from selfmotion.planning.candidate import Candidate
 from selfmotion.planning.effort import Effort
@@ -172,3 +172,22 @@ def test_where_a_proof_fails_starts_are_drawn(
     assert len(costs) > 1
     assert plan.certificate.verified != again
     assert plan.report.cost == (costs[0] if again else costs[-1])
+
+
+def test_where_no_motion_goes_on_others_begin(
+    panda_circle: Circle, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """All that begin at the start of the path break down on the way."""
+    begin = planner.Planner.begin
+
+    def failing(self: planner.Planner, start, **given):
+        if any(item.name == "starts" for item in self.attempts):
+            return begin(self, start, **given)
+        self.failure = BreakdownError("by order", time=2.0)
+        return None
+
+    monkeypatch.setattr(planner.Planner, "begin", failing)
+    problem = dataclasses.replace(panda_circle(), start=None)
+    plan = sm.plan(problem, search=sm.Search(mode="local", starts=6, finalists=2))
+    assert "starts where it breaks" in names_of(plan)
+    assert plan.certificate.verified

@@ -8,6 +8,7 @@ judged, on finer grids until its certificate finds nothing wrong, or a part of i
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from typing import cast
 
 import numpy as np
 
@@ -203,16 +204,16 @@ def _take_links_apart(planner: Planner) -> bool:
 
 
 def _draw_where_it_breaks(planner: Planner) -> bool:
-    """Draw configurations where the best motion breaks something most."""
-    best, search = planner.best, planner.search
+    """Draw configurations where the best motion breaks something most, or where none goes on."""
+    best, failure, search = planner.best, planner.failure, planner.search
     wanted = planner.is_sought and planner.takes_starts and planner.is_unmet
-    if best is None or not wanted or planner.is_out_of_reach():
+    if not (wanted and is_on_nodes(planner.problem, planner.effort)) or planner.is_out_of_reach():
         return False
-    if not is_on_nodes(planner.problem, planner.effort):
+    if best is None and not isinstance(failure, BreakdownError):
         return False
     # Of what is asked of the ends, and of an arm that meets itself, no time is told: others there.
-    breaks_at = best.breaks_at or 0.0
-    optimise_where_it_breaks(planner, breaks_at, search.starts, search.finalists)
+    at = best.breaks_at if best is not None else cast(BreakdownError, failure).time
+    optimise_where_it_breaks(planner, at or 0.0, search.starts, search.finalists)
     return True
 
 
