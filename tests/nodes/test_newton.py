@@ -238,7 +238,7 @@ class OnTheMove(sm.constraints.Constraint):
 def test_what_costs_next_to_nothing_keeps_what_costs_much(
     panda: sm.RobotModel, radius: float
 ) -> None:
-    """A tool that hardly moves, and a joint that has to: F is as much as a million times higher."""
+    """A tool that hardly moves, and a joint that has to: F is up to 35,000 times as high then."""
     path = sm.paths.Circle.around(panda.pose(PANDA_HOME), radius, 4.0, normal=(1.0, 0.0, 0.0))
     moving = (OnTheMove(0.05),)
     case = panda, "position", PANDA_HOME, path
