@@ -161,6 +161,26 @@ def test_the_nearest_of_few_poses_is_that_of_all(
     assert plan.check().smallest_singular_value == every
 
 
+@pytest.mark.parametrize("most", [20, 40, 100])
+def test_of_many_loops_the_nearest_pose_is_found(
+    most: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each has a dip, between two of the few poses that are looked at first."""
+    robot, t = robot_named("panda"), np.linspace(0.0, 40.0, 201)
+    angle, first = 0.5 * np.pi * t, robot.pose(PANDA_HOME)
+    poses = [first.copy() for _ in t]
+    for pose, s, a in zip(poses, t, angle, strict=True):
+        pose.translation += 0.12 * np.array([0.02 * s, np.sin(a), np.cos(a) - 1.0])
+    path = sm.paths.Waypoints.from_poses(t, poses)
+    plan = sm.plan(
+        sm.Problem(robot, path, "pose", PANDA_HOME, rest=False, constraints=(), clearance=None)
+    )
+    monkeypatch.setattr(check, "_MOST_POSES", 1_000_000)
+    every = plan.check().smallest_singular_value
+    monkeypatch.setattr(check, "_MOST_POSES", most)
+    assert plan.check().smallest_singular_value == every
+
+
 def test_long_motions_tell_how_far_their_check_is() -> None:
     robot, q = robot_named("panda"), robot_named("panda").dexterous_configuration()
     t = np.linspace(0.0, 10.0, 5001)

@@ -36,7 +36,7 @@ from selfmotion.robot import RobotModel
 from selfmotion.task import DampingLaw, Relaxation, Task
 
 # Of a long motion the distance from singular poses, which proves nothing, is looked at so often,
-# and then at all times around where it is smallest.
+# and then at all times around where it may be smallest.
 _MOST_POSES = 2_000
 # Files write times in some digits: a motion may end so much before or after its path [s], where all
 # is within the tolerance until both have ended.
@@ -214,12 +214,23 @@ def _because(time: float, damped: tuple[DampedStretch, ...]) -> str:
 
 
 def _near_singular(follows: Follows, trajectory: Trajectory, t: Array) -> Array:
-    """Return those of times t (K,) around which the arm is nearest to a singular pose."""
+    """Return those of times t (K,) around which the arm may be nearest to a singular pose.
+
+    Wherever a few values, less by what they change nearby, are below the least of all: of many
+    loops each one has a dip.
+    """
     every = 1 + len(t) // _MOST_POSES
     if every == 1:
         return t
-    nearest = int(np.argmin(smallest_singular_values(follows, trajectory(t[::every]))))
-    return t[max(0, nearest - 1) * every : (nearest + 1) * every + 1]
+    few = smallest_singular_values(follows, trajectory(t[::every]))
+    change = np.abs(np.diff(few, append=few[-1]))
+    nearby = np.maximum(change, np.maximum(np.append(change[1:], 0.0), np.append(0.0, change[:-1])))
+    may_be = few - nearby < few.min()
+    may_be[np.argmin(few)] = True
+    # All between one of these and those beside it.
+    between = np.repeat(may_be | np.append(may_be[1:], False), every)[: len(t)]
+    between[1:] |= between[:-1].copy()
+    return np.asarray(t[between])
 
 
 def _least(values: Array, t: Array, name: str) -> Extreme:
