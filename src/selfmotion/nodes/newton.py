@@ -246,8 +246,7 @@ class _Solver:
         if system is None:
             return Status.GRADIENT
         while True:
-            step = system.step(self._barrier)
-            self._promised = step.promised
+            step = self._step(system)
             last = not self._multipliers.size or self._barrier <= self._least
             self._changing = self._share_of(step.multipliers)
             there = last and self._is_there() and self._changing <= _SETTLED
@@ -255,9 +254,7 @@ class _Solver:
                 system = self._system(model)
                 if system is None:
                     return Status.GRADIENT
-                step = system.step(self._barrier)
-                self._promised = step.promised
-                return self._move(model, step)
+                return self._move(model, self._step(system))
             if there:
                 self._end_multipliers = step.end_multipliers
                 return Status.CONVERGED
@@ -282,6 +279,12 @@ class _Solver:
         if found is not None:
             self._shift = found.shift
         return found
+
+    def _step(self, system: System) -> Change:
+        """Return the step for the present barrier."""
+        step = system.step(self._barrier)
+        self._promised = step.promised
+        return step
 
     def _arrived(self) -> bool:
         """Whether the last step says that another one would promise nothing."""
