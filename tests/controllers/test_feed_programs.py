@@ -352,7 +352,7 @@ def test_clearances_decide_how_far_the_arm_may_be_off(abb: sm.RobotModel, tmp_pa
     tight = replace(plan, problem=held)
     tight = replace(tight, certificate=tight.check()).require()
     sm.files.write_motion(tight, file, settings=settings("weld.mod"))
-    motion = read_program(file, abb).along(seam)
+    motion = read_program(file, abb).motions(seam)[0]
     assert (motion.q >= q.min(axis=0) - room - 1e-6).all()
     assert (motion.q <= q.max(axis=0) + room + 1e-6).all()
 
@@ -464,7 +464,7 @@ def test_feeds_that_change_are_a_motion_each(abb: sm.RobotModel, tmp_path: Path,
     (stretch,) = read_poses(file, SLIDES).stretches
     np.testing.assert_allclose(stretch.speeds, [2.0 * FEED, FEED, 2.0 * FEED], rtol=1e-6)
     assert measured(plan, file).position <= program_miss(plan, file)[1].path.position + ROUNDED
-    read_program(file, abb).along(seam)
+    read_program(file, abb).motions(seam)[0]
     # Without the targets where they change all of it is as fast as at its ends.
     whole = stretch_of(file, abb)
     alone = replace(
@@ -551,7 +551,7 @@ def test_seams_with_weaves_are_read_as_they_are_written(abb: sm.RobotModel, tmp_
     sm.files.write_motion(plan, file, settings=settings("weld.mod"))
     stretch = stretch_of(file, abb)
     assert np.diff(stretch.lengths).min() < ZONE
-    certificate = plan.problem.certify(read_program(file, abb).along(seam), WITHIN)
+    certificate = plan.problem.certify(read_program(file, abb).motions(seam)[0], WITHIN)
     assert certificate.position_error.value < WITHIN.position
     far = measured(plan, file)
     assert far.position <= program_miss(plan, file)[1].path.position + ROUNDED

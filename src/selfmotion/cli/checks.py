@@ -58,11 +58,32 @@ def requirements(
 
 
 class Read(NamedTuple):
-    """A motion of a file, what it may miss its path by, and the program that it is of, if any."""
+    """A motion of a file, what it may miss its path by, and the program that it is of, if any.
+
+    Of a program the motion has to be judged by each way in which a controller may make it.
+    """
 
     motion: sm.Trajectory
     within: sm.Tolerance | None
     program: controllers.ControllerProgram | None = None
+
+    def ways(self, path: sm.paths.Path, robot: sm.RobotModel) -> list[sm.Trajectory]:
+        """Return the motions that are judged along a path."""
+        found = [self.motion] if self.program is None else self.program.motions(path)
+        return [controllers.without_followers(motion, robot) for motion in found]
+
+    def besides(
+        self, robot: sm.RobotModel, constraints: Sequence[sm.constraints.Constraint]
+    ) -> tuple[str, ...]:
+        """Return what speaks against a program besides its motion."""
+        program = self.program
+        if program is None:
+            return ()
+        return (
+            *([program.begins_elsewhere] if program.begins_elsewhere else []),
+            *controllers.misswitched(program, None),
+            *controllers.unlike(program, robot, constraints),
+        )
 
 
 def read(file: Path, degrees: bool, within: sm.Tolerance | None, robot: sm.RobotModel) -> Read:
@@ -87,11 +108,9 @@ def is_program(file: Path) -> bool:
     return file.suffix.lower() in controllers.READ_PROGRAMS
 
 
-def with_failure(certificate: sm.Certificate, text: str) -> sm.Certificate:
-    """Return a certificate with what else speaks against a motion; the same for ""."""
-    if not text:
-        return certificate
-    return replace(certificate, failures=(*certificate.failures, text))
+def with_failures(certificate: sm.Certificate, texts: Sequence[str]) -> sm.Certificate:
+    """Return a certificate with what else speaks against a motion."""
+    return replace(certificate, failures=(*certificate.failures, *texts))
 
 
 def left_to_controller(program: controllers.ControllerProgram | None) -> dict[str, str]:
@@ -163,23 +182,26 @@ def of_problem(
     And the program that it is.
     """
     problem, tolerance, ending = _asked_by(Path(asked), progress)
-    motion, within, program = read(file, degrees, within, problem.robot)
-    elsewhere = ""
+    given = read(file, degrees, within, problem.robot)
+    motions, program = given.ways(problem.path, problem.robot), given.program
+    against = given.besides(problem.robot, problem.constraints)
     if program is not None:
         problem = controllers.by_targets(problem)
-        motion, elsewhere = program.along(problem.path), program.begins_elsewhere
-        begin = motion.of_joints(problem.robot.joint_names).q[0]
+        begin = motions[0].of_joints(problem.robot.joint_names).q[0]
         problem = controllers.as_shifted(problem, program, begin)
         if controllers.shift_told(program):
             stages.print(f"note: {controllers.shift_told(program)}", markup=False, soft_wrap=True)
-    motion = controllers.without_followers(motion, problem.robot)
     if calibration is not None:
         problem = on_calibrated(problem, calibration)
-        tell_difference(problem.robot, motion)
+        tell_difference(problem.robot, motions[0])
     besides = requirements(problem.robot, *judged)
-    allowed, robot = within or tolerance, problem.robot
-    certificate = problem.certify(motion, allowed, ending, besides, progress)
-    certificate = with_failure(certificate, elsewhere)
+    allowed, robot = given.within or tolerance, problem.robot
+
+    def certify(motion: sm.Trajectory) -> sm.Certificate:
+        return problem.certify(motion, allowed, ending, besides, progress)
+
+    certificate, motion = controllers.judged_ways(motions, certify)
+    certificate = with_failures(certificate, against)
     close = near(robot, motion, (*problem.requirements, *besides))
     return certificate, close, robot, program
 

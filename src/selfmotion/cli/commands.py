@@ -213,18 +213,20 @@ def check(
                 packages=packages or (),
                 calibration=calibration,
             )
-            motion, stated, program = checks.read(file, degrees, within, arm)
-            motion = controllers.without_followers(motion, arm)
+            found = checks.read(file, degrees, within, arm)
+            program = found.program
             # Accelerations of a program are the controller's.
             asked = checks.requirements(arm, *judged, usual=program is None, apart=not no_collision)
             followed = documents.followed(path, context.params, arm)
-            elsewhere = ""
-            if program is not None:
-                motion, elsewhere = program.along(followed), program.begins_elsewhere
-            certificate = sm.certify(
-                arm, followed, task or "pose", motion, stated, asked, progress=display.stage
-            )
-            certificate = checks.with_failure(certificate, elsewhere)
+            stated = found.within
+
+            def certify(motion: sm.Trajectory) -> sm.Certificate:
+                return sm.certify(
+                    arm, followed, task or "pose", motion, stated, asked, progress=display.stage
+                )
+
+            certificate, motion = controllers.judged_ways(found.ways(followed, arm), certify)
+            certificate = checks.with_failures(certificate, found.besides(arm, ()))
             near = checks.near(arm, motion, asked)
     if as_json:
         data = summaries.certificate_json(certificate, near)

@@ -134,6 +134,7 @@ def export(
             markup=False,
             soft_wrap=True,
         )
+    _tell_held(made.robot)
     _finish(made, rate, verdicts, sound, as_json, sampled=bool(streamed))
 
 
@@ -150,6 +151,13 @@ def _tell_followers(robot: sm.RobotModel, out: list[Path], form: str | None) -> 
             markup=False,
             soft_wrap=True,
         )
+
+
+def _tell_held(robot: sm.RobotModel) -> None:
+    """Print which joints have to stand where while the motion runs."""
+    text = controllers.held_in_words(robot)
+    if text:
+        stages.print(f"note: {text}", markup=False, soft_wrap=True)
 
 
 def _check_verified(made: reread.Made, force: bool, as_json: bool) -> None:

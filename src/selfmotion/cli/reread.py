@@ -109,7 +109,7 @@ def _confirmed(made: Made, target: Path) -> tuple[bool, str]:
                 f"{1e3 * miss.position:.3g} mm and {miss.rotation:.2g} rad {where} "
                 f"({1e3 * said.position:.3g} mm are stated in the file)"
             )
-    switched = controllers.misswitched(read, made) if isinstance(made, sm.Program) else ()
+    switched = controllers.misswitched(read, made)
     kept &= not switched
     far = f", between which the tool is at most {', and '.join(told)}" if told else ""
     remark, at_feeds = read.remark, read.within is not None

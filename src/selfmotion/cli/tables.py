@@ -58,7 +58,8 @@ def show(plan: Plan, console: Console) -> None:
     )
     if len(report.attempts) > _USUAL_ATTEMPTS:
         console.print(_tried(report))
-    if report.remaining is not None and report.cost:
+    # Of a motion that breaks constraints the estimate is of no use: what it saves is not to be had.
+    if report.remaining is not None and report.cost and plan.certificate.verified:
         share = 100.0 * report.remaining / abs(report.cost)
         told = f"about {share:.2g} %" if share >= 0.01 else "less than 0.01 %"
         console.print(f"further saving possible: {told} (estimate)")

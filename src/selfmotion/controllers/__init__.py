@@ -11,6 +11,7 @@ from selfmotion.controllers.judged_programs import (
     as_shifted as as_shifted,
     judged_motion as judged_motion,
     judged_program as judged_program,
+    judged_ways as judged_ways,
     keeps_stated as keeps_stated,
     misswitched as misswitched,
     of_the_controller as of_the_controller,
@@ -19,6 +20,7 @@ from selfmotion.controllers.judged_programs import (
     read_program as read_program,
     shift_told as shift_told,
     stated_deviation as stated_deviation,
+    unlike as unlike,
 )
 from selfmotion.controllers.motion_tables import (
     followers as followers,
@@ -34,6 +36,9 @@ from selfmotion.controllers.motions import (
     read_parts as read_parts,
     write_motion as write_motion,
     write_parts as write_parts,
+)
+from selfmotion.controllers.program_facts import (
+    held_in_words as held_in_words,
 )
 from selfmotion.controllers.program_settings import (
     ProgramSettings as ProgramSettings,

@@ -9,6 +9,7 @@ import numpy as np
 from selfmotion.basics import FileFormatError, text_of
 from selfmotion.certificate import Tolerance
 from selfmotion.controllers.controller_program import ControllerProgram, Switch
+from selfmotion.controllers.program_facts import Load, ProgramFacts
 from selfmotion.controllers.program_settings import Axis
 from selfmotion.controllers.program_texts import BECAUSE, KEPT, PLANNED, TIMED
 from selfmotion.controllers.read_stretches import (
@@ -117,7 +118,7 @@ class Lines:
                 return self.duration(found[1])
         return None
 
-    def _joints(self) -> dict[str, tuple[str, bool]]:
+    def joints(self) -> dict[str, tuple[str, bool]]:
         """Return what comments say of axes: axis → its joint, and whether that slides."""
         said = next((note for note in self.notes if note.startswith("axes: ")), "axes: ")
         joints: dict[str, tuple[str, bool]] = {}
@@ -176,6 +177,7 @@ class Lines:
         switches: Sequence[Switch] = (),
         places: Places | None = None,
         robot: RobotModel | None = None,
+        load: Load | None = None,
     ) -> ControllerProgram:
         """Return the program of rows of targets, and of what is switched.
 
@@ -186,7 +188,7 @@ class Lines:
         """
         if not name:
             raise FileFormatError(f"{self._file}: has no beginning of a program")
-        said = self._joints()
+        said = self.joints()
         # Robots of fewer axes have numbers in the places of those they lack.
         kept = [k for k, axis in enumerate(present) if axis in said or not said]
         axes = tuple(Axis(present[k], *said.get(present[k], (present[k], False))) for k in kept)
@@ -218,6 +220,8 @@ class Lines:
             self.within(),
             tuple(dict.fromkeys(self._after(TIMED))),
             follower.approach,
+            ProgramFacts.stated(self.notes),
+            load,
         )
 
 

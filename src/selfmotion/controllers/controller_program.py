@@ -10,8 +10,10 @@ import numpy as np
 
 from selfmotion.basics import FileFormatError, Flags, ProblemError, Progress, nearest, silent
 from selfmotion.certificate import Tolerance
+from selfmotion.constraints import Constraint
 from selfmotion.controllers.feed_stretches import FeedStretch
 from selfmotion.controllers.feed_thinning import FeedSpan
+from selfmotion.controllers.program_facts import Load, ProgramFacts, check_load
 from selfmotion.controllers.program_settings import (
     OF_PATH,
     Axis,
@@ -32,7 +34,14 @@ from selfmotion.controllers.program_texts import (
     stated,
 )
 from selfmotion.controllers.read_stretches import SLOWLY
-from selfmotion.controllers.stretches import NO_MISS, Misses, PoseStretch, Stretch, miss_of
+from selfmotion.controllers.stretches import (
+    NO_MISS,
+    Knots,
+    Misses,
+    PoseStretch,
+    Stretch,
+    miss_of,
+)
 from selfmotion.controllers.targets import NotByPosesError, PosedSpans, PoseSpan, stretches_of
 from selfmotion.controllers.thinning import TIME_DIGITS, Piece, Span, pieces_of
 from selfmotion.controllers.tool_frames import (
@@ -98,6 +107,10 @@ class ControllerProgram:
         Why seams with a feed have times all the same, each reason once.
     approach : float
         How far joints go slowly from the axis target at its begin to its first pose [rad or m].
+    facts : ProgramFacts or None
+        What its head states that it rests on; None where it states nothing.
+    load : Load or None
+        What it says that the flange carries; None where it leaves that to the controller.
     """
 
     name: str
@@ -111,6 +124,8 @@ class ControllerProgram:
     within: Tolerance | None = None
     timed: tuple[str, ...] = ()
     approach: float = 0.0
+    facts: ProgramFacts | None = None
+    load: Load | None = None
 
     @property
     def targets(self) -> int:
@@ -139,27 +154,36 @@ class ControllerProgram:
         FileFormatError
             There is none.
         """
-        return self._motion(None)
+        return self.motions()[0]
 
-    def along(self, path: Path) -> Trajectory:
-        """Return the motion at the pace of the path of its seam: ramps are those of the plan.
+    def motions(self, path: Path | None = None) -> list[Trajectory]:
+        """Return what a controller may make of it, by each way in which it may join targets.
+
+        The cubic spline comes first. With a path, seams at speeds are at its pace: ramps are those
+        of the plan.
 
         Raises
         ------
         FileFormatError
-            A speed is another one than the path has.
+            There is none, or a speed is another one than the path has.
         """
-        return self._motion(path)
-
-    def _motion(self, path: Path | None) -> Trajectory:
-        t, q, qd = [np.zeros(1)], [self.stretches[0].q[:1]], [0.0 * self.stretches[0].q[:1]]
+        parts, begin = list[list[Knots]](), 0.0
         for stretch in self.stretches:
-            times, places, rates = stretch.t, stretch.q, 0.0 * stretch.q
             if path is not None and isinstance(stretch, FeedStretch):
-                times, places, rates = stretch.along(path, float(t[-1][-1]))
-            elif not stretch.is_rest:
-                times, places, rates = stretch.knots()
-            rates[[0, -1]] = 0.0
+                own = stretch.along(path, begin)
+            elif stretch.is_rest:
+                own = [Knots(stretch.t, stretch.q, 0.0 * stretch.q)]
+            else:
+                own = stretch.joined()
+            parts.append(own)
+            begin += float(own[0].t[-1])
+        # Where a stretch has fewer ways, its last one stands for the others.
+        count = max(len(own) for own in parts)
+        return [self._motion([own[min(k, len(own) - 1)] for own in parts]) for k in range(count)]
+
+    def _motion(self, parts: Sequence[Knots]) -> Trajectory:
+        t, q, qd = [np.zeros(1)], [parts[0].q[:1]], [0.0 * parts[0].q[:1]]
+        for times, places, rates in parts:
             t.append(t[-1][-1] + times[1:])
             q.append(places[1:])
             qd.append(rates[1:])
@@ -218,6 +242,7 @@ class Draft:
     tool: SE3
     settings: ProgramSettings
     verdict: str
+    facts: ProgramFacts
     frames: ToolFrames | None = None
 
     def signal(self, event: str) -> Signal | None:
@@ -256,7 +281,8 @@ def drafted(
     check_controller(plan.robot, form, settings)
     robot, pieces = plan.robot, pieces_of(plan)
     axes = axes_of(robot, settings)
-    check_signals({event: item.name for item in pieces for _, event in item.events}, settings)
+    happens = {event: item.name for item in pieces for _, event in item.events}
+    check_signals(happens, settings)
     slides = np.array([axis.slides for axis in axes])
     given = pieces, slides, settings.deviation, settings.move_deviation, progress
     frames, why = None, ""
@@ -289,7 +315,24 @@ def drafted(
         name, ordered, sorted_ones, stated, remark=plain(why), within=within
     )
     tool = tool_from_flange(robot, settings)
-    return Draft(program, robot, tool, settings, verdict, frames)
+    facts = ProgramFacts.of(robot, settings, list(happens), by_poses=frames is not None)
+    if settings.mass is not None:
+        load = Load(settings.mass, np.array(settings.center))
+        check_load(load, robot, _constraints_of(plan), facts.flange)
+    return Draft(program, robot, tool, settings, verdict, facts, frames)
+
+
+def _constraints_of(plan: Plan | Parts | Move | Program) -> list[Constraint]:
+    """Return all that the parts of a motion had to keep."""
+    match plan:
+        case Plan():
+            return list(plan.problem.constraints)
+        case Move():
+            return list(plan.constraints)
+        case Program():
+            return [item for step in plan.steps for item in _constraints_of(step.made)]
+    parts: list[Plan | Move] = [*plan.plans, *plan.moves]
+    return [item for part in parts for item in _constraints_of(part)]
 
 
 def _paths_of(plan: Plan | Parts | Move | Program) -> list[Path]:
@@ -386,6 +429,7 @@ def head(draft: Draft) -> list[str]:
         plain(f"selfmotion: {draft.robot.name}, {program.targets} {targets}"),
         *folded(plain(draft.verdict)),
         *folded(plain(f"axes: {axes}")),
+        *draft.facts.lines,
         *_of_speeds(program),
         f"deviation: {stated(program.miss.path)}",
         *([] if moves == NO_MISS else [f"deviation of moves: {stated(moves)}"]),

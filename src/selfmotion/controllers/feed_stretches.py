@@ -11,7 +11,7 @@ import numpy as np
 
 from selfmotion.basics import Array, FileFormatError
 from selfmotion.controllers.steps import put_on_arcs, step_lengths
-from selfmotion.controllers.stretches import PoseStretch, finer, straight
+from selfmotion.controllers.stretches import Knots, PoseStretch, finer, straight
 from selfmotion.controllers.tool_frames import ToolFrames
 from selfmotion.motion import Trajectory
 from selfmotion.path import Path, times_when
@@ -221,12 +221,17 @@ class FeedStretch(PoseStretch):
 
     def ways(self, times: Array) -> list[Array]:
         """See `Stretch.ways`: its steps, with corners rounded in their zones, a smooth curve."""
-        found = [self._stepped(times)]
+        return [self._joints(way(times), times)[:, self.order] for way in self._ways]
+
+    @property
+    def _ways(self) -> list[Callable[[Array], Array]]:
+        """Times → rows of poses by each way in which a controller may go, the stated one first."""
+        found: list[Callable[[Array], Array]] = [self._stepped]
         if len(self.t) > 2:
-            found.append(self._rounded(times))
+            found.append(self._rounded)
             if not np.isfinite(self.vias).any():
-                found.append(self._spline(times))
-        return [self._joints(rows, times)[:, self.order] for rows in found]
+                found.append(self._spline)
+        return found[::-1] if self.is_spline else found
 
     def smooth(self) -> tuple[Array, Array, Array]:
         """See `Stretch.smooth`: with its ramps."""
@@ -235,6 +240,11 @@ class FeedStretch(PoseStretch):
         times = np.unique(np.concatenate([times, ends, self.seconds - ends]))
         times = times[np.append(np.diff(times) > 1e-9, True)]
         times[-1] = self.seconds
+        return self._driven(times, self.ramps.passed(times))[0]
+
+    def joined(self) -> list[Knots]:
+        """See `Stretch.joined`: with its ramps."""
+        times = self.smooth()[0]
         return self._driven(times, self.ramps.passed(times))
 
     def matched(self, motion: Trajectory, first: float) -> Array:
@@ -242,13 +252,13 @@ class FeedStretch(PoseStretch):
         gone = PassedLength.of_motion(self.frames, motion, first, first + self.seconds)
         return motion(np.clip(gone.when(self._shares * gone.whole), motion.t[0], motion.t[-1]))
 
-    def at_pace(self, gone: PassedLength) -> tuple[Array, Array, Array]:
-        """Return what `smooth` does, at the pace at which something else has gone as far."""
+    def at_pace(self, gone: PassedLength) -> list[Knots]:
+        """Return what `joined` does, at the pace at which something else has gone as far."""
         own = np.interp(gone.at(gone.t) * (self.lengths[-1] / gone.whole), self.lengths, self.t)
         return self._driven(gone.t - gone.t[0], own)
 
-    def along(self, path: Path, first: float) -> tuple[Array, Array, Array]:
-        """Return what `smooth` does, at the pace of a path that it begins at `first` [s].
+    def along(self, path: Path, first: float) -> list[Knots]:
+        """Return what `joined` does, at the pace of a path that it begins at `first` [s].
 
         Raises
         ------
@@ -297,14 +307,17 @@ class FeedStretch(PoseStretch):
         """How far the tool has gone where it is looked at, of the whole."""
         return np.asarray(self._gone(self.looked_at()) / self.lengths[-1])
 
-    def _driven(self, times: Array, own: Array) -> tuple[Array, Array, Array]:
+    def _driven(self, times: Array, own: Array) -> list[Knots]:
         from scipy.interpolate import CubicSpline
 
-        rows = self._spline(own) if self.is_spline else self._stepped(own)
-        q = self._joints(rows, own)[:, self.order]
-        if not np.isfinite(q).all():
-            return times, q, q
-        return times, q, CubicSpline(times, q, bc_type="clamped")(times, 1)
+        found = []
+        for q in self.ways(own):
+            rates = q
+            if np.isfinite(q).all():
+                rates = CubicSpline(times, q, bc_type="clamped")(times, 1)
+                rates[[0, -1]] = 0.0
+            found.append(Knots(times, q, rates))
+        return found
 
     def _stepped(self, times: Array) -> Array:
         rows = straight(times, self.t, self._rows())

@@ -24,7 +24,7 @@ from selfmotion.controllers.steps import (
     arc_through,
     step_lengths,
 )
-from selfmotion.controllers.stretches import SURE, Event, Miss, Stretch, on_one_side
+from selfmotion.controllers.stretches import SURE, Event, Knots, Miss, Stretch, on_one_side
 from selfmotion.controllers.targets import NotByPosesError, PoseSpan, largest
 from selfmotion.controllers.thinning import Piece, events_within, rests
 from selfmotion.controllers.tool_frames import WORLD, Rounding, ToolFrames
@@ -135,11 +135,21 @@ class FeedSpan(PoseSpan):
     def _keeps(
         self, stretches: Sequence[FeedStretch], gone: Sequence[PassedLength], allowed: Tolerance
     ) -> bool:
-        """Whether the seam keeps all that it has to with stretches in place of its motion."""
+        """Whether the seam keeps all that it has to with stretches in place of its motion.
+
+        By each way in which a controller may join their targets.
+        """
+        ways = [stretch.at_pace(each) for stretch, each in zip(stretches, gone, strict=True)]
+        count = max(len(own) for own in ways)
+        return all(
+            self._keeps_by([own[min(k, len(own) - 1)] for own in ways], allowed)
+            for k in range(count)
+        )
+
+    def _keeps_by(self, parts: Sequence[Knots], allowed: Tolerance) -> bool:
         motion, begin = self.piece.motion, self.first
         rows: list[tuple[Array, Array, Array]] = []
-        for stretch, each in zip(stretches, gone, strict=True):
-            t, q, qd = stretch.at_pace(each)
+        for t, q, qd in parts:
             if not np.isfinite(q).all():
                 return False
             kept = slice(1 if rows else 0, None)
@@ -148,8 +158,8 @@ class FeedSpan(PoseSpan):
         before, after = motion.t < self.first - _PROMPT, motion.t > self.last + _PROMPT
         given = motion.t, motion.q, motion.qd
         whole = [
-            np.concatenate([own[before], *parts, own[after]])
-            for own, parts in zip(given, zip(*rows, strict=True), strict=True)
+            np.concatenate([own[before], *each, own[after]])
+            for own, each in zip(given, zip(*rows, strict=True), strict=True)
         ]
         judged = Trajectory(whole[0], whole[1], whole[2], motion.joint_names)
         return self.piece.keeps is not None and self.piece.keeps(judged, allowed)

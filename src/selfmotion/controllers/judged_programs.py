@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import combinations, pairwise
 from pathlib import Path as FilePath
 from tempfile import TemporaryDirectory
@@ -9,8 +10,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from selfmotion.basics import Array, FileFormatError, Progress, silent
-from selfmotion.certificate import Tolerance
+from selfmotion.basics import (
+    Array,
+    FileFormatError,
+    ProblemError,
+    Progress,
+    RobotError,
+    silent,
+)
+from selfmotion.certificate import Certificate, Tolerance
 from selfmotion.constraints import Constraint
 from selfmotion.controllers.controller_program import (
     ControllerProgram,
@@ -20,6 +28,7 @@ from selfmotion.controllers.controller_program import (
     drafted,
 )
 from selfmotion.controllers.krl import KrlReader, write_krl
+from selfmotion.controllers.program_facts import check_load
 from selfmotion.controllers.program_lines import ProgramReader
 from selfmotion.controllers.program_settings import ProgramSettings
 from selfmotion.controllers.program_texts import plain
@@ -152,14 +161,15 @@ class ProgramParts(NamedTuple):
 
     Attributes
     ----------
-    motions : list of Trajectory
-        Of each step; of a seam at the pace of its path.
-    slow : sequence of (int, Trajectory)
+    motions : list of list of Trajectory
+        Of each step, by each way in which a controller may join its targets; of a seam at the pace
+        of its path.
+    slow : sequence of (int, list of Trajectory)
         Slow motions to where a shifted program goes on: before which step, and what.
     """
 
-    motions: list[Trajectory]
-    slow: Sequence[tuple[int, Trajectory]]
+    motions: list[list[Trajectory]]
+    slow: Sequence[tuple[int, list[Trajectory]]]
 
 
 def parts_of(file: FilePath, program: ControllerProgram, job: Program) -> ProgramParts:
@@ -182,7 +192,8 @@ def parts_of(file: FilePath, program: ControllerProgram, job: Program) -> Progra
     for number, step in enumerate(job.steps):
         taken, seconds = [], 0.0
         while left and left[0].name == SLOWLY:
-            slow.append((number, part([left.pop(0)]).trajectory.of_joints(names)))
+            own = part([left.pop(0)])
+            slow.append((number, [motion.of_joints(names) for motion in own.motions()]))
         while left and seconds < step.motion.duration - _MOMENT:
             taken.append(left.pop(0))
             seconds += taken[-1].duration
@@ -192,8 +203,8 @@ def parts_of(file: FilePath, program: ControllerProgram, job: Program) -> Progra
                 f"{step.motion.duration:.6g} s: it is of another one"
             )
         own, made = part(taken), step.made
-        motion = own.trajectory if isinstance(made, Move) else own.along(made.problem.path)
-        found.motions.append(motion.of_joints(names))
+        path = None if isinstance(made, Move) else made.problem.path
+        found.motions.append([motion.of_joints(names) for motion in own.motions(path)])
     if left:
         raise FileFormatError(f"{file}: goes on with '{left[0].name}' when the job has ended")
     return found
@@ -208,15 +219,15 @@ def slow_steps(
     """
     moves = [(k, step.made) for k, step in enumerate(job.steps) if isinstance(step.made, Move)]
     steps, pieces = list[JudgedStep](), dict[int, list[Piece]]()
-    for number, motion in parts.slow:
+    for number, motions in parts.slow:
         name = f"slowly to '{job.steps[number].name}'"
-        pieces.setdefault(number, []).append(Piece(name, motion))
+        pieces.setdefault(number, []).append(Piece(name, motions[0]))
         if not moves:
             steps.append(JudgedStep(name, False, "not verified: the job has no free moves"))
             continue
         _, near = min(moves, key=lambda move: abs(move[0] - number))
-        judged = Move(near.robot, what_targets_keep(near.constraints), motion)
-        steps.append(JudgedStep(name, judged.verified, judged.verdict))
+        kept = what_targets_keep(near.constraints)
+        steps.append(_judged_move(name, [Move(near.robot, kept, motion) for motion in motions]))
     return tuple(steps), pieces
 
 
@@ -291,6 +302,37 @@ class JudgedProgram(NamedTuple):
         )
 
 
+def _judged_move(name: str, ways: Sequence[Move]) -> JudgedStep:
+    """Return what is found of a move by each way in which it may be made: the first that fails."""
+    worst = next((move for move in ways if not move.verified), ways[0])
+    way = "" if worst is ways[0] else _STRAIGHT
+    return JudgedStep(name, worst.verified, f"{worst.verdict}{way}")
+
+
+def judged_ways(
+    motions: Sequence[Trajectory], judge: Callable[[Trajectory], Certificate]
+) -> tuple[Certificate, Trajectory]:
+    """Return the worst certificate of what a controller may make of targets, and its motion.
+
+    That is the first which is not verified; else the one with the largest error of the path.
+    """
+    worst: tuple[Certificate, Trajectory] | None = None
+    for number, motion in enumerate(motions):
+        found = judge(motion)
+        if not found.verified:
+            said = (*found.failures[:-1], f"{found.failures[-1]}{_STRAIGHT if number else ''}")
+            return replace(found, failures=said), motion
+        if worst is None or found.position_error.value > worst[0].position_error.value:
+            worst = found, motion
+    if worst is None:
+        raise ProblemError("there is no motion to judge")
+    return worst
+
+
+# Said of a motion that is not smooth through its targets.
+_STRAIGHT = " (where the controller goes straight between targets, or rounds their corners)"
+
+
 def judged_program(file: FilePath, job: Program, within: Tolerance | None = None) -> JudgedProgram:
     """Judge a controller's program by the job that it is of: each step, and the whole.
 
@@ -307,9 +349,9 @@ def judged_program(file: FilePath, job: Program, within: Tolerance | None = None
         The file cannot be read, or is of another job.
     """
     program = read_program(file, job.robot)
-    within = within or stated_deviation(program)
+    allowed = within or stated_deviation(program)
     parts = parts_of(file, program, job)
-    steps, pieces = _judged_steps(job, parts.motions, within, what_targets_keep, program)
+    steps, pieces = _judged_steps(job, parts.motions, allowed, what_targets_keep, program)
     slow, between = slow_steps(parts, job)
     pieces = [piece for k, own in enumerate(pieces) for piece in (*between.get(k, ()), own)]
     # From axis targets to poses there are digits of both, which the arm's kinematics may magnify.
@@ -319,10 +361,48 @@ def judged_program(file: FilePath, job: Program, within: Tolerance | None = None
         *gaps(job.robot, pieces, digits),
         *(() if program.shift is not None else _elsewhere(job, pieces, digits)),
         *([program.begins_elsewhere] if program.begins_elsewhere else []),
-        *_otherwise_switched(job, program.switches),
+        *misswitched(program, job),
+        *_off_moves(file, program, job),
+        *unlike(program, job.robot, [item for own in job.steps for item in _kept_by(own.made)]),
     )
     left = of_the_controller(program)
-    return JudgedProgram((*steps, *slow), failures, within, shift_told(program), left)
+    return JudgedProgram((*steps, *slow), failures, allowed, shift_told(program), left)
+
+
+def _kept_by(made: Plan | Move) -> Sequence[Constraint]:
+    return made.problem.constraints if isinstance(made, Plan) else made.constraints
+
+
+def _off_moves(file: FilePath, program: ControllerProgram, job: Program) -> Iterator[str]:
+    """Yield by how much free moves leave those of the job, beyond what the file states."""
+    if program.shift is not None:
+        return
+    _, stated, found = program_miss(job, file, program)
+    if any(one > other + 1e-9 for one, other in zip(found.moves, stated.moves, strict=True)):
+        yield (
+            f"free moves are up to {1e3 * found.moves.position:.4g} mm, joints "
+            f"{found.moves.joint:.4g} rad or m off those of the job, the file states "
+            f"{1e3 * stated.moves.position:.4g} mm and {stated.moves.joint:.4g}"
+        )
+
+
+def unlike(
+    program: ControllerProgram, robot: RobotModel, constraints: Sequence[Constraint]
+) -> Iterator[str]:
+    """Yield what a program rests on that is not so where it is judged: held joints, its load."""
+    facts = program.facts
+    if facts is None:
+        if robot.locked:
+            yield (
+                f"its head does not say where held joints stand ({', '.join(robot.locked)}): write "
+                f"the program again"
+            )
+        return
+    yield from facts.against(robot)
+    try:
+        check_load(program.load, robot, constraints, facts.flange)
+    except (ProblemError, RobotError) as error:
+        yield str(error)
 
 
 def of_the_controller(program: ControllerProgram) -> str:
@@ -378,9 +458,17 @@ def as_shifted(problem: Problem, program: ControllerProgram, begin: Array) -> Pr
     return replace(problem, path=path, start=start)
 
 
-def misswitched(program: ControllerProgram, job: Program) -> tuple[str, ...]:
-    """Return what of a job's events a controller's program does not switch, or otherwise."""
-    return tuple(_otherwise_switched(job, program.switches))
+def misswitched(program: ControllerProgram, made: object) -> tuple[str, ...]:
+    """Return what a controller's program switches otherwise than its job's events, or besides them.
+
+    A plan, parts or a move have no events.
+    """
+    if isinstance(made, Program):
+        return tuple(_otherwise_switched(made, program))
+    return tuple(
+        f"'{switch.output}' is switched at {switch.at:.4f} s, and the motion has no events"
+        for switch in program.switches
+    )
 
 
 def judged_motion(motion: Trajectory, job: Program) -> JudgedProgram:
@@ -398,7 +486,7 @@ def judged_motion(motion: Trajectory, job: Program) -> JudgedProgram:
         told = f"it lasts {whole.duration:.6g} s, the job {job.duration:.6g} s"
         return JudgedProgram((), (told,))
     ends = [*job.begins, job.duration]
-    motions = [part_of(whole, first, last) for first, last in pairwise(ends)]
+    motions = [[part_of(whole, first, last)] for first, last in pairwise(ends)]
     steps, pieces = _judged_steps(job, motions, None, tuple)
     failures = (
         *(f"the job itself: {text}" for text in job.failures),
@@ -419,25 +507,26 @@ def part_of(motion: Trajectory, first: float, last: float) -> Trajectory:
 
 def _judged_steps(
     job: Program,
-    motions: Sequence[Trajectory],
+    motions: Sequence[Sequence[Trajectory]],
     within: Tolerance | None,
     kept: Callable[[Sequence[Constraint]], tuple[Constraint, ...]],
     program: ControllerProgram | None = None,
 ) -> tuple[tuple[JudgedStep, ...], list[Piece]]:
     """Return what certificates say of the motions of a job's steps, by what of it is `kept`."""
     found, pieces = list[JudgedStep](), list[Piece]()
-    for step, motion in zip(job.steps, motions, strict=True):
+    for step, ways in zip(job.steps, motions, strict=True):
         made = step.made
         if isinstance(made, Move):
-            move = Move(made.robot, kept(made.constraints), motion)
-            found.append(JudgedStep(step.name, move.verified, move.verdict))
+            asked = kept(made.constraints)
+            found.append(_judged_move(step.name, [Move(made.robot, asked, way) for way in ways]))
         else:
             problem = replace(made.problem, constraints=kept(made.problem.constraints))
             if program is not None:
-                problem = as_shifted(problem, program, motion.q[0])
-            certificate = problem.certify(motion, within or made.tolerance)
+                problem = as_shifted(problem, program, ways[0].q[0])
+            certify = partial(problem.certify, tolerance=within or made.tolerance)
+            certificate, _ = judged_ways(ways, certify)
             found.append(JudgedStep(step.name, certificate.verified, certificate.verdict))
-        pieces.append(Piece(f"'{step.name}'", motion))
+        pieces.append(Piece(f"'{step.name}'", ways[0]))
     return tuple(found), pieces
 
 
@@ -448,10 +537,13 @@ def _elsewhere(job: Program, pieces: Sequence[Piece], digits: float = _DIGITS) -
         yield from elsewhere(job.robot, pieces[end], end, asked, digits)
 
 
-def _otherwise_switched(job: Program, switches: Sequence[Switch]) -> Iterator[str]:
+def _otherwise_switched(job: Program, program: ControllerProgram) -> Iterator[str]:
     """Yield what of a job's events a program does not switch, or switches otherwise."""
     asked = sorted(job.events, key=lambda event: event[0])
-    made = sorted(switches, key=lambda switch: switch.at)
+    made = sorted(program.switches, key=lambda switch: switch.at)
+    stated = None if program.facts is None else program.facts.outputs
+    if asked and stated is None:
+        yield "its head does not say which output each event switches: write the program again"
     if len(asked) != len(made):
         yield f"it switches {len(made)} times, the job {len(asked)} times"
         return
@@ -464,6 +556,17 @@ def _otherwise_switched(job: Program, switches: Sequence[Switch]) -> Iterator[st
             )
         if switch.value is None and switch.output != plain(event):
             yield f"event '{event}' of '{seam}' is called '{switch.output}'"
+        if stated is not None and plain(event) in stated:
+            meant = stated[plain(event)]
+            if meant is None and switch.value is not None:
+                yield f"event '{event}' is a comment only, but '{switch.output}' is switched"
+            if meant is not None and meant != (switch.output, switch.value):
+                yield (
+                    f"event '{event}' switches '{switch.output}' to {switch.value} at "
+                    f"{switch.at:.4f} s, it was written to switch '{meant[0]}' to {meant[1]}"
+                )
+        elif stated is not None:
+            yield f"its head does not say which output event '{event}' switches"
         before = known.setdefault(event, switch)
         if before[1:] != switch[1:]:
             yield (

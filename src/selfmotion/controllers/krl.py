@@ -19,8 +19,14 @@ from selfmotion.controllers.feed_stretches import FeedStretch
 from selfmotion.controllers.program_lines import ProgramReader, switched
 from selfmotion.controllers.program_settings import AXES, written
 from selfmotion.controllers.program_texts import module_name, plain
-from selfmotion.controllers.read_stretches import Pose, pose_of_values
-from selfmotion.controllers.stretches import PoseStretch, Stretch, straight
+from selfmotion.controllers.read_stretches import Pose, pose_of_values, times_of
+from selfmotion.controllers.stretches import (
+    PoseStretch,
+    Stretch,
+    fastest_between,
+    on_one_side,
+    straight,
+)
 from selfmotion.controllers.thinning import TIME_DIGITS
 from selfmotion.controllers.tool_frames import krl_numbers, krl_pose, status_and_turn
 from selfmotion.robot import RobotModel
@@ -60,6 +66,9 @@ _WORDS = (
 NAME = 24
 # The fastest approach [m/s, °/s], and speeds above all that times ask for.
 _FASTEST, _TURNING, _UNBOUND, UNBOUND_TURNING = 0.5, 100.0, 2.0, 400.0
+# What axes may have of their speeds [%]; the most that $VEL.CP may be [m/s]; what is set is above
+# what times ask for by this share.
+_WHOLE, _MOST, _ABOVE_ASKED = 100.0, 3.0, 1.02
 # Ways shorter than this have no direction [m]; digits leave poses of a line this far off it.
 _SHORT, _ON_LINE = 1e-3, 4e-7
 
@@ -115,8 +124,10 @@ def _block(draft: Draft, stretch: Stretch) -> list[str]:
     block, segment = "PTP_SPLINE", "SPTP"
     if isinstance(stretch, PoseStretch):
         block, segment = "SPLINE", "SLIN" if _is_straight(stretch) else "SPL"
-        # After a seam at its feed.
-        lines += [f"  $VEL.CP = {_UNBOUND:g}"] if speeds_of(draft.program) else []
+        speed = _unbound(stretch)
+        # After a seam at its feed, or where times ask for more.
+        if speeds_of(draft.program) or speed > _UNBOUND:
+            lines.append(f"  $VEL.CP = {speed:g}")
     lines += [f"  {block}", "    TIME_BLOCK START"]
     for k in range(1, len(stretch.t)):
         lines += _triggers(draft, stretch, k)
@@ -124,6 +135,12 @@ def _block(draft: Draft, stretch: Stretch) -> list[str]:
         lines.append(f"    TIME_BLOCK PART = {_seconds(stretch.t[k] - stretch.t[k - 1])}")
     lines += [f"    TIME_BLOCK END = {_seconds(stretch.t[-1])}", "  ENDSPLINE"]
     return lines
+
+
+def _unbound(stretch: PoseStretch) -> float:
+    """Return a speed above what the times of a stretch ask for, if $VEL.CP can be it [m/s]."""
+    fast, _ = fastest_between(stretch.t, stretch.places, stretch.turns)
+    return float(min(max(_UNBOUND, np.ceil(1e3 * _ABOVE_ASKED * fast) / 1e3), _MOST))
 
 
 def _at_speed(draft: Draft, stretch: FeedStretch) -> list[str]:
@@ -296,6 +313,8 @@ class KrlReader(ProgramReader):
         self._triggers: list[tuple[int, Sequence[str]]] = []
         # Of segments at speeds: $VEL.CP [m/s], that of each, and through where they go.
         self._speed = 0.0
+        # Share of their speed and acceleration that axes have in motions by axes [%].
+        self._percent: dict[str, float] = {}
         # How fast the tool turns at most [°/s], and what is said of how it turns.
         self._turning: dict[str, float] = {}
         self._turns: set[str] = set()
@@ -318,7 +337,23 @@ class KrlReader(ProgramReader):
 
     def carried_work_is(self, given: Sequence[str]) -> None:
         """Take what poses are counted in, where an external kinematic system carries it."""
-        self.work, self.is_carried = self._frame(given[0]), True
+        unit, other, frame = given
+        if unit != other:
+            raise self.lines.fault(f"MACHINE_DEF[{unit}] beside MACHINE_DEF[{other}], expected one")
+        self.work, self.is_carried, self.unit = self._frame(frame), True, unit
+
+    def loaded(self, given: Sequence[str]) -> None:
+        """Take what the flange carries; its inertia is the controller's."""
+        mass, center = given
+        values = self._values(center)
+        self.load_is(mass, [str(values.get(name, 0.0)) for name in "XYZ"], 1e-3)
+
+    def axes_are(self, given: Sequence[str]) -> None:
+        """Take at which share of their speed or acceleration the axes move [%]."""
+        percent = self.lines.number_of(given[1])
+        if not 0.0 < percent <= _WHOLE:
+            raise self.lines.fault(f"#{given[0]}_PTP is {percent:g} %, expected up to {_WHOLE:g}")
+        self._percent[given[0].upper()] = percent
 
     def go(self, given: Sequence[str]) -> None:
         """Take where the motion begins, or where it slowly goes on by axis targets."""
@@ -327,6 +362,12 @@ class KrlReader(ProgramReader):
 
     def go_linear(self, given: Sequence[str]) -> None:
         """Take the pose from which the motion goes on by poses."""
+        turning = max(self._turning.values(), default=0.0)
+        if not (0.0 < self._speed <= _FASTEST and turning <= _TURNING):
+            raise self.lines.fault(
+                f"LIN goes to where the motion goes on at {self._speed:g} m/s and {turning:g}°/s, "
+                f"expected at most {_FASTEST:g} m/s and {_TURNING:g}°/s: nothing has judged it"
+            )
         self.slowly(self._pose(given[0]))
 
     def block(self, given: Sequence[str]) -> None:
@@ -442,10 +483,41 @@ class KrlReader(ProgramReader):
                 raise self.lines.fault("a trigger has no target after it")
             self.switches.append(switched(self.clock + sum(times[:number]), what))
         if self._by_poses:
+            self._check_in_time(times)
             self.follow(self._poses, times)
         else:
+            slow = [f"#{name}_PTP" for name in ("VEL", "ACC") if self._share(name) < _WHOLE]
+            if slow:
+                share = self._share(slow[0][1:4])
+                raise self.lines.fault(
+                    f"BAS({slow[0]}) before this block is {share:g} %, expected {_WHOLE:g}: less "
+                    f"holds the axes back from their times"
+                )
             self.join(self._targets, times)
         self.state = "ended"
+
+    def _share(self, name: str) -> float:
+        return self._percent.get(name, 0.0)
+
+    def _check_in_time(self, times: Sequence[float]) -> None:
+        """Refuse speeds in force that hold the tool back from the times of a block."""
+        if self.pose_at is None:
+            return
+        every = [self.pose_at, *self._poses]
+        places = np.array([pose.place for pose in every])
+        turns = np.array([pose.turn for pose in every])
+        fast, turning = fastest_between(times_of(times), places, on_one_side(turns))
+        least = min(self._turning.get(name, 0.0) for name in ("ORI1", "ORI2"))
+        if fast > self._speed:
+            raise self.lines.fault(
+                f"times ask for {fast:.4g} m/s, $VEL.CP is {self._speed:g} m/s: it holds the tool "
+                f"back from its times"
+            )
+        if np.degrees(turning) > least:
+            raise self.lines.fault(
+                f"times ask for {np.degrees(turning):.4g}°/s, $VEL.ORI1 or $VEL.ORI2 is "
+                f"{least:g}°/s: it holds the tool back from its times"
+            )
 
     def close(self, _: Sequence[str]) -> None:
         """End a spline block."""
@@ -496,17 +568,18 @@ class KrlReader(ProgramReader):
 
 _AXIS = r"[AE][1-6]\s+[^,{}]+"
 _TARGET = rf"\{{\s*(?:E6AXIS\s*:|AXIS\s*:)?\s*({_AXIS}(?:,\s*{_AXIS})*)\}}"
-_ANY = r"[^;{}]*"
 _IN_BODY = ("head", "body")
 _NUMBER = r"[A-Z][1-6]?\s+[^,{}]+"
 _POSE = rf"\{{\s*(?:E6POS\s*:|POS\s*:|FRAME\s*:)?\s*({_NUMBER}(?:,\s*{_NUMBER})*)\}}"
 _WITH = r"(?: WITH \$VEL\.CP ?= ?([\d.e-]+))?"
-_UNIT = r"MACHINE_DEF ?\[ ?\d+ ?\]"
+_UNIT = r"MACHINE_DEF ?\[ ?(\d+) ?\]"
+_XYZABC = r"\{((?: ?,? ?[XYZABC] [^,{}]+)+)\}"
+_NO_INERTIA = r"\{ ?X 0(?:\.0*)? ?, ?Y 0(?:\.0*)? ?, ?Z 0(?:\.0*)? ?\}"
 KrlReader.grammar = (
     (("before",), r"&(?:ACCESS|REL|PARAM|COMMENT)\b.*", KrlReader.skip),
     (("before",), rf"DEF ([A-Z]\w{{0,{NAME - 1}}}) ?\( ?\)", KrlReader.begin),
     (("head",), r"BAS ?\( ?#INITMOV ?, ?0 ?\)", KrlReader.skip),
-    (_IN_BODY, r"BAS ?\( ?#(?:VEL|ACC)_PTP ?, ?[\d.]+ ?\)", KrlReader.skip),
+    (_IN_BODY, r"BAS ?\( ?#(VEL|ACC)_PTP ?, ?([\d.]+) ?\)", KrlReader.axes_are),
     (_IN_BODY, r"\$VEL\.CP ?= ?([\d.e-]+)", KrlReader.speed_is),
     (_IN_BODY, r"\$VEL\.(ORI1|ORI2) ?= ?([\d.]+)", KrlReader.turning_is),
     (("head",), r"(\$ORI_TYPE) ?= ?#VAR", KrlReader.turns),
@@ -518,7 +591,11 @@ KrlReader.grammar = (
         rf"\$BASE ?= ?EK ?\( ?{_UNIT}\.ROOT ?, ?{_UNIT}\.MECH_TYPE ?, ?{_POSE} ?\)",
         KrlReader.carried_work_is,
     ),
-    (("head",), rf"\$LOAD ?= ?\{{{_ANY}\{{{_ANY}\}}{_ANY}\{{{_ANY}\}}{_ANY}\}}", KrlReader.skip),
+    (
+        ("head",),
+        rf"\$LOAD ?= ?\{{ ?M ([^,{{}}]+), ?CM {_XYZABC} ?, ?J {_NO_INERTIA} ?\}}",
+        KrlReader.loaded,
+    ),
     (_IN_BODY, rf"PTP {_TARGET}", KrlReader.go),
     (_IN_BODY[1:], rf"LIN {_POSE}", KrlReader.go_linear),
     (_IN_BODY[1:], r"WAIT SEC (\S+)", KrlReader.wait),

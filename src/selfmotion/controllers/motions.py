@@ -158,6 +158,11 @@ def check_verified(plan: Plan | Parts | Move | Program, file: Path, force: bool)
 def form_of(path: Path, form: str | None) -> str:
     """Return the format of a file."""
     ending = path.suffix.lower()
+    if path.name.lower().endswith(_TIMETABLE):
+        raise FileFormatError(
+            f"{path}: {_TIMETABLE} is the name of a job's timetable, which is no motion: "
+            f"`selfmotion job FILE --out {path.name}` writes it; call the motion otherwise"
+        )
     own = ending in PROGRAMS
     name = SUFFIXES.get(ending) if form is None else form
     if name is None or name not in FORMS:
@@ -301,6 +306,8 @@ def _write_stream(
     write_text(file, script(plan.robot, joints, q, rate, settings, events))
 
 
+# How tables of what happens when are called.
+_TIMETABLE = ".timetable.csv"
 # What is written as messages of ROS, in texts.
 MESSAGES = ("ros", "moveit")
 # Samples per second of a stream to an arm of Universal Robots.

@@ -10,6 +10,7 @@ import numpy as np
 from selfmotion.controllers.commented_lines import Lines
 from selfmotion.controllers.controller_program import ControllerProgram, Switch
 from selfmotion.controllers.feed_stretches import Ramps, times_at
+from selfmotion.controllers.program_facts import Load, ProgramFacts
 from selfmotion.controllers.program_texts import PLANNED
 from selfmotion.controllers.read_stretches import (
     Pose,
@@ -61,6 +62,9 @@ class ProgramReader:
         # Whether an axis carries the work object, where a program says it.
         self.is_carried: bool | None = None
         self.switches: list[Switch] = []
+        # What the flange carries, and the mechanical unit of the work object, where it says that.
+        self.load: Load | None = None
+        self.unit = ""
 
     def program(self) -> ControllerProgram:
         """Read all of it.
@@ -86,8 +90,14 @@ class ProgramReader:
             raise self.lines.fault(f"is the last one, expected {self.last}")
         places = self.lines.places(self.tool, self.work)
         places.is_carried = self.is_carried
-        rows, present = self.rows, self.present
-        return self.lines.program(self.name, present, rows, self.switches, places, self.robot)
+        facts = ProgramFacts.stated(self.lines.notes)
+        if facts is not None and self.unit and facts.positioner not in ("", self.unit):
+            raise self.lines.fault(
+                f"its work object is carried by mechanical unit '{self.unit}', it was written for "
+                f"'{facts.positioner}'"
+            )
+        given = self.name, self.present, self.rows, self.switches, places, self.robot, self.load
+        return self.lines.program(*given)
 
     @property
     def clock(self) -> float:
@@ -97,6 +107,11 @@ class ProgramReader:
     def switch(self, given: Sequence[str]) -> None:
         """Take what is switched now: an output and its value, or the name of an event."""
         self.switches.append(switched(self.clock, given))
+
+    def load_is(self, mass: str, center: Sequence[str], metres: float) -> None:
+        """Take what the flange carries: its mass [kg] and centre, in so many metres."""
+        at = [metres * self.lines.coordinate(text) for text in center]
+        self.load = Load(self.lines.number_of(mass), np.array(at))
 
     def skip(self, _: Sequence[str]) -> None:
         """Take a line that says nothing of the motion."""

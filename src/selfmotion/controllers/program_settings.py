@@ -368,23 +368,34 @@ def tool_from_flange(robot: RobotModel, settings: ProgramSettings) -> SE3:
     RobotError
         There is no such link.
     """
-    carrier, tool = robot.carrier_of(robot.tool)
+    link, tool = flange_of(robot, settings), robot.carrier_of(robot.tool)[1]
+    return robot.carrier_of(link)[1].inverse() * tool if link else tool
+
+
+def flange_of(robot: RobotModel, settings: ProgramSettings) -> str:
+    """Return the link that is the controller's flange; empty for that which carries the tool.
+
+    Raises
+    ------
+    ProblemError
+        The flange rides on another link than the tool.
+    RobotError
+        There is no such link.
+    """
+    carrier = robot.carrier_of(robot.tool)[0]
     if settings.flange is not None:
-        other, place = robot.carrier_of(settings.flange)
-        if other != carrier:
+        if robot.carrier_of(settings.flange)[0] != carrier:
             raise ProblemError(
                 f"{robot.name}: flange '{settings.flange}' does not move with tool '{robot.tool}'"
             )
-        return place.inverse() * tool
+        return settings.flange
     # In a cell, that of the part which carries the tool.
     part = robot.tool.rpartition("/")[0]
     for name in _FLANGES:
         link = f"{part}/{name}" if part else name
-        if link in robot.urdf.links:
-            other, place = robot.carrier_of(link)
-            if other == carrier:
-                return place.inverse() * tool
-    return tool
+        if link in robot.urdf.links and robot.carrier_of(link)[0] == carrier:
+            return link
+    return ""
 
 
 def written(q: Array, axes: Sequence[Axis]) -> list[str]:

@@ -251,6 +251,8 @@ class RapidReader(StopReader):
         self._known: dict[str, list[float]] = {}
         # What tool and work object of the module are called, and whether arcs turn as is judged.
         self._tool_name, self._work_name, self._turns_evenly = "", "", False
+        # Whether configurations of poses are not asked for.
+        self._goes_on = False
 
     def begin(self, given: Sequence[str]) -> None:
         """Begin the module."""
@@ -262,13 +264,15 @@ class RapidReader(StopReader):
             raise self.lines.fault(f"there is a tooldata '{self._tool_name}' already, expected one")
         self._tool_name = given[0].lower()
         self.tool = self._frame(given[1], given[2])
+        self.load_is(given[3], self._texts(given[4], 3, "cog"), 1e-3)
 
     def work_is(self, given: Sequence[str]) -> None:
         """Take the work object: user frame and object frame, the first one of a unit its own."""
         if self._work_name:
             raise self.lines.fault(f"there is a wobjdata '{self._work_name}' already, expected one")
         self._work_name = given[0].lower()
-        fixed, user, object_ = given[1].upper() == "TRUE", given[2:4], given[4:6]
+        fixed, self.unit, *frames = given[1].upper() == "TRUE", *given[2:]
+        user, object_ = frames[:2], frames[2:]
         self.is_carried = not fixed
         own = self._frame(*object_)
         self.work = self._frame(*user) * own if fixed else own
@@ -280,8 +284,29 @@ class RapidReader(StopReader):
     def go(self, given: Sequence[str]) -> None:
         """Take where the motion begins, or where it slowly goes on by axis targets."""
         self._check_stopped("a slow motion")
-        self.begin_at(self._target(given[0], given[1]))
+        robot, others, speed, tool = given
+        self._check_slow(speed)
+        self._check_tool(tool)
+        self.begin_at(self._target(robot, others))
         self.state = "body"
+
+    def _check_slow(self, speed: str) -> None:
+        """Refuse a motion to where the program goes on that is faster than slow ones are."""
+        known = self._known.get(speed.lower())
+        most = (_FASTEST, _TURNING, _FASTEST, _TURNING)
+        if known is None or any(x > least for x, least in zip(known, most, strict=True)):
+            found = "none of the module" if known is None else ", ".join(f"{x:g}" for x in known)
+            raise self.lines.fault(
+                f"a motion to where the program goes on has speed '{speed}' ({found}), expected a "
+                f"speeddata of the module of at most {', '.join(f'{x:g}' for x in most)}: nothing "
+                f"has judged it"
+            )
+
+    def _check_tool(self, tool: str) -> None:
+        if tool.lower() != self._tool_name:
+            raise self.lines.fault(
+                f"tool is '{tool}', expected '{self._tool_name}', the one that the module has"
+            )
 
     def speed_is(self, given: Sequence[str]) -> None:
         """Take the speed of a speeddata [mm/s]."""
@@ -289,6 +314,10 @@ class RapidReader(StopReader):
         if not values[0] > 0.0:
             raise self.lines.fault(f"v_tcp is {values[0]:g} mm/s, expected a number above 0")
         self._known[given[0].lower()] = values
+
+    def goes_on(self, _: Sequence[str]) -> None:
+        """Take that linear motions go on in the configuration that the arm is in."""
+        self._goes_on = True
 
     def arcs_turn_evenly(self, _: Sequence[str]) -> None:
         """Take how the tool turns in circular motions."""
@@ -301,6 +330,7 @@ class RapidReader(StopReader):
         if not poses[4:] and speed.lower().endswith(SLOW):
             if zone.lower() != "fine":
                 raise self.lines.fault(f"a slow motion has zone {zone}, expected fine")
+            self._check_slow(speed)
             self.go_linear(poses)
             return
         if self.axes or self.times:
@@ -316,14 +346,17 @@ class RapidReader(StopReader):
 
     def _check_names(self, tool: str, work: str) -> None:
         """Refuse a pose of another tool or work object than those of the module."""
-        for kind, name, known in (
-            ("tool", tool, self._tool_name),
-            ("work object", work, self._work_name),
-        ):
-            if name.lower() != known:
-                raise self.lines.fault(
-                    f"{kind} is '{name}', expected '{known}', the one that the module has"
-                )
+        self._check_tool(tool)
+        if work.lower() != self._work_name:
+            raise self.lines.fault(
+                f"work object is '{work}', expected '{self._work_name}', the one that the module "
+                f"has"
+            )
+        if not self._goes_on:
+            raise self.lines.fault(
+                "linear motions need ConfL \\Off before them: else the controller may stop where "
+                "the configuration is another one than a target states"
+            )
 
     def _check_judged(self, speed: str, zone: str, *, is_round: bool) -> None:
         """Refuse what makes another motion of a seam at its speed than the one that is judged."""
@@ -356,7 +389,8 @@ class RapidReader(StopReader):
 
     def move(self, given: Sequence[str]) -> None:
         """Take an axis target."""
-        robot, others, seconds, zone = given
+        robot, others, seconds, zone, tool = given
+        self._check_tool(tool)
         if self.poses:
             raise self.lines.fault("an axis target after a pose whose zone is not fine")
         axes, taken = self._target(robot, others), self.lines.duration(seconds)
@@ -427,6 +461,7 @@ _LIST = r"\[([^\[\]]*)\]"
 _TARGET = rf"\[ ?{_LIST} ?, ?{_LIST} ?\]"
 _POSE = rf"\[ ?{_LIST} ?, ?{_LIST} ?, ?{_LIST} ?, ?{_LIST} ?\]"
 _FRAME = rf"\[ ?{_LIST} ?, ?{_LIST} ?\]"
+_NO_TURN = r"\[ ?1 ?, ?0 ?, ?0 ?, ?0 ?\]"
 _TIMED = rf"{_WORD} ?\\T ?:= ?([^,]+), ?(fine|z[0-9]{{1,3}})"
 _FRAMES = rf"({_WORD}) ?\\WObj ?:= ?({_WORD}) ?;"
 _AT_SPEED = rf"({_WORD}) ?, ?(fine|z[0-9]{{1,3}}) ?, ?{_FRAMES}"
@@ -434,27 +469,28 @@ RapidReader.grammar = (
     (("before",), rf"MODULE ({_WORD})", RapidReader.begin),
     (
         ("data",),
-        rf"(?:TASK )?PERS tooldata ({_WORD}) ?:= ?\[ ?TRUE ?, ?{_FRAME}[^;!]*\];",
+        rf"(?:TASK )?PERS tooldata ({_WORD}) ?:= ?\[ ?TRUE ?, ?{_FRAME} ?, ?\[ ?([^,\[\]]+), ?"
+        rf"{_LIST} ?, ?{_NO_TURN} ?, ?0 ?, ?0 ?, ?0 ?\] ?\];",
         RapidReader.tool_is,
     ),
     (
         ("data",),
-        rf"(?:TASK )?PERS wobjdata ({_WORD}) ?:= ?\[ ?FALSE ?, ?(TRUE|FALSE) ?, ?\"\w*\" ?, ?"
+        rf"(?:TASK )?PERS wobjdata ({_WORD}) ?:= ?\[ ?FALSE ?, ?(TRUE|FALSE) ?, ?\"(\w*)\" ?, ?"
         rf"{_FRAME} ?, ?{_FRAME} ?\];",
         RapidReader.work_is,
     ),
     (("data",), rf"CONST speeddata ({_WORD}) ?:= ?{_LIST};", RapidReader.speed_is),
     (("data",), rf"PROC {_WORD} ?\( ?\)", RapidReader.procedure),
-    (("start", "body"), r"ConfL ?\\ ?(?:On|Off) ?;", RapidReader.skip),
+    (("start",), r"ConfL ?\\ ?Off ?;", RapidReader.goes_on),
     (("start", "body"), r"CirPathMode ?\\ ?ObjectFrame ?;", RapidReader.arcs_turn_evenly),
     (
         ("start", "body"),
-        rf"MoveAbsJ {_TARGET} ?\\NoEOffs ?, ?{_WORD} ?, ?fine ?, ?{_WORD} ?;",
+        rf"MoveAbsJ {_TARGET} ?\\NoEOffs ?, ?({_WORD}) ?, ?fine ?, ?({_WORD}) ?;",
         RapidReader.go,
     ),
     (
         ("body",),
-        rf"MoveAbsJ {_TARGET} ?\\NoEOffs ?, ?{_TIMED} ?, ?{_WORD} ?;",
+        rf"MoveAbsJ {_TARGET} ?\\NoEOffs ?, ?{_TIMED} ?, ?({_WORD}) ?;",
         RapidReader.move,
     ),
     (("body",), rf"MoveL {_POSE} ?, ?{_AT_SPEED}", RapidReader.move_at_speed),

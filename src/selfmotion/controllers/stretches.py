@@ -16,6 +16,8 @@ from selfmotion.robot import Chain
 
 # The worst is no more than so many times what is found at times that are so near to each other.
 SURE = 1.02
+# At a corner the velocity changes within this share of the shorter of its two sides.
+_CORNER = 1e-3
 # Where between two targets, and how near to each, the error is looked at.
 _BETWEEN = np.array([0.0, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875])
 
@@ -25,6 +27,52 @@ class Event(NamedTuple):
 
     target: int
     name: str
+
+
+class Knots(NamedTuple):
+    """A joint motion from rest to rest: cubics through positions and velocities at times.
+
+    Attributes
+    ----------
+    t : (K,)
+        [s]
+    q, qd : (K, n)
+        [rad or m, and per second]
+    """
+
+    t: Array
+    q: Array
+    qd: Array
+
+    @classmethod
+    def cornered(cls, t: Array, q: Array, each: int) -> "Knots":
+        """Return a motion (K, n) that is smooth but for a corner at each so many-th of its times.
+
+        There the velocity changes within a short time, as it does at both ends.
+        """
+        from scipy.interpolate import CubicSpline
+
+        corners = t[::each]
+        sides = np.diff(corners)
+        reach = _CORNER * np.minimum(np.append(sides, np.inf), np.append(np.inf, sides))
+        times, places, rates = [t[:1]], [q[:1]], [0.0 * q[:1]]
+        for k in range(len(sides)):
+            own = slice(k * each, (k + 1) * each + 1)
+            ends = corners[k] + reach[k], corners[k + 1] - reach[k + 1]
+            at = np.concatenate([ends[:1], t[own][1:-1], ends[1:]])
+            if each == 1:
+                slope = (q[k + 1] - q[k]) / sides[k]
+                here, rate = q[k] + (at - corners[k])[:, None] * slope, np.tile(slope, (2, 1))
+            else:
+                spline = CubicSpline(t[own], q[own])
+                here, rate = spline(at), spline(at, 1)
+            times.append(at)
+            places.append(here)
+            rates.append(rate)
+        times.append(t[-1:])
+        places.append(q[-1:])
+        rates.append(0.0 * q[-1:])
+        return cls(np.concatenate(times), np.concatenate(places), np.concatenate(rates))
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,11 +135,17 @@ class Stretch:
         spline = CubicSpline(self.t, self.q, bc_type="clamped")
         return times, spline(times), spline(times, 1)
 
-    def knots(self) -> tuple[Array, Array, Array]:
-        """Return as many of these as it takes that cubics through them are the spline."""
+    def joined(self) -> list[Knots]:
+        """Return the motion by each way in which controllers join targets: smooth, straight, cut.
+
+        As few knots as it takes: see `miss_of` for what these are.
+        """
         from scipy.interpolate import CubicSpline
 
-        return self.t, self.q, CubicSpline(self.t, self.q, bc_type="clamped")(self.t, 1)
+        rates = CubicSpline(self.t, self.q, bc_type="clamped")(self.t, 1)
+        rates[[0, -1]] = 0.0
+        lines = polygons(self.t, self.q, _straight)
+        return [Knots(self.t, self.q, rates), *(Knots.cornered(*line, 1) for line in lines)]
 
 
 class Miss(NamedTuple):
@@ -184,14 +238,29 @@ def ways(t: Array, q: Array, times: Array) -> list[Array]:
     """Return joint positions (K, n) at times by each way of joining targets."""
     from scipy.interpolate import CubicSpline
 
-    lines = _straight(times, t, q)
+    lines = [_straight(times, *line) for line in polygons(t, q, _straight)]
     if len(t) < 3:
-        return [lines]
-    middles = 0.5 * (t[:-1] + t[1:])
-    knots = np.concatenate([t[:1], middles, t[-1:]])
-    corners = _straight(times, knots, _straight(knots, t, q))
-    spline = CubicSpline(t, q, bc_type="clamped")(times)
-    return [lines, corners, spline]
+        return lines
+    return [*lines, CubicSpline(t, q, bc_type="clamped")(times)]
+
+
+def polygons(
+    t: Array, rows: Array, between: Callable[[Array, Array, Array], Array]
+) -> list[tuple[Array, Array]]:
+    """Return the polygon of targets, and that whose corners are cut from middle to middle.
+
+    Parameters
+    ----------
+    t : (K,)
+    rows : (K, m)
+        Of joints, or of poses.
+    between : callable
+        Times, the times of rows, rows → rows at these times, straight between those given.
+    """
+    if len(t) < 3:
+        return [(t, rows)]
+    knots = np.concatenate([t[:1], 0.5 * (t[:-1] + t[1:]), t[-1:]])
+    return [(t, rows), (knots, between(knots, t, rows))]
 
 
 def _straight(times: Array, t: Array, q: Array) -> Array:
@@ -245,13 +314,9 @@ class PoseStretch(Stretch):
 
         Where no joints are known they are not numbers.
         """
-        targets = self._rows()
-        lines = straight(times, self.t, targets)
-        found = [lines]
+        lines = polygons(self.t, self._rows(), straight)
+        found = [straight(times, *line) for line in lines]
         if len(self.t) > 2:
-            middles = 0.5 * (self.t[:-1] + self.t[1:])
-            knots = np.concatenate([self.t[:1], middles, self.t[-1:]])
-            found.append(straight(times, knots, straight(knots, self.t, targets)))
             found.append(self._spline(times))
         return [self._joints(rows, times)[:, self.order] for rows in found]
 
@@ -265,9 +330,17 @@ class PoseStretch(Stretch):
             return times, q, q
         return times, q, CubicSpline(times, q, bc_type="clamped")(times, 1)
 
-    def knots(self) -> tuple[Array, Array, Array]:
-        """See `Stretch.knots`."""
-        return self.smooth()
+    def joined(self) -> list[Knots]:
+        """See `Stretch.joined`; where no joints are known they are not numbers."""
+        found = [_at_rest(*self.smooth())]
+        for knots, rows in polygons(self.t, self._rows(), straight):
+            times = finer(knots, _BETWEEN_POSES)
+            q = self._joints(straight(times, knots, rows), times)[:, self.order]
+            if not np.isfinite(q).all():
+                found.append(Knots(times, q, q))
+                continue
+            found.append(Knots.cornered(times, q, len(_BETWEEN_POSES)))
+        return found
 
     def _spline(self, times: Array) -> Array:
         from scipy.interpolate import CubicSpline
@@ -286,6 +359,13 @@ class PoseStretch(Stretch):
         q[:, self.frames.external] = rows[:, 7:]
         found, arrived = self.frames.solved(rows[:, :3], rows[:, 3:7], q)
         return np.where(arrived[:, None], found, np.nan)
+
+
+def _at_rest(t: Array, q: Array, qd: Array) -> Knots:
+    """Return knots that begin and end at rest, where a spline leaves digits of it."""
+    rates = np.array(qd)
+    rates[[0, -1]] = 0.0
+    return Knots(t, q, rates)
 
 
 def straight(times: Array, t: Array, rows: Array) -> Array:
@@ -310,6 +390,24 @@ def straight(times: Array, t: Array, rows: Array) -> Array:
 
 # Below this sine of the angle slerp and a straight line are the same.
 _SMALL = 1e-9
+
+
+def fastest_between(t: Array, places: Array, turns: Array) -> tuple[float, float]:
+    """Return how fast the tool moves and turns at most by timed poses [m/s, rad/s].
+
+    Straight between them, or on the spline through them that begins and ends at rest.
+    """
+    from scipy.interpolate import CubicSpline
+
+    steps = np.diff(t)
+    fast = float((np.linalg.norm(np.diff(places, axis=0), axis=1) / steps).max())
+    apart = np.linalg.norm(np.diff(turns, axis=0), axis=1)
+    turning = float((4.0 * np.arcsin(np.minimum(0.5 * apart, 1.0)) / steps).max())
+    spline = CubicSpline(t, np.hstack([places, turns]), bc_type="clamped")
+    rates = spline(finer(t, _BETWEEN_POSES), 1)
+    fast = max(fast, float(np.linalg.norm(rates[:, :3], axis=1).max()))
+    # A unit quaternion turns half as fast as what it stands for.
+    return fast, max(turning, 2.0 * float(np.linalg.norm(rates[:, 3:], axis=1).max()))
 
 
 def on_one_side(turns: Array) -> Array:

@@ -287,11 +287,19 @@ class Span:
             )
 
     def _missed(self, stretch: Stretch) -> Flags:
-        """Whether the spline misses a feed, or passes a limit of speed, between two targets (K,).
+        """Whether a feed is missed, or a limit of speed passed, between two targets (K,).
 
-        Where the motion itself does not.
+        Where the motion itself does not; on the spline through the targets and straight between
+        them. Cut corners are slower than that.
         """
-        times, q, qd = stretch.smooth()
+        far = np.zeros(len(stretch.t) - 1)
+        for times, q, qd in stretch.joined()[:2]:
+            step = np.clip(np.searchsorted(stretch.t, times, side="right") - 1, 0, len(far) - 1)
+            np.maximum.at(far, step, self._taken(times, q, qd))
+        return np.asarray(far > 1.0)
+
+    def _taken(self, times: Array, q: Array, qd: Array) -> Array:
+        """Return how much is taken of what feeds and limits of speed leave, at times (K,)."""
         motion = self.piece.motion
         t = np.clip(self.first + times, self.first, motion.t[-1])
         exact, rates = motion(t), motion(t, 1)
@@ -310,7 +318,7 @@ class Span:
                 for begin, end in feed.during + motion.t[0]:
                     asked = (t > begin) & (t < end)
                     taken = np.maximum(taken, np.where(asked, off / max(room, 1e-12), 0.0))
-        return np.asarray(taken[:-1].reshape(len(stretch.t) - 1, -1).max(axis=1) > 1.0)
+        return taken
 
 
 def events_within(piece: Piece, first: float, last: float) -> list[tuple[float, str]]:

@@ -8,6 +8,7 @@ import numpy as np
 from selfmotion.basics import Array, ProblemError, write_text
 from selfmotion.controllers.controller_program import Draft, before, head, with_begins
 from selfmotion.controllers.feed_stretches import ZONE, FeedStretch
+from selfmotion.controllers.program_facts import held_in_words
 from selfmotion.controllers.program_lines import StopReader
 from selfmotion.controllers.program_settings import AXES, ProgramSettings, tool_from_flange
 from selfmotion.controllers.program_texts import pin_values, plain
@@ -75,6 +76,7 @@ def script(
         f"gain = {_GAIN}:",
         f"# the arm follows about {_LOOK_AHEAD} s late, and rounds what is faster than that;",
         "# outputs are switched as much later, when the arm is there.",
+        *([f"# {plain(held_in_words(robot))}"] if robot.locked else []),
         "def selfmotion():",
         *_tool(robot, joints, asked),
         *([] if asked.mass is None else [f"  set_payload({asked.mass:.6g}, [{center}])"]),
@@ -150,6 +152,8 @@ def _vector(values: Array) -> str:
 # The fastest approach [m/s], its acceleration [m/s²]; blends reach so far [m], and at most so much
 # of the way to the next target, as two of them may not overlap.
 _FASTEST, _ACCELERATION, _BLEND, _SHARE = 0.5, 1.2, 1e-3, 0.45
+# Speeds are written in four digits.
+_UP = 1.001
 # Where the tool turns in place, the arm goes on as well [m].
 _LEAST = 1e-5
 
@@ -250,6 +254,11 @@ class UrscriptReader(StopReader):
 
     comment, last = "#", "end"
 
+    def __init__(self, file: FilePath, robot: RobotModel | None = None) -> None:
+        super().__init__(file, robot)
+        # Of timed motions since the last stop [m].
+        self._blends: list[float] = []
+
     def begin(self, _: Sequence[str]) -> None:
         """Begin the program."""
         self.name, self.state, self.present = "selfmotion", "head", list(AXES[:_JOINTS])
@@ -262,30 +271,85 @@ class UrscriptReader(StopReader):
         """Take the feature."""
         self.work = self._frame(given[0])
 
+    def loaded(self, given: Sequence[str]) -> None:
+        """Take what the flange carries."""
+        center = given[1].split(",")
+        if len(center) != 3:
+            raise self.lines.fault(f"set_payload has {len(center)} numbers, expected 3")
+        self.load_is(given[0], center, 1.0)
+
     def go(self, given: Sequence[str]) -> None:
         """Take where the motion begins, or where it slowly goes on by joints."""
         self._check_stopped()
+        self._check_slow(given[1:], (_JOINT_ACCELERATION, _FASTEST_JOINT), "rad/s")
         self.begin_at(self._joints(given[0]))
         self.state = "body"
 
     def go_linear(self, given: Sequence[str]) -> None:
         """Take the pose from which the motion goes on by poses."""
         self._check_stopped()
+        self._check_slow(given[1:], (_ACCELERATION, _FASTEST), "m/s")
         self.slowly(self._pose(given[0]))
+
+    def _check_slow(self, given: Sequence[str], most: tuple[float, float], unit: str) -> None:
+        """Refuse a motion to where the program goes on that is faster than slow ones are."""
+        push, speed = (self.lines.number_of(text) for text in given)
+        if not (0.0 < push <= _UP * most[0] and 0.0 < speed <= _UP * most[1]):
+            raise self.lines.fault(
+                f"a motion to where the program goes on has a={push:g}, v={speed:g}, expected at "
+                f"most {most[0]:g} {unit}² and {most[1]:g} {unit}: nothing has judged it"
+            )
 
     def move(self, given: Sequence[str]) -> None:
         """Take a joint target."""
         if self.poses:
             raise self.lines.fault("a joint target after a pose with a blend, expected r=0")
         axes, taken = self._joints(given[0]), self.lines.duration(given[1])
-        self.take_axes(axes, taken, stops=self.lines.number_of(given[2]) == 0.0)
+        radius = self.lines.number_of(given[2])
+        self._blends.append(radius)
+        if radius == 0.0:
+            self._check_blends(self._places([self.at, *self.axes, axes]))
+        self.take_axes(axes, taken, stops=radius == 0.0)
 
     def move_linear(self, given: Sequence[str]) -> None:
         """Take a pose."""
         if self.axes or self.speeds:
             raise self.lines.fault("a pose after another kind with a blend, expected r=0")
         pose, taken = self._pose(given[0]), self.lines.duration(given[1])
-        self.take_pose(pose, taken, stops=self.lines.number_of(given[2]) == 0.0)
+        radius = self.lines.number_of(given[2])
+        self._blends.append(radius)
+        if radius == 0.0:
+            before = [] if self.pose_at is None else [self.pose_at]
+            self._check_blends(np.array([item.place for item in (*before, *self.poses, pose)]))
+        self.take_pose(pose, taken, stops=radius == 0.0)
+
+    def _places(self, targets: Sequence[list[float] | None]) -> Array | None:
+        """Return where the tool is at joint targets [deg], (K, 3); None where no arm is known."""
+        joints = self.lines.joints()
+        named = [joints[axis][0] for axis in self.present if axis in joints]
+        if self.robot is None or None in targets or sorted(named) != sorted(self.robot.joint_names):
+            return None
+        order = [named.index(name) for name in self.robot.joint_names]
+        return self.robot.chain.along(np.radians(np.array(targets)[:, order]))[2]
+
+    def _check_blends(self, places: Array | None) -> None:
+        """Refuse blends that reach past the middle of a way: there a controller leaves targets out.
+
+        Where no arm is known, those that are larger than any that is written.
+        """
+        radii = np.array(self._blends[:-1])
+        self._blends = []
+        most = np.full(len(radii), _BLEND)
+        if places is not None and len(places) == len(radii) + 2:
+            ways = np.linalg.norm(np.diff(places, axis=0), axis=1)
+            most = np.maximum(0.5 * np.minimum(ways[:-1], ways[1:]), _LEAST)
+        far = radii > most
+        if far.any() or (radii < 0.0).any():
+            k = int(np.argmax(far))
+            raise self.lines.fault(
+                f"a blend before this stop has r={radii[k]:g} m, expected at most {most[k]:.4g} m, "
+                f"half of the way to the next target: blends that overlap leave targets out"
+            )
 
     def move_at_speed(self, given: Sequence[str]) -> None:
         """Take a pose at a speed, straight or round."""
@@ -345,13 +409,13 @@ class UrscriptReader(StopReader):
 
 _LIST = r"\[([^\[\]]*)\]"
 _TARGET = rf"pose_trans\(feature, ?p{_LIST}\)"
-_SPEED = r"a=[\d.e-]+, ?v=[\d.e-]+"
+_SPEED = r"a=([\d.e-]+), ?v=([\d.e-]+)"
 _RAMPED, _PACED = r"a=([\d.e-]+)", r"v=([\d.e-]+), ?r=([\d.e-]+)"
 _TIMED = r"t=([\d.e-]+), ?r=([\d.e-]+)"
 UrscriptReader.grammar = (
     (("before",), r"def selfmotion\(\):", UrscriptReader.begin),
     (("head",), rf"set_tcp\(p{_LIST}\)", UrscriptReader.tool_is),
-    (("head",), rf"set_payload\([\d.e-]+, ?{_LIST}\)", UrscriptReader.skip),
+    (("head",), rf"set_payload\(([\d.e-]+), ?{_LIST}\)", UrscriptReader.loaded),
     (("head",), rf"feature = p{_LIST}", UrscriptReader.work_is),
     (("head", "body"), rf"movej\({_LIST}, ?{_SPEED}\)", UrscriptReader.go),
     (("body",), rf"movej\({_LIST}, ?{_TIMED}\)", UrscriptReader.move),

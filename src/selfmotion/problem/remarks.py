@@ -105,8 +105,9 @@ def remarks_on(
                 yield f"{pair.first} - {pair.second}: {pair.remedy}"
     yield from _unit_remarks(robot, constraints)
     for item in constraints:
-        # What nobody asked for by name is not missed.
-        if not item.applies(robot) and not any(item is usual for usual in KEPT):
+        # What nobody asked for by name is not missed, nor what another constraint gives.
+        known = (type(each) is type(item) and each.applies(robot) for each in constraints)
+        if not (item.applies(robot) or any(item is usual for usual in KEPT) or any(known)):
             option = "--acceleration, or " * isinstance(item, JointAccelerationLimits)
             kind = type(item).__name__
             yield (

@@ -36,7 +36,7 @@ def facts(plan: Plan) -> dict[str, Cell]:
     report, certificate = plan.report, plan.certificate
     rows: dict[str, Cell] = {"verdict": (certificate.verdict, "")}
     rows["cost"] = _compared(report.cost, report.initial_cost)
-    if report.remaining is not None:
+    if report.remaining is not None and certificate.verified:
         rows["further saving possible, estimate"] = (f"{report.remaining:.2g}", _share(report))
     for name, value in report.terms.items():
         rows[f"cost term: {name}"] = _compared(value, report.initial_terms.get(name))
