@@ -8,6 +8,7 @@ import pytest
 from rich.console import Console
 
 import selfmotion as sm
+from selfmotion.basics import Array
 from selfmotion.cli import tables
 
 # The published method integrates its costs on its own grid.
@@ -49,10 +50,14 @@ def test_a_total_is_told_of_the_same_costs_only(plans: dict[str, sm.Plan]) -> No
     found = sm.compare([speed, other])
     assert "total cost" not in found.costs
     assert "joint velocity (each plan's own)" in found.costs
-    for one, same in ((lambda qd, q, t: t, False), (abs, True)):
+
+    def speed_of(q: Array, qd: Array, t: Array) -> Array:
+        return np.square(qd).sum(axis=1)
+
+    for one, same in ((lambda q, qd, t: t, False), (speed_of, True)):
         made = [
             replace(speed, problem=replace(speed.problem, costs=[sm.costs.FunctionCost(g)]))
-            for g in (abs, abs if same else one)
+            for g in (speed_of, speed_of if same else one)
         ]
         assert ("total cost" in sm.compare(made).costs) is same
 

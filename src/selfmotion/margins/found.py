@@ -110,6 +110,8 @@ class Margins:
     part, tool, base : SubjectMargin
     judged : str
         What was judged, in words.
+    motion, problem : str
+        Digests of the motion and of the problem that they are of.
     """
 
     robot: str
@@ -117,6 +119,8 @@ class Margins:
     tool: SubjectMargin
     base: SubjectMargin
     judged: str
+    motion: str
+    problem: str
 
     @property
     def subjects(self) -> tuple[SubjectMargin, ...]:

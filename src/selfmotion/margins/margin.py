@@ -95,7 +95,8 @@ def margin(
         _margin_of(plan, models, item, allowed, left)
         for item in (part_of(plan, part, middle), tool_of(plan, tool), base_of(plan))
     )
-    return Margins(plan.robot.name, of_part, of_tool, of_base, _judged(plan, allowed, left))
+    judged, made_of = _judged(plan, allowed, left), (plan.trajectory.digest, plan.problem.digest)
+    return Margins(plan.robot.name, of_part, of_tool, of_base, judged, *made_of)
 
 
 def _checked(plan: Plan, tolerance: Tolerance | None) -> Tolerance | None:

@@ -98,11 +98,15 @@ class Correction:
     ----------
     of : str
     translation, rotation : CorrectionSide
+    motion, problem : str
+        Digests of the motion and of the problem that it is of.
     """
 
     of: str
     translation: CorrectionSide
     rotation: CorrectionSide
+    motion: str
+    problem: str
 
     def __str__(self) -> str:
         """Return both in words: what is confirmed, where, and what stops more."""
@@ -179,7 +183,8 @@ def correction(
     )
     corners = _Corners(places, plan, progress)
     translation = corners.side(range(3), limits[0])
-    return Correction(of, translation, corners.side(range(3, 6), limits[1]))
+    rotation = corners.side(range(3, 6), limits[1])
+    return Correction(of, translation, rotation, plan.trajectory.digest, plan.problem.digest)
 
 
 def _standing(plan: Plan) -> tuple[str, ...]:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, MutableMapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path as FilePath
@@ -15,10 +17,13 @@ from selfmotion.basics import (
     CollisionError,
     FileFormatError,
     PlanError,
+    ProblemError,
     Progress,
     RobotError,
     SelfmotionError,
     as_path,
+    description_of,
+    digest_of,
     silent,
 )
 from selfmotion.certificate import (
@@ -32,7 +37,7 @@ from selfmotion.certificate import (
     approaches,
 )
 from selfmotion.collision import Obstacle
-from selfmotion.costs import Cost, metres_of
+from selfmotion.costs import Cost, FunctionCost, LostCost, metres_of
 from selfmotion.motion import Trajectory
 from selfmotion.path import Path
 from selfmotion.problem.problem import Problem
@@ -64,6 +69,15 @@ class Views(Protocol):
         """Return the plan's curves as a matplotlib figure."""
 
 
+def _digests(costs: Sequence[Cost]) -> dict[str, str]:
+    """Return the digest of each cost by its name; "" of a function, which no file has."""
+    functions = FunctionCost | LostCost
+    return {
+        cost.name: "" if isinstance(cost, functions) else digest_of(description_of(cost))
+        for cost in costs
+    }
+
+
 @dataclass(frozen=True, eq=False)
 class Plan:
     """A joint motion along a tool motion.
@@ -79,6 +93,7 @@ class Plan:
     coefficients : (size,)
         x, the null motion's coefficients.
     report : Report
+        Of this motion: of one that was put in the place of another, costs are evaluated again.
     certificate : Certificate
         Of this motion and this problem: one of any other is not kept, and the plan is then not
         verified (``replace(plan, trajectory=…)``); `check` makes a new one.
@@ -103,6 +118,31 @@ class Plan:
         check, motion = self.certificate, self.trajectory
         if (check.motion, check.problem) != (motion.digest, self.problem.digest):
             object.__setattr__(self, "certificate", check.of_another())
+        object.__setattr__(self, "report", self._own_report())
+
+    def _own_report(self) -> Report:
+        """Return the report of this motion and problem: that of others is evaluated again.
+
+        Where it does not say what it is of, it is of what the certificate was of. What cannot be
+        evaluated, as functions that no file has, leaves a cost that is not a number.
+        """
+        report = self.report
+        own = self.trajectory.digest, self.problem.digest, _digests(self.problem.costs)
+        if (report.motion, report.problem, report.costs) == own:
+            return report
+        unknown = not (report.motion or report.problem)
+        motion, problem, costs = own
+        if unknown and self.certificate.motion:
+            return replace(report, motion=motion, problem=problem, costs=costs)
+        terms = {}
+        for cost in self.problem.costs:
+            with suppress(ProblemError):
+                if not isinstance(cost, LostCost):
+                    terms[cost.name] = self.evaluate(cost)
+        complete = len(terms) == len(self.problem.costs)
+        total = sum(terms.values()) if complete else math.nan
+        found = report.evaluated(total, terms)
+        return replace(found, motion=motion, problem=problem, costs=costs)
 
     def __repr__(self) -> str:
         """Return a few lines: what moves, at what cost, and the verdict."""

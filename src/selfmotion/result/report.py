@@ -1,7 +1,7 @@
 """How a plan was found, and how far it may be from the best."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 from selfmotion.constraints import ActiveConstraint
 from selfmotion.motion import NullMotion
@@ -118,6 +118,12 @@ class Report:
         published method, which knows no other null motion.
     attempts : tuple of Attempt
         The strategies that were tried, in order; empty for other works' methods.
+    motion, problem : str
+        Digests of the motion and the problem that costs, active constraints and all else are of;
+        "" until the plan is made. Of what was put in the place of another, `evaluated` is the
+        report.
+    costs : dict
+        The digest of each cost by its name; "" of one that is a function.
     """
 
     cost: float
@@ -139,6 +145,21 @@ class Report:
     null_motion: NullMotion | None = None
     remaining: float | None = None
     attempts: tuple[Attempt, ...] = ()
+    motion: str = ""
+    problem: str = ""
+    costs: Mapping[str, str] = field(default_factory=dict)
+
+    def evaluated(self, cost: float, terms: Mapping[str, float]) -> "Report":
+        """Return the report of another motion: what it costs, and nothing of how it was found."""
+        return replace(
+            self,
+            cost=cost,
+            terms=dict(terms),
+            message="motion or problem were put in the place of those that were planned",
+            gap=None,
+            active=(),
+            remaining=None,
+        )
 
     def __repr__(self) -> str:
         """Return one line: costs, effort and how it ended."""

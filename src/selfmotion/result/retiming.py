@@ -75,10 +75,10 @@ def retime(
     Velocity, acceleration, jerk and torque limits and those of the tool are kept, all that the
     plan was asked to keep, by linear programmes in the square of the pace (`result.pacing`). Where
     the problem says how fast the arm begins or ends, it does so. The geometric path of joints and
-    tool stays; the tool motion becomes a `Retimed` one, the certificate is made anew. The report
-    stays, but for when constraints bind, which moves along, and for remarks: where no jerk is
-    limited and accelerations often change at once, and where the tool waited on its way (`Dwell`),
-    which it does no longer than limits ask.
+    tool stays; the tool motion becomes a `Retimed` one, the certificate is made anew. Costs are
+    evaluated again; the report has when constraints bind, which moves along, and remarks: where no
+    jerk is limited and accelerations often change at once, and where the tool waited on its way
+    (`Dwell`), which it does no longer than limits ask.
 
     Parameters
     ----------
@@ -240,6 +240,6 @@ def _retimed(plan: Plan, wanted: Sequence[Constraint], pace: Pace) -> Plan:
         problem=problem,
         trajectory=trajectory,
         initial_trajectory=trajectory,
-        report=replace(plan.report, active=active),
     )
-    return replace(retimed, certificate=retimed.check())
+    report = replace(retimed.report, active=active, message=plan.report.message)
+    return replace(retimed, report=report, certificate=retimed.check())

@@ -249,7 +249,7 @@ def write_sheet(
     Raises
     ------
     PlanError
-        The certificate is of another motion, or the margins are of another arm.
+        The certificate is of another motion, or the margins are of another motion or problem.
     """
     if not isinstance(plan, Plan):
         raise ProblemError(f"write_sheet: plan is {shown(plan)}, expected a Plan")
@@ -259,6 +259,12 @@ def write_sheet(
         raise PlanError(f"{plan.robot.name}: {plan.certificate.verdict}")
     if margins is not None and margins.robot != plan.robot.name:
         raise PlanError(f"the margins are of {margins.robot}, the plan is of {plan.robot.name}")
+    own = plan.trajectory.digest, plan.problem.digest
+    if margins is not None and (margins.motion, margins.problem) != own:
+        raise PlanError(
+            f"{plan.robot.name}: the margins are of another motion or problem than the plan; find "
+            f"them anew (selfmotion.margin(plan))"
+        )
     path = as_path(file)
     if path.suffix != ".html":
         raise ProblemError(f"{path}: expected a name that ends in .html")
