@@ -74,6 +74,36 @@ def test_a_target_that_is_seen_no_more_goes_on_for_a_while(panda: sm.RobotModel)
     assert np.all(segments[-1].qd[-1] == 0.0)
 
 
+@pytest.mark.parametrize("as_path", [False, True])
+def test_a_target_that_is_sent_again_is_as_old_as_it_was_seen(
+    panda: sm.RobotModel, as_path: bool
+) -> None:
+    """A camera that stopped seeing, and sends its last target on: the arm stops as without one."""
+    replanner, home = Replanner(panda, patience=0.1), panda.pose(PANDA_HOME)
+    sent = realtime.MovingPose(home, TWIST, 0.0)
+    given = {"path": sent} if as_path else {"target": home, "twist": TWIST, "seen": 0.0}
+    t, q, qd, flags, reasons = 0.0, PANDA_HOME, np.zeros(7), list[Flag](), list[str]()
+    for _ in range(60):
+        segment = replanner.step(t, q, qd, **given)
+        t += replanner.period
+        now = segment.index(t)
+        q, qd = segment.q[now], segment.qd[now]
+        flags.append(segment.flag)
+        reasons += segment.reasons
+    assert flags[5] is Flag.PLANNED
+    assert flags[12:] == [Flag.STOPPING] * len(flags[12:])
+    assert any("it was seen 0.11 s ago (patience: 0.1 s)" in text for text in reasons)
+    assert np.all(qd == 0.0)
+
+
+def test_a_target_of_another_clock_is_none(panda: sm.RobotModel) -> None:
+    segment = Replanner(panda).step(
+        0.0, PANDA_HOME, np.zeros(7), target=panda.pose(PANDA_HOME), twist=TWIST, seen=1.7e9
+    )
+    assert segment.flag is Flag.STOPPING
+    assert "on another clock?" in segment.reasons[0]
+
+
 def test_what_a_camera_cannot_have_seen_is_left_out_and_told(panda: sm.RobotModel) -> None:
     replanner, home = Replanner(panda), panda.pose(PANDA_HOME)
     assert replanner.step(0.0, PANDA_HOME, np.zeros(7)).reasons == ("there was no target yet",)

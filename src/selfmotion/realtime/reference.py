@@ -254,17 +254,18 @@ class LastPath:
         self._without = 0.0
 
     def samples(
-        self, path: Path | None, t: Array, waited: float, reasons: list[str]
+        self, path: Path | None, t: Array, waited: float, age: float, reasons: list[str]
     ) -> PathSamples | None:
         """Return the path at times (K,); the last one where it fails, and add the reason.
 
         The last one, too, where none is given: targets come at their own rate. None after too long,
-        of which `waited` [s] have passed since it was asked last.
+        of which `waited` [s] have passed since it was asked last, and `age` [s] since a given
+        target was seen.
         """
         if path is not None:
             try:
                 found = resting(path, t)
-                self._path, self._without = path, 0.0
+                self._path, self._without = path, age
                 return found
             # A path is the user's code: whatever it raises must not leave the arm without a
             # command.

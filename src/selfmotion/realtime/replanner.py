@@ -109,6 +109,11 @@ def as_seen(
         return None
 
 
+def age_of(path: Path | None, t: float) -> float:
+    """Return how long ago a target was seen [s]; of a path, which is no observation, 0."""
+    return t - path.seen if isinstance(path, MovingPose) else 0.0
+
+
 def in_null_space(motion: NullMotion) -> NullMotion:
     """Return a null motion; ProblemError unless it is one in the null space."""
     if motion.space != "null":
@@ -162,8 +167,8 @@ class Replanner:
         Time constant [s] of the filter of what the arm is off its command: no shorter than its
         own time constant and delay.
     patience : float
-        Without a path or a measured state for this long [s], or with a singular pose right ahead,
-        the arm is brought to rest.
+        Without a path, a target that was seen, or a measured state for this long [s], or with a
+        singular pose right ahead, the arm is brought to rest.
     approach : Approach
         How the tool comes back to the path.
 
@@ -277,7 +282,8 @@ class Replanner:
             How the target moves: velocity of its origin [m/s] and angular velocity [rad/s], world
             axes. By default it rests.
         seen : float, optional
-            When the target was seen, on the clock of `t` [s]; by default at `t`.
+            When the target was seen, on the clock of `t` [s]; by default at `t`. One that was seen
+            longer ago than `patience` is none, however often it is sent.
 
         Returns
         -------
@@ -295,8 +301,15 @@ class Replanner:
         t, reasons = as_number(t, "t"), list[str]()
         if target is not None or twist is not None or seen is not None:
             path = as_seen(path, target, twist, t if seen is None else seen, reasons)
+        age = age_of(path, t)
+        if abs(age) > self._patience:
+            when = f"{age:.3g} s ago" if age > 0.0 else f"in {-age:.3g} s: on another clock?"
+            reasons.append(
+                f"the target is left out: it was seen {when} (patience: {self._patience:.3g} s)"
+            )
+            path, age = None, 0.0
         with one_blas_thread():
-            return self._step(t, q, qd, path, obstacles or {}, reasons)
+            return self._step(t, q, qd, path, max(age, 0.0), obstacles or {}, reasons)
 
     def _step(
         self,
@@ -304,6 +317,7 @@ class Replanner:
         q: npt.ArrayLike,
         qd: npt.ArrayLike,
         path: Path | None,
+        age: float,
         obstacles: Mapping[str, SE3],
         reasons: list[str],
     ) -> Segment:
@@ -317,7 +331,7 @@ class Replanner:
             self._around.move(obstacles)
         moving = self._measure(q, passed, reasons)
         waited = max(passed, self.cycle)
-        target = self._path.samples(path, commands.time + self._times, waited, reasons)
+        target = self._path.samples(path, commands.time + self._times, waited, age, reasons)
         error, flag, follows = np.zeros(2), Flag.STOPPING, False
         first = 0
         if target is not None:
