@@ -61,6 +61,18 @@ def test_the_limits_of_a_file_are_scaled_and_join_the_arms(
     assert sm.files.read_joint_limits(written(tmp_path, nested), panda)[1].of(panda)[0] == 1.0
 
 
+def test_a_joint_brakes_by_no_more_than_its_deceleration(
+    panda: sm.RobotModel, tmp_path: Path
+) -> None:
+    """Of whichever sign: Pilz's planner writes it as a negative acceleration."""
+    for sign in (1.0, -1.0):
+        limits = {"has_deceleration_limits": True, "max_deceleration": sign * 0.5}
+        limits |= {"has_acceleration_limits": True, "max_acceleration": 2.0}
+        document = {"joint_limits": {"panda_joint1": limits}}
+        (found,) = sm.files.read_joint_limits(written(tmp_path, document), panda)
+        assert found.of(panda)[0] == 0.5
+
+
 def test_a_makers_limits_stay_unless_they_are_replaced(panda: sm.RobotModel) -> None:
     for kind, published in (
         (sm.constraints.JointAccelerationLimits, panda.acceleration_limit),

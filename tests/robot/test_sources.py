@@ -8,6 +8,7 @@ import pinocchio as pin
 import pytest
 
 import selfmotion as sm
+from selfmotion.robot import Dynamics
 from support.arms import robot_named, short_line
 
 # Roundings of angles that are written and read.
@@ -25,6 +26,10 @@ def model_of(robot: sm.RobotModel) -> pin.Model:
 
 def poses(robot: sm.RobotModel, q: np.ndarray) -> np.ndarray:
     return np.array([pose.homogeneous for pose in robot.pose(q)])
+
+
+# Torques of two models of one arm differ by rounding [Nm].
+TORQUES = 1e-9
 
 
 def test_text_is_the_arm_of_its_file(robot: sm.RobotModel) -> None:
@@ -64,6 +69,27 @@ def test_a_model_keeps_its_masses(robot: sm.RobotModel) -> None:
 
 
 @pytest.mark.parametrize("name", ["panda", "tiago", "z1"])
+def test_a_model_keeps_the_inertia_of_its_rotors(panda: sm.RobotModel, tmp_path: Path) -> None:
+    """Torques are those of `pinocchio.rnea` of the model that was given, in a cell as well."""
+    given = pin.buildModelFromXML(robot_named("ur5").urdf.readable_text)
+    given.armature = np.linspace(0.5, 2.0, given.nv)
+    data, rng = given.createData(), np.random.default_rng(3)
+    rows = rng.uniform(-1.0, 1.0, (3, 6))
+    for robot in (
+        sm.load_robot(given, tool="tool0"),
+        sm.load_robot({"arm": given}, tool="arm/tool0"),
+    ):
+        found = Dynamics(robot).torques(*(row[None] for row in rows))[0]
+        np.testing.assert_allclose(found, pin.rnea(given, data, *rows), atol=TORQUES)
+
+
+def test_gravity_that_a_urdf_cannot_say_is_refused() -> None:
+    given = pin.buildModelFromXML(robot_named("ur5").urdf.readable_text)
+    given.gravity.linear = np.array([9.81, 0.0, 0.0])
+    with pytest.raises(sm.errors.RobotError, match=r"gravity is \(9.81, 0, 0\).*base="):
+        sm.load_robot(given, tool="tool0")
+
+
 def test_a_model_with_bodies_collides_as_its_file(name: str) -> None:
     """The same distances between the same links: by meshes, boxes, spheres and cylinders."""
     robot = robot_named(name)

@@ -342,7 +342,7 @@ class JointTorqueLimits(Constraint):
             limit=limit,
             of_pace=True,
             series=lambda stretch: dynamics.series(stretch.chain()),
-            covers=(_covered(self.of(robot)),),
+            covers=(_covered(robot, self.of(robot)),),
         )
 
     def of(self, robot: RobotModel) -> Array:
@@ -353,7 +353,13 @@ class JointTorqueLimits(Constraint):
         return per_joint(self.limit, robot.dof, what, positive=True)
 
 
-def _covered(limit: Array) -> str:
-    """Return what a verdict may claim: of some motors nobody may have said what they can."""
+def _covered(robot: RobotModel, limit: Array) -> str:
+    """Return what a verdict may claim: of some motors nobody may have said what they can.
+
+    Torques are those of rigid bodies: where a URDF has damping or friction, the verdict says so.
+    """
     known = int(np.isfinite(limit).sum())
-    return "torques" if known == len(limit) else f"torques of {known} of {len(limit)} joints"
+    claim = "torques" if known == len(limit) else f"torques of {known} of {len(limit)} joints"
+    model = robot.model
+    losses = np.any(model.damping) or np.any(model.upperDryFrictionLimit)
+    return f"{claim} without damping and friction" if losses else claim

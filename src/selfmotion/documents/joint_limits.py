@@ -40,10 +40,11 @@ _KINDS: Mapping[str, tuple[str, ...]] = {
     "velocity": ("max_velocity",),
     "acceleration": ("max_acceleration",),
     "jerk": ("max_jerk",),
+    "deceleration": ("max_deceleration",),
 }
 # What such files may say besides, and plans do not ask.
 _OTHERS = (
-    *("has_effort_limits", "max_effort", "has_deceleration_limits", "max_deceleration"),
+    *("has_effort_limits", "max_effort"),
     *("angle_wraparound", "has_soft_limits", "k_position", "k_velocity"),
     *("soft_lower_limit", "soft_upper_limit"),
 )
@@ -101,7 +102,11 @@ def read_joint_limits(
     if np.isfinite(lower).any() or np.isfinite(upper).any():
         found.append(JointPositionLimits(lower, upper))
     for kind, constraint in _RATES.items():
-        limit = _each(robot, joints, f"max_{kind}", np.inf) * factors.get(kind, 1.0)
+        limit = _each(robot, joints, f"max_{kind}", np.inf)
+        if kind == "acceleration":
+            # Accelerations are limited alike in both directions: the arm brakes by as much.
+            limit = np.minimum(limit, _each(robot, joints, "max_deceleration", np.inf))
+        limit = limit * factors.get(kind, 1.0)
         if np.isfinite(limit).any():
             found.append(constraint(limit))
     return tuple(found)
@@ -159,6 +164,9 @@ def _joint(file: Path, joint: str, values: Any) -> dict[str, float]:
                     f"{file}: {where}: {flag} is true, but {missing[0]} is missing"
                 )
             found.update({key: _number(file, f"{where}.{key}", values[key]) for key in keys})
+            if kind == "deceleration":
+                # Pilz's planner writes them as negative accelerations.
+                found["max_deceleration"] = abs(found["max_deceleration"])
         elif flag not in values and any(key in values for key in keys):
             raise FileFormatError(
                 f"{file}: {where}.{keys[-1]} has no effect without {flag}; say true or false"

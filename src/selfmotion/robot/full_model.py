@@ -169,7 +169,26 @@ def full_model(urdf: Urdf) -> Any:
     if said:
         # What comes last only says that the whole is none.
         raise RobotError(f"{urdf.source}: is not read by Pinocchio: {'; '.join(said[-3:])}")
+    _add_rotors(model, text)
     return model
+
+
+# The attribute of ``<dynamics>`` that has a rotor's inertia, counted at the joint [kg m² or kg].
+ARMATURE = "armature"
+
+
+def _add_rotors(model: Any, text: str) -> None:
+    """Give a model the inertias of rotors that its text has, which no parser of URDFs knows."""
+    if ARMATURE not in text:
+        return
+    for joint in ElementTree.fromstring(text).findall("joint"):
+        turning = joint.find("dynamics")
+        inertia = 0.0 if turning is None else float(turning.get(ARMATURE, "0"))
+        if inertia:
+            index = model.joints[model.getJointId(joint.get("name", ""))].idx_v
+            armature = np.array(model.armature)
+            armature[index] = inertia
+            model.armature = armature
 
 
 def link_geometry(urdf: Urdf, model: Any, kind: pin.GeometryType) -> Any:

@@ -9,10 +9,13 @@ import numpy as np
 import pinocchio as pin
 
 from selfmotion.basics import Array, RobotError, is_file
+from selfmotion.robot.full_model import ARMATURE
 from selfmotion.task import rpy
 
 # Angles beyond the first are no limits [rad]; speeds and efforts beyond the second are none.
 _ENDLESS, _NONE = 1e5, 1e30
+# Gravity is the usual one within this [m/s²].
+_SAME_GRAVITY = 0.02
 # What of a model has a name that a tool may have; the others are joints.
 _NAMED = (pin.FrameType.BODY, pin.FrameType.OP_FRAME, pin.FrameType.SENSOR)
 
@@ -21,8 +24,9 @@ def urdf_text_of(model: Any, geometry: Any, source: str) -> str:
     """Return URDF text of a ``pinocchio.Model``.
 
     Its bodies and frames become links, its revolute and prismatic joints are joints with their
-    limits, and the inertia of each joint is that of the link it carries. What else it has (gravity,
-    friction, rotors) a URDF has not.
+    limits, and the inertia of each joint is that of the link it carries. Damping and friction are
+    those of the joints; the inertia of a rotor (``armature``) is an attribute of ``<dynamics>``
+    that only this package knows.
 
     Parameters
     ----------
@@ -35,9 +39,10 @@ def urdf_text_of(model: Any, geometry: Any, source: str) -> str:
     Raises
     ------
     RobotError
-        A joint is neither revolute nor prismatic, a name is there twice, or a URDF knows no such
-        body.
+        A joint is neither revolute nor prismatic, a name is there twice, a URDF knows no such
+        body, or gravity does not act along -z.
     """
+    _check_gravity(model, source)
     robot = ElementTree.Element("robot", name=model.name or "robot")
     links = _Links(model)
     names = links.names()
@@ -59,6 +64,18 @@ def urdf_text_of(model: Any, geometry: Any, source: str) -> str:
         fixed = ElementTree.SubElement(robot, "joint", name=f"{item.name}_fixed", type="fixed")
         _connect(fixed, parent, item.name, place)
     return ElementTree.tostring(robot, encoding="unicode")
+
+
+def _check_gravity(model: Any, source: str) -> None:
+    """Refuse gravity that a URDF cannot say: torques would be verified for another one."""
+    gravity = np.array(model.gravity.vector)
+    usual = np.array(pin.Model().gravity.vector)
+    if np.abs(gravity - usual).max() > _SAME_GRAVITY:
+        found = ", ".join(f"{value:g}" for value in gravity[:3])
+        raise RobotError(
+            f"{source}: gravity is ({found}) m/s², expected (0, 0, -9.81): set model.gravity so, "
+            f"and turn an arm on a wall by base= (load_robot({{'arm': model}}, base={{'arm': pose}}))"
+        )
 
 
 class _Links:
@@ -176,6 +193,14 @@ def _moving_joint(model: Any, joint: int, links: _Links, source: str) -> Element
     if not endless:
         limit |= {"lower": lower, "upper": upper}
     ElementTree.SubElement(element, "limit", {key: repr(each) for key, each in limit.items()})
+    turning = {
+        "damping": model.damping[kind.idx_v],
+        "friction": model.upperDryFrictionLimit[kind.idx_v],
+        ARMATURE: model.armature[kind.idx_v],
+    }
+    if any(turning.values()):
+        said = {key: repr(float(each)) for key, each in turning.items()}
+        ElementTree.SubElement(element, "dynamics", said)
     return element
 
 
