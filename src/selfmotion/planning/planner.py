@@ -204,6 +204,9 @@ class Planner:
     rival : Candidate or None
         The best motion from these. It is not chosen where the start is given or the search local,
         and only compared with.
+    stops, advice : str
+        What stops a motion that is not verified, and what may help, in words; empty where nothing
+        is known.
     failure : SelfmotionError or None
         Why there is no motion, if there is none: the last reason.
     notes : list of str
@@ -231,6 +234,8 @@ class Planner:
     sequences: list[Sequence] = field(default_factory=list)
     rival: Candidate | None = None
     failure: SelfmotionError | None = None
+    stops: str = ""
+    advice: str = ""
     notes: list[str] = field(default_factory=list)
     waiting: abc.Sequence[Candidate] = ()
     ranking: Ranking | None = None

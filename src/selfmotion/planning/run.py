@@ -80,6 +80,10 @@ def gathered(planner: Planner, deadline: Deadline) -> Plan:
         remaining=solution.remaining,
         attempts=tuple(planner.attempts),
     )
+    if planner.stops or planner.advice:
+        advice = (planner.advice,) if planner.advice else ()
+        failures = (planner.stops, *check.failures) if planner.stops else check.failures
+        check = replace(check, failures=failures, notes=(*check.notes, *advice))
     return Plan(
         problem=planner.problem.asked,
         trajectory=planner.problem.own(motion.trajectory),

@@ -316,6 +316,41 @@ def _draw_where_proof_fails(planner: Planner) -> bool:
     return True
 
 
+def _look_what_stops(planner: Planner) -> bool:
+    """Look what stops a motion that is not verified: whether the arm can be there at all."""
+    judged, problem = planner.judged, planner.problem
+    if judged is None or judged.certificate.verified or judged.part.candidate.cut_short:
+        return False
+    if planner.is_published or problem.damping is not None:
+        return False
+    if judged.part.ending or judged.fails_at is None:
+        return False
+    failure = planner.failure
+    if isinstance(failure, NoSequenceError):
+        planner.stops = str(failure).removeprefix(f"{problem.asked.robot.name}: ")
+        return True
+    rng = np.random.default_rng(planner.search.rng)
+    blocked = obstruction(problem, rng, judged.fails_at)
+    if blocked is not None:
+        planner.stops = _passing(blocked)
+    elif planner.is_free:
+        planner.advice = (
+            "the arm can be at each pose that was looked at, but no motion was found that joins "
+            "them: plan it in parts (plan_in_parts, parts = true in files)"
+        )
+    else:
+        planner.advice = (
+            "the arm can be at each pose that was looked at: another start may do (start=None)"
+        )
+    return True
+
+
+def _passing(blocked: Obstruction) -> str:
+    return (
+        f"no motion along the path passes t = {blocked.time:.6g} s: {blocked.reason}{blocked.help}"
+    )
+
+
 # By name, as reports have it; each says whether it was tried.
 STEPS: tuple[tuple[str, Callable[[Planner], bool]], ...] = (
     # Look: a 'no' before anything is planned.
@@ -337,6 +372,7 @@ STEPS: tuple[tuple[str, Callable[[Planner], bool]], ...] = (
     ("finer grids and proof", _judge),
     ("largest part instead", _plan_part_instead),
     ("starts where the proof fails", _draw_where_proof_fails),
+    ("what stops it", _look_what_stops),
 )
 
 
@@ -394,8 +430,7 @@ def _no_way(problem: Problem, blocked: Obstruction) -> SelfmotionError:
             rotation_miss=rotation,
         )
     return NoSequenceError(
-        f"{robot.name}: no motion along the path passes t = {blocked.time:.6g} s: "
-        f"{blocked.reason}{blocked.help}",
+        f"{robot.name}: {_passing(blocked)}",
         time=blocked.time,
         reason=blocked.reason,
     )

@@ -74,7 +74,8 @@ def _check_gravity(model: Any, source: str) -> None:
         found = ", ".join(f"{value:g}" for value in gravity[:3])
         raise RobotError(
             f"{source}: gravity is ({found}) m/s², expected (0, 0, -9.81): set model.gravity so, "
-            f"and turn an arm on a wall by base= (load_robot({{'arm': model}}, base={{'arm': pose}}))"
+            f"and turn an arm on a wall by base= (load_robot({{'arm': model}}, "
+            f"base={{'arm': pose}}))"
         )
 
 

@@ -243,10 +243,13 @@ def _roomiest_pair(poses: SinglePoses, met: Array) -> tuple[Closest, float]:
     return worst, asked
 
 
-def obstruction(problem: Problem, rng: np.random.Generator) -> Obstruction | None:
+def obstruction(
+    problem: Problem, rng: np.random.Generator, suspect: float | None = None
+) -> Obstruction | None:
     """Return a pose of the path that no configuration was found for; None where there is none.
 
-    Poses all along the path, the first, then those that are farthest from the others. A
+    Poses all along the path, that at a `suspect` time [s] first, then the first, then those that
+    are farthest from the others. A
     pose is given up when thousands of tries lead nowhere: Newton's method from all over the
     limits, and of the bands of tolerances; where self-motions are curves, these as a whole; and
     what met bodies least, moved aside.
@@ -255,6 +258,8 @@ def obstruction(problem: Problem, rng: np.random.Generator) -> Obstruction | Non
     times = spread_along(problem.path, _COARSE_POSES)
     known: dict[float, Array] = {}
     order = _worst_first(problem, times)
+    if suspect is not None:
+        order = [suspect, *(t for t in order if t != suspect)]
     for t in order:
         near = min(known, key=lambda other: abs(other - t), default=None)
         found = poses.look(t, np.empty((0, poses.robot.dof)) if near is None else known[near])
