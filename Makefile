@@ -96,8 +96,9 @@ fuzz-job: $(READY)  ## random jobs that leave posts; one that is killed at 20 ra
 	$(BIN)/python benchmarks/job_killed.py
 	$(BIN)/python benchmarks/job_killed.py --workers 2
 
-fuzz-programs: $(READY)  ## 100 random plans as linear programs, played by kinematics and interpolation of the judge's own
+fuzz-programs: $(READY)  ## 100 random plans as linear programs, played by a judge of its own; 1,000 programs that were changed
 	OMP_NUM_THREADS=1 $(BIN)/python benchmarks/programs.py
+	OMP_NUM_THREADS=1 $(BIN)/python benchmarks/changed_programs.py
 
 fuzz-kept: $(READY)  ## 50 folders of jobs and 50 of batches, each spoilt in one way and begun again
 	OMP_NUM_THREADS=1 $(BIN)/python benchmarks/kept_folders.py
