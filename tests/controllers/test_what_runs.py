@@ -412,3 +412,18 @@ def test_free_moves_are_those_of_the_job(job: sm.Program, tmp_path: Path) -> Non
 def test_a_timetable_is_no_motion(plan: sm.Plan, tmp_path: Path) -> None:
     with pytest.raises(sm.errors.FileFormatError, match="is the name of a job's timetable"):
         sm.files.write_motion(plan, tmp_path / "weld.timetable.csv")
+
+
+@pytest.mark.parametrize("suffix", [".src", ".mod"])
+def test_an_axis_that_no_joint_is_does_not_move(plan: sm.Plan, tmp_path: Path, suffix: str) -> None:
+    """A rail that somebody wrote into each target of a program of an arm without one."""
+    file = tmp_path / f"seam{suffix}"
+    sm.files.write_motion(plan, file, settings=settings("joints"))
+    text = file.read_text()
+    sm.files.read_motion(file)
+    moved = text.replace("], [9E9,", "], [500,")
+    moved = re.sub(r"(\{A1 [^}]*)\}", r"\1, E1 500}", moved)
+    assert moved != text
+    file.write_text(moved)
+    with pytest.raises(sm.errors.FileFormatError, match="axis E1 has targets"):
+        sm.files.read_motion(file)

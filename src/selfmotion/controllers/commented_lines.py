@@ -194,6 +194,7 @@ class Lines:
         axes = tuple(Axis(present[k], *said.get(present[k], (present[k], False))) for k in kept)
         if not axes:
             raise FileFormatError(f"{self._file}: has no axes of those that its comments name")
+        self._check_unnamed(present, kept, rows)
         frames = None
         if any(_has_poses(row) for row in rows):
             if robot is None or places is None:
@@ -223,6 +224,30 @@ class Lines:
             ProgramFacts.stated(self.notes),
             load,
         )
+
+    def _check_unnamed(
+        self, present: Sequence[str], kept: Sequence[int], rows: Sequence[Row | PoseRow | SlowRow]
+    ) -> None:
+        """Refuse axes that move, and that no comment gives a joint: nothing judges them.
+
+        Robots of fewer than six axes have 0 in the places of those they lack.
+        """
+        for k, axis in enumerate(present):
+            if k in kept:
+                continue
+            if axis.startswith("E") or any(q[k] != 0.0 for q in _axis_targets(rows)):
+                raise FileFormatError(
+                    f"{self._file}: axis {axis} has targets, and the comment 'axes: …' names no "
+                    f"joint that it is: nothing has judged its motion"
+                )
+
+
+def _axis_targets(rows: Sequence[Row | PoseRow | SlowRow]) -> Iterator[list[float]]:
+    for row in rows:
+        if isinstance(row, Row):
+            yield from row.q
+        elif isinstance(row, SlowRow) and not isinstance(row.target, Pose):
+            yield row.target
 
 
 def _has_poses(row: Row | PoseRow | SlowRow) -> bool:

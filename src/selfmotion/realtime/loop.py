@@ -99,7 +99,8 @@ def follow(
             state.obstacles,
             target=state.target,
             twist=state.twist,
-            seen=state.seen,
+            # A target without a time was seen when the state was.
+            seen=state.t if state.seen is None and state.target is not None else state.seen,
         )
         write(segment)
         count += 1
