@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple, Protocol
@@ -214,6 +214,22 @@ class BoundQuantity:
             return np.concatenate([above, -above], axis=1)
         by /= limit[:, None, None]
         return np.asarray(2.0 * np.einsum("kmc,kmcd->kmd", self._used(samples), by))
+
+    @property
+    def squares(self) -> Callable[[Samples], Array] | None:
+        """``squares(samples)`` → slopes (K, c, n) whose squares h bends by; None of numbers.
+
+        Where it is narrow, what it bends by is all that stops a step: a vector at the edge of its
+        limit is as long to first order wherever it turns to.
+        """
+        is_vector = self.quantity.components > 1 and len(self.quantity.columns) == 1
+        return self._squares if is_vector else None
+
+    def _squares(self, samples: Samples) -> Array:
+        changes = self.quantity.derivatives(*motion_at_nodes(samples))
+        slopes = np.sqrt(2.0) / float(self.quantity.bounds[0]) * changes[0][:, 0]
+        # What depends on q̇ as well is left to its slopes.
+        return np.asarray(slopes if len(changes) == 1 else np.zeros_like(slopes))
 
     def easing(self, column: int) -> tuple[float, str]:
         """See `easing_of`: 2 % of a limit, in both directions."""

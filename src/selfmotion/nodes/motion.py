@@ -14,7 +14,7 @@ from selfmotion.nodes.charts import Centred, Charts, Manifolds, Place
 from selfmotion.nodes.ends import NodeEnds
 from selfmotion.nodes.kernels import follow
 from selfmotion.nodes.objective import NodeCost
-from selfmotion.nodes.rows import NodeRows, looked
+from selfmotion.nodes.rows import NodeRows, counts_at_once, looked
 from selfmotion.nodes.samples import CurveSamples
 from selfmotion.nodes.smoothness import quickness, smoothing_of, would_be_calm
 from selfmotion.nodes.spline import AT_GAUSS, Quintic
@@ -114,7 +114,7 @@ class NodeGrid:
     def without_rows(self) -> "NodeGrid":
         """Return the same with nothing asked but what its ends are, and what counts at once."""
         return self.asking(
-            [item for item in self.constraints if item.equality or _counts_at_once(item)]
+            [item for item in self.constraints if item.equality or counts_at_once(item)]
         )
 
     def asking(self, constraints: Sequence[BoundConstraint]) -> "NodeGrid":
@@ -306,7 +306,7 @@ class NodeMotion:
         beyond = rows.split(self.h - rows.granted)
         pairs = zip(rows.constraints, beyond, strict=True)
         return any(
-            not np.max(own, initial=0.0) <= most for item, own in pairs if not _counts_at_once(item)
+            not np.max(own, initial=0.0) <= most for item, own in pairs if not counts_at_once(item)
         )
 
     def would_be_calm(self) -> bool:
@@ -386,8 +386,3 @@ class NodeMotion:
         # What is nearly a basis will do for charts to begin with, and turns as those around it do.
         last = np.searchsorted(self.grid.t, grid.t, side="right") - 1
         return grid.around(Charts(grid.manifolds, q, self.charts.bases[last]), qd, qdd)
-
-
-def _counts_at_once(item: BoundConstraint) -> bool:
-    """Whether a constraint is what a tolerance is: a joint that it leaves free has no cost."""
-    return bool(getattr(item, "counts_at_once", False))
