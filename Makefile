@@ -6,13 +6,22 @@ READY := $(VENV)/.ready
 # What is imported by many processes is compiled to bytecode once.
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: demo test lint format bench bench-constrained bench-binding bench-remaining bench-relaxed bench-batch bench-peers bench-starts bench-places bench-margins bench-bought bench-corrections bench-place bench-first bench-fastest bench-feeds bench-job bench-moved bench-moves bench-raster bench-rails bench-lifts bench-numbers bench-spirals bench-latency docs errors suite suite-made fuzz fuzz-tasks fuzz-cells fuzz-certificate fuzz-deceptions fuzz-generated fuzz-realtime fuzz-files fuzz-job fuzz-kept fuzz-programs arms mutants memory acceptance distances study clean
+.PHONY: demo test test-baseline lint format bench bench-constrained bench-binding bench-remaining bench-relaxed bench-batch bench-peers bench-starts bench-places bench-margins bench-bought bench-corrections bench-place bench-first bench-fastest bench-feeds bench-job bench-moved bench-moves bench-raster bench-rails bench-lifts bench-numbers bench-spirals bench-latency docs errors suite suite-made fuzz fuzz-tasks fuzz-cells fuzz-certificate fuzz-deceptions fuzz-generated fuzz-realtime fuzz-files fuzz-job fuzz-kept fuzz-programs arms mutants memory acceptance distances study clean
 
 demo: $(READY)  ## plan, check and replay the paper's planar arm and a Panda, into out/
 	$(BIN)/selfmotion demo --out out
 
 test: $(READY)  ## the whole test run, on two cores
 	$(BIN)/pytest --numprocesses 2 --dist loadfile --no-loadscope-reorder
+
+# What plans, and what is computed with it: the rest reads and writes files and pages.
+PLANNING := $(addprefix tests/, baselines batch certificate collision constraints costs follow job \
+	kernels margins motion nodes optimise paper path placement planning problem realtime result \
+	robot search task transfer)
+
+test-baseline: $(READY)  ## the tests that plan, as on a processor without AVX-512
+	PYTHONPATH=tests $(BIN)/python -m support.baseline $(BIN)/pytest --numprocesses 2 --dist loadfile \
+		--no-loadscope-reorder $(PLANNING)
 
 lint: $(READY)  ## style, types and layers
 	$(BIN)/ruff check .
