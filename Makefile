@@ -6,7 +6,7 @@ READY := $(VENV)/.ready
 # What is imported by many processes is compiled to bytecode once.
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: demo test test-baseline lint format bench bench-constrained bench-binding bench-remaining bench-relaxed bench-batch bench-peers bench-starts bench-places bench-margins bench-bought bench-corrections bench-place bench-first bench-fastest bench-feeds bench-job bench-moved bench-moves bench-raster bench-rails bench-lifts bench-numbers bench-spirals bench-latency docs errors suite suite-made fuzz fuzz-tasks fuzz-cells fuzz-certificate fuzz-deceptions fuzz-generated fuzz-realtime fuzz-files fuzz-job fuzz-kept fuzz-programs arms mutants memory acceptance distances study clean
+.PHONY: demo test test-baseline lint format bench bench-constrained bench-binding bench-remaining bench-relaxed bench-batch bench-peers bench-starts bench-places bench-margins bench-bought bench-corrections bench-place bench-first bench-fastest bench-feeds bench-job bench-moved bench-kept bench-moves bench-raster bench-rails bench-lifts bench-numbers bench-spirals bench-latency docs errors suite suite-made fuzz fuzz-tasks fuzz-cells fuzz-certificate fuzz-deceptions fuzz-generated fuzz-realtime fuzz-files fuzz-job fuzz-kept fuzz-programs arms mutants memory acceptance distances study clean
 
 demo: $(READY)  ## plan, check and replay the paper's planar arm and a Panda, into out/
 	$(BIN)/selfmotion demo --out out
@@ -116,6 +116,9 @@ bench-job: $(READY)  ## a frame of 132 strokes: order, plans, moves past what wa
 
 bench-moved: $(READY)  ## 30 jobs whose part was moved, planned again from what is kept
 	OMP_NUM_THREADS=1 $(BIN)/python benchmarks/moved_parts.py
+
+bench-kept: $(READY)  ## 100 jobs of which a seam was added, removed or moved: what did not change is kept
+	OMP_NUM_THREADS=1 $(BIN)/python benchmarks/kept_seams.py
 
 bench-latency: $(READY)  ## 10,000 steps of the replanner: percentiles, misses, and the cost of short sight
 	$(BIN)/python benchmarks/latency.py
