@@ -284,7 +284,7 @@ def worst_time(constraints: Sequence[BoundConstraint], samples: Samples) -> floa
     worst, time = 0.0, None
     for item in constraints:
         if not item.equality:
-            h = item.residual(samples).max(axis=1)
+            h = item.residual(samples).max(axis=1, initial=-np.inf)
             row = int(np.argmax(h))
             if h[row] > max(worst, item.tolerance):
                 worst, time = float(h[row]), float(samples.sampling.node_times[row])

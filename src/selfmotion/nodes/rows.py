@@ -320,7 +320,8 @@ class NodeRows:
                 beyond = np.asarray(item.above(curve, item.tolerance)).reshape(count, -1)
                 found[beyond.any(axis=1)] = np.maximum(found[beyond.any(axis=1)], 2)
                 continue
-            h = np.asarray(item.residual(curve)).reshape(count, -1).max(axis=1)
+            # Of a quantity that nothing limits there are no rows.
+            h = np.asarray(item.residual(curve)).reshape(count, -1).max(axis=1, initial=-np.inf)
             if not (h <= item.tolerance).all():
                 kept = _granted(item)
                 need = np.sqrt(np.maximum(h - kept, 0.0) / (_ROOM * (item.tolerance - kept)))
