@@ -215,6 +215,12 @@ class BoundQuantity:
         by /= limit[:, None, None]
         return np.asarray(2.0 * np.einsum("kmc,kmcd->kmd", self._used(samples), by))
 
+    def is_of_accelerations(self, dof: int) -> bool:
+        """Whether what has a limit depends on q̈, for an arm of so many joints."""
+        somewhere = np.full((1, dof), 0.3)
+        changes = self.quantity.derivatives(somewhere, somewhere, somewhere)
+        return len(changes) > 2 and bool(np.any(changes[2][:, self.quantity.limited]))
+
     @property
     def squares(self) -> Callable[[Samples], Array] | None:
         """``squares(samples)`` → slopes (K, c, n) whose squares h bends by; None of numbers.

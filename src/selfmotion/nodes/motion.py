@@ -14,10 +14,10 @@ from selfmotion.nodes.charts import Centred, Charts, Manifolds, Place
 from selfmotion.nodes.ends import NodeEnds
 from selfmotion.nodes.kernels import follow
 from selfmotion.nodes.objective import NodeCost
-from selfmotion.nodes.rows import NodeRows, counts_at_once, looked
+from selfmotion.nodes.rows import NodeRows, accelerates_of, counts_at_once, looked
 from selfmotion.nodes.samples import CurveSamples
 from selfmotion.nodes.smoothness import quickness, smoothing_of, would_be_calm
-from selfmotion.nodes.spline import AT_GAUSS, Quintic
+from selfmotion.nodes.spline import AT_GAUSS, FINE_POINTS, POINTS, Quintic
 from selfmotion.problem import Problem
 
 
@@ -74,7 +74,8 @@ class NodeGrid:
         follows = problem.follows
         self.manifolds = Manifolds(follows, t, copies)
         copies = self.manifolds.copies
-        self.spline = Quintic(t, copies)
+        accelerates = any(accelerates_of(item, follows.robot.dof) for item in constraints)
+        self.spline = Quintic(t, copies, FINE_POINTS if accelerates else POINTS)
         smoothing = smoothing_of(problem, self.spline, calm=calm, quick=quick)
         self.cost = NodeCost(follows, self.spline, problem.all_costs, smoothing)
         self.ends = NodeEnds([item for item in constraints if isinstance(item, BoundEnd)])

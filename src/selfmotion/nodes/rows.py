@@ -469,3 +469,9 @@ class LinearRows:
 def counts_at_once(item: BoundConstraint) -> bool:
     """Whether a constraint is what a tolerance is: a joint that it leaves free has no cost."""
     return bool(getattr(item, "counts_at_once", False))
+
+
+def accelerates_of(item: BoundConstraint, dof: int) -> bool:
+    """Whether a constraint is on a quantity of q̈, for motions of so many joints."""
+    own = getattr(item, "is_of_accelerations", None)
+    return own is not None and bool(own(dof))

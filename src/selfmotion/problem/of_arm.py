@@ -159,6 +159,11 @@ class BoundOfArm:
         own = _ArmTangents(motion, self.follows.robot.dof)
         return self.bound.tangents(samples.of(self.follows), own)
 
+    def is_of_accelerations(self, dof: int) -> bool:
+        """See `BoundQuantity.is_of_accelerations`."""
+        own = getattr(self.bound, "is_of_accelerations", None)
+        return own is not None and bool(own(self.follows.robot.dof))
+
     @property
     def squares(self) -> Callable[[Samples], Array] | None:
         """See `BoundQuantity.squares`."""
