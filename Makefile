@@ -6,13 +6,22 @@ READY := $(VENV)/.ready
 # What is imported by many processes is compiled to bytecode once.
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: demo test lint format bench bench-constrained bench-binding bench-remaining bench-relaxed bench-batch bench-peers bench-starts bench-places bench-margins bench-bought bench-corrections bench-place bench-first bench-fastest bench-feeds bench-job bench-moved bench-moves bench-raster bench-rails bench-lifts bench-numbers bench-spirals bench-latency docs errors suite suite-made fuzz fuzz-tasks fuzz-cells fuzz-certificate fuzz-deceptions fuzz-generated fuzz-realtime fuzz-files fuzz-job fuzz-kept fuzz-programs arms mutants memory acceptance distances study clean
+.PHONY: demo test test-baseline lint format bench bench-constrained bench-binding bench-remaining bench-relaxed bench-batch bench-peers bench-starts bench-places bench-known bench-margins bench-bought bench-corrections bench-place bench-first bench-fastest bench-feeds bench-job bench-moved bench-kept bench-moves bench-raster bench-rails bench-lifts bench-numbers bench-spirals bench-latency docs errors suite suite-made fuzz fuzz-tasks fuzz-cells fuzz-certificate fuzz-deceptions fuzz-generated fuzz-realtime fuzz-files fuzz-job fuzz-kept fuzz-programs arms mutants memory acceptance distances study clean
 
 demo: $(READY)  ## plan, check and replay the paper's planar arm and a Panda, into out/
 	$(BIN)/selfmotion demo --out out
 
 test: $(READY)  ## the whole test run, on two cores
 	$(BIN)/pytest --numprocesses 2 --dist loadfile --no-loadscope-reorder
+
+# What plans, and what is computed with it: the rest reads and writes files and pages.
+PLANNING := $(addprefix tests/, baselines batch certificate collision constraints costs follow job \
+	kernels margins motion nodes optimise paper path placement planning problem realtime result \
+	robot search task transfer)
+
+test-baseline: $(READY)  ## the tests that plan, as on a processor without AVX-512
+	PYTHONPATH=tests $(BIN)/python -m support.baseline $(BIN)/pytest --numprocesses 2 --dist loadfile \
+		--no-loadscope-reorder $(PLANNING)
 
 lint: $(READY)  ## style, types and layers
 	$(BIN)/ruff check .
@@ -54,6 +63,9 @@ bench-places: $(READY)  ## a seam at 300 places around three arms, each 'no' hel
 
 bench-corrections: $(READY)  ## how far parts may stand elsewhere when planned again, held against random displacements
 	OMP_NUM_THREADS=1 $(BIN)/python benchmarks/corrections.py
+
+bench-known: $(READY)  ## 18 kinds of 30 problems that have a known motion: what is not found, and what is false
+	OMP_NUM_THREADS=1 $(BIN)/python benchmarks/known.py --out out/known.csv
 
 bench-margins: $(READY)  ## by how much part, tool and base may be displaced: 200 plans, 10,000 displacements, judged
 	OMP_NUM_THREADS=1 $(BIN)/python benchmarks/margins.py
@@ -108,6 +120,9 @@ bench-job: $(READY)  ## a frame of 132 strokes: order, plans, moves past what wa
 
 bench-moved: $(READY)  ## 30 jobs whose part was moved, planned again from what is kept
 	OMP_NUM_THREADS=1 $(BIN)/python benchmarks/moved_parts.py
+
+bench-kept: $(READY)  ## 100 jobs of which a seam was added, removed or moved: what did not change is kept
+	OMP_NUM_THREADS=1 $(BIN)/python benchmarks/kept_seams.py
 
 bench-latency: $(READY)  ## 10,000 steps of the replanner: percentiles, misses, and the cost of short sight
 	$(BIN)/python benchmarks/latency.py

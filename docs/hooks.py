@@ -25,8 +25,9 @@ BESIDE = (
     *(f"arms/{f.name}" for f in DOCS.glob("arms/*")),
 )
 GALLERY = (
-    "weld_seam", "weld_corner", "two_arms", "weld_positioner", "weld_torch", "part_in_hand",
-    "painting", "weld_frame", "in_parts", "own_obstacle", "rail", "closed_loop", "ur5_pointing",
+    "weld_seam", "weld_corner", "two_arms", "weld_positioner", "weld_downhand", "weld_torch",
+    "part_in_hand", "painting", "weld_frame", "in_parts", "own_obstacle", "rail", "closed_loop",
+    "ur5_pointing",
 )  # fmt: skip
 # What is played at the top of a how-to: the example that it is about.
 PLAYED = {

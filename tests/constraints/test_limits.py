@@ -14,8 +14,11 @@ from selfmotion.robot import Dynamics
 from support.arms import robot_named, short_line
 from support.circles import upright_circle
 from support.files_of_people import finger
+from support.places import ROOT
 
 Circle = Callable[..., sm.Problem]
+# The same iterate by Newton's method with rows that do not count and without them [rad/s].
+ROUNDING = 1e-9
 
 
 def certify_again(plan: sm.Plan, requirements: list[sm.certificate.Requirement]) -> sm.Certificate:
@@ -88,11 +91,11 @@ def test_accelerations_are_judged_at_their_extremes(panda_circle: Circle) -> Non
 
 
 def test_limits_that_do_not_bind_cost_no_evaluation(panda_circle: Circle) -> None:
-    """Exactly the quasi-Newton method then, point by point."""
+    """The same method then, point by point."""
     without, within = sm.plan(panda_circle(constraints=())), sm.plan(panda_circle())
     assert without.report.evaluations == within.report.evaluations
     for first, second in zip(without.report.history, within.report.history, strict=True):
-        np.testing.assert_array_equal(first.x, second.x)
+        np.testing.assert_allclose(second.x, first.x, rtol=0, atol=ROUNDING)
 
 
 def test_limits_that_nobody_knows_are_told_of() -> None:
@@ -254,3 +257,56 @@ def test_a_joint_that_mimics_is_judged_by_its_own_effort(
         .judge(FinishedMotion(robot, motion))
     )
     assert own.satisfied
+
+
+class Unlimited(sm.constraints.Constraint):
+    """A quantity whose only number has no limit: it has no rows."""
+
+    def quantity(self, robot: sm.RobotModel) -> sm.certificate.Quantity:
+        return sm.certificate.Quantity(
+            "unlimited",
+            (sm.certificate.Column("q", "the first joint", "rad"),),
+            lambda q, *_: q[:, :1],
+            lambda q, *_: (np.tile(np.eye(robot.dof)[None, :1], (len(q), 1, 1)),),
+            limit=np.inf,
+        )
+
+
+@pytest.fixture(scope="module")
+def bare(tmp_path_factory: pytest.TempPathFactory) -> sm.RobotModel:
+    """An arm of which no effort and no speed is known."""
+    text = (ROOT / "robots" / "planar_3r.urdf").read_text()
+    text = re.sub(r'(effort|velocity)="[^"]*"', r'\1="0"', text)
+    file = tmp_path_factory.mktemp("bare") / "bare.urdf"
+    file.write_text(text)
+    return sm.load_robot(file)
+
+
+@pytest.mark.parametrize("free", [False, True])
+@pytest.mark.parametrize(
+    "asked",
+    [
+        sm.constraints.JointTorqueLimits(),
+        sm.constraints.JointVelocityLimits(),
+        sm.constraints.JointAccelerationLimits(),
+        sm.constraints.JointJerkLimits(),
+        Unlimited(),
+    ],
+    ids=lambda item: type(item).__name__,
+)
+def test_what_has_no_rows_on_an_arm_asks_for_nothing(
+    bare: sm.RobotModel, asked: sm.constraints.Constraint, free: bool
+) -> None:
+    """Whether the start is given or not; the verdict covers nothing of it, and a remark says so."""
+    start = np.array([1.57, -1.57, -0.5])
+    path = short_line(bare, start)
+    options = {} if free else {"start": start}
+    problem = sm.Problem(bare, path, "planar", constraints=[asked], clearance=None, **options)
+    plan = sm.plan(problem).require()
+    name = asked.requirement(bare).name
+    assert name not in plan.certificate.covers
+    assert plan.report.active == ()
+    without = sm.plan(problem.changed(constraints=()))
+    assert plan.report.cost == pytest.approx(without.report.cost, rel=1e-9)
+    assert "limited" in " ".join(plan.certificate.remarks)
+    assert sm.plan_in_parts(problem).verified

@@ -89,6 +89,81 @@ def test_of_other_seams_those_that_are_known_are_kept(program) -> None:
         np.testing.assert_array_equal(kept.q, known.q)
 
 
+def same_motion(one: sm.Plan, other: sm.Plan) -> bool:
+    parts = ("t", "q", "qd")
+    return all(
+        np.array_equal(getattr(one.trajectory, part), getattr(other.trajectory, part))
+        for part in parts
+    )
+
+
+@pytest.mark.parametrize("change", ["moved", "added", "removed"])
+def test_what_did_not_change_is_kept_bit_for_bit(program, tmp_path, change: str) -> None:
+    """From the file, in its direction; and it says what was kept, and why the rest was not."""
+    program.save(tmp_path / "job.program")
+    loaded, listed = sm.load_program(tmp_path / "job.program"), seams()
+    if change == "moved":
+        listed[1] = seams(0.03)[1]
+    elif change == "added":
+        more = replace(seams(0.03)[0], name="more")
+        listed = [listed[0], more, *listed[1:]]
+    else:
+        listed.pop(1)
+    again = planned_again(loaded, listed).require()
+    same = {seam.name for seam in listed} - {"more"} - ({"seam 1"} if change == "moved" else set())
+    turned = {step.name: step.turned for step in program.steps}
+    for step in again.steps:
+        if step.name in same:
+            assert same_motion(step.made, program.plans[step.name])
+            assert step.turned == turned[step.name]
+    others = {"moved": {"seam 1": "its path is another"}, "removed": {}}.get(
+        change, {"more": "the earlier program does not make it"}
+    )
+    assert again.kept == {**dict.fromkeys(same, ""), **others}
+    count = len(listed)
+    assert again.kept_told[0] == f"kept as they were: {len(same)} of {count} seams"
+    assert len(again.kept_told) == 1 + len(others)
+
+
+def test_of_what_is_asked_otherwise_it_says_why(program) -> None:
+    first, second, third = seams()
+    listed = [
+        replace(first, constraints=[sm.constraints.JointVelocityLimits(2.0)]),
+        replace(second, costs=[sm.costs.JointVelocity(2.0)]),
+        replace(third, relaxations=[sm.Relaxation("z", band=1e-3)]),
+    ]
+    again = planned_again(program, listed).require()
+    assert again.kept == {
+        "seam 0": "its constraints are others",
+        "seam 1": "its costs are others",
+        "seam 2": "its tolerances are others",
+    }
+    assert planned_again(program, seams()).kept == dict.fromkeys(program.order, "")
+    # A program that was not begun at another one has nothing to say.
+    assert program.kept == {}
+    assert program.kept_told == ()
+
+
+def test_what_is_kept_is_given_up_only_where_no_program_comes_of_it(program, monkeypatch) -> None:
+    """Then the other direction is tried, and it says why."""
+    between = FreeMotions.between
+    begins = {step.motion.q[0].tobytes() for step in program.steps if step.is_seam}
+
+    def to_no_kept_start(self, first, last, seconds, known=None):
+        if last.tobytes() in begins:
+            return self._missing("not there")
+        return between(self, first, last, seconds, known)
+
+    monkeypatch.setattr(FreeMotions, "between", to_no_kept_start)
+    monkeypatch.setattr(work, "leads", lambda *_: False)
+    again = planned_again(program, seams()).require()
+    turned = {step.name: step.turned for step in program.steps}
+    for step in again.steps:
+        if step.is_seam:
+            assert step.turned != turned[step.name]
+            assert again.kept[step.name].startswith("no program comes of what could be kept: ")
+
+
 def test_a_seam_that_cannot_begin_there_is_planned_like_any_other(program, monkeypatch) -> None:
     monkeypatch.setattr(work, "like_before", lambda *_: None)
     again = planned_again(program, seams(0.02)).require()

@@ -11,7 +11,7 @@ import pytest
 import selfmotion as sm
 from selfmotion.job import Step
 from selfmotion.job.files import Shelf
-from selfmotion.job.seam import backwards_plan
+from selfmotion.job.seam import backwards, backwards_plan
 from selfmotion.task import SE3
 from support.arms import robot_named
 
@@ -232,7 +232,7 @@ def test_a_turned_plan_tells_the_times_of_its_own_direction() -> None:
     plan = sm.plan(
         sm.Problem(robot_named("panda"), path, "pointing", constraints=asked, clearance=None)
     )
-    turned = backwards_plan(plan).require()
+    turned = backwards_plan(plan, backwards(plan.problem)).require()
     spans = [span for item in turned.report.active for span in item.spans]
     assert spans
     for first, last in spans:

@@ -13,6 +13,12 @@ from support.arms import PANDA_HOME, Case
 from support.nodes import nodes_of, problem_of
 from support.splines import best_spline
 
+# A joint whose place costs nothing is moved as a whole, to the accuracy of an optimum [rad].
+CONSTANT = 1e-7
+# By this share of what the others go, at most: how far is for rounding to decide, which is another
+# one on each processor. Where nothing holds the joint it may go as far as the others.
+FOLLOWED = 0.2
+
 
 def never(step: Step) -> bool:
     return False
@@ -62,10 +68,11 @@ def test_what_costs_nothing_stays_as_it_is(panda: sm.RobotModel) -> None:
     begin = nodes_of(problem_of((panda, "position", PANDA_HOME, path)), 64, free=True)
     found = minimise(begin, never)
     assert found.status is Status.CONVERGED
-    away = np.abs(found.motion.place.q - begin.place.q).max(axis=0)
-    # Others go far; what rounding says of the last one is not followed.
-    assert away[:6].max() > 0.05
-    assert away[6] < 0.01
+    moved = found.motion.place.q - begin.place.q
+    others, last = np.abs(moved[:, :6]).max(), np.abs(moved[:, 6]).max()
+    # What the joint gains in speed costs; where it stands is left to rounding, and hardly followed.
+    assert np.ptp(moved[:, 6]) <= CONSTANT
+    assert last < FOLLOWED * others
 
 
 def test_many_nodes_take_as_many_iterations(panda: sm.RobotModel) -> None:

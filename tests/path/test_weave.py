@@ -15,6 +15,8 @@ LENGTH = 0.3
 COUNTED = 1e-6
 # What a place may be off the published formula [m].
 MICROMETRE = 1e-6
+# A pose and a twist by two classes [m, m/s, rad/s].
+ROUNDING = 1e-14
 
 
 def seam(turned: bool = False) -> sm.paths.Path:
@@ -62,8 +64,9 @@ def test_a_sine_is_a_sine() -> None:
     allowed = 2.0 * np.pi * COUNTED * AMPLITUDE
     np.testing.assert_allclose(away[inner], expected[inner], atol=allowed)
     for end in (0.0, plain.duration):
-        np.testing.assert_array_equal(woven.twist(end), plain.twist(end))
-        np.testing.assert_array_equal(woven.pose(end).homogeneous, plain.pose(end).homogeneous)
+        np.testing.assert_allclose(woven.twist(end), plain.twist(end), rtol=0, atol=ROUNDING)
+        here, there = (path.pose(end).homogeneous for path in (woven, plain))
+        np.testing.assert_allclose(here, there, rtol=0, atol=ROUNDING)
 
 
 def carrier(name: str) -> sm.paths.Path:

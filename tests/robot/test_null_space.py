@@ -69,7 +69,8 @@ def test_a_singular_configuration_has_a_larger_one(planar: sm.RobotModel) -> Non
 def test_many_configurations_are_each_of_them(arm) -> None:
     robot, task, q = arm
     for k, (here, pose) in enumerate(zip(q, robot.pose(q), strict=True)):
-        np.testing.assert_array_equal(robot.pose(here).homogeneous, pose.homogeneous)
+        found = robot.pose(here).homogeneous
+        np.testing.assert_allclose(found, pose.homogeneous, rtol=0, atol=ROUNDING)
         one, all_of_them = robot.jacobian(here), robot.jacobian(q)
         np.testing.assert_allclose(all_of_them[k], one, rtol=0, atol=ROUNDING)
         np.testing.assert_allclose(

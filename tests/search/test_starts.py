@@ -1,11 +1,14 @@
 """Starts: on the path at any time, and carried from there to both of its ends."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import selfmotion as sm
 from selfmotion.search import carried, start_candidates
 from support.arms import Case
+from support.two_arms import both_arms
 
 # Newton's method ends at this [m].
 ON_PATH = 1e-6
@@ -43,3 +46,18 @@ def test_they_are_carried_to_both_ends(case: Case, at: int) -> None:
     assert misses(problem, motions[0], t) <= ON_PATH
     # Back along the same way, as far as steps of finite length know it.
     assert np.abs(motions - way).max() <= 0.2
+
+
+@pytest.mark.parametrize("number", [0, 8, 10, 21])
+def test_within_narrow_limits_there_are_some_as_well(number: int) -> None:
+    """Of two arms at once, whose hands hold on to each other: within limits around a motion."""
+    follows, start = both_arms("pose", "pose")
+    rng = np.random.default_rng(number)
+    below, above = rng.uniform(0.0, 0.5, (2, len(start)))
+    arm = replace(follows.robot, lower=start - below, upper=start + above)
+    starts = start_candidates(follows.for_robot(arm), 8, np.random.default_rng(0))
+    assert starts
+    for q in starts:
+        assert ((q >= arm.lower) & (q <= arm.upper)).all()
+        for item in follows.items:
+            assert max(item.miss(item.path.pose(0.0), q)) <= ON_PATH

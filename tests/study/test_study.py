@@ -25,6 +25,8 @@ from support.followed import standing
 
 # Costs of the reading notes are given to four or five decimals.
 PRINTED = 1e-4
+# A Jacobian of many configurations at once, and of one [m, rad].
+ROUNDING = 1e-14
 
 
 VERDICTS = {
@@ -177,7 +179,7 @@ def test_solver_points_integrate_straight_lines(planar: sm.RobotModel) -> None:
     samples = Samples.along(standing(planar, sm.Task.PLANAR), points, q, np.zeros_like(q))
     for k in range(4):
         expected = planar.task_jacobian(q[k], sm.Task.PLANAR)
-        np.testing.assert_array_equal(samples.task_jacobian[k], expected)
+        np.testing.assert_allclose(samples.task_jacobian[k], expected, rtol=0, atol=ROUNDING)
 
 
 def test_samples_along_are_those_of_the_rollout(panda: sm.RobotModel) -> None:

@@ -167,6 +167,8 @@ def show_program(program: Program, console: Console) -> None:
         f"{program.extent} in {program.duration:.2f} s, of it {program.transfer_time:.2f} s moves "
         f"and waits",
     )
+    for line in program.kept_told:
+        _print(console, line)
     count = len(program.notes)
     if count:
         _print(console, f"{count} note{'s' * (count != 1)}: {_MORE}")
@@ -268,6 +270,7 @@ def program_json(program: Program) -> dict[str, Any]:
         "transfer_time": program.transfer_time,
         "bound": program.bound,
         "missing": dict(program.missing),
+        "kept": dict(program.kept),
         "notes": list(program.notes),
         "steps": [
             {

@@ -280,6 +280,8 @@ def show_program(program: Program, console: Console) -> None:
     if longest:
         told = ", ".join(f"{step.name} {step.motion.duration:.2f} s" for step in longest)
         console.print(f"longest moves: {told}", markup=False, soft_wrap=True)
+    for line in program.kept_told:
+        console.print(line, markup=False, soft_wrap=True)
     for note in program.notes:
         console.print(f"note: {note}", markup=False, soft_wrap=True)
     console.print(

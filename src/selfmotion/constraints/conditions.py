@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple, Protocol
@@ -215,6 +215,28 @@ class BoundQuantity:
         by /= limit[:, None, None]
         return np.asarray(2.0 * np.einsum("kmc,kmcd->kmd", self._used(samples), by))
 
+    def is_of_accelerations(self, dof: int) -> bool:
+        """Whether what has a limit depends on q̈, for an arm of so many joints."""
+        somewhere = np.full((1, dof), 0.3)
+        changes = self.quantity.derivatives(somewhere, somewhere, somewhere)
+        return len(changes) > 2 and bool(np.any(changes[2][:, self.quantity.limited]))
+
+    @property
+    def squares(self) -> Callable[[Samples], Array] | None:
+        """``squares(samples)`` → slopes (K, c, n) whose squares h bends by; None of numbers.
+
+        Where it is narrow, what it bends by is all that stops a step: a vector at the edge of its
+        limit is as long to first order wherever it turns to.
+        """
+        is_vector = self.quantity.components > 1 and len(self.quantity.columns) == 1
+        return self._squares if is_vector else None
+
+    def _squares(self, samples: Samples) -> Array:
+        changes = self.quantity.derivatives(*motion_at_nodes(samples))
+        slopes = np.sqrt(2.0) / float(self.quantity.bounds[0]) * changes[0][:, 0]
+        # What depends on q̇ as well is left to its slopes.
+        return np.asarray(slopes if len(changes) == 1 else np.zeros_like(slopes))
+
     def easing(self, column: int) -> tuple[float, str]:
         """See `easing_of`: 2 % of a limit, in both directions."""
         share = 0.02 if self.quantity.components == 1 else 0.04
@@ -268,7 +290,7 @@ def worst_time(constraints: Sequence[BoundConstraint], samples: Samples) -> floa
     worst, time = 0.0, None
     for item in constraints:
         if not item.equality:
-            h = item.residual(samples).max(axis=1)
+            h = item.residual(samples).max(axis=1, initial=-np.inf)
             row = int(np.argmax(h))
             if h[row] > max(worst, item.tolerance):
                 worst, time = float(h[row]), float(samples.sampling.node_times[row])

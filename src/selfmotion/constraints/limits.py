@@ -345,6 +345,12 @@ class JointTorqueLimits(Constraint):
             covers=(_covered(robot, self.of(robot)),),
         )
 
+    def applies(self, robot: RobotModel) -> bool:
+        """See `Constraint.applies`."""
+        shared = np.asarray(robot.model.upperEffortLimit)[robot.coupling.shared]
+        each = self.limit is None and bool((shared > 0.0).any())
+        return each or bool(np.isfinite(self.of(robot)).any())
+
     def of(self, robot: RobotModel) -> Array:
         """Return the limits for an arm, (n,) [Nm or N]."""
         if self.limit is None:

@@ -18,12 +18,15 @@ from selfmotion.basics import (
     ProblemError,
     SelfmotionError,
     as_path,
+    description_of,
+    digest_of,
     digest_of_file,
     shown,
 )
 from selfmotion.certificate import Tolerance
 from selfmotion.collision import obstacle_from_dict
-from selfmotion.constraints import Constraint
+from selfmotion.constraints import Clearance, Constraint
+from selfmotion.costs import Cost, FunctionCost
 from selfmotion.job.program import Program
 from selfmotion.job.seam import Seam, Step, waiting
 from selfmotion.job.specification import Specification
@@ -34,6 +37,7 @@ from selfmotion.result import (
     Move,
     Plan,
     another_tool,
+    arm_digest,
     files_of,
     key_of,
     load_move,
@@ -45,6 +49,7 @@ from selfmotion.result import (
     write_kept,
 )
 from selfmotion.robot import RobotModel
+from selfmotion.task import Task
 
 # Programs as files, and what a job has finished so far.
 
@@ -291,6 +296,83 @@ class Earlier:
         plan, turned = self._of_seams.get(seam.name, (None, False))
         return None if plan is None or (turned and not seam.either_way) else (plan, turned)
 
+    def kept(
+        self,
+        seam: Seam,
+        problem: Problem,
+        constraints: Sequence[Constraint],
+        clearance: Clearance | None,
+    ) -> tuple[Plan | None, str]:
+        """Return the plan of a seam of which the same is asked, as it is, or why there is none.
+
+        Judged anew by its `problem`, in the direction in which it was made: what files of bodies
+        hold may have changed. `constraints` and `clearance` are those of the job.
+        """
+        known = self.plan_of(seam)
+        if seam.name not in self._of_seams:
+            return None, "the earlier program does not make it"
+        if known is None:
+            return None, "it was made from its end to its start, and may not be any more"
+        changed = self._changed(seam, problem.robot, constraints, clearance)
+        if changed:
+            return None, changed
+        plan, _ = known
+        found = replace(plan, problem=replace(problem, start=plan.problem.start))
+        found = replace(found, certificate=found.check())
+        if found.certificate.verified:
+            return found, ""
+        return None, f"it is not verified any more: {found.certificate.summary}"
+
+    def _changed(
+        self,
+        seam: Seam,
+        robot: RobotModel,
+        constraints: Sequence[Constraint],
+        clearance: Clearance | None,
+    ) -> str:
+        """Return in words what is asked otherwise of a seam; "" where nothing is."""
+        before = self.program.specification
+        if before is None:
+            return "the earlier program does not say what was asked for"
+        own = next((item for item in before.seams if item.name == seam.name), None)
+        if own is None:
+            return "the earlier program does not say what was asked of it"
+        if before.arm != arm_digest(robot):
+            return "the arm is another, or its tool, reference, limits or locked joints are"
+        if Task.of(own.task) is not Task.of(seam.task):
+            return "its task is another"
+        if not _cost_the_same(own.costs, seam.costs):
+            return "its costs are others"
+        clear = [[] if item is None else [item] for item in (before.clearance, clearance)]
+        pairs: dict[str, tuple[Sequence[Any], Sequence[Any]]] = {
+            "its path is another": ([own.path], [seam.path]),
+            "its tolerances are others": (own.relaxations, seam.relaxations),
+            "its constraints are others": (own.constraints, seam.constraints),
+            "the constraints of the job are others": (before.constraints, constraints),
+            "what the job is kept clear of is another": (clear[0], clear[1]),
+        }
+        for text, (some, others) in pairs.items():
+            if _described(some) != _described(others):
+                return text
+        return ""
+
+    def kept_in(self, program: Program, changed: Mapping[str, str], why: str) -> dict[str, str]:
+        """Return for each seam of a program "" where its motion is kept, else why it is not.
+
+        What is asked otherwise is `changed`; `why` no program came of what could be kept.
+        """
+        found = dict[str, str]()
+        for name, plan in program.plans.items():
+            known, _ = self._of_seams.get(name, (None, False))
+            motion = None if known is None else known.trajectory
+            same = motion is not None and all(
+                np.array_equal(getattr(motion, part), getattr(plan.trajectory, part))
+                for part in ("t", "q", "qd")
+            )
+            reason = changed.get(name) or f"no program comes of what could be kept: {why}"
+            found[name] = "" if same else reason
+        return found
+
     def order_of(self, seams: Sequence[Seam]) -> list[Seam] | None:
         """Return seams in its order, where it made these and no others and they may come so."""
         named, made = {seam.name: seam for seam in seams}, self.program.order
@@ -305,6 +387,24 @@ class Earlier:
         far = [_apart(move.motion.q[[0, -1]], ends) for move in found]
         k = int(np.argmin(far)) if far else -1
         return found[k] if k >= 0 and far[k] < _NEAR else None
+
+
+def _described(several: Sequence[Any]) -> str:
+    """Return what tells some values from others."""
+    return digest_of([description_of(item) for item in several])
+
+
+def _cost_the_same(some: Sequence[Cost] | None, others: Sequence[Cost] | None) -> bool:
+    """Whether costs are the same; of functions nobody can tell but where they are one."""
+    if some is None or others is None:
+        return some is others
+    if len(some) != len(others):
+        return False
+    return all(
+        one is other
+        or (not isinstance(one, FunctionCost) and description_of(one) == description_of(other))
+        for one, other in zip(some, others, strict=True)
+    )
 
 
 def check_earlier(earlier: object, robot: RobotModel) -> None:

@@ -186,7 +186,7 @@ class Growing:
         """Return the plan of a state, checked with what stands there."""
         key = state, frozenset(past)
         if key not in self._checked:
-            one, plan = self._ordering.states[state], self._ordering.states[state].made
+            one, plan = self._ordering.states[state], self._ordering.made_of(state)
             if past:
                 seam = self._ordering.seams[one.seam]
                 problem = self._work.asked.problem(seam, tuple(past.values()), one.turned)

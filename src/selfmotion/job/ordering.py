@@ -48,11 +48,6 @@ class State:
         ends = self.plan.trajectory.q[[0, -1]]
         return ends[::-1] if self.mirrored else ends
 
-    @cached_property
-    def made(self) -> Plan:
-        """The plan as it is made."""
-        return backwards_plan(self.plan) if self.mirrored else self.plan
-
 
 class Ordering:
     """Which states there are, what leads from one to another, and the best round of them.
@@ -75,6 +70,8 @@ class Ordering:
     states : list of State
     missing : dict
         Seams without a state, and why.
+    changed : dict
+        Seams that are not made as in an earlier program, and why; "" without any.
 
     Raises
     ------
@@ -95,6 +92,7 @@ class Ordering:
         asked = work.asked
         self._free = FreeMotions(asked.robot, asked.of_moves(()), np.random.default_rng(0))
         self.states: list[State] = []
+        self._mirrored: dict[int, Plan] = {}
         self.missing: dict[str, str] = {}
         self._check_order()
         # What is known better than by limits: from state to state, None for the ends.
@@ -106,13 +104,24 @@ class Ordering:
         known = work.earlier
         before = [None if known is None else known.plan_of(seam) for seam in self.seams]
         self._begun = {number for number, one in enumerate(before) if one is not None}
-        wanted = [
-            (seam, problem, None)
-            if one is None
-            else (seam, asked.problem(seam, turned=one[1]), one[0])
-            for seam, problem, one in zip(self.seams, self.problems, before, strict=True)
-        ]
-        for number, (plans, reason) in enumerate(work.like_before(wanted)):
+        self.changed: dict[str, str] = {}
+        wanted = dict[int, tuple[Seam, Problem, Plan | None]]()
+        for number, (seam, one) in enumerate(zip(self.seams, before, strict=True)):
+            kept, why = work.kept(seam)
+            if kept is not None:
+                # As it is, in its direction.
+                self.states.append(State(number, kept, one is not None and one[1]))
+                continue
+            self.changed[seam.name] = why
+            problem = self.problems[number]
+            wanted[number] = (
+                (seam, problem, None)
+                if one is None
+                else (seam, asked.problem(seam, turned=one[1]), one[0])
+            )
+        self._kept = tuple(self.states)
+        made = work.like_before(list(wanted.values())) if wanted else []
+        for number, (plans, reason) in zip(wanted, made, strict=True):
             one = before[number]
             if not plans:
                 self.missing[self.seams[number].name] = reason
@@ -122,6 +131,35 @@ class Ordering:
         if self.states:
             self._add_alike()
             self._add_nearby()
+        self._missing_at_first = dict(self.missing)
+
+    @property
+    def keeps(self) -> bool:
+        """Whether seams are made as an earlier program makes them, and in its directions."""
+        return bool(self._kept)
+
+    def free(self, *, order: bool, directions: bool) -> None:
+        """Let the order be looked for, and what is kept be made the other way round as well."""
+        self.missing = dict(self._missing_at_first)
+        self.is_free = self.is_free or order
+        if directions:
+            for state in self._kept:
+                if self.seams[state.seam].either_way:
+                    turned = not state.turned
+                    self.states.append(State(state.seam, state.plan, turned, mirrored=True))
+            self._kept = ()
+            self.__dict__.pop("estimates", None)
+
+    def made_of(self, state: int) -> Plan:
+        """Return the plan of a state as it is made, of the problem in its direction."""
+        one = self.states[state]
+        if not one.mirrored:
+            return one.plan
+        if state not in self._mirrored:
+            seam = self.seams[one.seam]
+            problem = self._work.asked.problem(seam, turned=one.turned)
+            self._mirrored[state] = backwards_plan(one.plan, problem)
+        return self._mirrored[state]
 
     def add(self, seam: int, plan: Plan, turned: bool = False) -> None:
         """Add a way to make a seam, and the same the other way round where that is one."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import accumulate
 from pathlib import Path, Path as FilePath
@@ -42,6 +42,9 @@ class Program:
     specification : Specification, optional
         What was asked for, which the steps are held against; None for steps that were put together
         by hand, and the verdict says so.
+    kept : mapping
+        Where it was begun at an earlier program: each seam, with "" where its motion is that of the
+        earlier one, bit for bit, else with why it is not. Files do not have it.
     """
 
     robot: RobotModel
@@ -50,6 +53,7 @@ class Program:
     bound: float = 0.0
     notes: tuple[str, ...] = ()
     specification: Specification | None = None
+    kept: Mapping[str, str] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         """Return a few lines: how many seams in what order, how long, and the verdict."""
@@ -64,6 +68,16 @@ class Program:
         """How many seams it makes, in words."""
         count = len(self.order)
         return f"{count} seam{'s' * (count != 1)}"
+
+    @property
+    def kept_told(self) -> tuple[str, ...]:
+        """What was kept of an earlier program in words: how many seams, and why others were not."""
+        if not self.kept:
+            return ()
+        others = {name: why for name, why in self.kept.items() if why}
+        count, total = len(self.kept) - len(others), len(self.kept)
+        first = f"kept as they were: {count} of {total} seam{'s' * (total != 1)}"
+        return (first, *(f"planned: '{name}', as {why}" for name, why in others.items()))
 
     @property
     def order(self) -> tuple[str, ...]:

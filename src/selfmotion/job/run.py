@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor
 from dataclasses import replace
 from itertools import pairwise
@@ -156,7 +156,8 @@ class Builder:
                 steps.append(Step(self._ordering.name_of_move(*pair), moves[pair]))
             here = self._ordering.states[state]
             seam = self._ordering.seams[here.seam]
-            steps += seam_steps(seam, here.made, here.turned, self._work)
+            plan = self._ordering.made_of(state)
+            steps += seam_steps(seam, plan, here.turned, self._work)
         if None in by_last:
             steps.append(Step(self._ordering.name_of_move(*by_last[None]), moves[by_last[None]]))
         return steps
@@ -225,8 +226,10 @@ def plan_job(
         program is the same.
     warm_start : Program, optional
         An earlier program of this job, or of one like it, as when a part was moved: seams and moves
-        that did not change are kept, others begin at its motions, in its order where it made the
-        same seams. Where no verified program comes of that, all is replanned.
+        that did not change are kept bit for bit and in their directions, in its order where it
+        made the same seams, in any other one else; other seams begin at its motions. Only where no
+        verified program comes of that, what is kept is made the other way round, or all is
+        replanned. `Program.kept` says what of it was kept, and why the rest was not.
     rng : int
         Seed of all random numbers.
     progress : callable, optional
@@ -283,23 +286,47 @@ def plan_job(
         asked.clearance,
         arm=arm_digest(robot),
     )
+    earlier, changed, why = None, dict[str, str](), ""
     if warm_start is not None:
         check_earlier(warm_start, robot)
         earlier = Earlier(warm_start)
         work = Work(asked, shelf, executor, progress, earlier)
         as_before = earlier.order_of(listed) if is_free else None
         ordering = Ordering(as_before or listed, work, ends, price, is_free and not as_before)
-        if ordering.states:
-            program = Builder(ordering, work, ends).program()
+        changed = ordering.changed
+        for program in _kept_first(ordering, work, ends, is_free):
             program = replace(program, specification=asked_for)
             if program.verified:
-                return program
+                return replace(program, kept=earlier.kept_in(program, changed, why))
+            why = why or program.summary
     work = Work(asked, shelf, executor, progress)
     ordering = Ordering(listed, work, ends, price, is_free)
     if not ordering.states:
         reasons = "".join(f"\n  '{name}': {why}" for name, why in ordering.missing.items())
         raise PlanError(f"{robot.name}: no seam has a motion:{reasons}")
-    return replace(Builder(ordering, work, ends).program(), specification=asked_for)
+    program = replace(Builder(ordering, work, ends).program(), specification=asked_for)
+    if earlier is None:
+        return program
+    return replace(program, kept=earlier.kept_in(program, changed, why))
+
+
+def _kept_first(
+    ordering: Ordering, work: Work, ends: tuple[Array | None, ...], is_free: bool
+) -> Iterator[Program]:
+    """Yield programs with what is kept of an earlier one: as it was made there first.
+
+    In the order of that one, where it made the same seams; then in any; then with what is kept the
+    other way round as well. Where nothing is kept, only the first.
+    """
+    if not ordering.states:
+        return
+    yield Builder(ordering, work, ends).program()
+    if ordering.keeps and is_free and not ordering.is_free:
+        ordering.free(order=True, directions=False)
+        yield Builder(ordering, work, ends).program()
+    if ordering.keeps:
+        ordering.free(order=is_free, directions=True)
+        yield Builder(ordering, work, ends).program()
 
 
 def _slowest(seam: Seam) -> float:

@@ -268,9 +268,11 @@ def backwards(problem: Problem) -> Problem:
     return replace(problem, **turned, start=None)
 
 
-def backwards_plan(plan: Plan) -> Plan:
-    """Return a plan the other way round, judged anew, with its report by the new times."""
-    problem = backwards(plan.problem)
+def backwards_plan(plan: Plan, problem: Problem) -> Plan:
+    """Return a plan the other way round, judged anew, with its report by the new times.
+
+    `problem` is that of the other way.
+    """
     duration = plan.trajectory.duration
     null_motion, coefficients = _turned_null_motion(plan)
     active = [

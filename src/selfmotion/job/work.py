@@ -130,6 +130,14 @@ class Work:
         self.asked, self._shelf, self._executor = asked, shelf, executor
         self.tell, self.earlier = progress, earlier
 
+    def kept(self, seam: Seam) -> tuple[Plan | None, str]:
+        """Return the earlier plan of a seam of which the same is asked, or why there is none."""
+        if self.earlier is None:
+            return None, ""
+        asked, known = self.asked, self.earlier.plan_of(seam)
+        problem = asked.problem(seam, turned=known is not None and known[1])
+        return self.earlier.kept(seam, problem, asked.constraints, asked.clearance)
+
     def like_before(
         self, wanted: Sequence[tuple[Seam, Problem, Plan | None]]
     ) -> list[tuple[list[Plan], str]]:

@@ -14,10 +14,10 @@ from selfmotion.nodes.charts import Centred, Charts, Manifolds, Place
 from selfmotion.nodes.ends import NodeEnds
 from selfmotion.nodes.kernels import follow
 from selfmotion.nodes.objective import NodeCost
-from selfmotion.nodes.rows import NodeRows, looked
+from selfmotion.nodes.rows import NodeRows, accelerates_of, counts_at_once, looked
 from selfmotion.nodes.samples import CurveSamples
 from selfmotion.nodes.smoothness import quickness, smoothing_of, would_be_calm
-from selfmotion.nodes.spline import AT_GAUSS, Quintic
+from selfmotion.nodes.spline import AT_GAUSS, FINE_POINTS, POINTS, Quintic
 from selfmotion.problem import Problem
 
 
@@ -74,7 +74,8 @@ class NodeGrid:
         follows = problem.follows
         self.manifolds = Manifolds(follows, t, copies)
         copies = self.manifolds.copies
-        self.spline = Quintic(t, copies)
+        accelerates = any(accelerates_of(item, follows.robot.dof) for item in constraints)
+        self.spline = Quintic(t, copies, FINE_POINTS if accelerates else POINTS)
         smoothing = smoothing_of(problem, self.spline, calm=calm, quick=quick)
         self.cost = NodeCost(follows, self.spline, problem.all_costs, smoothing)
         self.ends = NodeEnds([item for item in constraints if isinstance(item, BoundEnd)])
@@ -114,7 +115,7 @@ class NodeGrid:
     def without_rows(self) -> "NodeGrid":
         """Return the same with nothing asked but what its ends are, and what counts at once."""
         return self.asking(
-            [item for item in self.constraints if item.equality or _counts_at_once(item)]
+            [item for item in self.constraints if item.equality or counts_at_once(item)]
         )
 
     def asking(self, constraints: Sequence[BoundConstraint]) -> "NodeGrid":
@@ -306,7 +307,7 @@ class NodeMotion:
         beyond = rows.split(self.h - rows.granted)
         pairs = zip(rows.constraints, beyond, strict=True)
         return any(
-            not np.max(own, initial=0.0) <= most for item, own in pairs if not _counts_at_once(item)
+            not np.max(own, initial=0.0) <= most for item, own in pairs if not counts_at_once(item)
         )
 
     def would_be_calm(self) -> bool:
@@ -386,8 +387,3 @@ class NodeMotion:
         # What is nearly a basis will do for charts to begin with, and turns as those around it do.
         last = np.searchsorted(self.grid.t, grid.t, side="right") - 1
         return grid.around(Charts(grid.manifolds, q, self.charts.bases[last]), qd, qdd)
-
-
-def _counts_at_once(item: BoundConstraint) -> bool:
-    """Whether a constraint is what a tolerance is: a joint that it leaves free has no cost."""
-    return bool(getattr(item, "counts_at_once", False))

@@ -118,9 +118,9 @@ class Model(NamedTuple):
         around = around.scaled(grid.scale)
         both = spline.changes(around.changes)
         intervals = grid.cost.curvature(motion.samples, motion.partials, both)
-        # Rows of tolerances bend as they do, however far they are broken; not past others.
+        # Squares bend as they do, however far they are broken; those of tolerances not past others.
         apart = wild and motion.breaks_hard(WILD)
-        bending = None if apart else grid.rows.bending(motion.checked, multipliers, both)
+        bending = grid.rows.bending(motion.checked, multipliers, both, without_tolerances=apart)
         if bending is not None:
             intervals = intervals + bending
         gradient = around.pulled(by_cost)

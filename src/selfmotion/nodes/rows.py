@@ -236,7 +236,14 @@ class NodeRows:
         by = rows.reshape(len(which), ORDERS, n)
         return PointRows(intervals, np.swapaxes(shares, 1, 2) @ by)
 
-    def bending(self, samples: Samples, multipliers: Array, both: Array) -> Array | None:
+    def bending(
+        self,
+        samples: Samples,
+        multipliers: Array,
+        both: Array,
+        *,
+        without_tolerances: bool = False,
+    ) -> Array | None:
         """Return Σ multipliers · ∂²h/∂w² of rows that are sums of squares: what they bend by.
 
         By w of both ends of each interval, (N, d, d); None where there are none.
@@ -245,6 +252,8 @@ class NodeRows:
         for item, own in zip(self.constraints, self.split(multipliers), strict=True):
             squares = getattr(item, "squares", None)
             if squares is None or not own.any():
+                continue
+            if without_tolerances and counts_at_once(item):
                 continue
             slopes = np.sqrt(np.abs(own))[:, :1, None] * squares(samples)
             points, which = np.nonzero(slopes.any(axis=2))
@@ -311,7 +320,8 @@ class NodeRows:
                 beyond = np.asarray(item.above(curve, item.tolerance)).reshape(count, -1)
                 found[beyond.any(axis=1)] = np.maximum(found[beyond.any(axis=1)], 2)
                 continue
-            h = np.asarray(item.residual(curve)).reshape(count, -1).max(axis=1)
+            # Of a quantity that nothing limits there are no rows.
+            h = np.asarray(item.residual(curve)).reshape(count, -1).max(axis=1, initial=-np.inf)
             if not (h <= item.tolerance).all():
                 kept = _granted(item)
                 need = np.sqrt(np.maximum(h - kept, 0.0) / (_ROOM * (item.tolerance - kept)))
@@ -454,3 +464,14 @@ class LinearRows:
     def _counting(self) -> list[Flags]:
         """Which rows of each constraint count."""
         return self.rows.split(self.kept)
+
+
+def counts_at_once(item: BoundConstraint) -> bool:
+    """Whether a constraint is what a tolerance is: a joint that it leaves free has no cost."""
+    return bool(getattr(item, "counts_at_once", False))
+
+
+def accelerates_of(item: BoundConstraint, dof: int) -> bool:
+    """Whether a constraint is on a quantity of q̈, for motions of so many joints."""
+    own = getattr(item, "is_of_accelerations", None)
+    return own is not None and bool(own(dof))

@@ -24,8 +24,9 @@ CONTROLS = (6, 5, 4, 3)
 # Gauss points on an interval: the square of a quintic's derivative is integrated exactly.
 _ROOTS, _SHARES = np.polynomial.legendre.leggauss(5)
 GAUSS, WEIGHTS = 0.5 * (1.0 + _ROOTS), 0.5 * _SHARES
-# Where constraints that are no limits of joints look at an interval, besides the last node.
-POINTS = np.array([0.0, 0.5])
+# Where constraints that are no limits of joints look at an interval, besides the last node. Where
+# one is of accelerations, twice as often: q̈ is a cubic, and swings between two points if it may.
+POINTS, FINE_POINTS = np.array([0.0, 0.5]), np.array([0.0, 0.25, 0.5, 0.75])
 
 
 def _powers(s: Array, order: int) -> Array:
@@ -58,7 +59,7 @@ def _controls() -> tuple[Array, ...]:
 
 # Nodes that tell derivatives at one of them.
 _STENCIL = 5
-AT_GAUSS, AT_CONTROLS, AT_POINTS = unit_bases(GAUSS), _controls(), unit_bases(POINTS)
+AT_GAUSS, AT_CONTROLS = unit_bases(GAUSS), _controls()
 AT_END = unit_bases(np.ones(1))
 # How (q, q̇, q̈) of both ends scale with h to become y.
 _SCALED = np.array([0, 1, 2, 0, 1, 2])
@@ -76,6 +77,8 @@ class Quintic:
         Times of the nodes [s].
     copies : int
         How many motions there are; below, N + 1 nodes are those of all.
+    shares : (P,)
+        Where constraints look at an interval, as shares of it; 0 is the first.
 
     Attributes
     ----------
@@ -88,7 +91,8 @@ class Quintic:
         What costs look at: the Gauss points of each interval.
     """
 
-    def __init__(self, t: Array, copies: int = 1) -> None:
+    def __init__(self, t: Array, copies: int = 1, shares: Array = POINTS) -> None:
+        self._shares = shares
         self.t = np.tile(t, copies)
         self.steps = np.diff(self.t)
         self.gaps = np.arange(1, copies) * len(t) - 1
@@ -108,7 +112,7 @@ class Quintic:
     @cached_property
     def points(self) -> Sampling:
         """What constraints look at that are no limits of joints."""
-        inner = (self.t[:-1, None] + self.steps[:, None] * POINTS).ravel()
+        inner = (self.t[:-1, None] + self.steps[:, None] * self._shares).ravel()
         return Sampling.trapezoidal(np.append(inner, self.t[-1]))
 
     @cached_property
@@ -180,9 +184,13 @@ class Quintic:
         """Return a derivative at shares of all intervals, (N, S, n), for U_o there and y."""
         return np.asarray((tables[order] @ ends) * self.rates(order)[:, None, None])
 
+    @cached_property
+    def _at_points(self) -> tuple[Array, ...]:
+        return unit_bases(self._shares)
+
     def at_points(self, order: int, ends: Array) -> Array:
-        """Return a derivative at the `points`, (2 N + 1, n)."""
-        inner = self.at(AT_POINTS, order, ends).reshape(-1, ends.shape[2])
+        """Return a derivative at the `points`, (P N + 1, n)."""
+        inner = self.at(self._at_points, order, ends).reshape(-1, ends.shape[2])
         last = AT_END[order] @ ends[-1] * self.rates(order)[-1]
         return np.concatenate([inner, last])
 
@@ -191,9 +199,10 @@ class Quintic:
 
         (R,) and (R, 4, 6).
         """
-        last = which == len(POINTS) * self.count
-        k = np.where(last, self.count - 1, which // len(POINTS))
-        tables = np.stack([*AT_POINTS], axis=1)[which % len(POINTS)]
+        count = len(self._shares)
+        last = which == count * self.count
+        k = np.where(last, self.count - 1, which // count)
+        tables = np.stack([*self._at_points], axis=1)[which % count]
         tables[last] = np.stack([table[0] for table in AT_END])
         powers = self.steps[k][:, None] ** -np.arange(float(ORDERS))
         return k, tables * powers[:, :, None]

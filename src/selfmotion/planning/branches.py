@@ -1,12 +1,10 @@
 """Several motions along one path that begin in different configurations."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from selfmotion.basics import Array, Progress, SelfmotionError, description_of, silent
-from selfmotion.costs import Cost, FunctionCost
+from selfmotion.basics import Array, Progress, SelfmotionError, silent
 from selfmotion.optimise import Status
 from selfmotion.planning.effort import Search
 from selfmotion.planning.grids import rough_grid
@@ -78,17 +76,7 @@ def branches(
 
 
 def like_before(problem: Problem, before: Plan) -> Plan | None:
-    """Return the verified plan that begins at the motion of another one, or None.
-
-    Where the same is asked with the same costs, its motion is taken as it is, and judged anew: what
-    files of bodies hold may have changed.
-    """
-    same = replace(before.problem, start=problem.start).digest == problem.digest
-    if same and _cost_the_same(before.problem.costs, problem.costs):
-        kept = replace(before, problem=replace(problem, start=before.problem.start))
-        kept = replace(kept, certificate=kept.check())
-        if kept.certificate.verified:
-            return kept
+    """Return the verified plan that begins at the motion of another one, or None."""
     start = near_start(problem, before.trajectory.q[0])
     return None if start is None else from_start(problem, start, before)[0]
 
@@ -108,17 +96,6 @@ def from_start(
     if made.certificate.verified:
         return made, ""
     return None, made.certificate.verdict
-
-
-def _cost_the_same(some: Sequence[Cost], others: Sequence[Cost]) -> bool:
-    """Whether costs are the same; of functions nobody can tell but where they are one."""
-    if len(some) != len(others):
-        return False
-    return all(
-        one is other
-        or (not isinstance(one, FunctionCost) and description_of(one) == description_of(other))
-        for one, other in zip(some, others, strict=True)
-    )
 
 
 def _whole(made: Plan) -> Plan:

@@ -309,7 +309,7 @@ class Planner:
 
     def taken_up(self, motion: Trajectory) -> Candidate | None:
         """Return the candidate that begins at a rough motion; None where it breaks down at once."""
-        candidate = self.begin(motion.q[0], free=True)
+        candidate = self.begin(motion.q[0], free=self.is_free)
         if candidate is not None:
             candidate.resume(motion)
         return candidate

@@ -316,8 +316,13 @@ class Polisher:
             gains = known.cost - found.cost > NOTHING * abs(known.cost)
             if not (found.has_arrived or gains) and self._ended is None:
                 # More nodes lead nowhere, and multipliers on the way say nothing.
-                found = None if polishes else self.again(known)
-                return found if found is not None and found.has_arrived else known
+                again = None if polishes else self.again(known)
+                if again is not None and again.has_arrived:
+                    return again
+                # Between few nodes it may be off the path: there, what is on the way will do.
+                errors = self._problem.errors_between(known.motion.trajectory)
+                off = not polishes and again is None and errors.max() > _NEAR_PATH
+                return found if off else known
             known, is_rough = found.after(known.cost), not polishes
         return known
 

@@ -9,6 +9,7 @@ followed, too: from a motion whose self-motion goes back to it, Newton's method 
 handful of iterations, however many loops there are.
 """
 
+import contextlib
 from collections import abc
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
@@ -39,9 +40,11 @@ from selfmotion.problem import Problem, asked_of_part
 from selfmotion.search import (
     LAST_SMOOTHINGS,
     Sequence,
+    Stacked,
     asks_length,
     carried,
     guides,
+    metrics,
     shortest_along,
     start_candidates,
 )
@@ -109,6 +112,73 @@ def optimise_where_it_breaks(
     if ranking.run(starts, finalists, at):
         ranked = ranking.ranked
         _optimise_each(planner, _resumed(planner, ranked), len(ranked))
+
+
+def may_stack(planner: Planner) -> bool:
+    """Whether a quantity of q is violated, or a motion may be shared in several ways."""
+    problem, best = planner.problem, planner.best
+    names = [item.name for item in problem.envelope.quantities]
+    broken = (
+        names
+        if best is None
+        else [
+            name for name in names if any(text.startswith(f"{name}: ") for text in best.violations)
+        ]
+    )
+    return bool(broken) or len(metrics(problem.robot)) > 1
+
+
+def optimise_stacked(planner: Planner, finalists: int) -> bool:
+    """Optimise from motions that keep limits and quantities as rows of their task.
+
+    In several metrics, each part of a cell heavy in turn; from both ends of the path, and from
+    where the best motion breaks something. Return whether there was any.
+    """
+    problem = planner.problem
+    # Between two nodes of a rough motion a part of a cell may turn by half a radian.
+    t = rough_grid(problem).halved().halved().nodes
+    motions = [*_stacked(planner, t)]
+    found = np.concatenate(motions) if motions else np.zeros((0, 0, 0))
+    if len(found):
+        ranking = planner.ranking = Ranking(problem, planner.effort, planner.progress)
+        ranking.run_along(found, t, finalists)
+        ranked = ranking.ranked
+        _optimise_each(planner, _resumed(planner, ranked), len(ranked))
+    return bool(len(found))
+
+
+def _stacked(planner: Planner, t: Array) -> Iterator[Array]:
+    """Yield motions (K, N, n) through times t (N,) [s] that keep conditions all the way."""
+    problem, asked = planner.problem, planner.problem.envelope
+    drawn = _begun_at(planner, t)
+    for weights in metrics(problem.robot):
+        task = Stacked(problem.follows, asked.quantities, asked.lower, asked.upper, weights)
+        for place, starts in drawn.items():
+            if planner.is_free:
+                q, kept = task.placed(starts, float(t[place]))
+                starts = q[kept]
+            motions, arrived = task.carried(starts, t, place)
+            yield motions[arrived]
+
+
+def _begun_at(planner: Planner, t: Array) -> dict[int, Array]:
+    """Return configurations (K, n) to begin with, by the number of their time among some (N,).
+
+    The given start; or what is drawn at both ends, and where the best motion breaks something.
+    """
+    problem, best = planner.problem, planner.best
+    if problem.given_start is not None:
+        return {0: problem.given_start[None]}
+    breaks = best.breaks_at if best is not None else None
+    places = {0, len(t) - 1, *([] if breaks is None else [int(np.argmin(np.abs(t - breaks)))])}
+    found = dict[int, Array]()
+    arm = problem.follows.for_robot(problem.envelope.arm(problem.robot))
+    for place in sorted(places):
+        with contextlib.suppress(InverseKinematicsError):
+            # What keeps everything by chance is rare: they are put there.
+            drawn = start_candidates(arm, planner.search.starts, planner.rng, time=float(t[place]))
+            found[place] = np.array(drawn)
+    return found
 
 
 def _best(problem: Problem, starts: abc.Sequence[Array]) -> list[Array]:

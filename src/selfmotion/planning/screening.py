@@ -23,6 +23,8 @@ _ROUGH_ROUNDS = 30
 _SAME_TO_DIGITS = 1e-9
 # So many rough motions at most; where conditions count, with so many steps more that know them.
 ROUGH_MOTIONS, _WITH_CONDITIONS = 16, 12
+# And so many of those that keep conditions from the beginning.
+_WITHIN = 6
 # Motions at x = 0 that are this near at all times [rad or m] lie in one valley of the cost, as a
 # rule; rough optima this near are the same.
 ONE_VALLEY = 0.6
@@ -85,6 +87,7 @@ class Ranking:
 
     def __init__(self, problem: Problem, effort: Effort, progress: Progress) -> None:
         self._problem, self._effort, self._progress = problem, effort, progress
+        self._free = problem.given_start is None
         self._apart = apart_of(problem.robot)
         self._t = rough_grid(problem).nodes
         self._found: Batch | None = None
@@ -127,6 +130,40 @@ class Ranking:
             self._ranked = self._with_conditions(free, begun, finalists)
         return bool(self._ranked)
 
+    def run_along(self, motions: Array, t: Array, finalists: int) -> bool:
+        """Leave the best `finalists` of motions (K, N, n) on the path at times t (N,) [s].
+
+        Of those that are unlike each other the cheapest ones, with what they violate; after some
+        steps with conditions. Returns whether there is one.
+        """
+        from scipy.interpolate import CubicSpline
+
+        problem, sampling = self._problem, Sampling.trapezoidal(t)
+        if self._free:
+            motions = np.array([wound_back(problem.robot, motion) for motion in motions])
+        curves = [CubicSpline(t, motion) for motion in motions]
+        each = [Samples.along(problem.follows, sampling, q(t), q(t, 1)) for q in curves]
+        costs = np.array([problem_cost(problem, samples) for samples in each])
+        cheapest = np.argsort(costs, kind="stable")
+        alone = unlike(motions, cheapest, self._apart, ONE_VALLEY)[0][:ROUGH_MOTIONS]
+        merits = dict[int, float]()
+        for k in alone:
+            bound = problem.bind_constraints(*motions[k, [0, -1]], apart=False)
+            merits[k] = penalised(float(costs[k]), bound, each[k])
+        found = list[NodeMotion]()
+        chosen = sorted(alone, key=lambda k: merits[k])[:_WITHIN]
+        for number, k in enumerate(chosen, 1):
+            self._progress("start", number, len(chosen))
+            begun = self._near(*(curves[k](self._t, order) for order in range(3)))
+            found += [] if begun is None else [self._roughly(begun)]
+            self._ranked = self._different(sorted(found, key=self._rank))[:finalists]
+        return bool(self._ranked)
+
+    def _roughly(self, begun: NodeMotion) -> NodeMotion:
+        """Return the rough optimum near a motion, or that itself where it keeps more."""
+        found = minimise(begun, lambda _: False, roughly=True, most=_ROUGH_ROUNDS).motion
+        return min(found, begun, key=self._rank)
+
     def _is_pointwise(self) -> bool:
         """Whether costs can be told of motions side by side, and nothing is asked of ends.
 
@@ -168,7 +205,7 @@ class Ranking:
 
     def _grid(self, problem: Problem) -> NodeGrid:
         counts = self._effort.counts
-        return NodeGrid(problem, self._t, (), free=True, counts=counts, calm=True)
+        return NodeGrid(problem, self._t, (), free=self._free, counts=counts, calm=True)
 
     def _decisive(self, found: Batch, finalists: int) -> list[NodeMotion]:
         """Return the cheapest motion that keeps all, then others about as cheap; or none.
@@ -222,9 +259,13 @@ class Ranking:
             better = minimise(motion, lambda _: False, roughly=True, most=most).motion
             found = sorted([*found, (self._rank(better), better)], key=lambda each: each[0])
             self._ranked = [one for _, one in found]
-        q = np.array([motion.place.q for motion in self._ranked])
+        return self._different(self._ranked)[:finalists]
+
+    def _different(self, motions: Sequence[NodeMotion]) -> list[NodeMotion]:
+        """Return motions without those that are near one before them."""
+        q = np.array([motion.place.q for motion in motions])
         alone, _ = unlike(q, np.arange(len(q)), self._apart, _SAME_OPTIMUM)
-        return [self._ranked[k] for k in alone[:finalists]]
+        return [motions[k] for k in alone]
 
     def _rank(self, motion: NodeMotion) -> tuple[bool, float]:
         """Return what sorts motions, the best first: what is not kept yet has its price."""
@@ -272,7 +313,7 @@ class Ranking:
         problem, still = self._problem, np.zeros_like(q)
         bound = problem.bind_constraints(q[0], q[-1], apart=self._effort.apart)
         counts = self._effort.counts
-        grid = NodeGrid(problem, self._t, bound, free=True, counts=counts, calm=True)
+        grid = NodeGrid(problem, self._t, bound, free=self._free, counts=counts, calm=True)
         return grid.near(q, still if qd is None else qd, still if qdd is None else qdd)
 
     def _clear(self, motion: NodeMotion) -> bool:
@@ -345,9 +386,14 @@ def _merit(problem: Problem, q: Array, twists: Array, sampling: Sampling) -> flo
     except np.linalg.LinAlgError:
         return np.inf
     samples = replace(still, qd=qd)
-    costs = [float(sampling.weights @ cost.value(samples)) for cost in problem.all_costs]
     bound = problem.bind_constraints(q[0], q[-1], apart=False)
-    return penalised(sum(costs), bound, samples)
+    return penalised(problem_cost(problem, samples), bound, samples)
+
+
+def problem_cost(problem: Problem, samples: Samples) -> float:
+    """Return what a motion costs."""
+    weights = samples.sampling.weights
+    return sum(float(weights @ cost.value(samples)) for cost in problem.all_costs)
 
 
 def apart_of(robot: RobotModel) -> Apart:

@@ -27,7 +27,9 @@ from selfmotion.planning.proposals import (
     VERY_LONG_WAY,
     is_long,
     keep_to_posture,
+    may_stack,
     optimise_sequences,
+    optimise_stacked,
     optimise_starts,
     optimise_where_it_breaks,
 )
@@ -175,6 +177,16 @@ def _try_postures(planner: Planner) -> bool:
         return False
     keep_to_posture(planner)
     return True
+
+
+def _stack_rows(planner: Planner) -> bool:
+    """Optimise from motions that keep limits and quantities as rows of their task."""
+    wanted = planner.is_sought and planner.is_unmet
+    begins = planner.takes_starts or not planner.is_free
+    can = is_on_nodes(planner.problem, planner.effort) and may_stack(planner)
+    if not (wanted and begins and can) or planner.is_out_of_reach():
+        return False
+    return optimise_stacked(planner, planner.search.finalists)
 
 
 def _judge_on_meshes(planner: Planner) -> bool:
@@ -363,6 +375,7 @@ STEPS: tuple[tuple[str, Callable[[Planner], bool]], ...] = (
     ("given start", _begin_at_start),
     ("starts", _draw_starts),
     ("postures compared", _compare_postures),
+    ("conditions as rows", _stack_rows),
     ("proof on meshes", _judge_on_meshes),
     ("links in pieces", _take_links_apart),
     (_WHERE_IT_BREAKS, _draw_where_it_breaks),

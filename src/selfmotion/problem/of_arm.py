@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, cast
+from typing import ClassVar, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -11,7 +11,7 @@ from selfmotion.basics import Array, Flags, Ints
 from selfmotion.certificate import Column, Quantity
 from selfmotion.collision import Closest, CollisionModel
 from selfmotion.constraints import BoundConstraint, BoundLimits, NodeTangents, easing_of
-from selfmotion.constraints.conditions import BoundQuantity, motion_at_nodes, motion_of_order
+from selfmotion.constraints.conditions import BoundQuantity, motion_of_order
 from selfmotion.costs import Cost, Partials, Samples
 from selfmotion.follow import AugmentedFollows, Follows
 from selfmotion.task import ROW_NAMES, Relaxation
@@ -159,6 +159,20 @@ class BoundOfArm:
         own = _ArmTangents(motion, self.follows.robot.dof)
         return self.bound.tangents(samples.of(self.follows), own)
 
+    def is_of_accelerations(self, dof: int) -> bool:
+        """See `BoundQuantity.is_of_accelerations`."""
+        own = getattr(self.bound, "is_of_accelerations", None)
+        return own is not None and bool(own(self.follows.robot.dof))
+
+    @property
+    def squares(self) -> Callable[[Samples], Array] | None:
+        """See `BoundQuantity.squares`."""
+        own = getattr(self.bound, "squares", None)
+        if own is None:
+            return None
+        n = self.follows.robot.dof
+        return lambda samples: _filled(own(samples.of(self.follows)), samples.q.shape[1] - n)
+
     def easing(self, column: int) -> tuple[float, str]:
         """See `easing_of`."""
         return easing_of(self.bound, column)
@@ -198,12 +212,21 @@ class BodiesOfArm:
 
 
 def quantity_of_arm(quantity: Quantity, n: int) -> Quantity:
-    """Return a quantity of n joints, of motions of more; its derivatives are not asked for."""
+    """Return a quantity of n joints, of motions of more."""
 
-    def cut(of: Callable[..., Any]) -> Callable[..., Any]:
-        return lambda *motion: of(*(x[:, :n] for x in motion))
+    def values(*motion: Array) -> Array:
+        return quantity.values(*(x[:, :n] for x in motion))
 
-    return replace(quantity, values=cut(quantity.values), derivatives=cut(quantity.derivatives))
+    def derivatives(*motion: Array) -> tuple[Array, ...]:
+        more = motion[0].shape[1] - n
+        return tuple(_filled(by, more) for by in quantity.derivatives(*(x[:, :n] for x in motion)))
+
+    return replace(quantity, values=values, derivatives=derivatives)
+
+
+def _filled(by: Array, more: int) -> Array:
+    """Return derivatives (…, n) with those by so many more joints, 0."""
+    return np.concatenate([by, np.zeros((*by.shape[:-1], more))], axis=-1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -219,16 +242,10 @@ class WithinBand(BoundQuantity):
     window: tuple[float, float] = (-np.inf, np.inf)
     counts_at_once: ClassVar[bool] = True
 
-    @property
-    def squares(self) -> Callable[[Samples], Array] | None:
-        """``squares(samples)`` → slopes (K, c, n) whose squares h bends by; None of one number."""
-        return self._squares if self.quantity.components > 1 else None
-
     def _squares(self, samples: Samples) -> Array:
-        (by,) = self.quantity.derivatives(*motion_at_nodes(samples))
-        found = np.sqrt(2.0) / float(self.quantity.bounds[0]) * by[:, 0]
+        found = super()._squares(samples)
         found[self._outside(samples)] = 0.0
-        return np.asarray(found)
+        return found
 
     @classmethod
     def of(cls, item: Relaxation, follows: AugmentedFollows) -> "WithinBand":

@@ -20,6 +20,7 @@ from selfmotion.search.obstruction import (
     obstruction as obstruction,
     reachable as reachable,
 )
+from selfmotion.search.stacked import Stacked as Stacked, metrics as metrics
 from selfmotion.search.starts import (
     carried as carried,
     spread as spread,

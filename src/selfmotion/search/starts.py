@@ -20,6 +20,8 @@ _TRIES = 2
 # Where most of them do not keep what else is asked of a configuration: so many rounds of these at
 # most, until there is this share of the starts.
 _START_ROUNDS, _ENOUGH_STARTS = 12, 0.5
+# What a slower method leaves [m, rad] where Newton's method does the rest.
+_NEARLY = 1e-6
 
 
 Admits = Callable[[Array], npt.NDArray[np.bool_]]
@@ -67,6 +69,8 @@ def start_candidates(
         found = _along_curves(follows, count, rng, admits or _all, time)
     if not found:
         found = _scattered(follows, count, rng, admits or _all, time)
+    if not found:
+        found = _approached(follows, count, rng, admits or _all, time)
     if not found and admits is not None:
         return start_candidates(follows, count, rng, None, time)
     if not found and not follows.is_plain:
@@ -123,6 +127,28 @@ def _scattered(
         # Without anything else to keep, one round tells what there is.
         if admits is _all or len(found) >= _ENOUGH_STARTS * count:
             break
+    return found
+
+
+def _approached(
+    follows: Follows, count: int, rng: np.random.Generator, admits: Admits, time: float
+) -> list[Array]:
+    """Return up to `count` configurations that a slower method finds, none near another.
+
+    It lets go of limits again: where these are narrow, Newton's method stops at some of them.
+    """
+    robot, t = follows.robot, np.array([time])
+    manifold = Manifold(follows, robot.lower, robot.upper)
+    target, held, found = follows.targets(t)[0], follows.held(t)[0], list[Array]()
+    seeds = spread(robot, _TRIES * count, rng)
+    near, misses = manifold.approach(seeds, target, held)
+    near = near[(misses <= _NEARLY).all(axis=1)]
+    if not len(near):
+        return found
+    q, arrived = manifold.project(near, target, held=held)
+    for one in q[arrived][admits(q[arrived])]:
+        if len(found) < count and all(np.linalg.norm(one - other) > UNLIKE for other in found):
+            found.append(one)
     return found
 
 
