@@ -1,5 +1,6 @@
 """Programs of machine tools in: what they say of a tool is where the path takes it."""
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -249,7 +250,8 @@ def test_statements_of_systems_are_passed_over_or_told(tmp_path: Path) -> None:
     assert first.events == ((0, "OPSTOP"),)
     # Where home is, is not known: the cut begins where it is known again.
     np.testing.assert_allclose(1e3 * second.positions, [[30, 0, 0], [40, 0, 0]])
-    offset, home = first.notes
+    inserted, offset, home = first.notes
+    assert "line 4: INSERT STOP = 3: lines for a control are passed over" in inserted
     assert "line 11: CUTCOM/LEFT,XYPLAN: places are taken as they are written" in offset
     assert "GOHOME goes to a place of the machine's own" in home
     file = written(tmp_path, "b.ncl", ROUND_BEGIN + "GOHOME/0,0,90\nGOTO/0,0,80\n")
@@ -418,6 +420,9 @@ def test_a_job_is_read_from_a_machine_program(tmp_path: Path) -> None:
         ("G4 P1 G10", "G4 and G10 are in one line"),
         ("G1 X10 L3", "L repeats the line, which is not read"),
         ("G93 G1 X10 F60\nX20", "says no F, which after G93 each line has"),
+        ("G54 P2 X4", "word 'P2' of this line is not read"),
+        ("G1 X40 Q2", "word 'Q2' of this line is not read"),
+        ("M97 P100", "M97: subprograms are not read"),
     ],
 )
 def test_other_words_are_refused_by_line(tmp_path: Path, line: str, said: str) -> None:
@@ -444,6 +449,22 @@ def test_other_words_are_refused_by_line(tmp_path: Path, line: str, said: str) -
         ("GOTO/1,2,3,0,0,0", "has no direction"),
         ("FEDRAT/100,MMPR", "expected a feed, and MMPM or IPM"),
         ("UNITS/FEET", "expected MM or INCHES"),
+        ("PREFUN/55", "a G word of one control, which may move anything"),
+        ("INSERT G55", "words of a control that may move something"),
+        ("INSERT/M8 X40", "words of a control that may move something"),
+        ("SWITCH/2", "the frame of another turret"),
+        ("SET/HEAD,2", "a way to read what follows"),
+        ("SET/MODE,INCR", "places by differences are not read"),
+        ("MODE/TURN", "a way to read what follows"),
+        ("ORIGIN/0,0,5", "a zero that moves"),
+        ("ROTATE/TABLE,90", "a table that turns"),
+        ("OFSTNO/1\nOFSTNO/2", "OFSTNO/2 after OFSTNO/1: another zero of the control"),
+        ("SETUP/START,1\nSETUP/START,2", "SETUP/2 after SETUP/1: another way to hold the part"),
+        ("SETUP/FIXTURE", "statement 'SETUP/FIXTURE' is not read"),
+        ("RAPID/XYZ", "statement 'RAPID/XYZ' is not read"),
+        ("MSYS/0,0,0,1,0,0,0,1,0", "MSYS after places that are in none"),
+        ("FEDRAT/10,IPM", "feeds are in IPM, and the file has UNITS/MM: say in which unit"),
+        ("UNITS/INCH", "feeds are in MMPM, and the file has UNITS/INCHES: say in which unit"),
         ("?", "is not read"),
     ],
 )
@@ -603,3 +624,89 @@ def test_events_of_rows_with_times_are_at_these_times_after_a_ramp(tmp_path: Pat
         assert np.linalg.norm(1e3 * seam.path.pose(at).translation - row) < 1e-3
         # Half a ramp is lost at the start.
         assert at == pytest.approx(table[number][0] + 0.15, abs=1e-6)
+
+
+# Operations as NX writes them, each in its machine coordinate system.
+OPERATION = """TOOL PATH/{name},TOOL,MILL
+TLDATA/MILL,10.0,0.0,75.0,0.0,0.0
+MSYS/{frame}
+PAINT/PATH
+RAPID
+GOTO/0.0,0.0,20.0,0.0,0.0,1.0
+FEDRAT/MMPM,600.0
+GOTO/0.0,0.0,0.0
+CIRCLE/20.0,0.0,0.0,0.0,0.0,1.0,20.0,0.06,0.5,10.0,0.0
+GOTO/40.0,0.0,0.0
+END-OF-PATH
+"""
+
+
+def test_operations_in_other_frames_are_where_these_are(tmp_path: Path) -> None:
+    """Against the frames' matrices: places of the second, seen from the first."""
+    from scipy.spatial.transform import Rotation
+
+    rng = np.random.default_rng(0)
+    for frames in (Rotation.random(2, rng=rng), Rotation.from_euler("z", [[0.0], [np.pi / 2]])):
+        origins = 200.0 * rng.normal(size=(2, 3))
+        text = "UNITS/MM\n"
+        for name, turn, origin in zip("AB", frames.as_matrix(), origins, strict=True):
+            values = [*origin, *turn[:, 0], *turn[:, 1]]
+            text += OPERATION.format(name=name, frame=",".join(f"{x:.10f}" for x in values))
+        first, second = read_cldata(written(tmp_path, "part.cls", text)).values()
+        one, other = (
+            np.vstack([np.column_stack([turn, origin]), [0, 0, 0, 1]])
+            for turn, origin in zip(frames.as_matrix(), origins, strict=True)
+        )
+        between = np.linalg.inv(one) @ other
+        own = np.column_stack([1e3 * first.positions, np.ones(len(first.positions))])
+        wanted = (own @ between.T)[:, :3]
+        np.testing.assert_allclose(1e3 * second.positions[-len(wanted) :], wanted, atol=1e-6)
+        np.testing.assert_allclose(second.values[-1][:, 2], -between[:3, 2], atol=1e-8)
+        assert any("MSYS: another machine coordinate system" in note for note in first.notes)
+
+
+def test_files_that_contradict_themselves_are_asked_for_their_unit(tmp_path: Path) -> None:
+    text = "FEDRAT/IPM,10\nRAPID\nGOTO/0,0,1,0,0,1\nGOTO/0,0,0\nGOTO/4,0,0\n"
+    file = written(tmp_path, "part.cls", text)
+    with pytest.raises(
+        sm.errors.FileFormatError,
+        match=r"line 1: feeds are in IPM, and the file has no UNITS: .*unit = 'in'",
+    ):
+        sm.files.read_path(file)
+    for unit, metre in (("in", 25.4e-3), ("mm", 1e-3)):
+        path = sm.files.read_path(file, unit=unit)
+        end = path.pose(path.duration).translation
+        np.testing.assert_allclose(end, [4 * metre, 0, 0], atol=1e-12)
+        assert path.feeds[0].asked == pytest.approx(10 * 25.4e-3 / 60)
+    file = written(tmp_path, "part.cls", text.replace("IPM,10", "MMPM,100"))
+    rows = read_cldata(file)["cut 1"]
+    assert "no statement says UNITS: lengths are taken for mm" in rows.notes
+    np.testing.assert_allclose(rows.positions[-1], [4e-3, 0, 0])
+
+
+def test_what_a_program_does_not_say_is_told(tmp_path: Path) -> None:
+    text = "T1 M6\nG0 X0 Y0 Z5\n/G1 Z0 F600\nG1 X10\nT2 M6\nG0 X0\nG1 Y9\n"
+    notes = "\n".join(read_gcode(written(tmp_path, "a.nc", text))["cut 1"].notes)
+    for said in ("no line says G20 or G21", "line 3: lines that may be skipped", "T2 after T1"):
+        assert said in notes
+
+
+@pytest.mark.parametrize("where", ["beside", "in each"])
+def test_words_that_may_move_poses_are_refused_and_others_told(where: str, tmp_path: Path) -> None:
+    poses = [{"x": 0.4, "y": 0.1 * k, "z": 0.3} for k in range(3)]
+
+    def reads(key: str, value: object) -> sm.paths.Path:
+        document: dict[str, object] = {"poses": poses}
+        if where == "beside":
+            document |= {key: value}
+        else:
+            document = {"poses": [{**pose, key: value} for pose in poses]}
+        return sm.files.read_path(written(tmp_path, "a.json", json.dumps(document)), feed=0.05)
+
+    for key, value in (("unit", "mm"), ("tool_offset", {"z": 0.1}), ("frame", "tool")):
+        with pytest.raises(
+            sm.errors.FileFormatError, match=f"'{key}' is .*which may move the poses"
+        ):
+            reads(key, value)
+    assert not reads("name", "seam").notes
+    assert "passed over: 'gripper'" in reads("gripper", "open").notes[0]

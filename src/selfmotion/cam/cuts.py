@@ -122,6 +122,11 @@ class Machine:
         self._open: Cut | None = None
         self._next: list[str] = []
 
+    @property
+    def moved(self) -> bool:
+        """Whether it has been anywhere that is known."""
+        return bool(self.cuts) or not np.isnan(self.position).any()
+
     def fault(self, what: str) -> FileFormatError:
         """Return an error about the line that is read."""
         return FileFormatError(f"{self.file}: line {self.number}: {what}")
