@@ -54,7 +54,8 @@ _LAST = re.compile(r"\(\s*(LINE|POINT)\s*/([^()]*)\)")
 # Cycles whose holes are drilled in steps, words for these, and those with a number behind them.
 _PECKS = ("DEEP", "DEEP2", "BRKCHP")
 _STEPS = ("SUBPECK", "STEP", "INCR")
-_OF_HOLES = ("FEDTO", "DEPTH", "RAPTO", "CLEAR", "DWELL", "MMPM", "IPM", "1STPECK", *_STEPS)
+_OF_HOLES = ("FEDTO", "DEPTH", "RAPTO", "CLEAR", "RTRCTO", "DWELL", "MMPM", "IPM", "1STPECK")
+_OF_HOLES = (*_OF_HOLES, *_STEPS)
 # Axes nearer than this are the same; those of a frame are square up to this: rounding of files.
 _TURNED, _SQUARE = 1e-6, 1e-4
 _UP = np.array([0.0, 0.0, 1.0])
@@ -119,6 +120,8 @@ class _Reader:
         self._in_world = False
         # The words of a cycle while there is one.
         self._cycle: dict[str, float] = {}
+        # Where the tool was before it.
+        self._level: Array = np.full(3, np.nan)
 
     def seams(self) -> Mapping[str, PoseRows]:
         """Return the cuts by names."""
@@ -315,8 +318,11 @@ class _Reader:
             word = items.pop(0)
             if word in _PECKS:
                 found[word[:4]] = 1.0
-            elif word == "RTRCTO" and items:
+            elif word == "RTRCTO" and items[:1] == ["AUTO"]:
+                # Back to where it was before the cycle.
                 items.pop(0)
+                found["AUTO"] = 1.0
+                self._level = machine.position.copy()
             elif word in _OF_HOLES and items:
                 found[word] = self._number(items.pop(0))
             elif _NUMBER.fullmatch(word) and bare:
@@ -345,6 +351,14 @@ class _Reader:
             first = asked.get("1STPECK", others)
             pecks = Pecks(unit * first, unit * others, is_out="DEEP" in asked)
         waits = asked.get("DWELL", 0.0) > 0.0
+        # Between holes it is as high as it says, or as it was before them.
+        level = max(height, unit * asked.get("RTRCTO", 0.0))
+        before = float((self._level - top) @ axis)
+        if "AUTO" in asked and np.isfinite(before):
+            level = max(level, before)
+        over = top + level * axis
+        if level > height:
+            self.machine.rapid(over, axis)
         drill(
             self.machine,
             top + height * axis,
@@ -353,6 +367,8 @@ class _Reader:
             pecks=pecks,
             dwell=f"DELAY/{asked['DWELL']:g}" if waits else "",
         )
+        if level > height:
+            self.machine.rapid(over, axis)
         self._arc, self._ahead, self._axis, self._rapid = None, None, None, False
 
     def _to(self, position: Array, axis: Array, *, travels: bool) -> None:
@@ -376,9 +392,11 @@ class _Reader:
             position = self._place(self._numbers("GOHOME", given[:3], 3).tolist())
         else:
             position = np.full(3, np.nan)
+            machine.climbs()
             machine.note(
-                "GOHOME goes to a place of the machine's own: it is passed over, and where the "
-                "tool is, is not known until the next GOTO"
+                "GOHOME goes to a place of the machine's own, which is taken to be above all: the "
+                "tool goes up as high as it has been, and where it is then, is not known until the "
+                "next GOTO"
             )
         self._to(position, machine.axis, travels=True)
 

@@ -172,9 +172,11 @@ class _Reader:
         idle = [name for name in "PQ" if name in values and not self._has_p(name, codes)]
         if idle:
             raise machine.unread(f"word '{idle[0]}{values[idle[0]]:g}' of this line")
-        # What starts does so before the motion of its line, what stops after it. A rapid leaves the
-        # cut before: all that its line switches belongs to the next one.
-        late = [code for code in switched if self._travels or code in STOPS]
+        # What starts does so before the motion of its line, what stops after it; where a rapid
+        # leaves the cut before, what starts belongs to the next one.
+        late = [code for code in switched if code in STOPS]
+        if self._travels:
+            machine.hold()
         for code in switched:
             if code not in late:
                 self._mode(code)
@@ -187,6 +189,7 @@ class _Reader:
             self._drill(values)
         else:
             self._move(values)
+        machine.release()
         for code in late:
             self._mode(code)
         return not _ENDS.isdisjoint(codes)
@@ -301,13 +304,26 @@ class _Reader:
 
     def _goes_home(self, code: str, values: Mapping[str, float]) -> None:
         """Go to a place that is the machine's own: where that is in the part is not known."""
-        axes = [k for k, name in enumerate("XYZ") if name in values]
-        for k in axes or range(3):
+        machine = self.machine
+        axes = [k for k, name in enumerate("XYZ") if name in values] or [0, 1, 2]
+        if code != "G53":
+            # By the place that its line says.
+            goal = self._at.copy()
+            for k in axes:
+                if "XYZ"[k] in values:
+                    before = 0.0 if self._absolute else goal[k]
+                    goal[k] = self._unit * values["XYZ"[k]] + before
+            machine.rapid(self._part(goal), machine.axis)
+            self._at = goal
+        if 2 in axes:
+            machine.climbs()
+        for k in axes:
             self._at[k] = np.nan
-        self.machine.rapid(self._part(self._at), self.machine.axis)
-        self.machine.note(
-            f"{code} goes to a place of the machine's own: it is passed over, and "
-            f"where the tool is, is not known until X, Y and Z are given"
+        machine.rapid(self._part(self._at), machine.axis)
+        machine.note(
+            f"{code} goes to a place of the machine's own, which is taken to be above all: the "
+            f"tool goes up as high as it has been, and where it is then, is not known until X, Y "
+            f"and Z are given"
         )
 
     def _set(self, values: Mapping[str, float]) -> None:
@@ -376,6 +392,12 @@ class _Reader:
             step = self._unit * self._hole.get("Q", 0.0)
             pecks = Pecks(step, step, is_out=self._cycle == "G83")
         waits = self._cycle in ("G82", "G89") and self._hole.get("P", 0.0) > 0.0
+        if np.isfinite(self._at[2]):
+            # Over the hole at the height where it is, or where the hole begins if that is above.
+            for place in (self._at, goal):
+                over = place.copy()
+                over[2] = max(self._at[2], self._hole["R"])
+                machine.rapid(self._part(over), axis)
         drill(
             machine,
             self._part(above),

@@ -13,6 +13,7 @@ from selfmotion.basics import (
     TURN,
     Array,
     FileFormatError,
+    Flags,
     ProblemError,
     as_choice,
     nearest,
@@ -115,6 +116,9 @@ class PoseRows:
         Whether it is meant in its own direction only, as cuts of a machine are.
     notes : tuple of str
         What to know of how the file was read.
+    rapid : (N,) or None
+        Whether the tool goes on from each pose as fast as it may, whatever the feed; None for
+        nowhere.
     """
 
     places: Sequence[str]
@@ -127,6 +131,7 @@ class PoseRows:
     straight: bool = False
     one_way: bool = False
     notes: tuple[str, ...] = ()
+    rapid: Flags | None = None
 
 
 # Options of `read_path` that say what a file means.
@@ -239,6 +244,7 @@ def some_rows(rows: PoseRows, chosen: Sequence[int]) -> PoseRows:
         rows.straight,
         rows.one_way,
         rows.notes,
+        None if rows.rapid is None else rows.rapid[chosen],
     )
 
 
