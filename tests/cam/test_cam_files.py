@@ -1,5 +1,6 @@
 """Programs of machine tools in: what they say of a tool is where the path takes it."""
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -7,6 +8,7 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.cam.cldata import read_cldata
+from selfmotion.cam.cuts import RAPID
 from selfmotion.cam.gcode import read_gcode
 from selfmotion.cam.path_rows import PoseRows
 
@@ -51,6 +53,8 @@ RAPID
 GOTO/100,0,50,0,0,1
 GODLTA/10,0,-20
 GODLTA/0,30,0
+RAPID
+GOTO/110,30,50
 FINI
 """
 # What rounded corners and chords of arcs may be off [m].
@@ -66,16 +70,21 @@ def test_cuts_are_what_is_between_rapids(tmp_path: Path) -> None:
     cuts = read_gcode(written(tmp_path, "slot.nc", GCODE))
     assert list(cuts) == ["cut 1", "cut 2"]
     first, second = cuts.values()
-    np.testing.assert_allclose(first.positions[:3], [[0, 0, 5e-3], [0, 0, -2e-3], [0.04, 0, -2e-3]])
-    assert first.places[:3] == ["line 7", "line 7", "line 8"]
+    # The rapid along the tool's axis before, and the one behind.
+    np.testing.assert_allclose(
+        1e3 * first.positions[:4], [[0, 0, 50], [0, 0, 5], [0, 0, -2], [40, 0, -2]]
+    )
+    assert first.places[:4] == ["line 5", "line 6", "line 7", "line 8"]
     assert first.feed is not None
+    assert first.rapid is not None
     # From a pose on, 600 and 1200 mm/min.
-    np.testing.assert_allclose(first.feed[:3], [0.01, 0.02, 0.02])
+    np.testing.assert_allclose(first.feed[1:4], [0.01, 0.02, 0.02])
+    assert first.rapid[:4].tolist() == [True, False, False, False]
     assert [event for _, event in first.events] == ["M6", "M3", "M8", "M9"]
     np.testing.assert_allclose(
-        second.positions, [[0.1, 0, 0.05], [0.11, 0, 0.03], [0.11, 0.03, 0.03]]
+        1e3 * second.positions, [[100, 0, 50], [110, 0, 30], [110, 30, 30], [110, 30, 50]]
     )
-    arc = first.positions[3:-2]
+    arc = first.positions[4:-2]
     away = np.linalg.norm(arc[:, :2] - [0.04, 0.02], axis=1)
     np.testing.assert_allclose(away, 0.02, atol=1e-12)
     middles = 0.5 * (arc[1:] + arc[:-1])
@@ -144,7 +153,10 @@ def test_the_path_goes_along_the_legs_at_the_feeds(tmp_path: Path, name: str) ->
     assert max(away(point) for point in samples.translation[::10]) < CORNER
     np.testing.assert_allclose(samples.translation[[0, -1]], rows.positions[[0, -1]], atol=1e-9)
     speeds = np.linalg.norm(samples.twist[:, :3], axis=1)
-    assert speeds.max() == pytest.approx(0.02, rel=0.02)
+    # The rapid down to where the feed begins is as fast as rapids are.
+    begun = t > t[(samples.translation[:, 2] < 5e-3 - 1e-6).argmax()]
+    assert speeds[begun].max() == pytest.approx(0.02, rel=0.02)
+    assert speeds.max() == pytest.approx(RAPID, rel=0.02)
     for end in (0, -1):
         assert np.abs(samples.twist[end]).max() < 1e-9
 
@@ -204,18 +216,33 @@ HOLES = {
 }
 
 
+# Where the tool stands above the first hole, and leaves each, in each language [mm].
+LEVELS = {
+    "G-code": ([20], [], [], [20]),
+    "by differences": ([20], [], [], [20]),
+    "NX": ([20], [20], [20], [20]),
+    "CAMWorks": ([20], [20], [20], [20]),
+    "ISO": ([], [], [], [20]),
+}
+
+
 @pytest.mark.parametrize("language", HOLES)
 def test_holes_are_cuts_that_come_straight_out(language: str, tmp_path: Path) -> None:
     is_gcode = language in ("G-code", "by differences")
     file = written(tmp_path, "a.nc" if is_gcode else "a.apt", HOLES[language])
     first, second, line = (read_gcode if is_gcode else read_cldata)(file).values()
     heights = [2, -1, 2, -0.5, -4, 2, -3.5, -5, 2]
-    for hole, x in ((first, 10), (second, 20)):
-        wanted = np.column_stack([np.full(9, x), np.zeros(9), heights])
+    before, after, again, last = LEVELS[language]
+    for hole, x, come, go in ((first, 10, before, after), (second, 20, again, last)):
+        own = [*come, *heights, *go]
+        wanted = np.column_stack([np.full(len(own), x), np.zeros(len(own)), own])
         np.testing.assert_allclose(1e3 * hole.positions, wanted, atol=1e-9)
         assert hole.feed is not None
-        # At the feed where it cuts, faster where the hole is there already.
-        np.testing.assert_allclose(hole.feed[:-1], [0.002, *[0.05, 0.05, 0.002] * 2, 0.05])
+        assert hole.rapid is not None
+        # At the feed where it cuts, in rapids where the hole is there already.
+        rapid = [True] * len(come) + [False, *[True, True, False] * 2, True] + [True] * len(go)
+        assert hole.rapid[:-1].tolist() == rapid[: len(own) - 1]
+        np.testing.assert_allclose(hole.feed[~hole.rapid], 0.002)
     np.testing.assert_allclose(1e3 * line.positions, [[20, 0, 20], [30, 0, 20]], atol=1e-9)
 
 
@@ -227,11 +254,11 @@ def test_other_cycles_wait_break_chips_and_come_out_at_the_feed(tmp_path: Path) 
         return found
 
     waits, reams = hole("G82 X0 Z-5 R2 P500 F120"), hole("G85 X0 Z-5 R2 F120")
-    assert waits.events == ((1, "G4 P500"),)
-    assert reams.feed is not None
-    np.testing.assert_allclose(reams.feed, 0.002)
+    assert waits.events == ((2, "G4 P500"),)
+    assert reams.rapid is not None
+    assert reams.rapid[:-1].tolist() == [True, False, False]
     chips = hole("G73 X0 Z-5 R2 Q4 F120")
-    np.testing.assert_allclose(1e3 * chips.positions[:, 2], [2, -2, -1.5, -5, 2], atol=1e-9)
+    np.testing.assert_allclose(1e3 * chips.positions[:, 2], [20, 2, -2, -1.5, -5, 2], atol=1e-9)
 
 
 def test_statements_of_systems_are_passed_over_or_told(tmp_path: Path) -> None:
@@ -245,11 +272,15 @@ def test_statements_of_systems_are_passed_over_or_told(tmp_path: Path) -> None:
     content = text.replace("PART = 1", "STÜCK = 1").replace("\n", "\r\n").encode("latin-1")
     (tmp_path / "a.aptsource").write_bytes(content)
     first, second = read_cldata(tmp_path / "a.aptsource").values()
-    np.testing.assert_allclose(1e3 * first.positions, [[10, 0, 5], [10, 0, 0], [20, 0, 0]])
+    # Where home is, is not known, but it is above: up as high as the tool has been.
+    np.testing.assert_allclose(
+        1e3 * first.positions, [[10, 0, 5], [10, 0, 0], [20, 0, 0], [20, 0, 5]]
+    )
     assert first.events == ((0, "OPSTOP"),)
-    # Where home is, is not known: the cut begins where it is known again.
     np.testing.assert_allclose(1e3 * second.positions, [[30, 0, 0], [40, 0, 0]])
-    offset, home = first.notes
+    inserted, offset, home, unjudged = first.notes
+    assert unjudged == "stock and engagement are not judged"
+    assert "line 4: INSERT STOP = 3: lines for a control are passed over" in inserted
     assert "line 11: CUTCOM/LEFT,XYPLAN: places are taken as they are written" in offset
     assert "GOHOME goes to a place of the machine's own" in home
     file = written(tmp_path, "b.ncl", ROUND_BEGIN + "GOHOME/0,0,90\nGOTO/0,0,80\n")
@@ -278,7 +309,7 @@ def test_a_program_without_z_is_in_its_plane(tmp_path: Path) -> None:
     laser = "G21 G90 (Z is not said)\nM4 S0\nG0 X5 Y5\nG1 X10 F600 S255\nY10\nM5\n"
     (cut,) = read_gcode(written(tmp_path, "a.nc", laser)).values()
     np.testing.assert_allclose(1e3 * cut.positions, [[5, 5, 0], [10, 5, 0], [10, 10, 0]])
-    assert cut.notes == ("no line says Z: it is taken for 0",)
+    assert cut.notes[0] == "no line says Z: it is taken for 0"
 
 
 def test_a_cut_that_goes_back_rests_there(tmp_path: Path) -> None:
@@ -371,7 +402,7 @@ def test_a_job_is_read_from_a_machine_program(tmp_path: Path) -> None:
     assert (first.name, second.name) == ("cut 1", "cut 2")
     assert [name for name, _ in first.events] == ["M6", "M3", "M8", "M9"]
     assert [at for name, at in first.events if name in ("M6", "M9")] == [0.0, first.path.duration]
-    np.testing.assert_allclose(first.path.pose(0.0).translation, [0.4, 0.0, 0.305], atol=1e-9)
+    np.testing.assert_allclose(first.path.pose(0.0).translation, [0.4, 0.0, 0.35], atol=1e-9)
     np.testing.assert_allclose(first.path.pose(0.0).rotation[:, 2], [0, 0, -1], atol=1e-9)
 
 
@@ -418,6 +449,9 @@ def test_a_job_is_read_from_a_machine_program(tmp_path: Path) -> None:
         ("G4 P1 G10", "G4 and G10 are in one line"),
         ("G1 X10 L3", "L repeats the line, which is not read"),
         ("G93 G1 X10 F60\nX20", "says no F, which after G93 each line has"),
+        ("G54 P2 X4", "word 'P2' of this line is not read"),
+        ("G1 X40 Q2", "word 'Q2' of this line is not read"),
+        ("M97 P100", "M97: subprograms are not read"),
     ],
 )
 def test_other_words_are_refused_by_line(tmp_path: Path, line: str, said: str) -> None:
@@ -444,6 +478,22 @@ def test_other_words_are_refused_by_line(tmp_path: Path, line: str, said: str) -
         ("GOTO/1,2,3,0,0,0", "has no direction"),
         ("FEDRAT/100,MMPR", "expected a feed, and MMPM or IPM"),
         ("UNITS/FEET", "expected MM or INCHES"),
+        ("PREFUN/55", "a G word of one control, which may move anything"),
+        ("INSERT G55", "words of a control that may move something"),
+        ("INSERT/M8 X40", "words of a control that may move something"),
+        ("SWITCH/2", "the frame of another turret"),
+        ("SET/HEAD,2", "a way to read what follows"),
+        ("SET/MODE,INCR", "places by differences are not read"),
+        ("MODE/TURN", "a way to read what follows"),
+        ("ORIGIN/0,0,5", "a zero that moves"),
+        ("ROTATE/TABLE,90", "a table that turns"),
+        ("OFSTNO/1\nOFSTNO/2", "OFSTNO/2 after OFSTNO/1: another zero of the control"),
+        ("SETUP/START,1\nSETUP/START,2", "SETUP/2 after SETUP/1: another way to hold the part"),
+        ("SETUP/FIXTURE", "statement 'SETUP/FIXTURE' is not read"),
+        ("RAPID/XYZ", "statement 'RAPID/XYZ' is not read"),
+        ("MSYS/0,0,0,1,0,0,0,1,0", "MSYS after places that are in none"),
+        ("FEDRAT/10,IPM", "feeds are in IPM, and the file has UNITS/MM: say in which unit"),
+        ("UNITS/INCH", "feeds are in MMPM, and the file has UNITS/INCHES: say in which unit"),
         ("?", "is not read"),
     ],
 )
@@ -603,3 +653,89 @@ def test_events_of_rows_with_times_are_at_these_times_after_a_ramp(tmp_path: Pat
         assert np.linalg.norm(1e3 * seam.path.pose(at).translation - row) < 1e-3
         # Half a ramp is lost at the start.
         assert at == pytest.approx(table[number][0] + 0.15, abs=1e-6)
+
+
+# Operations as NX writes them, each in its machine coordinate system.
+OPERATION = """TOOL PATH/{name},TOOL,MILL
+TLDATA/MILL,10.0,0.0,75.0,0.0,0.0
+MSYS/{frame}
+PAINT/PATH
+RAPID
+GOTO/0.0,0.0,20.0,0.0,0.0,1.0
+FEDRAT/MMPM,600.0
+GOTO/0.0,0.0,0.0
+CIRCLE/20.0,0.0,0.0,0.0,0.0,1.0,20.0,0.06,0.5,10.0,0.0
+GOTO/40.0,0.0,0.0
+END-OF-PATH
+"""
+
+
+def test_operations_in_other_frames_are_where_these_are(tmp_path: Path) -> None:
+    """Against the frames' matrices: places of the second, seen from the first."""
+    from scipy.spatial.transform import Rotation
+
+    rng = np.random.default_rng(0)
+    for frames in (Rotation.random(2, rng=rng), Rotation.from_euler("z", [[0.0], [np.pi / 2]])):
+        origins = 200.0 * rng.normal(size=(2, 3))
+        text = "UNITS/MM\n"
+        for name, turn, origin in zip("AB", frames.as_matrix(), origins, strict=True):
+            values = [*origin, *turn[:, 0], *turn[:, 1]]
+            text += OPERATION.format(name=name, frame=",".join(f"{x:.10f}" for x in values))
+        first, second = read_cldata(written(tmp_path, "part.cls", text)).values()
+        one, other = (
+            np.vstack([np.column_stack([turn, origin]), [0, 0, 0, 1]])
+            for turn, origin in zip(frames.as_matrix(), origins, strict=True)
+        )
+        between = np.linalg.inv(one) @ other
+        own = np.column_stack([1e3 * first.positions, np.ones(len(first.positions))])
+        wanted = (own @ between.T)[:, :3]
+        np.testing.assert_allclose(1e3 * second.positions[-len(wanted) :], wanted, atol=1e-6)
+        np.testing.assert_allclose(second.values[-1][:, 2], -between[:3, 2], atol=1e-8)
+        assert any("MSYS: another machine coordinate system" in note for note in first.notes)
+
+
+def test_files_that_contradict_themselves_are_asked_for_their_unit(tmp_path: Path) -> None:
+    text = "FEDRAT/IPM,10\nRAPID\nGOTO/0,0,1,0,0,1\nGOTO/0,0,0\nGOTO/4,0,0\n"
+    file = written(tmp_path, "part.cls", text)
+    with pytest.raises(
+        sm.errors.FileFormatError,
+        match=r"line 1: feeds are in IPM, and the file has no UNITS: .*unit = 'in'",
+    ):
+        sm.files.read_path(file)
+    for unit, metre in (("in", 25.4e-3), ("mm", 1e-3)):
+        path = sm.files.read_path(file, unit=unit)
+        end = path.pose(path.duration).translation
+        np.testing.assert_allclose(end, [4 * metre, 0, 0], atol=1e-12)
+        assert path.feeds[0].asked == pytest.approx(10 * 25.4e-3 / 60)
+    file = written(tmp_path, "part.cls", text.replace("IPM,10", "MMPM,100"))
+    rows = read_cldata(file)["cut 1"]
+    assert "no statement says UNITS: lengths are taken for mm" in rows.notes
+    np.testing.assert_allclose(rows.positions[-1], [4e-3, 0, 0])
+
+
+def test_what_a_program_does_not_say_is_told(tmp_path: Path) -> None:
+    text = "T1 M6\nG0 X0 Y0 Z5\n/G1 Z0 F600\nG1 X10\nT2 M6\nG0 X0\nG1 Y9\n"
+    notes = "\n".join(read_gcode(written(tmp_path, "a.nc", text))["cut 1"].notes)
+    for said in ("no line says G20 or G21", "line 3: lines that may be skipped", "T2 after T1"):
+        assert said in notes
+
+
+@pytest.mark.parametrize("where", ["beside", "in each"])
+def test_words_that_may_move_poses_are_refused_and_others_told(where: str, tmp_path: Path) -> None:
+    poses = [{"x": 0.4, "y": 0.1 * k, "z": 0.3} for k in range(3)]
+
+    def reads(key: str, value: object) -> sm.paths.Path:
+        document: dict[str, object] = {"poses": poses}
+        if where == "beside":
+            document |= {key: value}
+        else:
+            document = {"poses": [{**pose, key: value} for pose in poses]}
+        return sm.files.read_path(written(tmp_path, "a.json", json.dumps(document)), feed=0.05)
+
+    for key, value in (("unit", "mm"), ("tool_offset", {"z": 0.1}), ("frame", "tool")):
+        with pytest.raises(
+            sm.errors.FileFormatError, match=f"'{key}' is .*which may move the poses"
+        ):
+            reads(key, value)
+    assert not reads("name", "seam").notes
+    assert "passed over: 'gripper'" in reads("gripper", "open").notes[0]

@@ -228,7 +228,7 @@ _SAME_LINE = {
 @pytest.mark.parametrize("kind", _SAME_LINE)
 def test_legs_shorter_than_the_tolerance_hardly_count(kind: str, tmp_path: Path) -> None:
     def cut(text: str, corners: str) -> sm.paths.Path:
-        file = written(tmp_path, "a.nc", _HEAD + text + "G0 Z10\nM30\n")
+        file = written(tmp_path, "a.nc", _HEAD + text + "G0 X90\nM30\n")
         return sm.files.read_path(file, seam="cut 1", corners=corners)
 
     plain, path = cut("G1 X30\nG1 Y30\n", "round"), cut(_SAME_LINE[kind], "round")
@@ -351,7 +351,7 @@ def test_what_extrudes_is_a_cut(relative: bool, tmp_path: Path) -> None:
     assert (4, "retract") in loop.events
     assert (0, "prime") in line.events
     assert [event for _, event in loop.events][:2] == ["M104", "M117"]
-    (note,) = loop.notes
+    note, _ = loop.notes
     assert "line 5: G28 goes to a place of the machine's own" in note
     assert "not known until X, Y and Z are given" in note
     path = sm.files.read_path(tmp_path / "part.gcode", seam="cut 1")
@@ -388,7 +388,7 @@ def test_another_nozzle_of_a_printer_is_an_event(tmp_path: Path) -> None:
     assert (1, "T1") in loop.events
 
 
-ROTARY = "G21 G90 G94\nG0 X-25 Y-6 Z45 {0}0 C0\nG1 Z38 F300\nG1 X-20 {0}-26.5 C-5\nG0 Z60\nM30\n"
+ROTARY = "G21 G90 G94\nG0 X-25 Y-6 Z45 {0}0 C0\nG1 Z38 F300\nG1 X-20 {0}-26.5 C-5\nG0 X90\nM30\n"
 
 
 @pytest.mark.parametrize("first", ["A", "B"])

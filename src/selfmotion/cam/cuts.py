@@ -19,15 +19,29 @@ _BYTES, _POSES, _FAR = 200_000_000, 1_000_000, 1e3
 # What stops something: after a cut it belongs to that.
 RETRACT, PRIME = "retract", "prime"
 STOPS = ("M5", "M9", "SPINDL/OFF", "COOLNT/OFF", "ARCOFF", RETRACT)
+# What is not known of a program of a machine tool.
+UNJUDGED = "stock and engagement are not judged"
+_FREE = (
+    "only rapids along the tool's axis are made as the file has them, all others are free motions; "
+    "let CAM write retracts and approaches along the axis"
+)
+_UP = np.array([0.0, 0.0, 1.0])
 # Poses nearer than this [m, and of their axes] are the same.
 _SAME = 1e-9
+# How fast the tool goes where a file says rapid and the motion is part of a cut, at most [m/s].
+RAPID = 0.1
+# A rapid goes along the tool's axis where it goes aside by no more than this [m] and this share of
+# its length: rounding of files.
+_ASIDE, _SKEW = 2e-5, 1e-3
 # Axes apart from their opposite by less than this have no shortest way.
 _OPPOSITE = 1e-9
 
 
 @dataclass
 class Cut:
-    """A stretch at a feed while it is read: where each pose stands in the file, and what happens.
+    """A cut while it is read: where each pose stands in the file, and what happens.
+
+    Rapids along the tool's axis, to it and from it, are part of it.
 
     Attributes
     ----------
@@ -36,17 +50,30 @@ class Cut:
         Of the tip [m], and from the tip to the holder.
     feeds : list of float
         To each pose [m/s], 0 where none is known.
+    rapid : list of bool
+        Whether the tool goes to each pose in a rapid.
     events : list of (int, str)
         At which pose what happens.
+    is_hole : bool
+        Whether it is a hole that is done: what is cut next is no part of it.
     """
 
     places: list[str] = field(default_factory=list)
     positions: list[Array] = field(default_factory=list)
     axes: list[Array] = field(default_factory=list)
     feeds: list[float] = field(default_factory=list)
+    rapid: list[bool] = field(default_factory=list)
     events: list[tuple[int, str]] = field(default_factory=list)
+    is_hole: bool = False
 
-    def add(self, place: str, position: Array, axis: Array, feed: float) -> None:
+    @property
+    def cuts(self) -> bool:
+        """Whether it goes anywhere at a feed."""
+        return not all(self.rapid[1:])
+
+    def add(
+        self, place: str, position: Array, axis: Array, feed: float, *, rapid: bool = False
+    ) -> None:
         """Add a pose, unless it is the last one again."""
         if self.positions:
             away = np.abs(position - self.positions[-1]).max(), np.abs(axis - self.axes[-1]).max()
@@ -56,6 +83,7 @@ class Cut:
         self.positions.append(position)
         self.axes.append(axis)
         self.feeds.append(feed)
+        self.rapid.append(rapid)
 
     def ends(self, event: str) -> None:
         """Note what happens at its end."""
@@ -65,6 +93,7 @@ class Cut:
         """Return the poses, the tool's z axis against the axes, turned as little as may be."""
         # The feed of a table is from a pose on, that of a machine up to one.
         feeds = np.array([*self.feeds[1:], self.feeds[-1]])
+        rapid = np.array([*self.rapid[1:], self.rapid[-1]])
         rotations = _transported(-np.array(self.axes))
         return PoseRows(
             self.places,
@@ -75,6 +104,7 @@ class Cut:
             feeds if feeds.all() else None,
             events=tuple(self.events),
             straight=True,
+            rapid=rapid if rapid.any() else None,
         )
 
 
@@ -119,8 +149,19 @@ class Machine:
         self.feed = 0.0
         self.cuts: list[Cut] = []
         self.notes: list[str] = []
+        # The cut that is read, or the rapids that lead to one; what happens before the next.
         self._open: Cut | None = None
         self._next: list[str] = []
+        self._held: list[str] | None = None
+        # The highest place so far, and from where the tool comes down after it went up to a place
+        # that is not known [m]; whether the last traverse went along the tool's axis as well.
+        self._highest = self._above = -np.inf
+        self._slanted = False
+
+    @property
+    def moved(self) -> bool:
+        """Whether it has been anywhere that is known."""
+        return bool(self.cuts) or not np.isnan(self.position).any()
 
     def fault(self, what: str) -> FileFormatError:
         """Return an error about the line that is read."""
@@ -151,14 +192,66 @@ class Machine:
         return text_of(self.file, content).rstrip("\x1a")
 
     def rapid(self, position: Array, axis: Array) -> None:
-        """Go somewhere without cutting, which ends a cut."""
+        """Go somewhere in a rapid: along the tool's axis as part of a cut, else between cuts."""
         self._check(position)
-        if self._open is not None and len(self._open.places) < 2:
-            # It went nowhere, but what happened there did.
-            self.cuts.remove(self._open)
-            self._next = [*(event for _, event in self._open.events), *self._next]
-        self._open = None
+        known = not np.isnan(position).any()
+        if self._open is not None and known and self._is_along(position, axis):
+            self.release()
+            self._open.add(self._place, position, axis, RAPID, rapid=True)
+        else:
+            self._leaves(position)
+            if known:
+                self._open = Cut()
+                if self._above > self._height(position, axis):
+                    # It comes down from where it went up to.
+                    above = position + (self._above - self._height(position, axis)) * axis
+                    self._open.add(self._place, above, axis, RAPID, rapid=True)
+                self._open.add(self._place, position, axis, RAPID, rapid=True)
+                self._above = -np.inf
+        self._is_at(position, axis)
+
+    def _is_at(self, position: Array, axis: Array) -> None:
         self.position, self.axis = position, axis
+        height = self._height(position, axis)
+        if np.isfinite(height):
+            self._highest = max(self._highest, height)
+
+    def climbs(self) -> None:
+        """Go up along the tool's axis, nobody knows how far: as high as the tool has been."""
+        height = self._height(self.position, self.axis)
+        if np.isfinite(height) and self._highest > height:
+            self.rapid(self.position + (self._highest - height) * self.axis, self.axis)
+        self._above = self._highest
+
+    def _height(self, position: Array, axis: Array) -> float:
+        """Return the height of a place [m]; infinite where it is not known or the tool tilted."""
+        is_up = float(np.abs(axis - _UP).max()) < _SAME
+        return float(position @ _UP) if is_up and not np.isnan(position).any() else np.inf
+
+    def _is_along(self, position: Array, axis: Array) -> bool:
+        """Return whether a place is above or below the tool along its axis."""
+        way = position - self.position
+        length = float(np.linalg.norm(way))
+        aside = float(np.linalg.norm(way - (way @ axis) * axis))
+        is_turned = np.abs(axis - self.axis).max() > _SKEW
+        return not is_turned and aside <= _ASIDE + _SKEW * length
+
+    def _leaves(self, position: Array) -> None:
+        """End a cut."""
+        left, self._open = self._open, None
+        self._slanted = False
+        if left is None:
+            return
+        if not np.isnan(position).any():
+            way = position - left.positions[-1]
+            away = float(way @ left.axes[-1])
+            self._slanted = abs(away) > _ASIDE + _SKEW * float(np.linalg.norm(way))
+        if not left.cuts:
+            # It went nowhere, but what happened there did.
+            self.cuts = [cut for cut in self.cuts if cut is not left]
+            self._next = [*(event for _, event in left.events), *self._next]
+        elif self._slanted and left.rapid[-1] is False:
+            self.note(f"a rapid leaves a cut aside: {_FREE}")
 
     def cut(self, position: Array, axis: Array) -> None:
         """Go somewhere at the feed."""
@@ -168,30 +261,62 @@ class Machine:
             raise self.fault(
                 f"cuts, and {missing[0]} is not known yet: give X, Y and Z in a rapid before"
             )
-        place = f"line {self.number}"
-        if self._open is None:
+        if self._open is None or self._open.is_hole:
+            known = self._open is not None
+            self._leaves(np.full(3, np.nan))
             self._open = Cut()
+            if known:
+                self._open.add(self._place, self.position, self.axis, RAPID, rapid=True)
+        if not self.cuts or self.cuts[-1] is not self._open:
             self.cuts.append(self._open)
-            if not np.isnan(self.position).any():
-                self._open.add(place, self.position, self.axis, self.feed)
-            self._open.events += [(0, event) for event in self._next]
+            self._open.events[:0] = [(0, event) for event in self._next]
             self._next = []
-        self._open.add(place, position, axis, self.feed)
+            if self._slanted and len(self._open.places) == 1:
+                self.note(f"a rapid comes to a cut aside: {_FREE}")
+        self._open.add(self._place, position, axis, self.feed)
         if len(self._open.places) > _POSES:
             raise self.fault(f"a cut has more than {_POSES} poses")
-        self.position, self.axis = position, axis
+        self._is_at(position, axis)
+
+    def ends_hole(self) -> None:
+        """End a hole: what is cut next is another cut, but for rapids along the axis."""
+        if self._open is not None:
+            self._open.is_hole = True
+
+    def hold(self) -> None:
+        """Keep what happens until `release`."""
+        self._held = []
+
+    def release(self) -> None:
+        """Note what happened since `hold`, now."""
+        held, self._held = self._held, None
+        for event in held or ():
+            self.happens(event)
 
     def happens(self, event: str) -> None:
-        """Note what happens: where the tool is in a cut, or else where the next one begins.
+        """Note what happens: where the tool is, or where the next cut begins.
 
         What stops something between two cuts happens at the end of the one before.
         """
-        if self._open is None and event in STOPS and self.cuts and not self._next:
+        if self._held is not None:
+            self._held.append(event)
+            return
+        is_between = self._open is None or len(self._open.places) == 1
+        if is_between and event in STOPS and self.cuts and not self._waiting:
             self.cuts[-1].ends(event)
         elif self._open is None:
             self._next.append(event)
         else:
             self._open.events.append((len(self._open.places) - 1, event))
+
+    @property
+    def _waiting(self) -> bool:
+        """Whether something happens before the next cut."""
+        return bool(self._next or (self._open and self._open.events))
+
+    @property
+    def _place(self) -> str:
+        return f"line {self.number}"
 
     def _check(self, position: Array) -> None:
         if np.nanmax(np.abs(position), initial=0.0) > _FAR:
@@ -199,14 +324,14 @@ class Machine:
 
     def seams(self) -> Mapping[str, PoseRows]:
         """Return the cuts as rows of poses, by names."""
-        moved = [cut for cut in self.cuts if len(cut.places) > 1]
-        left = [event for cut in self.cuts if len(cut.places) < 2 for _, event in cut.events]
-        for event in (*left, *self._next) if moved else ():
+        self._leaves(np.full(3, np.nan))
+        moved = [cut for cut in self.cuts if cut.cuts]
+        for event in self._next if moved else ():
             moved[-1].ends(event)
         self._next = []
         if not moved:
             raise FileFormatError(f"{self.file}: has no cut: no motion at a feed")
-        notes = tuple(self.notes)
+        notes = (*self.notes, UNJUDGED)
         rows = (replace(cut.rows(), one_way=True, notes=notes) for cut in moved)
         return {f"cut {number}": each for number, each in enumerate(rows, 1)}
 
@@ -318,9 +443,8 @@ def center_by_radius(
 
 # Holes that cycles of machines drill: down at the feed, and straight out again.
 
-# How fast the tool goes where it is in a hole that is there already [m/s], unless it cuts faster;
-# and how far it stays off the bottom then, or comes back to break chips [m].
-OUT = 0.05
+# How far the tool stays off the bottom of a hole that is there already, or comes back to break
+# chips [m].
 _OFF = 5e-4
 _PECKS = 10_000
 
@@ -343,7 +467,9 @@ def drill(
     dwell: str = "",
     feeds_out: bool = False,
 ) -> None:
-    """Drill a hole, which is a cut of its own: from a place above it to its bottom and back.
+    """Drill a hole: from a place above it to its bottom and back.
+
+    Out, and down again where the hole is there already, it goes in rapids.
 
     Parameters
     ----------
@@ -370,22 +496,21 @@ def drill(
             f"the hole ends {-1e3 * depth:.4g} mm above where it begins, expected a depth"
         )
     machine.rapid(above, axis)
-    feed = machine.feed
-    out = feed if feeds_out or feed == 0.0 else max(feed, OUT)
     done = 0.0
     for reached in _depths(machine, depth, pecks):
-        if done > 0.0 and pecks is not None and pecks.is_out:
-            _go(machine, above, axis, out)
-            _go(machine, above - max(0.0, done - _OFF) * axis, axis, out)
-        elif done > 0.0:
-            _go(machine, above - max(0.0, done - _OFF) * axis, axis, feed)
-        _go(machine, above - reached * axis, axis, feed)
+        if done > 0.0:
+            if pecks is not None and pecks.is_out:
+                machine.rapid(above, axis)
+            machine.rapid(above - max(0.0, done - _OFF) * axis, axis)
+        machine.cut(above - reached * axis, axis)
         done = reached
     if dwell:
         machine.happens(dwell)
-    _go(machine, above, axis, out)
-    # What follows is no part of the hole.
-    machine.rapid(above, axis)
+    if feeds_out:
+        machine.cut(above, axis)
+    else:
+        machine.rapid(above, axis)
+    machine.ends_hole()
 
 
 def _depths(machine: Machine, depth: float, pecks: Pecks | None) -> list[float]:
@@ -401,9 +526,3 @@ def _depths(machine: Machine, depth: float, pecks: Pecks | None) -> list[float]:
         found.append(here)
         here += pecks.others
     return [*found, depth]
-
-
-def _go(machine: Machine, place: Array, axis: Array, feed: float) -> None:
-    cutting, machine.feed = machine.feed, feed
-    machine.cut(place, axis)
-    machine.feed = cutting

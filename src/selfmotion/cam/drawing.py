@@ -12,7 +12,7 @@ import numpy as np
 
 from selfmotion.basics import Array, FileFormatError, Ints, ProblemError
 from selfmotion.cam.cuts import Cut
-from selfmotion.cam.path_rows import DRAWN_UNITS, PoseRows, no_such_seam
+from selfmotion.cam.path_rows import LENGTH_UNITS, PoseRows, no_such_seam
 
 # Entities of DXF drawings as points (N, 3) along them, in units of the drawing.
 
@@ -205,7 +205,7 @@ def read_drawing(
     if unit is None:
         raise FileFormatError(
             f"{file}: says no unit that a path has ($INSUNITS is {drawing.units}); say which it is "
-            f"drawn in: unit = 'mm', expected one of {', '.join(DRAWN_UNITS)}"
+            f"drawn in: unit = 'mm', expected one of {', '.join(LENGTH_UNITS)}"
         )
     try:
         drawn = list(_drawn(file, drawing))
@@ -226,13 +226,16 @@ def read_drawing(
         if entity.dxftype() in _SAID:
             beside[entity.dxftype()] += 1
         else:
-            layers[layer].extend(_piece(file, layer, place, entity, DRAWN_UNITS[unit]))
+            layers[layer].extend(_piece(file, layer, place, entity, LENGTH_UNITS[unit]))
     strokes = {layer: _strokes(pieces) for layer, pieces in layers.items()}
     found = _named(file, strokes, hidden, beside)
-    if not beside:
-        return found
-    note = f"passed over: {', '.join(f'{count} {kind}' for kind, count in sorted(beside.items()))}"
-    return {name: replace(rows, notes=(note,)) for name, rows in found.items()}
+    kinds = ", ".join(f"{count} {kind}" for kind, count in sorted(beside.items()))
+    layers_off = ", ".join(f"'{name}'" for name in hidden)
+    notes = (
+        *([f"passed over: {kinds}"] if beside else []),
+        *([f"passed over: layers that are off or frozen: {layers_off}"] if hidden else []),
+    )
+    return {name: replace(rows, notes=notes) for name, rows in found.items()}
 
 
 def _drawn(file: FilePath, drawing: Any) -> Iterator[tuple[str | None, str, Any]]:

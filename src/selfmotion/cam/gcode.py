@@ -45,6 +45,10 @@ _REASONS = {
 }
 # A wait, a retraction of its own, a look at a bed.
 _STANDING = {"G4", "G10", "G11", "G29"}
+# What has words P and Q, besides cycles, arcs and M words: how corners are smoothed.
+_WITH_P = {"G61", "G61.1", "G64", "G5.1", "G8"}
+# Calls of other programs.
+_CALLS = {"M96", "M97", "M98", "M99", "M198"}
 # Zeros of workpieces; a program has one.
 _ZEROS = {"G54", "G55", "G56", "G57", "G58", "G59"}
 _TIP = {"G43.4", "G43.5"}
@@ -93,7 +97,7 @@ def read_gcode(file: FilePath, reading: Reading | None = None) -> Mapping[str, P
         reader.machine.number = number
         if reader.take(line):
             break
-    return reader.machine.seams()
+    return reader.seams()
 
 
 class _Reader:
@@ -117,8 +121,16 @@ class _Reader:
         self._hole: dict[str, float] = {}
         # How far material is fed, and whether words say so from the start.
         self._fed, self._fed_from_start = 0.0, True
-        # What S said on the line of a cut.
+        # What S said on the line of a cut; the first tool; whether a unit is said.
         self._power: float | None = None
+        self._tool: float | None = None
+        self._says_unit = False
+
+    def seams(self) -> Mapping[str, PoseRows]:
+        """Return the cuts by names."""
+        if not (self._says_unit or self._prints):
+            self.machine.notes.append("no line says G20 or G21: lengths are taken for mm")
+        return self.machine.seams()
 
     def stay_flat(self) -> None:
         """Stay at Z 0, as lasers and plotters do, whose programs say no Z."""
@@ -155,12 +167,16 @@ class _Reader:
                 self._mode(code)
         if "R" in values and self._motion < 2 and not self._cycle:
             raise machine.fault("R is read of arcs only (G2, G3)")
-        if self._prints and "T" in values:
-            # A printer changes its nozzle here; other machines wait for M6.
-            machine.happens(f"T{values['T']:g}")
-        # What starts does so before the motion of its line, what stops after it. A rapid leaves the
-        # cut before: all that its line switches belongs to the next one.
-        late = [code for code in switched if self._travels or code in STOPS]
+        if "T" in values:
+            self._select(values["T"])
+        idle = [name for name in "PQ" if name in values and not self._has_p(name, codes)]
+        if idle:
+            raise machine.unread(f"word '{idle[0]}{values[idle[0]]:g}' of this line")
+        # What starts does so before the motion of its line, what stops after it; where a rapid
+        # leaves the cut before, what starts belongs to the next one.
+        late = [code for code in switched if code in STOPS]
+        if self._travels:
+            machine.hold()
         for code in switched:
             if code not in late:
                 self._mode(code)
@@ -173,9 +189,27 @@ class _Reader:
             self._drill(values)
         else:
             self._move(values)
+        machine.release()
         for code in late:
             self._mode(code)
         return not _ENDS.isdisjoint(codes)
+
+    def _select(self, tool: float) -> None:
+        """Take the number of a tool; a printer changes its nozzle, other machines wait for M6."""
+        if self._prints:
+            self.machine.happens(f"T{tool:g}")
+        elif self._tool not in (None, tool):
+            self.machine.note(
+                f"T{tool:g} after T{self._tool:g}: another tool: the tip of the arm's tool is "
+                f"taken to be where that of each one is"
+            )
+        self._tool = tool
+
+    def _has_p(self, name: str, codes: Sequence[str]) -> bool:
+        """Return whether a word P or Q means something in a line with these codes."""
+        is_arc = name == "P" and self._motion > 1
+        listens = any(code in _WITH_P or code.startswith("M") for code in codes)
+        return bool(self._cycle) or is_arc or listens
 
     def _stand(self, words: Sequence[tuple[str, str]], codes: Sequence[str]) -> None:
         """Take a line in which nothing moves; its modes hold from then on."""
@@ -209,7 +243,7 @@ class _Reader:
     def _mode(self, code: str) -> None:
         match code:
             case "G20" | "G21":
-                self._unit = _INCH if code == "G20" else _MM
+                self._unit, self._says_unit = _INCH if code == "G20" else _MM, True
             case "G90" | "G91":
                 self._absolute = code == "G90"
             case "G93" | "G94":
@@ -253,7 +287,7 @@ class _Reader:
                     f"{code}: cycles that tap or bore are not read, those that drill are "
                     f"({', '.join(sorted(_DRILLS))}); let CAM write their moves (G0, G1)"
                 )
-            case "M98" | "M99":
+            case _ if code in _CALLS:
                 raise self.machine.fault(f"{code}: subprograms are not read; write them out")
             case _ if code.startswith("M"):
                 self.machine.happens(code)
@@ -270,13 +304,26 @@ class _Reader:
 
     def _goes_home(self, code: str, values: Mapping[str, float]) -> None:
         """Go to a place that is the machine's own: where that is in the part is not known."""
-        axes = [k for k, name in enumerate("XYZ") if name in values]
-        for k in axes or range(3):
+        machine = self.machine
+        axes = [k for k, name in enumerate("XYZ") if name in values] or [0, 1, 2]
+        if code != "G53":
+            # By the place that its line says.
+            goal = self._at.copy()
+            for k in axes:
+                if "XYZ"[k] in values:
+                    before = 0.0 if self._absolute else goal[k]
+                    goal[k] = self._unit * values["XYZ"[k]] + before
+            machine.rapid(self._part(goal), machine.axis)
+            self._at = goal
+        if 2 in axes:
+            machine.climbs()
+        for k in axes:
             self._at[k] = np.nan
-        self.machine.rapid(self._part(self._at), self.machine.axis)
-        self.machine.note(
-            f"{code} goes to a place of the machine's own: it is passed over, and "
-            f"where the tool is, is not known until X, Y and Z are given"
+        machine.rapid(self._part(self._at), machine.axis)
+        machine.note(
+            f"{code} goes to a place of the machine's own, which is taken to be above all: the "
+            f"tool goes up as high as it has been, and where it is then, is not known until X, Y "
+            f"and Z are given"
         )
 
     def _set(self, values: Mapping[str, float]) -> None:
@@ -345,6 +392,12 @@ class _Reader:
             step = self._unit * self._hole.get("Q", 0.0)
             pecks = Pecks(step, step, is_out=self._cycle == "G83")
         waits = self._cycle in ("G82", "G89") and self._hole.get("P", 0.0) > 0.0
+        if np.isfinite(self._at[2]):
+            # Over the hole at the height where it is, or where the hole begins if that is above.
+            for place in (self._at, goal):
+                over = place.copy()
+                over[2] = max(self._at[2], self._hole["R"])
+                machine.rapid(self._part(over), axis)
         drill(
             machine,
             self._part(above),

@@ -36,7 +36,10 @@ def bare_line(line: str, machine: Machine) -> str:
     """Return a line in capitals, without comments and the sign of one that may be skipped (/)."""
     if len(line) > _LINE:
         raise machine.fault(f"has {len(line)} characters, expected {_LINE} at most")
-    return _without_comments(line.upper()).lstrip("/").strip()
+    text = _without_comments(line.upper())
+    if text.startswith("/"):
+        machine.note("lines that may be skipped (/) are read")
+    return text.lstrip("/").strip()
 
 
 def words_of(text: str, machine: Machine) -> list[tuple[str, str]]:

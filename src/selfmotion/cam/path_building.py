@@ -7,7 +7,8 @@ from pathlib import Path as FilePath
 
 import numpy as np
 
-from selfmotion.basics import TURN, Array, FileFormatError, PathError, as_choice
+from selfmotion.basics import TURN, Array, FileFormatError, Ints, PathError, as_choice
+from selfmotion.cam.cuts import RAPID
 from selfmotion.cam.path_rows import DRAWING, PoseRows, some_rows
 from selfmotion.path import (
     ORIENTATIONS,
@@ -237,24 +238,44 @@ def _of_cut(rows: PoseRows, turns: Array | None, asked: Pacing) -> Path:
     feeds = rows.feed if asked.feed is None else np.full(len(rows.positions), asked.feed)
     if feeds is None:
         raise PathError("it says no feed (programs: F, FEDRAT); give a feed [m/s]")
-    feeds = _steady(rows.positions, feeds, asked.tolerance)
     still = np.tile([1.0, 0.0, 0.0, 0.0], (len(rows.positions), 1)) if turns is None else turns
-    kept = merged(rows.positions, still, asked.tolerance, _TURN_TOLERANCE).kept
-    legs = np.diff(rows.positions[kept], axis=0)
+    rapid = np.zeros(len(feeds), dtype=bool) if rows.rapid is None else rows.rapid
+    changes = 1 + np.flatnonzero(np.diff(rapid[:-1]))
+    pieces: list[Path] = []
+    for first, last in pairwise([0, *changes.tolist(), len(rows.positions) - 1]):
+        is_rapid = bool(rapid[first])
+        part = slice(first, last + 1)
+        own = (
+            feeds[part] if is_rapid else _steady(rows.positions[part], feeds[part], asked.tolerance)
+        )
+        ends = first + _rests(rows.positions[part], still[part], asked)
+        for begin, end in pairwise(ends.tolist()):
+            leg = slice(begin, end + 1)
+            piece = Polyline(
+                rows.positions[leg],
+                None if turns is None else turns[leg],
+                tolerance=asked.tolerance,
+            )
+            at = own[begin - first : end + 1 - first]
+            if is_rapid:
+                pieces.append(Feed(piece, RAPID, required=False, **asked.bounds))
+            else:
+                pieces.append(_at_feed(piece, piece.pose_times, at, asked.bounds))
+    return pieces[0] if len(pieces) == 1 else Joined(pieces)
+
+
+def _rests(positions: Array, turns: Array, asked: Pacing) -> Ints:
+    """Return at which poses a tool rests: both ends, where it goes back on itself, or corners."""
+    kept = merged(positions, turns, asked.tolerance, _TURN_TOLERANCE).kept
+    legs = np.diff(positions[kept], axis=0)
     lengths = np.linalg.norm(legs, axis=1)
     with np.errstate(invalid="ignore", divide="ignore"):
         cosines = (legs[:-1] * legs[1:]).sum(axis=1) / (lengths[:-1] * lengths[1:])
-    back = kept[1 + np.flatnonzero(cosines < _BACK - 1.0)]
+    least = _BACK - 1.0
     if asked.corners == "stop":
-        bend = _BEND if asked.corner_angle is None else asked.corner_angle
-        back = kept[1 + np.flatnonzero(cosines < np.cos(bend))]
-    pieces: list[Path] = []
-    for first, last in pairwise([0, *back.tolist(), len(rows.positions) - 1]):
-        part = slice(first, last + 1)
-        own = None if turns is None else turns[part]
-        piece = Polyline(rows.positions[part], own, tolerance=asked.tolerance)
-        pieces.append(_at_feed(piece, piece.pose_times, feeds[part], asked.bounds))
-    return pieces[0] if len(pieces) == 1 else Joined(pieces)
+        least = np.cos(_BEND if asked.corner_angle is None else asked.corner_angle)
+    inner = kept[1 + np.flatnonzero(cosines < least)]
+    return np.array([0, *inner.tolist(), len(positions) - 1])
 
 
 def _steady(positions: Array, feeds: Array, tolerance: float) -> Array:
@@ -354,6 +375,9 @@ def _rotations(file: FilePath, rows: PoseRows) -> Array:
 
 def _check_jumps(file: FilePath, rows: PoseRows, rotations: Array, jump: float) -> None:
     steps = np.linalg.norm(np.diff(rows.positions, axis=0), axis=1)
+    if rows.rapid is not None:
+        # A rapid goes straight as far as the file says.
+        steps = np.where(rows.rapid[:-1], 0.0, steps)
     cosines = np.einsum("kij,kij->k", rotations[:-1], rotations[1:])
     turns = np.arccos(np.clip(0.5 * (cosines - 1.0), -1.0, 1.0))
     if len(steps) == 1 and jump >= JUMP and file.suffix.lower() != DRAWING:

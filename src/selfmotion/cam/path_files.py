@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path as FilePath
 from typing import Any
 
@@ -18,11 +20,12 @@ from selfmotion.basics import (
     read_values,
     shown,
 )
-from selfmotion.cam.cldata import CLDATA, read_cldata
+from selfmotion.cam.cldata import read_cldata
 from selfmotion.cam.drawing import read_drawing
 from selfmotion.cam.gcode import read_gcode
 from selfmotion.cam.path_building import JUMP, Pacing, path_of_rows
 from selfmotion.cam.path_rows import (
+    CLDATA,
     DRAWING,
     PROGRAMS,
     READERS,
@@ -51,6 +54,11 @@ _ORDERS = {
 }
 _TABLES = ("position", "pos", "translation", *_QUATERNIONS, *_ANGLES)
 _WRITTEN = (".yaml", ".yml", ".json")
+# Keys that move nothing, and those that say where or how large poses are, which is not read.
+_NAMES = frozenset(
+    ("name", "label", "id", "index", "header", "stamp", "time_stamp", "frame_id", "child_frame_id")
+) | frozenset(("comment", "comments", "description", "note", "author", "date", "version"))
+_MOVING = re.compile(r"units?|scale|offset|origin|transform|base|tool|tcp|frame|relative")
 
 
 def read_poses(file: FilePath, reading: Reading) -> Mapping[str, PoseRows]:
@@ -61,15 +69,26 @@ def read_poses(file: FilePath, reading: Reading) -> Mapping[str, PoseRows]:
     FileFormatError
         The file cannot be read, holds no poses, or a pose lacks something; it is named.
     """
-    found = _poses_in(read_values(file))
+    document = read_values(file)
+    beside = dict[str, Any]()
+    found = _poses_in(document, beside)
     if found is None:
         return READERS[file.suffix.lower()](file, reading)
+    notes = _passed_over(file, "beside the poses", beside)
     places, items = [place for place, _ in found], [item for _, item in found]
     if all(_is_matrix(item) for item in items):
         matrices = np.array([[[_number(file, place, value) for value in row] for row in item]
                              for place, item in found])  # fmt: skip
         rows = PoseRows(places, matrices[:, :3, 3], "rotation", matrices[:, :3, :3], None)
-        return {"": rows}
+        return {"": replace(rows, notes=notes)}
+    for place, item in found:
+        if not isinstance(item, Mapping):
+            raise FileFormatError(f"{file}: {place}: is a matrix among poses of another form")
+        inner = item.get("pose")
+        unread = [_unread(item), _unread(inner) if isinstance(inner, Mapping) else {}]
+        notes += _passed_over(
+            file, place, {key: item for each in unread for key, item in each.items()}
+        )
     flat = [dict(_numbers_of(file, place, item)) for place, item in found]
     for place, row in zip(places, flat, strict=True):
         if set(row) != set(flat[0]):
@@ -79,7 +98,45 @@ def read_poses(file: FilePath, reading: Reading) -> Mapping[str, PoseRows]:
             )
     header = list(flat[0])
     table = np.array([[row[name] for name in header] for row in flat])
-    return {"": rows_of_table(file, header, table, places, {})}
+    rows = rows_of_table(file, header, table, places, {})
+    # What is passed over in each pose is told of the first one.
+    told = {note.partition(": ")[2]: note for note in reversed(notes)}
+    return {"": replace(rows, notes=(*rows.notes, *reversed(told.values())))}
+
+
+def _unread(item: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what of a pose is no number or list of one that is read."""
+    return {
+        key: value
+        for key, value in item.items()
+        if key != "pose"
+        and not isinstance(value, list)
+        and not is_number(value)
+        and not (isinstance(value, Mapping) and key in _TABLES)
+    }
+
+
+def _passed_over(file: FilePath, where: str, values: Mapping[str, Any]) -> tuple[str, ...]:
+    """Return a note of keys that are not read.
+
+    Raises
+    ------
+    FileFormatError
+        One of them says where or how large poses are.
+    """
+    for key, value in values.items():
+        if key not in _NAMES and _MOVING.search(str(key).lower()):
+            raise FileFormatError(
+                f"{file}: {where}: '{key}' is {shown(value)}, which may move the poses and is not "
+                f"read: write them in metres and in one frame (columns x_mm, …; --frame), and drop "
+                f"it"
+            )
+    others = [f"'{key}'" for key in values if key not in _NAMES]
+    return (f"{where}: passed over: {', '.join(others[:_LISTED])}",) if others else ()
+
+
+# So many keys that are passed over are named.
+_LISTED = 6
 
 
 READ: Mapping[str, Callable[[FilePath, Reading], Mapping[str, PoseRows]]] = dict.fromkeys(
@@ -87,8 +144,11 @@ READ: Mapping[str, Callable[[FilePath, Reading], Mapping[str, PoseRows]]] = dict
 )
 
 
-def _poses_in(document: Any) -> list[tuple[str, Any]] | None:
-    """Return poses by what they are called, None where they are messages or there are none."""
+def _poses_in(document: Any, beside: dict[str, Any]) -> list[tuple[str, Any]] | None:
+    """Return poses by what they are called, None where they are messages or there are none.
+
+    What stands beside their list is put into `beside`.
+    """
     inner, key = document, ""
     for _ in range(_DEEPEST):
         if not isinstance(inner, Mapping) or "header" in inner or _are_poses(inner.values()):
@@ -97,6 +157,7 @@ def _poses_in(document: Any) -> list[tuple[str, Any]] | None:
         keys = keys or (list(inner) if len(inner) == 1 else [])
         if not keys:
             break
+        beside |= {str(name): value for name, value in inner.items() if name != keys[0]}
         key, inner = str(keys[0]), inner[keys[0]]
     if isinstance(inner, Mapping) and _are_poses(inner.values()):
         return [(f"'{name}'", item) for name, item in inner.items()]
@@ -135,8 +196,8 @@ def _is_matrix(item: Any) -> bool:
 def _numbers_of(file: FilePath, place: str, item: Mapping[str, Any]) -> Iterator[tuple[str, float]]:
     """Yield the numbers of a pose by what columns of a table are called.
 
-    Texts are passed over, and tables of anything else, such as joints; of two orientations the
-    quaternion is taken.
+    Texts are passed over, and tables of anything else, such as joints, with a note; of two
+    orientations the quaternion is taken.
     """
     turned = any(key in item for key in _QUATERNIONS)
     for key, value in item.items():
@@ -182,7 +243,7 @@ _READERS: Mapping[str, Callable[[FilePath, Reading], Mapping[str, PoseRows]]] = 
     **READERS,
     **READ,
     **dict.fromkeys(PROGRAMS, read_gcode),
-    **dict.fromkeys(CLDATA, lambda file, _: read_cldata(file)),
+    **dict.fromkeys(CLDATA, lambda file, reading: read_cldata(file, reading.unit)),
 }
 # Of files that can be nothing but a path.
 PATH_SUFFIXES = (*TABLES, *PROGRAMS, *CLDATA, DRAWING)
@@ -254,8 +315,10 @@ def read_path(
       left-handed; and ``INDIRV`` with ``TLON,GOFWD``, as CATIA writes them. ``CYCLE/DRILL``,
       ``DEEP`` and ``BRKCHP`` drill a hole at each ``GOTO`` (``FEDTO RAPTO STEP``, …), until
       ``CYCLE/OFF``. ``SPINDL COOLNT AUXFUN ARCON ARCOFF STOP OPSTOP DELAY`` are events; names,
-      texts, the cutter's shape and number (``LOADTL``, …) are passed over, and ``CUTCOM`` with a
-      note; ``FINI`` or ``END`` ends it
+      texts, the cutter's shape and number (``LOADTL``, …) are passed over, and ``CUTCOM``,
+      ``INSERT`` and another tool with a note; ``FINI`` or ``END`` ends it. After another ``MSYS``
+      places are those of the first one; another ``OFSTNO`` or ``SETUP`` is refused. Lengths are in
+      mm where neither ``UNITS`` nor `unit` says otherwise; feeds in another unit are refused then
 
     A hole is a cut of its own, straight down at the feed and out again, out and where it is drilled
     already at 50 mm/s.
@@ -313,7 +376,7 @@ def read_path(
     rotary_center : (3,)
         A point on all of a table's axes, in the program's coordinates [m].
     unit : {"mm", "cm", "dm", "m", "in", "ft"}, optional
-        Of a drawing that says none, or another one than it is drawn in.
+        Of a drawing or APT that says none, or another one than it is written in.
 
     Raises
     ------

@@ -13,6 +13,7 @@ from selfmotion.basics import (
     TURN,
     Array,
     FileFormatError,
+    Flags,
     ProblemError,
     as_choice,
     nearest,
@@ -115,6 +116,9 @@ class PoseRows:
         Whether it is meant in its own direction only, as cuts of a machine are.
     notes : tuple of str
         What to know of how the file was read.
+    rapid : (N,) or None
+        Whether the tool goes on from each pose as fast as it may, whatever the feed; None for
+        nowhere.
     """
 
     places: Sequence[str]
@@ -127,13 +131,16 @@ class PoseRows:
     straight: bool = False
     one_way: bool = False
     notes: tuple[str, ...] = ()
+    rapid: Flags | None = None
 
 
 # Options of `read_path` that say what a file means.
 READING = ("columns", "rotary", "rotary_axes", "rotary_center", "unit")
-# Metres of the units that a drawing may be said to be in.
-DRAWN_UNITS = {"mm": 1e-3, "cm": 1e-2, "dm": 0.1, "m": 1.0, "in": 25.4e-3, "ft": 0.3048}
+# Metres of the units that a drawing or a file of cutter locations may be said to be in.
+LENGTH_UNITS = {"mm": 1e-3, "cm": 1e-2, "dm": 0.1, "m": 1.0, "in": 25.4e-3, "ft": 0.3048}
 DRAWING = ".dxf"
+# Suffixes of files of cutter locations: of APT, CATIA, NX and Creo.
+CLDATA = (".apt", ".aptsource", ".cls", ".clsf", ".cl", ".ncl")
 
 
 @dataclass(frozen=True)
@@ -147,7 +154,7 @@ class Reading:
     rotary : Rotary or None
         Of a program of a machine: what its rotary words turn.
     unit : str or None
-        Of a drawing, whatever it says itself.
+        Of a drawing or of cutter locations, whatever the file says itself.
     """
 
     columns: tuple[str, ...] | None = None
@@ -171,9 +178,11 @@ class Reading:
             raise FileFormatError(f"{file}: rotary has no effect: it is no G-code; drop it")
         unit, columns = options.get("unit"), options.get("columns")
         if unit is not None:
-            as_choice(unit, f"{file}: unit", tuple(DRAWN_UNITS), FileFormatError)
-            if file.suffix.lower() != DRAWING:
-                raise FileFormatError(f"{file}: unit has no effect: it is no drawing; drop it")
+            as_choice(unit, f"{file}: unit", tuple(LENGTH_UNITS), FileFormatError)
+            if file.suffix.lower() not in (DRAWING, *CLDATA):
+                raise FileFormatError(
+                    f"{file}: unit has no effect: it is neither a drawing nor APT; drop it"
+                )
         if columns is None:
             return cls(None, rotary, unit)
         if isinstance(columns, str):
@@ -235,6 +244,7 @@ def some_rows(rows: PoseRows, chosen: Sequence[int]) -> PoseRows:
         rows.straight,
         rows.one_way,
         rows.notes,
+        None if rows.rapid is None else rows.rapid[chosen],
     )
 
 

@@ -11,7 +11,16 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from selfmotion.basics import Array, Flags, PathError, as_number, as_numbers, read_only, series
+from selfmotion.basics import (
+    Array,
+    Flags,
+    PathError,
+    as_flag,
+    as_number,
+    as_numbers,
+    read_only,
+    series,
+)
 from selfmotion.path.base import Path, PathSamples, PathSeries, _Derived, check_path
 from selfmotion.path.feed_kept import FeedKept
 from selfmotion.path.feed_nodes import FeedNodes, twist_sizes
@@ -56,6 +65,9 @@ class Feed(_Derived, kind="feed"):
         Times of the original [s], increasing, and the feed from each of them on [m/s], `feed`
         before the first. The tool runs up to a faster feed, and down to a slower one before that
         begins.
+    required : bool
+        Whether the feed has to be reached. Where it need not, as of retracts, it is a bound: the
+        tool is as fast as the limits allow up to it, and `feeds` has none.
 
     Raises
     ------
@@ -74,8 +86,10 @@ class Feed(_Derived, kind="feed"):
         smoothing: float = 0.05,
         within: float = 0.02,
         stretches: npt.ArrayLike | None = None,
+        required: bool = True,
     ) -> None:
         self._path = check_path(path, "feed: path").at_constant_speed()
+        self.required = as_flag(required, "feed: required", PathError)
         given = {
             "feed": feed,
             "turn_rate": turn_rate,
@@ -202,6 +216,8 @@ class Feed(_Derived, kind="feed"):
     @cached_property
     def feeds(self) -> tuple[FeedKept, ...]:
         """See `Path.feeds`: how well its own feeds are kept, each where it is asked for."""
+        if not self.required:
+            return ()
         t, counts, causes, asked = self._counted
         speeds, lasts = twist_sizes(self.samples(t).twist)[:, 0], np.gradient(t)
         begins = np.array([0.0, *self.when(self._asked[1:, 0]), self.duration])
@@ -258,7 +274,7 @@ class Feed(_Derived, kind="feed"):
             asked[self._asked[:, 1] == old, 1] = new
         changed = {**self._limits, **limits, "feed": float(asked[0, 1])}
         stretches = asked if len(asked) > 1 else None
-        return Feed(self._path, **changed, within=self._within, stretches=stretches)
+        return self._like(self._path, changed, stretches)
 
     def along(self, path: Path, later: float) -> Feed:
         """Return the same along a longer path, on which the original begins `later` [s].
@@ -268,7 +284,7 @@ class Feed(_Derived, kind="feed"):
         asked = self._asked + np.array([later, 0.0])
         changed = {**self._limits, "feed": float(asked[0, 1])}
         stretches = asked[1:] if len(asked) > 1 else None
-        return Feed(path, **changed, within=self._within, stretches=stretches)
+        return self._like(path, changed, stretches)
 
     def slower(self, factor: float) -> Feed:
         """Return the same motion, taking `factor` times as long.
@@ -281,13 +297,21 @@ class Feed(_Derived, kind="feed"):
         limits = {name: own / factor ** powers.get(name, 1) for name, own in self._limits.items()}
         limits["feed"] = self._own_feed / factor
         stretches = self._asked / [1.0, factor] if len(self._asked) > 1 else None
-        return Feed(self._path, **limits, within=self._within, stretches=stretches)
+        return self._like(self._path, limits, stretches)
+
+    def _like(self, path: Path, limits: Mapping[str, float], stretches: Any) -> Feed:
+        """Return another path with other limits, kept as well as here."""
+        return Feed(
+            path, **limits, within=self._within, stretches=stretches, required=self.required
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """See `Saved.to_dict`."""
         described: dict[str, Any] = {**self._limits, "feed": self._own_feed, "within": self._within}
         if len(self._asked) > 1:
             described["stretches"] = self._asked.tolist()
+        if not self.required:
+            described["required"] = False
         return {"kind": self.kind, "path": self._path.to_dict(), **described}
 
 
