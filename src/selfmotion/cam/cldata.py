@@ -54,8 +54,10 @@ _LAST = re.compile(r"\(\s*(LINE|POINT)\s*/([^()]*)\)")
 # Cycles whose holes are drilled in steps, words for these, and those with a number behind them.
 _PECKS = ("DEEP", "DEEP2", "BRKCHP")
 _STEPS = ("SUBPECK", "STEP", "INCR")
-_OF_HOLES = ("FEDTO", "DEPTH", "RAPTO", "CLEAR", "RTRCTO", "DWELL", "MMPM", "IPM", "1STPECK")
-_OF_HOLES = (*_OF_HOLES, *_STEPS)
+_OF_HOLES = (
+    *("FEDTO", "DEPTH", "RAPTO", "CLEAR", "RTRCTO", "DWELL", "MMPM", "IPM", "1STPECK"),
+    *_STEPS,
+)
 # Axes nearer than this are the same; those of a frame are square up to this: rounding of files.
 _TURNED, _SQUARE = 1e-6, 1e-4
 _UP = np.array([0.0, 0.0, 1.0])

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path as FilePath
+from typing import Any
 
 import numpy as np
 
@@ -321,7 +322,7 @@ def _without_stubs(rows: PoseRows, rotations: Array, asked: Pacing) -> tuple[Pos
     return some_rows(rows, chosen), rotations[chosen]
 
 
-def _at_feed(path: Path, t: Array, feeds: Array, bounds: Mapping[str, float]) -> Feed:
+def _at_feed(path: Path, t: Array, feeds: Array, bounds: Mapping[str, Any]) -> Feed:
     """Return a path at the feeds (N,) that begin at its times (N,); the last one has no way."""
     changes = 1 + np.flatnonzero(np.diff(feeds[:-1]))
     stretches = np.stack([t[changes], feeds[changes]], axis=1) if len(changes) else None

@@ -285,9 +285,9 @@ def backwards_plan(plan: Plan, problem: Problem) -> Plan:
         trajectory=reversed_motion(plan.trajectory),
         initial_trajectory=reversed_motion(plan.initial_trajectory),
         coefficients=coefficients,
-        report=replace(plan.report, active=tuple(active), null_motion=null_motion),
     )
-    return replace(turned, certificate=turned.check())
+    report = replace(turned.report.with_found(plan.report, active), null_motion=null_motion)
+    return replace(turned, report=report, certificate=turned.check())
 
 
 def _turned_null_motion(plan: Plan) -> tuple[NullMotion | None, Array]:

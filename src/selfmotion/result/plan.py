@@ -121,19 +121,16 @@ class Plan:
         object.__setattr__(self, "report", self._own_report())
 
     def _own_report(self) -> Report:
-        """Return the report of this motion and problem: that of others is evaluated again.
+        """Return the report of this motion and these costs: that of others is evaluated again.
 
         Where it does not say what it is of, it is of what the certificate was of. What cannot be
         evaluated, as functions that no file has, leaves a cost that is not a number.
         """
-        report = self.report
-        own = self.trajectory.digest, self.problem.digest, _digests(self.problem.costs)
-        if (report.motion, report.problem, report.costs) == own:
+        motion, costs, report = self.trajectory.digest, _digests(self.problem.costs), self.report
+        if (report.motion, report.costs) == (motion, costs):
             return report
-        unknown = not (report.motion or report.problem)
-        motion, problem, costs = own
-        if unknown and self.certificate.motion:
-            return replace(report, motion=motion, problem=problem, costs=costs)
+        if not report.motion and self.certificate.motion:
+            return replace(report, motion=motion, costs=costs)
         terms = {}
         for cost in self.problem.costs:
             with suppress(ProblemError):
@@ -142,7 +139,7 @@ class Plan:
         complete = len(terms) == len(self.problem.costs)
         total = sum(terms.values()) if complete else math.nan
         found = report.evaluated(total, terms)
-        return replace(found, motion=motion, problem=problem, costs=costs)
+        return replace(found, motion=motion, costs=costs)
 
     def __repr__(self) -> str:
         """Return a few lines: what moves, at what cost, and the verdict."""

@@ -1,6 +1,6 @@
 """How a plan was found, and how far it may be from the best."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from selfmotion.constraints import ActiveConstraint
@@ -118,10 +118,9 @@ class Report:
         published method, which knows no other null motion.
     attempts : tuple of Attempt
         The strategies that were tried, in order; empty for other works' methods.
-    motion, problem : str
-        Digests of the motion and the problem that costs, active constraints and all else are of;
-        "" until the plan is made. Of what was put in the place of another, `evaluated` is the
-        report.
+    motion : str
+        Digest of the motion that costs, active constraints and all else are of; "" until the plan
+        is made. Of a motion that was put in the place of another, `evaluated` is the report.
     costs : dict
         The digest of each cost by its name; "" of one that is a function.
     """
@@ -146,19 +145,28 @@ class Report:
     remaining: float | None = None
     attempts: tuple[Attempt, ...] = ()
     motion: str = ""
-    problem: str = ""
     costs: Mapping[str, str] = field(default_factory=dict)
 
     def evaluated(self, cost: float, terms: Mapping[str, float]) -> "Report":
-        """Return the report of another motion: what it costs, and nothing of how it was found."""
+        """Return the report of another motion or costs: what it costs, not how it was found."""
         return replace(
             self,
             cost=cost,
             terms=dict(terms),
-            message="motion or problem were put in the place of those that were planned",
+            message="motion or costs were put in the place of those that were planned",
             gap=None,
             active=(),
             remaining=None,
+        )
+
+    def with_found(self, before: "Report", active: Sequence[ActiveConstraint]) -> "Report":
+        """Return it with how the same motion was found at another pace or the other way round."""
+        return replace(
+            self,
+            message=before.message,
+            gap=before.gap,
+            remaining=before.remaining,
+            active=tuple(active),
         )
 
     def __repr__(self) -> str:

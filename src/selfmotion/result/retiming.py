@@ -241,5 +241,5 @@ def _retimed(plan: Plan, wanted: Sequence[Constraint], pace: Pace) -> Plan:
         trajectory=trajectory,
         initial_trajectory=trajectory,
     )
-    report = replace(retimed.report, active=active, message=plan.report.message)
+    report = retimed.report.with_found(plan.report, active)
     return replace(retimed, report=report, certificate=retimed.check())
