@@ -161,6 +161,12 @@ class ProgramReader:
         every = [self.pose_at, *poses]
         round_ones = np.array([[np.nan] * 3 if via is None else via.place for via in vias])
         own = times_at(np.array([pose.place for pose in every]), round_ones, speeds)
+        if not (np.diff(own) > 0.0).all():
+            k = int(np.argmin(np.diff(own)))
+            raise self.lines.fault(
+                f"target {k + 1} of a seam at its speed is where the one before is, expected a way "
+                f"to go: at a speed a step of no length takes no time"
+            )
         if not 0.0 < own[-1] < planned:
             raise self.lines.fault(
                 f"at these speeds it takes {own[-1]:.6g} s without ramps, planned are "

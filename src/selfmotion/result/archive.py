@@ -325,7 +325,7 @@ def _report_to_dict(report: Report) -> dict[str, Any]:
     return {
         **_without(report, "history"),
         "terms": dict(report.terms),
-        "costs": dict(report.costs),
+        "costs": dict(report.costs or {}),
         "initial_terms": dict(report.initial_terms),
         "status": report.status.value,
         "gap": None if report.gap is None else dataclasses.asdict(report.gap),

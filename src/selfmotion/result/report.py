@@ -1,7 +1,7 @@
 """How a plan was found, and how far it may be from the best."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 from selfmotion.constraints import ActiveConstraint
 from selfmotion.motion import NullMotion
@@ -145,7 +145,7 @@ class Report:
     remaining: float | None = None
     attempts: tuple[Attempt, ...] = ()
     motion: str = ""
-    costs: Mapping[str, str] = field(default_factory=dict)
+    costs: Mapping[str, str] | None = None
 
     def evaluated(self, cost: float, terms: Mapping[str, float]) -> "Report":
         """Return the report of another motion or costs: what it costs, not how it was found."""
