@@ -68,7 +68,6 @@ def test_a_model_keeps_its_masses(robot: sm.RobotModel) -> None:
         np.testing.assert_allclose(*torques, rtol=1e-9, atol=1e-9)
 
 
-@pytest.mark.parametrize("name", ["panda", "tiago", "z1"])
 def test_a_model_keeps_the_inertia_of_its_rotors(panda: sm.RobotModel, tmp_path: Path) -> None:
     """Torques are those of `pinocchio.rnea` of the model that was given, in a cell as well."""
     given = pin.buildModelFromXML(robot_named("ur5").urdf.readable_text)
@@ -90,6 +89,7 @@ def test_gravity_that_a_urdf_cannot_say_is_refused() -> None:
         sm.load_robot(given, tool="tool0")
 
 
+@pytest.mark.parametrize("name", ["panda", "tiago", "z1"])
 def test_a_model_with_bodies_collides_as_its_file(name: str) -> None:
     """The same distances between the same links: by meshes, boxes, spheres and cylinders."""
     robot = robot_named(name)
