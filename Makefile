@@ -6,7 +6,7 @@ READY := $(VENV)/.ready
 # What is imported by many processes is compiled to bytecode once.
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: demo check test test-baseline lint format bench bench-constrained bench-binding bench-remaining bench-relaxed bench-batch bench-peers bench-starts bench-places bench-known bench-margins bench-bought bench-corrections bench-place bench-first bench-fastest bench-feeds bench-job bench-moved bench-kept bench-moves bench-raster bench-rails bench-lifts bench-numbers bench-spirals bench-latency docs errors suite suite-made fuzz fuzz-tasks fuzz-cells fuzz-certificate fuzz-deceptions fuzz-generated fuzz-realtime fuzz-files fuzz-job fuzz-kept fuzz-programs arms mutants memory acceptance distances study clean
+.PHONY: demo check test test-baseline lint format bench bench-constrained bench-binding bench-remaining bench-relaxed bench-batch bench-peers bench-starts bench-places bench-known bench-lost bench-margins bench-bought bench-corrections bench-place bench-first bench-fastest bench-feeds bench-job bench-moved bench-kept bench-moves bench-raster bench-rails bench-lifts bench-numbers bench-spirals bench-latency docs errors suite suite-made fuzz fuzz-tasks fuzz-cells fuzz-certificate fuzz-deceptions fuzz-generated fuzz-realtime fuzz-files fuzz-job fuzz-kept fuzz-programs arms mutants memory acceptance distances study clean
 
 demo: $(READY)  ## plan, check and replay the paper's planar arm and a Panda, into out/
 	$(BIN)/selfmotion demo --out out
@@ -69,6 +69,9 @@ bench-corrections: $(READY)  ## how far parts may stand elsewhere when planned a
 
 bench-known: $(READY)  ## 18 kinds of 30 problems that have a known motion: what is not found, and what is false
 	OMP_NUM_THREADS=1 $(BIN)/python benchmarks/known.py --out out/known.csv
+
+bench-lost: $(READY)  ## costs and verdicts of all these problems against what is kept: what is lost, and dearer
+	OMP_NUM_THREADS=1 $(BIN)/python benchmarks/lost.py
 
 bench-margins: $(READY)  ## by how much part, tool and base may be displaced: 200 plans, 10,000 displacements, judged
 	OMP_NUM_THREADS=1 $(BIN)/python benchmarks/margins.py
