@@ -6,13 +6,16 @@ READY := $(VENV)/.ready
 # What is imported by many processes is compiled to bytecode once.
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: demo test test-baseline lint format bench bench-constrained bench-binding bench-remaining bench-relaxed bench-batch bench-peers bench-starts bench-places bench-known bench-margins bench-bought bench-corrections bench-place bench-first bench-fastest bench-feeds bench-job bench-moved bench-kept bench-moves bench-raster bench-rails bench-lifts bench-numbers bench-spirals bench-latency docs errors suite suite-made fuzz fuzz-tasks fuzz-cells fuzz-certificate fuzz-deceptions fuzz-generated fuzz-realtime fuzz-files fuzz-job fuzz-kept fuzz-programs arms mutants memory acceptance distances study clean
+.PHONY: demo check test test-baseline lint format bench bench-constrained bench-binding bench-remaining bench-relaxed bench-batch bench-peers bench-starts bench-places bench-known bench-lost bench-margins bench-bought bench-corrections bench-place bench-first bench-fastest bench-feeds bench-job bench-moved bench-kept bench-moves bench-raster bench-rails bench-lifts bench-numbers bench-spirals bench-latency docs errors short suite suite-made fuzz fuzz-tasks fuzz-cells fuzz-certificate fuzz-deceptions fuzz-generated fuzz-realtime fuzz-files fuzz-job fuzz-kept fuzz-programs arms mutants memory acceptance distances study clean
 
 demo: $(READY)  ## plan, check and replay the paper's planar arm and a Panda, into out/
 	$(BIN)/selfmotion demo --out out
 
 test: $(READY)  ## the whole test run, on two cores
-	$(BIN)/pytest --numprocesses 2 --dist loadfile --no-loadscope-reorder
+	$(BIN)/pytest --numprocesses 2 --dist loadfile --no-loadscope-reorder --keep-durations
+
+check: lint  ## style, types, layers and all tests below 0.1 s, on a few arms: a minute
+	$(BIN)/pytest --numprocesses 2 --dist worksteal --below 0.1 --arms few
 
 # What plans, and what is computed with it: the rest reads and writes files and pages.
 PLANNING := $(addprefix tests/, baselines batch certificate collision constraints costs follow job \
@@ -66,6 +69,9 @@ bench-corrections: $(READY)  ## how far parts may stand elsewhere when planned a
 
 bench-known: $(READY)  ## 18 kinds of 30 problems that have a known motion: what is not found, and what is false
 	OMP_NUM_THREADS=1 $(BIN)/python benchmarks/known.py --out out/known.csv
+
+bench-lost: $(READY)  ## costs and verdicts of all these problems against what is kept: what is lost, and dearer
+	OMP_NUM_THREADS=1 $(BIN)/python benchmarks/lost.py
 
 bench-margins: $(READY)  ## by how much part, tool and base may be displaced: 200 plans, 10,000 displacements, judged
 	OMP_NUM_THREADS=1 $(BIN)/python benchmarks/margins.py
@@ -145,6 +151,10 @@ $(READY): pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
 	PIP_CONSTRAINT=constraints.txt $(BIN)/pip install --quiet --disable-pip-version-check -e '.[dev]'
 	touch $@
+
+short: $(READY)  ## every benchmark and fuzz with few problems: whether it still runs
+	$(BIN)/pip install --quiet --constraint constraints.txt -e '.[mutants]'
+	OMP_NUM_THREADS=1 $(BIN)/python benchmarks/short.py
 
 suite: $(READY)  ## path problems made elsewhere, planned and scored
 	$(BIN)/python benchmarks/suite.py

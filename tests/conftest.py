@@ -8,12 +8,7 @@ import selfmotion as sm
 from selfmotion.basics import Array
 from support.arms import CASES, PANDA_HOME, robot_named, short_line, start_of
 
-# Files that take longest, each by itself.
-LONGEST = (
-    *("test_site", "test_browser", "test_readme", "test_study", "test_generated", "test_pictures"),
-    *("test_layout", "test_interruption", "test_run", "test_motions", "test_app", "test_deviation"),
-    *("test_riding", "test_job", "test_content", "test_feed", "test_cells", "test_retiming"),
-)
+pytest_plugins = ("support.durations",)
 
 
 @pytest.fixture(params=sorted({name for name, _ in CASES}))
@@ -46,9 +41,3 @@ def panda_circle(panda: sm.RobotModel) -> Callable[[str], sm.Problem]:
     """Return a maker of the problem: Panda on a vertical circle of 0.15 m in 4 s."""
     path = sm.paths.Circle.around(panda.pose(PANDA_HOME), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
     return lambda task="pose", **options: sm.Problem(panda, path, task, PANDA_HOME, **options)
-
-
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Begin with the files that take longest, so that no worker is left alone with one."""
-    place = {name: number for number, name in enumerate(LONGEST)}
-    items.sort(key=lambda item: place.get(item.path.stem, len(place)))

@@ -11,7 +11,7 @@ import selfmotion as sm
 from selfmotion import testing
 from selfmotion.certificate import FinishedMotion, JointLimits
 from selfmotion.robot import Dynamics
-from support.arms import robot_named, short_line
+from support.arms import PANDA_HOME, robot_named, short_line
 from support.circles import upright_circle
 from support.files_of_people import finger
 from support.places import ROOT
@@ -310,3 +310,21 @@ def test_what_has_no_rows_on_an_arm_asks_for_nothing(
     assert plan.report.cost == pytest.approx(without.report.cost, rel=1e-9)
     assert "limited" in " ".join(plan.certificate.remarks)
     assert sm.plan_in_parts(problem).verified
+
+
+def test_torques_that_bind_all_over_are_kept_between_nodes() -> None:
+    """Accelerations cost nothing: they swing between two looks at an interval, if they may."""
+    panda = robot_named("panda")
+    path = sm.paths.Circle.around(panda.pose(PANDA_HOME), 0.1, 1.2, normal=(1.0, 0.0, 0.0))
+    problem = sm.Problem(panda, path, "position", PANDA_HOME, clearance=None)
+    free = sm.plan(problem.changed(constraints=()))
+    torques = sm.constraints.JointTorqueLimits(1e3).quantity(panda).values
+    t = np.linspace(0.0, free.trajectory.duration, 400)
+    used = np.abs(torques(*(free.trajectory(t, order) for order in range(3))))
+    # A third of the motion uses more than this of the first joint.
+    limit = 1.2 * used.max(axis=0)
+    limit[0] = np.quantile(used[:, 0], 0.7)
+    asked = sm.constraints.JointTorqueLimits(limit)
+    plan = sm.plan(problem.changed(constraints=[asked])).require()
+    share = np.abs(torques(*(plan.trajectory(t, order) for order in range(3)))) / limit
+    assert 0.98 < share[:, 0].max() <= 1.0

@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
+from selfmotion.basics import Array
 from selfmotion.motion import Trajectory
+from selfmotion.nodes.rows import accelerates_of
 from selfmotion.nodes.spline import AT_CONTROLS, ORDERS, Quintic, unit_bases
 from selfmotion.robot import ToolRates
 from support.arms import PANDA_HOME
@@ -162,3 +164,42 @@ def test_intervals_are_divided_where_something_is_beyond_between_points(
     assert (most < 0.98 * limit).any()
     assert (parts[most > 1.02 * limit] == parts.max()).all()
     assert (parts[most < 0.98 * limit] == 1).all()
+
+
+@pytest.mark.parametrize("name", ["tool", "a band", "clearance"])
+def test_what_is_of_accelerations_looks_twice_as_often(panda: sm.RobotModel, name: str) -> None:
+    spline = motion_with(panda, name).grid.spline
+    each = (len(spline.points.t) - 1) / spline.count
+    assert each == {"tool": 4.0}.get(name, 2.0)
+    # Of speeds of the tool alone nothing is of accelerations.
+    follows = small_circle(panda).follows
+    speed = sm.constraints.ToolLimits(speed=1.0).bind(follows, PANDA_HOME, PANDA_HOME)
+    assert not accelerates_of(speed, panda.dof)
+
+
+def test_rows_of_a_vector_bend_as_squares_do(panda: sm.RobotModel) -> None:
+    """The curvature that Newton's method is told of a cone, by differences of its slope."""
+    path = sm.paths.Circle.around(panda.pose(PANDA_HOME), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
+    tilt = sm.constraints.Tilt("panda_hand_tcp", within=0.3)
+    problem = sm.Problem(
+        *(panda, path, "position", PANDA_HOME), constraints=[tilt], rest=False, clearance=None
+    )
+    motion = nodes_of(problem, 6)
+    bound = next(item for item in motion.grid.constraints if item.name.startswith("tilt"))
+    slopes = bound.squares(motion.checked)
+    assert slopes.shape == (len(motion.checked.q), 3, 7)
+    way = np.random.default_rng(0).normal(size=7)
+
+    def h(share: float) -> Array:
+        q = motion.checked.q + share * way
+        away = bound.quantity.away(q, 0.0 * q, 0.0 * q)[:, 0]
+        linear = bound.quantity.away(motion.checked.q, 0.0 * q, 0.0 * q)[:, 0]
+        turned = linear + share * slopes @ way * bound.quantity.bounds[0] / np.sqrt(2.0)
+        assert np.abs(away - turned).max() <= 10.0 * share**2
+        return np.asarray((turned**2).sum(axis=1)) / bound.quantity.bounds[0] ** 2
+
+    bends = (h(1e-3) + h(-1e-3) - 2.0 * h(0.0)) / 1e-6
+    np.testing.assert_allclose(bends, ((slopes @ way) ** 2).sum(axis=1), rtol=1e-6)
+    # Of numbers there is nothing of that.
+    limits = sm.constraints.Band.of_elbow("up").bind(problem.follows, PANDA_HOME, PANDA_HOME)
+    assert limits.squares is None

@@ -8,6 +8,7 @@ import pinocchio as pin
 import pytest
 
 import selfmotion as sm
+from selfmotion.basics import Array
 from selfmotion.documents import read_problem
 from selfmotion.placement import search
 from selfmotion.placement.places import Places, Tried, places_of
@@ -277,3 +278,54 @@ def test_directions_of_the_world_stay_where_the_base_is_tilted() -> None:
         # The arm as it is drawn, tilted by hand.
         hand = drawn.chain_to("panda_hand").place(plan.trajectory(t)).rotation
         assert -(tilted @ hand)[2, 2] >= np.cos(0.1) - 1e-6
+
+
+def test_no_plan_is_said_only_of_what_fails_from_nothing_too(
+    found: sm.placement.Placement, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Motions of neighbours are proposals: where they lead nowhere, a place may be as good."""
+    surely = Places.surely
+    asked: list[Array] = []
+
+    def nowhere(self: Places, place: Array, *near: object, **given: bool) -> Tried:
+        return Tried(place, np.inf, "not quickly")
+
+    def noted(self: Places, place: Array) -> Tried:
+        asked.append(place)
+        return surely(self, place)
+
+    drawn = found.map(points=3)
+    monkeypatch.setattr(Places, "tried", nowhere)
+    monkeypatch.setattr(Places, "surely", noted)
+    again = found.map(points=3)
+    assert len(asked) == 9
+    assert [reason == "" for row in again.reasons for reason in row] == [
+        reason == "" for row in drawn.reasons for reason in row
+    ]
+    assert (again.costs >= drawn.costs / NO_WORSE).all()
+
+
+def test_directions_in_which_nothing_changes_are_named() -> None:
+    """A planar arm knows nothing of heights."""
+    flat = sm.place(planar(), {"x": (-0.1, 0.1), "z": (-0.1, 0.1)})
+    assert flat.flat == ("z",)
+    assert "nothing changes along z" in str(flat)
+
+
+def test_a_quick_no_is_asked_again_from_the_nearest_place(monkeypatch: pytest.MonkeyPatch) -> None:
+    tried = Places.tried
+    lent: list[Array] = []
+
+    def refusing(self: Places, place: Array, near: object = (), thorough: bool = False) -> Tried:
+        """Refuse half of the places where nothing is known."""
+        if not near and not thorough and place[0] > 0.0:
+            return Tried(place, np.inf, "quickly")
+        if near:
+            lent.append(place)
+        return tried(self, place, near, thorough)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(Places, "tried", refusing)
+    best = sm.place(planar(), {"x": (-0.2, 0.2)})
+    refused = [item.place for item in best.tried if item.reason == "quickly"]
+    assert refused
+    assert {place.tobytes() for place in refused} <= {place.tobytes() for place in lent}

@@ -23,6 +23,9 @@ if TYPE_CHECKING:
 
 # A coordinate nearer to its bound than this share of the box is on it.
 _ON_BOUND = 1e-6
+# Nothing changes along a coordinate where so far to either side [share of the box] the cost differs
+# by less than this share.
+_ASIDE, _SAME = 0.1, 1e-5
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,6 +123,9 @@ class Placement:
         The coordinates that are at an end of the box: a larger one would gain.
     tried : tuple of Tried
         All places that were looked at.
+    flat : tuple of str
+        The coordinates in which nothing changes: to either side of the place the motions cost the
+        same.
     """
 
     of: str
@@ -134,6 +140,7 @@ class Placement:
     _places: Places = field(repr=False)
     _box: Box = field(repr=False)
     _best: Tried = field(repr=False)
+    flat: tuple[str, ...] = ()
 
     @property
     def verified(self) -> bool:
@@ -173,6 +180,7 @@ class Placement:
             f"{len(self.tried)} places tried, {failed} of them without a verified motion in the "
             f"short time that each has",
             *(f"binds: {text}" for text in self.binds),
+            *(f"nothing changes along {name}: any value costs the same" for name in self.flat),
         ]
         return "\n".join(lines)
 
@@ -181,7 +189,9 @@ class Placement:
     def map(self, names: Sequence[str] | None = None, points: int = 9) -> PlaceMap:
         """Return what places cost around this one, all over the box in two coordinates.
 
-        Each is planned, beginning with the nearest place that is.
+        Each is planned from the nearest place that is, and from nothing; where both lead nowhere,
+        with all that a plan does, for 10 s of the processor: only what fails then as well is told
+        as having no plan.
 
         Parameters
         ----------
@@ -212,7 +222,12 @@ class Placement:
         for cell in sorted(cells, key=lambda cell: self._far(at[cell], best)):
             place = at[cell]
             far = [self._far(place, other) for other in known]
-            found[cell] = self._places.tried(place, known[int(np.argmin(far))].plans)
+            near = known[int(np.argmin(far))].plans
+            # Motions near by are proposals: others may cost less there.
+            either = self._places.tried(place, near), self._places.tried(place)
+            found[cell] = min(either, key=lambda item: item.cost)
+            if not np.isfinite(found[cell].cost):
+                found[cell] = self._places.surely(place)
             if np.isfinite(found[cell].cost):
                 known.append(found[cell])
         costs = np.array([[found[i, j].cost for j in range(count)] for i in range(count)])
@@ -226,6 +241,21 @@ class Placement:
 
     def _far(self, place: Array, other: Tried) -> float:
         return float(np.linalg.norm(self._box.share(place) - self._box.share(other.place)))
+
+
+def flat_along(places: Places, box: Box, best: Tried) -> tuple[str, ...]:
+    """Return the coordinates in which the cost is the same to either side of a place."""
+    share, found = box.share(best.place), list[str]()
+    for k, name in enumerate(places.names):
+        costs = list[float]()
+        for aside in (-_ASIDE, _ASIDE):
+            there = share.copy()
+            # At an end of the box both looks are to one side.
+            there[k] += aside if 0.0 <= share[k] + aside <= 1.0 else -0.5 * aside
+            costs.append(places.tried(box.at(there), best.plans).cost)
+        if all(abs(cost - best.cost) <= _SAME * abs(best.cost) for cost in costs):
+            found.append(name)
+    return tuple(found)
 
 
 def on_bounds(places: Places, box: Box, place: Array) -> tuple[str, ...]:

@@ -27,7 +27,7 @@ from selfmotion.basics import (
 )
 from selfmotion.batch import Item
 from selfmotion.documents import Job
-from selfmotion.placement.found import Placement, on_bounds
+from selfmotion.placement.found import Placement, flat_along, on_bounds
 from selfmotion.placement.places import (
     COORDINATES,
     Places,
@@ -109,7 +109,7 @@ def place(
     # Of where it stands a quick 'no', or a cost that took no pains, is not to be told.
     here = np.zeros(len(names))
     known = [places.tried(here, thorough=True)] if box.holds(here) else []
-    best, tried = best_place(places, box, run.every, run.descents, known)
+    best, tried = best_place(places, box, run.every, run.near, run.descents, known)
     if not np.isfinite(best.cost):
         raise PlanError(
             f"place: no verified motion at any of {len(tried)} places that were tried; at "
@@ -124,12 +124,13 @@ def place(
         tuple(item.problem for item in plans),
         plans,
         sum(item.report.cost for item in plans),
-        known[0].cost if known else np.nan,
+        min((item.cost for item in tried if not item.place.any()), default=np.nan),
         on_bounds(places, box, best.place),
         tuple(replace(item, plans=()) for item in tried),
         places,
         box,
         best,
+        flat_along(places, box, best),
     )
 
 
@@ -193,6 +194,14 @@ class _Here:
             self._tell(found[-1])
         return found
 
+    def near(self, wanted: Sequence[tuple[Array, Tried]]) -> list[Tried]:
+        """Plan at places, each from the motions of another one."""
+        found = []
+        for each, other in wanted:
+            found.append(self._places.tried(each, other.plans))
+            self._tell(found[-1])
+        return found
+
     def descents(self, begun: Sequence[Tried]) -> list[tuple[Tried, list[Tried]]]:
         """Go downhill from places."""
         found = []
@@ -215,6 +224,14 @@ class _There:
         """Plan at places, each on its own."""
         jobs = [
             self._executor.submit(_try_there, self._sent, self._modules, each) for each in wanted
+        ]
+        return [job.result() for job in jobs]
+
+    def near(self, wanted: Sequence[tuple[Array, Tried]]) -> list[Tried]:
+        """Plan at places, each from the motions of another one."""
+        jobs = [
+            self._executor.submit(_try_near, self._sent, self._modules, each, other.place)
+            for each, other in wanted
         ]
         return [job.result() for job in jobs]
 
@@ -243,6 +260,14 @@ def _received(sent: str, modules: Sequence[str]) -> Places:
 def _try_there(sent: str, modules: Sequence[str], at: Array) -> Tried:
     """Plan at a place in another process; its plans stay there."""
     return replace(_received(sent, modules).tried(at), plans=())
+
+
+def _try_near(sent: str, modules: Sequence[str], at: Array, other: Array) -> Tried:
+    """Plan at a place in another process, from the motions of another place."""
+    places = _received(sent, modules)
+    near = places.tried(other)
+    found = places.tried(at, near.plans) if near.plans else near
+    return replace(found, place=at, plans=())
 
 
 def _descend_there(

@@ -37,6 +37,8 @@ _NEAR, _QUICK = Search(1, 1, "local"), Search(16, 2, "local")
 # So long a place is worked at [s of the processor, so that it is the same on a busy machine]: near
 # known motions, what comes at all comes in a tenth of that.
 _PATIENCE_NEAR, _PATIENCE = 0.3, 0.6
+# And so long before it is said that there is none [s of the processor].
+_PATIENCE_SURE = 10.0
 # What a place is told by: a shift [m] and roll, pitch and yaw [rad], as URDFs have them.
 COORDINATES = ("x", "y", "z", "roll", "pitch", "yaw")
 # Poses of each path that have to be reached before a place is planned, and tries of each.
@@ -122,6 +124,17 @@ class Places:
                 return _quickly(problem, near[k], _NEAR, _PATIENCE_NEAR)
             _check_reach(problem)
             return _quickly(problem, None, _QUICK, _PATIENCE)
+
+        return self._each(place, planned)
+
+    def surely(self, place: Array) -> Tried:
+        """Plan at a place with all that a plan does, from nothing, for 10 s of the processor each.
+
+        What fails here is told as having no motion.
+        """
+
+        def planned(_: int, problem: Problem) -> Plan:
+            return _quickly(problem, None, Search(), _PATIENCE_SURE)
 
         return self._each(place, planned)
 

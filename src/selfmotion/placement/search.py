@@ -155,10 +155,17 @@ def _updated(inverse: Array, moved: Array, changed: Array) -> Array:
     return np.asarray(left @ inverse @ left.T + np.outer(moved, moved) / curved)
 
 
+def _nearest(place: Tried, others: Sequence[Tried], box: Box) -> Tried:
+    """Return the one of some places that is nearest to another."""
+    share = box.share(place.place)
+    return min(others, key=lambda item: float(np.linalg.norm(box.share(item.place) - share)))
+
+
 def best_place(
     places: Places,
     box: Box,
     every: Callable[[Sequence[Array]], list[Tried]],
+    near: Callable[[Sequence[tuple[Array, Tried]]], list[Tried]],
     descents: Callable[[Sequence[Tried]], list[tuple[Tried, list[Tried]]]],
     known: Sequence[Tried] = (),
 ) -> tuple[Tried, list[Tried]]:
@@ -169,6 +176,8 @@ def best_place(
     places, box
     every : callable
         Plans at places, each on its own.
+    near : callable
+        Plans at places, each from the motions of another one.
     descents : callable
         Goes downhill from places; returns where each arrives, and what it tried.
     known : sequence of Tried
@@ -181,6 +190,11 @@ def best_place(
         if any(np.isfinite(item.cost) for item in tried):
             break
         first, count = count, 2 * count
+    # A quick 'no' is none: the nearest place that has motions may lend them.
+    met = [item for item in tried if np.isfinite(item.cost)]
+    unmet = [item for item in tried if not np.isfinite(item.cost)]
+    if met:
+        tried += near([(item.place, _nearest(item, met, box)) for item in unmet])
     best = min(tried, key=lambda item: item.cost)
     for arrived, more in descents(finalists(tried, box)):
         tried += more
