@@ -291,9 +291,9 @@ def read_path(
     - ``.apt .aptsource .cls .clsf .cl .ncl``: APT, cutter location data, below
     - ``.dxf``: a drawing, below; with ``pip install 'selfmotion[dxf]'``
 
-    Of programs of machine tools, what goes at a feed is a cut, with the rapids along the tool's axis
-    to it and from it, at up to 100 mm/s; all other rapids part cuts, called ``cut 1``, ``cut 2``,
-    …. Legs are straight, their corners rounded within `tolerance`, and the tool rests
+    Of programs of machine tools, what goes at a feed is a cut, with the rapids along the tool's
+    axis to it and from it, at up to 100 mm/s; all other rapids part cuts, called ``cut 1``,
+    ``cut 2``, …. Legs are straight, their corners rounded within `tolerance`, and the tool rests
     where it goes back on itself. Positions are those of the tip. The tool's z axis points into the
     part, against the axis of the machine: down where the file has none. About it the tool turns as
     little as may be.
