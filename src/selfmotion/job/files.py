@@ -101,7 +101,7 @@ def load_program(file: str | Path) -> Program:
         raise FileFormatError(f"{path}: is a damaged program: {error!r}") from error
     if changed:
         missing[path.name] = "the file was changed after the program was written"
-    return Program(made[0].robot, steps, missing, bound, notes, specification, unjudged)
+    return Program(made[0].robot, steps, missing, bound, notes, specification, unjudged=unjudged)
 
 
 def _step_to_dict(step: Step) -> dict[str, Any]:
