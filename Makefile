@@ -6,7 +6,7 @@ READY := $(VENV)/.ready
 # What is imported by many processes is compiled to bytecode once.
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: demo check test test-baseline lint format bench bench-constrained bench-binding bench-remaining bench-relaxed bench-batch bench-peers bench-starts bench-places bench-known bench-lost bench-margins bench-bought bench-corrections bench-place bench-first bench-fastest bench-feeds bench-job bench-moved bench-kept bench-moves bench-raster bench-rails bench-lifts bench-numbers bench-spirals bench-latency docs errors short suite suite-made fuzz fuzz-tasks fuzz-cells fuzz-certificate fuzz-deceptions fuzz-generated fuzz-realtime fuzz-files fuzz-job fuzz-kept fuzz-programs arms mutants memory acceptance distances study clean
+.PHONY: demo check test test-baseline lint format bench bench-constrained bench-binding bench-remaining bench-relaxed bench-batch bench-peers bench-starts bench-places bench-known bench-lost bench-margins bench-bought bench-corrections bench-place bench-first bench-fastest bench-feeds bench-job bench-moved bench-kept bench-moves bench-raster bench-rails bench-lifts bench-numbers bench-spirals bench-latency docs errors short suite suite-made fuzz fuzz-tasks fuzz-cells fuzz-certificate fuzz-deceptions fuzz-generated fuzz-realtime fuzz-files fuzz-pockets fuzz-job fuzz-kept fuzz-programs arms mutants memory acceptance distances study clean
 
 demo: $(READY)  ## plan, check and replay the paper's planar arm and a Panda, into out/
 	$(BIN)/selfmotion demo --out out
@@ -113,6 +113,9 @@ fuzz-job: $(READY)  ## random jobs that leave posts; one that is killed at 20 ra
 	$(BIN)/python benchmarks/random_jobs.py
 	$(BIN)/python benchmarks/job_killed.py
 	$(BIN)/python benchmarks/job_killed.py --workers 2
+
+fuzz-pockets: $(READY)  ## 200 random programs of pockets and holes, held against an interpreter of its own
+	OMP_NUM_THREADS=1 $(BIN)/python benchmarks/pockets.py
 
 fuzz-programs: $(READY)  ## 100 random plans as linear programs, played by a judge of its own; 1,000 programs that were changed
 	OMP_NUM_THREADS=1 $(BIN)/python benchmarks/programs.py

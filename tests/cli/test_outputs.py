@@ -10,7 +10,7 @@ from rich.console import Console
 
 import selfmotion as sm
 from selfmotion.cli.outputs import tell_large
-from support.shell import invoke
+from support.shell import complaint, invoke
 
 
 def test_what_cannot_be_written_discards_neither_plan_nor_other_files(tmp_path: Path) -> None:
@@ -77,3 +77,26 @@ def test_a_large_file_of_text_proposes_a_bag(tmp_path: Path) -> None:
     assert plain.getvalue().endswith(f"about a third, --out {bag}\n")
     assert "has 11 MB" in plain.getvalue()
     assert ("--rate" in plain.getvalue(), "without --rate" in rated.getvalue()) == (False, True)
+
+
+def test_outputs_outside_of_the_files_folder_need_a_word(tmp_path: Path) -> None:
+    given, mine = tmp_path / "downloads", tmp_path / "measured.csv"
+    given.mkdir()
+    mine.write_text("what took a week to measure\n")
+    (given / "link.csv").symlink_to(mine)
+    cell = given / "cell.toml"
+    text = (
+        'outputs = ["OUT"]\ntask = "position"\nstart = "home"\nclearance = false\n[robot]\n'
+        'name = "panda"\n[path]\nkind = "line"\nby = [0, 0.05, 0]\nduration = 3\n'
+    )
+    for out in ("../measured.csv", str(mine), "link.csv"):
+        for command in ("plan", "fastest"):
+            cell.write_text(text.replace("OUT", out))
+            assert "is outside of the file's own folder; say --force" in complaint(command, cell)
+        assert mine.read_text().startswith("what took")
+    cell.write_text(text.replace("OUT", "../measured.csv"))
+    assert invoke("plan", cell, "--force")[0] == 0
+    assert mine.read_text().startswith("t,")
+    cell.write_text(text.replace("OUT", "deeper/plan.csv"))
+    assert invoke("plan", cell)[0] == 0
+    assert (given / "deeper" / "plan.csv").exists()

@@ -691,3 +691,27 @@ def test_what_is_read_back_is_held_in_turns_joints_and_outputs_as_well(
     kept, said = reread._confirmed(program, file)
     assert not kept
     assert "both switch '7' to True" in said
+
+
+@pytest.mark.parametrize("form", ["joint {}", "gelenk_ä{}", "axis,{}", 'a"{}(1)'])
+def test_names_of_joints_come_back_from_every_file(form: str, tmp_path: Path) -> None:
+    from html import escape
+
+    text, names = robot_named("ur5").urdf.text, robot_named("ur5").joint_names
+    for k, name in enumerate(names, 1):
+        text = text.replace(f'joint name="{name}"', f'joint name="{escape(form.format(k))}"')
+    (tmp_path / "arm.urdf").write_text(text, encoding="utf-8")
+    robot = sm.load_robot(tmp_path / "arm.urdf", tool="tool0")
+    assert robot.joint_names == tuple(form.format(k) for k in range(1, 7))
+    start = np.array([0.1, -1.3, 1.4, -1.6, -1.5, 0.2])
+    end = robot.pose(start).copy()
+    end.translation = end.translation + np.array([0.0, 0.05, 0.0])
+    line = sm.paths.Line(robot.pose(start), end, 2.0)
+    plan = sm.plan(sm.Problem(robot, line, "position", start, clearance=None))
+    settings = sm.files.ProgramSettings(mass=1.0)
+    for suffix in (".src", ".mod", ".csv", ".yaml", ".json", ".npz"):
+        file = tmp_path / f"out{suffix}"
+        sm.files.write_motion(plan, file, settings=settings if suffix == ".mod" else None)
+        motion = sm.files.read_motion(file)
+        assert motion.joint_names == robot.joint_names
+        np.testing.assert_allclose(motion.q[0], start, atol=1e-6)

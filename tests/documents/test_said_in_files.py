@@ -29,6 +29,7 @@ EXCEPTIONS = {
     "problem": "is the file",
     "plan": "is what goal = 'retimed' makes",
     "seams": "are the tables [[seams]]",
+    "required": "is true of every feed that somebody asks for; rapids of programs are no feeds",
 }
 # Of certain tables: said otherwise in files.
 OTHERWISE: dict[str, dict[str, str]] = {

@@ -195,9 +195,17 @@ def _read_array(stream: Any, size: int, name: str) -> Array:
 
 
 def write_csv(file: Path, header: Sequence[str], table: Array) -> None:
-    """Write a table with a header line, numbers with all their digits."""
-    lines = [",".join(header), *(",".join(map(repr, row)) for row in table.tolist())]
+    """Write a table with a header line, numbers with all their digits.
+
+    Titles with a comma or a quotation mark are in quotation marks, as in RFC 4180.
+    """
+    lines = [",".join(map(_title, header)), *(",".join(map(repr, row)) for row in table.tolist())]
     write_text(file, "\n".join(lines) + "\n")
+
+
+def _title(name: str) -> str:
+    quoted = '"' + name.replace('"', '""') + '"'
+    return quoted if set(name) & set(",;\t\"'([") or name != name.strip() else name
 
 
 def as_path(file: Any) -> Path:

@@ -1,5 +1,6 @@
 """Tables in files: columns of numbers with any separator, and nested ones with SI units."""
 
+import csv
 import json
 import math
 import re
@@ -19,6 +20,8 @@ from selfmotion.basics.files import text_of, write_text
 # What begins a line that says nothing.
 _COMMENTS = ("#", "%", "//")
 _DECIMAL_COMMA = re.compile(r"[+-]?[0-9]*,[0-9]+([eE][+-]?[0-9]+)?")
+# A title in quotation marks that has a mark in it which separates columns, or such a mark itself.
+_QUOTED = re.compile(r'"[^"]*[,;\t"(\[][^"]*"')
 # The name of a column that is left out.
 LEFT_OUT = "-"
 
@@ -143,7 +146,7 @@ def _header(
 
 def _titles(line: str) -> list[str]:
     """Return the titles in a header; units in brackets belong to the word before them."""
-    joined = re.sub(r"\s+([\[(])", r"\1", line)
+    joined = line if _QUOTED.search(line) else re.sub(r"\s+([\[(])", r"\1", line)
     titles = _cells(joined, _mark(joined))
     return titles[:-1] if titles[1:] and not titles[-1] else titles
 
@@ -155,11 +158,16 @@ def _mark(line: str) -> str:
         cells = _cells(line, mark)
         if len(cells) > 1 and all(_as_float(cell, mark) is not None for cell in cells):
             return mark
-    mark = max(",;\t", key=line.count)
-    return mark if mark in line else ""
+    # What is in quotation marks separates nothing.
+    bare = _QUOTED.sub("", line)
+    mark = max(",;\t", key=bare.count)
+    return mark if mark in bare else ""
 
 
 def _cells(line: str, mark: str) -> list[str]:
+    if mark and _QUOTED.search(line):
+        quoted = csv.reader([line], delimiter=mark, skipinitialspace=True)
+        return [cell.strip() for cell in next(quoted)]
     cells = line.split(mark) if mark else line.split()
     return [cell.strip().strip("\"'").strip() for cell in cells]
 

@@ -1,5 +1,8 @@
 """Tool motions from files: tables and lists of poses, G-code, APT, drawings."""
 
+from selfmotion.cam.cuts import (
+    UNJUDGED as UNJUDGED,
+)
 from selfmotion.cam.path_events import (
     times_of_events as times_of_events,
 )

@@ -522,7 +522,7 @@ def _depths(machine: Machine, depth: float, pecks: Pecks | None) -> list[float]:
             f"drills by {1e3 * pecks.others:.4g} mm at once, expected a step above 0 (Q, STEP)"
         )
     found, here = list[float](), pecks.first
-    while here < depth:
+    while here < depth - _SAME:
         found.append(here)
         here += pecks.others
     return [*found, depth]

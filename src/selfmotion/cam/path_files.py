@@ -291,7 +291,8 @@ def read_path(
     - ``.apt .aptsource .cls .clsf .cl .ncl``: APT, cutter location data, below
     - ``.dxf``: a drawing, below; with ``pip install 'selfmotion[dxf]'``
 
-    Of programs of machine tools, what goes at a feed is a cut; rapids part cuts, called ``cut 1``,
+    Of programs of machine tools, what goes at a feed is a cut, with the rapids along the tool's
+    axis to it and from it, at up to 100 mm/s; all other rapids part cuts, called ``cut 1``,
     ``cut 2``, …. Legs are straight, their corners rounded within `tolerance`, and the tool rests
     where it goes back on itself. Positions are those of the tip. The tool's z axis points into the
     part, against the axis of the machine: down where the file has none. About it the tool turns as
@@ -304,7 +305,7 @@ def read_path(
       or ``R``, of their centre itself after ``G90.1``, ``P`` times round, as chords within 0.01 mm.
       ``G73 G81 G82 G83 G85 G89`` drill holes along Z (``X Y Z R Q P``, ``G98 G99``), until ``G80``.
       Without any ``Z`` it is 0. ``M2 M30`` end it, other ``M`` and ``G4`` are events;
-      ``G28 G30 G53`` go to places that are not known, and are passed over with a note; ``G9 G15
+      ``G28 G30 G53`` go up as high as the tool has been, with a note; ``G9 G15
       G40 G43 G49 G50.1 G61 G64 G67 G69``, one of ``G54`` to ``G59``, ``N O S T H D P Q``, ``%`` and
       comments are passed over, with a note where ``S`` changes from cut to cut
     - G-code of printers, where lines have ``E``: what extrudes is a cut, what does not a travel.
@@ -321,7 +322,7 @@ def read_path(
       mm where neither ``UNITS`` nor `unit` says otherwise; feeds in another unit are refused then
 
     A hole is a cut of its own, straight down at the feed and out again, out and where it is drilled
-    already at 50 mm/s.
+    already in rapids.
 
     Any other word or statement is refused, by its line.
 

@@ -45,12 +45,14 @@ def plan(
     allow_code: options.AllowCodeOption = False,
     out: options.OutOption = None,
     html: options.HtmlOption = None,
+    force: options.ForceOption = False,
     verbose: options.VerboseOption = False,
     as_json: options.JsonOption = False,
 ) -> None:
     """Plan a motion, check it, and write it."""
     warm_start = None if warm is None else sm.load_plan(warm)
     job = documents.read(context, problem, settings or [], allow_code, warm_start)
+    outputs.check_own(job.outputs, problem, force)
     if job.goal != "parts":
         outputs.check_suffixes([*job.outputs, *(out or [])])
     asked = {
@@ -349,6 +351,7 @@ def fastest(
     allow_code: options.AllowCodeOption = False,
     out: options.OutOption = None,
     html: options.HtmlOption = None,
+    force: options.ForceOption = False,
     verbose: options.VerboseOption = False,
     as_json: options.JsonOption = False,
 ) -> None:
@@ -359,6 +362,7 @@ def fastest(
             f"selfmotion init writes one"
         )
     job = documents.of_file(Path(problem), settings or [], allow_code)
+    outputs.check_own(job.outputs, problem, force)
     outputs.check_suffixes([*job.outputs, *(out or [])])
     given = dict(zip(("acceleration", "velocity"), _limits(acceleration, velocity), strict=True))
     if keep:

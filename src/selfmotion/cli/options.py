@@ -297,6 +297,10 @@ ToleranceOption = Annotated[
         help="Allowed deviation from the path (m and rad); 1e-6 by default, or the plan's."
     ),
 ]
+ForceOption = Annotated[
+    bool,
+    typer.Option("--force", help="Write outputs that the file names outside of its own folder."),
+]
 VerboseOption = Annotated[
     bool, typer.Option("--verbose", "-v", help="Print all that was measured, tried and found.")
 ]

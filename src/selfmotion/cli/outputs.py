@@ -271,6 +271,23 @@ def _replay(result: sm.Plan, file: Path) -> None:
     write_replay(result, file)
 
 
+def check_own(files: Sequence[Path], document: str, force: bool) -> None:
+    """Refuse outputs that a document names outside of its own folder, unless they are meant.
+
+    Raises
+    ------
+    FileFormatError
+        One is; it is named.
+    """
+    folder = Path(document).resolve().parent
+    for file in files:
+        if not force and not file.resolve().is_relative_to(folder):
+            raise sm.errors.FileFormatError(
+                f"{document}: outputs: '{file}' is outside of the file's own folder; say --force "
+                f"if that is meant, or --out"
+            )
+
+
 def check_suffixes(files: list[Path]) -> None:
     """Raise FileFormatError for a file that --out cannot write."""
     for file in files:

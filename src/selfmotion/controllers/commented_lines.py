@@ -11,7 +11,7 @@ from selfmotion.certificate import Tolerance
 from selfmotion.controllers.controller_program import ControllerProgram, Switch
 from selfmotion.controllers.program_facts import Load, ProgramFacts
 from selfmotion.controllers.program_settings import Axis
-from selfmotion.controllers.program_texts import BECAUSE, KEPT, PLANNED, TIMED
+from selfmotion.controllers.program_texts import BECAUSE, KEPT, PLANNED, TIMED, of_word
 from selfmotion.controllers.read_stretches import (
     Follower,
     Places,
@@ -125,7 +125,7 @@ class Lines:
         for item in said.removeprefix("axes: ").split(", "):
             found = re.fullmatch(r"([AE][1-6]) = (\S+) \[(mm|deg)\]", item)
             if found:
-                joints[found[1]] = found[2], found[3] == "mm"
+                joints[found[1]] = of_word(found[2]), found[3] == "mm"
         names = [joint for joint, _ in joints.values()]
         if len(set(names)) < len(names):
             raise FileFormatError(f"{self._file}: two axes are the same joint: {said[:200]}")
@@ -161,7 +161,7 @@ class Lines:
         for note in self.notes:
             said = re.fullmatch(r"poses: work object (\S+) of (\S+), flange (\S+)", note[:400])
             if said:
-                found.work_name, found.carrier, found.flange = said.groups()
+                found.work_name, found.carrier, found.flange = map(of_word, said.groups())
             planned = re.fullmatch(r"planned work object: ([-+.\d, e]+)", note[:400])
             if planned:
                 values = [self.number_of(text) for text in planned[1].split(",")]

@@ -27,6 +27,7 @@ from selfmotion.controllers.program_texts import (
     BECAUSE,
     KEPT,
     PLANNED,
+    as_word,
     folded,
     pin_values,
     plain,
@@ -421,7 +422,8 @@ def head(draft: Draft) -> list[str]:
     """Return the comments at the head of a program, without what marks them as such."""
     program = draft.program
     axes = ", ".join(
-        f"{axis.name} = {axis.joint} [{'mm' if axis.slides else 'deg'}]" for axis in program.axes
+        f"{axis.name} = {as_word(axis.joint)} [{'mm' if axis.slides else 'deg'}]"
+        for axis in program.axes
     )
     moves = program.miss.moves
     targets = "target" if program.targets == 1 else "targets"
@@ -486,9 +488,10 @@ def _of_poses(draft: Draft) -> list[str]:
     if frames is None:
         return []
     place = ", ".join(f"{value:.9f}" for value in pin_values(frames.work))
-    flange = draft.settings.flange or "-"
+    names = (frames.name, frames.carrier, draft.settings.flange or "-")
+    work, carrier, flange = map(as_word, names)
     return [
-        f"poses: work object {frames.name} of {frames.carrier}, flange {flange}",
+        f"poses: work object {work} of {carrier}, flange {flange}",
         f"planned work object: {place}",
         "(m, and quaternion x, y, z, w, in that frame; shift the work object to shift the motion)",
         "Poses are reached in the arm's configuration at the begin, by axes.",

@@ -19,6 +19,7 @@ from selfmotion.basics import (
     write_csv,
     write_text,
 )
+from selfmotion.controllers.program_texts import as_word
 from selfmotion.controllers.samples import MotionSamples
 from selfmotion.motion import Trajectory, column_names
 from selfmotion.robot import RobotModel, Urdf
@@ -150,7 +151,9 @@ def keyframes(robot: RobotModel, t: Array, q: Array, qd: Array) -> str:
             frame, "key", name=f"t{k}", time=repr(time), qpos=_text(position), qvel=_text(speed)
         )
     ElementTree.indent(root)
-    heading = f"<!-- joints: {' '.join(joints)} -->\n"
+    # A comment of XML has no two hyphens.
+    words = " ".join(as_word(joint).replace("--", "-%2D") for joint in joints)
+    heading = f"<!-- joints: {words} -->\n"
     return heading + ElementTree.tostring(root, encoding="unicode") + "\n"
 
 

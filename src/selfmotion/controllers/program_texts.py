@@ -4,11 +4,14 @@ import re
 from collections.abc import Sequence
 from math import ceil
 from pathlib import Path as FilePath
+from urllib.parse import quote, unquote
 
 from selfmotion.basics import FileFormatError
 from selfmotion.controllers.stretches import Miss
 from selfmotion.task import SE3, Quaternion
 
+# Marks in names that stand in comments as they are, besides letters, digits and _ . - ~.
+_MARKS = "/:+#@()[]{}<>|$&=*;!?^"
 # Characters in a line of comments.
 _WIDTH = 100
 # What a comment begins with that says why targets are joints.
@@ -43,6 +46,16 @@ def plain(text: str) -> str:
     return " ".join(
         text.replace("→", "->").replace("°", " deg").encode("ascii", "replace").decode().split()
     )
+
+
+def as_word(name: str) -> str:
+    """Return a name as one word of ASCII; see `of_word`."""
+    return quote(name, safe=_MARKS)
+
+
+def of_word(word: str) -> str:
+    """Return the name that `as_word` wrote."""
+    return unquote(word)
 
 
 def folded(text: str) -> list[str]:

@@ -11,7 +11,7 @@ from selfmotion.controllers.feed_stretches import ZONE, FeedStretch
 from selfmotion.controllers.program_facts import held_in_words
 from selfmotion.controllers.program_lines import StopReader
 from selfmotion.controllers.program_settings import AXES, ProgramSettings, tool_from_flange
-from selfmotion.controllers.program_texts import pin_values, plain
+from selfmotion.controllers.program_texts import as_word, pin_values, plain
 from selfmotion.controllers.read_stretches import Pose, pose_of_values
 from selfmotion.controllers.stretches import PoseStretch, Stretch
 from selfmotion.controllers.thinning import TIME_DIGITS
@@ -71,7 +71,8 @@ def script(
     period = repr(1.0 / rate)
     center = ", ".join(f"{value:.6g}" for value in asked.center)
     lines = [
-        f"# {robot.name}: {len(q)} setpoints, joints {', '.join(joints)} [rad].",
+        f"# {plain(robot.name)}: {len(q)} setpoints, "
+        f"joints {', '.join(map(as_word, joints))} [rad].",
         f"# servoj at {rate:g} Hz (t = {period} s), lookahead_time = {_LOOK_AHEAD} s, "
         f"gain = {_GAIN}:",
         f"# the arm follows about {_LOOK_AHEAD} s late, and rounds what is faster than that;",

@@ -2,16 +2,13 @@
 
 import itertools
 import json
-import os
 from collections.abc import Mapping
 from copy import deepcopy
 from pathlib import Path
 from typing import Any
 
 from selfmotion.basics import FileFormatError, nearest, read_document, write_document
-
-# Keys whose values are names of files, looked for beside the document.
-_FILES = ("file", "joint_limits", "mesh", "outputs", "srdf")
+from selfmotion.documents.named_files import named_from
 
 
 def set_key(document: dict[str, Any], key: str, value: Any) -> None:
@@ -104,15 +101,4 @@ def write_combination(file: Path, settings: Mapping[str, Any], target: Path) -> 
     document = {key: value for key, value in read_document(file).items() if key != "grid"}
     for key, value in settings.items():
         set_key(document, key, value)
-    write_document(target, _named_from(document, file.resolve().parent, target.resolve().parent))
-
-
-def _named_from(value: Any, old: Path, new: Path, key: str = "") -> Any:
-    """Return a document whose files, named from a folder, are named from another one."""
-    if isinstance(value, dict):
-        return {name: _named_from(item, old, new, name) for name, item in value.items()}
-    if isinstance(value, list):
-        return [_named_from(item, old, new, key) for item in value]
-    if key in _FILES and isinstance(value, str) and not Path(value).is_absolute():
-        return Path(os.path.relpath(old / value, new)).as_posix()
-    return value
+    write_document(target, named_from(document, file.resolve().parent, target.resolve().parent))

@@ -27,6 +27,7 @@ from selfmotion.path import (
     ORIENTATIONS,
     Circle,
     Feed,
+    Joined,
     Line,
     Path,
     Placed,
@@ -188,9 +189,30 @@ def path_of(
 
 
 def led(path: Path, values: Mapping[str, Any]) -> Path:
-    """Return a path with a lead-in and a lead-out, as a file says it."""
+    """Return a path with a lead-in and a lead-out, as a file says it.
+
+    An end at which a program has a rapid of its own along the tool's axis gets none.
+    """
     _check_keys(values, "leads", ("length", "duration"), ("axis",))
-    return with_leads(path, **values)
+    pieces = with_leads(path, **values).pieces
+    first, last = own_rapids(path)
+    kept = pieces[int(first) : len(pieces) - int(last)]
+    told = (OWN_RAPIDS,) if first or last else ()
+    return Joined(kept).noted((*path.notes, *told))
+
+
+# What is told of leads that a program needs none of.
+OWN_RAPIDS = "leads are left out where the program has a rapid along the tool's axis"
+
+
+def own_rapids(path: Path) -> tuple[bool, bool]:
+    """Return whether a path begins, and whether it ends, with a rapid of a program."""
+    pieces = path.pieces if isinstance(path, Joined) else (path,)
+    first, last = pieces[0], pieces[-1]
+    return (
+        isinstance(first, Feed) and not first.required,
+        isinstance(last, Feed) and not last.required,
+    )
 
 
 def woven(path: Path, values: Mapping[str, Any]) -> Path:

@@ -1,7 +1,6 @@
 """From a problem back to its file."""
 
 import dataclasses
-import os
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path as FilePath
 from typing import Any
@@ -18,6 +17,7 @@ from selfmotion.basics import (
     shown,
     write_document,
 )
+from selfmotion.documents.named_files import named_from
 from selfmotion.documents.problem_file import Job
 from selfmotion.optimise import QuasiNewton
 from selfmotion.problem import Problem, check_problem, problem_to_dict
@@ -53,21 +53,26 @@ def write_problem(problem: Problem | Job, file: str | FilePath) -> None:
     path = as_path(file)
     if not isinstance(problem, Job):
         check_problem(problem)
-        write_document(path, problem_table(problem))
+        write_document(path, _named_beside(problem_table(problem), path))
         return
     # Plain keys stand before the first table.
-    table = {**_settings(problem, path), **problem_table(problem.problem)}
+    table = _named_beside({**_settings(problem), **problem_table(problem.problem)}, path)
     write_document(path, dict(sorted(table.items(), key=lambda item: isinstance(item[1], dict))))
 
 
-def _settings(job: Job, file: FilePath) -> dict[str, Any]:
+def _named_beside(table: dict[str, Any], file: FilePath) -> dict[str, Any]:
+    """Return a table whose files are named from where its own file is."""
+    found: dict[str, Any] = named_from(table, FilePath.cwd(), file.parent.resolve())
+    return found
+
+
+def _settings(job: Job) -> dict[str, Any]:
     """Return the keys that say how a job is planned."""
     table: dict[str, Any] = {}
     if job.goal != "best":
         table["goal"] = job.goal
     if job.outputs:
-        folder = file.parent.resolve()
-        table["outputs"] = [os.path.relpath(name.resolve(), folder) for name in job.outputs]
+        table["outputs"] = [str(name) for name in job.outputs]
     if job.max_evaluations is not None:
         table["max_evaluations"] = job.max_evaluations
     if job.parts:

@@ -18,7 +18,15 @@ from selfmotion.basics import (
     read_document,
     shown,
 )
-from selfmotion.cam import READING, Reading, one_seam, read_path, read_seams, times_of_events
+from selfmotion.cam import (
+    READING,
+    UNJUDGED,
+    Reading,
+    one_seam,
+    read_path,
+    read_seams,
+    times_of_events,
+)
 from selfmotion.constraints import Clearance
 from selfmotion.documents.problem_file import Job, job_of
 from selfmotion.documents.problem_parts import (
@@ -26,6 +34,7 @@ from selfmotion.documents.problem_parts import (
     NAME,
     led,
     obstacle,
+    own_rapids,
     placed_body,
     standing,
     start_of,
@@ -65,6 +74,8 @@ class SeamJob:
         Of a file that asks for the highest feed: feed [m/s] → the job at that one.
     most_feed : float
         How fast that may be at most [m/s].
+    unjudged : tuple of str
+        What nothing is asked of, as of files of machine tools; programs say it.
     """
 
     robot: RobotModel
@@ -72,6 +83,7 @@ class SeamJob:
     settings: Mapping[str, Any]
     at_feed: Callable[[float], "SeamJob"] | None = None
     most_feed: float = FASTEST_FEED
+    unjudged: tuple[str, ...] = ()
 
     @property
     def remarks(self) -> tuple[str, ...]:
@@ -103,7 +115,8 @@ class SeamJob:
         at_feed = self.at_feed
         if at_feed is not None:
             return highest_feed(lambda feed: at_feed(feed).plan(**options), self.most_feed).program
-        return plan_job(self.robot, self.seams, **{**self.settings, **options})
+        program = plan_job(self.robot, self.seams, **{**self.settings, **options})
+        return replace(program, unjudged=self.unjudged)
 
 
 def read_seam_job(file: str | FilePath, *, allow_code: bool = False) -> SeamJob:
@@ -174,7 +187,13 @@ def seam_job_of(
     clearance = apart[0] if apart else whole.problem.clearance
     if apart or whole.problem.clearance is not NO_OVERLAP:
         options["clearance"] = clearance
-    return SeamJob(whole.problem.robot, tuple(seams), {**options, "constraints": kept})
+    is_cut = any(UNJUDGED in seam.path.notes for seam in seams)
+    return SeamJob(
+        whole.problem.robot,
+        tuple(seams),
+        {**options, "constraints": kept},
+        unjudged=(UNJUDGED,) if is_cut else (),
+    )
 
 
 def _at_highest(
@@ -245,7 +264,7 @@ class _Reader:
                 f"the file in it, whose event '{events[0][0]}' would be lost; say when in events, "
                 f"or put the file into the path itself"
             )
-        return _after_lead(events, path.get("leads")), any(one_way for _, one_way in found)
+        return _after_lead(events, path.get("leads"), None), any(one_way for _, one_way in found)
 
     def _events_of_file(
         self, path: Mapping[str, Any], where: str
@@ -258,8 +277,9 @@ class _Reader:
             if not rows.events:
                 return [], rows.one_way
             options = {key: path[key] for key in ("seam", *_PACED) if key in path}
-            events = times_of_events(read_path(file, **options), rows)
-            return _after_lead(events, path.get("leads")), rows.one_way
+            made = read_path(file, **options)
+            events = times_of_events(made, rows)
+            return _after_lead(events, path.get("leads"), made), rows.one_way
         except (SelfmotionError, TypeError) as error:
             raise FileFormatError(f"{self._file}: {where}: path: {error}") from error
 
@@ -287,8 +307,8 @@ class _Reader:
             if values.get("run_up"):
                 path, events = _run_up(path, events, f"seams, '{name}'", self._file)
             if "leads" in values:
+                events = _after_lead(events, values["leads"], path)
                 path = led(path, values["leads"])
-                events = _after_lead(events, values["leads"])
             if events:
                 own["events"] = [*events, *rest.get("events", [])]
             if events or rows.one_way:
@@ -390,10 +410,11 @@ def _run_up(
 
 
 def _after_lead(
-    events: Sequence[tuple[str, float]], leads: Mapping[str, Any] | None
+    events: Sequence[tuple[str, float]], leads: Mapping[str, Any] | None, path: Path | None
 ) -> list[tuple[str, float]]:
     """Return events of a path [s] after its lead-in, whose faults are told where it is made."""
-    first = (leads or {}).get("duration", 0.0)
+    has_own = path is not None and own_rapids(path)[0]
+    first = 0.0 if has_own else (leads or {}).get("duration", 0.0)
     later = first if isinstance(first, int | float) else 0.0
     return [(event, later + at) for event, at in events]
 

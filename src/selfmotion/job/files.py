@@ -69,6 +69,7 @@ def write_program(program: Program, file: Path) -> None:
         "missing": {**program.missing, **troubles},
         "bound": program.bound,
         "notes": list(program.notes),
+        "unjudged": list(program.unjudged),
         "specification": None if asked is None else asked.to_dict(),
     }
     write_bundle(file, "program", _FORMAT, description, [step.made for step in found])
@@ -91,6 +92,7 @@ def load_program(file: str | Path) -> Program:
         steps = tuple(_step(values, item) for values, item in pairs)
         missing = {str(name): str(why) for name, why in description["missing"].items()}
         notes, bound = tuple(map(str, description["notes"])), float(description["bound"])
+        unjudged = tuple(map(str, description.get("unjudged", ())))
         asked = description["specification"]
         specification = None if asked is None else Specification.from_dict(asked, made[0].robot)
         if not math.isfinite(bound):
@@ -99,7 +101,7 @@ def load_program(file: str | Path) -> Program:
         raise FileFormatError(f"{path}: is a damaged program: {error!r}") from error
     if changed:
         missing[path.name] = "the file was changed after the program was written"
-    return Program(made[0].robot, steps, missing, bound, notes, specification)
+    return Program(made[0].robot, steps, missing, bound, notes, specification, unjudged=unjudged)
 
 
 def _step_to_dict(step: Step) -> dict[str, Any]:

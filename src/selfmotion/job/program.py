@@ -45,6 +45,8 @@ class Program:
     kept : mapping
         Where it was begun at an earlier program: each seam, with "" where its motion is that of the
         earlier one, bit for bit, else with why it is not. Files do not have it.
+    unjudged : tuple of str
+        What nothing was asked of and a reader may take for judged; the verdict says it.
     """
 
     robot: RobotModel
@@ -54,6 +56,7 @@ class Program:
     notes: tuple[str, ...] = ()
     specification: Specification | None = None
     kept: Mapping[str, str] = field(default_factory=dict)
+    unjudged: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         """Return a few lines: how many seams in what order, how long, and the verdict."""
@@ -148,9 +151,10 @@ class Program:
         if self.verified:
             alone = "" if self.specification else "; the file does not say what was asked for"
             reached = reached_text(list(self.plans.values()), self.tolerance)
+            beside = "".join(f"; {text}" for text in self.unjudged)
             return (
                 f"verified at all times: {self.extent}, and all moves in between, from rest to "
-                f"rest; {reached}{alone}"
+                f"rest; {reached}{alone}{beside}"
             )
         return f"not verified: {'; '.join(self.failures)}"
 

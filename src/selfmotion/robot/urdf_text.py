@@ -15,7 +15,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from selfmotion.basics import RobotError, is_file, is_folder, nearest
+from selfmotion.basics import RobotError, is_file, is_folder, nearest, shown
+from selfmotion.robot.xacro_expressions import only_arithmetic
 
 # Packages and files that robot descriptions name, found on this machine without ROS.
 #
@@ -357,13 +358,8 @@ def _finding(packages: Packages) -> Iterator[None]:
             raise substitution_args.SubstitutionException(packages.searched(name))
         return str(folder)
 
-    with _alone:
-        own, known = substitution_args._eval_find, substitution_args._eval_dict
-        substitution_args._eval_find = known["find"] = find
-        try:
-            yield
-        finally:
-            substitution_args._eval_find = known["find"] = own
+    with _alone, only_arithmetic(find):
+        yield
 
 
 # The text of a URDF: what is no URDF at all, and what is written in it for Pinocchio.
@@ -400,9 +396,27 @@ def root_of(text: str, source: str) -> ElementTree.Element:
         raise RobotError(f"{source}: the root element is <{root.tag}>, expected <robot>")
     if not root.get("name"):
         root.set("name", Path(source).stem or "robot")
+    _check_names(root, source)
     if root.find("link") is None:
         raise RobotError(f"{source}: has no <link>, expected those of an arm")
     return root
+
+
+# Attributes that name a robot, a link, a joint or a frame.
+_NAMING = ("name", "link", "joint")
+
+
+def _check_names(root: ElementTree.Element, source: str) -> None:
+    """Refuse names that are no single line: they stand in programs, tables and pages."""
+    for element in root.iter():
+        for key in _NAMING:
+            name = element.get(key, "")
+            odd = next((letter for letter in name if not letter.isprintable()), None)
+            if odd is not None:
+                raise RobotError(
+                    f"{source}: <{element.tag}> has {key}={shown(name)}, with a character "
+                    f"{ord(odd)}, expected one line of letters, digits and marks; call it otherwise"
+                )
 
 
 def check_expanded(root: ElementTree.Element, source: str) -> None:

@@ -1,0 +1,125 @@
+"""Expressions in xacro files: sums and lists are evaluated, anything else of Python is refused."""
+
+import ast
+import builtins
+import contextlib
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+# Xacro evaluates what stands in ${…} and $(eval …) as Python. It forbids some names, but a lambda,
+# a dictionary of methods or a frame leads past that, and $(eval …) has all of Python's functions.
+# A description is a text that somebody else wrote: only these forms are evaluated.
+_FORMS = (
+    *(ast.Expression, ast.Constant, ast.Name, ast.Load, ast.Store, ast.Attribute, ast.Subscript),
+    *(ast.Slice, ast.List, ast.Tuple, ast.Dict, ast.Set, ast.Starred, ast.Call, ast.keyword),
+    *(ast.IfExp, ast.BoolOp, ast.BinOp, ast.UnaryOp, ast.Compare, ast.JoinedStr),
+    *(ast.FormattedValue, ast.ListComp, ast.SetComp, ast.DictComp, ast.GeneratorExp),
+    *(ast.comprehension, ast.boolop, ast.operator, ast.unaryop, ast.cmpop),
+)
+# What leads from a value to the code that made it.
+_INNER = ("gi_", "cr_", "ag_", "tb_", "co_", "func_")
+_FRAMES = ("f_back", "f_builtins", "f_code", "f_globals", "f_locals", "mro")
+# Functions of xacro's that hand out what is inside of values, or make classes.
+_LEFT_OUT = ("type", "vars")
+# Names of Python that $(eval …) has besides its own, as xacro's documentation lists them.
+_FUNCTIONS = ("list", "dict", "map", "str", "float", "int")
+
+
+class Refused(Exception):
+    """An expression is no arithmetic."""
+
+
+def check_expression(text: str) -> None:
+    """Raise `Refused` for an expression that does more than arithmetic.
+
+    Raises
+    ------
+    Refused
+    SyntaxError
+        It is no expression of Python.
+    """
+    for node in ast.walk(ast.parse(text.strip(), mode="eval")):
+        said = ""
+        if not isinstance(node, _FORMS):
+            said = type(node).__name__.lower()
+        elif isinstance(node, ast.Name) and node.id.startswith("__"):
+            said = node.id
+        elif isinstance(node, ast.Attribute):
+            name = node.attr
+            if name.startswith(("__", *_INNER)) or name in _FRAMES:
+                said = name
+        if said:
+            raise Refused(
+                f"the expression '{text.strip()[:60]}' is code ({said}), which is never run; "
+                f"write a number, a text or arithmetic"
+            )
+
+
+@contextlib.contextmanager
+def only_arithmetic(find: Any) -> Iterator[None]:
+    """Let xacro evaluate nothing but arithmetic, and find packages by a function, meanwhile.
+
+    What xacro keeps between files, and what it adds to the reader of YAML, is gone afterwards.
+    """
+    import xacro
+    import yaml
+    from xacro import substitution_args
+
+    own = xacro.safe_eval
+
+    def evaluated(text: str, known: Any, local: Any = None) -> Any:
+        check_expression(text)
+        return own(text, known, local)
+
+    def evaluated_argument(text: str, context: Any) -> str:
+        check_expression(text)
+        arguments = context.setdefault("arg", {})
+        known = _Arguments(
+            arguments,
+            {
+                **{
+                    key: item for key, item in substitution_args._eval_dict.items() if key[0] != "_"
+                },
+                "find": find,
+                "arg": lambda name: substitution_args.convert_value(arguments[name], "auto"),
+                "dirname": lambda: substitution_args._eval_dirname(context["filename"]),
+            },
+            substitution_args.convert_value,
+        )
+        functions = {name: getattr(builtins, name) for name in _FUNCTIONS}
+        return str(
+            eval(compile(text.strip(), "<xacro>", "eval"), {"__builtins__": functions}, known)
+        )
+
+    symbols = xacro.create_global_symbols()
+    for name in _LEFT_OUT:
+        symbols["python"].pop(name, None)
+    constructors = dict(yaml.SafeLoader.yaml_constructors)
+    changed: list[tuple[Any, str, Any]] = [
+        (xacro, "safe_eval", evaluated),
+        (xacro, "_global_symbols", symbols),
+        (substitution_args, "_eval", evaluated_argument),
+        (substitution_args, "_eval_find", find),
+    ]
+    before = [(module, name, getattr(module, name)) for module, name, _ in changed]
+    try:
+        for module, name, item in changed:
+            setattr(module, name, item)
+        yield
+    finally:
+        for module, name, item in before:
+            setattr(module, name, item)
+        yaml.SafeLoader.yaml_constructors = constructors
+
+
+class _Arguments(dict[str, Any]):
+    """Names in $(eval …): functions, and arguments by their values."""
+
+    def __init__(
+        self, arguments: Mapping[str, str], functions: Mapping[str, Any], read: Any
+    ) -> None:
+        super().__init__(functions)
+        self._arguments, self._read = arguments, read
+
+    def __missing__(self, name: str) -> Any:
+        return self._read(self._arguments[name], "auto")
