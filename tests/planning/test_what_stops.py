@@ -1,6 +1,7 @@
 """A 'no' begins with what stops the motion, and when; not with what the best of bad ones breaks."""
 
 import numpy as np
+import pytest
 
 import selfmotion as sm
 from selfmotion.task import SE3
@@ -63,3 +64,14 @@ def test_where_each_pose_is_in_reach_another_start_is_proposed() -> None:
     assert "no motion along the path passes" not in given.certificate.verdict
     free = past_a_plate((0.1, 0.02, 0.5), 0.0, free=True)
     assert sm.plan(free, search=QUICK).certificate.verified
+
+
+@pytest.mark.parametrize("search", [None, QUICK, sm.Search(starts=32, finalists=5)])
+def test_a_motion_whose_hulls_alone_meet_a_body_is_found(search: sm.Search | None) -> None:
+    """However many starts there are: turns of the tool about its free axis make no other motion.
+
+    Of four postures one passes the plate, by its meshes and not by their hulls, and costs most.
+    """
+    given = {} if search is None else {"search": search}
+    plan = sm.plan(past_a_plate((0.1, 0.02, 0.5), 0.0, free=True), **given)
+    assert plan.certificate.verified

@@ -199,6 +199,8 @@ class Planner:
         The best so far.
     second : Candidate or None
         The best one before it.
+    broken : list of Candidate
+        Those that were optimised and break something.
     sequences : list of Sequence
         What the global search found; empty where it was not asked for or in vain.
     rival : Candidate or None
@@ -231,6 +233,7 @@ class Planner:
     blocked: Obstruction | None = None
     best: Candidate | None = None
     second: Candidate | None = None
+    broken: list[Candidate] = field(default_factory=list)
     sequences: list[Sequence] = field(default_factory=list)
     rival: Candidate | None = None
     failure: SelfmotionError | None = None
@@ -326,6 +329,7 @@ class Planner:
             return
         if chosen:
             self.consider(candidate)
+            self.broken += [candidate] if candidate.violations else []
         if candidate.violations and candidate.effort.apart:
             # Others are asked at once to keep the arm off itself.
             self.effort = candidate.effort
@@ -374,19 +378,19 @@ class Planner:
             if self.judge_as_it_is(one):
                 return
 
-    def is_free_by_meshes(self, *, just: bool = False) -> bool:
-        """Whether bodies are apart by their meshes along the best motion, though not by hulls.
+    def free_by_meshes(self, *, just: bool = False) -> abc.Iterator[Candidate]:
+        """Yield candidates whose bodies are apart by their meshes, though not by their hulls.
 
-        As far as asked for, or `just` so.
+        The best first; apart as far as asked for, or `just` so. Where nothing keeps everything, a
+        motion whose hulls meet by little may be the only one whose meshes do not.
         """
-        best = self.best
-        if best is None or not best.violations:
-            return False
         bodies = self.problem.envelope.bodies
-        if all(model.is_all_convex for model, _ in bodies):
-            return False
-        q = best.evaluation().trajectory.q
-        return all(model.worst(q).value >= (0.0 if just else far) for model, far in bodies)
+        if not self.is_unmet or all(model.is_all_convex for model, _ in bodies):
+            return
+        for candidate in sorted(self.broken, key=Candidate.score):
+            q = candidate.evaluation().trajectory.q
+            if all(model.worst(q).value >= (0.0 if just else far) for model, far in bodies):
+                yield candidate
 
     def judge_as_it_is(self, best: Candidate) -> bool:
         """Let a motion be it if it is verified; return whether it is."""

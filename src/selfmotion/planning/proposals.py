@@ -85,6 +85,11 @@ def optimise_starts(planner: Planner, count: int, finalists: int) -> None:
         if ranking.run(starts, finalists):
             ranked = ranking.ranked
             _optimise_each(planner, _resumed(planner, ranked), len(ranked))
+            if planner.is_unmet and planner.best is not None and not planner.is_over:
+                before = [motion.trajectory for motion in ranked]
+                before.append(planner.best.evaluation().trajectory)
+                aside = ranking.left_aside(before, finalists)
+                _optimise_each(planner, _resumed(planner, aside), len(aside))
             return
     elif len(starts) > finalists:
         starts = _best(planner.problem, starts)[:finalists]

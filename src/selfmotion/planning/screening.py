@@ -8,7 +8,7 @@ import numpy as np
 from selfmotion.basics import Array, Flags, Ints, Progress, RobotError
 from selfmotion.constraints import penalised
 from selfmotion.costs import Samples
-from selfmotion.motion import Sampling
+from selfmotion.motion import Sampling, Trajectory
 from selfmotion.nodes import Batch, NodeGrid, NodeMotion, minimise
 from selfmotion.planning.effort import Effort
 from selfmotion.planning.grids import ABOUT_AS_GOOD, NOTHING, UNKEPT, resolves, rough_grid
@@ -21,6 +21,8 @@ _ROUGH_ROUNDS = 30
 # Rough optima on nodes whose costs differ by less than this share are mirror images; and joints are
 # within their limits to this share of a turn.
 _SAME_TO_DIGITS = 1e-9
+# Violations of images of one motion differ by less than this share.
+_SAME_VIOLATION = 1e-6
 # So many rough motions at most; where conditions count, with so many steps more that know them.
 ROUGH_MOTIONS, _WITH_CONDITIONS = 16, 12
 # And so many of those that keep conditions from the beginning.
@@ -92,6 +94,8 @@ class Ranking:
         self._t = rough_grid(problem).nodes
         self._found: Batch | None = None
         self._ranked: list[NodeMotion] = []
+        # Motions at the starts, of which the ranked ones came.
+        self._carried: list[Array] = []
 
     @property
     def ranked(self) -> list[NodeMotion]:
@@ -116,6 +120,8 @@ class Ranking:
         motions, arrived = carried(problem.follows, np.array(starts), self._t, at)
         if not arrived.any():
             return False
+        order = most_promising(problem, starts, motions, arrived, self._t, self._apart)
+        self._carried = [motions[k] for k in order]
         free: list[NodeMotion] = []
         if self._is_pointwise():
             optima = self._freely(motions[arrived], finalists)
@@ -124,11 +130,36 @@ class Ranking:
             free = optima
         if not self._ranked:
             # Optima lie where nothing was asked: what keeps everything may begin elsewhere.
-            order = most_promising(problem, starts, motions, arrived, self._t, self._apart)
-            near = (self._near(motions[k]) for k in order[: max(ROUGH_MOTIONS, finalists)])
-            begun = [motion for motion in near if motion is not None]
+            begun = self._begun(max(ROUGH_MOTIONS, finalists))
             self._ranked = self._with_conditions(free, begun, finalists)
         return bool(self._ranked)
+
+    def left_aside(self, known: Sequence[Trajectory], finalists: int) -> list[NodeMotion]:
+        """Return rough motions with conditions, unlike those that are known, the best first.
+
+        For where none of the best came to keep everything: between rough nodes a body may be met
+        that no node meets, so that what seems the best of all is none.
+        """
+        near = (self._near(motion(self._t)) for motion in known)
+        others = [motion for motion in near if motion is not None]
+        begun, found = self._begun(ROUGH_MOTIONS), list[NodeMotion]()
+        for number, motion in enumerate(begun, 1):
+            self._progress("start", number, len(begun))
+            better = self._roughly(motion)
+            if not _is_image(better, [*others, *found]):
+                found.append(better)
+        return sorted(found, key=self._rank)[:finalists]
+
+    def _begun(self, count: int) -> list[NodeMotion]:
+        """Return so many motions at starts with conditions, none an image of another one."""
+        found = list[NodeMotion]()
+        for carried_on in self._carried:
+            motion = self._near(carried_on)
+            if motion is not None and not _is_image(motion, found):
+                found.append(motion)
+            if len(found) == count:
+                break
+        return found
 
     def run_along(self, motions: Array, t: Array, finalists: int) -> bool:
         """Leave the best `finalists` of motions (K, N, n) on the path at times t (N,) [s].
@@ -247,7 +278,11 @@ class Ranking:
         """
         found: list[tuple[tuple[bool, float], NodeMotion]] = []
         total = len(free) + len(others)
+        tried = list[NodeMotion]()
         for number, motion in enumerate([*free, *others], 1):
+            if _is_image(motion, tried):
+                continue
+            tried.append(motion)
             if free and number > len(free) and found and found[0][1].violation <= 0.0:
                 break
             if number <= len(free) and found and (False, motion.cost) >= found[0][0]:
@@ -331,6 +366,18 @@ def _hopeful(found: Batch) -> Flags:
     least = found.costs[~found.going].min(initial=np.inf)
     dearest = least + ABOUT_AS_GOOD * abs(least) if np.isfinite(least) else least
     return np.asarray(found.going & (found.costs - found.promised < dearest))
+
+
+def _is_image(motion: NodeMotion, others: Sequence[NodeMotion]) -> bool:
+    """Whether one of others costs and violates the same to the last digits.
+
+    As where only a turn of the tool about its free axis tells them apart, or a mirror.
+    """
+    return any(
+        _same(motion.cost, one.cost)
+        and abs(motion.violation - one.violation) <= _SAME_VIOLATION * (1.0 + one.violation)
+        for one in others
+    )
 
 
 def _same(a: float, b: float | None) -> bool:

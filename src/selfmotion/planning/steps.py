@@ -191,18 +191,24 @@ def _stack_rows(planner: Planner) -> bool:
 
 def _judge_on_meshes(planner: Planner) -> bool:
     """Take a motion that bodies' hulls forbid where their meshes do not."""
-    if planner.best is None or not planner.is_sought or not planner.is_free_by_meshes():
+    if planner.best is None or not planner.is_sought:
         return False
-    planner.judge_as_it_is(planner.best)
-    return True
+    tried = False
+    for candidate in planner.free_by_meshes():
+        tried = True
+        if planner.judge_as_it_is(candidate):
+            planner.best = candidate
+            break
+    return tried
 
 
 def _take_links_apart(planner: Planner) -> bool:
     """Optimise again with links in convex pieces, where only their hulls meet something."""
-    best, search, effort = planner.best, planner.search, planner.effort
-    if best is None or effort.in_pieces or not (planner.is_sought and planner.is_unmet):
+    search, effort = planner.search, planner.effort
+    if effort.in_pieces or not (planner.is_sought and planner.is_unmet):
         return False
-    if not planner.is_free_by_meshes(just=True):
+    best = next(planner.free_by_meshes(just=True), None)
+    if best is None:
         return False
     planner.effort = replace(effort, in_pieces=True)
     known = best.evaluation().trajectory
