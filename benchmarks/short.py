@@ -29,6 +29,7 @@ SHORT: dict[str, list[str]] = {
     "binding.py": ["--kind", "jerk"],
     "bought_margins.py": ["--count", "1", "--displacements", "2"],
     "certificate.py": ["--count", "1"],
+    "changed_programs.py": ["--number", "20"],
     "constrained.py": ["--count", "4"],
     "corrections.py": ["--count", "1", "--displacements", "2"],
     "deceptions.py": ["--count", "2"],
