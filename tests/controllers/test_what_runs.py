@@ -11,7 +11,12 @@ import pytest
 import selfmotion as sm
 from selfmotion import controllers
 from selfmotion.controllers import judged_program, read_program
-from selfmotion.controllers.program_facts import Load, ProgramFacts, verified_loads
+from selfmotion.controllers.program_facts import (
+    Load,
+    ProgramFacts,
+    verified_loads,
+    with_checksum,
+)
 from selfmotion.controllers.program_texts import plain
 from selfmotion.task import SE3, exp3
 from support.arms import robot_named
@@ -304,18 +309,25 @@ def test_a_plan_switches_nothing(plan: sm.Plan, kept: Path, tmp_path: Path) -> N
     assert "'7' is switched at 0.0000 s, and the motion has no events" in printed
 
 
-@pytest.mark.parametrize("line", ["held joints", "outputs", "checksum"])
-def test_what_a_head_states_is_not_changed_by_hand(tmp_path: Path, line: str) -> None:
+@pytest.mark.parametrize(
+    ("line", "old", "new"),
+    [
+        ("held joints", "0.8", "0.9"),
+        ("outputs", "true", "false"),
+        ("deviation", "0.09", "9.0"),
+        ("axes", "a1 [deg]", "a2 [deg]"),
+    ],
+)
+def test_what_a_head_states_is_not_changed_by_hand(line: str, old: str, new: str) -> None:
     facts = ProgramFacts("flange", {"rail": 0.8}, {"arc on": ("7", True)}, "STN1")
-    notes = facts.lines
-    assert not ProgramFacts.stated(notes).is_changed
-    changed = [
-        note.replace("0.8", "0.9").replace("true", "false") if note.startswith(line) else note
-        for note in notes
-    ]
-    if line == "checksum":
-        changed = notes[:-1]
+    notes = with_checksum(["axes: A1 = a1 [deg]", *facts.notes, "deviation: 0.09 mm, 0.1 rad"])
+    stated = ProgramFacts.stated(notes)
+    assert not stated.is_changed
+    assert (stated.held, stated.outputs) == (facts.held, facts.outputs)
+    changed = [note.replace(old, new) if note.startswith(line) else note for note in notes]
+    assert changed != notes
     assert ProgramFacts.stated(changed).is_changed
+    assert ProgramFacts.stated(notes[:-1]).is_changed
     assert ProgramFacts.stated([]) is None
 
 

@@ -13,7 +13,7 @@ from selfmotion.certificate import Tolerance
 from selfmotion.constraints import Constraint
 from selfmotion.controllers.feed_stretches import FeedStretch
 from selfmotion.controllers.feed_thinning import FeedSpan
-from selfmotion.controllers.program_facts import Load, ProgramFacts, check_load
+from selfmotion.controllers.program_facts import Load, ProgramFacts, check_load, with_checksum
 from selfmotion.controllers.program_settings import (
     OF_PATH,
     Axis,
@@ -427,11 +427,11 @@ def head(draft: Draft) -> list[str]:
     )
     moves = program.miss.moves
     targets = "target" if program.targets == 1 else "targets"
-    return [
+    notes = [
         plain(f"selfmotion: {draft.robot.name}, {program.targets} {targets}"),
-        *folded(plain(draft.verdict)),
-        *folded(plain(f"axes: {axes}")),
-        *draft.facts.lines,
+        plain(draft.verdict),
+        plain(f"axes: {axes}"),
+        *draft.facts.notes,
         *_of_speeds(program),
         f"deviation: {stated(program.miss.path)}",
         *([] if moves == NO_MISS else [f"deviation of moves: {stated(moves)}"]),
@@ -442,6 +442,7 @@ def head(draft: Draft) -> list[str]:
         *_of_poses(draft),
         "Angles are those of the URDF: compare zeros and signs with the controller's.",
     ]
+    return [line for note in with_checksum(notes) for line in folded(note)]
 
 
 def speeds_of(program: ControllerProgram) -> list[float]:

@@ -12,14 +12,19 @@ import numpy as np
 from selfmotion.basics import Array, ProblemError
 from selfmotion.constraints import Constraint, JointTorqueLimits
 from selfmotion.controllers.program_settings import ProgramSettings, flange_of, tool_from_flange
-from selfmotion.controllers.program_texts import folded, plain
+from selfmotion.controllers.program_texts import KEPT, plain
 from selfmotion.robot import RobotModel
 from selfmotion.task import SE3
 
 # What comments begin with that state these facts.
 _HELD, _OUTPUTS, _UNIT, _FLANGE = "held joints: ", "outputs: ", "positioner: ", "flange: "
-_CHECKSUM = "checksum of these: "
 _FACTS = (_FLANGE, _HELD, _OUTPUTS, _UNIT)
+# What else a head states and a reader believes, and what guards all of it.
+_BELIEVED = (
+    *("axes: ", "deviation: ", "deviation of moves: ", KEPT, "poses: ", "planned work object: "),
+    *_FACTS,
+)
+_CHECKSUM = "checksum of what is stated: "
 # Held joints stand where the file says within its digits [rad or m].
 _DIGITS = 1e-6
 # A load is the same within this share, but at least within 1 g, and its centre within 1 mm: what a
@@ -99,7 +104,9 @@ class ProgramFacts:
         sums = [note.removeprefix(_CHECKSUM) for note in notes if _is(note, _CHECKSUM)]
         if not (said or sums):
             return None
+        changed = sums != [checksum(notes)]
         try:
+            flange = str(json.loads(said.get(_FLANGE, '""')))
             held = {name: float(x) for name, x in json.loads(said.get(_HELD, "{}")).items()}
             outputs = {
                 event: None if value is None else (str(value[0]), bool(value[1]))
@@ -107,35 +114,22 @@ class ProgramFacts:
             }
         except (ValueError, TypeError, AttributeError, IndexError, RecursionError):
             return cls(is_changed=True)
-        found = cls(said.get(_FLANGE, ""), held, outputs, said.get(_UNIT, ""))
-        changed = sums != [found._checksum]
-        return cls(found.flange, held, outputs, found.positioner, changed)
+        return cls(flange, held, outputs, said.get(_UNIT, ""), changed)
 
     @property
-    def lines(self) -> list[str]:
-        """What the head says, without what marks comments as such."""
-        return [
-            *(line for note in self._notes for line in folded(note)),
-            f"{_CHECKSUM}{self._checksum}",
-        ]
-
-    @property
-    def _notes(self) -> list[str]:
-        parts = [f"{_FLANGE}{plain(self.flange)}"]
+    def notes(self) -> list[str]:
+        """What the head says of them, without what marks comments as such."""
+        parts = [f"{_FLANGE}{json.dumps(self.flange)}"]
         parts += [f"{_HELD}{json.dumps(dict(self.held))}"] if self.held else []
         parts += [f"{_OUTPUTS}{json.dumps(dict(self.outputs))}"] if self.outputs else []
         return [*parts, f"{_UNIT}{self.positioner}"] if self.positioner else parts
-
-    @property
-    def _checksum(self) -> str:
-        return sha256("\n".join(self._notes).encode()).hexdigest()[:12]
 
     def against(self, robot: RobotModel) -> Iterator[str]:
         """Yield what of it is not as an arm has it."""
         if self.is_changed:
             yield (
-                "what its head states of held joints, outputs and the flange was changed by hand "
-                "(its checksum tells): write the program again"
+                "what its head states (axes, deviations, held joints, outputs, frames) was changed "
+                "by hand, as its checksum tells: write the program again"
             )
             return
         for name in sorted({*self.held, *robot.locked}):
@@ -146,6 +140,17 @@ class ProgramFacts:
                 yield f"it was written with joint '{name}' held at {here:.6g}, here it is not held"
             elif abs(here - there) > _DIGITS:
                 yield f"it was written with joint '{name}' held at {here:.6g}, here at {there:.6g}"
+
+
+def with_checksum(notes: Sequence[str]) -> list[str]:
+    """Return the comments of a head, with a last one that guards what a reader believes of it."""
+    return [*notes, f"{_CHECKSUM}{checksum(notes)}"]
+
+
+def checksum(notes: Sequence[str]) -> str:
+    """Return the checksum of those comments that a reader believes."""
+    believed = [note for note in notes if note.startswith(_BELIEVED)]
+    return sha256("\n".join(believed).encode()).hexdigest()[:12]
 
 
 def _is(note: str, key: str) -> bool:
