@@ -79,8 +79,15 @@ class JointPositionLimits(Constraint):
         wrong = np.flatnonzero(~(lower < upper))
         if wrong.size:
             k = int(wrong[0])
+            name = robot.joint_names[k]
+            if lower[k] == upper[k]:
+                raise ProblemError(
+                    f"{robot.name}: {LIMIT_NAMES[0]}: joint '{name}' has lower = upper = "
+                    f"{lower[k]:.6g}: it does not move; hold it there: lock = {{{name!r}: "
+                    f"{lower[k]:.6g}}} of the robot (--lock {name}={lower[k]:.6g})"
+                )
             raise ProblemError(
-                f"{robot.name}: {LIMIT_NAMES[0]}: joint '{robot.joint_names[k]}': lower "
+                f"{robot.name}: {LIMIT_NAMES[0]}: joint '{name}': lower "
                 f"{lower[k]:.6g} is not below upper {upper[k]:.6g}; the arm's own limits count as "
                 f"well, unless these replace them (replace = true)"
             )
