@@ -47,8 +47,6 @@ def _limit(**changes: str | None) -> str:
 
 # What is broken, the text that is replaced, and by what.
 EDITS: list[tuple[str, str, str]] = [
-    ("a limit without velocity", _SHOULDER, _limit(velocity=None)),
-    ("a limit without effort", _SHOULDER, _limit(effort=None)),
     ("a limit without lower", _SHOULDER, _limit(lower=None)),
     ("a limit without upper", _SHOULDER, _limit(upper=None)),
     ("a revolute joint without a limit", _SHOULDER, ""),

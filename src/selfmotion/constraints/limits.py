@@ -361,6 +361,12 @@ class JointTorqueLimits(Constraint):
     def of(self, robot: RobotModel) -> Array:
         """Return the limits for an arm, (n,) [Nm or N]."""
         if self.limit is None:
+            unsaid = [name for name in robot.joint_names if name in robot.urdf.lacking_efforts]
+            if unsaid:
+                raise ProblemError(
+                    f"{robot.name}: joint torque limits: joint '{unsaid[0]}' has a <limit> without "
+                    f"effort; add it to the URDF, or give limit = …"
+                )
             return robot.effort_limit
         what = f"{robot.name}: joint torque limits"
         return per_joint(self.limit, robot.dof, what, positive=True)

@@ -124,6 +124,24 @@ def mend_cosmetics(
     return notes + [f"{where}; torques cannot be computed" for where in lacking_inertials(root)]
 
 
+def without_limits(root: ElementTree.Element) -> dict[str, list[str]]:
+    """Say 0, for none, where a ``<limit>`` has no velocity or effort; return joints by which."""
+    found: dict[str, list[str]] = {"velocity": [], "effort": []}
+    for joint in root.findall("joint"):
+        limit = joint.find("limit")
+        if limit is None or joint.get("type") not in _MOVING:
+            continue
+        for key, names in found.items():
+            if limit.get(key) is None:
+                limit.set(key, "0")
+                names.append(joint.get("name", ""))
+    return found
+
+
+# Kinds of joints that have limits.
+_MOVING = ("revolute", "prismatic", "continuous")
+
+
 def _is_colour(material: ElementTree.Element, where: str, notes: list[str]) -> bool:
     """Return whether a material has a colour or a texture; one that is none is taken out."""
     for tag in ("color", "texture"):
@@ -350,9 +368,7 @@ def _check_limit(joint: ElementTree.Element, where: str) -> None:
         return
     for key in ("velocity", "effort"):
         if limit.get(key) is None:
-            raise RobotError(
-                f'{where} has a <limit> without {key}; add {key}="…", 0 where there is none'
-            )
+            limit.set(key, "0")
         value = _limit_number(limit, key, where, "; 0 is for none", math.inf)
         if value < 0.0:
             raise RobotError(f"{where} has {key} limit {value:g}, expected a number ≥ 0")

@@ -233,8 +233,10 @@ _FIND = re.compile(r"\$\(find\s+([^)\s]+)\s*\)")
 _DEEPEST_INCLUDE = 10
 
 
-def expand(path: Path, arguments: Mapping[str, str], packages: Packages) -> str:
-    """Return the URDF text of a xacro file.
+def expand(
+    path: Path, arguments: Mapping[str, str], packages: Packages, *, of_others: bool = False
+) -> str:
+    """Return the text of a URDF or an SRDF that is a xacro file.
 
     Parameters
     ----------
@@ -243,6 +245,8 @@ def expand(path: Path, arguments: Mapping[str, str], packages: Packages) -> str:
         Values of its ``<xacro:arg>``.
     packages : Packages
         Where ``$(find NAME)`` is looked up.
+    of_others : bool
+        Whether arguments that it does not have are left out: they are those of another file.
 
     Raises
     ------
@@ -258,6 +262,9 @@ def expand(path: Path, arguments: Mapping[str, str], packages: Packages) -> str:
         raise RobotError(f"{path}: no such xacro file")
     declared = _Declared(packages)
     declared.read(path)
+    if of_others:
+        known = declared.defaults
+        arguments = {key: value for key, value in arguments.items() if key in known}
     for key in arguments:
         if declared.complete and key not in declared.defaults:
             raise RobotError(
@@ -274,8 +281,8 @@ def expand(path: Path, arguments: Mapping[str, str], packages: Packages) -> str:
         missing = said.split("package '")
         reason = f"package '{missing[1].strip()}" if missing[1:] else said
         empty = [key for key, value in declared.defaults.items() if not value]
-        known = f"; {declared}" if "argument" in reason or set(empty) - set(arguments) else ""
-        raise RobotError(f"{path}: cannot be expanded by xacro: {reason}{known}") from error
+        told = f"; {declared}" if "argument" in reason or set(empty) - set(arguments) else ""
+        raise RobotError(f"{path}: cannot be expanded by xacro: {reason}{told}") from error
     text: str = document.toxml()
     return text
 
