@@ -99,6 +99,7 @@ def init(
         typer.Option("--positioner", help="Write a cell that has a table that tilts and turns."),
     ] = False,
     no_collision: options.NoCollisionOption = False,
+    srdf: options.SrdfOption = None,
     force: Annotated[bool, typer.Option("--force", help="Overwrite a file.")] = False,
 ) -> None:
     """Write a commented problem file to begin with; for an arm from a file it is tried first."""
@@ -115,6 +116,7 @@ def init(
         arguments=options.arguments(argument),
         packages=packages or (),
         clearance=not no_collision,
+        srdf=srdf,
     )
     text = next(texts) if robot in sm.NAMED_ARMS else documents.first_that_runs(texts, file, job)
     write_text(file, text)

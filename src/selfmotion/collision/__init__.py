@@ -25,6 +25,7 @@ from selfmotion.collision.obstacles import (
     obstacle_shapes as obstacle_shapes,
 )
 from selfmotion.collision.pairs import (
+    SAMPLES as SAMPLES,
     Closest as Closest,
     Overlap as Overlap,
     disabled_links as disabled_links,
