@@ -87,7 +87,6 @@ EDITS: list[tuple[str, str, str]] = [
     ("a joint without a type", _TYPE, 'name="shoulder"'),
     ("a joint without a name", _TYPE, 'type="revolute"'),
     ("a joint with an empty name", _TYPE, 'name="" type="revolute"'),
-    ("a planar joint", _TYPE, 'name="shoulder" type="planar"'),
     ("a floating joint", _TYPE, 'name="shoulder" type="floating"'),
     ("a spherical joint", _TYPE, 'name="shoulder" type="spherical"'),
     ("a joint without a parent", '<parent link="base"/><child', "<child"),

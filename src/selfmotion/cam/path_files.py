@@ -245,6 +245,18 @@ _READERS: Mapping[str, Callable[[FilePath, Reading], Mapping[str, PoseRows]]] = 
     **dict.fromkeys(PROGRAMS, read_gcode),
     **dict.fromkeys(CLDATA, lambda file, reading: read_cldata(file, reading.unit)),
 }
+# Programs of robots, which are no paths.
+_CONTROLLERS = {
+    ".mod": "ABB",
+    ".prg": "ABB",
+    ".src": "KUKA",
+    ".dat": "KUKA",
+    ".script": "Universal Robots",
+    ".urscript": "Universal Robots",
+    ".ls": "Fanuc",
+    ".tp": "Fanuc",
+    ".jbi": "Yaskawa",
+}
 # Of files that can be nothing but a path.
 PATH_SUFFIXES = (*TABLES, *PROGRAMS, *CLDATA, DRAWING)
 
@@ -460,6 +472,13 @@ def _read(path: FilePath, seam: str | None, reading: Reading) -> Mapping[str, Po
     reader = _READERS.get(suffix)
     if reader is None:
         known = ", ".join((*_READERS, DRAWING))
+        if suffix in _CONTROLLERS:
+            raise FileFormatError(
+                f"{path}: is a program of a robot ({_CONTROLLERS[suffix]}): as a path it is not "
+                f"read. One that selfmotion wrote is judged by `selfmotion check`; of another one "
+                f"write its targets as a table (x_mm,y_mm,z_mm and qw,qx,qy,qz or "
+                f"roll_deg,pitch_deg,yaw_deg; feed_mm), or as G-code"
+            )
         raise FileFormatError(f"{path}: has suffix '{path.suffix}', expected one of {known}")
     return reader(path, reading)
 

@@ -23,6 +23,7 @@ from selfmotion.robot.urdf_elements import (
     check_shape,
     lacking_inertials,
     mend_cosmetics,
+    split_planar,
     without_lacking,
     without_limits,
 )
@@ -312,7 +313,7 @@ def parse_urdf(
     """Validate URDF text; see `read_urdf`. Addresses of meshes are looked up by `packages`."""
     root = root_of(text, source)
     check_expanded(root, source)
-    notes = mend_cosmetics(root, check_shape)
+    notes = [*split_planar(root, source), *mend_cosmetics(root, check_shape)]
     unsaid = without_limits(root)
     for key, what in (("velocity", "speeds are"), ("effort", "torques are")):
         if unsaid[key]:
