@@ -1,6 +1,7 @@
 """Cases of people, from the shell: what is right of each is worked out from its files, by hand."""
 
 import math
+import re
 import shutil
 from pathlib import Path
 
@@ -9,6 +10,7 @@ import pinocchio as pin
 import pytest
 
 import selfmotion as sm
+from selfmotion.cam import Reading, one_seam
 from selfmotion.cam.gcode import read_gcode
 from support.own_kinematics import Arm, along
 from support.shell import complaint, invoke
@@ -238,3 +240,55 @@ def test_meshes_are_in_the_unit_that_they_say(tmp_path: Path) -> None:
     twice = sm.obstacles.Mesh("part", [0.5, 0.5, 0.3], folder / "box_mm_z.dae", scale=0.001)
     with pytest.raises(sm.errors.CollisionError, match=r"its unit is 0\.001 m, and scale is"):
         twice.geometry()
+
+
+PEERS = {
+    "irbcam.csv": ([[0, 0, 0], [50, 0, 0], [100, 0, 0]], 0.05, [0.0, 0.0, -1.0]),
+    "cpr.csv": ([[0, 0, 0], [50, 0, 0], [100, 20, 0]], None, None),
+    "compas.json": ([[450, -100, 350], [450, 0, 350], [450, 100, 350]], 0.025, [0.0, 0.0, -1.0]),
+    "compas_frames.json": (
+        [[450, -100, 350], [450, 0, 350], [450, 100, 350]],
+        None,
+        [0.0, 0.0, -1.0],
+    ),
+    "primitives.csv": ([[450, -100, 350], [450, 0, 350], [450, 100, 350]], None, None),
+}
+
+
+@pytest.mark.parametrize("name", PEERS)
+def test_pose_files_of_peers_are_read_with_their_conventions(name: str) -> None:
+    places, feed, down = PEERS[name]
+    file = CASES / "tables_of_peers" / name
+    rows = one_seam(file, None, Reading())
+    np.testing.assert_allclose(1e3 * rows.positions, places, atol=DIGITS)
+    (note,) = rows.notes
+    assert re.match(r"(IRBCAM|igus|compas|compas_slicer|motion primitives): ", note)
+    if feed is not None:
+        assert rows.feed is not None
+        np.testing.assert_allclose(rows.feed[:-1], feed)
+    assert (rows.orientation == "rotation") == (down is not None)
+    for turn in rows.values if down is not None else ():
+        np.testing.assert_allclose(turn[:, 2], down, atol=DIGITS)
+        np.testing.assert_allclose(turn.T @ turn, np.eye(3), atol=DIGITS)
+    # The shell's --feed counts for what has none, and instead of the file's.
+    assert sm.files.read_path(file, feed=0.05).duration > 1.0
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "said"),
+    [
+        ("a.csv", "x,y,z,rz1,ry,rz2,motion_type\n0,0,0,0,180,0,0\n1,0,0,0,180,0,1\n",
+         "line 3: motion_type 1: arcs of IRBCAM are not read"),
+        ("a.csv", "X 0; Y 0; Z 0; A 1\nX 1; Y 0\n", "line 2: .*as igus' programs write them"),
+        ("a.csv", 'breakpoints,primitives,points,q_bp\n0,movec_fit,"[array([1, 2, 3]), array([4, '
+         '5, 6])]",\n', "primitive 'movec_fit' with 2 points is not read"),
+        ("a.json", '[{"point": [0, 0, 0], "xaxis": [1, 0, 0], "yaxis": [1, 0, 0]}]',
+         "xaxis and yaxis are no two axes"),
+    ],
+)  # fmt: skip
+def test_what_peers_write_besides_is_refused(
+    name: str, text: str, said: str, tmp_path: Path
+) -> None:
+    (tmp_path / name).write_text(text)
+    with pytest.raises(sm.errors.FileFormatError, match=said):
+        sm.files.read_path(tmp_path / name, feed=0.05)

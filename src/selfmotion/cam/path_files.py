@@ -37,6 +37,7 @@ from selfmotion.cam.path_rows import (
     no_such_seam,
     rows_of_table,
 )
+from selfmotion.cam.peers import compas_poses, peer_table
 from selfmotion.path import Path
 
 # Poses as configurations of robots hold them: lists and names, of tables or matrices.
@@ -70,6 +71,9 @@ def read_poses(file: FilePath, reading: Reading) -> Mapping[str, PoseRows]:
         The file cannot be read, holds no poses, or a pose lacks something; it is named.
     """
     document = read_values(file)
+    peers = compas_poses(file, document)
+    if peers is not None:
+        return peers
     beside = dict[str, Any]()
     found = _poses_in(document, beside)
     if found is None:
@@ -239,8 +243,15 @@ def _number(file: FilePath, where: str, value: Any) -> float:
 
 # Tool motions from files: tables, arrays, what ROS writes, programs of machine tools, drawings.
 
+
+def _read_table(file: FilePath, reading: Reading) -> Mapping[str, PoseRows]:
+    peers = None if reading.columns else peer_table(file)
+    return READERS[file.suffix.lower()](file, reading) if peers is None else peers
+
+
 _READERS: Mapping[str, Callable[[FilePath, Reading], Mapping[str, PoseRows]]] = {
     **READERS,
+    **dict.fromkeys(TABLES, _read_table),
     **READ,
     **dict.fromkeys(PROGRAMS, read_gcode),
     **dict.fromkeys(CLDATA, lambda file, reading: read_cldata(file, reading.unit)),
@@ -299,6 +310,8 @@ def read_path(
     - ``.yaml .json``: ROS ``nav_msgs/Path``, ``geometry_msgs/PoseArray``, or poses in a list or by
       names (``waypoints``, ``poses``, parameters of a node): ``position`` and ``orientation``,
       columns of a table by name, or 4 × 4 matrices
+    - tables of IRBCAM, igus and of motion primitives, frames of compas and print points of
+      compas_slicer, by their titles; what their numbers mean is in a note
     - ``.nc .ngc .gcode .tap .cnc .eia .mpf .g .gc .gco``: G-code of up to five axes, below
     - ``.apt .aptsource .cls .clsf .cl .ncl``: APT, cutter location data, below
     - ``.dxf``: a drawing, below; with ``pip install 'selfmotion[dxf]'``
