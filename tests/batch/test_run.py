@@ -505,3 +505,21 @@ def test_settings_are_told_apart_by_what_they_hold() -> None:
     assert len(set(keys)) == len(keys)
     assert key(search=search(1)) == keys[1]
     assert key(optimizer=Own(max_iterations=3)) == keys[3]
+
+
+def test_a_file_that_cannot_be_read_is_a_row_and_rows_are_json(grid: Path, tmp_path: Path) -> None:
+    torn = tmp_path / "torn.toml"
+    torn.write_text("task = \n")
+    assert "is not TOML" in complaint("batch", torn, "--out", tmp_path / "one")
+    one = tmp_path / "one.toml"
+    one.write_text(GRID.partition("[grid]")[0])
+    code, text = invoke("batch", one, torn, "--out", tmp_path / "out", "--json", "--workers", "1")
+    assert code == 1
+
+    def refuse(word: str) -> None:
+        raise AssertionError(f"{word} is no JSON")
+
+    rows = {row["name"]: row for row in json.loads(text, parse_constant=refuse)["rows"]}
+    assert rows["one"]["verified"]
+    assert "is not TOML" in rows["torn"]["error"]
+    assert rows["torn"]["aim"] is None

@@ -13,7 +13,7 @@ from selfmotion.certificate import FinishedMotion, JointLimits
 from selfmotion.robot import Dynamics
 from support.arms import PANDA_HOME, robot_named, short_line
 from support.circles import upright_circle
-from support.files_of_people import finger
+from support.files_of_people import arm, finger
 from support.places import ROOT
 
 Circle = Callable[..., sm.Problem]
@@ -328,3 +328,12 @@ def test_torques_that_bind_all_over_are_kept_between_nodes() -> None:
     plan = sm.plan(problem.changed(constraints=[asked])).require()
     share = np.abs(torques(*(plan.trajectory(t, order) for order in range(3)))) / limit
     assert 0.98 < share[:, 0].max() <= 1.0
+
+
+def test_a_joint_that_does_not_move_is_to_be_held(tmp_path: Path) -> None:
+    text = re.sub(r'lower="-2.8" upper="2.8"', 'lower="0.3" upper="0.3"', arm(), count=1)
+    (tmp_path / "arm.urdf").write_text(text)
+    robot = sm.load_robot(tmp_path / "arm.urdf")
+    with pytest.raises(sm.errors.ProblemError, match=r"lower = upper = 0.3.*lock = .'j1': 0.3"):
+        sm.constraints.JointPositionLimits().limits(robot)
+    assert sm.load_robot(tmp_path / "arm.urdf", lock={"j1": 0.3}).dof == 6

@@ -1,6 +1,9 @@
 """A program makes every seam once, keeps everything at all times, and is the best that is known."""
 
 import itertools
+import os
+import signal
+import sys
 from collections.abc import Iterator
 from concurrent.futures import Executor, Future, ProcessPoolExecutor
 from contextlib import nullcontext
@@ -517,3 +520,41 @@ def test_progress_tells_what_each_stage_is_about(program) -> None:
     names = [step.name for step in program.steps if not step.is_seam]
     assert {f"move '{name}'" for name in names} <= set(stages)
     assert all(1 <= done <= total for _, done, total in told)
+
+
+def test_ends_of_a_job_are_looked_at_before_anything_is_planned(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def planned(*_: object, **__: object) -> None:
+        raise AssertionError("something was planned")
+
+    monkeypatch.setattr(work, "branches", planned)
+    panda, seams = robot_named("panda"), row_of_seams(1)
+    beyond, met = HOME.copy(), HOME.copy()
+    beyond[3] = -90.0
+    met[1], met[3] = 1.7, -0.1
+    floor = sm.obstacles.Box("floor", [0.0, 0.0, -0.06], [3.0, 3.0, 0.1])
+    clearance = sm.constraints.Clearance([floor])
+    for name, end, said in (
+        ("start", beyond, r"'panda_joint4' is at -90 rad .*allowed.*are these degrees"),
+        ("end", met, "floor"),
+    ):
+        with pytest.raises(sm.errors.ProblemError, match=rf"panda: the job's {name}: .*{said}"):
+            sm.plan_job(panda, seams, clearance=clearance, **{name: end})
+
+
+def test_an_interrupted_seam_stops_the_job(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whatever a plan had found when Ctrl-C was pressed: the job does not go on with it."""
+    module = sys.modules["selfmotion.planning.branches"]
+    made = module.plan
+
+    def pressed(*given: object, **options: object) -> sm.Plan:
+        found = made(*given, **options)
+        # After all was done, and the report says so.
+        os.kill(os.getpid(), signal.SIGINT)
+        return found
+
+    monkeypatch.setattr(module, "plan", pressed)
+    with pytest.raises(KeyboardInterrupt):
+        sm.plan_job(robot_named("panda"), row_of_seams(1), branches=1)
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler

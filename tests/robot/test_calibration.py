@@ -228,7 +228,7 @@ def test_calibrations_from_the_shell(tmp_path: Path) -> None:
 BAD: Mapping[str, tuple[str, str]] = {
     "nothing.yaml": ("{}", "has nothing"),
     "list.yaml": ("[1, 2]", "expected a table"),
-    "torn.yaml": ("a: [", "cannot be read"),
+    "torn.yaml": ("a: [", "is not YAML"),
     "other.toml": ("[limits]\na = 1\n", "'limits'"),
     "frame.yaml": ("kinematics: {shoulder: {x: 0}}", "shoulder: y is None"),
     "fewer.yaml": ("kinematics: {}", "no frame 'shoulder'"),
@@ -263,3 +263,10 @@ def test_calibrations_of_another_arm_are_refused(tmp_path: Path) -> None:
         sm.load_robot({"arm": "ur5"}, calibration=file)
     with pytest.raises(sm.errors.RobotError, match="cannot be read"):
         sm.load_robot("ur5", calibration=tmp_path / "nowhere.yaml")
+
+
+def test_a_joint_is_not_given_twice(tmp_path: Path) -> None:
+    file = tmp_path / "twice.yaml"
+    file.write_text("offsets:\n  panda_joint2: 0.002\n  panda_joint2: 0.003\n")
+    with pytest.raises(sm.errors.RobotError, match="key 'panda_joint2' is given twice"):
+        sm.load_robot("panda", calibration=file)

@@ -146,3 +146,16 @@ def test_an_arm_without_masses_is_refused(panda: sm.RobotModel, tmp_path: Path) 
     robot = sm.load_robot(tmp_path / "bare.urdf", tool=panda.tool)
     with pytest.raises(sm.errors.ProblemError, match="gives no masses"):
         upright_circle(robot, constraints=[sm.constraints.JointTorqueLimits()])
+
+
+def test_inertias_of_products_and_of_rods_are_taken() -> None:
+    """R I Rᵀ is symmetric up to rounding, and a rod's least moment 0 up to it."""
+    from scipy.spatial.transform import Rotation
+
+    rng, robot = np.random.default_rng(0), robot_named("panda")
+    for turn in Rotation.random(20, rng=rng).as_matrix():
+        for moments in ([0.0, 0.02, 0.02], rng.uniform(0.01, 0.02, 3)):
+            Dynamics(robot, 1.0, inertia=turn @ np.diag(moments) @ turn.T)
+    for wrong in (np.diag([0.02, 0.02, -1e-6]), [[0.02, 1e-6, 0], [0, 0.02, 0], [0, 0, 0.02]]):
+        with pytest.raises(sm.errors.ProblemError, match="is not symmetric with moments"):
+            Dynamics(robot, 1.0, inertia=wrong)

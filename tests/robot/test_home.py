@@ -16,6 +16,15 @@ def test_home_is_within_limits_and_meets_nothing(name: str) -> None:
     assert sm.obstacles.CollisionModel(robot).worst(robot.home[None]).value > 0.0
 
 
+def test_a_pose_can_be_held_and_left_at_the_home_of_an_arm_of_seven_joints() -> None:
+    """Away from singular poses, which zeros of all joints are for an xArm."""
+    for name in ("panda", "xarm7"):
+        robot = sm.load_robot(name)
+        assert np.linalg.svd(robot.jacobian(robot.home), compute_uv=False).min() > 0.1
+    circle = sm.paths.Circle.around(robot.pose(robot.home), 0.03, 2.0)
+    assert sm.plan(sm.Problem(robot, circle, start=robot.home)).certificate.verified
+
+
 def test_home_of_a_cell_is_that_of_its_parts() -> None:
     table = np.eye(4)
     table[0, 3] = 0.9

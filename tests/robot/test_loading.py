@@ -20,7 +20,6 @@ PLANAR = Path(sm.load_robot("planar_3r").urdf.source)
         ('<mass value="4"/>', '<mass value="-4"/>', r"link 'link1' has a negative mass"),
         ('<child link="link2"/>', '<child link="link1"/>', r"link 'link1' has two parents"),
         ('<child link="link3"/>', '<child link="link9"/>', r"link 'link9', which does not exist"),
-        ('type="revolute"', 'type="planar"', r"joint 'joint1' is planar"),
         ('type="revolute"', 'type="hinge"', r"joint 'joint1' has type 'hinge'"),
         ('name="joint2"', 'name="joint1"', r"joint name 'joint1' is used more than once"),
         ("</robot>", "", r"not well-formed XML"),

@@ -208,8 +208,6 @@ LIMIT = '<limit lower="-1" upper="1" velocity="1" effort="1"/>'
 @pytest.mark.parametrize(
     ("link", "limit", "message"),
     [
-        ("b", LIMIT.replace(' velocity="1"', ""), "joint 'j' has a <limit> without velocity"),
-        ("b", LIMIT.replace(' effort="1"', ""), "joint 'j' has a <limit> without effort"),
         (
             "b",
             LIMIT.replace('"-1"', '"-inf"'),

@@ -6,6 +6,7 @@ import json
 import marshal
 import math
 import os
+import stat
 import tempfile
 import zipfile
 from collections.abc import Callable, Mapping, Sequence
@@ -43,25 +44,31 @@ def is_folder(path: Path) -> bool:
 def write_atomically(file: Path, write: Callable[[IO[bytes]], object]) -> None:
     """Let `write` fill a temporary file beside `file`, then put it in place.
 
+    A symbolic link stays, and what it leads to is written; a file keeps its mode.
+
     Raises
     ------
     FileFormatError
         The folder cannot be written to.
     """
     try:
-        file.parent.mkdir(parents=True, exist_ok=True)
-        handle, name = tempfile.mkstemp(dir=file.parent, prefix=f".{file.name}.")
+        place = Path(os.path.realpath(file)) if file.is_symlink() else file
+        place.parent.mkdir(parents=True, exist_ok=True)
+        mode = stat.S_IMODE(place.stat().st_mode) if place.exists() else None
+        handle, name = tempfile.mkstemp(dir=place.parent, prefix=f".{place.name}.")
     except OSError as error:
         raise FileFormatError(f"{file}: cannot be written: {error}") from error
     temporary = Path(name)
     try:
         with os.fdopen(handle, "wb") as stream:
             write(stream)
-        # mkstemp makes the file private; give it what a newly created file would have.
-        mask = os.umask(0)
-        os.umask(mask)
-        temporary.chmod(0o666 & ~mask)
-        temporary.replace(file)
+        if mode is None:
+            # mkstemp makes the file private; give it what a newly created file would have.
+            mask = os.umask(0)
+            os.umask(mask)
+            mode = 0o666 & ~mask
+        temporary.chmod(mode)
+        temporary.replace(place)
     except OSError as error:
         raise FileFormatError(f"{file}: cannot be written: {error}") from error
     finally:

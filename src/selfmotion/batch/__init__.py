@@ -1,6 +1,11 @@
 """Many problems at once: on the cores of this machine, or on a cluster."""
 
-from selfmotion.batch.items import Item as Item, Row as Row, grid_items as grid_items
+from selfmotion.batch.items import (
+    Item as Item,
+    Row as Row,
+    grid_items as grid_items,
+    unread_item as unread_item,
+)
 from selfmotion.batch.maps import labels as labels, maps as maps
 from selfmotion.batch.run import (
     Batch as Batch,

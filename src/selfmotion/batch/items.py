@@ -102,6 +102,15 @@ def grid_items(file: Path, *, allow_code: bool = False) -> list[Item]:
     ]
 
 
+def unread_item(file: Path, error: SelfmotionError) -> Item:
+    """Return the item of a file that cannot be read: its row says why."""
+
+    def fails() -> Job:
+        raise error
+
+    return Item(file.stem, fails, {}, file)
+
+
 def problem_items(problems: list[Problem | Job], options: Mapping[str, Any]) -> list[Item]:
     """Return an item for each problem; ProblemError for what is none."""
     for name in options:

@@ -243,6 +243,8 @@ def _drawn(file: FilePath, drawing: Any) -> Iterator[tuple[str | None, str, Any]
 
     Blocks are what they are made of, where they are put; of that what is on layer 0 is on theirs.
     """
+    from ezdxf.lldxf.const import DXFError
+
     several = [
         (_visible_layer(drawing, item), _place(item), item, 0) for item in drawing.modelspace()
     ][::-1]
@@ -257,11 +259,25 @@ def _drawn(file: FilePath, drawing: Any) -> Iterator[tuple[str | None, str, Any]
                 f"{file}: layer '{layer}': {place} puts a block that the drawing does not have; "
                 f"delete it in CAD, or switch its layer off"
             )
-        inner = list[tuple[str | None, str, Any, int]]()
-        for one in entity.multi_insert() if entity.mcount > 1 else [entity]:
-            for part in one.virtual_entities():
-                own = layer if part.dxf.layer == "0" else _visible_layer(drawing, part)
-                inner.append((own, place, part, depth + 1))
+        if entity.dxf.zscale == 0.0:
+            # Programs for flat drawings write it.
+            entity.dxf.zscale = 1.0
+        try:
+            inner = [
+                (
+                    layer if part.dxf.layer == "0" else _visible_layer(drawing, part),
+                    place,
+                    part,
+                    depth + 1,
+                )
+                for one in (entity.multi_insert() if entity.mcount > 1 else [entity])
+                for part in one.virtual_entities()
+            ]
+        except (DXFError, *_SPOILT) as error:
+            raise FileFormatError(
+                f"{file}: layer '{layer}': {place} cannot be drawn ({_line(error)}): explode it in "
+                f"CAD, or switch its layer off"
+            ) from error
         count += len(inner)
         if count > _PARTS or depth > _DEEPEST:
             raise FileFormatError(

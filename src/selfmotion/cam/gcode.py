@@ -21,7 +21,14 @@ from selfmotion.cam.cuts import (
     drill,
     unit_axis,
 )
-from selfmotion.cam.gcode_words import bare_line, extrudes, lifts, values_of, words_of
+from selfmotion.cam.gcode_words import (
+    bare_line,
+    extrudes,
+    lifts,
+    says_axis,
+    values_of,
+    words_of,
+)
 from selfmotion.cam.path_rows import PoseRows, Reading
 from selfmotion.cam.rotary import HEAD, Rotary
 
@@ -165,6 +172,8 @@ class _Reader:
         for code in codes:
             if code not in switched:
                 self._mode(code)
+        if says_axis(line) and self._motion > 1 and not self._cycle:
+            raise machine.fault("the tool turns along an arc (A3, B3, C3), which is not read")
         if "R" in values and self._motion < 2 and not self._cycle:
             raise machine.fault("R is read of arcs only (G2, G3)")
         if "T" in values:

@@ -14,6 +14,10 @@ _EXTRUDES = re.compile(r"G0*[0-3](?![0-9.]).*E[+-]?[0-9.]")
 _ON_ITS_WAY = re.compile(r"[XYZ].*E[+-]?[0-9.]|E[+-]?[0-9.].*[XYZ]")
 # A word Z.
 _LIFTS = re.compile(r"Z\s*=?\s*[-+.0-9#\[]")
+# Words of Siemens' controls → what they are called here: the tool's axis, and its tip in the part.
+_SIEMENS = {"A3": "I", "B3": "J", "C3": "K"}
+_AXIS = re.compile(r"\b([ABC]3)\s*=")
+_TIP = (("TRAORI", "G43.4"), ("TRAFOOF", "G49"))
 _LINE = 1000
 # The letters that are read, and those that change nothing here.
 _LETTERS = "XYZABCIJKRFE" + "NSTHDOPQL"
@@ -39,7 +43,19 @@ def bare_line(line: str, machine: Machine) -> str:
     text = _without_comments(line.upper())
     if text.startswith("/"):
         machine.note("lines that may be skipped (/) are read")
-    return text.lstrip("/").strip()
+    return _translated(text.lstrip("/").strip())
+
+
+def says_axis(line: str) -> bool:
+    """Return whether a line says the tool's axis by words of Siemens' controls."""
+    return _AXIS.search(line.upper()) is not None
+
+
+def _translated(text: str) -> str:
+    """Return a line with words of Siemens' controls as they are called here."""
+    for word, code in _TIP:
+        text = re.sub(rf"\b{word}\b", code, text)
+    return _AXIS.sub(lambda found: f" {_SIEMENS[found[1]]}=", text)
 
 
 def words_of(text: str, machine: Machine) -> list[tuple[str, str]]:

@@ -37,6 +37,7 @@ from selfmotion.cam.path_rows import (
     no_such_seam,
     rows_of_table,
 )
+from selfmotion.cam.peers import compas_poses, peer_table
 from selfmotion.path import Path
 
 # Poses as configurations of robots hold them: lists and names, of tables or matrices.
@@ -70,6 +71,9 @@ def read_poses(file: FilePath, reading: Reading) -> Mapping[str, PoseRows]:
         The file cannot be read, holds no poses, or a pose lacks something; it is named.
     """
     document = read_values(file)
+    peers = compas_poses(file, document)
+    if peers is not None:
+        return peers
     beside = dict[str, Any]()
     found = _poses_in(document, beside)
     if found is None:
@@ -239,11 +243,30 @@ def _number(file: FilePath, where: str, value: Any) -> float:
 
 # Tool motions from files: tables, arrays, what ROS writes, programs of machine tools, drawings.
 
+
+def _read_table(file: FilePath, reading: Reading) -> Mapping[str, PoseRows]:
+    peers = None if reading.columns else peer_table(file)
+    return READERS[file.suffix.lower()](file, reading) if peers is None else peers
+
+
 _READERS: Mapping[str, Callable[[FilePath, Reading], Mapping[str, PoseRows]]] = {
     **READERS,
+    **dict.fromkeys(TABLES, _read_table),
     **READ,
     **dict.fromkeys(PROGRAMS, read_gcode),
     **dict.fromkeys(CLDATA, lambda file, reading: read_cldata(file, reading.unit)),
+}
+# Programs of robots, which are no paths.
+_CONTROLLERS = {
+    ".mod": "ABB",
+    ".prg": "ABB",
+    ".src": "KUKA",
+    ".dat": "KUKA",
+    ".script": "Universal Robots",
+    ".urscript": "Universal Robots",
+    ".ls": "Fanuc",
+    ".tp": "Fanuc",
+    ".jbi": "Yaskawa",
 }
 # Of files that can be nothing but a path.
 PATH_SUFFIXES = (*TABLES, *PROGRAMS, *CLDATA, DRAWING)
@@ -287,6 +310,8 @@ def read_path(
     - ``.yaml .json``: ROS ``nav_msgs/Path``, ``geometry_msgs/PoseArray``, or poses in a list or by
       names (``waypoints``, ``poses``, parameters of a node): ``position`` and ``orientation``,
       columns of a table by name, or 4 × 4 matrices
+    - tables of IRBCAM, igus and of motion primitives, frames of compas and print points of
+      compas_slicer, by their titles; what their numbers mean is in a note
     - ``.nc .ngc .gcode .tap .cnc .eia .mpf .g .gc .gco``: G-code of up to five axes, below
     - ``.apt .aptsource .cls .clsf .cl .ncl``: APT, cutter location data, below
     - ``.dxf``: a drawing, below; with ``pip install 'selfmotion[dxf]'``
@@ -460,6 +485,13 @@ def _read(path: FilePath, seam: str | None, reading: Reading) -> Mapping[str, Po
     reader = _READERS.get(suffix)
     if reader is None:
         known = ", ".join((*_READERS, DRAWING))
+        if suffix in _CONTROLLERS:
+            raise FileFormatError(
+                f"{path}: is a program of a robot ({_CONTROLLERS[suffix]}): as a path it is not "
+                f"read. One that selfmotion wrote is judged by `selfmotion check`; of another one "
+                f"write its targets as a table (x_mm,y_mm,z_mm and qw,qx,qy,qz or "
+                f"roll_deg,pitch_deg,yaw_deg; feed_mm), or as G-code"
+            )
         raise FileFormatError(f"{path}: has suffix '{path.suffix}', expected one of {known}")
     return reader(path, reading)
 

@@ -1,10 +1,11 @@
 """The command line: where commands are registered, what shows how far they are, how they end."""
 
+import math
 import sys
 import threading
 import time
 import traceback
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from concurrent.futures import Executor
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Annotated, Any, Self
@@ -303,6 +304,19 @@ def main() -> None:
         traceback.print_exc()
         complain("selfmotion failed; this is a fault of the program, not of what it was given")
         sys.exit(FAILED)
+
+
+def print_json(data: Any) -> None:
+    """Print values as JSON, which has no infinite numbers: they are null."""
+    terminal.print_json(data=_finite(data), allow_nan=False)
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, Mapping):
+        return {key: _finite(item) for key, item in value.items()}
+    return [_finite(item) for item in value] if isinstance(value, list | tuple) else value
 
 
 def complain(text: str) -> None:

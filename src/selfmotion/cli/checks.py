@@ -13,7 +13,7 @@ from selfmotion import controllers
 from selfmotion.basics import Progress
 from selfmotion.certificate import Extreme, approaches
 from selfmotion.cli import options
-from selfmotion.cli.app import NOT_VERIFIED, VERIFIED, stages, terminal
+from selfmotion.cli.app import NOT_VERIFIED, VERIFIED, print_json, stages, terminal
 from selfmotion.documents import read_joint_limits
 from selfmotion.problem import KEPT, NO_OVERLAP
 
@@ -241,7 +241,7 @@ def of_program(
             "failures": list(found.failures),
             "steps": [step._asdict() for step in steps],
         }
-        terminal.print_json(data=data)
+        print_json(data)
     else:
         for step in steps if verbose else [step for step in steps if not step.verified]:
             style = None if step.verified else "bold red"

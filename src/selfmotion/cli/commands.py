@@ -10,7 +10,7 @@ import typer
 
 import selfmotion as sm
 from selfmotion import controllers
-from selfmotion.basics import write_text
+from selfmotion.basics import held_interruption, write_text
 from selfmotion.cli import checks, documents, jobs, options, outputs, summaries, tables
 from selfmotion.cli.app import (
     FILES,
@@ -22,6 +22,7 @@ from selfmotion.cli.app import (
     app,
     fastest_with_progress,
     plan_with_progress,
+    print_json,
     stages,
     terminal,
 )
@@ -50,8 +51,9 @@ def plan(
     as_json: options.JsonOption = False,
 ) -> None:
     """Plan a motion, check it, and write it."""
-    warm_start = None if warm is None else sm.load_plan(warm)
-    job = documents.read(context, problem, settings or [], allow_code, warm_start)
+    with held_interruption():
+        warm_start = None if warm is None else sm.load_plan(warm)
+        job = documents.read(context, problem, settings or [], allow_code, warm_start)
     outputs.check_own(job.outputs, problem, force)
     if job.goal != "parts":
         outputs.check_suffixes([*job.outputs, *(out or [])])
@@ -97,6 +99,7 @@ def init(
         typer.Option("--positioner", help="Write a cell that has a table that tilts and turns."),
     ] = False,
     no_collision: options.NoCollisionOption = False,
+    srdf: options.SrdfOption = None,
     force: Annotated[bool, typer.Option("--force", help="Overwrite a file.")] = False,
 ) -> None:
     """Write a commented problem file to begin with; for an arm from a file it is tried first."""
@@ -113,6 +116,7 @@ def init(
         arguments=options.arguments(argument),
         packages=packages or (),
         clearance=not no_collision,
+        srdf=srdf,
     )
     text = next(texts) if robot in sm.NAMED_ARMS else documents.first_that_runs(texts, file, job)
     write_text(file, text)
@@ -232,7 +236,7 @@ def check(
             near = checks.near(arm, motion, asked)
     if as_json:
         data = summaries.certificate_json(certificate, near)
-        terminal.print_json(data=data | checks.left_to_controller(program))
+        print_json(data | checks.left_to_controller(program))
     else:
         outputs.show_certificate(certificate, near, arm, verbose)
         checks.tell_of_controller(program)
@@ -259,7 +263,7 @@ def compare(
         told = {name: summaries.plan_json(plan) for name, plan in saved.items()}
         for number, data in enumerate(told.values() if cost else ()):
             data["measured"] = {name: each[number] for name, each in found.costs.items()}
-        terminal.print_json(data=told)
+        print_json(told)
     else:
         tables.show_comparison(found, terminal)
 

@@ -8,7 +8,16 @@ import typer
 import selfmotion as sm
 from selfmotion import controllers
 from selfmotion.cli import jobs, options, outputs, reread
-from selfmotion.cli.app import FILES, NOT_VERIFIED, VERIFIED, StageDisplay, app, stages, terminal
+from selfmotion.cli.app import (
+    FILES,
+    NOT_VERIFIED,
+    VERIFIED,
+    StageDisplay,
+    app,
+    print_json,
+    stages,
+    terminal,
+)
 from selfmotion.controllers import FORMS
 from selfmotion.result import is_move
 
@@ -171,7 +180,7 @@ def _check_verified(made: reread.Made, force: bool, as_json: bool) -> None:
     else:
         verdict = made.certificate.verdict if isinstance(made, sm.Plan) else made.verdict
     if as_json:
-        terminal.print_json(data={"verified": False, "written": {}, "verdict": verdict})
+        print_json({"verified": False, "written": {}, "verdict": verdict})
     else:
         text = f"nothing is written: {verdict}; --force writes it all the same"
         terminal.print(text, markup=False, soft_wrap=True)
@@ -193,7 +202,7 @@ def _finish(
         miss = controllers.linear_miss(made, rate)
     if as_json:
         data: dict[str, Any] = {"verified": sound, "written": verdicts}
-        terminal.print_json(data=data if miss is None else data | {"linear_miss": miss._asdict()})
+        print_json(data if miss is None else data | {"linear_miss": miss._asdict()})
         raise typer.Exit(VERIFIED if sound else NOT_VERIFIED)
     for name, verdict in verdicts.items():
         terminal.print(f"wrote {name}{verdict and '; '}{verdict}", markup=False, soft_wrap=True)

@@ -8,7 +8,7 @@ from typing import Annotated, Any, NoReturn
 import typer
 
 import selfmotion as sm
-from selfmotion import controllers
+from selfmotion import basics, controllers
 from selfmotion.cli import (
     documents,
     options,
@@ -25,6 +25,7 @@ from selfmotion.cli.app import (
     check_cluster,
     complain,
     executor_at,
+    print_json,
     stages,
     terminal,
 )
@@ -80,18 +81,22 @@ def job(
         raise sm.errors.ProblemError(
             "--settings has no effect: it is of controllers' programs (--out .script, .src, .mod)"
         )
-    work = documents.seams_of_file(file, changes or [], allow_code)
-    earlier = None if before is None else sm.load_program(before)
-    asked = None if settings is None else sm.files.read_program_settings(settings)
-    if asked is not None or any(_switches(target) for target in wanted):
-        # Before anything is planned.
-        happens = {event: seam.name for seam in work.seams for event, _ in seam.events}
-        controllers.check_signals(happens, asked or sm.files.ProgramSettings())
-        for target in wanted:
-            if target.suffix.lower() in controllers.PROGRAMS:
-                form = controllers.PROGRAMS[target.suffix.lower()]
-                controllers.check_controller(work.robot, form, asked or sm.files.ProgramSettings())
-    remarks = work.remarks
+    # Ctrl-C while kernels are loaded is lost, unless it is noted.
+    with basics.held_interruption():
+        work = documents.seams_of_file(file, changes or [], allow_code)
+        earlier = None if before is None else sm.load_program(before)
+        asked = None if settings is None else sm.files.read_program_settings(settings)
+        if asked is not None or any(_switches(target) for target in wanted):
+            # Before anything is planned.
+            happens = {event: seam.name for seam in work.seams for event, _ in seam.events}
+            controllers.check_signals(happens, asked or sm.files.ProgramSettings())
+            for target in wanted:
+                if target.suffix.lower() in controllers.PROGRAMS:
+                    form = controllers.PROGRAMS[target.suffix.lower()]
+                    controllers.check_controller(
+                        work.robot, form, asked or sm.files.ProgramSettings()
+                    )
+        remarks = work.remarks
     outputs.tell(remarks)
     kept = folder or Path("out") / f"{file.stem}.job"
     here: Any = processes(workers) if workers > 1 else nullcontext()
@@ -197,7 +202,7 @@ def finish_parts(job: sm.files.Job, out: list[Path], as_json: bool, verbose: boo
 def _show(program: sm.Program, as_json: bool, verbose: bool, remarks: Sequence[str] = ()) -> None:
     if as_json:
         data = summaries.program_json(program) | {"remarks": list(remarks)}
-        terminal.print_json(data=data)
+        print_json(data)
     else:
         (tables if verbose else summaries).show_program(program, terminal)
 
@@ -205,7 +210,7 @@ def _show(program: sm.Program, as_json: bool, verbose: bool, remarks: Sequence[s
 def _show_parts(parts: sm.Parts, as_json: bool, verbose: bool, remarks: Sequence[str] = ()) -> None:
     if as_json:
         data = {"verified": parts.verified, "verdict": parts.verdict, "cuts": list(parts.cuts)}
-        terminal.print_json(data=data | {"remarks": list(remarks)})
+        print_json(data | {"remarks": list(remarks)})
     else:
         terminal.print(repr(parts) if verbose else parts.summary, markup=False, soft_wrap=True)
 

@@ -20,6 +20,7 @@ from selfmotion.cli.app import (
     StageDisplay,
     app,
     plan_with_progress,
+    print_json,
     stages,
     terminal,
 )
@@ -102,7 +103,7 @@ def margin(
     if as_json:
         planned = {item.of: _plain(dataclasses.asdict(item)) for item in again}
         planned |= {of: {"refused": why} for of, why in refused.items()}
-        terminal.print_json(data=margins_json(found) | {"corrected": planned})
+        print_json(margins_json(found) | {"corrected": planned})
         return
     whys = (f"not planned again for another place of the {of}: {refused[of]}" for of in refused)
     for told in (found, *again, *whys):
@@ -174,7 +175,7 @@ def _margins_of_seams(
             display.stage(f"measuring margins of seam '{name}'", number, len(plans))
             found[name] = sm.margin(plan, within, **asked)
     if as_json:
-        terminal.print_json(data={"seams": {name: margins_json(it) for name, it in found.items()}})
+        print_json({"seams": {name: margins_json(it) for name, it in found.items()}})
         return
     for name, each in found.items():
         terminal.print(f"seam '{name}': {each}\n", markup=False, soft_wrap=True)

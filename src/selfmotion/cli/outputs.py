@@ -13,7 +13,7 @@ import selfmotion as sm
 from selfmotion import controllers
 from selfmotion.certificate import Extreme
 from selfmotion.cli import reread, summaries, tables
-from selfmotion.cli.app import NOT_VERIFIED, VERIFIED, stages, terminal
+from selfmotion.cli.app import NOT_VERIFIED, VERIFIED, print_json, stages, terminal
 from selfmotion.task import SE3, exp3
 
 # Options of commands that write programs of controllers.
@@ -196,7 +196,7 @@ def finish(
     """
     if as_json:
         data = summaries.plan_json(result) | {"remarks": list(remarks)}
-        terminal.print_json(data=data)
+        print_json(data)
     else:
         show(result, verbose)
     sound = write(result, out, html, terminal, quiet=as_json, whole=verbose)

@@ -27,6 +27,7 @@ from selfmotion.cli.app import (
     complain,
     executor_at,
     plan_with_progress,
+    print_json,
     stages,
     terminal,
 )
@@ -89,12 +90,21 @@ def batch(
 
     Exit code 0 if some combination of each file is verified.
     """
-    from selfmotion.batch import grid_items, plan_items
+    from selfmotion.batch import grid_items, plan_items, unread_item
 
     check_cluster(dask, workers)
-    several = [grid_items(file, allow_code=allow_code) for file in files]
+    several = list[list["Item"]]()
     for file in files:
-        if basics.read_document(file).get("outputs"):
+        try:
+            several.append(grid_items(file, allow_code=allow_code))
+            has_outputs = bool(basics.read_document(file).get("outputs"))
+        except sm.errors.FileFormatError as error:
+            # Of many files one that cannot be read is a row like others that cannot be planned.
+            if len(files) == 1:
+                raise
+            several.append([unread_item(file, error)])
+            continue
+        if has_outputs:
             _told_apart(f"note: {file}: outputs are left out: the plans of a batch go to '{out}'")
     items = [item for each in several for item in each]
     names = [item.name for item in items]
@@ -110,7 +120,7 @@ def batch(
         complain(f"stopped; what is finished is in '{out}': run again to go on")
         raise typer.Exit(NOT_VERIFIED) from None
     if as_json:
-        terminal.print_json(data=summaries.batch_json(result))
+        print_json(summaries.batch_json(result))
     else:
         tables.show_batch(result, terminal)
     verified = {row.name for row in result.rows if row.verified}
@@ -127,7 +137,7 @@ def robots(as_json: options.JsonOption = False) -> None:
     """List the arms known by name: joints, tool frame, and redundancy for each task."""
     arms = {name: sm.load_robot(name) for name in sm.NAMED_ARMS}
     if as_json:
-        terminal.print_json(data=summaries.robots_json(arms))
+        print_json(summaries.robots_json(arms))
     else:
         tables.show_robots(arms, terminal)
 
@@ -232,7 +242,7 @@ def follow(
         except KeyboardInterrupt:
             link.ended = "stopped"
     if as_json:
-        terminal.print_json(data=link.summary)
+        print_json(link.summary)
     else:
         following.show_link(link, terminal)
     raise typer.Exit(VERIFIED if link.is_followed else NOT_VERIFIED)

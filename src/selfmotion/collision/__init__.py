@@ -1,6 +1,10 @@
 """Collisions: exact distances for certificates, smooth conservative ones for optimisation."""
 
-from selfmotion.collision.bodies import link_bodies as link_bodies, place_of as place_of
+from selfmotion.collision.bodies import (
+    Body as Body,
+    link_bodies as link_bodies,
+    place_of as place_of,
+)
 from selfmotion.collision.clearance import (
     ClearanceModel as ClearanceModel,
     Clearances as Clearances,
@@ -21,6 +25,7 @@ from selfmotion.collision.obstacles import (
     obstacle_shapes as obstacle_shapes,
 )
 from selfmotion.collision.pairs import (
+    SAMPLES as SAMPLES,
     Closest as Closest,
     Overlap as Overlap,
     disabled_links as disabled_links,

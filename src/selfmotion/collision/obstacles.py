@@ -21,7 +21,7 @@ from selfmotion.basics import (
     read_only,
     shown,
 )
-from selfmotion.robot import UrdfShape
+from selfmotion.robot import UrdfShape, unit_of
 from selfmotion.task import SE3, as_pose
 
 # An obstacle so large, or so far away [m], may be one in millimetres.
@@ -360,7 +360,7 @@ class Mesh(Obstacle):
     file : Path
         STL, OBJ, DAE or PLY.
     scale : float
-        Metres per unit of the file.
+        Metres per unit of the file; Collada files say their unit themselves.
     """
 
     shape: ClassVar[str] = "mesh"
@@ -380,12 +380,22 @@ class Mesh(Obstacle):
         """See `Obstacle.files`."""
         return (self.file,)
 
+    def _metres(self) -> float:
+        """Return the metres of a unit of the file."""
+        unit = unit_of(self.file)
+        if unit != 1.0 and self.scale != 1.0:
+            raise CollisionError(
+                f"{self.label}: {self.file} says itself that its unit is {unit:g} m, and scale is "
+                f"{self.scale:g}: leave scale out"
+            )
+        return unit * self.scale
+
     def geometry(self) -> Any:
         """See `Obstacle.geometry`."""
         if not is_file(self.file):
             raise CollisionError(f"{self.label}: no such file: {self.file}")
         try:
-            found = coal.MeshLoader().load(str(self.file), np.full(3, self.scale))
+            found = coal.MeshLoader().load(str(self.file), np.full(3, self._metres()))
         except (RuntimeError, ValueError) as error:
             # What comes before is where in the source of coal it was found.
             reason = " ".join(str(error).rpartition("message:")[2].split())
@@ -401,6 +411,7 @@ class Mesh(Obstacle):
 
     def urdf_shapes(self) -> Sequence[UrdfShape]:
         """See `Obstacle.urdf_shapes`."""
+        self._metres()
         if is_file(self.file):
             # An arm carries nothing of that size either.
             self.geometry()

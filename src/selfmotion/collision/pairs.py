@@ -11,11 +11,11 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from selfmotion.basics import CollisionError
+from selfmotion.basics import CollisionError, RobotError
 from selfmotion.collision.bodies import Body, link_bodies
 from selfmotion.collision.distances import HullDistances, Ints
 from selfmotion.collision.pair_distances import MeshDistances
-from selfmotion.robot import RobotModel, Urdf, UrdfJoint, is_placement
+from selfmotion.robot import Packages, RobotModel, Urdf, UrdfJoint, expand, is_placement
 
 # Which pairs of bodies have to be checked.
 
@@ -140,16 +140,35 @@ def _rigid_parts(urdf: Urdf) -> dict[str, str]:
     return {link: first(link) for link in urdf.links}
 
 
-def disabled_links(srdf: str | Path) -> tuple[tuple[str, str], ...]:
+def disabled_links(
+    srdf: str | Path,
+    arguments: Mapping[str, str] | None = None,
+    packages: Sequence[str | Path] = (),
+) -> tuple[tuple[str, str], ...]:
     """Return the pairs of links whose collisions an SRDF disables.
+
+    Parameters
+    ----------
+    srdf : path
+        Also one that is xacro: it is expanded.
+    arguments : dict, optional
+        Those of the arm's own xacro; what the file does not declare is left out.
+    packages : sequence of path
+        Folders in which packages are looked for.
 
     Raises
     ------
     CollisionError
-        The SRDF cannot be read, or a pair of it is not complete.
+        The SRDF cannot be read, disables nothing, or a pair of it is not complete.
     """
+    file = Path(srdf)
     try:
-        root = ElementTree.parse(srdf).getroot()
+        root = ElementTree.parse(file).getroot()
+        if any("xacro" in tag.tag for tag in root.iter() if isinstance(tag.tag, str)):
+            near = Packages(file, tuple(map(str, packages)))
+            root = ElementTree.fromstring(expand(file, arguments or {}, near, of_others=True))
+    except RobotError as error:
+        raise CollisionError(str(error)) from error
     except OSError as error:
         raise CollisionError(f"{srdf}: SRDF cannot be read: {error.strerror or error}") from error
     except ElementTree.ParseError as error:
@@ -165,6 +184,11 @@ def disabled_links(srdf: str | Path) -> tuple[tuple[str, str], ...]:
                 f"two links"
             )
         pairs.append((first, second))
+    if not pairs:
+        raise CollisionError(
+            f"{srdf}: has no <disable_collisions>, the only thing that is read of an SRDF: leave "
+            f"it out, or give the file that has them"
+        )
     return tuple(pairs)
 
 

@@ -79,8 +79,15 @@ class JointPositionLimits(Constraint):
         wrong = np.flatnonzero(~(lower < upper))
         if wrong.size:
             k = int(wrong[0])
+            name = robot.joint_names[k]
+            if lower[k] == upper[k]:
+                raise ProblemError(
+                    f"{robot.name}: {LIMIT_NAMES[0]}: joint '{name}' has lower = upper = "
+                    f"{lower[k]:.6g}: it does not move; hold it there: lock = {{{name!r}: "
+                    f"{lower[k]:.6g}}} of the robot (--lock {name}={lower[k]:.6g})"
+                )
             raise ProblemError(
-                f"{robot.name}: {LIMIT_NAMES[0]}: joint '{robot.joint_names[k]}': lower "
+                f"{robot.name}: {LIMIT_NAMES[0]}: joint '{name}': lower "
                 f"{lower[k]:.6g} is not below upper {upper[k]:.6g}; the arm's own limits count as "
                 f"well, unless these replace them (replace = true)"
             )
@@ -354,6 +361,12 @@ class JointTorqueLimits(Constraint):
     def of(self, robot: RobotModel) -> Array:
         """Return the limits for an arm, (n,) [Nm or N]."""
         if self.limit is None:
+            unsaid = [name for name in robot.joint_names if name in robot.urdf.lacking_efforts]
+            if unsaid:
+                raise ProblemError(
+                    f"{robot.name}: joint torque limits: joint '{unsaid[0]}' has a <limit> without "
+                    f"effort; add it to the URDF, or give limit = …"
+                )
             return robot.effort_limit
         what = f"{robot.name}: joint torque limits"
         return per_joint(self.limit, robot.dof, what, positive=True)

@@ -82,8 +82,10 @@ class ProgramReader:
                     method(self, found.groups())
                     break
             else:
+                is_own = any(note.startswith("selfmotion: ") for note in self.lines.notes)
+                other = "" if is_own else "selfmotion did not write this program, and "
                 raise self.lines.fault(
-                    f"'{text[:60]}' is not read: page 'Files' of the docs lists what is "
+                    f"'{text[:60]}' is not read: {other}page 'Files' of the docs lists what is "
                     f"(read_motion)"
                 )
         if self.state != "after":

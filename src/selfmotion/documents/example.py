@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from selfmotion.basics import Array, ProblemError
+from selfmotion.collision import SAMPLES, CollisionModel, disabled_links
 from selfmotion.path import Circle, Line, Path
 from selfmotion.robot import NAMED_ARMS, RobotModel, load_robot
 from selfmotion.task import SE3, Quaternion, Task
@@ -79,6 +80,37 @@ def _room(arm: RobotModel, task: Task, q: Array, way: Array) -> float:
     return float(least)
 
 
+# Links that overlap as they are made: telescopes, bellows, what is built one into the other.
+
+# In so many configurations overlap is how links are made; in so many it is, where they overlap in
+# the pose in which the arm is drawn as well.
+_ALWAYS, _OFTEN = 0.95, 0.2
+
+
+def overlapping_as_made(
+    arm: RobotModel, disabled: Sequence[tuple[str, str]] = ()
+) -> dict[tuple[str, str], str]:
+    """Return the pairs of links that overlap in nearly all configurations, or as they are drawn.
+
+    With how often and how deep, in words. MoveIt's Setup Assistant calls them Always and Default.
+    """
+    if not arm.urdf.has_collisions:
+        return {}
+    model = CollisionModel(arm, (), disabled)
+    drawn = np.clip(np.zeros(arm.dof), arm.lower, arm.upper)
+    deep = {frozenset((near.first, near.second)): -near.value for near in model.touching(drawn)}
+    shares: dict[tuple[str, str], float] = {}
+    for pair, count in zip(model.pairs, model.overlap_counts()[0].tolist(), strict=True):
+        shares[pair] = max(count / SAMPLES, shares.get(pair, 0.0))
+    found = {}
+    for pair, share in shares.items():
+        depth = deep.get(frozenset(pair))
+        if share >= _ALWAYS or (depth is not None and share >= _OFTEN):
+            drawn_so = "" if depth is None else f", by {1e3 * depth:.1f} mm as they are drawn"
+            found[pair] = f"overlap in {100.0 * share:.0f} % of all configurations{drawn_so}"
+    return found
+
+
 # The problem files that ``selfmotion init`` writes.
 
 _HEAD = """\
@@ -88,7 +120,7 @@ _HEAD = """\
 # "#:schema ./problem.schema.json".
 
 task = "{task}"        # pose, position, pointing (rotation about the tool axis free), planar, …
-{start}{clearance}    # leaves self-collision out
+{start}{clearance}
 
 """
 _START = """\
@@ -259,6 +291,7 @@ def example_texts(
     arguments: Mapping[str, str] | None = None,
     packages: Sequence[str | FilePath] = (),
     clearance: bool = True,
+    srdf: str | FilePath | None = None,
 ) -> Iterator[str]:
     """Yield commented problem files to begin with, the one most likely to run first.
 
@@ -280,7 +313,10 @@ def example_texts(
     lock, arguments, packages : optional
         As of `load_robot`.
     clearance : bool
-        Whether the arm is kept from meeting itself.
+        Whether the arm is kept from meeting itself. Links that overlap as they are made are left
+        out, and listed in the file.
+    srdf : path, optional
+        A file that says which links are left out as well.
 
     Raises
     ------
@@ -307,7 +343,7 @@ def example_texts(
         "command": "job" if job else "plan",
         "task": task.value,
         "away": _AWAY * arm.reach,
-        "clearance": "# clearance = false" if clearance else "clearance = false  ",
+        "clearance": _clearance(arm, target, loaded, srdf, positioner) if clearance else _NONE,
     }
     is_free = named or positioner
     starts = [(_RADII[0], None)] if is_free else list(_starts(arm, task, job))
@@ -325,6 +361,37 @@ def example_texts(
         one, two = _places(arm, at, positioner)
         given |= {"one": one, "two": two, "begin": begin, "start": "" if job else start}
         yield whole.format(**given, radius=radius)
+
+
+_NONE = "clearance = false      # leaves self-collision out"
+
+
+def _clearance(
+    arm: RobotModel,
+    target: FilePath,
+    loaded: Mapping[str, Any],
+    srdf: str | FilePath | None,
+    in_cell: bool,
+) -> str:
+    """Return the lines of a file that say which links are kept apart."""
+    known = () if srdf is None else disabled_links(srdf, loaded["arguments"], loaded["packages"])
+    pairs = overlapping_as_made(arm, known)
+    if not pairs and srdf is None:
+        return "# clearance = false    # leaves self-collision out"
+    said = ["distance = 0"]
+    if srdf is not None:
+        beside = os.path.relpath(FilePath(srdf).resolve(), target.resolve().parent)
+        said.append(f"srdf = {_quoted(FilePath(beside).as_posix())}")
+    lines = []
+    if pairs:
+        part = "arm/" if in_cell else ""
+        listed = ", ".join(
+            f"[{_quoted(part + first)}, {_quoted(part + second)}]" for first, second in pairs
+        )
+        said.append(f"disabled = [{listed}]")
+        lines = [f"# {first} - {second}: {why}" for (first, second), why in pairs.items()]
+        lines.insert(0, "# Left out, as these links are made so:")
+    return "\n".join([*lines, f"clearance = {{ {', '.join(said)} }}    # false: none"])
 
 
 def _said_of_robot(

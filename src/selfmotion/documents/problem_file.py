@@ -23,6 +23,7 @@ from selfmotion.basics import (
     restore,
 )
 from selfmotion.certificate import Tolerance
+from selfmotion.collision import disabled_links
 from selfmotion.constraints import Clearance, Constraint
 from selfmotion.costs import Cost, FunctionCost
 from selfmotion.documents.joint_limits import read_joint_limits
@@ -370,7 +371,12 @@ class _Reader:
         given = dict(values)
         bodies = [self._obstacle(item) for item in given.pop("obstacles", [])]
         if "srdf" in given:
-            given["srdf"] = self._beside(given["srdf"])
+            # With what the arm's own xacro is given.
+            robot = self.table["robot"]
+            folders = [self._beside(name) for name in robot.get("packages", ())]
+            srdf = self._beside(given.pop("srdf"))
+            read = disabled_links(srdf, robot.get("arguments"), folders)
+            given["disabled"] = (*given.get("disabled", ()), *read)
         return Clearance(tuple(bodies), **given)
 
     def _obstacle(self, values: Mapping[str, Any]) -> Any:

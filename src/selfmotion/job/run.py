@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor
+from contextlib import nullcontext
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -17,14 +18,15 @@ from selfmotion.basics import (
     PlanError,
     ProblemError,
     Progress,
-    as_called,
     as_choice,
     as_number,
     as_path,
     as_several,
     as_whole,
     check_executor,
+    held_interruption,
     nearest,
+    obeying,
     shown,
     silent,
 )
@@ -41,6 +43,7 @@ from selfmotion.job.work import Asked, Work, check_can_be_sent, seam_steps
 from selfmotion.problem import KEPT, NO_OVERLAP, check_all_times, check_feeds
 from selfmotion.result import Move, arm_digest
 from selfmotion.robot import RobotModel
+from selfmotion.transfer import FreeMotions
 
 # From an order to a program: moves are planned, and the order again where they disappoint.
 
@@ -267,7 +270,7 @@ def plan_job(
         as_whole(rng, "rng", 0, 2**63),
     )
     check_executor(executor)
-    as_called(progress, "progress")
+    told = obeying(progress)
     for seam in sorted(listed, key=_slowest):
         check_feeds(f"seam '{seam.name}'", [seam.path], [*asked.constraints, *seam.constraints])
     is_free = as_choice(order, "order", ("free", "given")) == "free"
@@ -276,38 +279,46 @@ def plan_job(
             check_can_be_sent(seam.costs or ())
     ends = tuple(None if q is None else robot.configuration(q) for q in (start, end))
     price = as_number(seconds_per_cost, "seconds_per_cost", least=0.0)
-    shelf = Shelf(None if folder is None else as_path(folder), Tolerance(), {})
-    asked_for = Specification(
-        listed,
-        not is_free,
-        ends[0],
-        ends[1],
-        asked.constraints,
-        asked.clearance,
-        arm=arm_digest(robot),
-    )
-    earlier, changed, why = None, dict[str, str](), ""
-    if warm_start is not None:
-        check_earlier(warm_start, robot)
-        earlier = Earlier(warm_start)
-        work = Work(asked, shelf, executor, progress, earlier)
-        as_before = earlier.order_of(listed) if is_free else None
-        ordering = Ordering(as_before or listed, work, ends, price, is_free and not as_before)
-        changed = ordering.changed
-        for program in _kept_first(ordering, work, ends, is_free):
-            program = replace(program, specification=asked_for)
-            if program.verified:
-                return replace(program, kept=earlier.kept_in(program, changed, why))
-            why = why or program.summary
-    work = Work(asked, shelf, executor, progress)
-    ordering = Ordering(listed, work, ends, price, is_free)
-    if not ordering.states:
-        reasons = "".join(f"\n  '{name}': {why}" for name, why in ordering.missing.items())
-        raise PlanError(f"{robot.name}: no seam has a motion:{reasons}")
-    program = replace(Builder(ordering, work, ends).program(), specification=asked_for)
-    if earlier is None:
-        return program
-    return replace(program, kept=earlier.kept_in(program, changed, why))
+    moves = FreeMotions(robot, asked.of_moves(()), np.random.default_rng(0))
+    for name, q in zip(("start", "end"), ends, strict=True):
+        refused = "" if q is None else moves.refusal(q)
+        if refused:
+            raise ProblemError(f"{robot.name}: the job's {name}: {refused}")
+    # Processes and schedulers wait for Ctrl-C themselves.
+    held = nullcontext() if executor is not None else held_interruption()
+    with held:
+        shelf = Shelf(None if folder is None else as_path(folder), Tolerance(), {})
+        asked_for = Specification(
+            listed,
+            not is_free,
+            ends[0],
+            ends[1],
+            asked.constraints,
+            asked.clearance,
+            arm=arm_digest(robot),
+        )
+        earlier, changed, why = None, dict[str, str](), ""
+        if warm_start is not None:
+            check_earlier(warm_start, robot)
+            earlier = Earlier(warm_start)
+            work = Work(asked, shelf, executor, told, earlier)
+            as_before = earlier.order_of(listed) if is_free else None
+            ordering = Ordering(as_before or listed, work, ends, price, is_free and not as_before)
+            changed = ordering.changed
+            for program in _kept_first(ordering, work, ends, is_free):
+                program = replace(program, specification=asked_for)
+                if program.verified:
+                    return replace(program, kept=earlier.kept_in(program, changed, why))
+                why = why or program.summary
+        work = Work(asked, shelf, executor, told)
+        ordering = Ordering(listed, work, ends, price, is_free)
+        if not ordering.states:
+            reasons = "".join(f"\n  '{name}': {why}" for name, why in ordering.missing.items())
+            raise PlanError(f"{robot.name}: no seam has a motion:{reasons}")
+        program = replace(Builder(ordering, work, ends).program(), specification=asked_for)
+        if earlier is None:
+            return program
+        return replace(program, kept=earlier.kept_in(program, changed, why))
 
 
 def _kept_first(

@@ -16,7 +16,15 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from selfmotion.basics import Array, ProblemError, Progress, digest_of, one_blas_thread
+from selfmotion.basics import (
+    Array,
+    ProblemError,
+    Progress,
+    digest_of,
+    obeying,
+    one_blas_thread,
+    silent,
+)
 from selfmotion.collision import Obstacle
 from selfmotion.constraints import Clearance, Constraint
 from selfmotion.costs import FunctionCost
@@ -332,7 +340,7 @@ def _move_here(task: _Task) -> Move:
     first, last = task["ends"]
     generator = np.random.default_rng(task["seed"])
     with one_blas_thread():
-        free = FreeMotions(robot, constraints, generator)
+        free = FreeMotions(robot, constraints, generator, obeying(silent))
         return free.between(first, last, task["seconds"], task.get("way"))
 
 

@@ -1,10 +1,11 @@
 """Several motions along one path that begin in different configurations."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
-from selfmotion.basics import Array, Progress, SelfmotionError, silent
+from selfmotion.basics import Array, Progress, SelfmotionError, presses, silent
 from selfmotion.optimise import Status
 from selfmotion.planning.effort import Search
 from selfmotion.planning.grids import rough_grid
@@ -67,7 +68,7 @@ def branches(
     if found or allowed is not None:
         return found, "" if found else reason or _nowhere(allowed or problem)
     try:
-        made = _whole(plan(problem, search=Search(rng=rng), progress=progress))
+        made = _whole(lambda: plan(problem, search=Search(rng=rng), progress=progress))
     except SelfmotionError as error:
         return [], str(error)
     if made.certificate.verified:
@@ -90,7 +91,8 @@ def from_start(
     """
     given = replace(problem, start=start)
     try:
-        made = _whole(plan(given, warm_start=before, max_evaluations=_BRANCH_EVALUATIONS))
+        most = _BRANCH_EVALUATIONS
+        made = _whole(lambda: plan(given, warm_start=before, max_evaluations=most))
     except SelfmotionError as error:
         return None, str(error)
     if made.certificate.verified:
@@ -98,9 +100,11 @@ def from_start(
     return None, made.certificate.verdict
 
 
-def _whole(made: Plan) -> Plan:
-    """Return a plan unless it was interrupted: then KeyboardInterrupt goes on."""
-    if made.report.status is Status.INTERRUPTED:
+def _whole(make: Callable[[], Plan]) -> Plan:
+    """Make a plan; where it was interrupted KeyboardInterrupt goes on, whatever it found."""
+    pressed = presses()
+    made = make()
+    if presses() > pressed or made.report.status is Status.INTERRUPTED:
         raise KeyboardInterrupt
     return made
 

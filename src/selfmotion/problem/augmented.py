@@ -67,6 +67,11 @@ class AugmentedProblem(Problem):
             object.__setattr__(self, "start", read_only(start))
 
     @property
+    def _made(self) -> set[str]:
+        """See `Problem._made`: what is followed is given here."""
+        return super()._made - {"follows"}
+
+    @property
     def asked(self) -> Problem:
         """See `Problem.asked`."""
         return self._original

@@ -27,7 +27,7 @@ from selfmotion.constraints import (
     ToolLimits,
 )
 from selfmotion.costs import Cost, JointVelocity
-from selfmotion.follow import Follow, Follows, VirtualJoints
+from selfmotion.follow import AugmentedFollows, Follow, Follows, VirtualJoints
 from selfmotion.motion import FreeNullMotion, NullMotion
 from selfmotion.path import FeedPossible, Path, check_oriented, spread_along
 from selfmotion.robot import Chain, RobotModel
@@ -281,7 +281,7 @@ def check_fit(follows: Follows, relaxations: Sequence[Relaxation]) -> None:
     for item in follows.items:
         check_oriented(item.path, item.task)
     check_relaxations(relaxations, first.path, first.task)
-    _check_redundancy(follows, bool(relaxations))
+    _check_redundancy(follows, relaxations)
     for item in follows.items:
         reach = follows.robot.reach_of(item.chain)
         _check_units(follows.robot, item.path, reach)
@@ -337,12 +337,20 @@ def _prescribed(path: Path, task: Task) -> list[str]:
     return rows
 
 
-def _check_redundancy(follows: Follows, is_relaxed: bool) -> None:
-    robot, task = follows.robot, follows.items[0].task
+def _check_redundancy(follows: Follows, relaxations: Sequence[Relaxation]) -> None:
+    robot, task, is_relaxed = follows.robot, follows.items[0].task, bool(relaxations)
     if len(follows.items) > 1:
-        _check_several(follows, is_relaxed)
+        _check_several(follows, relaxations)
         return
-    if not robot.can_follow(task):
+    if not robot.can_follow(task) and not _can_with(follows, relaxations):
+        if is_relaxed:
+            raise ProblemError(
+                f"{robot.name}: task '{task.value}' prescribes {task.dimension} rows "
+                f"({', '.join(task.row_names)}), and the arm cannot move '{robot.tool}' in all of "
+                f"them with its {robot.dof} joints and what is relaxed "
+                f"({', '.join(row for item in relaxations for row in item.rows)}); relax other "
+                f"rows as well"
+            )
         others = _redundant_tasks(robot)
         choice = (
             f"choose another task ({', '.join(others)})"
@@ -352,7 +360,7 @@ def _check_redundancy(follows: Follows, is_relaxed: bool) -> None:
         raise ProblemError(
             f"{robot.name}: task '{task.value}' prescribes {task.dimension} rows "
             f"({', '.join(task.row_names)}), but the arm cannot move '{robot.tool}' freely in "
-            f"all of them; {choice}"
+            f"all of them; {choice}, or relax rows that it cannot move (relaxations=)"
         )
     if follows.redundancy == 0 and not is_relaxed:
         others = _redundant_tasks(robot)
@@ -366,7 +374,19 @@ def _check_redundancy(follows: Follows, is_relaxed: bool) -> None:
         )
 
 
-def _check_several(follows: Follows, is_relaxed: bool) -> None:
+def _can_with(follows: Follows, relaxations: Sequence[Relaxation]) -> bool:
+    """Return whether all rows can be moved when tolerances are joints, too."""
+    if not relaxations:
+        return False
+    item = follows.items[0]
+    if item.task is Task.PLANAR_POSE and not _moves_in_plane(follows.robot, item.chain):
+        return False
+    whole = AugmentedFollows.with_tolerances(follows, relaxations)
+    return whole.robot.dof - whole.redundancy >= whole.dimension
+
+
+def _check_several(follows: Follows, relaxations: Sequence[Relaxation]) -> None:
+    is_relaxed = bool(relaxations)
     robot, rows, left = follows.robot, follows.dimension, follows.redundancy
     what = " and ".join(f"'{item.chain.tip_name}'" for item in follows.items)
     for item in follows.items:
@@ -375,7 +395,7 @@ def _check_several(follows: Follows, is_relaxed: bool) -> None:
                 f"{robot.name}: task 'planar_pose' is for frames that move in the x-y plane only, "
                 f"which '{item.chain.tip_name}' does not; choose another one (Follow(task=))"
             )
-    if robot.dof - left < rows:
+    if robot.dof - left < rows and not _can_with(follows, relaxations):
         raise ProblemError(
             f"{robot.name}: {what} have {rows} rows prescribed ({', '.join(follows.row_names)}), "
             f"but {robot.dof} joints cannot move them freely in all of these; prescribe fewer "

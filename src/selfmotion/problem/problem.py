@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -198,6 +198,38 @@ class Problem:
 
     def __repr__(self) -> str:
         return f"Problem({self.robot.name}, {self.path!r}, task '{self.task.value}')"
+
+    def __copy__(self) -> Self:
+        found = object.__new__(type(self))
+        found.__dict__.update(self.__dict__)
+        return found
+
+    def __getstate__(self) -> tuple[dict[str, Any], bool, list[int]]:
+        # What follows from the rest is made anew: bodies as they are placed belong to a thread. The
+        # usual clearance and limits are told from such that somebody asks for by which they are.
+        kept = {name: item for name, item in self.__dict__.items() if name not in self._made}
+        usual = [
+            next((k for k, each in enumerate(KEPT) if each is item), -1)
+            for item in self.constraints
+        ]
+        return kept, self.clearance is NO_OVERLAP, usual
+
+    def __setstate__(self, state: tuple[dict[str, Any], bool, list[int]]) -> None:
+        kept, is_usual, usual = state
+        self.__dict__.update(kept)
+        if is_usual:
+            object.__setattr__(self, "clearance", NO_OVERLAP)
+        pairs = zip(self.constraints, usual, strict=True)
+        items = (KEPT[k] if k >= 0 else item for item, k in pairs)
+        object.__setattr__(self, "constraints", tuple(items))
+
+    @property
+    def _made(self) -> set[str]:
+        """The names of what is made of the rest when it is asked for."""
+        several = (vars(cls).items() for cls in type(self).__mro__)
+        return {
+            name for each in several for name, item in each if isinstance(item, cached_property)
+        }
 
     @cached_property
     def follows(self) -> Follows:

@@ -8,7 +8,7 @@ import numpy as np
 
 from selfmotion.basics import Array
 from selfmotion.certificate import Requirement
-from selfmotion.collision import Obstacle, Solid
+from selfmotion.collision import Body, Obstacle, Solid
 from selfmotion.constraints import (
     Constraint,
     Envelope,
@@ -73,6 +73,9 @@ def _depths(obstacle: Obstacle, places: Array) -> Array:
 _FAR_ABOVE = 10.0
 _RATES = {1: ("rad/s", 50.0), 2: ("rad/s²", 200.0), 3: ("rad/s³", 5e4)}
 _FASTEST_TOOL = 50.0
+# Meshes with more triangles than these take long; a link is no larger than so many times its arm,
+# or so many times this [m] if it is smaller.
+_MANY_TRIANGLES, _LARGE, _SMALL_ARM = 200_000, 5.0, 0.5
 # No process is as slow as this [m/s].
 _SLOWEST_FEED = 1e-4
 
@@ -100,6 +103,7 @@ def remarks_on(
                 f"m/s? Then it is feed = {1e3 * slow:g}, feed_mm = {1e6 * slow:g}"
             )
     for model, _ in envelope.bodies:
+        yield from _body_remarks(robot, model.every_body)
         for pair in model.overlapping:
             if pair.is_checked:
                 yield f"{pair.first} - {pair.second}: {pair.remedy}"
@@ -117,6 +121,24 @@ def remarks_on(
             )
     bodies = [body for item in requirements for body in item.obstacles]
     yield from inside_remarks(robot, follows, bodies)
+
+
+def _body_remarks(robot: RobotModel, bodies: Sequence[Body]) -> Iterator[str]:
+    """Yield meshes that take long, and links so large that their files are in other units."""
+    for body in bodies:
+        solid = body.solid
+        if solid.is_mesh and solid.geometry.num_tris > _MANY_TRIANGLES:
+            yield (
+                f"'{body.name}' has {solid.geometry.num_tris} triangles: reading them takes most "
+                f"of the time, and some GB of memory beyond a million; export it with "
+                f"{_MANY_TRIANGLES} or fewer"
+            )
+        size, reach = float((solid.high - solid.low).max()), robot.reach
+        if not body.is_obstacle and reach < np.inf and size > _LARGE * max(reach, _SMALL_ARM):
+            yield (
+                f"link '{body.name}' has a body {size:.3g} m long, and the arm reaches {reach:.3g} "
+                f'm; is its mesh in another unit? Then scale it (<mesh scale="0.001 0.001 0.001">)'
+            )
 
 
 def _unit_remarks(robot: RobotModel, constraints: Sequence[Constraint]) -> Iterator[str]:

@@ -17,6 +17,7 @@ from selfmotion.robot.chain import (
     null_space as null_space,
 )
 from selfmotion.robot.chain_series import ChainSeries as ChainSeries, ToolRates as ToolRates
+from selfmotion.robot.collada import unit_of as unit_of
 from selfmotion.robot.configurations import mean_lever as mean_lever
 from selfmotion.robot.coordinates import (
     Coordinate as Coordinate,
@@ -58,6 +59,7 @@ from selfmotion.robot.urdf import (
     UrdfJoint as UrdfJoint,
     UrdfPart as UrdfPart,
 )
+from selfmotion.robot.urdf_text import Packages as Packages, expand as expand
 
 __all__ = [
     "Coordinate",

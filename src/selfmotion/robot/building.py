@@ -95,10 +95,18 @@ def _free_joints(
     Joints that mimic another one are moved by it, wherever it is.
     """
     for joint in chain:
-        if joint.kind in ("floating", "planar"):
+        if joint.kind == "planar":
+            parts = ", ".join(f"{joint.name}_{part}" for part in ("x", "y", "yaw"))
             raise RobotError(
-                f"{urdf.source}: joint '{joint.name}' is {joint.kind}; an arm's joints are "
-                f"revolute, continuous or prismatic"
+                f"{urdf.source}: joint '{joint.name}' is planar: it is read as {parts}, of which "
+                f'the first two need limits [m]: add <limit lower="-5" upper="5" velocity="0.5"/> '
+                f"to it"
+            )
+        if joint.kind == "floating":
+            raise RobotError(
+                f"{urdf.source}: joint '{joint.name}' is floating; an arm's joints are revolute, "
+                f"continuous or prismatic: make it fixed if the base stands, planar if it drives, "
+                f"or six joints in a row"
             )
     by_them = [followers[joint.name] for joint in chain if joint.name not in lock]
     moving = dict.fromkeys(item.joint for item in by_them if item.scale != 0.0)

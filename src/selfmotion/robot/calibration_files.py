@@ -10,7 +10,15 @@ from typing import Any, NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from selfmotion.basics import Array, RobotError, is_number, nearest, shown
+from selfmotion.basics import (
+    Array,
+    FileFormatError,
+    RobotError,
+    is_number,
+    nearest,
+    read_document,
+    shown,
+)
 
 # What Universal Robots' kinematics file has for each of its six frames, and their names.
 FRAMES = ("shoulder", "upper_arm", "forearm", "wrist_1", "wrist_2", "wrist_3")
@@ -53,15 +61,15 @@ def read_calibration(file: Path) -> CalibrationFile:
     RobotError
         The file cannot be read, or holds something else; the key is named.
     """
-    try:
-        text = file.read_text("utf-8-sig")
-    except OSError as error:
-        raise RobotError(f"{file}: cannot be read: {error.strerror or error}") from error
-    except UnicodeDecodeError as error:
-        raise RobotError(f"{file}: is not UTF-8 text: {error}") from error
     if file.suffix == ".conf":
+        try:
+            text = file.read_text("utf-8-sig")
+        except OSError as error:
+            raise RobotError(f"{file}: cannot be read: {error.strerror or error}") from error
+        except UnicodeDecodeError as error:
+            raise RobotError(f"{file}: is not UTF-8 text: {error}") from error
         return CalibrationFile(file, deltas=_deltas(file, text))
-    table = _table(file, text)
+    table = _table(file)
     if set(table) == {"kinematics"}:
         return CalibrationFile(file, frames=_frames(file, table["kinematics"]))
     unknown = [key for key in table if key not in ("joints", "offsets")]
@@ -83,19 +91,11 @@ def read_calibration(file: Path) -> CalibrationFile:
     return CalibrationFile(file, placements=placements, offsets=zeros)
 
 
-def _table(file: Path, text: str) -> Mapping[str, Any]:
-    import tomllib
-
-    import yaml
-
+def _table(file: Path) -> Mapping[str, Any]:
     try:
-        found = tomllib.loads(text) if file.suffix == ".toml" else yaml.safe_load(text)
-    except (tomllib.TOMLDecodeError, yaml.YAMLError, ValueError, RecursionError) as error:
-        told = " ".join(str(error).split())
-        raise RobotError(f"{file}: cannot be read: {told}") from error
-    if not isinstance(found, Mapping):
-        raise RobotError(f"{file}: holds {shown(found)}, expected a table of keys")
-    return found
+        return read_document(file)
+    except FileFormatError as error:
+        raise RobotError(str(error)) from error
 
 
 def _deltas(file: Path, text: str) -> Array:

@@ -11,6 +11,9 @@ from selfmotion.robot.chain_series import ChainSeries
 from selfmotion.robot.model import RobotModel
 from selfmotion.robot.tree_arrays import Coupling
 
+# Of an inertia this share is rounding: of files with nine digits, and of products of matrices.
+_ROUNDING = 1e-9
+
 
 class Dynamics:
     """τ = M(q)q̈ + C(q, q̇)q̇ + g(q) of an arm that holds something.
@@ -59,10 +62,13 @@ class Dynamics:
                 raise ProblemError(
                     f"payload: {name} is {value.tolist()}, expected {shape} finite numbers"
                 )
-        if np.abs(turning - turning.T).max() > 0.0 or np.linalg.eigvalsh(turning)[0] < 0.0:
+        # R I Rᵀ is symmetric, and a rod's moment about itself 0, up to rounding.
+        scale = _ROUNDING * float(np.abs(turning).max())
+        if np.abs(turning - turning.T).max() > scale or np.linalg.eigvalsh(turning)[0] < -scale:
             raise ProblemError(
                 f"payload: inertia {turning.tolist()} is not symmetric with moments ≥ 0"
             )
+        turning = 0.5 * (turning + turning.T)
         tool = model.frames[robot.chain.tip]
         held = pin.Inertia(float(payload), where, turning)
         model.appendBodyToJoint(tool.parentJoint, held, tool.placement)

@@ -17,6 +17,7 @@ import numpy as np
 import pinocchio as pin
 
 from selfmotion.basics import Array, RobotError, digest_of_file, is_file
+from selfmotion.robot.collada import unit_of
 from selfmotion.robot.urdf import Urdf
 from selfmotion.robot.urdf_text import Packages
 
@@ -205,7 +206,7 @@ def link_geometry(urdf: Urdf, model: Any, kind: pin.GeometryType) -> Any:
         try:
             geometry = pin.buildGeomFromUrdfString(
                 model,
-                _inner_text(urdf),
+                _in_metres(urdf, _inner_text(urdf)),
                 kind,
                 package_dirs=list(urdf.package_dirs),
                 mesh_loader=loader,
@@ -253,6 +254,21 @@ def _inner_text(urdf: Urdf) -> str:
         for end in (*joint.findall("parent"), *joint.findall("child")):
             end.set("link", names.get(end.get("link", ""), end.get("link", "")))
     return ElementTree.tostring(root, encoding="unicode")
+
+
+def _in_metres(urdf: Urdf, text: str) -> str:
+    """Return the text with meshes scaled by the units that their files say."""
+    if ".dae" not in text.lower():
+        return text
+    root, is_changed = ElementTree.fromstring(text), False
+    for mesh in root.iter("mesh"):
+        place = _place(urdf, mesh.get("filename", ""))
+        unit = 1.0 if place is None else unit_of(place)
+        if unit != 1.0:
+            scale = [float(value) for value in mesh.get("scale", "1 1 1").split()]
+            mesh.set("scale", " ".join(repr(unit * value) for value in scale))
+            is_changed = True
+    return ElementTree.tostring(root, encoding="unicode") if is_changed else text
 
 
 @contextlib.contextmanager

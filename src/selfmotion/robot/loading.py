@@ -299,7 +299,12 @@ def _parts(
     notes = tuple(
         f"{name}: {note}" for name, source in sources.items() for note in source.urdf.notes
     )
-    urdf = dataclasses.replace(urdf, parts=parts, notes=notes, packages=packages)
+    unsaid = tuple(
+        f"{name}/{joint}" for name, each in sources.items() for joint in each.urdf.lacking_efforts
+    )
+    urdf = dataclasses.replace(
+        urdf, parts=parts, notes=notes, packages=packages, lacking_efforts=unsaid
+    )
     first, source = next(iter(sources.items()))
     own = source.tool
     limits: dict[str, dict[str, float]] = {}

@@ -47,7 +47,10 @@ NAMED_ARMS: Mapping[str, NamedArm] = {
         home=(0.0, -np.pi / 4, 0.0, -3 * np.pi / 4, 0.0, np.pi / 2, np.pi / 4),
     ),
     # As in UFACTORY's semantic description, which comes with the URDF.
-    "xarm7": NamedArm("xarm_description/urdf/xarm7.urdf", "link_eef", home=7 * (0.0,)),
+    # Its maker's home, all zeros, is singular: no motion with a prescribed pose begins there.
+    "xarm7": NamedArm(
+        "xarm_description/urdf/xarm7.urdf", "link_eef", home=(0.0, -0.4, 0.0, 1.2, 0.0, 1.6, 0.0)
+    ),
     "baxter": NamedArm(
         "baxter_description/urdf/baxter.urdf",
         "left_gripper",

@@ -23,7 +23,9 @@ from selfmotion.robot.urdf_elements import (
     check_shape,
     lacking_inertials,
     mend_cosmetics,
+    split_planar,
     without_lacking,
+    without_limits,
 )
 from selfmotion.robot.urdf_text import (
     Packages,
@@ -117,6 +119,8 @@ class Urdf:
         What of it is not drawn or not weighed, and why.
     packages : tuple of str
         Folders of packages that the user named.
+    lacking_efforts : tuple of str
+        Joints of which it does not say what effort they have.
     """
 
     source: str
@@ -127,6 +131,7 @@ class Urdf:
     parts: tuple[UrdfPart, ...] = ()
     notes: tuple[str, ...] = ()
     packages: tuple[str, ...] = ()
+    lacking_efforts: tuple[str, ...] = ()
 
     @property
     def readable_text(self) -> str:
@@ -308,7 +313,12 @@ def parse_urdf(
     """Validate URDF text; see `read_urdf`. Addresses of meshes are looked up by `packages`."""
     root = root_of(text, source)
     check_expanded(root, source)
-    notes = mend_cosmetics(root, check_shape)
+    notes = [*split_planar(root, source), *mend_cosmetics(root, check_shape)]
+    unsaid = without_limits(root)
+    for key, what in (("velocity", "speeds are"), ("effort", "torques are")):
+        if unsaid[key]:
+            names = ", ".join(f"'{name}'" for name in unsaid[key])
+            notes.append(f"{names}: <limit> without {key}: taken for none, {what} not limited")
     check_link_elements(root, source)
     check_joint_elements(root, source)
     bare = without_lacking(copy.deepcopy(root))
@@ -323,7 +333,15 @@ def parse_urdf(
         make_meshes_absolute(root, packages, package_dirs)
     links = tuple(link.name for link in parsed.links)
     prepared = ElementTree.tostring(root, encoding="unicode")
-    return Urdf(source, prepared, package_dirs, joints, links, notes=tuple(notes))
+    return Urdf(
+        source,
+        prepared,
+        package_dirs,
+        joints,
+        links,
+        notes=tuple(notes),
+        lacking_efforts=tuple(unsaid["effort"]),
+    )
 
 
 def _joint(joint: Any) -> UrdfJoint:

@@ -124,6 +124,88 @@ def mend_cosmetics(
     return notes + [f"{where}; torques cannot be computed" for where in lacking_inertials(root)]
 
 
+def without_limits(root: ElementTree.Element) -> dict[str, list[str]]:
+    """Say 0, for none, where a ``<limit>`` has no velocity or effort; return joints by which."""
+    found: dict[str, list[str]] = {"velocity": [], "effort": []}
+    for joint in root.findall("joint"):
+        limit = joint.find("limit")
+        if limit is None or joint.get("type") not in _MOVING:
+            continue
+        for key, names in found.items():
+            if limit.get(key) is None:
+                limit.set(key, "0")
+                names.append(joint.get("name", ""))
+    return found
+
+
+def split_planar(root: ElementTree.Element, source: str) -> list[str]:
+    """Turn planar joints with limits into x, y and a turn about the axis, in place; return notes.
+
+    The plane is that of its frame's x and y where its axis is z, as MoveIt and Tesseract read it;
+    of another axis that frame turned the shortest way.
+
+    Raises
+    ------
+    RobotError
+        Its parts would have the name of a link.
+    """
+    notes, taken = [], {link.get("name") for link in root.findall("link")}
+    for joint in root.findall("joint"):
+        if joint.get("type") != "planar":
+            continue
+        name, where = joint.get("name", ""), f"{source}: joint '{joint.get('name')}'"
+        limit, axis = only(joint, "limit", where), only(joint, "axis", where)
+        parts = [f"{name}_{part}" for part in ("x", "y", "yaw")]
+        if limit is None or None in (limit.get("lower"), limit.get("upper")):
+            # Of an arm that it does not move it does not matter.
+            continue
+        if taken & set(parts):
+            raise RobotError(f"{where} is planar, and its parts have the name of a link")
+        normal = [0.0, 0.0, 1.0] if axis is None else numbers(axis, "xyz", 3, f"{where}: <axis>")
+        parent, child, origin = joint.find("parent"), joint.find("child"), joint.find("origin")
+        if parent is None or child is None:
+            continue
+        links = [parent.get("link", ""), *parts[:2], child.get("link", "")]
+        at = list(root).index(joint)
+        root.remove(joint)
+        directions = (*_plane_of(normal), normal)
+        for k, (part, direction) in enumerate(zip(parts, directions, strict=True)):
+            kind = "prismatic" if k < 2 else "continuous"
+            one = ElementTree.Element("joint", name=part, type=kind)
+            ElementTree.SubElement(one, "parent", link=links[k])
+            ElementTree.SubElement(one, "child", link=links[k + 1])
+            if k == 0 and origin is not None:
+                one.append(origin)
+            ElementTree.SubElement(one, "axis", xyz=" ".join(map(repr, direction)))
+            given = dict(limit.attrib)
+            if k == 2:
+                given = {key: value for key, value in given.items() if key == "effort"}
+                given["velocity"] = "0"
+            ElementTree.SubElement(one, "limit", given)
+            root.insert(at + k, one)
+            if k < 2:
+                root.append(ElementTree.Element("link", name=part))
+        notes.append(
+            f"joint '{name}' is planar: read as {', '.join(parts)}; its limits are those of the "
+            f"first two, the turn has none"
+        )
+    return notes
+
+
+def _plane_of(normal: list[float]) -> tuple[list[float], list[float]]:
+    """Return the x and y axes of the frame whose z axis was turned the shortest way to a normal."""
+    length = math.hypot(*normal)
+    x, y, z = (value / length for value in normal) if length > 0.0 else (0.0, 0.0, 1.0)
+    if z < -1.0 + 1e-9:
+        return [1.0, 0.0, 0.0], [0.0, -1.0, 0.0]
+    share = 1.0 / (1.0 + z)
+    return [1.0 - share * x * x, -share * x * y, -x], [-share * x * y, 1.0 - share * y * y, -y]
+
+
+# Kinds of joints that have limits.
+_MOVING = ("revolute", "prismatic", "continuous")
+
+
 def _is_colour(material: ElementTree.Element, where: str, notes: list[str]) -> bool:
     """Return whether a material has a colour or a texture; one that is none is taken out."""
     for tag in ("color", "texture"):
@@ -350,9 +432,7 @@ def _check_limit(joint: ElementTree.Element, where: str) -> None:
         return
     for key in ("velocity", "effort"):
         if limit.get(key) is None:
-            raise RobotError(
-                f'{where} has a <limit> without {key}; add {key}="…", 0 where there is none'
-            )
+            limit.set(key, "0")
         value = _limit_number(limit, key, where, "; 0 is for none", math.inf)
         if value < 0.0:
             raise RobotError(f"{where} has {key} limit {value:g}, expected a number ≥ 0")

@@ -233,8 +233,10 @@ _FIND = re.compile(r"\$\(find\s+([^)\s]+)\s*\)")
 _DEEPEST_INCLUDE = 10
 
 
-def expand(path: Path, arguments: Mapping[str, str], packages: Packages) -> str:
-    """Return the URDF text of a xacro file.
+def expand(
+    path: Path, arguments: Mapping[str, str], packages: Packages, *, of_others: bool = False
+) -> str:
+    """Return the text of a URDF or an SRDF that is a xacro file.
 
     Parameters
     ----------
@@ -243,6 +245,8 @@ def expand(path: Path, arguments: Mapping[str, str], packages: Packages) -> str:
         Values of its ``<xacro:arg>``.
     packages : Packages
         Where ``$(find NAME)`` is looked up.
+    of_others : bool
+        Whether arguments that it does not have are left out: they are those of another file.
 
     Raises
     ------
@@ -258,6 +262,9 @@ def expand(path: Path, arguments: Mapping[str, str], packages: Packages) -> str:
         raise RobotError(f"{path}: no such xacro file")
     declared = _Declared(packages)
     declared.read(path)
+    if of_others:
+        known = declared.defaults
+        arguments = {key: value for key, value in arguments.items() if key in known}
     for key in arguments:
         if declared.complete and key not in declared.defaults:
             raise RobotError(
@@ -274,10 +281,49 @@ def expand(path: Path, arguments: Mapping[str, str], packages: Packages) -> str:
         missing = said.split("package '")
         reason = f"package '{missing[1].strip()}" if missing[1:] else said
         empty = [key for key, value in declared.defaults.items() if not value]
-        known = f"; {declared}" if "argument" in reason or set(empty) - set(arguments) else ""
-        raise RobotError(f"{path}: cannot be expanded by xacro: {reason}{known}") from error
+        told = f"; {declared}" if "argument" in reason or set(empty) - set(arguments) else ""
+        raise RobotError(f"{path}: cannot be expanded by xacro: {reason}{told}") from error
     text: str = document.toxml()
+    if not of_others and document.getElementsByTagName("link").length == 0:
+        _check_called(path)
     return text
+
+
+def _check_called(path: Path) -> None:
+    """Raise RobotError for a xacro file that defines macros and calls none."""
+    root = ElementTree.parse(path).getroot()
+    macros = [item for item in root if _tag(item) == "macro"]
+    if not macros:
+        return
+    named = "; ".join(
+        f"{item.get('name')} (params: {item.get('params') or 'none'})" for item in macros
+    )
+    beside = sorted(
+        other.name
+        for other in path.resolve().parent.glob("*.xacro")
+        if other.name != path.name and f"{path.name}" in _content(other)
+    )
+    usual = f": {' or '.join(beside[:_FEW])}" if beside else ""
+    raise RobotError(
+        f"{path}: defines the macro {named} and calls none, so that it has no arm: give the file "
+        f"that includes it and calls the macro{usual}; or write one beside it: <xacro:include "
+        f'filename="{path.name}"/> <xacro:{macros[0].get("name")} …/>'
+    )
+
+
+# So many files that include another are named.
+_FEW = 3
+
+
+def _tag(element: ElementTree.Element) -> str:
+    return element.tag.rpartition("}")[2] if isinstance(element.tag, str) else ""
+
+
+def _content(file: Path) -> str:
+    try:
+        return file.read_text(errors="replace")
+    except OSError:
+        return ""
 
 
 def _text(value: Any) -> str:
@@ -316,7 +362,7 @@ class _Declared:
             self.complete = False
             return
         for element in root.iter():
-            tag = element.tag.rpartition("}")[2] if isinstance(element.tag, str) else ""
+            tag = _tag(element)
             if tag == "arg" and element.get("name"):
                 self._given.setdefault(element.get("name", ""), element.get("default"))
             elif tag == "include" and depth < _DEEPEST_INCLUDE:

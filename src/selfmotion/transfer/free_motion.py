@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from selfmotion.basics import (
+    TURN,
     Array,
     InverseKinematicsError,
     PlanError,
@@ -188,6 +189,10 @@ class FreeMotions:
             return f"the {where} configuration is not allowed: {self._wrong_with(several[0])}"
         return ""
 
+    def refusal(self, q: Array) -> str:
+        """Return why no motion begins or ends at a configuration (n,), "" where one may."""
+        return "" if Room(self.asked, self.robot, 0.0).free(q[None])[0] else self._wrong_with(q)
+
     def _wrong_with(self, q: Array) -> str:
         """Return what forbids a configuration (n,), in words."""
         asked, beyond = self.asked, []
@@ -199,7 +204,11 @@ class FreeMotions:
                     f"({low:.5g} to {high:.5g} allowed)"
                 )
         if beyond:
-            return f"{'; '.join(beyond)}; give one within the limits"
+            turns = [k for k, name in enumerate(self.robot.joint_names)
+                     if not self.robot.is_prismatic(name)]  # fmt: skip
+            in_degrees = bool(turns) and np.abs(q[turns]).max() > TURN
+            asked_for = "; are these degrees? Angles are in rad" if in_degrees else ""
+            return f"{'; '.join(beyond)}; give one within the limits{asked_for}"
         for model, far in asked.bodies:
             near = model.distance(q)
             if near.value < far:

@@ -1,0 +1,281 @@
+"""Pose files of other programs, in their own forms: IRBCAM, igus, compas, motion primitives.
+
+Each says what it is by its titles or words; what its numbers mean is in a note.
+"""
+
+import csv
+import io
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path as FilePath
+from typing import Any
+
+import numpy as np
+
+from selfmotion.basics import Array, FileFormatError, is_number, text_of
+from selfmotion.cam.path_rows import PoseRows
+
+_MM = 1e-3
+# A file with more bytes is none of these.
+_BYTES = 50_000_000
+
+
+def peer_table(file: FilePath) -> Mapping[str, PoseRows] | None:
+    """Return the poses of a table in the form of another program, None where it is in none.
+
+    Raises
+    ------
+    FileFormatError
+        It is one of theirs, and a row of it is not read.
+    """
+    try:
+        if file.stat().st_size > _BYTES:
+            return None
+        text = text_of(file, file.read_bytes())
+    except (OSError, FileFormatError):
+        return None
+    first = next((line for line in text.splitlines() if line.strip()), "")
+    titles = [title.strip().lower() for title in first.split(",")]
+    if {"x", "y", "z", "rz1", "ry", "rz2"} <= set(titles):
+        return {"": _of_irbcam(file, text, titles)}
+    if _IGUS.fullmatch(first.strip()):
+        return {"": _of_igus(file, text)}
+    if titles[:3] == ["breakpoints", "primitives", "points"]:
+        return {"": _of_primitives(file, text)}
+    return None
+
+
+def _number(file: FilePath, line: int, text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = np.nan
+    if not np.isfinite(value):
+        raise FileFormatError(f"{file}: line {line}: '{text[:40]}' is no number")
+    return value
+
+
+# IRBCAM: x, y, z [mm], angles about z, y and z of the frame as it is turned [°], velocity [mm/s].
+
+_IRBCAM = ("x", "y", "z", "rz1", "ry", "rz2")
+
+
+def _of_irbcam(file: FilePath, text: str, titles: Sequence[str]) -> PoseRows:
+    from scipy.spatial.transform import Rotation
+
+    rows, places, feeds = list[list[float]](), list[str](), list[float]()
+    for number, line in enumerate(text.splitlines(), 1):
+        cells = [cell.strip() for cell in line.split(",")]
+        if not line.strip() or [cell.lower() for cell in cells] == list(titles):
+            continue
+        if len(cells) != len(titles):
+            raise FileFormatError(
+                f"{file}: line {number} has {len(cells)} values, expected {len(titles)}"
+            )
+        found = dict(zip(titles, cells, strict=True))
+        values = {key: _number(file, number, found[key]) for key in _IRBCAM}
+        if _number(file, number, found.get("motion_type", "0")) != 0.0:
+            raise FileFormatError(
+                f"{file}: line {number}: motion_type {found['motion_type']}: arcs of IRBCAM are "
+                f"not read: let it write lines"
+            )
+        rows.append([values[key] for key in _IRBCAM])
+        feeds.append(_MM * _number(file, number, found.get("velocity", "0")))
+        places.append(f"line {number}")
+    table = np.array(rows).reshape(-1, 6)
+    turns = Rotation.from_euler("ZYZ", table[:, 3:], degrees=True).as_matrix()
+    others = [title for title in titles if title not in (*_IRBCAM, "motion_type", "velocity")]
+    passed = f"; passed over: {', '.join(others)}" if others else ""
+    # A velocity is that of the way to its row; -1 is a rapid.
+    to_next = np.array([*feeds[1:], *feeds[-1:]])
+    note = f"IRBCAM: x,y,z in mm, rz1,ry,rz2 about z, y and z in turn, velocity in mm/s{passed}"
+    return _straight(places, _MM * table[:, :3], "rotation", turns, to_next, note)
+
+
+def _straight(
+    places: Sequence[str],
+    positions: Array,
+    orientation: str,
+    values: Array,
+    feeds: Array | None,
+    note: str,
+) -> PoseRows:
+    """Return rows that the tool goes straight through, in rapids where a feed is below 0."""
+    rapid = None if feeds is None or not (feeds < 0.0).any() else feeds < 0.0
+    known = feeds is not None and bool((feeds[:-1] != 0.0).all())
+    return PoseRows(
+        places,
+        positions,
+        orientation,
+        values,
+        None,
+        np.abs(feeds) if known and feeds is not None else None,
+        straight=True,
+        one_way=True,
+        notes=(note,),
+        rapid=rapid,
+    )
+
+
+# igus (Commonplace Robotics): X, Y, Z [mm] and A, B, C, of which only places are read.
+
+_IGUS = re.compile(
+    r"X\s*[-+.\dE]+\s*;\s*Y\s*[-+.\dE]+\s*;\s*Z\s*[-+.\dE]+\s*(?:;.*)?", re.IGNORECASE
+)
+_WORD = re.compile(r"([A-Za-z]+)\s*([-+.\dEe]+)")
+
+
+def _of_igus(file: FilePath, text: str) -> PoseRows:
+    rows, places = list[list[float]](), list[str]()
+    for number, line in enumerate(text.splitlines(), 1):
+        if not line.strip():
+            continue
+        if not _IGUS.fullmatch(line.strip()):
+            raise FileFormatError(
+                f"{file}: line {number}: '{line[:40]}' is not read, expected X …; Y …; Z …; A …; "
+                f"B …; C … as igus' programs write them"
+            )
+        said = {word.upper(): value for word, value in _WORD.findall(line)}
+        rows.append([_number(file, number, said[key]) for key in "XYZ"])
+        places.append(f"line {number}")
+    note = (
+        "igus: X, Y, Z in mm; A, B, C are passed over: for orientations name the columns "
+        "(qw,qx,qy,qz or roll_deg,pitch_deg,yaw_deg)"
+    )
+    return _straight(places, _MM * np.array(rows), "", np.zeros((len(rows), 0)), None, note)
+
+
+# Motion primitives of research code: breakpoints,primitives,points,q_bp, with arrays as texts.
+
+_ARRAY = re.compile(r"array\(\s*\[([^\]]*)\]\s*\)")
+
+
+def _of_primitives(file: FilePath, text: str) -> PoseRows:
+    reader = csv.DictReader(io.StringIO(text))
+    rows, places = list[list[float]](), list[str]()
+    for found in reader:
+        where = reader.line_num
+        kind, points = str(found.get("primitives")), _ARRAY.findall(str(found.get("points")))
+        if not kind.lower().startswith(("movej", "movel")) or len(points) != 1:
+            raise FileFormatError(
+                f"{file}: line {where}: primitive '{kind[:20]}' with {len(points)} points is not "
+                f"read, expected movel or movej with one: let it be fitted by lines"
+            )
+        values = [_number(file, where, cell) for cell in points[0].split(",")]
+        if len(values) != 3:
+            raise FileFormatError(f"{file}: line {where}: expected x, y, z in points")
+        rows.append(values)
+        places.append(f"line {where}")
+    note = "motion primitives: points in mm, straight from one to the next; q_bp is passed over"
+    return _straight(
+        places, _MM * np.array(rows).reshape(-1, 3), "", np.zeros((len(rows), 0)), None, note
+    )
+
+
+# compas: frames by a point, an x axis and a y axis; print points of compas_slicer around them.
+
+_FRAME = ("point", "xaxis", "yaxis")
+_SQUARE = 1e-3
+
+
+def compas_poses(file: FilePath, document: Any) -> Mapping[str, PoseRows] | None:
+    """Return frames of compas, or print points of compas_slicer as seams; None where it has none.
+
+    Raises
+    ------
+    FileFormatError
+        A frame is not one; it is named.
+    """
+    if isinstance(document, list) and document and all(map(_is_frame, document)):
+        frames = [_inner(item) for item in document]
+        places = [f"[{k}]" for k in range(len(frames))]
+        positions, turns = _frames(file, places, frames)
+        note = "compas: points in metres, as compas_fab has them"
+        return {"": _straight(places, positions, "rotation", turns, None, note)}
+    if isinstance(document, Mapping) and document and all(map(_is_layer, document.values())):
+        return _print_points(file, document)
+    return None
+
+
+def _inner(item: Any) -> Any:
+    data = item.get("data") if isinstance(item, Mapping) else None
+    return data if isinstance(data, Mapping) else item
+
+
+def _is_frame(item: Any) -> bool:
+    return isinstance(_inner(item), Mapping) and set(_FRAME) <= set(_inner(item))
+
+
+def _is_layer(item: Any) -> bool:
+    return (
+        isinstance(item, Mapping)
+        and bool(item)
+        and all(
+            isinstance(path, Mapping)
+            and path
+            and all(
+                isinstance(one, Mapping) and _is_frame(one.get("frame")) for one in path.values()
+            )
+            for path in item.values()
+        )
+    )
+
+
+def _frames(
+    file: FilePath, places: Sequence[str], frames: Sequence[Mapping[str, Any]]
+) -> tuple[Array, Array]:
+    positions, turns = [], []
+    for place, frame in zip(places, frames, strict=True):
+        for key in _FRAME:
+            value = frame[key]
+            if not (isinstance(value, list) and len(value) == 3 and all(map(is_number, value))):
+                raise FileFormatError(f"{file}: {place}: {key} is no list of three numbers")
+        x, y = (np.array(frame[key], dtype=np.float64) for key in _FRAME[1:])
+        lengths = float(np.linalg.norm(x)), float(np.linalg.norm(y))
+        if min(lengths) < _SQUARE or abs(x @ y) > _SQUARE * lengths[0] * lengths[1]:
+            raise FileFormatError(f"{file}: {place}: xaxis and yaxis are no two axes of a frame")
+        x = x / lengths[0]
+        y = y - (y @ x) * x
+        y = y / np.linalg.norm(y)
+        positions.append(frame["point"])
+        turns.append(np.stack([x, y, np.cross(x, y)], axis=1))
+    return np.array(positions, dtype=np.float64), np.array(turns)
+
+
+def _print_points(file: FilePath, document: Mapping[str, Any]) -> Mapping[str, PoseRows]:
+    found: dict[str, PoseRows] = {}
+    note = "compas_slicer: points in mm, velocity in mm/s; wait_time and heights are passed over"
+    for layer, paths in document.items():
+        for path, points in paths.items():
+            items, name = list(points.values()), f"{layer} {path}"
+            places = [f"{layer}.{path}.{key}" for key in points]
+            frames = [_inner(item["frame"]) for item in items]
+            positions, turns = _frames(file, places, frames)
+            feeds = np.array([
+                _MM * float(item["velocity"]) if is_number(item.get("velocity")) else 0.0
+                for item in items
+            ])  # fmt: skip
+            # What does not extrude is a travel, which parts what is printed.
+            prints = [item.get("extruder_toggle", True) is not False for item in items]
+            for number, (first, last) in enumerate(_runs(prints), 1):
+                part = slice(first, last + 1)
+                whole = first == 0 and last == len(items) - 1
+                found[name if whole else f"{name} {number}"] = _straight(
+                    places[part], _MM * positions[part], "rotation", turns[part], feeds[part], note
+                )
+    if not found:
+        raise FileFormatError(f"{file}: nothing of it extrudes (extruder_toggle)")
+    return {"": next(iter(found.values()))} if len(found) == 1 else found
+
+
+def _runs(prints: Sequence[bool]) -> list[tuple[int, int]]:
+    """Return the first and last points of what is printed: each point extrudes to the next one."""
+    found, first = list[tuple[int, int]](), -1
+    for k, extrudes in enumerate(prints):
+        if extrudes and first < 0:
+            first = k
+        if first >= 0 and (not extrudes or k == len(prints) - 1):
+            if k > first:
+                found.append((first, k))
+            first = -1
+    return found

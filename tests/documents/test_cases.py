@@ -1,0 +1,294 @@
+"""Cases of people, from the shell: what is right of each is worked out from its files, by hand."""
+
+import math
+import re
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import selfmotion as sm
+from selfmotion.cam import Reading, one_seam
+from selfmotion.cam.gcode import read_gcode
+from support.own_kinematics import Arm, along
+from support.shell import complaint, invoke
+
+CASES = Path(__file__).parents[1] / "cases"
+PANDA_AT = ("--frame", "0.45,0,0.3,0,0,0", "--task", "pointing")
+# Digits of files, and chords of curves [m]; rounding of a motion [m, rad].
+DIGITS, CHORD, ROUNDING = 1e-6, 1e-5, 1e-6
+
+
+def planned(out: Path, *arguments: str | Path) -> sm.Plan:
+    """Plan in the shell, verified; return the plan."""
+    code, text = invoke("plan", *arguments, "--out", out / "x.npz")
+    assert code == 0, text
+    return sm.load_plan(out / "x.npz")
+
+
+def tips_of(plan: sm.Plan, count: int = 401) -> tuple[np.ndarray, np.ndarray]:
+    """Return rotations and places of the tool, by kinematics of the tests' own."""
+    own, t = Arm(plan.robot), np.linspace(0.0, plan.trajectory.duration, count)
+    return own.place(plan.robot.tool, along(plan.trajectory, t, 0))
+
+
+@pytest.mark.parametrize(
+    ("name", "deepest"), [("peck", -10), ("peck_5mm", -10), ("g81_shallow", -2), ("g81_deep", -10)]
+)
+def test_drilled_holes_have_the_feeds_of_their_files(name: str, deepest: float) -> None:
+    file = CASES / "peck_drilling" / f"{name}.nc"
+    path = sm.files.read_path(file)
+    assert {round(feed.asked, 6) for feed in path.feeds} == {0.006667}
+    assert all(feed.kept for feed in path.feeds)
+    heights = path.samples(np.linspace(0.0, path.duration, 4001)).translation[:, 2]
+    assert heights.min() == pytest.approx(1e-3 * deepest, abs=CHORD)
+    np.testing.assert_allclose(heights[0], heights[-1], atol=DIGITS)
+
+
+def test_a_flat_block_is_that_of_scale_one() -> None:
+    for name in ("flat", "plain"):
+        file = CASES / "flat_block" / f"{name}.dxf"
+        circle = sm.files.read_path(file, feed=0.02, seam="0 1")
+        line = sm.files.read_path(file, feed=0.02, seam="0 2")
+        ends = [line.pose(0.0).translation, line.pose(line.duration).translation]
+        np.testing.assert_allclose(ends, [[0, 0, 0], [0.06, 0, 0]], atol=DIGITS)
+        samples = circle.samples(np.linspace(0.0, circle.duration, 2001)).translation
+        away = np.linalg.norm(samples[:, :2] - [0.02, 0.01], axis=1)
+        # Corners of the chords are rounded, too.
+        np.testing.assert_allclose(away, 0.005, atol=5 * CHORD)
+        length = np.linalg.norm(np.diff(samples, axis=0), axis=1).sum()
+        assert length == pytest.approx(2 * math.pi * 5e-3, rel=3e-3)
+
+
+def test_words_of_sinumerik_say_the_tools_axis() -> None:
+    (cut,) = read_gcode(CASES / "sinumerik_words" / "arm.mpf").values()
+    assert cut.feed is not None
+    assert cut.rapid is None or not cut.rapid[1:-1].any()
+    np.testing.assert_allclose(cut.feed[-2], 2.0 / 60.0)
+    np.testing.assert_allclose(1e3 * cut.positions[-3:], [[0, 0, 0], [40, 0, 0], [80, 0, 0]])
+    np.testing.assert_allclose(cut.values[0][:, 2], [0, 0, -1], atol=DIGITS)
+    np.testing.assert_allclose(cut.values[-1][:, 2], [-0.34202, 0, -0.939693], atol=DIGITS)
+
+
+@pytest.mark.parametrize("name", ["teach.mod", "cut.src", "move.script"])
+def test_programs_of_others_are_named_as_such(name: str) -> None:
+    file = CASES / "programs_of_others" / name
+    said = complaint("plan", "panda", "--path", file, "--feed", "0.1")
+    assert "is a program of a robot" in said
+    assert "write its targets as a table" in said
+    table = CASES / "along_the_path" / "square.csv"
+    judged = complaint("check", file, "--robot", "panda", "--path", table)
+    assert "selfmotion did not write this program" in judged
+
+
+def test_a_limit_without_effort_or_speed_is_none(tmp_path: Path) -> None:
+    folder = CASES / "limit_without_effort"
+    known = planned(tmp_path, folder / "with_effort.urdf", "--circle", "0.03")
+    for name in ("no_effort", "continuous_velocity_only"):
+        plan = planned(tmp_path, folder / f"{name}.urdf", "--circle", "0.03")
+        remarks = plan.problem.robot.urdf.notes
+        robot = sm.load_robot(folder / f"{name}.urdf")
+        assert any("<limit> without effort: taken for none" in note for note in robot.urdf.notes)
+        assert isinstance(remarks, tuple)
+        if name == "no_effort":
+            np.testing.assert_allclose(plan.trajectory.q, known.trajectory.q, atol=ROUNDING)
+        with pytest.raises(sm.errors.ProblemError, match=r"'j1' has a <limit> without effort"):
+            sm.constraints.JointTorqueLimits().of(robot)
+
+
+def test_a_planar_joint_with_limits_is_three_joints(tmp_path: Path) -> None:
+    folder = CASES / "planar_base"
+    text = (folder / "planar_base.urdf").read_text()
+    asked = ("--line", "0.3,0,0", "--feed", "0.15", "--task", "pointing")
+    said = complaint("plan", folder / "planar_base.urdf", *asked)
+    assert "read as base_move_x, base_move_y, base_move_yaw" in said
+    limit = '<limit lower="-5" upper="5" velocity="0.5" effort="100"/></joint>'
+    first = text.index('type="planar"')
+    end = text.index("</joint>", first)
+    (tmp_path / "base.urdf").write_text(text[:end] + limit + text[end + len("</joint>") :])
+    one, other = sm.load_robot(tmp_path / "base.urdf"), sm.load_robot(folder / "three_joints.urdf")
+    assert one.joint_names[:3] == ("base_move_x", "base_move_y", "base_move_yaw")
+    rng = np.random.default_rng(0)
+    for q in rng.uniform(-1.0, 1.0, (20, 10)):
+        np.testing.assert_allclose(
+            one.pose(q).homogeneous, other.pose(q).homogeneous, atol=ROUNDING
+        )
+    planned(tmp_path, tmp_path / "base.urdf", *asked)
+
+
+def test_a_plane_that_leans_is_left_for_no_joint_of_it() -> None:
+    """Own product of transforms: x and y in the plane whose normal is the axis."""
+    axis = np.array([0.3, -0.4, 0.5]) / np.linalg.norm([0.3, -0.4, 0.5])
+    urdf = (
+        '<robot name="r"><link name="a"/><link name="b"/><joint name="p" type="planar">'
+        '<parent link="a"/><child link="b"/><origin xyz="0 0 1" rpy="0.2 0 0"/>'
+        '<axis xyz="0.3 -0.4 0.5"/><limit lower="-1" upper="1" velocity="1"/></joint></robot>'
+    )
+    robot = sm.load_robot(urdf)
+    turn = pin.rpy.rpyToMatrix(0.2, 0.0, 0.0)
+    for q in np.random.default_rng(1).uniform(-1.0, 1.0, (10, 3)):
+        pose = robot.pose(q)
+        moved = turn.T @ (pose.translation - [0, 0, 1])
+        assert abs(moved @ axis) < ROUNDING
+        assert np.linalg.norm(moved) == pytest.approx(float(np.hypot(q[0], q[1])), abs=ROUNDING)
+        rotated = turn.T @ pose.rotation
+        np.testing.assert_allclose(rotated, pin.exp3(q[2] * axis), atol=ROUNDING)
+
+
+def test_a_xacro_that_calls_nothing_says_what_it_defines(tmp_path: Path) -> None:
+    file = tmp_path / "only_macro.urdf.xacro"
+    shutil.copy(CASES / "only_a_macro" / "only_macro.urdf.xacro", file)
+    said = complaint("init", file, "--out", tmp_path / "x.toml")
+    assert "defines the macro rebel_arm (params: prefix load) and calls none" in said
+    (tmp_path / "robot.xacro").write_text(f'<robot><x filename="{file.name}"/></robot>')
+    assert "calls the macro: robot.xacro" in complaint("init", file, "--out", tmp_path / "x.toml")
+
+
+def test_a_telescope_is_begun_with_its_overlaps_left_out(tmp_path: Path) -> None:
+    file = tmp_path / "t.toml"
+    code, text = invoke("init", CASES / "telescope" / "tubes.urdf", "--tool", "tip", "--out", file)
+    assert code == 0, text
+    written = file.read_text()
+    # By the boxes of the file: 100, 80, 70, 60 and 50 mm wide, 13 mm apart, 130 mm of travel each.
+    for first, second in (
+        ("mast", "a1"),
+        ("mast", "a2"),
+        ("mast", "a3"),
+        ("a0", "a2"),
+        ("a0", "a3"),
+        ("a1", "a3"),
+    ):
+        assert f'["{first}", "{second}"]' in written
+        assert f"# {first} - {second}: overlap in " in written
+    srdf = tmp_path / "own.srdf"
+    srdf.write_text('<robot name="r"><disable_collisions link1="mast" link2="a1"/></robot>')
+    more = ("init", CASES / "telescope" / "tubes.urdf", "--tool", "tip", "--srdf", srdf)
+    assert invoke(*more, "--out", file, "--force")[0] == 0
+    assert 'srdf = "own.srdf"' in file.read_text()
+    assert '["mast", "a1"]' not in file.read_text()
+
+
+@pytest.mark.parametrize("name", ["plain.srdf", "included.srdf.xacro", "arguments.srdf.xacro"])
+def test_an_srdf_that_is_xacro_is_expanded(name: str, tmp_path: Path) -> None:
+    folder = CASES / "srdf_xacro"
+    arm = (folder / "arm.urdf", "--tool", "grasp", "--circle", "0.03")
+    plan = planned(tmp_path, *arm, "--srdf", folder / name)
+    (clearance,) = (c for c in plan.problem.all_constraints if c.kind == "Clearance")
+    assert set(clearance.disabled) == {("bar", "left"), ("bar", "right")}
+
+
+def test_an_srdf_is_given_the_arguments_of_its_arm_and_none_is_read_as_empty(
+    tmp_path: Path,
+) -> None:
+    for file in (CASES / "srdf_xacro").iterdir():
+        shutil.copy(file, tmp_path)
+    text = (tmp_path / "arm.urdf").read_text()
+    head, _, rest = text.partition("<robot")
+    names = rest.replace('"bar"', '"${p}bar"').replace('"left"', '"${p}left"')
+    names = names.replace('"right"', '"${p}right"')
+    (tmp_path / "arm.urdf.xacro").write_text(
+        f'{head}<robot xmlns:xacro="http://www.ros.org/wiki/xacro"{names.partition(">")[0]}>'
+        '<xacro:arg name="p" default=""/><xacro:property name="p" value="$(arg p)"/>'
+        f"{names.partition('>')[2]}"
+    )
+    asked = (tmp_path / "arm.urdf.xacro", "--argument", "p=my_", "--tool", "grasp")
+    plan = planned(
+        tmp_path, *asked, "--circle", "0.03", "--srdf", tmp_path / "arguments.srdf.xacro"
+    )
+    (clearance,) = (c for c in plan.problem.all_constraints if c.kind == "Clearance")
+    assert ("my_bar", "my_left") in clearance.disabled
+    empty = tmp_path / "empty.srdf"
+    empty.write_text('<robot name="arm"><group name="arm"/></robot>')
+    plain = (tmp_path / "arm.urdf", "--tool", "grasp", "--circle", "0.03")
+    said = complaint("plan", *plain, "--srdf", empty)
+    assert "has no <disable_collisions>" in said
+
+
+def test_five_joints_follow_what_a_tolerance_lets_them(tmp_path: Path) -> None:
+    arm = CASES / "five_joints_relaxed" / "arm5.urdf"
+    asked = (arm, "--line", "0,0.1,0", "--start", "0,0.6,0.9,1.0,0")
+    for more in (
+        ("--task", "pointing", "--relax", "rx,ry=0.5"),
+        ("--task", "pose", "--relax", "rx,ry=0.5", "--relax", "rz"),
+    ):
+        rotations, places = tips_of(planned(tmp_path, *asked, *more))
+        begin, end = places[0], places[-1]
+        np.testing.assert_allclose(end - begin, [0, 0.1, 0], atol=ROUNDING)
+        leans = np.arccos(np.clip(rotations[:, :, 2] @ rotations[0, :, 2], -1.0, 1.0))
+        assert leans.max() <= 0.5 + ROUNDING
+    assert "or relax rows that it cannot move" in complaint("plan", *asked, "--task", "pointing")
+
+
+def test_meshes_are_in_the_unit_that_they_say(tmp_path: Path) -> None:
+    folder = CASES / "collada_unit"
+    boxes = []
+    for name in ("dae_m_z", "dae_mm_z"):
+        robot = sm.load_robot(folder / f"{name}.urdf")
+        model = sm.obstacles.CollisionModel(robot)
+        (body,) = (body for body in model.every_body if body.name == "l5")
+        boxes.append([body.solid.low, body.solid.high])
+        drawn = robot.geometry(pin.GeometryType.VISUAL).geometryObjects
+        assert any(np.allclose(item.meshScale, 1.0 if name == "dae_m_z" else 1e-3)
+                   for item in drawn)  # fmt: skip
+    right = [[-0.05, -0.02, 0.04], [0.05, 0.02, 0.06]]
+    np.testing.assert_allclose(boxes, [right, right], atol=DIGITS)
+    part = sm.obstacles.Mesh("part", [0.5, 0.5, 0.3], folder / "box_mm_z.dae")
+    np.testing.assert_allclose(np.ptp(np.array(part.geometry().vertices()), axis=0),
+                               [0.1, 0.04, 0.02], atol=DIGITS)  # fmt: skip
+    twice = sm.obstacles.Mesh("part", [0.5, 0.5, 0.3], folder / "box_mm_z.dae", scale=0.001)
+    with pytest.raises(sm.errors.CollisionError, match=r"its unit is 0\.001 m, and scale is"):
+        twice.geometry()
+
+
+PEERS = {
+    "irbcam.csv": ([[0, 0, 0], [50, 0, 0], [100, 0, 0]], 0.05, [0.0, 0.0, -1.0]),
+    "cpr.csv": ([[0, 0, 0], [50, 0, 0], [100, 20, 0]], None, None),
+    "compas.json": ([[450, -100, 350], [450, 0, 350], [450, 100, 350]], 0.025, [0.0, 0.0, -1.0]),
+    "compas_frames.json": (
+        [[450, -100, 350], [450, 0, 350], [450, 100, 350]],
+        None,
+        [0.0, 0.0, -1.0],
+    ),
+    "primitives.csv": ([[450, -100, 350], [450, 0, 350], [450, 100, 350]], None, None),
+}
+
+
+@pytest.mark.parametrize("name", PEERS)
+def test_pose_files_of_peers_are_read_with_their_conventions(name: str) -> None:
+    places, feed, down = PEERS[name]
+    file = CASES / "tables_of_peers" / name
+    rows = one_seam(file, None, Reading())
+    np.testing.assert_allclose(1e3 * rows.positions, places, atol=DIGITS)
+    (note,) = rows.notes
+    assert re.match(r"(IRBCAM|igus|compas|compas_slicer|motion primitives): ", note)
+    if feed is not None:
+        assert rows.feed is not None
+        np.testing.assert_allclose(rows.feed[:-1], feed)
+    assert (rows.orientation == "rotation") == (down is not None)
+    for turn in rows.values if down is not None else ():
+        np.testing.assert_allclose(turn[:, 2], down, atol=DIGITS)
+        np.testing.assert_allclose(turn.T @ turn, np.eye(3), atol=DIGITS)
+    # The shell's --feed counts for what has none, and instead of the file's.
+    assert sm.files.read_path(file, feed=0.05).duration > 1.0
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "said"),
+    [
+        ("a.csv", "x,y,z,rz1,ry,rz2,motion_type\n0,0,0,0,180,0,0\n1,0,0,0,180,0,1\n",
+         "line 3: motion_type 1: arcs of IRBCAM are not read"),
+        ("a.csv", "X 0; Y 0; Z 0; A 1\nX 1; Y 0\n", "line 2: .*as igus' programs write them"),
+        ("a.csv", 'breakpoints,primitives,points,q_bp\n0,movec_fit,"[array([1, 2, 3]), array([4, '
+         '5, 6])]",\n', "primitive 'movec_fit' with 2 points is not read"),
+        ("a.json", '[{"point": [0, 0, 0], "xaxis": [1, 0, 0], "yaxis": [1, 0, 0]}]',
+         "xaxis and yaxis are no two axes"),
+    ],
+)  # fmt: skip
+def test_what_peers_write_besides_is_refused(
+    name: str, text: str, said: str, tmp_path: Path
+) -> None:
+    (tmp_path / name).write_text(text)
+    with pytest.raises(sm.errors.FileFormatError, match=said):
+        sm.files.read_path(tmp_path / name, feed=0.05)
