@@ -29,7 +29,7 @@ SHORT: dict[str, list[str]] = {
     "binding.py": ["--kind", "jerk"],
     "bought_margins.py": ["--count", "1", "--displacements", "2"],
     "certificate.py": ["--count", "1"],
-    "constrained.py": ["--count", "4"],
+    "constrained.py": ["--only", "1"],
     "corrections.py": ["--count", "1", "--displacements", "2"],
     "deceptions.py": ["--count", "2"],
     "distances.py": ["--count", "200"],
