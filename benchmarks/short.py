@@ -31,6 +31,7 @@ SHORT: dict[str, list[str]] = {
     "certificate.py": ["--count", "1"],
     "changed_programs.py": ["--number", "20"],
     "constrained.py": ["--count", "4"],
+    "constrained.py": ["--only", "1"],
     "corrections.py": ["--count", "1", "--displacements", "2"],
     "deceptions.py": ["--count", "2"],
     "distances.py": ["--count", "200"],
