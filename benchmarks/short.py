@@ -30,7 +30,6 @@ SHORT: dict[str, list[str]] = {
     "bought_margins.py": ["--count", "1", "--displacements", "2"],
     "certificate.py": ["--count", "1"],
     "changed_programs.py": ["--number", "20"],
-    "constrained.py": ["--count", "4"],
     "constrained.py": ["--only", "1"],
     "corrections.py": ["--count", "1", "--displacements", "2"],
     "deceptions.py": ["--count", "2"],
