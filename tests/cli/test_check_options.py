@@ -75,7 +75,11 @@ def test_what_is_not_judged_is_said_in_words_of_the_shell(tmp_path: Path) -> Non
     for name, words in (
         ("keys.xml", "is no motion that is read, though it is written: expected .csv,"),
         ("fast.script", "line 2: a stream of servoj is not read; only programs of linear motions"),
-        ("bad.mod", "line 2: 'MoveL p1;' is not read: page 'Files' of the docs lists what is"),
+        (
+            "bad.mod",
+            "line 2: 'MoveL p1;' is not read: selfmotion did not write this program, and "
+            "page 'Files' of the docs lists what is",
+        ),
         ("a.doc", "is no motion that is read: expected .csv, "),
     ):
         with pytest.raises(sm.errors.FileFormatError, match=words):

@@ -270,7 +270,7 @@ def program_json(program: Program) -> dict[str, Any]:
         "transfer_time": program.transfer_time,
         "bound": program.bound,
         "missing": dict(program.missing),
-        "kept": dict(program.kept),
+        "kept": dict(program.kept or {}),
         "notes": list(program.notes),
         "steps": [
             {

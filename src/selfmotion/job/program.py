@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import accumulate
 from pathlib import Path, Path as FilePath
@@ -42,9 +42,9 @@ class Program:
     specification : Specification, optional
         What was asked for, which the steps are held against; None for steps that were put together
         by hand, and the verdict says so.
-    kept : mapping
+    kept : mapping, optional
         Where it was begun at an earlier program: each seam, with "" where its motion is that of the
-        earlier one, bit for bit, else with why it is not. Files do not have it.
+        earlier one, bit for bit, else with why it is not; else None. Files do not have it.
     unjudged : tuple of str
         What nothing was asked of and a reader may take for judged; the verdict says it.
     """
@@ -55,7 +55,7 @@ class Program:
     bound: float = 0.0
     notes: tuple[str, ...] = ()
     specification: Specification | None = None
-    kept: Mapping[str, str] = field(default_factory=dict)
+    kept: Mapping[str, str] | None = None
     unjudged: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
