@@ -4,6 +4,7 @@ import math
 import re
 import shutil
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -292,3 +293,82 @@ def test_what_peers_write_besides_is_refused(
     (tmp_path / name).write_text(text)
     with pytest.raises(sm.errors.FileFormatError, match=said):
         sm.files.read_path(tmp_path / name, feed=0.05)
+
+
+def tool_along(path: sm.paths.Path, count: int = 4001) -> tuple[np.ndarray, ...]:
+    """Return places, speeds and rotations along a path."""
+    samples = path.samples(np.linspace(0.0, path.duration, count))
+    return samples.translation, samples.twist, samples.rotation
+
+
+@pytest.mark.parametrize("corners", ["stop", "round"])
+def test_a_knife_points_along_its_path(corners: str, tmp_path: Path) -> None:
+    square = CASES / "along_the_path" / "square.csv"
+    asked = ("--along", "x", "--corners", corners, "--feed", "0.03")
+    plan = planned(tmp_path, "panda", "--path", square, *asked, "--frame", "0.45,0,0.3,0,0,0")
+    rotations, places = tips_of(plan, 4001)
+    places = 1e3 * (places - [0.45, 0.0, 0.3])
+    np.testing.assert_allclose(rotations[:, 2, 2], -1.0, atol=ROUNDING)
+    for leg, ahead in (
+        ((places[:, 0] > 10) & (places[:, 0] < 90) & (places[:, 1] < 5), [1, 0, 0]),
+        ((places[:, 1] > 10) & (places[:, 1] < 70), [0, 1, 0]),
+        ((places[:, 0] > 10) & (places[:, 0] < 90) & (places[:, 1] > 75), [-1, 0, 0]),
+    ):
+        assert leg.any()
+        np.testing.assert_allclose(rotations[leg, :, 0], np.tile(ahead, (leg.sum(), 1)), atol=1e-5)
+    # In corners it turns on the spot; rounding that misses one by 1 mm begins some 5 mm before it.
+    turning = np.linalg.norm(np.diff(rotations[:, :, 0], axis=0), axis=1) > 1e-5
+    away = np.linalg.norm(places[:-1][turning, None] - [[100, 0, 0], [100, 80, 0]], axis=2)
+    assert away.min(axis=1).max() < (0.01 if corners == "stop" else 6.0)
+
+
+def test_curves_turn_on_their_way_and_a_lead_leans_the_tool(tmp_path: Path) -> None:
+    angles = np.radians(np.arange(0, 181, 3))
+    lines = [f"{100 * np.sin(a):.6f},{100 - 100 * np.cos(a):.6f},0" for a in angles]
+    (tmp_path / "arc.csv").write_text("\n".join(["x_mm,y_mm,z_mm", *lines]) + "\n")
+    lead = 0.2
+    for name, column, sign in (("x", 0, 1.0), ("-y", 1, -1.0)):
+        path = sm.files.read_path(
+            tmp_path / "arc.csv", feed=0.05, corners="round", along=name, lead=lead
+        )
+        places, twists, rotations = tool_along(path)
+        moving = np.linalg.norm(twists[:, :3], axis=1) > 0.02
+        ahead = twists[moving, :3] / np.linalg.norm(twists[moving, :3], axis=1)[:, None]
+        z, one = rotations[moving, :, 2], sign * rotations[moving, :, column]
+        # Chords of three degrees: the direction is that within half of it.
+        within = np.radians(1.6)
+        np.testing.assert_allclose(np.einsum("kc,kc->k", z, ahead), np.sin(lead), atol=within)
+        np.testing.assert_allclose(np.einsum("kc,kc->k", one, ahead), np.cos(lead), atol=within)
+        np.testing.assert_allclose(np.linalg.det(rotations), 1.0, atol=ROUNDING)
+        assert np.linalg.norm(places[-1] - [0, 0.2, 0]) < 1e-3
+
+
+def test_cuts_and_drawings_are_followed_along_too(tmp_path: Path) -> None:
+    text = "G21 G90\nG0 X0 Y0 Z20\nG0 Z5\nG1 Z0 F600\nX40 F1200\nY30\nG0 Z20\nM30\n"
+    (tmp_path / "knife.nc").write_text(text)
+    path = sm.files.read_path(tmp_path / "knife.nc", along="x", corners="stop")
+    places, _, rotations = tool_along(path)
+    np.testing.assert_allclose(places[[0, -1]], [[0, 0, 0.02], [0.04, 0.03, 0.02]], atol=DIGITS)
+    first, second = places[:, 0] < 0.039, places[:, 1] > 0.001
+    for leg, ahead in ((first, [1, 0, 0]), (second, [0, 1, 0])):
+        np.testing.assert_allclose(rotations[leg, :, 0], np.tile(ahead, (leg.sum(), 1)), atol=1e-6)
+    assert {round(feed.asked, 6) for feed in path.feeds} == {0.01, 0.02}
+    flat = CASES / "flat_block" / "flat.dxf"
+    circle = sm.files.read_path(flat, feed=0.01, seam="0 1", along="y", corners="round")
+    assert circle.duration > 2.0
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"along": "x"}, "say corners stop .* or round"),
+        ({"along": "z", "corners": "stop"}, "along is 'z', expected one of"),
+        ({"along": "x", "corners": "stop", "duration": 3.0, "feed": None}, "for paths at a feed"),
+        ({"lead": 0.2}, "lead has no effect without along"),
+        ({"along": "x", "corners": "stop", "lead": 30.0}, "lead is 30 rad, expected less than"),
+    ],
+)
+def test_what_along_cannot_be_is_said(options: dict[str, object], said: str) -> None:
+    given: dict[str, Any] = {"feed": 0.03, **options}
+    with pytest.raises(sm.errors.FileFormatError, match=said):
+        sm.files.read_path(CASES / "along_the_path" / "square.csv", **given)

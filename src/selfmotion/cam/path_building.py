@@ -1,16 +1,17 @@
 """From rows of poses to a tool motion."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path as FilePath
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from selfmotion.basics import TURN, Array, FileFormatError, Ints, PathError, as_choice
 from selfmotion.cam.cuts import RAPID
 from selfmotion.cam.path_rows import DRAWING, PoseRows, some_rows
+from selfmotion.cam.tangents import AXES, stretches_along, turning
 from selfmotion.path import (
     ORIENTATIONS,
     TURN_NOTE,
@@ -62,6 +63,8 @@ class Pacing:
     ramp: float | None = None
     flip_normals: bool = False
     standoff: float = 0.0
+    along: str | None = None
+    lead: float = 0.0
 
     @property
     def bounds(self) -> dict[str, float]:
@@ -92,7 +95,14 @@ def path_of_rows(path: FilePath, rows: PoseRows, asked: Pacing) -> Path:
     turns = _quaternions(rotations) if rows.orientation else None
     try:
         _check_corners(asked)
-        made = _of_cut(rows, turns, asked) if rows.straight else _of_table(path, rows, turns, asked)
+        if asked.along is not None:
+            made = _along(rows, rotations, asked)
+        elif asked.lead:
+            raise PathError("lead has no effect without along (x, -x, y, -y); drop it, or give it")
+        elif rows.straight:
+            made = _of_cut(rows, turns, asked)
+        else:
+            made = _of_table(path, rows, turns, asked)
         is_ramped = asked.ramp is not None and asked.duration is None
         found = section_at_rest(made, ramp=asked.ramp or 0.0) if is_ramped else made
     # Splines refuse times that differ, but by less than they can divide by.
@@ -263,6 +273,83 @@ def _of_cut(rows: PoseRows, turns: Array | None, asked: Pacing) -> Path:
             else:
                 pieces.append(_at_feed(piece, piece.pose_times, at, asked.bounds))
     return pieces[0] if len(pieces) == 1 else Joined(pieces)
+
+
+class _Piece(NamedTuple):
+    """Places (K, 3), rotations there, feeds from each on, and whether no feed is asked for."""
+
+    places: Array
+    turns: Array
+    feeds: Array
+    is_free: bool
+
+
+def _along(rows: PoseRows, rotations: Array, asked: Pacing) -> Path:
+    """Return straight legs along which an axis of the tool points where it goes."""
+    along = as_choice(asked.along, "along", tuple(AXES), PathError)
+    if asked.corners == "blend":
+        raise PathError(
+            f"along = '{along}' turns the tool in corners: say corners stop (on the spot, at "
+            f"rest) or round (within the tolerance)"
+        )
+    count = len(rows.positions)
+    if rows.t is not None or asked.duration is not None:
+        raise PathError(f"along = '{along}' is for paths at a feed, without times or a duration")
+    if rows.feed is not None and asked.feed is not None and not rows.straight:
+        raise PathError("has a column feed, so that feed has no effect; drop one")
+    feeds = rows.feed if asked.feed is None else np.full(count, asked.feed)
+    if feeds is None:
+        raise PathError(f"along = '{along}' needs a feed [m/s]; give it")
+    axes = rotations[:, :, 2] if rows.orientation else np.tile([0.0, 0.0, -1.0], (count, 1))
+    rapid = np.zeros(count, dtype=bool) if rows.rapid is None else rows.rapid
+    bend = _BEND if asked.corner_angle is None else asked.corner_angle
+    found = stretches_along(rows.positions, axes, rapid, along, asked.lead, bend)
+    pieces: list[_Piece] = []
+    for number, (first, last, turns) in enumerate(found):
+        if number:
+            before = turning(found[number - 1].rotations[-1], turns[0])
+            spot = np.repeat(rows.positions[first : first + 1], len(before), axis=0)
+            pieces.append(_Piece(spot, np.array(before), np.full(len(before), feeds[first]), True))
+        part = slice(first, last + 1)
+        pieces.append(_Piece(rows.positions[part], turns, feeds[part], bool(rapid[first])))
+    if asked.corners == "round":
+        pieces = _run_together(pieces, [bool(rapid[item.first]) for item in found])
+    paths: list[Path] = []
+    for places, turns, own, is_free in pieces:
+        if not is_free or np.ptp(places, axis=0).max() > 0.0 or _is_turned(turns):
+            legs = Polyline(places, _quaternions(turns), tolerance=asked.tolerance)
+            if is_free:
+                paths.append(Feed(legs, RAPID, required=False, **asked.bounds))
+            else:
+                steady = _steady(places, own, asked.tolerance)
+                paths.append(_at_feed(legs, legs.pose_times, steady, asked.bounds))
+    return paths[0] if len(paths) == 1 else Joined(paths)
+
+
+def _is_turned(turns: Array) -> bool:
+    """Whether rotations differ by more than rounding."""
+    return bool(np.abs(turns - turns[0]).max() > _REPEATED)
+
+
+def _run_together(pieces: Sequence[_Piece], rapid: Sequence[bool]) -> list[_Piece]:
+    """Return pieces of which those at a feed, and turns between two of them, are one."""
+    found: list[_Piece] = []
+    for number, piece in enumerate(pieces):
+        # Turns stand between stretches.
+        beside = rapid[number // 2 : number // 2 + 1 + number % 2]
+        at_feed = not any(beside)
+        if found and at_feed and not found[-1].is_free:
+            last = found[-1]
+            pairs = (
+                (last.places, piece.places),
+                (last.turns, piece.turns),
+                (last.feeds, piece.feeds),
+            )
+            joined = [np.concatenate([one, other[1:]]) for one, other in pairs]
+            found[-1] = _Piece(joined[0], joined[1], joined[2], False)
+        else:
+            found.append(piece._replace(is_free=not at_feed))
+    return found
 
 
 def _rests(positions: Array, turns: Array, asked: Pacing) -> Ints:

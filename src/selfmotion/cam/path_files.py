@@ -290,6 +290,8 @@ def read_path(
     ramp: float | None = None,
     flip_normals: bool = False,
     standoff: float = 0.0,
+    along: str | None = None,
+    lead: float = 0.0,
     columns: Sequence[str] | str | None = None,
     rotary: str | None = None,
     rotary_axes: Sequence[str] | str | None = None,
@@ -388,6 +390,13 @@ def read_path(
         Whether ``nx,ny,nz`` point out of the part, as surface normals of CAD do.
     standoff : float
         How far the tool's tip is held back from the poses, along its z axis [m].
+    along : {"x", "-x", "y", "-y"}, optional
+        Which axis of the tool is along the path, as of a knife or a nozzle; its z axis is that of
+        the file, or points down. Legs are straight; in corners the tool turns on the spot (corners
+        "stop") or within `tolerance` ("round"), and in bends smaller than `corner_angle` on its
+        way.
+    lead : float
+        By how much its z axis leans towards where it goes then [rad]; below 0 it lags.
     columns : sequence of str, optional
         Names of the columns of a table or of an array, in place of a header or where there is none;
         "-" leaves one out.
@@ -430,6 +439,8 @@ def read_path(
             "ramp": ramp,
             "flip_normals": flip_normals,
             "standoff": standoff,
+            "along": along,
+            "lead": lead,
         },
     )
     reading = Reading.of(
@@ -470,6 +481,9 @@ def _pacing(path: FilePath, options: Mapping[str, Any]) -> Pacing:
     asked = Pacing(**options)
     as_number(asked.jump, f"{path}: jump", above=0.0, error=FileFormatError)
     as_number(asked.standoff, f"{path}: standoff", error=FileFormatError)
+    lean = as_number(asked.lead, f"{path}: lead", error=FileFormatError)
+    if not abs(lean) < 0.5 * np.pi:
+        raise FileFormatError(f"{path}: lead is {lean:g} rad, expected less than a quarter turn")
     as_flag(asked.flip_normals, f"{path}: flip_normals", FileFormatError)
     for name, value in (("feed", asked.feed), ("duration", asked.duration)):
         if value is not None:

@@ -48,6 +48,8 @@ class Shell:
     columns: options.ColumnsOption = None
     flip_normals: options.FlipOption = False
     standoff: options.StandoffOption = None
+    along: options.AlongOption = None
+    lead: options.LeadOption = None
     rotary: options.RotaryOption = None
     rotary_axes: options.RotaryAxesOption = None
     rotary_center: options.RotaryCenterOption = None
@@ -211,6 +213,7 @@ _ENTRY = re.compile(r"constraints\[\d+\]\.obstacles(\[\d+\])")
 OF_PATH = (
     *("feed", "duration", "jump", "seam", "columns", "flip_normals", "standoff", "rotary"),
     *("rotary_axes", "rotary_center", "unit", "frame", "ramp", "corners", "corner_tolerance"),
+    *("along", "lead"),
 )
 
 
@@ -223,7 +226,7 @@ _OF_SHAPE = ("feed", "duration")
 def path_table(file: Path, typed: Mapping[str, Any]) -> dict[str, Any]:
     """Return the table of a path of a file, by the options `OF_PATH` as typed."""
     names = ("seam", "feed", "duration", "jump", "ramp", "standoff", "rotary", "unit")
-    given = {name: typed[name] for name in (*names, "rotary_axes")}
+    given = {name: typed[name] for name in (*names, "rotary_axes", "along", "lead")}
     given["columns"] = None if typed["columns"] is None else typed["columns"].split(",")
     given["flip_normals"] = typed["flip_normals"] or None
     if typed["rotary_center"] is not None:

@@ -83,6 +83,16 @@ StandoffOption = Annotated[
     float | None,
     typer.Option(help="Distance from the poses of --path, back along the tool's z axis (m)."),
 ]
+AlongOption = Annotated[
+    str | None,
+    typer.Option(
+        help="Which axis of the tool is along --path: x, -x, y or -y; with --corners stop or round."
+    ),
+]
+LeadOption = Annotated[
+    float | None,
+    typer.Option(help="By how much the tool leans towards where it goes, with --along (rad)."),
+]
 RotaryOption = Annotated[
     Rotary | None,
     typer.Option(

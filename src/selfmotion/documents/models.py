@@ -129,6 +129,8 @@ _PATH_FILE: _Fields = {
     "columns": (Names, None),
     "flip_normals": (Flag, False),
     "standoff": (Number, None),
+    "along": (Text, None),
+    "lead": (Number, None),
     "rotary": (Text, None),
     "rotary_axes": (Names, None),
     "rotary_center": (Numbers, None),
