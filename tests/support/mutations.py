@@ -80,7 +80,24 @@ _OTHERS = (
     (".json", '[{"poses": [{"position": {"x": 0.4, "y": 0, "z": 0.3}, "orientation": {"x": 1, '
      '"y": 0, "z": 0, "w": 0}}, {"position": {"x": 0.5, "y": 0, "z": 0.3}, "orientation": {"x": 1, '
      '"y": 0, "z": 0, "w": 0}}]}]'),
+    (".csv", "x, y, z, rz1, ry, rz2, motion_type, velocity\n0, 0, 0, 0, 180, 0, 0, 50\n50, 0, 0, "
+     "0, 180, 0, 0, 50\n"),
+    (".csv", "X 0.00; Y 0.00; Z 0.00; A 180.0; B 0.0; C 0.0\nX 50.00; Y 0.00; Z 0.00; A 1; B 0"),
+    (".csv", 'breakpoints,primitives,points,q_bp\n0,movej_fit,"[array([450.0, -100.0, 350.0])]","a'
+     '\nb"\n500,movel_fit,"[array([450.0, 0.0, 350.0])]",\n'),
+    (".json", '{"layer_0": {"path_0": {"0": {"frame": {"point": [0, 0, 0], "xaxis": [1, 0, 0], '
+     '"yaxis": [0, -1, 0]}, "velocity": 25}, "1": {"frame": {"point": [9, 0, 0], "xaxis": [1, 0, '
+     '0], "yaxis": [0, -1, 0]}, "velocity": 25, "extruder_toggle": false}}}}'),
+    (".cls", "MSYS/0,0,0,1,0,0,0,1,0\nRAPID\nGOTO/0,0,20,0,0,1\nFEDRAT/MMPM,600\nGOTO/0,0,0\nMSYS/"
+     "9,0,0,0,1,0,-1,0,0\nOFSTNO/1\nINSERT M8\nGOTO/40,0,0\nRAPID\nGOTO/40,0,20\n"),
+    (".mpf", "TRAORI\nG0 X=0 Y=0 Z=20 A3=0 B3=0 C3=1\nG1 X=40 Z=0 A3=0.1 B3=0 C3=0.9 F2000\n"),
 )  # fmt: skip
+_PLANAR = b"""<robot name="r"><link name="a"/><link name="b"/><joint name="p" type="planar">
+<parent link="a"/><child link="b"/><axis xyz="0 0 1"/><limit lower="-1" upper="1" velocity="1"/>
+</joint></robot>"""
+_SRDF_XACRO = b"""<robot xmlns:xacro="http://www.ros.org/wiki/xacro" name="arm">
+<xacro:arg name="p" default="l"/><xacro:property name="n" value="${1 + 1}"/>
+<disable_collisions link1="$(arg p)1" link2="l${n}"/></robot>"""
 _POINTS = b"""joint_names: [a, b]
 points:
 - {positions: [0, 1], velocities: [], time_from_start: {secs: 0, nsecs: 0}}
@@ -91,6 +108,10 @@ points:
 
 def _others(file: Path) -> object:
     return sm.files.read_path(file, feed=0.05, corners="round")
+
+
+def _along(file: Path) -> object:
+    return sm.files.read_path(file, feed=0.05, corners="round", along="x", lead=0.1)
 
 
 def _drawn_in_mm(file: Path) -> object:
@@ -112,7 +133,10 @@ def good_files() -> tuple[Good, ...]:
         Good("URDF", ".urdf", _URDF, sm.load_robot),
         *(Good(_kind(suffix), suffix, content, _path) for suffix, content in _paths()),
         *(Good("others' files", suffix, text.encode(), _others) for suffix, text in _OTHERS),
+        Good("others' files", ".csv", b"x,y,z\n0,0,0\n0.1,0,0\n0.1,0.08,0\n0,0.08,0\n", _along),
         Good("others' files", ".dxf", _drawing(unit=0), _drawn_in_mm),
+        Good("URDF", ".urdf", _PLANAR, sm.load_robot),
+        Good("SRDF", ".srdf", _SRDF_XACRO, lambda file: sm.constraints.Clearance(srdf=file)),
         Good("xacro", ".xacro", with_arguments_text().encode(), _expanded),
         Good("URDF", ".urdf", finger().encode(), lambda file: sm.load_robot(file, tool="tip")),
         Good("motion", ".yaml", _POINTS, sm.files.read_motion),

@@ -122,7 +122,7 @@ def _straight(
 _IGUS = re.compile(
     r"X\s*[-+.\dE]+\s*;\s*Y\s*[-+.\dE]+\s*;\s*Z\s*[-+.\dE]+\s*(?:;.*)?", re.IGNORECASE
 )
-_WORD = re.compile(r"([A-Za-z]+)\s*([-+.\dEe]+)")
+_WORD = re.compile(r"\s*([XYZ])\s*([-+.\dE]{1,40})\s*", re.IGNORECASE)
 
 
 def _of_igus(file: FilePath, text: str) -> PoseRows:
@@ -135,8 +135,9 @@ def _of_igus(file: FilePath, text: str) -> PoseRows:
                 f"{file}: line {number}: '{line[:40]}' is not read, expected X …; Y …; Z …; A …; "
                 f"B …; C … as igus' programs write them"
             )
-        said = {word.upper(): value for word, value in _WORD.findall(line)}
-        rows.append([_number(file, number, said[key]) for key in "XYZ"])
+        words = filter(None, map(_WORD.fullmatch, line.split(";")))
+        said = {found[1].upper(): found[2] for found in words}
+        rows.append([_number(file, number, said.get(key, "")) for key in "XYZ"])
         places.append(f"line {number}")
     note = (
         "igus: X, Y, Z in mm; A, B, C are passed over: for orientations name the columns "

@@ -5,7 +5,7 @@ from pathlib import Path
 
 # How much of a file is looked at: the unit stands at its head.
 _HEAD = 100_000
-_UNIT = re.compile(rb"<unit\b[^>]*?\bmeter\s*=\s*[\"']\s*([0-9.eE+-]+)\s*[\"']")
+_UNIT = re.compile(rb"<unit\b[^>]{0,200}?\bmeter\s*=\s*[\"']\s*([0-9.eE+-]+)\s*[\"']")
 
 
 def unit_of(file: Path) -> float:
