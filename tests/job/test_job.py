@@ -555,6 +555,10 @@ def test_an_interrupted_seam_stops_the_job(monkeypatch: pytest.MonkeyPatch) -> N
         return found
 
     monkeypatch.setattr(module, "plan", pressed)
-    with pytest.raises(KeyboardInterrupt):
-        sm.plan_job(robot_named("panda"), row_of_seams(1), branches=1)
-    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            sm.plan_job(robot_named("panda"), row_of_seams(1), branches=1)
+        assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    finally:
+        signal.signal(signal.SIGINT, before)
