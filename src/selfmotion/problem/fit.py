@@ -360,7 +360,7 @@ def _check_redundancy(follows: Follows, relaxations: Sequence[Relaxation]) -> No
         raise ProblemError(
             f"{robot.name}: task '{task.value}' prescribes {task.dimension} rows "
             f"({', '.join(task.row_names)}), but the arm cannot move '{robot.tool}' freely in "
-            f"all of them; relax rows that it cannot move (relaxations=), or {choice}"
+            f"all of them; {choice}, or relax rows that it cannot move (relaxations=)"
         )
     if follows.redundancy == 0 and not is_relaxed:
         others = _redundant_tasks(robot)
