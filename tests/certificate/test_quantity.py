@@ -66,7 +66,7 @@ def test_what_has_no_limit_is_not_covered_and_said() -> None:
     one = np.full(7, np.inf)
     one[2] = 30.0
     some = sm.constraints.JointTorqueLimits(one).requirement(robot)
-    assert some.covers == ("torques of 1 of 7 joints",)
+    assert some.covers == ("torques of 1 of 7 joints without damping and friction",)
     assert robot.joint_names[2] not in some.remarks[0]
 
 

@@ -4,8 +4,12 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.planning.screening import far_from_usual, usual_posture, wound_back
+from selfmotion.basics import Counts, silent
+from selfmotion.planning.effort import Effort
+from selfmotion.planning.screening import Ranking, far_from_usual, usual_posture, wound_back
+from selfmotion.search import Stacked, start_candidates
 from support.arms import robot_named
+from support.cones import downhand
 
 WHOLE = 2.0 * np.pi
 
@@ -51,3 +55,25 @@ def test_the_nearest_of_mirror_images_is_taken() -> None:
     # None of its joints could be a turn nearer.
     np.testing.assert_array_equal(wound_back(arm, q), q)
     assert far_from_usual(arm, q[None])[0] <= far_from_usual(arm, q[None] + WHOLE)[0]
+
+
+def test_whole_turns_are_told_by_the_limits_that_are_asked_for() -> None:
+    """A table that turns without end has to stay within a window of less than two turns."""
+    cell = downhand(0.5)
+    turn = cell.robot.joint_names.index("table/turn")
+    lower, upper = cell.robot.lower.copy(), cell.robot.upper.copy()
+    lower[turn], upper[turn] = 2.0, 12.0
+    limits = sm.constraints.JointPositionLimits(lower, upper)
+    problem = cell.changed(constraints=(limits, *cell.constraints[1:])).augmented
+    t, envelope = np.linspace(0.0, problem.path.duration, 49), problem.envelope
+    task = Stacked(problem.follows, envelope.quantities, lower, upper, np.ones(8))
+    arm = problem.follows.for_robot(envelope.arm(problem.robot))
+    starts, kept = task.placed(
+        np.array(start_candidates(arm, 24, np.random.default_rng(0))), float(t[0])
+    )
+    motions, arrived = task.carried(starts[kept], t)
+    ranking = Ranking(problem, Effort(None, None, None, Counts()), silent)
+    assert ranking.run_along(motions[arrived], t, 1)
+    (best,) = ranking.ranked
+    assert best.violation <= 0.0
+    assert (best.place.q[:, turn] >= 2.0).all()

@@ -90,6 +90,8 @@ class Ranking:
     def __init__(self, problem: Problem, effort: Effort, progress: Progress) -> None:
         self._problem, self._effort, self._progress = problem, effort, progress
         self._free = problem.given_start is None
+        # Whole turns are told by the limits that are asked for, not by the arm's own.
+        self._arm = problem.envelope.arm(problem.robot)
         self._apart = apart_of(problem.robot)
         self._t = rough_grid(problem).nodes
         self._found: Batch | None = None
@@ -171,7 +173,7 @@ class Ranking:
 
         problem, sampling = self._problem, Sampling.trapezoidal(t)
         if self._free:
-            motions = np.array([wound_back(problem.robot, motion) for motion in motions])
+            motions = np.array([wound_back(self._arm, motion) for motion in motions])
         curves = [CubicSpline(t, motion) for motion in motions]
         each = [Samples.along(problem.follows, sampling, q(t), q(t, 1)) for q in curves]
         costs = np.array([problem_cost(problem, samples) for samples in each])
@@ -314,7 +316,7 @@ class Ranking:
         have gone far beyond them, and the tool is where it was.
         """
         q = found.q[k]
-        motion = self._near(wound_back(self._problem.robot, q), found.qd[k], found.qdd[k])
+        motion = self._near(wound_back(self._arm, q), found.qd[k], found.qdd[k])
         # Costs may know one turn from another.
         if motion is not None and motion.cost <= (1.0 + _SAME_TO_DIGITS) * found.costs[k]:
             return motion
@@ -325,7 +327,7 @@ class Ranking:
         order = _cheapest(found)
         if not order.size:
             return order
-        robot, costs = self._problem.robot, found.costs[order]
+        robot, costs = self._arm, found.costs[order]
         # Each motion belongs with the cheapest one that is about as cheap.
         group, first = np.zeros(len(order), dtype=np.int64), 0
         for k in range(1, len(order)):
@@ -337,7 +339,7 @@ class Ranking:
 
     def _turned_inside(self, q: Array) -> Array:
         """Return a motion (N + 1, n) with joints beyond their limits turned back by whole turns."""
-        robot = self._problem.robot
+        robot = self._arm
         beyond = ((q > robot.upper) | (q < robot.lower)).any(axis=0)
         return np.where(beyond, wound_back(robot, q), q)
 
