@@ -591,12 +591,7 @@ def _absent(number: int, folder: Path) -> Deception:
     ]
     kinds = [*SLIDES[:3], str(rng.choice(["revolute", "continuous"]))]
     own = [str(rng.choice(ways)) for _ in kinds]
-    try:
-        robot = gantry(folder, own, kinds)
-    except sm.errors.RobotError:
-        # An attribute that URDF demands.
-        own = [x if "velocity" in x and "effort" in x else WIDE for x in own]
-        robot = gantry(folder, own, kinds)
+    robot = gantry(folder, own, kinds)
     t, q = np.array([0.0, 1.0]), np.zeros((2, 4))
     motion = sm.Trajectory(t, q, q, robot.joint_names, q)
     kinds_asked = [
@@ -607,6 +602,9 @@ def _absent(number: int, folder: Path) -> Deception:
         sm.constraints.JointTorqueLimits(),
     ]
     picked = [item for item in kinds_asked if rng.random() < 0.7]
+    if robot.urdf.lacking_efforts:
+        # Torques of joints whose file does not say an effort are refused.
+        picked = [x for x in picked if not isinstance(x, sm.constraints.JointTorqueLimits)]
     dwell = sm.paths.Dwell(robot.pose(q[0]), 1.0)
     if rng.random() < 0.5:
         found = [item.requirement(robot) for item in picked if item.applies(robot)]

@@ -346,8 +346,8 @@ def _check_redundancy(follows: Follows, relaxations: Sequence[Relaxation]) -> No
         if is_relaxed:
             raise ProblemError(
                 f"{robot.name}: task '{task.value}' prescribes {task.dimension} rows "
-                f"({', '.join(task.row_names)}), and the arm cannot move '{robot.tool}' in all of "
-                f"them with its {robot.dof} joints and what is relaxed "
+                f"({', '.join(task.row_names)}), and the arm cannot move '{robot.tool}' freely in "
+                f"all of them with its {robot.dof} joints and what is relaxed "
                 f"({', '.join(row for item in relaxations for row in item.rows)}); relax other "
                 f"rows as well"
             )
