@@ -314,6 +314,12 @@ class _Reader:
     def _goes_home(self, code: str, values: Mapping[str, float]) -> None:
         """Go to a place that is the machine's own: where that is in the part is not known."""
         machine = self.machine
+        turned = [name for name in "ABC" if name in values]
+        if turned:
+            raise machine.fault(
+                f"{code} {turned[0]}: an axis of rotation at a place of the machine's own: how the "
+                f"tool stands then is not known; write its angle without {code}"
+            )
         axes = [k for k, name in enumerate("XYZ") if name in values] or [0, 1, 2]
         if code != "G53":
             # By the place that its line says.

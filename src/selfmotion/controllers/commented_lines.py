@@ -28,6 +28,8 @@ from selfmotion.task import SE3
 # A file of a controller has less than so many bytes, lines less than so many characters, numbers
 # less than that.
 _BYTES, _LINE, _LARGEST = 50_000_000, 2000, 1e7
+# Lines end here; what ends them in other programs is in none.
+_ENDS, _STRANGE = re.compile(r"\r\n|\n|\r"), re.compile("[\v\f\x1c-\x1e\x85\u2028\u2029]")
 # What comments of events begin with.
 _EVENT = "event: "
 _NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)(E[+-]?[0-9]{1,3})?", re.IGNORECASE)
@@ -51,7 +53,8 @@ class Lines:
             raise FileFormatError(f"{file}: cannot be read: {error.strerror or error}") from error
         if len(content) > _BYTES:
             raise FileFormatError(f"{file}: has {len(content)} bytes, expected {_BYTES} at most")
-        self._lines = text_of(file, content).splitlines()
+        text = text_of(file, content)
+        self._lines = _ENDS.split(text)
         self.number = 0
         self.notes: list[str] = []
 
@@ -59,6 +62,12 @@ class Lines:
         """Yield what is no comment but that of an event, without spaces around it."""
         for number, line in enumerate(self._lines, 1):
             self.number = number
+            strange = _STRANGE.search(line)
+            if strange:
+                raise self.fault(
+                    f"has a character {ord(strange[0])}, at which some programs end a line and "
+                    f"controllers do not"
+                )
             text = line.strip()
             if len(text) > _LINE:
                 raise self.fault(f"has {len(text)} characters, expected {_LINE} at most")

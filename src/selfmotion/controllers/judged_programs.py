@@ -44,7 +44,7 @@ from selfmotion.path import Placed
 from selfmotion.problem import Problem
 from selfmotion.result import Move, Parts, Piece, Plan, elsewhere, gaps
 from selfmotion.robot import RobotModel
-from selfmotion.task import log3
+from selfmotion.task import SE3, log3
 
 # Programs of controllers as files: which suffix is which language.
 
@@ -166,10 +166,13 @@ class ProgramParts(NamedTuple):
         of its path.
     slow : sequence of (int, list of Trajectory)
         Slow motions to where a shifted program goes on: before which step, and what.
+    by_poses : list of bool
+        Whether a step has targets that are poses, or rests.
     """
 
     motions: list[list[Trajectory]]
     slow: Sequence[tuple[int, list[Trajectory]]]
+    by_poses: list[bool]
 
 
 def parts_of(file: FilePath, program: ControllerProgram, job: Program) -> ProgramParts:
@@ -184,7 +187,7 @@ def parts_of(file: FilePath, program: ControllerProgram, job: Program) -> Progra
     known = [axis.joint for axis in program.axes]
     if sorted(known) != sorted(names):
         raise FileFormatError(f"{file}: has joints {', '.join(known)}, expected {', '.join(names)}")
-    left, found = list(program.stretches), ProgramParts([], slow := [])
+    left, found = list(program.stretches), ProgramParts([], slow := [], [])
 
     def part(stretches: Sequence[Stretch]) -> ControllerProgram:
         return replace(program, stretches=tuple(stretches))
@@ -205,6 +208,10 @@ def parts_of(file: FilePath, program: ControllerProgram, job: Program) -> Progra
         own, made = part(taken), step.made
         path = None if isinstance(made, Move) else made.problem.path
         found.motions.append([motion.of_joints(names) for motion in own.motions(path)])
+        # Where the arm rests, it is where the poses around have it.
+        moving = [item for item in taken if not item.is_rest]
+        posed = not moving or any(isinstance(item, PoseStretch) for item in moving)
+        found.by_poses.append(posed)
     if left:
         raise FileFormatError(f"{file}: goes on with '{left[0].name}' when the job has ended")
     return found
@@ -238,6 +245,8 @@ _MOMENT, _LEAST = 1e-4, 1e-6
 # Where a program begins and ends is written to so many digits [rad or m], by poses to fewer; what
 # it switches is switched at a target, as near to its time [s].
 _DIGITS, _OF_POSES, _PROMPT = 1e-6, 1e-5, 1e-3
+# A slow motion of a shifted program ends as near as this to where the shift takes it [m].
+_EXPLAINED = 1e-3
 # Times as near as this are one [s].
 _INSTANT = 1e-9
 
@@ -359,10 +368,10 @@ def judged_program(file: FilePath, job: Program, within: Tolerance | None = None
     failures = (
         *(f"the job itself: {text}" for text in job.failures),
         *gaps(job.robot, pieces, digits),
-        *(() if program.shift is not None else _elsewhere(job, pieces, digits)),
+        *_elsewhere(job, pieces, digits, program),
         *([program.begins_elsewhere] if program.begins_elsewhere else []),
         *misswitched(program, job),
-        *_off_moves(file, program, job),
+        *_off_moves(file, program, job, parts),
         *unlike(program, job.robot, [item for own in job.steps for item in _kept_by(own.made)]),
     )
     left = of_the_controller(program)
@@ -373,9 +382,58 @@ def _kept_by(made: Plan | Move) -> Sequence[Constraint]:
     return made.problem.constraints if isinstance(made, Plan) else made.constraints
 
 
-def _off_moves(file: FilePath, program: ControllerProgram, job: Program) -> Iterator[str]:
+def _shifted_moves(program: ControllerProgram, job: Program, parts: ProgramParts) -> Iterator[str]:
+    """Yield what of a shifted program is elsewhere without the shift's doing.
+
+    Moves by joint targets, which know no work object; and slow motions that go farther than from
+    where a joint target is to where the shifted pose of it is, or back.
+    """
+    stated = program.miss.moves.joint
+    for step, ways, is_shifted in zip(job.steps, parts.motions, parts.by_poses, strict=True):
+        if isinstance(step.made, Plan) or is_shifted:
+            continue
+        t = np.union1d(step.motion.t, step.motion.t[:-1] + 0.5 * np.diff(step.motion.t))
+        here = step.motion(t)
+        for way in ways:
+            off = np.abs(way(np.minimum(t - t[0], way.t[-1])) - here).max()
+            if off > stated + _DIGITS:
+                yield (
+                    f"'{step.name}' has joints {off:.4g} rad or m off the move of the job, the "
+                    f"file states {stated:.4g}; a work object that is shifted moves no joint target"
+                )
+                break
+    shift = program.shift
+    frame = _carrier_place(program, job)
+    if shift is None or frame is None:
+        return
+    for number, ways in parts.slow:
+        ends = [job.robot.chain.place(q) for q in ways[0].q[[0, -1]]]
+        first, last = (np.asarray(frame.actInv(end.translation)) for end in ends)
+        explained = min(
+            np.linalg.norm(np.asarray(shift.act(first)) - last),
+            np.linalg.norm(np.asarray(shift.act(last)) - first),
+        )
+        if explained > _EXPLAINED:
+            yield (
+                f"before '{job.steps[number].name}' it goes slowly to where neither the job is nor "
+                f"the shift of its work object takes it ({1e3 * explained:.3g} mm)"
+            )
+
+
+def _carrier_place(program: ControllerProgram, job: Program) -> SE3 | None:
+    """Return where the carrier of the work object stands in the arm's frame; None if it moves."""
+    robot = job.robot
+    carrier = robot.urdf.root if program.carrier == WORLD else program.carrier
+    between = robot.chain_to(carrier, robot.reference)
+    return None if len(between.joints) else between.place(np.zeros(robot.dof))
+
+
+def _off_moves(
+    file: FilePath, program: ControllerProgram, job: Program, parts: ProgramParts
+) -> Iterator[str]:
     """Yield by how much free moves leave those of the job, beyond what the file states."""
     if program.shift is not None:
+        yield from _shifted_moves(program, job, parts)
         return
     _, stated, found = program_miss(job, file, program)
     if any(one > other + 1e-9 for one, other in zip(found.moves, stated.moves, strict=True)):
@@ -392,13 +450,12 @@ def unlike(
     """Yield what a program rests on that is not so where it is judged: held joints, its load."""
     facts = program.facts
     if facts is None:
-        if robot.locked:
-            yield (
-                f"its head does not say where held joints stand ({', '.join(robot.locked)}): write "
-                f"the program again"
-            )
+        yield (
+            "its head does not state what its targets rest on (flange, held joints, outputs, with "
+            "a checksum): write the program again"
+        )
         return
-    yield from facts.against(robot)
+    yield from facts.against(robot, program.load)
     try:
         check_load(program.load, robot, constraints, facts.flange)
     except (ProblemError, RobotError) as error:
@@ -530,9 +587,21 @@ def _judged_steps(
     return tuple(found), pieces
 
 
-def _elsewhere(job: Program, pieces: Sequence[Piece], digits: float = _DIGITS) -> Iterator[str]:
-    """Yield where a program does not begin or end as its job does."""
+def _elsewhere(
+    job: Program,
+    pieces: Sequence[Piece],
+    digits: float = _DIGITS,
+    program: ControllerProgram | None = None,
+) -> Iterator[str]:
+    """Yield where a program does not begin or end as its job does.
+
+    Poses of a shifted work object are elsewhere, joint targets are not.
+    """
     for end in (0, -1) if pieces else ():
+        if program is not None and program.shift is not None:
+            moving = [item for item in program.stretches if not item.is_rest]
+            if not moving or isinstance(moving[end], PoseStretch):
+                continue
         asked = job.steps[end].motion.q[end]
         yield from elsewhere(job.robot, pieces[end], end, asked, digits)
 

@@ -16,6 +16,7 @@ from selfmotion.controllers.controller_program import (
     with_begins,
 )
 from selfmotion.controllers.feed_stretches import FeedStretch
+from selfmotion.controllers.program_facts import ProgramFacts
 from selfmotion.controllers.program_lines import ProgramReader, switched
 from selfmotion.controllers.program_settings import AXES, written
 from selfmotion.controllers.program_texts import module_name, plain
@@ -313,6 +314,7 @@ class KrlReader(ProgramReader):
         self._triggers: list[tuple[int, Sequence[str]]] = []
         # Of segments at speeds: $VEL.CP [m/s], that of each, and through where they go.
         self._speed = 0.0
+        self._is_set = False
         # Share of their speed and acceleration that axes have in motions by axes [%].
         self._percent: dict[str, float] = {}
         # How fast the tool turns at most [°/s], and what is said of how it turns.
@@ -348,6 +350,15 @@ class KrlReader(ProgramReader):
         values = self._values(center)
         self.load_is(mass, [str(values.get(name, 0.0)) for name in "XYZ"], 1e-3)
 
+    def initialise(self, _: Sequence[str]) -> None:
+        """Take that all that is set begins anew, which has to come before anything is set."""
+        if self._is_set or self._percent or self._speed or self.tool or self.work or self.load:
+            raise self.lines.fault(
+                "BAS(#INITMOV, 0) after frames, speeds or the load were set, expected it once and "
+                "first: it may set them back"
+            )
+        self._is_set = True
+
     def axes_are(self, given: Sequence[str]) -> None:
         """Take at which share of their speed or acceleration the axes move [%]."""
         percent = self.lines.number_of(given[1])
@@ -357,6 +368,14 @@ class KrlReader(ProgramReader):
 
     def go(self, given: Sequence[str]) -> None:
         """Take where the motion begins, or where it slowly goes on by axis targets."""
+        facts = ProgramFacts.stated(self.lines.notes)
+        most = _WHOLE if facts is None else _WHOLE * facts.approach
+        fast = [name for name in ("VEL", "ACC") if not 0.0 < self._share(name) <= most + _ABOVE]
+        if fast:
+            raise self.lines.fault(
+                f"PTP goes to where the motion goes on at BAS(#{fast[0]}_PTP) of "
+                f"{self._share(fast[0]):g} %, expected up to {most:g}: nothing has judged it"
+            )
         self.begin_at(self._target(given[0]))
         self.state = "body"
 
@@ -578,7 +597,7 @@ _NO_INERTIA = r"\{ ?X 0(?:\.0*)? ?, ?Y 0(?:\.0*)? ?, ?Z 0(?:\.0*)? ?\}"
 KrlReader.grammar = (
     (("before",), r"&(?:ACCESS|REL|PARAM|COMMENT)\b.*", KrlReader.skip),
     (("before",), rf"DEF ([A-Z]\w{{0,{NAME - 1}}}) ?\( ?\)", KrlReader.begin),
-    (("head",), r"BAS ?\( ?#INITMOV ?, ?0 ?\)", KrlReader.skip),
+    (("head",), r"BAS ?\( ?#INITMOV ?, ?0 ?\)", KrlReader.initialise),
     (_IN_BODY, r"BAS ?\( ?#(VEL|ACC)_PTP ?, ?([\d.]+) ?\)", KrlReader.axes_are),
     (_IN_BODY, r"\$VEL\.CP ?= ?([\d.e-]+)", KrlReader.speed_is),
     (_IN_BODY, r"\$VEL\.(ORI1|ORI2) ?= ?([\d.]+)", KrlReader.turning_is),

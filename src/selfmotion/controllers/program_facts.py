@@ -18,7 +18,8 @@ from selfmotion.task import SE3
 
 # What comments begin with that state these facts.
 _HELD, _OUTPUTS, _UNIT, _FLANGE = "held joints: ", "outputs: ", "positioner: ", "flange: "
-_FACTS = (_FLANGE, _HELD, _OUTPUTS, _UNIT)
+_LOAD, _APPROACH = "load: ", "approach: "
+_FACTS = (_FLANGE, _HELD, _OUTPUTS, _UNIT, _LOAD, _APPROACH)
 # What else a head states and a reader believes, and what guards all of it.
 _BELIEVED = (
     *("axes: ", "deviation: ", "deviation of moves: ", KEPT, "poses: ", "planned work object: "),
@@ -74,6 +75,10 @@ class ProgramFacts:
         that is a comment.
     positioner : str
         The mechanical unit that carries the work object; empty for none.
+    load : Load or None
+        What the program was written to say of the flange's load; None where it says nothing.
+    approach : float
+        How fast it was written to go to its begin, as a share.
     is_changed : bool
         Whether somebody changed what is stated, by its checksum.
     """
@@ -82,6 +87,8 @@ class ProgramFacts:
     held: Mapping[str, float] = field(default_factory=dict)
     outputs: Mapping[str, tuple[str, bool] | None] = field(default_factory=dict)
     positioner: str = ""
+    load: Load | None = None
+    approach: float = 1.0
     is_changed: bool = False
 
     @classmethod
@@ -95,7 +102,9 @@ class ProgramFacts:
             outputs[plain(event)] = None if signal is None else (str(signal[0]), signal[1])
         held = {name: round(float(value), 9) + 0.0 for name, value in robot.locked.items()}
         unit = settings.positioner if by_poses else None
-        return cls(flange_of(robot, settings), held, outputs, "" if unit is None else str(unit))
+        load = None if settings.mass is None else Load(settings.mass, np.array(settings.center))
+        named = "" if unit is None else str(unit)
+        return cls(flange_of(robot, settings), held, outputs, named, load, settings.approach)
 
     @classmethod
     def stated(cls, notes: Sequence[str]) -> "ProgramFacts | None":
@@ -107,6 +116,11 @@ class ProgramFacts:
         changed = sums != [checksum(notes)]
         try:
             flange = str(json.loads(said.get(_FLANGE, '""')))
+            approach = float(json.loads(said.get(_APPROACH, "1.0")))
+            carried = json.loads(said.get(_LOAD, "null"))
+            load = None
+            if carried is not None:
+                load = Load(float(carried[0]), np.array([float(x) for x in carried[1:4]]))
             held = {name: float(x) for name, x in json.loads(said.get(_HELD, "{}")).items()}
             outputs = {
                 event: None if value is None else (str(value[0]), bool(value[1]))
@@ -114,7 +128,7 @@ class ProgramFacts:
             }
         except (ValueError, TypeError, AttributeError, IndexError, RecursionError):
             return cls(is_changed=True)
-        return cls(flange, held, outputs, said.get(_UNIT, ""), changed)
+        return cls(flange, held, outputs, said.get(_UNIT, ""), load, approach, changed)
 
     @property
     def notes(self) -> list[str]:
@@ -122,16 +136,23 @@ class ProgramFacts:
         parts = [f"{_FLANGE}{json.dumps(self.flange)}"]
         parts += [f"{_HELD}{json.dumps(dict(self.held))}"] if self.held else []
         parts += [f"{_OUTPUTS}{json.dumps(dict(self.outputs))}"] if self.outputs else []
-        return [*parts, f"{_UNIT}{self.positioner}"] if self.positioner else parts
+        parts += [f"{_UNIT}{self.positioner}"] if self.positioner else []
+        if self.load is not None:
+            parts.append(f"{_LOAD}{json.dumps([self.load.mass, *self.load.center.tolist()])}")
+        return [*parts, f"{_APPROACH}{json.dumps(self.approach)}"]
 
-    def against(self, robot: RobotModel) -> Iterator[str]:
-        """Yield what of it is not as an arm has it."""
+    def against(self, robot: RobotModel, load: Load | None) -> Iterator[str]:
+        """Yield what of it is not as an arm has it, or as the program says its load."""
         if self.is_changed:
             yield (
                 "what its head states (axes, deviations, held joints, outputs, frames) was changed "
                 "by hand, as its checksum tells: write the program again"
             )
             return
+        known = (load is None) == (self.load is None)
+        if not known or (load and self.load and not load.is_like(self.load)):
+            now, before = ("no load" if x is None else str(x) for x in (load, self.load))
+            yield f"it says that the flange carries {now}, it was written with {before}"
         for name in sorted({*self.held, *robot.locked}):
             here, there = self.held.get(name), robot.locked.get(name)
             if here is None:

@@ -366,6 +366,10 @@ class UrscriptReader(StopReader):
                 f"r is {radius} m, expected 0 to {ZONE:g}: corners of seams at speeds are judged "
                 f"as rounded by that at most"
             )
+        before = [] if self.pose_at is None else [self.pose_at]
+        self._blends.append(blend)
+        if blend == 0.0:
+            self._check_blends(np.array([item.place for item in (*before, *self.poses, pose)]))
         acceleration = self.lines.number_of(ramp)
         self.take_pose_at_speed(pose, via, fast, stops=blend == 0.0, acceleration=acceleration)
 

@@ -111,7 +111,10 @@ def as_seen(
 
 def age_of(path: Path | None, t: float) -> float:
     """Return how long ago a target was seen [s]; of a path, which is no observation, 0."""
-    return t - path.seen if isinstance(path, MovingPose) else 0.0
+    while path is not None and not isinstance(path, MovingPose):
+        # Of what is placed, carried along or retimed, the path that it is made of.
+        path = next((item for item in vars(path).values() if isinstance(item, Path)), None)
+    return 0.0 if path is None else t - path.seen
 
 
 def in_null_space(motion: NullMotion) -> NullMotion:

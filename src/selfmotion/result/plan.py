@@ -70,12 +70,24 @@ class Views(Protocol):
 
 
 def _digests(costs: Sequence[Cost]) -> dict[str, str]:
-    """Return the digest of each cost by its name; "" of a function, which no file has."""
-    functions = FunctionCost | LostCost
+    """Return the digest of each cost by its name; "" of a function that no file had."""
     return {
-        cost.name: "" if isinstance(cost, functions) else digest_of(description_of(cost))
+        cost.name: ""
+        if isinstance(cost, LostCost)
+        else f"function {id(cost.g)}"
+        if isinstance(cost, FunctionCost)
+        else digest_of(description_of(cost))
         for cost in costs
     }
+
+
+def _are_same(costs: Mapping[str, str], known: Mapping[str, str] | None) -> bool:
+    """Whether costs are those that a report is of, as far as files know them."""
+    return (
+        known is not None
+        and costs.keys() == known.keys()
+        and all(own in ("", known[name]) for name, own in costs.items())
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,7 +139,7 @@ class Plan:
         evaluated, as functions that no file has, leaves a cost that is not a number.
         """
         motion, costs, report = self.trajectory.digest, _digests(self.problem.costs), self.report
-        if (report.motion, report.costs) == (motion, costs):
+        if report.motion == motion and _are_same(costs, report.costs):
             return report
         if not report.motion and self.certificate.motion:
             return replace(report, motion=motion, costs=costs)
