@@ -439,3 +439,91 @@ def test_an_axis_that_no_joint_is_does_not_move(plan: sm.Plan, tmp_path: Path, s
     file.write_text(moved)
     with pytest.raises(sm.errors.FileFormatError, match="axis E1 has targets"):
         sm.files.read_motion(file)
+
+
+@pytest.mark.parametrize("character", ["\u2028", "\f", "\x85"])
+@pytest.mark.parametrize("suffix", [".src", ".mod", ".script"])
+def test_lines_end_where_controllers_end_them(
+    plan: sm.Plan, tmp_path: Path, suffix: str, character: str
+) -> None:
+    """What Python takes for the end of a line, a controller takes for part of a comment."""
+    file = tmp_path / f"seam{suffix}"
+    sm.files.write_motion(plan, file, settings=settings("timed-poses"))
+    text = file.read_text()
+    mark = {".src": ";", ".mod": "!", ".script": "#"}[suffix]
+    line = next(x for x in text.splitlines() if x.strip().startswith(f"{mark} step"))
+    file.write_text(text.replace(line, f"{line}{character} hidden"), encoding="utf-8")
+    with pytest.raises(sm.errors.FileFormatError, match="at which some programs end a line"):
+        sm.files.read_motion(file, robot=plan.robot)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        (r"BAS\(#VEL_PTP, 10\)", "BAS(#VEL_PTP, 100)", "nothing has judged it"),
+        (r"  BAS\(#(VEL|ACC)_PTP, 10\)\n", "", "nothing has judged it"),
+        (r"  BAS\(#INITMOV, 0\)\n((?:.*\n)*?)(  PTP)", r"\1  BAS(#INITMOV, 0)\n\2", "first"),
+    ],
+)
+def test_the_way_to_the_begin_is_as_slow_as_it_was_written(
+    plan: sm.Plan, tmp_path: Path, old: str, new: str, said: str
+) -> None:
+    file = tmp_path / "seam.src"
+    sm.files.write_motion(plan, file)
+    text = file.read_text()
+    changed = re.sub(old, new, text)
+    assert changed != text
+    file.write_text(changed)
+    with pytest.raises(sm.errors.FileFormatError, match=said):
+        sm.files.read_motion(file)
+
+
+def test_a_shift_excuses_only_what_it_moves(job: sm.Program, tmp_path: Path) -> None:
+    """A work object that is shifted by some micrometres moves no joint target."""
+    file = tmp_path / "weld.src"
+    shifted = sm.files.ProgramSettings(signals=SIGNALS, targets="poses")
+    sm.files.write_motion(job, file, settings=shifted)
+    text = file.read_text().replace("$BASE = {X 0.00000", "$BASE = {X 0.00300")
+    file.write_text(text)
+    assert judged_program(file, job).shifted
+    assert judged_program(file, job).verified
+    # Aside and back, slowly, between two steps.
+    before, after = text.split("  ; step: seam 1\n")
+    x, rest = re.findall(r"(?:SPL|SLIN) \{X (-?[\d.]+)(,[^}]*)\}", before)[-1]
+    aside = (
+        "  $VEL.CP = 0.05\n  $VEL.ORI1 = 10\n  $VEL.ORI2 = 10\n"
+        f"  LIN {{X {float(x) + 60.0:.5f}{rest}}}\n  LIN {{X {x}{rest}}}\n"
+        "  $VEL.CP = 2\n  $VEL.ORI1 = 400\n  $VEL.ORI2 = 400\n"
+    )
+    file.write_text(f"{before}  ; step: seam 1\n{aside}{after}")
+    found = judged_program(file, job)
+    assert not found.verified
+    assert any("goes slowly to where neither" in text for text in found.failures)
+
+
+def test_a_load_is_the_one_that_was_written(plan: sm.Plan, kept: Path, tmp_path: Path) -> None:
+    file = tmp_path / "seam.src"
+    sm.files.write_motion(plan, file, settings=settings("joints"))
+    text = file.read_text()
+    for changed in (
+        re.sub(r"  \$LOAD.*\n", "", text),
+        re.sub(r"\{M 1\.0000", "{M 4.0000", text),
+        re.sub(r"  ; (flange|checksum of what is stated): .*\n", "", text),
+    ):
+        assert changed != text
+        file.write_text(changed)
+        assert invoke("check", file, "--robot", kept)[0] == 1
+
+
+def test_torques_are_judged_along_the_smooth_way(tmp_path: Path) -> None:
+    """At the corners of straight lines a program has no acceleration that anybody knows."""
+    ur5 = robot_named("ur5")
+    start = ur5.dexterous_configuration("pointing")
+    circle = sm.paths.Circle.around(ur5.pose(start), 0.1, SECONDS, normal=(1.0, 0.0, 0.0))
+    limits = sm.constraints.JointPositionLimits(), sm.constraints.JointVelocityLimits()
+    asked = [*limits, sm.constraints.JointTorqueLimits(payload=1.0)]
+    problem = sm.Problem(ur5, circle, "pointing", start, constraints=asked, clearance=None)
+    sm.plan(problem).require().save(tmp_path / "seam.npz")
+    plan, file = sm.load_plan(tmp_path / "seam.npz"), tmp_path / "seam.src"
+    sm.files.write_motion(plan, file, settings=settings("joints"))
+    assert invoke("check", file, "--robot", tmp_path / "seam.npz")[0] == 0

@@ -104,6 +104,14 @@ def test_a_target_of_another_clock_is_none(panda: sm.RobotModel) -> None:
     assert "on another clock?" in segment.reasons[0]
 
 
+def test_a_target_within_another_path_has_its_age(panda: sm.RobotModel) -> None:
+    seen = realtime.MovingPose(panda.pose(PANDA_HOME), TWIST, 0.0)
+    for path in (sm.paths.Placed(seen, np.eye(4)), realtime.Conveyed(seen, (0.0, 0.0, 0.0))):
+        segment = Replanner(panda).step(5.0, PANDA_HOME, np.zeros(7), path)
+        assert segment.flag is Flag.STOPPING
+        assert "it was seen 5 s ago" in segment.reasons[0]
+
+
 def test_what_a_camera_cannot_have_seen_is_left_out_and_told(panda: sm.RobotModel) -> None:
     replanner, home = Replanner(panda), panda.pose(PANDA_HOME)
     assert replanner.step(0.0, PANDA_HOME, np.zeros(7)).reasons == ("there was no target yet",)

@@ -51,6 +51,15 @@ def test_a_problem_with_other_costs_is_another_one(plans: tuple[sm.Plan, sm.Plan
     assert other.report.cost != pytest.approx(best.report.cost, rel=INTEGRATED)
 
 
+def test_a_function_of_the_same_name_is_another_cost(plans: tuple[sm.Plan, sm.Plan]) -> None:
+    best, _ = plans
+    first = sm.costs.FunctionCost(lambda q, qd, t: np.sum(qd**2, axis=1), name="own")
+    plan = replace(best, problem=replace(best.problem, costs=[first]))
+    other = sm.costs.FunctionCost(lambda q, qd, t: 9.0 * np.sum(qd**2, axis=1), name="own")
+    again = replace(plan, problem=replace(plan.problem, costs=[other]))
+    assert again.report.cost == pytest.approx(9.0 * plan.report.cost, rel=INTEGRATED)
+
+
 def test_a_function_that_is_lost_leaves_a_cost_that_is_no_number(
     plans: tuple[sm.Plan, sm.Plan], tmp_path: Path
 ) -> None:

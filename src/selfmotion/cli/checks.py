@@ -200,7 +200,12 @@ def of_problem(
     def certify(motion: sm.Trajectory) -> sm.Certificate:
         return problem.certify(motion, allowed, ending, besides, progress)
 
-    certificate, motion = controllers.judged_ways(motions, certify)
+    lines = replace(problem, constraints=controllers.what_lines_keep(problem.constraints))
+
+    def certify_lines(motion: sm.Trajectory) -> sm.Certificate:
+        return lines.certify(motion, allowed, ending, besides, progress)
+
+    certificate, motion = controllers.judged_ways(motions, certify, certify_lines)
     certificate = with_failures(certificate, against)
     close = near(robot, motion, (*problem.requirements, *besides))
     return certificate, close, robot, program

@@ -52,6 +52,7 @@ from selfmotion.controllers.samples import (
 )
 from selfmotion.controllers.thinning import (
     by_targets as by_targets,
+    what_lines_keep as what_lines_keep,
 )
 from selfmotion.controllers.tool_frames import (
     turned_base as turned_base,

@@ -35,7 +35,7 @@ from selfmotion.controllers.program_texts import plain
 from selfmotion.controllers.rapid import RapidReader, write_rapid
 from selfmotion.controllers.read_stretches import SLOWLY
 from selfmotion.controllers.stretches import Misses, PoseStretch, Stretch
-from selfmotion.controllers.thinning import what_targets_keep
+from selfmotion.controllers.thinning import what_lines_keep, what_targets_keep
 from selfmotion.controllers.tool_frames import WORLD
 from selfmotion.controllers.urscript import UrscriptReader, write_urscript
 from selfmotion.job import Program, are_opposite
@@ -233,8 +233,7 @@ def slow_steps(
             steps.append(JudgedStep(name, False, "not verified: the job has no free moves"))
             continue
         _, near = min(moves, key=lambda move: abs(move[0] - number))
-        kept = what_targets_keep(near.constraints)
-        steps.append(_judged_move(name, [Move(near.robot, kept, motion) for motion in motions]))
+        steps.append(_judged_move(name, near, motions, what_targets_keep))
     return tuple(steps), pieces
 
 
@@ -311,23 +310,34 @@ class JudgedProgram(NamedTuple):
         )
 
 
-def _judged_move(name: str, ways: Sequence[Move]) -> JudgedStep:
+def _judged_move(
+    name: str,
+    made: Move,
+    motions: Sequence[Trajectory],
+    kept: Callable[[Sequence[Constraint]], tuple[Constraint, ...]],
+) -> JudgedStep:
     """Return what is found of a move by each way in which it may be made: the first that fails."""
+    asked, lines = kept(made.constraints), what_lines_keep(kept(made.constraints))
+    ways = [Move(made.robot, lines if k else asked, motion) for k, motion in enumerate(motions)]
     worst = next((move for move in ways if not move.verified), ways[0])
     way = "" if worst is ways[0] else _STRAIGHT
     return JudgedStep(name, worst.verified, f"{worst.verdict}{way}")
 
 
 def judged_ways(
-    motions: Sequence[Trajectory], judge: Callable[[Trajectory], Certificate]
+    motions: Sequence[Trajectory],
+    judge: Callable[[Trajectory], Certificate],
+    judge_lines: Callable[[Trajectory], Certificate] | None = None,
 ) -> tuple[Certificate, Trajectory]:
     """Return the worst certificate of what a controller may make of targets, and its motion.
+
+    The first motion is smooth, the others go straight (`what_lines_keep`).
 
     That is the first which is not verified; else the one with the largest error of the path.
     """
     worst: tuple[Certificate, Trajectory] | None = None
     for number, motion in enumerate(motions):
-        found = judge(motion)
+        found = (judge if judge_lines is None or not number else judge_lines)(motion)
         if not found.verified:
             said = (*found.failures[:-1], f"{found.failures[-1]}{_STRAIGHT if number else ''}")
             return replace(found, failures=said), motion
@@ -574,14 +584,18 @@ def _judged_steps(
     for step, ways in zip(job.steps, motions, strict=True):
         made = step.made
         if isinstance(made, Move):
-            asked = kept(made.constraints)
-            found.append(_judged_move(step.name, [Move(made.robot, asked, way) for way in ways]))
+            found.append(_judged_move(step.name, made, ways, kept))
         else:
             problem = replace(made.problem, constraints=kept(made.problem.constraints))
             if program is not None:
                 problem = as_shifted(problem, program, ways[0].q[0])
-            certify = partial(problem.certify, tolerance=within or made.tolerance)
-            certificate, _ = judged_ways(ways, certify)
+            lines = replace(problem, constraints=what_lines_keep(problem.constraints))
+            tolerance = within or made.tolerance
+            certificate, _ = judged_ways(
+                ways,
+                partial(problem.certify, tolerance=tolerance),
+                partial(lines.certify, tolerance=tolerance),
+            )
             found.append(JudgedStep(step.name, certificate.verified, certificate.verdict))
         pieces.append(Piece(f"'{step.name}'", ways[0]))
     return tuple(found), pieces

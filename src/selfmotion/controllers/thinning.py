@@ -9,7 +9,13 @@ import numpy as np
 
 from selfmotion.basics import Array, Flags, PlanError, ProblemError
 from selfmotion.certificate import JointLimits, Requirement, Separation, Tolerance, arm_limits
-from selfmotion.constraints import Constraint, JointAccelerationLimits, JointJerkLimits
+from selfmotion.constraints import (
+    Constraint,
+    JointAccelerationLimits,
+    JointJerkLimits,
+    JointTorqueLimits,
+    ToolLimits,
+)
 from selfmotion.controllers.stretches import NO_MISS, Event, Miss, Stretch, miss_between, miss_of
 from selfmotion.job import Program
 from selfmotion.motion import Trajectory
@@ -119,6 +125,20 @@ def what_targets_keep(constraints: Sequence[Constraint]) -> tuple[Constraint, ..
     """Return what targets can keep: how a controller accelerates between them is its own."""
     own = (JointAccelerationLimits, JointJerkLimits)
     return tuple(item for item in constraints if not isinstance(item, own))
+
+
+def what_lines_keep(constraints: Sequence[Constraint]) -> tuple[Constraint, ...]:
+    """Return what straight lines between targets can keep: at corners they have no acceleration.
+
+    Nor torques, then, which are judged along the smooth way.
+    """
+    return tuple(
+        replace(item, acceleration=np.inf, turn_acceleration=np.inf)
+        if isinstance(item, ToolLimits)
+        else item
+        for item in what_targets_keep(constraints)
+        if not isinstance(item, JointTorqueLimits)
+    )
 
 
 def _of_move(name: str, move: Move) -> Piece:
