@@ -140,6 +140,10 @@ class Lines:
             raise FileFormatError(f"{self._file}: two axes are the same joint: {said[:200]}")
         return joints
 
+    def facts(self) -> ProgramFacts | None:
+        """Return what the comments so far state that targets rest on; None where they do not."""
+        return ProgramFacts.stated(self.notes)
+
     def miss(self) -> Misses:
         """Return the deviations that the comments state, or ones without bounds."""
         path = self._stated("deviation: ")
@@ -230,7 +234,7 @@ class Lines:
             self.within(),
             tuple(dict.fromkeys(self._after(TIMED))),
             follower.approach,
-            ProgramFacts.stated(self.notes),
+            self.facts(),
             load,
         )
 

@@ -41,6 +41,7 @@ from selfmotion.controllers.stretches import (
     Misses,
     PoseStretch,
     Stretch,
+    by_each_way,
     miss_of,
 )
 from selfmotion.controllers.targets import NotByPosesError, PosedSpans, PoseSpan, stretches_of
@@ -155,7 +156,7 @@ class ControllerProgram:
         FileFormatError
             There is none.
         """
-        return self.motions()[0]
+        return self._motion([next(own) for own in self._joined(None)])
 
     def motions(self, path: Path | None = None) -> list[Trajectory]:
         """Return what a controller may make of it, by each way in which it may join targets.
@@ -168,19 +169,19 @@ class ControllerProgram:
         FileFormatError
             There is none, or a speed is another one than the path has.
         """
-        parts, begin = list[list[Knots]](), 0.0
+        return [self._motion(parts) for parts in by_each_way(self._joined(path))]
+
+    def _joined(self, path: Path | None) -> Iterator[Iterator[Knots]]:
+        """Yield of each stretch the ways in which a controller may join its targets."""
+        begin = 0.0
         for stretch in self.stretches:
             if path is not None and isinstance(stretch, FeedStretch):
-                own = stretch.along(path, begin)
+                yield stretch.along(path, begin)
             elif stretch.is_rest:
-                own = [Knots(stretch.t, stretch.q, 0.0 * stretch.q)]
+                yield iter([Knots(stretch.t, stretch.q, 0.0 * stretch.q)])
             else:
-                own = stretch.joined()
-            parts.append(own)
-            begin += float(own[0].t[-1])
-        # Where a stretch has fewer ways, its last one stands for the others.
-        count = max(len(own) for own in parts)
-        return [self._motion([own[min(k, len(own) - 1)] for own in parts]) for k in range(count)]
+                yield stretch.joined()
+            begin += stretch.duration
 
     def _motion(self, parts: Sequence[Knots]) -> Trajectory:
         t, q, qd = [np.zeros(1)], [parts[0].q[:1]], [0.0 * parts[0].q[:1]]
@@ -319,11 +320,11 @@ def drafted(
     facts = ProgramFacts.of(robot, settings, list(happens), by_poses=frames is not None)
     if settings.mass is not None:
         load = Load(settings.mass, np.array(settings.center))
-        check_load(load, robot, _constraints_of(plan), facts.flange)
+        check_load(load, robot, constraints_of(plan), facts.flange)
     return Draft(program, robot, tool, settings, verdict, facts, frames)
 
 
-def _constraints_of(plan: Plan | Parts | Move | Program) -> list[Constraint]:
+def constraints_of(plan: Plan | Parts | Move | Program) -> list[Constraint]:
     """Return all that the parts of a motion had to keep."""
     match plan:
         case Plan():
@@ -331,9 +332,9 @@ def _constraints_of(plan: Plan | Parts | Move | Program) -> list[Constraint]:
         case Move():
             return list(plan.constraints)
         case Program():
-            return [item for step in plan.steps for item in _constraints_of(step.made)]
+            return [item for step in plan.steps for item in constraints_of(step.made)]
     parts: list[Plan | Move] = [*plan.plans, *plan.moves]
-    return [item for part in parts for item in _constraints_of(part)]
+    return [item for part in parts for item in constraints_of(part)]
 
 
 def _paths_of(plan: Plan | Parts | Move | Program) -> list[Path]:

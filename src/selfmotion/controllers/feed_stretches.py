@@ -1,6 +1,6 @@
 """Tool poses with the speed between them, and how far along its path a tool is."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -240,9 +240,9 @@ class FeedStretch(PoseStretch):
         times = np.unique(np.concatenate([times, ends, self.seconds - ends]))
         times = times[np.append(np.diff(times) > 1e-9, True)]
         times[-1] = self.seconds
-        return self._driven(times, self.ramps.passed(times))[0]
+        return next(self._driven(times, self.ramps.passed(times)))
 
-    def joined(self) -> list[Knots]:
+    def joined(self) -> Iterator[Knots]:
         """See `Stretch.joined`: with its ramps."""
         times = self.smooth()[0]
         return self._driven(times, self.ramps.passed(times))
@@ -252,12 +252,12 @@ class FeedStretch(PoseStretch):
         gone = PassedLength.of_motion(self.frames, motion, first, first + self.seconds)
         return motion(np.clip(gone.when(self._shares * gone.whole), motion.t[0], motion.t[-1]))
 
-    def at_pace(self, gone: PassedLength) -> list[Knots]:
+    def at_pace(self, gone: PassedLength) -> Iterator[Knots]:
         """Return what `joined` does, at the pace at which something else has gone as far."""
         own = np.interp(gone.at(gone.t) * (self.lengths[-1] / gone.whole), self.lengths, self.t)
         return self._driven(gone.t - gone.t[0], own)
 
-    def along(self, path: Path, first: float) -> list[Knots]:
+    def along(self, path: Path, first: float) -> Iterator[Knots]:
         """Return what `joined` does, at the pace of a path that it begins at `first` [s].
 
         Raises
@@ -307,17 +307,15 @@ class FeedStretch(PoseStretch):
         """How far the tool has gone where it is looked at, of the whole."""
         return np.asarray(self._gone(self.looked_at()) / self.lengths[-1])
 
-    def _driven(self, times: Array, own: Array) -> list[Knots]:
+    def _driven(self, times: Array, own: Array) -> Iterator[Knots]:
         from scipy.interpolate import CubicSpline
 
-        found = []
-        for q in self.ways(own):
-            rates = q
+        for way in self._ways:
+            q = rates = self._joints(way(own), own)[:, self.order]
             if np.isfinite(q).all():
                 rates = CubicSpline(times, q, bc_type="clamped")(times, 1)
                 rates[[0, -1]] = 0.0
-            found.append(Knots(times, q, rates))
-        return found
+            yield Knots(times, q, rates)
 
     def _stepped(self, times: Array) -> Array:
         rows = straight(times, self.t, self._rows())

@@ -24,10 +24,18 @@ from selfmotion.controllers.steps import (
     arc_through,
     step_lengths,
 )
-from selfmotion.controllers.stretches import SURE, Event, Knots, Miss, Stretch, on_one_side
+from selfmotion.controllers.stretches import (
+    SURE,
+    Event,
+    Knots,
+    Miss,
+    Stretch,
+    by_each_way,
+    on_one_side,
+)
 from selfmotion.controllers.targets import NotByPosesError, PoseSpan, largest
 from selfmotion.controllers.thinning import Piece, events_within, rests
-from selfmotion.controllers.tool_frames import WORLD, Rounding, ToolFrames
+from selfmotion.controllers.tool_frames import Rounding, ToolFrames, carrier_in_reference
 from selfmotion.motion import Trajectory
 
 # What turning and self-motion may be off, from the most that is tried on [rad or m], the last as
@@ -139,12 +147,8 @@ class FeedSpan(PoseSpan):
 
         By each way in which a controller may join their targets.
         """
-        ways = [stretch.at_pace(each) for stretch, each in zip(stretches, gone, strict=True)]
-        count = max(len(own) for own in ways)
-        return all(
-            self._keeps_by([own[min(k, len(own) - 1)] for own in ways], allowed)
-            for k in range(count)
-        )
+        ways = (stretch.at_pace(each) for stretch, each in zip(stretches, gone, strict=True))
+        return all(self._keeps_by(parts, allowed) for parts in by_each_way(ways))
 
     def _keeps_by(self, parts: Sequence[Knots], allowed: Tolerance) -> bool:
         motion, begin = self.piece.motion, self.first
@@ -309,6 +313,4 @@ class FeedSpan(PoseSpan):
 
 def _rides_along(frames: ToolFrames) -> bool:
     """Whether the path is given in a frame that the work object stands still in."""
-    robot = frames.robot
-    carrier = robot.urdf.root if frames.carrier == WORLD else frames.carrier
-    return len(robot.chain_to(carrier, robot.reference).joints) == 0
+    return carrier_in_reference(frames.robot, frames.carrier) is not None

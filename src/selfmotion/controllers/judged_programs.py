@@ -25,6 +25,7 @@ from selfmotion.controllers.controller_program import (
     Draft,
     Joints,
     Switch,
+    constraints_of,
     drafted,
 )
 from selfmotion.controllers.krl import KrlReader, write_krl
@@ -36,7 +37,7 @@ from selfmotion.controllers.rapid import RapidReader, write_rapid
 from selfmotion.controllers.read_stretches import SLOWLY
 from selfmotion.controllers.stretches import Misses, PoseStretch, Stretch
 from selfmotion.controllers.thinning import what_lines_keep, what_targets_keep
-from selfmotion.controllers.tool_frames import WORLD
+from selfmotion.controllers.tool_frames import WORLD, carrier_in_reference
 from selfmotion.controllers.urscript import UrscriptReader, write_urscript
 from selfmotion.job import Program, are_opposite
 from selfmotion.motion import Trajectory
@@ -44,7 +45,7 @@ from selfmotion.path import Placed
 from selfmotion.problem import Problem
 from selfmotion.result import Move, Parts, Piece, Plan, elsewhere, gaps
 from selfmotion.robot import RobotModel
-from selfmotion.task import SE3, log3
+from selfmotion.task import log3
 
 # Programs of controllers as files: which suffix is which language.
 
@@ -382,14 +383,10 @@ def judged_program(file: FilePath, job: Program, within: Tolerance | None = None
         *([program.begins_elsewhere] if program.begins_elsewhere else []),
         *misswitched(program, job),
         *_off_moves(file, program, job, parts),
-        *unlike(program, job.robot, [item for own in job.steps for item in _kept_by(own.made)]),
+        *unlike(program, job.robot, constraints_of(job)),
     )
     left = of_the_controller(program)
     return JudgedProgram((*steps, *slow), failures, allowed, shift_told(program), left)
-
-
-def _kept_by(made: Plan | Move) -> Sequence[Constraint]:
-    return made.problem.constraints if isinstance(made, Plan) else made.constraints
 
 
 def _shifted_moves(program: ControllerProgram, job: Program, parts: ProgramParts) -> Iterator[str]:
@@ -413,7 +410,7 @@ def _shifted_moves(program: ControllerProgram, job: Program, parts: ProgramParts
                 )
                 break
     shift = program.shift
-    frame = _carrier_place(program, job)
+    frame = carrier_in_reference(job.robot, program.carrier)
     if shift is None or frame is None:
         return
     for number, ways in parts.slow:
@@ -428,14 +425,6 @@ def _shifted_moves(program: ControllerProgram, job: Program, parts: ProgramParts
                 f"before '{job.steps[number].name}' it goes slowly to where neither the job is nor "
                 f"the shift of its work object takes it ({1e3 * explained:.3g} mm)"
             )
-
-
-def _carrier_place(program: ControllerProgram, job: Program) -> SE3 | None:
-    """Return where the carrier of the work object stands in the arm's frame; None if it moves."""
-    robot = job.robot
-    carrier = robot.urdf.root if program.carrier == WORLD else program.carrier
-    between = robot.chain_to(carrier, robot.reference)
-    return None if len(between.joints) else between.place(np.zeros(robot.dof))
 
 
 def _off_moves(
@@ -512,14 +501,12 @@ def as_shifted(problem: Problem, program: ControllerProgram, begin: Array) -> Pr
     if program.shift is None:
         return problem
     robot = problem.robot
-    carrier = None if program.carrier == WORLD else program.carrier
-    between = robot.chain_to(carrier or robot.urdf.root, robot.reference)
-    if len(between.joints) or problem.also:
+    place = carrier_in_reference(robot, program.carrier)
+    if place is None or problem.also:
         raise FileFormatError(
             f"its work object is shifted, and the path is given in '{robot.reference or WORLD}', "
             f"which moves past it: plan again with the part where it is"
         )
-    place = between.place(np.zeros(robot.dof))
     path = Placed(problem.path, place * program.shift * place.inverse())
     start = None if problem.start is None else begin
     return replace(problem, path=path, start=start)

@@ -16,7 +16,6 @@ from selfmotion.controllers.controller_program import (
     with_begins,
 )
 from selfmotion.controllers.feed_stretches import FeedStretch
-from selfmotion.controllers.program_facts import ProgramFacts
 from selfmotion.controllers.program_lines import ProgramReader, switched
 from selfmotion.controllers.program_settings import AXES, written
 from selfmotion.controllers.program_texts import module_name, plain
@@ -368,7 +367,7 @@ class KrlReader(ProgramReader):
 
     def go(self, given: Sequence[str]) -> None:
         """Take where the motion begins, or where it slowly goes on by axis targets."""
-        facts = ProgramFacts.stated(self.lines.notes)
+        facts = self.lines.facts()
         most = _WHOLE if facts is None else _WHOLE * facts.approach
         fast = [name for name in ("VEL", "ACC") if not 0.0 < self._share(name) <= most + _ABOVE]
         if fast:

@@ -220,8 +220,10 @@ def check_load(
     ProblemError
         The load is another one; both are named.
     """
-    for verified in verified_loads(robot, constraints, flange) if load is not None else []:
-        if load is not None and not load.is_like(verified):
+    if load is None:
+        return
+    for verified in verified_loads(robot, constraints, flange):
+        if not load.is_like(verified):
             raise ProblemError(
                 f"{robot.name}: the program says that the flange carries {load}, torques were "
                 f"verified with {verified}: give the same to both (JointTorqueLimits(payload=…, "

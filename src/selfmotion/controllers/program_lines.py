@@ -10,7 +10,7 @@ import numpy as np
 from selfmotion.controllers.commented_lines import Lines
 from selfmotion.controllers.controller_program import ControllerProgram, Switch
 from selfmotion.controllers.feed_stretches import Ramps, times_at
-from selfmotion.controllers.program_facts import Load, ProgramFacts
+from selfmotion.controllers.program_facts import Load
 from selfmotion.controllers.program_texts import PLANNED
 from selfmotion.controllers.read_stretches import (
     Pose,
@@ -92,7 +92,7 @@ class ProgramReader:
             raise self.lines.fault(f"is the last one, expected {self.last}")
         places = self.lines.places(self.tool, self.work)
         places.is_carried = self.is_carried
-        facts = ProgramFacts.stated(self.lines.notes)
+        facts = self.lines.facts()
         if facts is not None and self.unit and facts.positioner not in ("", self.unit):
             raise self.lines.fault(
                 f"its work object is carried by mechanical unit '{self.unit}', it was written for "

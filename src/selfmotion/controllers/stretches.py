@@ -1,6 +1,6 @@
 """Stretches of a motion from rest to rest, as targets of joints or as tool poses."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -75,6 +75,16 @@ class Knots(NamedTuple):
         return cls(np.concatenate(times), np.concatenate(places), np.concatenate(rates))
 
 
+def by_each_way(parts: Iterable[Iterable[Knots]]) -> list[list[Knots]]:
+    """Return the parts of a motion by each way in which a controller may make it.
+
+    Where a part has fewer ways, its last one stands for the others.
+    """
+    each = [list(own) for own in parts]
+    count = max(len(own) for own in each)
+    return [[own[min(k, len(own) - 1)] for own in each] for k in range(count)]
+
+
 @dataclass(frozen=True, eq=False)
 class Stretch:
     """A motion from rest to rest by its targets, or a rest.
@@ -135,8 +145,8 @@ class Stretch:
         spline = CubicSpline(self.t, self.q, bc_type="clamped")
         return times, spline(times), spline(times, 1)
 
-    def joined(self) -> list[Knots]:
-        """Return the motion by each way in which controllers join targets: smooth, straight, cut.
+    def joined(self) -> Iterator[Knots]:
+        """Yield the motion by each way in which controllers join targets: smooth, straight, cut.
 
         As few knots as it takes: see `miss_of` for what these are.
         """
@@ -144,8 +154,9 @@ class Stretch:
 
         rates = CubicSpline(self.t, self.q, bc_type="clamped")(self.t, 1)
         rates[[0, -1]] = 0.0
-        lines = polygons(self.t, self.q, _straight)
-        return [Knots(self.t, self.q, rates), *(Knots.cornered(*line, 1) for line in lines)]
+        yield Knots(self.t, self.q, rates)
+        for line in polygons(self.t, self.q, _straight):
+            yield Knots.cornered(*line, 1)
 
 
 class Miss(NamedTuple):
@@ -330,17 +341,14 @@ class PoseStretch(Stretch):
             return times, q, q
         return times, q, CubicSpline(times, q, bc_type="clamped")(times, 1)
 
-    def joined(self) -> list[Knots]:
+    def joined(self) -> Iterator[Knots]:
         """See `Stretch.joined`; where no joints are known they are not numbers."""
-        found = [_at_rest(*self.smooth())]
+        yield _at_rest(*self.smooth())
         for knots, rows in polygons(self.t, self._rows(), straight):
             times = finer(knots, _BETWEEN_POSES)
             q = self._joints(straight(times, knots, rows), times)[:, self.order]
-            if not np.isfinite(q).all():
-                found.append(Knots(times, q, q))
-                continue
-            found.append(Knots.cornered(times, q, len(_BETWEEN_POSES)))
-        return found
+            known = bool(np.isfinite(q).all())
+            yield Knots.cornered(times, q, len(_BETWEEN_POSES)) if known else Knots(times, q, q)
 
     def _spline(self, times: Array) -> Array:
         from scipy.interpolate import CubicSpline

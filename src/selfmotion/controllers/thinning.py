@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
+from itertools import islice, pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -313,7 +313,7 @@ class Span:
         them. Cut corners are slower than that.
         """
         far = np.zeros(len(stretch.t) - 1)
-        for times, q, qd in stretch.joined()[:2]:
+        for times, q, qd in islice(stretch.joined(), 2):
             step = np.clip(np.searchsorted(stretch.t, times, side="right") - 1, 0, len(far) - 1)
             np.maximum.at(far, step, self._taken(times, q, qd))
         return np.asarray(far > 1.0)

@@ -123,6 +123,13 @@ _STEPS, _FARTHEST, _THERE, _DAMPED = 20, 0.3, 1e-10, 1e-14
 _NEAR = 1e-8
 
 
+def carrier_in_reference(robot: RobotModel, carrier: str) -> SE3 | None:
+    """Return where a work object's carrier stands in the frame of the paths; None if it moves."""
+    link = robot.urdf.root if carrier == WORLD else carrier
+    between = robot.chain_to(link, robot.reference)
+    return None if len(between.joints) else between.place(np.zeros(robot.dof))
+
+
 @dataclass(frozen=True, eq=False)
 class ToolFrames:
     """A work object, the frame that it stands in, and the tool that is moved in it.
