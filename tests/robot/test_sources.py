@@ -82,6 +82,36 @@ def test_a_model_keeps_the_inertia_of_its_rotors(panda: sm.RobotModel, tmp_path:
         np.testing.assert_allclose(found, pin.rnea(given, data, *rows), atol=TORQUES)
 
 
+ROTOR = """<robot name="r"><link name="base"/><link name="arm"><inertial><mass value="1"/>
+<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link><link name="tip"/>
+<joint name="turn" type="revolute"><parent link="base"/><child link="arm"/><axis xyz="0 0 1"/>
+<limit lower="-3" upper="3" velocity="1" effort="9"/><dynamics {turn}/></joint>
+<joint name="held" type="fixed"><parent link="arm"/><child link="tip"/><dynamics {held}/></joint>
+</robot>"""
+
+
+def test_a_urdf_says_the_inertia_of_rotors_of_joints_that_turn(tmp_path: Path) -> None:
+    file = tmp_path / "rotor.urdf"
+    file.write_text(
+        ROTOR.format(turn='damping="0" armature="0.5"', held='damping="0" armature="7"')
+    )
+    found = Dynamics(sm.load_robot(file)).torques(*np.array([[[0.2]], [[0.0]], [[2.0]]]))
+    np.testing.assert_allclose(found, [[2.0 * (1.0 + 0.5)]], atol=TORQUES)
+
+
+@pytest.mark.parametrize("said", ["x", "nan", "inf", "-1", ""])
+@pytest.mark.parametrize("key", ["armature", "damping", "friction"])
+def test_what_of_a_joints_dynamics_is_no_number_is_named(
+    key: str, said: str, tmp_path: Path
+) -> None:
+    file = tmp_path / "rotor.urdf"
+    file.write_text(ROTOR.format(turn=f'{key}="{said}"', held='damping="0"'))
+    with pytest.raises(
+        sm.errors.RobotError, match=f"'turn': <dynamics>: {key} is .*expected a num"
+    ):
+        sm.load_robot(file)
+
+
 def test_gravity_that_a_urdf_cannot_say_is_refused() -> None:
     given = pin.buildModelFromXML(robot_named("ur5").urdf.readable_text)
     given.gravity.linear = np.array([9.81, 0.0, 0.0])

@@ -19,6 +19,7 @@ import pinocchio as pin
 from selfmotion.basics import Array, RobotError, digest_of_file, is_file
 from selfmotion.robot.collada import unit_of
 from selfmotion.robot.urdf import Urdf
+from selfmotion.robot.urdf_elements import ARMATURE
 from selfmotion.robot.urdf_text import Packages
 
 # Joints that are held, in Pinocchio's terms.
@@ -174,21 +175,17 @@ def full_model(urdf: Urdf) -> Any:
     return model
 
 
-# The attribute of ``<dynamics>`` that has a rotor's inertia, counted at the joint [kg m² or kg].
-ARMATURE = "armature"
-
-
 def _add_rotors(model: Any, text: str) -> None:
     """Give a model the inertias of rotors that its text has, which no parser of URDFs knows."""
     if ARMATURE not in text:
         return
     for joint in ElementTree.fromstring(text).findall("joint"):
-        turning = joint.find("dynamics")
-        inertia = 0.0 if turning is None else float(turning.get(ARMATURE, "0"))
-        if inertia:
-            index = model.joints[model.getJointId(joint.get("name", ""))].idx_v
+        turning, name = joint.find("dynamics"), joint.get("name", "")
+        # Joints that are fixed are none of the model.
+        if turning is not None and turning.get(ARMATURE) and model.existJointName(name):
+            index = model.joints[model.getJointId(name)].idx_v
             armature = np.array(model.armature)
-            armature[index] = inertia
+            armature[index] = float(turning.get(ARMATURE, "0"))
             model.armature = armature
 
 

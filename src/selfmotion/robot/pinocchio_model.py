@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 from selfmotion.basics import Array, RobotError, is_file
-from selfmotion.robot.full_model import ARMATURE
+from selfmotion.robot.urdf_elements import ARMATURE
 from selfmotion.task import rpy
 
 # Angles beyond the first are no limits [rad]; speeds and efforts beyond the second are none.

@@ -391,6 +391,7 @@ def check_joint_elements(root: ElementTree.Element, source: str) -> None:
         check_origin(joint, where)
         _check_axis(joint, where)
         _check_limit(joint, where)
+        _check_dynamics(joint, where)
         _check_mimic(joint, where)
 
 
@@ -452,6 +453,19 @@ def _limit_number(
         return number(limit, key, f"{where}: <limit>", largest)
     except RobotError as error:
         raise RobotError(f"{error}{remedy}") from None
+
+
+# The attribute of ``<dynamics>`` that has a rotor's inertia, counted at the joint [kg m² or kg].
+ARMATURE = "armature"
+
+
+def _check_dynamics(joint: ElementTree.Element, where: str) -> None:
+    turning = only(joint, "dynamics", where)
+    for key in ("damping", "friction", ARMATURE):
+        if turning is not None and turning.get(key) is not None:
+            value = number(turning, key, f"{where}: <dynamics>")
+            if value < 0.0:
+                raise RobotError(f"{where}: <dynamics>: {key} is {value:g}, expected a number ≥ 0")
 
 
 def _check_mimic(joint: ElementTree.Element, where: str) -> None:
