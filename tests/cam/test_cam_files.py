@@ -447,6 +447,11 @@ def test_a_job_is_read_from_a_machine_program(tmp_path: Path) -> None:
         ("G1 X10 G4 P100", "G4 waits, and its line says a motion"),
         ("G4 X1 P100", "or two times"),
         ("G4 P1 G10", "G4 and G10 are in one line"),
+        ("G4 P1 G28", "G4 waits, and its line says a motion"),
+        ("G4 X1 G92", "G4 waits, and its line says a motion"),
+        ("G29 G53", "and ways home, are not read"),
+        ("G28 B0", "G28 B: an axis of rotation at a place of the machine's own"),
+        ("G53 A0", "G53 A: an axis of rotation at a place of the machine's own"),
         ("G1 X10 L3", "L repeats the line, which is not read"),
         ("G93 G1 X10 F60\nX20", "says no F, which after G93 each line has"),
         ("G54 P2 X4", "word 'P2' of this line is not read"),
@@ -481,6 +486,12 @@ def test_other_words_are_refused_by_line(tmp_path: Path, line: str, said: str) -
         ("PREFUN/55", "a G word of one control, which may move anything"),
         ("INSERT G55", "words of a control that may move something"),
         ("INSERT/M8 X40", "words of a control that may move something"),
+        ("INSERT X=R1", "words of a control that may move something"),
+        ("INSERT TRANS X=40", "words of a control that may move something"),
+        ("INSERT AROT", "words of a control that may move something"),
+        ("INSERT CYCLE800(1)", "words of a control that may move something"),
+        ("INSERT M8 $$ X40", "words of a control that may move something"),
+        ("GOHOME/1,2,3,4", "GOHOME has 4 numbers"),
         ("SWITCH/2", "the frame of another turret"),
         ("SET/HEAD,2", "a way to read what follows"),
         ("SET/MODE,INCR", "places by differences are not read"),
@@ -610,6 +621,75 @@ def test_effects_of_a_block_have_their_order(
     for cut, (on, off) in zip(cuts, events, strict=True):
         last = len(cut.positions) - 1
         assert cut.events == ((on * last, "M3"), (off * last, "M5"))
+
+
+@pytest.mark.parametrize("mark", ["\x85", "\u2028", "\u2029", "\v", "\f", "\x1e"])
+def test_what_no_machine_ends_a_line_at_ends_none(mark: str, tmp_path: Path) -> None:
+    """What follows it in a comment is part of that, in programs, cutter locations and tables."""
+    gcode = f"G21 G90 G0 X0 Y0 Z0\nG1 X10 F600 ; to here{mark}G1 X90\n"
+    apt = f"UNITS/MM\nRAPID\nGOTO/0,0,0\nFEDRAT/600,MMPM\nGOTO/10,0,0\nPPRINT A{mark}GOTO/90,0,0\n"
+    table = f"x_mm,y_mm,z_mm\n0,0,0\n10,0,0\n# to here{mark}90,0,0\n"
+    for name, text in (("a.nc", gcode), ("a.apt", apt), ("a.csv", table)):
+        file = tmp_path / name
+        file.write_text(text, "utf-8")
+        path = sm.files.read_path(file, feed=0.1)
+        assert path.samples(np.array([path.duration])).translation[0, 0] == pytest.approx(0.01)
+
+
+@pytest.mark.parametrize("text", ["PPRINT 5 $", "PARTNO A$", "INSERT M8 $"])
+def test_texts_of_apt_do_not_go_on_in_the_next_line(text: str, tmp_path: Path) -> None:
+    head = "UNITS/MM\nRAPID\nGOTO/0,0,0\nFEDRAT/600,MMPM\n"
+    file = written(tmp_path, "a.apt", f"{head}{text}\nGOTO/10,0,0\nGOTO/10,$\n20,0\n")
+    (rows,) = read_cldata(file).values()
+    np.testing.assert_allclose(rows.positions[:, :2], [[0.0, 0.0], [0.01, 0.0], [0.01, 0.02]])
+
+
+def test_a_way_home_has_the_axis_that_it_says(tmp_path: Path) -> None:
+    head = "UNITS/MM\nMULTAX/ON\nRAPID\nGOTO/0,0,0,0,0,1\nFEDRAT/600,MMPM\nGOTO/10,0,0\n"
+    text = "GOHOME/50,0,20,1,0,0\nGOTO/30,0,20\nGOTO/20,0,20\n"
+    cuts = list(read_cldata(written(tmp_path, "a.apt", head + text)).values())
+    np.testing.assert_allclose(cuts[-1].values[:, :, 2], [[-1.0, 0.0, 0.0]] * 3, atol=1e-12)
+
+
+PRINT = "G21\nG90\nM82\nG92 E0\nG0 X0 Y0 Z0.3\nG1 X10 E1 F600\n"
+
+
+@pytest.mark.parametrize("line", ["G 1 X10 Y20 E2", "N9 G1 X10 Y20 E2", "N 9 G1 X10 Y20 E2 *71"])
+def test_moves_of_printers_are_read_with_spaces_and_numbers(line: str, tmp_path: Path) -> None:
+    (rows,) = read_gcode(written(tmp_path, "a.gcode", f"{PRINT}{line}\n")).values()
+    np.testing.assert_allclose(rows.positions[:, :2], [[0.0, 0.0], [0.01, 0.0], [0.01, 0.02]])
+
+
+@pytest.mark.parametrize("line", ["M201 X500 Y500", "N9 M201 X500 Y500", "N9 M92 X80 E97", "N9"])
+def test_commands_of_printers_move_nothing_whatever_letters_they_have(
+    line: str, tmp_path: Path
+) -> None:
+    text = f"{PRINT}{line}\nG1 X10 Y20 E2\n"
+    (rows,) = read_gcode(written(tmp_path, "a.gcode", text)).values()
+    np.testing.assert_allclose(rows.positions[:, :2], [[0.0, 0.0], [0.01, 0.0], [0.01, 0.02]])
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ("M206 X5", "M206: zeros that a printer moves"),
+        ("N9 M206 X5", "M206: zeros that a printer moves"),
+        ("SET_GCODE_OFFSET Z=0.2", "SET_GCODE_OFFSET: zeros that a printer moves"),
+        ("RESTORE_GCODE_STATE NAME=a", "RESTORE_GCODE_STATE: .* modes that it goes back to"),
+        ("G10 P1 X5", "G10: zeros and offsets that a program sets"),
+    ],
+)
+def test_zeros_that_a_printer_moves_are_refused(line: str, said: str, tmp_path: Path) -> None:
+    file = written(tmp_path, "a.gcode", f"{PRINT}{line}\nG1 X20 E2\n")
+    with pytest.raises(sm.errors.FileFormatError, match=f"line 7: {said}"):
+        read_gcode(file)
+
+
+@pytest.mark.parametrize("word", ["K0", "L0"])
+def test_a_cycle_of_no_holes_drills_none(word: str, tmp_path: Path) -> None:
+    text = f"G21 G90 G0 X0 Y0 Z5\nG81 X9 Z-3 R1 F60 {word}\nX20\nG80\n"
+    (rows,) = read_gcode(written(tmp_path, "a.nc", text)).values()
+    np.testing.assert_allclose(rows.positions[:, 0], 0.02)
 
 
 def test_a_line_that_waits_changes_modes_and_switches_all_the_same(tmp_path: Path) -> None:

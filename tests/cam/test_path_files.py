@@ -474,3 +474,35 @@ def test_what_was_noted_of_a_file_is_known_of_what_is_made_of_its_path(tmp_path:
     assert not sm.files.read_path(
         turned(tmp_path / "a.csv", "roll,pitch,yaw", "3,0,0", "3,0.1,0"), feed=0.02
     ).notes
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "said"),
+    [
+        ("a.csv", '"x' + 200_000 * "a" + ',b",y,z\n0,0,0\n', "line 1: has 200009 characters"),
+        (
+            "b.csv",
+            'breakpoints,primitives,points,q_bp\n1,"' + 70_000 * "m\n" + '",[],[]\n',
+            "is no table: field larger",
+        ),
+        (
+            "c.csv",
+            'breakpoints,primitives,points\n1,"a\nb",[]\n',
+            "line 3: primitive 'a.nb' with 0",
+        ),
+        (
+            "d.json",
+            json.dumps([{"point": [10**400, 0, 0], "xaxis": [1, 0, 0], "yaxis": [0, 1, 0]}]),
+            r"\[0\]: point is no list of three numbers",
+        ),
+    ],
+    ids=["long-title", "long-cell", "cell-of-two-lines", "large-number"],
+)
+def test_what_no_program_writes_is_refused_in_one_line(
+    name: str, text: str, said: str, tmp_path: Path
+) -> None:
+    file = tmp_path / name
+    file.write_text(text)
+    with pytest.raises(sm.errors.FileFormatError, match=said) as caught:
+        sm.files.read_path(file, feed=0.1)
+    assert "\n" not in str(caught.value)

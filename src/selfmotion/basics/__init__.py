@@ -45,6 +45,7 @@ from selfmotion.basics.files import (
     digest_of_file as digest_of_file,
     is_file as is_file,
     is_folder as is_folder,
+    lines_of as lines_of,
     read_archive as read_archive,
     read_arrays as read_arrays,
     text_of as text_of,

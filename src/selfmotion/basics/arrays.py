@@ -171,8 +171,10 @@ def as_whole(
 
 
 def is_number(value: Any) -> bool:
-    """Whether a value of a document is a number; True and False are none."""
-    return isinstance(value, int | float) and not isinstance(value, bool)
+    """Whether a value of a document is a number that floats can hold; True and False are none."""
+    if isinstance(value, bool):
+        return False
+    return isinstance(value, float) or (isinstance(value, int) and value.bit_length() < 1024)
 
 
 def as_flag(value: Any, what: str, error: type[Exception] = ProblemError) -> bool:

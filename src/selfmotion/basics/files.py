@@ -6,6 +6,7 @@ import json
 import marshal
 import math
 import os
+import re
 import stat
 import tempfile
 import zipfile
@@ -107,6 +108,15 @@ def text_of(file: Path, content: bytes) -> str:
     if odd is not None:
         raise FileFormatError(f"{file}: is no text: it has a byte {ord(odd)}")
     return text
+
+
+# Where lines of a file end: other marks, at which Python ends one as well, may stand in comments.
+_LINE_END = re.compile(r"\r\n|\n|\r")
+
+
+def lines_of(text: str) -> list[str]:
+    """Return the lines of a text of a file, as machines that read it end them."""
+    return _LINE_END.split(text)
 
 
 def write_archive(file: Path, description: Mapping[str, Any], arrays: Mapping[str, Array]) -> None:

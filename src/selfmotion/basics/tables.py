@@ -13,7 +13,7 @@ import numpy as np
 
 from selfmotion.basics.arrays import TURN, Array, is_number
 from selfmotion.basics.errors import FileFormatError, nearest
-from selfmotion.basics.files import text_of, write_text
+from selfmotion.basics.files import lines_of, text_of, write_text
 
 # Tables of numbers, as programs write them: with any of the usual separators and headers.
 
@@ -22,6 +22,8 @@ _COMMENTS = ("#", "%", "//")
 _DECIMAL_COMMA = re.compile(r"[+-]?[0-9]*,[0-9]+([eE][+-]?[0-9]+)?")
 # A title in quotation marks that has a mark in it which separates columns, or such a mark itself.
 _QUOTED = re.compile(r'"[^"]*[,;\t"(\[][^"]*"')
+# A line of a table has so many characters at most: more are a file of another kind.
+_LONGEST = 100_000
 # The name of a column that is left out.
 LEFT_OUT = "-"
 
@@ -184,7 +186,13 @@ def _lines(file: Path) -> tuple[list[tuple[int, str]], list[tuple[int, str]]]:
         content = file.read_bytes()
     except OSError as error:
         raise FileFormatError(f"{file}: cannot be read: {error.strerror or error}") from error
-    lines = text_of(file, content).splitlines()
+    lines = lines_of(text_of(file, content))
+    long = next((k for k, line in enumerate(lines, 1) if len(line) > _LONGEST), None)
+    if long is not None:
+        raise FileFormatError(
+            f"{file}: line {long}: has {len(lines[long - 1])} characters, expected {_LONGEST} at "
+            f"most"
+        )
     all_lines = [(k, line.strip(" ")) for k, line in enumerate(lines, 1) if line.strip()]
     kept = [each for each in all_lines if not each[1].startswith(_COMMENTS)]
     if not kept:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from selfmotion.basics import Array
+from selfmotion.basics import Array, lines_of
 from selfmotion.cam.cuts import Machine, Pecks, arc_points, drill, unit_axis
 from selfmotion.cam.path_rows import LENGTH_UNITS, PoseRows
 
@@ -38,7 +38,12 @@ _REASONS = {
     "SET": "a way to read what follows",
 }
 # Words of a control in a line of INSERT that may move something.
-_MOVING = re.compile(r"(?<![A-Z])(?:G|[XYZABCUVW])\s*[-+.]?[0-9]")
+_MOVING = re.compile(
+    r"(?<![A-Z])[GXYZABCUVW]\s*=?\s*[-+.0-9#(\[R]|\bA?(?:TRANS|ROT|SCALE|MIRROR)\b"
+    r"|\b(?:CYCLE[0-9]+|CALL|TRAORI|TRAFOOF|M9[6-9]|M198)\b"
+)
+# A line for a control; like texts it has all that stands in it: no sign goes on in the next line.
+_AS_IT_IS = "INSERT"
 # Lines of texts, planes that the tip is on anyway, and what systems write of their own.
 _TEXTS = ("PARTNO", "PPRINT", "TPRINT", "REMARK", "DISPLY", "LETTER", "PSIS")
 _OWN = ("TOOL PATH", "END-OF-PATH", "CSI_")
@@ -85,10 +90,11 @@ def read_cldata(file: FilePath, unit: str | None = None) -> Mapping[str, PoseRow
     """
     reader = _Reader(file, unit)
     whole = ""
-    for number, line in enumerate(reader.machine.text().splitlines(), 1):
+    for number, line in enumerate(lines_of(reader.machine.text()), 1):
         reader.machine.number = number
-        text = line.partition("$$")[0].strip()
-        if text.endswith("$"):
+        is_text = not whole and line.strip().upper().startswith((*_TEXTS, _AS_IT_IS))
+        text = (line if is_text else line.partition("$$")[0]).strip()
+        if text.endswith("$") and not is_text:
             whole += text[:-1] + " "
             if len(whole) > _LONGEST:
                 raise reader.machine.fault(f"goes on for more than {_LONGEST} characters")
@@ -138,8 +144,8 @@ class _Reader:
             raise machine.fault(f"has {len(text)} characters, expected {_LONGEST} at most")
         if text.startswith((*_TEXTS, *_OWN)):
             return False
-        if text.startswith("INSERT"):
-            self._insert(text.removeprefix("INSERT").lstrip(" /"))
+        if text.startswith(_AS_IT_IS):
+            self._insert(text.removeprefix(_AS_IT_IS).lstrip(" /"))
             return False
         if text.startswith("TLON"):
             self._go_round(text)
@@ -155,10 +161,10 @@ class _Reader:
         word, rest = found[1], (found[2] or "").strip()
         given = [item.strip() for item in rest.split(",")] if rest else []
         match word:
-            case "GOTO" | "FROM" | "GODLTA":
+            case "GOHOME" if len(given) < 3:
+                self._go_home()
+            case "GOTO" | "FROM" | "GODLTA" | "GOHOME":
                 self._go(word, given)
-            case "GOHOME":
-                self._go_home(given)
             case "CIRCLE" | "MOVARC":
                 self._arc = self._arc_of(word, given)
             case "INDIRV":
@@ -299,10 +305,11 @@ class _Reader:
         axis = machine.axis if self._axis is None else self._axis
         if len(values) == 6:
             axis = self._direction(values[3:])
-        if self._cycle and word != "FROM":
+        travels = word in ("FROM", "GOHOME")
+        if self._cycle and not travels:
             self._drill(position, axis)
         else:
-            self._to(position, axis, travels=self._rapid or word == "FROM")
+            self._to(position, axis, travels=self._rapid or travels)
 
     def _drills(self, given: list[str]) -> None:
         """Take a cycle: what it is, and its words, each with a number behind it."""
@@ -388,19 +395,14 @@ class _Reader:
             for point in arc_points(machine, start, position, arc.center, arc.axis, more):
                 machine.cut(point, machine.axis)
 
-    def _go_home(self, given: list[str]) -> None:
+    def _go_home(self) -> None:
         machine = self.machine
-        if len(given) >= 3:
-            position = self._place(self._numbers("GOHOME", given[:3], 3).tolist())
-        else:
-            position = np.full(3, np.nan)
-            machine.climbs()
-            machine.note(
-                "GOHOME goes to a place of the machine's own, which is taken to be above all: the "
-                "tool goes up as high as it has been, and where it is then, is not known until the "
-                "next GOTO"
-            )
-        self._to(position, machine.axis, travels=True)
+        machine.climbs()
+        self._to(np.full(3, np.nan), machine.axis, travels=True)
+        machine.note(
+            "GOHOME goes to a place of the machine's own, which is taken to be above all: the tool "
+            "goes up as high as it has been, and where it is then, is not known until the next GOTO"
+        )
 
     def _arc_of(self, word: str, given: list[str]) -> _Arc:
         """Return the circle of ``CIRCLE/x,y,z,i,j,k,r`` or ``MOVARC/x,y,z,i,j,k,r,ANGLE,a``."""

@@ -9,7 +9,7 @@ from pathlib import Path as FilePath
 
 import numpy as np
 
-from selfmotion.basics import Array
+from selfmotion.basics import Array, lines_of
 from selfmotion.cam.cuts import (
     PRIME,
     RETRACT,
@@ -49,6 +49,11 @@ _REASONS = {
     "G16": "polar words are not read: let CAM write X, Y and Z",
     "G68": "turned frames are not read: let CAM write places in one frame",
     "G68.2": "turned frames are not read: let CAM write places in one frame, after G43.4",
+    **dict.fromkeys(
+        ("M206", "M290", "M428", "SET_GCODE_OFFSET", "RESTORE_GCODE_STATE"),
+        "zeros that a printer moves, and modes that it goes back to, are not read: let the slicer "
+        "write places in one frame, or delete the line if it moves nothing",
+    ),
 }
 # A wait, a retraction of its own, a look at a bed.
 _STANDING = {"G4", "G10", "G11", "G29"}
@@ -66,7 +71,8 @@ _DRILLS = {"G73", "G81", "G82", "G83", "G85", "G89"}
 _CYCLES = {"G74", "G76", "G84", "G86", "G87", "G88"}
 _HOME = {"G28", "G30", "G53"}
 # What of a printer's lines is read; all others are commands of its own.
-_MOVES = re.compile(r"[GTNXYZEF][0-9+.-]")
+_MOVES = re.compile(r"[GTXYZEF]\s*[0-9+.-]")
+_NUMBERED = re.compile(r"N\s*[0-9]+\s*")
 _MOTIONS = {"G0": 0, "G1": 1, "G2": 2, "G3": 3}
 _ENDS = {"M2", "M30"}
 # Of each group a line says one: controls refuse two (Grbl's error 21, LinuxCNC), and which one
@@ -100,7 +106,7 @@ def read_gcode(file: FilePath, reading: Reading | None = None) -> Mapping[str, P
     reader = _Reader(machine, rotary, *extrudes(text))
     if not lifts(text):
         reader.stay_flat()
-    for number, line in enumerate(text.splitlines(), 1):
+    for number, line in enumerate(lines_of(text), 1):
         reader.machine.number = number
         if reader.take(line):
             break
@@ -148,9 +154,11 @@ class _Reader:
         """Take a line; return whether the program ends with it."""
         machine = self.machine
         text = bare_line(line, machine)
-        if self._prints and text and not _MOVES.match(text):
-            self._command(text)
-            return False
+        if self._prints and text:
+            bare = _NUMBERED.sub("", text, count=1) if text.startswith("N") else text
+            if not _MOVES.match(bare):
+                self._command(bare)
+                return False
         if text == "%":
             # The second one ends the tape.
             self._begun, ended = True, self._begun
@@ -228,14 +236,15 @@ class _Reader:
         letters = {letter for letter, _ in said}
         if others:
             raise machine.fault(f"{name} and {others[0]} are in one line")
+        goes = any(code in _MOTIONS or code in _HOME or code == "G92" for code in codes)
         if name == "G4":
             moved = letters - set("PXUSF") if len(letters) < 2 else letters - set("P")
-            if moved or not _MOTIONS.keys().isdisjoint(codes):
+            if moved or goes:
                 raise machine.fault(
                     "G4 waits, and its line says a motion, or two times: write both into lines of "
                     "their own"
                 )
-        elif not letters.isdisjoint("L" if self._prints else _AXES + "IJKLR"):
+        elif goes or not letters.isdisjoint(self._of_zeros(name)):
             raise machine.fault(
                 f"{name}: zeros and offsets that a program sets, and ways home, are not read: let "
                 f"CAM write places in one frame"
@@ -248,6 +257,13 @@ class _Reader:
         for code in switched:
             if code in STOPS:
                 self._mode(code)
+
+    def _of_zeros(self, name: str) -> str:
+        """Return the letters with which a line that stands moves a zero all the same."""
+        if not self._prints:
+            return _AXES + "IJKLR"
+        # A printer looks at its bed between X and Y; R is a temperature of a nozzle.
+        return "L" if name == "G29" else _AXES + "IJKL"
 
     def _mode(self, code: str) -> None:
         match code:
@@ -305,10 +321,12 @@ class _Reader:
 
     def _command(self, text: str) -> None:
         """Take a line of a printer that moves nothing: it happens where the tool is."""
-        code = text.split()[0]
+        code = (text.split() or [""])[0]
+        if code in _REASONS:
+            raise self.machine.fault(f"{code}: {_REASONS[code]}")
         if code in ("M82", "M83"):
             self._fed_from_start = code == "M82"
-        elif text != "%":
+        elif code not in ("", "%"):
             self.machine.happens(code)
 
     def _goes_home(self, code: str, values: Mapping[str, float]) -> None:
@@ -394,7 +412,7 @@ class _Reader:
         lacking = [name for name in "ZR" if not np.isfinite(self._hole.get(name, np.nan))]
         if lacking:
             raise machine.fault(f"{self._cycle} says no {lacking[0]}, expected Z and R of the hole")
-        if not set(values) & set("XYZ") or values.get("L") == 0.0:
+        if not set(values) & set("XYZ") or 0.0 in (values.get("L"), values.get("K")):
             self._at = goal
             return
         above, bottom = goal.copy(), goal.copy()

@@ -3,6 +3,7 @@
 import re
 from collections.abc import Sequence
 
+from selfmotion.basics import lines_of
 from selfmotion.cam.cuts import Machine
 
 _WORD = re.compile(r"([A-Z])\s*=?\s*([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+))\s*")
@@ -25,14 +26,14 @@ _LETTERS = "XYZABCIJKRFE" + "NSTHDOPQL"
 
 def extrudes(text: str) -> tuple[bool, bool]:
     """Return whether a program is a printer's, and whether that extrudes on its way."""
-    lines = (re.sub(r"[;(].*", "", line.upper()) for line in text.splitlines() if len(line) < _LINE)
+    lines = (re.sub(r"[;(].*", "", line.upper()) for line in lines_of(text) if len(line) < _LINE)
     found = [line for line in lines if "E" in line and _EXTRUDES.search(line)]
     return bool(found), any(map(_ON_ITS_WAY.search, found))
 
 
 def lifts(text: str) -> bool:
     """Return whether a program says Z."""
-    lines = (line.upper() for line in text.splitlines() if len(line) < _LINE)
+    lines = (line.upper() for line in lines_of(text) if len(line) < _LINE)
     return any(_LIFTS.search(_without_comments(line)) for line in lines)
 
 

@@ -336,7 +336,8 @@ def read_path(
       G40 G43 G49 G50.1 G61 G64 G67 G69``, one of ``G54`` to ``G59``, ``N O S T H D P Q``, ``%`` and
       comments are passed over, with a note where ``S`` changes from cut to cut
     - G-code of printers, where lines have ``E``: what extrudes is a cut, what does not a travel.
-      ``M82 M83 G92 E`` set what E means; ``retract`` and ``prime`` are events, as are commands
+      ``M82 M83 G92 E`` set what E means; ``retract`` and ``prime`` are events, as are commands,
+      but for those that move a zero (``M206``, ``SET_GCODE_OFFSET``, …), which are refused
     - APT: ``GOTO FROM GODLTA GOHOME RAPID FEDRAT UNITS TLAXIS``, with ``i,j,k`` the tool's axis,
       feeds by the minute (``MMPM``, ``IPM``). Arcs are ``CIRCLE/x,y,z,i,j,k,r`` or ``MOVARC``
       before a ``GOTO``, right-handed about their axis, those of NX, which have 11 numbers,

@@ -6,18 +6,18 @@ Each says what it is by its titles or words; what its numbers mean is in a note.
 import csv
 import io
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path as FilePath
 from typing import Any
 
 import numpy as np
 
-from selfmotion.basics import Array, FileFormatError, is_number, text_of
+from selfmotion.basics import Array, FileFormatError, is_number, lines_of, shown, text_of
 from selfmotion.cam.path_rows import PoseRows
 
 _MM = 1e-3
-# A file with more bytes is none of these.
-_BYTES = 50_000_000
+# A file with more bytes is none of these; titles stand within so many.
+_BYTES, _HEAD = 50_000_000, 10_000
 
 
 def peer_table(file: FilePath) -> Mapping[str, PoseRows] | None:
@@ -29,20 +29,29 @@ def peer_table(file: FilePath) -> Mapping[str, PoseRows] | None:
         It is one of theirs, and a row of it is not read.
     """
     try:
-        if file.stat().st_size > _BYTES:
+        with file.open("rb") as stream:
+            head = stream.read(_HEAD)
+            first = next((line for line in lines_of(text_of(file, head)) if line.strip()), "")
+            titles = [title.strip().lower() for title in first.split(",")]
+            read = _reader_of(first, titles)
+            content = b"" if read is None else head + stream.read(_BYTES)
+        if read is None or len(content) > _BYTES:
             return None
-        text = text_of(file, file.read_bytes())
+        text = text_of(file, content)
     except (OSError, FileFormatError):
         return None
-    first = next((line for line in text.splitlines() if line.strip()), "")
-    titles = [title.strip().lower() for title in first.split(",")]
-    if {"x", "y", "z", "rz1", "ry", "rz2"} <= set(titles):
-        return {"": _of_irbcam(file, text, titles)}
+    return {"": read(file, text, titles)}
+
+
+def _reader_of(
+    first: str, titles: Sequence[str]
+) -> Callable[[FilePath, str, Sequence[str]], PoseRows] | None:
+    """Return what reads a table with this first line, None where it is of no other program."""
+    if set(_IRBCAM) <= set(titles):
+        return _of_irbcam
     if _IGUS.fullmatch(first.strip()):
-        return {"": _of_igus(file, text)}
-    if titles[:3] == ["breakpoints", "primitives", "points"]:
-        return {"": _of_primitives(file, text)}
-    return None
+        return _of_igus
+    return _of_primitives if tuple(titles[:3]) == _PRIMITIVES else None
 
 
 def _number(file: FilePath, line: int, text: str) -> float:
@@ -51,7 +60,7 @@ def _number(file: FilePath, line: int, text: str) -> float:
     except ValueError:
         value = np.nan
     if not np.isfinite(value):
-        raise FileFormatError(f"{file}: line {line}: '{text[:40]}' is no number")
+        raise FileFormatError(f"{file}: line {line}: {shown(text)} is no number")
     return value
 
 
@@ -64,7 +73,7 @@ def _of_irbcam(file: FilePath, text: str, titles: Sequence[str]) -> PoseRows:
     from scipy.spatial.transform import Rotation
 
     rows, places, feeds = list[list[float]](), list[str](), list[float]()
-    for number, line in enumerate(text.splitlines(), 1):
+    for number, line in enumerate(lines_of(text), 1):
         cells = [cell.strip() for cell in line.split(",")]
         if not line.strip() or [cell.lower() for cell in cells] == list(titles):
             continue
@@ -125,9 +134,9 @@ _IGUS = re.compile(
 _WORD = re.compile(r"\s*([XYZ])\s*([-+.\dE]{1,40})\s*", re.IGNORECASE)
 
 
-def _of_igus(file: FilePath, text: str) -> PoseRows:
+def _of_igus(file: FilePath, text: str, _: Sequence[str]) -> PoseRows:
     rows, places = list[list[float]](), list[str]()
-    for number, line in enumerate(text.splitlines(), 1):
+    for number, line in enumerate(lines_of(text), 1):
         if not line.strip():
             continue
         if not _IGUS.fullmatch(line.strip()):
@@ -148,18 +157,22 @@ def _of_igus(file: FilePath, text: str) -> PoseRows:
 
 # Motion primitives of research code: breakpoints,primitives,points,q_bp, with arrays as texts.
 
+_PRIMITIVES = ("breakpoints", "primitives", "points")
 _ARRAY = re.compile(r"array\(\s*\[([^\]]*)\]\s*\)")
 
 
-def _of_primitives(file: FilePath, text: str) -> PoseRows:
+def _of_primitives(file: FilePath, text: str, _: Sequence[str]) -> PoseRows:
     reader = csv.DictReader(io.StringIO(text))
+    try:
+        listed = [(reader.line_num, found) for found in reader]
+    except csv.Error as error:
+        raise FileFormatError(f"{file}: line {reader.line_num}: is no table: {error}") from error
     rows, places = list[list[float]](), list[str]()
-    for found in reader:
-        where = reader.line_num
+    for where, found in listed:
         kind, points = str(found.get("primitives")), _ARRAY.findall(str(found.get("points")))
         if not kind.lower().startswith(("movej", "movel")) or len(points) != 1:
             raise FileFormatError(
-                f"{file}: line {where}: primitive '{kind[:20]}' with {len(points)} points is not "
+                f"{file}: line {where}: primitive {shown(kind)} with {len(points)} points is not "
                 f"read, expected movel or movej with one: let it be fitted by lines"
             )
         values = [_number(file, where, cell) for cell in points[0].split(",")]

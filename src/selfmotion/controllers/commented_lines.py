@@ -6,7 +6,7 @@ from pathlib import Path as FilePath
 
 import numpy as np
 
-from selfmotion.basics import FileFormatError, text_of
+from selfmotion.basics import FileFormatError, lines_of, text_of
 from selfmotion.certificate import Tolerance
 from selfmotion.controllers.controller_program import ControllerProgram, Switch
 from selfmotion.controllers.program_facts import Load, ProgramFacts
@@ -28,8 +28,8 @@ from selfmotion.task import SE3
 # A file of a controller has less than so many bytes, lines less than so many characters, numbers
 # less than that.
 _BYTES, _LINE, _LARGEST = 50_000_000, 2000, 1e7
-# Lines end here; what ends them in other programs is in none.
-_ENDS, _STRANGE = re.compile(r"\r\n|\n|\r"), re.compile("[\v\f\x1c-\x1e\x85\u2028\u2029]")
+# What ends lines in other programs is in none.
+_STRANGE = re.compile("[\v\f\x1c-\x1e\x85\u2028\u2029]")
 # What comments of events begin with.
 _EVENT = "event: "
 _NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)(E[+-]?[0-9]{1,3})?", re.IGNORECASE)
@@ -53,8 +53,7 @@ class Lines:
             raise FileFormatError(f"{file}: cannot be read: {error.strerror or error}") from error
         if len(content) > _BYTES:
             raise FileFormatError(f"{file}: has {len(content)} bytes, expected {_BYTES} at most")
-        text = text_of(file, content)
-        self._lines = _ENDS.split(text)
+        self._lines = lines_of(text_of(file, content))
         self.number = 0
         self.notes: list[str] = []
 
