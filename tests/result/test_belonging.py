@@ -7,10 +7,13 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
+from selfmotion.result.measured import cost_of
 from support.arms import PANDA_HOME, robot_named
 
 # A cost is the same by two integrations of it [share].
 INTEGRATED = 1e-6
+# A rolled-out motion is of minimum norm between its knots up to this [rad/s].
+SMALL = 1e-5
 
 
 @pytest.fixture(scope="module")
@@ -49,6 +52,23 @@ def test_a_problem_with_other_costs_is_another_one(plans: tuple[sm.Plan, sm.Plan
     other = replace(best, problem=replace(best.problem, costs=[heavy]))
     assert other.report.cost == pytest.approx(other.evaluate(heavy), rel=INTEGRATED)
     assert other.report.cost != pytest.approx(best.report.cost, rel=INTEGRATED)
+    # Both are of the same costs, or the saving is none.
+    still = cost_of(other.problem.follows, other.initial_trajectory, heavy)
+    assert other.report.initial_cost == pytest.approx(still, rel=INTEGRATED)
+
+
+def test_what_the_minimum_norm_motion_costs_is_of_the_one_beside_the_plan(
+    plans: tuple[sm.Plan, sm.Plan], tmp_path: Path
+) -> None:
+    best, other = plans
+    put = replace(best, initial_trajectory=other.trajectory)
+    (cost,) = best.problem.costs
+    expected = cost_of(best.problem.follows, other.trajectory, cost)
+    assert put.report.initial_cost == pytest.approx(expected, rel=INTEGRATED)
+    assert put.report.initial_cost > best.report.initial_cost
+    assert (put.report.cost, put.report.message) == (best.report.cost, best.report.message)
+    put.save(tmp_path / "plan.npz")
+    assert sm.load_plan(tmp_path / "plan.npz").report.initial_cost == put.report.initial_cost
 
 
 def test_a_function_of_the_same_name_is_another_cost(plans: tuple[sm.Plan, sm.Plan]) -> None:
@@ -76,6 +96,16 @@ def test_the_report_of_a_retimed_plan_is_of_its_motion(plans: tuple[sm.Plan, sm.
     faster = sm.retime(plans[0], acceleration=2.0)
     (cost,) = faster.problem.costs
     assert faster.report.cost == pytest.approx(faster.evaluate(cost), rel=INTEGRATED)
+    # The other one is at this pace as well: of minimum norm, q̇ = J⁺J q̇, and so no cheaper than it.
+    still = faster.initial_trajectory
+    for when in np.linspace(0.0, still.duration, 12)[1:-1]:
+        jacobian = faster.robot.jacobian(still(when))
+        qd = still(when, 1)
+        np.testing.assert_allclose(np.linalg.pinv(jacobian) @ (jacobian @ qd), qd, atol=SMALL)
+    assert faster.report.initial_cost == pytest.approx(
+        cost_of(faster.problem.follows, still, cost), rel=INTEGRATED
+    )
+    assert faster.report.cost <= faster.report.initial_cost
 
 
 def test_margins_of_another_motion_are_refused(

@@ -1,6 +1,7 @@
 """Plans, certificates and robots as tables for the terminal; legible in a log as well."""
 
 import json
+import math
 import os
 import sys
 from collections.abc import Mapping, Sequence
@@ -45,7 +46,7 @@ def show(plan: Plan, console: Console) -> None:
     table.add_column("plan", justify="right")
     table.add_column("change", justify="right")
     for name in report.terms:
-        table.add_row(name, *_compare(report.initial_terms[name], report.terms[name]))
+        table.add_row(name, *_compare(report.initial_terms.get(name, math.nan), report.terms[name]))
     if len(report.terms) > 1:
         table.add_section()
         table.add_row("total", *_compare(report.initial_cost, report.cost))

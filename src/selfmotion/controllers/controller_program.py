@@ -34,7 +34,6 @@ from selfmotion.controllers.program_texts import (
     rounded_up,
     stated,
 )
-from selfmotion.controllers.read_stretches import SLOWLY
 from selfmotion.controllers.stretches import (
     NO_MISS,
     Knots,
@@ -208,7 +207,7 @@ class ControllerProgram:
         order = [names.index(name) for name in known]
         worst, at, k = Misses(NO_MISS, NO_MISS), 0.0, 0
         for number, stretch in enumerate(self.stretches):
-            if stretch.name == SLOWLY and self.shift is None:
+            if stretch.is_slow and self.shift is None:
                 after = self.stretches[min(number + 1, len(self.stretches) - 1)].name
                 raise FileFormatError(
                     f"the arm is not where '{after}' begins, by the poses before: it is singular "

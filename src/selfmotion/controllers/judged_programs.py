@@ -34,7 +34,6 @@ from selfmotion.controllers.program_lines import ProgramReader
 from selfmotion.controllers.program_settings import ProgramSettings
 from selfmotion.controllers.program_texts import plain
 from selfmotion.controllers.rapid import RapidReader, write_rapid
-from selfmotion.controllers.read_stretches import SLOWLY
 from selfmotion.controllers.stretches import Misses, PoseStretch, Stretch
 from selfmotion.controllers.thinning import what_lines_keep, what_targets_keep
 from selfmotion.controllers.tool_frames import WORLD, carrier_in_reference
@@ -195,7 +194,7 @@ def parts_of(file: FilePath, program: ControllerProgram, job: Program) -> Progra
 
     for number, step in enumerate(job.steps):
         taken, seconds = [], 0.0
-        while left and left[0].name == SLOWLY:
+        while left and left[0].is_slow:
             own = part([left.pop(0)])
             slow.append((number, [motion.of_joints(names) for motion in own.motions()]))
         while left and seconds < step.motion.duration - _MOMENT:

@@ -1,7 +1,7 @@
 """Rows of targets as a file has them, made into stretches; poses by inverse kinematics."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -14,8 +14,8 @@ from selfmotion.controllers.tool_frames import ToolFrames
 from selfmotion.robot import RobotModel
 from selfmotion.task import SE3, Quaternion
 
-# What slow motions to where a shifted program goes on are called.
-SLOWLY = "slowly"
+# What slow motions to where a shifted program goes on are called in messages.
+_SLOWLY = "a slow motion"
 # A slow motion to where the arm is already takes no time: digits differ by this [rad or m].
 _THERE = 1e-5
 # How fast slow motions are, where the file was shifted: what is read of them is their way [m/s,
@@ -201,7 +201,7 @@ class Follower:
             if before is not None and np.abs(self.at - before).max() > _THERE:
                 seconds = float(np.abs(self.at - before).max()) / _SLOW
                 both = np.array([before, self.at])
-                self.stretches.append(Stretch(SLOWLY, times_of([seconds]), both))
+                self.stretches.append(Stretch(_SLOWLY, times_of([seconds]), both, is_slow=True))
             return
         frames, _ = self._known()
         if before is None:
@@ -213,7 +213,8 @@ class Follower:
         seconds = max(far / _SLOW, angle / _SLOW, 0.1)
         moves = bool(self.stretches) and max(far, angle) > _THERE
         here = Pose(place[0], turn[0], self._others(before), row.target.line)
-        stretch = self._stretch(PoseRow(SLOWLY, [here, row.target], [seconds]))
+        found = self._stretch(PoseRow(_SLOWLY, [here, row.target], [seconds]))
+        stretch = replace(found, is_slow=True)
         if not self.stretches:
             self.approach = float(np.abs(stretch.q[-1] - before).max())
         if moves:

@@ -100,6 +100,8 @@ class Stretch:
     events : tuple of Event
     remark : str
         What there is to say of it.
+    is_slow : bool
+        Whether it is no part of the plan but a slow motion to where a shifted program goes on.
     """
 
     name: str
@@ -107,6 +109,7 @@ class Stretch:
     q: Array
     events: tuple[Event, ...] = ()
     remark: str = ""
+    is_slow: bool = False
 
     @property
     def duration(self) -> float:

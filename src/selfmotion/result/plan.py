@@ -105,7 +105,7 @@ class Plan:
     coefficients : (size,)
         x, the null motion's coefficients.
     report : Report
-        Of this motion: of one that was put in the place of another, costs are evaluated again.
+        Of these motions: of one that was put in the place of another, costs are evaluated again.
     certificate : Certificate
         Of this motion and this problem: one of any other is not kept, and the plan is then not
         verified (``replace(plan, trajectory=…)``); `check` makes a new one.
@@ -138,20 +138,28 @@ class Plan:
         Where it does not say what it is of, it is of what the certificate was of. What cannot be
         evaluated, as functions that no file has, leaves a cost that is not a number.
         """
-        motion, costs, report = self.trajectory.digest, _digests(self.problem.costs), self.report
-        if report.motion == motion and _are_same(costs, report.costs):
-            return report
+        motion, initial = self.trajectory.digest, self.initial_trajectory.digest
+        costs, report = _digests(self.problem.costs), self.report
         if not report.motion and self.certificate.motion:
-            return replace(report, motion=motion, costs=costs)
+            return replace(report, motion=motion, initial_motion=initial, costs=costs)
+        same_costs = _are_same(costs, report.costs)
+        # Files did not always say which minimum-norm motion it is: the one beside it.
+        if not (same_costs and report.initial_motion in ("", initial)):
+            total, terms = self._costs_of(self.initial_trajectory)
+            report = replace(report, initial_cost=total, initial_terms=terms)
+        if not (same_costs and report.motion == motion):
+            report = report.evaluated(*self._costs_of(self.trajectory))
+        return replace(report, motion=motion, initial_motion=initial, costs=costs)
+
+    def _costs_of(self, motion: Trajectory) -> tuple[float, Mapping[str, float]]:
+        """Return what a motion costs, and by which costs; nan where one cannot be evaluated."""
         terms = {}
         for cost in self.problem.costs:
             with suppress(ProblemError):
                 if not isinstance(cost, LostCost):
-                    terms[cost.name] = self.evaluate(cost)
+                    terms[cost.name] = cost_of(self.problem.follows, motion, cost)
         complete = len(terms) == len(self.problem.costs)
-        total = sum(terms.values()) if complete else math.nan
-        found = report.evaluated(total, terms)
-        return replace(found, motion=motion, costs=costs)
+        return (sum(terms.values()) if complete else math.nan), terms
 
     def __repr__(self) -> str:
         """Return a few lines: what moves, at what cost, and the verdict."""

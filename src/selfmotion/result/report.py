@@ -121,6 +121,8 @@ class Report:
     motion : str
         Digest of the motion that costs, active constraints and all else are of; "" until the plan
         is made. Of a motion that was put in the place of another, `evaluated` is the report.
+    initial_motion : str
+        Digest of the minimum-norm motion that the initial costs are of.
     costs : dict
         The digest of each cost by its name; "" of one that is a function.
     """
@@ -146,6 +148,7 @@ class Report:
     attempts: tuple[Attempt, ...] = ()
     motion: str = ""
     costs: Mapping[str, str] | None = None
+    initial_motion: str = ""
 
     def evaluated(self, cost: float, terms: Mapping[str, float]) -> "Report":
         """Return the report of another motion or costs: what it costs, not how it was found."""

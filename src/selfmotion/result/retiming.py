@@ -235,11 +235,9 @@ def _retimed(plan: Plan, wanted: Sequence[Constraint], pace: Pace) -> Plan:
         ),
         constraints=(*(item for item in asked if item is not None), *wanted),
     )
-    retimed = replace(
-        plan,
-        problem=problem,
-        trajectory=trajectory,
-        initial_trajectory=trajectory,
-    )
+    # Of the tool's motion at any pace the same joint path is of minimum norm.
+    is_whole = plan.initial_trajectory.duration == plan.trajectory.duration
+    initial = along(pace, plan.initial_trajectory) if is_whole else trajectory
+    retimed = replace(plan, problem=problem, trajectory=trajectory, initial_trajectory=initial)
     report = retimed.report.with_found(plan.report, active)
     return replace(retimed, report=report, certificate=retimed.check())
