@@ -84,6 +84,8 @@ from selfmotion.task import Damping as Damping, Relaxation as Relaxation, Task a
 from selfmotion.transfer import move as move
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from matplotlib.figure import Figure
 
     from selfmotion.realtime import Replanner as Replanner, warm_up as warm_up
@@ -219,6 +221,11 @@ class _Views:
         from selfmotion.replay import figure
 
         return figure(plan)
+
+    def write_replay(self, plan: Plan, file: "Path") -> None:
+        from selfmotion.replay import write_replay
+
+        write_replay(plan, file)
 
 
 Plan.views = _Views()

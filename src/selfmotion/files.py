@@ -14,7 +14,6 @@ from selfmotion.controllers import (
     write_parts,
 )
 from selfmotion.documents import (
-    Job,
     SeamJob,
     read_job,
     read_joint_limits,
@@ -23,14 +22,18 @@ from selfmotion.documents import (
 )
 from selfmotion.job import write_timetable
 from selfmotion.placement import write_placement
+from selfmotion.planning import PlanRequest
 from selfmotion.result import (
     load_move,
     load_parts,
 )
 from selfmotion.sheet import write_sheet
 
+# What `PlanRequest` was called before; it goes with the next version.
+Job = PlanRequest
+
 __all__ = [
-    "Job",
+    "PlanRequest",
     "ProgramSettings",
     "SeamJob",
     "load_move",

@@ -34,15 +34,15 @@ def plan() -> sm.Plan:
 def test_a_plan_is_made_for_its_own_job_only(plan: sm.Plan) -> None:
     problem = plan.problem
     faster = sm.retime(plan).require()
-    assert is_made_for(plan, sm.files.Job(problem))
-    assert is_made_for(faster, sm.files.Job(problem, goal="retimed"))
-    assert not is_made_for(faster, sm.files.Job(problem))
+    assert is_made_for(plan, sm.files.PlanRequest(problem))
+    assert is_made_for(faster, sm.files.PlanRequest(problem, goal="retimed"))
+    assert not is_made_for(faster, sm.files.PlanRequest(problem))
     slower = [*problem.constraints, sm.constraints.JointVelocityLimits(1.0)]
     others = [
-        sm.files.Job(problem, tolerance=sm.Tolerance(1e-9, 1e-9)),
-        sm.files.Job(replace(problem, path=toward(2.0, 0.31))),
-        sm.files.Job(replace(problem, constraints=slower)),
-        sm.files.Job(replace(problem, relaxations=[])),
+        sm.files.PlanRequest(problem, tolerance=sm.Tolerance(1e-9, 1e-9)),
+        sm.files.PlanRequest(replace(problem, path=toward(2.0, 0.31))),
+        sm.files.PlanRequest(replace(problem, constraints=slower)),
+        sm.files.PlanRequest(replace(problem, relaxations=[])),
     ]
     for job in others:
         assert not is_made_for(plan, job)

@@ -19,9 +19,9 @@ import pytest
 import trimesh
 
 import selfmotion as sm
-from selfmotion.batch import BatchProgress, Item, grid_items, plan_items, run
+from selfmotion.batch import BatchProgress, Item, plan_items, run
 from selfmotion.cli.runs import is_answered
-from selfmotion.documents import write_combination
+from selfmotion.documents import grid_items, write_combination
 from support.arms import PANDA_HOME, robot_named
 from support.places import ROOT, TESTS
 from support.shell import complaint, invoke
@@ -237,7 +237,7 @@ def test_bad_problems_do_not_stop_the_rest(tmp_path: Path) -> None:
     far.translation = far.translation + 5.0
     problems = [
         good,
-        sm.files.Job(
+        sm.files.PlanRequest(
             sm.Problem(panda, sm.paths.Circle.around(far, 0.05, 3.0)), sm.Search(starts=4)
         ),
         sm.Problem(panda, circle, costs=[sm.costs.FunctionCost(lambda qd, q, t: q[:, 0] ** 2)]),
@@ -254,17 +254,17 @@ def test_bad_problems_do_not_stop_the_rest(tmp_path: Path) -> None:
 def test_a_fault_of_ones_own_code_is_said_and_tried_again(
     grid: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    real = sm.files.Job.plan
+    real = sm.files.PlanRequest.plan
 
-    def faulty(job: sm.files.Job, **options: Any) -> sm.Plan:
+    def faulty(job: sm.files.PlanRequest, **options: Any) -> sm.Plan:
         if job.problem.path.duration == 4.0:
             raise ZeroDivisionError("own code")
         return real(job, **options)
 
-    monkeypatch.setattr(sm.files.Job, "plan", faulty)
+    monkeypatch.setattr(sm.files.PlanRequest, "plan", faulty)
     batch = plan_items(grid_items(grid), InPlace(), out=tmp_path / "out")
     assert [row.error for row in batch.rows if row.error] == ["ZeroDivisionError: own code"] * 2
-    monkeypatch.setattr(sm.files.Job, "plan", real)
+    monkeypatch.setattr(sm.files.PlanRequest, "plan", real)
     again = plan_items(grid_items(grid), InPlace(), out=tmp_path / "out")
     assert again.resumed == 4
     assert all(not row.error for row in again.rows)
@@ -275,7 +275,7 @@ def test_the_best_is_what_was_asked_for(
     grid: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, goal: str, duration: float
 ) -> None:
     """Who asked for the fastest motion does not want the cheapest, which takes longest."""
-    monkeypatch.setattr(sm.files.Job, "plan", lambda job, **options: sm.plan(job.problem))
+    monkeypatch.setattr(sm.files.PlanRequest, "plan", lambda job, **options: sm.plan(job.problem))
     grid.write_text(f'goal = "{goal}"\n' + GRID.replace("[0, 1]", "[0]"))
     batch = plan_items(grid_items(grid), InPlace(), out=tmp_path / "out")
     assert batch.best is not None
@@ -394,7 +394,7 @@ def test_names_sort_as_they_are_numbered(grid: Path) -> None:
 
 
 def test_of_each_file_some_combination_has_to_be_verified() -> None:
-    def made() -> sm.files.Job:
+    def made() -> sm.files.PlanRequest:
         raise sm.errors.ProblemError("is not planned here")
 
     one, other = ([Item(f"{file}-{k}", made, {}) for k in range(3)] for file in "ab")
@@ -447,7 +447,7 @@ def test_what_a_batch_is_given_is_used_or_refused_by_name(tmp_path: Path) -> Non
         ({"progress": 5}, "progress is 5, expected a function"),
         ({"deadline": 3.0}, "deadline: is no option of a batch; expected search, "),
         (
-            {"problems": [sm.files.Job(problem)], "tolerance": 1e-3},
+            {"problems": [sm.files.PlanRequest(problem)], "tolerance": 1e-3},
             "tolerance: has no effect: each",
         ),
         ({"problems": problem}, "expected a list of problems"),
@@ -458,7 +458,7 @@ def test_what_a_batch_is_given_is_used_or_refused_by_name(tmp_path: Path) -> Non
     with pytest.raises(sm.errors.FileFormatError, match="file is 5"):
         sm.plan_many([], out=5)  # type: ignore[arg-type]
     (row,) = sm.plan_many(
-        [sm.files.Job(problem, parts={"ramp": 0.1})], InPlace(), out=tmp_path
+        [sm.files.PlanRequest(problem, parts={"ramp": 0.1})], InPlace(), out=tmp_path
     ).rows
     assert row.error == "parts: has no effect on the best motion; leave it out"
 
@@ -466,7 +466,7 @@ def test_what_a_batch_is_given_is_used_or_refused_by_name(tmp_path: Path) -> Non
 def test_a_row_that_was_changed_or_renamed_is_not_believed(tmp_path: Path) -> None:
     """Neither its words, its name nor what is no row at all: all is planned again."""
     # Said at once, without a plan.
-    twice = 2 * [sm.files.Job(sm.sample_problem(), parts={"ramp": 0.1})]
+    twice = 2 * [sm.files.PlanRequest(sm.sample_problem(), parts={"ramp": 0.1})]
     before = [row.error for row in sm.plan_many(twice, InPlace(), out=tmp_path).rows]
     assert all(before)
     file, other = (tmp_path / "rows" / f"plan-{k}.json" for k in range(2))

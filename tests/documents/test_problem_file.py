@@ -31,11 +31,11 @@ def same_motion(one: sm.Plan, other: sm.Plan, tolerance: float = 0.0) -> None:
 
 
 @pytest.fixture(scope="module")
-def job(tmp_path_factory: pytest.TempPathFactory) -> sm.files.Job:
+def job(tmp_path_factory: pytest.TempPathFactory) -> sm.files.PlanRequest:
     return sm.files.read_job(written(tmp_path_factory.mktemp("cell"), CELL))
 
 
-def test_a_file_says_what_python_says(job: sm.files.Job) -> None:
+def test_a_file_says_what_python_says(job: sm.files.PlanRequest) -> None:
     panda = sm.load_robot("panda", lock={"panda_finger_joint1": 0.02})
     circle = sm.paths.Circle.around(panda.pose(PANDA_HOME), 0.1, 4.0, normal=(1.0, 0.0, 0.0))
     turned = pin.SE3(pin.rpy.rpyToMatrix(np.array([0, 0, np.pi / 18])), np.array([0, -0.6, 0.6]))
@@ -56,7 +56,9 @@ def test_a_file_says_what_python_says(job: sm.files.Job) -> None:
 
 
 @pytest.mark.parametrize("name", ["again.toml", "again.json"])
-def test_written_problems_give_the_same_plan(job: sm.files.Job, tmp_path: Path, name: str) -> None:
+def test_written_problems_give_the_same_plan(
+    job: sm.files.PlanRequest, tmp_path: Path, name: str
+) -> None:
     sm.files.write_problem(job.problem, tmp_path / name)
     again = sm.read_problem(tmp_path / name)
     same_motion(sm.plan(again, **job.settings), job.plan())

@@ -127,7 +127,7 @@ def test_every_exception_has_a_reason_and_a_user() -> None:
 
 def test_what_is_written_is_planned_the_same_again(tmp_path: Path) -> None:
     """With its search, its optimiser and its goal."""
-    job = sm.files.Job(
+    job = sm.files.PlanRequest(
         sm.sample_problem(),
         search=sm.Search(starts=7, finalists=2, mode="local", rng=3),
         optimizer=sm.QuasiNewton(),
@@ -157,10 +157,10 @@ def test_a_goal_says_what_is_looked_for() -> None:
     limits = [sm.constraints.JointVelocityLimits(2.0), sm.constraints.JointAccelerationLimits(4.0)]
     line = sm.paths.Line(arm.pose(start), end, 8.0)
     problem = sm.Problem(arm, line, "planar", start, constraints=limits)
-    own, retimed = (sm.files.Job(problem, goal=goal).plan() for goal in ("best", "retimed"))
+    own, retimed = (sm.files.PlanRequest(problem, goal=goal).plan() for goal in ("best", "retimed"))
     assert retimed.certificate.verified
     assert retimed.trajectory.duration < 0.5 * own.trajectory.duration
-    parts = sm.files.Job(problem, goal="parts", parts={"ramp": 0.2})
+    parts = sm.files.PlanRequest(problem, goal="parts", parts={"ramp": 0.2})
     with pytest.raises(sm.errors.ProblemError, match=r"goal: is 'parts'"):
         parts.plan()
     with pytest.raises(sm.errors.ProblemError, match="search: has no effect on a motion in parts"):
@@ -179,11 +179,11 @@ def test_what_has_no_effect_on_a_goal_is_refused(tmp_path: Path) -> None:
         ("fastest", {"parts": parts}, "parts: has no effect on the fastest motion"),
         ("parts", {"keep": keep}, "keep: has no effect on a motion in parts"),
     ):
-        job = sm.files.Job(problem, goal=goal, **given)
+        job = sm.files.PlanRequest(problem, goal=goal, **given)
         with pytest.raises(sm.errors.ProblemError, match=said):
             job.in_parts() if goal == "parts" else job.plan()
     with pytest.raises(sm.errors.ProblemError, match="goal is 'quick', expected one of"):
-        sm.files.Job(problem, goal="quick")
+        sm.files.PlanRequest(problem, goal="quick")
     file = tmp_path / "cell.toml"
     sm.files.write_problem(problem, file)
     file.write_text(file.read_text() + '\n[grid]\n"path.duration" = [3, 4]\n')

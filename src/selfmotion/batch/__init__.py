@@ -3,7 +3,6 @@
 from selfmotion.batch.items import (
     Item as Item,
     Row as Row,
-    grid_items as grid_items,
     unread_item as unread_item,
 )
 from selfmotion.batch.maps import labels as labels, maps as maps

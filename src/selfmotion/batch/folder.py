@@ -16,15 +16,15 @@ from selfmotion.basics import SelfmotionError, digest_of_file, write_bytes, writ
 from selfmotion.batch.items import Item, Row, measured
 from selfmotion.batch.maps import labels, maps
 from selfmotion.certificate import USUAL
-from selfmotion.documents import Job
 from selfmotion.path import Path as ToolPath, Retimed
+from selfmotion.planning import PlanRequest
 from selfmotion.problem import Problem
 from selfmotion.result import Asked, Plan, load_plan, read_kept, write_kept
 
 # Whether a plan is what a job of a batch asks for.
 
 
-def is_made_for(plan: Plan, job: Job) -> bool:
+def is_made_for(plan: Plan, job: PlanRequest) -> bool:
     """Whether a plan is of a job's problem, judged by all that it asks within its tolerance.
 
     Of a fastest motion: along the same path, at whatever pace.
@@ -152,11 +152,10 @@ class Folder:
         file = self.path / "replays" / f"{row.name}.html"
         # A plan that was made anew is newer than its replay.
         sound = file.is_file() and file.stat().st_mtime >= row.file.stat().st_mtime
-        if not sound and wanted:
-            from selfmotion.replay import write_replay
-
-            write_replay(row.plan(), file)
-        return file.relative_to(self.path).as_posix() if sound or wanted else ""
+        if not sound and wanted and Plan.views is not None:
+            Plan.views.write_replay(row.plan(), file)
+            sound = True
+        return file.relative_to(self.path).as_posix() if sound else ""
 
     def _row_file(self, name: str) -> Path:
         return self.path / "rows" / f"{name}.json"

@@ -6,9 +6,9 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from selfmotion.basics import FileFormatError, ProblemError, SelfmotionError, read_document
+from selfmotion.basics import FileFormatError, ProblemError, SelfmotionError
 from selfmotion.costs import FunctionCost
-from selfmotion.documents import Job, grid_documents, job_of
+from selfmotion.planning import PlanRequest
 from selfmotion.problem import Problem, problem_to_dict
 from selfmotion.result import Plan, files_of, key_of, load_plan, own_modules, told
 
@@ -32,12 +32,15 @@ class Item:
         What tells it from the others: keys of the grid and their values.
     file : Path or None
         The problem file whose grid it is of.
+    write : callable, optional
+        Writes its problem file to a path; of a grid's combination.
     """
 
     name: str
-    make: Callable[[], Job]
+    make: Callable[[], PlanRequest]
     settings: Mapping[str, Any] = field(default_factory=dict)
     file: Path | None = None
+    write: Callable[[Path], None] | None = None
 
     @cached_property
     def task(self) -> dict[str, Any]:
@@ -76,54 +79,30 @@ class Item:
         return key_of((task["problem"], told(task["options"])), task["files"])
 
 
-def grid_items(file: Path, *, allow_code: bool = False) -> list[Item]:
-    """Return an item for each problem of a file's ``[grid]``, or the one of a file without.
-
-    Raises
-    ------
-    FileFormatError
-        The file cannot be read, or its grid is none. What is wrong with single problems is said
-        by their rows.
-    """
-    memory: dict[str, Any] = {}
-    document = read_document(file)
-    try:
-        found = grid_documents(document)
-    except FileFormatError as error:
-        raise FileFormatError(f"{file}: {error}") from error
-    digits = len(str(len(found) - 1))
-
-    def maker(document: dict[str, Any]) -> Callable[[], Job]:
-        return lambda: job_of(document, file, allow_code=allow_code, memory=memory)
-
-    return [
-        Item(f"{file.stem}-{k:0{digits}d}" if settings else file.stem, maker(one), settings, file)
-        for k, (one, settings) in enumerate(found)
-    ]
-
-
 def unread_item(file: Path, error: SelfmotionError) -> Item:
     """Return the item of a file that cannot be read: its row says why."""
 
-    def fails() -> Job:
+    def fails() -> PlanRequest:
         raise error
 
     return Item(file.stem, fails, {}, file)
 
 
-def problem_items(problems: list[Problem | Job], options: Mapping[str, Any]) -> list[Item]:
+def problem_items(problems: list[Problem | PlanRequest], options: Mapping[str, Any]) -> list[Item]:
     """Return an item for each problem; ProblemError for what is none."""
     for name in options:
         if name not in OPTIONS:
             raise ProblemError(f"{name}: is no option of a batch; expected {', '.join(OPTIONS)}")
-        if problems and all(isinstance(given, Job) for given in problems):
-            raise ProblemError(f"{name}: has no effect: each problem is a Job, which says its own")
+        if problems and all(isinstance(given, PlanRequest) for given in problems):
+            raise ProblemError(
+                f"{name}: has no effect: each problem is a PlanRequest, which says its own"
+            )
     digits = len(str(max(len(problems) - 1, 0)))
     items = []
     for k, given in enumerate(problems):
-        if not isinstance(given, Problem | Job):
-            raise ProblemError(f"problems[{k}] is {given!r}, expected a Problem or a Job")
-        job = given if isinstance(given, Job) else Job(given, **options)
+        if not isinstance(given, Problem | PlanRequest):
+            raise ProblemError(f"problems[{k}] is {given!r}, expected a Problem or a PlanRequest")
+        job = given if isinstance(given, PlanRequest) else PlanRequest(given, **options)
         items.append(Item(f"plan-{k:0{digits}d}", lambda job=job: job))  # type: ignore[misc]
     return items
 
@@ -147,7 +126,7 @@ class Row:
     digest : str
         The SHA-256 of that file.
     goal : str
-        What was planned for: `Job.goal`.
+        What was planned for: `PlanRequest.goal`.
     error : str
         "" where there is a plan.
     reason : str
@@ -211,7 +190,7 @@ class Row:
 
 
 def measured(plan: Plan, goal: str) -> dict[str, Any]:
-    """Return what a row says of a plan that was made for a goal (`Job.goal`)."""
+    """Return what a row says of a plan that was made for a goal (`PlanRequest.goal`)."""
     report, certificate, duration = plan.report, plan.certificate, plan.trajectory.duration
     nearest = {certificate.limit_margin.name} & set(plan.robot.joint_names)
     is_part = bool(report.ending)

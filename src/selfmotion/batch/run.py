@@ -29,7 +29,7 @@ from selfmotion.basics import (
 )
 from selfmotion.batch.folder import Folder
 from selfmotion.batch.items import Item, Row, measured, problem_items
-from selfmotion.documents import Job, write_combination
+from selfmotion.planning import PlanRequest
 from selfmotion.problem import Problem, problem_from_dict
 from selfmotion.result import Made
 
@@ -56,7 +56,7 @@ def plan_task(task: Mapping[str, Any]) -> tuple[dict[str, Any], bytes]:
         for name in task["modules"]:
             importlib.import_module(name)
         problem = problem_from_dict(task["problem"], _made.of(task["files"]))
-        found = Job(problem, **task["options"]).plan()
+        found = PlanRequest(problem, **task["options"]).plan()
         with tempfile.TemporaryDirectory() as folder:
             file = Path(folder, "plan.npz")
             found.save(file)
@@ -152,7 +152,7 @@ class Batch:
 
 
 def plan_many(
-    problems: Iterable[Problem | Job],
+    problems: Iterable[Problem | PlanRequest],
     executor: Executor | None = None,
     *,
     out: str | Path,
@@ -169,7 +169,7 @@ def plan_many(
 
     Parameters
     ----------
-    problems : iterable of Problem or Job
+    problems : iterable of Problem or PlanRequest
         Files that a job would write are left out: plans go to the folder.
     executor : concurrent.futures.Executor, optional
         Where to run: for example ``distributed.Client(address).get_executor()``, or mpi4py's
@@ -239,15 +239,16 @@ def plan_items(
 
 def _write_best(items: Sequence[Item], rows: Mapping[str, Row], folder: Path) -> tuple[Path, ...]:
     """Write the best combination of each file with a grid as a problem file."""
-    best: dict[Path, Row] = {}
+    best: dict[Path, tuple[Row, Callable[[Path], None]]] = {}
     for item in items:
         row = rows[item.name]
-        if item.file is not None and item.settings and row.verified:
-            best[item.file] = min(best.get(item.file, row), row, key=lambda each: each.rank)
+        if item.file is not None and item.write is not None and item.settings and row.verified:
+            here = row, item.write
+            best[item.file] = min(best.get(item.file, here), here, key=lambda each: each[0].rank)
     written = []
-    for file, row in best.items():
+    for file, (_, write) in best.items():
         target = folder / f"{file.stem}-best{file.suffix}"
-        write_combination(file, row.settings, target)
+        write(target)
         written.append(target)
     return tuple(written)
 

@@ -330,7 +330,7 @@ def plan_with_progress(problem: sm.Problem, **options: Any) -> sm.Plan:
         return sm.plan(problem, callback=display.iteration, progress=display.stage, **options)
 
 
-def fastest_with_progress(job: sm.files.Job, **options: Any) -> sm.Fastest:
+def fastest_with_progress(job: sm.files.PlanRequest, **options: Any) -> sm.Fastest:
     """Look for the fastest motion of a job, and show how far it is."""
     with StageDisplay(stages) as display:
         return job.fastest(progress=display.stage, **options)

@@ -259,7 +259,7 @@ def read(
     settings: list[str],
     allow_code: bool,
     warm_start: sm.Plan | None = None,
-) -> sm.files.Job:
+) -> sm.files.PlanRequest:
     """Return the job of a problem file, or of a robot with the options of the shell.
 
     Options that say what a problem file says itself are refused beside one.
@@ -283,7 +283,7 @@ def read(
     return of_file(Path(given), settings, allow_code)
 
 
-def of_file(file: Path, settings: list[str], allow_code: bool) -> sm.files.Job:
+def of_file(file: Path, settings: list[str], allow_code: bool) -> sm.files.PlanRequest:
     """Return the job of a problem file."""
     document = read_document(file)
     if "grid" in document:
@@ -340,7 +340,7 @@ def _set(document: dict[str, Any], settings: list[str]) -> None:
 
 def _with_settings(
     document: dict[str, Any], file: Path | None, settings: list[str], allow_code: bool
-) -> sm.files.Job:
+) -> sm.files.PlanRequest:
     _set(document, settings)
     job = job_of(document, file, allow_code=allow_code)
     _tell_left_out(document, file)
@@ -348,7 +348,7 @@ def _with_settings(
     return job
 
 
-def _tell_flip(document: dict[str, Any], file: Path | None, job: sm.files.Job) -> None:
+def _tell_flip(document: dict[str, Any], file: Path | None, job: sm.files.PlanRequest) -> None:
     """Print that normals seem to point the other way, where only so the path is in reach."""
     path = document.get("path")
     if not (isinstance(path, dict) and path.get("kind") == "file"):

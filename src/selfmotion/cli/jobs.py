@@ -168,7 +168,9 @@ def write_program(
             sm.files.write_motion(program, file, settings=own, progress=display.stage)
 
 
-def finish_parts(job: sm.files.Job, out: list[Path], as_json: bool, verbose: bool) -> NoReturn:
+def finish_parts(
+    job: sm.files.PlanRequest, out: list[Path], as_json: bool, verbose: bool
+) -> NoReturn:
     """Plan a motion in parts, print it, write its files, and end."""
     wanted = [*job.outputs, *out]
     for file in wanted:

@@ -90,7 +90,8 @@ def batch(
 
     Exit code 0 if some combination of each file is verified.
     """
-    from selfmotion.batch import grid_items, plan_items, unread_item
+    from selfmotion.batch import plan_items, unread_item
+    from selfmotion.documents import grid_items
 
     check_cluster(dask, workers)
     several = list[list["Item"]]()

@@ -6,6 +6,7 @@ from selfmotion.documents.example import (
     example_text as example_text,
     example_texts as example_texts,
 )
+from selfmotion.documents.grid_items import grid_items as grid_items
 from selfmotion.documents.joint_limits import (
     read_joint_limits as read_joint_limits,
 )
@@ -16,7 +17,6 @@ from selfmotion.documents.overrides import (
     write_combination as write_combination,
 )
 from selfmotion.documents.problem_file import (
-    Job as Job,
     job_of as job_of,
     read_job as read_job,
     read_problem as read_problem,

@@ -38,12 +38,11 @@ from selfmotion.documents.field_types import (
     Weave,
     Whole,
 )
-from selfmotion.documents.problem_file import GOALS
 from selfmotion.documents.problem_parts import FEED_BOUNDS, FUNCTION
 from selfmotion.motion import NullMotion
 from selfmotion.optimise import QuasiNewton
 from selfmotion.path import ORIENTATIONS, Path, TimeLaw
-from selfmotion.planning import Search
+from selfmotion.planning import GOALS, Search
 from selfmotion.task import SE3, Damping, Relaxation, Task
 
 # Kinds that no file names: what is missing of a plan, a cost that damping adds, functions (which

@@ -16,7 +16,6 @@ from selfmotion.basics import (
     ProblemError,
     RobotError,
     SelfmotionError,
-    as_choice,
     as_path,
     in_si,
     read_document,
@@ -37,118 +36,11 @@ from selfmotion.documents.problem_parts import (
 )
 from selfmotion.follow import Follow
 from selfmotion.motion import NullMotion
-from selfmotion.optimise import LineSearch, Optimizer, QuasiNewton
-from selfmotion.planning import Fastest, Search, fastest, plan, plan_in_parts
+from selfmotion.optimise import LineSearch, QuasiNewton
+from selfmotion.planning import PlanRequest, Search
 from selfmotion.problem import Problem
-from selfmotion.result import Parts, Plan, retime
 from selfmotion.robot import NAMED_ARMS, NAMED_PARTS, RobotModel, load_robot
 from selfmotion.task import Damping, Relaxation, Task
-
-# A problem and how to plan it, as a file says it.
-
-# What is looked for (see `Job.goal`), what has no effect on it, and what it is called.
-_UNUSED = {
-    "best": ("keep", "parts"),
-    "retimed": ("keep", "parts"),
-    "fastest": ("parts", "optimizer", "max_evaluations"),
-    "parts": ("keep", "search", "optimizer", "max_evaluations"),
-}
-GOALS = tuple(_UNUSED)
-_CALLED = {"parts": "a motion in parts"}
-
-
-@dataclass(frozen=True, eq=False)
-class Job:
-    """What a problem file says: a problem, and how to plan it.
-
-    Attributes
-    ----------
-    problem : Problem
-    search : Search or None
-    optimizer : Optimizer or None
-    tolerance : Tolerance or None
-    max_evaluations : int or None
-        See `plan`.
-    outputs : tuple of Path
-        Files to write.
-    goal : {"best", "retimed", "fastest", "parts"}
-        What `plan` looks for: the motion that is best by its costs, that at its fastest pace
-        (`retime`), or the `fastest` one. Of parts (`plan_in_parts`) it is `in_parts`.
-    parts : mapping, optional
-        Of parts: ``retreat``, ``axis`` and ``ramp`` of `plan_in_parts`.
-    keep : mapping, optional
-        Costs that the fastest motion keeps; see `fastest`.
-    """
-
-    problem: Problem
-    search: Search | None = None
-    optimizer: Optimizer | None = None
-    tolerance: Tolerance | None = None
-    max_evaluations: int | None = None
-    outputs: tuple[FilePath, ...] = ()
-    goal: str = "best"
-    parts: Mapping[str, Any] | None = None
-    keep: Mapping[str, float] | None = None
-
-    def __post_init__(self) -> None:
-        as_choice(self.goal, "goal", GOALS)
-
-    @property
-    def settings(self) -> dict[str, Any]:
-        """What `plan` is given besides the problem."""
-        names = ("search", "optimizer", "tolerance", "max_evaluations")
-        return {name: getattr(self, name) for name in names}
-
-    def plan(self, **options: Any) -> Plan:
-        """Plan it; `options` are further ones of `plan`, or of `fastest` where that is the goal.
-
-        Raises
-        ------
-        ProblemError
-            The goal is a motion in parts, or something that is set has no effect on it.
-        """
-        if self.goal == "parts":
-            raise ProblemError("goal: is 'parts', of which there may be several: Job.in_parts()")
-        self.check_used(self.goal)
-        if self.goal == "fastest":
-            return self.fastest(**options).plan
-        found = plan(self.problem, **{**self.settings, **options})
-        return retime(found) if self.goal == "retimed" else found
-
-    def fastest(self, **options: Any) -> Fastest:
-        """Return its fastest motion; `options` are further ones of `fastest`.
-
-        Raises
-        ------
-        ProblemError
-            Something that is set has no effect on it: an optimiser, parts.
-        """
-        self.check_used("fastest")
-        asked = {"keep": self.keep, "search": self.search, "tolerance": self.tolerance, **options}
-        return fastest(self.problem, **asked)
-
-    def in_parts(self, **options: Any) -> Parts:
-        """Return its motion in the fewest parts; `options` are further ones of `plan_in_parts`.
-
-        Raises
-        ------
-        ProblemError
-            Something that is set has no effect on it: a search, an optimiser, costs to keep.
-        """
-        self.check_used("parts")
-        given = {**(self.parts or {}), "tolerance": self.tolerance, **options}
-        return plan_in_parts(self.problem, **given)
-
-    def check_used(self, goal: str) -> None:
-        """Raise ProblemError for what is set and has no effect on a goal."""
-        for name in _UNUSED[goal]:
-            if getattr(self, name) is not None:
-                said = {"optimizer": "optimiser"}.get(name, name)
-                called = _CALLED.get(goal, f"the {goal} motion")
-                raise ProblemError(f"{said}: has no effect on {called}; leave it out")
-
-
-# From a problem file to a problem, and how to plan it.
 
 
 def read_problem(file: str | FilePath, *, allow_code: bool = False) -> Problem:
@@ -156,7 +48,7 @@ def read_problem(file: str | FilePath, *, allow_code: bool = False) -> Problem:
     return read_job(file, allow_code=allow_code).problem
 
 
-def read_job(file: str | FilePath, *, allow_code: bool = False) -> Job:
+def read_job(file: str | FilePath, *, allow_code: bool = False) -> PlanRequest:
     """Read a problem file: TOML, or the same as JSON.
 
     Units are SI; keys that end in ``_deg`` or ``_mm`` are in degrees and millimetres. Files that it
@@ -179,7 +71,7 @@ def read_job(file: str | FilePath, *, allow_code: bool = False) -> Job:
     if "grid" in document:
         raise FileFormatError(
             f"{path}: grid: stands for many problems, which `selfmotion batch` plans "
-            f"(batch.grid_items); leave it out for one"
+            f"(documents.grid_items); leave it out for one"
         )
     return job_of(document, path, allow_code=allow_code)
 
@@ -190,7 +82,7 @@ def job_of(
     *,
     allow_code: bool = False,
     memory: dict[str, Any] | None = None,
-) -> Job:
+) -> PlanRequest:
     """Return the job that a document describes; `file` is where it comes from. See `read_job`.
 
     Where many documents are read, those with the same arm share it by `memory`.
@@ -256,7 +148,7 @@ class _Reader:
     degrees: str = ""
     memory: dict[str, Any] = field(default_factory=dict)
 
-    def job(self) -> Job:
+    def job(self) -> PlanRequest:
         table, file = self.table, self.file
         with _named(file, "robot"):
             robot = self._once(table["robot"], self._robot)
@@ -291,7 +183,7 @@ class _Reader:
             with _named(file, "joint_limits"):
                 limits = read_joint_limits(self._beside(table["joint_limits"]), robot)
                 problem = replace(problem, constraints=(*problem.constraints, *limits))
-        return Job(problem, **self._settings())
+        return PlanRequest(problem, **self._settings())
 
     def _once(self, values: Any, make: Callable[[Any], Any]) -> Any:
         # With all digits of poses, which their own text leaves out.

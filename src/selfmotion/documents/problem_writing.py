@@ -18,8 +18,8 @@ from selfmotion.basics import (
     write_document,
 )
 from selfmotion.documents.named_files import named_from
-from selfmotion.documents.problem_file import Job
 from selfmotion.optimise import QuasiNewton
+from selfmotion.planning import PlanRequest
 from selfmotion.problem import Problem, check_problem, problem_to_dict
 from selfmotion.robot import (
     LIMITS,
@@ -36,11 +36,11 @@ from selfmotion.robot import (
 )
 
 
-def write_problem(problem: Problem | Job, file: str | FilePath) -> None:
+def write_problem(problem: Problem | PlanRequest, file: str | FilePath) -> None:
     """Write a problem as TOML or JSON that `read_problem` turns into the same problem.
 
-    Of a `Job` the settings of the search, its goal and outputs are written as well: `read_job`
-    turns the file into the same job.
+    Of a `PlanRequest` the settings of the search, its goal and outputs are written as well:
+    `read_job` turns the file into the same one.
 
     Raises
     ------
@@ -51,7 +51,7 @@ def write_problem(problem: Problem | Job, file: str | FilePath) -> None:
         The file cannot be written.
     """
     path = as_path(file)
-    if not isinstance(problem, Job):
+    if not isinstance(problem, PlanRequest):
         check_problem(problem)
         write_document(path, _named_beside(problem_table(problem), path))
         return
@@ -66,7 +66,7 @@ def _named_beside(table: dict[str, Any], file: FilePath) -> dict[str, Any]:
     return found
 
 
-def _settings(job: Job) -> dict[str, Any]:
+def _settings(job: PlanRequest) -> dict[str, Any]:
     """Return the keys that say how a job is planned."""
     table: dict[str, Any] = {}
     if job.goal != "best":

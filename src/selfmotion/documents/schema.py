@@ -14,14 +14,13 @@ from selfmotion.collision import obstacle_shapes
 from selfmotion.constraints import Clearance, Constraint
 from selfmotion.costs import Cost
 from selfmotion.documents.models import document_model
-from selfmotion.documents.problem_file import Job
 from selfmotion.documents.seam_job import HIGHEST, JOB, OF_PROBLEM, OF_TABLE, SEAM
 from selfmotion.follow import Follow
 from selfmotion.job import Seam, plan_job
 from selfmotion.motion import NullMotion
 from selfmotion.optimise import LineSearch, QuasiNewton
 from selfmotion.path import Circle, Feed, Path, Weave, with_leads
-from selfmotion.planning import Search, plan, plan_in_parts
+from selfmotion.planning import PlanRequest, Search, plan, plan_in_parts
 from selfmotion.problem import Problem
 from selfmotion.robot import load_robot
 from selfmotion.task import Damping, Relaxation
@@ -30,7 +29,7 @@ from selfmotion.task import Damping, Relaxation
 
 # What a table's keys are given to, where that is no class of its own name.
 _GIVEN_TO: Mapping[str, tuple[Callable[..., Any], ...]] = {
-    "Problem": (Problem, plan, Job),
+    "Problem": (Problem, plan, PlanRequest),
     "Robot": (load_robot,),
     "RobotPart": (load_robot,),
     "InParts": (plan_in_parts,),

@@ -28,7 +28,7 @@ from selfmotion.cam import (
     times_of_events,
 )
 from selfmotion.constraints import Clearance
-from selfmotion.documents.problem_file import Job, job_of
+from selfmotion.documents.problem_file import job_of
 from selfmotion.documents.problem_parts import (
     FEED_BOUNDS,
     NAME,
@@ -42,6 +42,7 @@ from selfmotion.documents.problem_parts import (
 )
 from selfmotion.job import FASTEST_FEED, Program, Seam, highest_feed, plan_job
 from selfmotion.path import Feed, Path, Placed, pose_of, with_run_ups
+from selfmotion.planning import PlanRequest
 from selfmotion.problem import NO_OVERLAP, Problem
 from selfmotion.robot import RobotModel
 
@@ -367,7 +368,7 @@ class _Reader:
             values = placed_body(values, *self._standing)
         return obstacle(values, lambda name: self._file.parent / name)
 
-    def _read(self, own: Mapping[str, Any], where: str) -> Job:
+    def _read(self, own: Mapping[str, Any], where: str) -> PlanRequest:
         document = {**self._shared, **own}
         try:
             return job_of(document, self._file, allow_code=self._code, memory=self._memory)

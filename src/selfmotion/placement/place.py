@@ -26,7 +26,6 @@ from selfmotion.basics import (
     silent,
 )
 from selfmotion.batch import Item
-from selfmotion.documents import Job
 from selfmotion.placement.found import Placement, flat_along, on_bounds
 from selfmotion.placement.places import (
     COORDINATES,
@@ -37,6 +36,7 @@ from selfmotion.placement.places import (
     restored,
 )
 from selfmotion.placement.search import Box, Descent, best_place
+from selfmotion.planning import PlanRequest
 from selfmotion.problem import Problem
 
 # Places that this process was sent before, by their description.
@@ -215,7 +215,7 @@ class _There:
     """Plans in other processes."""
 
     def __init__(self, places: Places, box: Box, executor: Executor) -> None:
-        tasks = [Item("place", lambda p=item: Job(p)).task for item in places.problems]  # type: ignore[misc]
+        tasks = [Item("place", lambda p=item: PlanRequest(p)).task for item in places.problems]  # type: ignore[misc]
         sent = described(places, [task["problem"] for task in tasks])
         self._modules = sorted({name for task in tasks for name in task["modules"]})
         self._sent, self._box, self._executor = json.dumps(sent), box, executor

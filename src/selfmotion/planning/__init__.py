@@ -10,4 +10,5 @@ from selfmotion.planning.candidate import check_joints as check_joints
 from selfmotion.planning.effort import Search as Search
 from selfmotion.planning.fastest import Fastest as Fastest, fastest as fastest
 from selfmotion.planning.parts import plan_in_parts as plan_in_parts
+from selfmotion.planning.request import GOALS as GOALS, PlanRequest as PlanRequest
 from selfmotion.planning.run import plan as plan

@@ -79,11 +79,9 @@ def gathered(planner: Planner, deadline: Deadline) -> Plan:
         null_motion=solution.null_motion,
         remaining=solution.remaining,
         attempts=tuple(planner.attempts),
+        obstruction=planner.stops,
+        remedy=planner.advice,
     )
-    if planner.stops or planner.advice:
-        advice = (planner.advice,) if planner.advice else ()
-        failures = (planner.stops, *check.failures) if planner.stops else check.failures
-        check = replace(check, failures=failures, notes=(*check.notes, *advice))
     return Plan(
         problem=planner.problem.asked,
         trajectory=planner.problem.own(motion.trajectory),

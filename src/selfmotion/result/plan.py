@@ -68,6 +68,9 @@ class Views(Protocol):
     def figure(self, plan: Plan) -> Figure:
         """Return the plan's curves as a matplotlib figure."""
 
+    def write_replay(self, plan: Plan, file: FilePath) -> None:
+        """Write the replay as a page."""
+
 
 def _digests(costs: Sequence[Cost]) -> dict[str, str]:
     """Return the digest of each cost by its name; "" of a function that no file had."""
@@ -314,7 +317,7 @@ class Plan:
             self.trajectory, within, self.report.ending, requirements, progress
         )
         if not self.altered:
-            return found
+            return self.report.explained(found)
         return replace(found, failures=(self.altered, *found.failures))
 
     def require(self) -> Plan:

@@ -123,6 +123,9 @@ class Report:
         is made. Of a motion that was put in the place of another, `evaluated` is the report.
     initial_motion : str
         Digest of the minimum-norm motion that the initial costs are of.
+    obstruction, remedy : str
+        Of a motion that is not verified: what no motion along the path passes, and what may help;
+        "" where nothing is known of that.
     costs : dict
         The digest of each cost by its name; "" of one that is a function.
     """
@@ -149,6 +152,8 @@ class Report:
     motion: str = ""
     costs: Mapping[str, str] | None = None
     initial_motion: str = ""
+    obstruction: str = ""
+    remedy: str = ""
 
     def evaluated(self, cost: float, terms: Mapping[str, float]) -> "Report":
         """Return the report of another motion or costs: what it costs, not how it was found."""
@@ -160,7 +165,17 @@ class Report:
             gap=None,
             active=(),
             remaining=None,
+            obstruction="",
+            remedy="",
         )
+
+    def explained(self, certificate: Certificate) -> Certificate:
+        """Return a certificate that begins with what stops the motion, if it is not verified."""
+        if certificate.verified:
+            return certificate
+        first, last = ((text,) if text else () for text in (self.obstruction, self.remedy))
+        failures, notes = (*first, *certificate.failures), (*certificate.notes, *last)
+        return replace(certificate, failures=failures, notes=notes)
 
     def with_found(self, before: "Report", active: Sequence[ActiveConstraint]) -> "Report":
         """Return it with how the same motion was found at another pace or the other way round."""
