@@ -1,5 +1,8 @@
 """A 'no' begins with what stops the motion, and when; not with what the best of bad ones breaks."""
 
+from dataclasses import replace
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -33,7 +36,7 @@ def past_a_plate(size: tuple[float, float, float], up: float, *, free: bool = Fa
     )
 
 
-def test_a_verdict_begins_with_what_stops_the_motion() -> None:
+def test_a_verdict_begins_with_what_stops_the_motion(tmp_path: Path) -> None:
     problem = past_a_plate((0.3, 0.02, 2.0), 0.2)
     plan = sm.plan(problem)
     said = "not verified: no motion along the path passes t = "
@@ -54,6 +57,13 @@ def test_a_verdict_begins_with_what_stops_the_motion() -> None:
         looked_at += 1
         assert model.distance(q).value < clearance.distance + ROUNDED
     assert looked_at > DRAWN // 4
+    # Who reads the plan again is told as much; another motion is another matter.
+    plan.save(tmp_path / "plan.npz")
+    read = sm.load_plan(tmp_path / "plan.npz")
+    assert read.certificate.verdict == verdict
+    t = np.linspace(0.0, read.trajectory.duration, 9)
+    coarse = sm.Trajectory(t, read.trajectory(t), read.trajectory(t, 1), problem.robot.joint_names)
+    assert not replace(read, trajectory=coarse).check().verdict.startswith(said)
 
 
 def test_where_each_pose_is_in_reach_another_start_is_proposed() -> None:

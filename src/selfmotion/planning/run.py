@@ -88,7 +88,7 @@ def gathered(planner: Planner, deadline: Deadline) -> Plan:
         initial_trajectory=planner.problem.own(still.trajectory),
         coefficients=read_only(solution.coefficients),
         report=report,
-        certificate=check,
+        certificate=report.explained(check),
     )
 
 

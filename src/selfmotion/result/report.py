@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
+from selfmotion.certificate import Certificate
 from selfmotion.constraints import ActiveConstraint
 from selfmotion.motion import NullMotion
 from selfmotion.optimise import Iteration, Status
