@@ -373,3 +373,57 @@ def test_what_along_cannot_be_is_said(options: dict[str, object], said: str) -> 
     given: dict[str, Any] = {"feed": 0.03, **options}
     with pytest.raises(sm.errors.FileFormatError, match=said):
         sm.files.read_path(CASES / "along_the_path" / "square.csv", **given)
+
+
+@pytest.fixture(scope="module")
+def retimed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The line of the case, in the least time at 0.2 rad/s²."""
+    folder = tmp_path_factory.mktemp("retimed")
+    line = ("--line", "0,0.2,0", "--task", "position", "--start", "home")
+    code, text = invoke("plan", "panda", *line, "--out", folder / "l.npz")
+    assert code == 0, text
+    fast = ("--acceleration", "0.2", "--out", folder / "rt.npz")
+    code, text = invoke("retime", folder / "l.npz", *fast)
+    assert code == 0, text
+    return folder
+
+
+@pytest.mark.parametrize("rate", [125, 250, 500, 1000])
+@pytest.mark.parametrize("suffix", ["csv", "yaml"])
+def test_a_retimed_plan_keeps_its_limits_at_the_rate_of_a_controller(
+    rate: int, suffix: str, retimed: Path
+) -> None:
+    file = retimed / f"{rate}.{suffix}"
+    code, text = invoke("export", retimed / "rt.npz", "--out", file, "--rate", rate)
+    assert code == 0, text
+    assert "read back: verified" in text
+    motion = sm.files.read_motion(file)
+    np.testing.assert_allclose(np.diff(motion.t), 1.0 / rate, atol=2e-9)
+    # By quintics worked out here, between the samples as well.
+    h, u = 1.0 / rate, np.linspace(0.0, 1.0, 41)[:, None, None]
+    assert motion.qdd is not None
+    rows = [np.stack([a[:-1], a[1:]]) for a in (motion.q, motion.qd * h, motion.qdd * h * h)]
+    (p0, p1), (v0, v1), (a0, a1) = rows
+    c3 = 10 * (p1 - p0) - 6 * v0 - 4 * v1 - 1.5 * a0 + 0.5 * a1
+    c4 = -15 * (p1 - p0) + 8 * v0 + 7 * v1 + 1.5 * a0 - a1
+    c5 = 6 * (p1 - p0) - 3 * v0 - 3 * v1 - 0.5 * a0 + 0.5 * a1
+    bends = (a0 + 6 * c3 * u + 12 * c4 * u**2 + 20 * c5 * u**3) / h**2
+    assert np.abs(bends).max() <= 0.2 * (1.0 + 1e-5)
+    assert motion.duration < 1.05 * sm.load_plan(retimed / "rt.npz").trajectory.duration
+
+
+def test_a_plan_retimed_for_a_rate_is_its_own_file(retimed: Path) -> None:
+    asked = ("--acceleration", "0.2", "--rate", "500", "--out", retimed / "own.npz")
+    code, text = invoke("retime", retimed / "l.npz", *asked)
+    assert code == 0, text
+    plan = sm.load_plan(retimed / "own.npz")
+    np.testing.assert_allclose(np.diff(plan.trajectory.t), 2e-3, atol=1e-9)
+    code, text = invoke("export", retimed / "own.npz", "--out", retimed / "o.csv", "--rate", "500")
+    assert code == 0, text
+    assert "times as long" not in text
+    written = sm.files.read_motion(retimed / "o.csv")
+    np.testing.assert_allclose(written.q, plan.trajectory.q, atol=1e-12)
+    # A plan whose time was asked for stays as it is.
+    code, text = invoke("export", retimed / "l.npz", "--out", retimed / "l.csv", "--rate", "125")
+    assert code == 0, text
+    assert sm.files.read_motion(retimed / "l.csv").duration == pytest.approx(4.0)

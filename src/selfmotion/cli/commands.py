@@ -321,6 +321,12 @@ def retime(
     file: Annotated[Path, typer.Argument(help="A plan saved as .npz.")],
     acceleration: options.AccelerationOption = None,
     velocity: options.VelocityOption = None,
+    rate: Annotated[
+        float | None,
+        typer.Option(
+            help="Samples per second that a controller takes: limits are kept between these."
+        ),
+    ] = None,
     out: options.OutOption = None,
     html: options.HtmlOption = None,
     verbose: options.VerboseOption = False,
@@ -330,7 +336,7 @@ def retime(
     outputs.check_suffixes(out or [])
     with StageDisplay(stages) as display:
         display.stage("retiming", 1, 1)
-        result = sm.retime(sm.load_plan(file), *_limits(acceleration, velocity))
+        result = sm.retime(sm.load_plan(file), *_limits(acceleration, velocity), rate)
     outputs.finish(result, out or [], html, as_json, verbose)
 
 
