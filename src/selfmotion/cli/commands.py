@@ -336,7 +336,8 @@ def retime(
     outputs.check_suffixes(out or [])
     with StageDisplay(stages) as display:
         display.stage("retiming", 1, 1)
-        result = sm.retime(sm.load_plan(file), *_limits(acceleration, velocity), rate)
+        a, v = _limits(acceleration, velocity)
+        result = sm.retime(sm.load_plan(file), a, v, rate)
     outputs.finish(result, out or [], html, as_json, verbose)
 
 

@@ -41,8 +41,8 @@ _STEPS = (4e-3, 2e-3, 1e-3)
 _LOOKS, _BRIEF = 2000, 0.05
 # A motion that passes limits by so little is slowed as a whole, and a bit beyond that.
 _BY_A_LITTLE, _BEYOND = 1.002, 1.0 + 1e-6
-# Samples at a rate are a whole number of periods, to rounding [periods]. A motion is made slower for
-# them in steps of this part of what limits are passed by, so often at most for what else is judged.
+# Samples at a rate are a whole number of periods, to rounding [periods]. A motion is made slower
+# for them in steps of this part of what limits are passed by, so often at most for all else.
 _WHOLE, _PART, _SLOWER = 1e-6, 0.1, 12
 # Accelerations that jump from one side to the other this often, of all joints, are told of.
 _OFTEN = 12
