@@ -1,5 +1,6 @@
 """Cases of people, from the shell: what is right of each is worked out from its files, by hand."""
 
+import json
 import math
 import re
 import shutil
@@ -204,6 +205,37 @@ def test_a_telescope_is_begun_with_its_overlaps_left_out(tmp_path: Path) -> None
     assert 'srdf = "own.srdf"' in text
     assert '["mast", "a1"]' not in text
     assert '["mast", "a2"]' in text
+
+
+TELESCOPE = ("mast,a1", "mast,a2", "mast,a3", "a0,a2", "a0,a3", "a1,a3")
+
+
+def test_links_of_a_telescope_are_told_in_one_go_and_left_out_when_asked(tmp_path: Path) -> None:
+    tubes = CASES / "telescope" / "tubes.urdf"
+    # Half the way: what is looked at is what is said and left out.
+    asked = ("--tool", "tip", "--line", "0,-0.05,0.05", "--task", "pointing")
+    start = ("--start", "0.3,0.02,0.02,0.02,0.02,0.2,0.2,0.1")
+    code, text = invoke("plan", tubes, *asked, *start, "--json")
+    assert code == 1
+    (note,) = (note for note in json.loads(text)["remarks"] if "--disabled" in note)
+    for pair in TELESCOPE:
+        one, other = pair.split(",")
+        assert re.search(rf"{one} - {other}: these links overlap in \d+ % .*, by \d+", note)
+        assert f"--disabled {pair}" in note
+        assert f'<disable_collisions link1="{one}" link2="{other}"' in note
+    out = [word for pair in TELESCOPE for word in ("--disabled", pair)]
+    plan = planned(tmp_path, tubes, *asked, *start, *out)
+    (clearance,) = (c for c in plan.problem.all_constraints if c.kind == "Clearance")
+    assert {",".join(pair) for pair in clearance.disabled} == set(TELESCOPE)
+    # Those that are left are looked at.
+    fewer = out[:-2]
+    assert "a1 - a3 overlap by" in invoke("plan", tubes, *asked, *start, *fewer, "--verbose")[1]
+    said = complaint("plan", tubes, *asked, *start, "--disabled", "mast")
+    assert "--disabled is 'mast', expected two links" in said
+    said = complaint("plan", tubes, *asked, *start, "--disabled", "mast,a9")
+    assert "has no link 'a9'" in said
+    text = example_text(tubes, tmp_path / "t.toml", tool="tip", disabled=[("mast", "tip")])
+    assert '["mast", "tip"], ["mast", "a1"]' in text
 
 
 @pytest.mark.parametrize("name", ["plain.srdf", "included.srdf.xacro", "arguments.srdf.xacro"])
