@@ -289,6 +289,20 @@ def test_five_joints_follow_what_a_tolerance_lets_them(tmp_path: Path) -> None:
     assert "relax rows that it cannot move" in complaint("plan", *asked, "--task", "pointing")
 
 
+def test_the_tolerance_that_would_do_is_told(tmp_path: Path) -> None:
+    """The base joint turns by atan2(0.1, 0.558) = 0.177 rad: an axis at 2.5 rad leans by 0.106."""
+    arm = CASES / "five_joints_relaxed" / "arm5.urdf"
+    asked = (arm, "--line", "0,0.1,0", "--start", "0,0.6,0.9,1.0,0", "--task", "pointing")
+    said = complaint("plan", *asked)
+    assert said.endswith("with --relax: rx,ry=0.11 (rad) would do from this start")
+    planned(tmp_path, *asked, "--relax", "rx,ry=0.11")
+    less = 2.0 * math.asin(math.sin(0.5 * math.atan2(0.1, 0.558)) * math.sin(2.5))
+    assert 0.1 < less < 0.11
+    code, text = invoke("plan", *asked, "--relax", "rx,ry=0.1", "--out", tmp_path / "y.npz")
+    assert code == 1
+    assert "not verified" in text
+
+
 def test_meshes_are_in_the_unit_that_they_say(tmp_path: Path) -> None:
     folder = CASES / "collada_unit"
     boxes = []
