@@ -488,7 +488,7 @@ def test_what_was_noted_of_a_file_is_known_of_what_is_made_of_its_path(tmp_path:
         (
             "c.csv",
             'breakpoints,primitives,points\n1,"a\nb",[]\n',
-            "line 3: primitive 'a.nb' with 0",
+            r"line 3: motion primitive 'a.nb' with 0",
         ),
         (
             "d.json",

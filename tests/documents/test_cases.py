@@ -1,5 +1,6 @@
 """Cases of people, from the shell: what is right of each is worked out from its files, by hand."""
 
+import json
 import math
 import re
 import shutil
@@ -82,7 +83,41 @@ def test_programs_of_others_are_named_as_such(name: str) -> None:
     assert "write its targets as a table" in said
     table = CASES / "along_the_path" / "square.csv"
     judged = complaint("check", file, "--robot", "panda", "--path", table)
-    assert "selfmotion did not write this program" in judged
+    assert re.search(r"line \d+: '.*' is not read: selfmotion did not write this", judged)
+    assert "of another one judge the recorded motion, a table of t and a column per" in judged
+
+
+@pytest.mark.parametrize("name", ["a.JBI", "a.ls", "a.pgx", "a.as", "a.urp"])
+def test_programs_of_all_makers_are_named_as_such(name: str, tmp_path: Path) -> None:
+    (tmp_path / name).write_text("NOP\n")
+    said = complaint("plan", "panda", "--path", tmp_path / name, "--feed", "0.1")
+    assert "is a program of a robot (" in said
+
+
+@pytest.mark.parametrize(
+    "line", ["CYCLE832(0.05,_ORI_FINISH,1)", "TRANS X10", "ROT Z30", "R1=50", 'MSG("cut")']
+)
+def test_what_else_siemens_writes_is_refused_by_its_line(line: str, tmp_path: Path) -> None:
+    text = f"G17 G90 G71\nTRAORI\nG1 X=0 Y=0 Z=0 F2000\n{line}\nG1 X=50\nM30\n"
+    (tmp_path / "a.mpf").write_text(text)
+    said = complaint("plan", "panda", "--path", tmp_path / "a.mpf", "--task", "pointing")
+    # G71 is a cycle of other controls.
+    assert re.search(r"line 1: G71 is not read: of what only Siemens' controls know, TRAORI", said)
+    said = complaint_of(tmp_path, text.replace("G17 G90 G71", "G17 G90"))
+    assert re.search(r"line 4: .* is not read: of what only Siemens' controls know", said)
+
+
+def complaint_of(folder: Path, text: str) -> str:
+    (folder / "b.mpf").write_text(text)
+    return complaint("plan", "panda", "--path", folder / "b.mpf", "--task", "pointing")
+
+
+def test_a_line_may_begin_with_the_tools_axis(tmp_path: Path) -> None:
+    text = "G17 G90\nTRAORI\nG0 X=0 Y=0 Z=0\nA3=0 B3=0 C3=1 X=0\nG1 X=50 F2000\nM30\n"
+    (tmp_path / "a.mpf").write_text(text)
+    (cut,) = read_gcode(tmp_path / "a.mpf").values()
+    np.testing.assert_allclose(1e3 * cut.positions[-1], [50, 0, 0])
+    np.testing.assert_allclose(cut.values[-1][:, 2], [0, 0, -1], atol=DIGITS)
 
 
 def test_a_limit_without_effort_or_speed_is_none(tmp_path: Path) -> None:
@@ -172,6 +207,37 @@ def test_a_telescope_is_begun_with_its_overlaps_left_out(tmp_path: Path) -> None
     assert '["mast", "a2"]' in text
 
 
+TELESCOPE = ("mast,a1", "mast,a2", "mast,a3", "a0,a2", "a0,a3", "a1,a3")
+
+
+def test_links_of_a_telescope_are_told_in_one_go_and_left_out_when_asked(tmp_path: Path) -> None:
+    tubes = CASES / "telescope" / "tubes.urdf"
+    # Half the way: what is looked at is what is said and left out.
+    asked = ("--tool", "tip", "--line", "0,-0.05,0.05", "--task", "pointing")
+    start = ("--start", "0.3,0.02,0.02,0.02,0.02,0.2,0.2,0.1")
+    code, text = invoke("plan", tubes, *asked, *start, "--json")
+    assert code == 1
+    (note,) = (note for note in json.loads(text)["remarks"] if "--disabled" in note)
+    for pair in TELESCOPE:
+        one, other = pair.split(",")
+        assert re.search(rf"{one} - {other}: these links overlap in \d+ % .*, by \d+", note)
+        assert f"--disabled {pair}" in note
+        assert f'<disable_collisions link1="{one}" link2="{other}"' in note
+    out = [word for pair in TELESCOPE for word in ("--disabled", pair)]
+    plan = planned(tmp_path, tubes, *asked, *start, *out)
+    (clearance,) = (c for c in plan.problem.all_constraints if c.kind == "Clearance")
+    assert {",".join(pair) for pair in clearance.disabled} == set(TELESCOPE)
+    # Those that are left are looked at.
+    fewer = out[:-2]
+    assert "a1 - a3 overlap by" in invoke("plan", tubes, *asked, *start, *fewer, "--verbose")[1]
+    said = complaint("plan", tubes, *asked, *start, "--disabled", "mast")
+    assert "--disabled is 'mast', expected two links" in said
+    said = complaint("plan", tubes, *asked, *start, "--disabled", "mast,a9")
+    assert "has no link 'a9'" in said
+    text = example_text(tubes, tmp_path / "t.toml", tool="tip", disabled=[("mast", "tip")])
+    assert '["mast", "tip"], ["mast", "a1"]' in text
+
+
 @pytest.mark.parametrize("name", ["plain.srdf", "included.srdf.xacro", "arguments.srdf.xacro"])
 def test_an_srdf_that_is_xacro_is_expanded(name: str, tmp_path: Path) -> None:
     folder = CASES / "srdf_xacro"
@@ -221,6 +287,20 @@ def test_five_joints_follow_what_a_tolerance_lets_them(tmp_path: Path) -> None:
         leans = np.arccos(np.clip(rotations[:, :, 2] @ rotations[0, :, 2], -1.0, 1.0))
         assert leans.max() <= 0.5 + ROUNDING
     assert "relax rows that it cannot move" in complaint("plan", *asked, "--task", "pointing")
+
+
+def test_the_tolerance_that_would_do_is_told(tmp_path: Path) -> None:
+    """The base joint turns by atan2(0.1, 0.558) = 0.177 rad: an axis at 2.5 rad leans by 0.106."""
+    arm = CASES / "five_joints_relaxed" / "arm5.urdf"
+    asked = (arm, "--line", "0,0.1,0", "--start", "0,0.6,0.9,1.0,0", "--task", "pointing")
+    said = complaint("plan", *asked)
+    assert said.endswith("with --relax: rx,ry=0.11 (rad) would do from this start")
+    planned(tmp_path, *asked, "--relax", "rx,ry=0.11")
+    less = 2.0 * math.asin(math.sin(0.5 * math.atan2(0.1, 0.558)) * math.sin(2.5))
+    assert 0.1 < less < 0.11
+    code, text = invoke("plan", *asked, "--relax", "rx,ry=0.1", "--out", tmp_path / "y.npz")
+    assert code == 1
+    assert "not verified" in text
 
 
 def test_meshes_are_in_the_unit_that_they_say(tmp_path: Path) -> None:
@@ -280,10 +360,14 @@ def test_pose_files_of_peers_are_read_with_their_conventions(name: str) -> None:
     ("name", "text", "said"),
     [
         ("a.csv", "x,y,z,rz1,ry,rz2,motion_type\n0,0,0,0,180,0,0\n1,0,0,0,180,0,1\n",
-         "line 3: motion_type 1: arcs of IRBCAM are not read"),
+         "line 3: motion_type 1 is the middle of an arc of IRBCAM, whose end is missing"),
+        ("a.csv", "x,y,z,rz1,ry,rz2,motion_type\n0,0,0,0,180,0,1\n1,0,0,0,180,0,0\n",
+         "line 2: motion_type 1 is not read here"),
+        ("a.csv", "x,y,z,rz1,ry,rz2,motion_type\n0,0,0,0,180,0,0\n1,0,0,0,180,0,3\n",
+         "line 3: motion_type 3 is not read here, expected 0"),
         ("a.csv", "X 0; Y 0; Z 0; A 1\nX 1; Y 0\n", "line 2: .*as igus' programs write them"),
         ("a.csv", 'breakpoints,primitives,points,q_bp\n0,movec_fit,"[array([1, 2, 3]), array([4, '
-         '5, 6])]",\n', "primitive 'movec_fit' with 2 points is not read"),
+         '5, 6])]",\n', "motion primitive 'movec_fit' with 2 points is not read, expected"),
         ("a.json", '[{"point": [0, 0, 0], "xaxis": [1, 0, 0], "yaxis": [1, 0, 0]}]',
          "xaxis and yaxis are no two axes"),
     ],
@@ -294,6 +378,68 @@ def test_what_peers_write_besides_is_refused(
     (tmp_path / name).write_text(text)
     with pytest.raises(sm.errors.FileFormatError, match=said):
         sm.files.read_path(tmp_path / name, feed=0.05)
+
+
+ARCS = {
+    "irbcam.csv": (
+        "x,y,z,rz1,ry,rz2,motion_type,velocity\n0,0,0,0,180,0,0,50\n50,0,0,0,180,0,0,50\n"
+        "100,50,0,45,180,0,1,20\n50,100,0,90,180,0,0,20\n0,100,0,90,180,0,0,50\n"
+    ),
+    "primitives.csv": (
+        "breakpoints,primitives,points,q_bp\n"
+        '0,movej_fit,"[array([0.0, 0.0, 0.0])]",\n1,movel_fit,"[array([50.0, 0.0, 0.0])]",\n'
+        '2,movec_fit,"[array([100.0, 50.0, 0.0]), array([50.0, 100.0, 0.0])]",\n'
+        '3,movel_fit,"[array([0.0, 100.0, 0.0])]",\n'
+    ),
+}
+
+
+@pytest.mark.parametrize("name", ARCS)
+def test_arcs_of_peers_are_half_a_circle(name: str, tmp_path: Path) -> None:
+    """A line, half a circle of 50 mm about (50, 50), by a point between its ends, and a line."""
+    (tmp_path / name).write_text(ARCS[name])
+    rows = one_seam(tmp_path / name, None, Reading())
+    places = 1e3 * rows.positions
+    np.testing.assert_allclose(places[[0, 1, -2, -1], :2],
+                               [[0, 0], [50, 0], [50, 100], [0, 100]], atol=DIGITS)  # fmt: skip
+    arc = places[1:-1]
+    np.testing.assert_allclose(np.hypot(*(arc[:, :2] - 50).T), 50.0, atol=DIGITS)
+    assert arc[:, 0].max() == pytest.approx(100.0)
+    length = np.linalg.norm(np.diff(arc, axis=0), axis=1).sum()
+    assert length == pytest.approx(50.0 * math.pi, rel=1e-3)
+    if name == "irbcam.csv":
+        assert rows.feed is not None
+        np.testing.assert_allclose(rows.feed[[0, 1, len(rows.feed) // 2, -3]], [0.05, *[0.02] * 3])
+        # rz1 goes from 0 to 90° as evenly as the way: by 45° where it is half way.
+        turned = np.degrees(np.arctan2(rows.values[:, 1, 0], -rows.values[:, 0, 0]))
+        done = np.degrees(np.arctan2(arc[:, 1] - 50, arc[:, 0] - 50)) + 90.0
+        np.testing.assert_allclose(-turned[1:-1], 0.5 * done, atol=1e-6)
+
+
+def test_points_of_an_arc_on_a_line_are_a_line_and_one_place_is_none(tmp_path: Path) -> None:
+    flat = ARCS["irbcam.csv"].replace("100,50,0,45", "50,50,0,45")
+    (tmp_path / "a.csv").write_text(flat)
+    rows = one_seam(tmp_path / "a.csv", None, Reading())
+    np.testing.assert_allclose(1e3 * rows.positions[:, 0], [0, 50, 50, 50, 0], atol=DIGITS)
+    (tmp_path / "a.csv").write_text(ARCS["irbcam.csv"].replace("100,50,0,45", "50,0,0,45"))
+    with pytest.raises(sm.errors.FileFormatError, match="line 4: an arc needs three points"):
+        sm.files.read_path(tmp_path / "a.csv")
+
+
+def test_columns_a_b_c_are_those_of_kuka(tmp_path: Path) -> None:
+    """A about z, B about y, C about x, in turn: 180° about x is down, whatever A is."""
+    (tmp_path / "k.csv").write_text(
+        "X,Y,Z,A,B,C\n450,-100,350,0,0,180\n450,0,350,30,0,180\n450,100,350,30,10,180\n"
+    )
+    rows = one_seam(tmp_path / "k.csv", None, Reading())
+    np.testing.assert_allclose(rows.positions[:, 1], [-0.1, 0.0, 0.1], atol=DIGITS)
+    path = sm.files.read_path(tmp_path / "k.csv", feed=0.05)
+    found = [path.pose(0.0).rotation, path.pose(path.duration).rotation]
+    np.testing.assert_allclose(found[0], np.diag([1.0, -1.0, -1.0]), atol=DIGITS)
+    about_z, about_y = pin.exp3(np.radians([0, 0, 30.0])), pin.exp3(np.radians([0, 10.0, 0]))
+    right = about_z @ about_y @ pin.exp3(np.radians([180.0, 0, 0]))
+    np.testing.assert_allclose(found[1], right, atol=DIGITS)
+    assert any("A,B,C are read as KUKA's: angles about z, y and x" in note for note in path.notes)
 
 
 def tool_along(path: sm.paths.Path, count: int = 4001) -> tuple[np.ndarray, ...]:
@@ -373,3 +519,71 @@ def test_what_along_cannot_be_is_said(options: dict[str, object], said: str) -> 
     given: dict[str, Any] = {"feed": 0.03, **options}
     with pytest.raises(sm.errors.FileFormatError, match=said):
         sm.files.read_path(CASES / "along_the_path" / "square.csv", **given)
+
+
+@pytest.fixture(scope="module")
+def retimed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The line of the case, in the least time at 0.2 rad/s²."""
+    folder = tmp_path_factory.mktemp("retimed")
+    line = ("--line", "0,0.2,0", "--task", "position", "--start", "home")
+    code, text = invoke("plan", "panda", *line, "--out", folder / "l.npz")
+    assert code == 0, text
+    fast = ("--acceleration", "0.2", "--out", folder / "rt.npz")
+    code, text = invoke("retime", folder / "l.npz", *fast)
+    assert code == 0, text
+    return folder
+
+
+@pytest.mark.parametrize("rate", [125, 250, 500, 1000])
+@pytest.mark.parametrize("suffix", ["csv", "yaml"])
+def test_a_retimed_plan_keeps_its_limits_at_the_rate_of_a_controller(
+    rate: int, suffix: str, retimed: Path
+) -> None:
+    file = retimed / f"{rate}.{suffix}"
+    code, text = invoke("export", retimed / "rt.npz", "--out", file, "--rate", rate)
+    assert code == 0, text
+    assert "read back: verified" in text
+    motion = sm.files.read_motion(file)
+    np.testing.assert_allclose(np.diff(motion.t), 1.0 / rate, atol=2e-9)
+    # By quintics worked out here, between the samples as well.
+    h, u = 1.0 / rate, np.linspace(0.0, 1.0, 41)[:, None, None]
+    assert motion.qdd is not None
+    rows = [np.stack([a[:-1], a[1:]]) for a in (motion.q, motion.qd * h, motion.qdd * h * h)]
+    (p0, p1), (v0, v1), (a0, a1) = rows
+    c3 = 10 * (p1 - p0) - 6 * v0 - 4 * v1 - 1.5 * a0 + 0.5 * a1
+    c4 = -15 * (p1 - p0) + 8 * v0 + 7 * v1 + 1.5 * a0 - a1
+    c5 = 6 * (p1 - p0) - 3 * v0 - 3 * v1 - 0.5 * a0 + 0.5 * a1
+    bends = (a0 + 6 * c3 * u + 12 * c4 * u**2 + 20 * c5 * u**3) / h**2
+    assert np.abs(bends).max() <= 0.2 * (1.0 + 1e-5)
+    assert motion.duration < 1.05 * sm.load_plan(retimed / "rt.npz").trajectory.duration
+
+
+def test_a_plan_retimed_for_a_rate_is_its_own_file(retimed: Path) -> None:
+    asked = ("--acceleration", "0.2", "--rate", "500", "--out", retimed / "own.npz")
+    code, text = invoke("retime", retimed / "l.npz", *asked)
+    assert code == 0, text
+    plan = sm.load_plan(retimed / "own.npz")
+    np.testing.assert_allclose(np.diff(plan.trajectory.t), 2e-3, atol=1e-9)
+    code, text = invoke("export", retimed / "own.npz", "--out", retimed / "o.csv", "--rate", "500")
+    assert code == 0, text
+    assert "times as long" not in text
+    written = sm.files.read_motion(retimed / "o.csv")
+    np.testing.assert_allclose(written.q, plan.trajectory.q, atol=1e-12)
+    # A plan whose time was asked for stays as it is.
+    code, text = invoke("export", retimed / "l.npz", "--out", retimed / "l.csv", "--rate", "125")
+    assert code == 0, text
+    assert sm.files.read_motion(retimed / "l.csv").duration == pytest.approx(4.0)
+
+
+def test_messages_of_ros_say_which_frame_they_are_in(tmp_path: Path) -> None:
+    pose = "{position: {x: 0.4, y: %s, z: 0.3}, orientation: {x: 1.0, y: 0.0, z: 0.0, w: 0.0}}"
+    stamped = [
+        "{header: {stamp: {sec: 0, nanosec: 0}, frame_id: map}, pose: " + pose % y + "}"
+        for y in (0.0, 0.1)
+    ]
+    (tmp_path / "p.yaml").write_text(
+        "header: {frame_id: map}\nposes: [" + ", ".join(stamped) + "]\n"
+    )
+    path = sm.files.read_path(tmp_path / "p.yaml", feed=0.05)
+    assert any("poses in metres in frame 'map'" in note for note in path.notes)
+    np.testing.assert_allclose(path.pose(0.0).rotation[:, 2], [0, 0, -1], atol=DIGITS)

@@ -97,7 +97,11 @@ def test_a_trajectory_of_a_camera_is_read(tmp_path: Path) -> None:
     ("text", "said"),
     [
         ("seam,event\na,b\n", "column 'x' is missing; the header is seam,event, expected x,y,z"),
-        ("X,Y,Z,A,B,C\n", "'a': A,B,C of KUKA are yaw_deg,pitch_deg,roll_deg here"),
+        ("X,Y,Z,A,B\n", "'a': A,B,C of KUKA are yaw_deg,pitch_deg,roll_deg here"),
+        (
+            "X,Y,Z,A,B,C\n0.4,0,0.3,0,0,180\n0.4,0.1,0.3,0,0,180\n",
+            "A,B,C are KUKA's, whose x,y,z are in mm, and all of these are below 10",
+        ),
         ("x,y,z,q1,q2,q3,q4\n", "'q1': q1,q2,q3,q4 of ABB are qw,qx,qy,qz here"),
         ("x,y,z,w,p,r\n", "'w': W,P,R of Fanuc are roll_deg,pitch_deg,yaw_deg here"),
         ("id,x,y,z\n", "unknown column 'id', .*to leave a column out, call it - in columns"),

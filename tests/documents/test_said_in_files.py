@@ -42,6 +42,7 @@ OTHERWISE: dict[str, dict[str, str]] = {
     "retime": {
         "acceleration": "is a constraint JointAccelerationLimits",
         "velocity": "is a constraint JointVelocityLimits",
+        "rate": "is of a controller, not of a problem: retime --rate, export --rate",
     },
     "plan_in_parts": {"rng": "shifts seeds; the rest of the problem says all"},
     "plan_job": {

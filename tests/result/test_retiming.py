@@ -50,6 +50,26 @@ def test_retimed_plans_keep_limits_and_geometry(fast: sm.Plan, tmp_path) -> None
     assert sm.load_plan(tmp_path / "slow.npz").check() == slow.certificate
 
 
+@pytest.mark.parametrize("rate", [60.0, 125.0, 1000.0])
+def test_samples_at_a_rate_keep_limits_and_geometry(fast: sm.Plan, rate: float) -> None:
+    free, slow = sm.retime(fast, ACCELERATION), sm.retime(fast, ACCELERATION, rate=rate)
+    assert slow.certificate.acceleration_ratio is not None
+    assert slow.certificate.acceleration_ratio.value <= 1.0
+    np.testing.assert_allclose(np.diff(slow.trajectory.t), 1.0 / rate, atol=1e-9)
+    assert slow.trajectory.duration == pytest.approx(slow.path.duration)
+    assert free.trajectory.duration < slow.trajectory.duration < 1.2 * free.trajectory.duration
+    # At the samples it is on the same joint path, at a pace that is slower as a whole.
+    at = slow.trajectory.t * free.trajectory.duration / slow.trajectory.duration
+    np.testing.assert_allclose(slow.trajectory.q, free.trajectory(np.minimum(at, at[-1])),
+                               atol=1e-9)  # fmt: skip
+    # Sampled as it is, it passes them: that is what the time is for.
+    sampled = free.trajectory.sample(rate)
+    assert np.abs(sampled.extremes(2)[1]).max() > ACCELERATION
+    for bad in (0.0, np.nan, 0.1, 1e12):
+        with pytest.raises(sm.errors.ProblemError, match="rate is"):
+            sm.retime(free, ACCELERATION, rate=bad)
+
+
 def test_what_binds_does_so_where_it_did(panda: sm.RobotModel) -> None:
     """At other times, but at the same places of the joint path."""
     path = sm.paths.Circle.around(panda.pose(PANDA_HOME), 0.15, 6.0, normal=(1.0, 0.0, 0.0))

@@ -19,6 +19,8 @@ _BYTES, _POSES, _FAR = 200_000_000, 1_000_000, 1e3
 # What stops something: after a cut it belongs to that.
 RETRACT, PRIME = "retract", "prime"
 STOPS = ("M5", "M9", "SPINDL/OFF", "COOLNT/OFF", "ARCOFF", RETRACT)
+# The suffix of programs of Siemens' controls.
+_SIEMENS = ".mpf"
 # What is not known of a program of a machine tool.
 UNJUDGED = "stock and engagement are not judged"
 _FREE = (
@@ -169,7 +171,14 @@ class Machine:
 
     def unread(self, what: str) -> FileFormatError:
         """Return an error about something that is not read."""
-        return self.fault(f"{what} is not read: page 'Files' of the docs lists what is (read_path)")
+        own = (
+            "of what only Siemens' controls know, TRAORI, TRAFOOF, X=… and A3= B3= C3= are read: "
+            "let CAM write ISO G-code for the rest, or APT; "
+        )
+        siemens = own if self.file.suffix.lower() == _SIEMENS else ""
+        return self.fault(
+            f"{what} is not read: {siemens}page 'Files' of the docs lists what is (read_path)"
+        )
 
     def note(self, what: str) -> None:
         """Note what is to be known of the line that is read, once for what is said alike."""

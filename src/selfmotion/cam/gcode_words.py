@@ -44,7 +44,7 @@ def bare_line(line: str, machine: Machine) -> str:
     text = _without_comments(line.upper())
     if text.startswith("/"):
         machine.note("lines that may be skipped (/) are read")
-    return _translated(text.lstrip("/").strip())
+    return _translated(text.lstrip("/")).strip()
 
 
 def says_axis(line: str) -> bool:

@@ -267,6 +267,11 @@ _CONTROLLERS = {
     ".ls": "Fanuc",
     ".tp": "Fanuc",
     ".jbi": "Yaskawa",
+    ".as": "Kawasaki",
+    ".pg": "Kawasaki",
+    ".pdl": "Comau",
+    ".pgx": "Stäubli",
+    ".urp": "Universal Robots",
 }
 # Of files that can be nothing but a path.
 PATH_SUFFIXES = (*TABLES, *PROGRAMS, *CLDATA, DRAWING)
@@ -305,15 +310,15 @@ def read_path(
       ``nx,ny,nz`` (the tool's z axis) or none; ``feed`` [m/s] from a pose on, instead of ``t``;
       ``x_mm``, ``x_cm``, ``x_in``, ``feed_mm`` and ``roll_deg`` are in those units, as is ``X
       [mm]``; ``pos_x``, ``pose.position.x``, ``px`` and ``tx`` are ``x``, and ``orientation.x`` and
-      ``quat_x`` are ``qx``; ``seam`` names the seam that a pose is of, ``event`` what happens there
-      (``arc on; gas on``: both)
+      ``quat_x`` are ``qx``; ``a,b,c`` are KUKA's, and ``x,y,z`` beside them in mm; ``seam`` names
+      the seam that a pose is of, ``event`` what happens there (``arc on; gas on``: both)
     - ``.npy``: (N, 4, 4) poses, (N, 3) x,y,z or (N, 4) t,x,y,z; any other table
       with `columns`, which say in which order quaternions are
     - ``.yaml .json``: ROS ``nav_msgs/Path``, ``geometry_msgs/PoseArray``, or poses in a list or by
       names (``waypoints``, ``poses``, parameters of a node): ``position`` and ``orientation``,
       columns of a table by name, or 4 × 4 matrices
-    - tables of IRBCAM, igus and of motion primitives, frames of compas and print points of
-      compas_slicer, by their titles; what their numbers mean is in a note
+    - tables of IRBCAM (arcs as well), igus (places only) and of motion primitives, frames of compas
+      and print points of compas_slicer, by their titles; what their numbers mean is in a note
     - ``.nc .ngc .gcode .tap .cnc .eia .mpf .g .gc .gco``: G-code of up to five axes, below
     - ``.apt .aptsource .cls .clsf .cl .ncl``: APT, cutter location data, below
     - ``.dxf``: a drawing, below; with ``pip install 'selfmotion[dxf]'``

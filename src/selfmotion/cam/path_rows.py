@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path as FilePath
 from typing import Any
 
@@ -78,6 +78,15 @@ _MAKERS = {
     **dict.fromkeys(("w", "p", "r"), "W,P,R of Fanuc are roll_deg,pitch_deg,yaw_deg here"),
     **dict.fromkeys(("q1", "q2", "q3", "q4"), "q1,q2,q3,q4 of ABB are qw,qx,qy,qz here"),
 }
+
+
+# A frame of KUKA's: what its columns are called here. No arm reaches so many metres.
+_KUKA = {"a": "yaw_deg", "b": "pitch_deg", "c": "roll_deg", "x": "x_mm", "y": "y_mm", "z": "z_mm"}
+_KUKA_NOTE = (
+    "columns A,B,C are read as KUKA's: angles about z, y and x in turn in degrees, x,y,z in mm "
+    "where they say no unit"
+)
+_METRES = 10.0
 
 
 # Names that are long enough to be taken for one another.
@@ -212,7 +221,7 @@ def read_tables(file: FilePath, reading: Reading | None = None) -> dict[str, Pos
     header, table, lines, texts = read_rows(
         file,
         (SEAM, EVENT),
-        check=lambda names: [_meant(file, name) for name in names],
+        check=lambda names: [_meant(file, name) for name in _of_kuka(names)],
         columns=None if reading is None else reading.columns,
         named=named,
         usual=_HEADERS,
@@ -256,6 +265,10 @@ def rows_of_table(
     texts: Mapping[str, Sequence[str]],
 ) -> PoseRows:
     """Return rows of poses of the columns of numbers of a table, and of its texts."""
+    notes: tuple[str, ...] = ()
+    if (titles := _of_kuka(header)) != list(header):
+        _check_millimetres(file, header, table)
+        header, notes = titles, (_KUKA_NOTE,)
     columns = _columns(file, header, table)
     events = texts.get(EVENT, [""] * len(places))
     missing = [name for name in _POSITION if name not in columns]
@@ -279,12 +292,11 @@ def rows_of_table(
                 f"{file}: column '{lacking[0]}' is missing, expected {','.join(names)}"
             )
         values = np.stack([columns[name] for name in names], axis=1)
-    notes: tuple[str, ...] = ()
     if given == [_TURN]:
         unit = "_deg" if any(named(title) == "rx_deg" for title in header) else ""
         angles = ",".join(f"{name}{unit}" for name in ("roll", "pitch", "yaw"))
         _check_turns(file, values, places, angles)
-        notes = (f"{_TURN_NOTE}; angles about fixed axes are called {angles}",)
+        notes += (f"{_TURN_NOTE}; angles about fixed axes are called {angles}",)
     return PoseRows(
         places,
         np.stack([columns[name] for name in _POSITION], axis=1),
@@ -295,6 +307,23 @@ def rows_of_table(
         tuple((k, event) for k, text in enumerate(events) for event in _several(text)),
         notes=notes,
     )
+
+
+def _of_kuka(titles: Sequence[str]) -> list[str]:
+    """Return titles as they are called here where A, B and C are among them, as KUKA has them."""
+    given = [named(title) for title in titles]
+    return [_KUKA.get(name, name) for name in given] if {"a", "b", "c"} <= set(given) else [*titles]
+
+
+def _check_millimetres(file: FilePath, titles: Sequence[str], table: Array) -> None:
+    """Refuse places beside A, B, C that say no unit and are as small as metres would be."""
+    bare = [k for k, title in enumerate(titles) if named(title) in _POSITION]
+    if bare and len(table) and np.abs(table[:, bare]).max() < _METRES:
+        raise FileFormatError(
+            f"{file}: A,B,C are KUKA's, whose x,y,z are in mm, and all of these are below "
+            f"{_METRES:g}: call them x_mm,y_mm,z_mm; of metres call A,B,C "
+            f"yaw_deg,pitch_deg,roll_deg"
+        )
 
 
 def _check_turns(file: FilePath, turns: Array, places: Sequence[str], angles: str) -> None:
@@ -416,17 +445,23 @@ def _read_ros(file: FilePath) -> dict[str, PoseRows]:
             f"{file}: holds no message with poses, expected a nav_msgs/Path or "
             f"geometry_msgs/PoseArray, or a list of these"
         )
-    _check_frames(file, messages)
+    notes = _frames(file, messages)
     if len(messages) == 1:
-        return {"": _of_message(file, messages[0], "")}
+        return {"": replace(_of_message(file, messages[0], ""), notes=notes)}
     return {
-        f"seam {number}": _of_message(file, message, f"[{number - 1}].")
+        f"seam {number}": replace(_of_message(file, message, f"[{number - 1}]."), notes=notes)
         for number, message in enumerate(messages, 1)
     }
 
 
-def _check_frames(file: FilePath, messages: Sequence[Any]) -> None:
-    """Refuse poses in different frames: where these are to each other is not known."""
+def _frames(file: FilePath, messages: Sequence[Any]) -> tuple[str, ...]:
+    """Return a note of the frame that messages name, which is not looked up.
+
+    Raises
+    ------
+    FileFormatError
+        Poses are in different frames: where these are to each other is not known.
+    """
     frames: dict[str, None] = {}
     for message in messages:
         poses = message.get("poses") if isinstance(message, Mapping) else None
@@ -442,6 +477,11 @@ def _check_frames(file: FilePath, messages: Sequence[Any]) -> None:
             f"{file}: has poses in frame '{first}' and in '{second}', expected one: transform them "
             f"into the same, whose place is told by a frame (--frame)"
         )
+    return tuple(
+        f"ROS: poses in metres in frame '{name}', which is taken for the root of the arm, or for "
+        f"what frame (--frame) says"
+        for name in frames
+    )
 
 
 def _messages(items: Sequence[Any]) -> Iterator[Any]:

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from selfmotion.basics import Array, FileFormatError, is_number, lines_of, shown, text_of
+from selfmotion.cam.cuts import Machine, arc_points
 from selfmotion.cam.path_rows import PoseRows
 
 _MM = 1e-3
@@ -64,6 +65,46 @@ def _number(file: FilePath, line: int, text: str) -> float:
     return value
 
 
+# Arcs by a point between their ends.
+
+# Three points whose triangle is so flat lie on a line.
+_FLAT = 1e-6
+
+
+def _arc(
+    file: FilePath, line: int, first: Array, middle: Array, last: Array
+) -> tuple[Array, Array]:
+    """Return the points (K, 3) of an arc up to its middle, and those from there to its end [m].
+
+    Without the point that each begins at, with the one that it ends at.
+    """
+    one, other = middle - first, last - first
+    normal = np.cross(one, other)
+    size = float(normal @ normal)
+    if min(one @ one, other @ other) == 0.0 or not np.isfinite(size):
+        raise FileFormatError(
+            f"{file}: line {line}: an arc needs three points apart from each other"
+        )
+    if size <= _FLAT**2 * (one @ one) * (other @ other):
+        return middle[None], last[None]
+    away = (other @ other) * np.cross(normal, one) - (one @ one) * np.cross(normal, other)
+    center = first + away / (2.0 * size)
+    machine = Machine(file)
+    machine.number = line
+    return (
+        arc_points(machine, first, middle, center, normal),
+        arc_points(machine, middle, last, center, normal),
+    )
+
+
+def _turning(first: Array, last: Array, count: int) -> Array:
+    """Return rotations (count, 3, 3) evenly from one (3, 3) to another, which is the last."""
+    from scipy.spatial.transform import Rotation, Slerp
+
+    way = Slerp([0.0, 1.0], Rotation.from_matrix(np.stack([first, last])))
+    return np.asarray(way(np.arange(1, count + 1) / count).as_matrix())
+
+
 # IRBCAM: x, y, z [mm], angles about z, y and z of the frame as it is turned [°], velocity [mm/s].
 
 _IRBCAM = ("x", "y", "z", "rz1", "ry", "rz2")
@@ -73,6 +114,7 @@ def _of_irbcam(file: FilePath, text: str, titles: Sequence[str]) -> PoseRows:
     from scipy.spatial.transform import Rotation
 
     rows, places, feeds = list[list[float]](), list[str](), list[float]()
+    lines, middles = list[int](), list[int]()
     for number, line in enumerate(lines_of(text), 1):
         cells = [cell.strip() for cell in line.split(",")]
         if not line.strip() or [cell.lower() for cell in cells] == list(titles):
@@ -83,22 +125,58 @@ def _of_irbcam(file: FilePath, text: str, titles: Sequence[str]) -> PoseRows:
             )
         found = dict(zip(titles, cells, strict=True))
         values = {key: _number(file, number, found[key]) for key in _IRBCAM}
-        if _number(file, number, found.get("motion_type", "0")) != 0.0:
+        kind = _number(file, number, found.get("motion_type", "0"))
+        if kind not in (0.0, 1.0) or (
+            kind == 1.0 and (not rows or middles[-1:] == [len(rows) - 1])
+        ):
             raise FileFormatError(
-                f"{file}: line {number}: motion_type {found['motion_type']}: arcs of IRBCAM are "
-                f"not read: let it write lines"
+                f"{file}: line {number}: motion_type {found['motion_type']} is not read here, "
+                f"expected 0 (a line), or 1 for the point between both ends of an arc of IRBCAM"
             )
+        if kind == 1.0:
+            middles.append(len(rows))
+        lines.append(number)
         rows.append([values[key] for key in _IRBCAM])
         feeds.append(_MM * _number(file, number, found.get("velocity", "0")))
         places.append(f"line {number}")
+    if middles[-1:] == [len(rows) - 1]:
+        raise FileFormatError(
+            f"{file}: {places[-1]}: motion_type 1 is the middle of an arc of IRBCAM, whose end is "
+            f"missing"
+        )
     table = np.array(rows).reshape(-1, 6)
     turns = Rotation.from_euler("ZYZ", table[:, 3:], degrees=True).as_matrix()
     others = [title for title in titles if title not in (*_IRBCAM, "motion_type", "velocity")]
     passed = f"; passed over: {', '.join(others)}" if others else ""
+    note = (
+        f"IRBCAM: x,y,z in mm, rz1,ry,rz2 about z, y and z in turn, velocity in mm/s on the way to "
+        f"its row, -1 a rapid, motion_type 1 between both ends of an arc{passed}"
+    )
+    positions = _MM * table[:, :3]
+    if middles:
+        chosen, positions, turns = _with_arcs(file, lines, middles, positions, turns)
+        places, feeds = [places[k] for k in chosen], [feeds[k] for k in chosen]
     # A velocity is that of the way to its row; -1 is a rapid.
     to_next = np.array([*feeds[1:], *feeds[-1:]])
-    note = f"IRBCAM: x,y,z in mm, rz1,ry,rz2 about z, y and z in turn, velocity in mm/s{passed}"
-    return _straight(places, _MM * table[:, :3], "rotation", turns, to_next, note)
+    return _straight(places, positions, "rotation", turns, to_next, note)
+
+
+def _with_arcs(
+    file: FilePath, lines: Sequence[int], middles: Sequence[int], positions: Array, turns: Array
+) -> tuple[list[int], Array, Array]:
+    """Return poses with arcs as chords, and which row each is of."""
+    chosen, places, found = [0], [positions[:1]], [turns[:1]]
+    for k in range(1, len(positions)):
+        ways = [positions[k : k + 1]]
+        if k in middles:
+            ways = list(_arc(file, lines[k], *positions[k - 1 : k + 2]))
+        elif k - 1 in middles:
+            continue
+        for row, way in enumerate(ways, k):
+            chosen += [row] * len(way)
+            places.append(way)
+            found.append(_turning(turns[row - 1], turns[row], len(way)))
+    return chosen, np.concatenate(places), np.concatenate(found)
 
 
 def _straight(
@@ -149,8 +227,9 @@ def _of_igus(file: FilePath, text: str, _: Sequence[str]) -> PoseRows:
         rows.append([_number(file, number, said.get(key, "")) for key in "XYZ"])
         places.append(f"line {number}")
     note = (
-        "igus: X, Y, Z in mm; A, B, C are passed over: for orientations name the columns "
-        "(qw,qx,qy,qz or roll_deg,pitch_deg,yaw_deg)"
+        "igus: X, Y, Z in mm; A, B, C are passed over, as the form does not say about which axes "
+        "they turn in which order: for orientations write a table with columns qw,qx,qy,qz or "
+        "roll_deg,pitch_deg,yaw_deg"
     )
     return _straight(places, _MM * np.array(rows), "", np.zeros((len(rows), 0)), None, note)
 
@@ -158,6 +237,8 @@ def _of_igus(file: FilePath, text: str, _: Sequence[str]) -> PoseRows:
 # Motion primitives of research code: breakpoints,primitives,points,q_bp, with arrays as texts.
 
 _PRIMITIVES = ("breakpoints", "primitives", "points")
+# Primitives → how many points each has.
+_POINTS = {"movej": 1, "movel": 1, "movec": 2}
 _ARRAY = re.compile(r"array\(\s*\[([^\]]*)\]\s*\)")
 
 
@@ -167,23 +248,29 @@ def _of_primitives(file: FilePath, text: str, _: Sequence[str]) -> PoseRows:
         listed = [(reader.line_num, found) for found in reader]
     except csv.Error as error:
         raise FileFormatError(f"{file}: line {reader.line_num}: is no table: {error}") from error
-    rows, places = list[list[float]](), list[str]()
+    rows, places = list[Array](), list[str]()
     for where, found in listed:
         kind, points = str(found.get("primitives")), _ARRAY.findall(str(found.get("points")))
-        if not kind.lower().startswith(("movej", "movel")) or len(points) != 1:
+        expected = next((n for name, n in _POINTS.items() if kind.lower().startswith(name)), 0)
+        if not expected or len(points) != expected or (expected == 2 and not rows):
             raise FileFormatError(
-                f"{file}: line {where}: primitive {shown(kind)} with {len(points)} points is not "
-                f"read, expected movel or movej with one: let it be fitted by lines"
+                f"{file}: line {where}: motion primitive {shown(kind)} with {len(points)} points "
+                f"is not read, expected movel or movej with one, or movec with two (between both "
+                f"ends of an arc, and its end) after a first point"
             )
-        values = [_number(file, where, cell) for cell in points[0].split(",")]
-        if len(values) != 3:
+        given = [[_number(file, where, cell) for cell in each.split(",")] for each in points]
+        if any(len(values) != 3 for values in given):
             raise FileFormatError(f"{file}: line {where}: expected x, y, z in points")
-        rows.append(values)
-        places.append(f"line {where}")
-    note = "motion primitives: points in mm, straight from one to the next; q_bp is passed over"
-    return _straight(
-        places, _MM * np.array(rows).reshape(-1, 3), "", np.zeros((len(rows), 0)), None, note
+        ends = _MM * np.array(given)
+        way = ends if expected == 1 else np.concatenate(_arc(file, where, rows[-1], *ends))
+        rows += list(way)
+        places += [f"line {where}"] * len(way)
+    note = (
+        "motion primitives: points in mm, joined by straight lines (movej too), and by arcs for "
+        "movec; q_bp is passed over"
     )
+    positions = np.array(rows).reshape(-1, 3)
+    return _straight(places, positions, "", np.zeros((len(rows), 0)), None, note)
 
 
 # compas: frames by a point, an x axis and a y axis; print points of compas_slicer around them.

@@ -28,6 +28,7 @@ def requirements(
     obstacles: Path | None,
     clearance: float,
     srdf: Path | None,
+    disabled: list[str] | None,
     *,
     usual: bool = False,
     apart: bool = False,
@@ -49,9 +50,10 @@ def requirements(
         asked.append(sm.constraints.JointAccelerationLimits(most))
     if joint_limits is not None:
         asked += read_joint_limits(joint_limits, robot)
-    if obstacles is not None or clearance != 0.0 or srdf is not None:
+    if obstacles is not None or clearance != 0.0 or srdf is not None or disabled:
         bodies = () if obstacles is None else options.read_obstacles(obstacles)
-        asked.append(sm.constraints.Clearance(bodies, clearance, srdf))
+        pairs = tuple((one, other) for one, other in options.disabled_pairs(disabled))
+        asked.append(sm.constraints.Clearance(bodies, clearance, srdf, pairs))
     elif apart and robot.urdf.has_collisions:
         asked.append(NO_OVERLAP)
     return tuple(item.requirement(robot) for item in asked)

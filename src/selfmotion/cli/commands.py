@@ -100,6 +100,7 @@ def init(
     ] = False,
     no_collision: options.NoCollisionOption = False,
     srdf: options.SrdfOption = None,
+    disabled: options.DisabledOption = None,
     force: Annotated[bool, typer.Option("--force", help="Overwrite a file.")] = False,
 ) -> None:
     """Write a commented problem file to begin with; for an arm from a file it is tried first."""
@@ -117,6 +118,7 @@ def init(
         packages=packages or (),
         clearance=not no_collision,
         srdf=srdf,
+        disabled=options.disabled_pairs(disabled),
     )
     text = next(texts) if robot in sm.NAMED_ARMS else documents.first_that_runs(texts, file, job)
     write_text(file, text)
@@ -159,6 +161,7 @@ def check(
     obstacles: options.ObstaclesOption = None,
     clearance: options.ClearanceOption = 0.0,
     srdf: options.SrdfOption = None,
+    disabled: options.DisabledOption = None,
     no_collision: options.NoCollisionOption = False,
     tolerance: options.ToleranceOption = None,
     verbose: options.VerboseOption = False,
@@ -168,7 +171,7 @@ def check(
 
     One made elsewhere by what plan keeps: limits of the arm and of its maker, and self-collision.
     """
-    judged = velocity, acceleration, joint_limits, obstacles, clearance, srdf
+    judged = velocity, acceleration, joint_limits, obstacles, clearance, srdf, disabled
     within = None if tolerance is None else sm.Tolerance(tolerance, tolerance)
     path = context.params["path"]
     typed = {"path": path, **{name: context.params[name] for name in documents.OF_PATH}}
@@ -321,6 +324,12 @@ def retime(
     file: Annotated[Path, typer.Argument(help="A plan saved as .npz.")],
     acceleration: options.AccelerationOption = None,
     velocity: options.VelocityOption = None,
+    rate: Annotated[
+        float | None,
+        typer.Option(
+            help="Samples per second that a controller takes: limits are kept between these."
+        ),
+    ] = None,
     out: options.OutOption = None,
     html: options.HtmlOption = None,
     verbose: options.VerboseOption = False,
@@ -330,7 +339,8 @@ def retime(
     outputs.check_suffixes(out or [])
     with StageDisplay(stages) as display:
         display.stage("retiming", 1, 1)
-        result = sm.retime(sm.load_plan(file), *_limits(acceleration, velocity))
+        a, v = _limits(acceleration, velocity)
+        result = sm.retime(sm.load_plan(file), a, v, rate)
     outputs.finish(result, out or [], html, as_json, verbose)
 
 

@@ -76,6 +76,7 @@ class Shell:
     obstacles: options.ObstaclesOption = None
     clearance: options.ClearanceOption = 0.0
     srdf: options.SrdfOption = None
+    disabled: options.DisabledOption = None
     no_collision: options.NoCollisionOption = False
     damped: options.DampedOption = False
 
@@ -195,15 +196,21 @@ class Shell:
         found.append({"kind": "JointJerkLimits"})
         if self.closed:
             found.append({"kind": "ClosedPath"})
-        if self.obstacles is not None or self.clearance != 0.0 or self.srdf is not None:
+        given = self.obstacles, self.srdf, self.disabled
+        if any(given) or self.clearance != 0.0:
             if self.no_collision:
                 raise sm.errors.ProblemError(
-                    "--no-self-collision has no effect beside --obstacles, --clearance and --srdf, "
-                    "which keep links apart from each other as well; leave out pairs by --srdf"
+                    "--no-self-collision has no effect beside --obstacles, --clearance, --srdf and "
+                    "--disabled, which keep links apart from each other as well; leave out pairs "
+                    "by --disabled or --srdf"
                 )
             bodies = [] if self.obstacles is None else options.obstacle_tables(self.obstacles)
             clearance = {"kind": "Clearance", "obstacles": bodies, "distance": self.clearance}
-            found.append(clearance if self.srdf is None else {**clearance, "srdf": str(self.srdf)})
+            if self.srdf is not None:
+                clearance["srdf"] = str(self.srdf)
+            if self.disabled:
+                clearance["disabled"] = options.disabled_pairs(self.disabled)
+            found.append(clearance)
         return found
 
 
@@ -315,7 +322,11 @@ def first_that_runs(texts: Iterable[str], file: Path, job: bool) -> str:
             verified, reason = False, str(error)
         if verified:
             return text
-    raise sm.errors.ProblemError(f"{file}: no example was found that this arm follows: {reason}")
+    raise sm.errors.ProblemError(
+        f"{file}: no example was found that this arm follows: {reason}; give another link as "
+        f"--tool, hold joints (--lock), or leave out links that are made one into the other "
+        f"(--disabled; --no-self-collision leaves out all)"
+    )
 
 
 def seams_of_file(file: Path, settings: list[str], allow_code: bool) -> sm.files.SeamJob:

@@ -102,6 +102,8 @@ def export(
     _check_verified(made, force, as_json)
     _tell_followers(made.robot, out, form)
     outputs.tell_base(made.robot, asked)
+    if isinstance(made, sm.Plan) and any(reread.is_readable(target, form) for target in out):
+        made = _slow_enough(made, rate)
     verdicts: dict[str, str] = {}
     # Which what is only of these is said for.
     programs = any(reread.is_program(target, form, asked) for target in out)
@@ -145,6 +147,21 @@ def export(
         )
     _tell_held(made.robot)
     _finish(made, rate, verdicts, sound, as_json, sampled=bool(streamed))
+
+
+def _slow_enough(plan: sm.Plan, rate: float | None) -> sm.Plan:
+    """Return a plan as its samples at a rate keep limits, and print how much longer that takes."""
+    found = controllers.within_limits_at(plan, rate)
+    if found is not plan:
+        before, now = plan.trajectory.duration, found.trajectory.duration
+        stages.print(
+            f"note: between samples at {rate:g} Hz the accelerations of this retimed plan would "
+            f"pass limits: the motion takes {now:.6g} s instead of {before:.6g} s, "
+            f"{now / before:.4f} times as long (retime --rate {rate:g} makes a plan of it)",
+            markup=False,
+            soft_wrap=True,
+        )
+    return found
 
 
 def _tell_followers(robot: sm.RobotModel, out: list[Path], form: str | None) -> None:

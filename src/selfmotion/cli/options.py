@@ -1,7 +1,7 @@
 """Options of the commands, and what their texts mean."""
 
 import inspect
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import fields, replace
 from functools import wraps
 from pathlib import Path
@@ -301,6 +301,13 @@ ClearanceOption = Annotated[
 SrdfOption = Annotated[
     Path | None, typer.Option(help="SRDF: its disabled pairs of links are not checked.")
 ]
+DisabledOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="LINK,LINK",
+        help="Two links that may overlap, as they are made so. Repeatable.",
+    ),
+]
 ToleranceOption = Annotated[
     float | None,
     typer.Option(
@@ -493,3 +500,12 @@ def obstacle_tables(file: Path) -> list[dict[str, Any]]:
 def _listed(file: Path) -> Any:
     found = basics.read_values(file)
     return found.get("obstacles") if isinstance(found, dict) else found
+
+
+def disabled_pairs(texts: Sequence[str] | None) -> list[list[str]]:
+    """Return the pairs of links of --disabled."""
+    pairs = [[name.strip() for name in text.split(",")] for text in texts or ()]
+    for text, pair in zip(texts or (), pairs, strict=True):
+        if len(pair) != 2 or not all(pair):
+            raise sm.errors.ProblemError(f"--disabled is {text!r}, expected two links: LINK,LINK")
+    return pairs

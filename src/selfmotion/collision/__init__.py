@@ -1,5 +1,9 @@
 """Collisions: exact distances for certificates, smooth conservative ones for optimisation."""
 
+from selfmotion.collision.as_made import (
+    overlapping_as_made as overlapping_as_made,
+    told_as_made as told_as_made,
+)
 from selfmotion.collision.bodies import (
     Body as Body,
     link_bodies as link_bodies,

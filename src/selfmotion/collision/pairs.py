@@ -336,7 +336,8 @@ class Overlap:
         """In how many configurations, and what to do where that is how they are made."""
         return (
             f"these links overlap in {100 * self.share:.0f} % of all configurations: if that is "
-            f"how they are made, give srdf= a file with {srdf_line(self.first, self.second)}"
+            f"how they are made, leave them out: --disabled {self.first},{self.second}, or srdf= a "
+            f"file with {srdf_line(self.first, self.second)}"
         )
 
 

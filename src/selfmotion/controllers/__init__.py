@@ -49,6 +49,7 @@ from selfmotion.controllers.samples import (
     coarsest_rate as coarsest_rate,
     linear_miss as linear_miss,
     moving_ends as moving_ends,
+    within_limits_at as within_limits_at,
 )
 from selfmotion.controllers.thinning import (
     by_targets as by_targets,

@@ -39,7 +39,13 @@ from selfmotion.controllers.motion_tables import (
 )
 from selfmotion.controllers.program_settings import ProgramSettings
 from selfmotion.controllers.ros import bag, motion_of_bag
-from selfmotion.controllers.samples import MotionSamples, check_ends, coarsest_rate, for_cubics
+from selfmotion.controllers.samples import (
+    MotionSamples,
+    check_ends,
+    coarsest_rate,
+    for_cubics,
+    within_limits_at,
+)
 from selfmotion.controllers.urscript import check_joints, script
 from selfmotion.job import Program
 from selfmotion.motion import Trajectory
@@ -82,7 +88,9 @@ def write_motion(
     rate : float, optional
         Samples per second; by default those of the plan: few, whose quintics are its motion, as
         controllers of ROS 2 join them (URScript: 125). Messages of ROS have the coarsest rate at
-        which straight lines keep the plan's tolerance, where that is fewer.
+        which straight lines keep the plan's tolerance, where that is fewer. A retimed plan is as
+        much slower as quintics between samples at the rate need to keep its limits, which
+        ``retime(plan, rate=…)`` returns.
     format : str, optional
         By default the one that has the file's suffix.
     settings : ProgramSettings, optional
@@ -129,6 +137,8 @@ def write_motion(
         return
     if settings is not None:
         raise ProblemError(f"{path}: settings have no effect: they are of controllers' programs")
+    if isinstance(plan, Plan):
+        plan = within_limits_at(plan, rate)
     motion = plan.motion if isinstance(plan, Move) else plan.trajectory
     if name == "bag" and rate is None:
         motion = for_cubics(motion)
@@ -379,6 +389,7 @@ def write_parts(
     check_verified(plan, path, as_flag(force, "force"))
     check_ends(plan, path, force)
     write = WRITERS[name]
+    plan = within_limits_at(plan, rate)
     rate = STREAM if name == "urscript" and rate is None else rate
     samples, written = MotionSamples.of(plan.trajectory, rate), {}
     parts = list(dict.fromkeys(name.partition("/")[0] for name in names))

@@ -83,10 +83,14 @@ class ProgramReader:
                     break
             else:
                 is_own = any(note.startswith("selfmotion: ") for note in self.lines.notes)
-                other = "" if is_own else "selfmotion did not write this program, and "
+                other = (
+                    "selfmotion did not write this program, and only the statements that it writes "
+                    "are read; of another one judge the recorded motion, a table of t and a column "
+                    "per joint (.csv, .npz, .json, .yaml of ROS, .mcap); "
+                )
                 raise self.lines.fault(
-                    f"'{text[:60]}' is not read: {other}page 'Files' of the docs lists what is "
-                    f"(read_motion)"
+                    f"'{text[:60]}' is not read: {'' if is_own else other}page 'Files' of the docs "
+                    f"lists what is (read_motion)"
                 )
         if self.state != "after":
             raise self.lines.fault(f"is the last one, expected {self.last}")

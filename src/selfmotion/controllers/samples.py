@@ -11,7 +11,7 @@ from selfmotion.basics import Array, PlanError, ProblemError, shown
 from selfmotion.constraints import ClosedPath, EndVelocity, StartVelocity
 from selfmotion.job import Program
 from selfmotion.motion import MOST_SAMPLES, Trajectory
-from selfmotion.result import Move, Parts, Plan
+from selfmotion.result import Move, Parts, Plan, at_rate, is_retimed
 
 # A joint motion at the times that a file has it.
 
@@ -178,6 +178,22 @@ def coarsest_rate(plan: Plan) -> float | None:
     coarse = Trajectory(samples.t, samples.q, samples.qd, motion.joint_names, samples.qdd)
     found = plan.problem.certify(coarse, plan.tolerance, plan.report.ending)
     return rate if found.verified else None
+
+
+def within_limits_at(plan: Plan, rate: float | None) -> Plan:
+    """Return a retimed plan as slow as its samples at a rate need to keep its limits.
+
+    Any other plan, whose time is what was asked for, is returned as it is, and so is one of which
+    no slower motion is verified.
+    """
+    if rate is None or not (is_retimed(plan) and plan.certificate.verified):
+        return plan
+    samples = MotionSamples.of(plan.trajectory, rate)
+    read = Trajectory(samples.t, samples.q, samples.qd, plan.trajectory.joint_names, samples.qdd)
+    if plan.problem.certify(read, plan.tolerance, plan.report.ending).verified:
+        return plan
+    slower = at_rate(plan, rate)
+    return slower if slower.certificate.verified else plan
 
 
 def for_cubics(motion: Trajectory) -> Trajectory:

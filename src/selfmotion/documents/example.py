@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from selfmotion.basics import Array, ProblemError
-from selfmotion.collision import SAMPLES, CollisionModel, disabled_links
+from selfmotion.collision import disabled_links, overlapping_as_made
 from selfmotion.path import Circle, Line, Path
 from selfmotion.robot import NAMED_ARMS, RobotModel, load_robot
 from selfmotion.task import SE3, Quaternion, Task
@@ -78,37 +78,6 @@ def _room(arm: RobotModel, task: Task, q: Array, way: Array) -> float:
             return 0.0
         least = min(least, float(np.linalg.svd(rows, compute_uv=False)[-1]))
     return float(least)
-
-
-# Links that overlap as they are made: telescopes, bellows, what is built one into the other.
-
-# In so many configurations overlap is how links are made; in so many it is, where they overlap in
-# the pose in which the arm is drawn as well.
-_ALWAYS, _OFTEN = 0.95, 0.2
-
-
-def overlapping_as_made(
-    arm: RobotModel, disabled: Sequence[tuple[str, str]] = ()
-) -> dict[tuple[str, str], str]:
-    """Return the pairs of links that overlap in nearly all configurations, or as they are drawn.
-
-    With how often and how deep, in words. MoveIt's Setup Assistant calls them Always and Default.
-    """
-    if not arm.urdf.has_collisions:
-        return {}
-    model = CollisionModel(arm, (), disabled)
-    drawn = np.clip(np.zeros(arm.dof), arm.lower, arm.upper)
-    deep = {frozenset((near.first, near.second)): -near.value for near in model.touching(drawn)}
-    shares: dict[tuple[str, str], float] = {}
-    for pair, count in zip(model.pairs, model.overlap_counts()[0].tolist(), strict=True):
-        shares[pair] = max(count / SAMPLES, shares.get(pair, 0.0))
-    found = {}
-    for pair, share in shares.items():
-        depth = deep.get(frozenset(pair))
-        if share >= _ALWAYS or (depth is not None and share >= _OFTEN):
-            drawn_so = "" if depth is None else f", by {1e3 * depth:.1f} mm as they are drawn"
-            found[pair] = f"overlap in {100.0 * share:.0f} % of all configurations{drawn_so}"
-    return found
 
 
 # The problem files that ``selfmotion init`` writes.
@@ -292,6 +261,7 @@ def example_texts(
     packages: Sequence[str | FilePath] = (),
     clearance: bool = True,
     srdf: str | FilePath | None = None,
+    disabled: Sequence[Sequence[str]] = (),
 ) -> Iterator[str]:
     """Yield commented problem files to begin with, the one most likely to run first.
 
@@ -317,6 +287,8 @@ def example_texts(
         out, and listed in the file.
     srdf : path, optional
         A file that says which links are left out as well.
+    disabled : sequence of (str, str)
+        Pairs of links that are left out as well.
 
     Raises
     ------
@@ -336,6 +308,7 @@ def example_texts(
     task = Task.POINTING if positioner else _task_of(arm)
     where = _SEAMS if job else (_ON_PLATE if positioner else _PATH)
     whole = _HEAD + (_CELL if positioner else _ROBOT) + where + _REST + ("" if job else _OF_ONE)
+    apart = _clearance(arm, target, loaded, srdf, disabled, positioner) if clearance else _NONE
     given = _said_of_robot(robot, target, loaded, positioner) | {
         "tool": arm.tool,
         "link": f"arm/{arm.tool}" if positioner else arm.tool,
@@ -343,7 +316,7 @@ def example_texts(
         "command": "job" if job else "plan",
         "task": task.value,
         "away": _AWAY * arm.reach,
-        "clearance": _clearance(arm, target, loaded, srdf, positioner) if clearance else _NONE,
+        "clearance": apart,
     }
     is_free = named or positioner
     starts = [(_RADII[0], None)] if is_free else list(_starts(arm, task, job))
@@ -371,11 +344,13 @@ def _clearance(
     target: FilePath,
     loaded: Mapping[str, Any],
     srdf: str | FilePath | None,
+    disabled: Sequence[Sequence[str]],
     in_cell: bool,
 ) -> str:
     """Return the lines of a file that say which links are kept apart."""
+    asked = [(one, other) for one, other in disabled]
     known = () if srdf is None else disabled_links(srdf, loaded["arguments"], loaded["packages"])
-    pairs = overlapping_as_made(arm, known)
+    pairs = dict.fromkeys(asked, "as asked") | overlapping_as_made(arm, (*asked, *known))
     if not pairs and srdf is None:
         return "# clearance = false    # leaves self-collision out"
     said = ["distance = 0"]

@@ -30,6 +30,7 @@ from selfmotion.costs import Cost, JointVelocity
 from selfmotion.follow import AugmentedFollows, Follow, Follows, VirtualJoints
 from selfmotion.motion import FreeNullMotion, NullMotion
 from selfmotion.path import FeedPossible, Path, check_oriented, spread_along
+from selfmotion.problem.least_tolerance import that_would_do
 from selfmotion.robot import Chain, RobotModel
 from selfmotion.task import POSITION_ROWS, ROW_NAMES, Damping, Relaxation, Task
 
@@ -264,8 +265,10 @@ _MIDDLES, _EVENLY, _BESIDE, _SHORTEST = 400, 9, 0.1, 1e-9
 _WILD, _GRAVITY = 2000.0, 9.81
 
 
-def check_fit(follows: Follows, relaxations: Sequence[Relaxation]) -> None:
+def check_fit(follows: Follows, relaxations: Sequence[Relaxation], start: Any = None) -> None:
     """Refuse a path that an arm cannot follow in a task's rows, whatever the joint motion.
+
+    A `start` is what a tolerance that would do is looked for from.
 
     Raises
     ------
@@ -281,7 +284,7 @@ def check_fit(follows: Follows, relaxations: Sequence[Relaxation]) -> None:
     for item in follows.items:
         check_oriented(item.path, item.task)
     check_relaxations(relaxations, first.path, first.task)
-    _check_redundancy(follows, relaxations)
+    _check_redundancy(follows, relaxations, start)
     for item in follows.items:
         reach = follows.robot.reach_of(item.chain)
         _check_units(follows.robot, item.path, reach)
@@ -337,7 +340,7 @@ def _prescribed(path: Path, task: Task) -> list[str]:
     return rows
 
 
-def _check_redundancy(follows: Follows, relaxations: Sequence[Relaxation]) -> None:
+def _check_redundancy(follows: Follows, relaxations: Sequence[Relaxation], start: Any) -> None:
     robot, task, is_relaxed = follows.robot, follows.items[0].task, bool(relaxations)
     if len(follows.items) > 1:
         _check_several(follows, relaxations)
@@ -361,6 +364,7 @@ def _check_redundancy(follows: Follows, relaxations: Sequence[Relaxation]) -> No
             f"{robot.name}: task '{task.value}' prescribes {task.dimension} rows "
             f"({', '.join(task.row_names)}), but the arm cannot move '{robot.tool}' freely in "
             f"all of them; {choice}, or relax rows that it cannot move (relaxations=)"
+            f"{that_would_do(follows, start)}"
         )
     if follows.redundancy == 0 and not is_relaxed:
         others = _redundant_tasks(robot)

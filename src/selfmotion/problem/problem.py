@@ -175,7 +175,7 @@ class Problem:
             object.__setattr__(self, "costs", (JointVelocity.usual(self.robot),))
         for name, each in SEQUENCES.items():
             object.__setattr__(self, name, as_several(getattr(self, name), name, each))
-        check_fit(self.follows, self.relaxations)
+        check_fit(self.follows, self.relaxations, self.start)
         if isinstance(self.start, str):
             if self.start != "free":
                 raise ProblemError(f"start is '{self.start}', expected numbers, 'free' or None")

@@ -8,7 +8,7 @@ import numpy as np
 
 from selfmotion.basics import Array
 from selfmotion.certificate import Requirement
-from selfmotion.collision import Body, Obstacle, Solid
+from selfmotion.collision import Body, Obstacle, Solid, told_as_made
 from selfmotion.constraints import (
     Constraint,
     Envelope,
@@ -104,9 +104,8 @@ def remarks_on(
             )
     for model, _ in envelope.bodies:
         yield from _body_remarks(robot, model.every_body)
-        for pair in model.overlapping:
-            if pair.is_checked:
-                yield f"{pair.first} - {pair.second}: {pair.remedy}"
+        if told := told_as_made(robot, model):
+            yield told
     yield from _unit_remarks(robot, constraints)
     for item in constraints:
         # What nobody asked for by name is not missed, nor what another constraint gives.

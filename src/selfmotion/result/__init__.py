@@ -45,7 +45,9 @@ from selfmotion.result.plan import (
 )
 from selfmotion.result.report import Attempt as Attempt, Gap as Gap, Report as Report
 from selfmotion.result.retiming import (
+    at_rate as at_rate,
     check_no_feed as check_no_feed,
+    is_retimed as is_retimed,
     rate_limits as rate_limits,
     retime as retime,
     slowdown as slowdown,

@@ -15,6 +15,7 @@ from selfmotion.basics import (
     Ints,
     PlanError,
     ProblemError,
+    as_number,
     held_interruption,
     one_blas_thread,
     per_joint,
@@ -26,7 +27,7 @@ from selfmotion.constraints import (
     JointAccelerationLimits,
     JointVelocityLimits,
 )
-from selfmotion.motion import Grid, Trajectory
+from selfmotion.motion import MOST_SAMPLES, Grid, Trajectory, slowdown_of
 from selfmotion.path import STILL, Pace, Path, Retimed, edges_of
 from selfmotion.problem import Problem
 from selfmotion.result.measured import quantities_of_pace
@@ -40,6 +41,9 @@ _STEPS = (4e-3, 2e-3, 1e-3)
 _LOOKS, _BRIEF = 2000, 0.05
 # A motion that passes limits by so little is slowed as a whole, and a bit beyond that.
 _BY_A_LITTLE, _BEYOND = 1.002, 1.0 + 1e-6
+# Samples at a rate are a whole number of periods, to rounding [periods]. A motion is made slower
+# for them in steps of this part of what limits are passed by, so often at most for all else.
+_WHOLE, _PART, _SLOWER = 1e-6, 0.1, 12
 # Accelerations that jump from one side to the other this often, of all joints, are told of.
 _OFTEN = 12
 
@@ -69,6 +73,7 @@ def retime(
     plan: Plan,
     acceleration: npt.ArrayLike | None = None,
     velocity: npt.ArrayLike | None = None,
+    rate: float | None = None,
 ) -> Plan:
     """Return the plan's joint path in the shortest time within the limits, from rest to rest.
 
@@ -87,12 +92,16 @@ def retime(
         Limits [rad/s² or m/s²]; by default those that the plan was asked to keep, or the maker's.
     velocity : (n,) or float, optional
         Limits [rad/s or m/s]; by default those that the plan was asked to keep, or the URDF's.
+    rate : float, optional
+        Samples per second of the new motion, as a controller takes them; by default as many as the
+        pace needs. Accelerations that jump between two of these overshoot in the quintics through
+        them: the motion is as much slower as a whole as limits ask for.
 
     Raises
     ------
     ProblemError
-        A limit is not positive, no limits of acceleration are given or known, or the path has a
-        feed.
+        A limit is not positive, no limits of acceleration are given or known, the rate gives no
+        samples, or the path has a feed.
     PlanError
         No pace keeps the limits, or the arm does not move at all.
     """
@@ -116,7 +125,59 @@ def retime(
             result = _retimed(plan, wanted, pace.slower(factor * _BEYOND))
         if result.certificate.on_path:
             break
-    return _with_remarks(result, plan.path, kept.acceleration, kept.jerk)
+    result = _with_remarks(result, plan.path, kept.acceleration, kept.jerk)
+    return result if rate is None else at_rate(result, rate)
+
+
+def is_retimed(plan: Plan) -> bool:
+    """Whether a plan's pace is that of `retime`: as fast as limits allow, and nobody's time."""
+    pace = plan.path.pace if isinstance(plan.path, Retimed) else None
+    return pace is not None and np.array_equal(pace.t, plan.trajectory.t)
+
+
+def at_rate(plan: Plan, rate: float) -> Plan:
+    """Return a retimed plan by samples at a rate, as much slower as they need to keep its limits.
+
+    It takes a whole number of periods. Where no slower motion is verified either, what is returned
+    is not: its certificate says why.
+
+    Raises
+    ------
+    ProblemError
+        The rate gives no samples.
+    """
+    duration = plan.trajectory.duration
+    rate = as_number(rate, "rate", above=0.0)
+    if not 1.0 <= rate * duration <= MOST_SAMPLES:
+        raise ProblemError(
+            f"rate is {rate:g} Hz, expected from {1.0 / duration:.4g} to "
+            f"{MOST_SAMPLES / duration:.4g}, so that the motion of {duration:.6g} s has samples, "
+            f"not too many"
+        )
+    envelope = plan.problem.envelope
+    limits = envelope.speed, envelope.acceleration, envelope.jerk
+    periods = int(np.ceil(duration * rate - _WHOLE))
+    for _ in range(_SLOWER):
+        factor = np.inf
+        while factor > 1.0:
+            pace = _even(plan.trajectory, periods, rate)
+            factor = slowdown_of(along(pace, plan.trajectory), limits)
+            # How much is too much differs with where samples lie.
+            periods += int(np.ceil(_PART * (factor - 1.0) * periods)) if factor > 1.0 else 0
+        found = _retimed(plan, (), pace)
+        factor = max((item.factor for item in found.certificate.findings), default=1.0)
+        if factor == 1.0 or not np.isfinite(factor):
+            break
+        periods = max(periods + 1, int(np.ceil(factor * periods)))
+    return found
+
+
+def _even(motion: Trajectory, periods: int, rate: float) -> Pace:
+    """Return the pace by which a motion takes so many periods of a rate, slower as a whole."""
+    t = np.arange(periods + 1) / rate
+    share = np.full(len(t), motion.duration / t[-1])
+    sigma = np.linspace(0.0, motion.duration, len(t))
+    return Pace(t, sigma, share, np.zeros(len(t)))
 
 
 def _with_remarks(plan: Plan, original: Path, acceleration: Array, jerk: Array) -> Plan:
