@@ -25,7 +25,7 @@ PATIENCE = 180.0
 SHORT: dict[str, list[str]] = {
     "acceptance.py": ["--count", "2"],
     "arms.py": ["--only", "panda_description", "--out", "out/short/chains.md"],
-    "batch.py": ["--count", "4", "--same", "2"],
+    "batch.py": ["--count", "12", "--same", "2"],
     "binding.py": ["--kind", "jerk"],
     "bought_margins.py": ["--count", "1", "--displacements", "2"],
     "certificate.py": ["--count", "1"],
