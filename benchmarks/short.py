@@ -65,7 +65,7 @@ SHORT: dict[str, list[str]] = {
     "raster.py": ["--only", "small"],
     "relaxed.py": ["--count", "6"],
     "remaining.py": ["--most", "2"],
-    "sensitivity.py": ["planning", "--only", "_FEWER"],
+    "sensitivity.py": ["transfer", "--only", "_SHORTCUTS"],
     "spirals.py": ["4"],
     "starts.py": ["--count", "2", "--out", "out/short/starts.csv"],
     "suite.py": ["--folder", "benchmarks/data/panda__1cube", "--out", "out/short/suite"],
