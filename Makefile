@@ -79,8 +79,9 @@ bench-margins: $(READY)  ## by how much part, tool and base may be displaced: 20
 bench-bought: $(READY)  ## margins of 5 mm and 0.5° of 40 plans, displaced and judged; what they have to cost
 	OMP_NUM_THREADS=1 $(BIN)/python benchmarks/bought_margins.py
 
-bench-place: $(READY)  ## where to put the part, against places all over the box: 30 problems
+bench-place: $(READY)  ## where to put the part, against places all over the box: 30 problems; 10 maps, against cold plans
 	OMP_NUM_THREADS=1 $(BIN)/python benchmarks/place.py --many 400
+	OMP_NUM_THREADS=1 $(BIN)/python benchmarks/place.py --maps 5 --count 10
 
 bench-fastest: $(READY)  ## 60 paces against linear programmes; the fastest motions of 20 paths, against retimed plans
 	$(BIN)/python benchmarks/paces.py

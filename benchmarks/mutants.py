@@ -7,8 +7,9 @@ cheapest first, until one fails.
 Survivors are told with what was changed. Those that change no result are listed in
 data/equivalent_mutants.toml with the reason, and are not counted.
 
-Left out, because every test or none would see them: decorators, annotations, and replacements that
-nobody writes for numbers (bits, shifts, remainders, identity).
+Left out, because every test or none would see them: decorators, annotations, what is called only in
+order to be compiled (`meanwhile`), and replacements that nobody writes for numbers (bits, shifts,
+remainders, identity).
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ import ast
 import importlib
 import importlib.abc
 import importlib.machinery
+import inspect
 import os
 import random
 import shlex
@@ -30,7 +32,8 @@ from collections.abc import Iterator, Mapping
 from importlib.machinery import ModuleSpec
 from importlib.util import spec_from_file_location
 from pathlib import Path
-from typing import Annotated, NamedTuple, NoReturn
+from types import FunctionType, ModuleType
+from typing import Annotated, Any, NamedTuple, NoReturn
 
 import numba
 import pytest
@@ -38,6 +41,7 @@ import typer
 from cosmic_ray.ast import ast_nodes, get_ast
 from cosmic_ray.mutating import mutate_code
 from cosmic_ray.plugins import get_operator, operator_names
+from numba.core.caching import FunctionCache
 from rich.console import Console
 from rich.table import Table
 
@@ -45,6 +49,9 @@ HERE = Path(__file__).parent
 SOURCE = HERE.parent / "src" / "selfmotion"
 TESTS = HERE.parent / "tests"
 EQUIVALENT = HERE / "data" / "equivalent_mutants.toml"
+# How long tests may take: this, what compiles anew where a kernel is at fault, and so many times
+# what they take of the code as it is [s].
+PATIENCE, COMPILING, TIMES = 10.0, 120.0, 5.0
 
 _BINARY = (
     *("Add_Sub", "Add_Mul", "Sub_Add", "Sub_Mul", "Mul_Add", "Mul_Div", "Div_Mul", "Div_Sub"),
@@ -201,6 +208,16 @@ class Mutant(NamedTuple):
     after: str
     source: str
 
+    @property
+    def module(self) -> str:
+        """The name of its module."""
+        return "selfmotion." + self.file.removesuffix(".py").replace("/", ".")
+
+    @property
+    def compiles(self) -> bool:
+        """Whether there are kernels in its file."""
+        return any(f"\n@{name}\n" in self.source for name in ("kernel", "called", "inlined"))
+
 
 def sample_of(part: Part, count: int, seed: int) -> tuple[list[Mutant], int]:
     """Return `count` mutants of a part, by a seed, and how many there are in all."""
@@ -228,10 +245,13 @@ def _places(text: str) -> Iterator[tuple[str, int]]:
 
 
 def _noise(text: str) -> list[tuple[tuple[int, int], tuple[int, int]]]:
-    """Return where decorators and annotations are, and stars between parameters."""
+    """Return where decorators, annotations, stars between parameters and calls of kernels are."""
     found: list[ast.AST] = []
     for node in ast.walk(ast.parse(text)):
-        found += getattr(node, "decorator_list", [])
+        decorators = getattr(node, "decorator_list", [])
+        found += decorators
+        if any(ast.unparse(x) == "meanwhile" for x in decorators):
+            found.append(node)
         found += [
             x for x in (getattr(node, "annotation", None), getattr(node, "returns", None)) if x
         ]
@@ -255,7 +275,7 @@ class _Instead(importlib.abc.MetaPathFinder):
 
     def __init__(self, mutant: Mutant) -> None:
         self._file, self._source = SOURCE / mutant.file, mutant.source
-        self._name = "selfmotion." + mutant.file.removesuffix(".py").replace("/", ".")
+        self._name = mutant.module
 
     def find_spec(self, name: str, path: object = None, target: object = None) -> ModuleSpec | None:
         if name != self._name:
@@ -271,6 +291,33 @@ class _Instead(importlib.abc.MetaPathFinder):
 
     def _data(self, path: str) -> bytes:
         return self._source.encode()
+
+
+def _compile_with(module: str) -> None:
+    """Compile kernels anew that are of a module, or call what is; keep no kernel.
+
+    Numba knows a kept one by its bytecode, without the numbers in it and what it calls.
+    """
+    load = FunctionCache.load_overload
+
+    def load_others(cache: Any, *given: Any) -> Any:
+        return None if _reaches(cache._py_func, module, set()) else load(cache, *given)
+
+    FunctionCache.load_overload = load_others
+    FunctionCache.save_overload = lambda *_: None
+
+
+def _reaches(function: FunctionType, module: str, seen: set[FunctionType]) -> bool:
+    """Return whether a function is of a module, or calls one that is."""
+    if function.__module__ == module:
+        return True
+    seen.add(function)
+    found = inspect.getclosurevars(function)
+    used = [*found.globals.values(), *found.nonlocals.values()]
+    used += [getattr(x, n, None) for x in used if isinstance(x, ModuleType) for n in found.unbound]
+    called = {getattr(x, "py_func", x) for x in used if callable(x)}
+    functions = {x for x in called if isinstance(x, FunctionType)} - seen
+    return any(_reaches(x, module, seen) for x in functions)
 
 
 def fails(part: Part, tests: str, mutant: Mutant | None, patience: float, log: Path) -> str:
@@ -297,6 +344,7 @@ def _test(part: Part, tests: str, mutant: Mutant | None, log: Path) -> NoReturn:
         os.dup2(out.fileno(), 2)
     if mutant is not None:
         sys.meta_path.insert(0, _Instead(mutant))
+        _compile_with(mutant.module)
     given = ["-x", "-q", "-p", "no:cacheprovider", "-p", "no:xdist", f"--rootdir={TESTS.parent}"]
     given += ["--arms", "few"]
     if not part.compiled:
@@ -338,7 +386,7 @@ def main(
                 began = time.monotonic()
                 if fails(one, tests, None, 600.0, log):
                     sys.exit(f"{tests} fails on the code as it is:\n{log.read_text()}")
-                patience[tests] = 10.0 + 5.0 * (time.monotonic() - began)
+                patience[tests] = PATIENCE + TIMES * (time.monotonic() - began)
             longest = max(patience.values())
             sample, of_all = sample_of(one, count, seed)
             ends = Counter[str]()
@@ -347,8 +395,9 @@ def main(
                 if reason is not None:
                     ends["equivalent"] += 1
                     continue
+                more = COMPILING if mutant.compiles else 0.0
                 reasons_to_fail = (
-                    fails(one, x, mutant, patience.get(x, longest), log)
+                    fails(one, x, mutant, patience.get(x, longest) + more, log)
                     for x in one.tests_of(mutant)
                 )
                 why = next(filter(None, reasons_to_fail), "")

@@ -3,7 +3,9 @@
 `selfmotion.place` against places all over the box, each planned on its own, the best of which go
 downhill. The seams, one or three, are random, above a block that belongs to the part, beside a wall
 that does not. Times are those of the processor, costs those of verified motions. What an exhaustive
-grid of 10,000 places would take follows from what one place takes.
+grid of 10,000 places would take follows from what one place takes. With `--maps`, what a map around
+each place says is held against cold plans: whether every 'no plan' is one, and no cell is cheaper
+than the place that was found.
 """
 
 from __future__ import annotations
@@ -24,6 +26,9 @@ ARMS = (("panda", "pose"), ("xarm7", "pose"), ("ur5", "position"))
 WITHIN = {"x": (-0.2, 0.2), "y": (-0.25, 0.25), "yaw": (-0.6, 0.6)}
 # Places of an exhaustive grid.
 EXHAUSTIVE = 10_000
+# A map says 'no plan' wrongly where a cold plan has a motion within this time of it [s]; a cell is
+# cheaper than the best place where it is by more than this share.
+COLD, CHEAPER = 30.0, 0.005
 # Tries of seams of which a motion is known.
 TRIES = 20
 
@@ -76,15 +81,40 @@ def best_of_many(
     return min(arrived, key=lambda one: one.cost), len(sound), each
 
 
+def judged_map(found: sm.Placement, places: Places, points: int) -> tuple[int, int, int, float]:
+    """Return of a map its cells, those of no plan, how many of these have one, and its least cost.
+
+    The cost as a share of that of the place that was found.
+    """
+    drawn, names = found.map(points=points), list(found.place)
+    none, wrong = np.argwhere(np.isnan(drawn.costs)), 0
+    for i, j in none:
+        values = {**found.place, drawn.names[0]: drawn.across[j], drawn.names[1]: drawn.up[i]}
+        problems = places.at(np.array([values[name] for name in names]))
+        wrong += all(is_planned(problem) for problem in problems)
+    least = float(np.nanmin(drawn.costs, initial=np.inf)) / found.cost
+    return drawn.costs.size, len(none), wrong, least
+
+
+def is_planned(problem: sm.Problem) -> bool:
+    """Return whether a cold plan is verified."""
+    try:
+        return sm.plan(problem, deadline=COLD).certificate.verified
+    except sm.SelfmotionError:
+        return False
+
+
 def main(
     count: Annotated[int, typer.Option(help="How many problems.")] = 30,
     seed: Annotated[int, typer.Option(help="Of the first problem.")] = 0,
     many: Annotated[int, typer.Option(help="How many places are planned.")] = EXHAUSTIVE,
     refined: Annotated[int, typer.Option(help="From how many of these it goes downhill.")] = 10,
+    maps: Annotated[int, typer.Option(help="Only maps of so many cells a side, judged.")] = 0,
 ) -> None:
     """Place each, look everywhere, and compare."""
     console = Console(stderr=True)
     ratios, shares, unverified = [], [], 0
+    judged: list[tuple[int, int, int, float]] = []
     names = tuple(WITHIN)
     box = Box(*np.array([WITHIN[name] for name in names]).T)
     with Progress(console=console, transient=True) as told:
@@ -96,6 +126,15 @@ def main(
             placed = time.process_time() - began
             unverified += not all(plan.check().verified for plan in found.plans)
             places = places_of(seams, "part", ["block"], None, names)
+            if maps:
+                judged.append(judged_map(found, places, maps))
+                cells, none, wrong, least = judged[-1]
+                print(
+                    f"{number} {seams[0].robot.name}, {len(seams)} seams: of {cells} cells {none} "
+                    f"without a plan, {wrong} of them wrongly; cheapest {least:.4f} of the best",
+                    flush=True,
+                )
+                continue
             best, sound, each = best_of_many(places, box, many, refined, told)
             ratios.append(found.cost / best.cost)
             shares.append(placed / (EXHAUSTIVE * each))
@@ -105,6 +144,14 @@ def main(
                 f"{ratios[-1]:.4f}; {placed:.1f} s, {shares[-1]:.2%} of a grid of {EXHAUSTIVE}",
                 flush=True,
             )
+    if maps:
+        cells, none, wrong, least = np.array(judged).T
+        print(
+            f"{count} maps: {int(wrong.sum())} of {int(none.sum())} cells without a plan have one, "
+            f"{int((least < 1.0 - CHEAPER).sum())} maps have a cell that is more than "
+            f"{CHEAPER:.1%} below the best place; cheapest {least.min():.4f} of it"
+        )
+        raise SystemExit(int(wrong.any() or (least < 1.0 - CHEAPER).any()))
     print(
         f"{count} problems: cost of the place found, against the best of {many} places and of what "
         f"{refined} of them lead to: median {np.median(ratios):.4f}, worst {np.max(ratios):.4f}; "

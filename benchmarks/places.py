@@ -146,7 +146,7 @@ def main(
     """Plan at every place, and tell how often a 'yes' is missed and how fast a 'no' is."""
     console, rows = Console(), []
     # So that compiling is nobody's time.
-    for number in range(12):
+    for number in range(min(12, count)):
         answer(place(number))
     for number in track(range(seed, seed + count), "places", console=console, transient=True):
         problem = place(number)

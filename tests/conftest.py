@@ -1,6 +1,7 @@
 """Arms, tasks and paths that the laws are checked on."""
 
-from collections.abc import Callable
+import gc
+from collections.abc import Callable, Generator
 
 import pytest
 
@@ -9,6 +10,17 @@ from selfmotion.basics import Array
 from support.arms import CASES, PANDA_HOME, robot_named, short_line, start_of
 
 pytest_plugins = ("support.durations",)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collection() -> Generator[None, object, object]:
+    """Leave all tests out of garbage collections: thousands of them stay to the end anyway."""
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.freeze()
+        gc.enable()
 
 
 @pytest.fixture(params=sorted({name for name, _ in CASES}))

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import coal
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -403,3 +404,8 @@ def test_lever_arms_of_a_planar_arm_by_hand(tmp_path) -> None:
     pairs = dict(zip(model.pairs, model.pair_levers, strict=True))
     np.testing.assert_allclose(pairs["a", "c"], [0.0, 1.0, 0.6], atol=EXACT)
     np.testing.assert_allclose(pairs["c", "post"], [1.2, 1.0, 0.6], atol=EXACT)
+
+
+def test_what_is_no_mesh_has_an_inside() -> None:
+    assert Solid(coal.Box(0.1, 0.2, 0.3), "box").is_closed
+    assert Solid(coal.Sphere(0.1), "ball").is_closed

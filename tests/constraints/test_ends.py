@@ -111,3 +111,34 @@ def test_end_conditions_that_contradict_each_other_are_named(panda_circle: Circl
     )
     assert not plan.certificate.verified
     assert "not all constraints could be met" in plan.report.message
+
+
+def test_what_is_asked_of_rates_sets_them_at_its_end_alone() -> None:
+    asked = sm.constraints
+    rates = {
+        asked.StartVelocity: ((True, False), (False, False)),
+        asked.EndVelocity: ((False, True), (False, False)),
+        asked.StartAcceleration: ((False, False), (True, False)),
+        asked.EndAcceleration: ((False, False), (False, True)),
+    }
+    for kind, (velocity, acceleration) in rates.items():
+        assert kind.sets_velocity == velocity
+        assert kind.sets_acceleration == acceleration
+
+
+@pytest.mark.parametrize("off", [1e-7, 1e-4])
+def test_a_start_velocity_that_the_path_does_not_have_is_refused(
+    panda: sm.RobotModel, off: float
+) -> None:
+    path = short_line(panda, PANDA_HOME)
+    joint_rates = np.linalg.pinv(panda.jacobian(PANDA_HOME)) @ np.array([off, 0, 0, 0, 0, 0])
+    asked = [sm.constraints.StartVelocity(joint_rates)]
+
+    def posed() -> sm.Problem:
+        return sm.Problem(panda, path, start=PANDA_HOME, constraints=asked)
+
+    if off > 1e-6:
+        with pytest.raises(sm.errors.ProblemError, match="the start velocity moves"):
+            posed()
+    else:
+        posed()

@@ -14,7 +14,7 @@ from selfmotion.constraints import NodeTangents
 from selfmotion.costs import Samples
 from selfmotion.follow import AugmentedFollows, Follows
 from selfmotion.motion import Sampling
-from selfmotion.problem.of_arm import RowWithinBand, WithinBand
+from selfmotion.problem.of_arm import RowWithinBand, WithinBand, springs
 from support.arms import PANDA_HOME, robot_named
 from support.nodes import around_of, centred, moved, nodes_of, random_step
 
@@ -22,6 +22,8 @@ from support.nodes import around_of, centred, moved, nodes_of, random_step
 ROUNDING = 1e-12
 # Central differences over 1e-6: their truncation, and rounding over the step.
 GRADIENT = 1e-7
+# Of turns, coordinates shorten a deviation by their own share only to first order.
+BENT = 0.1
 # Central differences of a whole motion's cost, relative to the largest entry.
 COST = 1e-7
 
@@ -240,3 +242,43 @@ def test_gradients_along_nodes_equal_central_differences(
     gradient = np.einsum("konw,kon->kw", around_of(here).changes, force)
     exact = (aims[0] - aims[1]) / (2.0 * size)
     assert abs(float((gradient * direction).sum()) - exact) < COST * np.abs(gradient).sum()
+
+
+def test_springs_have_exact_slopes() -> None:
+    follows = Follows.of(robot_named("panda"), sm.paths.Dwell(pin.SE3.Identity(), 1.0), "pose")
+    q, cost = np.random.default_rng(0).normal(size=(3, 7)), springs(np.linspace(0.0, 2.0, 7))
+
+    def along(x: Array) -> Samples:
+        return Samples.along(follows, Sampling.trapezoidal(np.arange(3.0)), x, np.zeros_like(x))
+
+    exact = differences(lambda x: cost.value(along(x)), q)
+    np.testing.assert_allclose(cost.gradient(along(q)).q, exact, atol=GRADIENT)
+    np.testing.assert_allclose(np.diag(cost.curvature(7)[0]) * q, exact, atol=GRADIENT)
+
+
+@pytest.mark.parametrize("relaxations", [item[2] for item in TOLERANCES[1:5]])
+def test_what_is_brought_within_bands_deviates_by_no_more(relaxations: list[sm.Relaxation]) -> None:
+    """Of tolerances of several rows; what is within them may stay where it is."""
+    robot = robot_named("panda")
+    real = Follows.of(robot, sm.paths.Dwell(pin.SE3.Identity(), 1.0), "pose")
+    follows = AugmentedFollows.with_tolerances(real, relaxations)
+    count = len(follows.virtual.each)
+    q = np.zeros((40, robot.dof + count))
+    bands = [follows.virtual.widest([joint.row]) / joint.scale for joint in follows.virtual.each]
+    far = np.where(np.isfinite(bands), bands, 1.0)
+    q[:, -count:] = far * np.random.default_rng(2).normal(scale=0.7, size=(40, count))
+    if follows.virtual.swing is not None:
+        first, second = follows.virtual.swing
+        q[:, robot.dof + second] = q[:, robot.dof + first]
+    most = follows.within_bands(q)
+    there = np.clip(q, -most, most)
+    for item in relaxations:
+        if len(item.rows) == 1 or not np.isfinite(item.band):
+            continue
+        sizes = [np.linalg.norm(follows.deviation(item, x), axis=1) for x in (q, there)]
+        beyond = sizes[0] > item.band
+        assert beyond.any()
+        # They are brought to the edge, and no farther in.
+        assert (sizes[1] < (1.0 + BENT) * item.band).all()
+        assert (sizes[1][beyond] > (1.0 - BENT) * item.band).all()
+        np.testing.assert_allclose(sizes[1][~beyond], sizes[0][~beyond])

@@ -38,3 +38,15 @@ def test_compiled_parts_are_those_in_python() -> None:
         np.testing.assert_array_equal(
             compiled(table.qd_of)(rows, s, 7), kernels.stage_of(rows, 7, 6).qd[s]
         )
+
+
+def test_a_matrix_is_a_view_of_itself() -> None:
+    """As kernels take the matrix of one node, with what is compiled turned off as well."""
+    matrices = np.random.default_rng(0).normal(size=(3, 7, 4))
+
+    def whole(x: np.ndarray) -> np.ndarray:
+        return table.view(x, 0, (7, 4))
+
+    for matrix in matrices:
+        np.testing.assert_array_equal(whole(matrix), matrix)
+        np.testing.assert_array_equal(compiled(whole)(matrix), matrix)

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from support.arms import Case
+import selfmotion as sm
+from support.arms import Case, robot_named, start_of
 from support.nodes import around_of, centred, moved, nodes_of, problem_of, random_step
 
 # Newton's method stops there [m, rad]; what follows from it is rounding.
@@ -127,3 +128,33 @@ def test_towards_a_configuration(case: Case) -> None:
     np.testing.assert_allclose(quick.place.q[0], start, atol=1e-9)
     apart = [np.linalg.norm(one.place.q[-1] - wanted) for one in (quick, slow)]
     assert apart[0] <= apart[1] + 1e-9
+
+
+def test_from_rest_to_rest_where_no_time_is_given() -> None:
+    """Along a self-motion of a path that stands still, as 10 u³ - 15 u⁴ + 6 u⁵ rises."""
+    robot = robot_named("planar_3r")
+    start = start_of(robot, "planar")
+    still = sm.paths.Dwell(robot.pose(start), 2.0)
+    grid = nodes_of(problem_of((robot, sm.Task.PLANAR, start, still)), 40).grid
+    wanted = start + 0.01 * grid.problem.follows.null_basis(start)[:, 0]
+    motion = grid.motion_towards(start, wanted)
+    assert motion is not None
+    u = grid.t / grid.t[-1]
+    way = (motion.place.q - start) @ (wanted - start) / np.sum((wanted - start) ** 2)
+    np.testing.assert_allclose(way, u**3 * (10.0 - 15.0 * u + 6.0 * u**2), atol=1e-2)
+    assert way[-1] > 0.99
+
+
+def test_charts_of_motions_side_by_side_are_those_of_each_alone(case: Case) -> None:
+    """Each begins anew, with the basis that its first node has."""
+    motion = nodes_of(problem_of(case), 6)
+    many = motion.grid.copied(3).manifolds
+    own = motion.place.q, motion.place.qd, motion.place.qdd
+    together = many.near(*(np.tile(x, (3, 1)) for x in own))
+    alone = motion.grid.manifolds.near(*own)
+    assert together is not None
+    assert alone is not None
+    for k in range(3):
+        rows = slice(7 * k, 7 * (k + 1))
+        np.testing.assert_allclose(together.charts.bases[rows], alone.charts.bases, atol=1e-9)
+        np.testing.assert_allclose(together.nu[rows], alone.nu, atol=1e-9)

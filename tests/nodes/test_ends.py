@@ -7,6 +7,7 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.nodes import Step, minimise
+from selfmotion.nodes.ends import NodeEnds
 from selfmotion.optimise import Status
 from support.arms import PANDA_HOME, Case
 from support.nodes import around_of, centred, moved, nodes_of, problem_of, random_step
@@ -218,3 +219,18 @@ def test_limits_hardly_above_the_mean_speed_are_kept(planar: sm.RobotModel, shar
     limits[0] = sm.constraints.JointVelocityLimits(0.99 * mean)
     slow = sm.plan(sm.Problem(planar, dwell, "planar", start, constraints=limits, clearance=None))
     assert not slow.certificate.verified
+
+
+def test_an_end_at_another_configuration_is_told(panda: sm.RobotModel) -> None:
+    """By how far it is from what is asked for, where its own coordinates do not tell."""
+    problem = circle(panda)
+    end = np.array(PANDA_HOME)
+    asked = sm.constraints.EndConfiguration(end).bind(problem.follows, end, end)
+    away = 0.3 * problem.follows.jacobian(end)[0] / np.linalg.norm(problem.follows.jacobian(end)[0])
+    nodes = np.tile(end, (4, 3, 1))
+    assert NodeEnds([asked]).elsewhere(nodes) == {}
+    nodes[-1, 0] += away
+    assert NodeEnds([asked]).elsewhere(nodes) == {"end configuration": pytest.approx(0.3)}
+    nodes[-1, 0] -= away
+    nodes[:-1, 0] += away
+    assert NodeEnds([asked]).elsewhere(nodes) == {}

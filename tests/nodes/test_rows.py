@@ -6,7 +6,7 @@ import pytest
 import selfmotion as sm
 from selfmotion.basics import Array
 from selfmotion.motion import Trajectory
-from selfmotion.nodes.rows import accelerates_of
+from selfmotion.nodes.rows import NodeRows, accelerates_of
 from selfmotion.nodes.spline import AT_CONTROLS, ORDERS, Quintic, unit_bases
 from selfmotion.robot import ToolRates
 from support.arms import PANDA_HOME
@@ -203,3 +203,25 @@ def test_rows_of_a_vector_bend_as_squares_do(panda: sm.RobotModel) -> None:
     # Of numbers there is nothing of that.
     limits = sm.constraints.Band.of_elbow("up").bind(problem.follows, PANDA_HOME, PANDA_HOME)
     assert limits.squares is None
+
+
+def test_limits_are_told_as_used_where_the_curve_uses_them(panda: sm.RobotModel) -> None:
+    """Not where only a control point is near: in shares of what each limit is."""
+    motion = motion_with(panda, "positions")
+    q, times = motion.trajectory, motion.grid.spline.times_of(0)
+    once = np.unique(times)
+    lower, upper = panda.finite_limits()
+    # As near to a limit as the curve comes, and as far as it is half of that.
+    highest = float(q(once)[:, 3].max())
+    upper[3] = highest + 1e-4
+    limits = sm.constraints.JointPositionLimits(lower, upper)
+    bound = limits.bind(motion.grid.problem.follows, q.q[0], q.q[-1])
+    rows = NodeRows(motion.grid.spline, [bound], 7)
+    ones = np.ones(rows.spline.count * 6 * 2 * len(bound.joints))
+    (found,) = rows.multipliers_of(ones, motion.curve_ends)
+    used = found.used.reshape(len(found.times), 2, -1)
+    joint = list(bound.joints).index(3)
+    expected = q(found.times)[:, 3] - upper[3] > -0.005
+    assert 0 < expected.sum() < len(expected)
+    np.testing.assert_array_equal(used[:, 0, joint], expected)
+    assert not used[:, 1, joint].any()

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.nodes.smoothness import quickness
+from selfmotion.nodes.smoothness import quickness, smoothing_of
+from selfmotion.nodes.spline import Quintic
 from support.arms import Case, robot_named, short_line, start_of
 from support.nodes import nodes_of, problem_of
 
@@ -64,3 +65,23 @@ def test_what_starts_too_slowly_for_its_cost_is_quicker(case: Case) -> None:
     much = quickness(problem, samples, 1e-3 * cost, 1.0)
     more = quickness(problem, samples, 1e-4 * cost, 1.0)
     assert 0.0 < more <= much < 1.0
+
+
+def test_what_is_held_for_a_while_begins_and_ends_without_a_jump() -> None:
+    """The cost of accelerations is largest where that begins and ends, and nothing far from it."""
+    robot, _, start, path = case_of("panda", "pose")
+    window = (0.4 * path.duration, 0.7 * path.duration)
+    held = sm.Relaxation("rz", 0.1, during=window)
+    problem = problem_of((robot, "pose", start, path), relaxations=[held]).augmented
+    t = np.linspace(0.0, path.duration, 201)
+    spline = Quintic(t)
+    found = smoothing_of(problem, spline, calm=False)
+    assert found is not None
+    times = spline.sampling.t
+    for order in (2, 3):
+        share = found.shares[order].ravel()
+        near = np.min([np.abs(times - edge) for edge in window], axis=0)
+        assert (share[near < 1e-3 * path.duration] > 0.9 * share.max()).all()
+        assert share[near > 0.1 * path.duration].max() < 0.5 * share.max()
+        for edge in window:
+            assert share[np.argmin(np.abs(times - edge))] == pytest.approx(share.max(), rel=1e-2)

@@ -48,10 +48,19 @@ class Seen:
         page.on("request", lambda request: self.requests.append(request.url))
 
 
-def opened(browser, file, **options):
+@pytest.fixture(scope="module")
+def context(browser):
+    """Return where pages are opened: those of one context share what is compiled to draw them."""
     # Pixels are drawn without a graphics card: few are enough.
-    options = {"viewport": {"width": 640, "height": 480}, "reduced_motion": "reduce", **options}
-    page = browser.new_context(**options).new_page()
+    return browser.new_context(viewport={"width": 640, "height": 480}, reduced_motion="reduce")
+
+
+def opened(context, file, *, viewport=None, reduced_motion=None):
+    page = context.new_page()
+    if viewport is not None:
+        page.set_viewport_size(viewport)
+    if reduced_motion is not None:
+        page.emulate_media(reduced_motion=reduced_motion)
     page.seen = Seen(page)
     page.goto(file.as_uri())
     page.wait_for_selector("html[data-replay=ready]", timeout=60_000)
@@ -59,25 +68,25 @@ def opened(browser, file, **options):
 
 
 @pytest.fixture
-def open_page(browser):
+def open_page(context):
     pages = []
 
     def open_file(file, **options):
-        pages.append(opened(browser, file, **options))
+        pages.append(opened(context, file, **options))
         return pages[-1]
 
     yield open_file
     for page in pages:
-        page.context.close()
+        page.close()
 
 
 @pytest.fixture(scope="module")
-def pages(browser, files):
-    """Open the page of each arm; shaders are compiled anew for each that is opened."""
-    found = {name: opened(browser, files[name]) for name in ("planar", "panda", "ur5")}
+def pages(context, files):
+    """Open the page of each arm; scenes are set up anew for each that is opened."""
+    found = {name: opened(context, files[name]) for name in ("planar", "panda", "ur5")}
     yield found
     for page in found.values():
-        page.context.close()
+        page.close()
 
 
 def assert_quiet(page):

@@ -1,5 +1,7 @@
 """Chains moved to where they are shortest: on the path, within all that they kept, at a minimum."""
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 
@@ -7,8 +9,9 @@ import selfmotion as sm
 from selfmotion.basics import Array
 from selfmotion.follow import Follows
 from selfmotion.search.manifold import OnPath
+from selfmotion.search.measures import Length, RunningCost
 from selfmotion.search.nodes import Admissible
-from selfmotion.search.shortest import Shortest
+from selfmotion.search.shortest import Shortest, improved_by
 from support.arms import robot_named
 from support.paths import line_of
 
@@ -21,13 +24,13 @@ ON_PATH, GAIN = 1e-9, 5e-3
 class Chain:
     """A jagged chain of an arm whose tool goes along a line."""
 
-    def __init__(self, name: str) -> None:
+    def __init__(self, name: str, task: str = "position") -> None:
         self.robot = robot = robot_named(name)
-        self.path = line_of(robot, "position")
+        self.path = line_of(robot, task)
         self.t = np.linspace(0.0, self.path.duration, COUNT)
-        follows = Follows.of(robot, self.path, sm.Task.POSITION)
+        follows = Follows.of(robot, self.path, task)
         self.waypoints = OnPath(follows, self.t, robot.lower, robot.upper)
-        q = np.array(robot.inverse_kinematics(self.path.pose(0.0), task="position"))[None]
+        q = np.array(robot.inverse_kinematics(self.path.pose(0.0), task=task))[None]
         rng, found = np.random.default_rng(0), []
         for i in range(COUNT):
             guess = q + rng.normal(scale=0.05, size=q.shape)
@@ -87,3 +90,31 @@ def test_it_goes_round_what_the_chain_kept_clear_of() -> None:
     shorter = chain.shortest(kept)
     assert kept.keep(shorter).all()
     assert chain.length(shorter) < 0.8 * chain.length(chain.q)
+
+
+def best_of(chain: Chain, measure: Length | RunningCost) -> Callable[[Array, bool], Array]:
+    steps = np.full((COUNT - 1, chain.robot.dof), 0.5)
+    return improved_by(chain.waypoints, chain.kept(), steps, measure)
+
+
+@pytest.mark.parametrize(("name", "task"), [("panda", "position"), ("panda", "pose")])
+def test_along_curves_samples_lead_on_from_what_moving_aside_finds(name: str, task: str) -> None:
+    """With more freedom they are too many: what moves aside is the last word, as it is roughly."""
+    chain = Chain(name, task)
+    measure = Length(chain.robot.joint_weights)
+    better = best_of(chain, measure)
+    aside, whole = chain.shortest(chain.kept()), better(chain.q, False)
+    if chain.waypoints.redundancy > 1:
+        np.testing.assert_array_equal(whole, aside)
+    else:
+        assert chain.length(whole) < chain.length(aside)
+    assert chain.length(whole) <= chain.length(better(chain.q, True)) < chain.length(chain.q)
+
+
+def test_what_costs_more_than_its_length_becomes_cheaper() -> None:
+    chain = Chain("panda", "pose")
+    costs = [sm.costs.JointVelocity(), sm.costs.InverseManipulability(1e-3)]
+    measure = RunningCost.by(Follows.of(chain.robot, chain.path, "pose"), costs, chain.t)
+    found = best_of(chain, measure)(chain.q, False)
+    assert measure.of(found) < 0.9 * measure.of(chain.q)
+    assert chain.kept().keep(found).all()

@@ -8,6 +8,7 @@ The list holds what took more than `LEAST`, of tests by their ids, and of fixtur
 tests share by their file and name; what is not on it counts as cheap.
 """
 
+import contextlib
 import csv
 import os
 from collections import Counter
@@ -16,6 +17,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+
+from selfmotion import NAMED_ARMS
 
 TESTS = Path(__file__).resolve().parents[1]
 KEPT = TESTS / "durations.csv"
@@ -42,9 +45,26 @@ def kept() -> dict[str, float]:
 
 
 def _spent() -> float:
-    """Return the time of the processor that this process and those that it waited for took [s]."""
+    """Return the time of the processor that this process and all that it began took [s]."""
     times = os.times()
-    return times.user + times.system + times.children_user + times.children_system
+    ended = times.user + times.system + times.children_user + times.children_system
+    return ended + _still_running(os.getpid()) / os.sysconf("SC_CLK_TCK")
+
+
+def _still_running(pid: int) -> float:
+    """Return the ticks of all processes below one that have not ended, such as browsers."""
+    found = 0.0
+    # What ends meanwhile is counted by who waits for it; where there is no /proc, only that is.
+    with contextlib.suppress(OSError):
+        for task in os.listdir(f"/proc/{pid}/task"):
+            for child in Path(f"/proc/{pid}/task/{task}/children").read_text().split():
+                with contextlib.suppress(OSError):
+                    times = (
+                        Path(f"/proc/{child}/stat").read_text().rpartition(")")[2].split()[11:15]
+                    )
+                    found += sum(map(float, times))
+                found += _still_running(int(child))
+    return found
 
 
 def _shared(item: Any) -> Iterator[tuple[str, str]]:
@@ -55,13 +75,14 @@ def _shared(item: Any) -> Iterator[tuple[str, str]]:
 
 
 def _is_of_few(item: pytest.Item) -> bool:
-    """Whether a test is about none of the arms that laws are checked on, or one of the few."""
+    """Whether a test is about none of the named arms, or about one of the few."""
     given = getattr(item, "callspec", None)
     params = {} if given is None else given.params
-    case, robot = params.get("case", params.get("arm")), params.get("robot")
+    case, names = params.get("case", params.get("arm")), {name for name, _ in FEW}
     if isinstance(case, tuple) and len(case) == 2 and all(isinstance(x, str) for x in case):
         return case in FEW
-    return not isinstance(robot, str) or robot in {name for name, _ in FEW}
+    named = {x for x in params.values() if isinstance(x, str) and x in NAMED_ARMS}
+    return named <= names
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
@@ -71,19 +92,30 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         _leave_out(config, items, [item for item in items if not _is_of_few(item)])
     most = config.getoption("--below")
     if most is not None:
-        users = Counter(key for item in items for key in _shared(item))
-
-        def cost(item: pytest.Item) -> float:
-            # Of what is shared each has its part.
-            parts = (took.get("::".join(key), 0.0) / users[key] for key in _shared(item))
-            return took.get(item.nodeid, 0.0) + sum(parts)
-
-        _leave_out(config, items, [item for item in items if not cost(item) < most])
+        _leave_out(config, items, _dearer(items, took, most))
     of_file = Counter[str]()
     for name, seconds in took.items():
         of_file[name.split("::")[0]] += seconds  # type: ignore[assignment]  # seconds
     # No worker is left alone with a long one at the end; the order within a file stays.
     items.sort(key=lambda item: -of_file[item.nodeid.split("::")[0]])
+
+
+def _dearer(items: list[pytest.Item], took: dict[str, float], most: float) -> list[pytest.Item]:
+    """Return the tests that take as much: of what several share, each that is left has its part."""
+    out, left = list[pytest.Item](), [x for x in items if took.get(x.nodeid, 0.0) < most]
+    out += [x for x in items if not took.get(x.nodeid, 0.0) < most]
+    while True:
+        users = Counter(key for item in left for key in _shared(item))
+
+        def cost(item: pytest.Item, users: Counter[tuple[str, str]] = users) -> float:
+            parts = (took.get("::".join(key), 0.0) / users[key] for key in _shared(item))
+            return took.get(item.nodeid, 0.0) + sum(parts)
+
+        more = [item for item in left if not cost(item) < most]
+        if not more:
+            return out
+        out += more
+        left = [item for item in left if cost(item) < most]
 
 
 def _leave_out(
@@ -97,6 +129,8 @@ def _leave_out(
 @pytest.hookimpl(wrapper=True)
 def pytest_fixture_setup(fixturedef: Any, request: Any) -> Generator[None, Any, Any]:
     """Note what a fixture that several tests share takes."""
+    if not request.config.getoption("--keep-durations"):
+        return (yield)
     began = _spent()
     found = yield
     if fixturedef.scope in _SCOPES:
@@ -116,9 +150,8 @@ _IN_FIXTURES: Any = pytest.StashKey[float]()
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, Any, Any]:
     """Note what a test takes, without what it shares with others."""
-    stash = item.config.stash
-    shared, began = stash.get(_IN_FIXTURES, 0.0), _spent()
-    item.stash[_BEGAN] = (began, shared)
+    if item.config.getoption("--keep-durations"):
+        item.stash[_BEGAN] = (_spent(), item.config.stash.get(_IN_FIXTURES, 0.0))
     return (yield)
 
 

@@ -57,11 +57,16 @@ def composed(outer: Array, inner: Array) -> Array:
 
     The outer one's coefficients are per unit of g.
     """
-    moved = inner.copy()
-    moved[0] = 0.0
+    length = len(inner)
+    moved = np.zeros((2 * length - 1, *inner.shape[1:]))
+    moved[length:] = inner[1:]
+    # By row and column: what multiplies a coefficient, of g without its first, for the later ones.
+    by = moved[np.arange(length)[:, None] - np.arange(length) + length - 1]
     found = np.zeros_like(inner)
-    for coefficient in outer[::-1]:
-        found = product(found, moved)
+    # Horner's scheme: each product shifts by one at least, so that the first ones need few terms.
+    for left, coefficient in zip(range(len(outer) - 1, -1, -1), outer[::-1], strict=True):
+        k = max(length - left, 1)
+        found[:k] = np.einsum("kji,ji->ki", by[:k, :k], found[:k])
         found[0] += coefficient
     return found
 

@@ -16,9 +16,13 @@ from selfmotion.basics import Array, inlined
 def view(row: Array, first: int, shape: tuple[int, ...]) -> Array:
     """Return a view of a part of a row (or of each row of a table), as an array of `shape`.
 
+    An array of that shape is one of itself.
+
     Compiled, it is an address and a shape. A slice with `reshape` would be the same at a multiple
     of the price of a stage's arithmetic: it checks, copies if it must, and counts references.
     """
+    if row.shape == shape:
+        return row
     return row[..., first : first + prod(shape)].reshape(row.shape[:-1] + shape)
 
 
