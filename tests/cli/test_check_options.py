@@ -77,8 +77,8 @@ def test_what_is_not_judged_is_said_in_words_of_the_shell(tmp_path: Path) -> Non
         ("fast.script", "line 2: a stream of servoj is not read; only programs of linear motions"),
         (
             "bad.mod",
-            "line 2: 'MoveL p1;' is not read: selfmotion did not write this program, and "
-            "page 'Files' of the docs lists what is",
+            "line 2: 'MoveL p1;' is not read: selfmotion did not write this program, and only the "
+            "statements that it writes are read; of another one judge the recorded motion",
         ),
         ("a.doc", "is no motion that is read: expected .csv, "),
     ):
@@ -160,6 +160,8 @@ def test_no_option_is_left_without_an_effect(plan: Path) -> None:
     refused = {"robot", "path", "task", "tool", "reference", "lock", "degrees"}
     refused |= {"argument", "packages", "no_collision", *documents.OF_PATH}
     judged = {"velocity", "acceleration", "joint_limits", "obstacles", "clearance", "srdf"}
+    # What --disabled does is in tests/documents/test_cases.py.
+    judged |= {"disabled"}
     # What a calibration does is in tests/robot/test_calibration.py.
     assert names == refused | judged | {"tolerance", "calibration"}
 

@@ -229,6 +229,8 @@ def test_links_of_a_telescope_are_told_in_one_go_and_left_out_when_asked(tmp_pat
     assert {",".join(pair) for pair in clearance.disabled} == set(TELESCOPE)
     # Those that are left are looked at.
     fewer = out[:-2]
+    assert invoke("check", tmp_path / "x.npz", *out)[0] == 0
+    assert invoke("check", tmp_path / "x.npz", *fewer)[0] == 1
     assert "a1 - a3 overlap by" in invoke("plan", tubes, *asked, *start, *fewer, "--verbose")[1]
     said = complaint("plan", tubes, *asked, *start, "--disabled", "mast")
     assert "--disabled is 'mast', expected two links" in said

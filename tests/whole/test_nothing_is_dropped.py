@@ -205,7 +205,7 @@ def test_each_parameter_of_move_matters() -> None:
 def test_each_parameter_of_other_paces_matters() -> None:
     plan = sm.plan(sm.Problem(PANDA, line(), start=PANDA_HOME, clearance=None))
     base = sm.retime(plan).trajectory.digest
-    changed: dict[str, Any] = {"plan": None, "acceleration": 1.0, "velocity": 0.05}
+    changed: dict[str, Any] = {"plan": None, "acceleration": 1.0, "velocity": 0.05, "rate": 125.0}
     assert set(changed) == set(inspect.signature(sm.retime).parameters)
     for name, value in list(changed.items())[1:]:
         assert sm.retime(plan, **{name: value}).trajectory.digest != base, name
