@@ -27,7 +27,7 @@ BESIDE = (
 GALLERY = (
     "weld_seam", "weld_corner", "two_arms", "weld_positioner", "weld_downhand", "weld_torch",
     "part_in_hand", "painting", "weld_frame", "in_parts", "own_obstacle", "rail", "closed_loop",
-    "ur5_pointing",
+    "ur5_pointing", "mobile_base",
 )  # fmt: skip
 # What is played at the top of a how-to: the example that it is about.
 PLAYED = {

@@ -32,6 +32,7 @@ _COLUMNS = {"COLUMNS": "90"}
 GROUPS = {
     "Jobs": (
         "quickstart", "weld_seam", "deburring", "painting", "closed_loop", "ur5_pointing", "rail",
+        "mobile_base",
         "weld_corner", "weld_positioner", "weld_downhand", "weld_torch", "part_in_hand", "two_arms",
         "own_arm",
         "relaxed_rows", "in_parts", "paint_strokes", "weld_frame", "print_frame", "deburr_holes",
