@@ -17,6 +17,7 @@ from selfmotion.controllers import judged_program, program_miss
 from selfmotion.controllers.judged_programs import read_program
 from selfmotion.controllers.program_settings import axes_of, tool_from_flange
 from selfmotion.controllers.stretches import NO_MISS, ways
+from selfmotion.controllers.thinning import Piece, Span
 from selfmotion.job import Step
 from support.arms import PANDA_HOME, robot_named
 from support.industrial import two_seams
@@ -29,6 +30,8 @@ FILES = ("weld.src", "weld.mod")
 FINER = 1.02
 # Each stretch is longer or shorter by half a digit of time, at some rad/s.
 LATE = 2e-5
+# Share of a limit of speed that targets may take; targets are no nearer than half of 2 ms [s].
+FULL, CYCLE = 0.9995, 1e-3
 
 
 @pytest.fixture(scope="module")
@@ -715,3 +718,23 @@ def test_names_of_joints_come_back_from_every_file(form: str, tmp_path: Path) ->
         motion = sm.files.read_motion(file)
         assert motion.joint_names == robot.joint_names
         np.testing.assert_allclose(motion.q[0], start, atol=1e-6)
+
+
+def test_targets_are_not_nearer_than_a_controller_s_cycle() -> None:
+    """A joint as fast as its limit: the digits of angles pass it, however near targets are."""
+    ur5 = robot_named("ur5")
+    t = np.linspace(0.0, 2.0, 401)
+    # It starts and stops smoothly and goes evenly in between.
+    share = np.clip(np.minimum(t, 2.0 - t) / 0.4, 0.0, 1.0)
+    ramp = share**3 * (10.0 - 15.0 * share + 6.0 * share**2)
+    slope = np.gradient(ramp, t)
+    q = np.tile(ur5.dexterous_configuration("pointing"), (len(t), 1))
+    qd, qdd = np.zeros_like(q), np.zeros_like(q)
+    qd[:, 0], qdd[:, 0] = 0.3 * ramp, 0.3 * slope
+    q[:, 0] += np.concatenate([[0.0], np.cumsum(0.5 * (qd[1:, 0] + qd[:-1, 0]) * np.diff(t))])
+    motion = sm.Trajectory(t, q, qd, ur5.joint_names, qdd)
+    speeds = np.abs(motion(np.linspace(0.0, 2.0, 4001), 1)).max(axis=0) / FULL
+    piece = Piece("seam", motion, (), (ur5.chain,), speeds=np.maximum(speeds, 1e-9))
+    slides = np.zeros(ur5.dof, dtype=bool)
+    stretch, _ = Span.of(piece, slides, 0.0, 2.0).thinned(sm.Tolerance(1e-4, 1e-3))
+    assert np.diff(stretch.t).min() >= CYCLE

@@ -192,6 +192,9 @@ TIME_DIGITS, ANGLE_DIGITS, LENGTH_DIGITS = 5, 5, 4
 _SPARSE = 0.1
 # Share of what a feed leaves that may be taken where it is looked at: the worst is in between.
 _OF_FEED = 0.8
+# Steps are not made shorter than this [s]: no controller has shorter cycles, and the digits of
+# angles would be jumps of speed.
+_SHORTEST = 2e-3
 # Share of a limit of speed that the spline may use where the motion uses no more.
 _OF_SPEED = 0.9995
 # Times at which the motion's curvature is looked at, for each of its samples; targets at least
@@ -255,6 +258,9 @@ class Span:
                 break
             # With their neighbours, so that steps do not differ much.
             near = np.convolve(missed, np.ones(3), mode="same") > 0.0
+            near &= np.diff(t) > 2.0 * _SHORTEST
+            if not near.any():
+                break
             t = np.sort(np.append(t, 0.5 * (t[1:] + t[:-1])[near]))
         return stretch, self._miss(stretch)
 
