@@ -22,8 +22,8 @@ import numpy as np
 import typer
 
 import selfmotion as sm
-from selfmotion import replay
 from selfmotion.basics import Array
+from selfmotion.shell import replay
 
 PAGE = Path(__file__).parents[1] / "docs" / "chains.md"
 _HEAD = """# Every chain of example-robot-data

@@ -23,7 +23,7 @@ from rich.table import Table
 
 import selfmotion as sm
 from selfmotion.basics import Array
-from selfmotion.collision import CollisionModel
+from selfmotion.model.collision import CollisionModel
 
 ARMS = ("panda", "xarm7")
 # How many problems of each kind.

@@ -28,7 +28,7 @@ from rich.table import Table
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
 import selfmotion as sm
-from selfmotion.task import SE3, exp3
+from selfmotion.model.task import SE3, exp3
 from support.industrial import industrial_arm, two_seams
 from support.played_changes import Player
 from support.shell import invoke

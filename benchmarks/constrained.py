@@ -27,9 +27,9 @@ from rich.table import Table
 
 import selfmotion as sm
 from selfmotion.basics import Array
-from selfmotion.optimise import inverse_metric
-from selfmotion.paper import Objective, StillMotion, settled_still_motion
-from selfmotion.problem import problem_from_dict, problem_to_dict
+from selfmotion.planning.optimise import inverse_metric
+from selfmotion.planning.paper import Objective, StillMotion, settled_still_motion
+from selfmotion.problem.problem import problem_from_dict, problem_to_dict
 
 DATA = Path(__file__).parent / "data"
 PROBLEMS = DATA / "constrained_problems.json"

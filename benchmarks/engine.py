@@ -8,8 +8,8 @@ import numpy as np
 import pinocchio as pin
 
 import selfmotion as sm
-from selfmotion.motion import Grid
-from selfmotion.paper import Objective, StillMotion
+from selfmotion.model.motion import Grid
+from selfmotion.planning.paper import Objective, StillMotion
 
 
 def objective_on(problem: sm.Problem, steps: int) -> Objective:

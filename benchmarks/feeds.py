@@ -21,7 +21,7 @@ import numpy as np
 import pinocchio as pin
 
 import selfmotion as sm
-from selfmotion.problem import check_feeds
+from selfmotion.problem.problem import check_feeds
 
 ARMS = ("panda", "xarm7", "ur10", "kinova")
 # Times between which the tool's speed is measured [s], and what differences of positions miss.

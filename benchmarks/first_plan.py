@@ -33,7 +33,7 @@ with event.install_listener("numba:compile", counted):
     runpy.run_path(sys.argv[1], run_name="__main__")
 print(f"compiled: {counted.count}")
 """
-SHELL = "import sys; from selfmotion.cli import main; sys.exit(main())"
+SHELL = "import sys; from selfmotion.shell.cli import main; sys.exit(main())"
 # What needs other packages, or a robot's own software.
 LEFT_OUT = {"dask_cluster", "ros2_handover"}
 

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 import selfmotion as sm
-from selfmotion.task import SE3
+from selfmotion.model.task import SE3
 
 FOLDER = Path(__file__).parent / "data" / "frame__topopt100"
 # Of the nozzle and what heats it [m].

@@ -19,7 +19,7 @@ import numpy as np
 import trimesh
 
 import selfmotion as sm
-from selfmotion.task import SE3
+from selfmotion.model.task import SE3
 
 DOWN = np.diag([1.0, -1.0, -1.0])
 HOME = np.array(sm.NAMED_ARMS["panda"].home)
@@ -157,7 +157,7 @@ def batch(folder: Path, mesh: Path, shift: float) -> tuple[str, str]:
         )
         for y in (shift, shift - 0.15)
     ]
-    found = sm.batch.plan_many(problems, out=folder, workers=1)
+    found = sm.work.batch.plan_many(problems, out=folder, workers=1)
     plans = "".join("" if row.error else row.plan().trajectory.digest for row in found.rows)
     return "; ".join(row.verdict or row.error for row in found.rows), plans
 
@@ -183,7 +183,9 @@ def main() -> None:
                 elif way != "version":
                     WAYS[way](kept, rng)
                 said = "another" if way == "version" else sm.basics.version()
-                with mock.patch("selfmotion.result.archive.version", lambda said=said: said):
+                with mock.patch(
+                    "selfmotion.planning.result.archive.version", lambda said=said: said
+                ):
                     again = run(kept, mesh, shift)
                     once_more = run(kept, mesh, shift)
                 expected = run(fresh, mesh, shift)

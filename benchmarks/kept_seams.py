@@ -20,7 +20,7 @@ import typer
 from rich.console import Console
 
 import selfmotion as sm
-from selfmotion.task import SE3
+from selfmotion.model.task import SE3
 
 ARMS = ("panda", "xarm7", "ur10")
 CHANGES = ("added", "removed", "moved", "none")

@@ -129,7 +129,7 @@ def closed_loop(robot, task, costs, replanner, path, start):
     places, rates = np.concatenate(places), np.concatenate(rates)
     times = replanner.cycle * np.arange(len(places))
     samples = sm.costs.Samples.along(
-        sm.Follows.of(robot, path, task), sm.motion.Sampling.trapezoidal(times), places, rates
+        sm.Follows.of(robot, path, task), sm.model.motion.Sampling.trapezoidal(times), places, rates
     )
     return sum(float(samples.weights @ cost.value(samples)) for cost in costs), off
 

@@ -13,7 +13,7 @@ from scipy.optimize import linprog
 from scipy.sparse import coo_array, csr_array, vstack
 
 from selfmotion.basics import Array
-from selfmotion.motion import Trajectory
+from selfmotion.model.motion import Trajectory
 
 # HiGHS gives up on a programme after so many seconds.
 PATIENCE = 60.0

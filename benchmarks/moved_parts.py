@@ -19,7 +19,7 @@ from rich.console import Console
 
 import selfmotion as sm
 from selfmotion.basics import Array
-from selfmotion.task import SE3, rpy
+from selfmotion.model.task import SE3, rpy
 
 ARMS = ("panda", "xarm7", "ur10")
 # How far parts are moved [m] and turned [rad] at most.

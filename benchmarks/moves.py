@@ -11,9 +11,9 @@ import time
 import numpy as np
 
 import selfmotion as sm
-from selfmotion.problem import KEPT
-from selfmotion.task import SE3
-from selfmotion.transfer import FreeMotions, Room, rounded
+from selfmotion.model.task import SE3
+from selfmotion.planning.transfer import FreeMotions, Room, rounded
+from selfmotion.problem.problem import KEPT
 
 # Distance kept [m]; seconds in which a move should be found; looks at each that is found.
 APART, IN_TIME, LOOKS = 5e-3, 2.0, 4000

@@ -429,7 +429,7 @@ def _warm() -> None:
         "scipy.optimize",
         "scipy.interpolate",
         "daqp",
-        "selfmotion.testing",
+        "selfmotion.shell.testing",
     ):
         importlib.import_module(name)
     for name in [x for x in sys.modules if x.split(".")[0] in ("selfmotion", "support")]:

@@ -19,8 +19,8 @@ from rich.console import Console
 from rich.progress import Progress
 
 import selfmotion as sm
-from selfmotion.placement.places import Places, Tried, places_of
-from selfmotion.placement.search import Box, Descent, beginnings
+from selfmotion.work.placement.places import Places, Tried, places_of
+from selfmotion.work.placement.search import Box, Descent, beginnings
 
 ARMS = (("panda", "pose"), ("xarm7", "pose"), ("ur5", "position"))
 WITHIN = {"x": (-0.2, 0.2), "y": (-0.25, 0.25), "yaw": (-0.6, 0.6)}

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 import selfmotion as sm
-from selfmotion.study.expense import chain as planar_chain
+from selfmotion.paper.study.expense import chain as planar_chain
 
 DATA = Path(__file__).parent / "data"
 PANDA_HOME = np.array(sm.NAMED_ARMS["panda"].home)

@@ -29,8 +29,8 @@ from rich.table import Table
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
 import selfmotion as sm
-from selfmotion.controllers import PROGRAMS, program_miss, read_program
-from selfmotion.task import SE3, exp3
+from selfmotion.model.task import SE3, exp3
+from selfmotion.shop.controllers import PROGRAMS, program_miss, read_program
 from support.industrial import industrial_arm
 from support.played_programs import Read, off, read_poses
 

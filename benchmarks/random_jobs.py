@@ -15,7 +15,7 @@ import typer
 from rich.console import Console
 
 import selfmotion as sm
-from selfmotion.task import SE3
+from selfmotion.model.task import SE3
 
 # Looks at each step; distances may be off by rounding [m].
 LOOKS, ROUNDING = 400, 1e-9

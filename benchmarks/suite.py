@@ -22,7 +22,7 @@ from suite_judge import Judged, SuiteJudge
 
 import selfmotion as sm
 from selfmotion.basics import Array, Progress, write_atomically, write_csv
-from selfmotion.cli.tables import console
+from selfmotion.shell.cli.tables import console
 
 DATA = Path(__file__).parent / "data"
 

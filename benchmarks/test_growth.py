@@ -8,7 +8,7 @@ import pytest
 from engine import Measured, objective_on
 from problems import chain
 
-from selfmotion import kernels
+from selfmotion.model import kernels
 
 
 @pytest.mark.benchmark(group="growth in joints")

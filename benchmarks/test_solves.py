@@ -12,7 +12,7 @@ from engine import objective_on
 from problems import circle, suite_path
 
 import selfmotion as sm
-from selfmotion.study.published import (
+from selfmotion.paper.study.published import (
     PublishedFunction,
     published_null_motion,
     published_optimizer,
@@ -42,7 +42,7 @@ def jacobians_to(problem: sm.Problem, goal: float) -> int:
 
     On the first grid; with those of the null-space basis and the gradients, which need none.
     """
-    from selfmotion.optimise import inverse_metric
+    from selfmotion.planning.optimise import inverse_metric
 
     objective = objective_on(problem, FIRST_GRID)
     x = np.zeros(objective.size)
@@ -89,7 +89,7 @@ def test_scipy_bfgs(benchmark: Any, name: str) -> None:
 @pytest.mark.parametrize("name", list(PROBLEMS)[:5])
 def test_our_optimiser(benchmark: Any, name: str) -> None:
     """Our quasi-Newton method on the same objective, with H0 from the Gauss-Newton matrix."""
-    from selfmotion.optimise import inverse_metric
+    from selfmotion.planning.optimise import inverse_metric
 
     objective = objective_on(PROBLEMS[name](), 64)
     x = np.zeros(objective.size)

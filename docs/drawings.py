@@ -14,9 +14,9 @@ from matplotlib.figure import Figure
 from scipy.spatial.transform import Rotation
 
 import selfmotion as sm
-from selfmotion.replay.motion import curves
-from selfmotion.study.context import optimum
-from selfmotion.study.published import published_null_motion
+from selfmotion.paper.study.context import optimum
+from selfmotion.paper.study.published import published_null_motion
+from selfmotion.shell.replay.motion import curves
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

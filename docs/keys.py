@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from selfmotion.documents import json_schema
+from selfmotion.shell.documents import json_schema
 
 _INTRO = """# Every key of a file
 

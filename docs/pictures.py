@@ -6,8 +6,8 @@ Needs a Chromium browser. Takes about a minute.
 from pathlib import Path
 
 import selfmotion as sm
-from selfmotion.cli.runs import panda_past_a_box
-from selfmotion.replay import render_png
+from selfmotion.shell.cli.runs import panda_past_a_box
+from selfmotion.shell.replay import render_png
 
 DOCS = Path(__file__).parent
 

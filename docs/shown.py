@@ -14,8 +14,8 @@ from pathlib import Path
 from typer.testing import CliRunner
 
 import selfmotion as sm
-from selfmotion.cli import app
-from selfmotion.replay import write_replay
+from selfmotion.shell.cli import app
+from selfmotion.shell.replay import write_replay
 
 ROOT = Path(__file__).parent.parent
 EXAMPLES = ROOT / "examples"

@@ -17,7 +17,7 @@ from PIL import Image
 
 import selfmotion as sm
 from selfmotion.basics import Array
-from selfmotion.replay import render_png
+from selfmotion.shell.replay import render_png
 
 FILE = Path(__file__).parent / "two_motions.png"
 DURATION = 6.0

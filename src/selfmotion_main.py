@@ -16,7 +16,7 @@ def main() -> None:
     """Import the command line and run it."""
     # An exception would go through extension modules that make something else of it.
     before = signal.signal(signal.SIGINT, _end)
-    from selfmotion.cli import main as command
+    from selfmotion.shell.cli import main as command
 
     signal.signal(signal.SIGINT, before)
     command()

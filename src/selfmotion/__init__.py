@@ -28,44 +28,33 @@ from selfmotion import (
     result as result,
     robot as robot,
 )
-from selfmotion.baselines import plan_by as plan_by
 from selfmotion.basics import SelfmotionError as SelfmotionError, version as _version
-from selfmotion.batch import Batch as Batch, plan_many as plan_many
 from selfmotion.certificate import (
     Certificate as Certificate,
     Tolerance as Tolerance,
     certify as certify,
 )
-from selfmotion.documents import read_problem as read_problem
-from selfmotion.follow import Follow as Follow, Follows as Follows
-from selfmotion.job import (
-    Program as Program,
-    Seam as Seam,
-    load_program as load_program,
-    plan_job as plan_job,
+from selfmotion.model.follow import Follow as Follow, Follows as Follows
+from selfmotion.model.motion import (
+    PolynomialNullMotion as PolynomialNullMotion,
+    Trajectory as Trajectory,
 )
-from selfmotion.margins import Margin as Margin, margin as margin
-from selfmotion.motion import PolynomialNullMotion as PolynomialNullMotion, Trajectory as Trajectory
-from selfmotion.optimise import QuasiNewton as QuasiNewton
-from selfmotion.placement import (
-    correction as correction,
-    place as place,
-    plan_with_margin as plan_with_margin,
+from selfmotion.model.robot import (
+    NAMED_ARMS as NAMED_ARMS,
+    RobotModel as RobotModel,
+    load_robot as load_robot,
 )
-from selfmotion.planning import (
+from selfmotion.model.task import Damping as Damping, Relaxation as Relaxation, Task as Task
+from selfmotion.paper.baselines import plan_by as plan_by
+from selfmotion.planning.optimise import QuasiNewton as QuasiNewton
+from selfmotion.planning.planner import (
     Fastest as Fastest,
     Search as Search,
     fastest as fastest,
     plan as plan,
     plan_in_parts as plan_in_parts,
 )
-from selfmotion.problem import (
-    Problem as Problem,
-    calibrated as calibrated,
-    off_nominal as off_nominal,
-    sample_problem as sample_problem,
-)
-from selfmotion.result import (
+from selfmotion.planning.result import (
     Move as Move,
     Parts as Parts,
     Plan as Plan,
@@ -75,13 +64,27 @@ from selfmotion.result import (
     retime as retime,
     slowdown as slowdown,
 )
-from selfmotion.robot import (
-    NAMED_ARMS as NAMED_ARMS,
-    RobotModel as RobotModel,
-    load_robot as load_robot,
+from selfmotion.planning.transfer import move as move
+from selfmotion.problem.problem import (
+    Problem as Problem,
+    calibrated as calibrated,
+    off_nominal as off_nominal,
+    sample_problem as sample_problem,
 )
-from selfmotion.task import Damping as Damping, Relaxation as Relaxation, Task as Task
-from selfmotion.transfer import move as move
+from selfmotion.shell.documents import read_problem as read_problem
+from selfmotion.work.batch import Batch as Batch, plan_many as plan_many
+from selfmotion.work.job import (
+    Program as Program,
+    Seam as Seam,
+    load_program as load_program,
+    plan_job as plan_job,
+)
+from selfmotion.work.margins import Margin as Margin, margin as margin
+from selfmotion.work.placement import (
+    correction as correction,
+    place as place,
+    plan_with_margin as plan_with_margin,
+)
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -213,17 +216,17 @@ class _Views:
     """Shows plans by the replay, which is imported when the first one is shown."""
 
     def notebook_html(self, plan: Plan) -> str:
-        from selfmotion.replay import notebook_html
+        from selfmotion.shell.replay import notebook_html
 
         return notebook_html(plan)
 
     def figure(self, plan: Plan) -> "Figure":
-        from selfmotion.replay import figure
+        from selfmotion.shell.replay import figure
 
         return figure(plan)
 
     def write_replay(self, plan: Plan, file: "Path") -> None:
-        from selfmotion.replay import write_replay
+        from selfmotion.shell.replay import write_replay
 
         write_replay(plan, file)
 

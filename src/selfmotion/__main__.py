@@ -1,5 +1,5 @@
 """`python -m selfmotion` is the command `selfmotion`."""
 
-from selfmotion.cli import main
+from selfmotion.shell.cli import main
 
 main()

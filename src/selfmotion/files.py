@@ -4,8 +4,20 @@ What can be loaded again, without loss, has `save`: plans, moves, parts and prog
 else is written by a function ``write_…(thing, file)``; replays by `selfmotion.replay.write_replay`.
 """
 
-from selfmotion.cam import read_path
-from selfmotion.controllers import (
+from selfmotion.planning.planner import PlanRequest
+from selfmotion.planning.result import (
+    load_move,
+    load_parts,
+)
+from selfmotion.shell.documents import (
+    SeamJob,
+    read_job,
+    read_joint_limits,
+    read_seam_job,
+    write_problem,
+)
+from selfmotion.shop.cam import read_path
+from selfmotion.shop.controllers import (
     ProgramSettings,
     read_motion,
     read_parts,
@@ -13,21 +25,9 @@ from selfmotion.controllers import (
     write_motion,
     write_parts,
 )
-from selfmotion.documents import (
-    SeamJob,
-    read_job,
-    read_joint_limits,
-    read_seam_job,
-    write_problem,
-)
-from selfmotion.job import write_timetable
-from selfmotion.placement import write_placement
-from selfmotion.planning import PlanRequest
-from selfmotion.result import (
-    load_move,
-    load_parts,
-)
-from selfmotion.sheet import write_sheet
+from selfmotion.shop.sheet import write_sheet
+from selfmotion.work.job import write_timetable
+from selfmotion.work.placement import write_placement
 
 # What `PlanRequest` was called before; it goes with the next version.
 Job = PlanRequest

@@ -1,6 +1,6 @@
 """Bodies that stand around or ride along, and what measures their distances."""
 
-from selfmotion.collision import (
+from selfmotion.model.collision import (
     Box,
     Capsule,
     CollisionModel,

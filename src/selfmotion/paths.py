@@ -1,6 +1,6 @@
 """Tool motions over time: where the tool is to be, and how fast."""
 
-from selfmotion.path import (
+from selfmotion.model.path import (
     Circle,
     Dwell,
     Feed,

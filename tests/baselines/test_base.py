@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.replay import write_replay
+from selfmotion.shell.replay import write_replay
 
 
 def test_plans_by_a_method_are_plans_like_any(tmp_path: Path) -> None:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.baselines.lagrange import _Flow
+from selfmotion.paper.baselines.lagrange import _Flow
 
 Circle = Callable[..., sm.Problem]
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.baselines.local import pose_gradient
+from selfmotion.paper.baselines.local import pose_gradient
 
 Circle = Callable[..., sm.Problem]
 

@@ -14,8 +14,8 @@ from numba.core import caching
 
 import selfmotion as sm
 from selfmotion.basics import jit
-from selfmotion.nodes import charts
-from selfmotion.nodes.kernels import accelerate, bend_of
+from selfmotion.planning.nodes import charts
+from selfmotion.planning.nodes.kernels import accelerate, bend_of
 
 SOURCE = """
 from selfmotion.basics.jit import kernel
@@ -113,7 +113,7 @@ def test_another_process_compiles_where_it_can(monkeypatch: pytest.MonkeyPatch) 
     for count in (1, 2):
         monkeypatch.setattr(jit.os, "cpu_count", lambda count=count: count)
         jit.companion(jit.FIRST_WORKS)
-    assert [command[-2:] for command in started] == [["selfmotion.warm", "first"]]
+    assert [command[-2:] for command in started] == [["selfmotion.realtime.warm", "first"]]
     monkeypatch.setattr(jit, "_IS_ALONE", True)
     assert jit.companion(jit.ALL_WORKS) is None
     assert len(started) == 1

@@ -3,7 +3,7 @@
 import csv
 from pathlib import Path
 
-from selfmotion.batch.folder import Folder, Row
+from selfmotion.work.batch.folder import Folder, Row
 
 
 def test_what_ends_early_has_no_cost_to_compare(tmp_path: Path) -> None:

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.batch.folder import Folder, is_made_for
-from selfmotion.batch.items import Row, problem_items
-from selfmotion.task import SE3
+from selfmotion.model.task import SE3
+from selfmotion.work.batch.folder import Folder, is_made_for
+from selfmotion.work.batch.items import Row, problem_items
 from support.arms import robot_named
 
 

@@ -19,9 +19,9 @@ import pytest
 import trimesh
 
 import selfmotion as sm
-from selfmotion.batch import BatchProgress, Item, plan_items, run
-from selfmotion.cli.runs import is_answered
-from selfmotion.documents import grid_items, write_combination
+from selfmotion.shell.cli.runs import is_answered
+from selfmotion.shell.documents import grid_items, write_combination
+from selfmotion.work.batch import BatchProgress, Item, plan_items, run
 from support.arms import PANDA_HOME, robot_named
 from support.places import ROOT, TESTS
 from support.shell import complaint, invoke
@@ -409,7 +409,7 @@ def test_a_mesh_that_changed_is_planned_anew_in_any_process(tmp_path: Path) -> N
     line = sm.paths.Line(panda.pose(PANDA_HOME), panda.pose(PANDA_HOME + 0.05), 2.0)
     part, out = tmp_path / "part.stl", tmp_path / "out"
 
-    def row() -> tuple[sm.batch.Row, int]:
+    def row() -> tuple[sm.work.batch.Row, int]:
         bodies = [sm.obstacles.Mesh("part", np.zeros(3), str(part))]
         problem = sm.Problem(
             panda,
@@ -418,7 +418,7 @@ def test_a_mesh_that_changed_is_planned_anew_in_any_process(tmp_path: Path) -> N
             PANDA_HOME,
             constraints=[sm.constraints.Clearance(bodies, 0.01)],
         )
-        found = sm.batch.plan_many([problem], InPlace(), out=out)
+        found = sm.work.batch.plan_many([problem], InPlace(), out=out)
         return found.rows[0], found.resumed
 
     for at, verified in (([2.0, 2.0, 0.0], True), (line.pose(1.0).translation, False)):

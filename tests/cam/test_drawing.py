@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.cam.drawing import read_drawing
+from selfmotion.shop.cam.drawing import read_drawing
 from support.shell import complaint as refused
 
 # What chords may be off curves [m], as the docs say; rounding of a drawing in mm.

@@ -174,7 +174,7 @@ def test_a_frame_of_ones_own(poses: list[pin.SE3], tmp_path: Path) -> None:
     placed = sm.paths.Placed(sm.files.read_path(file), frame)
     agree(placed, poses)
     # Its twist is the derivative of its pose, like that of every path.
-    from selfmotion.testing import check_path
+    from selfmotion.shell.testing import check_path
 
     check_path(placed)
     out = tmp_path / "plan.npz"

@@ -7,9 +7,9 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.basics import Array, restore
-from selfmotion.cam import UNJUDGED
-from selfmotion.cam.cuts import RAPID
-from selfmotion.task import SE3
+from selfmotion.model.task import SE3
+from selfmotion.shop.cam import UNJUDGED
+from selfmotion.shop.cam.cuts import RAPID
 from support.own_kinematics import Arm, along
 from support.pocket_programs import Interpreter, misses, random_program
 

@@ -11,8 +11,8 @@ from selfmotion.certificate import Stretch
 from selfmotion.certificate.bounding import Bounded, _measured
 from selfmotion.certificate.path_error import _PathErrors
 from selfmotion.certificate.quantity import Shares
-from selfmotion.follow import BoundFollow
-from selfmotion.testing.constraints import check_majorants
+from selfmotion.model.follow import BoundFollow
+from selfmotion.shell.testing.constraints import check_majorants
 from support.arms import robot_named
 from support.two_arms import baxter_with_both_arms
 

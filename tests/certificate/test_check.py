@@ -12,7 +12,7 @@ from selfmotion.basics import Array
 from selfmotion.certificate import check
 from selfmotion.certificate.check import _because, _damped_stretches, _told, _undecided
 from selfmotion.certificate.path_error import PathCheck, smallest_singular_values
-from selfmotion.task import DampingLaw
+from selfmotion.model.task import DampingLaw
 from support.arms import PANDA_HOME, Case, robot_named
 from support.motions import motion_of
 

@@ -7,7 +7,7 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.basics import Array
-from selfmotion.robot import Dynamics
+from selfmotion.model.robot import Dynamics
 from support.arms import robot_named
 
 HOME = np.array([0.3, -1.2, 1.5, -1.0, 1.2, 0.4])

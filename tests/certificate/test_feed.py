@@ -11,9 +11,9 @@ import pytest
 import selfmotion as sm
 from selfmotion.certificate import Stretch
 from selfmotion.certificate.feed import FeedReached, _Along, _OwnPace, _Pace, _rounded_down
-from selfmotion.follow import Follows
-from selfmotion.path import section_at_rest
-from selfmotion.testing.constraints import check_majorants
+from selfmotion.model.follow import Follows
+from selfmotion.model.path import section_at_rest
+from selfmotion.shell.testing.constraints import check_majorants
 from support.arms import PANDA_HOME, robot_named
 from support.gantries import gantry
 

@@ -21,7 +21,7 @@ from selfmotion.certificate.path_error import (
     poses,
     rotation_vectors,
 )
-from selfmotion.follow import Follows
+from selfmotion.model.follow import Follows
 from support.arms import robot_named
 from support.two_arms import baxter_with_both_arms
 

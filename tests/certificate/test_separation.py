@@ -15,7 +15,7 @@ from selfmotion.certificate import (
     Separation,
 )
 from selfmotion.certificate.separation import Approach, _nearer, closest_at_all_times
-from selfmotion.collision import Closest, Overlap
+from selfmotion.model.collision import Closest, Overlap
 from support.arms import PANDA_HOME, robot_named, short_line, start_of
 from support.motions import motion_of
 

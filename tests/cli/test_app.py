@@ -16,8 +16,8 @@ from typer.testing import CliRunner
 
 import selfmotion as sm
 from selfmotion.basics import jit, seconds_waited_for_kernels
-from selfmotion.cli import app
-from selfmotion.cli.app import StageDisplay
+from selfmotion.shell.cli import app
+from selfmotion.shell.cli.app import StageDisplay
 from support.shell import complaint, invoke
 
 SELFMOTION = Path(sys.executable).with_name("selfmotion")
@@ -265,7 +265,7 @@ def test_kernels_that_compile_are_no_part_of_what_is_left(monkeypatch: pytest.Mo
 def test_a_log_is_never_silent_for_long(monkeypatch: pytest.MonkeyPatch) -> None:
     """A stage that tells nothing while it lasts has its line all the same."""
     # By this name the package has the application.
-    module = sys.modules["selfmotion.cli.app"]
+    module = sys.modules["selfmotion.shell.cli.app"]
     monkeypatch.setattr(module, "_SILENT", 0.05)
     monkeypatch.setattr(module, "_TICK", 0.01)
     monkeypatch.setattr(module, "_WORTH_SAYING", 0.0)

@@ -10,8 +10,8 @@ import pytest
 from typer.testing import CliRunner
 
 import selfmotion as sm
-from selfmotion.cli import app, commands, documents
-from selfmotion.documents import example_text, job_of
+from selfmotion.shell.cli import app, commands, documents
+from selfmotion.shell.documents import example_text, job_of
 from support.arms import robot_named
 from support.shell import complaint, invoke
 

@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 
 import selfmotion as sm
 from selfmotion.basics import write_csv
-from selfmotion.cli import app, main as command
+from selfmotion.shell.cli import app, main as command
 from support.arms import PANDA_HOME
 from support.shell import complaint
 

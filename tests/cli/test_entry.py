@@ -9,7 +9,7 @@ import pytest
 from support.places import ROOT
 
 
-@pytest.mark.parametrize("module", ["selfmotion", "numpy", "pinocchio", "selfmotion.cli.app"])
+@pytest.mark.parametrize("module", ["selfmotion", "numpy", "pinocchio", "selfmotion.shell.cli.app"])
 def test_ctrl_c_while_it_imports_ends_in_one_line(module: str) -> None:
     """At the moment in which a module is looked for, whatever the machine's speed."""
     code = (

@@ -13,8 +13,8 @@ import pytest
 from typer.testing import CliRunner
 
 import selfmotion as sm
-from selfmotion.cli import app, runs
-from selfmotion.cli.following import out_of_reach, replanner_of
+from selfmotion.shell.cli import app, runs
+from selfmotion.shell.cli.following import out_of_reach, replanner_of
 from support.arms import PANDA_HOME, robot_named
 from support.shell import complaint, invoke
 

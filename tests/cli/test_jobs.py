@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.cli import jobs
-from selfmotion.cli.documents import seams_of_file
+from selfmotion.shell.cli import jobs
+from selfmotion.shell.cli.documents import seams_of_file
 from support.places import ROOT
 from support.shell import complaint, invoke
 

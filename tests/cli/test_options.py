@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.cli.options import relaxation, search_of
+from selfmotion.shell.cli.options import relaxation, search_of
 from support.arms import PANDA_HOME, robot_named
 from support.shell import complaint, invoke
 

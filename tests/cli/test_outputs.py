@@ -9,7 +9,7 @@ import pytest
 from rich.console import Console
 
 import selfmotion as sm
-from selfmotion.cli.outputs import tell_large
+from selfmotion.shell.cli.outputs import tell_large
 from support.shell import complaint, invoke
 
 

@@ -11,9 +11,9 @@ from rich.console import Console
 from typer.testing import CliRunner
 
 import selfmotion as sm
-from selfmotion.cli import app, summaries
-from selfmotion.cli.summaries import in_shell
-from selfmotion.cli.tables import show_certificate
+from selfmotion.shell.cli import app, summaries
+from selfmotion.shell.cli.summaries import in_shell
+from selfmotion.shell.cli.tables import show_certificate
 from support.arms import robot_named
 from support.shell import complaint, invoke
 

@@ -13,13 +13,13 @@ import pytest
 from rich.console import Console
 
 import selfmotion as sm
-from selfmotion.cli import tables
+from selfmotion.shell.cli import tables
 from support.shell import complaint, invoke
 
 # Runs several commands in one process, each as the shell does, with a mark after each.
 SEVERAL = """
 import json, sys
-from selfmotion.cli import app
+from selfmotion.shell.cli import app
 for words in json.loads(sys.argv[1]):
     assert not app(words, standalone_mode=False), words
     print("\\f")

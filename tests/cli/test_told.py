@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.cli.summaries import blocked_told
-from selfmotion.documents import example_text
-from selfmotion.task import SE3
+from selfmotion.model.task import SE3
+from selfmotion.shell.cli.summaries import blocked_told
+from selfmotion.shell.documents import example_text
 from support.arms import robot_named
 from support.shell import complaint, invoke
 

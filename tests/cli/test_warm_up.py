@@ -4,8 +4,8 @@ from typing import Any
 
 import pytest
 
-from selfmotion import warm
-from selfmotion.cli import runs
+from selfmotion.realtime import warm
+from selfmotion.shell.cli import runs
 from support.shell import invoke
 
 

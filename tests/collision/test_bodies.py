@@ -9,7 +9,7 @@ import pytest
 import trimesh
 
 from selfmotion.basics.errors import CollisionError, RobotError
-from selfmotion.collision import (
+from selfmotion.model.collision import (
     Box,
     Capsule,
     ClearanceModel,
@@ -18,9 +18,9 @@ from selfmotion.collision import (
     Mesh,
     Sphere,
 )
-from selfmotion.collision.bodies import Body, link_bodies
-from selfmotion.collision.solids import Solid
-from selfmotion.robot import NAMED_ARMS, RobotModel, load_robot
+from selfmotion.model.collision.bodies import Body, link_bodies
+from selfmotion.model.collision.solids import Solid
+from selfmotion.model.robot import NAMED_ARMS, RobotModel, load_robot
 from support.independent_distances import mesh_of
 from support.two_arms import baxter_with_both_arms
 

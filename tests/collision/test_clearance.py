@@ -8,7 +8,7 @@ import pytest
 import trimesh
 
 from selfmotion.basics.errors import RobotError
-from selfmotion.collision import (
+from selfmotion.model.collision import (
     Box,
     Capsule,
     ClearanceModel,
@@ -17,8 +17,8 @@ from selfmotion.collision import (
     Mesh,
     Sphere,
 )
-from selfmotion.collision.distances import TOLERANCE
-from selfmotion.robot import NAMED_ARMS, load_robot
+from selfmotion.model.collision.distances import TOLERANCE
+from selfmotion.model.robot import NAMED_ARMS, load_robot
 
 TURNED = pin.SE3(pin.rpy.rpyToMatrix(0.4, -0.3, 0.8), np.array([0.5, -0.4, 0.6]))
 

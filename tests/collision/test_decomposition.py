@@ -9,9 +9,9 @@ import pytest
 import trimesh
 from scipy.spatial import ConvexHull
 
-from selfmotion.collision import Box, ClearanceModel, CollisionModel, Mesh, Solid
-from selfmotion.collision.decomposition import MOST, convex_pieces
-from selfmotion.robot import load_robot
+from selfmotion.model.collision import Box, ClearanceModel, CollisionModel, Mesh, Solid
+from selfmotion.model.collision.decomposition import MOST, convex_pieces
+from selfmotion.model.robot import load_robot
 from support.arms import PANDA_HOME
 
 # What rounding may leave of a point outside of all pieces, as a share of the size.
@@ -144,7 +144,7 @@ def read(mesh: trimesh.Trimesh, file: Path) -> Solid:
 def test_pieces_that_leave_something_out_are_not_taken(tmp_path, monkeypatch) -> None:
     whole = read(joined(window()), tmp_path / "whole.stl")
     assert len(whole.pieces) == 4
-    cut = "selfmotion.collision.decomposition.convex_pieces"
+    cut = "selfmotion.model.collision.decomposition.convex_pieces"
     monkeypatch.setattr(cut, lambda *mesh: convex_pieces(*mesh)[1:])
     another = read(joined(window(0.2)), tmp_path / "another.stl")
     assert another.pieces == (another,)

@@ -8,11 +8,11 @@ import pinocchio as pin
 import pytest
 
 from selfmotion.basics.errors import CollisionError
-from selfmotion.collision import distances as module
-from selfmotion.collision.distances import HullDistances
-from selfmotion.collision.pair_distances import MeshDistances
-from selfmotion.collision.solids import Solid
-from selfmotion.robot import RobotModel
+from selfmotion.model.collision import distances as module
+from selfmotion.model.collision.distances import HullDistances
+from selfmotion.model.collision.pair_distances import MeshDistances
+from selfmotion.model.collision.solids import Solid
+from selfmotion.model.robot import RobotModel
 from support.independent_distances import (
     KINDS,
     TOLERANCE,

@@ -10,7 +10,7 @@ import pytest
 import trimesh
 
 from selfmotion.basics.errors import CollisionError, RobotError
-from selfmotion.collision import (
+from selfmotion.model.collision import (
     Box,
     Capsule,
     CollisionModel,
@@ -20,7 +20,7 @@ from selfmotion.collision import (
     disabled_links,
     srdf_line,
 )
-from selfmotion.robot import NAMED_ARMS, RobotModel, load_robot
+from selfmotion.model.robot import NAMED_ARMS, RobotModel, load_robot
 
 BOXES = (
     Box("box", [0.5, 0.2, 0.5], [0.2, 0.2, 0.2]),

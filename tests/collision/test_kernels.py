@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from selfmotion.collision.kernels import winding_number
+from selfmotion.model.collision.kernels import winding_number
 
 
 def test_winding_number_counts_a_closed_surface_once() -> None:

@@ -11,7 +11,7 @@ import pinocchio as pin
 import pytest
 
 from selfmotion.basics.errors import CollisionError
-from selfmotion.collision import (
+from selfmotion.model.collision import (
     Box,
     Capsule,
     CollisionModel,
@@ -22,9 +22,9 @@ from selfmotion.collision import (
     obstacle_from_dict,
     obstacles as module,
 )
-from selfmotion.replay import scene
-from selfmotion.replay.meshes import Payload
-from selfmotion.robot import load_robot
+from selfmotion.model.robot import load_robot
+from selfmotion.shell.replay import scene
+from selfmotion.shell.replay.meshes import Payload
 
 POSE = pin.SE3(pin.rpy.rpyToMatrix(0.3, -0.2, 1.1), np.array([0.1, 0.2, 0.3]))
 

@@ -7,11 +7,11 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from selfmotion.collision import CollisionModel, disabled_links, how_near
-from selfmotion.collision.bodies import Body, link_bodies
-from selfmotion.collision.pairs import candidate_pairs
-from selfmotion.collision.solids import Solid
-from selfmotion.robot import RobotModel, load_robot
+from selfmotion.model.collision import CollisionModel, disabled_links, how_near
+from selfmotion.model.collision.bodies import Body, link_bodies
+from selfmotion.model.collision.pairs import candidate_pairs
+from selfmotion.model.collision.solids import Solid
+from selfmotion.model.robot import RobotModel, load_robot
 
 
 @pytest.fixture(scope="module")

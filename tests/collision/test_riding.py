@@ -13,8 +13,8 @@ import trimesh
 
 import selfmotion as sm
 from selfmotion.basics import Array, restore
-from selfmotion.collision import ClearanceModel
-from selfmotion.robot.mounting import placed
+from selfmotion.model.collision import ClearanceModel
+from selfmotion.model.robot.mounting import placed
 from support.arms import robot_named, short_line, start_of
 
 # Rounding of placements that are multiplied in another order, through GJK's accuracy [m].

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion import testing
 from selfmotion.certificate import FinishedMotion
+from selfmotion.shell import testing
 from support.arms import PANDA_HOME
 from support.circles import coordinate_along, small_circle
 from support.coordinates import COORDINATES

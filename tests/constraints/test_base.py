@@ -10,11 +10,11 @@ from rich.console import Console
 import selfmotion as sm
 from selfmotion.basics import Array
 from selfmotion.certificate import EndState, JointLimits
-from selfmotion.cli.tables import show
-from selfmotion.constraints import NodeTangents, linearised
-from selfmotion.motion.grid import Grid
-from selfmotion.motion.null_motion import PolynomialNullMotion
-from selfmotion.paper import Objective, StillMotion
+from selfmotion.model.motion.grid import Grid
+from selfmotion.model.motion.null_motion import PolynomialNullMotion
+from selfmotion.planning.paper import Objective, StillMotion
+from selfmotion.problem.constraints import NodeTangents, linearised
+from selfmotion.shell.cli.tables import show
 from support.arms import PANDA_HOME, central_difference, robot_named, short_line, start_of
 from support.followed import standing
 

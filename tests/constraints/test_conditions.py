@@ -8,7 +8,11 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.basics import Array, ProblemError
-from selfmotion.constraints import (
+from selfmotion.model.follow import Follows
+from selfmotion.model.motion.grid import Grid
+from selfmotion.model.task import Task
+from selfmotion.planning.paper import Rollout
+from selfmotion.problem.constraints import (
     Multipliers,
     NodeTangents,
     active_of,
@@ -16,12 +20,8 @@ from selfmotion.constraints import (
     penalty,
     violated,
 )
-from selfmotion.costs import Samples
-from selfmotion.follow import Follows
-from selfmotion.motion.grid import Grid
-from selfmotion.paper import Rollout
-from selfmotion.task import Task
-from selfmotion.testing import check_constraint
+from selfmotion.problem.costs import Samples
+from selfmotion.shell.testing import check_constraint
 from support.arms import robot_named, short_line, start_of
 
 DURATION = 1.5

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion import testing
 from selfmotion.certificate import FinishedMotion, JointLimits
-from selfmotion.robot import Dynamics
+from selfmotion.model.robot import Dynamics
+from selfmotion.shell import testing
 from support.arms import PANDA_HOME, robot_named, short_line
 from support.circles import upright_circle
 from support.files_of_people import arm, finger

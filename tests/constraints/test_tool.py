@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion import testing
 from selfmotion.certificate import FinishedMotion
-from selfmotion.costs import Samples
-from selfmotion.motion import Sampling
-from selfmotion.robot import ToolRates
-from selfmotion.testing import check_constraint
+from selfmotion.model.motion import Sampling
+from selfmotion.model.robot import ToolRates
+from selfmotion.problem.costs import Samples
+from selfmotion.shell import testing
+from selfmotion.shell.testing import check_constraint
 from support.arms import PANDA_HOME, central_difference, robot_named
 from support.circles import small_circle
 

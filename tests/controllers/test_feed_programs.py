@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.controllers import judged_program, program_miss, read_program
-from selfmotion.controllers.feed_stretches import ZONE, FeedStretch, Ramps, times_at
-from selfmotion.controllers.program_settings import axes_of
-from selfmotion.controllers.steps import arc_through
-from selfmotion.task import SE3, Quaternion, exp3
+from selfmotion.model.task import SE3, Quaternion, exp3
+from selfmotion.shop.controllers import judged_program, program_miss, read_program
+from selfmotion.shop.controllers.feed_stretches import ZONE, FeedStretch, Ramps, times_at
+from selfmotion.shop.controllers.program_settings import axes_of
+from selfmotion.shop.controllers.steps import arc_through
 from support.arms import robot_named
 from support.industrial import industrial_arm
 from support.played_programs import Off, off, read_poses

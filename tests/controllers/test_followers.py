@@ -7,8 +7,8 @@ import pytest
 from typer.testing import CliRunner
 
 import selfmotion as sm
-from selfmotion.cli import app
-from selfmotion.controllers import followers, without_followers
+from selfmotion.shell.cli import app
+from selfmotion.shop.controllers import followers, without_followers
 from support.files_of_people import finger
 
 

@@ -18,8 +18,8 @@ import yaml
 
 import selfmotion as sm
 from selfmotion.basics import Array
-from selfmotion.controllers import ros
-from selfmotion.controllers.samples import MotionSamples
+from selfmotion.shop.controllers import ros
+from selfmotion.shop.controllers.samples import MotionSamples
 from support.arms import robot_named
 from support.shell import complaint, invoke
 
@@ -345,7 +345,7 @@ def test_plans_side_by_side(saved: Path, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("rate", [None, 20.0, 100.0])
 def test_what_straight_lines_between_samples_cost(plan: sm.Plan, rate: float | None) -> None:
-    from selfmotion.controllers import linear_miss
+    from selfmotion.shop.controllers import linear_miss
 
     miss = linear_miss(plan, rate)
     samples = MotionSamples.of(plan.trajectory, rate)
@@ -368,7 +368,7 @@ def test_what_straight_lines_between_samples_cost(plan: sm.Plan, rate: float | N
 
 
 def test_no_rate_is_named_where_files_have_no_so_many_samples(plan: sm.Plan) -> None:
-    from selfmotion.controllers import linear_miss
+    from selfmotion.shop.controllers import linear_miss
 
     judged = dataclasses.replace(plan.certificate, tolerance=sm.Tolerance(1e-17, 1e-17))
     strict = dataclasses.replace(plan, certificate=judged)
@@ -379,7 +379,7 @@ def test_messages_of_ros_have_the_coarsest_rate_that_keeps_the_tolerance(
     plan: sm.Plan, tmp_path: Path
 ) -> None:
     """Where that is fewer samples than the plan's own; and lower rates do not keep it."""
-    from selfmotion.controllers import coarsest_rate, linear_miss
+    from selfmotion.shop.controllers import coarsest_rate, linear_miss
 
     assert coarsest_rate(plan) is None
     sm.files.write_motion(plan, tmp_path / "all.yaml")
@@ -512,7 +512,7 @@ def test_programs_have_no_parts_and_other_files_beside_them_do(
 
 def test_straight_lines_are_judged_at_every_hand(carried: sm.Plan) -> None:
     """The hand that only holds on is off as well, and may be the one that is off most."""
-    from selfmotion.controllers import linear_miss
+    from selfmotion.shop.controllers import linear_miss
 
     samples = MotionSamples.of(carried.trajectory, 10.0)
     middles = 0.5 * (samples.t[1:] + samples.t[:-1])

@@ -11,10 +11,11 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.controllers import judged_program, judged_programs, program_miss, read_program
-from selfmotion.controllers.program_settings import axes_of
-from selfmotion.controllers.stretches import Miss, Misses, miss_between
-from selfmotion.controllers.tool_frames import (
+from selfmotion.model.task import SE3, Quaternion, exp3
+from selfmotion.shop.controllers import judged_program, judged_programs, program_miss, read_program
+from selfmotion.shop.controllers.program_settings import axes_of
+from selfmotion.shop.controllers.stretches import Miss, Misses, miss_between
+from selfmotion.shop.controllers.tool_frames import (
     ROUNDINGS,
     ToolFrames,
     confdata,
@@ -22,7 +23,6 @@ from selfmotion.controllers.tool_frames import (
     status_and_turn,
     turned_base,
 )
-from selfmotion.task import SE3, Quaternion, exp3
 from support.arms import PANDA_HOME, robot_named
 from support.industrial import industrial_arm, two_seams
 from support.own_kinematics import Arm

@@ -9,16 +9,16 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 import selfmotion as sm
-from selfmotion import controllers
 from selfmotion.basics import Array
 from selfmotion.certificate import Separation
-from selfmotion.cli import reread
-from selfmotion.controllers import judged_program, program_miss
-from selfmotion.controllers.judged_programs import read_program
-from selfmotion.controllers.program_settings import axes_of, tool_from_flange
-from selfmotion.controllers.stretches import NO_MISS, ways
-from selfmotion.controllers.thinning import Piece, Span
-from selfmotion.job import Step
+from selfmotion.shell.cli import reread
+from selfmotion.shop import controllers
+from selfmotion.shop.controllers import judged_program, program_miss
+from selfmotion.shop.controllers.judged_programs import read_program
+from selfmotion.shop.controllers.program_settings import axes_of, tool_from_flange
+from selfmotion.shop.controllers.stretches import NO_MISS, ways
+from selfmotion.shop.controllers.thinning import Piece, Span
+from selfmotion.work.job import Step
 from support.arms import PANDA_HOME, robot_named
 from support.industrial import two_seams
 from support.shell import invoke

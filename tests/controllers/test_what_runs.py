@@ -9,16 +9,16 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion import controllers
-from selfmotion.controllers import judged_program, read_program
-from selfmotion.controllers.program_facts import (
+from selfmotion.model.task import SE3, exp3
+from selfmotion.shop import controllers
+from selfmotion.shop.controllers import judged_program, read_program
+from selfmotion.shop.controllers.program_facts import (
     Load,
     ProgramFacts,
     verified_loads,
     with_checksum,
 )
-from selfmotion.controllers.program_texts import plain
-from selfmotion.task import SE3, exp3
+from selfmotion.shop.controllers.program_texts import plain
 from support.arms import robot_named
 from support.industrial import two_seams
 from support.shell import invoke

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.costs import metres_of
+from selfmotion.problem.costs import metres_of
 from support.industrial import industrial_urdf
 from support.shell import invoke
 

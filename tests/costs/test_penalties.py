@@ -3,7 +3,7 @@
 import pytest
 
 import selfmotion as sm
-from selfmotion import testing
+from selfmotion.shell import testing
 from support.arms import PANDA_HOME
 
 

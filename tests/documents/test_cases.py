@@ -12,9 +12,9 @@ import pinocchio as pin
 import pytest
 
 import selfmotion as sm
-from selfmotion.cam import Reading, one_seam
-from selfmotion.cam.gcode import read_gcode
-from selfmotion.documents import example_text
+from selfmotion.shell.documents import example_text
+from selfmotion.shop.cam import Reading, one_seam
+from selfmotion.shop.cam.gcode import read_gcode
 from support.own_kinematics import Arm, along
 from support.shell import complaint, invoke
 

@@ -13,9 +13,9 @@ import pytest
 import selfmotion as sm
 from selfmotion.basics import read_document
 from selfmotion.basics.tables import ANGLES, LENGTHS, in_si
-from selfmotion.documents import job_of
-from selfmotion.documents.schema import json_schema
-from selfmotion.robot import Coordinate
+from selfmotion.model.robot import Coordinate
+from selfmotion.shell.documents import job_of
+from selfmotion.shell.documents.schema import json_schema
 from support.cells import CELL, written
 from support.shell import complaint
 

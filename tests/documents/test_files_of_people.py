@@ -14,9 +14,9 @@ from scipy.spatial.transform import Rotation
 from typer.testing import CliRunner
 
 import selfmotion as sm
-from selfmotion.cam.gcode import read_gcode
-from selfmotion.cam.path_rows import Reading
-from selfmotion.cli import app
+from selfmotion.shell.cli import app
+from selfmotion.shop.cam.gcode import read_gcode
+from selfmotion.shop.cam.path_rows import Reading
 from support.arms import robot_named
 from support.shell import complaint, invoke
 
@@ -164,14 +164,14 @@ def test_normals_that_seem_to_point_out_are_told(
     def refused(*_: object, **__: object) -> sm.Plan:
         raise sm.errors.PlanError("not planned here")
 
-    monkeypatch.setattr("selfmotion.cli.commands.plan_with_progress", refused)
+    monkeypatch.setattr("selfmotion.shell.cli.commands.plan_with_progress", refused)
     job = tmp_path / "a.toml"
     job.write_text(
         'task = "pointing"\nrobot.name = "panda"\n[seams]\nfile = "b.csv"\nfeed = 0.05\n'
     )
     seams = rows.replace("0.5,", "left,0.5,")
     written(tmp_path, "b.csv", f"seam,x,y,z,nx,ny,nz\n{seams}\n")
-    monkeypatch.setattr("selfmotion.documents.SeamJob.plan", refused)
+    monkeypatch.setattr("selfmotion.shell.documents.SeamJob.plan", refused)
     for setting, is_told in (("false", True), ("true", False)):
         asked = ["job", str(job), "--set", f"seams.flip_normals={setting}"]
         printed = CliRunner().invoke(app, asked).output

@@ -10,8 +10,8 @@ import pytest
 import trimesh
 
 import selfmotion as sm
-from selfmotion.documents import write_combination
-from selfmotion.documents.named_files import FILE_KEYS, named_from
+from selfmotion.shell.documents import write_combination
+from selfmotion.shell.documents.named_files import FILE_KEYS, named_from
 from support.arms import PANDA_HOME, robot_named
 
 GRID = """task = "position"

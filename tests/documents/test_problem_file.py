@@ -14,7 +14,7 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.basics import read_document
-from selfmotion.documents import example_text, grid_documents, job_of, json_schema
+from selfmotion.shell.documents import example_text, grid_documents, job_of, json_schema
 from support.arms import PANDA_HOME, robot_named
 from support.cells import CELL, written
 from support.files_of_people import reaching_arm

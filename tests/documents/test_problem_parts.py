@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.task import SE3, rpy
+from selfmotion.model.task import SE3, rpy
 
 BODIES = """
 obstacles = [

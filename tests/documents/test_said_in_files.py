@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.collision import obstacle_shapes
-from selfmotion.documents import json_schema
-from selfmotion.documents.seam_job import JOB, OF_PROBLEM, SEAM
+from selfmotion.model.collision import obstacle_shapes
+from selfmotion.shell.documents import json_schema
+from selfmotion.shell.documents.seam_job import JOB, OF_PROBLEM, SEAM
 from support.arms import robot_named
 
 SCHEMA = json_schema()

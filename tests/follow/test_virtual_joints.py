@@ -10,11 +10,11 @@ import pytest
 import selfmotion as sm
 from selfmotion.basics import Array
 from selfmotion.certificate.path_error import deviation_from
-from selfmotion.constraints import NodeTangents
-from selfmotion.costs import Samples
-from selfmotion.follow import AugmentedFollows, Follows
-from selfmotion.motion import Sampling
-from selfmotion.problem.of_arm import RowWithinBand, WithinBand, springs
+from selfmotion.model.follow import AugmentedFollows, Follows
+from selfmotion.model.motion import Sampling
+from selfmotion.problem.constraints import NodeTangents
+from selfmotion.problem.costs import Samples
+from selfmotion.problem.problem.of_arm import RowWithinBand, WithinBand, springs
 from support.arms import PANDA_HOME, robot_named
 from support.nodes import around_of, centred, moved, nodes_of, random_step
 

@@ -9,10 +9,10 @@ import trimesh
 
 import selfmotion as sm
 from selfmotion.basics import silent
-from selfmotion.job import work
-from selfmotion.job.files import Earlier, Shelf
-from selfmotion.task import SE3
-from selfmotion.transfer import FreeMotions, free_motion
+from selfmotion.model.task import SE3
+from selfmotion.planning.transfer import FreeMotions, free_motion
+from selfmotion.work.job import work
+from selfmotion.work.job.files import Earlier, Shelf
 from support.arms import robot_named
 
 DOWN = np.diag([1.0, -1.0, -1.0])

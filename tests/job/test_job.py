@@ -14,9 +14,9 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.job import Step, work
-from selfmotion.task import SE3
-from selfmotion.transfer import FreeMotions
+from selfmotion.model.task import SE3
+from selfmotion.planning.transfer import FreeMotions
+from selfmotion.work.job import Step, work
 from support.arms import robot_named
 
 DOWN = np.diag([1.0, -1.0, -1.0])
@@ -545,7 +545,7 @@ def test_ends_of_a_job_are_looked_at_before_anything_is_planned(
 
 def test_an_interrupted_seam_stops_the_job(monkeypatch: pytest.MonkeyPatch) -> None:
     """Whatever a plan had found when Ctrl-C was pressed: the job does not go on with it."""
-    module = sys.modules["selfmotion.planning.branches"]
+    module = sys.modules["selfmotion.planning.planner.branches"]
     made = module.plan
 
     def pressed(*given: object, **options: object) -> sm.Plan:

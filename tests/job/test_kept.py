@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.job import Step
-from selfmotion.job.files import Shelf
-from selfmotion.job.seam import backwards, backwards_plan
-from selfmotion.task import SE3
+from selfmotion.model.task import SE3
+from selfmotion.work.job import Step
+from selfmotion.work.job.files import Shelf
+from selfmotion.work.job.seam import backwards, backwards_plan
 from support.arms import robot_named
 
 DOWN = np.diag([1.0, -1.0, -1.0])
@@ -153,7 +153,7 @@ def test_another_version_plans_again(kept, tmp_path: Path, monkeypatch) -> None:
     folder, _ = kept
     shutil.copytree(folder, tmp_path, dirs_exist_ok=True)
     count = len(list(tmp_path.glob("*.json")))
-    monkeypatch.setattr("selfmotion.result.archive.version", lambda: "another")
+    monkeypatch.setattr("selfmotion.planning.result.archive.version", lambda: "another")
     assert again(tmp_path).verified
     assert len(list(tmp_path.glob("*.json"))) > count
 

@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from selfmotion.job.order import best_round, exact, improved, lower_bound
-from selfmotion.job.stops import Stops, along
+from selfmotion.work.job.order import best_round, exact, improved, lower_bound
+from selfmotion.work.job.stops import Stops, along
 
 # Sums of a dozen costs in another order differ by this share.
 ROUNDING = 1e-12

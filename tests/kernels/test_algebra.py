@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from selfmotion.basics import Array
-from selfmotion.kernels import algebra
+from selfmotion.model.kernels import algebra
 from support.compiled import compiled
 
 # Well-conditioned algebra with entries of order 1.

@@ -3,8 +3,8 @@
 import numpy as np
 
 from selfmotion.basics import Array
-from selfmotion.kernels import carried
-from selfmotion.robot import null_space
+from selfmotion.model.kernels import carried
+from selfmotion.model.robot import null_space
 from support.arms import Case
 from support.rollouts import random_epsilon, rollout_of
 

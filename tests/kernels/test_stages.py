@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from selfmotion import kernels
 from selfmotion.basics import Array
-from selfmotion.follow import Follows
-from selfmotion.kernels import stages, tool
+from selfmotion.model import kernels
+from selfmotion.model.follow import Follows
+from selfmotion.model.kernels import stages, tool
 from support.arms import Case, central_difference
 from support.compiled import compiled
 from support.two_arms import both_arms

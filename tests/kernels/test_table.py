@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from selfmotion import kernels
-from selfmotion.kernels import stages, table
+from selfmotion.model import kernels
+from selfmotion.model.kernels import stages, table
 from support.compiled import compiled
 
 

@@ -5,10 +5,10 @@ import pinocchio as pin
 import pytest
 
 import selfmotion as sm
-from selfmotion import kernels
 from selfmotion.basics import Array
 from selfmotion.basics.layout import LOGARITHM, POINTING, layout_of
-from selfmotion.kernels import stages, tool
+from selfmotion.model import kernels
+from selfmotion.model.kernels import stages, tool
 from support.arms import Case, central_difference
 from support.compiled import compiled
 from support.followed import standing

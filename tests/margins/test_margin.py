@@ -10,9 +10,9 @@ import pinocchio as pin
 import pytest
 
 import selfmotion as sm
-from selfmotion.collision import Separation
-from selfmotion.margins import least
-from selfmotion.margins.found import Displacement
+from selfmotion.model.collision import Separation
+from selfmotion.work.margins import least
+from selfmotion.work.margins.found import Displacement
 from support.arms import PANDA_HOME, robot_named
 from support.displaced import MISSED, Judge, random_displacement, worst_scale
 from support.shell import complaint, invoke

@@ -3,8 +3,8 @@
 import numpy as np
 
 import selfmotion as sm
-import selfmotion.testing
-from selfmotion.motion import joined_motions, reversed_motion
+import selfmotion.shell.testing
+from selfmotion.model.motion import joined_motions, reversed_motion
 
 
 def test_motions_are_joined_and_reversed_exactly() -> None:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.motion import NullMotionTable, PolynomialNullMotion
+from selfmotion.model.motion import NullMotionTable, PolynomialNullMotion
 
 
 def test_paper_parameterisation_has_the_papers_order() -> None:

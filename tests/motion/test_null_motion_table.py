@@ -5,7 +5,7 @@ from functools import partial
 import numpy as np
 import pytest
 
-from selfmotion.motion import NullMotionTable
+from selfmotion.model.motion import NullMotionTable
 
 
 def test_null_motion_table_and_its_transpose() -> None:

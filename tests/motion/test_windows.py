@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from selfmotion.motion import resting_window
+from selfmotion.model.motion import resting_window
 
 
 @pytest.mark.parametrize("orders", [(0, 0), (1, 0), (0, 2), (1, 1), (2, 2)])

@@ -5,7 +5,7 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.basics import Array, Counts
-from selfmotion.nodes import Batch, NodeGrid, Step, minimise
+from selfmotion.planning.nodes import Batch, NodeGrid, Step, minimise
 from support.arms import PANDA_HOME, Case
 from support.nodes import problem_of
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.nodes import Step, minimise
-from selfmotion.nodes.ends import NodeEnds
-from selfmotion.optimise import Status
+from selfmotion.planning.nodes import Step, minimise
+from selfmotion.planning.nodes.ends import NodeEnds
+from selfmotion.planning.optimise import Status
 from support.arms import PANDA_HOME, Case
 from support.nodes import around_of, centred, moved, nodes_of, problem_of, random_step
 

@@ -4,9 +4,9 @@ import numpy as np
 
 import selfmotion as sm
 from selfmotion.basics import Counts
-from selfmotion.nodes import NodeGrid
-from selfmotion.nodes.objective import LocalModel
-from selfmotion.nodes.spline import AT_CONTROLS
+from selfmotion.planning.nodes import NodeGrid
+from selfmotion.planning.nodes.objective import LocalModel
+from selfmotion.planning.nodes.spline import AT_CONTROLS
 from support.arms import PANDA_HOME, Case
 from support.nodes import nodes_of, problem_of
 from support.stretching import DURATION, rounded_problem, stretching

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.costs import Partials, Samples
-from selfmotion.nodes import Step, minimise
-from selfmotion.optimise import Status
+from selfmotion.planning.nodes import Step, minimise
+from selfmotion.planning.optimise import Status
+from selfmotion.problem.costs import Partials, Samples
 from support.arms import PANDA_HOME, Case
 from support.nodes import nodes_of, problem_of
 from support.splines import best_spline

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.optimise import Banded
-from selfmotion.robot import has_masses
+from selfmotion.model.robot import has_masses
+from selfmotion.planning.optimise import Banded
 from support.arms import Case
 from support.nodes import along, around_of, centred, moved, nodes_of, problem_of, random_step
 
@@ -121,6 +121,6 @@ def test_in_lots_the_curvature_is_the_same(case: Case, monkeypatch: pytest.Monke
     motion = nodes_of(problem_of(case))
     both = motion.grid.spline.changes(around_of(motion).changes)
     at_once = motion.grid.cost.curvature(motion.samples, motion.partials, both)
-    monkeypatch.setattr("selfmotion.nodes.objective._LOT", 5)
+    monkeypatch.setattr("selfmotion.planning.nodes.objective._LOT", 5)
     found = motion.grid.cost.curvature(motion.samples, motion.partials, both)
     np.testing.assert_allclose(found, at_once, rtol=1e-12, atol=1e-12 * np.abs(at_once).max())

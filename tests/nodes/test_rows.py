@@ -5,10 +5,10 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.basics import Array
-from selfmotion.motion import Trajectory
-from selfmotion.nodes.rows import NodeRows, accelerates_of
-from selfmotion.nodes.spline import AT_CONTROLS, ORDERS, Quintic, unit_bases
-from selfmotion.robot import ToolRates
+from selfmotion.model.motion import Trajectory
+from selfmotion.model.robot import ToolRates
+from selfmotion.planning.nodes.rows import NodeRows, accelerates_of
+from selfmotion.planning.nodes.spline import AT_CONTROLS, ORDERS, Quintic, unit_bases
 from support.arms import PANDA_HOME
 from support.circles import small_circle
 from support.nodes import along, around_of, centred, moved, nodes_of, random_step

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.nodes.smoothness import quickness, smoothing_of
-from selfmotion.nodes.spline import Quintic
+from selfmotion.planning.nodes.smoothness import quickness, smoothing_of
+from selfmotion.planning.nodes.spline import Quintic
 from support.arms import Case, robot_named, short_line, start_of
 from support.nodes import nodes_of, problem_of
 

@@ -5,7 +5,7 @@ import pytest
 from scipy.interpolate import BPoly
 
 from selfmotion.basics import Array
-from selfmotion.nodes.spline import (
+from selfmotion.planning.nodes.spline import (
     AT_CONTROLS,
     AT_GAUSS,
     CONTROLS,

@@ -5,8 +5,8 @@ import pytest
 from scipy.optimize import linprog
 from scipy.sparse import lil_array
 
-from selfmotion.optimise import BandedRows, banded_optimum
-from selfmotion.result.pace_rows import basis
+from selfmotion.planning.optimise import BandedRows, banded_optimum
+from selfmotion.planning.result.pace_rows import basis
 
 # The optimum is reached to this share.
 GAP = 1e-6

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from selfmotion.optimise import Banded
+from selfmotion.planning.optimise import Banded
 
 
 @pytest.mark.parametrize("size", [1, 3, 6])

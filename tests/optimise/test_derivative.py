@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from selfmotion.basics import Array
-from selfmotion.optimise.quasi_newton import is_misleading
+from selfmotion.planning.optimise.quasi_newton import is_misleading
 
 X, STEP = np.array([1.0, -2.0]), np.array([0.5, 0.25])
 

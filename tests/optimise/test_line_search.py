@@ -8,7 +8,7 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.basics import Array
-from selfmotion.optimise.quasi_newton import _minimizer, _Point
+from selfmotion.planning.optimise.quasi_newton import _minimizer, _Point
 from support.functions import Counted
 
 

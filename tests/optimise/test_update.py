@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.optimise.quasi_newton import renewed
+from selfmotion.planning.optimise.quasi_newton import renewed
 from support.functions import quadratic
 
 

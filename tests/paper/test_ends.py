@@ -6,9 +6,16 @@ from scipy.optimize import minimize
 
 import selfmotion as sm
 from selfmotion.basics import Array
-from selfmotion.motion import PolynomialNullMotion
-from selfmotion.optimise import inverse_metric
-from selfmotion.paper import Eliminated, FreeStart, Solution, closed, settled_still_motion, solve
+from selfmotion.model.motion import PolynomialNullMotion
+from selfmotion.planning.optimise import inverse_metric
+from selfmotion.planning.paper import (
+    Eliminated,
+    FreeStart,
+    Solution,
+    closed,
+    settled_still_motion,
+    solve,
+)
 from support.arms import PANDA_HOME, central_difference, robot_named
 
 # Exact gradients against extrapolated differences, relative to the largest entry.

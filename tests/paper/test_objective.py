@@ -7,12 +7,12 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.basics import Array
-from selfmotion.follow import Follows
-from selfmotion.motion import NullMotionTable, PolynomialNullMotion
-from selfmotion.motion.grid import Grid
-from selfmotion.paper import Objective, StillMotion
-from selfmotion.paper.rollout import Rollout
-from selfmotion.paper.still import FixedStart
+from selfmotion.model.follow import Follows
+from selfmotion.model.motion import NullMotionTable, PolynomialNullMotion
+from selfmotion.model.motion.grid import Grid
+from selfmotion.planning.paper import Objective, StillMotion
+from selfmotion.planning.paper.rollout import Rollout
+from selfmotion.planning.paper.still import FixedStart
 from support.arms import (
     PANDA_HOME,
     Case,

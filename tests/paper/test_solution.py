@@ -9,9 +9,9 @@ from scipy.optimize import minimize
 
 import selfmotion as sm
 from selfmotion.basics import Array, Counts
-from selfmotion.motion import BSplineNullMotion, Grid, NullMotion, PolynomialNullMotion
-from selfmotion.optimise import Function, Iteration, Minimum, Status
-from selfmotion.paper import Solution, StillMotion, settled_still_motion, solve
+from selfmotion.model.motion import BSplineNullMotion, Grid, NullMotion, PolynomialNullMotion
+from selfmotion.planning.optimise import Function, Iteration, Minimum, Status
+from selfmotion.planning.paper import Solution, StillMotion, settled_still_motion, solve
 from support.arms import PANDA_HOME, robot_named, short_line, start_of
 
 # The notes' costs are of a fine integration, and of optima that steps of 1e-8 of it end at: here

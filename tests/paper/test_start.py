@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from selfmotion.basics import Array
-from selfmotion.follow import Follows
-from selfmotion.paper.still import FreeStart
+from selfmotion.model.follow import Follows
+from selfmotion.planning.paper.still import FreeStart
 from support.arms import robot_named, short_line, start_of
 from support.two_arms import both_arms
 

@@ -7,7 +7,7 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.basics import Array, restore
-from selfmotion.testing import check_path
+from selfmotion.shell.testing import check_path
 from support.paths import pose, random_waypoints
 
 # A twist by two classes [m/s, rad/s].

@@ -9,10 +9,10 @@ from scipy.ndimage import binary_dilation
 from scipy.spatial.transform import Rotation
 
 import selfmotion as sm
-from selfmotion import testing
 from selfmotion.basics import restore
-from selfmotion.path import Retimed, Reversed, Section
-from selfmotion.task import SE3
+from selfmotion.model.path import Retimed, Reversed, Section
+from selfmotion.model.task import SE3
+from selfmotion.shell import testing
 from support.arms import PANDA_HOME
 from support.paths import polygon
 from support.shell import complaint

@@ -5,7 +5,7 @@ import pinocchio as pin
 import pytest
 
 import selfmotion as sm
-from selfmotion.path import FeedPossible
+from selfmotion.model.path import FeedPossible
 from support.arms import PANDA_HOME, robot_named
 
 # A feed that is larger by this is not kept.

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.task import SE3, exp3
+from selfmotion.model.task import SE3, exp3
 from support.paths import pose, there_and_back
 
 

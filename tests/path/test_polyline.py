@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import selfmotion as sm
-from selfmotion import testing
+from selfmotion.shell import testing
 from support.paths import polygon
 
 # The tool rests where it is slower than this [m/s, rad/s].

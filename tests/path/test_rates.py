@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.path import edges_of, spread_along, twist_rates
-from selfmotion.problem.along import rest_orders, way_of
+from selfmotion.model.path import edges_of, spread_along, twist_rates
+from selfmotion.problem.problem.along import rest_orders, way_of
 from support.paths import pose, random_waypoints
 
 # Of the largest acceleration: times are rounded by 1e-16 of a path that lasts 1e7 times as long as

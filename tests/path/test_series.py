@@ -8,7 +8,7 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.basics import Array
-from selfmotion.path import Section, path_series, section_at_rest
+from selfmotion.model.path import Section, path_series, section_at_rest
 
 # Interpolation of rounding, and for orientations that were integrated of what that leaves.
 ROUNDING = 1e-13

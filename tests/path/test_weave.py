@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 
 import selfmotion as sm
 from selfmotion.basics import Array
-from selfmotion.task import SE3
+from selfmotion.model.task import SE3
 from support.arms import robot_named
 
 AMPLITUDE, PITCH = 4e-3, 0.02

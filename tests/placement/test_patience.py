@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.placement import places
+from selfmotion.work.placement import places
 from support.arms import robot_named
 
 # Without the present place, which is planned at leisure, and with it.

@@ -9,10 +9,10 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.basics import Array
-from selfmotion.documents import read_problem
-from selfmotion.placement import search
-from selfmotion.placement.places import Places, Tried, places_of
-from selfmotion.placement.search import Box, Descent, finalists
+from selfmotion.shell.documents import read_problem
+from selfmotion.work.placement import search
+from selfmotion.work.placement.places import Places, Tried, places_of
+from selfmotion.work.placement.search import Box, Descent, finalists
 from support.arms import robot_named
 from support.shell import invoke
 

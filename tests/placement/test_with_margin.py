@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.placement import with_margin
+from selfmotion.work.placement import with_margin
 from support.arms import robot_named
 from support.displaced import MISSED, Judge, random_displacement
 from support.shell import invoke

@@ -11,12 +11,12 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.basics import BreakdownError, Counts
-from selfmotion.planning import planner
-from selfmotion.planning.candidate import Candidate
-from selfmotion.planning.effort import Effort
-from selfmotion.planning.grids import first_nodes
-from selfmotion.planning.polish import Polisher
-from selfmotion.planning.steps import STEPS
+from selfmotion.planning.planner import planner
+from selfmotion.planning.planner.candidate import Candidate
+from selfmotion.planning.planner.effort import Effort
+from selfmotion.planning.planner.grids import first_nodes
+from selfmotion.planning.planner.polish import Polisher
+from selfmotion.planning.planner.steps import STEPS
 
 Circle = Callable[..., sm.Problem]
 NAMES = [name for name, _ in STEPS]

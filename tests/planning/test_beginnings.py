@@ -8,10 +8,10 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.basics import Counts
-from selfmotion.nodes import NodeMotion, Optimum, Step, minimise
-from selfmotion.planning import polish
-from selfmotion.planning.effort import Effort
-from selfmotion.planning.solutions import NodeSolution
+from selfmotion.planning.nodes import NodeMotion, Optimum, Step, minimise
+from selfmotion.planning.planner import polish
+from selfmotion.planning.planner.effort import Effort
+from selfmotion.planning.planner.solutions import NodeSolution
 from support.arms import PANDA_HOME
 from support.nodes import nodes_of, problem_of
 from support.places import DATA

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.planning import effort as module
+from selfmotion.planning.planner import effort as module
 
 
 class Clock:

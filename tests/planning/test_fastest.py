@@ -9,7 +9,7 @@ import pinocchio as pin
 import pytest
 
 import selfmotion as sm
-from selfmotion.planning.fastest import _KeptCosts
+from selfmotion.planning.planner.fastest import _KeptCosts
 from support.arms import PANDA_HOME, robot_named
 
 # What the fastest motion uses of a limit somewhere at all times but where the jerk takes over, by

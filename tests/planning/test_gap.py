@@ -10,7 +10,7 @@ import pytest
 from rich.console import Console
 
 import selfmotion as sm
-from selfmotion.cli import tables
+from selfmotion.shell.cli import tables
 
 # Two optimisers of the same motion agree to the tolerance at which grids are accepted.
 SETTLED = 1e-3

@@ -10,13 +10,13 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.basics import Counts
-from selfmotion.follow import Follows
-from selfmotion.motion.grid import Grid
-from selfmotion.paper import Rollout, settled_still_motion
-from selfmotion.planning.candidate import Candidate
-from selfmotion.planning.effort import Effort
-from selfmotion.planning.largest_part import Part, shorter_part
-from selfmotion.replay import write_replay
+from selfmotion.model.follow import Follows
+from selfmotion.model.motion.grid import Grid
+from selfmotion.planning.paper import Rollout, settled_still_motion
+from selfmotion.planning.planner.candidate import Candidate
+from selfmotion.planning.planner.effort import Effort
+from selfmotion.planning.planner.largest_part import Part, shorter_part
+from selfmotion.shell.replay import write_replay
 from support.arms import PANDA_HOME, robot_named
 
 # The end of a part that only the workspace limits, relative to the closed form.

@@ -7,10 +7,10 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.basics import Counts, silent
-from selfmotion.planning.effort import Effort
-from selfmotion.planning.grids import first_nodes
-from selfmotion.planning.planner import Planner
-from selfmotion.planning.proposals import VERY_LONG_WAY, is_long
+from selfmotion.planning.planner.effort import Effort
+from selfmotion.planning.planner.grids import first_nodes
+from selfmotion.planning.planner.planner import Planner
+from selfmotion.planning.planner.proposals import VERY_LONG_WAY, is_long
 from support.arms import PANDA_HOME, robot_named
 
 NAME = "posture of a stretch"

@@ -4,8 +4,8 @@ import numpy as np
 import pinocchio as pin
 
 import selfmotion as sm
-import selfmotion.testing
-from selfmotion.planning.parts import _Mover, between_parts
+import selfmotion.shell.testing
+from selfmotion.planning.planner.parts import _Mover, between_parts
 from support.arms import robot_named
 from support.oracle import Judge
 from support.own_kinematics import Arm

@@ -8,10 +8,10 @@ import pinocchio as pin
 import pytest
 
 import selfmotion as sm
-import selfmotion.testing
+import selfmotion.shell.testing
 from selfmotion.basics import Array, NoSequenceError, ProblemError
-from selfmotion.path import section_at_rest
-from selfmotion.problem import times_along
+from selfmotion.model.path import section_at_rest
+from selfmotion.problem.problem import times_along
 from support.arms import robot_named
 
 # The planar arm keeps about this shape, and its first joint turns by so much at most.

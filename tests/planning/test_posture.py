@@ -5,9 +5,9 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.basics import Counts, silent
-from selfmotion.planning.effort import Effort
-from selfmotion.planning.screening import Ranking, far_from_usual, usual_posture, wound_back
-from selfmotion.search import Stacked, start_candidates
+from selfmotion.planning.planner.effort import Effort
+from selfmotion.planning.planner.screening import Ranking, far_from_usual, usual_posture, wound_back
+from selfmotion.planning.search import Stacked, start_candidates
 from support.arms import robot_named
 from support.cones import downhand
 

@@ -4,9 +4,9 @@ import numpy as np
 
 import selfmotion as sm
 from selfmotion.basics import Array
-from selfmotion.motion import Grid
-from selfmotion.planning.screening import ONE_VALLEY, most_promising
-from selfmotion.search import carried, start_candidates
+from selfmotion.model.motion import Grid
+from selfmotion.planning.planner.screening import ONE_VALLEY, most_promising
+from selfmotion.planning.search import carried, start_candidates
 from support.arms import robot_named
 from support.paths import line_of
 

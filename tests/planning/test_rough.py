@@ -7,10 +7,10 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.basics import Array, Counts
-from selfmotion.planning import screening as rough_motions
-from selfmotion.planning.effort import Effort
-from selfmotion.planning.screening import Ranking
-from selfmotion.search import start_candidates
+from selfmotion.planning.planner import screening as rough_motions
+from selfmotion.planning.planner.effort import Effort
+from selfmotion.planning.planner.screening import Ranking
+from selfmotion.planning.search import start_candidates
 from support.arms import robot_named
 from support.paths import line_of
 

@@ -11,9 +11,9 @@ import yourdfpy
 
 import selfmotion as sm
 from selfmotion.certificate import Certificate, Extreme
-from selfmotion.optimise import Status
-from selfmotion.planning.polish import Polisher
-from selfmotion.planning.run import message_of, status_of
+from selfmotion.planning.optimise import Status
+from selfmotion.planning.planner.polish import Polisher
+from selfmotion.planning.planner.run import message_of, status_of
 from support.arms import robot_named
 
 # Share of the cost that finer nodes may still save.

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.planning.solutions import score
+from selfmotion.planning.planner.solutions import score
 from support.arms import robot_named
 
 Circle = Callable[..., sm.Problem]

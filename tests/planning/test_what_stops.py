@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.task import SE3
+from selfmotion.model.task import SE3
 from support.arms import robot_named
 
 # A search that ends soon: what is said afterwards counts here.

@@ -9,7 +9,7 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.basics import Array
-from selfmotion.follow import AugmentedFollows
+from selfmotion.model.follow import AugmentedFollows
 
 # Two optima of one problem, found from different nodes, differ by so much of their cost.
 SAME_OPTIMUM = 5e-4

@@ -7,7 +7,7 @@ import pytest
 import trimesh
 
 import selfmotion as sm
-from selfmotion.problem import remarks
+from selfmotion.problem.problem import remarks
 from support.arms import PANDA_HOME, robot_named
 from support.files_of_people import arm
 

@@ -11,7 +11,7 @@ from numba.core import event
 import selfmotion as sm
 from selfmotion import realtime
 from selfmotion.realtime import Replanner, Segment, SimulatedArm, State
-from selfmotion.warm import Compiled
+from selfmotion.realtime.warm import Compiled
 from support import realtime_scenarios as scenarios
 from support.arms import PANDA_HOME
 from support.loops import closed_loop

@@ -7,7 +7,7 @@ import pytest
 import selfmotion as sm
 from selfmotion import realtime
 from selfmotion.realtime import Flag, MovingPose, Replanner
-from selfmotion.testing import check_path
+from selfmotion.shell.testing import check_path
 from support.arms import PANDA_HOME
 
 # A conveyor's speed [m/s], how often a camera sees it [s], and how late it tells [s].

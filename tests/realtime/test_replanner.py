@@ -83,7 +83,7 @@ def test_a_closed_loop_costs_little_more_than_planning_all_at_once(panda: sm.Rob
     count = round(replanner.period / replanner.cycle)
     q = np.concatenate([segment.q[:count] for segment in segments])
     qd = np.concatenate([segment.qd[:count] for segment in segments])
-    sampling = sm.motion.Sampling.trapezoidal(replanner.cycle * np.arange(len(q)))
+    sampling = sm.model.motion.Sampling.trapezoidal(replanner.cycle * np.arange(len(q)))
     samples = sm.costs.Samples.along(standing(panda, sm.Task.POSITION), sampling, q, qd)
     cost = sum(float(samples.weights @ item.value(samples)) for item in costs)
     assert cost < 1.03 * full.cost

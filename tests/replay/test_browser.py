@@ -8,11 +8,11 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from selfmotion.collision import Box, CollisionModel
-from selfmotion.constraints import Clearance
-from selfmotion.controllers import read_motion
-from selfmotion.replay import notebook_html, write_replay
-from selfmotion.robot import NAMED_ARMS
+from selfmotion.model.collision import Box, CollisionModel
+from selfmotion.model.robot import NAMED_ARMS
+from selfmotion.problem.constraints import Clearance
+from selfmotion.shell.replay import notebook_html, write_replay
+from selfmotion.shop.controllers import read_motion
 from support.layouts import chromium
 from support.replay_plans import arm_plan, planar_plan, shelf_plan
 

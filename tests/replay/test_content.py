@@ -16,13 +16,13 @@ import yourdfpy
 
 import selfmotion as sm
 from selfmotion.basics.errors import RobotError
-from selfmotion.replay import three
-from selfmotion.replay.content import page_content
-from selfmotion.replay.links import bake
-from selfmotion.replay.meshes import Payload, face_codes, grid_codes, make_mesh, read_meshes
-from selfmotion.replay.motion import curves, key_frames
-from selfmotion.replay.whole import facts
-from selfmotion.robot import NAMED_ARMS, load_robot
+from selfmotion.model.robot import NAMED_ARMS, load_robot
+from selfmotion.shell.replay import three
+from selfmotion.shell.replay.content import page_content
+from selfmotion.shell.replay.links import bake
+from selfmotion.shell.replay.meshes import Payload, face_codes, grid_codes, make_mesh, read_meshes
+from selfmotion.shell.replay.motion import curves, key_frames
+from selfmotion.shell.replay.whole import facts
 from support.files_of_people import finger
 from support.replay_plans import arm_plan, planar_plan
 

@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 
 import selfmotion as sm
-from selfmotion.batch.folder import Folder, Row
-from selfmotion.replay import write_replay
+from selfmotion.shell.replay import write_replay
+from selfmotion.work.batch.folder import Folder, Row
 from support.layouts import WIDTHS, chromium, faults
 from support.replay_plans import planar_plan, two_seams
 

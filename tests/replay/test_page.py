@@ -10,7 +10,7 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.basics.errors import FileFormatError, ProblemError
-from selfmotion.replay import notebook_html, replay_html, write_replay
+from selfmotion.shell.replay import notebook_html, replay_html, write_replay
 from support.replay_plans import arm_plan, planar_plan
 
 

@@ -15,7 +15,7 @@ import pytest
 from PIL import Image
 
 from selfmotion.basics.errors import RenderError
-from selfmotion.replay import browser, figure, render_gif, render_png
+from selfmotion.shell.replay import browser, figure, render_gif, render_png
 from support.places import TESTS
 from support.replay_plans import arm_plan, planar_plan
 from support.shell import complaint
@@ -87,7 +87,7 @@ def test_no_playwright_is_said_clearly(tmp_path, monkeypatch):
 WRITE = """
 import sys, psutil
 from support.replay_plans import planar_plan
-from selfmotion.replay import write_replay
+from selfmotion.shell.replay import write_replay
 write_replay(planar_plan(), sys.argv[1] + "/a.html")
 me = psutil.Process()
 assert me.children() == [] and me.net_connections() == [], "a process or port is left"
@@ -98,7 +98,7 @@ assert not {"meshcat", "zmq", "matplotlib", "playwright", "IPython"} & set(sys.m
 RENDER = """
 import sys
 from support.replay_plans import planar_plan
-from selfmotion.replay import render_gif
+from selfmotion.shell.replay import render_gif
 render_gif(planar_plan(), sys.argv[1] + "/a.gif", frames_per_second=100)
 """
 

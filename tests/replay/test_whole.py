@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.replay import replay_html, three
-from selfmotion.replay.meshes import Payload
-from selfmotion.replay.motion import curves
-from selfmotion.replay.whole import Whole
+from selfmotion.shell.replay import replay_html, three
+from selfmotion.shell.replay.meshes import Payload
+from selfmotion.shell.replay.motion import curves
+from selfmotion.shell.replay.whole import Whole
 from support.replay_plans import two_seams
 
 

@@ -14,7 +14,7 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.basics import files
-from selfmotion.result import key_of, own_modules
+from selfmotion.planning.result import key_of, own_modules
 from support.arms import robot_named
 
 # What a motion is at its nodes comes out of its polynomials [rad, rad/s].

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.result.measured import cost_of
+from selfmotion.planning.result.measured import cost_of
 from support.arms import PANDA_HOME, robot_named
 
 # A cost is the same by two integrations of it [share].

@@ -9,7 +9,7 @@ from rich.console import Console
 
 import selfmotion as sm
 from selfmotion.basics import Array
-from selfmotion.cli import tables
+from selfmotion.shell.cli import tables
 
 # The published method integrates its costs on its own grid.
 INTEGRATED = 1e-4

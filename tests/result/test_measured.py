@@ -9,7 +9,7 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.basics import Array
-from selfmotion.result import Reversals
+from selfmotion.planning.result import Reversals
 from support.arms import PANDA_HOME, Case, robot_named, short_line, start_of
 
 # Roundings of velocities, by two ways to a pseudo-inverse.

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.result import Ends, PaceLimits, fastest_pace, pacing, quantities_of_pace
-from selfmotion.robot import Dynamics
+from selfmotion.model.robot import Dynamics
+from selfmotion.planning.result import Ends, PaceLimits, fastest_pace, pacing, quantities_of_pace
 from support.arms import PANDA_HOME, robot_named
 
 # Unknowns of the programmes of so brief a motion: four times those that they may begin with.

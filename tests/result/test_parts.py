@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from selfmotion.basics import FileFormatError
-from selfmotion.result import read_bundle, write_bundle
+from selfmotion.planning.result import read_bundle, write_bundle
 
 
 @pytest.mark.parametrize(

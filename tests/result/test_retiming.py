@@ -10,7 +10,7 @@ from scipy.optimize import linprog
 from scipy.sparse import lil_array, vstack
 
 import selfmotion as sm
-from selfmotion.robot import Dynamics
+from selfmotion.model.robot import Dynamics
 from support.arms import PANDA_HOME, robot_named
 
 ACCELERATION = 6.0

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.result import Asked, Piece, gaps
-from selfmotion.result.asked import same_path
-from selfmotion.task import SE3
+from selfmotion.model.task import SE3
+from selfmotion.planning.result import Asked, Piece, gaps
+from selfmotion.planning.result.asked import same_path
 from support.arms import robot_named
 
 # A bump of the path: far above what paths that are one may differ by [m].

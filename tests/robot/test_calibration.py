@@ -11,7 +11,7 @@ import yaml
 from scipy.spatial.transform import Rotation
 
 import selfmotion as sm
-from selfmotion.documents import read_problem, write_problem
+from selfmotion.shell.documents import read_problem, write_problem
 from support.arms import robot_named
 from support.shell import invoke
 

@@ -10,7 +10,7 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.basics import Array
-from selfmotion.robot import Chain, Kinematics, ToolRates
+from selfmotion.model.robot import Chain, Kinematics, ToolRates
 from support.arms import central_difference
 from support.own_kinematics import Arm
 from support.random_cells import LEFT, RIGHT, random_cell

@@ -8,7 +8,7 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.basics import Array, series
-from selfmotion.robot import ChainSeries, ToolRates
+from selfmotion.model.robot import ChainSeries, ToolRates
 from support.arms import robot_named
 from support.circles import small_circle
 from support.gantries import gantry

@@ -9,7 +9,7 @@ import pytest
 import yourdfpy
 
 import selfmotion as sm
-from selfmotion.robot import Dynamics
+from selfmotion.model.robot import Dynamics
 from support.arms import robot_named
 from support.circles import upright_circle
 

@@ -5,7 +5,7 @@ import pinocchio as pin
 import pytest
 
 import selfmotion as sm
-from selfmotion.robot import NAMED_ARMS
+from selfmotion.model.robot import NAMED_ARMS
 
 
 @pytest.mark.parametrize("name", NAMED_ARMS)

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion import kernels
 from selfmotion.basics import Array
+from selfmotion.model import kernels
 from support.arms import central_difference
 from support.followed import standing
 

@@ -8,7 +8,7 @@ import pinocchio as pin
 import pytest
 
 import selfmotion as sm
-from selfmotion.robot import Dynamics
+from selfmotion.model.robot import Dynamics
 from support.arms import robot_named, short_line
 
 # Roundings of angles that are written and read.

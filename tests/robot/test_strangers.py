@@ -8,9 +8,9 @@ import pytest
 import yaml
 
 import selfmotion as sm
-from selfmotion.controllers.motion_tables import keyframes
-from selfmotion.controllers.program_texts import as_word, of_word
-from selfmotion.robot.xacro_expressions import Refused, check_expression, only_arithmetic
+from selfmotion.model.robot.xacro_expressions import Refused, check_expression, only_arithmetic
+from selfmotion.shop.controllers.motion_tables import keyframes
+from selfmotion.shop.controllers.program_texts import as_word, of_word
 from support.files_of_people import arm, chain_elements
 
 HEAD = '<robot name="arm" xmlns:xacro="http://www.ros.org/wiki/xacro">'

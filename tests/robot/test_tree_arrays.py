@@ -10,10 +10,10 @@ import yourdfpy
 import selfmotion as sm
 from selfmotion.basics import Array
 from selfmotion.certificate import path_error
-from selfmotion.motion import NullMotionTable, PolynomialNullMotion
-from selfmotion.paper.still import FixedStart
-from selfmotion.robot import Dynamics, Energy, ToolRates
-from selfmotion.robot.tree_arrays import JOINT
+from selfmotion.model.motion import NullMotionTable, PolynomialNullMotion
+from selfmotion.model.robot import Dynamics, Energy, ToolRates
+from selfmotion.model.robot.tree_arrays import JOINT
+from selfmotion.planning.paper.still import FixedStart
 from support.arms import Case, central_difference, objective_of, short_line
 from support.files_of_people import finger, torso
 from support.nodes import around_of, centred, moved, nodes_of, problem_of, random_step

@@ -9,10 +9,10 @@ import pinocchio as pin
 import pytest
 
 import selfmotion as sm
-from selfmotion.replay.content import page_content
-from selfmotion.replay.meshes import Payload
-from selfmotion.robot import full_model as gate
-from selfmotion.robot.urdf import parse_urdf
+from selfmotion.model.robot import full_model as gate
+from selfmotion.model.robot.urdf import parse_urdf
+from selfmotion.shell.replay.content import page_content
+from selfmotion.shell.replay.meshes import Payload
 from support.arms import robot_named
 from support.bad_urdfs import SOUND
 from support.files_of_people import finger

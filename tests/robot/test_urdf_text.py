@@ -7,10 +7,10 @@ import pinocchio as pin
 import pytest
 
 import selfmotion as sm
-from selfmotion.replay.links import bake
-from selfmotion.replay.meshes import Payload
-from selfmotion.robot import urdf_text
-from selfmotion.robot.urdf_text import Packages
+from selfmotion.model.robot import urdf_text
+from selfmotion.model.robot.urdf_text import Packages
+from selfmotion.shell.replay.links import bake
+from selfmotion.shell.replay.meshes import Payload
 from support.files_of_people import arm, described_package, with_arguments
 from support.shell import complaint, invoke
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from selfmotion.basics import Array
-from selfmotion.search.chains import best_chains, diverse_chains
-from selfmotion.search.nodes import Admissible
+from selfmotion.planning.search.chains import best_chains, diverse_chains
+from selfmotion.planning.search.nodes import Admissible
 
 
 def brute_force(layers: list[Array], step: Array) -> float:

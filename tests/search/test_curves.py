@@ -7,8 +7,8 @@ from scipy.integrate import quad
 
 import selfmotion as sm
 from selfmotion.basics import Array
-from selfmotion.follow import Follows
-from selfmotion.search import SelfMotion
+from selfmotion.model.follow import Follows
+from selfmotion.planning.search import SelfMotion
 from support.followed import standing
 
 

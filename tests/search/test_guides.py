@@ -5,8 +5,8 @@ import pinocchio as pin
 import pytest
 
 import selfmotion as sm
-from selfmotion.search import carried, shortest_along
-from selfmotion.search.guides import search_times
+from selfmotion.planning.search import carried, shortest_along
+from selfmotion.planning.search.guides import search_times
 from support.arms import PANDA_HOME
 from support.stretching import DURATION, rounded_problem, stretching
 

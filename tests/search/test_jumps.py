@@ -7,8 +7,8 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.basics import Array
-from selfmotion.search import Stretch, Stretches
-from selfmotion.search.stretches import jumps_of
+from selfmotion.planning.search import Stretch, Stretches
+from selfmotion.planning.search.stretches import jumps_of
 from support.arms import robot_named
 
 # Arms and tasks: redundancy 1, by a joint or by a row that is free.
@@ -73,7 +73,7 @@ def test_chains_do_without_jumps(monkeypatch: pytest.MonkeyPatch) -> None:
     def few(problem: sm.Problem) -> np.ndarray:
         return np.linspace(0.0, problem.path.duration, WAYPOINTS)
 
-    monkeypatch.setattr(sys.modules["selfmotion.search.guides"], "waypoint_times", few)
+    monkeypatch.setattr(sys.modules["selfmotion.planning.search.guides"], "waypoint_times", few)
     stretches = Stretches.of(wound())
     # What the samples alone would do.
     assert any(_jumps(stretches, item) for item in stretches._found(set()))

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.follow import Follows
-from selfmotion.kernels import carried
-from selfmotion.robot import null_space
-from selfmotion.search import spread
-from selfmotion.search.manifold import Manifold
+from selfmotion.model.follow import Follows
+from selfmotion.model.kernels import carried
+from selfmotion.model.robot import null_space
+from selfmotion.planning.search import spread
+from selfmotion.planning.search.manifold import Manifold
 from support.arms import robot_named
 from support.followed import standing
 from support.paths import line_of

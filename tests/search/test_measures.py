@@ -7,10 +7,10 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.basics import Array
-from selfmotion.costs import Samples
-from selfmotion.motion import Sampling
-from selfmotion.search.chains import best_chains
-from selfmotion.search.measures import Length, RunningCost, measure_of
+from selfmotion.model.motion import Sampling
+from selfmotion.planning.search.chains import best_chains
+from selfmotion.planning.search.measures import Length, RunningCost, measure_of
+from selfmotion.problem.costs import Samples
 from support.arms import robot_named
 from support.followed import standing
 

@@ -8,15 +8,15 @@ from scipy.interpolate import make_interp_spline
 
 import selfmotion as sm
 from selfmotion.basics import Array
-from selfmotion.search.curves import SPACING
-from selfmotion.search.obstruction import (
+from selfmotion.planning.search.curves import SPACING
+from selfmotion.planning.search.obstruction import (
     Obstruction,
     least_deviation,
     least_excess,
     nearest_place,
     obstruction,
 )
-from selfmotion.search.single_poses import SinglePoses
+from selfmotion.planning.search.single_poses import SinglePoses
 from support.arms import PANDA_HOME, robot_named
 
 # Remedies are as tight as their last round, and the path is moved a bit farther than it has to be.

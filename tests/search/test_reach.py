@@ -5,7 +5,7 @@ import pytest
 from scipy.interpolate import make_interp_spline
 
 import selfmotion as sm
-from selfmotion.search import reachable
+from selfmotion.planning.search import reachable
 from support.arms import robot_named
 
 

@@ -6,11 +6,11 @@ import pytest
 import selfmotion as sm
 from selfmotion.basics import Array, silent
 from selfmotion.basics.errors import NoSequenceError
-from selfmotion.follow import Follows
-from selfmotion.search.manifold import Manifold, OnPath
-from selfmotion.search.nodes import Admissible
-from selfmotion.search.sampled import sampled_layers
-from selfmotion.search.sequences import best_sequences
+from selfmotion.model.follow import Follows
+from selfmotion.planning.search.manifold import Manifold, OnPath
+from selfmotion.planning.search.nodes import Admissible
+from selfmotion.planning.search.sampled import sampled_layers
+from selfmotion.planning.search.sequences import best_sequences
 from support.arms import robot_named
 from support.followed import standing
 from support.paths import line_of
@@ -22,7 +22,7 @@ def searched(
     robot: sm.RobotModel,
     path: sm.paths.Path,
     bodies: tuple[tuple[sm.obstacles.CollisionModel, float], ...] = (),
-) -> list[sm.search.Sequence]:
+) -> list[sm.planning.search.Sequence]:
     t = np.linspace(0.0, path.duration, 21)
     follows, limits = Follows.of(robot, path, sm.Task.POSITION), (robot.lower, robot.upper)
     waypoints, steps = OnPath(follows, t, *limits), np.full((20, robot.dof), STEP)

@@ -10,9 +10,9 @@ import pytest
 import selfmotion as sm
 from selfmotion.basics import Array, silent
 from selfmotion.basics.errors import NoSequenceError
-from selfmotion.follow import Follows
-from selfmotion.search import Sequence
-from selfmotion.search.sequences import best_sequences, curve_layers
+from selfmotion.model.follow import Follows
+from selfmotion.planning.search import Sequence
+from selfmotion.planning.search.sequences import best_sequences, curve_layers
 from support.places import DATA
 
 STEP = np.radians(7.0)

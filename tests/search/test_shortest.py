@@ -7,11 +7,11 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.basics import Array
-from selfmotion.follow import Follows
-from selfmotion.search.manifold import OnPath
-from selfmotion.search.measures import Length, RunningCost
-from selfmotion.search.nodes import Admissible
-from selfmotion.search.shortest import Shortest, improved_by
+from selfmotion.model.follow import Follows
+from selfmotion.planning.search.manifold import OnPath
+from selfmotion.planning.search.measures import Length, RunningCost
+from selfmotion.planning.search.nodes import Admissible
+from selfmotion.planning.search.shortest import Shortest, improved_by
 from support.arms import robot_named
 from support.paths import line_of
 

@@ -8,7 +8,7 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.basics import Array
-from selfmotion.search import Stacked, metrics, start_candidates
+from selfmotion.planning.search import Stacked, metrics, start_candidates
 from support.arms import robot_named
 from support.cones import UPRIGHT, downhand
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.search import carried, start_candidates
+from selfmotion.planning.search import carried, start_candidates
 from support.arms import Case
 from support.two_arms import both_arms
 

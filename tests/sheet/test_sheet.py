@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.sheet.page import sections
+from selfmotion.shop.sheet.page import sections
 from support.arms import robot_named
 from support.shell import complaint, invoke
 

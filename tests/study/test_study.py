@@ -11,16 +11,16 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.costs.samples import Samples
-from selfmotion.motion import Sampling
-from selfmotion.study import Claim, Scale, Study, Verdict, run, write
-from selfmotion.study.context import bind, optimum
-from selfmotion.study.published import (
+from selfmotion.model.motion import Sampling
+from selfmotion.paper.study import Claim, Scale, Study, Verdict, run, write
+from selfmotion.paper.study.context import bind, optimum
+from selfmotion.paper.study.published import (
     PublishedFunction,
     flops_per_rate,
     published_null_motion,
 )
-from selfmotion.study.results import Chapter, Table
+from selfmotion.paper.study.results import Chapter, Table
+from selfmotion.problem.costs.samples import Samples
 from support.followed import standing
 
 # Costs of the reading notes are given to four or five decimals.
@@ -129,7 +129,7 @@ def test_verdicts_follow_the_numbers() -> None:
     pages = []
     for shown in (claim, turned):
         parts = (Chapter("s", "S", claims=(shown,)),)
-        from selfmotion.study.run import html
+        from selfmotion.paper.study.run import html
 
         pages.append(html(Study(parts, 0.0, "test")))
     assert 'class="refuted"' in pages[0]
@@ -208,7 +208,7 @@ def test_optimum_stops_where_coefficients_run_away(joint_space: sm.Problem) -> N
 
 
 def test_missing_matplotlib_is_said_before_any_work(monkeypatch: pytest.MonkeyPatch) -> None:
-    from selfmotion import study
+    from selfmotion.paper import study
     from support.shell import complaint
 
     def work(*_: object) -> Study:
@@ -223,7 +223,8 @@ def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """What the command does around a run: scale, progress, files, the claims as a table."""
     from typer.testing import CliRunner
 
-    from selfmotion import cli, study
+    from selfmotion.paper import study
+    from selfmotion.shell import cli
 
     asked = []
 

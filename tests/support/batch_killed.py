@@ -3,8 +3,8 @@
 import sys
 from pathlib import Path
 
-from selfmotion.batch import plan_items
-from selfmotion.documents import grid_items
+from selfmotion.shell.documents import grid_items
+from selfmotion.work.batch import plan_items
 
 if __name__ == "__main__":
     file, out, workers = sys.argv[1:]

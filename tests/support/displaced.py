@@ -11,7 +11,7 @@ import pinocchio as pin
 
 import selfmotion as sm
 from selfmotion.basics import Array
-from selfmotion.margins import SubjectMargin
+from selfmotion.work.margins import SubjectMargin
 
 # What coal's distances of hulls may miss, and so what the judge forgives [m].
 MISSED = 1e-5

@@ -1,7 +1,7 @@
 """What an arm follows, where no path matters."""
 
 import selfmotion as sm
-from selfmotion.follow import Follows
+from selfmotion.model.follow import Follows
 
 
 def standing(robot: sm.RobotModel, task: sm.Task | str) -> Follows:

@@ -13,10 +13,10 @@ import numpy as np
 import pinocchio as pin
 from scipy.spatial import ConvexHull
 
-from selfmotion.collision.bodies import Body
-from selfmotion.collision.distances import HullDistances
-from selfmotion.collision.solids import Solid
-from selfmotion.robot import RobotModel, load_robot
+from selfmotion.model.collision.bodies import Body
+from selfmotion.model.collision.distances import HullDistances
+from selfmotion.model.collision.solids import Solid
+from selfmotion.model.robot import RobotModel, load_robot
 
 # What a direction separates by may miss, and a nearest point [m]: GJK ends at a relative 1e-9 of
 # the squared distance, so directions are right to 3e-5, for bodies and distances of up to 1.5 m.

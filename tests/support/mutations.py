@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 import selfmotion as sm
-from selfmotion.cli.options import read_obstacles
+from selfmotion.shell.cli.options import read_obstacles
 from support.files_of_people import finger, with_arguments_text
 
 # Numbers that no file means, and tokens that stand where numbers should.

@@ -4,10 +4,10 @@ import numpy as np
 
 import selfmotion as sm
 from selfmotion.basics import Array, Counts
-from selfmotion.motion import Trajectory
-from selfmotion.nodes import NodeGrid, NodeMotion
-from selfmotion.nodes.objective import LocalModel
-from selfmotion.paper import settled_still_motion
+from selfmotion.model.motion import Trajectory
+from selfmotion.planning.nodes import NodeGrid, NodeMotion
+from selfmotion.planning.nodes.objective import LocalModel
+from selfmotion.planning.paper import settled_still_motion
 from support.arms import Case
 
 

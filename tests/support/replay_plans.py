@@ -7,8 +7,8 @@ import numpy as np
 import pinocchio as pin
 
 import selfmotion as sm
-from selfmotion.collision import Box, Capsule, Cylinder, Mesh, Sphere
-from selfmotion.constraints import Clearance
+from selfmotion.model.collision import Box, Capsule, Cylinder, Mesh, Sphere
+from selfmotion.problem.constraints import Clearance
 
 
 @cache

@@ -3,9 +3,9 @@
 import numpy as np
 
 from selfmotion.basics import Array
-from selfmotion.follow import Follows
-from selfmotion.motion import Grid, NullMotionTable
-from selfmotion.paper.rollout import Rollout
+from selfmotion.model.follow import Follows
+from selfmotion.model.motion import Grid, NullMotionTable
+from selfmotion.planning.paper.rollout import Rollout
 from support.arms import Case
 
 

@@ -9,7 +9,7 @@ from unittest.mock import patch
 import pytest
 from typer.testing import CliRunner
 
-from selfmotion.cli import app, main
+from selfmotion.shell.cli import app, main
 
 
 def invoke(*arguments: str | Path) -> tuple[int, str]:

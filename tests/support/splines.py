@@ -5,8 +5,8 @@ from scipy.optimize import minimize
 
 import selfmotion as sm
 from selfmotion.basics import Array
-from selfmotion.motion import Grid
-from selfmotion.paper import Objective, StillMotion
+from selfmotion.model.motion import Grid
+from selfmotion.planning.paper import Objective, StillMotion
 
 # Conditions that come this near to being broken by x = 0 are asked for.
 NEAR = -0.6

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 import selfmotion as sm
 from selfmotion.basics import Array
-from selfmotion.motion import NullMotion
+from selfmotion.model.motion import NullMotion
 
 JOINTS = ("revolute", "revolute", "revolute", "prismatic", "continuous")
 AXES = ("0 0 1", "0 1 0", "1 0 0", "0 0 -1", "0.6 0 0.8", "0 0 2")

@@ -6,7 +6,7 @@ import numpy as np
 
 import selfmotion as sm
 from selfmotion.basics import Array
-from selfmotion.follow import BoundFollow, Follows
+from selfmotion.model.follow import BoundFollow, Follows
 
 LEFT, RIGHT = "left_gripper", "right_gripper"
 

@@ -9,13 +9,13 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.basics import Array
-from selfmotion.costs import OffPath
-from selfmotion.follow import Follows
-from selfmotion.motion import NullMotionTable, PolynomialNullMotion
-from selfmotion.motion.grid import Grid
-from selfmotion.paper.rollout import Rollout
-from selfmotion.paper.still import FixedStart
-from selfmotion.task.damping import DampingLaw
+from selfmotion.model.follow import Follows
+from selfmotion.model.motion import NullMotionTable, PolynomialNullMotion
+from selfmotion.model.motion.grid import Grid
+from selfmotion.model.task.damping import DampingLaw
+from selfmotion.planning.paper.rollout import Rollout
+from selfmotion.planning.paper.still import FixedStart
+from selfmotion.problem.costs import OffPath
 from support.arms import Case, central_difference, objective_of
 from support.rollouts import assert_sensitivities
 

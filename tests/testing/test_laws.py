@@ -10,11 +10,11 @@ import pytest
 from typer.testing import CliRunner
 
 import selfmotion as sm
-from selfmotion import testing
 from selfmotion.basics import Array, restore
-from selfmotion.cli import app
-from selfmotion.follow import Follows
-from selfmotion.motion import NullMotion
+from selfmotion.model.follow import Follows
+from selfmotion.model.motion import NullMotion
+from selfmotion.shell import testing
+from selfmotion.shell.cli import app
 from support.arms import PANDA_HOME
 
 LIMITS = (sm.constraints.JointPositionLimits(), sm.constraints.JointVelocityLimits())

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.transfer import FreeMotions
+from selfmotion.planning.transfer import FreeMotions
 from support.arms import robot_named
 from support.oracle import Judge
 from support.own_kinematics import Arm
@@ -111,7 +111,7 @@ def test_moves_keep_bands_and_what_depends_on_the_pace() -> None:
         slow,
     ]
     last = panda.inverse_kinematics(
-        panda.pose(HOME) * sm.task.SE3(np.eye(3), np.array([0.2, -0.3, 0.0])), seed=HOME
+        panda.pose(HOME) * sm.model.task.SE3(np.eye(3), np.array([0.2, -0.3, 0.0])), seed=HOME
     )
     move = sm.move(panda, HOME, last, constraints=constraints).require()
     assert "speeds" in move.verdict

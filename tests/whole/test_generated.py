@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.optimise import inverse_metric
+from selfmotion.planning.optimise import inverse_metric
 from support import generated
 from support.generated import Generated, end_of
 from support.strategies import problems

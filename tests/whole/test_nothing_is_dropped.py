@@ -15,10 +15,10 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.basics import read_document
-from selfmotion.documents import json_schema
-from selfmotion.documents.seam_job import SHARED
-from selfmotion.problem import problem_to_dict
-from selfmotion.task import SE3
+from selfmotion.model.task import SE3
+from selfmotion.problem.problem import problem_to_dict
+from selfmotion.shell.documents import json_schema
+from selfmotion.shell.documents.seam_job import SHARED
 from support.arms import PANDA_HOME, robot_named
 from support.places import ROOT
 
@@ -217,7 +217,7 @@ def test_each_parameter_of_other_paces_matters() -> None:
 
 def test_each_parameter_of_fastest_matters(monkeypatch: pytest.MonkeyPatch) -> None:
     # One round shows it as well as many.
-    monkeypatch.setattr(sys.modules["selfmotion.planning.fastest"], "ROUNDS", 1)
+    monkeypatch.setattr(sys.modules["selfmotion.planning.planner.fastest"], "ROUNDS", 1)
     robot, (heard, tell) = robot_named("planar_3r"), told()
     start = np.array([0.1, 0.9, 0.9])
     path = sm.paths.Line(robot.pose(start), robot.pose(start + 0.2), 2.0)

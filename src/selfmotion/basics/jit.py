@@ -187,7 +187,7 @@ _IS_ALONE = False
 def companion(works: str) -> "subprocess.Popen[str] | None":
     """Let another process compile kernels, at the same time; it prints how many.
 
-    Those of `FIRST_WORKS` or `ALL_WORKS`, see `selfmotion.warm`. None where there is no other
+    Those of `FIRST_WORKS` or `ALL_WORKS`, see `selfmotion.realtime.warm`. None where there is no other
     processor, or where nothing is kept that another process compiles.
     """
     if _IS_ALONE or os.cpu_count() == 1 or numba.config.DISABLE_JIT or not sys.executable:
@@ -196,7 +196,7 @@ def companion(works: str) -> "subprocess.Popen[str] | None":
     paths = [package, *filter(None, [os.environ.get("PYTHONPATH")])]
     try:
         return subprocess.Popen(
-            [sys.executable, "-P", "-m", "selfmotion.warm", works],
+            [sys.executable, "-P", "-m", "selfmotion.realtime.warm", works],
             env={**os.environ, "PYTHONPATH": os.pathsep.join(paths)},
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,

@@ -25,8 +25,8 @@ from typing import NamedTuple
 import numpy as np
 
 from selfmotion.basics import Array, Ints, Progress, series, silent
-from selfmotion.motion import Trajectory
-from selfmotion.robot import ChainSeries, RobotModel
+from selfmotion.model.motion import Trajectory
+from selfmotion.model.robot import ChainSeries, RobotModel
 
 # Nodes of an interval: at least, and without a majorant.
 _FEWEST, _MEASURED = 3, 9

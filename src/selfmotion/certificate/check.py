@@ -29,11 +29,11 @@ from selfmotion.certificate.requirement import (
     covered_by,
 )
 from selfmotion.certificate.verdict import Certificate
-from selfmotion.follow import BoundFollow, Follow, Follows
-from selfmotion.motion import Trajectory
-from selfmotion.path import Path, check_oriented
-from selfmotion.robot import RobotModel
-from selfmotion.task import DampingLaw, Relaxation, Task
+from selfmotion.model.follow import BoundFollow, Follow, Follows
+from selfmotion.model.motion import Trajectory
+from selfmotion.model.path import Path, check_oriented
+from selfmotion.model.robot import RobotModel
+from selfmotion.model.task import DampingLaw, Relaxation, Task
 
 # Of a long motion the distance from singular poses, which proves nothing, is looked at so often,
 # and then at all times around where it may be smallest.

@@ -12,8 +12,8 @@ from selfmotion.basics import Array, Flags, series
 from selfmotion.certificate.bounding import Bounded, Bounds, Stretch, bounded
 from selfmotion.certificate.path_error import jacobians, smooth_between
 from selfmotion.certificate.requirement import Finding, FinishedMotion, Requirement
-from selfmotion.follow import BoundFollow
-from selfmotion.path import FeedKept, FeedPossible, Path, path_series
+from selfmotion.model.follow import BoundFollow
+from selfmotion.model.path import FeedKept, FeedPossible, Path, path_series
 
 # Shares of the room that is left are interpolated this well at least.
 _FINE = 1e-3

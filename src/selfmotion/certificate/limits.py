@@ -7,7 +7,7 @@ import numpy as np
 
 from selfmotion.basics import Array, ProblemError, read_only
 from selfmotion.certificate.requirement import Finding, FinishedMotion, Requirement, of_some
-from selfmotion.robot import RobotModel
+from selfmotion.model.robot import RobotModel
 
 # Limits of joint position, velocity, acceleration and jerk, judged at all times.
 

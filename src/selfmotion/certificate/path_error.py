@@ -9,11 +9,11 @@ import pinocchio as pin
 from selfmotion.basics import Array, ProblemError, Progress, series, silent
 from selfmotion.certificate.bounding import Bounded, Stretch, bounded
 from selfmotion.certificate.requirement import Extreme, Tolerance
-from selfmotion.follow import BoundFollow, Follows
-from selfmotion.motion import Trajectory
-from selfmotion.path import Path, path_series
-from selfmotion.robot import WORLD, Chain, RobotModel
-from selfmotion.task import Relaxation, Task
+from selfmotion.model.follow import BoundFollow, Follows
+from selfmotion.model.motion import Trajectory
+from selfmotion.model.path import Path, path_series
+from selfmotion.model.robot import WORLD, Chain, RobotModel
+from selfmotion.model.task import Relaxation, Task
 
 # Where a motion takes the tool, by forward kinematics; shares no code with the rollout.
 

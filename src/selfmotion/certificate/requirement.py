@@ -10,9 +10,9 @@ from functools import cached_property
 import numpy as np
 
 from selfmotion.basics import Array, as_number
-from selfmotion.collision import Obstacle
-from selfmotion.motion import Trajectory
-from selfmotion.robot import RobotModel
+from selfmotion.model.collision import Obstacle
+from selfmotion.model.motion import Trajectory
+from selfmotion.model.robot import RobotModel
 
 # What a certificate is made of: tolerances, and what was found.
 

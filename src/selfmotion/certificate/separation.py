@@ -12,8 +12,8 @@ import numpy as np
 
 from selfmotion.basics import Array
 from selfmotion.certificate.requirement import Extreme, Finding, FinishedMotion, Requirement
-from selfmotion.collision import Closest, CollisionModel, Obstacle, how_near, srdf_line
-from selfmotion.motion import Trajectory
+from selfmotion.model.collision import Closest, CollisionModel, Obstacle, how_near, srdf_line
+from selfmotion.model.motion import Trajectory
 
 # Intervals to begin with; each is halved so often before it counts as undecided.
 _FIRST, _DEPTH = 16, 40

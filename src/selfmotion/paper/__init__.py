@@ -1,18 +1,1 @@
-"""The published method, whole: eq. 4 rolled out, F and its exact gradient, given ends eliminated.
-
-Read `rollout`, `still`, `objective`, `ends` and `solution` in this order.
-"""
-
-from selfmotion.paper.ends import Eliminated as Eliminated, closed as closed
-from selfmotion.paper.objective import Objective as Objective
-from selfmotion.paper.rollout import Rollout as Rollout
-from selfmotion.paper.solution import Method as Method, Solution as Solution, solve as solve
-from selfmotion.paper.still import (
-    MOST_HALVINGS as MOST_HALVINGS,
-    FixedStart as FixedStart,
-    FreeStart as FreeStart,
-    Guide as Guide,
-    Start as Start,
-    StillMotion as StillMotion,
-    settled_still_motion as settled_still_motion,
-)
+"""What the published method is compared with: its study, and other works' methods."""

@@ -1,35 +1,3 @@
-"""What to plan, and every check of whether arm, path and task fit."""
+"""What is wanted: costs, constraints, and the problem."""
 
-from selfmotion.problem.along import (
-    arm_rest_orders as arm_rest_orders,
-    asked_of_part as asked_of_part,
-    at_all_times as at_all_times,
-    check_all_times as check_all_times,
-    envelope_of as envelope_of,
-    rest_orders as rest_orders,
-    times_along as times_along,
-)
-from selfmotion.problem.calibrated import (
-    calibrated as calibrated,
-    off_nominal as off_nominal,
-    start_on_path as start_on_path,
-)
-from selfmotion.problem.fit import (
-    KEPT as KEPT,
-    NO_OVERLAP as NO_OVERLAP,
-    START_MISS as START_MISS,
-    check_feeds as check_feeds,
-)
-from selfmotion.problem.of_arm import BodiesOfArm as BodiesOfArm
-from selfmotion.problem.paper_problem import sample_problem as sample_problem
-from selfmotion.problem.problem import (
-    Problem as Problem,
-    check_feeds_of as check_feeds_of,
-    check_problem as check_problem,
-)
-from selfmotion.problem.saved_problem import (
-    arm_and_constraints as arm_and_constraints,
-    describe_arm as describe_arm,
-    problem_from_dict as problem_from_dict,
-    problem_to_dict as problem_to_dict,
-)
+from selfmotion.problem.problem import *  # noqa: F403

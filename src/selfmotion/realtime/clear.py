@@ -5,11 +5,11 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from selfmotion.basics import Array, ProblemError, nearest
-from selfmotion.collision import ClearanceModel, CollisionModel, how_near
-from selfmotion.costs import Samples
+from selfmotion.model.collision import ClearanceModel, CollisionModel, how_near
+from selfmotion.model.robot import RobotModel
+from selfmotion.model.task import SE3, as_pose
+from selfmotion.problem.costs import Samples
 from selfmotion.realtime.settings import CLEAR_FOR, CLEARANCE_MARGIN, LEAVING, LEVEL, NEARER
-from selfmotion.robot import RobotModel
-from selfmotion.task import SE3, as_pose
 
 
 class Surroundings:

@@ -13,7 +13,8 @@ import numpy.typing as npt
 
 from selfmotion.basics import Array, ProblemError, StartError, read_only
 from selfmotion.basics.layout import Layout
-from selfmotion.constraints import (
+from selfmotion.model.robot import Kinematics, RobotModel
+from selfmotion.problem.constraints import (
     Constraint,
     JointAccelerationLimits,
     JointPositionLimits,
@@ -22,7 +23,6 @@ from selfmotion.constraints import (
 from selfmotion.realtime import law
 from selfmotion.realtime.law import braking_distance, tightened
 from selfmotion.realtime.settings import ACCELERATION, ENDS, FARTHEST, GAIN, SPEED
-from selfmotion.robot import Kinematics, RobotModel
 
 # Limits of the joints, as the loop keeps them.
 

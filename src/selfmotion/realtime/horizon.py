@@ -5,13 +5,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from selfmotion.basics import Array
-from selfmotion.costs import Cost, Samples
-from selfmotion.follow import Follows
-from selfmotion.kernels import transport
-from selfmotion.motion import Grid, NullMotion
-from selfmotion.optimise import minimize_quadratic
-from selfmotion.paper import Rollout
-from selfmotion.path import PathSamples
+from selfmotion.model.follow import Follows
+from selfmotion.model.kernels import transport
+from selfmotion.model.motion import Grid, NullMotion
+from selfmotion.model.path import PathSamples
+from selfmotion.model.robot import null_space
+from selfmotion.planning.optimise import minimize_quadratic
+from selfmotion.planning.paper import Rollout
+from selfmotion.problem.costs import Cost, Samples
 from selfmotion.realtime.clear import Surroundings
 from selfmotion.realtime.settings import (
     BADLY,
@@ -30,7 +31,6 @@ from selfmotion.realtime.settings import (
     WELL,
     WILD,
 )
-from selfmotion.robot import null_space
 
 # The quadratic programme of a step: its model, and an answer whatever it asks.
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from selfmotion.basics import Array, inlined, kernel
 from selfmotion.basics.layout import KIND, Layout
-from selfmotion.kernels import (
+from selfmotion.model.kernels import (
     at_tip,
     factor_damped,
     pose_error,

@@ -13,16 +13,16 @@ import numpy.typing as npt
 
 from selfmotion.basics import Array, ProblemError, as_number, read_only
 from selfmotion.certificate import Tolerance
-from selfmotion.constraints import Constraint
-from selfmotion.costs import Cost, JointVelocity, Samples
-from selfmotion.motion import Sampling, Trajectory
-from selfmotion.optimise import Status
-from selfmotion.path import Line, Path, Waypoints
-from selfmotion.problem import Problem
+from selfmotion.model.motion import Sampling, Trajectory
+from selfmotion.model.path import Line, Path, Waypoints
+from selfmotion.model.task import SE3
+from selfmotion.planning.optimise import Status
+from selfmotion.planning.result import Plan, Report
+from selfmotion.problem.constraints import Constraint
+from selfmotion.problem.costs import Cost, JointVelocity, Samples
+from selfmotion.problem.problem import Problem
 from selfmotion.realtime.commands import Segment
 from selfmotion.realtime.replanner import Replanner
-from selfmotion.result import Plan, Report
-from selfmotion.task import SE3
 
 # The loop around a replanner: reads states, writes segments, knows no transport.
 

@@ -10,11 +10,11 @@ import numpy as np
 import numpy.typing as npt
 
 from selfmotion.basics import Array, PathError, as_number, as_numbers, restore
-from selfmotion.follow import Follows
-from selfmotion.path import Path, PathSamples, check_duration, path_pose, rotations_about
+from selfmotion.model.follow import Follows
+from selfmotion.model.path import Path, PathSamples, check_duration, path_pose, rotations_about
+from selfmotion.model.task import SE3, Jexp3, exp3
 from selfmotion.realtime import law
 from selfmotion.realtime.settings import OFFSET_STEP
-from selfmotion.task import SE3, Jexp3, exp3
 
 # A pose that goes on as it was seen to move.
 

@@ -21,19 +21,19 @@ from selfmotion.basics import (
     plain_numbers,
     shown,
 )
-from selfmotion.constraints import Constraint
-from selfmotion.costs import Cost, JointVelocity
-from selfmotion.follow import Follows
-from selfmotion.motion import NullMotion, PolynomialNullMotion
-from selfmotion.path import Dwell, Path, PathSamples
+from selfmotion.model.follow import Follows
+from selfmotion.model.motion import NullMotion, PolynomialNullMotion
+from selfmotion.model.path import Dwell, Path, PathSamples
+from selfmotion.model.robot import RobotModel
+from selfmotion.model.task import SE3, Task
+from selfmotion.problem.constraints import Constraint
+from selfmotion.problem.costs import Cost, JointVelocity
 from selfmotion.realtime import law
 from selfmotion.realtime.clear import Surroundings
 from selfmotion.realtime.commands import Commands, Flag, Segment, joint_limits, planned_limits
 from selfmotion.realtime.horizon import Horizon
 from selfmotion.realtime.reference import Approach, LastPath, MovingPose, Reference
 from selfmotion.realtime.settings import AHEAD, SOON
-from selfmotion.robot import RobotModel
-from selfmotion.task import SE3, Task
 
 # What a replanner is given, checked before the first step.
 

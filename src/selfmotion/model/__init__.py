@@ -1,0 +1,1 @@
+"""What there is: task, robot, path, what follows it, motions, bodies, and compiled algebra."""

@@ -1,0 +1,39 @@
+"""Collisions: exact distances for certificates, smooth conservative ones for optimisation."""
+
+from selfmotion.model.collision.as_made import (
+    overlapping_as_made as overlapping_as_made,
+    told_as_made as told_as_made,
+)
+from selfmotion.model.collision.bodies import (
+    Body as Body,
+    link_bodies as link_bodies,
+    place_of as place_of,
+)
+from selfmotion.model.collision.clearance import (
+    ClearanceModel as ClearanceModel,
+    Clearances as Clearances,
+)
+from selfmotion.model.collision.displaced import (
+    DisplacedBodies as DisplacedBodies,
+    Separation as Separation,
+)
+from selfmotion.model.collision.exact import CollisionModel as CollisionModel
+from selfmotion.model.collision.obstacles import (
+    Box as Box,
+    Capsule as Capsule,
+    Cylinder as Cylinder,
+    Mesh as Mesh,
+    Obstacle as Obstacle,
+    Sphere as Sphere,
+    obstacle_from_dict as obstacle_from_dict,
+    obstacle_shapes as obstacle_shapes,
+)
+from selfmotion.model.collision.pairs import (
+    SAMPLES as SAMPLES,
+    Closest as Closest,
+    Overlap as Overlap,
+    disabled_links as disabled_links,
+    how_near as how_near,
+    srdf_line as srdf_line,
+)
+from selfmotion.model.collision.solids import Solid as Solid

@@ -1,0 +1,388 @@
+"""Distances between the robot's real collision geometry, itself and the world."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from copy import copy
+from dataclasses import replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from selfmotion.basics import Array, RobotError
+from selfmotion.model.collision import bodies as of_bodies
+from selfmotion.model.collision.bodies import Body, obstacle_bodies
+from selfmotion.model.collision.distances import HullDistances, Ints
+from selfmotion.model.collision.obstacles import Obstacle
+from selfmotion.model.collision.pair_distances import PairDistances
+from selfmotion.model.collision.pairs import (
+    Closest,
+    checked_pairs,
+    count_overlaps,
+    held_pairs,
+    links_of,
+)
+from selfmotion.model.robot import RobotModel
+
+# Bodies that are put in touch may overlap by this much [m]: rounding.
+_TOUCHING = 1e-6
+# What the links of an arm are called together.
+ITSELF = "the arm itself"
+_NO_PAIR = Closest(math.inf, "", "")
+
+
+class CollisionModel:
+    """Exact clearance of an arm, and of what rides on it, from itself and from obstacles.
+
+    Every body is a solid. While two bodies are apart their distance is that of the real meshes.
+    When they overlap, the value is minus the depth by which their convex hulls do, an upper bound
+    of the true depth; a mesh that fills its hull to 0.1 % of the volume counts as the hull. A body
+    wholly inside another one overlaps it, which the distance of two surfaces alone would miss.
+
+    Parameters
+    ----------
+    robot : RobotModel
+        The arm. All its links count, those on locked joints too, where they are held.
+    obstacles : sequence of Obstacle
+        The world, and what rides on links: those count as links that are fixed to theirs. The
+        robot's immovable base is not checked against the world.
+    disabled : sequence of (str, str)
+        Pairs of links or obstacles that are left out; see `disabled_links` for those of an SRDF.
+
+    Attributes
+    ----------
+    pairs : tuple of (str, str)
+        Names of the P pairs that are checked; a link of several pieces appears repeatedly.
+    bodies : tuple of str
+        Names of the B bodies, likewise.
+    to_world : (P,)
+        Which pairs are of what the robot carries along and an obstacle of the world.
+    checks_links, checks_obstacles : bool
+        Whether some pair is of links or of what rides on them, and of an obstacle.
+    overlapping : tuple of Overlap
+        Pairs of links that overlap in half or more of 500 sampled configurations. Those that do
+        in each, or are known to touch as they are made (`RobotModel.touching`), are not checked,
+        but for those of parts of a cell that were placed in each other.
+    disabled : tuple of (str, str)
+        Pairs of links that are left out only because that was asked for.
+
+    Raises
+    ------
+    CollisionError
+        Two obstacles, or an obstacle and a link, have the same name; an obstacle's frame is no
+        link; a piece of geometry is no body; a mesh cannot be read; what is disabled is neither a
+        link of the arm nor an obstacle.
+    RobotError
+        A mesh of the robot is missing.
+
+    Notes
+    -----
+    The two links that a movable joint joins are not checked against each other. Without collision
+    geometry in the URDF (`has_bodies` is False) there is no pair at all.
+
+    Boxes around the hulls, then the hulls (GJK) bound the distances of the meshes from below, so
+    the meshes are visited only for the few pairs that may hold the minimum.
+    """
+
+    def __init__(
+        self,
+        robot: RobotModel,
+        obstacles: Sequence[Obstacle] = (),
+        disabled: Sequence[tuple[str, str]] = (),
+    ) -> None:
+        self.robot, self.obstacles, self._disabled = robot, tuple(obstacles), tuple(disabled)
+        self._bodies = (*links_of(robot).bodies, *obstacle_bodies(self.obstacles, robot))
+        self.has_bodies = not all(body.is_obstacle for body in self._bodies)
+        self.bodies = tuple(body.name for body in self._bodies)
+        checked = checked_pairs(robot, self._bodies, self._disabled)
+        self._counts = checked.counts
+        self.overlapping, self.disabled = checked.overlapping, checked.disabled
+        self._take(checked.pairs)
+
+    def _take(self, pairs: Sequence[tuple[int, int]]) -> None:
+        """Check these pairs of bodies."""
+        self._index = np.array(pairs, dtype=np.int64).reshape(-1, 2)
+        self.pairs = tuple((self.bodies[i], self.bodies[j]) for i, j in pairs)
+        self.to_world = np.array([self._bodies[j].is_obstacle for _, j in pairs], dtype=np.bool_)
+        obstacles = {item.name for item in self.obstacles}
+        self.checks_links = not self.to_world.all()
+        self.checks_obstacles = not all(obstacles.isdisjoint(pair) for pair in self.pairs)
+        self._near = PairDistances(self.robot, self._bodies, self._index)
+        self.hulls = self._near.hulls
+
+    def of_pairs(self, pairs: Sequence[tuple[int, int]]) -> CollisionModel:
+        """Return the model of the same bodies in which these pairs are checked, by index."""
+        other = copy(self)
+        for known in ("pair_levers", "_levers"):
+            other.__dict__.pop(known, None)
+        other._take(pairs)
+        return other
+
+    @property
+    def every_body(self) -> tuple[Body, ...]:
+        """The B bodies, as `bodies` names them."""
+        return self._bodies
+
+    @property
+    def index(self) -> Ints:
+        """Which bodies each pair is of, (P, 2)."""
+        return self._index
+
+    @property
+    def groups(self) -> dict[str, CollisionModel]:
+        """The models of "the arm itself", its links alone, and of each obstacle or carried body.
+
+        With all that can meet it, by name. What has no pair is left out.
+        """
+        names = dict.fromkeys(body.name for body in self._bodies if body.link != body.name)
+        found: dict[str, list[tuple[int, int]]] = {}
+        for (i, j), pair in zip(self._index.tolist(), self.pairs, strict=True):
+            for name in [name for name in names if name in pair] or [ITSELF]:
+                found.setdefault(name, []).append((i, j))
+        return {name: self.of_pairs(found[name]) for name in (ITSELF, *names) if name in found}
+
+    @cached_property
+    def stuck(self) -> Closest | None:
+        """The links that held joints or placed parts put deepest into each other, if any."""
+        pairs = held_pairs(self._bodies, self.robot.urdf, self.robot.locked, self._disabled)
+        if not pairs:
+            return None
+        worst = self.of_pairs(pairs).worst(np.zeros((1, self.robot.dof)))
+        return worst if worst.value < -_TOUCHING else None
+
+    @property
+    def standing(self) -> frozenset[str]:
+        """Names of the obstacles that stand in the world."""
+        return frozenset(body.name for body in self._bodies if body.is_obstacle)
+
+    def is_convex(self, pair: int) -> bool:
+        """Whether both bodies of a pair are their own convex hulls."""
+        return self._near.meshes.hulls_decide[pair]
+
+    @property
+    def is_all_convex(self) -> bool:
+        """Whether all bodies that are checked are their own convex hulls."""
+        return all(self.is_convex(pair) for pair in range(len(self.pairs)))
+
+    def in_pieces(self, *, links: bool = False) -> tuple[HullDistances, Ints]:
+        """Return distances of hulls, obstacles in convex pieces, and which pair each is of, (Q,).
+
+        Links are made convex as a rule: they are taken apart where that is asked for, and before
+        obstacles only. Where nothing is, these are `hulls`.
+        """
+        names = {item.name for item in self.obstacles}
+        met = [names & {self._bodies[i].name, self._bodies[j].name} for i, j in self._index]
+        apart = [
+            {b for b in pair if self._bodies[b].name in names or (links and before)}
+            for pair, before in zip(self._index.tolist(), met, strict=True)
+        ]
+        bodies, first = list(self._bodies), dict[int, range]()
+        for b in sorted(set[int]().union(*apart)):
+            pieces = self._bodies[b].solid.pieces
+            if len(pieces) > 1:
+                first[b] = range(len(bodies), len(bodies) + len(pieces))
+                bodies += [replace(self._bodies[b], solid=solid) for solid in pieces]
+        if not first:
+            return self.hulls, np.arange(len(self.pairs))
+        found = [
+            (pair, k, m)
+            for pair, (i, j) in enumerate(self._index.tolist())
+            for k in (first.get(i, [i]) if i in apart[pair] else [i])
+            for m in (first.get(j, [j]) if j in apart[pair] else [j])
+        ]
+        of, *index = np.array(found, dtype=np.int64).T
+        return HullDistances(self.robot, bodies, np.stack(index, axis=1)), of
+
+    @cached_property
+    def open_meshes(self) -> tuple[str, ...]:
+        """Links and obstacles with a mesh that is neither closed, nor flat, nor as its hull.
+
+        Whether another body is wholly inside one of these is not certain: it is decided by the
+        winding number, which serves small holes. Distances from its surface are right.
+        """
+        found = (
+            body.name
+            for body in self._bodies
+            if not (body.solid.is_flat or body.solid.is_closed or body.solid.is_convex)
+        )
+        return tuple(dict.fromkeys(found))
+
+    @cached_property
+    def moved(self) -> npt.NDArray[np.bool_]:
+        """Which bodies each joint moves, (B, n): those on its link and on all beyond.
+
+        And those that joints carry which mimic it.
+        """
+        found = self.robot.coupling.bounds(self._moved.astype(np.float64))
+        return np.asarray(found > 0.0)
+
+    @cached_property
+    def _moved(self) -> npt.NDArray[np.bool_]:
+        return of_bodies.moved_by(self._bodies, self.robot)
+
+    @cached_property
+    def lever_arms(self) -> Array:
+        """How far points of the bodies move at most per unit of each joint, (B, n).
+
+        Row b bounds |∂x/∂q_j| over all points x of body b, in [m/rad] for revolute joints and
+        [m/m] for prismatic ones, at every configuration within the joint limits. So no point moves
+        farther than Σ_j lever_bj |Δq_j|.
+        """
+        arms = np.where(self._moved, self._axis_distances, 0.0)
+        return self.robot.coupling.bounds(arms)
+
+    @cached_property
+    def pair_levers(self) -> Array:
+        """How much the distance of each pair changes at most per unit of each joint, (P, n).
+
+        At every configuration within the joint limits, in the order of `pairs`: from one
+        configuration to another the distance of bodies that are apart changes by
+        Σ_j lever_pj |Δq_j| at most. Joints that move both bodies as one block count nothing.
+        """
+        return self.robot.coupling.bounds(self._levers)
+
+    @cached_property
+    def _levers(self) -> Array:
+        """Those of all joints of the model, (P, N)."""
+        return of_bodies.pair_levers(self._axis_distances, self._moved, self.hulls.pairs)
+
+    def pair_levers_up_to(self, farthest: Array, aside: Array | None = None) -> Array:
+        """Return `pair_levers` where joints go as far as `farthest` (n,) from 0, (P, n).
+
+        A prismatic joint beyond its limits lengthens the levers of all revolute ones, and so does
+        a body of the pair that is put `aside` by so much at most (P,) [m].
+        """
+        extra: Any = of_bodies.travel_beyond(self.robot, farthest)
+        if aside is not None:
+            extra = extra + aside[:, None]
+        counted = of_bodies.is_turned(self.robot) & (self._levers > 0.0)
+        return self.robot.coupling.bounds(self._levers + np.where(counted, extra, 0.0))
+
+    @cached_property
+    def _axis_distances(self) -> Array:
+        return of_bodies.axis_distances(self.robot, self._bodies)
+
+    def samples(self, q_samples: npt.ArrayLike) -> Array:
+        """Return samples (K, n) as an array.
+
+        Raises
+        ------
+        RobotError
+            The shape is not (K, n), or a number is not finite.
+        """
+        q = np.ascontiguousarray(q_samples, dtype=np.float64)
+        if q.ndim != 2 or q.shape[1] != self.robot.dof or not np.isfinite(q).all():
+            raise RobotError(
+                f"samples have shape {q.shape}, expected (K, {self.robot.dof}) finite numbers"
+            )
+        return q
+
+    def distance(self, q: npt.ArrayLike) -> Closest:
+        """Return the smallest distance over all pairs at `q`.
+
+        Raises
+        ------
+        RobotError
+            `q` is not a configuration of the arm.
+        """
+        return self.worst(self.robot.configuration(q)[None])
+
+    def worst(self, q_samples: npt.ArrayLike) -> Closest:
+        """Return the smallest distance over a motion (K, n); its `index` is the row.
+
+        Raises
+        ------
+        RobotError
+            A row is not a configuration of the arm.
+        """
+        q = self.samples(q_samples)
+        if not len(q) or not self.pairs:
+            return _NO_PAIR
+        value, pair = self._near.closest(q[0], self.hulls.lower_bounds(q[:1])[0])
+        # Pairs that are farther apart need no close look.
+        bounds, worst = self.hulls.lower_bounds(q, value), 0
+        lowest = bounds.min(axis=1)
+        for row in np.argsort(lowest, kind="stable").tolist():
+            if lowest[row] >= value:
+                break
+            found = self._near.closest(q[row], bounds[row], value)
+            if found[0] < value:
+                (value, pair), worst = found, row
+        return Closest(value, *self.pairs[pair], worst)
+
+    def distances(
+        self,
+        q_samples: npt.ArrayLike,
+        within: float | Array = math.inf,
+        exact_below: float | Array = math.inf,
+    ) -> Array:
+        """Return the distance of every pair at samples (K, n), (K, P) [m], as `pairs` names them.
+
+        Parameters
+        ----------
+        q_samples : (K, n)
+        within : float or (K, P)
+            Pairs that are farther apart than this need no exact number [m]: theirs is a lower
+            bound of the distance that is not below `within`. -inf where none is needed.
+        exact_below : float or (K, P)
+            For pairs that are farther apart than this, the distance of their hulls will do, a lower
+            bound that is not below this [m]: it takes a twentieth of the time.
+
+        Raises
+        ------
+        RobotError
+            A row is not a configuration of the arm.
+        """
+        q = self.samples(q_samples)
+        asked = np.broadcast_to(np.asarray(within, dtype=np.float64), (len(q), len(self.pairs)))
+        return self._near.distances(q, asked, np.minimum(asked, exact_below))
+
+    def collides(self, q: Array, margin: float = 0.0) -> bool:
+        """Whether some pair is closer than `margin` [m] at `q` (n,); made for many calls.
+
+        The convex hulls decide alone where they are apart by more than the margin, and where both
+        meshes are convex to 0.1 % of the volume; only other meshes are visited.
+
+        Raises
+        ------
+        RobotError
+            `q` is not a configuration of the arm.
+        """
+        if q.shape != (self.robot.dof,) or not math.isfinite(q.dot(q)):
+            self.robot.configuration(q)
+        return bool(self._near.closer(q[None], margin)[0])
+
+    def colliding(self, q_samples: Array, margin: float = 0.0) -> npt.NDArray[np.bool_]:
+        """Return at which of many configurations (K, n) `collides` holds, (K,).
+
+        Raises
+        ------
+        RobotError
+            The shape is not (K, n), or a number is not finite.
+        """
+        return self._near.closer(self.samples(q_samples), margin)
+
+    def touching(self, q: npt.ArrayLike) -> tuple[Closest, ...]:
+        """Return all pairs that overlap at `q`, the deepest first; see also `srdf_line`.
+
+        Raises
+        ------
+        RobotError
+            `q` is not a configuration of the arm.
+        """
+        values = self.distances(self.robot.configuration(q)[None], 0.0)[0]
+        rows = [i for i in np.argsort(values, kind="stable").tolist() if values[i] <= 0.0]
+        return tuple(Closest(float(values[i]), *self.pairs[i]) for i in rows)
+
+    def overlap_counts(self) -> tuple[Ints, Ints]:
+        """Return in how many of 500 configurations bodies overlap, and their hulls alone, (P,)."""
+        known = [self._counts.get((i, j)) for i, j in self._index.tolist()]
+        unknown = np.flatnonzero([counts is None for counts in known])
+        met, alone = count_overlaps(self.robot, self.hulls, self._near.meshes, unknown)
+        for pair, counts in enumerate(known):
+            if counts is not None:
+                met[pair], alone[pair] = counts
+        return met, alone

@@ -1,0 +1,423 @@
+"""Obstacles: bodies of the world, or on a link. An own shape is a subclass of `Obstacle`."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import MISSING, dataclass, field, fields
+from pathlib import Path
+from typing import Any, ClassVar
+
+import coal
+import numpy as np
+import numpy.typing as npt
+
+from selfmotion.basics import (
+    Array,
+    CollisionError,
+    as_number,
+    as_numbers,
+    is_file,
+    read_only,
+    shown,
+)
+from selfmotion.model.robot import UrdfShape, unit_of
+from selfmotion.model.task import SE3, as_pose
+
+# An obstacle so large, or so far away [m], may be one in millimetres.
+_HUGE = 100.0
+# What every obstacle has besides the lengths of its shape.
+_PLACE = ("name", "pose", "frame")
+# Shape → class, filled as the classes are made.
+_shapes: dict[str, type[Obstacle]] = {}
+
+
+@dataclass(frozen=True, eq=False)
+class Obstacle(ABC):
+    """What every obstacle has; use `Box`, `Sphere`, `Cylinder`, `Capsule`, `Mesh` or an own shape.
+
+    An own shape is a frozen dataclass derived from this one. It names its `shape`, adds its
+    lengths as fields, and returns its `geometry`; it is then known to `obstacle_from_dict`::
+
+        @dataclass(frozen=True, eq=False)
+        class Cone(Obstacle):
+            shape: ClassVar[str] = "cone"
+            radius: float
+            length: float
+
+            def geometry(self) -> Any:
+                return coal.Cone(self.radius, self.length)
+
+    Fields must be numbers, texts, lists of these, arrays or paths, which is what files can hold.
+
+    Attributes
+    ----------
+    name : str
+        What reports call it; unique among the obstacles and links of a model.
+    pose : pinocchio.SE3
+        The obstacle's frame in world axes; a position (3,) [m] is taken as a pose along them.
+    frame : str or None
+        The link of the robot that carries it, in whose frame `pose` is then: a torch, a camera, a
+        part in hand, a fixture on a table that turns. None for the world.
+
+    Raises
+    ------
+    CollisionError
+        The name is empty, the pose is no rigid motion, a length is not positive, or the frame is
+        no name. When a class is made: its shape is the name of another one.
+    """
+
+    shape: ClassVar[str] = ""
+
+    name: str
+    pose: SE3
+    frame: str | None = field(default=None, kw_only=True)
+
+    def __init_subclass__(cls, **keywords: Any) -> None:
+        super().__init_subclass__(**keywords)
+        known = _shapes.get(cls.shape)
+        if not cls.shape or (known and known.__qualname__ != cls.__qualname__):
+            raise CollisionError(
+                f"class {cls.__name__}: its shape is {cls.shape!r}, expected a name that no other "
+                f"obstacle has; taken are {', '.join(_shapes)}"
+            )
+        _shapes[cls.shape] = cls
+
+    def __post_init__(self) -> None:
+        if not (isinstance(self.name, str) and self.name):
+            raise CollisionError(f"{self.shape}: has name {self.name!r}, expected a text")
+        object.__setattr__(self, "pose", _pose(self.label, self.pose))
+        if self.frame is not None and not (isinstance(self.frame, str) and self.frame):
+            raise CollisionError(
+                f"{self.label}: frame is {shown(self.frame)}, expected the name of a link"
+            )
+
+    @property
+    def label(self) -> str:
+        """Shape and name, as messages say it."""
+        return f"{self.shape} '{self.name}'"
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """The files that its geometry is read from."""
+        return ()
+
+    @property
+    def hint(self) -> str:
+        """What looks like a slip of units, in words; "" where nothing does."""
+        geometry = self.geometry()
+        geometry.computeLocalAABB()
+        size = 2.0 * float(geometry.aabb_radius)
+        far = float(np.linalg.norm(self.pose.act(np.array(geometry.aabb_center))))
+        if max(size, far) < _HUGE:
+            return ""
+        return f"{self.label} is {size:.3g} m large and {far:.3g} m away: millimetres?"
+
+    @abstractmethod
+    def geometry(self) -> Any:
+        """Return its coal geometry, in the obstacle's frame [m].
+
+        Raises
+        ------
+        CollisionError
+            A file is missing or cannot be read.
+        """
+
+    def urdf_shapes(self) -> Sequence[UrdfShape]:
+        """Return what it is in a URDF, where an arm carries it (`load_robot`, bodies).
+
+        Raises
+        ------
+        CollisionError
+            A URDF does not know the shape.
+        """
+        raise CollisionError(
+            f"{self.label}: a URDF knows no such shape, so that no arm can carry it as a body; "
+            f"give it to a Clearance, with frame="
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it as JSON-safe values; `obstacle_from_dict` reverses this exactly."""
+        rest = (f.name for f in fields(self) if f.name not in _PLACE)
+        return {
+            "shape": self.shape,
+            "name": self.name,
+            "position": self.pose.translation.tolist(),
+            "rotation": self.pose.rotation.tolist(),
+            **({} if self.frame is None else {"frame": self.frame}),
+            **{key: _plain(getattr(self, key)) for key in rest},
+        }
+
+    def _set_length(self, key: str) -> None:
+        """Replace the attribute by a float, which must be positive."""
+        what = f"{self.label}: {key}"
+        length = as_number(getattr(self, key), what, above=0.0, most=1e6, error=CollisionError)
+        object.__setattr__(self, key, length)
+
+
+def obstacle_shapes() -> list[tuple[str, type[Obstacle]]]:
+    """Return the shapes that are known, with their classes."""
+    return list(_shapes.items())
+
+
+def obstacle_from_dict(values: Mapping[str, Any]) -> Obstacle:
+    """Build an obstacle from what `Obstacle.to_dict` returns.
+
+    Parameters
+    ----------
+    values : dict
+        ``shape`` and ``name``; ``position`` (3,) [m] and optionally ``rotation`` (3, 3) and
+        ``frame``; and the lengths of the shape.
+
+    Raises
+    ------
+    CollisionError
+        A key is missing, unknown or has a value that cannot be used.
+    """
+    rest = dict(values)
+    shape, name = rest.pop("shape", None), rest.pop("name", None)
+    if shape not in _shapes:
+        raise CollisionError(
+            f"obstacle {name!r}: shape is {shape!r}, expected one of {', '.join(_shapes)}; an own "
+            f"shape is known once its class is imported"
+        )
+    label = f"{shape} {name!r}"
+    if "position" not in rest:
+        raise CollisionError(f"{label}: 'position' is missing")
+    position = _numbers(rest.pop("position"))
+    rotation = _numbers(rest.pop("rotation", np.eye(3)))
+    if position.shape != (3,) or rotation.shape != (3, 3):
+        raise CollisionError(
+            f"{label}: position has shape {position.shape} and rotation {rotation.shape}, "
+            f"expected (3,) and (3, 3)"
+        )
+    cls = _shapes[shape]
+    own = [f for f in fields(cls) if f.name not in _PLACE]
+    known = {"frame", *(f.name for f in own)}
+    unknown = sorted(set(rest) - known)
+    if unknown:
+        raise CollisionError(f"{label}: has '{unknown[0]}', expected {', '.join(sorted(known))}")
+    needed = {f.name for f in own if f.default is MISSING and f.default_factory is MISSING}
+    missing = sorted(needed - set(rest))
+    if missing:
+        raise CollisionError(f"{label}: '{missing[0]}' is missing")
+    return cls(name, SE3(rotation, position), **rest)
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    return str(value) if isinstance(value, Path) else value
+
+
+def _numbers(values: npt.ArrayLike) -> Array:
+    """Return `values` as floats, or NaN where they are none, for one check to refuse."""
+    try:
+        return np.array(values, dtype=np.float64)
+    except (OverflowError, TypeError, ValueError):
+        return np.array(np.nan)
+
+
+def _pose(label: str, pose: Any) -> SE3:
+    if not isinstance(pose, SE3):
+        position = _numbers(pose)
+        if position.shape != (4, 4):
+            what, expected = f"{label}: pose", "an SE3, a (4, 4) matrix or a position (3,), finite"
+            pose = SE3(np.eye(3), as_numbers(pose, what, expected, (3,), CollisionError))
+    return as_pose(pose, f"{label}: pose", CollisionError)
+
+
+# The shapes of obstacles that come with the package.
+
+# A mesh that is longer than this is in millimetres [m].
+_LONGEST = 20.0
+
+
+@dataclass(frozen=True, eq=False)
+class Box(Obstacle):
+    """A solid box, its centre at the pose.
+
+    Attributes
+    ----------
+    size : (3,)
+        Full lengths along the pose's axes [m].
+    """
+
+    shape: ClassVar[str] = "box"
+
+    size: Array
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        expected = "three numbers above 0"
+        size = as_numbers(self.size, f"{self.label}: size", expected, (3,), CollisionError)
+        if not np.all((size > 0.0) & (size <= 1e6)):
+            raise CollisionError(f"{self.label}: size is {size.tolist()}, expected {expected}")
+        object.__setattr__(self, "size", read_only(size))
+
+    def geometry(self) -> Any:
+        """See `Obstacle.geometry`."""
+        return coal.Box(*self.size.tolist())
+
+    def urdf_shapes(self) -> Sequence[UrdfShape]:
+        """See `Obstacle.urdf_shapes`."""
+        return [UrdfShape("box", {"size": " ".join(map(repr, self.size.tolist()))})]
+
+
+@dataclass(frozen=True, eq=False)
+class Sphere(Obstacle):
+    """A solid sphere.
+
+    Attributes
+    ----------
+    radius : float
+        [m]
+    """
+
+    shape: ClassVar[str] = "sphere"
+
+    radius: float
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self._set_length("radius")
+
+    def geometry(self) -> Any:
+        """See `Obstacle.geometry`."""
+        return coal.Sphere(self.radius)
+
+    def urdf_shapes(self) -> Sequence[UrdfShape]:
+        """See `Obstacle.urdf_shapes`."""
+        return [UrdfShape("sphere", {"radius": repr(self.radius)})]
+
+
+@dataclass(frozen=True, eq=False)
+class Cylinder(Obstacle):
+    """A solid cylinder, its centre at the pose and its axis along the pose's z.
+
+    Attributes
+    ----------
+    radius, length : float
+        [m]
+    """
+
+    shape: ClassVar[str] = "cylinder"
+
+    radius: float
+    length: float
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self._set_length("radius")
+        self._set_length("length")
+
+    def geometry(self) -> Any:
+        """See `Obstacle.geometry`."""
+        return coal.Cylinder(self.radius, self.length)
+
+    def urdf_shapes(self) -> Sequence[UrdfShape]:
+        """See `Obstacle.urdf_shapes`."""
+        return [_cylinder(self.radius, self.length)]
+
+
+@dataclass(frozen=True, eq=False)
+class Capsule(Obstacle):
+    """All points within `radius` of a segment along the pose's z axis, centred at the pose.
+
+    Attributes
+    ----------
+    radius, length : float
+        Radius, and length of the segment (the caps come on top) [m].
+    """
+
+    shape: ClassVar[str] = "capsule"
+
+    radius: float
+    length: float
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self._set_length("radius")
+        self._set_length("length")
+
+    def geometry(self) -> Any:
+        """See `Obstacle.geometry`."""
+        return coal.Capsule(self.radius, self.length)
+
+    def urdf_shapes(self) -> Sequence[UrdfShape]:
+        """See `Obstacle.urdf_shapes`: a cylinder and two spheres."""
+        ends = (0.5 * self.length, -0.5 * self.length)
+        caps = (UrdfShape("sphere", {"radius": repr(self.radius)}, height) for height in ends)
+        return [_cylinder(self.radius, self.length), *caps]
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh(Obstacle):
+    """The solid bounded by a triangle mesh; the file is read when a model is built from it.
+
+    Attributes
+    ----------
+    file : Path
+        STL, OBJ, DAE or PLY.
+    scale : float
+        Metres per unit of the file; Collada files say their unit themselves.
+    """
+
+    shape: ClassVar[str] = "mesh"
+
+    file: Path
+    scale: float = 1.0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not isinstance(self.file, str | Path):
+            raise CollisionError(f"{self.label}: file is {shown(self.file)}, expected a path")
+        object.__setattr__(self, "file", Path(self.file))
+        self._set_length("scale")
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """See `Obstacle.files`."""
+        return (self.file,)
+
+    def _metres(self) -> float:
+        """Return the metres of a unit of the file."""
+        unit = unit_of(self.file)
+        if unit != 1.0 and self.scale != 1.0:
+            raise CollisionError(
+                f"{self.label}: {self.file} says itself that its unit is {unit:g} m, and scale is "
+                f"{self.scale:g}: leave scale out"
+            )
+        return unit * self.scale
+
+    def geometry(self) -> Any:
+        """See `Obstacle.geometry`."""
+        if not is_file(self.file):
+            raise CollisionError(f"{self.label}: no such file: {self.file}")
+        try:
+            found = coal.MeshLoader().load(str(self.file), np.full(3, self._metres()))
+        except (RuntimeError, ValueError) as error:
+            # What comes before is where in the source of coal it was found.
+            reason = " ".join(str(error).rpartition("message:")[2].split())
+            raise CollisionError(f"{self.label}: {self.file} cannot be read: {reason}") from error
+        corners = np.array(found.vertices()).reshape(-1, 3)
+        size = float(np.ptp(corners, axis=0).max()) if len(corners) else 0.0
+        if _LONGEST < size < np.inf:
+            raise CollisionError(
+                f"{self.label}: {self.file} is {size:.3g} m long: scale = 0.001 if it is in "
+                f"millimetres; of a hall, leave what is within {_LONGEST:g} m"
+            )
+        return found
+
+    def urdf_shapes(self) -> Sequence[UrdfShape]:
+        """See `Obstacle.urdf_shapes`."""
+        self._metres()
+        if is_file(self.file):
+            # An arm carries nothing of that size either.
+            self.geometry()
+        scale = " ".join([repr(self.scale)] * 3)
+        return [UrdfShape("mesh", {"filename": str(self.file.resolve()), "scale": scale})]
+
+
+def _cylinder(radius: float, length: float) -> UrdfShape:
+    return UrdfShape("cylinder", {"radius": repr(radius), "length": repr(length)})

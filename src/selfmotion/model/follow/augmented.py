@@ -1,0 +1,217 @@
+"""What an arm with virtual joints follows, and the arm itself."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, fields, replace
+from typing import Any, cast
+
+import numpy as np
+
+from selfmotion.basics import Array, Flags, read_only
+from selfmotion.model.follow.follow import BoundFollow, Follows
+from selfmotion.model.follow.table_chain import TableChain
+from selfmotion.model.follow.virtual_joints import VirtualJoints
+from selfmotion.model.path import Dwell
+from selfmotion.model.robot import RobotModel, mean_lever
+from selfmotion.model.task import SE3, Relaxation, Task
+
+# What is put back within a band is so by this share of it.
+_INSIDE = 0.999
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class AugmentedArm(RobotModel):
+    """An arm with virtual joints after its own, which move nothing of it.
+
+    Its model, links and chains are the arm's.
+
+    Attributes
+    ----------
+    arm : RobotModel
+    virtual : VirtualJoints
+    """
+
+    arm: RobotModel = field(repr=False)
+    virtual: VirtualJoints = field(repr=False)
+
+    @classmethod
+    def of(cls, arm: RobotModel, virtual: VirtualJoints) -> "AugmentedArm":
+        """Return an arm with virtual joints."""
+        own = {one.name: getattr(arm, one.name) for one in fields(RobotModel)}
+        limits = np.array([joint.limit for joint in virtual.each])
+        free = np.full(len(limits), np.inf)
+        more = {"lower": -limits, "upper": limits}
+        for name in ("velocity_limit", "effort_limit", "acceleration_limit", "jerk_limit"):
+            more[name] = free
+        for name, values in more.items():
+            own[name] = read_only(np.concatenate([own[name], values]))
+        own["joint_names"] = (*arm.joint_names, *(joint.name for joint in virtual.each))
+        return cls(**own, arm=arm, virtual=virtual)
+
+    @property
+    def is_revolute(self) -> Flags:
+        """See `RobotModel`: of virtual joints, those that are back after a turn of 2π."""
+        turns = [
+            joint.turns and joint.scale == 1.0 and not joint.name.startswith("tilt")
+            for joint in self.virtual.each
+        ]
+        return np.concatenate([self.arm.is_revolute, turns])
+
+    @property
+    def coordinate_sizes(self) -> Array:
+        """See `RobotModel.coordinate_sizes`."""
+        return np.append(self.arm.coordinate_sizes, [one.scale for one in self.virtual.each])
+
+    def is_prismatic(self, joint: str) -> bool:
+        """See `RobotModel.is_prismatic`."""
+        own = {one.name: not one.turns for one in self.virtual.each}
+        return own[joint] if joint in own else self.arm.is_prismatic(joint)
+
+    def told(self, k: int) -> str:
+        """See `RobotModel.told`: virtual joints are what they let the tool do."""
+        number = k - self.arm.dof
+        return self.arm.told(k) if number < 0 else self.virtual.told(number)
+
+    @property
+    def joint_weights(self) -> Array:
+        """See `RobotModel.joint_weights`: a virtual metre or radian counts as one of the arm."""
+        return np.concatenate(
+            [self.arm.joint_weights, self.virtual.weights(1.0 / mean_lever(self.arm))]
+        )
+
+    def dexterous_configuration(self, task: Task | str = Task.POSE) -> Array:
+        """See `RobotModel`: of the arm, with the virtual joints at 0."""
+        none = np.zeros(len(self.virtual.each))
+        return np.concatenate([self.arm.dexterous_configuration(task), none])
+
+
+@dataclass(frozen=True, eq=False)
+class AugmentedFollows(Follows):
+    """What is followed with virtual joints: their tip is on the path of the first tool.
+
+    Attributes
+    ----------
+    virtual : VirtualJoints
+    """
+
+    virtual: VirtualJoints = field(kw_only=True)
+
+    @classmethod
+    def with_tolerances(
+        cls, follows: Follows, relaxations: Sequence[Relaxation]
+    ) -> "AugmentedFollows":
+        """Return what an arm follows where rows of its first path are relaxed."""
+        arm, (first, *others) = follows.robot, follows.items
+        virtual = VirtualJoints(first.task, relaxations, follows.duration, mean_lever(arm))
+        robot = AugmentedArm.of(arm, virtual)
+        n, dof = arm.dof, robot.dof
+
+        def bound(item: BoundFollow, table: Array, task: Task) -> BoundFollow:
+            return BoundFollow(TableChain(item.chain.tip_name, table, dof), item.path, task)
+
+        items = [bound(first, virtual.table(first.chain, n), virtual.task)]
+        items += [bound(item, item.chain.table, item.task) for item in others]
+        alike = virtual.alike(n)
+        if alike is not None:
+            still = Dwell(SE3.Identity(), follows.duration)
+            items.append(BoundFollow(TableChain("", alike, dof), still, cast(Task, _Alike())))
+        return cls(robot, tuple(items), virtual=virtual)
+
+    @property
+    def with_windows_shut(self) -> "AugmentedFollows":
+        """The same where integrated motions make no use of what has a window, at any time."""
+        none = np.zeros(self.robot.dof - len(self.virtual.each), dtype=np.bool_)
+        held = np.append(none, self.virtual.windowed)
+
+        def shut(item: BoundFollow) -> BoundFollow:
+            own = item.chain
+            return BoundFollow(
+                TableChain(own.tip_name, own.table, self.robot.dof, held), item.path, item.task
+            )
+
+        return replace(self, items=tuple(shut(item) for item in self.items))
+
+    def deviation(self, item: Relaxation, q: Array) -> Array:
+        """Return how far the rows of a relaxation are off the path at q (K, n), (K, k) [m, rad]."""
+        return self.virtual.rows_of(item, q[:, self.robot.dof - len(self.virtual.each) :])[0]
+
+    def limits_within(self, item: Relaxation, band: float = np.inf) -> Array:
+        """Return limits of |q| (n,) beyond which a relaxation's rows are off their path too far.
+
+        By more than a band, or by more than the relaxations let each of them be at any time.
+        """
+        found = np.full(self.robot.dof, np.inf)
+        first = self.robot.dof - len(self.virtual.each)
+        for k, joint in enumerate(self.virtual.each):
+            if joint.row in item.indices:
+                # Half of a tilt is what its first hinge turns by.
+                halved = self.virtual.swing is not None and k == self.virtual.swing[0]
+                share = 0.5 if halved else 1.0
+                most = min(band, self.virtual.widest([joint.row]))
+                found[first + k] = share * most / joint.scale
+        return found
+
+    def within_bands(self, q: Array) -> Array:
+        """See `Follows.within_bands`."""
+        found, first = np.full_like(q, np.inf), self.robot.dof - len(self.virtual.each)
+        for item in self.virtual.relaxations:
+            band = self.virtual.widest(item.indices)
+            if len(item.rows) == 1 or not np.isfinite(band):
+                continue
+            size = np.linalg.norm(self.deviation(item, q), axis=1)
+            beyond = size > band
+            share = _INSIDE * band / np.where(beyond, size, 1.0)
+            for k, joint in enumerate(self.virtual.each, first):
+                if joint.row in item.indices:
+                    found[beyond, k] = share[beyond] * np.abs(q[beyond, k])
+        return found
+
+    @property
+    def is_plain(self) -> bool:
+        """See `Follows.is_plain`."""
+        return False
+
+    @property
+    def names(self) -> str:
+        """See `Follows.names`."""
+        return " and ".join(
+            f"'{item.chain.tip_name}'" for item in self.items if item.chain.tip_name
+        )
+
+    def held(self, t: Array) -> Flags:
+        """See `Follows.held`."""
+        none = np.zeros((len(t), self.robot.dof - len(self.virtual.each)), dtype=np.bool_)
+        return np.hstack([none, self.virtual.held(t)])
+
+    @property
+    def holds(self) -> bool:
+        """See `Follows.holds`."""
+        return bool(self.virtual.windowed.any())
+
+    @property
+    def edges(self) -> tuple[float, ...]:
+        """See `Follows.edges`."""
+        ends = {x for item in self.virtual.relaxations for x in item.window(self.duration)}
+        return tuple(sorted(ends - {0.0, self.duration}))
+
+
+class _Alike:
+    """The one row in which two hinges of a tilt turn alike; see `Task`."""
+
+    rows = np.zeros(1, dtype=np.intp)
+    dimension, tool_axes, angular, row_names = 1, False, False, ("tilt",)
+
+    def select(self, twists: Array, rotation: Array) -> Array:
+        """See `Task.select`."""
+        return twists[:1]
+
+    def select_along(self, twists: Array, rotations: Array) -> Array:
+        """See `Task.select_along`."""
+        return np.ascontiguousarray(twists[:, :1])
+
+    def twist_error(self, target: Any, actual: Any) -> Array:
+        """See `Task.twist_error`."""
+        return np.concatenate([target.translation - actual.translation, np.zeros(3)])
+
+    def miss(self, target: Any, actual: Any) -> tuple[float, float]:
+        """See `Task.miss`."""
+        return float(abs(target.translation[0] - actual.translation[0])), 0.0

@@ -1,0 +1,356 @@
+"""What an arm follows: tips on their paths, and the rows of all of them stacked."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any, Self
+
+import numpy as np
+import numpy.typing as npt
+
+from selfmotion.basics import Array, Flags, Ints, ProblemError, shown
+from selfmotion.basics.layout import Layout, layout_of
+from selfmotion.model.path import Dwell, Path, PathSamples
+from selfmotion.model.robot import Chain, RobotModel, null_space
+from selfmotion.model.robot.tree_arrays import JOINT
+from selfmotion.model.task import SE3, Task, as_pose
+
+# A tip that follows a path, in the rows that are prescribed: as asked for, and on an arm.
+
+
+@dataclass(frozen=True, eq=False)
+class Follow:
+    """A frame of the arm follows a path, in the rows of a task.
+
+    Parameters
+    ----------
+    path : Path, SE3 or (4, 4)
+        The motion of the tool in the frame of the reference; a pose is held all the time.
+    task : Task or str
+        The rows of it that are prescribed; ``"pose"`` by default.
+    tool : str, optional
+        The link that follows; by default the arm's tool.
+    reference : str, optional
+        The link in whose frame the path is given; by default the arm's reference where the tool is
+        its own, else the world.
+
+    Examples
+    --------
+    Two hands that hold one bar: ``Follow(grasp, tool="right/hand", reference="left/hand")``.
+    """
+
+    path: Path | SE3 | npt.ArrayLike
+    task: Task | str = Task.POSE
+    tool: str | None = None
+    reference: str | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "task", Task.of(self.task))
+        if not isinstance(self.path, Path):
+            object.__setattr__(self, "path", as_pose(self.path, "follow: the path"))
+        for name in ("tool", "reference"):
+            given = getattr(self, name)
+            if not isinstance(given, str | None):
+                raise ProblemError(f"follow: {name} is {shown(given)}, expected the name of a link")
+
+    def on(self, robot: RobotModel, duration: float) -> BoundFollow:
+        """Return the same of an arm, for so many seconds.
+
+        Raises
+        ------
+        RobotError
+            There is no such link.
+        ProblemError
+            The path lasts longer or shorter.
+        """
+        path: Any = self.path
+        if not isinstance(path, Path):
+            path = Dwell(path, duration)
+        if abs(path.duration - duration) > 1e-9 * duration:
+            raise ProblemError(
+                f"{robot.name}: the path of '{self.tool or robot.tool}' lasts {path.duration:.6g} "
+                f"s, expected {duration:.6g} s as that of '{robot.tool}'"
+            )
+        reference = self.reference
+        if reference is None and self.tool in (None, robot.tool):
+            reference = robot.reference
+        chain = robot.chain_to(self.tool or robot.tool, reference)
+        return BoundFollow(chain, path, Task.of(self.task))
+
+    def along(self, path: Path) -> Follow:
+        """Return the same on another path."""
+        return replace(self, path=path)
+
+
+@dataclass(frozen=True, eq=False)
+class BoundFollow:
+    """The tip of a chain on a path, in the rows of a task.
+
+    Poses, twists and errors are those of the tip in the chain's base frame, in its axes.
+
+    Attributes
+    ----------
+    chain : Chain
+    path : Path
+    task : Task
+    """
+
+    chain: Chain
+    path: Path
+    task: Task
+    _last: list[PathSamples] = field(default_factory=list, init=False, repr=False)
+
+    def target(self, t: Array) -> PathSamples:
+        """Return where the tip has to be at times t (K,), and how it moves.
+
+        Those of the last times are kept: many motions are looked at on the same grid.
+        """
+        for kept in self._last:
+            if np.array_equal(kept.t, t):
+                return kept
+        found = self.path.samples(t)
+        self._last[:] = [found]
+        return found
+
+    def jacobian(self, q: Array) -> Array:
+        """Return the prescribed rows of the Jacobian at q (n,), (m, n); q is not checked."""
+        jacobian, rotation, _ = self.chain.at(q)
+        return self.task.select(jacobian, rotation)
+
+    def twists(self, t: Array) -> Array:
+        """Return the prescribed rows of the path's twists at times t (K,), (K, m) [m/s, rad/s]."""
+        target = self.target(t)
+        return self.task.select_along(target.twist[:, :, None], target.rotation)[:, :, 0]
+
+    def error(self, t: float, q: Array) -> Array:
+        """Return what takes the tip at q (n,) to its path at t [s], in the rows, (m,) [m, rad]."""
+        actual = self.chain.place(q)
+        twist = self.task.twist_error(self.path.pose(t), actual)
+        return self.task.select(twist[:, None], actual.rotation)[:, 0]
+
+    def miss(self, pose: SE3, q: Array) -> tuple[float, float]:
+        """Return how far the tip at q (n,) is from a pose in the rows, (m, rad)."""
+        return self.task.miss(pose, self.chain.place(q))
+
+
+# All that an arm follows at once: rows of several tips, stacked.
+
+
+class TipKinematics:
+    """Asks for all tips at once, with data of their own.
+
+    Parameters
+    ----------
+    chains : sequence of Chain
+        Of one tree.
+
+    Attributes
+    ----------
+    each : list of Kinematics
+        They share their data.
+    """
+
+    def __init__(self, chains: Sequence[Chain]) -> None:
+        first = chains[0].kinematics()
+        self.each = [first, *(chain.kinematics(first.data) for chain in chains[1:])]
+        count, dof = len(chains), chains[0].dof
+        self._jacobians = np.zeros((count, 6, dof))
+        self._rotations, self._translations = np.zeros((count, 3, 3)), np.zeros((count, 3))
+
+    def at(self, q: Array) -> tuple[Array, Array, Array]:
+        """Return Jacobians (F, 6, n), rotations (F, 3, 3) and translations (F, 3) at q (n,).
+
+        Valid until the next call.
+        """
+        for f, tip in enumerate(self.each):
+            self._jacobians[f] = tip.at(q) if f == 0 else tip.beside()
+            self._rotations[f], self._translations[f] = tip.rotation, tip.translation
+        return self._jacobians, self._rotations, self._translations
+
+
+@dataclass(frozen=True, eq=False)
+class Follows:
+    """What an arm follows: the one thing that planners, costs and constraints are told.
+
+    Attributes
+    ----------
+    robot : RobotModel
+    items : tuple of BoundFollow
+        Each a tip on its path; their rows are stacked in this order. They last equally long.
+    """
+
+    robot: RobotModel
+    items: tuple[BoundFollow, ...]
+
+    @classmethod
+    def of(
+        cls, robot: RobotModel, path: Path, task: Task | str, also: Sequence[Follow] = ()
+    ) -> Self:
+        """Return that an arm's tool follows a path, and other frames theirs."""
+        first = BoundFollow(robot.chain, path, Task.of(task))
+        return cls(robot, (first, *(item.on(robot, path.duration) for item in also)))
+
+    @property
+    def dimension(self) -> int:
+        """Number m of prescribed rows."""
+        return sum(item.task.dimension for item in self.items)
+
+    @property
+    def duration(self) -> float:
+        """How long the motion lasts [s]."""
+        return self.items[0].path.duration
+
+    @property
+    def only(self) -> BoundFollow:
+        """The one tip that is followed.
+
+        Raises
+        ------
+        ProblemError
+            There are several.
+        """
+        if len(self.items) > 1:
+            raise ProblemError(
+                f"{self.robot.name}: {len(self.items)} frames follow paths of their own, which is "
+                f"not supported here, only one"
+            )
+        return self.items[0]
+
+    @property
+    def path(self) -> Path:
+        """The path of the one tip."""
+        return self.only.path
+
+    @property
+    def task(self) -> Task:
+        """The rows of the one tip."""
+        return self.only.task
+
+    @cached_property
+    def redundancy(self) -> int:
+        """Number n - m of directions of self-motion at generic configurations."""
+        jacobians = [self.jacobian(q) for q in self.robot.generic_configurations()]
+        return self.robot.dof - max(map(_rank, jacobians))
+
+    @cached_property
+    def linear(self) -> Array:
+        """1 for rows in metres, 0 for those in radians, (m,)."""
+        return np.concatenate([item.task.rows < 3 for item in self.items]).astype(np.float64)
+
+    def kinematics(self) -> TipKinematics:
+        """Return the kinematics of all tips with data of their own, for whoever asks often."""
+        return TipKinematics([item.chain for item in self.items])
+
+    def targets(self, t: Array) -> Array:
+        """Return where the tips have to be at times t (W,): translation and rotation, (W, 12 F)."""
+        parts = []
+        for item in self.items:
+            samples = item.target(t)
+            parts += [samples.translation, samples.rotation.reshape(len(samples.t), 9)]
+        return np.ascontiguousarray(np.hstack(parts))
+
+    @cached_property
+    def layout(self) -> Layout:
+        """What compiled kernels need of the rows."""
+        return layout_of(
+            [(f.task.rows, f.task.tool_axes, f.chain.joints) for f in self.items], self.robot.dof
+        )
+
+    @cached_property
+    def chains(self) -> Array:
+        """What compiled kernels need of the chains, (F, c + 1, 6, 3): their tables, filled up."""
+        tables = [item.chain.table for item in self.items]
+        found = np.zeros((len(tables), max(map(len, tables)), *tables[0].shape[1:]))
+        for own, table in zip(found, tables, strict=True):
+            own[: len(table)] = table
+        return found
+
+    def every_column(self, q: Array) -> tuple[Array, Ints] | None:
+        """Return the columns of all joints at q (S, n), (S, F, 6, W), and their order (F + 1, W).
+
+        None where no joint on a chain mimics another one: then those of coordinates will do.
+        Derivatives of Jacobians need them, see `selfmotion.model.kernels.tool`.
+        """
+        if not any(item.chain.is_coupled for item in self.items):
+            return None
+        tables = [item.chain.table for item in self.items]
+        coordinates = [table[:-1, JOINT, 0].astype(np.int64) for table in tables]
+        ends = np.cumsum([0, *map(len, coordinates)])
+        columns = np.zeros((len(q), len(tables), 6, int(ends[-1])))
+        orders = []
+        for f, item in enumerate(self.items):
+            own = slice(int(ends[f]), int(ends[f + 1]))
+            columns[:, f, :, own] = item.chain.every_along(q)
+            others = np.delete(np.arange(ends[-1]), own)
+            orders.append(np.append(np.arange(ends[-1])[own], others))
+        return columns, np.array([*orders, np.concatenate(coordinates)])
+
+    @property
+    def row_names(self) -> tuple[str, ...]:
+        """Names of the rows, (m)."""
+        return tuple(name for item in self.items for name in item.task.row_names)
+
+    def twists(self, t: Array) -> Array:
+        """Return the prescribed rows of the paths' twists at times t (K,), (K, m) [m/s, rad/s]."""
+        return np.concatenate([item.twists(t) for item in self.items], axis=1)
+
+    def jacobian(self, q: Array) -> Array:
+        """Return the prescribed rows of all Jacobians at q (n,), (m, n); q is not checked."""
+        return np.concatenate([item.jacobian(q) for item in self.items])
+
+    def jacobians(self, q: Array) -> Array:
+        """Return the same at many configurations (K, n), (K, m, n)."""
+        rows = []
+        for item in self.items:
+            jacobian, rotation, _ = item.chain.along(q)
+            rows.append(item.task.select_along(jacobian, rotation))
+        return np.concatenate(rows, axis=1)
+
+    def null_basis(self, q: Array) -> Array:
+        """Return an orthonormal basis of the self-motion's directions at q (n,), (n, r)."""
+        return null_space(self.jacobian(q))
+
+    def along(self, path: Path) -> Follows:
+        """Return that the one tip follows another path."""
+        return replace(self, items=(replace(self.only, path=path),))
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether it is the arm's own tool alone, of which the arm has inverse kinematics."""
+        return len(self.items) == 1
+
+    @property
+    def names(self) -> str:
+        """The tips that are followed, for messages."""
+        return " and ".join(f"'{item.chain.tip_name}'" for item in self.items)
+
+    def held(self, t: Array) -> Flags:
+        """Return which coordinates have to stand still at 0 at times t (K,), (K, n)."""
+        return np.zeros((len(t), self.robot.dof), dtype=np.bool_)
+
+    def within_bands(self, q: Array) -> Array:
+        """Return limits of |q| like q (K, n), within which joints that share a band keep it.
+
+        Infinite where they do. Of bands in several windows the widest one counts.
+        """
+        return np.full_like(q, np.inf)
+
+    @property
+    def holds(self) -> bool:
+        """Whether there are such at any time."""
+        return False
+
+    @property
+    def edges(self) -> tuple[float, ...]:
+        """When coordinates begin and end to stand still [s]."""
+        return ()
+
+    def for_robot(self, robot: RobotModel) -> Follows:
+        """Return the same for an arm of the same joints with other limits."""
+        return replace(self, robot=robot)
+
+
+def _rank(jacobian: Array) -> int:
+    return int(np.linalg.matrix_rank(jacobian, tol=1e-6))

@@ -1,0 +1,149 @@
+"""Chains that are given by their tables alone: joints that no URDF has are on them."""
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from selfmotion.basics import Array, Flags, Ints, kernel
+from selfmotion.model.robot import Chain, Kinematics, place_tips
+from selfmotion.model.robot.tree_arrays import JOINT
+from selfmotion.model.task import SE3
+
+
+class TableChain(Chain):
+    """The joints of a table, from a base to a tip; see `Chain`.
+
+    Parameters
+    ----------
+    name : str
+        Of the tip.
+    table : (c + 1, 6, 3)
+        See `ChainArrays.table`.
+    dof : int
+        Number of all coordinates, n.
+    held : (n,) of bool, optional
+        Coordinates that do not move the tip where motions are integrated; by default none.
+    """
+
+    def __init__(self, name: str, table: Array, dof: int, held: Flags | None = None) -> None:
+        super().__init__(None, 0)
+        self._name, self._table, self._dof = name, table, dof
+        self._held = np.zeros(dof, dtype=np.bool_) if held is None else held
+
+    def __getstate__(self) -> Any:
+        return self._name, self._table, self._dof, self._held
+
+    @property
+    def dof(self) -> int:
+        """See `Chain.dof`."""
+        return self._dof
+
+    @property
+    def tip_name(self) -> str:
+        """See `Chain.tip_name`."""
+        return self._name
+
+    @property
+    def table(self) -> Array:
+        """See `Chain.table`."""
+        return self._table
+
+    @property
+    def joints(self) -> Ints:
+        """See `Chain.joints`."""
+        return np.array(list(dict.fromkeys(self._coordinates.tolist())), dtype=np.int64)
+
+    @property
+    def _coordinates(self) -> Ints:
+        """The coordinate of each joint on the way."""
+        return self._table[:-1, JOINT, 0].astype(np.int64)
+
+    def kinematics(self, data: Any = None) -> Kinematics:
+        """See `Chain.kinematics`: with `held` coordinates at rest."""
+        table = self._table.copy()
+        table[:-1, JOINT, 2] *= ~self._held[self._coordinates]
+        return TableKinematics(TableChain(self._name, table, self._dof), data)
+
+    def place(self, q: Array) -> SE3:
+        """See `Chain.place`."""
+        _, rotation, translation = self.at(q)
+        return SE3(rotation, translation)
+
+    def at(self, q: Array) -> tuple[Array, Array, Array]:
+        """See `Chain.at`."""
+        jacobians, rotations, translations = self.along(q[None])
+        return jacobians[0], rotations[0], translations[0]
+
+
+class TableKinematics(Kinematics):
+    """What `Kinematics` are to other chains; its data are the configuration."""
+
+    __slots__ = ("_at_tip", "_table")
+
+    def __init__(self, chain: TableChain, data: Any = None) -> None:
+        n = chain.dof
+        self.chain, self.data = chain, np.zeros(n) if data is None else data
+        self.jacobian = np.zeros((6, n), order="F")
+        self.rotation, self.translation = np.zeros((3, 3), order="F"), np.zeros(3)
+        self._table = np.array(chain.table)[None]
+        self._at_tip = np.zeros((1, 6, n)), np.empty((1, 3, 3)), np.empty((1, 3))
+
+    def refresh(self, q: Array) -> None:
+        """See `Kinematics.refresh`."""
+        self.data[:] = q
+        self.place_frames()
+
+    def place_frames(self) -> None:
+        """See `Kinematics.place_frames`."""
+        _place(self.data, self._table, *self._at_tip)
+        _at_base(*self._at_tip, self.jacobian, self.rotation, self.translation)
+
+    def march(
+        self,
+        q: Array,
+        step: Callable[..., bool],
+        *arguments: Any,
+        beside: Sequence[Kinematics] = (),
+    ) -> int | None:
+        """See `Kinematics.march`."""
+        each = [self, *beside]
+        for s, configuration in enumerate(q):
+            self.data[:] = configuration
+            for f, own in enumerate(each):
+                own.place_frames()
+                if not step(s, f, own.jacobian, own.rotation, own.translation, *arguments):
+                    return s
+        return None
+
+    def at(self, q: Array) -> Array:
+        """See `Kinematics.at`."""
+        self.data[:] = q
+        return self.beside()
+
+    def beside(self) -> Array:
+        """See `Kinematics.beside`."""
+        self.place_frames()
+        return np.array(self._at_tip[0][0])
+
+
+@kernel
+def _place(q: Array, table: Array, jacobian: Array, rotation: Array, translation: Array) -> None:
+    """Set where a tip is, (1, 3, 3) and (1, 3), and its Jacobian (1, 6, n), at q (n,)."""
+    r, p = np.empty((len(q) + 1, 3, 3)), np.empty((len(q) + 1, 3))
+    place_tips(q, table, r, p, rotation, translation, jacobian)
+
+
+@kernel
+def _at_base(
+    at_tip: Array, turn: Array, place: Array, jacobian: Array, rotation: Array, translation: Array
+) -> None:
+    """Set the Jacobian (6, n) at the base's origin for that at the tip's, and where that is."""
+    for a in range(3):
+        b, c = (a + 1) % 3, (a + 2) % 3
+        translation[a] = place[0, a]
+        for i in range(3):
+            rotation[a, i] = turn[0, a, i]
+        for k in range(at_tip.shape[2]):
+            moved = at_tip[0, 3 + b, k] * place[0, c] - at_tip[0, 3 + c, k] * place[0, b]
+            jacobian[a, k], jacobian[3 + a, k] = at_tip[0, a, k] - moved, at_tip[0, 3 + a, k]

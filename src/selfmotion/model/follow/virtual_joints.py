@@ -1,0 +1,422 @@
+"""A tolerance is a virtual joint between the tool and its path.
+
+Where rows are relaxed, more joints follow the tool's, or come before the arm's, and their tip is
+exactly on the path: a row of position in world axes is a slide under the arm, one in tool axes a
+slide behind the tool; a row of rotation is a hinge behind the tool. What takes the tool's
+orientation to the path's is exp(-[δ]×), and two rows of δ are those of a joint that tilts without
+twisting: with hinges about the rows' axes i and j,
+
+    exp([δ]×) = R_i(α) R_j(2β) R_i(α),   δ = 2 θ/sin θ (sin α cos β, sin β),   cos θ = cos α cos β,
+
+since a product of quaternions that reads the same from both sides has no part along the third axis.
+Its first and last hinge are two joints, and that they turn alike is one row more that is followed.
+Where the third row is relaxed, too, a hinge about it comes first. Of a task that prescribes where
+the tool's axis points, tilting it needs no third hinge, unless rows have bands of their own.
+
+A virtual joint's coordinate is 1 where the tool is at its band, or a radian, or what moves as far
+as a radian of the arm does, whichever is less: so do joints of both kinds, of wide bands and narrow
+ones, weigh alike where motions are as short as they can be.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+
+from selfmotion.basics import Array, Flags, ProblemError
+from selfmotion.model.robot import Chain
+from selfmotion.model.robot.tree_arrays import AXIS, JOINT, POSITION, ROTATION
+from selfmotion.model.task import POSITION_ROWS, ROW_NAMES, Relaxation, Task
+
+# A window's end is what rounding makes of it, by this share of the motion.
+_ROUNDING = 1e-9
+# Of a half turn no axis is known: below this, closed forms of θ / sin θ have series.
+_SMALL = 1e-2
+
+
+@dataclass(frozen=True)
+class VirtualJoint:
+    """One of the virtual joints.
+
+    Attributes
+    ----------
+    name : str
+    axis : int
+        0, 1 or 2, in the axes of the frame that it is in.
+    turns : bool
+        Whether it is a hinge.
+    scale : float
+        How far it goes [rad or m] where its coordinate is 1.
+    row : int or None
+        The row x, y, z, rx, ry, rz that is 0 when it stands still; None for what moves always.
+    limit : float
+        Of |coordinate|.
+    sign : float
+        Of its axis.
+    """
+
+    name: str
+    axis: int
+    turns: bool
+    scale: float
+    row: int | None = None
+    limit: float = np.inf
+    sign: float = 1.0
+
+
+class VirtualJoints:
+    """The virtual joints of a task's relaxations.
+
+    Parameters
+    ----------
+    task : Task
+    relaxations : sequence of Relaxation
+    duration : float
+        Of the motion [s].
+    lever : float
+        What moves by a radian goes so far [m].
+
+    Attributes
+    ----------
+    task : Task
+        The rows in which the last joint's tip follows the path.
+    under, behind : tuple of VirtualJoint
+        Those under the arm, and those behind its tool, in the order of the chain.
+    """
+
+    def __init__(
+        self, task: Task, relaxations: Sequence[Relaxation], duration: float, lever: float
+    ) -> None:
+        self.relaxations, self._duration, self._lever = tuple(relaxations), duration, lever
+        in_tool = any(item.in_tool_axes for item in relaxations)
+        rows = sorted({k for item in relaxations for k in item.indices})
+        slides = [self._slide(row) for row in rows if row < 3]
+        self.under = () if in_tool else tuple(slides)
+        hinges, self.task = self._hinges(task, [row - 3 for row in rows if row >= 3], in_tool)
+        self.behind = (*hinges, *(slides if in_tool else ()))
+
+    @property
+    def each(self) -> tuple[VirtualJoint, ...]:
+        """All of them, in the order of their coordinates."""
+        return (*self.under, *self.behind)
+
+    def told(self, number: int) -> str:
+        """Return in words what one of them lets the tool do."""
+        row, of = self.each[number].row, ""
+        if self.swing is not None and number in self.swing:
+            row, of = self.each[self.swing[0]].row, "half of "
+        if row is None:
+            return "a turn that is not prescribed"
+        return f"{of}the deviation {ROW_NAMES[row]}"
+
+    @cached_property
+    def swing(self) -> tuple[int, int] | None:
+        """The places of the two hinges of a tilt that turn alike; None where there is no tilt."""
+        alike = [k for k, joint in enumerate(self.each) if joint.name.startswith("tilt")]
+        return (alike[0], alike[2]) if len(alike) == 3 else None
+
+    def _bands(self, row: int) -> list[float]:
+        return [item.band for item in self.relaxations if row in item.indices]
+
+    def _scale(self, row: int) -> float:
+        return min(*self._bands(row), self._lever if row < 3 else 1.0)
+
+    def _slide(self, row: int) -> VirtualJoint:
+        scale = self._scale(row)
+        limit = max(self._bands(row)) / scale
+        return VirtualJoint(f"relaxed {ROW_NAMES[row]}", row, False, scale, row, limit, -1.0)
+
+    def _hinges(
+        self, task: Task, axes: list[int], in_tool: bool
+    ) -> tuple[list[VirtualJoint], Task]:
+        """Return the hinges, and the rows in which what is behind them is on the path."""
+        if task is Task.POINTING:
+            together = {item.rows for item in self.relaxations if item.angular}
+            alone = bool(axes) and {frozenset(rows) for rows in together} != {frozenset(_TILT)}
+            across = [item for item in self.relaxations if item.in_tool_axes]
+            turned = any(set(item.rows) not in _ROUND for item in across)
+            if not (alone or turned):
+                return (self._tilt(*axes, alike=False) if axes else []), task
+            return [_heading(), *self._about(axes)], Task.POSE
+        if task is Task.POSITION and in_tool:
+            # Its path's axes say what is relaxed, and it may be turned against them in any way.
+            free = [VirtualJoint(f"tilt {k}", k % 2, True, 1.0 if k % 2 else 0.5) for k in range(3)]
+            return [_heading(), *free], Task.POSE
+        return self._about(axes), task
+
+    def _about(self, axes: list[int]) -> list[VirtualJoint]:
+        """Return the hinges of rows of rotation about up to three axes."""
+        if len(axes) < 2:
+            return [self._hinge(axis) for axis in axes]
+        if len(axes) == 2:
+            return self._tilt(*axes, alike=True)
+        last = self._twisted()
+        first, second = (axis for axis in axes if axis != last)
+        return [self._hinge(last), *self._tilt(first, second, alike=True)]
+
+    def _hinge(self, axis: int) -> VirtualJoint:
+        row = 3 + axis
+        scale = self._scale(row)
+        limit = max(self._bands(row)) / scale
+        return VirtualJoint(f"relaxed {ROW_NAMES[row]}", axis, True, scale, row, limit)
+
+    def _tilt(self, i: int, j: int, *, alike: bool) -> list[VirtualJoint]:
+        """Return the joints that tilt about two axes, without a twist where two turn `alike`."""
+        scale = min(self._scale(3 + i), self._scale(3 + j))
+        limits = [max(self._bands(3 + axis)) / scale for axis in (i, j)]
+        if not alike:
+            return [
+                VirtualJoint(f"tilt {ROW_NAMES[3 + axis]}", axis, True, scale, 3 + axis, limit)
+                for axis, limit in zip((i, j), limits, strict=True)
+            ]
+        first = VirtualJoint(f"tilt {ROW_NAMES[3 + i]}", i, True, 0.5 * scale, 3 + i, limits[0])
+        middle = VirtualJoint(f"tilt {ROW_NAMES[3 + j]}", j, True, scale, 3 + j, limits[1])
+        last = VirtualJoint("tilt back", i, True, 0.5 * scale, None, limits[0])
+        return [first, middle, last]
+
+    def _twisted(self) -> int:
+        """Return the axis of the row that is never relaxed with one other row of rotation alone.
+
+        Raises
+        ------
+        ProblemError
+            There is none.
+        """
+        ends = sorted({x for item in self.relaxations for x in item.window(self._duration)})
+        middles = np.array([0.5 * (a + b) for a, b in pairwise(ends)])
+        pairs = set()
+        for relaxed in self._relaxed(middles)[:, 3:]:
+            if relaxed.sum() == 2:
+                pairs.add(int(np.flatnonzero(~relaxed)[0]))
+        if len(pairs) > 1:
+            raise ProblemError(
+                "relaxations: of the rows rx, ry and rz, two and another two are relaxed at "
+                "different times; give all three one window, or relax no more than two of them"
+            )
+        return pairs.pop() if pairs else 2
+
+    def _relaxed(self, t: Array) -> Flags:
+        """Return which of the six rows are relaxed at times t (K,), (K, 6)."""
+        found = np.zeros((len(t), 6), dtype=np.bool_)
+        near = _ROUNDING * self._duration
+        for item in self.relaxations:
+            first, last = item.window(self._duration)
+            begun = (t > first + near) | (first <= near)
+            lasts = (t < last - near) | (last >= self._duration - near)
+            found[:, item.indices] |= (begun & lasts)[:, None]
+        return found
+
+    def held(self, t: Array) -> Flags:
+        """Return which joints stand still at times t (K,), outside of all windows, (K, v)."""
+        relaxed = self._relaxed(t)
+        rows = [joint.row for joint in self.each]
+        free = [np.ones(len(t), bool) if row is None else relaxed[:, row] for row in rows]
+        return np.asarray(~np.stack(free, axis=1))
+
+    @cached_property
+    def windowed(self) -> Flags:
+        """Which joints stand still at some time, (v,)."""
+        ends = {x for item in self.relaxations for x in item.window(self._duration)}
+        times = np.array(sorted(ends | {0.0, self._duration}))
+        return np.asarray(self.held(times).any(axis=0))
+
+    @cached_property
+    def at_zero(self) -> Flags:
+        """Which joints are at 0 where the tool is on its path itself, (v,)."""
+        return np.array([joint.row is not None or joint.name == "tilt back" for joint in self.each])
+
+    def table(self, chain: Chain, first: int) -> Array:
+        """Return the table of an arm's chain with them, whose coordinates begin with a number."""
+        own, count = chain.table, len(self.under)
+        extra = np.zeros((count + len(self.behind), 6, 3))
+        extra[:, ROTATION:] = np.eye(3)
+        for k, joint in enumerate(self.each):
+            extra[k, JOINT] = first + k, joint.turns, joint.scale
+            extra[k, AXIS, joint.axis] = joint.sign
+        table = np.concatenate([extra[:count], own[:-1], extra[count:], own[-1:]])
+        if self.behind:
+            # The arm's tip is where the first of them is.
+            place = len(table) - 1 - len(self.behind)
+            table[place, POSITION], table[place, ROTATION:] = own[-1, POSITION], own[-1, ROTATION:]
+            table[-1, POSITION], table[-1, ROTATION:] = 0.0, np.eye(3)
+        return table
+
+    def alike(self, first: int) -> Array | None:
+        """Return the table of two slides that are at 0 where a tilt's hinges turn alike, or None.
+
+        Their coordinates are those of the hinges, and begin with a number.
+        """
+        if self.swing is None:
+            return None
+        table = np.zeros((3, 6, 3))
+        table[:, ROTATION:] = np.eye(3)
+        table[:, JOINT, 0] = first + self.swing[0], first + self.swing[1], -1.0
+        table[:2, JOINT, 2] = 1.0
+        table[:2, AXIS, 0] = 1.0, -1.0
+        return table
+
+    def weights(self, metre: float) -> Array:
+        """Return what a unit of each coordinate counts, (v,): as a joint of the arm that moves so.
+
+        `metre` is what a metre counts [rad/m].
+        """
+        return np.array([joint.scale * (1.0 if joint.turns else metre) for joint in self.each])
+
+    def widest(self, rows: Sequence[int]) -> float:
+        """Return how far rows are off together at most, at the time when that is most [rad or m].
+
+        By the bands that hold then: rows that share one have another one in another window.
+        """
+        ends = sorted({x for item in self.relaxations for x in item.window(self._duration)})
+        middles = [0.5 * (a + b) for a, b in pairwise(ends)]
+        return max(self._allowed(rows, time) for time in middles)
+
+    def _allowed(self, rows: Sequence[int], time: float) -> float:
+        """Return how far rows may be off together at a time, 0 where they are not relaxed."""
+        windows = [(item, item.window(self._duration)) for item in self.relaxations]
+        here = [item for item, (first, last) in windows if first < time < last]
+        each = [min((x.band for x in here if row in x.indices), default=0.0) for row in rows]
+        shared = (item.band for item in here if set(rows) <= set(item.indices))
+        return min([float(np.linalg.norm(each)), *shared])
+
+    def joint_of(self, item: Relaxation) -> tuple[int, float] | None:
+        """Return the number of the joint by which a relaxation's one row is off, and its scale.
+
+        None where it has several rows, or that is not what a joint's coordinate says.
+        """
+        tilts = any(joint.name.startswith("tilt") for joint in self.each)
+        if len(item.rows) > 1 or (item.angular and tilts):
+            return None
+        number = next(k for k, joint in enumerate(self.each) if joint.row == item.indices[0])
+        return number, self.each[number].scale
+
+    def rows_of(self, item: Relaxation, s: Array) -> tuple[Array, Array]:
+        """Return the deviation in a relaxation's rows at coordinates s (K, v): (K, k), (K, k, v).
+
+        And its derivatives. Of the rows that tilt a pointing tool, as long as these are.
+        """
+        count = len(self.each)
+        own = {joint.row: k for k, joint in enumerate(self.each) if joint.row is not None}
+        turning = [k for k, joint in enumerate(self.each) if joint.name.startswith("tilt")]
+        if not item.angular or not turning:
+            places = [own[row] for row in item.indices]
+            slopes = np.zeros((len(places), count))
+            slopes[np.arange(len(places)), places] = [self.each[k].scale for k in places]
+            return s @ slopes.T, np.broadcast_to(slopes, (len(s), *slopes.shape))
+        vector, by = self._tilted(s, turning, own)
+        which = [row - 3 for row in item.indices]
+        return vector[:, which], by[:, which]
+
+    def _tilted(self, s: Array, turning: list[int], own: dict[int, int]) -> tuple[Array, Array]:
+        """Return δ of a tilt, and of a twist before it where its row is relaxed, (K, 3)."""
+        first, second = self.each[turning[0]], self.each[turning[1]]
+        i, j = first.axis, second.axis
+        k = 3 - i - j
+        halves = len(turning) == 3
+        a, b = first.scale * s[:, turning[0]], second.scale * s[:, turning[1]]
+        if halves:
+            b = 0.5 * b
+        slope_a, slope_b = first.scale, second.scale * (0.5 if halves else 1.0)
+        real, vector = np.cos(a) * np.cos(b), np.zeros((len(s), 3))
+        vector[:, i], vector[:, j] = np.sin(a) * np.cos(b), np.sin(b)
+        by_real, by_vector = np.zeros(s.shape), np.zeros((len(s), 3, s.shape[1]))
+        by_real[:, turning[0]] = -slope_a * np.sin(a) * np.cos(b)
+        by_real[:, turning[1]] = -slope_b * np.cos(a) * np.sin(b)
+        by_vector[:, i, turning[0]] = slope_a * np.cos(a) * np.cos(b)
+        by_vector[:, i, turning[1]] = -slope_b * np.sin(a) * np.sin(b)
+        by_vector[:, j, turning[1]] = slope_b * np.cos(b)
+        if halves and 3 + k in own:
+            # A quaternion about the third axis comes first.
+            place = own[3 + k]
+            half = 0.5 * self.each[place].scale
+            c, z = np.cos(half * s[:, place])[:, None], np.sin(half * s[:, place])[:, None]
+            axis, cross = np.eye(3)[k], np.cross(np.eye(3)[k], np.eye(3)).T
+            turned = vector @ cross.T
+            by_turned = cross @ by_vector
+            whole = c[:, 0] * real
+            by_whole = c * by_real
+            by_whole[:, place] = -half * z[:, 0] * real
+            by_both = c[:, :, None] * by_vector + z[:, :, None] * by_turned
+            by_both += (z * by_real)[:, None, :] * axis[:, None]
+            by_both[:, :, place] += half * (-z * vector + c * turned)
+            by_both[:, :, place] += half * c * real[:, None] * axis
+            vector = c * vector + z * turned + z * real[:, None] * axis
+            # Of both quaternions of a turn, the one of less than half a turn.
+            side = np.where(whole < 0.0, -1.0, 1.0)
+            real, vector = side * whole, side[:, None] * vector
+            by_real, by_vector = side[:, None] * by_whole, side[:, None, None] * by_both
+        size, slope = _angles(real, np.linalg.norm(vector, axis=1))
+        factor = 2.0 if halves else 1.0
+        by = size[:, None, None] * by_vector
+        by += (slope[:, None] * by_real)[:, None, :] * vector[:, :, None]
+        return factor * size[:, None] * vector, factor * by
+
+    def coordinates(self, tool: tuple[Array, Array], path: tuple[Array, Array]) -> Array:
+        """Return the coordinates that take tools to the path: rotations (K, 3, 3), places (K, 3).
+
+        Of tools that deviate from their path in nothing but what is relaxed.
+        """
+        from scipy.spatial.transform import Rotation
+
+        (turns, places), (wanted, targets) = tool, path
+        found = np.zeros((len(turns), len(self.each)))
+        away = places - targets
+        in_tool = (np.swapaxes(wanted, 1, 2) @ away[:, :, None])[:, :, 0]
+        for k, joint in enumerate(self.each):
+            if not joint.turns:
+                rows = away if k < len(self.under) else in_tool
+                found[:, k] = rows[:, joint.axis] / joint.scale
+        hinges = [k for k, joint in enumerate(self.each) if joint.turns]
+        if not hinges:
+            return found
+        q = Rotation.from_matrix(np.swapaxes(turns, 1, 2) @ wanted).as_quat(canonical=True)
+        vector, real = q[:, :3], q[:, 3]
+        tilting = [k for k in hinges if self.each[k].name.startswith("tilt")]
+        for k in hinges:
+            joint = self.each[k]
+            if k in tilting:
+                continue
+            # A twist that comes before the rest, or all there is.
+            angle = 2.0 * np.arctan2(vector[:, joint.axis], real)
+            found[:, k] = angle / joint.scale
+            rest = Rotation.from_rotvec(-angle[:, None] * np.eye(3)[joint.axis])
+            q = (rest * Rotation.from_quat(np.column_stack([vector, real]))).as_quat(canonical=True)
+            vector, real = q[:, :3], q[:, 3]
+        if len(tilting) == 3:
+            i, j = self.each[tilting[0]].axis, self.each[tilting[1]].axis
+            beta, alpha = np.arcsin(vector[:, j]), np.arctan2(vector[:, i], real)
+            for k, angle in zip(tilting, (alpha, 2.0 * beta, alpha), strict=True):
+                found[:, k] = angle / self.each[k].scale
+        elif tilting:
+            # R_i(a) R_j(b) takes the path's z axis to the tool's.
+            axis = (np.swapaxes(turns, 1, 2) @ wanted[:, :, 2:])[:, :, 0]
+            beta = np.arcsin(np.clip(axis[:, 0], -1.0, 1.0))
+            alpha = np.arctan2(-axis[:, 1], axis[:, 2])
+            for k, angle in zip(tilting, (alpha, beta), strict=True):
+                found[:, k] = angle / self.each[k].scale
+        return found
+
+
+_TILT = ("rx", "ry")
+# What is the same however the tool is turned about its axis.
+_ROUND: tuple[set[str], ...] = ({"z"}, {"x", "y"}, set(POSITION_ROWS))
+
+
+def _heading() -> VirtualJoint:
+    return VirtualJoint("heading", 2, True, 1.0)
+
+
+def _angles(cosine: Array, sine: Array) -> tuple[Array, Array]:
+    """Return θ / sin θ and its derivative by cos θ."""
+    angle = np.arctan2(sine, cosine)
+    small, square = angle < _SMALL, angle**2
+    safe = np.where(small, 1.0, sine)
+    size = np.where(small, 1.0 + square / 6.0 + 7.0 * square**2 / 360.0, angle / safe)
+    slope = np.where(
+        small,
+        -(1.0 / 3.0 + 2.0 * square / 15.0),
+        (angle * cosine - sine) / safe**3,
+    )
+    return size, slope

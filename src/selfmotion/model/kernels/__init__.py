@@ -1,0 +1,53 @@
+"""What numba compiles: the small dense algebra around Pinocchio's Jacobians.
+
+Notation, per stage: J6 (6, n) a tip's Jacobian [v; ω] in the axes of its chain's base, S the
+selection of its task's rows, J = S J6 (m, n) the rows of all tips, one below the other, ε the null
+motion, u = S(ẋ_d + K e) the commanded rows with pose errors e, A = JJᵀ + λ²I = LLᵀ (λ = 0 except
+near singular poses, where damping is asked for), y = A⁻¹(u - Jε), and eq. 4 in the form that needs
+one solve:
+
+    q̇ = Jᵀy + ε = J⁺u + (I - J⁺J) ε.
+
+Python calls `advance`, `pullback`, `sensitivities`, `contract_task` and
+`transport`. Each is made of small kernels, which LLVM inlines, and is compiled for what it is
+given: who has no damping, or a path that does not move, does not wait for theirs.
+"""
+
+from selfmotion.model.kernels.algebra import (
+    carried as carried,
+    cholesky as cholesky,
+    factor_damped as factor_damped,
+    finite as finite,
+    gram as gram,
+    respond as respond,
+    solve_cholesky as solve_cholesky,
+    transport as transport,
+)
+from selfmotion.model.kernels.stages import (
+    Law as Law,
+    advance as advance,
+    at_tip as at_tip,
+    pullback as pullback,
+    sensitivities as sensitivities,
+    space_size as space_size,
+)
+from selfmotion.model.kernels.start import approach as approach
+from selfmotion.model.kernels.table import (
+    Stage as Stage,
+    Tip as Tip,
+    columns as columns,
+    path_of as path_of,
+    rates_of as rates_of,
+    stage_of as stage_of,
+    tip_of as tip_of,
+    view as view,
+)
+from selfmotion.model.kernels.tool import (
+    Every as Every,
+    contract_task as contract_task,
+    errors_and_rows as errors_and_rows,
+    pose_error as pose_error,
+    rows_of as rows_of,
+    select as select,
+    task_rows as task_rows,
+)

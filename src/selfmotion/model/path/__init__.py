@@ -1,0 +1,51 @@
+"""Tool motion over time: what the tool frame is to do, as pose and twist at any time."""
+
+from selfmotion.model.path.base import (
+    STILL as STILL,
+    Path as Path,
+    PathSamples as PathSamples,
+    PathSeries as PathSeries,
+    check_duration as check_duration,
+    check_oriented as check_oriented,
+    path_pose as path_pose,
+    path_series as path_series,
+    rotations_about as rotations_about,
+)
+from selfmotion.model.path.derived import (
+    Placed as Placed,
+    Retimed as Retimed,
+    Reversed as Reversed,
+    Section as Section,
+    section_at_rest as section_at_rest,
+)
+from selfmotion.model.path.feed import Feed as Feed, FeedPossible as FeedPossible
+from selfmotion.model.path.feed_kept import FeedKept as FeedKept
+from selfmotion.model.path.joined import (
+    Dwell as Dwell,
+    Joined as Joined,
+    Stroke as Stroke,
+    with_leads as with_leads,
+    with_run_ups as with_run_ups,
+)
+from selfmotion.model.path.pace import Pace as Pace, times_when as times_when
+from selfmotion.model.path.polyline import Polyline as Polyline, merged as merged
+from selfmotion.model.path.rates import (
+    edges_of as edges_of,
+    spread_along as spread_along,
+    twist_rates as twist_rates,
+)
+from selfmotion.model.path.shapes import (
+    Circle as Circle,
+    Line as Line,
+    Spiral as Spiral,
+    TimeLaw as TimeLaw,
+)
+from selfmotion.model.path.twist import TwistPath as TwistPath
+from selfmotion.model.path.waypoints import Waypoints as Waypoints
+from selfmotion.model.path.weave import Weave as Weave
+from selfmotion.model.path.written_poses import (
+    ORIENTATIONS as ORIENTATIONS,
+    TURN_NOTE as TURN_NOTE,
+    from_normal as from_normal,
+    pose_of as pose_of,
+)

@@ -1,0 +1,165 @@
+"""How well a path at a feed keeps it: what was asked, what is reached, and what holds it."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from selfmotion.basics import Array, Flags, Ints
+
+if TYPE_CHECKING:
+    from selfmotion.model.path.feed import Feed
+
+# Times that are told are alike up to this [s].
+_SAME = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class FeedKept:
+    """What a `Feed` makes of one of the feeds that were asked for, where it was.
+
+    Stretches count but for run-up and run-down, rounded corners, and turning on the spot; each has
+    to reach it.
+
+    Attributes
+    ----------
+    asked : float
+        [m/s].
+    within : float
+        What may be missing of it, as a share.
+    during : (W, 2)
+        From when to when it is asked for [s].
+    t, speeds : (K,)
+        Times of these [s], and how fast the tool is then [m/s].
+    lasts : (K,)
+        What time each stands for [s].
+    counts : (K,)
+        When the feed counts.
+    causes : (K,)
+        What holds the tool at each time, in words.
+    path : Feed
+        The one at this feed, whatever was made of it since: its own speed between these times.
+    own : (K,)
+        The times on that path [s].
+    rows : (K,)
+        Their numbers there: between two that follow each other is no other.
+    """
+
+    asked: float
+    within: float
+    during: Array
+    t: Array = field(repr=False)
+    speeds: Array = field(repr=False)
+    lasts: Array = field(repr=False)
+    counts: Flags = field(repr=False)
+    causes: tuple[str, ...] = field(repr=False)
+    path: "Feed" = field(repr=False)
+    own: Array = field(repr=False)
+    rows: Ints = field(repr=False)
+
+    @property
+    def reached(self) -> float:
+        """The largest speed [m/s]."""
+        return float(np.max(self.speeds))
+
+    @property
+    def slowest(self) -> float:
+        """The smallest speed where it counts [m/s]; of a stretch where none does, the largest."""
+        return float(self.speeds[self._worst])
+
+    @property
+    def time(self) -> float:
+        """When that is [s]."""
+        return float(self.t[self._worst])
+
+    @property
+    def slower(self) -> float:
+        """For how long the tool is too slow where it counts [s]."""
+        slow = (self.speeds < (1.0 - self.within) * self.asked) & self.counts
+        return float(self.lasts @ slow)
+
+    @property
+    def held_by(self) -> str:
+        """What holds it where it is slowest."""
+        return self.causes[self._worst] if self.counts[self._worst] else "run-up and run-down"
+
+    def named(self, time: float, duration: float) -> str:
+        """Return the feed in words, and when on a path it is asked for near a time [s]."""
+        first, last = self.during[int(np.argmin(np.abs(self.during - time).min(axis=1)))]
+        ends = 0.0, duration
+        whole = len(self.during) == 1 and np.allclose((first, last), ends, rtol=0.0, atol=_SAME)
+        stretch = "" if whole else f" from t = {first:.3f} to {last:.3f} s"
+        return f"the feed of {self.asked:g} m/s{stretch}"
+
+    @property
+    def kept(self) -> bool:
+        """Whether the feed is kept where it counts, and reached at all."""
+        return self.slowest >= (1.0 - self.within) * self.asked
+
+    @property
+    def left_over(self) -> float:
+        """How much faster or slower than the path the tool may be where the feed counts [m/s]."""
+        most = max((1.0 + self.within) * self.asked, self.reached)
+        return max(min(most - self.reached, self.slowest - (1.0 - self.within) * self.asked), 0.0)
+
+    @cached_property
+    def _worst(self) -> int:
+        """The slowest time where it counts; of a stretch where none does, its fastest one."""
+        chosen = []
+        for own in range(len(self.during)):
+            here = self._stretch == own
+            if (self.counts & here).any():
+                chosen.append(int(np.argmin(np.where(self.counts & here, self.speeds, np.inf))))
+            elif here.any():
+                # Too short to run up and down.
+                chosen.append(int(np.argmax(np.where(here, self.speeds, -np.inf))))
+        return min(chosen, key=lambda k: float(self.speeds[k]))
+
+    @cached_property
+    def _stretch(self) -> Ints:
+        """In which stretch each time lies, (K,)."""
+        return np.maximum(np.searchsorted(self.during[:, 0], self.t, side="right") - 1, 0)
+
+    def timed(self, when: Callable[[Array], Array]) -> "FeedKept":
+        """Return the same at other times, given by a function of those here."""
+        during = np.sort(when(self.during.ravel()).reshape(-1, 2), axis=1)
+        return replace(self, during=during[np.argsort(during[:, 0])], t=when(self.t))
+
+    @property
+    def pieces(self) -> tuple[Array, Flags]:
+        """The intervals of the path at this feed that are left of it.
+
+        Beginnings and ends [s], (I, 2), and whether the feed counts there, (I,): at both ends.
+        """
+        order = np.argsort(self.rows)
+        rows, own, counts = self.rows[order], self.own[order], self.counts[order]
+        next_to = (np.diff(rows) == 1) & (np.diff(own) > 0.0)
+        ends = np.stack([own[:-1], own[1:]], axis=1)
+        return ends[next_to], (counts[:-1] & counts[1:])[next_to]
+
+    def later(self, seconds: float) -> "FeedKept":
+        """Return the same, begun later."""
+        return self.timed(lambda t: t + seconds)
+
+    def between(self, first: float, last: float) -> "FeedKept | None":
+        """Return it from one time to another [s]; None where it does not count in between."""
+        found = self.where((self.t >= first) & (self.t <= last))
+        return found and replace(found, during=np.clip(found.during, first, last))
+
+    def where(self, rows: Flags) -> "FeedKept | None":
+        """Return it at some of the times (K,); without stretches where it counts at none of them.
+
+        None where it counts in no stretch.
+        """
+        if rows.all():
+            return self
+        counted = np.unique(self._stretch[self.counts & rows])
+        if not len(counted):
+            return None
+        rows = rows & np.isin(self._stretch, counted)
+        names = ("t", "speeds", "lasts", "counts", "own", "rows")
+        chosen = {name: getattr(self, name)[rows] for name in names}
+        causes = tuple(np.array(self.causes)[rows].tolist())
+        return replace(self, during=self.during[counted], **chosen, causes=causes)

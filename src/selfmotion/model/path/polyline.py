@@ -1,0 +1,466 @@
+"""Straight legs with rounded corners, and as few of them as keep near many poses."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any, NamedTuple, Self
+
+import numpy as np
+import numpy.typing as npt
+
+from selfmotion.basics import (
+    Array,
+    Ints,
+    PathError,
+    as_number,
+    as_numbers,
+    read_only,
+    series,
+    shown,
+)
+from selfmotion.model.path.base import Path, PathSamples, PathSeries, path_pose, rotvecs, unit
+from selfmotion.model.path.waypoints import of_file, scalar_first
+from selfmotion.model.task import SE3, Quaternion
+
+if TYPE_CHECKING:
+    from scipy.spatial.transform import Rotation
+
+# Poses that a polyline can do without: those that its legs pass within a tolerance.
+#
+# By the algorithm of Ramer (1972), Douglas and Peucker (1973): a leg from the first pose to the
+# last is divided at the pose that it misses by most, until it misses none by more than the
+# tolerance. A pose from which the tool goes back along the leg, or that is turned otherwise,
+# divides it as well.
+
+# Legs miss poses by this share of the tolerances: rounding of files. Where they cut off a stub, by
+# that; a stub is shorter than this share of the legs beside it.
+_ROUNDING, _CUT, _STUB = 2e-3, 0.5, 0.25
+
+
+class Merged(NamedTuple):
+    """Which poses of N are ends of legs.
+
+    Attributes
+    ----------
+    kept : (M,)
+        Their numbers; first and last are among them.
+    shares : (N,)
+        Where each pose is passed: the leg's number, and as its fraction the share of the leg.
+    missed, turned : (M - 1,)
+        By how much each leg misses poses at most [m, rad].
+    """
+
+    kept: Ints
+    shares: Array
+    missed: Array
+    turned: Array
+
+
+def merged(points: Array, turns: Array, tolerance: float, turn_tolerance: float) -> Merged:
+    """Return which of poses (N, 3), (N, 4) legs have to end at.
+
+    Legs miss poses by next to nothing, so that curves of short chords stay what they are. Where a
+    leg shorter than the tolerance stands between legs that are far longer, these miss one of its
+    ends, by half of the tolerances [m, rad] at most.
+    """
+    measure = _Measure(points, turns, tolerance, turn_tolerance)
+    kept = measure.without_stubs(measure.divided(_ROUNDING))
+    legs = [measure.leg(first, last) for first, last in pairwise(kept)]
+    shares = np.concatenate(
+        [[0.0], *(np.append(k + leg.shares, k + 1.0) for k, leg in enumerate(legs))]
+    )
+    return Merged(
+        np.array(kept, dtype=np.int64),
+        shares,
+        np.array([leg.away.max(initial=0.0) for leg in legs]),
+        np.array([leg.turned.max(initial=0.0) for leg in legs]),
+    )
+
+
+class _Leg(NamedTuple):
+    """Of the poses between a leg's ends: where it passes them, how far off, turned, and back."""
+
+    shares: Array
+    away: Array
+    turned: Array
+    back: Array
+
+
+class _Measure:
+    """Poses, and what legs between them may miss."""
+
+    def __init__(
+        self, points: Array, turns: Array, tolerance: float, turn_tolerance: float
+    ) -> None:
+        self._points, self._turns = points, turns
+        self._tolerance, self._turn_tolerance = tolerance, turn_tolerance
+
+    def leg(self, first: int, last: int) -> _Leg:
+        """Return what a leg from one pose to another does to those between them."""
+        return _leg(self._points, self._turns, first, last)
+
+    def miss(self, leg: _Leg) -> Array:
+        """Return by how much it misses each, as shares of the tolerances."""
+        moved = np.maximum(leg.away, leg.back) / self._tolerance
+        return np.asarray(np.maximum(moved, leg.turned / self._turn_tolerance))
+
+    def divided(self, most: float) -> list[int]:
+        """Return the ends of legs that miss poses by a share of the tolerances."""
+        kept, waiting = [0], [(0, len(self._points) - 1)]
+        while waiting:
+            first, last = waiting.pop()
+            if last == first + 1:
+                kept.append(last)
+                continue
+            # Turns take ten times as long as places, which decide as a rule.
+            moved = _leg(self._points, self._turns, first, last, turns_count=False)
+            missed = self.miss(moved)
+            if missed.max() <= most:
+                missed = self.miss(self.leg(first, last))
+            if missed.max() > most:
+                middle = first + 1 + int(missed.argmax())
+                waiting += [(middle, last), (first, middle)]
+            else:
+                kept.append(last)
+        return kept
+
+    def without_stubs(self, kept: list[int]) -> list[int]:
+        """Return these ends but for one of each short leg among long ones, the better one."""
+        lengths = np.linalg.norm(np.diff(self._points[kept], axis=0), axis=1)
+        beside = np.concatenate([[np.inf], lengths, [np.inf]])
+        bounds = np.minimum(_STUB * np.minimum(beside[:-2], beside[2:]), self._tolerance)
+        # Of thousands of chords none is a stub as a rule.
+        if not (lengths < bounds).any():
+            return kept
+        found = list(kept)
+        k = 0
+        while k + 1 < len(found):
+            around = found[max(k - 1, 0) : k + 3]
+            lengths = np.linalg.norm(np.diff(self._points[around], axis=0), axis=1)
+            own = lengths[min(k, 1)]
+            others = np.delete(lengths, min(k, 1))
+            if own < self._tolerance and len(others) and own < _STUB * others.min():
+                ends = [each for each in (k, k + 1) if 0 < each < len(found) - 1]
+                missed = [
+                    self.miss(self.leg(found[each - 1], found[each + 1])).max(initial=0.0)
+                    for each in ends
+                ]
+                if min(missed) <= _CUT:
+                    del found[ends[int(np.argmin(missed))]]
+                    continue
+            k += 1
+        return found
+
+
+def _leg(points: Array, turns: Array, first: int, last: int, turns_count: bool = True) -> _Leg:
+    if last == first + 1:
+        return _Leg(*np.zeros((4, 0)))
+    inner = points[first + 1 : last] - points[first]
+    chord = points[last] - points[first]
+    length = float(np.sqrt(chord @ chord))
+    if length > 0.0:
+        along = inner @ (chord / length)
+        shares = np.clip(along / length, 0.0, 1.0)
+    else:
+        along = np.zeros(len(inner))
+        shares = np.arange(1, len(inner) + 1) / (len(inner) + 1.0)
+    beside = inner - shares[:, None] * chord
+    away = np.sqrt((beside * beside).sum(axis=1))
+    passed = np.maximum(np.maximum.accumulate(along), 0.0)
+    shares = np.maximum.accumulate(shares)
+    # Where the tool goes back, it has to turn round where it has come farthest.
+    back = _gone_back(along, passed)
+    turned = _turned(turns, first, last, shares) if turns_count else np.zeros(len(shares))
+    return _Leg(shares, away, turned, back)
+
+
+def _gone_back(along: Array, passed: Array) -> Array:
+    """Return for each pose by how much the tool goes back from it along a leg before its end."""
+    rest = np.minimum.accumulate(along[::-1])[::-1]
+    return np.where(along >= passed, np.maximum(along - rest, 0.0), 0.0)
+
+
+def _turned(turns: Array, first: int, last: int, shares: Array) -> Array:
+    """Return by how much poses are turned otherwise than a leg passes them [rad]."""
+    if (turns[first : last + 1] == turns[first]).all():
+        return np.zeros(len(shares))
+    from scipy.spatial.transform import Rotation
+
+    rotations: Any = Rotation.from_quat(turns[first : last + 1], scalar_first=True)
+    whole = (rotations[0].inv() * rotations[-1]).as_rotvec()
+    passed = rotations[0] * Rotation.from_rotvec(shares[:, None] * whole)
+    return np.asarray((passed.inv() * rotations[1:-1]).magnitude())
+
+
+# Straight legs with rounded corners.
+
+# The pace of a polyline itself, to be replaced by `Feed` [m/s].
+_SPEED = 1.0
+# The same where it only turns [rad/s].
+_TURN_RATE = 10.0
+# Poses nearer than this [s of the pace above] are the same.
+_SAME = 1e-9
+# Two corners that are apart by this share of either meet.
+_HARDLY = 1e-2
+# The corner is passed at this share of d |Δv|, where the velocity changes by Δv within ± d.
+_MISS = 5.0 / 32.0
+# m(x) / d over u = x / d in the corner, coefficients of 1, u, u² …: ∫∫ 15/16 (1 - u²)² du du.
+_WAY = np.array([_MISS, 0.5, 15.0 / 32.0, 0.0, -15.0 / 96.0, 0.0, 1.0 / 32.0])
+
+
+class Polyline(Path, kind="polyline"):
+    """Straight legs from pose to pose; corners are rounded, and missed by no more than tolerances.
+
+    In a leg the tool moves at a constant speed and turns about a fixed axis. Within a time ± d
+    of a corner its velocity goes over from that of one leg to that of the next by v₁ + Δv m'(x)
+    with m''(x) ∝ (1 - x²/d²)²: the path is C³, and its miss of the corner is 5/32 d |Δv|.
+
+    Poses that legs pass anyway make no corners, nor do legs shorter than the tolerance that stand
+    between far longer ones: what is below the tolerance hardly counts.
+
+    Its own pace is 1 m/s, or 10 rad/s where it mostly turns: `Feed` gives it one that fits.
+
+    Parameters
+    ----------
+    positions : (N, 3)
+        [m], world axes.
+    quaternions_wxyz : (N, 4) or scipy.spatial.transform.Rotation, optional
+        Orientations [w, x, y, z]; normalised, either sign. Rotations of SciPy know their order,
+        numbers have to be in this one. By default none is prescribed, for
+        tasks that leave it free ('position').
+    tolerance : float
+        How far the tool may pass from a corner [m].
+    turn_tolerance : float
+        Likewise [rad].
+
+    Raises
+    ------
+    PathError
+        Shapes do not agree, fewer than two poses, all the same, a zero quaternion, a leg that turns
+        back on the one before.
+    """
+
+    def __init__(
+        self,
+        positions: npt.ArrayLike,
+        quaternions_wxyz: npt.ArrayLike | Rotation | None = None,
+        *,
+        tolerance: float = 1e-3,
+        turn_tolerance: float = 1e-2,
+    ) -> None:
+        points = as_numbers(positions, "polyline: positions", error=PathError)
+        self._oriented = quaternions_wxyz is not None
+        if quaternions_wxyz is None:
+            quaternions_wxyz = np.tile([1.0, 0.0, 0.0, 0.0], (len(np.atleast_1d(points)), 1))
+        turns = as_numbers(scalar_first(quaternions_wxyz), "polyline: quaternions", error=PathError)
+        if points.ndim != 2 or points.shape[1:] != (3,) or len(points) < 2:
+            raise PathError(
+                f"polyline: positions have shape {points.shape}, expected (N, 3) with N ≥ 2"
+            )
+        if turns.shape != (len(points), 4):
+            raise PathError(
+                f"polyline: quaternions have shape {turns.shape}, expected ({len(points)}, 4)"
+            )
+        zero = np.flatnonzero(~np.any(turns, axis=1))
+        if zero.size:
+            raise PathError(f"polyline: quaternions[{zero[0]}] is zero, expected an orientation")
+        what = "polyline: tolerance"
+        self._tolerance = as_number(tolerance, what, above=0.0, error=PathError)
+        what = "polyline: turn_tolerance"
+        self._turn_tolerance = as_number(turn_tolerance, what, above=0.0, error=PathError)
+        self._given = read_only(points), read_only(unit(turns))
+        self._merged = merged(*self._given, self._tolerance, self._turn_tolerance)
+        self._points, self._turns = (read_only(given[self._merged.kept]) for given in self._given)
+        lasts = self._lasts
+        if np.any(lasts <= _SAME):
+            raise PathError(
+                f"polyline: all {len(points)} poses are the same within its tolerances; a Dwell "
+                f"stays where it is"
+            )
+        self._times = read_only(np.append(0.0, np.cumsum(lasts)))
+        self.duration = float(self._times[-1])
+        self._check_reversals()
+
+    @classmethod
+    def from_poses(cls, poses: list[SE3], **options: Any) -> Polyline:
+        """Return the path through `poses` (SE3 or (4, 4)); options as in the class."""
+        if not isinstance(poses, Sequence | np.ndarray):
+            raise PathError(f"polyline: poses is {shown(poses)}, expected a list of poses")
+        frames = [path_pose(pose, f"polyline: poses[{k}]") for k, pose in enumerate(poses)]
+        turns = [np.roll(Quaternion(frame.rotation).coeffs(), 1) for frame in frames]
+        return cls([frame.translation for frame in frames], turns, **options)
+
+    @property
+    def oriented(self) -> bool:
+        """See `Path.oriented`: where quaternions are given."""
+        return self._oriented
+
+    @property
+    def knots(self) -> Array:
+        """See `Path.knots`: where corners begin and end, so that steps end there.
+
+        Where hardly anything is straight between two corners, the second begins where the first
+        ends: steps of next to no time would turn rounding into accelerations.
+        """
+        half = self._corners.half
+        ends, starts = self._times[:-1] + half[:-1], self._times[1:] - half[1:]
+        hardly = starts - ends <= _HARDLY * np.minimum(half[:-1], half[1:])
+        dropped = np.isin(self._edges, starts[1:-1][hardly[1:-1]])
+        return read_only(self._edges[~dropped])
+
+    @property
+    def marks(self) -> Array:
+        """See `Path.marks`: where corners begin and end, all of them."""
+        return read_only(self._edges)
+
+    @property
+    def rounded(self) -> Array:
+        """See `Path.rounded`."""
+        half, at = self._corners.half[1:-1], self.corner_times
+        return np.stack([at - half, at + half], axis=1)
+
+    @property
+    def corner_times(self) -> Array:
+        """When the corners between legs are passed [s]."""
+        return self._times[1:-1]
+
+    @property
+    def pose_times(self) -> Array:
+        """When each pose is passed, within the tolerance [s], (N,)."""
+        shares = self._merged.shares
+        return np.interp(shares, np.arange(len(self._times)), self._times)
+
+    @cached_property
+    def _edges(self) -> Array:
+        legs = self._corners
+        inner = self._times[1:-1]
+        edges = np.concatenate([inner - legs.half[1:-1], inner + legs.half[1:-1]])
+        edges = np.sort(np.concatenate([[0.0, self.duration], edges]))
+        return np.asarray(edges[np.append(True, np.diff(edges) > _SAME * self.duration)])
+
+    @cached_property
+    def _lasts(self) -> Array:
+        """How long each leg lasts, (N - 1,)."""
+        way = np.linalg.norm(np.diff(self._points, axis=0), axis=1) / _SPEED
+        turning = np.linalg.norm(self._rotvecs, axis=1) / _TURN_RATE
+        return np.asarray(np.maximum(way, turning))
+
+    @cached_property
+    def _rotvecs(self) -> Array:
+        """How each leg turns, in tool axes [rad], (N - 1, 3)."""
+        return rotvecs(self._turns)
+
+    @cached_property
+    def _rotations(self) -> Any:
+        from scipy.spatial.transform import Rotation
+
+        return Rotation.from_quat(self._turns, scalar_first=True)
+
+    @cached_property
+    def _corners(self) -> _Corners:
+        # The ends are corners without a change.
+        lasts = self._lasts
+        speeds = np.diff(self._points, axis=0) / lasts[:, None]
+        rates = self._rotvecs / lasts[:, None]
+        before, after = np.r_[0, : len(lasts)], np.r_[: len(lasts), len(lasts) - 1]
+        jumps = np.linalg.norm(speeds[after] - speeds[before], axis=1)
+        turns = np.linalg.norm(rates[after] - rates[before], axis=1)
+        tiny = np.finfo(float).tiny
+        # What legs miss poses by is no longer left to the corners at their ends.
+        missed, turned = (np.maximum(off[before], off[after]) for off in self._merged[2:])
+        half = np.minimum(
+            (self._tolerance - missed) / (_MISS * np.maximum(jumps, tiny)),
+            (self._turn_tolerance - turned) / (_MISS * np.maximum(turns, tiny)),
+        )
+        half = np.minimum(half, 0.5 * np.minimum(lasts[before], lasts[after]))
+        return _Corners(speeds[before], speeds[after], rates[before], rates[after], half)
+
+    def _check_reversals(self) -> None:
+        corners = self._corners
+        middle = np.linalg.norm(corners.speed_in + corners.speed_out, axis=1) / _SPEED
+        middle += np.linalg.norm(corners.rate_in + corners.rate_out, axis=1) / _TURN_RATE
+        back = np.flatnonzero(middle < 1e-6)
+        if back.size:
+            raise PathError(
+                f"polyline: at poses[{self._merged.kept[back[0]]}] the tool turns straight back; "
+                f"end one polyline there and begin another: Feed(first, …) + Feed(second, …)"
+            )
+
+    def evaluate(self, t: Array) -> PathSamples:
+        """See `Path.evaluate`."""
+        from scipy.spatial.transform import Rotation
+
+        middles = 0.5 * (self._times[:-1] + self._times[1:])
+        k = np.searchsorted(middles, t, side="right")
+        corners, x = self._corners, t - self._times[k]
+        after, share = _passed(x, corners.half[k])
+        before = (x - after)[:, None]
+        after, share = after[:, None], share[:, None]
+        slow, fast = corners.speed_in[k], corners.speed_out[k]
+        position = self._points[k] + slow * before + fast * after
+        first = rotation = self._rotations[k]
+        turning = np.zeros_like(position)
+        # Products of rotations are by far the dearest part of it.
+        if corners.rate_in.any() or corners.rate_out.any():
+            first = rotation * Rotation.from_rotvec(corners.rate_in[k] * before)
+            turning = rotation.apply(corners.rate_in[k]) * (1.0 - share)
+            turning += first.apply(corners.rate_out[k]) * share
+            rotation = first * Rotation.from_rotvec(corners.rate_out[k] * after)
+        twist = np.hstack([slow + (fast - slow) * share, turning])
+        return PathSamples(t, position, rotation.as_matrix(), twist)
+
+    def series(self, middle: Array, half: Array) -> PathSeries:
+        """See `Path.series`."""
+        k = np.searchsorted(0.5 * (self._times[:-1] + self._times[1:]), middle, side="right")
+        corners, x = self._corners, middle - self._times[k]
+        wide = np.where(corners.half[k] > 0.0, corners.half[k], 1.0)
+        inside = np.abs(x) < corners.half[k]
+        bend = wide * series.recentred(_WAY[:, None], x / wide, half / wide)
+        beside = np.zeros_like(bend)
+        beside[:2] = np.where(x > 0.0, np.stack([x, half]), 0.0)
+        after = np.where(inside, bend, beside)
+        before = -after
+        before[:2] += np.stack([x, half])
+        parts = series.of_polynomial(before), series.of_polynomial(after)
+        moved, turned = (
+            np.linalg.norm(slow[k], axis=1) * parts[0] + np.linalg.norm(fast[k], axis=1) * parts[1]
+            for slow, fast in (corners[:2], corners[2:4])
+        )
+        return PathSeries(moved, series.exponential(turned))
+
+    def to_dict(self) -> dict[str, Any]:
+        """See `Saved.to_dict`."""
+        return {
+            "kind": self.kind,
+            "positions": self._given[0].tolist(),
+            "quaternions": self._given[1].tolist() if self._oriented else None,
+            "tolerance": self._tolerance,
+            "turn_tolerance": self._turn_tolerance,
+        }
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any], **context: Any) -> Self:
+        """See `Saved.from_dict`: files say `quaternions`."""
+        return super().from_dict(of_file(values), **context)
+
+
+class _Corners(NamedTuple):
+    """Velocities [m/s], rates in tool axes [rad/s] before and after each pose, and d [s]."""
+
+    speed_in: Array
+    speed_out: Array
+    rate_in: Array
+    rate_out: Array
+    half: Array
+
+
+def _passed(x: Array, half: Array) -> tuple[Array, Array]:
+    """Return m(x), which goes over from 0 to x within ± d, and m'(x)."""
+    u = np.clip(x / np.where(half > 0.0, half, 1.0), -1.0, 1.0)
+    # ∫ 15/16 (1 - u²)² du.
+    share = 0.5 + 15.0 / 16.0 * (u - 2.0 / 3.0 * u**3 + u**5 / 5.0)
+    way = np.polynomial.polynomial.polyval(u, _WAY)
+    inside = np.abs(x) < half
+    return np.where(inside, half * way, np.maximum(x, 0.0)), np.where(inside, share, x > 0.0)

@@ -1,0 +1,26 @@
+"""What of the tool's motion is prescribed: rows, bands around them, damping near singular poses."""
+
+from selfmotion.model.task.damping import (
+    Damping as Damping,
+    DampingLaw as DampingLaw,
+    feedback_rate as feedback_rate,
+)
+from selfmotion.model.task.poses import (
+    SE3 as SE3,
+    Jexp3 as Jexp3,
+    Quaternion as Quaternion,
+    as_pose as as_pose,
+    exp3 as exp3,
+    log3 as log3,
+    rpy as rpy,
+    skew as skew,
+    skews as skews,
+    turn as turn,
+    turning as turning,
+)
+from selfmotion.model.task.rows import (
+    POSITION_ROWS as POSITION_ROWS,
+    ROW_NAMES as ROW_NAMES,
+    Relaxation as Relaxation,
+    Task as Task,
+)

@@ -1,0 +1,25 @@
+"""Other works' ways to resolve redundancy, each usable as ``plan(problem, method=…)``."""
+
+from selfmotion.paper.baselines.base import (
+    Method as Method,
+    Motion as Motion,
+    plan_by as plan_by,
+    start_of as start_of,
+)
+from selfmotion.paper.baselines.lagrange import LagrangianOptimum as LagrangianOptimum
+from selfmotion.paper.baselines.local import (
+    DampedLeastSquares as DampedLeastSquares,
+    ExtendedJacobian as ExtendedJacobian,
+    GradientProjection as GradientProjection,
+    PseudoInverse as PseudoInverse,
+)
+
+__all__ = [
+    "DampedLeastSquares",
+    "ExtendedJacobian",
+    "GradientProjection",
+    "LagrangianOptimum",
+    "Method",
+    "Motion",
+    "PseudoInverse",
+]

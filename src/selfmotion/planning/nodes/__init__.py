@@ -1,0 +1,6 @@
+"""Motions given by nodes on their self-motion manifolds, optimised by Newton's method."""
+
+from selfmotion.planning.nodes.batch import Batch as Batch
+from selfmotion.planning.nodes.motion import NodeGrid as NodeGrid, NodeMotion as NodeMotion
+from selfmotion.planning.nodes.newton import Optimum as Optimum, Step as Step, minimise as minimise
+from selfmotion.planning.nodes.smoothness import rest_times as rest_times

@@ -1,0 +1,203 @@
+"""Many motions at once: rough optima of all, by Newton's method on the nodes of all.
+
+The motions know nothing of each other: one after the other, with gaps between them, they are one
+motion of many nodes, so that what is compiled and what is an array sees all of them in one pass.
+Each takes steps of its own. Conditions do not count: what keeps them all the same is the best near
+by, and of what does not, the cost is a bound from below on what may become of it.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from selfmotion.basics import Array, Flags, Ints
+from selfmotion.planning.nodes.charts import Centred, Charts, Place
+from selfmotion.planning.nodes.motion import NodeGrid, NodeMotion
+from selfmotion.planning.nodes.objective import LocalModel
+from selfmotion.planning.nodes.spline import GAUSS
+from selfmotion.planning.optimise import Banded
+
+# A motion is left alone when a step promises less than this share of what it costs.
+_ENOUGH = 1e-3
+# Shares of Newton's step that are tried, what each has to do of what it promises, and how far nodes
+# go in one [rad or m].
+_SHARES, _DONE, _FARTHEST = (1.0, 0.25, 0.0625), 1e-4, 0.5
+# More of a matrix's diagonal, as in `newton`: this share of its usual entry; where it is not
+# positive definite this one of its largest entry, and so many times more.
+_FLAT, _SHIFT, _MORE = 1e-11, 1e-6, 8.0
+# What a place is made of.
+_PLACE = ("q", "qd", "qdd", "tangents", "table")
+_LEAVES = "of several motions, one that is not to be had leaves the others"
+
+
+@dataclass(frozen=True, eq=False)
+class Batch:
+    """Motions on the same nodes, side by side.
+
+    Attributes
+    ----------
+    motion : NodeMotion
+        All of them, one after the other.
+    costs : (K,)
+        F of each; inf of one that is not to be had.
+    going : (K,)
+        Whether Newton's method may still lead somewhere.
+    promised : (K,)
+        By how much the last step was to lower the cost, twice; inf before the first.
+    """
+
+    motion: NodeMotion
+    costs: Array
+    going: Flags
+    promised: Array
+
+    @classmethod
+    def near(cls, grid: NodeGrid, motions: Array) -> "Batch":
+        """Return motions without self-motion whose nodes are those nearest to q (K, N + 1, n)."""
+        many, q = grid.copied(len(motions)), motions.reshape(-1, motions.shape[2])
+        begun = many.manifolds.near(q, np.zeros_like(q), np.zeros_like(q))
+        if begun is None:
+            raise RuntimeError(_LEAVES)
+        count = len(motions)
+        return cls._of(many.at(begun), np.ones(count, dtype=np.bool_), np.full(count, np.inf))
+
+    @classmethod
+    def _of(cls, motion: NodeMotion, going: Flags, promised: Array) -> "Batch":
+        """Return the motions of nodes, of which those on their way are looked at anew."""
+        samples, grid, count = motion.samples, motion.grid, len(going)
+        # That looks at the clock as well.
+        grid.counts.evaluated()
+        grid.counts.evaluations += int(going.sum()) - 1
+        each = np.sum([cost.value(samples) for cost in grid.problem.all_costs], axis=0)
+        # In gaps, a cost may be infinite.
+        shares, counts = np.zeros_like(each), samples.weights > 0.0
+        shares[counts] = samples.weights[counts] * each[counts]
+        costs = np.append(shares.reshape(-1, len(GAUSS)).sum(axis=1), 0.0)
+        costs = costs.reshape(count, -1).sum(axis=1)
+        return cls(motion, np.where(np.isfinite(costs), costs, np.inf), going, promised)
+
+    @property
+    def count(self) -> int:
+        """K."""
+        return len(self.going)
+
+    @property
+    def q(self) -> Array:
+        """The motions at their nodes, (K, N + 1, n)."""
+        return self._each(self.motion.place.q)
+
+    @property
+    def qd(self) -> Array:
+        """How fast they are there, (K, N + 1, n)."""
+        return self._each(self.motion.place.qd)
+
+    @property
+    def qdd(self) -> Array:
+        """Their accelerations there, (K, N + 1, n)."""
+        return self._each(self.motion.place.qdd)
+
+    def picked(self, which: Ints) -> "Batch":
+        """Return some of them."""
+        motion, whole = self.motion, self.motion.place
+        grid = motion.grid.copied(len(which))
+        rows = self._rows(which)
+        charts = Charts(grid.manifolds, motion.charts.q[rows], motion.charts.bases[rows])
+        place = Place(*(np.ascontiguousarray(getattr(whole, name)[rows]) for name in _PLACE))
+        some = grid.at(Centred(charts, motion.nu[rows], motion.alpha[rows], place))
+        return Batch(some, self.costs[which], self.going[which], self.promised[which])
+
+    def advanced(self) -> "Batch":
+        """Return them after one of Newton's steps with each that is on its way."""
+        which = np.flatnonzero(self.going)
+        if len(which) == self.count:
+            return self._stepped()
+        return self._with(which, self.picked(which)._stepped()) if len(which) else self
+
+    def _with(self, which: Ints, others: "Batch") -> "Batch":
+        """Return them with others in place of some."""
+        mine, own = self.motion, others.motion
+        rows = self._rows(which)
+
+        def joined(before: Any, after: Any, where: Ints = rows) -> Any:
+            found = before.copy()
+            found[where] = after
+            return found
+
+        charts = Charts(
+            mine.grid.manifolds,
+            joined(mine.charts.q, own.charts.q),
+            joined(mine.charts.bases, own.charts.bases),
+        )
+        place = Place(
+            *(joined(getattr(mine.place, name), getattr(own.place, name)) for name in _PLACE)
+        )
+        nu, alpha = joined(mine.nu, own.nu), joined(mine.alpha, own.alpha)
+        return Batch(
+            mine.grid.at(Centred(charts, nu, alpha, place)),
+            joined(self.costs, others.costs, which),
+            joined(self.going, others.going, which),
+            joined(self.promised, others.promised, which),
+        )
+
+    def _rows(self, which: Ints) -> Ints:
+        """Return which nodes are those of some motions."""
+        size = len(self.motion.nu) // self.count
+        return np.asarray((which[:, None] * size + np.arange(size)).ravel())
+
+    def _stepped(self) -> "Batch":
+        motion, grid = self.motion, self.motion.grid
+        grid.counts.gradients += self.count
+        # Beside what is not to be had, others know nothing of that.
+        spline = grid.spline
+        slopes = grid.cost.slopes(motion.samples, motion.curve_ends, motion.partials)
+        slopes[spline.gaps] = 0.0
+        force = spline.scattered(slopes)
+        around = LocalModel.of(motion.charts, motion.nu, motion.alpha, motion.place, force)
+        if around is None:
+            raise RuntimeError(_LEAVES)
+        around = around.scaled(grid.scale)
+        gradient = around.pulled(force)
+        gradient.reshape(-1)[grid.held] = 0.0
+        both = spline.changes(around.changes)
+        intervals = grid.cost.curvature(motion.samples, motion.partials, both)
+        intervals[spline.gaps] = 0.0
+        matrix = Banded(len(gradient), gradient.shape[1], 1)
+        matrix.add(0, 0, around.curvature)
+        matrix.add_pairs(0, intervals)
+        matrix.hold(grid.held)
+        step, rights = np.zeros((self.count, gradient.size // self.count)), -gradient
+        rights = rights.reshape(step.shape)
+        sound = self.going & np.isfinite(rights).all(axis=1)
+        for k in np.flatnonzero(sound).tolist():
+            solved = matrix.part_solved(k, self.count, rights[k], (_FLAT, _SHIFT, _MORE))
+            if solved is None:
+                sound[k] = False
+            else:
+                step[k] = solved
+        promised = np.where(sound, (rights * step).sum(axis=1), np.inf)
+        going = sound & (promised > _ENOUGH * np.abs(self.costs))
+        if not going.any():
+            return Batch(self.motion, self.costs, going, promised)
+        return self._moved(step, promised, going)
+
+    def _moved(self, step: Array, promised: Array, going: Flags) -> "Batch":
+        """Return them along their steps, each as far as it does what it promises."""
+        motion, r, due = self.motion, self.motion.nu.shape[1], np.where(going, promised, 0.0)
+        by_node = step.reshape(self.count, -1, 3, r)
+        farthest = np.abs(by_node[:, :, 0]).max(axis=(1, 2))
+        most = np.where(going, _FARTHEST / np.maximum(farthest, _FARTHEST), 0.0)
+        left, length = going.copy(), most.copy()
+        for share in (*_SHARES, 0.0):
+            length[left] = share * most[left]
+            found = motion.stepped((length[:, None, None, None] * by_node).reshape(-1, 3 * r))
+            if found is None:
+                raise RuntimeError(_LEAVES)
+            new = Batch._of(found, going & (length > 0.0), promised)
+            left[left] = ~(new.costs <= self.costs - _DONE * length * due)[left]
+            if not left.any():
+                break
+        return new
+
+    def _each(self, table: Array) -> Array:
+        return table.reshape(self.count, -1, table.shape[1])

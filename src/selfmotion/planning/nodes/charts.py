@@ -1,0 +1,348 @@
+"""All nodes of a motion at once: where they are on their self-motion manifolds, and eq. 4 there."""
+
+from copy import copy
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from selfmotion.basics import Array, meanwhile
+from selfmotion.basics.layout import layout_of
+from selfmotion.model import kernels
+from selfmotion.model.follow import Follows
+from selfmotion.model.path import twist_rates
+from selfmotion.model.robot import null_space
+from selfmotion.planning.nodes.kernels import accelerate, bend_of, look
+
+
+@dataclass(frozen=True, eq=False)
+class Place:
+    """Nodes in the charts around a reference, and their motion by eq. 4.
+
+    Attributes
+    ----------
+    q, qd, qdd : (N + 1, n)
+    tangents : (N + 1, n, r)
+        T = ∂q/∂z.
+    table : (N + 1, columns)
+        What eq. 4 leaves for its derivatives.
+    """
+
+    q: Array
+    qd: Array
+    qdd: Array
+    tangents: Array
+    table: Array
+
+    @property
+    def nodes(self) -> Array:
+        """(q, q̇, q̈), (N + 1, 3, n)."""
+        return np.stack([self.q, self.qd, self.qdd], axis=1)
+
+
+class Bases(NamedTuple):
+    """How q̇ and q̈ change with ν and α at nodes.
+
+    Attributes
+    ----------
+    by_rate : (N + 1, n, r)
+        B = ∂q̇/∂ν = ∂q̈/∂α.
+    by_both : (N + 1, n, r)
+        D = ∂q̈/∂ν.
+    """
+
+    by_rate: Array
+    by_both: Array
+
+
+class Centred(NamedTuple):
+    """Nodes at the reference of their charts.
+
+    Attributes
+    ----------
+    charts : Charts
+    nu, alpha : (N + 1, r)
+    place : Place
+    """
+
+    charts: "Charts"
+    nu: Array
+    alpha: Array
+    place: Place
+
+
+@dataclass(frozen=True, eq=False)
+class Charts:
+    """Charts of the self-motion manifolds of all nodes, around a motion on the path.
+
+    The coordinates of a node are z (r,), where it is on its manifold, ν (r,), its null motion in
+    eq. 4, q̇ = J⁺ẋ + (I - J⁺J) N0 ν, and α (r,), its null acceleration, q̈ = J⁺(ẍ - J̇q̇) +
+    (I - J⁺J) N0 α. Where joints are held at 0, they move no tip, and the last coordinates are
+    theirs.
+
+    Attributes
+    ----------
+    manifolds : Manifolds
+    q : (N + 1, n)
+        The reference: z = 0 where that is on the path, else next to it.
+    bases : (N + 1, n, r)
+        N0, orthonormal bases of the null spaces there.
+    """
+
+    manifolds: "Manifolds"
+    q: Array
+    bases: Array
+
+    def at(self, z: Array, nu: Array, alpha: Array) -> Place | None:
+        """Return the nodes at z, ν and α, (N + 1, r) each; None where one is not to be had."""
+        found = self._looked(z, self.spread(nu), self.spread(alpha), centred=False)
+        return None if found is None else found[0]
+
+    def around(self, z: Array, nu: Array, alpha: Array) -> tuple[Place, Bases] | None:
+        """Return the same with how it changes with ν and α there."""
+        given = z, self.spread(nu), self.spread(alpha)
+        found = self._looked(*given, centred=False, full=True)
+        return None if found is None or found[1] is None else (found[0], found[1])
+
+    def repeated(self, count: int) -> "Charts":
+        """Return the charts so many times, one after the other: looked at in one pass."""
+        if count == 1:
+            return self
+        tiled = np.tile(self.q, (count, 1)), np.tile(self.bases, (count, 1, 1))
+        return Charts(self.manifolds.repeated(count), *tiled)
+
+    def bases_at(self, place: Place) -> Bases:
+        """Return how the motion at a place at the reference changes with ν and α."""
+        other = replace(place, qdd=np.empty_like(place.qdd))
+        return self.manifolds.accelerated(other, np.zeros_like(place.q), self.bases)
+
+    def centred(
+        self, z: Array, epsilon: Array, a: Array, *, carried: bool = False
+    ) -> Centred | None:
+        """Return charts around the nodes at z (N + 1, r), with what of ε and a (N + 1, n) acts.
+
+        Of the bases, only the first need be known where they are to be `carried` from node to node.
+        None where a node is not to be had.
+        """
+        looked = self._looked(z, epsilon, a, centred=True, carried=carried)
+        if looked is None:
+            return None
+        place = looked[0]
+        around = Charts(self.manifolds, place.q, place.tangents)
+        own, turned = self.manifolds.rates(place.table)[1], np.swapaxes(place.tangents, 1, 2)
+        nu, alpha = ((turned @ each[:, :, None])[:, :, 0] for each in (own, a))
+        return Centred(around, nu, alpha, place)
+
+    def places(self, z: Array) -> Array | None:
+        """Return q at z (N + 1, r), (N + 1, n); None where a node is not to be had."""
+        none = np.zeros_like(self.q)
+        q, table, tangents = (
+            np.empty_like(self.q),
+            self.manifolds.table(),
+            np.empty_like(self.bases),
+        )
+        return q if self._look(q, table, tangents, z, none, centred=False) else None
+
+    def spread(self, coordinates: Array) -> Array:
+        """Return ε = N0 ν or a = N0 α, (N + 1, n)."""
+        return np.asarray((self.bases @ coordinates[:, :, None])[:, :, 0])
+
+    def _looked(
+        self,
+        z: Array,
+        epsilon: Array,
+        a: Array,
+        *,
+        centred: bool,
+        carried: bool = False,
+        full: bool = False,
+    ) -> tuple[Place, Bases | None] | None:
+        own, bases = self.manifolds, self.bases
+        q, table, tangents = np.empty_like(self.q), own.table(), np.empty_like(bases)
+        if not self._look(q, table, tangents, z, epsilon, centred=centred, carried=carried):
+            return None
+        qd, _ = own.rates(table)
+        place = Place(q, np.array(qd), np.empty_like(q), tangents, table)
+        around = own.accelerated(place, a, bases if full else None)
+        return place, around if full else None
+
+    def _look(
+        self,
+        q: Array,
+        table: Array,
+        tangents: Array,
+        z: Array,
+        epsilon: Array,
+        *,
+        centred: bool,
+        carried: bool = False,
+    ) -> bool:
+        """Set q, a table and tangents at z; return whether all nodes are to be had."""
+        own = self.manifolds
+        own.rates(table)[1][:] = epsilon
+        along = len(q) // own.copies if carried else 0
+        z, given = np.ascontiguousarray(z), (own.targets, own.chains, own.layout)
+        failed = look(q, z, self.bases, self.q, *given, table, tangents, own.held, centred, along)
+        return failed < 0 or not own.is_whole
+
+
+class Manifolds:
+    """The self-motion manifolds of a path at given times.
+
+    Parameters
+    ----------
+    follows : Follows
+    t : (N + 1,)
+        Times [s].
+    copies : int, optional
+        Of how many motions these are the nodes, one after the other, at times `t` each. There, one
+        that is not to be had leaves the others: q̇ of its nodes that are nowhere is no number. By
+        default they are those of one motion, all of which have to be had.
+    """
+
+    def __init__(self, follows: Follows, t: Array, copies: int | None = None) -> None:
+        self.is_whole, copies = copies is None, copies or 1
+        self.follows, self.t, self.copies = follows, np.tile(t, copies), copies
+        self.chains, self.layout = follows.chains, follows.layout
+        self._sizes = follows.robot.dof, follows.dimension, len(follows.items)
+        self._paths, asked = [], []
+        for item in follows.items:
+            own = item.target(t)
+            parts = own.translation, own.rotation.reshape(-1, 9), own.twist
+            self._paths.append(np.tile(np.hstack(parts), (copies, 1)))
+            asked.append(twist_rates(item.path, t))
+        self.held = np.tile(follows.held(t), (copies, 1))
+        self.targets = np.ascontiguousarray(np.hstack([path[:, :12] for path in self._paths]))
+        # ẍ of the paths, (N + 1, 6 F).
+        self._asked = np.ascontiguousarray(np.tile(np.hstack(asked), (copies, 1)))
+        self._repeated: dict[int, Manifolds] = {}
+
+    def repeated(self, count: int) -> "Manifolds":
+        """Return the same so many times, one after the other."""
+        if count == 1:
+            return self
+        if count not in self._repeated:
+            found = copy(self)
+            found.copies, found.t = count * self.copies, np.tile(self.t, count)
+            for name in ("held", "targets", "_asked"):
+                setattr(found, name, np.tile(getattr(self, name), (count, 1)))
+            found._paths = [np.tile(path, (count, 1)) for path in self._paths]
+            found._repeated = {}
+            self._repeated[count] = found
+        return self._repeated[count]
+
+    def table(self) -> Array:
+        """Return a table with nothing in it but the paths."""
+        n, m, count = self._sizes
+        table = np.zeros((len(self.t), kernels.columns(n, m, count)))
+        for f, path in enumerate(self._paths):
+            kernels.path_of(table, f, n, m)[:] = path
+        return table
+
+    def rates(self, table: Array) -> tuple[Array, Array]:
+        """Return q̇ and ε of a table, (N + 1, n) each, as views of it."""
+        return kernels.rates_of(table, self.follows.robot.dof)
+
+    def accelerated(self, place: Place, a: Array, bases: Array | None) -> Bases:
+        """Set q̈ of a place for a null acceleration a (N + 1, n).
+
+        Returns how the motion changes with ν and α, for `bases`; without, nothing of use.
+        """
+        full = bases is not None
+        by = np.empty(place.tangents.shape if full else (0, 0, 0))
+        found = Bases(by, np.empty_like(by))
+        accelerate(
+            place.table,
+            self.layout,
+            self.follows.every_column(place.q),
+            self._asked,
+            np.ascontiguousarray(a),
+            np.ascontiguousarray(bases) if full else by,
+            full,
+            place.qdd,
+            *found,
+        )
+        return found
+
+    def bends(self, place: Place, force: Array, directions: Array) -> Array:
+        """Return half the second derivatives of force · q̈ along directions of q̇, (N + 1, d).
+
+        For a force (N + 1, n), and directions (N + 1, n, d).
+        """
+        every = self.follows.every_column(place.q)
+        given = np.ascontiguousarray(directions), np.ascontiguousarray(force)
+        return np.asarray(bend_of(place.table, self.layout, every, *given))
+
+    def with_held_last(self, q: Array, bases: Array) -> Array:
+        """Return bases (N + 1, n, r) at q (N + 1, n) whose last vectors are those of held joints.
+
+        These move no tip, so that they are in the null spaces. Where they are last already, bases
+        stay as they are.
+        """
+        found = bases.copy()
+        for k in np.flatnonzero(self.held.any(axis=1)):
+            self._put_held_last(int(k), q[k], found)
+        return found
+
+    def _put_held_last(self, k: int, q: Array, bases: Array) -> None:
+        joints = np.flatnonzero(self.held[k])
+        unit = np.eye(bases.shape[1])[:, joints]
+        if not len(joints) or np.array_equal(bases[k, :, -len(joints) :], unit):
+            return
+        moving = np.delete(np.arange(len(unit)), joints)
+        free = null_space(self.follows.jacobian(q)[:, moving])
+        own = np.zeros((len(unit), free.shape[1]))
+        # As near as may be to what they were.
+        left, _, right = np.linalg.svd(free.T @ bases[k, moving, : free.shape[1]])
+        own[moving] = free @ (left @ right)
+        bases[k] = np.hstack([own, unit])
+
+    def _bases(self, q: Array) -> Array:
+        """Return bases of the null spaces at q (N + 1, n), each turned to the one before."""
+        rows = np.where(self.held[:, None], 0.0, self.follows.jacobians(q))
+        spaces = np.ascontiguousarray(null_space(rows))
+        for k in range(len(q)):
+            first = k % (len(q) // self.copies) == 0
+            if not first:
+                left, _, right = np.linalg.svd(spaces[k].T @ spaces[k - 1])
+                spaces[k] = spaces[k] @ (left @ right)
+            self._put_held_last(k, q[k], spaces)
+        return spaces
+
+    def near(self, q: Array, epsilon: Array, a: Array) -> Centred | None:
+        """Return charts around the nodes nearest to q, with what of ε and a acts there.
+
+        (N + 1, n) each. Their bases turn no more than they must from each node to the next. None
+        where a node does not come onto its manifold.
+        """
+        n, m, _ = self._sizes
+        none = np.zeros((len(q), n - m))
+        if self.held.any():
+            q, epsilon, a = (np.where(self.held, 0.0, x) for x in (q, epsilon, a))
+            return Charts(self, q, self._bases(q)).centred(none, epsilon, a)
+        bases = np.zeros((len(q), n, n - m))
+        for first in range(0, len(q), len(q) // self.copies):
+            bases[first] = self.follows.null_basis(q[first])
+        return Charts(self, q, bases).centred(none, epsilon, a, carried=True)
+
+
+@meanwhile
+def _call_what_follows() -> None:
+    """Call the kernels that follow the largest one, `look`, for no nodes at all."""
+    layout = layout_of([(np.arange(1), False, np.arange(2))], 2)
+    table, rates = np.zeros((0, kernels.columns(2, 1, 1))), np.zeros((0, 2))
+    bases = np.zeros((0, 2, 1))
+    given = np.zeros((0, 6)), rates, bases, True, rates, bases, bases
+    accelerate(table, layout, None, *given)
+    bend_of(table, layout, None, bases, rates)
+
+
+def orthonormal(tangents: Array) -> Array:
+    """Return orthonormal bases of the spans of full-rank matrices (K, n, r): Gram-Schmidt."""
+    found = np.array(tangents)
+    for x in range(found.shape[2]):
+        for y in range(x):
+            share = np.einsum("kn,kn->k", found[:, :, y], found[:, :, x])
+            found[:, :, x] -= share[:, None] * found[:, :, y]
+        found[:, :, x] /= np.linalg.norm(found[:, :, x], axis=1)[:, None]
+    return found

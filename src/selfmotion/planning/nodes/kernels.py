@@ -1,0 +1,422 @@
+"""What numba compiles: nodes put onto their self-motion manifolds, and eq. 4 and its rate there.
+
+Each node's chart is around a reference on the manifold, with an orthonormal basis N0 of the null
+space there: z are the coordinates N0ᵀ(q - q_ref) of q on the manifold {q : F(q) = x}, and ε = N0 ν
+is the null motion of eq. 4. With B = [J; N0ᵀ],
+
+    ∂q/∂z = T = B⁻¹ [0; I],    ∂q̇/∂ν = (I - J⁺J) N0.
+
+The rate of eq. 4 along the motion is q̈ = J⁺(ẍ - J̇q̇) + (I - J⁺J) a, with a = N0 α of the node.
+"""
+
+from math import sqrt
+
+import numpy as np
+
+from selfmotion.basics import Array, Flags, Ints, called, inlined, kernel
+from selfmotion.basics.layout import KIND, ORDER, POINTING, Layout
+from selfmotion.model.kernels import (
+    Every,
+    Tip,
+    approach,
+    cholesky,
+    errors_and_rows,
+    finite,
+    gram,
+    respond,
+    rows_of,
+    select,
+    solve_cholesky,
+    stage_of,
+    tip_of,
+    view,
+)
+from selfmotion.model.kernels.algebra import (
+    Vector,
+    add_angular,
+    angular,
+    angular_part,
+    cross,
+    linear,
+    plus,
+)
+from selfmotion.model.robot import place_tips
+
+# A node this near to its place [m, rad] is there; Newton's method is quadratic from nearby.
+_THERE, _STEPS = 1e-12, 12
+# A guess need not be nearer; the step after that makes it a square of this.
+_NEAR = 1e-4
+
+
+@kernel
+def look(
+    q: Array,
+    coordinates: Array,
+    bases: Array,
+    references: Array,
+    targets: Array,
+    chains: Array,
+    layout: Layout,
+    table: Array,
+    tangents: Array,
+    held: Flags,
+    centred: bool,
+    carried: int,
+) -> int:
+    """Put nodes onto their manifolds at coordinates z (K, r), and evaluate eq. 4 there.
+
+    For charts with `bases` (K, n, r) and `references` (K, n), and `targets` (K, 12 F). Rows of the
+    `table` hold paths and null motions already; q̇ and all else is set, q (K, n), and T in
+    `tangents` (K, n, r). Or, `centred`, an orthonormal basis of the null space instead of T, and of
+    ε what is in it: the same motion in charts around it. Where bases are to be `carried`, along
+    motions of so many nodes, the first is that of a motion's first node, and each other one becomes
+    what is found at the node before; 0 for none. Joints that are `held` (K, n) at 0 move no tip;
+    see `Charts`. Returns the first node for which that is impossible, or -1; of all such nodes, q̇
+    is no number.
+    """
+    failed = -1
+    (count, n), m, r = q.shape, rows_of(layout), bases.shape[2]
+    tips = layout.shape[0]
+    turns, places = np.empty((chains.shape[1], 3, 3)), np.empty((chains.shape[1], 3))
+    rotations, positions = np.empty((tips, 3, 3)), np.empty((tips, 3))
+    jacobians = np.zeros((tips, 6, n))
+    system, factor, b = np.empty((n, n)), np.empty((n, n)), np.empty(n)
+    for k in range(count):
+        # Views: slices are counted references, which take as long as what is done with them.
+        here, off = view(q[k], 0, (n,)), np.inf
+        if carried > 0 and k % carried > 0:
+            for j in range(n):
+                for x in range(r):
+                    bases[k, j, x] = tangents[k - 1, j, x]
+        for j in range(n):
+            here[j] = references[k, j]
+            for x in range(r):
+                here[j] += bases[k, j, x] * coordinates[k, x]
+        for _ in range(_STEPS):
+            place_tips(here, chains, turns, places, rotations, positions, jacobians)
+            _hold(held[k], jacobians)
+            off = approach(
+                here,
+                jacobians,
+                rotations,
+                positions,
+                view(targets[k], 0, (12 * tips,)),
+                layout,
+                view(bases[k], 0, (n, r)),
+                view(references[k], 0, (n,)),
+                view(coordinates[k], 0, (r,)),
+                b,
+                system,
+                factor,
+            )
+            # Singular, not a number, or there: what that step has moved is rounding.
+            if not off >= _THERE:
+                break
+        if not 0.0 <= off < _THERE:
+            failed = k if failed < 0 else failed
+            nowhere = stage_of(table[k], n, m).qd
+            for j in range(n):
+                nowhere[j] = np.nan
+                for x in range(r):
+                    tangents[k, j, x] = np.nan
+            continue
+        for x in range(r):
+            for i in range(n):
+                b[i] = 1.0 if i == m + x else 0.0
+            solve_cholesky(factor, b)
+            for j in range(n):
+                total = 0.0
+                for i in range(n):
+                    total += system[i, j] * b[i]
+                tangents[k, j, x] = total
+        row = table[k]
+        at = stage_of(row, n, m)
+        if centred:
+            _centre(tangents[k], at.epsilon, b)
+        for j in range(n):
+            at.q[j] = q[k, j]
+        # The rows of B, and of the factor of BBᵀ, begin with those of J and of JJᵀ.
+        for i in range(m):
+            for j in range(n):
+                at.task_jacobian[i, j] = system[i, j]
+            for j in range(i + 1):
+                at.factor[i, j] = factor[i, j]
+        for f in range(tips):
+            tip = tip_of(row, f, n, m)
+            _note(tip, rotations[f], positions[f], jacobians[f])
+            select(layout, f, tip.rotation, tip.command, at.y)
+        respond(at.task_jacobian, at.factor, at.y, at.epsilon, at.qd)
+        if not finite(at.qd):
+            failed = k if failed < 0 else failed
+    return failed
+
+
+@inlined
+def _hold(held: Flags, jacobians: Array) -> None:
+    """Clear the columns of joints that are held, (n,), in Jacobians (F, 6, n)."""
+    for j in range(len(held)):
+        if held[j]:
+            for f in range(jacobians.shape[0]):
+                for i in range(6):
+                    jacobians[f, i, j] = 0.0
+
+
+@inlined
+def _centre(tangents: Array, epsilon: Array, rest: Array) -> None:
+    """Make tangents (n, r) orthonormal by Gram-Schmidt, and ε what of it they span."""
+    n, r = tangents.shape
+    for j in range(n):
+        rest[j] = epsilon[j]
+    for x in range(r):
+        for y in range(x):
+            share = 0.0
+            for j in range(n):
+                share += tangents[j, y] * tangents[j, x]
+            for j in range(n):
+                tangents[j, x] -= share * tangents[j, y]
+        square, share = 0.0, 0.0
+        for j in range(n):
+            square += tangents[j, x] * tangents[j, x]
+            share += tangents[j, x] * rest[j]
+        length = sqrt(square)
+        for j in range(n):
+            rest[j] -= share / square * tangents[j, x]
+            tangents[j, x] /= length
+    for j in range(n):
+        epsilon[j] -= rest[j]
+
+
+@inlined
+def _note(tip: Tip, turn: Array, place: Array, six: Array) -> None:
+    """Set where a tip is, its Jacobian, and that its command is its path's twist."""
+    for i in range(3):
+        tip.translation[i] = place[i]
+        for j in range(3):
+            tip.rotation[i, j] = turn[i, j]
+    for i in range(6):
+        tip.command[i] = tip.target_twist[i]
+        for j in range(six.shape[1]):
+            tip.jacobian[i, j] = six[i, j]
+
+
+@kernel
+def accelerate(
+    table: Array,
+    layout: Layout,
+    every: Every | None,
+    asked: Array,
+    alpha: Array,
+    bases: Array,
+    full: bool,
+    qdd: Array,
+    by_rate: Array,
+    by_both: Array,
+) -> None:
+    """Set q̈ (K, n) of nodes whose motion `look` has evaluated: q̈ = a + J⁺(b - J a).
+
+    With a (K, n) = `alpha` the null acceleration, b = S(ẍ - J̇q̇) + Ṡ(ẋ - Jq̇), and ẍ = `asked`
+    (K, 6 F). If `full`, also ∂q̇/∂ν = ∂q̈/∂α = B = (I - J⁺J) N0 (K, n, r) = `by_rate`, and
+    ∂q̈/∂ν = J⁺ ∂b/∂q̇ B (K, n, r) = `by_both`: b is quadratic in q̇, so that its central
+    difference is exact.
+    """
+    (count, n), m, r = qdd.shape, rows_of(layout), bases.shape[2]
+    right, other, six = np.empty(m), np.empty(m), np.empty(6)
+    rates, way = np.empty(n), np.empty(n)
+    for k in range(count):
+        at = stage_of(table[k], n, m)
+        _needed(table[k], layout, every, k, asked[k], at.qd, six, right)
+        _answer(at.task_jacobian, at.factor, right, alpha[k], qdd[k])
+        if not full:
+            continue
+        for x in range(r):
+            for j in range(n):
+                way[j] = bases[k, j, x]
+            for i in range(m):
+                right[i] = 0.0
+            _answer(at.task_jacobian, at.factor, right, way, rates)
+            for j in range(n):
+                by_rate[k, j, x], way[j] = rates[j], at.qd[j] + rates[j]
+            _needed(table[k], layout, every, k, asked[k], way, six, right)
+            for j in range(n):
+                way[j] = at.qd[j] - rates[j]
+            _needed(table[k], layout, every, k, asked[k], way, six, other)
+            for i in range(m):
+                right[i] = 0.5 * (right[i] - other[i])
+            for j in range(n):
+                way[j] = 0.0
+            _answer(at.task_jacobian, at.factor, right, way, rates)
+            for j in range(n):
+                by_both[k, j, x] = rates[j]
+
+
+@kernel
+def bend_of(
+    table: Array, layout: Layout, every: Every | None, directions: Array, force: Array
+) -> Array:
+    """Return half the second derivatives of λᵀq̈ along directions of q̇, (K, d).
+
+    For λ = `force` (K, n) and u = `directions` (K, n, d): -λᵀJ⁺ Q(u, u), with J̇q̇ = Q(q̇, q̇).
+    """
+    (count, n, size), m = directions.shape, rows_of(layout)
+    out, way, six = np.zeros((count, size)), np.empty(n), np.empty(6)
+    right, other, by = np.empty(m), np.empty(m), np.empty(m)
+    none = np.zeros(6 * layout.shape[0])
+    for k in range(count):
+        at = stage_of(table[k], n, m)
+        for i in range(m):
+            by[i] = 0.0
+            for j in range(n):
+                by[i] += at.task_jacobian[i, j] * force[k, j]
+        solve_cholesky(at.factor, by)
+        for x in range(size):
+            for j in range(n):
+                way[j] = directions[k, j, x]
+            _needed(table[k], layout, every, k, none, way, six, right)
+            for j in range(n):
+                way[j] = -way[j]
+            _needed(table[k], layout, every, k, none, way, six, other)
+            for i in range(m):
+                out[k, x] += 0.5 * by[i] * (right[i] + other[i])
+    return out
+
+
+@called
+def _needed(
+    row: Array,
+    layout: Layout,
+    every: Every | None,
+    s: int,
+    asked: Array,
+    rates: Array,
+    six: Array,
+    out: Array,
+) -> None:
+    """Set `out` (m,) to what q̈ has to make of the rows at q̇ = `rates`; `six` is to work in.
+
+    Rows in tool axes turn with the tool: there, Ṡ(ẋ - Jq̇) = -S(ω × ω_d).
+    """
+    n, m = len(rates), rows_of(layout)
+    for f in range(layout.shape[0]):
+        tip = tip_of(row, f, n, m)
+        if every is None:
+            spin = _turned(layout, f, tip.jacobian, rates, six)
+        else:
+            spin = _turned_every(every[1], f, every[0][s, f], rates, six)
+        for i in range(6):
+            six[i] = asked[6 * f + i] - six[i]
+        if layout[f, KIND] == POINTING:
+            add_angular(six, -1.0, cross(spin, angular_part(tip.target_twist)))
+        select(layout, f, tip.rotation, six, out)
+
+
+@inlined
+def _turned(layout: Layout, f: int, jacobian: Array, rates: Array, out: Array) -> Vector:
+    """Set `out` (6,) to J̇6 q̇ of tip f, and return the tip's angular velocity.
+
+    By two running sums along the chain, see `selfmotion.model.kernels.tool`: with s_i, w_i the
+    shares of joint i in the tip's velocities and W_<i the sum of w before it,
+
+        J̇6 q̇ = Σ_i [(2 W_<i + w_i) × s_i; W_<i × w_i].
+    """
+    spin, v, w = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    for i in range(len(rates)):
+        k = layout[f, ORDER + i]
+        v, w, spin = _added(linear(jacobian, k), angular(jacobian, k), rates[k], spin, v, w)
+    for i in range(3):
+        out[i], out[3 + i] = v[i], w[i]
+    return spin
+
+
+@inlined
+def _turned_every(members: Ints, f: int, own: Array, rates: Array, out: Array) -> Vector:
+    """Do the same for the columns `own` (6, W) of all joints, of which some share a coordinate."""
+    spin, v, w, last = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), members.shape[0] - 1
+    for i in range(own.shape[1]):
+        j = members[f, i]
+        rate = rates[members[last, j]]
+        v, w, spin = _added(linear(own, j), angular(own, j), rate, spin, v, w)
+    for i in range(3):
+        out[i], out[3 + i] = v[i], w[i]
+    return spin
+
+
+@inlined
+def _added(
+    place: Vector, axis: Vector, rate: float, spin: Vector, v: Vector, w: Vector
+) -> tuple[Vector, Vector, Vector]:
+    """Return the sums v, w and W with one joint more."""
+    own = (rate * axis[0], rate * axis[1], rate * axis[2])
+    twice = plus(own, 2.0, spin)
+    return plus(v, rate, cross(twice, place)), plus(w, 1.0, cross(spin, own)), plus(own, 1.0, spin)
+
+
+@inlined
+def _answer(jacobian: Array, factor: Array, right: Array, way: Array, out: Array) -> None:
+    """Set `out` (n,) to p + J⁺(b - J p) for p = `way`; `right` (m,) is b, and is written over."""
+    m, n = jacobian.shape
+    for i in range(m):
+        for j in range(n):
+            right[i] -= jacobian[i, j] * way[j]
+    solve_cholesky(factor, right)
+    for j in range(n):
+        out[j] = way[j]
+        for i in range(m):
+            out[j] += jacobian[i, j] * right[i]
+
+
+@kernel
+def follow(
+    start: Array,
+    wanted: Array,
+    share: Array,
+    targets: Array,
+    chains: Array,
+    layout: Layout,
+    held: Flags,
+    q: Array,
+) -> int:
+    """Set q (K, n) to configurations on targets (K, 12 F), each near the one before it.
+
+    From one to the next, the self-motion goes a `share` (K,) of the way to `wanted` (n,); joints
+    that are `held` (K, n) are at 0. Returns the first one that is not to be had, or -1.
+    """
+    (count, n), m, tips = q.shape, rows_of(layout), layout.shape[0]
+    turns, places = np.empty((chains.shape[1], 3, 3)), np.empty((chains.shape[1], 3))
+    rotations, positions = np.empty((tips, 3, 3)), np.empty((tips, 3))
+    jacobians = np.zeros((tips, 6, n))
+    rows, factor, b = np.empty((m, n)), np.empty((m, m)), np.empty(m)
+    way, here = np.empty(n), start.copy()
+    for k in range(count):
+        off = np.inf
+        for j in range(n):
+            if held[k, j]:
+                here[j] = 0.0
+        for i in range(_STEPS):
+            place_tips(here, chains, turns, places, rotations, positions, jacobians)
+            _hold(held[k], jacobians)
+            errors_and_rows(layout, targets[k], jacobians, rotations, positions, b, rows)
+            off = 0.0
+            for x in range(m):
+                if not abs(b[x]) <= off:
+                    off = abs(b[x])
+            # First Jᵀ(JJᵀ)⁻¹(e - J p) + p: towards what is wanted by p, then what is left of e.
+            for j in range(n):
+                way[j] = share[k] * (wanted[j] - here[j]) if i == 0 and not held[k, j] else 0.0
+            for x in range(m):
+                for j in range(n):
+                    b[x] -= rows[x, j] * way[j]
+            gram(rows, factor)
+            if not off < np.inf or not cholesky(factor):
+                return k
+            solve_cholesky(factor, b)
+            for j in range(n):
+                here[j] += way[j]
+                for x in range(m):
+                    here[j] += rows[x, j] * b[x]
+            if i > 0 and off < _NEAR:
+                break
+        if not off < _NEAR:
+            return k
+        for j in range(n):
+            q[k, j] = here[j]
+    return -1

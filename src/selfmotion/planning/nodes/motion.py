@@ -1,0 +1,389 @@
+"""A motion on its path, given by its nodes."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
+
+import numpy as np
+
+from selfmotion.basics import Array, Counts, Flags, Ints, read_only
+from selfmotion.model.motion import Trajectory
+from selfmotion.planning.nodes.charts import Centred, Charts, Manifolds, Place
+from selfmotion.planning.nodes.ends import NodeEnds
+from selfmotion.planning.nodes.kernels import follow
+from selfmotion.planning.nodes.objective import NodeCost
+from selfmotion.planning.nodes.rows import NodeRows, accelerates_of, counts_at_once, looked
+from selfmotion.planning.nodes.samples import CurveSamples
+from selfmotion.planning.nodes.smoothness import quickness, smoothing_of, would_be_calm
+from selfmotion.planning.nodes.spline import AT_GAUSS, FINE_POINTS, POINTS, Quintic
+from selfmotion.problem.constraints import BoundConstraint, BoundEnd
+from selfmotion.problem.costs import Partials
+from selfmotion.problem.problem import Problem
+
+
+class NodeGrid:
+    """What all motions of a problem on the same nodes share.
+
+    Parameters
+    ----------
+    problem : Problem
+    t : (N + 1,)
+        Times of the nodes [s].
+    constraints : sequence of BoundConstraint
+        Conditions along the motion, h ≤ 0, and at the ends, c = 0.
+    free : bool
+        Whether the start may move along its self-motion.
+    counts : Counts
+        Where work is added up.
+    calm : bool
+        Whether motions are kept from wavering everywhere, see `smoothing_of`.
+    quick : float
+        In what share of the usual time the self-motion starts and stops, see `smoothing_of`.
+    copies : int, optional
+        Of how many motions these are the nodes, one after the other, at times `t` each; see
+        `Manifolds`.
+
+    Attributes
+    ----------
+    constraints : tuple of BoundConstraint
+    spline : Quintic
+    manifolds : Manifolds
+    cost : NodeCost
+    rows : NodeRows
+    ends : NodeEnds
+    scale : (3r,)
+        What makes w all rad: 1, and the reciprocals of a usual step and of its square.
+    held : (k,)
+        Numbers of the coordinates w (N + 1, 3r), in one row, that stay as they are.
+    """
+
+    def __init__(
+        self,
+        problem: Problem,
+        t: Array,
+        constraints: Sequence[BoundConstraint],
+        *,
+        free: bool,
+        counts: Counts,
+        calm: bool = False,
+        quick: float = 1.0,
+        copies: int | None = None,
+    ) -> None:
+        self.problem, self.free, self.counts = problem, free, counts
+        self.calm, self.quick = calm, quick
+        follows = problem.follows
+        self.manifolds = Manifolds(follows, t, copies)
+        copies = self.manifolds.copies
+        accelerates = any(accelerates_of(item, follows.robot.dof) for item in constraints)
+        self.spline = Quintic(t, copies, FINE_POINTS if accelerates else POINTS)
+        smoothing = smoothing_of(problem, self.spline, calm=calm, quick=quick)
+        self.cost = NodeCost(follows, self.spline, problem.all_costs, smoothing)
+        self.ends = NodeEnds([item for item in constraints if isinstance(item, BoundEnd)])
+        others = [item for item in constraints if not item.equality]
+        self.rows = NodeRows(self.spline, others, follows.robot.dof)
+        self.constraints = tuple(constraints)
+        self._one = t
+        r = follows.robot.dof - follows.dimension
+        usual = float(np.median(np.diff(t)))
+        self.scale = np.repeat([1.0, 1.0 / usual, 1.0 / usual**2], r)
+        # Nodes at which q̇ and q̈ are given, by order.
+        first = len(t) * np.arange(copies)
+        self._resting: list[Ints] = []
+        for order in (1, 2):
+            asked = [rest >= order for rest in problem.rest_orders]
+            ends = np.array([0, len(t) - 1])[np.array(asked)]
+            self._resting.append((ends + first[:, None]).ravel())
+        held: list[Ints] = [] if free else [np.arange(r)]
+        for order, nodes in enumerate(self._resting, 1):
+            held += [3 * r * node + order * r + np.arange(r) for node in nodes]
+        for node, count in enumerate(self.manifolds.held.sum(axis=1)):
+            last = 3 * r * node + np.arange(r - count, r)
+            held += [last, last + r, last + 2 * r] if count else []
+        self.held = np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *held]))
+
+    @property
+    def t(self) -> Array:
+        """Times of the nodes [s], (N + 1,)."""
+        return self.spline.t
+
+    def on(self, t: Array, *, calm: bool = False, quick: float | None = None) -> "NodeGrid":
+        """Return the same on other nodes, and from now on `calm` and so `quick` if wanted."""
+        found = self._other(t, calm=calm, quick=quick)
+        found.rows = self.rows.on(found.spline)
+        return found
+
+    def without_rows(self) -> "NodeGrid":
+        """Return the same with nothing asked but what its ends are, and what counts at once."""
+        return self.asking(
+            [item for item in self.constraints if item.equality or counts_at_once(item)]
+        )
+
+    def asking(self, constraints: Sequence[BoundConstraint]) -> "NodeGrid":
+        """Return the same nodes, asked for other constraints."""
+        return self._other(self._one, constraints)
+
+    def copied(self, copies: int) -> "NodeGrid":
+        """Return the nodes of so many motions, one after the other, for `Batch`.
+
+        Of what belongs to several, `NodeMotion` knows places, samples and costs alone.
+        """
+        return self._other(self._one, copies=copies)
+
+    def _other(
+        self,
+        t: Array,
+        constraints: Sequence[BoundConstraint] | None = None,
+        *,
+        calm: bool = False,
+        quick: float | None = None,
+        copies: int | None = None,
+    ) -> "NodeGrid":
+        return NodeGrid(
+            self.problem,
+            t,
+            self.constraints if constraints is None else constraints,
+            free=self.free,
+            counts=self.counts,
+            calm=calm or self.calm,
+            quick=self.quick if quick is None else quick,
+            copies=copies,
+        )
+
+    def near(self, q: Array, qd: Array, qdd: Array | None = None) -> "NodeMotion | None":
+        """Return the motion whose nodes are those nearest to q (N + 1, n) at q̇ and q̈.
+
+        Without q̈, what differences of q and q̇ make of it. None where a node does not come onto its
+        manifold.
+        """
+        if qdd is None:
+            qdd = self._accelerations(q, qd)
+        found = self.manifolds.near(q, self.rested(qd, 1), self.rested(qdd, 2))
+        return None if found is None else self.at(found)
+
+    def _accelerations(self, q: Array, qd: Array) -> Array:
+        """Return q̈ at the nodes: the means of what cubics through q and q̇ have on both sides."""
+        h, size = self.spline.steps[:, None], len(self._one)
+        rise, first, second = (q[1:] - q[:-1]) / h, qd[:-1], qd[1:]
+        left = (6.0 * rise - 4.0 * first - 2.0 * second) / h
+        right = (-6.0 * rise + 2.0 * first + 4.0 * second) / h
+        after, before = np.concatenate([left, left[-1:]]), np.concatenate([right[:1], right])
+        found = 0.5 * (before + after)
+        found[::size], found[size - 1 :: size] = after[::size], before[size - 1 :: size]
+        return np.asarray(found)
+
+    def around(self, charts: Charts, qd: Array, qdd: Array) -> "NodeMotion | None":
+        """Return the motion at z = 0 of charts whose rates are nearest to q̇ and q̈, or None."""
+        own = self.manifolds.held
+        if own.any():
+            q = np.where(own, 0.0, charts.q)
+            charts = replace(charts, q=q, bases=self.manifolds.with_held_last(q, charts.bases))
+        none = np.zeros((len(qd), charts.bases.shape[2]))
+        found = charts.centred(none, self.rested(qd, 1), self.rested(qdd, 2))
+        return None if found is None else self.at(found)
+
+    def rested(self, rates: Array, order: int) -> Array:
+        """Return what rates are where the arm does not rest."""
+        found = np.where(self.manifolds.held, 0.0, rates)
+        found[self._resting[order - 1]] = 0.0
+        return found
+
+    def motion_towards(
+        self, start: Array, wanted: Array, time: float | None = None
+    ) -> "NodeMotion | None":
+        """Return a motion from a start (n,) whose self-motion goes towards `wanted` (n,).
+
+        It is there, as far as the path lets it, after about so much time [s]; by default at the
+        end, from rest to rest. None where the path cannot be followed like that.
+        """
+        own = self.manifolds
+        q = np.empty((len(self.t), len(start)))
+        if time is None:
+            # What is left of the way falls as a motion of minimum jerk.
+            u = 1.0 - self.t / self.t[-1]
+            left = u**3 * (10.0 + u * (6.0 * u - 15.0))
+            share = np.append(0.0, 1.0 - left[1:] / left[:-1])
+        else:
+            share = np.minimum(np.append(0.0, np.diff(self.t)) / time, 1.0)
+        if follow(start, wanted, share, own.targets, own.chains, own.layout, own.held, q) >= 0:
+            return None
+        qd = np.asarray(np.gradient(q, self.t, axis=0))
+        return self.near(q, qd, np.asarray(np.gradient(qd, self.t, axis=0)))
+
+    def at(self, found: Centred) -> "NodeMotion":
+        """Return the motion of nodes at the reference of their charts."""
+        return NodeMotion(self, *found)
+
+
+@dataclass(frozen=True, eq=False)
+class NodeMotion:
+    """A motion given by its nodes.
+
+    Attributes
+    ----------
+    grid : NodeGrid
+    charts : Charts
+    nu, alpha : (N + 1, r)
+        Null motions and null accelerations there.
+    place : Place
+    """
+
+    grid: NodeGrid
+    charts: Charts
+    nu: Array
+    alpha: Array
+    place: Place
+
+    @cached_property
+    def curve_ends(self) -> Array:
+        """Y of each interval, (N, 6, n); see `Quintic`."""
+        return self.grid.spline.ends(self.place.nodes)
+
+    @property
+    def centred(self) -> Centred:
+        """The nodes at the reference of their charts."""
+        return Centred(self.charts, self.nu, self.alpha, self.place)
+
+    def _at_gauss(self, order: int) -> Array:
+        n = self.place.q.shape[1]
+        return self.grid.spline.at(AT_GAUSS, order, self.curve_ends).reshape(-1, n)
+
+    @cached_property
+    def samples(self) -> CurveSamples:
+        """The motion as costs see it."""
+        grid = self.grid
+        return CurveSamples(grid.manifolds.follows, grid.spline.sampling, self._at_gauss)
+
+    @cached_property
+    def checked(self) -> CurveSamples:
+        """The motion as constraints see it that are no limits of joints."""
+        grid = self.grid
+        at = partial(grid.spline.at_points, ends=self.curve_ends)
+        return CurveSamples(grid.manifolds.follows, grid.spline.points, at)
+
+    @cached_property
+    def terms(self) -> dict[str, float]:
+        """What each cost contributes."""
+        self.grid.counts.evaluated()
+        return self.grid.cost.terms(self.samples)
+
+    @property
+    def cost(self) -> float:
+        """F."""
+        return sum(self.terms.values())
+
+    @cached_property
+    def aim(self) -> float:
+        """What is minimised: F and what keeps the motion smooth."""
+        return self.cost + self.grid.cost.roughness(self.curve_ends)
+
+    @cached_property
+    def partials(self) -> tuple[Partials, ...]:
+        """Derivatives of each cost's integrand at the samples."""
+        return self.grid.cost.partials(self.samples)
+
+    @cached_property
+    def h(self) -> Array:
+        """All rows, less what is granted of their tolerances, (R,); see `NodeRows`."""
+        return self.grid.rows.residuals(self.checked, self.curve_ends)
+
+    @cached_property
+    def c(self) -> Array:
+        """What is off at the ends, (E,)."""
+        return self.grid.ends.residuals(self.place.nodes)
+
+    @cached_property
+    def elsewhere(self) -> dict[str, float]:
+        """How far its ends are from where they should be, though `c` is 0; see `NodeEnds`."""
+        return self.grid.ends.elsewhere(self.place.nodes)
+
+    @cached_property
+    def violation(self) -> float:
+        """By how much the worst row is beyond its tolerance [units of h]; 0 where all are kept."""
+        return float(np.max(self.h - self.grid.rows.granted, initial=0.0))
+
+    def breaks_hard(self, most: float = 0.0) -> bool:
+        """Whether a row is beyond its tolerance by more than that, other than of a tolerance."""
+        rows = self.grid.rows
+        beyond = rows.split(self.h - rows.granted)
+        pairs = zip(rows.constraints, beyond, strict=True)
+        return any(
+            not np.max(own, initial=0.0) <= most for item, own in pairs if not counts_at_once(item)
+        )
+
+    def would_be_calm(self) -> bool:
+        """Whether it may be kept from wavering, see `smoothing_of`."""
+        return would_be_calm(self.grid.problem, self.samples, self.cost)
+
+    @cached_property
+    def quickness(self) -> float:
+        """In what share of the usual time it should start and stop, see `quickness`."""
+        return quickness(self.grid.problem, self.samples, self.cost, self.grid.quick)
+
+    @property
+    def epsilon(self) -> Array:
+        """The null motion ε = N0 ν at the nodes, (N + 1, n)."""
+        return self.charts.spread(self.nu)
+
+    def stepped(self, step: Array) -> "NodeMotion | None":
+        """Return the motion at a step (N + 1, 3r) of scaled coordinates; None where it is none.
+
+        Each node on its own: rates do as the coordinates say, whatever the nodes beside it do.
+        """
+        r = self.nu.shape[1]
+        z, nu, alpha = np.split(step * self.grid.scale, [r, 2 * r], axis=1)
+        epsilon, a = self.charts.spread(self.nu + nu), self.charts.spread(self.alpha + alpha)
+        found = self.charts.centred(z, epsilon, a)
+        return None if found is None else self.grid.at(found)
+
+    def along(self, step: Array, changes: Array) -> "NodeMotion | None":
+        """Return the motion next to where a step leads to first order; None where it is none.
+
+        A step (N + 1, 3r) moves the curve by `changes` (N + 1, 3, n, 3r) times it, which is what
+        linear rows know; from there it comes onto the path by a correction c(t) that is smooth in
+        time. Rates take its derivatives along: where each node's rates were their own, they would
+        contradict the places of those beside it, by the step squared, and the jerk between nodes
+        that are near to each other would be that over the square of the time between them.
+        """
+        grid, nodes, r = self.grid, self.place.nodes, self.nu.shape[1]
+        count, size = step.shape
+        moved = (changes.reshape(count, -1, size) @ step[:, :, None]).reshape(nodes.shape)
+        line, z = nodes + moved, step[:, :r] * grid.scale[:r]
+        q = self.charts.places(z)
+        if q is None:
+            return None
+        rate, bend = grid.spline.differences(q - line[:, 0])
+        qd, qdd = grid.rested(line[:, 1] + rate, 1), grid.rested(line[:, 2] + bend, 2)
+        found = self.charts.centred(z, qd, qdd)
+        return None if found is None else grid.at(found)
+
+    def parts_between(self) -> Ints:
+        """Return into how many parts intervals have to be divided, (N,); see `NodeRows`."""
+        grid = self.grid
+        if not grid.rows.looks_between:
+            return np.ones(grid.spline.count, dtype=np.int64)
+        curve = looked(grid.spline, grid.manifolds.follows, self.curve_ends)
+        return grid.rows.parts_between(curve)
+
+    def broken_between(self) -> Flags:
+        """Return on which intervals something is broken between the points, or nearly so, (N,)."""
+        return np.asarray(self.parts_between() > 1)
+
+    def forget(self) -> None:
+        """Let go of what can be computed anew."""
+        for name in ("samples", "checked", "partials", "h", "curve_ends"):
+            self.__dict__.pop(name, None)
+
+    @cached_property
+    def trajectory(self) -> Trajectory:
+        """The motion itself: the quintic through the nodes."""
+        place, names = self.place, self.grid.problem.robot.joint_names
+        q, qd, qdd = (read_only(x) for x in (place.q, place.qd, place.qdd))
+        return Trajectory(self.grid.t, q, qd, names, qdd)
+
+    def on(self, grid: NodeGrid) -> "NodeMotion | None":
+        """Return the motion on other nodes."""
+        own = self.trajectory
+        q, qd, qdd = (own(grid.t, order) for order in range(3))
+        # What is nearly a basis will do for charts to begin with, and turns as those around it do.
+        last = np.searchsorted(self.grid.t, grid.t, side="right") - 1
+        return grid.around(Charts(grid.manifolds, q, self.charts.bases[last]), qd, qdd)

@@ -1,0 +1,208 @@
+"""A motion between nodes: quintic pieces through (q, q̇, q̈), and where they are looked at.
+
+On an interval of length h the piece is a polynomial of s = (t - t_k)/h, linear in its ends
+
+    y = (q, h q̇, h² q̈) of the left node, then of the right one:  (d/dt)^o q = h^-o U_o(s) y,
+
+with the same tables U_o for all intervals. Its control points (of the Bernstein form, G. Farin,
+"Curves and Surfaces for CAGD", ch. 5) are linear in y as well, and the curve stays within their
+convex hull: what all control points of a derivative keep, the whole curve keeps.
+"""
+
+from functools import cached_property
+from math import comb, perm
+
+import numpy as np
+
+from selfmotion.basics import Array, Ints
+from selfmotion.model.motion import Sampling
+
+# Orders of derivatives that are known: q, q̇, q̈ and the jerk.
+ORDERS = 4
+# Control points of each.
+CONTROLS = (6, 5, 4, 3)
+# Gauss points on an interval: the square of a quintic's derivative is integrated exactly.
+_ROOTS, _SHARES = np.polynomial.legendre.leggauss(5)
+GAUSS, WEIGHTS = 0.5 * (1.0 + _ROOTS), 0.5 * _SHARES
+# Where constraints that are no limits of joints look at an interval, besides the last node. Where
+# one is of accelerations, twice as often: q̈ is a cubic, and swings between two points if it may.
+POINTS, FINE_POINTS = np.array([0.0, 0.5]), np.array([0.0, 0.25, 0.5, 0.75])
+
+
+def _powers(s: Array, order: int) -> Array:
+    """Return the derivatives of 1, s, … s⁵ at s (S,), (S, 6)."""
+    each = [perm(p, order) * s ** max(p - order, 0) for p in range(6)]
+    return np.stack([x * np.ones_like(s) for x in each], axis=1)
+
+
+# Coefficients of 1, s, … s⁵ by (q, q̇, q̈) of both ends.
+_ENDS = np.linalg.inv(
+    np.concatenate([_powers(np.array([s]), order) for s in (0.0, 1.0) for order in range(3)])
+)
+
+
+def unit_bases(s: Array) -> tuple[Array, ...]:
+    """Return U_o(s) of q, q̇, q̈ and the jerk at shares s (S,) of an interval, (S, 6) each."""
+    return tuple(_powers(s, order) @ _ENDS for order in range(ORDERS))
+
+
+def _controls() -> tuple[Array, ...]:
+    """Return how control points of q, q̇, q̈ and the jerk follow from y, (6 - o, 6) each."""
+    found = []
+    for order, count in enumerate(CONTROLS):
+        s, degree = np.linspace(0.0, 1.0, count), count - 1
+        terms = [comb(degree, i) * s**i * (1.0 - s) ** (degree - i) for i in range(count)]
+        solved = np.linalg.solve(np.stack(terms, axis=1), unit_bases(s)[order])
+        found.append(np.asarray(solved, dtype=np.float64))
+    return tuple(found)
+
+
+# Nodes that tell derivatives at one of them.
+_STENCIL = 5
+AT_GAUSS, AT_CONTROLS = unit_bases(GAUSS), _controls()
+AT_END = unit_bases(np.ones(1))
+# How (q, q̇, q̈) of both ends scale with h to become y.
+_SCALED = np.array([0, 1, 2, 0, 1, 2])
+
+
+class Quintic:
+    """Quintic pieces on given times.
+
+    Of several motions on the same nodes, one after the other, the interval from the end of one to
+    the start of the next is a gap: it weighs nothing, and nothing moves there.
+
+    Parameters
+    ----------
+    t : (N + 1,)
+        Times of the nodes [s].
+    copies : int
+        How many motions there are; below, N + 1 nodes are those of all.
+    shares : (P,)
+        Where constraints look at an interval, as shares of it; 0 is the first.
+
+    Attributes
+    ----------
+    t : (N + 1,)
+    steps : (N,)
+        Lengths of the intervals [s].
+    gaps : (K,)
+        Which intervals are gaps.
+    sampling : Sampling
+        What costs look at: the Gauss points of each interval.
+    """
+
+    def __init__(self, t: Array, copies: int = 1, shares: Array = POINTS) -> None:
+        self._shares = shares
+        self.t = np.tile(t, copies)
+        self.steps = np.diff(self.t)
+        self.gaps = np.arange(1, copies) * len(t) - 1
+        self.steps[self.gaps] = 1.0
+        h = self.steps.copy()
+        h[self.gaps] = 0.0
+        times = (self.t[:-1, None] + h[:, None] * GAUSS).ravel()
+        each = (h[:, None] * WEIGHTS).ravel()
+        self.sampling = Sampling(times, each, np.arange(len(times)))
+        self._powers = self.steps[:, None] ** _SCALED
+
+    @property
+    def count(self) -> int:
+        """N."""
+        return len(self.steps)
+
+    @cached_property
+    def points(self) -> Sampling:
+        """What constraints look at that are no limits of joints."""
+        inner = (self.t[:-1, None] + self.steps[:, None] * self._shares).ravel()
+        return Sampling.trapezoidal(np.append(inner, self.t[-1]))
+
+    @cached_property
+    def _stencils(self) -> tuple[Ints, Array]:
+        """Which nodes tell derivatives at each node, and by how much: (N + 1, S), (2, N + 1, S)."""
+        count = len(self.t)
+        width = min(_STENCIL, count)
+        first = np.clip(np.arange(count) - width // 2, 0, count - width)
+        which = first[:, None] + np.arange(width)
+        far = self.t[which] - self.t[:, None]
+        usual = np.abs(far).max(axis=1)[:, None, None]
+        powers = (far[:, None, :] / usual) ** np.arange(width)[None, :, None]
+        wanted = np.eye(width, 3)[:, 1:]
+        found = np.linalg.solve(powers, np.broadcast_to(wanted, (count, *wanted.shape)))
+        found *= np.array([1.0, 2.0]) / usual ** np.array([1.0, 2.0])
+        return which, np.moveaxis(found, 2, 0)
+
+    def differences(self, x: Array) -> tuple[Array, Array]:
+        """Return the first two derivatives at the nodes of what is x (N + 1, n) there, by time.
+
+        Of polynomials through five nodes. Of one motion only.
+        """
+        which, shares = self._stencils
+        first, second = (shares[:, :, None, :] @ x[which])[:, :, 0]
+        return first, second
+
+    def times_of(self, order: int) -> Array:
+        """Return where control points belong [s], (N, 6 - o)."""
+        shares = np.linspace(0.0, 1.0, CONTROLS[order])
+        return np.asarray(self.t[:-1, None] + self.steps[:, None] * shares)
+
+    def ends(self, nodes: Array) -> Array:
+        """Return y of each interval, (N, 6, n), for (q, q̇, q̈) of the nodes, (N + 1, 3, n)."""
+        found = np.concatenate([nodes[:-1], nodes[1:]], axis=1) * self._powers[:, :, None]
+        if self.gaps.size:
+            found[self.gaps, 3] = found[self.gaps, 0]
+            found[np.ix_(self.gaps, np.array([1, 2, 4, 5]))] = 0.0
+        return np.asarray(found)
+
+    def scattered(self, by_ends: Array) -> Array:
+        """Return derivatives by (q, q̇, q̈) of the nodes, for those by y (N, 6, n), (N + 1, 3, n)."""
+        own = by_ends * self._powers[:, :, None]
+        if self.gaps.size:
+            own[self.gaps] = 0.0
+        found = np.zeros((self.count + 1, 3, own.shape[2]))
+        found[:-1] += own[:, :3]
+        found[1:] += own[:, 3:]
+        return found
+
+    def changes(self, changes: Array) -> Array:
+        """Return how y changes with w of both ends of each interval, (N, n, 6, 2 d).
+
+        `changes` (N + 1, 3, n, d) is ∂(q, q̇, q̈)/∂w of the nodes.
+        """
+        turned = np.swapaxes(changes, 1, 2)
+        count, n, _, size = turned.shape
+        both = np.zeros((count - 1, n, 6, 2 * size))
+        both[:, :, :3, :size], both[:, :, 3:, size:] = turned[:-1], turned[1:]
+        both *= self._powers[:, None, :, None]
+        if self.gaps.size:
+            both[self.gaps] = 0.0
+        return both
+
+    def rates(self, order: int) -> Array:
+        """Return h^-o, (N,)."""
+        return np.asarray(self.steps ** float(-order))
+
+    def at(self, tables: tuple[Array, ...], order: int, ends: Array) -> Array:
+        """Return a derivative at shares of all intervals, (N, S, n), for U_o there and y."""
+        return np.asarray((tables[order] @ ends) * self.rates(order)[:, None, None])
+
+    @cached_property
+    def _at_points(self) -> tuple[Array, ...]:
+        return unit_bases(self._shares)
+
+    def at_points(self, order: int, ends: Array) -> Array:
+        """Return a derivative at the `points`, (P N + 1, n)."""
+        inner = self.at(self._at_points, order, ends).reshape(-1, ends.shape[2])
+        last = AT_END[order] @ ends[-1] * self.rates(order)[-1]
+        return np.concatenate([inner, last])
+
+    def point_shares(self, which: Ints) -> tuple[Ints, Array]:
+        """Return the intervals of some points (R,), and how q … jerk there follow from y.
+
+        (R,) and (R, 4, 6).
+        """
+        count = len(self._shares)
+        last = which == count * self.count
+        k = np.where(last, self.count - 1, which // count)
+        tables = np.stack([*self._at_points], axis=1)[which % count]
+        tables[last] = np.stack([table[0] for table in AT_END])
+        powers = self.steps[k][:, None] ** -np.arange(float(ORDERS))
+        return k, tables * powers[:, :, None]

@@ -1,0 +1,410 @@
+"""From the decision vector to the cost and its gradient: the only place with the chain rule."""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from selfmotion.basics import Array, BreakdownError, Counts, ProblemError
+from selfmotion.model.motion import Evaluation, Grid, NullMotion, NullMotionTable, Trajectory
+from selfmotion.planning.paper.rollout import Rollout
+from selfmotion.planning.paper.still import (
+    FixedStart,
+    FreeStart,
+    Start,
+    StillMotion,
+    null_motion_table,
+)
+from selfmotion.problem.constraints import BoundConstraint, NodeTangents, linearised, violated
+from selfmotion.problem.costs import ERROR, Cost, Samples
+from selfmotion.problem.problem import Problem
+
+# Samples whose tangents are weighed together.
+_LOT = 4096
+
+
+class _CostIntegrals:
+    """∫ Σ G dt over the motions on a grid.
+
+    Parameters
+    ----------
+    costs : sequence of Cost
+        The integrands G.
+    grid : Grid
+    """
+
+    def __init__(self, costs: Sequence[Cost], grid: Grid) -> None:
+        self._costs, self._grid = tuple(costs), grid
+        self.names = tuple(cost.name for cost in costs)
+
+    def values(self, samples: Samples) -> dict[str, float]:
+        """Return the integral of each cost."""
+        return {cost.name: float(samples.weights @ cost.value(samples)) for cost in self._costs}
+
+    def cotangents(self, samples: Samples) -> tuple[Array, Array, Array]:
+        """Return the derivatives of the sum with respect to q, q̇ and e at the stages.
+
+        Raises
+        ------
+        ProblemError
+            One of them is not finite.
+        """
+        sampling = self._grid.sampling
+        by_q, by_qd = np.zeros_like(samples.q), np.zeros_like(samples.qd)
+        by_error = np.zeros_like(samples.error)
+        weights, nodes = samples.weights[:, None], sampling.nodes
+        for cost in self._costs:
+            partials = cost.gradient(samples)
+            for total, part in (
+                (by_q, partials.q),
+                (by_qd, partials.qd),
+                (by_error, partials.error),
+            ):
+                if part is not None:
+                    self._require_finite(cost, "gradient", part)
+                    total += weights * part
+            for order, part in ((1, partials.qdd), (2, partials.qddd)):
+                if part is not None:
+                    self._require_finite(cost, "gradient", part)
+                    by_qd[nodes] += sampling.differentiation(order).T @ (weights * part)
+        return by_q, by_qd, by_error
+
+    def require_finite(self, samples: Samples) -> None:
+        """Raise ProblemError where a cost has no finite value; says when."""
+        for cost in self._costs:
+            self._require_finite(cost, "value", np.asarray(cost.value(samples)))
+
+    def _require_finite(self, cost: Cost, which: str, table: Array) -> None:
+        bad = ~np.isfinite(table)
+        if bad.any():
+            row = int(np.argmax(bad.reshape(len(bad), -1).any(axis=1)))
+            raise ProblemError(
+                f"cost '{cost.name}': its {which} is {table[row]} at "
+                f"t = {self._grid.stage_times[row]:.6g} s, expected finite numbers; "
+                f"selfmotion.testing.check_cost checks a cost"
+            )
+
+    def curvature(self, by_q: Array, by_qd: Array, by_error: Callable[[], Array]) -> Array:
+        """Return ∫ Σ_k (∂q^(k)/∂x)ᵀ W_k (∂q^(k)/∂x) dt, (size, size).
+
+        Over the derivatives q^(k) of q that the costs weigh (that of ½ q̇ᵀq̇ where none does), and
+        likewise over the pose error.
+
+        Parameters
+        ----------
+        by_q, by_qd : (S, n, size)
+            ∂q/∂x and ∂q̇/∂x at the stages.
+        by_error : callable
+            Returns that of the pose error, (S, m, size); asked where a cost weighs it.
+        """
+        (stages, n, size), sampling = by_q.shape, self._grid.sampling
+        curvatures = [cost.curvature(n) for cost in self._costs]
+        if not any(curvatures):
+            curvatures = [{1: np.eye(n)}]
+        found = np.zeros((size, size))
+        nodes = by_qd[sampling.nodes].reshape(len(sampling.nodes), -1)
+        for curvature in curvatures:
+            for order, weight in curvature.items():
+                table = by_error() if order == ERROR else by_q if order == 0 else by_qd
+                for first in range(0, stages, _LOT):
+                    lot = slice(first, first + _LOT)
+                    tangent = table[lot]
+                    if order > 1:
+                        operator = sampling.differentiation(order - 1)[lot]
+                        tangent = (operator @ nodes).reshape(tangent.shape)
+                    found += _weighted(tangent, weight, sampling.weights[lot])
+        return found
+
+
+def _weighted(tangent: Array, weight: Array, times: Array) -> Array:
+    """Return Σ times tangentᵀ W tangent over samples, (size, size)."""
+    flat = tangent.shape[0] * tangent.shape[1], tangent.shape[2]
+    # Near singular poses tangents may be beyond all numbers: see `inverse_metric`.
+    with np.errstate(over="ignore", invalid="ignore"):
+        weighted = times[:, None, None] * (weight @ tangent)
+        return np.asarray(tangent.reshape(flat).T @ weighted.reshape(flat))
+
+
+class Objective:
+    """F = ∫ Σ G(q̇, q, t) dt along the motion of a decision vector, and what misses its ends.
+
+    The decision vector is [z | x]: where the start is on its self-motion manifold (nothing if it is
+    given), and the null motion's coefficients.
+
+    Parameters
+    ----------
+    rollout : Rollout
+        The engine; its grid is that of the null motion.
+    null_motion : NullMotionTable
+        x → ε at the stages.
+    costs : sequence of Cost
+    start : Start
+        z → q(0).
+    ends : sequence of BoundConstraint
+        Equalities on the ends of the motion: c(x) = 0.
+    counts : Counts
+        Where work is added up.
+
+    Raises
+    ------
+    ProblemError
+        One of the ends is no equality.
+    """
+
+    def __init__(
+        self,
+        rollout: Rollout,
+        null_motion: NullMotionTable,
+        costs: Sequence[Cost],
+        start: Start,
+        ends: Sequence[BoundConstraint],
+        counts: Counts,
+    ) -> None:
+        for item in ends:
+            if not item.equality:
+                raise ProblemError(
+                    f"constraint '{item.name}' is none on the ends: no limits are kept here"
+                )
+        self.rollout, self.null_motion, self.start = rollout, null_motion, start
+        self.ends, self.counts = tuple(ends), counts
+        self._costs = _CostIntegrals(costs, rollout.grid)
+        self._at: Array | None = None
+        # ∂q/∂x and ∂q̇/∂x there, gradient and evaluation, once they were asked for.
+        self._tangents: tuple[Array, Array] | None = None
+        self._gradient: Array | None = None
+        self._evaluation: Evaluation | None = None
+        self._terms: dict[str, float] = {}
+        self._first = rollout.first_target
+        # Which of the first and the last node neither move nor accelerate.
+        self._still_ends: list[int] = []
+        # Whether the rollout holds the motion of x = 0.
+        self._is_rolled = False
+        # When the last motion broke down [s].
+        self._broken: float | None = None
+
+    @classmethod
+    def of(
+        cls,
+        problem: Problem,
+        still: StillMotion,
+        *,
+        grid: Grid | None = None,
+        free: bool = False,
+        ends: Sequence[BoundConstraint] = (),
+        counts: Counts | None = None,
+        null_motion: NullMotion | None = None,
+        around: Array | None = None,
+        rollout: Rollout | None = None,
+    ) -> "Objective":
+        """Return the objective of a problem around its motion at x = 0.
+
+        Parameters
+        ----------
+        problem : Problem
+        still : StillMotion
+            The motion at x = 0: its start, and the basis of the null motion, are those of x.
+        grid : Grid, optional
+            By default that of `still`.
+        free : bool
+            Whether the start may move along its self-motion.
+        ends : sequence of BoundConstraint
+            What is asked of the ends.
+        counts : Counts, optional
+        null_motion : NullMotion, optional
+            By default that of the problem.
+        around : (S, n), optional
+            The null motion of x = 0; by default that of `still`.
+        rollout : Rollout, optional
+            That of `still`, on this grid, which nobody else uses any more; by default a new one.
+        """
+        follows, grid = problem.follows, grid or still.grid
+        t = grid.stage_times
+        start: Start = FreeStart(follows, still.start) if free else FixedStart(still.start)
+        found = cls(
+            rollout or Rollout(follows, grid, damping=problem.damping_law),
+            null_motion_table(problem, t, still, null_motion or problem.null_motion, around),
+            problem.all_costs,
+            start,
+            ends,
+            Counts() if counts is None else counts,
+        )
+        if problem.damping is None:
+            orders = zip((0, -1), problem.rest_orders, strict=True)
+            found._still_ends = [end for end, order in orders if order > 1]
+        found._is_rolled = rollout is not None and not start.size
+        return found
+
+    @property
+    def grid(self) -> Grid:
+        """The grid that motions are integrated on."""
+        return self.rollout.grid
+
+    @property
+    def size(self) -> int:
+        """Number of decision variables."""
+        return self.start.size + self.null_motion.size
+
+    @property
+    def evaluations(self) -> int:
+        """How often F was computed, by all that add to the same counts."""
+        return self.counts.evaluations
+
+    def parts(self, x: Array) -> tuple[Array, Array]:
+        """Return the parts z and x of the decision vector."""
+        return x[: self.start.size], x[self.start.size :]
+
+    def value(self, x: Array) -> float:
+        """Return the cost at x; infinite where the motion breaks down."""
+        self._run(x)
+        return total if np.isfinite(total := sum(self._terms.values())) else np.inf
+
+    def gradient(self, x: Array) -> Array:
+        """Return the gradient of `value` at x, (size,).
+
+        Exact for the discretised motion; NaN where it breaks down.
+        """
+        self._run(x)
+        if self._gradient is None:
+            self.counts.gradients += 1
+            self._gradient = self._pulled_back(x)
+        return self._gradient.copy()
+
+    def _pulled_back(self, x: Array) -> Array:
+        if not np.isfinite(self.value(x)):
+            return np.full(self.size, np.nan)
+        by_epsilon, by_start = self.rollout.pullback(
+            *self._costs.cotangents(self.rollout.samples())
+        )
+        return np.concatenate(
+            [by_start @ self.start.tangent(), self.null_motion.pullback(by_epsilon)]
+        )
+
+    def require_finite(self, x: Array) -> None:
+        """Raise an error that says why and when F is not finite at x, where it is not.
+
+        Raises
+        ------
+        BreakdownError
+            Its motion breaks down.
+        ProblemError
+            A cost has no finite value.
+        """
+        samples = self.samples(x)
+        if self._broken is not None:
+            raise BreakdownError(
+                f"{self.rollout.robot.name}: eq. 4 breaks down near t = {self._broken:.4g} s, "
+                f"where the tool reaches a singular pose",
+                time=self._broken,
+            )
+        self._costs.require_finite(samples)
+
+    def slope(self, x: Array, direction: Array) -> float:
+        """Return the derivative of `value` at x along `direction`."""
+        return float(self.gradient(x) @ direction)
+
+    def terms(self, x: Array) -> dict[str, float]:
+        """Return what each cost contributes to F at x."""
+        self._run(x)
+        return dict(self._terms)
+
+    def samples(self, x: Array) -> Samples:
+        """Return the motion of x at the stages; its arrays are those of the next run, too."""
+        self._run(x)
+        return self.rollout.samples()
+
+    def at(self, x: Array) -> Evaluation:
+        """Return the motion of x with all that is known of it."""
+        self._run(x)
+        if self._evaluation is None:
+            before = self.rollout.jacobian_evaluations
+            t, q, qd = self.rollout.polished()
+            names = self.rollout.robot.joint_names
+            qdd = self.grid.derivative(qd)
+            # Where the arm comes to rest smoothly that is so by construction; differences are not.
+            qdd[self._still_ends] = 0.0
+            trajectory = Trajectory(t, q, qd, names, qdd)
+            self.counts.jacobians += self.rollout.jacobian_evaluations - before
+            terms = dict(self._terms)
+            self._evaluation = Evaluation(x.copy(), terms, trajectory, self.rollout.damped)
+        return self._evaluation
+
+    def misses(self, x: Array) -> Array:
+        """Return c at x of E conditions on the ends, (E,): 0 where they are met."""
+        samples = self.samples(x)
+        return np.concatenate(
+            [np.zeros(0), *(item.residual(samples).ravel() for item in self.ends)]
+        )
+
+    def miss_tangents(self, x: Array) -> Array:
+        """Return ∂c/∂x at x, (E, size)."""
+        motion, samples, rows = self.node_tangents(x), self.samples(x), [np.zeros((0, self.size))]
+        for item in self.ends:
+            known = linearised(item, samples, motion)
+            rows.append(known.picked(motion, np.arange(known.count)))
+        return np.concatenate(rows)
+
+    def unmet(self, x: Array) -> tuple[str, ...]:
+        """Return what is wrong at x for each of the ends that it misses, beyond its tolerance."""
+        return violated(self.ends, self.samples(x))
+
+    def metric(self, x: Array) -> Array:
+        """Return the Gauss-Newton matrix of quadratic costs, (size, size).
+
+        ∫ Σ_k (∂q^(k)/∂x)ᵀ W_k (∂q^(k)/∂x) dt over the derivatives q^(k) of q that the costs weigh
+        (that of ½ q̇ᵀq̇ where none does), and likewise over the pose error. Its inverse starts the
+        quasi-Newton method.
+        """
+        by_q, by_qd = self._sensitivities(x)
+        return self._costs.curvature(by_q, by_qd, lambda: self._error_tangent(by_q))
+
+    def node_tangents(self, x: Array) -> NodeTangents:
+        """Return how the motion at the nodes changes with the decision vector, at x."""
+        by_q, by_qd = self._sensitivities(x)
+        sampling = self.grid.sampling
+        return NodeTangents(by_q[sampling.nodes], by_qd[sampling.nodes], sampling)
+
+    def _error_tangent(self, by_q: Array) -> Array:
+        """Return ∂(S e)/∂x = -J ∂q/∂x, (S, m, size).
+
+        Nothing on the path, where the self-motion does not move the tool.
+        """
+        return np.asarray(-(self.rollout.samples().task_jacobian @ by_q))
+
+    def _run(self, x: Array) -> None:
+        """Make x the motion that the rollout holds."""
+        if self._at is not None and np.array_equal(self._at, x):
+            return
+        self.counts.evaluated()
+        # An interruption on the way must not leave half a motion as that of x.
+        self._at = self._tangents = self._gradient = self._evaluation = None
+        self._terms = dict.fromkeys(self._costs.names, np.inf)
+        before = self.rollout.jacobian_evaluations
+        try:
+            self._evaluate(x)
+        finally:
+            self.counts.jacobians += self.rollout.jacobian_evaluations - before
+        self._at = x.copy()
+
+    def _evaluate(self, x: Array) -> None:
+        z, coefficients = self.parts(x)
+        start = self.start.configuration(z, self._first)
+        self._broken = 0.0 if start is None else None
+        if start is None:
+            return
+        is_rolled, self._is_rolled = self._is_rolled and not x.any(), False
+        if not is_rolled:
+            self._broken = self.rollout.run(start, self.null_motion.epsilon(coefficients))
+        if self._broken is not None:
+            return
+        self._terms = self._costs.values(self.rollout.samples())
+
+    def _sensitivities(self, x: Array) -> tuple[Array, Array]:
+        """Return ∂q/∂[z | x] and ∂q̇/∂[z | x] at the stages, (S, n, size)."""
+        self._run(x)
+        if self._tangents is not None:
+            return self._tangents
+        first = self.start.size
+        epsilon_matrix = self.null_motion.matrix(first)
+        start_matrix = np.zeros((epsilon_matrix.shape[1], self.size))
+        start_matrix[:, :first] = self.start.tangent()
+        self._tangents = self.rollout.sensitivities(epsilon_matrix, start_matrix)
+        return self._tangents

@@ -1,0 +1,330 @@
+"""Where a motion begins, and the motion at x = 0: what the arm does without self-motion."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property, partial
+
+import numpy as np
+
+from selfmotion.basics import Array, BreakdownError
+from selfmotion.model.follow import Follows
+from selfmotion.model.kernels import carried
+from selfmotion.model.motion import Grid, NullMotion, NullMotionTable
+from selfmotion.model.robot import null_space
+from selfmotion.model.task import SE3
+from selfmotion.planning.paper.rollout import Rollout
+from selfmotion.problem.problem import Problem
+
+# Newton's method onto the start of the path is quadratic: few steps, and the one after an error of
+# this is exact. Far moves fail and say so.
+_STEPS, _ARRIVED = 20, 1e-9
+# Steps to begin with; halved until the motion at x = 0 drifts off the path by less than this,
+# relative to the extent of the path. Costs are then right to about the same.
+_FEWEST_STEPS, _DRIFT = 32, 1e-3
+# Trouble that three grids in turn place within this share of the motion, and of which the last has
+# at least half as much as the first, is the motion's own.
+_SAME_PLACE, _SAME_AMOUNT = 1e-3, 0.5
+# A motion in which a joint goes so far [rad or m] has been thrown out of a singular pose.
+_WILD = 1e3
+# The finest grid has 2 to this power times the steps of the first.
+MOST_HALVINGS = 8
+# A path shorter than this [m] is as good as a point.
+_SHORTEST = 1e-3
+
+
+class FixedStart:
+    """A given start configuration: q(0) as a function of no variables."""
+
+    size = 0
+
+    def __init__(self, q: Array) -> None:
+        self._q = q
+
+    def configuration(self, z: Array, target: Array) -> Array:
+        """Return q(0), (n,)."""
+        return self._q
+
+    def tangent(self) -> Array:
+        """Return ∂q(0)/∂z, (n, 0)."""
+        return np.zeros((len(self._q), 0))
+
+
+class FreeStart:
+    """The start moves along the self-motion manifold of the tips' first poses.
+
+    q(0) solves F(q) = x(0) and N0ᵀ(q - q_ref) = z, with N0 an orthonormal null-space basis at the
+    reference: coordinates of the manifold, exact and smooth near it.
+
+    Parameters
+    ----------
+    follows : Follows
+    reference : (n,)
+        q_ref, on the first poses; z = 0.
+    """
+
+    def __init__(self, follows: Follows, reference: Array) -> None:
+        self._follows, self._reference = follows, reference
+        self._null = follows.null_basis(reference)
+        self._at = reference
+        self._tips = follows.kinematics()
+
+    @property
+    def size(self) -> int:
+        """Number of decision variables z: the redundancy r."""
+        return int(self._null.shape[1])
+
+    def configuration(self, z: Array, target: Array) -> Array | None:
+        """Return q(0) (n,), or None where no configuration belongs to z and the tips' first poses.
+
+        These are as `Follows.targets` has them, (12 F,).
+        """
+        q = self._reference + self._null @ z
+        for _ in range(_STEPS):
+            system, missed = self._missed(q, z, target)
+            wrong = float(np.abs(missed).max())
+            # NaN arrives nowhere.
+            if not np.isfinite(wrong):
+                return None
+            try:
+                # B⁻¹ = Bᵀ(BBᵀ)⁻¹: errors of the product are taken out by the next step.
+                q = q + system.T @ np.linalg.solve(system @ system.T, missed)
+            except np.linalg.LinAlgError:
+                return None
+            if wrong < _ARRIVED:
+                self._at = q
+                return q
+        return None
+
+    def _missed(self, q: Array, z: Array, target: Array) -> tuple[Array, Array]:
+        """Return B = [J; N0ᵀ] (m + r, n) and b = [e; z - N0ᵀ(q - q_ref)] at q (n,)."""
+        rows, errors = list[Array](), list[Array]()
+        places = target.reshape(-1, 12)
+        for item, place, *at in zip(self._follows.items, places, *self._tips.at(q), strict=True):
+            jacobian, rotation, translation = at
+            wanted = SE3(place[3:].reshape(3, 3), place[:3])
+            error = item.task.twist_error(wanted, SE3(rotation, translation))
+            errors.append(item.task.select(error[:, None], rotation)[:, 0])
+            rows.append(item.task.select(jacobian, rotation))
+        along = self._null.T
+        missed = np.concatenate([*errors, z - along @ (q - self._reference)])
+        return np.vstack([*rows, along]), missed
+
+    def tangent(self) -> Array:
+        """Return ∂q(0)/∂z at the last q(0), [J; N0ᵀ]⁻¹ [0; I], (n, size)."""
+        items, m = self._follows.items, self._follows.dimension
+        jacobians, rotations, _ = self._tips.at(self._at)
+        rows = [
+            item.task.select(jacobian, rotation)
+            for item, jacobian, rotation in zip(items, jacobians, rotations, strict=True)
+        ]
+        right = np.vstack([np.zeros((m, self.size)), np.eye(self.size)])
+        return np.asarray(np.linalg.solve(np.vstack([*rows, self._null.T]), right))
+
+
+Start = FixedStart | FreeStart
+
+
+Guide = Callable[[Array], Array]
+"""t (S,) → a null motion (S, n) that stands for x = 0."""
+
+
+@dataclass(frozen=True, eq=False)
+class StillMotion:
+    """A motion at x = 0, integrated on a grid.
+
+    Attributes
+    ----------
+    problem : Problem
+    grid : Grid
+    guide : Guide or None
+        The null motion that stands for x = 0; None for none.
+    q, qd : (N + 1, n)
+        At the nodes.
+    jacobians : (N + 1, m, n)
+        Task Jacobians there.
+    drift : (N + 1, m)
+        How far the tool is off the path in each row, relative to the path's extent (positions) or
+        in rad; NaN after a breakdown.
+    broken : float or None
+        When eq. 4 broke down [s].
+    damped : bool
+        Whether the inverse was damped anywhere.
+    jacobian_evaluations : int
+        What it took.
+    rollout : Rollout
+        What integrated it: for one objective on the same grid.
+    """
+
+    problem: Problem
+    grid: Grid
+    guide: Guide | None
+    q: Array
+    qd: Array
+    jacobians: Array
+    drift: Array
+    broken: float | None
+    damped: bool
+    jacobian_evaluations: int
+    rollout: Rollout
+
+    @classmethod
+    def on(
+        cls,
+        problem: Problem,
+        configuration: Array,
+        grid: Grid,
+        guide: Guide | None = None,
+    ) -> "StillMotion":
+        """Integrate from a start configuration (n,) on one grid."""
+        rollout = Rollout(problem.follows, grid, damping=problem.damping_law)
+        t = grid.stage_times
+        idle = np.zeros((len(t), problem.robot.dof))
+        own = idle if guide is None else problem.brought_to_rest(t, guide(t))
+        broken = rollout.run(configuration, own)
+        samples, drift = rollout.samples(), rollout.drift / _extents(rollout)
+        if broken is not None:
+            drift = np.where((grid.nodes > broken)[:, None], np.nan, drift)
+        nodes = grid.node_stages
+        wild = np.abs(samples.q[nodes] - configuration).max(axis=1) > _WILD
+        if broken is None and wild.any():
+            broken = float(grid.nodes[int(np.argmax(wild))])
+        return cls(
+            problem,
+            grid,
+            guide,
+            samples.q[nodes],
+            samples.qd[nodes],
+            samples.task_jacobian[nodes],
+            drift,
+            broken,
+            rollout.damped,
+            rollout.jacobian_evaluations,
+            rollout,
+        )
+
+    @property
+    def start(self) -> Array:
+        """Its first configuration, (n,)."""
+        return np.array(self.q[0])
+
+    @property
+    def end(self) -> Array:
+        """Its last configuration, (n,)."""
+        return np.array(self.q[-1])
+
+    def off_path(self, allowed: float) -> float | None:
+        """Return the first time [s] at which it is off the path by more than that; None if never.
+
+        A breakdown counts, too.
+        """
+        off = ~(np.abs(self.drift) <= allowed).all(axis=1)
+        first = float(self.grid.nodes[int(np.argmax(off))]) if off.any() else None
+        times = [time for time in (first, self.broken) if time is not None]
+        return min(times) if times else None
+
+    def frame(self, t: Array) -> Array:
+        """Return a basis of the null space along this motion at times t (S,), (S, n, r).
+
+        At the nodes carried along, so that it does not turn inside the null space; between them the
+        entries follow a cubic spline.
+        """
+        n = self.problem.robot.dof
+        none = n == self.problem.follows.dimension
+        return np.zeros((len(t), n, 0)) if none else np.asarray(self._frame(t))
+
+    @cached_property
+    def _frame(self) -> Callable[[Array], Array]:
+        from scipy.interpolate import CubicSpline
+
+        bases = carried(null_space(self.jacobians[0]), self.jacobians)
+        return CubicSpline(self.grid.nodes, bases)
+
+
+def null_motion_table(
+    problem: Problem, t: Array, still: StillMotion, motion: NullMotion, around: Array | None
+) -> NullMotionTable:
+    """Return a null motion at times t (S,), in the basis of a motion at x = 0.
+
+    Around (S, n) is the null motion of x = 0, by default the guide's.
+    """
+    n, redundancy = problem.robot.dof, problem.robot.dof - problem.follows.dimension
+    if around is None:
+        guide = still.guide
+        around = np.zeros((len(t), n)) if guide is None else problem.brought_to_rest(t, guide(t))
+    # Of an arm without redundancy no null motion acts.
+    is_joint = motion.space == "joint" and redundancy > 0
+    frame, rows = (None, n) if is_joint else (partial(still.frame, t), redundancy)
+    return NullMotionTable(problem.null_functions(t, motion), frame, rows, around)
+
+
+def _extents(rollout: Rollout) -> Array:
+    """Return how far the paths go [m], for the rows of positions, and 1 for the others, (m,)."""
+    extents = [max(float(np.ptp(path, axis=0).max()), _SHORTEST) for path in rollout.targets]
+    tasks = [item.task for item in rollout.follows.items]
+    return np.concatenate(
+        [np.where(task.rows < 3, far, 1.0) for task, far in zip(tasks, extents, strict=True)]
+    )
+
+
+def settled_still_motion(
+    problem: Problem,
+    configuration: Array,
+    guide: Guide | None = None,
+    grid: Grid | None = None,
+) -> tuple[StillMotion, int]:
+    """Return the motion at x = 0 on the coarsest grid on which it stays near the path.
+
+    Damping takes it off the path: there, on the first grid that changes the error no more. The
+    first one that is tried is `grid`, by default one of few steps.
+
+    Returns
+    -------
+    still : StillMotion
+    jacobian_evaluations : int
+        On all grids tried.
+
+    Raises
+    ------
+    BreakdownError
+        It runs into a singular pose.
+    """
+    steps = max(_FEWEST_STEPS, problem.null_motion.fewest_steps)
+    grid = grid or Grid.aligned(problem.knots, steps)
+    coarse: Array | None = None
+    troubles: list[tuple[float, float]] = []
+    evaluations = 0
+    for _ in range(MOST_HALVINGS):
+        still = StillMotion.on(problem, configuration, grid, guide)
+        evaluations += still.jacobian_evaluations
+        settled = _settled(still, coarse)
+        if still.broken is None and settled:
+            return still, evaluations
+        coarse = still.drift
+        trouble = still.broken if still.broken is not None else still.off_path(_DRIFT)
+        time = 0.0 if trouble is None else trouble
+        amount = np.inf if still.broken is not None else float(np.abs(still.drift).max())
+        troubles.append((time, amount))
+        if not still.damped and _stays(troubles, problem.path.duration):
+            break
+        grid = grid.halved()
+    raise BreakdownError(
+        f"{problem.robot.name}: without self-motion the tool reaches a singular pose near "
+        f"t = {time:.4g} s; start elsewhere (start=), or keep the path away from the edge "
+        f"of the workspace",
+        time=time,
+    )
+
+
+def _settled(still: StillMotion, coarse: Array | None) -> bool:
+    if still.damped and coarse is not None:
+        return bool((np.abs(still.drift[::2] - coarse) <= _DRIFT).all())
+    return bool((np.abs(still.drift) <= _DRIFT).all())
+
+
+def _stays(troubles: list[tuple[float, float]], duration: float) -> bool:
+    """Return whether trouble (when, how much) does not go away on finer grids."""
+    if len(troubles) < 3:
+        return False
+    times, amounts = zip(*troubles[-3:], strict=True)
+    in_place = max(times) - min(times) <= _SAME_PLACE * duration
+    return bool(in_place and amounts[-1] >= _SAME_AMOUNT * amounts[0])

@@ -1,0 +1,176 @@
+"""Several motions along one path that begin in different configurations."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from selfmotion.basics import Array, Progress, SelfmotionError, presses, silent
+from selfmotion.planning.optimise import Status
+from selfmotion.planning.planner.effort import Search
+from selfmotion.planning.planner.grids import rough_grid
+from selfmotion.planning.planner.run import plan
+from selfmotion.planning.planner.screening import wound_back
+from selfmotion.planning.result import Plan
+from selfmotion.planning.search import carried, start_candidates
+from selfmotion.planning.transfer import Room
+from selfmotion.problem.problem import Problem
+
+# So many starts are tried for each branch that is asked for, until so many have failed; plans from
+# each take so many evaluations at most, and are the same where both their ends are as near as this
+# [rad or m].
+_BRANCH_TRIES = 4
+_BRANCH_EVALUATIONS = 60
+_SAME_ENDS = 0.2
+
+
+def branches(
+    problem: Problem,
+    count: int,
+    rng: np.random.Generator,
+    allowed: Problem | None = None,
+    progress: Progress = silent,
+) -> tuple[list[Plan], str]:
+    """Return up to `count` verified plans of a problem that begin far from each other.
+
+    Each begins at a configuration that puts the tool on the start of the path and is allowed there,
+    the next one as far as any from those before. Where none of these leads to a verified plan, all
+    that `plan` does is done.
+
+    Parameters
+    ----------
+    problem : Problem
+    count : int
+    rng : Generator
+    allowed : Problem, optional
+        The same with more that stands there, which the starts keep clear of; the plans need not.
+        With it nothing more is tried.
+    progress : callable, optional
+
+    Returns
+    -------
+    plans : list of Plan
+        Different ones at both ends; empty where there are none.
+    reason : str
+        Why not, where there are none.
+    """
+    found: list[Plan] = []
+    reason, failed = "", 0
+    for number, start in enumerate(_spread(allowed or problem, rng), 1):
+        if len(found) == count or failed == _BRANCH_TRIES or number > _BRANCH_TRIES * count:
+            break
+        progress("branch", number, _BRANCH_TRIES * count)
+        made, why = from_start(problem, start)
+        failed += made is None
+        reason = reason or why
+        if made is not None and all(_apart(made, other) > _SAME_ENDS for other in found):
+            found.append(made)
+    if found or allowed is not None:
+        return found, "" if found else reason or _nowhere(allowed or problem)
+    try:
+        made = _whole(lambda: plan(problem, search=Search(rng=rng), progress=progress))
+    except SelfmotionError as error:
+        return [], str(error)
+    if made.certificate.verified:
+        return [made], ""
+    return [], reason or made.certificate.verdict
+
+
+def like_before(problem: Problem, before: Plan) -> Plan | None:
+    """Return the verified plan that begins at the motion of another one, or None."""
+    start = near_start(problem, before.trajectory.q[0])
+    return None if start is None else from_start(problem, start, before)[0]
+
+
+def from_start(
+    problem: Problem, start: Array, before: Plan | None = None
+) -> tuple[Plan | None, str]:
+    """Return the verified plan from a start (n,), or None and why there is none.
+
+    It may begin at the motion of one `before`.
+    """
+    given = replace(problem, start=start)
+    try:
+        most = _BRANCH_EVALUATIONS
+        made = _whole(lambda: plan(given, warm_start=before, max_evaluations=most))
+    except SelfmotionError as error:
+        return None, str(error)
+    if made.certificate.verified:
+        return made, ""
+    return None, made.certificate.verdict
+
+
+def _whole(make: Callable[[], Plan]) -> Plan:
+    """Make a plan; where it was interrupted KeyboardInterrupt goes on, whatever it found."""
+    pressed = presses()
+    made = make()
+    if presses() > pressed or made.report.status is Status.INTERRUPTED:
+        raise KeyboardInterrupt
+    return made
+
+
+def near_start(problem: Problem, q: Array) -> Array | None:
+    """Return the start of a problem's path (n,) that Newton's method finds from a configuration.
+
+    None where it finds none that is allowed.
+    """
+    robot = problem.envelope.arm(problem.robot)
+    try:
+        start = robot.inverse_kinematics(problem.path.pose(0.0), problem.task, seed=q, attempts=1)
+    except SelfmotionError:
+        return None
+    return start if _room(problem).free(start[None])[0] else None
+
+
+def _room(problem: Problem) -> Room:
+    return Room(problem.envelope, problem.robot)
+
+
+def _spread(problem: Problem, rng: np.random.Generator) -> list[Array]:
+    """Return allowed starts, each as far as any from those before, the first in the middle."""
+    robot = problem.envelope.arm(problem.robot)
+    follows = problem.follows.for_robot(robot)
+    room = _room(problem)
+    try:
+        starts = np.array(start_candidates(follows, Search().starts, rng, room.free))
+    except SelfmotionError:
+        return []
+    starts = starts[room.free(starts)]
+    if not len(starts):
+        return []
+    # A wrist need not begin a whole turn away from where people expect it.
+    motions, arrived = carried(follows, starts, rough_grid(problem).nodes)
+    back = np.array([wound_back(robot, motion)[0] for motion in motions])
+    starts = np.where((arrived & room.free(back))[:, None], back, starts)
+    apart = np.abs(starts[:, None] - starts) @ robot.joint_weights
+    lower, upper = robot.finite_limits()
+    order = [int(np.argmin(np.abs(starts - 0.5 * (lower + upper)) @ robot.joint_weights))]
+    while len(order) < len(starts):
+        nearest = apart[order].min(axis=0)
+        nearest[order] = -1.0
+        order.append(int(np.argmax(nearest)))
+    return [starts[k] for k in order]
+
+
+def _apart(one: Plan, other: Plan) -> float:
+    """Return how far the ends of two plans are apart, of that end where they are farther apart."""
+    ends = one.trajectory.q[[0, -1]] - other.trajectory.q[[0, -1]]
+    return float(np.abs(ends).max(axis=1).max())
+
+
+def _nowhere(problem: Problem) -> str:
+    """Return why a path cannot even be begun."""
+    asked, follows = problem.envelope, problem.follows.for_robot(problem.robot)
+    try:
+        starts = np.array(start_candidates(follows, _BRANCH_TRIES, np.random.default_rng(0)))
+    except SelfmotionError as error:
+        return str(error)
+    for model, far in asked.bodies:
+        near = model.worst(starts)
+        if near.value < far:
+            return (
+                f"no configuration was found that puts the tool on its start and meets nothing: of "
+                f"{len(starts)} one has {near.first} and {near.second} {near.value * 1e3:.2f} mm "
+                f"apart (wanted: {far * 1e3:.2f} mm)"
+            )
+    return "no configuration was found that puts the tool on its start and keeps what is asked"

@@ -1,0 +1,465 @@
+"""A motion from one start: the minimum-norm motion first, then what polishing makes of it."""
+
+from collections.abc import Callable, Sequence
+from copy import copy
+from dataclasses import replace
+
+import numpy as np
+
+from selfmotion.basics import (
+    Array,
+    BreakdownError,
+    Flags,
+    InverseKinematicsError,
+    ProblemError,
+    shown,
+)
+from selfmotion.model.motion import (
+    Evaluation,
+    FreeNullMotion,
+    Grid,
+    NullMotionTable,
+    PolynomialNullMotion,
+    Trajectory,
+)
+from selfmotion.model.robot import RobotModel, null_space
+from selfmotion.planning.optimise import Iteration, QuasiNewton, Status
+from selfmotion.planning.paper import (
+    MOST_HALVINGS,
+    Guide,
+    Method,
+    Objective,
+    StillMotion,
+    settled_still_motion,
+)
+from selfmotion.planning.planner.effort import Effort
+from selfmotion.planning.planner.grids import first_nodes, is_on_nodes, is_published, most_nodes
+from selfmotion.planning.planner.polish import Polisher
+from selfmotion.planning.planner.solutions import NodeSolution, PublishedSolution, Solution, score
+from selfmotion.planning.result import Plan
+from selfmotion.planning.search import Manifold
+from selfmotion.problem.constraints import BoundConstraint, BoundEnd
+from selfmotion.problem.problem import Problem
+
+
+def check_warm_start(plan: object, problem: Problem) -> None:
+    """Raise ProblemError where a plan is none, or one of another arm."""
+    if not isinstance(plan, Plan):
+        raise ProblemError(f"warm_start is {shown(plan)}, expected a Plan; load_plan reads one")
+    check_joints(plan.robot, problem.robot)
+
+
+def check_joints(theirs: RobotModel, ours: RobotModel) -> None:
+    """Raise ProblemError where what is known has another arm's joints."""
+    if theirs.joint_names != ours.joint_names:
+        raise ProblemError(
+            f"warm_start: its joints are {', '.join(theirs.joint_names)}, expected those of "
+            f"{ours.name}: {', '.join(ours.joint_names)}"
+        )
+
+
+def on_start(problem: Problem, seed: Array) -> Array:
+    """Return the configuration (n,) near another one that is on the start of all paths.
+
+    Raises
+    ------
+    InverseKinematicsError
+        There is none.
+    """
+    follows, robot = problem.follows, problem.robot
+    if not follows.is_plain:
+        manifold = Manifold(follows, robot.lower, robot.upper)
+        held = follows.held(np.zeros(1))
+        q, arrived = manifold.project(seed[None], follows.targets(np.zeros(1)), far=True, held=held)
+        if not arrived[0]:
+            misses = np.array([item.miss(item.path.pose(0.0), q[0]) for item in follows.items])
+            position, rotation = misses.max(axis=0)
+            raise InverseKinematicsError(
+                f"{robot.name}: from the configuration that is known none was found in which all "
+                f"frames are where their paths begin",
+                position_miss=float(position),
+                rotation_miss=float(rotation),
+            )
+        return np.asarray(q[0])
+    return problem.robot.inverse_kinematics(problem.path.pose(0.0), problem.task, seed)
+
+
+def pace_of(plan: Plan, problem: Problem) -> float:
+    """Return the duration of a plan's path over that of the problem's."""
+    return plan.path.duration / problem.path.duration
+
+
+def slower(trajectory: Trajectory, pace: float) -> Trajectory:
+    """Return the same motion so many times as fast; `pace` is its duration over the new one."""
+    qdd = None if trajectory.qdd is None else pace**2 * trajectory.qdd
+    t, qd = trajectory.t / pace, pace * trajectory.qd
+    return Trajectory(t, trajectory.q, qd, trajectory.joint_names, qdd)
+
+
+def moved_to(trajectory: Trajectory, start: Array) -> Trajectory:
+    """Return the same motion from another start (n,); where it is off the path, it is put there."""
+    q = trajectory.q + (start - trajectory.q[0])
+    return Trajectory(trajectory.t, q, trajectory.qd, trajectory.joint_names, trajectory.qdd)
+
+
+def coefficients_of(
+    trajectory: Trajectory, pace: float, problem: Problem, t: Array, table: NullMotionTable
+) -> Array:
+    """Return the coefficients x whose null motion is nearest to that of another motion, (size,).
+
+    By least squares over the times. Of a null motion only Nᵀε acts, with N (n, r) a basis of the
+    null space of the task: it is fitted to Nᵀq̇, with N and q̇ those of the other motion at the same
+    share of its path.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+    pace : float
+        The duration of its path over that of the problem's.
+    problem : Problem
+    t : (S,)
+        Times on its path [s].
+    table : NullMotionTable
+        Its null motion at these times.
+    """
+    # A plan of a part of its path ends earlier.
+    theirs = np.minimum(t * pace, trajectory.t[-1])
+    q, qd = trajectory(theirs), pace * trajectory(theirs, 1)
+    null = np.swapaxes(null_space(problem.follows.jacobians(q)), 1, 2)
+    acting = null @ table.matrix()
+    wanted = np.einsum("srn,sn->sr", null, qd)
+    if not wanted.size:
+        return np.zeros(table.size)
+    return np.asarray(np.linalg.lstsq(acting.reshape(-1, table.size), wanted.ravel())[0])
+
+
+class Candidate:
+    """A start, its minimum-norm motion, and the best motion that was found near that.
+
+    What is found is replaced as a whole, so that an interruption finds what belongs together.
+
+    Parameters
+    ----------
+    problem : Problem
+    effort : Effort
+    start : (n,)
+    free : bool
+        Whether the start may move along its self-motion.
+    guide : Guide, optional
+        The null motion that stands for x = 0 in eq. 4: where the search found one worth starting
+        from.
+    grid : Grid, optional
+        To begin with; it is refined until the motion stays near the path.
+
+    Attributes
+    ----------
+    constraints : tuple of BoundConstraint
+        Those that count, bound to the ends.
+    still : PublishedSolution
+        The minimum-norm motion: eq. 4 at x = 0.
+    history : list of Iteration
+    is_hopeless : bool
+        Whether it ended because another motion is known that costs less.
+
+    Raises
+    ------
+    BreakdownError
+        The minimum-norm motion runs into a singular pose.
+    ProblemError
+        A constraint asks for an equality elsewhere than at the ends.
+    """
+
+    def __init__(
+        self,
+        problem: Problem,
+        effort: Effort,
+        start: Array,
+        *,
+        free: bool,
+        guide: Guide | None = None,
+        grid: Grid | None = None,
+    ) -> None:
+        begun, jacobians = _begun(problem, start, guide, grid)
+        effort.counts.jacobians += jacobians
+        self.problem, self.effort, self.free = problem, effort, free
+        self.constraints = problem.bind_constraints(
+            start, begun.end, apart=effort.apart, in_pieces=effort.in_pieces
+        )
+        _require_known(self.constraints)
+        self._ends = begun.start, begun.end
+        problem = begun.problem
+        # Beyond so many steps a grid is not refined any more.
+        self.most_steps = int(begun.grid.steps * 2**MOST_HALVINGS)
+        if isinstance(problem.null_motion, FreeNullMotion) and is_published(problem, effort):
+            problem = problem.changed(null_motion=PolynomialNullMotion())
+        ends = tuple(item for item in self.constraints if item.equality)
+        own = QuasiNewton() if effort.optimizer is None else effort.optimizer
+        counts = effort.counts
+        objective = Objective.of(
+            problem, begun, free=free, ends=ends, counts=counts, rollout=begun.rollout
+        )
+        method = Method(problem, begun, free, ends, own, counts, None, None)
+        # Without self-motion it is the only one; else nothing better was found.
+        ended = Status.INFEASIBLE if problem.follows.redundancy > 0 else Status.CONVERGED
+        self.still = PublishedSolution(
+            method, objective, np.zeros(objective.size), None, ended, (), self.constraints
+        )
+        self.history: list[Iteration] = []
+        self.is_hopeless = False
+        self._found: Solution | None = None
+        self._ended: Status | None = None
+        self._warm: Plan | None = None
+        self._known: Trajectory | None = None
+
+    @property
+    def solution(self) -> Solution:
+        """The best motion so far."""
+        return self._found or self.still
+
+    @property
+    def status(self) -> Status:
+        """How the last minimisation ended, or what ended all of them."""
+        return self.solution.status if self._ended is None else self._ended
+
+    @property
+    def cut_short(self) -> bool:
+        """Whether the user wants no more."""
+        return self.status.is_cut_short
+
+    @property
+    def is_spent(self) -> bool:
+        """Whether nothing more is to be evaluated."""
+        return self.cut_short or self.status is Status.MAX_EVALUATIONS
+
+    @property
+    def violations(self) -> tuple[str, ...]:
+        """What is wrong, for each constraint that the best motion violates."""
+        return self.solution.violations
+
+    @property
+    def breaks_at(self) -> float | None:
+        """When [s] the best motion violates constraints most; None where it does not."""
+        return self._found.breaks_at if isinstance(self._found, NodeSolution) else None
+
+    @property
+    def will_do(self) -> bool:
+        """Whether the best motion keeps all constraints, and keeps the arm off itself."""
+        return not self.violations and self.solution.keeps_off_itself
+
+    @property
+    def is_of_chain(self) -> bool:
+        """Whether the best motion is a chain of the search, at its optimum."""
+        return isinstance(self._found, NodeSolution) and self._found.is_chain
+
+    def end(self, status: Status) -> None:
+        """Take the motion as it is; there is no time for another one."""
+        self._ended = status
+
+    def evaluation(self) -> Evaluation:
+        """Return the motion as it is now."""
+        return self.solution.evaluation()
+
+    def still_evaluation(self) -> Evaluation:
+        """Return the minimum-norm motion, on the grid of the best one where that has one."""
+        found = self._found
+        known = found if isinstance(found, PublishedSolution) else self.still
+        return known.still_evaluation()
+
+    def score(self) -> tuple[bool, bool, float]:
+        """Return what ranks it among others: the smaller, the better; see `score`."""
+        return score(self.solution)
+
+    def take(self, found: NodeSolution, history: Sequence[Iteration] = ()) -> None:
+        """Let what was found elsewhere be the best motion, with the way to it."""
+        self._found = found
+        self.history += history
+
+    def adopt(self, plan: Plan) -> None:
+        """Begin at a plan's motion instead of x = 0, unless that would be worse."""
+        self._warm = plan
+
+    def resume(self, trajectory: Trajectory) -> None:
+        """Begin at a motion that is known."""
+        self._known = trajectory
+
+    def polish(self, cost_to_beat: float = np.inf) -> None:
+        """Optimise from the motion that there is.
+
+        Where a motion is known that costs `cost_to_beat`, it ends as soon as it is clear that this
+        one will cost more.
+        """
+        if self._ended is not None or self.is_of_chain:
+            return
+        if not np.isfinite(self.still.cost):
+            self.still.objective.require_finite(self.still.x)
+        if is_published(self.problem, self.effort):
+            self._polish_as_published()
+        elif is_on_nodes(self.problem, self.effort):
+            self._polish_on_nodes(cost_to_beat)
+
+    def settle(self) -> None:
+        """Go on until more nodes save nothing; the published method has done so on its grids."""
+        found = self._found
+        if self._ended is None and isinstance(found, NodeSolution) and not found.is_chain:
+            self._by_nodes(lambda polisher: polisher.settled(found))
+
+    def as_begun(self) -> "Candidate":
+        """Return it as it was before anything was found: the minimum-norm motion."""
+        begun = copy(self)
+        begun._found = None
+        return begun
+
+    def as_adopted(self) -> "Candidate | None":
+        """Return it with the motion of the plan that it began with; None where there is none."""
+        if self._warm is None or not is_on_nodes(self.problem, self.effort):
+            return None
+        motions, t = self._first_motions()
+        if len(motions) < 2:
+            return None
+        polisher = Polisher(self.problem, self.effort, self.constraints, free=self.free)
+        motion = polisher.grid(t).near(*(motions[0](t, order) for order in range(3)))
+        if motion is None:
+            return None
+        known = copy(self)
+        # Nothing better was found.
+        known._found = replace(NodeSolution.on_the_way(motion), status=Status.PRECISION)
+        return known
+
+    def refine(self, where: Flags | None = None) -> None:
+        """Go on with half the step length, everywhere or for some of the steps (N,)."""
+        if self._found is None:
+            self.still = self.still.refined(where)
+        else:
+            self._found = self._found.refined(where)
+
+    def keep_off_itself(self) -> bool:
+        """Ask that of an optimum that takes the arm into itself; return whether there is a new one.
+
+        Few do, so that the others need not wait for distances.
+        """
+        found = self._found
+        if not isinstance(found, NodeSolution) or found.violations:
+            return False
+        # Of a given start in which it meets itself, nothing else begins.
+        can = self.free or self.problem.keeps_off_itself(found.motion.place.q[:1])
+        if self._ended is not None or self.effort.apart or found.is_chain or not can:
+            return False
+        self.effort = replace(self.effort, apart=True)
+        self.constraints = self.problem.bind_constraints(
+            *self._ends, in_pieces=self.effort.in_pieces
+        )
+        self.still = replace(self.still, constraints=self.constraints)
+
+        def optimum(polisher: Polisher) -> NodeSolution | None:
+            first = self._known or self.still.evaluation().trajectory
+            return polisher.with_more(found) or polisher.near([first], found.motion.grid.t)
+
+        self._by_nodes(optimum)
+        return self._found is not found
+
+    def _polish_as_published(self) -> None:
+        """Go to the optimum of the published method."""
+        effort, before = self.effort, self._found
+        if isinstance(before, PublishedSolution):
+            found = before.again()
+        else:
+            begun, most = self.still, effort.max_evaluations
+            limit = None if most is None else effort.counts.evaluations + most
+            method = replace(begun.method, limit=limit, callback=effort.callback)
+            found = replace(begun, method=method, x=self._first_coefficients()).settled()
+        self._found = found
+        self.history = list(found.history)
+        if found.status is Status.INTERRUPTED:
+            self.end(Status.INTERRUPTED)
+
+    def _first_coefficients(self) -> Array:
+        """Return the decision vector that is nearest to a known plan, if no worse than x = 0."""
+        plan, problem = self._warm, self.problem
+        objective, none = self.still.objective, self.still.x
+        if plan is None:
+            return none
+        t, pace = objective.grid.stage_times, pace_of(plan, problem)
+        near = coefficients_of(plan.trajectory, pace, problem, t, objective.null_motion)
+        z, _ = objective.parts(none)
+        x = np.concatenate([z, near])
+        return x if objective.value(x) <= self.still.cost else none
+
+    def _polish_on_nodes(self, cost_to_beat: float) -> None:
+        """Go to the optimum on nodes near the motion."""
+        before = self._found
+
+        def optimum(polisher: Polisher) -> NodeSolution | None:
+            if isinstance(before, NodeSolution):
+                return polisher.again(before)
+            motions, t = self._first_motions()
+            return polisher.near(motions, t, cost_to_beat)
+
+        self._by_nodes(optimum)
+        found = self._found
+        # One that costs more already is none to take either way.
+        if found is not None and found.cost < cost_to_beat and not found.keeps_off_itself:
+            self.keep_off_itself()
+        if self.status is Status.GRADIENT:
+            # A gradient that is not finite is named with its time.
+            self.still.objective.gradient(self.still.x)
+
+    def _first_motions(self) -> tuple[list[Trajectory], Array]:
+        """Return motions to begin near, and the times of the first nodes (N + 1,)."""
+        problem, warm, t = self.problem, self._warm, first_nodes(self.problem)
+        motions = [self._known or self.still.evaluation().trajectory]
+        if warm is not None and warm.trajectory.t[-1] == warm.path.duration:
+            own = slower(warm.trajectory, pace_of(warm, problem))
+            if not self.free:
+                own = moved_to(own, self._ends[0])
+            motions = [own, *motions]
+            if len(own.t) <= most_nodes(problem):
+                # Its nodes are where such a motion needs them.
+                t = np.unique(np.append(own.t, problem.knots))
+        return motions, t
+
+    def _by_nodes(self, search: Callable[[Polisher], NodeSolution | None]) -> None:
+        """Let what is found on nodes be the best motion, if something is."""
+        polisher = Polisher(self.problem, self.effort, self.constraints, free=self.free)
+        try:
+            found = search(polisher)
+        except KeyboardInterrupt:
+            if polisher.latest is None and self._found is None:
+                raise
+            found = polisher.latest
+            self._ended = Status.INTERRUPTED
+        if polisher.is_stopped:
+            # A motion that was better before it is left as it was, and does not say so.
+            self._ended = Status.STOPPED
+            if found is not None and found.violations:
+                found = polisher.latest or found
+        self.history += polisher.history
+        self.is_hopeless = polisher.is_hopeless
+        self._found = found or self._found
+
+
+def _begun(
+    problem: Problem, start: Array, guide: Guide | None, grid: Grid | None
+) -> tuple[StillMotion, int]:
+    """Return the motion at x = 0, see `settled_still_motion`.
+
+    It keeps out of tolerances in windows, so that it is one that may be followed. Where the path
+    cannot be followed like that, it makes use of them, at any time: to begin with, that will do.
+    """
+    shut = problem.with_windows_shut
+    try:
+        return settled_still_motion(shut, start, guide, grid)
+    except BreakdownError:
+        if shut is problem:
+            raise
+        return settled_still_motion(problem, start, guide, grid)
+
+
+def _require_known(constraints: Sequence[BoundConstraint]) -> None:
+    """Raise ProblemError for equalities that are none on the ends."""
+    for item in constraints:
+        if item.equality and not isinstance(item, BoundEnd):
+            raise ProblemError(
+                f"constraint '{item.name}': it is an equality, expected h ≤ 0 at all nodes; "
+                f"equalities are asked of the ends alone (ClosedPath, EndConfiguration, …), and "
+                f"others are two-sided bands"
+            )

@@ -1,0 +1,135 @@
+"""What is asked of a plan besides its problem, which all its optimisations share."""
+
+import time
+from dataclasses import dataclass
+
+import numpy as np
+
+from selfmotion.basics import (
+    Counts,
+    Progress,
+    as_called,
+    as_choice,
+    as_whole,
+    obey_interruption,
+    random_numbers,
+)
+from selfmotion.planning.optimise import Callback, Optimizer
+
+_MODES = ("auto", "local", "global")
+
+
+@dataclass(frozen=True)
+class Search:
+    """Where motions begin, when the start is free.
+
+    Parameters
+    ----------
+    starts : int
+        So many at most: for redundancy 1 along all self-motions of the first pose, else what
+        Newton's method finds from twice as many seeds.
+    finalists : int
+        How many starts are optimised to the end, at most: those with the best rough optima on few
+        nodes. With as many as `starts`, starts are not screened.
+    mode : {"auto", "local", "global"}
+        Optimise from many starts (local), or from the best sequences over all self-motions: sampled
+        evenly where the redundancy is 1, at random where it is more.
+        ``"auto"``: from many starts first, and from
+        sequences where none of them leads to a motion that keeps the constraints.
+    compare : bool
+        Search globally whatever the other search finds, also where the start is given, so that
+        `Report.gap` tells how far the plan is from the best motion of all. Needs redundancy 1.
+    rng : Generator or int
+        Shifts the seeds; the same one gives the same plan.
+
+    Raises
+    ------
+    ProblemError
+        A number is below 1, or the mode unknown.
+    """
+
+    starts: int = 48
+    finalists: int = 3
+    mode: str = "auto"
+    compare: bool = False
+    rng: np.random.Generator | int = 0
+
+    def __post_init__(self) -> None:
+        for name in ("starts", "finalists"):
+            as_whole(getattr(self, name), f"search: {name}", 1, 10**6)
+        as_choice(self.mode, "search: mode", _MODES)
+        random_numbers(self.rng)
+
+
+@dataclass
+class Deadline(Counts):
+    """Counts of work that look at the clock: when it is over, the best so far has to do.
+
+    It interrupts once, at an evaluation of the cost or between two stages: what is left to do then,
+    such as judging the motion, is done.
+
+    Attributes
+    ----------
+    end : float
+        By the clock `time.perf_counter` [s]; inf for none.
+    passed : bool
+        Whether it has interrupted.
+    """
+
+    end: float = float("inf")
+    passed: bool = False
+
+    @classmethod
+    def after(cls, seconds: float | None) -> "Deadline":
+        """Return the one so many seconds from now; None for none."""
+        return cls() if seconds is None else cls(end=time.perf_counter() + seconds)
+
+    def evaluated(self) -> None:
+        """See `Counts.evaluated`; KeyboardInterrupt where the deadline has passed."""
+        super().evaluated()
+        self.check()
+
+    def check(self) -> None:
+        """Raise KeyboardInterrupt, once, if it is over; also where Ctrl-C was pressed."""
+        obey_interruption()
+        if not self.passed and time.perf_counter() >= self.end:
+            self.passed = True
+            raise KeyboardInterrupt
+
+    def checked_by(self, progress: Progress) -> Progress:
+        """Return a progress that looks at the clock as well; ProblemError for no function."""
+        as_called(progress, "progress")
+
+        def told(stage: str, done: int, total: int) -> None:
+            progress(stage, done, total)
+            self.check()
+
+        return told
+
+
+@dataclass(frozen=True)
+class Effort:
+    """What all candidates of a plan share.
+
+    Attributes
+    ----------
+    optimizer : Optimizer or None
+        Of the published method, where one is asked for.
+    callback : callable or None
+        Called with each `Iteration`.
+    max_evaluations : int or None
+        Limit on evaluations of each candidate.
+    counts : Counts
+        Where work is added up.
+    apart : bool
+        Whether the optimisation keeps the arm apart from itself where only the default asks for it.
+    in_pieces : bool
+        Whether it knows links by convex pieces before obstacles, not by their hulls.
+    """
+
+    optimizer: Optimizer | None
+    callback: Callback | None
+    max_evaluations: int | None
+    counts: Counts
+    apart: bool = False
+    in_pieces: bool = False

@@ -1,0 +1,412 @@
+"""The fastest motion along a path: pace and null motion, each in its turn."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from selfmotion.basics import (
+    Array,
+    PathError,
+    PlanError,
+    ProblemError,
+    Progress,
+    as_number,
+    held_interruption,
+    shown,
+    silent,
+)
+from selfmotion.certificate import Tolerance
+from selfmotion.model.motion import Grid
+from selfmotion.model.path import Pace, Path, Retimed, times_when
+from selfmotion.planning.optimise import Status
+from selfmotion.planning.planner.effort import Deadline, Search
+from selfmotion.planning.planner.run import plan, told_of
+from selfmotion.planning.result import Plan, check_no_feed, rate_limits, retime
+from selfmotion.problem.constraints import Constraint, JointVelocityLimits
+from selfmotion.problem.costs import Cost, LimitUse, Samples, Scaled
+from selfmotion.problem.problem import Problem, check_problem
+
+# After so many seconds the best so far has to do.
+_FASTEST_DEADLINE = 60.0
+# Rounds end when one gains less than this share, or after so many.
+_ROUND_GAIN = 2e-3
+ROUNDS = 8
+# Costs that are to be kept and are not count as so many times the motion's time, then more.
+_KEPT_WEIGHT, _KEPT_GROWTH = 0.05, 4.0
+# The power of the cost: the larger, the nearer to the largest share, and the harder to minimise.
+_POWER = 16.0
+# Intervals of the pace at which a round plans, and its degree.
+_COARSE = 32
+_DEGREE = 5
+
+
+# Steps at which costs are measured, at least.
+_STEPS = 300
+
+
+@dataclass(frozen=True, eq=False)
+class _KeptCosts:
+    """Costs of a problem, and by which factor a motion may cost more than the best by all costs.
+
+    What a motion costs depends on its pace, and all faster ones cost more by their joint speeds. So
+    joint paths are compared: each costs what it does at the time law of the problem's own path.
+
+    Attributes
+    ----------
+    problem : Problem
+    costs : tuple of Cost
+        Those of the problem's that are kept.
+    factors : tuple of float
+        How many times as much they may be, at least 1; of what is negative, by how many times its
+        size less 1 it may rise.
+    """
+
+    problem: Problem
+    costs: tuple[Cost, ...]
+    factors: tuple[float, ...]
+
+    @classmethod
+    def of(cls, problem: Problem, keep: Mapping[str, float]) -> _KeptCosts:
+        """Return those of kinds or names, ProblemError where the problem has no such cost."""
+        if not isinstance(keep, Mapping):
+            raise ProblemError(f"keep is {shown(keep)}, expected a factor for each kind of cost")
+        costs, factors = [], []
+        for key, factor in keep.items():
+            found = [item for item in problem.costs if key in (item.kind, item.name)]
+            if not found:
+                known = ", ".join(dict.fromkeys(item.kind for item in problem.costs))
+                raise ProblemError(f"keep: the problem has no cost {shown(key)}, but {known}")
+            number = as_number(factor, f"keep: {key}", least=1.0)
+            costs += found
+            factors += [number] * len(found)
+        return cls(problem, tuple(costs), tuple(factors))
+
+    def values(self, plan: Plan) -> Array:
+        """Return what the joint path of a plan costs at the time law of the problem's path, (K,).
+
+        Parameters
+        ----------
+        plan : Plan
+            Along the problem's path, or along a `Retimed` one of it.
+        """
+        motion, grid = plan.trajectory, Grid.aligned(self.problem.path.knots, _STEPS)
+        paces = _paces(plan.path)
+        t = grid.nodes
+        for pace in paces[len(_paces(self.problem.path)) :]:
+            t = times_when(pace, t, np.zeros(len(t)), np.full(len(t), pace.t[-1]))
+        passed = motion(motion.t[0] + np.minimum(t, motion.duration))
+        q, qd = _by(grid.nodes, passed, grid.stage_times)
+        samples = Samples.along(self.problem.follows, grid.sampling, q, qd)
+        return np.array([samples.weights @ cost.value(samples) for cost in self.costs])
+
+    def bounds(self, best: Array) -> Array:
+        """Return what costs may be, (K,), where the motion that is best by them costs `best`."""
+        return np.asarray(best + (np.array(self.factors) - 1.0) * np.abs(best))
+
+    def weighted(self, costs: Array, weight: float) -> tuple[Cost, ...]:
+        """Return the costs so that each counts about as a weight [s], of what they are."""
+        sizes = np.maximum(np.abs(costs), 1e-12)
+        each = zip(self.costs, sizes.tolist(), strict=True)
+        return tuple(Scaled(cost, weight / size) for cost, size in each)
+
+
+def _paces(path: Path) -> list[Pace]:
+    """Return the paces of a path that is retimed, maybe again and again, the first one first."""
+    return [*_paces(path.original), path.pace] if isinstance(path, Retimed) else []
+
+
+def _by(nodes: Array, q: Array, t: Array) -> tuple[Array, Array]:
+    """Return a motion through q (N, n) at nodes (N,), and its velocities, at times t (S,)."""
+    from scipy.interpolate import CubicSpline
+
+    spline = CubicSpline(nodes, q)
+    return np.asarray(spline(t)), np.asarray(spline(t, 1))
+
+
+# What brings a path to another pace.
+_Repaced = Callable[[Path], Path]
+
+
+@dataclass(frozen=True, eq=False)
+class Fastest:
+    """The fastest motion found, and what it began with.
+
+    Attributes
+    ----------
+    plan : Plan
+        The motion, from rest to rest.
+    pseudo_inverse : float
+        Time of the minimum-norm motion at its fastest [s]; inf if that violates other limits at any
+        pace, or if there was no time to find out.
+    retimed : float
+        Likewise of the motion that is best by the problem's own costs.
+    times : tuple of float
+        Of the best motion after each round [s].
+    status : Status
+        `DEADLINE` or `INTERRUPTED` where more rounds might have gained more.
+    """
+
+    plan: Plan
+    pseudo_inverse: float
+    retimed: float
+    times: tuple[float, ...]
+    status: Status = Status.CONVERGED
+
+    @property
+    def duration(self) -> float:
+        """Time of the motion [s]."""
+        return self.plan.path.duration
+
+
+def fastest(
+    problem: Problem,
+    acceleration: npt.ArrayLike | None = None,
+    velocity: npt.ArrayLike | None = None,
+    *,
+    keep: Mapping[str, float] | None = None,
+    search: Search | None = None,
+    tolerance: Tolerance | None = None,
+    deadline: float | None = _FASTEST_DEADLINE,
+    progress: Progress = silent,
+) -> Fastest:
+    """Return the fastest motion along the problem's path, whatever its own pace and costs.
+
+    It begins with the motion that is best by the problem's costs and with the minimum-norm motion,
+    each at its fastest pace (`retime`). Then in turn the null motion minimises what is used of the
+    limits at the pace found so far (`LimitUse`), and the pace is the fastest for that joint path;
+    rounds go on while they gain. The best motion is returned: never slower than the first two.
+
+    Parameters
+    ----------
+    problem : Problem
+        Its constraints are kept; its costs decide only what is begun with.
+    acceleration : (n,) or float, optional
+        Limits [rad/s² or m/s²]; by default those of the arm's maker.
+    velocity : (n,) or float, optional
+        Limits [rad/s or m/s]; by default those that the problem asks for, or the URDF's.
+    keep : mapping of str to float, optional
+        How many times as much a cost of the problem, by its kind or name, may be as that of the
+        motion which is best by all costs: ``{"JointVelocity": 1.1}``. What is compared is the cost
+        of the joint path at the time law of the problem's own path, since any motion costs more in
+        less time.
+    search : Search, optional
+        See `plan`.
+    tolerance : Tolerance, optional
+        See `plan`.
+    deadline : float, optional
+        After so many seconds the best so far has to do; None looks as long as rounds gain. Nothing
+        is begun that would take longer, by what the same took before; the first motion is judged
+        whatever the time. Ctrl-C keeps the best so far as well.
+    progress : callable, optional
+        Called with ``("fastest", round, rounds)``, and with the stages of `plan` in between. It may
+        raise `KeyboardInterrupt` to stop.
+
+    Raises
+    ------
+    ProblemError
+        No limits of acceleration are given or known; the problem has no such cost to keep, or its
+        path has a feed.
+    PlanError
+        No motion that was found keeps all limits at any pace, or none was found in time; says the
+        last verdict.
+    KeyboardInterrupt
+        The interruption came before there was a motion.
+    """
+    check_problem(problem)
+    check_no_feed(problem)
+    kept = _KeptCosts.of(problem, {} if keep is None else keep)
+    limits = rate_limits(problem, acceleration, velocity)
+    seconds = None if deadline is None else as_number(deadline, "deadline", above=0.0)
+    clock = Deadline.after(seconds)
+    rounds = _Rounds(problem, limits, kept, search, tolerance, clock, progress)
+    status = Status.CONVERGED
+    try:
+        with held_interruption():
+            rounds.run()
+    except KeyboardInterrupt:
+        # A plan in between may have seen first that it is late.
+        late = time.perf_counter() >= clock.end - rounds.longest
+        status = Status.DEADLINE if late else Status.INTERRUPTED
+        if rounds.best is None and not late:
+            raise
+    if rounds.best is None:
+        when = f" in {deadline} s" if status is Status.DEADLINE else ""
+        raise PlanError(f"no motion keeps all limits at any pace{when}: {rounds.verdict}")
+    found = rounds.retimed
+    best = told_of(rounds.best, status) if status.is_cut_short else rounds.best
+    return Fastest(best, found["x = 0"], found["costs"], tuple(rounds.times), status)
+
+
+class _Rounds:
+    """The best so far, and what it is looked for with.
+
+    Parameters
+    ----------
+    problem : Problem
+    limits : (n,), (n,)
+        Of velocity and acceleration.
+    kept : _KeptCosts
+    search : Search or None
+    tolerance : Tolerance or None
+    clock : Deadline
+    progress : Progress
+    """
+
+    def __init__(
+        self,
+        problem: Problem,
+        limits: tuple[Array, Array],
+        kept: _KeptCosts,
+        search: Search | None,
+        tolerance: Tolerance | None,
+        clock: Deadline,
+        progress: Progress,
+    ) -> None:
+        self._problem, (self._v, self._a) = problem, limits
+        self._search, self._tolerance, self._clock = search, tolerance, clock
+        self._progress = clock.checked_by(progress)
+        self._kept, self._bounds = kept, np.full(len(kept.costs), np.inf)
+        geometric = (item for item in problem.constraints if not item.of_pace)
+        # At the pace that it comes to have, limits of speed are kept; at this one nothing is.
+        any_speed = JointVelocityLimits(np.inf, replace=True)
+        self._free = replace(problem, constraints=(*geometric, any_speed))
+        self.best: Plan | None = None
+        self.verdict = "nothing was planned yet"
+        self.times: list[float] = []
+        self.retimed = {"x = 0": np.inf, "costs": np.inf}
+        # What the pace of a motion took at most [s].
+        self.longest = 0.0
+
+    def run(self) -> None:
+        """Go on while rounds gain; KeyboardInterrupt where they were stopped."""
+        planned = self._plan(self._free)
+        if planned.report.ending or not planned.certificate.on_path:
+            # At no pace can it be followed to its end: what else is wrong says nothing.
+            self.verdict = planned.report.ending or planned.certificate.verdict
+            return
+        costs = self._kept.values(planned)
+        self._bounds = self._kept.bounds(costs)
+        found = self._taken("costs", planned)
+        still = replace(planned, trajectory=planned.initial_trajectory)
+        still = replace(still, certificate=still.check())
+        if still.certificate.on_path:
+            self._left(self.longest)
+            self._taken("x = 0", still)
+        if planned.report.status.is_cut_short:
+            raise KeyboardInterrupt
+        use, weight = LimitUse(self._v, self._a, _POWER), 0.0
+        pace: _Repaced = _own
+        for number in range(ROUNDS):
+            self._progress("fastest", number, ROUNDS)
+            before = self._duration
+            weighted = self._kept.weighted(costs, weight * self._duration) if weight else ()
+            asked = replace(self._free, costs=(use, *weighted))
+            try:
+                paced = _at_pace(asked, pace)
+            except PathError:
+                # No pace as smooth as the path is near the one found: that one stands.
+                return
+            planned = self._plan(paced, self.longest)
+            self.verdict = planned.certificate.verdict
+            if planned.certificate.on_path and not planned.report.ending:
+                found = self._taken("rounds", planned)
+            if planned.report.status.is_cut_short:
+                raise KeyboardInterrupt
+            self.times.append(self._duration)
+            kept = self._keeps(planned)
+            if number and kept and self._duration > (1.0 - _ROUND_GAIN) * before:
+                return
+            # Costs that are passed count more in the next round.
+            weight = weight if kept else max(_KEPT_WEIGHT, _KEPT_GROWTH * weight)
+            pace = _stand_in(self._problem.path, planned.path, found.path)
+
+    def _left(self, kept: float = 0.0) -> float:
+        """Return the time that is left but for what is kept [s]; KeyboardInterrupt for none."""
+        self._clock.check()
+        left = self._clock.end - time.perf_counter() - kept
+        if left <= 0.0:
+            raise KeyboardInterrupt
+        return left
+
+    def _plan(self, problem: Problem, kept: float = 0.0) -> Plan:
+        """Plan, in the time that is left but for what is kept for its pace [s].
+
+        KeyboardInterrupt where something stopped it, or there is none.
+        """
+        left = self._left(kept)
+        try:
+            return plan(
+                problem,
+                search=self._search,
+                tolerance=self._tolerance,
+                deadline=left if np.isfinite(left) else None,
+                progress=self._progress,
+            )
+        except PlanError:
+            self._clock.check()
+            raise
+
+    @property
+    def _duration(self) -> float:
+        return np.inf if self.best is None else self.best.path.duration
+
+    def _keeps(self, planned: Plan) -> bool:
+        """Return whether a motion's joint path costs no more than it may."""
+        return bool(np.all(self._kept.values(planned) <= self._bounds))
+
+    def _taken(self, name: str, planned: Plan) -> Plan:
+        """Return a motion at its fastest: the best so far if none is faster and costs are kept."""
+        began = time.perf_counter()
+        found = _at_its_fastest(planned, self._problem, self._v, self._a)
+        self.longest = max(self.longest, time.perf_counter() - began)
+        self.verdict = found.certificate.verdict
+        if found.certificate.verified:
+            self.retimed[name] = found.path.duration
+            if found.path.duration < self._duration and self._keeps(planned):
+                self.best = found
+        return found
+
+
+def _at_its_fastest(planned: Plan, problem: Problem, v: Array, a: Array) -> Plan:
+    """Return a motion at the fastest pace that keeps all that the problem asks for."""
+    constraints: tuple[Constraint, ...] = tuple(problem.constraints)
+    whole = replace(planned, problem=replace(planned.problem, constraints=constraints))
+    return retime(whole, a, v)
+
+
+def _at_pace(problem: Problem, pace: _Repaced) -> Problem:
+    """Return a problem along a path at another pace, with the windows of its tolerances there."""
+    path = pace(problem.path)
+    when = path.when if isinstance(path, Retimed) else np.asarray
+    return replace(problem, **problem.along(pace, when))
+
+
+def _own(path: Path) -> Path:
+    return path
+
+
+def _stand_in(original: Path, current: Path, found: Path) -> _Repaced:
+    """Return what brings a path to about the pace of `found`, which is a pace of `current`.
+
+    As smooth as the path: its accelerations do not jump from limit to limit.
+    """
+    from scipy.interpolate import make_interp_spline
+
+    if not isinstance(found, Retimed):
+        raise TypeError(f"a retimed motion has a {type(found).__name__}")
+    t = np.linspace(0.0, found.duration, _COARSE + 1)
+    sigma = np.clip(found.pace(t), 0.0, current.duration)
+    if isinstance(current, Retimed) and current is not original:
+        sigma = current.pace(sigma)
+    sigma = np.maximum.accumulate(sigma)
+    sigma[0], sigma[-1] = 0.0, original.duration
+    still: Any = [(1, 0.0), (2, 0.0)]
+    spline = make_interp_spline(t, sigma, _DEGREE, bc_type=(still, still))
+    rate, bend = np.maximum(spline(t, 1), 0.0), spline(t, 2)
+    return lambda path: Retimed(path, t, sigma, rate, bend)

@@ -1,0 +1,308 @@
+"""The largest part of a path that the arm can follow, where it cannot follow all of it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from selfmotion.basics import Array, BreakdownError, RedundancyError
+from selfmotion.model.motion import Evaluation, Grid, Sampling
+from selfmotion.model.path import Section, edges_of
+from selfmotion.planning.optimise import Status
+from selfmotion.planning.paper import Guide, StillMotion
+from selfmotion.planning.planner.candidate import Candidate
+from selfmotion.planning.planner.effort import Effort, Search
+from selfmotion.planning.planner.screening import ROUGH_MOTIONS
+from selfmotion.planning.search import Reach
+from selfmotion.problem.problem import Problem
+
+# Share of the time to the edge of the workspace that is given up, since joint speeds grow without
+# bound towards it.
+_EDGE_MARGIN = 1e-4
+# The end of the part is found to this share of it, and a part below this share of the path, and of
+# the first piece of it, is none.
+_END_AGREEMENT = 4e-3
+_LEAST_PART = 1e-2
+# Ends that are tried, at most.
+_PROBES = 10
+# Motions are followed in so many steps, until they are off the path by this share of its extent.
+_FOLLOWED_STEPS = 128
+# Where the last bit of a part is too rough, parts that end by this share earlier.
+_PART_BACK = 0.02
+_OFF_PATH = 1e-2
+# Constant null motions that stand for x = 0 where that breaks down: joint angles over the path.
+_PUSHES = (0.5, 2.0)
+# Why a part ends where its end is no limit that was broken.
+_ROUGH = "beyond that it is off the path or past limits between its nodes"
+
+
+_Begin = tuple[Array, Guide | None]
+"""A start, and a null motion in place of x = 0."""
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """A motion along the first part of a path, or all of it.
+
+    Attributes
+    ----------
+    problem : Problem
+        That of the part.
+    candidate : Candidate
+        Optimised.
+    ending : str
+        Why it goes no further; "" where the part is the whole.
+    why : str
+        The reasons alone.
+    """
+
+    problem: Problem
+    candidate: Candidate
+    ending: str = ""
+    why: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class _Attempt:
+    """What came of a start on a part: no candidate where it broke down; how far all was kept."""
+
+    begin: _Begin
+    problem: Problem
+    candidate: Candidate | None
+    kept_until: float
+    found: Evaluation | None
+    trouble: str = ""
+
+    @property
+    def arrived(self) -> bool:
+        return self.candidate is not None and not self.candidate.violations
+
+    @property
+    def cost(self) -> float:
+        return np.inf if self.found is None else self.found.cost
+
+    @property
+    def reason(self) -> str:
+        """Why nothing is made of it."""
+        if self.candidate is None:
+            return self.trouble
+        return "; ".join(self.candidate.violations)
+
+    @property
+    def cut_short(self) -> bool:
+        """Whether the user ended the optimisation."""
+        return self.candidate is not None and self.candidate.cut_short
+
+
+def largest_part(problem: Problem, reach: Reach, effort: Effort) -> Part | None:
+    """Return an optimised motion along the largest part [0, t] of the path that can be found.
+
+    Motions up to where single poses are in reach, by the same optimiser as any; where none
+    arrives, the end of the part is bisected. Conditions on the end of the motion do not apply to a
+    part.
+
+    Parameters
+    ----------
+    problem : Problem
+        Of the whole path.
+    reach : Reach
+        How far single poses are in reach.
+    effort : Effort
+        What candidates share.
+
+    Returns
+    -------
+    Part or None
+        None where nothing worth the name is left.
+    """
+    try:
+        return _largest_part(problem, reach, effort)
+    except RedundancyError:
+        # Before a tolerance's window, a part may have no self-motion.
+        return None
+
+
+def _largest_part(problem: Problem, reach: Reach, effort: Effort) -> Part | None:
+    goal = reach.time * (1.0 - _EDGE_MARGIN) if reach.reason else reach.time
+    if goal < _least(problem):
+        return None
+    first = _until(problem, goal)
+    attempts = []
+    given = problem.given_start is not None
+    few = reach.starts if given else reach.starts[:: -(-len(reach.starts) // ROUGH_MOTIONS)]
+    few = [_start_of(first, problem, q) for q in few]
+    starts = _apart(first, few) if effort.apart else few
+    for begin in _beginnings(first, starts)[: Search().finalists if given else 1]:
+        attempts.append(_attempt(first, begin, effort))
+        if attempts[-1].cut_short:
+            return _part(problem, attempts[-1], reach, "")
+    arrived = [attempt for attempt in attempts if attempt.arrived]
+    if arrived:
+        return _part(problem, min(arrived, key=lambda attempt: attempt.cost), reach, "")
+    furthest = max(attempts, key=lambda attempt: attempt.kept_until)
+    return _bisect(problem, furthest, reach, effort)
+
+
+def _least(problem: Problem) -> float:
+    """Return how long the part of a path has to last to be one [s]."""
+    first = float(edges_of(problem.path.knots)[1])
+    return _LEAST_PART * min(first, problem.path.duration)
+
+
+def _bisect(problem: Problem, failed: _Attempt, reach: Reach, effort: Effort) -> Part | None:
+    """Return the motion of a start on the largest part on which it arrives."""
+    arrived: _Attempt | None = None
+    low, high = 0.0, failed.problem.path.duration
+    back = _END_AGREEMENT
+    for _ in range(_PROBES):
+        if arrived is None:
+            # What was kept until then is a good guess; where it is not, further and further back.
+            probe = max(min(failed.kept_until, high * (1.0 - back)), 0.5 * high)
+            back *= 2.0
+        else:
+            probe = 0.5 * (low + high)
+        if probe < _least(problem) or high - low < _END_AGREEMENT * high:
+            break
+        part = _until(problem, probe)
+        attempt = _attempt(part, _begin_of(part, failed), effort)
+        if attempt.arrived or attempt.cut_short:
+            arrived, low = attempt, probe
+        else:
+            failed, high = attempt, probe
+        if attempt.cut_short:
+            break
+    return None if arrived is None else _part(problem, arrived, reach, failed.reason)
+
+
+def _part(problem: Problem, found: _Attempt, reach: Reach, further: str) -> Part:
+    """Return the part, with the reason why nothing goes `further` in words."""
+    if found.candidate is None:
+        raise RuntimeError("a part is made of a motion that was found")
+    reasons = [reach.reason] if reach.reason else []
+    reasons += [f"the next longer motion fails: {further}"] if further else []
+    return _ending_at(problem, found.problem, found.candidate, "; ".join(reasons))
+
+
+def shorter_part(problem: Problem, part: Part, effort: Effort) -> Part | None:
+    """Return a motion on a part that ends a little earlier; None where none is found.
+
+    For one whose last bit is too rough: near a singular pose rates grow between its nodes.
+    """
+    first = _until(problem, part.problem.path.duration * (1.0 - _PART_BACK))
+    start = _start_of(first, part.problem, part.candidate.evaluation().trajectory.q[0])
+    attempt = _attempt(first, (start, None), effort)
+    if attempt.candidate is None or not attempt.arrived:
+        return None
+    return _ending_at(problem, first, attempt.candidate, part.why or _ROUGH)
+
+
+def _ending_at(problem: Problem, part: Problem, candidate: Candidate, why: str) -> Part:
+    end, whole = part.path.duration, problem.path.duration
+    ending = f"the motion ends at t = {end:.6g} s of {whole:.6g} s: {why}"
+    return Part(part, candidate, ending if end < whole else "", why)
+
+
+def _until(problem: Problem, time: float) -> Problem:
+    """Return the problem on [0, time], without conditions on the end."""
+    if time >= problem.path.duration:
+        return problem
+    asked = (item.on_part() for item in problem.constraints)
+    kept = [item for item in asked if item is not None]
+    shorter = problem.along(
+        lambda path: Section(path, 0.0, time, crowding=True), lambda t: np.minimum(t, time)
+    )
+    return problem.changed(**shorter, constraints=kept)
+
+
+def _start_of(part: Problem, problem: Problem, q: Array) -> Array:
+    """Return a start (n,) of a problem as one of its part, which may have fewer joints."""
+    own = q[None, : problem.asked.robot.dof]
+    return np.asarray(part.at(np.zeros(1), own)[0])
+
+
+def _begin_of(part: Problem, failed: _Attempt) -> _Begin:
+    """Return where another part begins as a start of a part, which may have fewer joints."""
+    start, guide = failed.begin
+    if isinstance(guide, _Push):
+        guide = guide.of(part.asked.robot.dof, part.robot.dof)
+    return _start_of(part, failed.problem, start), guide
+
+
+def _attempt(problem: Problem, begin: _Begin, effort: Effort) -> _Attempt:
+    try:
+        start, guide = begin
+        free = problem.given_start is None
+        candidate = Candidate(problem, effort, start, free=free, guide=guide)
+    except BreakdownError as error:
+        reason = f"it runs into a singular pose near t = {error.time:.6g} s"
+        return _Attempt(begin, problem, None, error.time, None, reason)
+    try:
+        candidate.polish()
+    except KeyboardInterrupt:
+        candidate.end(Status.INTERRUPTED)
+    found = candidate.evaluation()
+    motion = found.trajectory
+    # Constraints that cannot be met may throw it far off: x = 0 then tells more.
+    until = max(_kept_until(problem, motion.t, motion.q, motion.qd), -_rank(problem, *begin)[1])
+    return _Attempt(begin, problem, candidate, until, found)
+
+
+def _apart(problem: Problem, starts: list[Array]) -> list[Array]:
+    """Return the starts at which the arm does not meet itself; all where it always does."""
+    return [q for q in starts if problem.keeps_off_itself(q[None])] or starts
+
+
+def _beginnings(problem: Problem, starts: list[Array]) -> list[_Begin]:
+    """Return starts, and null motions in place of x = 0 where that breaks down; the best first."""
+    ranked = sorted(((start, None) for start in starts), key=lambda each: _rank(problem, *each))
+    furthest = ranked[0][0]
+    if -_rank(problem, furthest, None)[0] >= problem.path.duration:
+        return list(ranked)
+    pushed: list[_Begin] = [*ranked, *((furthest, push) for push in _pushes(problem, furthest))]
+    return sorted(pushed, key=lambda each: _rank(problem, *each))
+
+
+class _Push:
+    """A constant rate as the null motion that stands for x = 0."""
+
+    def __init__(self, rate: Array) -> None:
+        self._rate = rate
+
+    def of(self, own: int, dof: int) -> "_Push":
+        """Return that of the arm's own joints, with virtual ones at rest after them, dof in all."""
+        if len(self._rate) == dof:
+            return self
+        return _Push(np.append(self._rate[:own], np.zeros(dof - own)))
+
+    def __call__(self, t: Array) -> Array:
+        """Return the rate at times `t` (S,), (S, n)."""
+        return np.tile(self._rate, (len(t), 1))
+
+
+def _pushes(problem: Problem, start: Array) -> list[Guide]:
+    """Return null motions to either side: x = 0 may keep to a plane that has no way on."""
+    basis = problem.follows.null_basis(start) / problem.path.duration
+    angles = [sign * angle for angle in _PUSHES for sign in (1.0, -1.0)]
+    return [_Push(angle * direction) for direction in basis.T for angle in angles]
+
+
+def _rank(problem: Problem, start: Array, guide: Guide | None) -> tuple[float, float, float]:
+    """Return how far a motion stays on the path and within its limits [-s], and its effort.
+
+    That without self-motion, from a start; the smaller, the better.
+    """
+    path = problem.path
+    grid = Grid.aligned(path.knots, _FOLLOWED_STEPS)
+    still = StillMotion.on(problem.with_windows_shut, start, grid, guide)
+    trouble = still.off_path(_OFF_PATH)
+    far = path.duration if trouble is None else trouble
+    kept = _kept_until(problem, still.grid.nodes, still.q, still.qd)
+    # Beyond the place where it broke down, speeds may be anything.
+    weights = Sampling.trapezoidal(still.grid.nodes).weights
+    effort = float(weights @ np.sum(still.qd**2, axis=1)) if trouble is None else np.inf
+    return -far, -min(kept, far), effort
+
+
+def _kept_until(problem: Problem, t: Array, q: Array, qd: Array) -> float:
+    """Return the first of the times t (N,) at which a joint is beyond its limits, or the last."""
+    kept = problem.envelope.keeps(q, qd)
+    return float(t[-1] if kept.all() else t[int(np.argmin(kept))])

@@ -1,0 +1,465 @@
+"""Proposals that are more than a line: many starts, chains over all self-motions, postures.
+
+The shortest chain is a motion of nodes at once, where length is all that is asked for.
+
+Along paths that are many times as long as the arm, motions keep to a posture. Without self-motion
+an arm drifts from loop to loop, until it is folded or stretched, and rough motions of few steps
+tell nothing of hundreds of loops. A stretch of such a path tells in which posture the rest is best
+followed, too: from a motion whose self-motion goes back to it, Newton's method on nodes takes a
+handful of iterations, however many loops there are.
+"""
+
+import contextlib
+from collections import abc
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from selfmotion.basics import (
+    Array,
+    Flags,
+    InverseKinematicsError,
+    NoSequenceError,
+    SelfmotionError,
+)
+from selfmotion.model.motion import Grid, Sampling
+from selfmotion.model.path import Section
+from selfmotion.planning.nodes import NodeGrid, NodeMotion
+from selfmotion.planning.optimise import Status
+from selfmotion.planning.planner.candidate import Candidate, on_start
+from selfmotion.planning.planner.effort import Effort
+from selfmotion.planning.planner.grids import is_on_nodes, most_nodes, resolves, rough_grid
+from selfmotion.planning.planner.planner import Planner
+from selfmotion.planning.planner.polish import Polisher
+from selfmotion.planning.planner.screening import ONE_VALLEY, Ranking, apart_of, most_promising
+from selfmotion.planning.planner.solutions import NodeSolution
+from selfmotion.planning.search import (
+    LAST_SMOOTHINGS,
+    Sequence,
+    Stacked,
+    asks_length,
+    carried,
+    guides,
+    metrics,
+    shortest_along,
+    start_candidates,
+)
+from selfmotion.problem.constraints import BoundConstraint
+from selfmotion.problem.problem import Problem, asked_of_part
+
+# A path is long where the tool goes more than so many times the arm's reach: x = 0 begins to drift
+# away. Of one that is longer than the second, rough motions from many starts tell nothing any more.
+LONG_WAY, VERY_LONG_WAY = 5.0, 12.0
+# What a stretch of it is long that tells the posture, likewise.
+_STRETCH_WAY = 2.0
+# Nodes to begin with.
+_FIRST_NODES = 64
+# The shortest chain of a sequence becomes a motion of so many times its waypoints, with more where
+# it does not keep the conditions between them, so often.
+_FINER_CHAIN = 3
+_CHAIN_ROUNDS = 4
+# Sequences are not worth refining when dearer by this factor than one that keeps all constraints.
+_DEARER = 1.25
+# The same where that is the chain of a sequence itself, on which optimising gains next to nothing.
+_DEARER_CHAIN = 1.005
+# What a joint at rest takes of a velocity that is lacking, where the fastest takes 1; and where all
+# are as slow as this [rad/s or m/s], none is.
+_LEAST, _STILL = 1e-2, 1e-9
+# Limits are looked at so often between two nodes.
+_LOOKS = 16
+
+
+def optimise_starts(planner: Planner, count: int, finalists: int) -> None:
+    """Draw so many starts, and optimise from the best of them; from all where they are few.
+
+    Raises
+    ------
+    InverseKinematicsError
+        None reaches the start of the path.
+    """
+    starts = _starts(planner, count)
+    if len(starts) > finalists and is_on_nodes(planner.problem, planner.effort):
+        ranking = planner.ranking = Ranking(planner.problem, planner.effort, planner.progress)
+        if ranking.run(starts, finalists):
+            ranked = ranking.ranked
+            _optimise_each(planner, _resumed(planner, ranked), len(ranked))
+            if planner.is_unmet and planner.best is not None and not planner.is_over:
+                before = [motion.trajectory for motion in ranked]
+                before.append(planner.best.evaluation().trajectory)
+                aside = ranking.left_aside(before, finalists)
+                _optimise_each(planner, _resumed(planner, aside), len(aside))
+            return
+    elif len(starts) > finalists:
+        starts = _best(planner.problem, starts)[:finalists]
+    begun = (planner.begin(start, free=True) for start in starts)
+    known = (candidate for candidate in begun if candidate is not None)
+    candidates = sorted(known, key=lambda candidate: candidate.solution.merit())
+    _optimise_each(planner, candidates, len(candidates))
+
+
+def optimise_where_it_breaks(
+    planner: Planner, breaks_at: float, count: int, finalists: int
+) -> None:
+    """Draw so many configurations where the best motion breaks most, a time [s], and optimise.
+
+    There the fewest configurations keep all, as a rule: motions that begin with one of these, and
+    are carried to both ends of the path from there, need not find it.
+    """
+    problem, t = planner.problem, rough_grid(planner.problem).nodes
+    at = int(np.argmin(np.abs(t - breaks_at)))
+    try:
+        starts = _drawn(problem, planner, count, float(t[at]))
+    except InverseKinematicsError:
+        return
+    ranking = planner.ranking = Ranking(problem, planner.effort, planner.progress)
+    if ranking.run(starts, finalists, at):
+        ranked = ranking.ranked
+        _optimise_each(planner, _resumed(planner, ranked), len(ranked))
+
+
+def may_stack(planner: Planner) -> bool:
+    """Whether a quantity of q is violated, or a motion may be shared in several ways."""
+    problem, best = planner.problem, planner.best
+    names = [item.name for item in problem.envelope.quantities]
+    broken = (
+        names
+        if best is None
+        else [
+            name for name in names if any(text.startswith(f"{name}: ") for text in best.violations)
+        ]
+    )
+    return bool(broken) or len(metrics(problem.robot)) > 1
+
+
+def optimise_stacked(planner: Planner, finalists: int) -> bool:
+    """Optimise from motions that keep limits and quantities as rows of their task.
+
+    In several metrics, each part of a cell heavy in turn; from both ends of the path, and from
+    where the best motion breaks something. Return whether there was any.
+    """
+    problem = planner.problem
+    # Between two nodes of a rough motion a part of a cell may turn by half a radian.
+    t = rough_grid(problem).halved().halved().nodes
+    motions = [*_stacked(planner, t)]
+    found = np.concatenate(motions) if motions else np.zeros((0, 0, 0))
+    if len(found):
+        ranking = planner.ranking = Ranking(problem, planner.effort, planner.progress)
+        ranking.run_along(found, t, finalists)
+        ranked = ranking.ranked
+        _optimise_each(planner, _resumed(planner, ranked), len(ranked))
+    return bool(len(found))
+
+
+def _stacked(planner: Planner, t: Array) -> Iterator[Array]:
+    """Yield motions (K, N, n) through times t (N,) [s] that keep conditions all the way."""
+    problem, asked = planner.problem, planner.problem.envelope
+    drawn = _begun_at(planner, t)
+    for weights in metrics(problem.robot):
+        task = Stacked(problem.follows, asked.quantities, asked.lower, asked.upper, weights)
+        for place, starts in drawn.items():
+            if planner.is_free:
+                q, kept = task.placed(starts, float(t[place]))
+                starts = q[kept]
+            motions, arrived = task.carried(starts, t, place)
+            yield motions[arrived]
+
+
+def _begun_at(planner: Planner, t: Array) -> dict[int, Array]:
+    """Return configurations (K, n) to begin with, by the number of their time among some (N,).
+
+    The given start; or what is drawn at both ends, and where the best motion breaks something.
+    """
+    problem, best = planner.problem, planner.best
+    if problem.given_start is not None:
+        return {0: problem.given_start[None]}
+    breaks = best.breaks_at if best is not None else None
+    places = {0, len(t) - 1, *([] if breaks is None else [int(np.argmin(np.abs(t - breaks)))])}
+    found = dict[int, Array]()
+    arm = problem.follows.for_robot(problem.envelope.arm(problem.robot))
+    for place in sorted(places):
+        with contextlib.suppress(InverseKinematicsError):
+            # What keeps everything by chance is rare: they are put there.
+            drawn = start_candidates(arm, planner.search.starts, planner.rng, time=float(t[place]))
+            found[place] = np.array(drawn)
+    return found
+
+
+def _best(problem: Problem, starts: abc.Sequence[Array]) -> list[Array]:
+    """Return starts, the best first, by their motions without self-motion."""
+    t = rough_grid(problem).nodes
+    motions, arrived = carried(problem.follows, np.array(starts), t)
+    order = most_promising(problem, starts, motions, arrived, t, apart_of(problem.robot))
+    return [starts[k] for k in order]
+
+
+def _starts(planner: Planner, count: int) -> list[Array]:
+    """Return so many starts: on the path itself, or as near to it as tolerances allow."""
+    problem = planner.problem
+    try:
+        found = _drawn(problem.asked, planner, count)
+    except InverseKinematicsError:
+        if problem.asked is problem:
+            raise
+        return _drawn(problem, planner, count)
+    return list(problem.at(np.zeros(len(found)), np.array(found)))
+
+
+def _drawn(problem: Problem, planner: Planner, count: int, time: float = 0.0) -> list[Array]:
+    """Return so many configurations that are on the path at a time [s]."""
+    arm, asked = problem.envelope.arm(problem.robot), problem.envelope
+    admits = asked.admits if asked.quantities else None
+    return start_candidates(problem.follows.for_robot(arm), count, planner.rng, admits, time)
+
+
+def _optimise_each(planner: Planner, candidates: Iterable[Candidate], count: int) -> None:
+    planner.waiting = ()
+    for number, candidate in enumerate(candidates, 1):
+        if planner.is_over:
+            break
+        planner.waiting = (*planner.waiting, candidate)
+        planner.progress("optimising start", number, count)
+        planner.polish(candidate)
+        # What nothing can reach, no other start will.
+        if planner.is_out_of_reach():
+            break
+    planner.waiting = ()
+
+
+def _resumed(planner: Planner, rough: abc.Sequence[NodeMotion]) -> Iterator[Candidate]:
+    """Yield candidates that begin at rough motions, only when their turn comes."""
+    for motion in rough:
+        candidate = None if planner.is_over else planner.taken_up(motion.trajectory)
+        if candidate is not None:
+            yield candidate
+
+
+def optimise_sequences(planner: Planner, *, chosen: bool) -> None:
+    """Search, and optimise from the best sequences, one after another; note a search in vain.
+
+    What is found is compared with what stands, and `chosen` only if it may be.
+    """
+    try:
+        planner.sequences = guides(planner.problem, planner.search.rng, planner.progress)
+    except NoSequenceError as error:
+        planner.failure = error
+        planner.notes.append(f"global search: {error}")
+    begun: list[Candidate] = []
+    for number, guide in enumerate(planner.sequences, 1):
+        planner.progress("refining sequence", number, len(planner.sequences))
+        candidate = planner.begin(guide.start, free=True, guide=guide)
+        if candidate is None or (begun and _is_hopeless(planner, guide, candidate, begun[0])):
+            continue
+        found = along_chain(planner.problem, candidate.effort, guide, candidate.constraints)
+        if found is not None:
+            candidate.take(found)
+        if begun and begun[0].is_of_chain and not candidate.is_of_chain:
+            continue
+        planner.polish(candidate, chosen=chosen)
+        if planner.is_over:
+            return
+        begun = sorted([*begun, candidate], key=Candidate.score)
+    if begun:
+        planner.rival = begun[0]
+
+
+def _is_hopeless(planner: Planner, guide: Sequence, candidate: Candidate, best: Candidate) -> bool:
+    """Whether a sequence is much dearer than the best, and costs more than what there is.
+
+    Optimising gains some percent on a sequence.
+    """
+    if best.violations:
+        return False
+    least = planner.sequences[0].cost
+    share = _DEARER_CHAIN if best.is_of_chain else _DEARER
+    dearer = guide.cost > least + (share - 1.0) * abs(least)
+    return dearer and candidate.solution.merit() > best.score()[-1]
+
+
+def along_chain(
+    problem: Problem,
+    effort: Effort,
+    guide: Sequence,
+    constraints: abc.Sequence[BoundConstraint],
+) -> NodeSolution | None:
+    """Return the motion through the shortest chain near a sequence; None where it will not do.
+
+    Where length is all that is asked for, joints rest and start again all over the path: a motion
+    of few nodes cannot, and Newton's method has no use for second derivatives of kinks. The chain
+    is at its optimum already, so that it only needs velocities.
+    """
+    if not is_on_nodes(problem, effort) or not asks_length(problem):
+        return None
+    if any(item.equality for item in constraints):
+        # The search's sequences know nothing of given ends.
+        return None
+    t, q = guide.t, guide.q
+    finer = Grid.aligned(problem.knots, _FINER_CHAIN * len(t))
+    for number in range(_CHAIN_ROUNDS):
+        # A few nodes more change little.
+        stages = LAST_SMOOTHINGS[2:] if number else LAST_SMOOTHINGS
+        found = shortest_along(problem, t, q, finer.nodes, stages)
+        if found is None:
+            return None
+        t, q = found
+        grid = NodeGrid(problem, t, constraints, free=True, counts=effort.counts)
+        motion = _through(grid, q)
+        if motion is None:
+            return None
+        broken = motion.broken_between() | _beyond_limits(motion)
+        if not broken.any():
+            none = np.zeros(len(motion.h))
+            return NodeSolution(motion, Status.PRECISION, none, is_chain=True)
+        finer = Grid(t).halved(np.convolve(broken, np.ones(3), "same") > 0.0)
+    return None
+
+
+def _beyond_limits(motion: NodeMotion) -> Flags:
+    """Return on which intervals a joint passes a limit, also for a moment, (N,)."""
+    asked, t = motion.grid.problem.envelope, motion.grid.t
+    looks = (t[:-1, None] + np.diff(t)[:, None] * np.arange(_LOOKS) / _LOOKS).ravel()
+    q, qd = motion.trajectory(looks), motion.trajectory(looks, 1)
+    beyond = (q < asked.lower) | (q > asked.upper) | (np.abs(qd) > asked.speed)
+    return np.asarray(beyond.reshape(len(t) - 1, -1).any(axis=1))
+
+
+def _through(grid: NodeGrid, q: Array) -> NodeMotion | None:
+    """Return the motion through nodes q (K, n), with smooth velocities."""
+    from scipy.interpolate import PchipInterpolator
+
+    # Monotone cubics pass no limit that the nodes keep.
+    near = PchipInterpolator(grid.t, q).derivative()(grid.t)
+    motion = grid.near(q, near)
+    return motion and grid.near(q, _resting(motion, near))
+
+
+def _resting(motion: NodeMotion, near: Array) -> Array:
+    """Return q̇ on the path that is nearest to another one, `near` (K, n), in what rests there.
+
+    What this is off the path is left to the joints that move, so that others go on resting.
+    """
+    share = np.abs(near) / np.maximum(np.abs(near).max(axis=1, keepdims=True), _STILL)
+    rows = motion.grid.problem.follows.jacobians(motion.place.q)
+    lack = np.einsum("kmn,kn->km", rows, motion.place.qd - near)
+    shared = np.maximum(share, _LEAST)[:, :, None] * rows.transpose(0, 2, 1)
+    return np.asarray(near + (shared @ np.linalg.solve(rows @ shared, lack[:, :, None]))[:, :, 0])
+
+
+def is_long(planner: Planner) -> bool:
+    """Whether the tool's way is many times the arm's reach, and nodes will do for the problem."""
+    problem = planner.problem
+    return problem.way_in_reaches > LONG_WAY and is_on_nodes(problem, planner.effort)
+
+
+def keep_to_posture(planner: Planner) -> None:
+    """Optimise a stretch in the middle, then the whole path from motions in its postures.
+
+    Where the user wants no more after the stretch, the motion in its posture has to do.
+    """
+    postures, ended = _postures(planner)
+    for number, posture in enumerate(postures, 1):
+        planner.progress("posture", number, len(postures))
+        _optimise(planner, posture, ended)
+        if planner.is_over:
+            break
+    if ended is not None:
+        _end(planner, ended)
+
+
+def _end(planner: Planner, ended: Status) -> None:
+    """Let what stands be it, where the user wants no more; KeyboardInterrupt where nothing does."""
+    if planner.best is not None:
+        planner.best.end(ended)
+    elif ended is Status.INTERRUPTED:
+        raise KeyboardInterrupt
+
+
+def _optimise(planner: Planner, posture: Array, ended: Status | None) -> None:
+    """Consider the best motion near one in a posture (n,), if it keeps the conditions.
+
+    Where the user wants no more, it has to do where there is no other.
+    """
+    problem, start = planner.problem, planner.problem.given_start
+    if start is None:
+        try:
+            start = on_start(problem, posture)
+        except SelfmotionError:
+            return
+    constraints = problem.bind_constraints(start, start, apart=planner.effort.apart)
+    polisher = Polisher(problem, planner.effort, constraints, free=planner.is_free)
+    if ended is not None:
+        polisher.end(ended)
+    motion = _near(polisher, problem, start, posture)
+    if motion is None:
+        return
+    try:
+        found = polisher.best_near(motion, planner.cost_to_beat)
+    except KeyboardInterrupt:
+        found, ended = polisher.latest, Status.INTERRUPTED
+        if found is None:
+            raise
+    if polisher.is_stopped:
+        ended = Status.STOPPED
+    will_do = found is not None and not found.violations and found.cost < planner.cost_to_beat
+    if found is None or not (will_do or (ended is not None and planner.best is None)):
+        if ended is not None:
+            _end(planner, ended)
+        return
+    # Of its velocities eq. 4 keeps the self-motion.
+    rates, grid = partial(motion.trajectory, order=1), Grid(motion.grid.t)
+    candidate = planner.begin(start, free=planner.is_free, guide=rates, grid=grid)
+    if candidate is not None:
+        candidate.take(found, polisher.history)
+        if ended is not None:
+            candidate.end(ended)
+        planner.consider(candidate)
+
+
+def _postures(planner: Planner) -> tuple[list[Array], Status | None]:
+    """Return mean configurations (n,) of the best motions along a stretch in the middle.
+
+    And what ended the search for them, if the user did.
+    """
+    problem = planner.problem
+    middle, half = 0.5, 0.5 * _STRETCH_WAY / problem.way_in_reaches
+    first, last = (problem.path.duration * share for share in (middle - half, middle + half))
+    stretch = problem.changed(
+        **problem.along(lambda path: Section(path, first, last)),
+        start=None,
+        constraints=list(asked_of_part(problem, is_first=False, is_last=False)),
+        rest=False,
+    )
+    inner = replace(
+        planner, problem=stretch, best=None, failure=None, waiting=(), ranking=None, attempts=[]
+    )
+    try:
+        optimise_starts(inner, planner.search.starts, planner.search.finalists)
+    except SelfmotionError:
+        return [], None
+    motions = [] if inner.best is None else [inner.best.evaluation().trajectory]
+    ranked = [] if inner.ranking is None else inner.ranking.ranked
+    motions += [motion.trajectory for motion in ranked]
+    found: list[Array] = []
+    for motion in motions:
+        weights = Sampling.trapezoidal(motion.t).weights
+        posture = np.asarray(weights @ motion.q / weights.sum())
+        if all(np.abs(posture - other).max() > ONE_VALLEY for other in found):
+            found.append(posture)
+    return found, inner.best.status if inner.is_over and inner.best is not None else None
+
+
+def _near(polisher: Polisher, problem: Problem, start: Array, posture: Array) -> NodeMotion | None:
+    """Return the motion from a start (n,) that goes to a posture (n,) by self-motion.
+
+    On the coarsest nodes on which it costs what it does; None where there is none.
+    """
+    # As long as it takes the tool to go as far as the arm reaches.
+    time = problem.path.duration / problem.way_in_reaches
+    grid, most = Grid.aligned(problem.knots, _FIRST_NODES), most_nodes(problem)
+    while grid.steps <= most:
+        motion = polisher.grid(grid.nodes).motion_towards(start, posture, time)
+        if motion is not None and resolves(motion):
+            return motion
+        grid = grid.halved()
+    return None

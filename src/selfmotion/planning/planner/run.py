@@ -1,0 +1,316 @@
+"""From a problem to a plan, and what is said of it."""
+
+import time
+from collections import abc
+from dataclasses import replace
+
+import numpy as np
+
+from selfmotion.basics import (
+    PlanError,
+    ProblemError,
+    Progress,
+    as_called,
+    as_number,
+    as_whole,
+    held_interruption,
+    one_blas_thread,
+    read_only,
+    shown,
+    silent,
+    was_interrupted,
+)
+from selfmotion.certificate import Certificate, Tolerance
+from selfmotion.planning.optimise import Callback, Optimizer, Status
+from selfmotion.planning.planner.candidate import check_warm_start
+from selfmotion.planning.planner.effort import Deadline, Effort, Search
+from selfmotion.planning.planner.grids import is_published
+from selfmotion.planning.planner.planner import Judged, Planner
+from selfmotion.planning.planner.steps import go_through
+from selfmotion.planning.result import Gap, Plan, Report
+from selfmotion.planning.search import SPACING, Sequence
+from selfmotion.problem.problem import Problem, check_feeds_of, check_problem
+
+# Evaluations of the cost that a damped motion may take.
+_DAMPED_EVALUATIONS = 400
+
+
+def gathered(planner: Planner, deadline: Deadline) -> Plan:
+    """Return the plan.
+
+    Raises
+    ------
+    KeyboardInterrupt
+        The interruptions left no time for a proof.
+    """
+    judged = planner.judged
+    if judged is None:
+        raise KeyboardInterrupt
+    part, motion, still, check = judged.part, judged.motion, judged.still, judged.certificate
+    candidate = part.candidate
+    if deadline.passed and candidate.status is Status.INTERRUPTED:
+        candidate.end(Status.DEADLINE)
+    counts, solution = candidate.effort.counts, candidate.solution
+    status = status_of(candidate.status, check)
+    report = Report(
+        cost=motion.cost,
+        initial_cost=still.cost,
+        terms=motion.terms,
+        initial_terms=still.terms,
+        evaluations=counts.evaluations,
+        gradient_evaluations=counts.gradients,
+        jacobian_evaluations=counts.jacobians,
+        steps=len(motion.trajectory.t) - 1,
+        iterations=sum(iteration.step > 0.0 for iteration in candidate.history),
+        history=tuple(candidate.history),
+        status=status,
+        message=message_of(
+            status,
+            candidate.violations,
+            check,
+            ending=part.ending,
+            notes=planner.notes,
+            published=planner.is_published,
+        ),
+        seconds=time.perf_counter() - planner.began,
+        gap=_gap(planner, judged),
+        ending=part.ending,
+        active=solution.active,
+        null_motion=solution.null_motion,
+        remaining=solution.remaining,
+        attempts=tuple(planner.attempts),
+        obstruction=planner.stops,
+        remedy=planner.advice,
+    )
+    return Plan(
+        problem=planner.problem.asked,
+        trajectory=planner.problem.own(motion.trajectory),
+        initial_trajectory=planner.problem.own(still.trajectory),
+        coefficients=read_only(solution.coefficients),
+        report=report,
+        certificate=report.explained(check),
+    )
+
+
+def _gap(planner: Planner, judged: Judged) -> Gap | None:
+    """Compare a plan with what the global search knows; None where it knows nothing."""
+    if not planner.sequences or judged.part.candidate is not planner.best:
+        return None
+    motion, rival, rival_cost = judged.motion, planner.rival, judged.rival_cost
+    shortest = min(planner.sequences, key=lambda each: each.length)
+    weights = planner.problem.robot.joint_weights
+    if rival is not None and rival is planner.best and not rival.violations:
+        rival_cost = motion.cost
+    return Gap(
+        cost=motion.cost,
+        best_cost=rival_cost,
+        length=float((weights * np.abs(np.diff(motion.trajectory(shortest.t), axis=0))).sum()),
+        best_length=shortest.length,
+        spacing=SPACING,
+        sequences=len(planner.sequences),
+    )
+
+
+def status_of(status: Status, certificate: Certificate) -> Status:
+    """Return how the optimisation ended; what the certificate finds kept is not infeasible."""
+    kept = status is Status.INFEASIBLE and certificate.verified
+    return Status.PRECISION if kept else status
+
+
+def message_of(
+    status: Status,
+    violations: abc.Sequence[str],
+    certificate: Certificate,
+    *,
+    ending: str = "",
+    notes: abc.Sequence[str] = (),
+    published: bool = False,
+) -> str:
+    """Return in words how the optimisation ended, and what came of it."""
+    said = status.message
+    if status is Status.GRADIENT and not certificate.on_path:
+        least = certificate.smallest_singular_value
+        said = (
+            f"the motion passes a singular pose near t = {least.time:.4g} s (smallest singular "
+            f"value {least.value:.2g}), next to which its cost cannot be lowered"
+        )
+    parts = [said] if status.is_cut_short or published or not violations else []
+    if violations and certificate.verified:
+        # Such as the clearance of bodies, whose convex hulls are planned with.
+        parts.append(
+            f"violated by the optimiser's bounds, kept by the motion: {'; '.join(violations)}"
+        )
+    elif violations and published:
+        parts.append(
+            f"the published method keeps nothing but given ends, and this is not kept: "
+            f"{'; '.join(violations)}; without null_motion, optimizer and damping it is asked for"
+        )
+    elif violations:
+        parts.append(f"not all constraints could be met: {'; '.join(violations)}")
+    if certificate.failures and not (violations or ending):
+        parts.append(f"but {certificate.verdict}")
+    message = "; ".join(text for text in (ending, *parts, *notes) if text)
+    if certificate.damped:
+        stretches = " and ".join(map(str, certificate.damped))
+        message += f"; the inverse was damped {stretches}"
+    return message
+
+
+def plan(
+    problem: Problem,
+    *,
+    optimizer: Optimizer | None = None,
+    search: Search | None = None,
+    warm_start: Plan | None = None,
+    tolerance: Tolerance | None = None,
+    max_evaluations: int | None = None,
+    deadline: float | None = None,
+    callback: Callback | None = None,
+    progress: Progress = silent,
+) -> Plan:
+    """Plan the joint motion that follows the path exactly and minimises the costs.
+
+    Parameters
+    ----------
+    problem : Problem
+    optimizer : Optimizer, optional
+        Minimises by the published method: over the coefficients of the problem's null motion, a
+        cubic by default, with nothing asked but given ends and closure. By default Newton's method
+        on nodes keeps all constraints, and `QuasiNewton` serves where a null motion or damping
+        asks for the published method.
+    search : Search, optional
+        How to search where the start is free, and whether to compare with a global search.
+    warm_start : Plan, optional
+        A plan of this problem or of one like it: its null motion is the initial guess, unless the
+        minimum-norm motion is better. Where the start is free, its start too; others are tried only
+        if that falls short.
+    tolerance : Tolerance, optional
+        Allowed deviation from the path, between samples as well. The number of steps
+        follows from it.
+    max_evaluations : int, optional
+        Limit on evaluations of the cost while optimising one start; the finished motion is
+        evaluated a few times more. By default none, but 400 with damping and 150 on each part of
+        the path (30 where the start is free), where limits of joint speed often cannot be met and
+        trying would take minutes.
+    deadline : float, optional
+        After so many seconds planning stops with the best motion so far: no worse than the
+        minimum-norm motion, or than what the search began with. It is then judged like any other
+        plan, which takes some more time.
+    callback : callable, optional
+        Called with each `Iteration`; returning True stops, keeping the best so far.
+    progress : callable, optional
+        Told the stage, how much of it has begun, and of how many: ``("start", 3, 24)``; of 0, news:
+        that no motion passes a pose is told at once, before the part of the path that can be
+        followed is planned. It may raise `KeyboardInterrupt` to stop.
+
+    Returns
+    -------
+    Plan
+        Also where the search fell short: `Plan.report` and `Plan.certificate` say so, and
+        `Plan.require` raises. Where the path leaves the workspace, within the joint limits, or no
+        motion passes a singular pose: the motion on the largest part [0, t] that was found, never
+        verified, with t and the reason in its verdict. After an interruption (Ctrl-C) the best
+        plan that was known by then, checked like any other; its status says so.
+
+    Raises
+    ------
+    BreakdownError
+        The minimum-norm motion runs into a singular pose, from every start, so early that no part
+        of the path is worth a plan.
+    InverseKinematicsError
+        The start is free and no configuration reaches the start of the path.
+    FeedError
+        The path asks for a feed that it cannot have, whatever the arm; before anything is planned.
+    NoSequenceError
+        The global search finds that no motion follows the path; says where it ends and why.
+    PlanError
+        The deadline came before there was a complete motion.
+    ProblemError
+        An argument is not what it should be, or has no effect on this problem.
+    KeyboardInterrupt
+        The interruption came before there was a complete motion.
+    """
+    _check(problem, search, max_evaluations)
+    if warm_start is not None:
+        check_warm_start(warm_start, problem)
+    is_one = callable(getattr(optimizer, "minimize", None)) and not isinstance(optimizer, type)
+    if optimizer is not None and not is_one:
+        raise ProblemError(f"optimizer is {shown(optimizer)}, expected one such as QuasiNewton()")
+    if callback is not None:
+        as_called(callback, "callback")
+    check_feeds_of(problem)
+    seconds = None if deadline is None else as_number(deadline, "deadline", above=0.0)
+    clock = Deadline.after(seconds)
+    if problem.damping is not None and max_evaluations is None:
+        max_evaluations = _DAMPED_EVALUATIONS
+    effort = Effort(optimizer, callback, max_evaluations, clock)
+    if problem.relaxations and is_published(problem, effort):
+        raise ProblemError(
+            "relaxations: the published method keeps nothing but given ends, so that the tool "
+            "would leave its tolerances; leave null_motion out, optimizer and damping too"
+        )
+    search, problem = search or Search(), problem.augmented
+    if warm_start is not None:
+        known = problem.with_own(warm_start.trajectory, warm_start.path)
+        warm_start = replace(warm_start, trajectory=known)
+    planner = Planner(
+        problem,
+        effort,
+        search,
+        Tolerance.of(tolerance),
+        clock.checked_by(progress),
+        warm_start=warm_start,
+    )
+    try:
+        with one_blas_thread(), held_interruption():
+            return _planned(planner, clock)
+    except KeyboardInterrupt:
+        if not clock.passed:
+            raise
+        raise PlanError(
+            f"the deadline of {deadline} s came before there was a complete motion; allow more "
+            f"time, or give a start"
+        ) from None
+
+
+def plan_along(problem: Problem, guide: Sequence, tolerance: Tolerance, progress: Progress) -> Plan:
+    """Plan as `plan` does, but try a motion first that is known, near which there should be one."""
+    clock = Deadline()
+    effort = Effort(None, None, None, clock)
+    problem = problem.augmented
+    guide = replace(guide, q=problem.at(guide.t, guide.q))
+    planner = Planner(problem, effort, Search(), tolerance, progress, guide=guide)
+    with one_blas_thread(), held_interruption():
+        return _planned(planner, clock)
+
+
+def _planned(planner: Planner, clock: Deadline) -> Plan:
+    """Return the plan, told of an interruption that came when all was done."""
+    go_through(planner)
+    found = gathered(planner, clock)
+    return told_of(found, Status.INTERRUPTED) if was_interrupted() else found
+
+
+def told_of(plan: Plan, status: Status) -> Plan:
+    """Return a plan whose report says what kept another one from being tried to the end."""
+    message = f"{status.message}; before: {plan.report.message}"
+    return replace(plan, report=replace(plan.report, status=status, message=message))
+
+
+def _check(problem: Problem, search: Search | None, max_evaluations: int | None) -> None:
+    check_problem(problem)
+    if search is not None and not isinstance(search, Search):
+        raise ProblemError(f"search is {shown(search)}, expected Search(mode=…, starts=…, …)")
+    if search is not None and problem.given_start is not None and not search.compare:
+        raise ProblemError(
+            "search= has no effect, since the problem's start is given; leave one of them out, or "
+            "ask for Search(compare=True)"
+        )
+    redundancy = problem.follows.redundancy
+    if search is not None and search.compare and redundancy != 1:
+        raise ProblemError(
+            f"compare: the global search needs redundancy 1, but {problem.robot.name} has "
+            f"{redundancy} for task '{problem.task.value}'"
+        )
+    if max_evaluations is not None:
+        as_whole(max_evaluations, "max_evaluations", least=1, most=10**9)

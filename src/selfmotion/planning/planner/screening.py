@@ -1,0 +1,471 @@
+"""Rough motions from many starts, and which of them are worth more: on nodes, all at once."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from selfmotion.basics import Array, Flags, Ints, Progress, RobotError
+from selfmotion.model.motion import Sampling, Trajectory
+from selfmotion.model.robot import RobotModel
+from selfmotion.planning.nodes import Batch, NodeGrid, NodeMotion, minimise
+from selfmotion.planning.planner.effort import Effort
+from selfmotion.planning.planner.grids import ABOUT_AS_GOOD, NOTHING, UNKEPT, resolves, rough_grid
+from selfmotion.planning.search import carried
+from selfmotion.problem.constraints import penalised
+from selfmotion.problem.costs import Samples
+from selfmotion.problem.problem import Problem
+
+# Steps of Newton's method for rough motions.
+_ROUGH_ROUNDS = 30
+# Rough optima on nodes whose costs differ by less than this share are mirror images; and joints are
+# within their limits to this share of a turn.
+_SAME_TO_DIGITS = 1e-9
+# Violations of images of one motion differ by less than this share.
+_SAME_VIOLATION = 1e-6
+# So many rough motions at most; where conditions count, with so many steps more that know them.
+ROUGH_MOTIONS, _WITH_CONDITIONS = 16, 12
+# And so many of those that keep conditions from the beginning.
+_WITHIN = 6
+# Motions at x = 0 that are this near at all times [rad or m] lie in one valley of the cost, as a
+# rule; rough optima this near are the same.
+ONE_VALLEY = 0.6
+_SAME_OPTIMUM = 0.1
+_TURN = 2.0 * np.pi
+
+
+def usual_posture(robot: RobotModel) -> Array:
+    """Return home (n,) where it is known, else the middle of the joints' limits [rad or m]."""
+    try:
+        return robot.home
+    except RobotError:
+        return np.asarray(0.5 * np.add(*robot.finite_limits()))
+
+
+def far_from_usual(robot: RobotModel, motions: Array) -> Array:
+    """Return how far motions (K, N, n) are from the usual posture on average, (K,) [rad]."""
+    away = np.abs(motions - usual_posture(robot)) @ robot.joint_weights
+    return np.asarray(away.mean(axis=1))
+
+
+def wound_back(robot: RobotModel, motion: Array) -> Array:
+    """Return a motion (N, n) with joints turned by whole turns, as near to usual as limits allow.
+
+    The tool is where it was. What fits nowhere within its limits is put in the middle of them.
+    """
+    lowest, highest = motion.min(axis=0), motion.max(axis=0)
+    middle, shift = 0.5 * (lowest + highest), np.zeros(robot.dof)
+    usual = usual_posture(robot)
+    for joint in np.flatnonzero(robot.is_revolute):
+        lower, upper = robot.lower[joint], robot.upper[joint]
+        wanted = round((usual[joint] - middle[joint]) / _TURN)
+        # Rounding must not take a joint that stands on its limit round to the other side.
+        least = np.ceil((lower - lowest[joint]) / _TURN - _SAME_TO_DIGITS)
+        most = np.floor((upper - highest[joint]) / _TURN + _SAME_TO_DIGITS)
+        if least <= most:
+            shift[joint] = np.clip(wanted, least, most)
+        elif np.isfinite(lower) and np.isfinite(upper):
+            shift[joint] = round((0.5 * (lower + upper) - middle[joint]) / _TURN)
+    return np.asarray(motion + _TURN * shift)
+
+
+Apart = Callable[[Array, Array], Array]
+"""How far a motion (N, n) is from each of others (K, N, n), (K,) [rad or m]."""
+
+
+class Ranking:
+    """Ranks starts by rough optima on nodes.
+
+    Of all of them at once first, in which conditions do not count: where the cheapest one keeps
+    them all the same, it is the best. Where none does for sure, a few steps with conditions tell
+    from which of the cheapest ones they can be kept, and what that costs.
+
+    Parameters
+    ----------
+    problem : Problem
+    effort : Effort
+    progress : Progress
+    """
+
+    def __init__(self, problem: Problem, effort: Effort, progress: Progress) -> None:
+        self._problem, self._effort, self._progress = problem, effort, progress
+        self._free = problem.given_start is None
+        # Whole turns are told by the limits that are asked for, not by the arm's own.
+        self._arm = problem.envelope.arm(problem.robot)
+        self._apart = apart_of(problem.robot)
+        self._t = rough_grid(problem).nodes
+        self._found: Batch | None = None
+        self._ranked: list[NodeMotion] = []
+        # Motions at the starts, of which the ranked ones came.
+        self._carried: list[Array] = []
+
+    @property
+    def ranked(self) -> list[NodeMotion]:
+        """The motions that were found so far, the best first."""
+        if not self._ranked and self._found is not None:
+            # Interrupted: the cheapest one that keeps all will do.
+            near = (self._motion(self._found, k) for k in _cheapest(self._found))
+            motions = [motion for motion in near if motion is not None]
+            kept = (one for one in motions if one.violation <= 0.0)
+            best = next((one for one in kept if self._clear(one)), next(iter(motions), None))
+            return [] if best is None else [best]
+        return self._ranked
+
+    def run(self, starts: Sequence[Array], finalists: int, at: int = 0) -> bool:
+        """Leave the best `finalists` of the starts (n,), or fewer where they became the same.
+
+        The motions are at them where `at` of their times is, by default at the start of the path.
+
+        Returns whether that tells which starts are best.
+        """
+        problem = self._problem
+        motions, arrived = carried(problem.follows, np.array(starts), self._t, at)
+        if not arrived.any():
+            return False
+        order = most_promising(problem, starts, motions, arrived, self._t, self._apart)
+        self._carried = [motions[k] for k in order]
+        free: list[NodeMotion] = []
+        if self._is_pointwise():
+            optima = self._freely(motions[arrived], finalists)
+            if optima is None:
+                return False
+            free = optima
+        if not self._ranked:
+            # Optima lie where nothing was asked: what keeps everything may begin elsewhere.
+            begun = self._begun(max(ROUGH_MOTIONS, finalists))
+            self._ranked = self._with_conditions(free, begun, finalists)
+        return bool(self._ranked)
+
+    def left_aside(self, known: Sequence[Trajectory], finalists: int) -> list[NodeMotion]:
+        """Return rough motions with conditions, unlike those that are known, the best first.
+
+        For where none of the best came to keep everything: between rough nodes a body may be met
+        that no node meets, so that what seems the best of all is none.
+        """
+        near = (self._near(motion(self._t)) for motion in known)
+        others = [motion for motion in near if motion is not None]
+        begun, found = self._begun(ROUGH_MOTIONS), list[NodeMotion]()
+        for number, motion in enumerate(begun, 1):
+            self._progress("start", number, len(begun))
+            better = self._roughly(motion)
+            if not _is_image(better, [*others, *found]):
+                found.append(better)
+        return sorted(found, key=self._rank)[:finalists]
+
+    def _begun(self, count: int) -> list[NodeMotion]:
+        """Return so many motions at starts with conditions, none an image of another one."""
+        found = list[NodeMotion]()
+        for carried_on in self._carried:
+            motion = self._near(carried_on)
+            if motion is not None and not _is_image(motion, found):
+                found.append(motion)
+            if len(found) == count:
+                break
+        return found
+
+    def run_along(self, motions: Array, t: Array, finalists: int) -> bool:
+        """Leave the best `finalists` of motions (K, N, n) on the path at times t (N,) [s].
+
+        Of those that are unlike each other the cheapest ones, with what they violate; after some
+        steps with conditions. Returns whether there is one.
+        """
+        from scipy.interpolate import CubicSpline
+
+        problem, sampling = self._problem, Sampling.trapezoidal(t)
+        if self._free:
+            motions = np.array([wound_back(self._arm, motion) for motion in motions])
+        curves = [CubicSpline(t, motion) for motion in motions]
+        each = [Samples.along(problem.follows, sampling, q(t), q(t, 1)) for q in curves]
+        costs = np.array([problem_cost(problem, samples) for samples in each])
+        cheapest = np.argsort(costs, kind="stable")
+        alone = unlike(motions, cheapest, self._apart, ONE_VALLEY)[0][:ROUGH_MOTIONS]
+        merits = dict[int, float]()
+        for k in alone:
+            bound = problem.bind_constraints(*motions[k, [0, -1]], apart=False)
+            merits[k] = penalised(float(costs[k]), bound, each[k])
+        found = list[NodeMotion]()
+        chosen = sorted(alone, key=lambda k: merits[k])[:_WITHIN]
+        for number, k in enumerate(chosen, 1):
+            self._progress("start", number, len(chosen))
+            begun = self._near(*(curves[k](self._t, order) for order in range(3)))
+            found += [] if begun is None else [self._roughly(begun)]
+            self._ranked = self._different(sorted(found, key=self._rank))[:finalists]
+        return bool(self._ranked)
+
+    def _roughly(self, begun: NodeMotion) -> NodeMotion:
+        """Return the rough optimum near a motion, or that itself where it keeps more."""
+        found = minimise(begun, lambda _: False, roughly=True, most=_ROUGH_ROUNDS).motion
+        return min(found, begun, key=self._rank)
+
+    def _is_pointwise(self) -> bool:
+        """Whether costs can be told of motions side by side, and nothing is asked of ends.
+
+        Not where accelerations cost: few nodes say little of them.
+        """
+        problem, dof = self._problem, self._problem.robot.dof
+        costs = problem.all_costs
+        if not all(cost.is_pointwise and max(cost.curvature(dof), default=0) < 2 for cost in costs):
+            return False
+        q = problem.robot.generic_configurations()[0]
+        return not any(item.equality for item in problem.bind_constraints(q, q, apart=False))
+
+    def _freely(self, motions: Array, finalists: int) -> list[NodeMotion] | None:
+        """Return the rough optima near motions (K, N + 1, n), the cheapest first.
+
+        Those that are the best for sure are ranked. None where none is to be had.
+        """
+        problem = self._problem
+        nodes = self._grid(problem)
+        total = 1 + _ROUGH_ROUNDS
+        self._progress("screening start", 1, total)
+        found = self._found = Batch.near(nodes, motions)
+        soft = problem.softened(float(found.costs.min()))
+        if soft is not problem:
+            found = self._found = Batch.near(self._grid(soft), motions)
+        alone, near = unlike(found.q, _cheapest(found), self._apart, ONE_VALLEY)
+        which = [*alone, *near][: max(ROUGH_MOTIONS, finalists)]
+        if not which:
+            return None
+        found = self._found = found.picked(np.array(which, dtype=np.int64))
+        for number in range(2, total + 1):
+            self._progress("screening start", number, total)
+            if _hopeful(found).any():
+                found = self._found = found.advanced()
+        self._ranked = self._decisive(found, finalists)
+        order = unlike(found.q, self._expected(found), self._apart, _SAME_OPTIMUM)[0]
+        each = [] if self._ranked else [self._motion(found, k) for k in order]
+        return [motion for motion in each if motion is not None]
+
+    def _grid(self, problem: Problem) -> NodeGrid:
+        counts = self._effort.counts
+        return NodeGrid(problem, self._t, (), free=self._free, counts=counts, calm=True)
+
+    def _decisive(self, found: Batch, finalists: int) -> list[NodeMotion]:
+        """Return the cheapest motion that keeps all, then others about as cheap; or none.
+
+        None is the cheapest for sure where it is not at its optimum yet, or the nodes are too few.
+        """
+        kept: list[NodeMotion] = []
+        others: list[NodeMotion] = []
+        dearest = np.inf
+        for k in unlike(found.q, self._expected(found), self._apart, _SAME_OPTIMUM)[0]:
+            if found.costs[k] > dearest or len(kept) + len(others) == finalists:
+                break
+            motion = self._motion(found, k)
+            # What costs the same to the last digits is one of the arm's mirror images.
+            if motion is None or any(_same(motion.cost, one.cost) for one in kept):
+                continue
+            if found.going[k] or not resolves(motion):
+                return []
+            # What got stuck may become better as well.
+            stuck = found.promised[k] > ABOUT_AS_GOOD * abs(motion.cost)
+            if stuck or motion.breaks_hard():
+                others.append(motion)
+            elif self._clear(motion):
+                kept.append(motion)
+            else:
+                # An optimum that takes the arm into itself goes on doing that.
+                continue
+            cost = float(found.costs[k])
+            dearest = min(dearest, cost + ABOUT_AS_GOOD * abs(cost))
+        return [*kept, *others] if kept and not _hopeful(found).any() else []
+
+    def _with_conditions(
+        self, free: Sequence[NodeMotion], others: Sequence[NodeMotion], finalists: int
+    ) -> list[NodeMotion]:
+        """Return the best of what a few steps with conditions make of motions, different ones.
+
+        Of optima without conditions, the cheapest first; and of others where none of these keeps
+        everything.
+        """
+        found: list[tuple[tuple[bool, float], NodeMotion]] = []
+        total = len(free) + len(others)
+        tried = list[NodeMotion]()
+        for number, motion in enumerate([*free, *others], 1):
+            if _is_image(motion, tried):
+                continue
+            tried.append(motion)
+            if free and number > len(free) and found and found[0][1].violation <= 0.0:
+                break
+            if number <= len(free) and found and (False, motion.cost) >= found[0][0]:
+                # With conditions it would cost more still.
+                continue
+            self._progress("start", number, total)
+            # It is a long way from where there is no self-motion.
+            most = _WITH_CONDITIONS if number <= len(free) else _ROUGH_ROUNDS
+            better = minimise(motion, lambda _: False, roughly=True, most=most).motion
+            found = sorted([*found, (self._rank(better), better)], key=lambda each: each[0])
+            self._ranked = [one for _, one in found]
+        return self._different(self._ranked)[:finalists]
+
+    def _different(self, motions: Sequence[NodeMotion]) -> list[NodeMotion]:
+        """Return motions without those that are near one before them."""
+        q = np.array([motion.place.q for motion in motions])
+        alone, _ = unlike(q, np.arange(len(q)), self._apart, _SAME_OPTIMUM)
+        return [motions[k] for k in alone]
+
+    def _rank(self, motion: NodeMotion) -> tuple[bool, float]:
+        """Return what sorts motions, the best first: what is not kept yet has its price."""
+        cost = motion.cost
+        return not self._clear(motion), cost + UNKEPT * abs(cost) * motion.violation
+
+    def _motion(self, found: Batch, k: int) -> NodeMotion | None:
+        """Return one of the motions, with the conditions that are asked of it.
+
+        Its joints are turned by whole turns to where people expect them. What knows no limits may
+        have gone far beyond them, and the tool is where it was.
+        """
+        q = found.q[k]
+        motion = self._near(wound_back(self._arm, q), found.qd[k], found.qdd[k])
+        # Costs may know one turn from another.
+        if motion is not None and motion.cost <= (1.0 + _SAME_TO_DIGITS) * found.costs[k]:
+            return motion
+        return self._near(self._turned_inside(q), found.qd[k], found.qdd[k])
+
+    def _expected(self, found: Batch) -> Ints:
+        """Return the numbers of motions, the cheapest first; of about as cheap ones the usual."""
+        order = _cheapest(found)
+        if not order.size:
+            return order
+        robot, costs = self._arm, found.costs[order]
+        # Each motion belongs with the cheapest one that is about as cheap.
+        group, first = np.zeros(len(order), dtype=np.int64), 0
+        for k in range(1, len(order)):
+            if costs[k] - costs[first] > NOTHING * abs(costs[first]):
+                first = k
+            group[k] = first
+        far = far_from_usual(robot, np.array([wound_back(robot, found.q[k]) for k in order]))
+        return np.asarray(order[np.lexsort((far, group))])
+
+    def _turned_inside(self, q: Array) -> Array:
+        """Return a motion (N + 1, n) with joints beyond their limits turned back by whole turns."""
+        robot = self._arm
+        beyond = ((q > robot.upper) | (q < robot.lower)).any(axis=0)
+        return np.where(beyond, wound_back(robot, q), q)
+
+    def _near(
+        self, q: Array, qd: Array | None = None, qdd: Array | None = None
+    ) -> NodeMotion | None:
+        """Return the motion nearest to one, with the conditions; by default without self-motion."""
+        problem, still = self._problem, np.zeros_like(q)
+        bound = problem.bind_constraints(q[0], q[-1], apart=self._effort.apart)
+        counts = self._effort.counts
+        grid = NodeGrid(problem, self._t, bound, free=self._free, counts=counts, calm=True)
+        return grid.near(q, still if qd is None else qd, still if qdd is None else qdd)
+
+    def _clear(self, motion: NodeMotion) -> bool:
+        return self._problem.keeps_off_itself(motion.place.q)
+
+
+def _cheapest(found: Batch) -> Ints:
+    """Return the numbers of motions, the cheapest first, without those that are not to be had."""
+    order = np.argsort(found.costs, kind="stable")
+    return np.asarray(order[np.isfinite(found.costs[order])])
+
+
+def _hopeful(found: Batch) -> Flags:
+    """Return which motions are on their way, and may come to cost less than what has arrived."""
+    least = found.costs[~found.going].min(initial=np.inf)
+    dearest = least + ABOUT_AS_GOOD * abs(least) if np.isfinite(least) else least
+    return np.asarray(found.going & (found.costs - found.promised < dearest))
+
+
+def _is_image(motion: NodeMotion, others: Sequence[NodeMotion]) -> bool:
+    """Whether one of others costs and violates the same to the last digits.
+
+    As where only a turn of the tool about its free axis tells them apart, or a mirror.
+    """
+    return any(
+        _same(motion.cost, one.cost)
+        and abs(motion.violation - one.violation) <= _SAME_VIOLATION * (1.0 + one.violation)
+        for one in others
+    )
+
+
+def _same(a: float, b: float | None) -> bool:
+    return b is not None and abs(a - b) <= _SAME_TO_DIGITS * abs(a)
+
+
+def most_promising(
+    problem: Problem,
+    starts: Sequence[Array],
+    motions: Array,
+    arrived: Flags,
+    t: Array,
+    apart: Apart,
+) -> list[int]:
+    """Return numbers of starts, the best first, and those last that are near a better one.
+
+    By what the motions cost that follow the path from them without self-motion, and by how much
+    these violate: the start of one that is near a better one moves there by itself. Last of all
+    come those from which the path cannot be followed like that.
+
+    Parameters
+    ----------
+    problem : Problem
+    starts : sequence of (n,)
+    motions : (K, N, n)
+        The motions from them, at few times t (N,) [s].
+    arrived : (K,)
+        Which of them follow the path to its end.
+    apart : callable
+        How far motions are from each other.
+    """
+    merits = np.full(len(starts), np.inf)
+    twists = problem.follows.twists(t)
+    sampling = Sampling.trapezoidal(t)
+    for k in np.flatnonzero(arrived):
+        merits[k] = _merit(problem, motions[k], twists, sampling)
+    order = np.argsort(merits, kind="stable")
+    followed = order[arrived[order]]
+    valleys, slopes = unlike(motions, followed, apart, ONE_VALLEY)
+    return [*valleys, *slopes, *order[~arrived[order]].tolist()]
+
+
+def _merit(problem: Problem, q: Array, twists: Array, sampling: Sampling) -> float:
+    """Return what a motion q (N, n) along the path costs, and more where it violates something.
+
+    `twists` (N, m) are those of the path at the grid's nodes, which are the samples.
+    """
+    still = Samples.along(problem.follows, sampling, q, np.zeros_like(q))
+    J = still.task_jacobian
+    gram = J @ J.transpose(0, 2, 1)
+    try:
+        qd = np.einsum("smn,sm->sn", J, np.linalg.solve(gram, twists[..., None])[..., 0])
+    except np.linalg.LinAlgError:
+        return np.inf
+    samples = replace(still, qd=qd)
+    bound = problem.bind_constraints(q[0], q[-1], apart=False)
+    return penalised(problem_cost(problem, samples), bound, samples)
+
+
+def problem_cost(problem: Problem, samples: Samples) -> float:
+    """Return what a motion costs."""
+    weights = samples.sampling.weights
+    return sum(float(weights @ cost.value(samples)) for cost in problem.all_costs)
+
+
+def apart_of(robot: RobotModel) -> Apart:
+    """Return how far motions of an arm are from each other, at most, up to whole turns."""
+    turning, sizes = robot.is_revolute, robot.coordinate_sizes
+
+    def apart(motion: Array, others: Array) -> Array:
+        difference = others - motion
+        turns = np.round(difference / (2.0 * np.pi))
+        away = sizes * np.abs(difference - 2.0 * np.pi * turns * turning)
+        return np.asarray(away.max(axis=(1, 2)))
+
+    return apart
+
+
+def unlike(motions: Array, order: Ints, apart: Apart, least: float) -> tuple[list[int], list[int]]:
+    """Return those of motions (K, N, n) that are not near one earlier in an order, and the others.
+
+    Numbers of motions, in that order; farther apart than `least` is not near.
+    """
+    alone: list[int] = []
+    near: list[int] = []
+    for k in order.tolist():
+        is_alone = bool((apart(motions[k], motions[alone]) > least).all())
+        (alone if is_alone else near).append(k)
+    return alone, near

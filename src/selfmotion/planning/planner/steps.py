@@ -1,0 +1,455 @@
+"""The list that a plan goes through: look, propose and polish, judge; in this order, and when.
+
+A proposal is a motion to begin with, or several, cheap ones first. `Planner.polish` optimises each
+and keeps the best; a proposal is left out where what is known will do. In the end the best is
+judged, on finer grids until its certificate finds nothing wrong, or a part of it is.
+"""
+
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from typing import cast
+
+import numpy as np
+
+from selfmotion.basics import (
+    BreakdownError,
+    InverseKinematicsError,
+    NoSequenceError,
+    SelfmotionError,
+)
+from selfmotion.model.task import SE3
+from selfmotion.planning.planner.candidate import Candidate, on_start
+from selfmotion.planning.planner.effort import Search
+from selfmotion.planning.planner.grids import is_on_nodes
+from selfmotion.planning.planner.planner import Planner
+from selfmotion.planning.planner.proposals import (
+    VERY_LONG_WAY,
+    is_long,
+    keep_to_posture,
+    may_stack,
+    optimise_sequences,
+    optimise_stacked,
+    optimise_starts,
+    optimise_where_it_breaks,
+)
+from selfmotion.planning.result import Attempt
+from selfmotion.planning.search import Obstruction, obstruction
+from selfmotion.problem.constraints import JointPositionLimits
+from selfmotion.problem.problem import Problem
+
+_WHERE_IT_BREAKS = "starts where it breaks"
+
+
+def go_through(planner: Planner) -> None:
+    """Try everything that applies, in order.
+
+    An interruption ends one step; of those after it, what applies to the best so far is done.
+
+    Raises
+    ------
+    SelfmotionError
+        There is no motion.
+    KeyboardInterrupt
+        The interruption came before there was a complete motion.
+    """
+    for name, step in STEPS:
+        began = time.perf_counter()
+        try:
+            tried = step(planner)
+        except KeyboardInterrupt:
+            planner.interrupted()
+            tried = True
+        if tried:
+            seconds = time.perf_counter() - began
+            planner.attempts.append(Attempt(name, *_outcome(planner), seconds))
+
+
+def _outcome(planner: Planner) -> tuple[str, float | None]:
+    """Return in words what is best, and what it costs."""
+    judged, best = planner.judged, planner.best
+    if judged is not None:
+        parts = (judged.part.ending, judged.certificate.verdict)
+        return "; ".join(text for text in parts if text), judged.motion.cost
+    if best is not None:
+        wrong = "; ".join(best.violations)
+        if wrong:
+            return f"not all constraints are met: {wrong}", best.solution.cost
+        itself = "" if best.solution.keeps_off_itself else ", but the arm meets itself"
+        return f"all constraints are met{itself}", best.solution.cost
+    if planner.failure is not None:
+        return str(planner.failure), None
+    return planner.blocked.reason if planner.blocked else "nothing is in the way", None
+
+
+def _look(planner: Planner) -> bool:
+    """Look whether the arm can be at some single poses at all, where nothing is known yet."""
+    if not planner.is_free or planner.is_begun:
+        return False
+    blocked = planner.blocked = _looked_at(planner.problem, planner.search)
+    if blocked is not None:
+        # What can be planned all the same takes many times as long as the 'no'.
+        planner.progress(f"no motion passes t = {blocked.time:.6g} s: {blocked.reason}", 0, 0)
+    return True
+
+
+def _plan_before_blocked_pose(planner: Planner) -> bool:
+    """Plan what comes before a pose that is out of reach."""
+    blocked = planner.blocked
+    if blocked is None or blocked.is_met:
+        return False
+    told = blocked.help.removeprefix("; ")
+    planner.notes += [told] if told else []
+    try:
+        found = planner.judge_part(blocked.time)
+    except InverseKinematicsError:
+        found = False
+    if not found:
+        raise _no_way(planner.problem, blocked)
+    return True
+
+
+def _follow_guide(planner: Planner) -> bool:
+    """Optimise from a motion that is known."""
+    guide = planner.guide
+    if guide is None:
+        return False
+    candidate = planner.begin(guide.start, free=planner.is_free, guide=guide)
+    if candidate is not None:
+        planner.polish(candidate)
+    return True
+
+
+def _begin_at_plan(planner: Planner) -> bool:
+    """Optimise from a plan of this problem or of one like it, if it leads to a motion."""
+    plan = planner.warm_start
+    if plan is None or not planner.is_free:
+        return False
+    try:
+        start = on_start(planner.problem, plan.trajectory.q[0])
+    except InverseKinematicsError as error:
+        planner.failure = error
+        return True
+    candidate = planner.begin(start, free=True)
+    if candidate is not None:
+        candidate.adopt(plan)
+        planner.progress("warm start", 1, 1)
+        planner.polish(candidate)
+    return True
+
+
+def _keep_to_posture(planner: Planner) -> bool:
+    """Optimise from motions in the postures that are best on a stretch, on a very long path."""
+    return planner.problem.way_in_reaches > VERY_LONG_WAY and _try_postures(planner)
+
+
+def _begin_at_start(planner: Planner) -> bool:
+    """Optimise from the start that is given."""
+    start = planner.problem.given_start
+    if start is None or not (planner.is_sought and planner.is_unmet):
+        return False
+    candidate = planner.begin(start, free=False)
+    if candidate is not None:
+        if planner.warm_start is not None:
+            candidate.adopt(planner.warm_start)
+        planner.polish(candidate)
+    return True
+
+
+def _draw_starts(planner: Planner) -> bool:
+    """Optimise from the best of starts that are drawn."""
+    search = planner.search
+    if not (planner.is_sought and planner.takes_starts and (planner.is_unmet or search.compare)):
+        return False
+    optimise_starts(planner, search.starts, search.finalists)
+    return True
+
+
+def _compare_postures(planner: Planner) -> bool:
+    """Do so on a path that is long, where it may lead to a better motion than other starts."""
+    return planner.problem.way_in_reaches <= VERY_LONG_WAY and _try_postures(planner)
+
+
+def _try_postures(planner: Planner) -> bool:
+    wanted = planner.is_unmet or not planner.is_begun
+    possible = is_long(planner) and (planner.takes_starts or not planner.is_free)
+    if not (planner.is_sought and wanted and possible):
+        return False
+    keep_to_posture(planner)
+    return True
+
+
+def _stack_rows(planner: Planner) -> bool:
+    """Optimise from motions that keep limits and quantities as rows of their task."""
+    wanted = planner.is_sought and planner.is_unmet
+    begins = planner.takes_starts or not planner.is_free
+    can = is_on_nodes(planner.problem, planner.effort) and may_stack(planner)
+    if not (wanted and begins and can) or planner.is_out_of_reach():
+        return False
+    return optimise_stacked(planner, planner.search.finalists)
+
+
+def _judge_on_meshes(planner: Planner) -> bool:
+    """Take a motion that bodies' hulls forbid where their meshes do not."""
+    if planner.best is None or not planner.is_sought:
+        return False
+    tried = False
+    for candidate in planner.free_by_meshes():
+        tried = True
+        if planner.judge_as_it_is(candidate):
+            planner.best = candidate
+            break
+    return tried
+
+
+def _take_links_apart(planner: Planner) -> bool:
+    """Optimise again with links in convex pieces, where only their hulls meet something."""
+    search, effort = planner.search, planner.effort
+    if effort.in_pieces or not (planner.is_sought and planner.is_unmet):
+        return False
+    best = next(planner.free_by_meshes(just=True), None)
+    if best is None:
+        return False
+    planner.effort = replace(effort, in_pieces=True)
+    known = best.evaluation().trajectory
+    candidate = planner.begin(known.q[0], free=best.free)
+    if candidate is not None:
+        candidate.resume(known)
+        planner.polish(candidate)
+    if planner.is_unmet and planner.takes_starts and not planner.is_over:
+        optimise_starts(planner, search.starts, search.finalists)
+    return True
+
+
+def _draw_where_it_breaks(planner: Planner) -> bool:
+    """Draw configurations where the best motion breaks something most, or where none goes on."""
+    best, failure, search = planner.best, planner.failure, planner.search
+    wanted = planner.is_sought and planner.takes_starts and planner.is_unmet
+    if not (wanted and is_on_nodes(planner.problem, planner.effort)) or planner.is_out_of_reach():
+        return False
+    if best is None and not isinstance(failure, BreakdownError):
+        return False
+    # Of what is asked of the ends, and of an arm that meets itself, no time is told: others there.
+    at = best.breaks_at if best is not None else cast(BreakdownError, failure).time
+    optimise_where_it_breaks(planner, at or 0.0, search.starts, search.finalists)
+    return True
+
+
+def _search_globally(planner: Planner) -> bool:
+    """Optimise from the best chains of configurations over all self-motions."""
+    wanted = planner.search.compare or (planner.chooses_globally and planner.is_unmet)
+    can = planner.is_searchable and (planner.is_free or planner.best)
+    if not (planner.is_sought and wanted and can) or planner.is_out_of_reach():
+        return False
+    optimise_sequences(planner, chosen=planner.chooses_globally)
+    return True
+
+
+def _plan_largest_part(planner: Planner) -> bool:
+    """Plan the part that can be followed, where there is no motion, or poses are out of reach.
+
+    No other motion on finer grids would be better then.
+    """
+    best, failure = planner.best, planner.failure
+    if best is not None:
+        short = planner.is_sought and _may_meet_more(best) and planner.problem.damping is None
+        if short and planner.reach().reason:
+            planner.judge_part()
+            return True
+        return False
+    if planner.judged is not None:
+        return False
+    if failure is None:
+        raise RuntimeError("each start leads to a motion or to an error")
+    if not isinstance(failure, BreakdownError | NoSequenceError):
+        raise failure
+    # Chains of configurations end at obstacles and step limits as well: these stay errors.
+    blocked = isinstance(failure, NoSequenceError) and not planner.reach(failure.time).reason
+    if blocked:
+        raise failure
+    if not planner.judge_part(failure.time):
+        reason = planner.reach(failure.time).reason
+        if isinstance(failure, BreakdownError) and reason:
+            raise BreakdownError(
+                f"{planner.problem.asked.robot.name}: {reason}; and of the path before that no "
+                f"part was found that can be followed; start elsewhere (start=), or move the path",
+                time=failure.time,
+            ) from failure
+        raise failure
+    return True
+
+
+def _may_meet_more(best: Candidate) -> bool:
+    return bool(best.violations) and not best.is_spent
+
+
+def _judge(planner: Planner) -> bool:
+    """Go on to finer grids, until the certificate finds nothing wrong."""
+    if planner.best is None or planner.judged is not None:
+        return False
+    planner.judge(planner.best)
+    return True
+
+
+def _plan_part_instead(planner: Planner) -> bool:
+    """Plan the largest part where a motion along all of the path is off it, or past limits."""
+    best, judged = planner.best, planner.judged
+    if best is None or judged is None or best is not judged.part.candidate:
+        return False
+    check = judged.certificate
+    # With damping the motion goes on where the path cannot be followed: so it was asked for.
+    if best.is_spent or planner.problem.damping is not None:
+        return False
+    out_of_limits = bool(best.violations) and check.limit_margin.value < 0.0
+    suspect = check.position_error.time
+    # Where single poses are in reach, constraints that are not met say more than a part.
+    if (check.on_path and not out_of_limits) or not planner.reach(suspect).reason:
+        return False
+    planner.judge_part(suspect)
+    return True
+
+
+def _draw_where_proof_fails(planner: Planner) -> bool:
+    """Draw configurations where the proof fails, if nothing was known to break there before."""
+    best, judged, search = planner.best, planner.judged, planner.search
+    if best is None or judged is None or best is not judged.part.candidate or best.is_spent:
+        return False
+    fails_at, known = judged.fails_at, {item.name for item in planner.attempts}
+    if fails_at is None or _WHERE_IT_BREAKS in known or not planner.takes_starts:
+        return False
+    if not is_on_nodes(planner.problem, planner.effort) or planner.is_out_of_reach():
+        return False
+    planner.best = planner.judged = None
+    try:
+        optimise_where_it_breaks(planner, fails_at, search.starts, search.finalists)
+        found = planner.best
+        if found is not None and found.will_do:
+            planner.judge(found)
+    finally:
+        found = planner.best
+        if planner.judged is None or not planner.judged.certificate.verified:
+            planner.best, planner.judged = best, judged
+            if found is not None and found.cut_short:
+                best.end(found.status)
+    return True
+
+
+def _look_what_stops(planner: Planner) -> bool:
+    """Look what stops a motion that is not verified: whether the arm can be there at all."""
+    judged, problem = planner.judged, planner.problem
+    if judged is None or judged.certificate.verified or judged.part.candidate.cut_short:
+        return False
+    if planner.is_published or problem.damping is not None:
+        return False
+    if judged.part.ending or judged.fails_at is None:
+        return False
+    failure = planner.failure
+    if isinstance(failure, NoSequenceError):
+        planner.stops = str(failure).removeprefix(f"{problem.asked.robot.name}: ")
+        return True
+    rng = np.random.default_rng(planner.search.rng)
+    blocked = obstruction(problem, rng, judged.fails_at)
+    if blocked is not None:
+        planner.stops = _passing(blocked)
+    elif planner.is_free:
+        planner.advice = (
+            "the arm can be at each pose that was looked at, but no motion was found that joins "
+            "them: plan it in parts (plan_in_parts, parts = true in files)"
+        )
+    else:
+        planner.advice = (
+            "the arm can be at each pose that was looked at: another start may do (start=None)"
+        )
+    return True
+
+
+def _passing(blocked: Obstruction) -> str:
+    return (
+        f"no motion along the path passes t = {blocked.time:.6g} s: {blocked.reason}{blocked.help}"
+    )
+
+
+# By name, as reports have it; each says whether it was tried.
+STEPS: tuple[tuple[str, Callable[[Planner], bool]], ...] = (
+    # Look: a 'no' before anything is planned.
+    ("look at single poses", _look),
+    ("part before a pose out of reach", _plan_before_blocked_pose),
+    # Propose and polish, until one will do.
+    ("motion that is known", _follow_guide),
+    ("warm start", _begin_at_plan),
+    ("posture of a stretch", _keep_to_posture),
+    ("given start", _begin_at_start),
+    ("starts", _draw_starts),
+    ("postures compared", _compare_postures),
+    ("conditions as rows", _stack_rows),
+    ("proof on meshes", _judge_on_meshes),
+    ("links in pieces", _take_links_apart),
+    (_WHERE_IT_BREAKS, _draw_where_it_breaks),
+    ("global search", _search_globally),
+    # Judge.
+    ("largest part", _plan_largest_part),
+    ("finer grids and proof", _judge),
+    ("largest part instead", _plan_part_instead),
+    ("starts where the proof fails", _draw_where_proof_fails),
+    ("what stops it", _look_what_stops),
+)
+
+
+def _looked_at(problem: Problem, search: Search) -> Obstruction | None:
+    """Return a pose that the arm cannot be at; None where it can be at all that were looked at.
+
+    Or where it goes on all the same: damped motions leave their path, and what only keeps the arm
+    apart from itself was not asked for.
+
+    Raises
+    ------
+    InverseKinematicsError
+        It is the first pose, which is out of reach.
+    NoSequenceError
+        Bodies that were asked to be kept apart are met there.
+    """
+    if problem.damping is not None:
+        return None
+    blocked = obstruction(problem, np.random.default_rng(search.rng))
+    if blocked is None:
+        return None
+    if blocked.is_met and problem.own_collision is not None:
+        return blocked
+    if blocked.is_met or blocked.time == 0.0:
+        raise _no_way(problem, blocked)
+    return blocked
+
+
+def _is_in_own_reach(problem: Problem, pose: SE3) -> bool:
+    """Whether limits that were asked for, and not the arm's own, keep it from a pose."""
+    asked = problem.asked
+    if not any(isinstance(item, JointPositionLimits) for item in problem.constraints):
+        return False
+    try:
+        asked.robot.inverse_kinematics(pose, asked.task)
+    except InverseKinematicsError:
+        return False
+    return True
+
+
+def _no_way(problem: Problem, blocked: Obstruction) -> SelfmotionError:
+    """Return the error that says what is in the way, and what would help."""
+    robot, pose = problem.robot, problem.path.pose(blocked.time)
+    task = problem.asked.task.value
+    if not blocked.is_met and blocked.time == 0.0:
+        position, rotation = blocked.misses
+        remedy = "move the pose into the workspace"
+        if _is_in_own_reach(problem, pose):
+            remedy = "the arm's own limits let it be there: widen JointPositionLimits"
+        return InverseKinematicsError(
+            f"{robot.name}: no configuration within the limits puts '{robot.tool}' at "
+            f"{np.round(pose.translation, 4).tolist()} m for task '{task}', where "
+            f"the path begins: {blocked.reason}; {remedy}{blocked.help}",
+            position_miss=position,
+            rotation_miss=rotation,
+        )
+    return NoSequenceError(
+        f"{robot.name}: {_passing(blocked)}",
+        time=blocked.time,
+        reason=blocked.reason,
+    )

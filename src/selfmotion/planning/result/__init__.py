@@ -1,0 +1,66 @@
+"""What came of a problem: plans, how they were found, their files, and other paces."""
+
+from selfmotion.planning.result.archive import (
+    Made as Made,
+    files_of as files_of,
+    key_of as key_of,
+    own_modules as own_modules,
+    read_kept as read_kept,
+    told as told,
+    write_kept as write_kept,
+)
+from selfmotion.planning.result.asked import (
+    Asked as Asked,
+    Piece as Piece,
+    another_tool as another_tool,
+    arm_digest as arm_digest,
+    described as described,
+    elsewhere as elsewhere,
+    gaps as gaps,
+    keeps_as_far as keeps_as_far,
+    moving_end as moving_end,
+    not_judged_by as not_judged_by,
+)
+from selfmotion.planning.result.comparison import Comparison as Comparison, compare as compare
+from selfmotion.planning.result.measured import (
+    LimitsUsed as LimitsUsed,
+    NullSpaceVelocity as NullSpaceVelocity,
+    Reversals as Reversals,
+    quantities_of_pace as quantities_of_pace,
+)
+from selfmotion.planning.result.move import Move as Move, is_move as is_move, load_move as load_move
+from selfmotion.planning.result.pace_rows import PaceLimits as PaceLimits
+from selfmotion.planning.result.pacing import (
+    Ends as Ends,
+    along as along,
+    fastest_pace as fastest_pace,
+)
+from selfmotion.planning.result.parts import (
+    Parts as Parts,
+    load_parts as load_parts,
+    read_bundle as read_bundle,
+    write_bundle as write_bundle,
+)
+from selfmotion.planning.result.plan import (
+    Plan as Plan,
+    Views as Views,
+    load_plan as load_plan,
+    reached_text as reached_text,
+)
+from selfmotion.planning.result.report import Attempt as Attempt, Gap as Gap, Report as Report
+from selfmotion.planning.result.retiming import (
+    at_rate as at_rate,
+    check_no_feed as check_no_feed,
+    is_retimed as is_retimed,
+    rate_limits as rate_limits,
+    retime as retime,
+    slowdown as slowdown,
+)
+
+__all__ = [
+    "Attempt",
+    "Comparison",
+    "Gap",
+    "LimitsUsed",
+    "NullSpaceVelocity",
+]

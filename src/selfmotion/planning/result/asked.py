@@ -1,0 +1,366 @@
+"""What a motion is held against besides its own certificate, alone and where motions meet."""
+
+import json
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from selfmotion.basics import Array, Saved, description_of, digest_of
+from selfmotion.certificate import (
+    ARRIVED,
+    STILL_ACCELERATION,
+    USUAL,
+    JointLimits,
+    Requirement,
+    Tolerance,
+)
+from selfmotion.model.follow import Follow
+from selfmotion.model.motion import Trajectory
+from selfmotion.model.path import Path
+from selfmotion.model.robot import RobotModel
+from selfmotion.model.task import Relaxation, Task
+from selfmotion.planning.result.move import Move
+from selfmotion.planning.result.plan import Plan
+from selfmotion.problem.constraints import Clearance, Constraint
+from selfmotion.problem.problem import Problem, arm_rest_orders, rest_orders
+
+# What a motion along a path is held against, besides what its own certificate says.
+
+# Paths that are described otherwise are one where they are as near as this [m, and as a rotation
+# matrix] at their marks, and between each two of them at these shares, which no rhythm has; times
+# are the same up to rounding [s].
+_SHARES = np.sort(np.modf(0.5 * (np.sqrt(5.0) - 1.0) * np.arange(1, 14))[0])
+_SAME, _ROUNDING = 1e-9, 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Asked:
+    """What was asked of a motion along a path.
+
+    Attributes
+    ----------
+    robot : RobotModel
+        With the tool that follows, in the frame of its reference.
+    path : Path
+    task : Task
+    relaxations : sequence of Relaxation
+    constraints : sequence of Constraint
+        What it has to be judged by, besides `clearance`.
+    clearance : Clearance or None
+        How far bodies have to be apart, or more.
+    tolerance : Tolerance
+        What the path may be missed by, or less.
+    also : sequence of Follow
+        What else of the arm follows a path.
+    rest : bool
+        Whether the arm has to rest where its paths do, unless `constraints` say how fast it is.
+    """
+
+    robot: RobotModel
+    path: Path
+    task: Task
+    relaxations: Sequence[Relaxation] = ()
+    constraints: Sequence[Constraint] = ()
+    clearance: Clearance | None = None
+    tolerance: Tolerance = USUAL
+    also: Sequence[Follow] = ()
+    rest: bool = True
+
+    def failures(self, plan: Plan) -> Iterator[str]:
+        """Yield, in words, what of it a plan was not judged by."""
+        problem = plan.problem
+        yield from another_tool(problem.robot, self.robot)
+        if problem.task is not self.task:
+            yield f"its task is '{problem.task.value}', not '{self.task.value}'"
+        if not same_path(problem.path, self.path):
+            yield "it is along another path"
+        if not _same_follows(problem.also, self.also):
+            yield "what else follows a path is another"
+        if not _same_bands(problem.relaxations, self.relaxations):
+            yield "other rows are relaxed"
+        yield from not_judged_by(problem.all_constraints, self.constraints, self.clearance)
+        yield from self._restless(problem)
+        within, wanted = plan.tolerance, self.tolerance
+        if not (within.position <= wanted.position and within.rotation <= wanted.rotation):
+            yield (
+                f"it is judged within {within.position:.2g} m and {within.rotation:.2g} rad, "
+                f"expected {wanted.position:.2g} m and {wanted.rotation:.2g} rad"
+            )
+
+    def _restless(self, made: Problem) -> Iterator[str]:
+        """Yield that a problem does not ask for rest at an end where it was asked for."""
+        wanted = arm_rest_orders(made.follows, self.constraints) if self.rest else (0, 0)
+        # A damped motion is not judged by its rest.
+        judged = made.rest_orders if made.damping is None else (0, 0)
+        for end, order, found in zip(("start", "end"), wanted, judged, strict=True):
+            if found < order:
+                what = " without acceleration" if found else ""
+                yield f"it is not judged by rest{what} at its {end}, which was asked for"
+
+
+def arm_digest(robot: RobotModel) -> str:
+    """Return what tells arms apart, with their tools, reference and limits; see `another_tool`."""
+    limits = [getattr(robot, name) for name, _, _ in _LIMITS]
+    told = (robot.urdf.sha256, robot.joint_names, robot.tools, robot.reference, robot.locked)
+    return digest_of(told, sorted(robot.touching), limits, robot.effort_limit)
+
+
+def another_tool(made: RobotModel, asked: RobotModel) -> Iterator[str]:
+    """Yield in what an arm is not the one that was asked for."""
+    if made.urdf.sha256 != asked.urdf.sha256 or made.joint_names != asked.joint_names:
+        yield f"it is of another arm than {asked.name}: {made.name}"
+    elif made.tools != asked.tools:
+        yield f"its tool is '{', '.join(made.tools)}', not '{', '.join(asked.tools)}'"
+    elif made.reference != asked.reference:
+        yield f"its path is in the frame of '{made.reference}', not '{asked.reference}'"
+    elif dict(made.locked) != dict(asked.locked):
+        yield "other joints are locked, or elsewhere"
+    elif set(made.touching) != set(asked.touching):
+        yield "other links of it may touch"
+    else:
+        yield from _other_limits(made, asked)
+
+
+# What constraints take from an arm where they say no more: attribute, in words, power of time.
+_LIMITS = (
+    ("lower", "lower limit", ""),
+    ("upper", "upper limit", ""),
+    ("velocity_limit", "limit of speed", "/s"),
+    ("acceleration_limit", "limit of acceleration", "/s²"),
+    ("jerk_limit", "limit of jerk", "/s³"),
+)
+
+
+def _other_limits(made: RobotModel, asked: RobotModel) -> Iterator[str]:
+    """Yield a joint of an arm that has other limits than that of the same arm as it was asked."""
+    for name, words, power in _LIMITS:
+        found, wanted = getattr(made, name), getattr(asked, name)
+        others = np.flatnonzero(found != wanted)
+        if others.size:
+            k = int(others[0])
+            joint = asked.joint_names[k]
+            yield (
+                f"the {words} of its joint '{joint}' is {found[k]:g} "
+                f"{asked.unit_of(joint)}{power}, not {wanted[k]:g}"
+            )
+            return
+    if not np.array_equal(made.effort_limit, asked.effort_limit):
+        yield "its limits of torque are others"
+
+
+def not_judged_by(
+    judged: Sequence[Constraint], asked: Sequence[Constraint], clearance: Clearance | None
+) -> Iterator[str]:
+    """Yield what was asked for and is not among what a motion is judged by."""
+    known = {described(item) for item in judged}
+    for item in asked:
+        if described(item) not in known:
+            yield f"it is not judged by {type(item).__name__}, which was asked for"
+    if clearance is not None and not any(keeps_as_far(item, clearance) for item in judged):
+        yield "it is not judged by the clearance that was asked for"
+
+
+def described(item: Saved) -> str:
+    """Return what tells values apart, as a text."""
+    return json.dumps(description_of(item), sort_keys=True, default=repr)
+
+
+def same_path(made: Path, asked: Path) -> bool:
+    """Whether two paths are the same motion."""
+    if made is asked or described(made) == described(asked):
+        return True
+    if not abs(made.duration - asked.duration) <= _ROUNDING:
+        return False
+    t = _looked_at(np.minimum(np.union1d(made.marks, asked.marks), made.duration))
+    return _apart(made, t, asked, np.minimum(t, asked.duration)) <= _SAME
+
+
+def follows_at(part: Path, t: Array, whole: Path, times: Array) -> bool:
+    """Whether a path has the poses at times t (K,) that another has at its own `times` (K,)."""
+    return _apart(part, t, whole, times) <= _SAME
+
+
+def looked_at(path: Path) -> Array:
+    """Return the times of a path's marks, and some between each two of them, (K,) [s]."""
+    return _looked_at(np.asarray(path.marks))
+
+
+def _looked_at(marks: Array) -> Array:
+    between = marks[:-1, None] + np.diff(marks)[:, None] * _SHARES
+    return np.union1d(marks, between.ravel())
+
+
+def _apart(one: Path, t: Array, other: Path, times: Array) -> float:
+    """Return by how much poses differ at most [m, and as a rotation matrix]."""
+    here, there = one.samples(t), other.samples(times)
+    places = np.abs(here.translation - there.translation).max()
+    turns = np.abs(here.rotation - there.rotation).max()
+    # NaN stays NaN, which is no match.
+    return float(np.max([places, turns]))
+
+
+def _same_follows(made: Sequence[Follow], asked: Sequence[Follow]) -> bool:
+    if len(made) != len(asked):
+        return False
+    for one, other in zip(made, asked, strict=True):
+        if (one.task, one.tool, one.reference) != (other.task, other.tool, other.reference):
+            return False
+        if isinstance(one.path, Path) != isinstance(other.path, Path):
+            return False
+        if isinstance(one.path, Path) and isinstance(other.path, Path):
+            if not same_path(one.path, other.path):
+                return False
+        elif not np.array_equal(_matrix(one.path), _matrix(other.path)):
+            return False
+    return True
+
+
+def _matrix(pose: object) -> Array:
+    return np.asarray(getattr(pose, "homogeneous", pose), dtype=np.float64)
+
+
+def _same_bands(made: Sequence[Relaxation], asked: Sequence[Relaxation]) -> bool:
+    """Whether the same rows are relaxed, in the same windows up to rounding."""
+    if len(made) != len(asked):
+        return False
+    for one, other in zip(made, asked, strict=True):
+        values, wanted = one.to_dict(), other.to_dict()
+        during, window = values.pop("during"), wanted.pop("during")
+        if values != wanted or (during is None) != (window is None):
+            return False
+        if window is not None and not np.allclose(during, window, rtol=0.0, atol=_ROUNDING):
+            return False
+    return True
+
+
+def keeps_as_far(item: Constraint, apart: Clearance) -> bool:
+    """Whether a constraint keeps all that a clearance does of the arm itself and its own bodies."""
+    return (
+        isinstance(item, Clearance)
+        and item.distance >= apart.distance
+        and set(item.disabled) <= set(apart.disabled)
+    )
+
+
+# How motions that are judged one by one hang together: from rest to rest, without a jump.
+
+# Where one motion ends, the next begins, up to rounding [rad or m].
+_JOINED = 1e-9
+_START, _END = 0, -1
+_SMOOTH = 2
+
+
+class Piece(NamedTuple):
+    """One of several motions of an arm, each after the one before.
+
+    Attributes
+    ----------
+    name : str
+        In words: ``"'top'"``, ``"part 1"``.
+    motion : Trajectory
+    accelerates : (bool, bool)
+        Whether it may accelerate at its start and its end: only where its tool's own motion does.
+    """
+
+    name: str
+    motion: Trajectory
+    accelerates: tuple[bool, bool] = (False, False)
+
+    @classmethod
+    def of(cls, name: str, made: Plan | Move) -> "Piece | None":
+        """Return a plan or a move as a piece; None for a move that was not found."""
+        if isinstance(made, Plan):
+            return cls(name, made.trajectory, _accelerates(made.problem, made.requirements))
+        return None if made.trajectory is None else cls(name, made.trajectory)
+
+
+def _accelerates(problem: Problem, requirements: Sequence[Requirement]) -> tuple[bool, bool]:
+    limited = any(
+        isinstance(item, JointLimits) and item.order > _SMOOTH and np.isfinite(item.upper).any()
+        for item in requirements
+    )
+    if limited:
+        # No limited jerk makes a step of acceleration.
+        return False, False
+    orders = [rest_orders(item.path, item.task) for item in problem.follows.items]
+    start, end = (min(order[k] for order in orders) < _SMOOTH for k in (0, 1))
+    return start, end
+
+
+def gaps(robot: RobotModel, pieces: Sequence[Piece], allowed: float = _JOINED) -> Iterator[str]:
+    """Yield where from one piece to the next the arm jumps, moves or accelerates.
+
+    Configurations have to agree within what is allowed, by default 1e-9 rad or m; at both sides the
+    arm has to rest, within 1e-6 rad/s or m/s and 1e-3 rad/s² or m/s². All of them have to state
+    accelerations, or none: between the samples of the whole some would be other motions than were
+    judged.
+    """
+    yield from _mixed(pieces)
+    for one, other in pairwise(pieces):
+        last, first = one.motion.q[_END], other.motion.q[_START]
+        yield from _jump(robot, one.name, other.name, last, first, allowed)
+        yield from moving_end(robot, one, _END)
+        yield from moving_end(robot, other, _START)
+
+
+def _mixed(pieces: Sequence[Piece]) -> Iterator[str]:
+    cubic = [piece.name for piece in pieces if piece.motion.qdd is None]
+    if cubic and len(cubic) < len(pieces):
+        yield (
+            f"{cubic[0]} states no accelerations, and others do, so that it is another motion "
+            f"between its samples in the whole; give its accelerations (Trajectory(qdd=…)), and "
+            f"judge it again"
+        )
+
+
+def _jump(
+    robot: RobotModel, one: str, other: str, last: Array, first: Array, allowed: float = _JOINED
+) -> Iterator[str]:
+    apart = np.abs(first - last)
+    worst = int(np.argmax(apart))
+    # Written so that NaN is a jump.
+    if not apart[worst] <= allowed:
+        joint = robot.joint_names[worst]
+        yield (
+            f"from {one} to {other} joint '{joint}' would jump by {apart[worst]:.3g} "
+            f"{robot.unit_of(joint)} ({allowed:g} allowed); plan one of them again, from where the "
+            f"other is"
+        )
+
+
+def elsewhere(
+    robot: RobotModel, piece: Piece, end: int, asked: Array, allowed: float = _JOINED
+) -> Iterator[str]:
+    """Yield where a piece does not begin (0) or end (-1) at a configuration (n,)."""
+    apart = np.abs(piece.motion.q[end] - asked)
+    worst = int(np.argmax(apart))
+    if not apart[worst] <= allowed:
+        joint, verb = robot.joint_names[worst], "end" if end else "begin"
+        yield (
+            f"{piece.name} does not {verb} where it was asked to: joint '{joint}' is "
+            f"{apart[worst]:.3g} {robot.unit_of(joint)} away ({allowed:g} allowed); plan it again, "
+            f"{'to' if end else 'from'} there"
+        )
+
+
+def moving_end(robot: RobotModel, piece: Piece, end: int) -> Iterator[str]:
+    """Yield where a piece does not rest at its start (0) or its end (-1)."""
+    motion, verb = piece.motion, "end" if end else "begin"
+    rates = ((1, "moves", ARRIVED, ""), (2, "accelerates", STILL_ACCELERATION, "²"))
+    for order, what, allowed, power in rates:
+        # What a file does not state is not judged: between its samples the controller accelerates.
+        if order == _SMOOTH and (motion.qdd is None or piece.accelerates[end]):
+            continue
+        rate = np.abs(motion(motion.t[end], order))
+        worst = int(np.argmax(rate))
+        if not rate[worst] <= allowed:
+            joint = robot.joint_names[worst]
+            yield (
+                f"{piece.name} does not {verb} at rest: joint '{joint}' {what} at "
+                f"{rate[worst]:.2g} {robot.unit_of(joint)}/s{power} ({allowed:g} allowed); plan it "
+                f"along a path that rests there, with rest=True"
+            )
+            return

@@ -1,0 +1,251 @@
+"""What can be asked of a finished motion: limits that it uses, its null motion, reversals."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+import numpy.typing as npt
+
+from selfmotion.basics import Array, ProblemError, read_only, shown
+from selfmotion.certificate import Quantity, QuantityWithinLimits, Requirement, deviation_from
+from selfmotion.model.follow import Follows
+from selfmotion.model.motion import Sampling, Trajectory
+from selfmotion.model.robot import null_space
+from selfmotion.planning.result.pace_rows import PaceLimits
+from selfmotion.problem.costs import Cost, PlacedLater, Samples
+from selfmotion.problem.problem import Problem
+
+# Which limits a motion uses, and for how long: whether it could be faster.
+
+# A limit is used fully from this share of it on.
+FULLY = 0.95
+# Times that are looked at, so many per sample of the motion and at least.
+_PER_SAMPLE, _FEWEST = 3, 2000
+_RATES = ("speed", "acceleration", "jerk")
+
+
+@dataclass(frozen=True)
+class LimitsUsed:
+    """For what share of a motion's time limits of its pace are used fully, by 95 % or more.
+
+    Attributes
+    ----------
+    busy : float
+        Some limit is: at 1 the motion is as fast as its joint path allows.
+    shares : tuple of (str, float)
+        Which limit is used most then, "acceleration of joint 'elbow'", and for what share of the
+        time; the longest first.
+    """
+
+    busy: float
+    shares: tuple[tuple[str, float], ...]
+
+    def __str__(self) -> str:
+        """Return both in words."""
+        told = f"{self.busy:.1%} of the time"
+        if not self.shares:
+            return told
+        return f"{told}: " + ", ".join(f"{name} {share:.1%}" for name, share in self.shares)
+
+
+def quantities_of_pace(requirements: Sequence[Requirement]) -> tuple[Quantity, ...]:
+    """Return the quantities within limits that a slower pace may keep."""
+    kept = (item.quantity for item in requirements if isinstance(item, QuantityWithinLimits))
+    return tuple(item for item in kept if item.of_pace and len(item.limited))
+
+
+def limits_used(problem: Problem, motion: Trajectory) -> LimitsUsed:
+    """Return how long a motion uses which of the limits of its pace that a problem asks for."""
+    envelope = problem.envelope
+    quantities = quantities_of_pace(problem.requirements)
+    limits = PaceLimits(envelope.speed, envelope.acceleration, envelope.jerk, quantities)
+    count = max(_PER_SAMPLE * len(motion.t), _FEWEST)
+    # In the middle of equal parts of the time.
+    t = motion.t[0] + motion.duration * (np.arange(count) + 0.5) / count
+    used = np.concatenate(limits.shares_at(motion, t), axis=1)
+    names = [f"{rate} of joint '{name}'" for rate in _RATES for name in motion.joint_names]
+    names += [column.label for item in quantities for column in item.columns]
+    most = np.argmax(used, axis=1)
+    full = used.max(axis=1) >= FULLY
+    shares = _shares(most[full], len(names)) / count
+    order = np.argsort(-shares, kind="stable")
+    found = tuple((names[k], float(shares[k])) for k in order if shares[k] > 0.0)
+    return LimitsUsed(float(full.mean()), found)
+
+
+def _shares(which: Array, count: int) -> Array:
+    return np.bincount(which, minlength=count).astype(np.float64)
+
+
+# What can be asked of a finished motion: its part in the null space, and its cost by any cost.
+
+# Gauss-Legendre points on each interval: squares of a quintic's derivatives are integrated exactly.
+_ROOTS, _SHARES = np.polynomial.legendre.leggauss(5)
+
+
+@dataclass(frozen=True, eq=False)
+class NullSpaceVelocity:
+    """The part of joint velocities that lies in the null space of the task's Jacobian.
+
+    Attributes
+    ----------
+    joints : (n,) or (K, n)
+        (I − J⁺J) q̇ [rad/s or m/s]; equal to N z.
+    coordinates : (r,) or (K, r)
+        z = Nᵀq̇ [rad/s or m/s].
+    basis : (n, r) or (K, n, r)
+        N, orthonormal, J N = 0. At each time the one nearest to that of the time before, so that z
+        is continuous where times are close; the first one is arbitrary.
+    """
+
+    joints: Array
+    coordinates: Array
+    basis: Array
+
+    def __repr__(self) -> str:
+        """Return what it is of, and how large it is at most."""
+        several = "" if self.joints.ndim == 1 else f"{len(self.joints)} times, "
+        most = np.abs(self.joints).max(initial=0.0)
+        return (
+            f"NullSpaceVelocity({several}{self.joints.shape[-1]} joints, "
+            f"{self.coordinates.shape[-1]} coordinates, at most {most:.4g} rad/s or m/s)"
+        )
+
+
+def null_space_velocity(
+    follows: Follows, motion: Trajectory, t: npt.ArrayLike
+) -> NullSpaceVelocity:
+    """Return the part of q̇ in the null space at times within the motion; see `Plan.null_motion`."""
+    _check_times(t)
+    qd = motion(t, 1)
+    if qd.ndim == 1:
+        basis = null_space(follows.jacobian(motion(t)))
+    else:
+        basis = null_space(follows.jacobians(motion(t)))
+        for k in range(1, len(basis)):
+            # The rotation of its columns that brings it nearest (orthogonal Procrustes problem).
+            left, _, right = np.linalg.svd(basis[k].T @ basis[k - 1])
+            basis[k] = basis[k] @ (left @ right)
+    coordinates = np.einsum("...nr,...n->...r", basis, qd)
+    return NullSpaceVelocity(np.einsum("...nr,...r->...n", basis, coordinates), coordinates, basis)
+
+
+def deviation_along(problem: Problem, motion: Trajectory, t: npt.ArrayLike) -> Array:
+    """Return how far the tool is off its path at times within the motion; see `Plan.deviation`."""
+    _check_times(t)
+    q, in_tool_axes = motion(t), any(item.in_tool_axes for item in problem.relaxations)
+    times = np.atleast_1d(np.asarray(t, dtype=np.float64))
+    found = deviation_from(problem.follows.items[0], times, np.atleast_2d(q), in_tool_axes)
+    return read_only(found if q.ndim == 2 else found[0])
+
+
+def _check_times(t: npt.ArrayLike) -> None:
+    if np.ndim(t) > 1:
+        raise ValueError(f"t has shape {np.shape(t)}, expected a time or times (K,) [s]")
+
+
+def cost_of(follows: Follows, motion: Trajectory, cost: Cost) -> float:
+    """Return ∫ G dt of a cost along a motion; see `Plan.evaluate`."""
+    if not isinstance(cost, Cost):
+        raise ProblemError(
+            f"cost is {shown(cost)}, expected a cost such as sm.costs.JointVelocity(), or "
+            f"sm.costs.FunctionCost(g) for a function"
+        )
+    cost.check(follows)
+    samples = _samples(follows, motion)
+    values = np.asarray(cost.value(samples))
+    if values.shape != samples.t.shape:
+        raise ProblemError(
+            f"cost '{cost.name}': its value has shape {values.shape}, expected {samples.t.shape}: "
+            f"one number for each sample"
+        )
+    bad = np.flatnonzero(~np.isfinite(values))
+    if len(bad):
+        raise ProblemError(
+            f"cost '{cost.name}': its value is {values[bad[0]]} at t = {samples.t[bad[0]]:.6g} s, "
+            f"expected finite numbers; selfmotion.testing.check_cost checks a cost"
+        )
+    return float(samples.weights @ values)
+
+
+def _samples(follows: Follows, motion: Trajectory) -> Samples:
+    """Return a motion at the Gauss points of each of its intervals."""
+    steps = np.diff(motion.t)[:, None]
+    t = (motion.t[:-1, None] + steps * 0.5 * (1.0 + _ROOTS)).ravel()
+    sampling = Sampling(t, (steps * 0.5 * _SHARES).ravel(), np.arange(len(t)))
+    q, qd, qdd, qddd = (motion(t, order) for order in range(4))
+    return PlacedLater(follows, sampling, q=q, qd=qd, qdd=qdd, qddd=qddd)
+
+
+# Where the joints of a motion change their direction.
+
+# A joint that goes back by less than this [rad or m] did not turn round.
+LEAST = 1e-3
+# Times that are looked at for each sample of the motion, and halvings to find when one turns round.
+_BETWEEN, _HALVINGS = 4, 40
+
+
+@dataclass(frozen=True, eq=False)
+class Reversals:
+    """When the joints of a motion turn round, each by more than 1 mrad or 1 mm.
+
+    Attributes
+    ----------
+    times : mapping
+        Joint → times [s], (K,).
+    """
+
+    times: Mapping[str, Array]
+
+    @classmethod
+    def of(cls, motion: Trajectory) -> Reversals:
+        """Return those of a motion."""
+        shares = np.arange(_BETWEEN) / _BETWEEN
+        steps = np.diff(motion.t)[:, None] * shares
+        t = np.append((motion.t[:-1, None] + steps).ravel(), motion.t[-1])
+        speeds = motion(t, 1)
+        turns = {
+            name: read_only(_turns(motion, number, t, speeds[:, number]))
+            for number, name in enumerate(motion.joint_names)
+        }
+        return cls(MappingProxyType(turns))
+
+    @property
+    def count(self) -> int:
+        """How many there are, of all joints together."""
+        return sum(map(len, self.times.values()))
+
+    def __str__(self) -> str:
+        """Return how many times, and which joints do, those first that do most often."""
+        order = sorted(self.times, key=lambda name: -len(self.times[name]))
+        turning = [f"{name} {len(self.times[name])}" for name in order if len(self.times[name])]
+        return f"{self.count} ({', '.join(turning)})" if turning else "0"
+
+
+def _turns(motion: Trajectory, number: int, t: Array, speed: Array) -> Array:
+    """Return when one joint turns round."""
+    moving = np.flatnonzero(speed)
+    change = np.flatnonzero(np.diff(np.sign(speed[moving])))
+    early, late, sign = t[moving[change]], t[moving[change + 1]], np.sign(speed[moving[change]])
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (early + late)
+        before = motion(middle, 1)[:, number] * sign > 0.0 if len(middle) else sign > 0.0
+        early, late = np.where(before, middle, early), np.where(before, late, middle)
+    places = motion(np.concatenate([t[:1], late, t[-1:]]))[:, number]
+    # Of turns with less than LEAST in between both go, the nearest first.
+    kept = list(range(len(places)))
+    while len(kept) > 2:
+        ways = np.abs(np.diff(places[kept]))
+        least = int(np.argmin(ways))
+        if ways[least] > LEAST:
+            break
+        if least == 0:
+            del kept[1]
+        elif least == len(ways) - 1:
+            del kept[-2]
+        else:
+            del kept[least : least + 2]
+    return np.asarray(late[np.array(kept[1:-1], dtype=int) - 1])

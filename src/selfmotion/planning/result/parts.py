@@ -1,0 +1,436 @@
+"""A plan in several parts, its file, and whether it is the motion that was asked for."""
+
+import hashlib
+import json
+import tempfile
+import zipfile
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from functools import cached_property
+from itertools import accumulate, pairwise
+from pathlib import Path as FilePath
+from typing import Any
+
+import numpy as np
+
+from selfmotion.basics import (
+    FileFormatError,
+    PlanError,
+    SelfmotionError,
+    as_path,
+    digest_of_file,
+    write_atomically,
+)
+from selfmotion.certificate import USUAL, Tolerance, first_of
+from selfmotion.model.motion import Trajectory, joined_motions
+from selfmotion.model.path import Path, Retimed
+from selfmotion.model.robot import RobotModel
+from selfmotion.planning.result.archive import OtherVersionError, check_version, file_digest
+from selfmotion.planning.result.asked import (
+    Asked,
+    Piece,
+    another_tool,
+    elsewhere,
+    follows_at,
+    gaps,
+    looked_at,
+    not_judged_by,
+)
+from selfmotion.planning.result.move import Move, load_move
+from selfmotion.planning.result.plan import Plan, load_plan, reached_text
+from selfmotion.problem.problem import (
+    START_MISS,
+    Problem,
+    asked_of_part,
+    at_all_times,
+    problem_from_dict,
+    problem_to_dict,
+    times_along,
+)
+
+# Plans and moves as one file: a description in JSON, and their own files, in one archive.
+
+# Bundles beyond so many bytes are not read.
+_LARGEST = 2_000_000_000
+_NAME = "bundle.json"
+
+
+def write_bundle(
+    file: FilePath,
+    kind: str,
+    version: int,
+    description: Mapping[str, Any],
+    made: Sequence[Plan | Move],
+) -> None:
+    """Write plans and moves, and what else is known, to one file; atomically.
+
+    Parameters
+    ----------
+    file : FilePath
+    kind : str
+        What it is, for who reads it: ``"program"``.
+    version : int
+        Raised with every change that older versions cannot read.
+    description : mapping
+        JSON-safe.
+    made : sequence of Plan or Move
+        Moves that were found.
+    """
+
+    def write(stream: Any) -> None:
+        # What is inside is compressed already.
+        with zipfile.ZipFile(stream, "w") as archive, tempfile.TemporaryDirectory() as folder:
+            members = []
+            for number, item in enumerate(made):
+                member = FilePath(folder, _member(number))
+                item.save(member)
+                members.append({"plan": isinstance(item, Plan), "digest": digest_of_file(member)})
+                archive.write(member, member.name)
+            whole = {"kind": kind, "version": version, "members": members, **description}
+            archive.writestr(_NAME, json.dumps({**whole, "digest": file_digest(whole, {})}))
+
+    write_atomically(file, write)
+
+
+def read_bundle(
+    file: FilePath, kind: str, version: int
+) -> tuple[dict[str, Any], list[Plan | Move], bool]:
+    """Return what `write_bundle` wrote, judged anew, and whether the file was changed since.
+
+    Raises
+    ------
+    FileFormatError
+        The file is missing, is of another kind, lacks something, or was written by another version.
+    """
+    try:
+        with zipfile.ZipFile(file) as archive, tempfile.TemporaryDirectory() as folder:
+            if sum(item.file_size for item in archive.infolist()) > _LARGEST:
+                raise ValueError(f"it unpacks to more than {_LARGEST:g} bytes")
+            description: dict[str, Any] = json.loads(archive.read(_NAME))
+            if description["kind"] != kind:
+                raise ValueError(f"it is a {description['kind']}, expected a {kind}")
+            check_version(file, kind, description["version"], version)
+            changed = description.pop("digest", None) != file_digest(description, {})
+            made, known = list[Plan | Move](), dict[str, Any]()
+            for number, item in enumerate(description["members"]):
+                data = archive.read(_member(number))
+                changed |= hashlib.sha256(data).hexdigest() != item["digest"]
+                member = FilePath(folder, _member(number))
+                member.write_bytes(data)
+                load = load_plan if item["plan"] else load_move
+                made.append(load(member, known=known))
+    except FileNotFoundError:
+        raise FileFormatError(f"{file}: no such file") from None
+    except OSError as error:
+        raise FileFormatError(f"{file}: cannot be read: {error.strerror or error}") from error
+    except OtherVersionError:
+        raise
+    # Any number or key of a damaged file may be any other, and fail anywhere.
+    except Exception as error:
+        reason = " ".join(str(error).split()) or type(error).__name__
+        raise FileFormatError(f"{file}: is no {kind}, or a damaged one: {reason}") from error
+    if not made:
+        raise FileFormatError(f"{file}: is no {kind}, or a damaged one: it holds no motion")
+    return description, made, changed
+
+
+def _member(number: int) -> str:
+    return f"{number:04d}.npz"
+
+
+# A plan in several parts, with changes of configuration in between.
+
+# Raised with every change that older versions cannot read.
+_FORMAT = 1
+
+
+@dataclass(frozen=True, eq=False)
+class Parts:
+    """A motion along a path with as few changes of configuration as were found to be needed.
+
+    Attributes
+    ----------
+    problem : Problem
+        What was asked for, of the whole path.
+    plans : tuple of Plan
+        One for each part of the path, in order, each with a problem of its own.
+    moves : tuple of Move
+        From the end of each part to the start of the next, and back to the first one's start where
+        the path has to be closed and its motion is not.
+    cuts : tuple of float
+        Where on the path each part but the last ends, and the next begins [s].
+    endings : tuple of str
+        Why each part but the last goes no further.
+    altered : str
+        Why the file that they were read from is not the one that was written; "" where it is.
+    tolerance : Tolerance
+        What each of the plans may miss the path by.
+    """
+
+    problem: Problem
+    plans: tuple[Plan, ...]
+    moves: tuple[Move, ...] = ()
+    cuts: tuple[float, ...] = ()
+    endings: tuple[str, ...] = ()
+    altered: str = ""
+    tolerance: Tolerance = USUAL
+
+    def __repr__(self) -> str:
+        """Return a few lines: the parts, where they are cut and why, and the verdict."""
+        lines = [f"Parts({self.problem!r}, {len(self.plans)} with {len(self.moves)} moves)"]
+        lines += [
+            f"  cut at t = {cut:.6g} s: {ending}"
+            for cut, ending in zip(self.cuts, self.endings, strict=False)
+        ]
+        return "\n".join([*lines, f"  {self.verdict}"])
+
+    @property
+    def robot(self) -> RobotModel:
+        """The arm."""
+        return self.problem.robot
+
+    @property
+    def verified(self) -> bool:
+        """Whether the parts are what was asked for, and everything is kept at all times."""
+        return not self.failures
+
+    @property
+    def verdict(self) -> str:
+        """One line: verified, and how near to the path; or what is wrong with which of them."""
+        if self.verified:
+            return (
+                f"verified at all times: {len(self.plans)} part{'s' * (len(self.plans) != 1)}, and "
+                f"all moves in between; {reached_text(self.plans, self.tolerance)}"
+            )
+        return f"not verified: {'; '.join(self.failures)}"
+
+    @property
+    def summary(self) -> str:
+        """The verdict in short: of what is wrong the first."""
+        return self.verdict if self.verified else first_of(self.failures)
+
+    @cached_property
+    def failures(self) -> tuple[str, ...]:
+        """What speaks against them; empty for verified ones."""
+        parts = [
+            f"part {number}: {plan.certificate.verdict}"
+            for number, plan in enumerate(self.plans, 1)
+            if not plan.certificate.verified
+        ]
+        moves = [
+            f"move {number}: {move.trouble}"
+            for number, move in enumerate(self.moves, 1)
+            if not move.verified
+        ]
+        altered = [self.altered] if self.altered else []
+        return (*altered, *parts, *moves, *PartsAsked(self).failures())
+
+    @property
+    def trajectory(self) -> Trajectory:
+        """All parts and moves as one motion from t = 0 on.
+
+        Raises
+        ------
+        PlanError
+            A move was not found.
+        """
+        return joined_motions(self._motions)
+
+    @property
+    def begins(self) -> tuple[float, ...]:
+        """When each part begins in `trajectory` [s].
+
+        Raises
+        ------
+        PlanError
+            A move was not found.
+        """
+        durations = [motion.duration for motion in self._motions]
+        # Motions are parts and moves by turns.
+        return tuple(accumulate(durations[:-1], initial=0.0))[::2]
+
+    @property
+    def _motions(self) -> list[Trajectory]:
+        motions = []
+        for number, plan in enumerate(self.plans):
+            motions.append(plan.trajectory)
+            if number < len(self.moves):
+                move = self.moves[number]
+                if move.trajectory is None:
+                    raise PlanError(f"move {number + 1} was not found: {move.trouble}")
+                motions.append(move.trajectory)
+        return motions
+
+    def require(self) -> "Parts":
+        """Return the parts themselves if all of them, and all moves, are verified.
+
+        Raises
+        ------
+        PlanError
+            They are not; the message is the verdict.
+        """
+        if not self.verified:
+            raise PlanError(f"{self.problem.robot.name}: {self.verdict}")
+        return self
+
+    def save(self, file: str | FilePath) -> None:
+        """Write all parts and moves to one file that `load_parts` reads; atomically.
+
+        Raises
+        ------
+        PlanError
+            A move was not found.
+        """
+        description = {
+            "problem": problem_to_dict(self.problem),
+            "tolerance": asdict(self.tolerance),
+            "cuts": list(self.cuts),
+            "endings": list(self.endings),
+            **({"altered": self.altered} if self.altered else {}),
+        }
+        for number, move in enumerate(self.moves, 1):
+            if move.trajectory is None:
+                raise PlanError(f"move {number} was not found: {move.trouble}")
+        write_bundle(as_path(file), "parts", _FORMAT, description, [*self.plans, *self.moves])
+
+
+def load_parts(file: str | FilePath) -> Parts:
+    """Read parts that `Parts.save` wrote, and judge all of them anew.
+
+    A file that was changed is never verified.
+
+    Raises
+    ------
+    FileFormatError
+        The file is missing, holds no parts, lacks something, or was written by another version.
+    """
+    path = as_path(file)
+    description, made, changed = read_bundle(path, "parts", _FORMAT)
+    try:
+        problem = problem_from_dict(description["problem"])
+        cuts = tuple(map(float, description["cuts"]))
+        endings = tuple(map(str, description["endings"]))
+        # Files of before say none: then it is the usual one.
+        tolerance = Tolerance(**description.get("tolerance", {}))
+        altered = str(description.get("altered", ""))
+    except (KeyError, TypeError, ValueError, SelfmotionError) as error:
+        raise FileFormatError(f"{path}: are damaged parts: {error!r}") from error
+    plans = tuple(item for item in made if isinstance(item, Plan))
+    moves = tuple(item for item in made if isinstance(item, Move))
+    if changed:
+        altered = f"{path.name} was changed after the parts were written"
+    return Parts(problem, plans, moves, cuts, endings, altered, tolerance)
+
+
+# Whether parts are, together, the motion that was asked for.
+
+# A part is never quicker than the path is [share].
+_OWN_PACE = 1.0 + 1e-9
+
+
+class PartsAsked:
+    """Holds parts against their problem: the whole path in order, and one move after another.
+
+    Parameters
+    ----------
+    parts : Parts
+    """
+
+    def __init__(self, parts: "Parts") -> None:
+        self._parts, self._problem = parts, parts.problem
+
+    def failures(self) -> Iterator[str]:
+        """Yield what was asked for and is not so."""
+        parts = self._parts
+        if not parts.plans:
+            yield "there is no part"
+            return
+        stops = [0.0, *parts.cuts, self._problem.path.duration]
+        if len(stops) != len(parts.plans) + 1 or not np.all(np.diff(stops) > 0.0):
+            yield (
+                f"{len(parts.plans)} parts are cut at {list(parts.cuts)} s, expected a time "
+                f"between each two, in order, within 0..{stops[-1]:.6g} s"
+            )
+            return
+        for number, (plan, ends) in enumerate(zip(parts.plans, pairwise(stops), strict=True), 1):
+            for text in self._of_part(plan, ends, number):
+                yield f"part {number}: {text}"
+        yield from self._of_moves()
+
+    def _of_part(self, plan: Plan, ends: tuple[float, float], number: int) -> Iterator[str]:
+        problem, made = self._problem, plan.problem
+        is_first, is_last = number == 1, number == len(self._parts.plans)
+        path = made.path
+        if not (is_first and is_last):
+            if not _is_part(path, problem.path, ends):
+                yield f"it is not the path from {ends[0]:.6g} to {ends[1]:.6g} s"
+                return
+            if isinstance(path, Retimed):
+                moved = problem.along(lambda _: path, times_along(path, ends))
+                relaxed = moved["relaxations"]
+            else:
+                relaxed = tuple(problem.relaxations)
+            constraints = tuple(asked_of_part(problem, is_first, is_last))
+        else:
+            path, relaxed = problem.path, tuple(problem.relaxations)
+            constraints = tuple(problem.constraints)
+        own = problem.own_collision
+        kept = [item for item in constraints if item.applies(problem.robot)]
+        asked = Asked(
+            problem.robot,
+            path,
+            problem.task,
+            relaxed,
+            (*kept, *([] if own is None else [own])),
+            tolerance=self._parts.tolerance,
+            also=problem.also,
+            rest=problem.rest and problem.damping is None,
+        )
+        yield from asked.failures(plan)
+        start = problem.given_start
+        if is_first and start is not None:
+            # What a start given near the path is put onto it by.
+            first = Piece("it", plan.trajectory)
+            yield from elsewhere(problem.robot, first, 0, start, START_MISS)
+
+    def _of_moves(self) -> Iterator[str]:
+        parts, problem = self._parts, self._problem
+        plans, moves = parts.plans, parts.moves
+        is_closed = any(item.closes for item in problem.constraints) and len(plans) > 1
+        wanted = len(plans) if is_closed else len(plans) - 1
+        if len(moves) != wanted:
+            yield f"{len(plans)} parts have {len(moves)} moves in between, expected {wanted}"
+            return
+        own = problem.own_collision
+        asked = [*at_all_times(problem.constraints), *([] if own is None else [own])]
+        for number, move in enumerate(moves, 1):
+            for text in another_tool(move.robot, problem.robot):
+                yield f"move {number}: {text}"
+            if move.trajectory is not None:
+                kept = [item for item in asked if item.applies(problem.robot)]
+                for text in not_judged_by(move.constraints, kept, None):
+                    yield f"move {number}: {text}"
+        pieces = []
+        for number, plan in enumerate(plans, 1):
+            pieces.append(Piece.of(f"part {number}", plan))
+            pieces += [Piece.of(f"move {number}", move) for move in moves[number - 1 : number]]
+        if is_closed:
+            pieces.append(Piece.of("part 1", plans[0]))
+        found = [piece for piece in pieces if piece is not None]
+        # Where a move was not found, that is told already.
+        if len(found) == len(pieces):
+            yield from gaps(problem.robot, found)
+
+
+def _is_part(part: Path, whole: Path, ends: tuple[float, float]) -> bool:
+    """Whether a path is another one from one of its times to another, or slower."""
+    t = looked_at(part)
+    first, last = ends
+    passed = part.pace(t) if isinstance(part, Retimed) else t
+    # All of it: what is left out at either end is bridged by a move.
+    reached = np.array([passed[0], passed[-1]])
+    if not np.abs(reached - [0.0, last - first]).max() <= 1e-9 * whole.duration:
+        return False
+    if isinstance(part, Retimed) and not np.all(part.pace(t, 1) <= _OWN_PACE):
+        return False
+    return follows_at(part, t, whole, np.clip(first + passed, first, last))

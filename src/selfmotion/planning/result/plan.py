@@ -1,0 +1,428 @@
+"""A finished plan: the motion, the problem it solves, how it was found, and what the check says."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, MutableMapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path as FilePath
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol
+
+import numpy.typing as npt
+
+from selfmotion.basics import (
+    Array,
+    CollisionError,
+    FileFormatError,
+    PlanError,
+    ProblemError,
+    Progress,
+    RobotError,
+    SelfmotionError,
+    as_path,
+    description_of,
+    digest_of,
+    silent,
+)
+from selfmotion.certificate import (
+    Certificate,
+    Extreme,
+    FinishedMotion,
+    Requirement,
+    Tolerance,
+    allowed_text,
+    apart_text,
+    approaches,
+)
+from selfmotion.model.collision import Obstacle
+from selfmotion.model.motion import Trajectory
+from selfmotion.model.path import Path
+from selfmotion.model.robot import RobotModel
+from selfmotion.model.task import Task
+from selfmotion.planning.result.archive import Archive, in_order_of
+from selfmotion.planning.result.measured import (
+    LimitsUsed,
+    NullSpaceVelocity,
+    Reversals,
+    cost_of,
+    deviation_along,
+    limits_used,
+    null_space_velocity,
+)
+from selfmotion.planning.result.report import Report
+from selfmotion.problem.costs import Cost, FunctionCost, LostCost, metres_of
+from selfmotion.problem.problem.problem import Problem
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+class Views(Protocol):
+    """What shows plans: made by the replay, which knows plans, not the other way round."""
+
+    def notebook_html(self, plan: Plan) -> str:
+        """Return the replay as HTML for a notebook."""
+
+    def figure(self, plan: Plan) -> Figure:
+        """Return the plan's curves as a matplotlib figure."""
+
+    def write_replay(self, plan: Plan, file: FilePath) -> None:
+        """Write the replay as a page."""
+
+
+def _digests(costs: Sequence[Cost]) -> dict[str, str]:
+    """Return the digest of each cost by its name; "" of a function that no file had."""
+    return {
+        cost.name: ""
+        if isinstance(cost, LostCost)
+        else f"function {id(cost.g)}"
+        if isinstance(cost, FunctionCost)
+        else digest_of(description_of(cost))
+        for cost in costs
+    }
+
+
+def _are_same(costs: Mapping[str, str], known: Mapping[str, str] | None) -> bool:
+    """Whether costs are those that a report is of, as far as files know them."""
+    return (
+        known is not None
+        and costs.keys() == known.keys()
+        and all(own in ("", known[name]) for name, own in costs.items())
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """A joint motion along a tool motion.
+
+    Attributes
+    ----------
+    problem : Problem
+        What was asked for.
+    trajectory : Trajectory
+        The motion; shorter than the path where the arm cannot follow it to the end.
+    initial_trajectory : Trajectory
+        The minimum-norm motion (q̇ = J⁺ẋ), for comparison.
+    coefficients : (size,)
+        x, the null motion's coefficients.
+    report : Report
+        Of these motions: of one that was put in the place of another, costs are evaluated again.
+    certificate : Certificate
+        Of this motion and this problem: one of any other is not kept, and the plan is then not
+        verified (``replace(plan, trajectory=…)``); `check` makes a new one.
+    altered : str
+        Why the file that it was read from is not the one that was written; "" where it is.
+    """
+
+    views: ClassVar[Views | None] = None
+
+    problem: Problem
+    trajectory: Trajectory
+    initial_trajectory: Trajectory
+    coefficients: Array
+    report: Report
+    certificate: Certificate
+    altered: str = ""
+
+    def __post_init__(self) -> None:
+        # In the robot's order, whichever a file has: what is joined is joined by columns.
+        for name in ("trajectory", "initial_trajectory"):
+            object.__setattr__(self, name, in_order_of(self.robot, getattr(self, name)))
+        check, motion = self.certificate, self.trajectory
+        if (check.motion, check.problem) != (motion.digest, self.problem.digest):
+            object.__setattr__(self, "certificate", check.of_another())
+        object.__setattr__(self, "report", self._own_report())
+
+    def _own_report(self) -> Report:
+        """Return the report of this motion and these costs: that of others is evaluated again.
+
+        Where it does not say what it is of, it is of what the certificate was of. What cannot be
+        evaluated, as functions that no file has, leaves a cost that is not a number.
+        """
+        motion, initial = self.trajectory.digest, self.initial_trajectory.digest
+        costs, report = _digests(self.problem.costs), self.report
+        if not report.motion and self.certificate.motion:
+            return replace(report, motion=motion, initial_motion=initial, costs=costs)
+        same_costs = _are_same(costs, report.costs)
+        # Files did not always say which minimum-norm motion it is: the one beside it.
+        if not (same_costs and report.initial_motion in ("", initial)):
+            total, terms = self._costs_of(self.initial_trajectory)
+            report = replace(report, initial_cost=total, initial_terms=terms)
+        if not (same_costs and report.motion == motion):
+            report = report.evaluated(*self._costs_of(self.trajectory))
+        return replace(report, motion=motion, initial_motion=initial, costs=costs)
+
+    def _costs_of(self, motion: Trajectory) -> tuple[float, Mapping[str, float]]:
+        """Return what a motion costs, and by which costs; nan where one cannot be evaluated."""
+        terms = {}
+        for cost in self.problem.costs:
+            with suppress(ProblemError):
+                if not isinstance(cost, LostCost):
+                    terms[cost.name] = cost_of(self.problem.follows, motion, cost)
+        complete = len(terms) == len(self.problem.costs)
+        return (sum(terms.values()) if complete else math.nan), terms
+
+    def __repr__(self) -> str:
+        """Return a few lines: what moves, at what cost, and the verdict."""
+        report, verdict = self.report, self.certificate.verdict
+        costs = f"{report.initial_cost:.6g} → {report.cost:.6g}"
+        return (
+            f"Plan({self.robot.name}, task '{self.task.value}', {self.trajectory.duration:.6g} s)\n"
+            f"  cost {costs} in {report.iterations} iterations: {report.status.value}\n"
+            f"  {verdict}"
+        )
+
+    @property
+    def robot(self) -> RobotModel:
+        """The arm."""
+        return self.problem.robot
+
+    @property
+    def path(self) -> Path:
+        """The tool's motion."""
+        return self.problem.path
+
+    @property
+    def task(self) -> Task:
+        """The rows of it that are prescribed."""
+        return self.problem.task
+
+    @property
+    def tolerance(self) -> Tolerance:
+        """What the motion may miss the path by."""
+        return self.certificate.tolerance
+
+    @property
+    def requirements(self) -> tuple[Requirement, ...]:
+        """What the certificate judged besides the path and the arm's own limits."""
+        return self.problem.requirements
+
+    @property
+    def obstacles(self) -> tuple[Obstacle, ...]:
+        """The obstacles that the requirements are about."""
+        return tuple(body for item in self.requirements for body in item.obstacles)
+
+    @cached_property
+    def approaches(self) -> Mapping[str, Extreme]:
+        """How near each obstacle and carried body comes, and the arm to itself, at all times.
+
+        Name → the distance [m], when, and which two bodies; to a fiftieth of it or 0.1 mm. Found
+        when it is asked for.
+        """
+        return approaches(self.requirements, FinishedMotion(self.robot, self.trajectory))
+
+    @cached_property
+    def limits_used(self) -> LimitsUsed:
+        """For what share of the time limits of speeds, accelerations, torques … are used fully.
+
+        By joint and limit: what keeps the motion from being faster. Found when it is asked for.
+        """
+        return limits_used(self.problem, self.trajectory)
+
+    @cached_property
+    def reversals(self) -> Reversals:
+        """When each joint turns round, by more than 1 mrad or 1 mm. Found when it is asked for."""
+        return Reversals.of(self.trajectory)
+
+    def null_motion(self, t: npt.ArrayLike) -> NullSpaceVelocity:
+        """Return what of the joint velocities lies in the null space of the task at `t`.
+
+        q̇ = J⁺ẋ + (I − J⁺J) q̇: the first part moves the tool, the second one only the joints. J are
+        the rows of all frames that follow a path, as they are prescribed; where tolerances
+        (`relaxations`) are used, ẋ = J q̇ is what the tool does, not what the path asks.
+
+        Parameters
+        ----------
+        t : float or (K,)
+            Times within the motion [s].
+
+        Returns
+        -------
+        NullSpaceVelocity
+            In joints, ``joints`` (n,) or (K, n), and in coordinates, ``coordinates`` (r,) or
+            (K, r), of a ``basis``.
+
+        Raises
+        ------
+        ValueError
+            A time is outside the motion, or times have another shape.
+        """
+        return null_space_velocity(self.problem.follows, self.trajectory, t)
+
+    def deviation(self, t: npt.ArrayLike) -> Array:
+        """Return how far the tool is off its path at `t`, as the certificate sees it.
+
+        The six rows of a `Relaxation`. x, y, z [m] are the tool's position minus the path's: in
+        world axes, or in those of the path's tool frame where a tolerance of positions is
+        (``axes="tool"``). rx, ry, rz [rad] are the rotation vector that takes the path's
+        orientation to the tool's, in the axes of the path's tool frame; of `POINTING` the shortest
+        one between the z axes. Rows that the task leaves free are zero. Poses are those of the
+        robot and of the path; nothing is of the joints by which the planner uses tolerances.
+
+        Parameters
+        ----------
+        t : float or (K,)
+            Times within the motion [s].
+
+        Returns
+        -------
+        (6,) or (K, 6)
+            Of the tool; where further frames follow paths (`also`), not of these.
+
+        Raises
+        ------
+        ValueError
+            A time is outside the motion, or times have another shape.
+        """
+        return deviation_along(self.problem, self.trajectory, t)
+
+    def evaluate(self, cost: Cost) -> float:
+        """Return ∫ G dt of any cost along the plan, also of one that it was not planned for.
+
+        By Gauss-Legendre quadrature with five points on each interval of the motion. Of the plan's
+        own costs it is ``report.terms`` (of the published method up to its integration error).
+
+        Raises
+        ------
+        ProblemError
+            It is no cost, does not fit the arm or the task, or is not finite somewhere: the time is
+            named. Costs that were functions are not in a plan's file: give them again.
+        """
+        return cost_of(self.problem.follows, self.trajectory, cost)
+
+    @property
+    def metres(self) -> Mapping[str, float]:
+        """What a metre of each joint that slides counted against a radian of the others [rad].
+
+        In the first cost of joint rates; empty for an arm of one kind of joints.
+        """
+        return metres_of(self.problem.costs, self.robot)
+
+    def check(
+        self,
+        tolerance: Tolerance | None = None,
+        requirements: Sequence[Requirement] = (),
+        *,
+        progress: Progress = silent,
+    ) -> Certificate:
+        """Return a new certificate of the motion.
+
+        By all that the problem asks for and by `requirements` besides; with another tolerance than
+        the plan's where one is given. `progress` is told how far it is, as in `certify`.
+        """
+        within = tolerance or self.tolerance
+        found = self.problem.certify(
+            self.trajectory, within, self.report.ending, requirements, progress
+        )
+        if not self.altered:
+            return self.report.explained(found)
+        return replace(found, failures=(self.altered, *found.failures))
+
+    def require(self) -> Plan:
+        """Return the plan itself if its certificate is verified.
+
+        Raises
+        ------
+        PlanError
+            It is not; the message is the verdict.
+        """
+        if not self.certificate.verified:
+            raise PlanError(f"{self.robot.name}: {self.certificate.verdict}")
+        return self
+
+    def save(self, file: str | FilePath) -> None:
+        """Write the plan, without loss, to a ``.npz`` file that `load_plan` reads.
+
+        The file carries the URDF's text, so that it can be checked where the URDF is not, and the
+        problem but for code: costs that are functions are missing when it is loaded.
+        The write is atomic.
+
+        Raises
+        ------
+        PlanError
+            The certificate is of another motion.
+        """
+        if not self.certificate.motion:
+            raise PlanError(f"{self.robot.name}: {self.certificate.verdict}")
+        Archive(
+            self.problem,
+            self.trajectory,
+            self.initial_trajectory,
+            self.coefficients,
+            self.report,
+            self.certificate,
+            self.altered,
+        ).write(as_path(file))
+
+    def figure(self) -> Figure:
+        """Return joint positions and velocities, manipulability and path error as a figure.
+
+        Needs matplotlib (``pip install 'selfmotion[plots]'``).
+        """
+        if self.views is None:
+            raise PlanError("figures are made by the whole package: import selfmotion")
+        return self.views.figure(self)
+
+    def _repr_html_(self) -> str | None:
+        """Show the replay inline in a notebook."""
+        return None if self.views is None else self.views.notebook_html(self)
+
+
+def reached_text(plans: Sequence[Plan], tolerance: Tolerance) -> str:
+    """Return in words how near to their paths plans keep, for the verdict of all of them."""
+    found = [
+        pair
+        for plan in plans
+        for check in (plan.certificate,)
+        for pair in ((check.position_error, check.rotation_error), *check.others)
+    ]
+    position = max(one.value for one, _ in found)
+    rotation = max(other.value for _, other in found)
+    relaxed = any(plan.certificate.deviations for plan in plans)
+    return (
+        f"at most {position:.1e} m and {rotation:.1e} rad off the path"
+        f"{apart_text(relaxed)}{allowed_text(tolerance)}"
+    )
+
+
+def load_plan(
+    file: str | FilePath,
+    *,
+    progress: Progress = silent,
+    known: MutableMapping[str, Any] | None = None,
+) -> Plan:
+    """Read a plan that `Plan.save` wrote, and measure its motion anew.
+
+    A file that was changed is never verified. Where the robot's own file has changed since, the
+    certificate's notes say so: the plan is checked against the arm it was made for. `progress` is
+    told how far it is, as in `certify`. Who reads many plans of one arm hands the same `known` to
+    each: arms and constraints are put there, and taken from there.
+
+    Raises
+    ------
+    FileFormatError
+        The file is missing, is no plan, lacks something, or was written by a newer version.
+    """
+    archive = Archive.read(as_path(file), known)
+    # What the file says of itself is not believed.
+    plan = Plan(*archive[:-1])
+    try:
+        certificate = plan.check(progress=progress)
+    except (CollisionError, RobotError) as error:
+        unknown = f"it could not be checked again: {error}"
+        written = archive.certificate
+        certificate = replace(
+            written,
+            failures=(unknown, *written.failures),
+            motion=plan.trajectory.digest,
+            problem=plan.problem.digest,
+        )
+    except (SelfmotionError, ArithmeticError, ValueError) as error:
+        raise FileFormatError(f"{file}: is a damaged plan: {error}") from error
+    source = (plan.robot.urdf.source,) if plan.robot.urdf.has_changed() else ()
+    for name in (*source, *archive.changed):
+        note = f"{name} has changed since the plan was made"
+        certificate = replace(certificate, notes=(*certificate.notes, note))
+    return replace(plan, certificate=certificate)

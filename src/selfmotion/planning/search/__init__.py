@@ -1,0 +1,33 @@
+"""Where to begin: start configurations, self-motion curves, chains over them, reach."""
+
+from selfmotion.planning.search.chains import Sequence as Sequence
+from selfmotion.planning.search.curves import (
+    SPACING as SPACING,
+    SelfMotion as SelfMotion,
+)
+from selfmotion.planning.search.guides import (
+    BESIDE as BESIDE,
+    LAST_SMOOTHINGS as LAST_SMOOTHINGS,
+    asks_length as asks_length,
+    guides as guides,
+    has_curves as has_curves,
+    shortest_along as shortest_along,
+)
+from selfmotion.planning.search.manifold import Manifold as Manifold
+from selfmotion.planning.search.obstruction import (
+    Obstruction as Obstruction,
+    Reach as Reach,
+    obstruction as obstruction,
+    reachable as reachable,
+)
+from selfmotion.planning.search.stacked import Stacked as Stacked, metrics as metrics
+from selfmotion.planning.search.starts import (
+    carried as carried,
+    spread as spread,
+    start_candidates as start_candidates,
+)
+from selfmotion.planning.search.stretches import (
+    Stretch as Stretch,
+    Stretches as Stretches,
+    turned_towards as turned_towards,
+)

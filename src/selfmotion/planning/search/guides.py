@@ -1,0 +1,153 @@
+"""Motions worth starting from, found by the global search over self-motions."""
+
+import itertools
+from collections import abc
+
+import numpy as np
+
+from selfmotion.basics import Array, Progress
+from selfmotion.model.path import Path, spread_along
+from selfmotion.model.task import log3
+from selfmotion.planning.search.chains import Sequence
+from selfmotion.planning.search.manifold import OnPath
+from selfmotion.planning.search.measures import Length, measure_of
+from selfmotion.planning.search.nodes import Admissible
+from selfmotion.planning.search.sampled import sampled_layers
+from selfmotion.planning.search.sequences import Layers, best_sequences, curve_layers
+from selfmotion.planning.search.shortest import Shortest
+from selfmotion.problem.costs import PathLength
+from selfmotion.problem.problem import Problem
+
+# Sequences refined; the best among the samples is not always that of the best motion.
+_REFINED = 3
+# From one of the search's times to the next the tool moves by so much [m, rad], whatever the path's
+# own waypoints: more times would take longer, and what comes of them is smoothed anyway.
+_STRIDE = 0.02
+_TURN = 0.1
+# At fewer times than these a search would miss obstacles: self-motion curves allow for more than
+# samples of larger spaces do in the same time. More would take too long.
+_FEWEST_OF_CURVES = 150
+_FEWEST = 60
+_MOST = 400
+# The path is looked at so often to see how far the tool moves.
+_PATH_LOOKS = 2000
+# What the sequences keep beyond the clearance asked for, since they are only checked at waypoints.
+_MARGIN = 2.5e-4
+# Where the best chain itself is made the motion, it moves aside in the stages with the least δ, so
+# far from limits [rad or m] and at this share of the largest speeds: between waypoints it bulges.
+_CHAIN_EDGE = 5e-4
+_CHAIN_SPEED = 0.95
+# A node that does not come onto the path is put so far towards the next one; not in the middle,
+# where a halved grid would have one of the same times again.
+BESIDE = 0.3
+LAST_SMOOTHINGS = (3.0, 1.0, 0.3, 0.1, 0.03)
+
+
+def guides(problem: Problem, rng: np.random.Generator | int, progress: Progress) -> list[Sequence]:
+    """Return guides from the best sequences over the self-motions, by the problem's own costs.
+
+    Raises
+    ------
+    NoSequenceError
+        No chain of configurations follows the path; says where it ends and why.
+    """
+    weights = _weights(problem)
+    layers = layers_of(problem, weights, rng, progress)
+    measure = measure_of(problem.follows, problem.costs, layers.t, weights)
+    return best_sequences(layers, _REFINED, measure, progress)
+
+
+def layers_of(
+    problem: Problem, weights: Array, rng: np.random.Generator | int, progress: Progress
+) -> Layers:
+    """Return the nodes of a problem: samples of all self-motions, free and within limits.
+
+    Parameters
+    ----------
+    problem : Problem
+    weights : (n,)
+        What a unit of each joint counts.
+    rng : Generator or int
+    progress : Progress
+    """
+    asked, t = problem.envelope, waypoint_times(problem)
+    steps = np.minimum(asked.speed * np.diff(t)[:, None], np.pi)
+    bodies = tuple((model, distance + _MARGIN) for model, distance in asked.bodies)
+    limits = asked.lower, asked.upper
+    if has_curves(problem):
+        return curve_layers(problem.follows, t, steps, limits, bodies, rng, progress)
+    waypoints = OnPath(problem.follows, t, *limits)
+    return sampled_layers(waypoints, t, steps, limits, bodies, weights, rng, progress)
+
+
+def shortest_along(
+    problem: Problem, t: Array, q: Array, where: Array, smoothings: abc.Sequence[float]
+) -> tuple[Array, Array] | None:
+    """Return the shortest configurations near those q (W, n) at t, at times `where`, (K,), (K, n).
+
+    In stages with these δ, see `Shortest.near`. Where nothing near comes onto the path, it is tried
+    a little later instead: at a singular pose rounding may put it beyond reach, by next to nothing.
+    None where that does not help, or one meets something.
+    """
+    weights, asked = _weights(problem), problem.envelope
+    edge = np.minimum(_CHAIN_EDGE, 1e-2 * (asked.upper - asked.lower))
+    limits = asked.lower + edge, asked.upper - edge
+    waypoints = OnPath(problem.follows, where, *limits)
+    here, arrived = waypoints.project_each(_between(t, q, where), np.arange(len(where)))
+    if not arrived[[0, -1]].all():
+        return None
+    if not arrived.all():
+        where = np.where(arrived, where, where + BESIDE * np.diff(where, append=where[-1]))
+        waypoints = OnPath(problem.follows, where, *limits)
+        here, arrived = waypoints.project_each(_between(t, q, where), np.arange(len(where)))
+        if not arrived.all():
+            return None
+    bodies = tuple((model, distance + _MARGIN) for model, distance in asked.bodies)
+    bounds = Admissible(*limits, problem.robot.is_revolute, bodies)
+    largest = np.minimum(_CHAIN_SPEED * asked.speed * np.diff(where)[:, None], np.pi)
+    here = Shortest(waypoints, bounds, largest, weights).near(here, smoothings)
+    return (where, here) if bounds.keep(here).all() else None
+
+
+def _between(t: Array, q: Array, where: Array) -> Array:
+    """Return what lies straight between configurations q (W, n) at t, at times `where`, (K, n)."""
+    return np.column_stack([np.interp(where, t, joint) for joint in q.T])
+
+
+def asks_length(problem: Problem) -> bool:
+    """Whether sequences are chosen by their length."""
+    t, weights = np.array([0.0, problem.path.duration]), _weights(problem)
+    return isinstance(measure_of(problem.follows, problem.costs, t, weights), Length)
+
+
+def has_curves(problem: Problem) -> bool:
+    """Whether the self-motions of a problem are curves, at all times."""
+    return problem.follows.redundancy == 1 and not problem.follows.holds
+
+
+def waypoint_times(problem: Problem) -> Array:
+    """Return times (W,) [s] at which to search for a problem's configurations."""
+    return search_times(problem.path, _FEWEST_OF_CURVES if has_curves(problem) else _FEWEST)
+
+
+def search_times(path: Path, fewest: int) -> Array:
+    """Return times (W,) [s] at which to search for configurations, as the tool moves on."""
+    t = spread_along(path, _PATH_LOOKS)
+    tool = path.samples(t)
+    moved = np.linalg.norm(np.diff(tool.translation, axis=0), axis=1) / _STRIDE
+    turned = np.array([np.linalg.norm(log3(a.T @ b)) for a, b in itertools.pairwise(tool.rotation)])
+    travel = np.concatenate([[0.0], np.cumsum(moved + turned / _TURN)])
+    # Where the tool stands still, time counts, so that there is always one time after another.
+    count = int(np.clip(np.ceil(travel[-1]), fewest, _MOST))
+    travel += t * (1e-3 * count / path.duration)
+    times = np.interp(np.linspace(0.0, travel[-1], count + 1), travel, t)
+    times[-1] = path.duration
+    return np.asarray(times)
+
+
+def _weights(problem: Problem) -> Array:
+    """Return what a unit of each joint counts, (n,): as the path's length does, if it is a cost."""
+    for cost in problem.costs:
+        if isinstance(cost, PathLength) and cost.joint_weights is not None:
+            return np.asarray(cost.joint_weights, dtype=np.float64)
+    return problem.robot.joint_weights

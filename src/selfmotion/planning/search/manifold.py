@@ -1,0 +1,384 @@
+"""Newton's method onto the self-motions of many poses at once, and along a path's waypoints."""
+
+import numpy as np
+
+from selfmotion.basics import Array, Flags, Ints, RobotError, called, kernel
+from selfmotion.basics.layout import Layout
+from selfmotion.model.follow import Follows
+from selfmotion.model.kernels import (
+    carried,
+    cholesky,
+    errors_and_rows,
+    gram,
+    rows_of,
+    solve_cholesky,
+)
+from selfmotion.model.robot import null_space, place_tips
+
+# Longest single correction or round [rad or m]: a far start wanders where J is nearly singular.
+LONGEST_CORRECTION = 0.5
+# Newton's steps onto the path, from near it and from anywhere.
+_NEAR_STEPS = 10
+_FAR_STEPS = 60
+# Of the slower method, which has as many, those that gain less than this share of what is left, so
+# often in turn, are the last ones: what arrives gains nearly all of it in each.
+_LITTLE_GAIN, _LITTLE_GAINS = 1e-3, 5
+
+
+# A Newton correction of this size [rad or m] leaves an error of its square.
+CONVERGED = 1e-6
+# What a solution may miss by [m, rad].
+NOTHING_LEFT = 1e-12
+# Compiled kinematics and Pinocchio's differ by rounding alone [m, or rows of a rotation].
+_AGREE = 1e-9
+
+
+@kernel
+def correct(
+    q: Array,
+    jacobians: Array,
+    rotations: Array,
+    translations: Array,
+    target: Array,
+    layout: Layout,
+    tangent: Array,
+    longest: float,
+) -> float:
+    """Add J⁺e to q, no longer than `longest`, and project `tangent` onto the null space of J.
+
+    Of all tips, (F, 6, n), (F, 3, 3) and (F, 3); `target` (12 F,) is as `Follows.targets` has it.
+    Returns the norm of the correction before it was shortened; -1 where J has no full rank.
+    """
+    n, m = jacobians.shape[2], rows_of(layout)
+    z, along = np.empty(m), np.zeros(m)
+    jacobian, factor = np.empty((m, n)), np.empty((m, m))
+    errors_and_rows(layout, target, jacobians, rotations, translations, z, jacobian)
+    for i in range(m):
+        for k in range(n):
+            along[i] += jacobian[i, k] * tangent[k]
+    gram(jacobian, factor)
+    if not cholesky(factor):
+        return -1.0
+    solve_cholesky(factor, z)
+    solve_cholesky(factor, along)
+    length, norm = 0.0, 0.0
+    step = np.zeros(n)
+    for k in range(n):
+        for i in range(m):
+            step[k] += jacobian[i, k] * z[i]
+            tangent[k] -= jacobian[i, k] * along[i]
+        length += step[k] ** 2
+        norm += tangent[k] ** 2
+    length, norm = np.sqrt(length), np.sqrt(norm)
+    scale = longest / length if length > longest else 1.0
+    for k in range(n):
+        q[k] += scale * step[k]
+        tangent[k] /= norm
+    return float(length)
+
+
+@called
+def stopped(q: Array, lower: Array, upper: Array, held: Flags) -> bool:
+    """Put joints (n,) that are beyond a limit onto it and note that; return whether none was."""
+    inside = True
+    for j in range(len(q)):
+        if q[j] < lower[j] or q[j] > upper[j]:
+            q[j] = min(max(q[j], lower[j]), upper[j])
+            held[j], inside = True, False
+    return inside
+
+
+@called
+def clear_held(held: Flags, jacobians: Array) -> None:
+    """Clear the columns of joints (n,) that are held in Jacobians (F, 6, n)."""
+    for j in range(len(held)):
+        if held[j]:
+            for f in range(jacobians.shape[0]):
+                for i in range(6):
+                    jacobians[f, i, j] = 0.0
+
+
+@kernel
+def project_all(
+    q: Array,
+    targets: Array,
+    chains: Array,
+    layout: Layout,
+    lower: Array,
+    upper: Array,
+    still: Flags,
+    longest: float,
+    steps: int,
+    arrived: Flags,
+) -> None:
+    """Put each of q (K, n) onto its target (K, 12 F) by Newton's method, in place.
+
+    A joint that would leave its limits (K, n) stays at the limit, and the others do the rest;
+    joints that are to stand `still` (K, n) are at 0. `arrived`
+    (K,) says of which that was possible within so many steps.
+    """
+    n, tips = q.shape[1], layout.shape[0]
+    r, p = np.empty((chains.shape[1], 3, 3)), np.empty((chains.shape[1], 3))
+    rotations, positions = np.empty((tips, 3, 3)), np.empty((tips, 3))
+    jacobians, unused = np.zeros((tips, 6, n)), np.empty(n)
+    held = np.zeros(n, dtype=np.bool_)
+    for k in range(len(q)):
+        arrived[k] = False
+        for j in range(n):
+            held[j] = still[k, j]
+            if still[k, j]:
+                q[k, j] = 0.0
+        length = np.inf
+        for _ in range(steps):
+            inside = stopped(q[k], lower[k], upper[k], held)
+            if inside and length < CONVERGED:
+                arrived[k] = True
+                break
+            place_tips(q[k], chains, r, p, rotations, positions, jacobians)
+            unused[:] = 1.0
+            clear_held(held, jacobians)
+            length = correct(
+                q[k], jacobians, rotations, positions, targets[k], layout, unused, longest
+            )
+            # Singular, or not a number.
+            if not length >= 0.0:
+                break
+
+
+@kernel
+def approach_all(
+    q: Array,
+    target: Array,
+    chains: Array,
+    layout: Layout,
+    lower: Array,
+    upper: Array,
+    still: Flags,
+    iterations: int,
+    misses: Array,
+) -> None:
+    """Bring each of q (K, n) as near to a target as limits let it.
+
+    Levenberg-Marquardt with steps that are cut off at the limits, which arrives also where Newton's
+    method does not, and at the nearest place where nothing arrives; joints that are to stand
+    `still` (n,) are at 0. `misses` (K, m) are what is left in the rows [m, rad]; infinite where
+    that is no number from the beginning.
+    """
+    n, tips, m = q.shape[1], layout.shape[0], rows_of(layout)
+    r, p = np.empty((n + 1, 3, 3)), np.empty((n + 1, 3))
+    rotations, positions = np.empty((tips, 3, 3)), np.empty((tips, 3))
+    jacobians, error, step = np.zeros((tips, 6, n)), np.empty(m), np.empty(m)
+    jacobian, factor, steep = np.empty((m, n)), np.empty((m, m)), np.empty((m, n))
+    trial = np.empty(n)
+    for k in range(len(q)):
+        damping, best, idle = 1e-3, np.inf, 0
+        trial[:], error[:] = q[k], np.inf
+        for _ in range(iterations):
+            for j in range(n):
+                trial[j] = 0.0 if still[j] else min(max(trial[j], lower[j]), upper[j])
+            place_tips(trial, chains, r, p, rotations, positions, jacobians)
+            clear_held(still, jacobians)
+            errors_and_rows(layout, target, jacobians, rotations, positions, step, steep)
+            size = 0.0
+            for i in range(m):
+                size += step[i] ** 2
+            if size < best:
+                idle = idle + 1 if size > (1.0 - _LITTLE_GAIN) * best else 0
+                best, damping = size, max(0.1 * damping, 1e-14)
+                error[:], jacobian[:], q[k] = step, steep, trial
+                hold(q[k], lower, upper, error, jacobian)
+            else:
+                damping *= 10.0
+                # Before anything is known it is not a number: there is no way on from there.
+                if damping > 1e6 or best == np.inf:
+                    break
+            if best < NOTHING_LEFT**2 or idle == _LITTLE_GAINS:
+                break
+            gram(jacobian, factor)
+            for i in range(m):
+                factor[i, i] += damping
+                step[i] = error[i]
+            if not cholesky(factor):
+                break
+            solve_cholesky(factor, step)
+            for j in range(n):
+                along = 0.0
+                for i in range(m):
+                    along += jacobian[i, j] * step[i]
+                trial[j] = q[k, j] + along
+        misses[k] = error
+
+
+@called
+def hold(q: Array, lower: Array, upper: Array, error: Array, jacobian: Array) -> None:
+    """Take the joints at limits that a step would leave out of J (m, n)."""
+    for j in range(len(q)):
+        slope = 0.0
+        for i in range(len(error)):
+            slope += jacobian[i, j] * error[i]
+        if (q[j] <= lower[j] and slope < 0.0) or (q[j] >= upper[j] and slope > 0.0):
+            jacobian[:, j] = 0.0
+
+
+class Manifold:
+    """Projects configurations onto {q : F(q) = x} within limits, each by Newton's method.
+
+    Parameters
+    ----------
+    follows : Follows
+    lower, upper : (n,)
+        Joint limits [rad or m], ±inf where there is none. Joints stop there while others go on.
+
+    Attributes
+    ----------
+    revolute : (n,)
+    chains : (F, c + 1, 6, 3)
+        See `Follows.chains`.
+    layout : (1, 9 + n)
+        See `Follows.layout`.
+
+    Raises
+    ------
+    RobotError
+        The compiled kinematics are not those of Pinocchio.
+    """
+
+    def __init__(self, follows: Follows, lower: Array, upper: Array) -> None:
+        self.follows, self.robot = follows, follows.robot
+        # Copies: kernels are compiled anew for what may not be written to.
+        self._limits = np.array(lower), np.array(upper)
+        self._limited = np.isfinite(upper)
+        self.chains = follows.chains
+        self.revolute: Flags = follows.robot.is_revolute
+        self.layout = follows.layout
+        self._check()
+
+    def project(
+        self, q: Array, target: Array, *, far: bool = False, held: Flags | None = None
+    ) -> tuple[Array, Flags]:
+        """Return the configurations (K, n) that Newton's method reaches, and where it does, (K,).
+
+        From where it reaches none of its target, it is given more steps.
+
+        Parameters
+        ----------
+        q : (K, n)
+        target : (12 F,) or (K, 12 F)
+            See `Follows.targets`.
+        far : bool
+            Whether q is any configuration instead of one near the solution.
+        held : (n,) or (K, n), optional
+            Joints that have to stand at 0; by default none.
+        """
+        wanted = np.array(np.broadcast_to(target, (len(q), np.shape(target)[-1])), order="C")
+        still = np.array(np.broadcast_to(False if held is None else held, q.shape))
+        found, arrived = self._within(q, wanted, still, _FAR_STEPS if far else _NEAR_STEPS)
+        # Near singular poses Newton's method takes many steps, from near as well.
+        alone = ~arrived if np.ndim(target) == 2 else np.full(len(q), not arrived.any())
+        if not far and alone.any():
+            found[alone], arrived[alone] = self._within(
+                q[alone], wanted[alone], still[alone], _FAR_STEPS
+            )
+        # Joints that share a band may be within their limits, and beyond that together.
+        within = np.where(self._limited, self.follows.within_bands(found), np.inf)
+        beyond = arrived & (np.abs(found) > within).any(axis=1)
+        if beyond.any():
+            given = found[beyond], wanted[beyond], still[beyond], _FAR_STEPS, within[beyond]
+            found[beyond], arrived[beyond] = self._within(*given)
+        return found, arrived
+
+    def approach(self, q: Array, target: Array, held: Flags) -> tuple[Array, Array]:
+        """Return configurations (K, n) brought as near to a target (12 F,) as limits let them.
+
+        Slower than `project`, it arrives at stretched poses and with joints at their limits, too;
+        joints that are `held` (n,) stand at 0.
+
+        Returns
+        -------
+        q : (K, n)
+        misses : (K, 2)
+            What is left [m], [rad].
+        """
+        found, left = np.array(q), np.zeros((len(q), self.follows.dimension))
+        limits = *self._limits, np.array(held)
+        approach_all(found, target, self.chains, self.layout, *limits, _FAR_STEPS, left)
+        linear = self.follows.linear > 0.0
+        parts = np.where(linear, left, 0.0), np.where(linear, 0.0, left)
+        misses = [np.sqrt(np.einsum("km,km->k", part, part)) for part in parts]
+        return found, np.stack(misses, axis=1)
+
+    def _within(
+        self, q: Array, targets: Array, still: Flags, steps: int, most: Array | float = np.inf
+    ) -> tuple[Array, Flags]:
+        """Return what Newton's method makes of q (K, n), no |q| more than `most` besides limits."""
+        found, arrived = np.array(q, order="C"), np.zeros(len(q), dtype=bool)
+        # In one order of memory: each is a kernel of its own.
+        sides = np.maximum(self._limits[0], -most), np.minimum(self._limits[1], most)
+        lower, upper = (np.array(np.broadcast_to(side, q.shape), order="C") for side in sides)
+        project_all(
+            found,
+            targets,
+            self.chains,
+            self.layout,
+            lower,
+            upper,
+            np.array(still, order="C"),
+            LONGEST_CORRECTION,
+            steps,
+            arrived,
+        )
+        return found, arrived
+
+    def _check(self) -> None:
+        """Compare with Pinocchio: where it puts the tool, nothing is left to correct."""
+        ends = zip(self._limits, self.robot.finite_limits(), strict=True)
+        lower, upper = (np.where(np.isfinite(own), own, finite) for own, finite in ends)
+        for q in np.random.default_rng(0).uniform(lower, upper, (3, self.robot.dof)):
+            items = self.follows.items
+            poses = [item.chain.place(q) for item in items]
+            target = np.concatenate(
+                [part for pose in poses for part in (pose.translation, pose.rotation.ravel())]
+            )
+            still = np.zeros((1, len(q)), dtype=np.bool_)
+            found, arrived = self._within(q[None], target[None], still, _NEAR_STEPS)
+            for item, pose in zip(items, poses, strict=True):
+                miss = max(item.miss(pose, found[0]))
+                if not (arrived[0] and miss < _AGREE):
+                    raise RobotError(
+                        f"{self.robot.name}: compiled kinematics put '{item.chain.tip_name}' "
+                        f"{miss:.3g} off where Pinocchio does; this is an error of selfmotion's"
+                    )
+
+
+class OnPath:
+    """Configurations that put the tool on its path at each of W waypoints.
+
+    Parameters
+    ----------
+    follows : Follows
+    t : (W,)
+        Times of the waypoints [s].
+    lower, upper : (n,)
+        Joint limits [rad or m].
+    """
+
+    def __init__(self, follows: Follows, t: Array, lower: Array, upper: Array) -> None:
+        self._follows, self._manifold = follows, Manifold(follows, lower, upper)
+        self._targets, self.robot, self.count = follows.targets(t), follows.robot, len(t)
+        self._held, self.redundancy = follows.held(t), follows.redundancy
+
+    def project(self, q: Array, i: int, *, far: bool = False) -> tuple[Array, Flags]:
+        """Return what Newton's method makes of q (K, n) at waypoint i, and where it arrives."""
+        return self._manifold.project(q, self._targets[i], far=far, held=self._held[i])
+
+    def project_each(self, q: Array, i: Ints) -> tuple[Array, Flags]:
+        """Return the same of q (K, n), each at its own waypoint (K,)."""
+        return self._manifold.project(q, self._targets[i], held=self._held[i])
+
+    def bases(self, q: Array) -> Array:
+        """Return bases of the directions that a motion q (W, n) may move aside in, (W, n, d).
+
+        Each turned to the one before.
+        """
+        jacobians = self._follows.jacobians(q)
+        return carried(null_space(jacobians[0]), jacobians)

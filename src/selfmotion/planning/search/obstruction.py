@@ -1,0 +1,383 @@
+"""Poses of a path that the arm cannot be at: which, why, what would help, how far it gets."""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import cast
+
+import numpy as np
+
+from selfmotion.basics import Array
+from selfmotion.model.collision import Closest, how_near
+from selfmotion.model.follow import AugmentedFollows
+from selfmotion.model.path import edges_of, spread_along
+from selfmotion.model.task import POSITION_ROWS, ROW_NAMES, Relaxation
+from selfmotion.planning.search.nodes import AT_LIMIT
+from selfmotion.planning.search.single_poses import CLIMBERS, MOST_LOOKED_AT, Found, SinglePoses
+from selfmotion.planning.search.starts import start_candidates
+from selfmotion.problem.problem import Problem
+
+# Poses along the path that are looked at, bisections of the time at which no branch goes on, and
+# poses at which it is looked at how far they are out of reach.
+_POSES = 64
+_BISECTIONS = 16
+_LOOKS = 6
+# Poses about a time of trouble, in shares of the piece of the path that it is in.
+_ABOUT = (-1e-3, 0.0, 1e-3, 4e-3)
+# A singular value below this share of the dexterous configuration's counts as stretched or folded.
+_STRETCHED = 0.1
+# Poses along a path at which to look before anything else.
+_COARSE_POSES = 9
+# What would help is looked for in so many rounds, in each of which a deviation has to be this share
+# of the least before.
+_SHRINKS, _SHRUNK = 6, 0.75
+# A path is moved so often, each time a bit farther than needed at the pose where nothing was found,
+# and no farther than this [m].
+_MOVE_TRIES, _OVERSHOOT, _FARTHEST = 4, 0.05, 0.5
+
+
+_ROTATION_ROWS = ROW_NAMES[len(POSITION_ROWS) :]
+
+
+def remedies(poses: SinglePoses, t: float, times: Array) -> list[str]:
+    """Return in words what would let the arm be at the pose at t [s], each by itself.
+
+    The path moved as a whole, so that at the other times [s], too, there are configurations; the
+    tool turned away from its path at t; and one joint that goes farther, also at t.
+    """
+    found = []
+    shift = nearest_place(poses, times)
+    if shift is not None:
+        # Rounded away from where the path is: what is told has to suffice.
+        far = np.copysign(np.ceil(1e4 * np.abs(shift) - 1e-3) / 10.0, shift) + 0.0
+        told = ", ".join(f"{axis} {x:+.4g}" for axis, x in zip("xyz", far, strict=True) if x)
+        found.append(f"the path moved by {np.linalg.norm(far):.3g} mm ({told})")
+    turn = least_deviation(poses, t, _ROTATION_ROWS)
+    if turn is not None:
+        found.append(f"the tool turned by {np.degrees(np.linalg.norm(turn)):.1f}° there")
+    joint = least_excess(poses, t)
+    if joint is not None:
+        name, excess = joint
+        unit = poses.problem.asked.robot.unit_of(name)
+        found.append(f"joint '{name}' going {excess:.3g} {unit} beyond its limit")
+    return found
+
+
+def nearest_place(poses: SinglePoses, times: Array) -> Array | None:
+    """Return a short way (3,) [m] by which the path has to be moved, None where none is found.
+
+    So that at all the times [s] something is found: by as much as the first that is not needs, and
+    then on. Bodies stay where they are.
+    """
+    shift = np.zeros(3)
+    for _ in range(_MOVE_TRIES):
+        moved = poses.shifted(shift)
+        blocked = moved.first_blocked(times)
+        if blocked is None:
+            return shift
+        more = least_deviation(moved, blocked, POSITION_ROWS)
+        if more is None:
+            return None
+        shift = shift + (1.0 + _OVERSHOOT) * more
+        if np.linalg.norm(shift) > _FARTHEST:
+            return None
+    return None
+
+
+def least_deviation(poses: SinglePoses, t: float, rows: tuple[str, ...]) -> Array | None:
+    """Return the least deviation of some rows (3,) at t [s] with which something free is found.
+
+    As far as tries tell: the least of many, and then less and less. None where nothing is found, or
+    the task does not prescribe these rows.
+    """
+    asked = poses.problem.asked
+    prescribed = [ROW_NAMES[k] for k in asked.task.rows]
+    rows = tuple(row for row in rows if row in prescribed)
+    if not rows:
+        return None
+    more = Relaxation(rows, _FARTHEST if rows[0] in POSITION_ROWS else np.pi)
+    others = (
+        replace(item, rows=tuple(row for row in item.rows if row not in rows))
+        for item in asked.relaxations
+        if not set(item.rows) <= set(rows)
+    )
+    wider, n = poses.of(replace(asked, relaxations=(*others, more))), asked.robot.dof
+    follows = cast(AugmentedFollows, wider.problem.follows)
+    q = poses.some(t, CLIMBERS)[:, :n]
+    q = np.hstack([q, np.zeros((len(q), follows.robot.dof - n))])
+    best: Array | None = None
+    for _ in range(_SHRINKS):
+        q, arrived = wider.project(q, t, far=True)
+        q = q[arrived]
+        q = q[wider.bounds.keep(q)]
+        if not len(q):
+            break
+        away = follows.deviation(more, q)
+        sizes = np.linalg.norm(away, axis=1)
+        order = np.argsort(sizes)
+        q, size = q[order], float(sizes[order[0]])
+        if best is None or size < np.linalg.norm(best):
+            best = np.zeros(6)
+            best[more.indices] = away[order[0]]
+        limits = follows.limits_within(more, _SHRUNK * size)
+        if not limits.max() > 0.0:
+            break
+        wider = wider.with_limits(
+            np.maximum(wider.bounds.lower, -limits), np.minimum(wider.bounds.upper, limits)
+        )
+    if best is None:
+        return None
+    return best[:3] if rows[0] in POSITION_ROWS else best[3:]
+
+
+def least_excess(poses: SinglePoses, t: float) -> tuple[str, float] | None:
+    """Return the joint that would have to leave its limits least for a pose, and how far.
+
+    None where no single joint is in the way.
+    """
+    lower, upper = poses.bounds.lower, poses.bounds.upper
+    seeds = poses.some(t, CLIMBERS)
+    found: list[tuple[float, str]] = []
+    for k, name in enumerate(poses.problem.asked.robot.joint_names):
+        if not (np.isfinite(lower[k]) or np.isfinite(upper[k])):
+            continue
+        wide = poses.with_limits(
+            np.where(np.arange(len(lower)) == k, -np.inf, lower),
+            np.where(np.arange(len(upper)) == k, np.inf, upper),
+        )
+        q, arrived = wide.project(seeds, t, far=True)
+        q = q[arrived]
+        q = q[wide.bounds.keep(q)]
+        excess = np.maximum(q[:, k] - upper[k], lower[k] - q[:, k])
+        if len(q):
+            found.append((float(excess.min()), name))
+    if not found:
+        return None
+    excess, name = min(found)
+    return name, excess
+
+
+@dataclass(frozen=True, eq=False)
+class Obstruction:
+    """A pose of a path at which no configuration was found.
+
+    Attributes
+    ----------
+    time : float
+        When [s].
+    is_met : bool
+        Whether the pose is in reach, but for bodies that are met.
+    poses : SinglePoses
+        What looked for it.
+    found : Found
+        What there is at the pose.
+    times : (K,)
+        When to look again, if something is changed, this time first [s].
+    """
+
+    time: float
+    is_met: bool
+    poses: SinglePoses
+    found: Found
+    times: Array
+
+    @cached_property
+    def _nearest(self) -> tuple[Array, Array]:
+        return self.poses.nearest(self.time)
+
+    @property
+    def misses(self) -> tuple[float, float]:
+        """What the nearest configuration misses the pose by, (m, rad)."""
+        position, rotation = self._nearest[1][0]
+        return float(position), float(rotation)
+
+    @property
+    def reason(self) -> str:
+        """What is in the way at that pose, and how closely it was looked at."""
+        poses, found = self.poses, self.found
+        name = poses.robot.tool
+        if self.is_met:
+            return (
+                f"each configuration that was found to put '{name}' there, from {found.tries} "
+                f"tries, meets something: {_roomiest(poses, found.met)}"
+            )
+        q, _ = self._nearest
+        position, rotation = self.misses
+        turned = f" and {rotation:.2g} rad" if poses.problem.asked.task.angular else ""
+        return (
+            f"none was found that puts '{name}' there, from {found.tries} tries"
+            f"{cause(poses, q[0])}: the nearest misses it by {1e3 * position:.3g} mm{turned}"
+        )
+
+    @property
+    def _least_clearance(self) -> float:
+        """How far bodies are apart at the pose at most, where that is less than was asked [m]."""
+        if not self.is_met:
+            return 0.0
+        worst, asked = _roomiest_pair(self.poses, self.found.met)
+        # Rounded down: what is told has to suffice.
+        known = np.floor(1e4 * worst.value) / 1e4
+        return float(known) if 0.0 < worst.value < asked else 0.0
+
+    @cached_property
+    def help(self) -> str:
+        """What would help, each by itself; "" for nothing that is known."""
+        found = remedies(self.poses, self.time, self.times)
+        least = self._least_clearance
+        found += [f"a clearance of {1e3 * least:.3g} mm"] if least > 0.0 else []
+        return f"; what would help: {', or '.join(found)}" if found else ""
+
+
+def _roomiest(poses: SinglePoses, met: Array) -> str:
+    """Return what is met at the configuration (of K, n) that bodies are least near to."""
+    worst, asked = _roomiest_pair(poses, met)
+    return (
+        f"at best '{worst.first}' and '{worst.second}' {how_near(worst.value)} (wanted: "
+        f"{1e3 * asked:.3g} mm)"
+    )
+
+
+def _roomiest_pair(poses: SinglePoses, met: Array) -> tuple[Closest, float]:
+    """Return the nearest bodies where these are least near, and how far apart they should be."""
+    # The last ones were moved aside from what they met.
+    _, worst, asked = max((poses.room(q) for q in met[-MOST_LOOKED_AT:]), key=lambda each: each[0])
+    return worst, asked
+
+
+def obstruction(
+    problem: Problem, rng: np.random.Generator, suspect: float | None = None
+) -> Obstruction | None:
+    """Return a pose of the path that no configuration was found for; None where there is none.
+
+    Poses all along the path, that at a `suspect` time [s] first, then the first, then those that
+    are farthest from the others. A
+    pose is given up when thousands of tries lead nowhere: Newton's method from all over the
+    limits, and of the bands of tolerances; where self-motions are curves, these as a whole; and
+    what met bodies least, moved aside.
+    """
+    poses = SinglePoses(problem, rng)
+    times = spread_along(problem.path, _COARSE_POSES)
+    known: dict[float, Array] = {}
+    order = _worst_first(problem, times)
+    if suspect is not None:
+        order = [suspect, *(t for t in order if t != suspect)]
+    for t in order:
+        near = min(known, key=lambda other: abs(other - t), default=None)
+        found = poses.look(t, np.empty((0, poses.robot.dof)) if near is None else known[near])
+        if not len(found.free):
+            found = poses.look_closely(t, found)
+        if not len(found.free):
+            again = np.array([t, *(other for other in order if other != t)])
+            return Obstruction(t, len(found.met) > 0, poses, found, again)
+        known[t] = found.free
+    return None
+
+
+def _worst_first(problem: Problem, times: Array) -> list[float]:
+    """Return times [s], after the first of the poses farthest from the middle of all.
+
+    Where the path cannot be begun, no part of it can be planned; else, what is too far, too near or
+    in the way is mostly so at an end.
+    """
+    places = problem.path.samples(times).translation
+    away = np.linalg.norm(places - places.mean(axis=0), axis=1)
+    away[0] = np.inf
+    return [float(t) for t in times[np.argsort(-away, kind="stable")]]
+
+
+def cause(poses: SinglePoses, q: Array) -> str:
+    """Return what keeps the arm from reaching further at q (n,); "" where nothing shows."""
+    robot, follows, causes = poses.robot, poses.follows, []
+    near = np.minimum(q - robot.lower, robot.upper - q)[: poses.problem.asked.robot.dof] < AT_LIMIT
+    if np.any(near):
+        names = ", ".join(f"'{robot.joint_names[k]}'" for k in np.flatnonzero(near))
+        causes.append(f"at its limit: joint {names}")
+    best = robot.dexterous_configuration(poses.problem.asked.task)
+    here, there = (
+        float(np.linalg.svd(follows.jacobian(x), compute_uv=False)[-1]) for x in (q, best)
+    )
+    if here < _STRETCHED * there:
+        causes.append(f"arm stretched or folded, smallest singular value {here:.2g}")
+    return f" ({'; '.join(causes)})" if causes else ""
+
+
+@dataclass(frozen=True, eq=False)
+class Reach:
+    """How far along the path single poses can be reached at all.
+
+    Attributes
+    ----------
+    time : float
+        The last time up to which every pose has a configuration within the limits [s].
+    starts : list of (n,)
+        Configurations at the start of the path.
+    reason : str
+        What is beyond; "" where nothing is.
+    """
+
+    time: float
+    starts: list[Array]
+    reason: str
+
+
+def reachable(
+    problem: Problem, starts: int, rng: np.random.Generator, suspect: float = 0.0
+) -> Reach:
+    """Return how far single poses of the path can be reached, within the joint limits.
+
+    With what tolerances allow. Inverse kinematics from the solutions of the pose before, and from
+    elsewhere where these do not go on: a pose that nothing leads to is out of reach, as far as can
+    be told. Poses all along the path, and more about the time `suspect` [s], where a motion had
+    trouble.
+    """
+    poses = SinglePoses(problem, rng, clear=False)
+    path, given = problem.path, poses.problem.given_start
+    first = [given] if given is not None else start_candidates(poses.follows, starts, rng)
+    knots = edges_of(path.knots)
+    piece = np.diff(knots)[min(int(np.searchsorted(knots, suspect, "right")), len(knots) - 1) - 1]
+    about = np.clip(suspect + piece * np.array(_ABOUT), 0.0, path.duration)
+    times = np.union1d(spread_along(path, _POSES + 1), about)
+    known, last = np.array(first), 0.0
+    for t in times[1:]:
+        found = poses.look(t, known)
+        if not len(found.free):
+            known, last = _edge(poses, (last, t), known)
+            # From right before it, a pose that only seemed out of reach is found.
+            found = poses.look(t, known)
+        if not len(found.free):
+            found = poses.look_closely(t, found)
+        if not len(found.free):
+            return Reach(last, first, _out_of_reach(poses, last, known[0], times[times > last]))
+        known, last = found.free, float(t)
+    return Reach(path.duration, first, "")
+
+
+def _edge(poses: SinglePoses, interval: tuple[float, float], known: Array) -> tuple[Array, float]:
+    """Return solutions at the last time of an interval that there are any, and this time."""
+    last, beyond = interval
+    for _ in range(_BISECTIONS):
+        middle = 0.5 * (last + beyond)
+        found = poses.look(middle, known)
+        if len(found.free):
+            known, last = found.free, middle
+        else:
+            beyond = middle
+    return known, last
+
+
+def _out_of_reach(poses: SinglePoses, time: float, q: Array, beyond: Array) -> str:
+    """Return in words that later poses are out of reach, by how much, and what the arm looks like.
+
+    q (n,) is its configuration at `time`, the last one; `beyond` are later times.
+    """
+    begin = f"from t = {time:.6g} s on the pose is out of reach{cause(poses, q)}"
+    if len(poses.problem.asked.follows.items) > 1:
+        names = poses.follows.names
+        return f"{begin}: no configuration was found that puts {names} on their paths"
+    looks = beyond[np.unique(np.linspace(0, len(beyond) - 1, _LOOKS).round().astype(int))]
+    misses = [(*poses.nearest(float(t))[1][0], float(t)) for t in looks]
+    position, rotation, when = max(misses, key=lambda miss: miss[0] + miss[1])
+    turned = f" and {rotation:.2g} rad" if poses.problem.asked.task.angular else ""
+    return (
+        f"{begin}: the nearest configuration found misses it by up to "
+        f"{1e3 * position:.3g} mm{turned}, at t = {when:.4g} s"
+    )

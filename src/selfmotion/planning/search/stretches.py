@@ -1,0 +1,304 @@
+"""The fewest chains of nodes that together follow a path which no single one follows."""
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from selfmotion.basics import Array, Flags, Ints, NoSequenceError, Progress, silent
+from selfmotion.planning.search.chains import best_chains, connected, unturned
+from selfmotion.planning.search.guides import layers_of
+from selfmotion.planning.search.manifold import OnPath
+from selfmotion.planning.search.measures import Length, cheapest, near_pairs
+from selfmotion.planning.search.nodes import Admissible
+from selfmotion.planning.search.sequences import Layers
+from selfmotion.problem.problem import Problem
+
+# What a change to another configuration counts: more than any motion in between.
+_BREAK = 1e6
+# A step is put onto the path in so many places, less one. What an arm can follow has no part that
+# is more than this share of it, nor farther than this [rad or m].
+_JUMP_LOOKS, _JUMP_SHARE, _LEAST_JUMP = 8, 0.4, 0.05
+# Chains are looked for again without the jumps they have, so often.
+_JUMP_ROUNDS = 12
+
+
+class _Jumps:
+    """What is known of jumps along a path: chains are looked for again without them.
+
+    Parameters
+    ----------
+    problem : Problem
+    t : (W,)
+        Times of the waypoints [s].
+    steps : (W - 1, n)
+        Largest change of each joint from one waypoint to the next [rad or m].
+    """
+
+    def __init__(self, problem: Problem, t: Array, steps: Array) -> None:
+        self._problem, self._t, self._steps = problem, t, steps
+        # The largest share of these that is no jump, as far as is known.
+        self._most = 1.0
+        # Waypoints at which each step is looked at, and what was found there.
+        self._at: set[int] = set()
+        self._known: dict[tuple[int, bytes], tuple[Ints, Ints]] = {}
+
+    def note(self, chains: Sequence[tuple[int, Array]]) -> bool:
+        """Note where chains jump: their first waypoints, and configurations (W, n); whether any."""
+        jumping: list[float] = []
+        others = 0.0
+        for first, q in chains:
+            steps = self._steps[first : first + len(q) - 1]
+            share = (np.abs(np.diff(q, axis=0)) / steps).max(axis=1)
+            t = self._t[first : first + len(q)]
+            (jumps,) = np.nonzero(jumps_of(self._problem, t[:-1], t[1:], q[:-1], q[1:]))
+            jumping += share[jumps].tolist()
+            others = max(others, float(np.delete(share, jumps).max(initial=0.0)))
+            self._at |= {first + k for k in jumps.tolist()}
+        if jumping and max(jumping) > others:
+            # The next ones would be much like these, a waypoint earlier or later.
+            self._most = 0.5 * (max(others, min(jumping)) + others)
+        return bool(jumping)
+
+    def extended(
+        self, k: int, length: Length, before: Array, cost: Array, after: Array, turning: Flags
+    ) -> tuple[Array, Ints]:
+        """Return `Length.extended` from waypoint k to the next, without steps that jump."""
+        step = self._most * self._steps[k]
+        if k not in self._at:
+            return length.extended(k, before, cost, after, step, turning)
+        first, second = self._taken(k, before, after, turning)
+        moved = unturned(after[second] - before[first], turning)
+        price = np.abs(moved) @ length.weights
+        price[(np.abs(moved) > step).any(axis=1)] = np.inf
+        return cheapest(first, second, price, cost, len(after))
+
+    def _taken(self, k: int, before: Array, after: Array, turning: Flags) -> tuple[Ints, Ints]:
+        """Return the steps from waypoint k to the next that are no jumps, (P,), (P,)."""
+        key = k, turning.tobytes()
+        if key not in self._known:
+            step = np.ascontiguousarray(self._most * self._steps[k])
+            first, second = near_pairs(before, after, step, turning)
+            here = before[first]
+            there = here + unturned(after[second] - here, turning)
+            early, late = (np.full(len(first), time) for time in self._t[k : k + 2])
+            jump = jumps_of(self._problem, early, late, here, there)
+            self._known[key] = first[~jump], second[~jump]
+        return self._known[key]
+
+
+def jumps_of(problem: Problem, early: Array, late: Array, here: Array, there: Array) -> Flags:
+    """Return which steps from q (K, n) at times (K,) to others, (K, n) at (K,), no motion takes.
+
+    Between its ends a step is put onto the path in a few places, within limits. Where arms can go
+    that way, these are about evenly apart; between two branches most of the step is left between
+    two of them, or nothing arrives.
+    """
+    share = np.arange(1, _JUMP_LOOKS) / _JUMP_LOOKS
+    times = (early[:, None] + (late - early)[:, None] * share).ravel()
+    straight = here[:, None] + (there - here)[:, None] * share[:, None]
+    where = OnPath(problem.follows, times, problem.envelope.lower, problem.envelope.upper)
+    n = here.shape[1]
+    found, arrived = where.project_each(straight.reshape(-1, n), np.arange(len(times)))
+    between = found.reshape(len(here), len(share), n)
+    whole = np.concatenate([here[:, None], between, there[:, None]], axis=1)
+    parts = np.linalg.norm(np.diff(whole, axis=1), axis=2).max(axis=1)
+    most = np.maximum(_JUMP_SHARE * np.linalg.norm(there - here, axis=1), _LEAST_JUMP)
+    # Also where there are no steps at all.
+    return np.asarray((parts > most) | ~arrived.reshape(len(here), len(share)).all(axis=1))
+
+
+@dataclass(frozen=True, eq=False)
+class Stretch:
+    """A chain of configurations along a stretch of a path.
+
+    Attributes
+    ----------
+    first, last : int
+        Its waypoints.
+    t : (W,)
+        Times of the waypoints [s].
+    q : (W, n)
+        Configurations [rad or m].
+    ending : str
+        Why no chain from its first waypoint goes all the way; "" for the last one.
+    """
+
+    first: int
+    last: int
+    t: Array
+    q: Array
+    ending: str
+
+
+@dataclass(frozen=True, eq=False)
+class Stretches:
+    """Nodes along a path, over which the fewest chains are looked for; made by `Stretches.of`."""
+
+    problem: Problem
+    _layers: Layers
+    _jumps: _Jumps
+
+    @property
+    def t(self) -> Array:
+        """Times of the waypoints [s], (W,)."""
+        return self._layers.t
+
+    @classmethod
+    def of(
+        cls, problem: Problem, rng: np.random.Generator | int = 0, progress: Progress = silent
+    ) -> "Stretches":
+        """Return the nodes of a problem: samples of all self-motions, free and within limits.
+
+        Raises
+        ------
+        NoSequenceError
+            A pose of the path has no node at all; tells the time and why.
+        """
+        layers = layers_of(problem, problem.robot.joint_weights, rng, progress)
+        found = cls(problem, layers, _Jumps(problem, layers.t, layers.steps))
+        found._pin_ends()
+        found._check()
+        return found
+
+    def fewest(self, forbidden: set[int]) -> list[Stretch]:
+        """Return the fewest chains that follow the path one after the other, the shortest such.
+
+        Each begins in the pose in which the one before it ends, in another configuration; the ways
+        to these count as well. None has a step that no motion takes, as far as is known.
+
+        Parameters
+        ----------
+        forbidden : set of int
+            Waypoints at which no chain may end before the last one.
+
+        Raises
+        ------
+        NoSequenceError
+            No chains, however many, follow the path; tells the time and why.
+        """
+        for _ in range(_JUMP_ROUNDS):
+            found = self._found(forbidden)
+            if not self._jumps.note([(item.first, item.q) for item in found]):
+                break
+        return found
+
+    def _found(self, forbidden: set[int]) -> list[Stretch]:
+        """Return the fewest chains without the jumps that are known; see `fewest`."""
+        bounds = self._layers.bounds
+        # Joints with room for several turns turn without end at first: see `best_sequences`.
+        any_turn = bounds.without_turns()
+        while True:
+            layers = [any_turn.layer(q) for q in self._layers.samples]
+            turning = any_turn.turning
+            chains = self._chains(layers, any_turn, forbidden)
+            motions = [
+                bounds.turned_inside(connected(layers[first : first + len(chain)], chain, turning))
+                for first, chain in chains
+            ]
+            beyond = np.any([bounds.beyond(q) for q in motions], axis=0)
+            if not np.any(beyond):
+                break
+            any_turn = any_turn.counting_turns(beyond, bounds)
+        return [
+            Stretch(
+                first,
+                first + len(q) - 1,
+                self.t[first : first + len(q)],
+                q,
+                self._ending(first, layers, any_turn) if q is not motions[-1] else "",
+            )
+            for (first, _), q in zip(chains, motions, strict=True)
+        ]
+
+    def _pin_ends(self) -> None:
+        """Let nothing but a given start, and a given end, be a node there."""
+        start, samples = self.problem.given_start, self._layers.samples
+        if start is not None:
+            samples[0] = start[None]
+        for item in self.problem.constraints:
+            end = item.fixed_end(self.problem.robot)
+            if end is not None:
+                samples[-1] = end[None]
+                self._keep_given(-1, "end configuration asked for")
+        if start is not None:
+            self._keep_given(0, "given start")
+
+    def _keep_given(self, i: int, name: str) -> None:
+        q = self._layers.samples[i]
+        if np.any(self._layers.bounds.beyond(q)):
+            k = int(np.argmax(self._layers.bounds.beyond(q)))
+            joint = self.problem.robot.joint_names[k]
+            raise self._refused(
+                i, f"the {name} has joint '{joint}' at {q[0, k]:.4g}, outside its limits"
+            )
+        if not self._layers.bounds.keep(q)[0]:
+            raise self._refused(i, f"the {name} is in collision, or nearer than asked for")
+
+    def _check(self) -> None:
+        for i, samples in enumerate(self._layers.samples):
+            if len(samples) == 0:
+                raise self._refused(
+                    i, self._layers.why(i, samples, samples, self._layers.bounds.without_turns())
+                )
+
+    def _chains(
+        self, layers: list[Array], bounds: Admissible, forbidden: set[int]
+    ) -> list[tuple[int, list[int]]]:
+        """Return the first waypoint of each chain, and its nodes, first to last."""
+        length, turning = Length(self.problem.robot.joint_weights), bounds.turning
+        anywhere = np.full(len(turning), np.inf)
+        cost = np.zeros(len(layers[0]))
+        parents: list[Ints] = [np.arange(len(cost))]
+        # From which node of its own waypoint a node is changed to; itself where it is not.
+        changes: list[Ints] = [np.arange(len(cost))]
+        for i, (before, after) in enumerate(itertools.pairwise(layers), 1):
+            cost, parent = self._jumps.extended(i - 1, length, before, cost, after, turning)
+            if not np.any(np.isfinite(cost)):
+                raise self._refused(i, self._layers.why(i, before, after, bounds))
+            parents.append(parent)
+            change = np.arange(len(cost))
+            if i < len(layers) - 1 and i not in forbidden:
+                changed, source = length.extended(i, after, cost, after, anywhere, turning)
+                better = changed + _BREAK < cost
+                change = np.where(better, source, change)
+                cost = np.where(better, changed + _BREAK, cost)
+            changes.append(change)
+        return _traced_back(parents, changes, int(np.argmin(cost)))
+
+    def _ending(self, first: int, layers: list[Array], any_turn: Admissible) -> str:
+        """Return why no chain from a waypoint on follows the rest of the path."""
+        chains = best_chains(layers[first:], self._layers.steps[first:], any_turn.turning)
+        if chains.blocked is None:
+            return "what goes on from there among the samples did not keep all constraints"
+        i = first + chains.blocked
+        alive = layers[i - 1][np.isfinite(chains.cost[chains.blocked - 1])]
+        reason = self._layers.why(i, alive, layers[i], any_turn)
+        return f"no motion from t = {self.t[first]:.6g} s passes t = {self.t[i]:.6g} s: {reason}"
+
+    def _refused(self, i: int, reason: str) -> NoSequenceError:
+        return self._layers.refused(i, reason, ", in however many parts,")
+
+
+def _traced_back(
+    parents: list[Ints], changes: list[Ints], node: int
+) -> list[tuple[int, list[int]]]:
+    """Return the chains that end in a node of the last waypoint; see `Stretches`."""
+    chains: list[tuple[int, list[int]]] = []
+    chain: list[int] = []
+    for i in range(len(parents) - 1, 0, -1):
+        chain.append(node)
+        source = int(changes[i][node])
+        if source != node:
+            chains.append((i, chain[::-1]))
+            node, chain = source, [source]
+        node = int(parents[i][node])
+    chains.append((0, [*chain, node][::-1]))
+    return chains[::-1]
+
+
+def turned_towards(q: Array, before: Array, turning: Flags) -> Array:
+    """Return a motion (W, n), joints that turn without end by the turns that lead it nearest."""
+    step = q[0] - before
+    return np.asarray(q + (unturned(step, turning) - step))

@@ -1,0 +1,365 @@
+"""Joint motions from one configuration to another that nothing but limits and bodies tells."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+import numpy.typing as npt
+
+from selfmotion.basics import (
+    TURN,
+    Array,
+    InverseKinematicsError,
+    PlanError,
+    Progress,
+    read_only,
+    silent,
+)
+from selfmotion.certificate import Quantity
+from selfmotion.model.collision import how_near
+from selfmotion.model.follow import Follows
+from selfmotion.model.motion import Trajectory, slowdown_of
+from selfmotion.model.path import Dwell
+from selfmotion.model.robot import RobotModel
+from selfmotion.model.task import SE3, Task
+from selfmotion.planning.result import (
+    Ends,
+    Move,
+    PaceLimits,
+    along,
+    fastest_pace,
+    quantities_of_pace,
+)
+from selfmotion.planning.search import start_candidates
+from selfmotion.planning.transfer.ways import (
+    MOVE_MARGIN,
+    PATH_SAMPLES,
+    ROUNDING,
+    Room,
+    find_way,
+    rounded,
+    shortened,
+    straight_way,
+)
+from selfmotion.problem.constraints import Constraint, Envelope
+from selfmotion.problem.problem import at_all_times, envelope_of
+
+# After so many seconds a move counts as not found.
+MOVE_DEADLINE = 10.0
+# Shares of the limits that are used; and the acceleration where nobody limits it: up to full speed
+# in so many seconds, which is this one where nobody limits it either [rad/s or m/s].
+_USED = 0.95
+_UP_TO_SPEED = 0.25
+_USUAL_SPEED = 1.0
+# Controllers want accelerations without jumps from arms of any make: where nobody limits the jerk,
+# they are reached in this time [s], and no move is briefer. Knots of a pace are so far apart [s].
+_SOFT = 0.02
+_STEP_OF_PACE = 4e-3
+# Requirements that depend on the pace may be kept by a slower one, tried so often.
+_SLOWER_FACTOR = 1.2
+_SLOWER_TRIES = 12
+# Where the certificate finds what looks have missed, bodies are kept so many times farther apart
+# and looked at as many times more often, and a way is looked for again, so often.
+_WIDER = 2.0
+_TRIES_OF_MOVE = 4
+# Where the straight leg is blocked, trees begin so far back along the tool's axis as well [m].
+_RETREATS = (0.01, 0.03, 0.08)
+# A move that is shorter than this [rad or m] goes by one smooth law of time.
+_SHORTEST_PACED = 2e-3
+# Configurations for an end that is a pose of the tool, at most.
+_END_CONFIGURATIONS = 16
+
+
+# Roundings that a motion may add up to.
+_ROUNDINGS = 16.0
+
+
+class FreeMotions:
+    """Finds motions of an arm between configurations.
+
+    Parameters
+    ----------
+    robot : RobotModel
+    constraints : sequence of Constraint
+        What they must keep at all times; what is asked of ends only is left out.
+    rng : Generator
+    progress : Progress
+    """
+
+    def __init__(
+        self,
+        robot: RobotModel,
+        constraints: Sequence[Constraint],
+        rng: np.random.Generator,
+        progress: Progress = silent,
+    ) -> None:
+        kept = at_all_times(constraints)
+        self.robot, self.constraints = robot, tuple(item for item in kept if item.applies(robot))
+        self._rng, self._progress = rng, progress
+        self.asked: Envelope = envelope_of(robot, self.constraints)
+
+    def configurations(self, end: npt.ArrayLike | SE3, task: Task) -> Array:
+        """Return the configurations (k, n) that an end stands for; see `move`."""
+        if not is_pose(end):
+            return self.robot.configuration(end)[None]
+        arm = self.asked.arm(self.robot)
+        follows = Follows.of(arm, Dwell(end, 1.0), task)
+        room = Room(self.asked, self.robot)
+        found = np.array(start_candidates(follows, _END_CONFIGURATIONS, self._rng, room.free))
+        free = found[room.free(found)]
+        if not len(free):
+            raise InverseKinematicsError(
+                f"{self.robot.name}: all {len(found)} configurations that were found for the pose "
+                f"of an end are beyond limits or meet something; give a configuration or fewer "
+                f"rows (task=)",
+                position_miss=0.0,
+                rotation_miss=0.0,
+            )
+        return free
+
+    def between(
+        self,
+        first: Array,
+        last: Array,
+        seconds: float = MOVE_DEADLINE,
+        known: Array | None = None,
+    ) -> Move:
+        """Return the move from a configuration (n,) to another one, or why there is none.
+
+        A way between them (m, n) may be `known`: it is taken where it is free and no straight leg.
+        """
+        return self.through([first[None], last[None]], seconds, known)
+
+    def time_of(self, first: Array, last: Array) -> Array:
+        """Return what straight moves (K, n) → (K, n) would take by the limits, at least [s]."""
+        limits = self._limits
+        far = np.abs(last - first)
+        # From rest to rest: full acceleration, full speed, full brake.
+        ramp = limits.speed / limits.acceleration
+        short = 2.0 * np.sqrt(far / limits.acceleration)
+        times = np.where(far > limits.speed * ramp, far / limits.speed + ramp, short)
+        return np.asarray(times.max(axis=-1))
+
+    def through(self, ends: Sequence[Array], seconds: float, known: Array | None = None) -> Move:
+        """Return the move through one of several configurations (k, n) each, in this order.
+
+        A way from the first to the last one may be `known`; see `between`.
+        """
+        self._progress("move", 1, 1)
+        blocked = self._blocked(ends)
+        if blocked:
+            return self._missing(blocked)
+        # Of the processor, so that what else a machine does changes nothing.
+        began = time.thread_time()
+        ends = [self._inside(several) for several in ends]
+        worst, margin, finer = "", MOVE_MARGIN, 1.0
+        for _ in range(_TRIES_OF_MOVE):
+            room = Room(self.asked, self.robot, margin, finer)
+            way = self._known_way(room, ends, known) or self._way(room, ends, began + seconds)
+            if way is None:
+                break
+            path = rounded(room, *way)
+            if path is not None:
+                try:
+                    move = self.at_its_pace(path)
+                except PlanError as error:
+                    return self._missing(str(error))
+                if move.verified:
+                    return move
+                worst = worst or f", where {move.trouble}"
+            margin, finer = _WIDER * margin, _WIDER * finer
+        waited = time.thread_time() - began
+        return self._missing(
+            f"no way was found between the configurations in {waited:.1f} s{worst}"
+        )
+
+    def _inside(self, q: Array) -> Array:
+        """Return configurations on a limit as far inside it as rounding may lead beyond."""
+        lower, upper = self.asked.lower, self.asked.upper
+        return np.clip(q, lower + _ulps(lower), upper - _ulps(upper))
+
+    def _missing(self, trouble: str) -> Move:
+        return Move(self.robot, self.constraints, None, trouble)
+
+    def _blocked(self, ends: Sequence[Array]) -> str:
+        """Return what is wrong with an end already, "" for nothing."""
+        room = Room(self.asked, self.robot, 0.0)
+        for number, several in enumerate(ends):
+            if room.free(several).any():
+                continue
+            where = "first" if number == 0 else "last" if number == len(ends) - 1 else "via"
+            return f"the {where} configuration is not allowed: {self._wrong_with(several[0])}"
+        return ""
+
+    def refusal(self, q: Array) -> str:
+        """Return why no motion begins or ends at a configuration (n,), "" where one may."""
+        return "" if Room(self.asked, self.robot, 0.0).free(q[None])[0] else self._wrong_with(q)
+
+    def _wrong_with(self, q: Array) -> str:
+        """Return what forbids a configuration (n,), in words."""
+        asked, beyond = self.asked, []
+        for joint, name in enumerate(self.robot.joint_names):
+            low, high = asked.lower[joint], asked.upper[joint]
+            if max(low - q[joint], q[joint] - high) > ROUNDING:
+                beyond.append(
+                    f"joint '{name}' is at {q[joint]:.5g} {self.robot.unit_of(name)} "
+                    f"({low:.5g} to {high:.5g} allowed)"
+                )
+        if beyond:
+            turns = [k for k, name in enumerate(self.robot.joint_names)
+                     if not self.robot.is_prismatic(name)]  # fmt: skip
+            in_degrees = bool(turns) and np.abs(q[turns]).max() > TURN
+            asked_for = "; are these degrees? Angles are in rad" if in_degrees else ""
+            return f"{'; '.join(beyond)}; give one within the limits{asked_for}"
+        for model, far in asked.bodies:
+            near = model.distance(q)
+            if near.value < far:
+                apart = f"{how_near(near.value)} (wanted: {far * 1e3:.2f} mm)"
+                return f"{near.first} and {near.second} {apart}"
+        names = ", ".join(item.name for item in asked.quantities)
+        return f"it leaves what is asked of {names}"
+
+    def _known_way(
+        self, room: Room, ends: Sequence[Array], known: Array | None
+    ) -> tuple[Array, list[int]] | None:
+        """Return a way that is known (m, n), where it is free and nothing is straight."""
+        if known is None or straight_way(room, ends[0], ends[-1]) is not None:
+            return None
+        # On limits, the ends are put inside them.
+        known = np.concatenate([ends[0], known[1:-1], ends[-1]])
+        if not all(room.is_open(*leg) for leg in pairwise(known)):
+            return None
+        return shortened(room, known, self._rng), []
+
+    def _way(self, room: Room, ends: Sequence[Array], end: float) -> tuple[Array, list[int]] | None:
+        """Return a way (m, n) through all ends, and where on it the inner ones are."""
+        legs: list[Array] = []
+        starts = _allowed(room, ends[0])
+        for goals in ends[1:]:
+            leg = self._leg(room, starts, _allowed(room, goals), end)
+            if leg is None:
+                return None
+            legs.append(leg)
+            starts = leg[-1:]
+        passed = np.cumsum([len(leg) - 1 for leg in legs]).tolist()[:-1]
+        return np.concatenate([legs[0], *(leg[1:] for leg in legs[1:])]), passed
+
+    def _leg(self, room: Room, starts: Array, goals: Array, end: float) -> Array | None:
+        """Return a way from one of starts (a, n) to one of goals (b, n), also after a retreat.
+
+        Among what a tool works on the way out is narrow, and along the tool's axis.
+        """
+        direct = straight_way(room, starts, goals)
+        if direct is not None:
+            return direct
+        out = [self._retreats(room, several) for several in (starts, goals)]
+        first, last = (np.concatenate([q, out[k][0]]) for k, q in enumerate((starts, goals)))
+        way = find_way(room, first, last, end, self._rng)
+        if way is None:
+            return None
+        before, after = (
+            [origin for place, origin in zip(*each, strict=True) if np.array_equal(place, tip)]
+            for each, tip in zip(out, (way[0], way[-1]), strict=True)
+        )
+        if not (before or after):
+            return way
+        whole = np.concatenate([*(q[None] for q in before[:1]), way, *(q[None] for q in after[:1])])
+        return shortened(room, whole, self._rng)
+
+    def _retreats(self, room: Room, several: Array) -> tuple[Array, Array]:
+        """Return where the tool is back along its axis, and from where a free leg leads there."""
+        robot, found, origins = self.robot, list[Array](), list[Array]()
+        for q in several:
+            for length in _RETREATS:
+                away = robot.pose(q) * SE3(np.eye(3), np.array([0.0, 0.0, -length]))
+                try:
+                    there = robot.inverse_kinematics(away, seed=q, attempts=1)
+                except InverseKinematicsError:
+                    continue
+                if room.is_open(q, there):
+                    found.append(there)
+                    origins.append(q)
+        return np.reshape(found, (-1, robot.dof)), np.reshape(origins, (-1, robot.dof))
+
+    @property
+    def _limits(self) -> Envelope:
+        """The limits of the pace: all of speed and acceleration are finite."""
+        asked = self.asked
+        speed = np.where(np.isfinite(asked.speed), asked.speed, _USUAL_SPEED)
+        usual = speed / _UP_TO_SPEED
+        faster = np.where(np.isfinite(asked.acceleration), asked.acceleration, usual)
+        return replace(
+            asked,
+            speed=read_only(_USED * speed),
+            acceleration=read_only(_USED * faster),
+            jerk=read_only(_USED * asked.jerk),
+        )
+
+    @cached_property
+    def _quantities(self) -> tuple[Quantity, ...]:
+        """What else a slower pace may keep."""
+        return quantities_of_pace([item.requirement(self.robot) for item in self.constraints])
+
+    def _fast(self, path: Trajectory) -> Trajectory:
+        """Return a joint path at the fastest pace that the limits allow, from rest to rest."""
+        limits = self._limits
+        jerk = np.where(np.isfinite(limits.jerk), limits.jerk, limits.acceleration / _SOFT)
+        kept = PaceLimits(limits.speed, limits.acceleration, jerk, self._quantities)
+        return along(fastest_pace(path, kept, Ends(), _STEP_OF_PACE), path)
+
+    def at_its_pace(self, path: Trajectory) -> Move:
+        """Return the move along a joint path, as fast as it may be."""
+        # Of the shortest ones a search for the fastest pace sees rounding only.
+        short = path.travelled(path.t[-1:]).max() < _SHORTEST_PACED
+        motion = self._unhurried(path) if short else self._fast(path)
+        q, qd = motion.q.copy(), motion.qd.copy()
+        # Exactly where it should begin and end.
+        q[0], q[-1], qd[0], qd[-1] = path.q[0], path.q[-1], 0.0, 0.0
+        faster = motion(motion.t, 2)
+        for slower in _SLOWER_FACTOR ** np.arange(_SLOWER_TRIES):
+            t, names = slower * motion.t, self.robot.joint_names
+            whole = Trajectory(t, q, qd / slower, names, faster / slower**2)
+            found = Move(self.robot, self.constraints, whole)
+            if not any(not item.satisfied and item.of_pace for item in found.findings):
+                break
+        return found
+
+    def _unhurried(self, path: Trajectory) -> Trajectory:
+        """Return a joint path over 0 to 1 from rest to rest by one smooth law of time.
+
+        σ = 10τ³ - 15τ⁴ + 6τ⁵, as fast as the limits allow.
+        """
+        tau = np.linspace(0.0, 1.0, PATH_SAMPLES + 1)
+        sigma = np.clip(tau**3 * (10.0 - 15.0 * tau + 6.0 * tau**2), 0.0, 1.0)
+        rate = 30.0 * tau**2 * (1.0 - tau) ** 2
+        bend = 60.0 * tau * (1.0 - 3.0 * tau + 2.0 * tau**2)
+        q, qd = path(sigma), path(sigma, 1)
+        qdd = path(sigma, 2) * rate[:, None] ** 2 + qd * bend[:, None]
+        unit = Trajectory(tau, q, qd * rate[:, None], self.robot.joint_names, qdd)
+        limits = self._limits
+        needed = slowdown_of(unit, (limits.speed, limits.acceleration, limits.jerk))
+        longest = max(needed, _SOFT)
+        faster = qdd / longest**2
+        return Trajectory(longest * tau, q, unit.qd / longest, unit.joint_names, faster)
+
+
+def is_pose(end: npt.ArrayLike | SE3) -> bool:
+    """Whether an end of a move is a pose of the tool, not a configuration."""
+    return hasattr(end, "homogeneous") or np.shape(end) == (4, 4)
+
+
+def _ulps(limit: Array) -> Array:
+    """Return what sums of a few numbers of this size may be off by."""
+    finite = np.where(np.isfinite(limit), limit, 0.0)
+    return np.asarray(_ROUNDINGS * np.spacing(1.0 + np.abs(finite)))
+
+
+def _allowed(room: Room, several: Array) -> Array:
+    """Return those of configurations that are free; all where none is with its margin."""
+    free = several[room.free(several)]
+    return free if len(free) else several

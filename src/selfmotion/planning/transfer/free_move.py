@@ -1,0 +1,111 @@
+"""A joint motion from one configuration to another, or to a pose of the tool."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from selfmotion.basics import (
+    ProblemError,
+    Progress,
+    as_number,
+    as_several,
+    held_interruption,
+    obeying,
+    one_blas_thread,
+    random_numbers,
+    shown,
+    silent,
+)
+from selfmotion.model.robot import RobotModel
+from selfmotion.model.task import SE3, Task
+from selfmotion.planning.result import Move
+from selfmotion.planning.transfer.free_motion import MOVE_DEADLINE, FreeMotions, is_pose
+from selfmotion.problem.constraints import Clearance, Constraint
+from selfmotion.problem.problem import KEPT, NO_OVERLAP, check_all_times
+
+
+def move(
+    robot: RobotModel,
+    first: npt.ArrayLike | SE3,
+    last: npt.ArrayLike | SE3,
+    *,
+    constraints: Sequence[Constraint] = KEPT,
+    clearance: Clearance | None = NO_OVERLAP,
+    via: Sequence[npt.ArrayLike] = (),
+    task: Task | str = "pose",
+    deadline: float = MOVE_DEADLINE,
+    rng: np.random.Generator | int = 0,
+    progress: Progress = silent,
+) -> Move:
+    """Move from one configuration to another, from rest to rest, past what is in the way.
+
+    Straight where that is free; else along the best of a few ways that two trees find
+    (RRT-Connect), shortened, with corners rounded as far as there is room. The pace is as fast as
+    the limits of joint velocity, acceleration and jerk allow. The motion is judged like a plan, at
+    all times.
+
+    Parameters
+    ----------
+    robot : RobotModel
+    first, last : (n,) or SE3
+        Configurations [rad or m], or a pose of the tool (an SE3 or a 4 × 4 matrix, in the frame of
+        `RobotModel.pose`): then any configuration that puts the tool there.
+    constraints : sequence of Constraint
+        What the motion must keep. By default limits of joint position and velocity, and those of
+        acceleration and jerk that the arm's maker publishes.
+    clearance : Clearance, optional
+        What keeps the arm apart from obstacles and from itself: by default its links must not
+        overlap. None to leave that out; the verdict then says so. A `Clearance` among the
+        constraints takes the place of the default.
+    via : sequence of (n,)
+        Configurations that the motion passes exactly, in this order, without stopping where there
+        is room for a curve.
+    task : Task or str
+        The rows of the pose that count where an end is one.
+    deadline : float
+        After so many seconds of looking the move counts as not found; of the processor, so that
+        what else a machine does changes nothing.
+    rng : Generator or int
+        Shifts the samples; the same one gives the same move, unless the deadline ends it.
+    progress : callable, optional
+        Told the stage, as in `plan`.
+
+    Returns
+    -------
+    Move
+        Also where none was found: `Move.trouble` says after how many seconds, and `Move.require`
+        raises. That none is found does not prove that there is none.
+
+    Raises
+    ------
+    InverseKinematicsError
+        No configuration puts the tool at a pose.
+    ProblemError
+        An argument is not what it should be.
+    """
+    if not isinstance(robot, RobotModel):
+        raise ProblemError(f"robot is {shown(robot)}, expected a RobotModel")
+    asked = list(as_several(constraints, "constraints", Constraint))
+    check_all_times(asked, "the ends of a move are first and last; leave it out")
+    if clearance is not None and not isinstance(clearance, Clearance):
+        raise ProblemError(f"clearance is {shown(clearance)}, expected a Clearance, or None")
+    apart = any(item.envelope(robot).bodies for item in asked)
+    default = clearance is NO_OVERLAP and (apart or not robot.urdf.has_collisions)
+    if clearance is not None and not default:
+        asked.append(clearance)
+    if not isinstance(via, list | tuple | np.ndarray):
+        raise ProblemError(f"via is {shown(via)}, expected a list of configurations")
+    given = (first, *via, last)
+    if Task.of(task) is not Task.POSE and not any(is_pose(end) for end in given):
+        raise ProblemError(
+            f"task is '{Task.of(task).value}', which counts where an end is a pose: all ends are "
+            f"configurations"
+        )
+    seconds, generator = as_number(deadline, "deadline", above=0.0), random_numbers(rng)
+    motions = FreeMotions(robot, asked, generator, obeying(progress))
+    with one_blas_thread(), held_interruption():
+        ends = [motions.configurations(end, Task.of(task)) for end in given]
+        return motions.through(ends, seconds)

@@ -1,0 +1,276 @@
+"""Distance from obstacles, and of links from each other."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import InitVar, dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any, ClassVar, cast
+from weakref import WeakKeyDictionary
+
+import numpy as np
+
+from selfmotion.basics import Array, Flags, Ints, ProblemError, as_number, shown
+from selfmotion.certificate import Separation
+from selfmotion.model.collision import (
+    ClearanceModel,
+    Clearances,
+    CollisionModel,
+    Obstacle,
+    disabled_links,
+    how_near,
+    obstacle_from_dict,
+)
+from selfmotion.model.follow import Follows
+from selfmotion.model.robot import RobotModel
+from selfmotion.problem.constraints.base import Constraint, Envelope
+from selfmotion.problem.constraints.conditions import NodeTangents, motion_of_order
+from selfmotion.problem.costs import Samples
+
+# No arm keeps farther from what it could meet [m].
+_FARTHEST = 3.0
+
+
+@dataclass(frozen=True, eq=False)
+class Clearance(Constraint):
+    """The arm, and what rides on it, keep a distance from obstacles and from each other.
+
+    An obstacle with a `frame` rides on that link, like another link that is fixed to it. While
+    optimising, links are their convex hulls and obstacles with hollows convex pieces that contain
+    them; the certificate measures the meshes themselves.
+    Obstacles of the world are not checked against the immovable base: no motion changes that
+    distance, and an arm bolted to a table touches it.
+
+    Parameters
+    ----------
+    obstacles : Obstacle or sequence of Obstacle
+        The world, and what rides on links.
+    distance : float
+        Smallest distance [m].
+    srdf : path, optional
+        File whose ``disable_collisions`` are left out as well. It is read once, here.
+    disabled : sequence of (str, str)
+        Pairs of links or obstacles that are left out.
+
+    Raises
+    ------
+    CollisionError
+        The SRDF cannot be read.
+    """
+
+    kept_moving: ClassVar[bool] = True
+
+    obstacles: tuple[Obstacle, ...] = ()
+    distance: float = 5e-3
+    srdf: InitVar[str | Path | None] = None
+    disabled: tuple[tuple[str, str], ...] = ()
+
+    def __post_init__(self, srdf: str | Path | None) -> None:
+        given: Any = self.obstacles
+        listed = (given,) if isinstance(given, Obstacle) else given
+        if not (
+            isinstance(listed, list | tuple) and all(isinstance(item, Obstacle) for item in listed)
+        ):
+            raise ProblemError(
+                f"clearance: obstacles are {shown(self.obstacles)}, expected Box, Sphere, "
+                f"Cylinder, Capsule or Mesh"
+            )
+        object.__setattr__(self, "obstacles", tuple(listed))
+        if not isinstance(self.disabled, list | tuple):
+            raise ProblemError(
+                f"clearance: disabled is {shown(self.disabled)}, expected pairs of names of links"
+            )
+        pairs = [_pair(item) for item in self.disabled]
+        read = () if srdf is None else disabled_links(srdf)
+        object.__setattr__(self, "disabled", tuple(dict.fromkeys((*pairs, *read))))
+        distance = as_number(self.distance, "clearance: distance", least=0.0)
+        if distance > _FARTHEST:
+            raise ProblemError(
+                f"clearance: distance is {distance:g} m, farther than arms keep from anything, "
+                f"expected at most {_FARTHEST:g}; in millimetres? It is in m (distance_mm in files)"
+            )
+        object.__setattr__(self, "distance", distance)
+
+    def model(self, robot: RobotModel) -> CollisionModel:
+        """Return the exact model that the certificate measures with, made once per arm.
+
+        Raises
+        ------
+        ProblemError
+            The arm has no collision geometry.
+        """
+        return self._models(robot).exact
+
+    def bind(self, follows: Follows, start: Array, end: Array) -> BoundClearance:
+        """See `Constraint.bind`."""
+        return BoundClearance(self._models(follows.robot).smooth, self.distance)
+
+    def bind_pieces(self, follows: Follows) -> BoundClearance:
+        """Return what `bind` does, with links in convex pieces before obstacles."""
+        return BoundClearance(self._models(follows.robot).in_pieces, self.distance)
+
+    def requirement(self, robot: RobotModel) -> Separation:
+        """See `Constraint.requirement`."""
+        return Separation(self.model(robot), self.distance)
+
+    def envelope(self, robot: RobotModel) -> Envelope:
+        """See `Constraint.envelope`."""
+        return replace(Envelope.unbounded(robot.dof), bodies=((self.model(robot), self.distance),))
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any], **context: Any) -> Clearance:
+        """See `Saved.from_dict`."""
+        obstacles = tuple(obstacle_from_dict(item) for item in values["obstacles"])
+        return cls(**{**values, "obstacles": obstacles})
+
+    def to_dict(self) -> dict[str, Any]:
+        """See `Saved.to_dict`."""
+        return {
+            "kind": self.kind,
+            "obstacles": [obstacle.to_dict() for obstacle in self.obstacles],
+            "distance": self.distance,
+            "disabled": [list(pair) for pair in self.disabled],
+        }
+
+    def _models(self, robot: RobotModel) -> _Models:
+        made = _made.setdefault(self, WeakKeyDictionary())
+        if robot not in made:
+            made[robot] = _Models(self, robot)
+        return made[robot]
+
+
+def _pair(given: Any) -> tuple[str, str]:
+    """Return a pair of links as it was given, or raise ProblemError."""
+    match given:
+        case [str() as first, str() as second]:
+            return first, second
+    raise ProblemError(f"clearance: disabled has {shown(given)}, expected pairs of names of links")
+
+
+class _Models:
+    """The exact model of a clearance, and the one that the optimiser follows."""
+
+    def __init__(self, wanted: Clearance, robot: RobotModel) -> None:
+        self.exact = CollisionModel(robot, wanted.obstacles, wanted.disabled)
+        self._near = wanted.distance + _NEAR
+        if not self.exact.has_bodies:
+            raise ProblemError(
+                f"{robot.name}: a clearance is asked for, but its URDF has no collision geometry "
+                f"to measure from; add <collision> to its links, or leave the clearance out"
+            )
+        if self.exact.standing and not self.exact.to_world.any():
+            raise ProblemError(
+                f"{robot.name}: a clearance from obstacles is asked for, but no link that moves "
+                f"has collision geometry; add <collision> to those, or leave the obstacles out"
+            )
+
+    @cached_property
+    def smooth(self) -> ClearanceModel:
+        return ClearanceModel(self.exact, self._near)
+
+    @cached_property
+    def in_pieces(self) -> ClearanceModel:
+        return ClearanceModel(self.exact, self._near, links_in_pieces=True)
+
+
+# Models take a good part of a second to make, and each start of a plan needs them.
+_made: WeakKeyDictionary[Clearance, WeakKeyDictionary[RobotModel, _Models]] = WeakKeyDictionary()
+
+
+@dataclass(frozen=True, eq=False)
+class BoundClearance:
+    """h = (d_min + margin - d) / 0.1 m for each pair of bodies."""
+
+    model: ClearanceModel
+    distance: float
+    name: str = "clearance"
+    equality = False
+    margin: float = 1e-4
+    _last: list[Any] = field(default_factory=list, repr=False)
+
+    @property
+    def tolerance(self) -> float:
+        """See `BoundConstraint.tolerance`: half the margin."""
+        return 0.5 * self.margin / _METRE
+
+    def residual(self, samples: Samples) -> Array:
+        """See `BoundConstraint.residual`."""
+        return (self.distance + self.margin - self._clearances(samples).values) / _METRE
+
+    def above(self, samples: Samples, level: float) -> Flags:
+        """Return at which nodes some h is more than a level that is hardly below 0, (N + 1,).
+
+        Where the distances are not known yet, this takes much less time than these.
+        """
+        least = self.distance + self.margin - level * _METRE
+        q = self._of_arm(samples)
+        if self._knows(q):
+            return np.asarray((self._last[1].values < least).any(axis=1))
+        return self.model.closer(q, least)
+
+    def tangents(self, samples: Samples, motion: NodeTangents) -> Array:
+        """See `BoundConstraint.tangents`."""
+        return _Pull(self._clearances(samples)).all(motion)
+
+    def linearised_at(self, samples: Samples) -> tuple[tuple[int, int], _Pull]:
+        """See `linearised`."""
+        now = self._clearances(samples)
+        return (len(now.values), now.values.shape[1]), _Pull(now)
+
+    def _clearances(self, samples: Samples) -> Clearances:
+        """Return the distances at the nodes; those of the last motion are kept."""
+        q = self._of_arm(samples)
+        if not self._knows(q):
+            self._last[:] = [q, self.model.clearances(q)]
+        return cast(Clearances, self._last[1])
+
+    def _of_arm(self, samples: Samples) -> Array:
+        """Return q at the nodes of the joints that move bodies, which come first, (N + 1, n)."""
+        q = motion_of_order(samples, 0)
+        dof = self.model.robot.dof
+        return q if q.shape[1] == dof else np.ascontiguousarray(q[:, :dof])
+
+    def _knows(self, q: Array) -> bool:
+        return bool(self._last) and np.array_equal(self._last[0], q)
+
+    def easing(self, column: int) -> tuple[float, str]:
+        """See `easing_of`: a millimetre."""
+        first, second = self.model.pairs[column]
+        return 1e-3 / _METRE, f"1 mm less between '{first}' and '{second}'"
+
+    def describe(self, samples: Samples, row: int, column: int) -> str:
+        """See `BoundConstraint.describe`."""
+        first, second = self.model.pairs[column]
+        value = self.distance + self.margin - self.residual(samples)[row, column] * _METRE
+        of_hulls = "" if self.model.is_exact(column) else "the convex hulls of "
+        return (
+            f"{of_hulls}'{first}' and '{second}' {how_near(value)} at t = "
+            f"{samples.sampling.node_times[row]:.3f} s, wanted {self.distance * 1e3:.2f} mm"
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class _Pull:
+    """How clearances change with the motion."""
+
+    clearances: Clearances
+
+    def all(self, motion: NodeTangents) -> Array:
+        """Return the entries of all rows and columns."""
+        return self.clearances.along(-self._moved(motion) / _METRE)
+
+    def picked(self, motion: NodeTangents, rows: Ints, columns: Ints) -> Array:
+        """See `Linear.picked`."""
+        slopes = self.clearances.slopes_at(rows, columns)
+        return np.asarray(np.einsum("kn,knd->kd", slopes, self._moved(motion)[rows])) / -_METRE
+
+    def _moved(self, motion: NodeTangents) -> Array:
+        return motion.q[:, : self.clearances.slopes.shape[1]]
+
+
+# So far beyond the distance asked for, clearances begin to level off [m]: well outside of where
+# the optimiser feels the constraint.
+_NEAR = 0.01
+# Clearances count in units of this, to weigh about as much as joint angles.
+_METRE = 0.1

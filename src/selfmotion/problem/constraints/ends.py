@@ -1,0 +1,322 @@
+"""Conditions on the end of the motion: a configuration, rest, repetition."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+import numpy.typing as npt
+
+from selfmotion.basics import Array, ProblemError, as_flag, as_numbers, per_joint, read_only
+from selfmotion.certificate import QUANTITIES, ClosedMotion, EndState
+from selfmotion.model.follow import Follows
+from selfmotion.model.path import STILL
+from selfmotion.model.robot import RobotModel
+from selfmotion.problem.constraints.base import Constraint
+from selfmotion.problem.constraints.conditions import NodeTangents, motion_of_order
+from selfmotion.problem.costs import Samples
+
+# What is asked of an end of the motion, bound to an arm.
+
+# The optimiser need only come near [rad, rad/s]: Newton's method then closes the rest.
+_NEAR = 1e-4
+# A configuration is another one than the one asked for where it is farther away than its own
+# coordinates tell, by this factor and this distance [rad or m].
+_FARTHER, _ELSEWHERE = 2.0, 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class BoundEnd:
+    """Nᵀ(x - target) = 0 at an end (`row`), or Nᵀ(x(T) - x(0)) = 0 without a target.
+
+    x is q, q̇ or both. Where that is all that is left to ask for of q, `is_whole`, it is to be the
+    target: other configurations on the same pose may be on the plane Nᵀ(q - target) = 0 as well.
+    """
+
+    name: str
+    orders: tuple[int, ...]
+    target: Array | None
+    null: Array
+    row: int = -1
+    is_whole: bool = False
+    equality = True
+    tolerance = _NEAR
+
+    def residual(self, samples: Samples) -> Array:
+        """See `BoundConstraint.residual`."""
+        parts = []
+        for order in self.orders:
+            x = motion_of_order(samples, order)
+            reached, wanted = (x[-1], x[0]) if self.target is None else (x[self.row], self.target)
+            parts.append(self.null.T @ (reached - wanted))
+        return np.concatenate(parts)[None, :]
+
+    def tangents(self, samples: Samples, motion: NodeTangents) -> Array:
+        """See `BoundConstraint.tangents`."""
+        parts = []
+        for order in self.orders:
+            x = motion.of_order(order)
+            parts.append(self.null.T @ (x[-1] - x[0] if self.target is None else x[self.row]))
+        return np.concatenate(parts)[None]
+
+    def elsewhere(self, first: Array, last: Array) -> float:
+        """Return how far q is from the target where it is another one on the same pose, else 0.
+
+        For q at the first and the last node, (n,) each [rad or m].
+        """
+        if not self.is_whole:
+            return 0.0
+        away = last - first if self.target is None else (last if self.row else first) - self.target
+        far, told = (float(np.linalg.norm(x)) for x in (away, self.null.T @ away))
+        return far if far > _FARTHER * told + _ELSEWHERE else 0.0
+
+    def describe(self, samples: Samples, row: int, column: int) -> str:
+        """See `BoundConstraint.describe`."""
+        order = self.orders[column // self.null.shape[1]]
+        quantity = QUANTITIES[order]
+        goal = "that of the start" if self.target is None else "the one asked for"
+        miss = np.abs(self.residual(samples)).max()
+        where = "end" if self.row else "start"
+        unit = ("rad or m", "rad/s or m/s", "rad/s² or m/s²")[order]
+        return (
+            f"the {quantity} at the {where} is {miss:.3g} {unit} away from {goal} "
+            f"({self.tolerance:g} allowed)"
+        )
+
+
+# Conditions on the end of the motion: a configuration, rest, repetition.
+#
+# The tool's rows of q(T) and q̇(T) are given by the path already. What is left to ask for are the
+# r coordinates along the self-motion: h = Nᵀ(x(T) - target), with N an orthonormal null-space
+# basis at the target configuration, at the start for closed paths, or at the end of the motion
+# that the optimisation begins with. Two configurations on the same pose with equal coordinates
+# are equal, near the reference, and so are two velocities with the same tool velocity; the
+# residual is free of what the integration leaves of the path error.
+
+# A start velocity may be this far off that of the path [m/s, rad/s].
+_NEAR_TWIST = 1e-6
+# Poses nearer than this are the same: far above rounding, far below any tolerance.
+_SAME_POSE = 1e-7
+
+
+@dataclass(frozen=True, eq=False)
+class EndConfiguration(Constraint):
+    """The motion ends in a configuration that puts the tool on the end of the path.
+
+    Where tolerances allow it, beside that.
+
+    Parameters
+    ----------
+    q : (n,)
+        q(T) [rad or m].
+    """
+
+    pins: ClassVar[tuple[bool, bool]] = (False, True)
+
+    q: npt.ArrayLike
+
+    def bind(self, follows: Follows, start: Array, end: Array) -> BoundEnd:
+        """See `Constraint.bind`."""
+        target = read_only(follows.robot.configuration(self.q))
+        null = follows.null_basis(target)
+        return BoundEnd("end configuration", (0,), target, null, is_whole=True)
+
+    def requirement(self, robot: RobotModel) -> EndState:
+        """See `Constraint.requirement`."""
+        return EndState(0, read_only(robot.configuration(self.q)))
+
+    def fixed_end(self, robot: RobotModel) -> Array:
+        """See `Constraint.fixed_end`."""
+        return robot.configuration(self.q)
+
+    def on_part(self) -> None:
+        """See `Constraint.on_part`: the part ends elsewhere."""
+
+
+class _EndRate(Constraint):
+    """A velocity or an acceleration at one end: the one field of each class."""
+
+    order: ClassVar[int]
+    at_start: ClassVar[bool]
+
+    def __init_subclass__(cls, *, order: int, at_start: bool, **options: Any) -> None:
+        cls.order, cls.at_start = order, at_start
+        here = (at_start, not at_start)
+        cls.pins = here
+        cls.sets_velocity = here if order == 1 else (False, False)
+        cls.sets_acceleration = here if order == 2 else (False, False)
+        super().__init_subclass__(**options)
+
+    @property
+    def asked(self) -> npt.ArrayLike:
+        """What is asked for, (n,) or one number."""
+        given: npt.ArrayLike = getattr(self, "q" + "d" * self.order)
+        return given
+
+    @property
+    def _name(self) -> str:
+        return f"{'start' if self.at_start else 'end'} {QUANTITIES[self.order]}"
+
+    def bind(self, follows: Follows, start: Array, end: Array) -> BoundEnd:
+        """See `Constraint.bind`."""
+        null = follows.null_basis(start if self.at_start else end)
+        row = 0 if self.at_start else -1
+        return BoundEnd(self._name, (self.order,), self.target(follows.robot), null, row)
+
+    def requirement(self, robot: RobotModel) -> EndState:
+        """See `Constraint.requirement`."""
+        return EndState(self.order, self.target(robot), self.at_start)
+
+    def target(self, robot: RobotModel) -> Array:
+        """Return what is asked for of an arm, (n,) [rad or m, per s^order]."""
+        what = f"{robot.name}: {self._name}"
+        return as_numbers(per_joint(self.asked, robot.dof, what), what)
+
+    def on_part(self) -> Constraint | None:
+        """See `Constraint.on_part`: a part begins as the whole, but ends elsewhere."""
+        return self if self.at_start else None
+
+    def on_last_part(self) -> Constraint | None:
+        """See `Constraint.on_last_part`: it ends as the whole, but begins elsewhere."""
+        return None if self.at_start else self
+
+
+@dataclass(frozen=True, eq=False)
+class EndVelocity(_EndRate, order=1, at_start=False):
+    """The motion ends with a joint velocity; 0 for rest.
+
+    The tool's rows of it have to be those of the path's end: for rest, the path has to end at rest.
+
+    Parameters
+    ----------
+    qd : (n,) or 0
+        q̇(T) [rad/s or m/s].
+    """
+
+    qd: npt.ArrayLike = 0.0
+
+    def check(self, follows: Follows) -> None:
+        """See `Constraint.check`: a motion ends at rest only where its path does."""
+        if np.any(self.target(follows.robot)):
+            return
+        speed = float(np.abs(follows.twists(np.array([follows.duration]))).max())
+        if speed > STILL:
+            raise ProblemError(
+                f"the motion cannot end at rest: the path ends at {speed:.3g} m/s or rad/s; give "
+                f"the path a time law that ends at rest (time_law='minimum_jerk'), or ask for "
+                f"another end velocity"
+            )
+
+
+@dataclass(frozen=True, eq=False)
+class StartVelocity(_EndRate, order=1, at_start=True):
+    """The motion begins with a joint velocity: that of an arm that moves already.
+
+    Needs a given start, where the tool's rows of it have to be those of the path's start.
+
+    Parameters
+    ----------
+    qd : (n,) or 0
+        q̇(0) [rad/s or m/s].
+    """
+
+    qd: npt.ArrayLike = 0.0
+
+    def check_start(self, follows: Follows, start: Array | None) -> None:
+        """See `Constraint.check_start`: the tool has to begin as the path does."""
+        robot = follows.robot
+        if start is None:
+            raise ProblemError("a start velocity needs a given start (start=)")
+        asked = follows.jacobian(start) @ self.target(robot)
+        twist = follows.twists(np.zeros(1))[0]
+        row = int(np.argmax(np.abs(asked - twist)))
+        if abs(asked[row] - twist[row]) > _NEAR_TWIST:
+            begins = round(float(twist[row]), 9) + 0.0
+            raise ProblemError(
+                f"the start velocity moves '{robot.tool}' at {asked[row]:.6g} m/s or rad/s in row "
+                f"'{follows.row_names[row]}', but the path begins at {begins:g}; give "
+                f"the path that speed, or the arm another one"
+            )
+
+
+@dataclass(frozen=True, eq=False)
+class StartAcceleration(_EndRate, order=2, at_start=True):
+    """The motion begins with a joint acceleration: with `StartVelocity`, the hand-over of an arm.
+
+    Its part that moves the tool has to be what the path and the velocity make of it. An arm that
+    is not said to move begins at rest.
+
+    Parameters
+    ----------
+    qdd : (n,) or 0
+        q̈(0) [rad/s² or m/s²].
+    """
+
+    qdd: npt.ArrayLike = 0.0
+
+    def check_start(self, follows: Follows, start: Array | None) -> None:
+        """See `Constraint.check_start`: of a free start no acceleration is known."""
+        if start is None:
+            raise ProblemError("a start acceleration needs a given start (start=)")
+
+
+@dataclass(frozen=True, eq=False)
+class EndAcceleration(_EndRate, order=2, at_start=False):
+    """The motion ends with a joint acceleration; see `StartAcceleration`.
+
+    Parameters
+    ----------
+    qdd : (n,) or 0
+        q̈(T) [rad/s² or m/s²].
+    """
+
+    qdd: npt.ArrayLike = 0.0
+
+
+@dataclass(frozen=True)
+class ClosedPath(Constraint):
+    """The motion ends as it began, so that it can be repeated: q(T) = q(0).
+
+    Parameters
+    ----------
+    velocity : bool
+        Also q̇(T) = q̇(0), for repetition without a jump in speed.
+    """
+
+    closes: ClassVar[bool] = True
+
+    velocity: bool = True
+
+    def __post_init__(self) -> None:
+        as_flag(self.velocity, "closed path: velocity")
+
+    def bind(self, follows: Follows, start: Array, end: Array) -> BoundEnd:
+        """See `Constraint.bind`."""
+        orders = (0, 1) if self.velocity else (0,)
+        return BoundEnd("closed path", orders, None, follows.null_basis(start), is_whole=True)
+
+    def requirement(self, robot: RobotModel) -> ClosedMotion:
+        """See `Constraint.requirement`."""
+        return ClosedMotion(self.velocity)
+
+    def check(self, follows: Follows) -> None:
+        """See `Constraint.check`: the tool's path has to be closed as well."""
+        for item in follows.items:
+            path = item.path
+            position, rotation = item.task.miss(path.pose(0.0), path.pose(path.duration))
+            if max(position, rotation) > _SAME_POSE:
+                raise ProblemError(
+                    f"a closed joint path needs a closed tool path, but the tool ends "
+                    f"{position:.3g} m and {rotation:.3g} rad from where it began"
+                )
+
+    def at_rest(self) -> ClosedPath:
+        """See `Constraint.at_rest`: both velocities are 0."""
+        return ClosedPath(velocity=False)
+
+    def on_part(self) -> None:
+        """See `Constraint.on_part`: a part of a loop is not closed."""
+
+    def on_last_part(self) -> None:
+        """See `Constraint.on_last_part`: a part of a loop is not closed."""

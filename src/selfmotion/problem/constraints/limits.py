@@ -1,0 +1,384 @@
+"""Limits of joint position, velocity, acceleration, jerk and torque."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import ClassVar
+
+import numpy as np
+import numpy.typing as npt
+
+from selfmotion.basics import Array, Ints, ProblemError, as_flag, as_number, per_joint, read_only
+from selfmotion.certificate import LIMIT_NAMES, Column, JointLimits, Quantity
+from selfmotion.model.follow import Follows
+from selfmotion.model.robot import Dynamics, RobotModel, check_radians
+from selfmotion.problem.constraints.base import Constraint, Envelope
+from selfmotion.problem.constraints.conditions import NodeTangents, motion_of_order
+from selfmotion.problem.costs import Samples
+
+# Limits of joint position, velocity, acceleration and jerk.
+
+_QUANTITIES = ("position", "speed", "acceleration", "jerk")
+_POWERS = ("", "/s", "/s²", "/s³")
+_RATES = ("position", "velocity", "acceleration", "jerk")
+
+
+@dataclass(frozen=True, eq=False)
+class JointPositionLimits(Constraint):
+    """Joint coordinates stay within limits.
+
+    Parameters
+    ----------
+    lower, upper : (n,), optional
+        [rad or m]; ±inf for none. By default only the URDF's.
+    margin : float
+        Distance aimed to be kept from them [rad or m]; at least half of it is.
+    replace : bool
+        Whether these stand in place of the URDF's limits. By default both are kept.
+    """
+
+    kept_moving: ClassVar[bool] = True
+
+    lower: npt.ArrayLike | None = None
+    upper: npt.ArrayLike | None = None
+    margin: float = 1e-5
+    replace: bool = False
+
+    def __post_init__(self) -> None:
+        _check_margin(self.margin)
+        as_flag(self.replace, f"{type(self).__name__}: replace")
+
+    def bind(self, follows: Follows, start: Array, end: Array) -> BoundLimits:
+        """See `Constraint.bind`."""
+        robot = follows.robot
+        return BoundLimits.of(robot, self.requirement(robot), self.margin)
+
+    def requirement(self, robot: RobotModel) -> JointLimits:
+        """See `Constraint.requirement`."""
+        return JointLimits(0, *self.limits(robot))
+
+    def envelope(self, robot: RobotModel) -> Envelope:
+        """See `Constraint.envelope`."""
+        return Envelope.of_limits(self.requirement(robot))
+
+    def limits(self, robot: RobotModel) -> tuple[Array, Array]:
+        """Return lower and upper limits of an arm, (n,) each [rad or m]."""
+        own = []
+        for side, given, arm, tighter in (
+            ("lower", self.lower, robot.lower, np.maximum),
+            ("upper", self.upper, robot.upper, np.minimum),
+        ):
+            if given is None:
+                own.append(arm)
+                continue
+            values = per_joint(given, robot.dof, f"{robot.name}: {LIMIT_NAMES[0]}: {side}")
+            check_radians(robot, values, f"{robot.name}: {LIMIT_NAMES[0]}", "limits")
+            own.append(values if self.replace else read_only(tighter(values, arm)))
+        lower, upper = own
+        wrong = np.flatnonzero(~(lower < upper))
+        if wrong.size:
+            k = int(wrong[0])
+            name = robot.joint_names[k]
+            if lower[k] == upper[k]:
+                raise ProblemError(
+                    f"{robot.name}: {LIMIT_NAMES[0]}: joint '{name}' has lower = upper = "
+                    f"{lower[k]:.6g}: it does not move; hold it there: lock = {{{name!r}: "
+                    f"{lower[k]:.6g}}} of the robot (--lock {name}={lower[k]:.6g})"
+                )
+            raise ProblemError(
+                f"{robot.name}: {LIMIT_NAMES[0]}: joint '{name}': lower "
+                f"{lower[k]:.6g} is not below upper {upper[k]:.6g}; the arm's own limits count as "
+                f"well, unless these replace them (replace = true)"
+            )
+        return lower, upper
+
+
+class _RateLimits(Constraint):
+    """Limits of |q̇|, |q̈| or of the jerk: one's own, and those of the URDF or the arm's maker."""
+
+    order: ClassVar[int]
+    of_pace: ClassVar[bool] = True
+    limit: npt.ArrayLike | None
+    replace: bool
+
+    def __post_init__(self) -> None:
+        _check_margin(self.margin)
+        as_flag(self.replace, f"{type(self).__name__}: replace")
+
+    def published(self, robot: RobotModel) -> Array:
+        """Return the arm's, (n,); inf where none are known."""
+        known: Array = getattr(robot, f"{_RATES[self.order]}_limit")
+        return known
+
+    def of(self, robot: RobotModel) -> Array:
+        """Return the limits for an arm, (n,) [rad or m, per s^order]."""
+        if self.limit is None:
+            return self.published(robot)
+        what = f"{robot.name}: {LIMIT_NAMES[self.order]}"
+        own = per_joint(self.limit, robot.dof, what, positive=True)
+        return own if self.replace else read_only(np.minimum(own, self.published(robot)))
+
+    def applies(self, robot: RobotModel) -> bool:
+        """See `Constraint.applies`."""
+        return bool(np.isfinite(self.of(robot)).any())
+
+    def bind(self, follows: Follows, start: Array, end: Array) -> BoundLimits:
+        """See `Constraint.bind`."""
+        return BoundLimits.of(follows.robot, self.requirement(follows.robot), self.margin)
+
+    def requirement(self, robot: RobotModel) -> JointLimits:
+        """See `Constraint.requirement`."""
+        limit = self.of(robot)
+        return JointLimits(self.order, -limit, limit)
+
+    def envelope(self, robot: RobotModel) -> Envelope:
+        """See `Constraint.envelope`."""
+        return Envelope.of_limits(self.requirement(robot))
+
+
+@dataclass(frozen=True, eq=False)
+class JointVelocityLimits(_RateLimits):
+    """Joint speeds stay below limits.
+
+    Parameters
+    ----------
+    limit : (n,) or float, optional
+        [rad/s or m/s]; by default only the URDF's.
+    margin : float
+        Share of the limit that is aimed to be left unused; at least half of it is.
+    replace : bool
+        Whether these stand in place of the URDF's limits. By default both are kept.
+    """
+
+    order: ClassVar[int] = 1
+    kept_moving: ClassVar[bool] = True
+
+    limit: npt.ArrayLike | None = None
+    margin: float = 1e-4
+    replace: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class JointAccelerationLimits(_RateLimits):
+    """Joint accelerations stay below limits.
+
+    Parameters
+    ----------
+    limit : (n,) or float, optional
+        [rad/s² or m/s²]; by default those of the arm's maker, if known (URDFs give none).
+    margin : float
+        Share of the limit that is aimed to be left unused; at least half of it is.
+    replace : bool
+        Whether these stand in place of the maker's limits. By default both are kept.
+    """
+
+    order: ClassVar[int] = 2
+    kept_moving: ClassVar[bool] = True
+
+    limit: npt.ArrayLike | None = None
+    margin: float = 1e-4
+    replace: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class JointJerkLimits(_RateLimits):
+    """Joint jerks, the derivatives of accelerations, stay below limits.
+
+    Parameters
+    ----------
+    limit : (n,) or float, optional
+        [rad/s³ or m/s³]; by default those of the arm's maker, if known (URDFs give none).
+    margin : float
+        Share of the limit that is aimed to be left unused; at least half of it is.
+    replace : bool
+        Whether these stand in place of the maker's limits. By default both are kept.
+    """
+
+    order: ClassVar[int] = 3
+
+    limit: npt.ArrayLike | None = None
+    margin: float = 1e-4
+    replace: bool = False
+
+
+def _check_margin(margin: float) -> None:
+    as_number(margin, "limits: margin", above=0.0, most=1.0)
+
+
+@dataclass(frozen=True, eq=False)
+class BoundLimits:
+    """lower ≤ x ≤ upper for x = q, q̇, q̈ or the jerk of the joints that have finite limits.
+
+    h = (x - upper) / s + margin and (lower - x) / s + margin, with s = 1 for positions and the
+    limit itself for its derivatives.
+    """
+
+    name: str
+    order: int
+    joints: npt.NDArray[np.intp]
+    joint_names: tuple[str, ...]
+    units: tuple[str, ...]
+    lower: Array
+    upper: Array
+    scale: Array
+    margin: float
+    equality = False
+
+    @classmethod
+    def of(cls, robot: RobotModel, limits: JointLimits, margin: float) -> BoundLimits:
+        """Return what is judged, for the joints with a finite limit on either side."""
+        lower, upper, order = limits.lower, limits.upper, limits.order
+        joints = np.flatnonzero(np.isfinite(lower) | np.isfinite(upper))
+        scale = np.ones(len(joints)) if order == 0 else upper[joints]
+        names = tuple(robot.joint_names[k] for k in joints)
+        units = tuple("rad" if turns else "m" for turns in robot.is_revolute[joints].tolist())
+        sides = lower[joints], upper[joints]
+        return cls(limits.name, order, joints, names, units, *sides, scale, margin)
+
+    @property
+    def tolerance(self) -> float:
+        """See `BoundConstraint.tolerance`: half the margin."""
+        return 0.5 * self.margin
+
+    def residual(self, samples: Samples) -> Array:
+        """See `BoundConstraint.residual`."""
+        x = motion_of_order(samples, self.order)
+        x = x if len(self.joints) == x.shape[1] else x[:, self.joints]
+        h = np.empty((len(x), 2 * len(self.joints)))
+        np.subtract(x, self.upper, out=h[:, : len(self.joints)])
+        np.subtract(self.lower, x, out=h[:, len(self.joints) :])
+        h /= self._both_scales
+        h += self.margin
+        return h
+
+    @cached_property
+    def _both_scales(self) -> Array:
+        return np.concatenate([self.scale, self.scale])
+
+    def tangents(self, samples: Samples, motion: NodeTangents) -> Array:
+        """See `BoundConstraint.tangents`."""
+        above = motion.of_order(self.order)[:, self.joints] / self.scale[:, None]
+        return np.concatenate([above, -above], axis=1)
+
+    def linearised_at(self, samples: Samples) -> tuple[tuple[int, int], BoundLimits]:
+        """See `linearised`."""
+        return (len(samples.nodes), 2 * len(self.joints)), self
+
+    def picked(self, motion: NodeTangents, rows: Ints, columns: Ints) -> Array:
+        """See `Linear.picked`."""
+        joints = columns % len(self.joints)
+        signed = np.where(columns < len(self.joints), 1.0, -1.0) / self.scale[joints]
+        return motion.picked(self.order, rows, self.joints[joints]) * signed[:, None]
+
+    def easing(self, column: int) -> tuple[float, str]:
+        """See `easing_of`: 2 % of a rate, on both sides; 0.01 rad or m of a position."""
+        number = column % len(self.joints)
+        joint = f"joint '{self.joint_names[number]}'"
+        if self.order > 0:
+            return 0.02, f"2 % more {_QUANTITIES[self.order]} for {joint}"
+        side = "upper" if column < len(self.joints) else "lower"
+        return 0.01, f"0.01 {self.units[number]} more at the {side} limit of {joint}"
+
+    def describe(self, samples: Samples, row: int, column: int) -> str:
+        """See `BoundConstraint.describe`."""
+        joint = column % len(self.joints)
+        value = motion_of_order(samples, self.order)[row, self.joints[joint]]
+        limit = self.upper[joint] if column < len(self.joints) else self.lower[joint]
+        unit = self.units[joint] + _POWERS[self.order]
+        return (
+            f"{_QUANTITIES[self.order]} of joint '{self.joint_names[joint]}' is {value:.4g} {unit} "
+            f"at t = {samples.sampling.node_times[row]:.3f} s, limit {limit:.4g} {unit}"
+        )
+
+
+# Limits of joint torque, with what the tool holds.
+
+_WITH = " and of those that mimic it"
+
+
+@dataclass(frozen=True, eq=False)
+class JointTorqueLimits(Constraint):
+    """Joint torques stay below limits: gravity, inertia and Coriolis forces, with a payload.
+
+    Of joints that mimic another one motor may turn all, or each its own, which no URDF says. Both
+    are kept: what all of them ask of the joint that they mimic (Cᵀτ) stays below its effort, and
+    what each carries (τ) below its own. Limits of one's own are those of the former alone.
+
+    Parameters
+    ----------
+    limit : (n,) or float, optional
+        [Nm, or N of prismatic joints]; by default the URDF's efforts.
+    payload : float
+        Mass that the tool holds [kg].
+    center : (3,)
+        Its centre of mass in the tool frame [m].
+    inertia : (3, 3), optional
+        Its inertia about that centre, along the tool's axes [kg m²]; by default a point mass.
+    margin : float
+        Share of the limit that is aimed to be left unused; at least half of it is.
+    """
+
+    limit: npt.ArrayLike | None = None
+    payload: float = 0.0
+    center: npt.ArrayLike = (0.0, 0.0, 0.0)
+    inertia: npt.ArrayLike | None = None
+    margin: float = 1e-3
+
+    def __post_init__(self) -> None:
+        as_number(self.margin, "joint torque limits: margin", above=0.0, most=1.0)
+
+    def quantity(self, robot: RobotModel) -> Quantity:
+        """See `Constraint.quantity`."""
+        each = self.limit is None
+        dynamics = Dynamics(robot, self.payload, self.center, self.inertia, each=each)
+        limit = self.of(robot)
+        names = [(name, f"torque of joint '{name}'") for name in robot.joint_names]
+        if each and len(robot.coupling.shared):
+            own = [robot.model.names[int(k) + 1] for k in robot.coupling.shared]
+            names = [(name, f"{label}{_WITH * (name in own)}") for name, label in names]
+            names += [(name, f"torque of joint '{name}' alone") for name in own]
+            efforts = np.asarray(robot.model.upperEffortLimit)[robot.coupling.shared]
+            limit = np.append(limit, np.where(efforts > 0.0, efforts, np.inf))
+        units = ["N" if robot.is_prismatic(name) else "Nm" for name, _ in names]
+        return Quantity(
+            "joint torque limits",
+            [Column(*name, unit) for name, unit in zip(names, units, strict=True)],
+            dynamics.torques,
+            dynamics.derivatives,
+            limit=limit,
+            of_pace=True,
+            series=lambda stretch: dynamics.series(stretch.chain()),
+            covers=(_covered(robot, self.of(robot)),),
+        )
+
+    def applies(self, robot: RobotModel) -> bool:
+        """See `Constraint.applies`."""
+        shared = np.asarray(robot.model.upperEffortLimit)[robot.coupling.shared]
+        each = self.limit is None and bool((shared > 0.0).any())
+        return each or bool(np.isfinite(self.of(robot)).any())
+
+    def of(self, robot: RobotModel) -> Array:
+        """Return the limits for an arm, (n,) [Nm or N]."""
+        if self.limit is None:
+            unsaid = [name for name in robot.joint_names if name in robot.urdf.lacking_efforts]
+            if unsaid:
+                raise ProblemError(
+                    f"{robot.name}: joint torque limits: joint '{unsaid[0]}' has a <limit> without "
+                    f"effort; add it to the URDF, or give limit = …"
+                )
+            return robot.effort_limit
+        what = f"{robot.name}: joint torque limits"
+        return per_joint(self.limit, robot.dof, what, positive=True)
+
+
+def _covered(robot: RobotModel, limit: Array) -> str:
+    """Return what a verdict may claim: of some motors nobody may have said what they can.
+
+    Torques are those of rigid bodies: where a URDF has damping or friction, the verdict says so.
+    """
+    known = int(np.isfinite(limit).sum())
+    claim = "torques" if known == len(limit) else f"torques of {known} of {len(limit)} joints"
+    model = robot.model
+    losses = np.any(model.damping) or np.any(model.upperDryFrictionLimit)
+    return f"{claim} without damping and friction" if losses else claim

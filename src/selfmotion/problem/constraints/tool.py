@@ -1,0 +1,228 @@
+"""Limits of the tool: how fast it moves and accelerates, and how far an axis of it may tilt."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from selfmotion.basics import Array, ProblemError, as_number, as_numbers, nearest, shown
+from selfmotion.certificate import Column, Quantity, Stretch
+from selfmotion.model.robot import RobotModel, ToolRates
+from selfmotion.problem.constraints.base import Constraint, Envelope, check_changes
+
+# Limits of how fast the tool moves and accelerates.
+
+# What of the tool is limited, as [v, ω] and [dv/dt, dω/dt] have it, and in which units.
+TOOL_RATES = (
+    ("speed", "m/s"),
+    ("turn rate", "rad/s"),
+    ("acceleration", "m/s²"),
+    ("turn acceleration", "rad/s²"),
+)
+
+
+@dataclass(frozen=True, eq=False)
+class ToolLimits(Constraint):
+    """The tool moves and turns no faster, and accelerates no more, than it may.
+
+    All are as the arm's reference sees them, where it has one, and the verdict says so.
+    What the path prescribes is the path's: a limit that it passes itself cannot be kept, and the
+    verdict says by how much. What the task leaves free, such as turning, keeps the limits.
+
+    Parameters
+    ----------
+    speed : float
+        Of the tool frame's origin [m/s].
+    turn_rate : float
+        [rad/s].
+    acceleration : float
+        [m/s²].
+    turn_acceleration : float
+        [rad/s²].
+    margin : float
+        Share of each that is aimed to be left unused; at least half of it is.
+    """
+
+    speed: float = np.inf
+    turn_rate: float = np.inf
+    acceleration: float = np.inf
+    turn_acceleration: float = np.inf
+    margin: float = 1e-3
+
+    def __post_init__(self) -> None:
+        for (name, _), value in zip(TOOL_RATES, self._given, strict=True):
+            if not (isinstance(value, float) and value == np.inf):
+                as_number(value, f"tool limits: {name.replace(' ', '_')}", above=0.0)
+        as_number(self.margin, "tool limits: margin", above=0.0, most=1.0)
+        if not np.isfinite(self.limit).any():
+            raise ProblemError(
+                "tool limits: none is given, expected one of speed, turn_rate, acceleration and "
+                "turn_acceleration"
+            )
+
+    @property
+    def _given(self) -> tuple[float, float, float, float]:
+        return self.speed, self.turn_rate, self.acceleration, self.turn_acceleration
+
+    @property
+    def limit(self) -> Array:
+        """Speed, turn rate, acceleration and turn acceleration, (4,); inf where there is none."""
+        return np.array(self._given, dtype=np.float64)
+
+    def quantity(self, robot: RobotModel) -> Quantity:
+        """See `Constraint.quantity`."""
+        rates, tool = ToolRates(robot.chain), robot.tool
+        limited = np.isfinite(self.limit)
+        seen = "" if robot.reference is None else f" seen from '{robot.reference}'"
+
+        def values(q: Array, qd: Array, qdd: Array) -> Array:
+            return np.stack(rates(q, qd, qdd), axis=1).reshape(-1, 4, 3)
+
+        def derivatives(q: Array, qd: Array, qdd: Array) -> tuple[Array, ...]:
+            speeds, accelerations = rates.derivatives(q, qd, qdd)
+            # A speed does not depend on q̈.
+            pairs = zip((*speeds, np.zeros_like(speeds[0])), accelerations, strict=True)
+            return tuple(np.stack(pair, axis=1).reshape(-1, 4, 3, robot.dof) for pair in pairs)
+
+        def known(stretch: Stretch) -> Array:
+            found = rates.series(stretch.chain())
+            length = min(map(len, found))
+            return np.stack([item[:length] for item in found])
+
+        return Quantity(
+            "tool limits",
+            [
+                Column(tool, f"{name} of the tool '{tool}'{seen}", unit, 1 if k < 2 else 2)
+                for k, (name, unit) in enumerate(TOOL_RATES)
+            ],
+            values,
+            derivatives,
+            limit=self.limit,
+            of_pace=True,
+            series=known,
+            components=3,
+            covers=tuple(
+                f"tool {name}{seen}"
+                for (name, _), own in zip(TOOL_RATES, limited, strict=True)
+                if own
+            ),
+        )
+
+
+# An axis of a link near a direction of the world: a cup that must not spill, a flat seam.
+
+_AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+
+
+@dataclass(frozen=True, eq=False)
+class Tilt(Constraint):
+    """An axis of a link stays within an angle of a direction of the world, at all times.
+
+    With a the axis and d the direction, both of length 1, |a - d| = 2 sin(θ/2) ≤ 2 sin(within/2).
+
+    Parameters
+    ----------
+    frame : str
+        The link.
+    axis : {"x", "y", "z"} or (3,)
+        In the link's own frame.
+    within : float
+        The largest angle [rad], less than π.
+    towards : (3,)
+        In world axes; downwards by default, in files to be said.
+    margin : float
+        Share of the angle which is aimed to be left unused; at least half of it is.
+    """
+
+    frame: str
+    axis: str | npt.ArrayLike = "z"
+    within: float = 0.1
+    towards: npt.ArrayLike = (0.0, 0.0, -1.0)
+    margin: float = 5e-4
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.frame, str):
+            raise ProblemError(f"tilt: frame is {shown(self.frame)}, expected the name of a link")
+        _direction(_axis(self.axis), "tilt: axis")
+        _direction(self.towards, "tilt: towards")
+        as_number(self.within, "tilt: within", above=0.0, most=np.pi * (1.0 - 1e-6))
+        as_number(self.margin, "tilt: margin", above=0.0, most=1.0)
+
+    def envelope(self, robot: RobotModel) -> Envelope:
+        """See `Constraint.envelope`."""
+        return Envelope.of_quantity(self.quantity(robot), robot.dof)
+
+    def quantity(self, robot: RobotModel) -> Quantity:
+        """See `Constraint.quantity`."""
+        if self.frame not in robot.urdf.links:
+            raise ProblemError(
+                f"{robot.name}: no link '{self.frame}' whose tilt could be limited"
+                f"{nearest(self.frame, robot.urdf.links)}; links: {', '.join(robot.urdf.links)}"
+            )
+        chain = robot.chain_to(self.frame)
+        axis = _direction(_axis(self.axis), "tilt: axis")
+        towards = _direction(self.towards, "tilt: towards")
+
+        def values(q: Array, qd: Array, qdd: Array) -> Array:
+            _, rotations, _ = chain.along(q)
+            return np.asarray((rotations @ axis - towards)[:, None])
+
+        def derivatives(q: Array, qd: Array, qdd: Array) -> tuple[Array, ...]:
+            # A joint that turns the link at ω takes its axis a along ω × a.
+            jacobians, rotations, _ = chain.along(q)
+            turned = (rotations @ axis)[:, None]
+            slopes = np.cross(jacobians[:, 3:].transpose(0, 2, 1), turned)
+            return (slopes.transpose(0, 2, 1)[:, None],)
+
+        def known(stretch: Stretch) -> Array:
+            return np.asarray(stretch.chain().orientation(chain.tip)[None])
+
+        found = _Angle(
+            f"tilt of '{self.frame}'",
+            (Column(self.frame, f"the tilt of '{self.frame}' from {_told(towards)}", "rad"),),
+            values,
+            derivatives,
+            limit=2.0 * np.sin(0.5 * self.within),
+            series=known,
+            components=3,
+        )
+        check_changes(found, robot)
+        return found
+
+
+class _Angle(Quantity):
+    """A quantity that is the chord of an angle, told as the angle."""
+
+    def said(self, column: int, away: float, time: float) -> str:
+        """See `Quantity.said`."""
+        angle, limit = (
+            2.0 * float(np.arcsin(min(0.5 * abs(chord), 1.0)))
+            for chord in (away, self.bounds[column])
+        )
+        return (
+            f"{self.columns[column].label} is {angle:.4g} rad at t = {time:.3f} s, expected at "
+            f"most {limit:.4g} rad"
+        )
+
+
+def _axis(axis: str | npt.ArrayLike) -> npt.ArrayLike:
+    if not isinstance(axis, str):
+        return axis
+    if axis not in _AXES:
+        raise ProblemError(f"tilt: axis is '{axis}', expected x, y, z or three numbers")
+    return _AXES[axis]
+
+
+def _direction(given: npt.ArrayLike, what: str) -> Array:
+    """Return three numbers as a unit vector."""
+    vector = as_numbers(given, what, "three numbers, not all 0", (3,))
+    length = float(np.linalg.norm(vector))
+    if not length > 0.0:
+        raise ProblemError(f"{what} is zero, expected a direction")
+    return np.asarray(vector / length)
+
+
+def _told(direction: Array) -> str:
+    return "[" + ", ".join(f"{number:.3g}" for number in np.round(direction, 6) + 0.0) + "]"

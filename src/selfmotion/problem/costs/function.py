@@ -1,0 +1,132 @@
+"""Any integrand that a user can write down."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from selfmotion.basics import Array, ProblemError, is_known, plain_numbers, restore, shown
+from selfmotion.model.robot import RobotModel
+from selfmotion.problem.costs.base import Cost, Partials, check_name
+from selfmotion.problem.costs.samples import Samples
+
+Integrand = Callable[[Array, Array, Array], npt.ArrayLike]
+IntegrandGradient = Callable[[Array, Array, Array], tuple[npt.ArrayLike, npt.ArrayLike]]
+
+
+@dataclass(frozen=True)
+class FunctionCost(Cost):
+    """Any integrand G(q̇, q, t), the paper's general form.
+
+    Parameters
+    ----------
+    g : callable
+        ``g(qd, q, t)`` with qd, q (S, n) and t (S,) → (S,), vectorised over samples.
+    g_gradient : callable, optional
+        ``g_gradient(qd, q, t)`` → (∂G/∂q̇, ∂G/∂q), each (S, n). Without it both are taken by
+        central differences, 4n calls of `g`.
+    """
+
+    g: Integrand
+    g_gradient: IntegrandGradient | None = None
+    name: str = "function"
+
+    def __post_init__(self) -> None:
+        check_name(self.name)
+        for field in ("g", "g_gradient"):
+            given = getattr(self, field)
+            if not callable(given) and not (given is None and field == "g_gradient"):
+                raise ProblemError(
+                    f"cost '{self.name}': {field} is {shown(given)}, expected a function of "
+                    f"(qd, q, t)"
+                )
+
+    def value(self, samples: Samples) -> Array:
+        """See `Cost.value`."""
+        return self._call(samples.qd, samples.q, samples.t)
+
+    def gradient(self, samples: Samples) -> Partials:
+        """See `Cost.gradient`."""
+        qd, q, t = samples.qd, samples.q, samples.t
+        if self.g_gradient is not None:
+            by_qd, by_q = (np.asarray(part, dtype=float) for part in self.g_gradient(qd, q, t))
+            for part in (by_qd, by_q):
+                if part.shape != q.shape:
+                    raise ProblemError(
+                        f"cost '{self.name}': its gradient has shape {part.shape}, "
+                        f"expected {q.shape} for both ∂G/∂q̇ and ∂G/∂q"
+                    )
+            return Partials(q=by_q, qd=by_qd)
+        return Partials(
+            q=self._difference(q, lambda shifted: self._call(qd, shifted, t)),
+            qd=self._difference(qd, lambda shifted: self._call(shifted, q, t)),
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """See `Saved.to_dict`: a file carries no function, only that there was one."""
+        return {"kind": LostCost.kind, "name": self.name, "was": self.kind}
+
+    def _call(self, qd: Array, q: Array, t: Array) -> Array:
+        value = plain_numbers(self.g(qd, q, t))
+        if value is None:
+            raise ProblemError(f"cost '{self.name}' returned no numbers, expected {t.shape}")
+        if value.shape != t.shape:
+            raise ProblemError(
+                f"cost '{self.name}' returned shape {value.shape} for {len(t)} samples, "
+                f"expected {t.shape}"
+            )
+        return value
+
+    @staticmethod
+    def _difference(x: Array, function: Callable[[Array], Array]) -> Array:
+        gradient = np.empty_like(x)
+        for i in range(x.shape[1]):
+            # The cube root of the rounding error balances it against the truncation error.
+            step = np.cbrt(np.finfo(float).eps) * np.maximum(1.0, np.abs(x[:, i]))
+            above, below = x.copy(), x.copy()
+            above[:, i] += step
+            below[:, i] -= step
+            gradient[:, i] = (function(above) - function(below)) / (above[:, i] - below[:, i])
+        return gradient
+
+
+@dataclass(frozen=True)
+class LostCost(Cost):
+    """A cost of a saved plan that was a function, or a class that is not imported here.
+
+    A plan file carries no code. The motion can be checked and shown without it; planning again
+    needs the cost itself.
+
+    Parameters
+    ----------
+    name : str
+    was : str
+        Kind of the cost that was saved.
+    """
+
+    name: str
+    was: str
+
+    def value(self, samples: Samples) -> Array:
+        """Raise ProblemError: what the cost was is not known."""
+        raise ProblemError(
+            f"cost '{self.name}' was a {self.was}, which the plan's file does not carry; give it "
+            f"again: dataclasses.replace(problem, costs=[…])"
+        )
+
+    def gradient(self, samples: Samples) -> Partials:
+        """Raise ProblemError, as `value` does."""
+        raise ProblemError(f"cost '{self.name}' was a {self.was}, which is not known here")
+
+
+def cost_from_dict(description: Mapping[str, Any], robot: RobotModel) -> Cost:
+    """Return the cost that `Cost.to_dict` described; a `LostCost` where the code is not here."""
+    if not is_known(Cost, description):
+        kind = str(description.get("kind"))
+        return LostCost(str(description.get("name", kind)), kind)
+    cost: Cost = restore(Cost, description, robot=robot)
+    return cost

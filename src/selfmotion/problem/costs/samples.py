@@ -1,0 +1,236 @@
+"""A motion at sample times, as costs and constraints see it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from selfmotion.basics import Array, Ints
+from selfmotion.model import kernels
+from selfmotion.model.follow import Follows
+from selfmotion.model.motion import Sampling
+from selfmotion.model.task import Task
+
+_ARRAYS = ("q", "qd", "task_jacobian")
+
+
+@dataclass(frozen=True, eq=False)
+class TipSamples:
+    """Where a tip is that follows a path, at S times, in its chain's base frame.
+
+    Attributes
+    ----------
+    jacobian : (S, 6, n)
+        The tip's Jacobian [v, ω].
+    rotation, translation : (S, 3, 3), (S, 3)
+        The tip's pose.
+    error : (S, 6)
+        Pose error e, from the tip to the path [m, rad]; see `Task.twist_error`.
+    """
+
+    jacobian: Array
+    rotation: Array
+    translation: Array
+    error: Array
+
+    def __post_init__(self) -> None:
+        _show(self, tuple(self.__dataclass_fields__))
+
+    def at(self, rows: Ints) -> TipSamples:
+        """Return those of some of the times."""
+        return TipSamples(*(getattr(self, name)[rows] for name in self.__dataclass_fields__))
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """A joint motion at S times, with the kinematics there of all that follows a path.
+
+    The arrays refuse to be written to. `jacobian`, `rotation`, `translation` and `task` are those
+    of the first tip that follows a path, which mostly is the only one; `tips` has them all.
+
+    Attributes
+    ----------
+    sampling : Sampling
+        When the samples are taken.
+    q, qd : (S, n)
+        Joint coordinates and velocities.
+    follows : Follows
+        What the arm follows.
+    tips : tuple of TipSamples
+    task_jacobian : (S, m, n)
+        The prescribed rows of all tips.
+    """
+
+    sampling: Sampling
+    q: Array
+    qd: Array
+    follows: Follows
+    tips: tuple[TipSamples, ...]
+    task_jacobian: Array
+
+    def __post_init__(self) -> None:
+        _show(self, _ARRAYS)
+
+    @classmethod
+    def along(cls, follows: Follows, sampling: Sampling, q: Array, qd: Array) -> Samples:
+        """Return the samples of a motion on its path, q and q̇ (S, n) each."""
+        tips, rows = [], []
+        for item in follows.items:
+            jacobian, rotation, translation = item.chain.along(q)
+            rows.append(item.task.select_along(jacobian, rotation))
+            tips.append(TipSamples(jacobian, rotation, translation, np.zeros((len(q), 6))))
+        stacked = rows[0] if len(rows) == 1 else np.concatenate(rows, axis=1)
+        return cls(sampling, q, qd, follows, tuple(tips), stacked)
+
+    @property
+    def jacobian(self) -> Array:
+        """The tool's Jacobian [v, ω], world axes, (S, 6, n)."""
+        return self.tips[0].jacobian
+
+    @property
+    def rotation(self) -> Array:
+        """The tool's orientation, (S, 3, 3)."""
+        return self.tips[0].rotation
+
+    @property
+    def translation(self) -> Array:
+        """The tool's position [m], (S, 3)."""
+        return self.tips[0].translation
+
+    @property
+    def task(self) -> Task:
+        """The rows that the path prescribes."""
+        return self.follows.items[0].task
+
+    @property
+    def error(self) -> Array:
+        """Pose errors e of all tips [m, rad], one after the other, (S, 6 F)."""
+        errors = [tip.error for tip in self.tips]
+        return errors[0] if len(errors) == 1 else np.concatenate(errors, axis=1)
+
+    @property
+    def t(self) -> Array:
+        """Times [s], (S,)."""
+        return self.sampling.t
+
+    @property
+    def weights(self) -> Array:
+        """Quadrature weights [s]: ∫ G dt ≈ weights · G, (S,)."""
+        return self.sampling.weights
+
+    @property
+    def nodes(self) -> npt.NDArray[np.intp]:
+        """Indices of the samples that are nodes, (N + 1,)."""
+        return self.sampling.nodes
+
+    @cached_property
+    def qdd(self) -> Array:
+        """Joint accelerations, (S, n): differences of q̇ over the nodes."""
+        return np.asarray(self.sampling.differentiation(1) @ self.qd[self.nodes])
+
+    @cached_property
+    def qddd(self) -> Array:
+        """Joint jerks, (S, n)."""
+        return np.asarray(self.sampling.differentiation(2) @ self.qd[self.nodes])
+
+    def of(self, follows: Follows) -> Samples:
+        """Return the motion of the arm alone, without the virtual joints after its own.
+
+        What is asked for again is not made again.
+        """
+        if self.follows is follows:
+            return self
+        known = self.__dict__.get("_of_arm")
+        if known is None or known.follows is not follows:
+            known = self.__dict__["_of_arm"] = _OfArm(self, follows)
+        return known
+
+    @cached_property
+    def gram(self) -> Array:
+        """JJᵀ of the task Jacobian, (S, m, m)."""
+        gram: Array = self.task_jacobian @ self.task_jacobian.transpose(0, 2, 1)
+        return gram
+
+    @cached_property
+    def gram_determinant(self) -> Array:
+        """Det JJᵀ = w², the square of Yoshikawa's manipulability, (S,)."""
+        return np.asarray(np.linalg.det(self.gram))
+
+    @cached_property
+    def log_determinant_gradient(self) -> Array:
+        """∂ log det(JJᵀ) / ∂q = 2 ⟨(JJᵀ)⁻¹J, ∂J/∂q⟩, (S, n)."""
+        inverse = np.asarray(np.linalg.solve(self.gram, self.task_jacobian), dtype=np.float64)
+        return self.contract(2.0 * inverse)
+
+    def contract(self, weights: Array) -> Array:
+        """Return ⟨M, ∂J/∂q_k⟩ for `weights` M (S, m, n) on the task Jacobian, (S, n)."""
+        weights, layout = np.ascontiguousarray(weights), self.follows.layout
+        every = self.follows.every_column(self.q)
+        parts = [
+            kernels.contract_task(tip.jacobian, tip.rotation, weights, layout, f, every)
+            for f, tip in enumerate(self.tips)
+        ]
+        return parts[0] if len(parts) == 1 else np.sum(parts, axis=0)
+
+
+class PlacedLater(Samples):
+    """A motion as costs and constraints see it; tips are placed when they are asked for.
+
+    Parameters
+    ----------
+    follows : Follows
+    sampling : Sampling
+    given : arrays
+        By name: q and q̇ (S, n), where they are not known otherwise.
+    """
+
+    def __init__(self, follows: Follows, sampling: Sampling, **given: Array) -> None:
+        for name, value in {"sampling": sampling, "follows": follows, **given}.items():
+            object.__setattr__(self, name, value)
+
+    @cached_property
+    def _placed(self) -> Samples:
+        return Samples.along(self.follows, self.sampling, self.q, self.qd)
+
+    @cached_property
+    def tips(self) -> tuple[TipSamples, ...]:
+        """See `Samples`."""
+        return self._placed.tips
+
+    @cached_property
+    def task_jacobian(self) -> Array:
+        """See `Samples`."""
+        return self._placed.task_jacobian
+
+
+class _OfArm(PlacedLater):
+    """A motion of an arm's own joints, which come before all others; see `Samples.of`."""
+
+    _whole: Samples
+
+    def __init__(self, whole: Samples, follows: Follows) -> None:
+        n = follows.robot.dof
+        object.__setattr__(self, "_whole", whole)
+        super().__init__(follows, whole.sampling, q=whole.q[:, :n], qd=whole.qd[:, :n])
+
+    @cached_property
+    def qdd(self) -> Array:
+        """See `Samples`."""
+        return self._whole.qdd[:, : self.follows.robot.dof]
+
+    @cached_property
+    def qddd(self) -> Array:
+        """See `Samples`."""
+        return self._whole.qddd[:, : self.follows.robot.dof]
+
+
+def _show(owner: Samples | TipSamples, names: Sequence[str]) -> None:
+    """Make arrays views of their own: the owner may go on writing, whoever is shown one may not."""
+    for name in names:
+        view = getattr(owner, name).view()
+        view.setflags(write=False)
+        object.__setattr__(owner, name, view)

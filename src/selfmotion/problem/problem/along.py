@@ -1,0 +1,184 @@
+"""What is asked along a path: where it is smooth, at rest, how far it goes, and parts of it."""
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from functools import reduce
+from operator import and_
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from selfmotion.basics import Array, ProblemError, read_only
+from selfmotion.certificate import Requirement, arm_limits
+from selfmotion.model.follow import Follows
+from selfmotion.model.path import STILL, Path, Retimed, edges_of, spread_along
+from selfmotion.model.robot import RobotModel
+from selfmotion.model.task import Relaxation, Task
+from selfmotion.problem.constraints import Constraint, Envelope
+
+if TYPE_CHECKING:
+    from selfmotion.problem.problem.problem import Problem
+
+# Times between which everything that is asked for is smooth.
+
+
+def smooth_knots(follows: Follows, relaxations: Sequence[Relaxation]) -> Array:
+    """Return the knots of all paths, and the ends of the windows of tolerances, [s] (K,)."""
+    duration, first = follows.duration, follows.items[0]
+    knots = list(first.path.knots)
+    for other in follows.items[1:]:
+        knots = _with_times(knots, other.path.knots, duration)
+    for item in relaxations:
+        knots = _with_times(knots, item.window(duration), duration)
+    return read_only(sorted(knots))
+
+
+def _with_times(knots: list[float], times: Iterable[float], duration: float) -> list[float]:
+    """Return knots and times; nearer to each other than rounding, two are one."""
+    found = list(knots)
+    for time in times:
+        if np.abs(np.array(found) - time).min() > 1e-9 * duration:
+            found.append(float(time))
+    return found
+
+
+# How smoothly a tool, and the arm with it, begins and ends.
+
+# Speeds are compared this share of the path's first or last piece from an end, and twice as far
+# from it: what comes after that piece says nothing of how it begins.
+_NEAR_END = 1e-4
+# Speed that grows with at least this power of the time has no acceleration at the end.
+_SMOOTH = 1.5
+
+
+def arm_rest_orders(follows: Follows, constraints: Sequence[Constraint]) -> tuple[int, int]:
+    """Return how smoothly an arm comes to rest with all its tips, unless constraints say how fast.
+
+    Of each end, as in `rest_orders`.
+    """
+    orders = [rest_orders(item.path, item.task) for item in follows.items]
+    start, end = (_allowed(min(order[k] for order in orders), constraints, k) for k in (0, 1))
+    return start, end
+
+
+def _allowed(order: int, constraints: Sequence[Constraint], end: int) -> int:
+    if any(item.sets_velocity[end] for item in constraints):
+        return 0
+    accelerates = any(item.sets_acceleration[end] for item in constraints)
+    return min(order, 1) if accelerates else order
+
+
+def rest_orders(path: Path, task: Task) -> tuple[int, int]:
+    """Return how smoothly the prescribed rows begin and end.
+
+    Of each end: 0 where the tool moves, 1 where it rests, 2 where it rests and does not accelerate
+    either, so that a motion from standstill is smooth there.
+    """
+    pieces, away = np.diff(edges_of(path.knots)), np.arange(3.0)
+    first = _speeds(path, task, _NEAR_END * pieces[0] * away)
+    last = _speeds(path, task, path.duration - _NEAR_END * pieces[-1] * away)
+    return _order(first), _order(last)
+
+
+def _speeds(path: Path, task: Task, t: np.ndarray) -> list[float]:
+    samples = path.samples(t)
+    rows = task.select_along(samples.twist[:, :, None], samples.rotation)[:, :, 0]
+    return [float(speed) for speed in np.abs(rows).max(axis=1)]
+
+
+def _order(speeds: list[float]) -> int:
+    at, near, far = speeds
+    if at > STILL:
+        return 0
+    return 2 if far == 0.0 or near <= far * 0.5**_SMOOTH else 1
+
+
+# How far a tool goes along its path.
+
+# Samples of the way to begin with and at most; more of them would make it longer by less.
+_SAMPLES, _MOST_SAMPLES, _GROWS = 101, 100_000, 1.05
+
+
+def way_of(path: Path) -> float:
+    """Return how far the tool goes [m], through so many points that more hardly lengthen it."""
+    way, before, samples = 0.0, -1.0, _SAMPLES
+    # Loops are many or few: the way through more and more points, of which none are the same.
+    while way > _GROWS * before and samples < _MOST_SAMPLES:
+        places = path.samples(spread_along(path, samples)).translation
+        before, way = way, float(np.linalg.norm(np.diff(places, axis=0), axis=1).sum())
+        samples = 2 * samples + 1
+    return way
+
+
+# What constraints, and the arm's own limits, ask of single configurations and velocities.
+
+
+def envelope_of(robot: RobotModel, constraints: Sequence[Constraint]) -> Envelope:
+    """Return what constraints ask of single configurations, with the arm's own limits."""
+    requirements = [item.requirement(robot) for item in constraints]
+    return with_own_limits(robot, requirements, asked_envelope(robot, constraints))
+
+
+def asked_envelope(robot: RobotModel, constraints: Sequence[Constraint]) -> Envelope:
+    """Return what constraints ask, without the arm's own limits."""
+    free = Envelope.unbounded(robot.dof)
+    return reduce(and_, (item.envelope(robot) for item in constraints), free)
+
+
+def with_own_limits(
+    robot: RobotModel, requirements: Sequence[Requirement], asked: Envelope
+) -> Envelope:
+    """Return an envelope with the arm's own limits where the certificate judges these."""
+    own = (Envelope.of_limits(item) for item in arm_limits(robot, requirements))
+    return reduce(and_, own, asked)
+
+
+# What of a problem is asked along a part of its path, and of moves between parts.
+
+# On a part, a window is none where it is open for less than this share of the part, and of itself.
+_SHORTEST_WINDOW = 1e-2
+
+
+def asked_of_part(problem: "Problem", is_first: bool, is_last: bool) -> Iterator[Constraint]:
+    """Yield what the constraints ask of a part that is the first or the last one, or neither."""
+    for item in problem.constraints:
+        kept: Constraint | None = None if item.closes else item
+        if kept is not None and not is_last:
+            kept = kept.on_part()
+        if kept is not None and not is_first:
+            kept = kept.on_last_part()
+        if kept is not None:
+            yield kept
+
+
+def at_all_times(constraints: Sequence[Constraint]) -> list[Constraint]:
+    """Return what constraints ask of all times, and nothing that they ask of an end."""
+    parts = (item.on_part() for item in constraints)
+    inner = (part.on_last_part() for part in parts if part is not None)
+    return [item for item in inner if item is not None]
+
+
+def check_all_times(constraints: Sequence[Constraint], remedy: str) -> None:
+    """Raise ProblemError, with a remedy, where a constraint asks something of an end alone."""
+    for item in constraints:
+        if item.on_part() is None or item.on_last_part() is None:
+            raise ProblemError(
+                f"constraints: {type(item).__name__} asks something of an end alone: {remedy}"
+            )
+
+
+def times_along(path: Retimed, ends: tuple[float, float]) -> Callable[[Array], Array]:
+    """Return when windows of the whole path (first, last) are open on a stretch of it.
+
+    As (0, 0) where that is hardly at all.
+    """
+
+    def when(window: Array) -> Array:
+        first, last = path.when(np.clip(window, *ends) - ends[0]).tolist()
+        # A ramp hardly moves at its end: when it gets there is known to some digits only.
+        first = 0.0 if window[0] <= ends[0] else first
+        last = path.duration if window[1] >= ends[1] else last
+        least = _SHORTEST_WINDOW * min(path.duration, float(window[1] - window[0]))
+        is_open = last - first > least
+        return np.array([first, last]) if is_open else np.zeros(2)
+
+    return when

@@ -1,0 +1,570 @@
+"""What to plan: an arm, a tool motion, the rows that count, and what to minimise."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, replace
+from functools import cached_property
+from typing import Any, Self
+
+import numpy as np
+import numpy.typing as npt
+
+from selfmotion.basics import (
+    Array,
+    ProblemError,
+    Progress,
+    as_flag,
+    as_several,
+    description_of,
+    digest_of,
+    digest_of_file,
+    read_only,
+    shown,
+    silent,
+)
+from selfmotion.certificate import (
+    AtRest,
+    Certificate,
+    Requirement,
+    Separation,
+    Tolerance,
+    arm_limits,
+    certify,
+    errors_between,
+)
+from selfmotion.model.follow import Follow, Follows
+from selfmotion.model.motion import NullMotion, Trajectory, fading_window
+from selfmotion.model.path import Path
+from selfmotion.model.robot import RobotModel, mesh_digests
+from selfmotion.model.task import Damping, DampingLaw, Relaxation, Task, feedback_rate
+from selfmotion.problem.constraints import (
+    BoundConstraint,
+    Clearance,
+    Constraint,
+    Envelope,
+    JointPositionLimits,
+    JointVelocityLimits,
+)
+from selfmotion.problem.costs import BeyondLimits, Cost, JointVelocity, OffPath
+from selfmotion.problem.problem.along import (
+    arm_rest_orders,
+    asked_envelope,
+    smooth_knots,
+    way_of,
+    with_own_limits,
+)
+from selfmotion.problem.problem.fit import (
+    ANY_NULL_MOTION,
+    KEPT,
+    NO_OVERLAP,
+    SEQUENCES,
+    START_MISS,
+    USUAL_COSTS,
+    check_costs,
+    check_end,
+    check_feeds,
+    check_fit,
+    check_judged,
+    check_kinds,
+    check_start,
+    first_tool,
+)
+from selfmotion.problem.problem.remarks import remarks_on
+
+# Joints of a damped motion are held within their limits by springs of this stiffness, in shares of
+# a limit of speed or radians.
+_BEYOND_LIMITS = 1e4
+
+
+class _TaskField:
+    """A task that may be given by its name."""
+
+    def __get__(self, problem: Any, owner: Any = None) -> Task:
+        # Asked of the class, it is the default.
+        return Task.POSE if problem is None else problem.__dict__["_task"]
+
+    def __set__(self, problem: Any, task: Task | str) -> None:
+        problem.__dict__["_task"] = Task.of(task)
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """A planning problem.
+
+    Parameters
+    ----------
+    robot : RobotModel
+    path : Path
+        The tool's motion.
+    task : Task or str
+        The rows of it that are prescribed; ``"pose"`` by default.
+    start : (n,) or "free", optional
+        q(0) [rad or m]; must put the tool on the start of the path. By default free: many starts
+        are tried, and the best ones optimised along with the rest of the motion.
+    null_motion : NullMotion
+        The parameterisation of the self-motion. By default any, optimised at nodes.
+    costs : sequence of Cost
+        Their integrals are added up. By default ∫ ½ q̇ᵀq̇ dt; see `JointVelocity.usual`.
+    constraints : sequence of Constraint
+        What the motion must keep, each judged by the certificate. By default the URDF's limits of
+        joint position and velocity, and those of acceleration and jerk that the arm's maker
+        publishes (`RobotModel.acceleration_limit`). The URDF's are kept, too, where these say
+        nothing of position or velocity: they are always judged.
+    relaxations : sequence of Relaxation
+        Rows in which the tool may leave its path, by how much and when. Each is one more joint
+        between tool and path, which costs nothing, so that the deviation is part of the
+        self-motion. By default none. A given start, or an end configuration, may use them; the
+        end of a path with other conditions there is on the path itself; where a path is closed,
+        the deviation is so, too. Of several paths the first is relaxed.
+    clearance : Clearance, optional
+        How the arm keeps apart from itself and from obstacles, besides what constraints say: by
+        default its links must not overlap, where its URDF has bodies and no constraint is a
+        `Clearance`. None to leave that out; the verdict then says so.
+    rest : bool
+        Whether the arm is at rest where the path begins or ends at rest, which a controller asks
+        for, unless a constraint says how fast it is there: the null motion then vanishes, and its
+        derivative too where the tool does not accelerate either. The paper's does not.
+    also : sequence of Follow
+        What else of the arm follows a path at the same time: their rows are prescribed besides. A
+        list of `Follow` in place of the path is the same; its first one is then the tool.
+    damping : Damping, optional
+        Go through singular poses, and past the edge of the workspace, at the price of the path: by
+        default the tool stays on the path, and there is no motion through such poses. Adds the
+        cost "path error".
+
+    Raises
+    ------
+    RedundancyError
+        The task leaves no self-motion, and no row is relaxed.
+    StartError
+        `start` is off the path.
+    ProblemError
+        The arm cannot move in all the rows, two costs share a name, a cost, constraint or
+        relaxation does not fit the arm, the path or the task.
+
+    Notes
+    -----
+    What it has besides its parameters and `certify` is what planners ask it, and may change with
+    them.
+    """
+
+    robot: RobotModel
+    path: Path
+    task: _TaskField = _TaskField()  # a descriptor, meant to be shared
+    start: npt.ArrayLike | str | None = None
+    null_motion: NullMotion = ANY_NULL_MOTION
+    costs: Sequence[Cost] = USUAL_COSTS
+    constraints: Sequence[Constraint] = KEPT
+    relaxations: Sequence[Relaxation] = ()
+    damping: Damping | None = None
+    clearance: Clearance | None = NO_OVERLAP
+    rest: bool = True
+    also: Sequence[Follow] = ()
+
+    def __post_init__(self) -> None:
+        if isinstance(self.path, list | tuple):
+            several = as_several(self.path, "path", Follow)
+            first, robot = first_tool(several, self.robot)
+            object.__setattr__(self, "robot", robot)
+            object.__setattr__(self, "path", first.path)
+            object.__setattr__(self, "task", first.task)
+            object.__setattr__(self, "also", (*several[1:], *self.also))
+        check_kinds(self)
+        if self.costs is USUAL_COSTS:
+            object.__setattr__(self, "costs", (JointVelocity.usual(self.robot),))
+        for name, each in SEQUENCES.items():
+            object.__setattr__(self, name, as_several(getattr(self, name), name, each))
+        check_fit(self.follows, self.relaxations, self.start)
+        if isinstance(self.start, str):
+            if self.start != "free":
+                raise ProblemError(f"start is '{self.start}', expected numbers, 'free' or None")
+            object.__setattr__(self, "start", None)
+        object.__setattr__(self, "rest", as_flag(self.rest, "rest"))
+        check_costs(self.follows, self.costs, self.all_costs)
+        for item in self.constraints:
+            item.check(self.follows)
+            end = item.fixed_end(self.robot)
+            if end is not None:
+                check_end(self.follows, end, self.relaxations)
+        # Now, not when the motion is finished: without a requirement nothing judges it.
+        check_judged(self.all_constraints, self._asked)
+        if self.start is not None:
+            start = read_only(self.robot.configuration(self.start))
+            object.__setattr__(self, "start", start)
+            check_start(self.follows, start, self.relaxations)
+        for item in self.constraints:
+            item.check_start(self.follows, self.given_start)
+
+    def __repr__(self) -> str:
+        return f"Problem({self.robot.name}, {self.path!r}, task '{self.task.value}')"
+
+    def __copy__(self) -> Self:
+        found = object.__new__(type(self))
+        found.__dict__.update(self.__dict__)
+        return found
+
+    def __getstate__(self) -> tuple[dict[str, Any], bool, list[int]]:
+        # What follows from the rest is made anew: bodies as they are placed belong to a thread. The
+        # usual clearance and limits are told from such that somebody asks for by which they are.
+        kept = {name: item for name, item in self.__dict__.items() if name not in self._made}
+        usual = [
+            next((k for k, each in enumerate(KEPT) if each is item), -1)
+            for item in self.constraints
+        ]
+        return kept, self.clearance is NO_OVERLAP, usual
+
+    def __setstate__(self, state: tuple[dict[str, Any], bool, list[int]]) -> None:
+        kept, is_usual, usual = state
+        self.__dict__.update(kept)
+        if is_usual:
+            object.__setattr__(self, "clearance", NO_OVERLAP)
+        pairs = zip(self.constraints, usual, strict=True)
+        items = (KEPT[k] if k >= 0 else item for item, k in pairs)
+        object.__setattr__(self, "constraints", tuple(items))
+
+    @property
+    def _made(self) -> set[str]:
+        """The names of what is made of the rest when it is asked for."""
+        several = (vars(cls).items() for cls in type(self).__mro__)
+        return {
+            name for each in several for name, item in each if isinstance(item, cached_property)
+        }
+
+    @cached_property
+    def follows(self) -> Follows:
+        """What the arm follows: the one thing that planners are told."""
+        return Follows.of(self.robot, self.path, self.task, self.also)
+
+    @cached_property
+    def augmented(self) -> Problem:
+        """The problem as planners see it: its tolerances are virtual joints."""
+        from selfmotion.problem.problem.augmented import AugmentedProblem
+
+        return AugmentedProblem(self) if self.relaxations else self
+
+    @property
+    def asked(self) -> Problem:
+        """The problem as it was asked, where this is `augmented`."""
+        return self
+
+    def own(self, trajectory: Trajectory) -> Trajectory:
+        """Return what the arm's own joints do in a motion of all."""
+        return trajectory
+
+    def at(self, t: Array, q: Array) -> Array:
+        """Return all coordinates for the arm's own, (K, n), at times t (K,) [s] of the path."""
+        return q
+
+    def with_own(self, trajectory: Trajectory, path: Path) -> Trajectory:
+        """Return the motion of all joints for one of the arm's own along a path like this one's."""
+        return trajectory
+
+    def softened(self, cost: float) -> Problem:
+        """Return the same where using tolerances costs, for who does not ask bands to be kept.
+
+        Where `cost` is what a motion costs, being at a band all the time costs as much.
+        """
+        return self
+
+    @property
+    def with_windows_shut(self) -> Problem:
+        """The same where motions without self-motion make no use of tolerances in windows."""
+        return self
+
+    def changed(self, **changes: Any) -> Problem:
+        """Return the same with other parameters."""
+        return replace(self, **changes)
+
+    def along(
+        self, other: Callable[[Path], Path], when: Callable[[Array], Array] | None = None
+    ) -> dict[str, Any]:
+        """Return, for `dataclasses.replace`, other paths in place of all that are followed.
+
+        With `when`, also the windows of tolerances at other times; those that become empty are
+        left out.
+        """
+        others = tuple(
+            item.along(other(bound.path))
+            for item, bound in zip(self.also, self.follows.items[1:], strict=True)
+        )
+        found: dict[str, Any] = {"path": other(self.path), "also": others}
+        if when is not None:
+            moved = (item.moved(when) for item in self.relaxations)
+            found["relaxations"] = tuple(item for item in moved if item is not None)
+        return found
+
+    @property
+    def given_start(self) -> Array | None:
+        """The start configuration (n,), or None where it is free."""
+        return None if self.start is None else np.asarray(self.start, dtype=np.float64)
+
+    @cached_property
+    def all_costs(self) -> tuple[Cost, ...]:
+        """The costs; with those of being off the path and beyond limits where it is damped."""
+        if self.damping is None or self.damping_law is None:
+            return tuple(self.costs)
+        rate = feedback_rate(self.path.duration)
+        weight = self.damping.path_weight * (rate / self.damping_law.threshold) ** 2
+        asked = self.envelope
+        limits = BeyondLimits(_BEYOND_LIMITS, asked.lower, asked.upper, asked.speed)
+        return (*self.costs, OffPath(float(weight), self.follows.dimension), limits)
+
+    @cached_property
+    def own_collision(self) -> Clearance | None:
+        """What keeps the arm apart, besides the constraints; None for nothing.
+
+        The default is left out where a constraint keeps the arm apart, or it has no bodies; what
+        was given never is.
+        """
+        if self.clearance is not NO_OVERLAP:
+            return self.clearance
+        if not self.robot.urdf.has_collisions:
+            return None
+        if any(item.envelope(self.robot).bodies for item in self.constraints):
+            return None
+        return self.clearance
+
+    def keeps_off_itself(self, q: Array) -> bool:
+        """Whether configurations (K, n) keep the arm apart from itself by its meshes.
+
+        Where only the default asks it to: what constraints ask is for the optimisation to keep.
+        """
+        if self.own_collision is None:
+            return True
+        return all(model.worst(q).value >= far for model, far in self.envelope.bodies)
+
+    @property
+    def all_constraints(self) -> tuple[Constraint, ...]:
+        """The constraints that ask something, with `own_collision` last where there is one."""
+        own = self.own_collision
+        return (*self._asking, *([] if own is None else [own]))
+
+    @property
+    def _asking(self) -> tuple[Constraint, ...]:
+        return tuple(item for item in self.constraints if item.applies(self.robot))
+
+    def bind_constraints(
+        self, start: Array, end: Array, *, apart: bool = True, in_pieces: bool = False
+    ) -> tuple[BoundConstraint, ...]:
+        """Return the constraints for this arm, given first and last configuration, (n,) each.
+
+        Those of the motion that the optimisation begins with. Without `own_collision` where it need
+        not keep `apart` from itself; with links `in_pieces` where their hulls are too large. With
+        the arm's own limits where nothing is said of them: no motion beyond these is verified.
+        """
+        asked = [*self._own_limits, *(self.all_constraints if apart else self._asking)]
+        if all(self.rests):
+            asked = [item.at_rest() for item in asked]
+        return tuple(
+            item.bind_pieces(self.follows)
+            if in_pieces and isinstance(item, Clearance)
+            else item.bind(self.follows, start, end)
+            for item in asked
+        )
+
+    @property
+    def _own_limits(self) -> tuple[Constraint, ...]:
+        """The arm's own limits of position and velocity, where constraints say nothing of them."""
+        said = {type(item) for item in self.constraints}
+        judged = {item.order for item in arm_limits(self.robot, self._asked)}
+        own = enumerate((JointPositionLimits(), JointVelocityLimits()))
+        return tuple(
+            item
+            for order, item in own
+            if order in judged and type(item) not in said and item.applies(self.robot)
+        )
+
+    @cached_property
+    def rest_orders(self) -> tuple[int, int]:
+        """How smoothly the arm comes to rest at the start and at the end; see `rest_orders`."""
+        return arm_rest_orders(self.follows, self.constraints) if self.rest else (0, 0)
+
+    @property
+    def rests(self) -> tuple[bool, bool]:
+        """Whether the arm has to be at rest at the start and at the end."""
+        start, end = self.rest_orders
+        return start > 0, end > 0
+
+    def null_functions(self, t: Array, motion: NullMotion) -> Array:
+        """Return φ of a null motion at times `t` (S,), at rest where the arm has to be, (S, K)."""
+        return motion.resting(t, self.path.duration, self.rest_orders)
+
+    def brought_to_rest(self, t: Array, epsilon: Array) -> Array:
+        """Return a null motion (S, n) that fades to nothing where the arm has to be at rest."""
+        return epsilon * fading_window(t, self.path.duration, self.rests)[:, None]
+
+    @cached_property
+    def damping_law(self) -> DampingLaw | None:
+        """The damping in numbers [m, rad] for this arm and task."""
+        if self.damping is None:
+            return None
+        best = self.follows.jacobian(self.robot.dexterous_configuration(self.task))
+        return self.damping.law(float(np.linalg.svd(best, compute_uv=False)[-1]))
+
+    @cached_property
+    def requirements(self) -> tuple[Requirement, ...]:
+        """What the certificate has to judge besides the path: rest, and one of each constraint."""
+        return (*self._rest(*self.rest_orders), *self._asked)
+
+    @cached_property
+    def _asked(self) -> tuple[Requirement, ...]:
+        return tuple(item.requirement(self.robot) for item in self.all_constraints)
+
+    def _rest(self, start: int, end: int) -> tuple[Requirement, ...]:
+        """Return what judges rest of so high orders; see `rest_orders`."""
+        # A damped motion is under way to the path wherever it is off it.
+        if self.damping is not None or not (start or end):
+            return ()
+        return (AtRest(start > 0, end > 0, (start > 1, end > 1)),)
+
+    @cached_property
+    def asked_envelope(self) -> Envelope:
+        """What the constraints ask of single configurations and velocities."""
+        return asked_envelope(self.robot, self.all_constraints)
+
+    @cached_property
+    def envelope(self) -> Envelope:
+        """The same, with the arm's own limits where the certificate judges these."""
+        return with_own_limits(self.robot, self.requirements, self.asked_envelope)
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What to know before planning: links that overlap, limits or places that look wrong."""
+        found = remarks_on(
+            self.robot, self.follows, self.constraints, self.requirements, self.envelope
+        )
+        return tuple(dict.fromkeys(found))
+
+    def certify(
+        self,
+        trajectory: Trajectory,
+        tolerance: Tolerance | None = None,
+        ending: str = "",
+        besides: Sequence[Requirement] = (),
+        progress: Progress = silent,
+    ) -> Certificate:
+        """Return the certificate of a motion, by all that the problem asks for; see `certify`.
+
+        And by requirements `besides`, and where it begins if a start is given. A motion with an
+        `ending` stops before it can rest at the end of the path.
+        """
+        start, end = self.rest_orders
+        rests = self._rest(start, 0 if ending else end)
+        certificate = certify(
+            self.robot,
+            self.path,
+            self.task,
+            trajectory,
+            tolerance,
+            (*rests, *self._asked, *besides),
+            also=self.also,
+            relaxations=self.relaxations,
+            damping=self.damping_law,
+            ending=ending,
+            progress=progress,
+        )
+        elsewhere = () if self.given_start is None else self._elsewhere(trajectory)
+        failures = (*elsewhere, *certificate.failures)
+        notes = (*certificate.notes, *self._too_near(certificate))
+        return replace(certificate, problem=self.digest, failures=failures, notes=notes)
+
+    def _too_near(self, certificate: Certificate) -> tuple[str, ...]:
+        """Return that bodies are too near at the given start already, in words."""
+        wrong = {found.requirement for found in certificate.findings if not found.satisfied}
+        apart = [item for item in self._asked if isinstance(item, Separation)]
+        start = self.given_start
+        if start is None or not any(item.name in wrong for item in apart):
+            return ()
+        return tuple(filter(None, (item.of_given_start(start) for item in apart)))
+
+    def _elsewhere(self, trajectory: Trajectory) -> tuple[str, ...]:
+        """Return that a motion does not begin at the given start, in words."""
+        apart = np.abs(trajectory.of_joints(self.robot.joint_names).q[0] - self.given_start)
+        worst = int(np.argmax(apart))
+        # Written so that NaN is elsewhere.
+        if bool(apart[worst] <= START_MISS):
+            return ()
+        joint = self.robot.joint_names[worst]
+        return (
+            f"it does not begin at the given start: joint '{joint}' is {apart[worst]:.3g} "
+            f"{self.robot.unit_of(joint)} away ({START_MISS:g} allowed); leave the start out, or "
+            f"plan from there",
+        )
+
+    @cached_property
+    def digest(self) -> str:
+        """What tells it from problems whose motions are judged by something else.
+
+        A digest of the arm, of what is followed and how nearly, from which start, and of what has
+        to be kept; not of costs and the null motion, which no certificate judges.
+        """
+        robot = self.robot
+        arm = (robot.urdf.sha256, robot.joint_names, robot.tools, robot.reference)
+        own = sorted(robot.urdf.continuous()), robot.locked, robot.touching
+        damping = None if self.damping is None else asdict(self.damping)
+        followed = [
+            (item.path.duration, item.task.value, item.chain.tip_name, item.chain.base)
+            for item in self.follows.items
+        ]
+        asked = (*(item.path for item in self.follows.items), *self.all_constraints)
+        return digest_of(
+            arm,
+            own,
+            robot.lower,
+            robot.upper,
+            robot.velocity_limit,
+            # What constraints take from the arm where they say no more.
+            robot.acceleration_limit,
+            robot.jerk_limit,
+            robot.effort_limit,
+            damping,
+            followed,
+            [item.to_dict() for item in self.relaxations],
+            [description_of(item) for item in asked],
+            self.given_start,
+            self._mesh_digests(),
+            self.rest,
+        )
+
+    def _mesh_digests(self) -> dict[str, str]:
+        """Return what the files of all bodies hold that are kept apart: their names are not it."""
+        if not self.asked_envelope.bodies:
+            return {}
+        bodies = (body for item in self._asked for body in item.obstacles)
+        files = {str(file): digest_of_file(file) for body in bodies for file in body.files}
+        return {**mesh_digests(self.robot.urdf, "collision"), **files}
+
+    def errors_between(self, trajectory: Trajectory) -> Array:
+        """Return the errors of a motion in the middle between samples, (N, 2) [m, rad]."""
+        found = [
+            errors_between(item, trajectory, () if k else self.relaxations)
+            for k, item in enumerate(self.follows.items)
+        ]
+        return np.asarray(np.max(found, axis=0))
+
+    @cached_property
+    def knots(self) -> Array:
+        """Times [s] between which paths and deviations are smooth; see `Path.knots`."""
+        return smooth_knots(self.follows, self.relaxations)
+
+    @cached_property
+    def way_in_reaches(self) -> float:
+        """How far the tool goes along the path, as a multiple of the arm's reach."""
+        return way_of(self.path) / self.robot.reach
+
+
+# What help() shows of a field that is a descriptor.
+Problem.__init__.__annotations__["task"] = "Task | str"
+
+
+def check_feeds_of(problem: Problem) -> None:
+    """Refuse feeds that no motion has; see `check_feeds`."""
+    paths = [item.path for item in problem.follows.items]
+    check_feeds(problem.robot.name, paths, problem.constraints)
+
+
+def check_problem(problem: object) -> None:
+    """Raise ProblemError where something else was given for a problem."""
+    if not isinstance(problem, Problem):
+        raise ProblemError(f"problem is {shown(problem)}, expected a Problem(robot, path, …)")

@@ -1,0 +1,163 @@
+"""What to know of a problem before planning: limits, bodies or places that look wrong."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import coal
+import numpy as np
+
+from selfmotion.basics import Array
+from selfmotion.certificate import Requirement
+from selfmotion.model.collision import Body, Obstacle, Solid, told_as_made
+from selfmotion.model.follow import Follows
+from selfmotion.model.path import TURN_NOTE, spread_along
+from selfmotion.model.robot import RobotModel, mounting_of
+from selfmotion.problem.constraints import (
+    Constraint,
+    Envelope,
+    JointAccelerationLimits,
+    JointJerkLimits,
+    JointVelocityLimits,
+    ToolLimits,
+)
+from selfmotion.problem.problem.fit import KEPT
+
+# A path that goes through obstacles, which nothing notices where the tool has no body.
+
+# Where a path is looked at, and how deep it may be in what it works on [m].
+_LOOKS, _DEEP = 101, 2e-3
+
+
+def inside_remarks(
+    robot: RobotModel, follows: Follows, obstacles: Sequence[Obstacle]
+) -> Iterator[str]:
+    """Yield the obstacles that the tool's point goes through; none where the arm holds a body."""
+    first = follows.items[0]
+    if mounting_of(robot.urdf, robot.tool).bodies:
+        return
+    t = spread_along(first.path, _LOOKS)
+    places = first.path.samples(t).translation
+    for item in dict.fromkeys(obstacles):
+        # Of others it depends on how the arm stands.
+        if item.frame != robot.reference:
+            continue
+        depths = _depths(item, places)
+        k = int(depths.argmax())
+        if depths[k] > _DEEP:
+            yield (
+                f"the path is {1e3 * depths[k]:.3g} mm inside {item.label} at t = {t[k]:.3g} s, "
+                f"and nothing is checked there: the arm holds no body (robot.bodies)"
+            )
+
+
+def _depths(obstacle: Obstacle, places: Array) -> Array:
+    """Return how deep points (K, 3) are inside an obstacle (K,) [m], 0 outside."""
+    solid = Solid(obstacle.geometry(), obstacle.label)
+    points = (places - obstacle.pose.translation) @ obstacle.pose.rotation
+    found = np.zeros(len(points))
+    within = np.all((points > solid.low) & (points < solid.high), axis=1)
+    request, point = coal.DistanceRequest(), coal.Sphere(1e-6)
+    for k in np.flatnonzero(within):
+        place = coal.Transform3s(np.eye(3), points[k])
+        still = coal.Transform3s.Identity()
+        away = coal.distance(point, place, solid.geometry, still, request, coal.DistanceResult())
+        inside = solid.contains_any(points[k : k + 1]) if solid.is_mesh else away < 0.0
+        found[k] = abs(away) if inside else 0.0
+    return found
+
+
+# What to know of a problem before planning: limits, bodies or places that look wrong.
+
+# Limits so many times the arm's own are in other units, and so are those that no arm has: of joints
+# by order, and of the tool's speed [m/s].
+_FAR_ABOVE = 10.0
+_RATES = {1: ("rad/s", 50.0), 2: ("rad/s²", 200.0), 3: ("rad/s³", 5e4)}
+_FASTEST_TOOL = 50.0
+# Meshes with more triangles than these take long; a link is no larger than so many times its arm,
+# or so many times this [m] if it is smaller.
+_MANY_TRIANGLES, _LARGE, _SMALL_ARM = 200_000, 5.0, 0.5
+# No process is as slow as this [m/s].
+_SLOWEST_FEED = 1e-4
+
+
+def remarks_on(
+    robot: RobotModel,
+    follows: Follows,
+    constraints: Sequence[Constraint],
+    requirements: Sequence[Requirement],
+    envelope: Envelope,
+) -> Iterator[str]:
+    """Yield what is to be known: links that overlap, limits in other units or of nothing known.
+
+    And what of its file is left out, and places inside what the tool works on.
+    """
+    yield from robot.urdf.notes
+    for followed in follows.items:
+        task = followed.task
+        is_turned = task.angular and not task.tool_axes
+        yield from (note for note in followed.path.notes if is_turned or note != TURN_NOTE)
+        slow = min((item.asked for item in followed.path.feeds), default=np.inf)
+        if slow < _SLOWEST_FEED:
+            yield (
+                f"a feed of {1e3 * slow:g} mm/s takes {followed.path.duration:.4g} s; are these "
+                f"m/s? Then it is feed = {1e3 * slow:g}, feed_mm = {1e6 * slow:g}"
+            )
+    for model, _ in envelope.bodies:
+        yield from _body_remarks(robot, model.every_body)
+        if told := told_as_made(robot, model):
+            yield told
+    yield from _unit_remarks(robot, constraints)
+    for item in constraints:
+        # What nobody asked for by name is not missed, nor what another constraint gives.
+        known = (type(each) is type(item) and each.applies(robot) for each in constraints)
+        if not (item.applies(robot) or any(item is usual for usual in KEPT) or any(known)):
+            option = "--acceleration, or " * isinstance(item, JointAccelerationLimits)
+            kind = type(item).__name__
+            yield (
+                f"{item.requirement(robot).name}: none are known of {robot.name}, so none are "
+                f'kept; give {option}in the file [[constraints]] kind = "{kind}", limit = …, in '
+                f"Python {kind}(…)"
+            )
+    bodies = [body for item in requirements for body in item.obstacles]
+    yield from inside_remarks(robot, follows, bodies)
+
+
+def _body_remarks(robot: RobotModel, bodies: Sequence[Body]) -> Iterator[str]:
+    """Yield meshes that take long, and links so large that their files are in other units."""
+    for body in bodies:
+        solid = body.solid
+        if solid.is_mesh and solid.geometry.num_tris > _MANY_TRIANGLES:
+            yield (
+                f"'{body.name}' has {solid.geometry.num_tris} triangles: reading them takes most "
+                f"of the time, and some GB of memory beyond a million; export it with "
+                f"{_MANY_TRIANGLES} or fewer"
+            )
+        size, reach = float((solid.high - solid.low).max()), robot.reach
+        if not body.is_obstacle and reach < np.inf and size > _LARGE * max(reach, _SMALL_ARM):
+            yield (
+                f"link '{body.name}' has a body {size:.3g} m long, and the arm reaches {reach:.3g} "
+                f'm; is its mesh in another unit? Then scale it (<mesh scale="0.001 0.001 0.001">)'
+            )
+
+
+def _unit_remarks(robot: RobotModel, constraints: Sequence[Constraint]) -> Iterator[str]:
+    """Yield limits so far above the arm's own, or any arm's, that they may be in other units."""
+    for item in constraints:
+        if isinstance(item, ToolLimits) and _FASTEST_TOOL < item.speed < np.inf:
+            yield f"ToolLimits: a speed of {item.speed:g} m/s is no limit; in mm/s? speed_mm"
+        limits = JointVelocityLimits | JointAccelerationLimits | JointJerkLimits
+        if not isinstance(item, limits) or item.limit is None:
+            continue
+        kind, (unit, most) = type(item).__name__, _RATES[item.order]
+        own, published = replace(item, replace=True).of(robot), item.published(robot)
+        for k, name in enumerate(robot.joint_names):
+            if robot.is_prismatic(name) or not np.isfinite(own[k]):
+                continue
+            told = ""
+            if not item.replace and own[k] > _FAR_ABOVE * published[k]:
+                told = f"has no effect, the arm's own limit is {published[k]:.4g} {unit}"
+            elif own[k] > most:
+                told = f"is more than arms do (above {most:g} {unit})"
+            if told:
+                yield f"{kind}: {own[k]:g} {unit} for '{name}' {told}; in degrees? limit_deg"
+                break

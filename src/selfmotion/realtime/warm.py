@@ -1,0 +1,136 @@
+"""Small pieces of work that call every kernel; another process may do them to compile these."""
+
+import sys
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from itertools import islice
+from typing import Any
+
+import numpy as np
+from numba.core import event
+
+import selfmotion as sm
+from selfmotion import realtime
+from selfmotion.basics import FIRST_WORKS, Counts, compile_alone, read_only
+from selfmotion.model.collision.kernels import winding_number
+from selfmotion.model.task import SE3
+from selfmotion.planning.nodes import NodeGrid
+from selfmotion.work.job.order import improved
+from selfmotion.work.job.stops import Stops
+
+
+class Compiled(event.Listener):  # type: ignore[misc]  # numba ships no types
+    """Counts what numba compiles."""
+
+    def __init__(self) -> None:
+        self.count = 0
+
+    def on_start(self, event: object) -> None:
+        """See numba: something is compiled."""
+
+    def on_end(self, event: object) -> None:
+        """See numba: it was."""
+        self.count += 1
+
+
+def main(which: str) -> None:
+    """Do the works that a plan needs first, or all, the last one first; print what was compiled."""
+    compile_alone()
+    counted = Compiled()
+    with event.install_listener("numba:compile", counted):
+        works = small_works()
+        for _, work in islice(works, 2) if which == FIRST_WORKS else reversed(list(works)):
+            work()
+    sys.stdout.write(str(counted.count))
+
+
+def small_works() -> Iterator[tuple[str, Callable[[], object]]]:
+    """Yield small pieces of work that together call every kernel as it is called at all."""
+    arm = sm.load_robot("panda")
+    home = np.array(sm.NAMED_ARMS["panda"].home)
+    place, size = np.array([0.5, 0.4, 0.3]), np.array([0.1, 0.1, 0.6])
+    circle = sm.paths.Circle.around(arm.pose(home), 0.05, 4.0)
+    box = sm.constraints.Clearance((sm.obstacles.Box("post", place, size),), 0.01)
+    alone = sm.Problem(arm, circle, "position", home, clearance=None)
+
+    def plan(problem: sm.Problem, **options: Any) -> Callable[[], object]:
+        return lambda: sm.plan(problem, **options)
+
+    # What takes longest comes first: another process begins with what comes before it in a plan.
+    t, still = np.linspace(0.0, 4.0, 5), np.zeros((5, 7))
+    nodes = NodeGrid(alone, t, (), free=False, counts=Counts())
+    yield "nodes", lambda: nodes.near(np.tile(home, (5, 1)), still, still)
+    yield "a given start", plan(alone)
+    given = sm.Problem(arm, circle, "position", home)
+    free = replace(given, start=None)
+    yield "self-collision", plan(given)
+    yield "a free start", plan(free)
+    yield "the paper's arm", plan(sm.sample_problem())
+    yield "bodies", plan(replace(given, constraints=[box]))
+    torque = sm.constraints.JointTorqueLimits()
+    yield "meshes", lambda: winding_number(np.zeros((1, 3, 3)), np.zeros(3))
+    model = sm.obstacles.CollisionModel(arm, box.obstacles)
+    yield "distances", lambda: model.worst(read_only(np.stack([home, home + 0.1])))
+    yield "torques", plan(replace(given, constraints=[*given.constraints, torque]))
+    tool = sm.constraints.ToolLimits(speed=0.2, acceleration=5.0)
+    yield "the tool", plan(replace(given, constraints=[*given.constraints, tool]))
+    yield "singular poses", plan(replace(given, costs=[sm.costs.InverseManipulability(0.01)]))
+    yield "paces", lambda: sm.retime(sm.plan(given))
+    yield "accelerations", plan(replace(given, costs=[sm.costs.JointAcceleration()]))
+    yield (
+        "relaxed rows",
+        plan(replace(given, task="pose", relaxations=[sm.Relaxation(("rx", "ry"), 0.1)])),
+    )
+    tilted = replace(free, task="pose", relaxations=[sm.Relaxation(("rx", "ry"), 0.1)])
+    yield "relaxed rows from anywhere", plan(tilted)
+    away = sm.paths.Line(arm.pose(home), _far(arm.pose(home)), 2.0)
+    yield "what is out of reach", lambda: _refused(replace(tilted, path=away))
+    yield "damping", plan(replace(given, damping=sm.Damping()))
+    yield "a global search", plan(free, search=sm.Search(mode="global"))
+    yield "self-motion curves", plan(replace(free, task="pose"), search=sm.Search(mode="global"))
+    yield "several tips and moving frames", plan(_carried())
+    yield "limits on the way", lambda: nodes.motion_towards(home, home, 1.0)
+    yield "orders of many seams", lambda: improved(_two_stops())
+    yield "moves", lambda: sm.move(arm, home, home + 0.3, clearance=box)
+    yield "a replanner", lambda: realtime.warm_up(realtime.Replanner(arm, "position"))
+
+
+def _refused(problem: sm.Problem) -> str:
+    try:
+        return sm.plan(problem).certificate.verdict
+    except sm.SelfmotionError as error:
+        return str(error)
+
+
+def _far(pose: SE3) -> SE3:
+    """Return a pose that no Panda reaches."""
+    return SE3(pose.rotation, pose.translation + np.array([1.5, 0.0, 0.0]))
+
+
+def _two_stops() -> Stops:
+    """Return two seams that can be made one way each, in any order."""
+    none, any_, free = [frozenset[int]()] * 2, np.ones(2), np.zeros((2, 2), dtype=bool)
+    return Stops(none, none, np.arange(2), any_, np.ones((2, 2)), any_, any_, free)
+
+
+def _carried() -> sm.Problem:
+    """Return two arms that carry a bar along a line."""
+    left, right = "left/panda_hand_tcp", "right/panda_hand_tcp"
+    apart = np.eye(4)
+    apart[1, 3] = -0.9
+    cell = sm.load_robot(
+        {"left": "panda", "right": "panda"}, base={"right": apart}, tool=(left, right)
+    )
+    first, grasp = np.diag([1.0, -1.0, -1.0, 1.0]), np.eye(4)
+    first[:3, 3], grasp[1, 3] = (0.45, -0.25, 0.3), 0.4
+    last = first.copy()
+    last[0, 3] += 0.05
+    carried: Any = [
+        sm.Follow(sm.paths.Line(first, last, 2.0), tool=left),
+        sm.Follow(grasp, tool=right, reference=left),
+    ]
+    return sm.Problem(cell, carried)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1])

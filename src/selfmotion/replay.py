@@ -1,0 +1,6 @@
+"""Replays of plans as pages.
+
+A door: what it names is made in `selfmotion.shell.replay`.
+"""
+
+from selfmotion.shell.replay import *  # noqa: F403

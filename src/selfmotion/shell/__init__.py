@@ -1,0 +1,1 @@
+"""Files, pages, commands, and laws for what users write."""

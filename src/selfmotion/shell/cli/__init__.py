@@ -1,0 +1,20 @@
+"""The command line."""
+
+from selfmotion.shell.cli import (
+    commands as commands,
+    exports as exports,
+    jobs as jobs,
+    margins as margins,
+    runs as runs,
+)
+from selfmotion.shell.cli.app import app as app, main as main
+
+# What most people come for is listed first; the others as their modules are imported.
+_FIRST = ("plan", "job")
+app.registered_commands.sort(
+    key=lambda command: (
+        _FIRST.index(name)
+        if (name := getattr(command.callback, "__name__", "")) in _FIRST
+        else len(_FIRST)
+    )
+)

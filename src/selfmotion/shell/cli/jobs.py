@@ -1,0 +1,230 @@
+"""Commands about many seams in one program."""
+
+from collections.abc import Sequence
+from contextlib import nullcontext
+from pathlib import Path
+from typing import Annotated, Any, NoReturn
+
+import typer
+
+import selfmotion as sm
+from selfmotion import basics
+from selfmotion.shell.cli import (
+    documents,
+    options,
+    outputs,
+    summaries,
+    tables,
+)
+from selfmotion.shell.cli.app import (
+    NOT_VERIFIED,
+    PLAN,
+    VERIFIED,
+    StageDisplay,
+    app,
+    check_cluster,
+    complain,
+    executor_at,
+    print_json,
+    stages,
+    terminal,
+)
+from selfmotion.shop import controllers
+
+PROGRAM, PARTS = ".program", ".parts"
+TIMETABLE = ".timetable.csv"
+
+
+@app.command(
+    epilog="Example: selfmotion job frame.toml --out frame.program --out frame.yaml",
+    rich_help_panel=PLAN,
+)
+def job(
+    file: Annotated[Path, typer.Argument(help="A job file: a problem file with seams.")],
+    out: Annotated[
+        list[Path] | None,
+        typer.Option(
+            help="File: .program (all of it), .timetable.csv (what happens when), or the motion "
+            "as `export` writes it. Repeatable."
+        ),
+    ] = None,
+    html: options.HtmlOption = None,
+    folder: Annotated[
+        Path | None,
+        typer.Option(help="Folder for finished work; a job that was stopped resumes from it."),
+    ] = None,
+    before: Annotated[
+        Path | None,
+        typer.Option(
+            "--from",
+            help="An earlier .program of this job, or of one like it: what did not change is kept, "
+            "the rest begins at its motions.",
+        ),
+    ] = None,
+    workers: Annotated[int, typer.Option(min=1, help="Processes.")] = 1,
+    dask: Annotated[
+        str | None, typer.Option(help="Or the address of a Dask scheduler, host:port.")
+    ] = None,
+    settings: outputs.SettingsOption = None,
+    changes: options.SetOption = None,
+    allow_code: options.AllowCodeOption = False,
+    verbose: options.VerboseOption = False,
+    as_json: options.JsonOption = False,
+) -> None:
+    """Plan many seams as one program: order, directions, and the moves in between."""
+    from selfmotion.work.batch import processes
+
+    wanted = [*(out or []), *([] if html is None else [html])]
+    for target in wanted:
+        _check(target)
+    check_cluster(dask, workers if workers > 1 else None)
+    if settings is not None and not any(_switches(target) for target in wanted):
+        raise sm.errors.ProblemError(
+            "--settings has no effect: it is of controllers' programs (--out .script, .src, .mod)"
+        )
+    # Ctrl-C while kernels are loaded is lost, unless it is noted.
+    with basics.held_interruption():
+        work = documents.seams_of_file(file, changes or [], allow_code)
+        earlier = None if before is None else sm.load_program(before)
+        asked = None if settings is None else sm.files.read_program_settings(settings)
+        if asked is not None or any(_switches(target) for target in wanted):
+            # Before anything is planned.
+            happens = {event: seam.name for seam in work.seams for event, _ in seam.events}
+            controllers.check_signals(happens, asked or sm.files.ProgramSettings())
+            for target in wanted:
+                if target.suffix.lower() in controllers.PROGRAMS:
+                    form = controllers.PROGRAMS[target.suffix.lower()]
+                    controllers.check_controller(
+                        work.robot, form, asked or sm.files.ProgramSettings()
+                    )
+        remarks = work.remarks
+    outputs.tell(remarks)
+    kept = folder or Path("out") / f"{file.stem}.job"
+    here: Any = processes(workers) if workers > 1 else nullcontext()
+    try:
+        with executor_at(dask) as cluster, here as pool, StageDisplay(stages) as display:
+            program = work.plan(
+                folder=kept,
+                executor=cluster or pool,
+                warm_start=earlier,
+                progress=display.stage,
+            )
+    except KeyboardInterrupt:
+        complain(f"stopped; what is finished is in '{kept}': run again to go on")
+        raise typer.Exit(NOT_VERIFIED) from None
+    if work.at_feed is not None and not as_json:
+        feeds = [feed.asked for plan in program.plans.values() for feed in plan.path.feeds]
+        text = f"feed: {max(feeds):g} m/s, the highest that was found at which all seams are kept"
+        terminal.print(text, markup=False, soft_wrap=True)
+    _show(program, as_json, verbose, remarks)
+    # What is only of programs of targets is said for these, where there are some.
+    has_targets = any(target.suffix.lower() in controllers.PROGRAMS for target in wanted)
+    for target in wanted:
+        unsound = outputs.left_out(program)
+        if unsound and outputs.is_motion(target) and not _is_timetable(target):
+            outputs.tell_left_out(target, terminal, unsound, quiet=as_json)
+            continue
+        of_stream = asked is not None and not asked.by_poses
+        streamed = of_stream and has_targets and target.suffix.lower() == ".script"
+        write_program(program, target, asked.streamed if asked and streamed else asked)
+        if not as_json:
+            terminal.print(f"wrote {target}", markup=False, soft_wrap=True)
+            outputs.tell_large(target, terminal)
+    raise typer.Exit(VERIFIED if program.verified else NOT_VERIFIED)
+
+
+def _check(file: Path) -> None:
+    if not (file.suffix in (PROGRAM, ".html", *controllers.SUFFIXES) or _is_timetable(file)):
+        known = ", ".join(controllers.SUFFIXES)
+        raise sm.errors.FileFormatError(
+            f"{file}: --out writes .program, .timetable.csv, .html (a replay) or the motion "
+            f"({known})"
+        )
+
+
+def _switches(file: Path) -> bool:
+    """Whether a file says what events switch."""
+    return file.suffix.lower() in (*controllers.PROGRAMS, ".script")
+
+
+def _is_timetable(file: Path) -> bool:
+    return file.name.endswith(TIMETABLE)
+
+
+def write_program(
+    program: sm.Program, file: Path, settings: sm.files.ProgramSettings | None = None
+) -> None:
+    """Write a program as what the name of a file says."""
+    if file.suffix == PROGRAM:
+        program.save(file)
+    elif _is_timetable(file):
+        sm.files.write_timetable(program, file)
+    elif file.suffix == ".html":
+        from selfmotion.shell.replay import write_replay
+
+        write_replay(program, file)
+    else:
+        own = settings if _switches(file) else None
+        with StageDisplay(stages) as display:
+            sm.files.write_motion(program, file, settings=own, progress=display.stage)
+
+
+def finish_parts(
+    job: sm.files.PlanRequest, out: list[Path], as_json: bool, verbose: bool
+) -> NoReturn:
+    """Plan a motion in parts, print it, write its files, and end."""
+    wanted = [*job.outputs, *out]
+    for file in wanted:
+        if file.suffix not in (PARTS, ".html", *controllers.SUFFIXES):
+            known = ", ".join(controllers.SUFFIXES)
+            raise sm.errors.FileFormatError(
+                f"{file}: of parts --out writes {PARTS} (all of it), .html or the motion ({known})"
+            )
+    with StageDisplay(stages) as display:
+        found = job.in_parts(progress=display.stage)
+    _show_parts(found, as_json, verbose, job.problem.remarks)
+    for file in wanted:
+        unsound = outputs.left_out(found)
+        if unsound and outputs.is_motion(file):
+            outputs.tell_left_out(file, terminal, unsound, quiet=as_json)
+            continue
+        if file.suffix == PARTS:
+            found.save(file)
+        elif file.suffix == ".html":
+            from selfmotion.shell.replay import write_replay
+
+            write_replay(found, file)
+        else:
+            sm.files.write_motion(found, file)
+        if not as_json:
+            terminal.print(f"wrote {file}", markup=False, soft_wrap=True)
+            outputs.tell_large(file, terminal)
+    raise typer.Exit(VERIFIED if found.verified else NOT_VERIFIED)
+
+
+def _show(program: sm.Program, as_json: bool, verbose: bool, remarks: Sequence[str] = ()) -> None:
+    if as_json:
+        data = summaries.program_json(program) | {"remarks": list(remarks)}
+        print_json(data)
+    else:
+        (tables if verbose else summaries).show_program(program, terminal)
+
+
+def _show_parts(parts: sm.Parts, as_json: bool, verbose: bool, remarks: Sequence[str] = ()) -> None:
+    if as_json:
+        data = {"verified": parts.verified, "verdict": parts.verdict, "cuts": list(parts.cuts)}
+        print_json(data | {"remarks": list(remarks)})
+    else:
+        terminal.print(repr(parts) if verbose else parts.summary, markup=False, soft_wrap=True)
+
+
+def check(file: Path, as_json: bool, verbose: bool) -> NoReturn:
+    """Print what is known of a program or of parts, read and judged anew, and end."""
+    made: sm.Program | sm.Parts
+    if file.suffix == PARTS:
+        made = sm.files.load_parts(file)
+        _show_parts(made, as_json, verbose)
+    else:
+        made = sm.load_program(file)
+        _show(made, as_json, verbose)
+    raise typer.Exit(VERIFIED if made.verified else NOT_VERIFIED)

@@ -1,0 +1,348 @@
+"""The commands about a cell: how wrong it may be, and where to put the part."""
+
+import dataclasses
+from collections.abc import Mapping
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import typer
+
+import selfmotion as sm
+from selfmotion.shell.cli import checks, documents, options, outputs
+from selfmotion.shell.cli.app import (
+    LOOK,
+    NOT_VERIFIED,
+    PLAN,
+    VERIFIED,
+    StageDisplay,
+    app,
+    plan_with_progress,
+    print_json,
+    stages,
+    terminal,
+)
+from selfmotion.work.batch import processes
+
+# The commands that say how wrong a cell may be.
+
+_NAMES = "may be given several times"
+
+
+_Tolerance = Annotated[
+    float | None,
+    typer.Option(help="Tolerance of the process: deviation of the tool from its path (m)."),
+]
+_Turn = Annotated[
+    float | None,
+    typer.Option(help="Tolerance of the process for the orientation (rad); with --tolerance."),
+]
+_Part = Annotated[
+    list[str] | None,
+    typer.Option(help=f"A body of the part ({_NAMES}); by default all obstacles there."),
+]
+
+
+@app.command(
+    epilog="Example: selfmotion margin plan.npz --tolerance 5e-4 --turn 0.02", rich_help_panel=LOOK
+)
+def margin(
+    file: Annotated[Path, typer.Argument(help="A plan saved as .npz, or a .program.")],
+    tolerance: _Tolerance = None,
+    turn: _Turn = None,
+    clearance: Annotated[
+        float, typer.Option(help="Clearance that must remain between bodies (m).")
+    ] = 0.0,
+    part: _Part = None,
+    tool: Annotated[
+        list[str] | None,
+        typer.Option(help=f"A body of the tool ({_NAMES}); by default all on its joint."),
+    ] = None,
+    center: Annotated[
+        str | None,
+        typer.Option(
+            help="Centre of rotation of the part: x,y,z (m); by default the path's middle."
+        ),
+    ] = None,
+    corrected: Annotated[
+        bool,
+        typer.Option(
+            "--corrected",
+            help="Also: how far part and base may be displaced if the motion is planned again.",
+        ),
+    ] = False,
+    as_json: options.JsonOption = False,
+) -> None:
+    """Measure by how much part, tool and base may be displaced before a plan fails."""
+    within = _process(tolerance, turn)
+    about = None if center is None else options.numbers(center, "--center", 3)
+    asked: dict[str, Any] = {"clearance": clearance, "center": about}
+    asked |= {"part": part or None, "tool": tool or None}
+    if file.suffix == ".program":
+        if corrected:
+            raise sm.errors.ProblemError("--corrected is of a single plan (.npz); leave it out")
+        _margins_of_seams(sm.load_program(file), within, asked, as_json)
+        return
+    plan = sm.load_plan(file)
+    with StageDisplay(stages) as display:
+        display.stage("measuring margins", 1, 1)
+        found = sm.margin(plan, within, **asked)
+    again, refused = [], dict[str, str]()
+    if about is not None:
+        # Margins have it in the frame of the path, corrections in world axes.
+        about = plan.problem.follows.items[0].chain.base_placement.act(np.array(about))
+    for of in ("part", "base") if corrected else ():
+        given: dict[str, Any] = {"part": part or None, "center": about} if of == "part" else {}
+        try:
+            with StageDisplay(stages) as display:
+                again.append(sm.correction(plan, of=of, progress=display.stage, **given))
+        except sm.errors.ProblemError as error:
+            # The other one may have an answer all the same.
+            refused[of] = str(error)
+    if as_json:
+        planned = {item.of: _plain(dataclasses.asdict(item)) for item in again}
+        planned |= {of: {"refused": why} for of, why in refused.items()}
+        print_json(margins_json(found) | {"corrected": planned})
+        return
+    whys = (f"not planned again for another place of the {of}: {refused[of]}" for of in refused)
+    for told in (found, *again, *whys):
+        terminal.print(str(told), markup=False, soft_wrap=True)
+
+
+@app.command(
+    epilog="Example: selfmotion calibrate plan.npz ur5_kinematics.yaml --out measured.npz",
+    rich_help_panel=PLAN,
+)
+def calibrate(
+    file: Annotated[Path, typer.Argument(help="A plan saved as .npz, for the arm as drawn.")],
+    calibration: Annotated[
+        Path,
+        typer.Argument(help="Calibration of the arm; see check."),
+    ],
+    out: options.OutOption = None,
+    html: options.HtmlOption = None,
+    verbose: options.VerboseOption = False,
+    as_json: options.JsonOption = False,
+) -> None:
+    """Check a plan on the calibrated arm, and plan again for that arm."""
+    outputs.check_suffixes(out or [])
+    planned = sm.load_plan(file)
+    problem = sm.calibrated(planned.problem, calibration)
+    checks.tell_difference(problem.robot, planned.trajectory)
+    judged = checks.on_calibrated(planned.problem, calibration)
+    verdict = judged.certify(planned.trajectory, planned.tolerance, planned.report.ending).verdict
+    stages.print(f"as planned, on the calibrated arm: {verdict}", markup=False, soft_wrap=True)
+    result = plan_with_progress(problem, warm_start=planned, tolerance=planned.tolerance)
+    outputs.finish(result, out or [], html, as_json, verbose)
+
+
+@app.command(
+    epilog="Example: selfmotion sheet plan.npz --tolerance 5e-4 --turn 0.02 -o sheet.html",
+    rich_help_panel=LOOK,
+)
+def sheet(
+    file: Annotated[Path, typer.Argument(help="A plan saved as .npz.")],
+    out: Annotated[Path, typer.Option("--out", "-o", help="The page to write (.html).")] = Path(
+        "sheet.html"
+    ),
+    tolerance: _Tolerance = None,
+    turn: _Turn = None,
+    part: _Part = None,
+    title: Annotated[str, typer.Option(help="Title; by default arm and task.")] = "",
+) -> None:
+    """Write a process sheet: motion, limits kept and margins on one A4 page."""
+    within = _process(tolerance, turn)
+    plan = sm.load_plan(file)
+    bodies = any(what in plan.certificate.covers for what in ("self-collision", "obstacles"))
+    margins = None
+    if plan.certificate.verified and (bodies or within is not None):
+        with StageDisplay(stages) as display:
+            display.stage("measuring margins", 1, 1)
+            margins = sm.margin(plan, within, part=part or None)
+    written = sm.files.write_sheet(plan, out, margins, title=title)
+    terminal.print(f"wrote {written}", markup=False, soft_wrap=True)
+
+
+def _margins_of_seams(
+    program: sm.Program, within: sm.Tolerance | None, asked: Mapping[str, Any], as_json: bool
+) -> None:
+    """Print the margins of each seam; those of moves are not known."""
+    plans = {step.name: step.made for step in program.steps if isinstance(step.made, sm.Plan)}
+    found = {}
+    with StageDisplay(stages) as display:
+        for number, (name, plan) in enumerate(plans.items(), 1):
+            display.stage(f"measuring margins of seam '{name}'", number, len(plans))
+            found[name] = sm.margin(plan, within, **asked)
+    if as_json:
+        print_json({"seams": {name: margins_json(it) for name, it in found.items()}})
+        return
+    for name, each in found.items():
+        terminal.print(f"seam '{name}': {each}\n", markup=False, soft_wrap=True)
+    terminal.print("not judged: the moves between the seams", markup=False, soft_wrap=True)
+
+
+def _process(tolerance: float | None, turn: float | None) -> sm.Tolerance | None:
+    """Return what a process allows, both numbers or none."""
+    if (tolerance is None) != (turn is None):
+        raise sm.errors.ProblemError("--tolerance and --turn say together what the process allows")
+    return None if tolerance is None or turn is None else sm.Tolerance(tolerance, turn)
+
+
+def margins_json(found: sm.margins.Margins) -> dict[str, Any]:
+    """Return margins as JSON-safe values, the sentence first."""
+    return {"sentence": found.sentence, **_plain(dataclasses.asdict(found))}
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _plain(each) for key, each in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(each) for each in value]
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    # JSON has no number for what has no time, or no end.
+    return None if isinstance(value, float) and not np.isfinite(value) else value
+
+
+# The commands that look for a place, or for a motion that bears another one.
+
+_Range = Annotated[str | None, typer.Option(help="Range of displacements: low,high (m).")]
+_Turns = Annotated[str | None, typer.Option(help="Range of rotations: low,high (rad).")]
+_PROBLEMS, _PAGES = (".toml", ".json"), (".html", ".png")
+
+
+@app.command(
+    epilog="Example: selfmotion place cell.toml --x=-0.2,0.2 --yaw=-0.5,0.5 --part block --out "
+    "placed.toml --map map.html",
+    rich_help_panel=PLAN,
+)
+def place(
+    files: Annotated[list[Path], typer.Argument(help="Problem files, of one arm.")],
+    x: _Range = None,
+    y: _Range = None,
+    z: _Range = None,
+    roll: _Turns = None,
+    pitch: _Turns = None,
+    yaw: _Turns = None,
+    base: Annotated[
+        bool, typer.Option("--base", help="Move the arm's base, not the part.")
+    ] = False,
+    part: Annotated[
+        list[str] | None,
+        typer.Option(help="An obstacle that belongs to the part (may be given several times)."),
+    ] = None,
+    path_alone: Annotated[
+        bool, typer.Option("--path-alone", help="No obstacle moves along with the path.")
+    ] = False,
+    center: Annotated[
+        str | None,
+        typer.Option(help="Centre of rotation: x,y,z (m); by default the middle of the paths."),
+    ] = None,
+    workers: Annotated[
+        int | None, typer.Option(help="Processes; by default this one alone.", min=1)
+    ] = None,
+    out: Annotated[
+        list[Path] | None,
+        typer.Option(
+            help="Problem file (.toml, .json) or plan (.npz) at the place; of several problems "
+            "numbered. Repeatable."
+        ),
+    ] = None,
+    drawn: Annotated[
+        list[Path] | None,
+        typer.Option("--map", help="Map of places around it, as .html or .png. Repeatable."),
+    ] = None,
+    points: Annotated[int, typer.Option(help="Points of the map in each direction.", min=2)] = 9,
+    settings: options.SetOption = None,
+    allow_code: options.AllowCodeOption = False,
+) -> None:
+    """Find the place of the part, or of the arm, at which the motions cost least."""
+    if part and path_alone:
+        raise sm.errors.ProblemError(
+            "--part and --path-alone say different things; give one of them"
+        )
+    for file in [*(out or []), *(drawn or [])]:
+        known = (*_PROBLEMS, ".npz") if file in (out or []) else _PAGES
+        if file.suffix not in known:
+            raise sm.errors.FileFormatError(
+                f"{file}: expected a name that ends in {', '.join(known)}"
+            )
+    problems = [documents.of_file(file, settings or [], allow_code).problem for file in files]
+    named = {"x": x, "y": y, "z": z, "roll": roll, "pitch": pitch, "yaw": yaw}
+    within = {
+        name: options.numbers(text, f"--{name}", 2)
+        for name, text in named.items()
+        if text is not None
+    }
+    given: dict[str, Any] = {"of": "base" if base else "part"}
+    if part or path_alone:
+        given["part"] = part or ()
+    if center is not None:
+        given["center"] = options.numbers(center, "--center", 3)
+    with ExitStack() as stack:
+        display = stack.enter_context(StageDisplay(stages))
+        if workers is not None:
+            given["executor"] = stack.enter_context(processes(workers))
+        found = sm.place(problems, within, progress=display.stage, **given)
+    terminal.print(str(found), markup=False, soft_wrap=True)
+    for file in out or []:
+        _write(found, file)
+    if drawn:
+        pictured = found.map(points=points) if len(within) > 1 else None
+        for file in drawn:
+            if file.suffix == ".html":
+                sm.files.write_placement(found, file, pictured)
+            elif pictured is None:
+                raise sm.errors.ProblemError(f"{file}: a picture of places is over two coordinates")
+            else:
+                pictured.figure().savefig(file)
+            terminal.print(f"wrote {file}", markup=False, soft_wrap=True)
+
+
+@app.command(
+    "plan-margin",
+    epilog="Example: selfmotion plan-margin cell.toml --position 0.005 --rotation 0.01 --out a.npz",
+    rich_help_panel=PLAN,
+)
+def plan_margin(
+    file: Annotated[Path, typer.Argument(help="A problem file.")],
+    position: Annotated[float, typer.Option(help="By how much it may be shifted (m).")] = 0.0,
+    rotation: Annotated[float, typer.Option(help="By how much it may be turned (rad).")] = 0.0,
+    of: Annotated[
+        list[str] | None, typer.Option(help="part (the default), tool or base. Repeatable.")
+    ] = None,
+    part: Annotated[
+        list[str] | None,
+        typer.Option(help="A body of the part (repeatable); by default all obstacles there."),
+    ] = None,
+    out: options.OutOption = None,
+    settings: options.SetOption = None,
+    allow_code: options.AllowCodeOption = False,
+) -> None:
+    """Plan a motion that tolerates displacements of part, tool or base."""
+    outputs.check_suffixes(out or [])
+    problem = documents.of_file(file, settings or [], allow_code).problem
+    with StageDisplay(stages) as display:
+        found = sm.plan_with_margin(
+            problem,
+            sm.Margin(position, rotation),
+            of=of or "part",
+            part=part or None,
+            progress=display.stage,
+        )
+    terminal.print(str(found), markup=False, soft_wrap=True)
+    outputs.write(found.plan, out or [], None, terminal, quiet=False)
+    raise typer.Exit(VERIFIED if found.reached else NOT_VERIFIED)
+
+
+def _write(found: sm.placement.Placement, file: Path) -> None:
+    """Write the problems or plans of a place, numbered where they are several."""
+    several = len(found.plans) > 1
+    for number, plan in enumerate(found.plans):
+        named = file.with_stem(f"{file.stem}-{number}") if several else file
+        if named.suffix == ".npz":
+            plan.save(named)
+        else:
+            sm.files.write_problem(plan.problem, named)
+        terminal.print(f"wrote {named}", markup=False, soft_wrap=True)

@@ -1,0 +1,298 @@
+"""The files that a plan is written to, and the options of what programs say."""
+
+import tempfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Annotated, Any, NoReturn
+
+import numpy as np
+import typer
+from rich.console import Console
+
+import selfmotion as sm
+from selfmotion.certificate import Extreme
+from selfmotion.model.task import SE3, exp3
+from selfmotion.shell.cli import reread, summaries, tables
+from selfmotion.shell.cli.app import NOT_VERIFIED, VERIFIED, print_json, stages, terminal
+from selfmotion.shop import controllers
+
+# Options of commands that write programs of controllers.
+
+SettingsOption = Annotated[
+    Path | None,
+    typer.Option(
+        help="File with settings of a controller's program: deviation, axes, signals, "
+        "flange, mass, center, approach, targets, work_object, positioner (TOML)."
+    ),
+]
+TargetsOption = Annotated[
+    str | None,
+    typer.Option(
+        help="Of controllers' programs: joints; poses (linear and circular motions in a work "
+        "object at the feed, which can be shifted and touched up); timed-poses (at the plan's "
+        "times)."
+    ),
+]
+WorkObjectOption = Annotated[
+    str | None,
+    typer.Option(
+        help="Work object of the poses: path (the frame that the path is given in), a link, or "
+        "x,y,z,rx,ry,rz \\[m, and rotation vector in rad] in the controller's frame: the link "
+        "base where there is one, of Universal Robots' arms turned by 180 degrees from that of "
+        "--frame; with --targets poses.",
+        metavar="path|NAME|X,Y,Z,RX,RY,RZ",
+    ),
+]
+MassOption = Annotated[
+    float | None,
+    typer.Option(help="Of controllers' programs: mass of what the flange carries \\[kg]."),
+]
+
+
+def program_settings(
+    file: Path | None, targets: str | None, wobj: str | None, mass: float | None
+) -> sm.files.ProgramSettings | None:
+    """Return the settings of controllers' programs: those of a file, and of options; None for none.
+
+    Raises
+    ------
+    ProblemError
+        A work object is neither a name nor six numbers.
+    """
+    given: dict[str, Any] = {} if targets is None else {"targets": targets}
+    if mass is not None:
+        given["mass"] = mass
+    if wobj is not None:
+        given["work_object"] = _work_object(wobj)
+    if file is not None:
+        return sm.files.read_program_settings(file, **given)
+    return sm.files.ProgramSettings(**given) if given else None
+
+
+def tell_base(robot: sm.RobotModel, asked: sm.files.ProgramSettings | None) -> None:
+    """Print how the frame that a work object in numbers is counted in is turned from the root."""
+    told = controllers.turned_base(robot)
+    if told and asked is not None and isinstance(asked.work_object, SE3):
+        stages.print(f"note: {told}", markup=False, soft_wrap=True)
+
+
+def _work_object(text: str) -> str | SE3:
+    """Return the link or the pose that an option says."""
+    parts = text.split(",")
+    if len(parts) == 1:
+        return text
+    try:
+        values = [float(part) for part in parts]
+    except ValueError:
+        values = []
+    if len(values) != 6 or not np.isfinite(values).all():
+        raise sm.errors.ProblemError(
+            f"--wobj: '{text}' is neither the name of a link nor six numbers x,y,z,rx,ry,rz "
+            f"[m, rad]"
+        )
+    turn = float(np.linalg.norm(values[3:]))
+    if turn > np.pi * (1.0 + 1e-4):
+        raise sm.errors.ProblemError(
+            f"--wobj has a rotation vector of {turn:.4g} rad, more than half a turn; in degrees, "
+            f"or angles about axes? Expected x,y,z,rx,ry,rz in m, and the axis of one turn as long "
+            f"as its angle in rad: 0,0,1.5708 is 90° about z"
+        )
+    return SE3(exp3(np.array(values[3:])), np.array(values[:3]))
+
+
+# The files that a plan is written to.
+
+# Text of more than so many bytes is better a bag.
+_TEXT, _LARGE = (".yaml", ".yml", ".json"), 10_000_000
+
+
+def write(
+    result: sm.Plan,
+    out: list[Path],
+    html: Path | None,
+    console: Console,
+    *,
+    quiet: bool = False,
+    whole: bool = False,
+) -> bool:
+    """Write all files that can be written, and tell; the plan itself in any case.
+
+    Motions are read back, as `export` does; returns whether all are still those of the plan. The
+    `whole` verdicts on them, or their summaries.
+
+    Raises
+    ------
+    FileFormatError
+        A file could not be written; says where the plan is.
+    """
+    written, faults = list[Path](), list[str]()
+    unsound = left_out(result)
+    for file in [*out, *([] if html is None else [html])]:
+        if unsound and is_motion(file):
+            tell_left_out(file, console, unsound, quiet=quiet)
+            continue
+        try:
+            _write_one(result, file, page=file is html)
+            written.append(file)
+        except sm.SelfmotionError as error:
+            faults.append(str(error))
+    if faults and not any(file.suffix == ".npz" for file in written):
+        rescued = Path(tempfile.mkdtemp(prefix="selfmotion-")) / "plan.npz"
+        result.save(rescued)
+        written.append(rescued)
+    sound = _tell_written(result, written, console, quiet=quiet, whole=whole)
+    if faults:
+        kept = next(file for file in written if file.suffix == ".npz")
+        raise sm.errors.FileFormatError(f"{'; '.join(faults)}; the plan is in {kept}")
+    return sound
+
+
+def _tell_written(
+    result: sm.Plan, files: Sequence[Path], console: Console, *, quiet: bool, whole: bool
+) -> bool:
+    """Tell which files were written, and what motions in them are when they are read back."""
+    sampled = [
+        file for file in files if is_motion(file) and not reread.is_program(file, None, None)
+    ]
+    messages = [file for file in sampled if reread.is_message(file, None)]
+    coarsest = controllers.coarsest_rate(result) if messages else None
+    sound = True
+    for file in files:
+        verdict = ""
+        if is_motion(file):
+            kept, verdict = reread.read_back(result, file, None, None, None, whole=whole)
+            sound &= kept
+        if not quiet:
+            text = f"wrote {file}{verdict and '; '}{verdict}"
+            console.print(text, markup=False, soft_wrap=True)
+            tell_large(file, console)
+    if sampled and not quiet:
+        rate = coarsest if messages == sampled else None
+        told = [reread.told_coarsest(coarsest)] if coarsest is not None else []
+        told.append(reread.told_straight(controllers.linear_miss(result, rate)))
+        for text in told:
+            console.print(text, markup=False, soft_wrap=True)
+    return sound
+
+
+def tell(remarks: Sequence[str]) -> None:
+    """Print what is to be known of a problem before it is planned."""
+    for remark in remarks:
+        stages.print(f"note: {remark}", markup=False, soft_wrap=True)
+
+
+def finish(
+    result: sm.Plan,
+    out: list[Path],
+    html: Path | None,
+    as_json: bool,
+    verbose: bool,
+    *,
+    remarks: Sequence[str] = (),
+) -> NoReturn:
+    """Print a plan, write its files, and end with what its verdict says.
+
+    Remarks on its problem are in what programs read; others were told before.
+    """
+    if as_json:
+        data = summaries.plan_json(result) | {"remarks": list(remarks)}
+        print_json(data)
+    else:
+        show(result, verbose)
+    sound = write(result, out, html, terminal, quiet=as_json, whole=verbose)
+    sound &= result.certificate.verified
+    sound &= not (left_out(result) and any(map(is_motion, out)))
+    raise typer.Exit(VERIFIED if sound else NOT_VERIFIED)
+
+
+def show(result: sm.Plan, verbose: bool) -> None:
+    """Print what is to be known of a plan, or all of it."""
+    (tables.show if verbose else summaries.show_plan)(result, terminal)
+
+
+def show_certificate(
+    certificate: sm.Certificate,
+    approaches: Mapping[str, Extreme],
+    robot: sm.RobotModel,
+    verbose: bool,
+) -> None:
+    """Print what is to be known of a certificate, or all of it."""
+    if verbose:
+        tables.show_certificate(certificate, approaches, robot, terminal)
+    else:
+        summaries.show_certificate(certificate, approaches, terminal)
+
+
+def is_motion(file: Path) -> bool:
+    """Whether a file is a motion that a controller may be given."""
+    return file.suffix in controllers.SUFFIXES and file.suffix != ".npz"
+
+
+def left_out(made: sm.Plan | sm.Parts | sm.Program) -> str:
+    """Return why a motion is given to no controller, "" where nothing speaks against it."""
+    verified = made.certificate.verified if isinstance(made, sm.Plan) else made.verified
+    return controllers.moving_ends(made) if verified else "it is not verified"
+
+
+def tell_left_out(file: Path, console: Console, reason: str, *, quiet: bool) -> None:
+    """Say that a motion was not written, and why."""
+    if not quiet:
+        console.print(
+            f"{file} is not written: {reason}; `selfmotion export --force` writes it",
+            markup=False,
+            soft_wrap=True,
+        )
+
+
+def tell_large(file: Path, console: Console, *, given_rate: bool = False) -> None:
+    """Say what is smaller than a large file of text; nothing where it is not large."""
+    if file.suffix.lower() in _TEXT and file.is_file() and file.stat().st_size > _LARGE:
+        fewer = "without --rate it has only those samples that the motion takes; " * given_rate
+        console.print(
+            f"{file} has {file.stat().st_size / 1e6:.0f} MB: {fewer}a ROS 2 bag takes about a "
+            f"third, --out {file.with_suffix('.mcap')}",
+            markup=False,
+            soft_wrap=True,
+        )
+
+
+def _write_one(result: sm.Plan, file: Path, *, page: bool) -> None:
+    if page or file.suffix == ".html":
+        _replay(result, file)
+    elif file.suffix == ".npz":
+        result.save(file)
+    else:
+        sm.files.write_motion(result, file)
+
+
+def _replay(result: sm.Plan, file: Path) -> None:
+    from selfmotion.shell.replay import write_replay
+
+    write_replay(result, file)
+
+
+def check_own(files: Sequence[Path], document: str, force: bool) -> None:
+    """Refuse outputs that a document names outside of its own folder, unless they are meant.
+
+    Raises
+    ------
+    FileFormatError
+        One is; it is named.
+    """
+    folder = Path(document).resolve().parent
+    for file in files:
+        if not force and not file.resolve().is_relative_to(folder):
+            raise sm.errors.FileFormatError(
+                f"{document}: outputs: '{file}' is outside of the file's own folder; say --force "
+                f"if that is meant, or --out"
+            )
+
+
+def check_suffixes(files: list[Path]) -> None:
+    """Raise FileFormatError for a file that --out cannot write."""
+    for file in files:
+        if file.suffix not in (".npz", ".html", *controllers.SUFFIXES):
+            known = ", ".join(controllers.SUFFIXES)
+            raise sm.errors.FileFormatError(
+                f"{file}: --out writes .npz (the plan), .html (its replay) or its motion ({known})"
+            )

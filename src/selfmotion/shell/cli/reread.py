@@ -1,0 +1,153 @@
+"""What is said of motions that were written: whether, read back, they are still the plan's."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+import selfmotion as sm
+from selfmotion.shop import controllers
+
+Made = sm.Plan | sm.Parts | sm.Move | sm.Program
+
+
+def is_message(target: Path, form: str | None) -> bool:
+    """Whether a file is a message of ROS, which has as few samples as straight lines allow."""
+    return (form or controllers.SUFFIXES.get(target.suffix.lower())) in controllers.MESSAGES
+
+
+def is_program(target: Path, form: str | None, asked: sm.files.ProgramSettings | None) -> bool:
+    """Whether a file is a program of targets, which has no rate."""
+    name = form or controllers.SUFFIXES.get(target.suffix.lower())
+    linear = asked is not None and asked.by_poses
+    return name in controllers.PROGRAMS.values() or (name == "urscript" and linear)
+
+
+def is_of_controller(target: Path, form: str | None) -> bool:
+    """Whether a file is run by a controller itself, and has settings."""
+    name = form or controllers.SUFFIXES.get(target.suffix.lower())
+    return name == "urscript" or name in controllers.PROGRAMS.values()
+
+
+def is_readable(target: Path, form: str | None) -> bool:
+    """Whether a file can be read back as a motion."""
+    return form in controllers.READABLE or (
+        form is None and target.suffix.lower() not in (".xml", ".script")
+    )
+
+
+def read_back(
+    made: Made,
+    target: Path,
+    form: str | None,
+    rate: float | None,
+    asked: sm.files.ProgramSettings | None,
+    *,
+    whole: bool,
+) -> tuple[bool, str]:
+    """Return whether what was written is still the motion, and what there is to say.
+
+    The `whole` verdict, or its summary.
+    """
+    if is_program(target, form, asked) and target.suffix.lower() in controllers.READ_PROGRAMS:
+        return _confirmed(made, target)
+    if not is_readable(target, form):
+        return verified(made), ""
+    motion = sm.files.read_motion(target)
+    match made:
+        case sm.Plan():
+            return judged(made, motion, whole=whole)
+        case sm.Move():
+            read = sm.Move(made.robot, made.constraints, motion.of_joints(made.robot.joint_names))
+            return read.verified and made.verified, f"read back: {read.verdict}"
+        case sm.Program() | sm.Parts() if rate is not None:
+            # Steps meet between its samples: there is no motion of each that rests at its ends.
+            return verified(made), _told_of_samples(made.trajectory, motion, rate)
+        case sm.Program():
+            found = controllers.judged_motion(motion, made)
+            return found.verified, f"read back: {found.verdict}"
+    return _judged_parts(made, motion, whole=whole)
+
+
+def _told_of_samples(motion: sm.Trajectory, read: sm.Trajectory, rate: float) -> str:
+    """Return how far a motion leaves the whole that it was sampled from, in words."""
+    t = np.append(motion.t, motion.t[:-1] + 0.5 * np.diff(motion.t))
+    off = read.of_joints(motion.joint_names)(np.clip(t, None, read.t[-1])) - motion(t)
+    return (
+        f"at {rate:g} Hz up to {np.abs(off).max():.3g} rad or m off the motion; "
+        "its steps are judged only without a rate"
+    )
+
+
+def _judged_parts(made: sm.Parts, motion: sm.Trajectory, *, whole: bool) -> tuple[bool, str]:
+    """Return whether a motion is still that of parts, part by part and move by move."""
+    every = motion.of_joints(made.robot.joint_names)
+    stops = np.append(made.begins, made.trajectory.duration)
+    plans, moves = [], []
+    for k, (plan, begin) in enumerate(zip(made.plans, made.begins, strict=True)):
+        end = begin + plan.trajectory.duration
+        read = replace(plan, trajectory=controllers.part_of(every, begin, end))
+        plans.append(replace(read, certificate=read.check()))
+        if k < len(made.moves):
+            after = stops[k + 1]
+            part = controllers.part_of(every, end, float(after))
+            moves.append(sm.Move(made.robot, made.moves[k].constraints, part))
+    found = replace(made, plans=tuple(plans), moves=tuple(moves))
+    return found.verified, _told(found, whole)
+
+
+def _confirmed(made: Made, target: Path) -> tuple[bool, str]:
+    """Return whether a program keeps what it states, and that in words."""
+    read = controllers.read_program(target, made.robot)
+    count, stated, found = controllers.program_miss(made, target, read)
+    told, kept = [], verified(made) and controllers.keeps_stated(found, stated)
+    for miss, said, where in zip(found, stated, ("off the plan", "in free moves"), strict=True):
+        # The file states nine digits.
+        kept &= all(one <= other + 1e-9 for one, other in zip(miss, said, strict=True))
+        if miss.position > 0.0:
+            told.append(
+                f"{1e3 * miss.position:.3g} mm and {miss.rotation:.2g} rad {where} "
+                f"({1e3 * said.position:.3g} mm are stated in the file)"
+            )
+    switched = controllers.misswitched(read, made)
+    kept &= not switched
+    far = f", between which the tool is at most {', and '.join(told)}" if told else ""
+    remark, at_feeds = read.remark, read.within is not None
+    targets = "target" if count == 1 else "targets"
+    paced = ["seams are at their feeds, with ramps of the controller's own"] if at_feeds else []
+    paced += [f"a seam has times all the same: {reason}" for reason in read.timed]
+    why = (f"they are joints, as poses do not keep the motion: {remark}",) if remark else ()
+    return kept, f"read back: {'; '.join((f'{count} {targets}{far}', *paced, *why, *switched))}"
+
+
+def verified(made: Made) -> bool:
+    """Whether what was made is verified."""
+    return made.certificate.verified if isinstance(made, sm.Plan) else made.verified
+
+
+def judged(plan: sm.Plan, motion: sm.Trajectory, *, whole: bool) -> tuple[bool, str]:
+    """Return whether a motion is still that of a plan, and its verdict in words."""
+    found = plan.problem.certify(motion, plan.tolerance, plan.report.ending)
+    return found.verified and not plan.altered, _told(found, whole)
+
+
+def _told(found: sm.Certificate | sm.Parts, whole: bool) -> str:
+    return f"read back: {found.verdict if whole else found.summary}"
+
+
+def told_straight(miss: controllers.LinearMiss) -> str:
+    """Return what straight lines between samples cost, in words."""
+    rate = "no --rate keeps" if miss.rate is None else f"--rate {miss.rate:.0f} keeps"
+    return (
+        f"joined by straight lines, the samples stay within {miss.position:.2g} m and "
+        f"{miss.rotation:.2g} rad of the motion; {rate} the plan's tolerance so (controllers of "
+        f"ROS 2 join by cubics or quintics, which are nearer)"
+    )
+
+
+def told_coarsest(rate: float) -> str:
+    """Return at which rate messages are, in words."""
+    return (
+        f"at {rate:g} Hz: the coarsest rate at which straight lines between samples keep the "
+        f"plan's tolerance"
+    )

@@ -1,0 +1,42 @@
+"""Problem files and job files: what they may say, read and written."""
+
+from typing import Any
+
+from selfmotion.shell.documents.example import (
+    example_text as example_text,
+    example_texts as example_texts,
+)
+from selfmotion.shell.documents.grid_items import grid_items as grid_items
+from selfmotion.shell.documents.joint_limits import (
+    read_joint_limits as read_joint_limits,
+)
+from selfmotion.shell.documents.overrides import (
+    grid_documents as grid_documents,
+    parse_setting as parse_setting,
+    set_key as set_key,
+    write_combination as write_combination,
+)
+from selfmotion.shell.documents.problem_file import (
+    job_of as job_of,
+    read_job as read_job,
+    read_problem as read_problem,
+)
+from selfmotion.shell.documents.problem_parts import (
+    obstacle as obstacle,
+    path_of as path_of,
+)
+from selfmotion.shell.documents.problem_writing import (
+    write_problem as write_problem,
+)
+from selfmotion.shell.documents.seam_job import (
+    SeamJob as SeamJob,
+    read_seam_job as read_seam_job,
+    seam_job_of as seam_job_of,
+)
+
+
+def json_schema() -> dict[str, Any]:
+    """Return the JSON Schema of problem and job files, for editors."""
+    from selfmotion.shell.documents import schema
+
+    return schema.json_schema()

@@ -1,0 +1,314 @@
+"""All that a page knows, from plans: see `Payload` for how it travels."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from selfmotion.basics import Array
+from selfmotion.model.follow import BoundFollow
+from selfmotion.planning.result import Plan
+from selfmotion.shell.replay import links, scene, three
+from selfmotion.shell.replay.meshes import Json, Payload
+from selfmotion.shell.replay.motion import (
+    ClearanceCurve,
+    Curves,
+    KeyFrames,
+    SelfMotion,
+    clearance_curve,
+    curves,
+    key_frames,
+    self_motion,
+    torque_limits,
+)
+from selfmotion.shell.replay.whole import Whole, describe, table
+
+# What can be shown and hidden: with its key, and whether it is shown at first.
+_LAYERS = [
+    {"name": "ghost", "label": "minimum-norm motion", "key": "g", "on": False},
+    {"name": "trace", "label": "tool path", "key": "t", "on": True},
+    {"name": "triads", "label": "tool axes", "key": "a", "on": True},
+    {"name": "ellipsoid", "label": "velocity ellipsoid", "key": "e", "on": False},
+    {"name": "frames", "label": "joint frames", "key": "f", "on": False},
+    {"name": "names", "label": "names", "key": "n", "on": False},
+]
+_BODIES_LAYER = {"name": "bodies", "label": "collision bodies", "key": "b", "on": False}
+_PAIR_LAYER = {"name": "pair", "label": "closest pair", "key": "c", "on": True}
+
+# Sizes of what is drawn, relative to half the diagonal of the scene.
+_TRACE_RADIUS = 0.005
+# How thick moves are beside seams, which are what a job is about.
+_THIN = 0.4
+_TRIAD_LENGTH = 0.09
+_ELLIPSOID_LENGTH = 0.3
+_FRAME_LENGTH = 0.12
+
+
+class _Tip:
+    """What follows a path, sampled: where it is and was to be, where the path is carried."""
+
+    def __init__(self, plan: Plan, follow: BoundFollow, whole: Whole | None) -> None:
+        self.carrier = follow.chain.carrier
+        points = {} if whole is None else {"points": whole.points}
+        self.shown = curves(plan, plan.trajectory, follow, **points)
+        still = plan.initial_trajectory is plan.trajectory
+        self.start = self.shown if still else curves(plan, plan.initial_trajectory, follow)
+        # The whole path, also where the motion ends before it.
+        times = np.linspace(0.0, follow.path.duration, len(self.shown.t))
+        base = follow.chain.base_placement
+        prescribed = follow.path.samples(times).translation
+        self.target: Array = prescribed @ base.rotation.T + base.translation
+
+    @property
+    def outline(self) -> list[Array]:
+        """Points of it in world axes; a path that is carried is where the tool is."""
+        still = [self.target] if self.carrier < 0 else []
+        return [self.shown.tool_in_world, *still]
+
+
+class _Motion:
+    """A plan, sampled: the motion itself and the minimum-norm motion."""
+
+    def __init__(self, plan: Plan, whole: Whole | None) -> None:
+        robot = plan.robot
+        self.plan, self.whole = plan, whole
+        self.frames = key_frames(robot, plan.trajectory)
+        self.ghost = key_frames(robot, plan.initial_trajectory)
+        self.tips = [_Tip(plan, item, whole) for item in plan.problem.follows.items]
+        self.shown, self.start = self.tips[0].shown, self.tips[0].start
+        self.obstacles = plan.obstacles if whole is None else whole.obstacles
+        models = [model for model, _ in plan.problem.envelope.bodies]
+        grows = whole is not None and whole.grows
+        self.clearance = None if grows else clearance_curve(plan.trajectory, models)
+        self.self_motion = None if whole else self_motion(plan.problem, plan.trajectory)
+
+
+def page_content(
+    plans: list[Plan],
+    names: list[str],
+    payload: Payload,
+    *,
+    triads: int | npt.ArrayLike,
+    whole: Whole | None = None,
+) -> Json:
+    """Return the JSON of a page; its arrays go into `payload`. Parameters as in `replay_html`.
+
+    `whole` is what the one plan stands for, where it does.
+    """
+    robot = plans[0].robot
+    arm = links.bake(robot, payload)
+    motions = [_Motion(plan, whole) for plan in plans]
+    hull = scene.outline(
+        arm,
+        [frames for motion in motions for frames in (motion.frames, motion.ghost)],
+        [points for motion in motions for tip in motion.tips for points in tip.outline],
+    )
+    box = scene.Extent(hull.min(axis=0), hull.max(axis=0))
+    # A part is seen whole, a floor is not.
+    around = [
+        corners for motion in motions for corners in scene.outlines(motion.obstacles, box.radius)
+    ]
+    scale = _scale(motions)
+    longest = max(float(np.linalg.norm(m.shown.ellipsoid, axis=(1, 2)).max()) for m in motions)
+    return {
+        "camera": scene.camera(np.concatenate([hull, *around]), motions[0].shown.tool_in_world),
+        "commands": [
+            *scene.stage_commands(box),
+            *links.arm_commands(robot, arm),
+            *links.ghost_commands(robot, arm),
+            scene.ellipsoid_command(),
+            *scene.body_commands(robot, payload),
+        ],
+        "meshes": arm.meshes,
+        "joints": _joints(plans[0]),
+        # What is drawn moves with the model's joints: those that mimic others are among them.
+        "movers": [links.joint_name(robot, k) for k in range(robot.model.nv)],
+        "layers": _layers(motions),
+        "scale": {**scale, "colors": three.COLOR_SCALE},
+        "ellipsoidSize": _ELLIPSOID_LENGTH * box.radius / longest,
+        "frameSize": _FRAME_LENGTH * box.radius,
+        "links": {visual.link: links.link_node(robot, visual) for visual in arm.visuals},
+        "plans": [
+            _plan(motion, name, f"/selfmotion/plan{k}", payload, scale, triads, box.radius)
+            for k, (motion, name) in enumerate(zip(motions, names, strict=True))
+        ],
+        "table": [*_missing(arm, len(plans)), *_facts(plans, whole)],
+    }
+
+
+def _layers(motions: list[_Motion]) -> list[Json]:
+    """Return what can be shown and hidden; of several steps there is no minimum-norm motion."""
+    kept = [item for item in _LAYERS if item["name"] != "ghost" or motions[0].whole is None]
+    has_bodies = motions[0].plan.robot.urdf.has_collisions
+    bodies = [_BODIES_LAYER] if has_bodies else []
+    pair = [_PAIR_LAYER] if any(motion.clearance for motion in motions) else []
+    return [*kept, *bodies, *pair]
+
+
+def _facts(plans: list[Plan], whole: Whole | None) -> list[Json]:
+    if whole is None:
+        return table(plans)
+    return [{"label": label, "cells": [cell]} for label, cell in whole.facts.items()]
+
+
+def _missing(arm: links.Arm, plans: int) -> list[Json]:
+    """Return the row of the table that says what of the arm is not drawn, where there is some."""
+    cells = [("; ".join(arm.missing), ""), *[("", "")] * (plans - 1)]
+    return [{"label": "not drawn", "cells": cells}] if arm.missing else []
+
+
+def _scale(motions: list[_Motion]) -> Json:
+    """Return the ends of the colour scale, the same for all plans, so that colours compare."""
+    values = np.concatenate(
+        [each.manipulability for motion in motions for each in (motion.shown, motion.start)]
+    )
+    low, high = float(values.min()), float(values.max())
+    if high - low < 1e-9 * high:
+        low, high = 0.9 * low, 1.1 * high or 1.0
+    return {"low": low, "high": high}
+
+
+def _plan(
+    motion: _Motion,
+    name: str,
+    root: str,
+    payload: Payload,
+    scale: Json,
+    triads: int | npt.ArrayLike,
+    size: float,
+) -> Json:
+    """Return what a page needs of one plan, its traces below the node `root`."""
+    shown, whole = motion.shown, motion.whole
+    times = (
+        np.linspace(0.0, shown.t[-1], triads)
+        if isinstance(triads, int)
+        else np.atleast_1d(np.asarray(triads, dtype=float))
+    )
+    return {
+        "label": name,
+        "description": describe(motion.plan) if whole is None else whole.description,
+        "steps": [] if whole is None else whole.steps(),
+        "events": [] if whole is None else whole.happenings(),
+        "root": root,
+        "tips": [
+            *(
+                {"root": f"{root}/tip{f}", "carrier": tip.carrier}
+                for f, tip in enumerate(motion.tips)
+            ),
+            *([] if whole is None else [{"root": f"{root}/moves", "carrier": -1}]),
+        ],
+        "duration": motion.plan.trajectory.duration,
+        "verdict": motion.plan.certificate.verdict if whole is None else whole.verdict,
+        "verified": bool((motion.plan.certificate if whole is None else whole).verified),
+        "frames": _packed(motion.frames, payload),
+        "ghost": _packed(motion.ghost, payload),
+        "selfMotion": _self_motion(motion.self_motion, payload),
+        "curves": _curves(motion.plan, shown, payload),
+        "start": _curves(motion.plan, motion.start, payload),
+        "ellipsoid": {
+            "t": payload.array(shown.t),
+            "matrix": payload.array(shown.ellipsoid),
+            "tool": payload.array(shown.tool_in_world),
+        },
+        "clearance": None if motion.clearance is None else _clearance(motion.clearance, payload),
+        "obstacles": {item.name: scene.obstacle_node(root, item) for item in motion.obstacles},
+        "riders": scene.riders(root, motion.plan.robot, motion.obstacles),
+        "commands": [
+            *scene.obstacle_commands(root, motion.plan.robot, motion.obstacles, payload),
+            *(
+                command
+                for f, tip in enumerate(motion.tips)
+                for command in _traces(f"{root}/tip{f}", payload, tip, scale, times, size, whole)
+            ),
+        ],
+    }
+
+
+def _traces(
+    root: str,
+    payload: Payload,
+    tip: _Tip,
+    scale: Json,
+    times: Array,
+    size: float,
+    whole: Whole | None,
+) -> list[Json]:
+    """Return the commands for the traces of a tip, below the node `root` of what carries them.
+
+    Of a whole the seams are where they are carried, and the moves in the world beside it.
+    """
+    radius = _TRACE_RADIUS * size
+    axes = scene.triad_command(root, payload, tip.shown, times, _TRIAD_LENGTH * size)
+    if whole is None:
+        traces = (tip.shown, tip.start, tip.target, scale, radius)
+        return [*scene.trace_commands(root, payload, *traces), axes]
+    moves = f"{root.rsplit('/', 1)[0]}/moves"
+    return [*whole.commands(root, moves, payload, tip.shown, (radius, _THIN * radius)), axes]
+
+
+def _packed(frames: KeyFrames, payload: Payload) -> Json:
+    return {
+        "t": payload.array(frames.t, "f8"),
+        "position": payload.array(frames.position),
+        "quaternion": payload.array(frames.quaternion),
+    }
+
+
+def _self_motion(found: SelfMotion | None, payload: Payload) -> Json | None:
+    if found is None:
+        return None
+    return {
+        "joint": found.joint,
+        "t": payload.array(found.frames[0].t),
+        "position": payload.array(np.stack([one.position for one in found.frames])),
+        "quaternion": payload.array(np.stack([one.quaternion for one in found.frames])),
+        "steps": len(found.frames),
+    }
+
+
+def _curves(plan: Plan, sampled: Curves, payload: Payload) -> Json:
+    drawn: Json = {
+        "t": payload.array(sampled.t),
+        "q": payload.array(sampled.q),
+        "qd": payload.array(sampled.qd),
+        "qdd": payload.array(sampled.qdd),
+        "manipulability": payload.array(sampled.manipulability),
+    }
+    if sampled.torque is not None:
+        drawn["torque"] = payload.array(sampled.torque)
+    if np.any(plan.task.rows < 3):
+        drawn["position"] = payload.array(sampled.position_error)
+    if np.any(plan.task.rows >= 3):
+        drawn["rotation"] = payload.array(sampled.rotation_error)
+    # What is allowed is no error, and a page says so.
+    drawn["relaxed"] = bool(plan.problem.relaxations)
+    return drawn
+
+
+def _clearance(curve: ClearanceCurve, payload: Payload) -> Json:
+    return {
+        "t": payload.array(curve.t),
+        "value": payload.array(curve.value),
+        "pairs": curve.pairs,
+    }
+
+
+def _joints(plan: Plan) -> list[Json]:
+    robot, asked = plan.robot, torque_limits(plan)
+    effort = robot.effort_limit if asked is None else asked.of(robot)
+    return [
+        {
+            "name": name,
+            "unit": "m" if robot.is_prismatic(name) else "rad",
+            "lower": _finite(robot.lower[k]),
+            "upper": _finite(robot.upper[k]),
+            "speed": _finite(robot.velocity_limit[k]),
+            "acceleration": _finite(robot.acceleration_limit[k]),
+            "effort": _finite(effort[k]),
+        }
+        for k, name in enumerate(robot.joint_names)
+    ]
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None

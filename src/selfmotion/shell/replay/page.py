@@ -1,0 +1,205 @@
+"""One HTML file from one or several plans of a robot."""
+
+from __future__ import annotations
+
+import base64
+import gzip
+import hashlib
+import html
+import importlib.metadata
+import os
+from collections.abc import Sequence
+from importlib import resources
+from pathlib import Path
+from string import Template
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from selfmotion.basics import (
+    Array,
+    ProblemError,
+    as_numbers,
+    as_path,
+    as_whole,
+    shown as told,
+    write_text,
+)
+from selfmotion.planning.result import Move, Parts, Plan
+from selfmotion.shell.replay.content import page_content
+from selfmotion.shell.replay.meshes import Payload
+from selfmotion.shell.replay.still import still
+from selfmotion.shell.replay.whole import Whole, describe
+from selfmotion.work.job import Program
+
+# What a page can show.
+Shown = Plan | Sequence[Plan] | Program | Parts | Move
+_TRIADS, _MOST_TRIADS = 7, 1000
+_VIEWER = "meshcat/viewer/dist/main.min.js"
+_SCRIPTS = ("payload.js", "stage.js", "plots.js", "page.js")
+
+
+def replay_html(
+    plans: Shown,
+    *,
+    title: str | None = None,
+    labels: Sequence[str] | None = None,
+    description: str | None = None,
+    triads: int | npt.ArrayLike | None = None,
+) -> str:
+    """Return a page that replays plans: complete, offline, the same bytes for the same plans.
+
+    For plans that keep a clearance, obstacles and the closest pair of bodies are shown too.
+
+    Parameters
+    ----------
+    plans : Plan or sequence of Plan, Program, Parts or Move
+        What to show; several plans of one robot share a page with a switch. Of a program and of
+        parts the seams have colours, and a table to jump to each.
+    title : str, optional
+        Heading of the page. Default: the robot's name and the task.
+    labels : sequence of str, optional
+        Names of the plans on the switch. Default: A, B, C, …
+    description : str, optional
+        What the page shows, in words. Default: arm, task, cost and verdict.
+    triads : int or array of float
+        Where the tool's axes are drawn: how many, evenly spaced in time, or at which times [s].
+        Default: 7 of each plan, none of what has several steps.
+
+    Raises
+    ------
+    ProblemError
+        No plan, plans of different robots, or an argument that is not what it should be.
+    RobotError
+        A visual of the robot cannot be read.
+    """
+    whole = Whole.of(plans) if isinstance(plans, Program | Parts | Move) else None
+    shown = _as_list(plans if whole is None else whole.plan)
+    names = _labels(shown, labels)
+    payload = Payload()
+    content = page_content(
+        shown,
+        names,
+        payload,
+        triads=_TRIADS * (whole is None) if triads is None else _checked(triads),
+        whole=whole,
+    )
+    obstacles = shown[0].obstacles if whole is None else whole.obstacles
+    seams = [] if whole is None else whole.seams()
+    picture = still(shown[0].robot, shown[0].trajectory, obstacles, content["camera"], seams)
+    if description is not None:
+        for shown_plan in content["plans"]:
+            shown_plan["description"] = description
+    if whole is not None:
+        heading = title or f"{shown[0].robot.name}, {type(plans).__name__.lower()}"
+        return _assemble(heading, description or whole.description, payload.pack(content), picture)
+    heading = title or f"{shown[0].robot.name}, {shown[0].task.value} task"
+    sentences = [describe(plan) for plan in shown]
+    if len(shown) > 1:
+        sentences = [f"{name}: {said}." for name, said in zip(names, sentences, strict=True)]
+    return _assemble(heading, description or " ".join(sentences), payload.pack(content), picture)
+
+
+def write_replay(plans: Shown, file: str | os.PathLike[str], **options: Any) -> Path:
+    """Write `replay_html` to `file`, whole or not at all; options are those of `replay_html`.
+
+    Returns
+    -------
+    Path
+        The file.
+    """
+    path = as_path(file)
+    write_text(path, replay_html(plans, **options))
+    return path
+
+
+def notebook_html(plan: Plan, height: int = 900) -> str:
+    """Return the replay as an inline frame, for ``Plan._repr_html_`` in a notebook."""
+    page = html.escape(replay_html(plan), quote=True)
+    return (
+        f'<iframe srcdoc="{page}" sandbox="allow-scripts allow-downloads" '
+        f'title="selfmotion replay" style="width:100%;height:{height}px;border:0"></iframe>'
+    )
+
+
+def _as_list(plans: Any) -> list[Plan]:
+    shown = list(plans) if isinstance(plans, Sequence) else [plans]
+    if not shown:
+        raise ProblemError("a replay needs at least one plan")
+    for plan in shown:
+        if not isinstance(plan, Plan):
+            raise ProblemError(
+                f"a replay is of {told(plan)}, expected plans, or one Program, Parts or Move"
+            )
+    first = shown[0].robot
+    for plan in shown[1:]:
+        same = plan.robot.urdf.sha256 == first.urdf.sha256
+        if not same or plan.robot.joint_names != first.joint_names:
+            raise ProblemError(
+                f"plans of different robots ('{first.name}' and '{plan.robot.name}') cannot share "
+                f"a replay; write one for each"
+            )
+    return shown
+
+
+def _labels(plans: list[Plan], labels: Sequence[str] | None) -> list[str]:
+    if labels is None:
+        return ["plan"] if len(plans) == 1 else [f"Plan {chr(65 + k)}" for k in range(len(plans))]
+    if len(labels) != len(plans):
+        raise ProblemError(f"{len(labels)} labels for {len(plans)} plans; give one for each")
+    for label in labels:
+        if not isinstance(label, str):
+            raise ProblemError(f"labels: {told(label)}, expected a text for each plan")
+    return list(labels)
+
+
+def _checked(triads: int | npt.ArrayLike) -> int | Array:
+    """Return a number of triads, or their times [s]."""
+    if isinstance(triads, int):
+        return as_whole(triads, "triads", 0, _MOST_TRIADS)
+    return np.atleast_1d(as_numbers(triads, "triads", "how many, or times [s]"))
+
+
+def _assemble(title: str, description: str, payload: str, picture: str) -> str:
+    viewer = _viewer_code()
+    script = "\n" + "\n".join(_web(name) for name in _SCRIPTS)
+    policy = "; ".join(
+        [
+            "default-src 'none'",
+            f"script-src {_hash(script)} {_hash(viewer)}",
+            # meshcat and its control panel put style sheets of their own into the page.
+            "style-src 'unsafe-inline'",
+            "img-src data: blob:",
+            "base-uri 'none'",
+            "form-action 'none'",
+        ]
+    )
+    packed = base64.b64encode(gzip.compress(viewer.encode(), compresslevel=9, mtime=0))
+    return Template(_web("page.html")).substitute(
+        policy=policy,
+        title=html.escape(title),
+        description=html.escape(description),
+        style=_web("style.css"),
+        viewer=packed.decode("ascii"),
+        payload=payload,
+        still=picture,
+        script=script,
+    )
+
+
+def _viewer_code() -> str:
+    """Return meshcat's viewer. `import meshcat` would bring ZeroMQ; this only reads its file."""
+    file = importlib.metadata.distribution("meshcat").locate_file(_VIEWER)
+    return Path(str(file)).read_text(encoding="utf-8")
+
+
+def _web(name: str) -> str:
+    return (
+        resources.files("selfmotion.shell.replay").joinpath("web", name).read_text(encoding="utf-8")
+    )
+
+
+def _hash(script: str) -> str:
+    digest = hashlib.sha256(script.encode()).digest()
+    return f"'sha256-{base64.b64encode(digest).decode('ascii')}'"

@@ -1,0 +1,537 @@
+"""What programs of machine tools do: cuts at a feed, rapids in between, arcs and holes."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path as FilePath
+from typing import NamedTuple
+
+import numpy as np
+
+from selfmotion.basics import Array, FileFormatError, text_of
+from selfmotion.model.path import from_normal
+from selfmotion.shop.cam.path_rows import PoseRows
+
+# What programs of machine tools do: cuts at a feed, and rapids in between.
+
+# A file of a machine tool has less than so many bytes, a cut less than so many poses; nothing is
+# farther away than this [m].
+_BYTES, _POSES, _FAR = 200_000_000, 1_000_000, 1e3
+# What stops something: after a cut it belongs to that.
+RETRACT, PRIME = "retract", "prime"
+STOPS = ("M5", "M9", "SPINDL/OFF", "COOLNT/OFF", "ARCOFF", RETRACT)
+# The suffix of programs of Siemens' controls.
+_SIEMENS = ".mpf"
+# What is not known of a program of a machine tool.
+UNJUDGED = "stock and engagement are not judged"
+_FREE = (
+    "only rapids along the tool's axis are made as the file has them, all others are free motions; "
+    "let CAM write retracts and approaches along the axis"
+)
+_UP = np.array([0.0, 0.0, 1.0])
+# Poses nearer than this [m, and of their axes] are the same.
+_SAME = 1e-9
+# How fast the tool goes where a file says rapid and the motion is part of a cut, at most [m/s].
+RAPID = 0.1
+# A rapid goes along the tool's axis where it goes aside by no more than this [m] and this share of
+# its length: rounding of files.
+_ASIDE, _SKEW = 2e-5, 1e-3
+# Axes apart from their opposite by less than this have no shortest way.
+_OPPOSITE = 1e-9
+
+
+@dataclass
+class Cut:
+    """A cut while it is read: where each pose stands in the file, and what happens.
+
+    Rapids along the tool's axis, to it and from it, are part of it.
+
+    Attributes
+    ----------
+    places : list of str
+    positions, axes : list of (3,)
+        Of the tip [m], and from the tip to the holder.
+    feeds : list of float
+        To each pose [m/s], 0 where none is known.
+    rapid : list of bool
+        Whether the tool goes to each pose in a rapid.
+    events : list of (int, str)
+        At which pose what happens.
+    is_hole : bool
+        Whether it is a hole that is done: what is cut next is no part of it.
+    """
+
+    places: list[str] = field(default_factory=list)
+    positions: list[Array] = field(default_factory=list)
+    axes: list[Array] = field(default_factory=list)
+    feeds: list[float] = field(default_factory=list)
+    rapid: list[bool] = field(default_factory=list)
+    events: list[tuple[int, str]] = field(default_factory=list)
+    is_hole: bool = False
+
+    @property
+    def cuts(self) -> bool:
+        """Whether it goes anywhere at a feed."""
+        return not all(self.rapid[1:])
+
+    def add(
+        self, place: str, position: Array, axis: Array, feed: float, *, rapid: bool = False
+    ) -> None:
+        """Add a pose, unless it is the last one again."""
+        if self.positions:
+            away = np.abs(position - self.positions[-1]).max(), np.abs(axis - self.axes[-1]).max()
+            if max(away) < _SAME:
+                return
+        self.places.append(place)
+        self.positions.append(position)
+        self.axes.append(axis)
+        self.feeds.append(feed)
+        self.rapid.append(rapid)
+
+    def ends(self, event: str) -> None:
+        """Note what happens at its end."""
+        self.events.append((len(self.places) - 1, event))
+
+    def rows(self) -> PoseRows:
+        """Return the poses, the tool's z axis against the axes, turned as little as may be."""
+        # The feed of a table is from a pose on, that of a machine up to one.
+        feeds = np.array([*self.feeds[1:], self.feeds[-1]])
+        rapid = np.array([*self.rapid[1:], self.rapid[-1]])
+        rotations = _transported(-np.array(self.axes))
+        return PoseRows(
+            self.places,
+            np.array(self.positions),
+            "rotation",
+            rotations,
+            None,
+            feeds if feeds.all() else None,
+            events=tuple(self.events),
+            straight=True,
+            rapid=rapid if rapid.any() else None,
+        )
+
+
+def _transported(axes: Array) -> Array:
+    """Return rotations whose z axes are (N, 3), each turned from the last one about no z axis."""
+    from scipy.spatial.transform import Rotation
+
+    found = [from_normal(axes[0])]
+    for axis in axes[1:]:
+        before = found[-1][:, 2]
+        if (axis == before).all():
+            found.append(found[-1])
+            continue
+        cross, cosine = np.cross(before, axis), float(before @ axis)
+        if cosine < _OPPOSITE - 1.0:
+            found.append(from_normal(axis))
+            continue
+        sine = float(np.linalg.norm(cross))
+        angle = np.arctan2(sine, cosine)
+        turn = Rotation.from_rotvec(cross * (angle / sine if sine > 0.0 else 0.0))
+        turned = turn.as_matrix() @ found[-1]
+        # Exactly that axis, after many turns too.
+        x = turned[:, 0] - axis * (axis @ turned[:, 0])
+        x = x / np.linalg.norm(x)
+        found.append(np.stack([x, np.cross(axis, x), axis], axis=1))
+    return np.array(found)
+
+
+class Machine:
+    """Where the tool is, and the cuts so far.
+
+    Parameters
+    ----------
+    file : path
+    """
+
+    def __init__(self, file: FilePath) -> None:
+        self.file = file
+        self.number = 0
+        self.position: Array = np.full(3, np.nan)
+        self.axis: Array = np.array([0.0, 0.0, 1.0])
+        self.feed = 0.0
+        self.cuts: list[Cut] = []
+        self.notes: list[str] = []
+        # The cut that is read, or the rapids that lead to one; what happens before the next.
+        self._open: Cut | None = None
+        self._next: list[str] = []
+        self._held: list[str] | None = None
+        # The highest place so far, and from where the tool comes down after it went up to a place
+        # that is not known [m]; whether the last traverse went along the tool's axis as well.
+        self._highest = self._above = -np.inf
+        self._slanted = False
+
+    @property
+    def moved(self) -> bool:
+        """Whether it has been anywhere that is known."""
+        return bool(self.cuts) or not np.isnan(self.position).any()
+
+    def fault(self, what: str) -> FileFormatError:
+        """Return an error about the line that is read."""
+        return FileFormatError(f"{self.file}: line {self.number}: {what}")
+
+    def unread(self, what: str) -> FileFormatError:
+        """Return an error about something that is not read."""
+        own = (
+            "of what only Siemens' controls know, TRAORI, TRAFOOF, X=… and A3= B3= C3= are read: "
+            "let CAM write ISO G-code for the rest, or APT; "
+        )
+        siemens = own if self.file.suffix.lower() == _SIEMENS else ""
+        return self.fault(
+            f"{what} is not read: {siemens}page 'Files' of the docs lists what is (read_path)"
+        )
+
+    def note(self, what: str) -> None:
+        """Note what is to be known of the line that is read, once for what is said alike."""
+        if not any(what in note for note in self.notes):
+            self.notes.append(f"line {self.number}: {what}")
+
+    def text(self) -> str:
+        """Return the file's text."""
+        try:
+            content = self.file.read_bytes()
+        except OSError as error:
+            raise FileFormatError(
+                f"{self.file}: cannot be read: {error.strerror or error}"
+            ) from error
+        if len(content) > _BYTES:
+            raise FileFormatError(
+                f"{self.file}: has {len(content)} bytes, expected {_BYTES} at most"
+            )
+        # DOS marks the end of a file.
+        return text_of(self.file, content).rstrip("\x1a")
+
+    def rapid(self, position: Array, axis: Array) -> None:
+        """Go somewhere in a rapid: along the tool's axis as part of a cut, else between cuts."""
+        self._check(position)
+        known = not np.isnan(position).any()
+        if self._open is not None and known and self._is_along(position, axis):
+            self.release()
+            self._open.add(self._place, position, axis, RAPID, rapid=True)
+        else:
+            self._leaves(position)
+            if known:
+                self._open = Cut()
+                if self._above > self._height(position, axis):
+                    # It comes down from where it went up to.
+                    above = position + (self._above - self._height(position, axis)) * axis
+                    self._open.add(self._place, above, axis, RAPID, rapid=True)
+                self._open.add(self._place, position, axis, RAPID, rapid=True)
+                self._above = -np.inf
+        self._is_at(position, axis)
+
+    def _is_at(self, position: Array, axis: Array) -> None:
+        self.position, self.axis = position, axis
+        height = self._height(position, axis)
+        if np.isfinite(height):
+            self._highest = max(self._highest, height)
+
+    def climbs(self) -> None:
+        """Go up along the tool's axis, nobody knows how far: as high as the tool has been."""
+        height = self._height(self.position, self.axis)
+        if np.isfinite(height) and self._highest > height:
+            self.rapid(self.position + (self._highest - height) * self.axis, self.axis)
+        self._above = self._highest
+
+    def _height(self, position: Array, axis: Array) -> float:
+        """Return the height of a place [m]; infinite where it is not known or the tool tilted."""
+        is_up = float(np.abs(axis - _UP).max()) < _SAME
+        return float(position @ _UP) if is_up and not np.isnan(position).any() else np.inf
+
+    def _is_along(self, position: Array, axis: Array) -> bool:
+        """Return whether a place is above or below the tool along its axis."""
+        way = position - self.position
+        length = float(np.linalg.norm(way))
+        aside = float(np.linalg.norm(way - (way @ axis) * axis))
+        is_turned = np.abs(axis - self.axis).max() > _SKEW
+        return not is_turned and aside <= _ASIDE + _SKEW * length
+
+    def _leaves(self, position: Array) -> None:
+        """End a cut."""
+        left, self._open = self._open, None
+        self._slanted = False
+        if left is None:
+            return
+        if not np.isnan(position).any():
+            way = position - left.positions[-1]
+            away = float(way @ left.axes[-1])
+            self._slanted = abs(away) > _ASIDE + _SKEW * float(np.linalg.norm(way))
+        if not left.cuts:
+            # It went nowhere, but what happened there did.
+            self.cuts = [cut for cut in self.cuts if cut is not left]
+            self._next = [*(event for _, event in left.events), *self._next]
+        elif self._slanted and left.rapid[-1] is False:
+            self.note(f"a rapid leaves a cut aside: {_FREE}")
+
+    def cut(self, position: Array, axis: Array) -> None:
+        """Go somewhere at the feed."""
+        self._check(position)
+        missing = [name for name, value in zip("XYZ", position, strict=True) if np.isnan(value)]
+        if missing:
+            raise self.fault(
+                f"cuts, and {missing[0]} is not known yet: give X, Y and Z in a rapid before"
+            )
+        if self._open is None or self._open.is_hole:
+            known = self._open is not None
+            self._leaves(np.full(3, np.nan))
+            self._open = Cut()
+            if known:
+                self._open.add(self._place, self.position, self.axis, RAPID, rapid=True)
+        if not self.cuts or self.cuts[-1] is not self._open:
+            self.cuts.append(self._open)
+            self._open.events[:0] = [(0, event) for event in self._next]
+            self._next = []
+            if self._slanted and len(self._open.places) == 1:
+                self.note(f"a rapid comes to a cut aside: {_FREE}")
+        self._open.add(self._place, position, axis, self.feed)
+        if len(self._open.places) > _POSES:
+            raise self.fault(f"a cut has more than {_POSES} poses")
+        self._is_at(position, axis)
+
+    def ends_hole(self) -> None:
+        """End a hole: what is cut next is another cut, but for rapids along the axis."""
+        if self._open is not None:
+            self._open.is_hole = True
+
+    def hold(self) -> None:
+        """Keep what happens until `release`."""
+        self._held = []
+
+    def release(self) -> None:
+        """Note what happened since `hold`, now."""
+        held, self._held = self._held, None
+        for event in held or ():
+            self.happens(event)
+
+    def happens(self, event: str) -> None:
+        """Note what happens: where the tool is, or where the next cut begins.
+
+        What stops something between two cuts happens at the end of the one before.
+        """
+        if self._held is not None:
+            self._held.append(event)
+            return
+        is_between = self._open is None or len(self._open.places) == 1
+        if is_between and event in STOPS and self.cuts and not self._waiting:
+            self.cuts[-1].ends(event)
+        elif self._open is None:
+            self._next.append(event)
+        else:
+            self._open.events.append((len(self._open.places) - 1, event))
+
+    @property
+    def _waiting(self) -> bool:
+        """Whether something happens before the next cut."""
+        return bool(self._next or (self._open and self._open.events))
+
+    @property
+    def _place(self) -> str:
+        return f"line {self.number}"
+
+    def _check(self, position: Array) -> None:
+        if np.nanmax(np.abs(position), initial=0.0) > _FAR:
+            raise self.fault(f"{position.tolist()} m is farther than anything is")
+
+    def seams(self) -> Mapping[str, PoseRows]:
+        """Return the cuts as rows of poses, by names."""
+        self._leaves(np.full(3, np.nan))
+        moved = [cut for cut in self.cuts if cut.cuts]
+        for event in self._next if moved else ():
+            moved[-1].ends(event)
+        self._next = []
+        if not moved:
+            raise FileFormatError(f"{self.file}: has no cut: no motion at a feed")
+        notes = (*self.notes, UNJUDGED)
+        rows = (replace(cut.rows(), one_way=True, notes=notes) for cut in moved)
+        return {f"cut {number}": each for number, each in enumerate(rows, 1)}
+
+
+def unit_axis(values: Sequence[float], machine: Machine) -> Array:
+    """Return the direction of a tool axis."""
+    axis = np.array(values, dtype=np.float64)
+    length = float(np.linalg.norm(axis))
+    if not 1e-6 < length < 1e6:
+        raise machine.fault(f"tool axis {axis.tolist()} has no direction")
+    return axis / length
+
+
+# Arcs of machines as points: circles about an axis, and helices along it.
+
+# Chords of arcs are off by this at most [m].
+_CHORD = 1e-5
+# Both ends of an arc are as far from its centre, and no farther apart than its circle is wide, but
+# for this [m].
+_ROUND = 2e-4
+# Arcs of a larger radius [m] are a fault of what wrote them, and so are more chords.
+_LARGEST, _POINTS = 1e5, 100_000
+
+
+def arc_points(
+    machine: Machine, start: Array, goal: Array, center: Array, axis: Array, more_turns: int = 0
+) -> Array:
+    """Return points (K, 3) of an arc, its end the last one.
+
+    It goes right-handed about an axis through the centre, and evenly along it; where both ends are
+    in one direction it is a whole turn.
+
+    Parameters
+    ----------
+    machine : Machine
+        Whose line is read.
+    start, goal, center, axis : (3,)
+    more_turns : int
+        Whole turns besides.
+
+    Raises
+    ------
+    FileFormatError
+        The ends are not as far from the axis as each other, or the arc is too large.
+    """
+    if np.isnan(start).any() or np.isnan(goal).any():
+        raise machine.fault(
+            "an arc begins where X, Y or Z is not known yet: give X, Y and Z in a rapid before"
+        )
+    axis = axis / np.linalg.norm(axis)
+    heights = (start - center) @ axis, (goal - center) @ axis
+    arms = start - center - heights[0] * axis, goal - center - heights[1] * axis
+    radius, other = (float(np.linalg.norm(arm)) for arm in arms)
+    if radius < _SAME or abs(radius - other) > _ROUND:
+        raise machine.fault(
+            f"the arc begins {1e3 * radius:.4g} mm from its centre and ends "
+            f"{1e3 * other:.4g} mm from it"
+        )
+    if radius > _LARGEST:
+        raise machine.fault(f"the arc has a radius of {radius:.4g} m")
+    x = arms[0] / radius
+    y = np.cross(axis, x)
+    turn = float(np.arctan2(arms[1] @ y, arms[1] @ x)) % (2.0 * np.pi)
+    if turn < 1e-9:
+        turn = 2.0 * np.pi
+    turn += 2.0 * np.pi * more_turns
+    count = max(2, int(np.ceil(turn / (2.0 * np.arccos(max(0.0, 1.0 - _CHORD / radius))))))
+    if count > _POINTS:
+        raise machine.fault(f"the arc takes {count} chords, expected {_POINTS} at most")
+    share = np.arange(1, count + 1)[:, None] / count
+    angle, radii = turn * share, radius + (other - radius) * share
+    found = center + radii * (np.cos(angle) * x + np.sin(angle) * y)
+    found = found + (heights[0] + (heights[1] - heights[0]) * share) * axis
+    found[-1] = goal
+    return np.asarray(found)
+
+
+def center_by_radius(
+    machine: Machine, start: Array, goal: Array, radius: float, sense: float
+) -> Array:
+    """Return the centre (2,) of an arc in its plane.
+
+    Parameters
+    ----------
+    machine : Machine
+        Whose line is read.
+    start, goal : (2,)
+    radius : float
+        [m]; below 0 for an arc of more than half a turn.
+    sense : float
+        1 for an arc that goes right-handed, -1 for one that does not.
+
+    Raises
+    ------
+    FileFormatError
+        No such arc joins the ends.
+    """
+    chord = goal - start
+    length = float(np.linalg.norm(chord))
+    if length < _SAME or length > 2.0 * abs(radius) + _ROUND:
+        raise machine.fault(
+            f"no arc of radius {1e3 * radius:.4g} mm joins points {1e3 * length:.4g} mm apart"
+        )
+    height = np.sqrt(max(0.0, radius**2 - 0.25 * length**2))
+    side = sense if radius > 0.0 else -sense
+    normal = np.array([-chord[1], chord[0]]) / length
+    return np.asarray(start + 0.5 * chord + side * height * normal)
+
+
+# Holes that cycles of machines drill: down at the feed, and straight out again.
+
+# How far the tool stays off the bottom of a hole that is there already, or comes back to break
+# chips [m].
+_OFF = 5e-4
+_PECKS = 10_000
+
+
+class Pecks(NamedTuple):
+    """How a deep hole is drilled: so far at once [m], and out in between, or only a little back."""
+
+    first: float
+    others: float
+    is_out: bool
+
+
+def drill(
+    machine: Machine,
+    above: Array,
+    bottom: Array,
+    axis: Array,
+    *,
+    pecks: Pecks | None = None,
+    dwell: str = "",
+    feeds_out: bool = False,
+) -> None:
+    """Drill a hole: from a place above it to its bottom and back.
+
+    Out, and down again where the hole is there already, it goes in rapids.
+
+    Parameters
+    ----------
+    machine : Machine
+        Whose line is read; its feed is that of the cut.
+    above, bottom : (3,)
+        Where the feed begins, and the bottom [m].
+    axis : (3,)
+        From the bottom to above it.
+    pecks : Pecks, optional
+    dwell : str
+        What happens at the bottom, if anything.
+    feeds_out : bool
+        Whether it comes out at the feed, not faster.
+
+    Raises
+    ------
+    FileFormatError
+        The hole has no depth, or needs too many pecks.
+    """
+    depth = float((above - bottom) @ axis)
+    if not depth > 0.0:
+        raise machine.fault(
+            f"the hole ends {-1e3 * depth:.4g} mm above where it begins, expected a depth"
+        )
+    machine.rapid(above, axis)
+    done = 0.0
+    for reached in _depths(machine, depth, pecks):
+        if done > 0.0:
+            if pecks is not None and pecks.is_out:
+                machine.rapid(above, axis)
+            machine.rapid(above - max(0.0, done - _OFF) * axis, axis)
+        machine.cut(above - reached * axis, axis)
+        done = reached
+    if dwell:
+        machine.happens(dwell)
+    if feeds_out:
+        machine.cut(above, axis)
+    else:
+        machine.rapid(above, axis)
+    machine.ends_hole()
+
+
+def _depths(machine: Machine, depth: float, pecks: Pecks | None) -> list[float]:
+    """Return how deep it is after each peck."""
+    if pecks is None:
+        return [depth]
+    if not min(pecks.first, pecks.others) > 0.0 or depth / pecks.others > _PECKS:
+        raise machine.fault(
+            f"drills by {1e3 * pecks.others:.4g} mm at once, expected a step above 0 (Q, STEP)"
+        )
+    found, here = list[float](), pecks.first
+    while here < depth - _SAME:
+        found.append(here)
+        here += pecks.others
+    return [*found, depth]

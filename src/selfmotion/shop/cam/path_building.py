@@ -1,0 +1,548 @@
+"""From rows of poses to a tool motion."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from pathlib import Path as FilePath
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from selfmotion.basics import TURN, Array, FileFormatError, Ints, PathError, as_choice
+from selfmotion.model.path import (
+    ORIENTATIONS,
+    TURN_NOTE,
+    Feed,
+    Joined,
+    Path,
+    Polyline,
+    Waypoints,
+    merged,
+    section_at_rest,
+)
+from selfmotion.shop.cam.cuts import RAPID
+from selfmotion.shop.cam.path_rows import DRAWING, PoseRows, some_rows
+from selfmotion.shop.cam.tangents import AXES, stretches_along, turning
+
+# A coordinate beyond this [m] can only be meant in millimetres.
+_FAR = 50.0
+# Poses farther from their predecessor than this [m] are a jump, unless another length is given.
+JUMP = 0.5
+# Rotations by more than this [rad] are a jump, too: their direction would be a guess.
+_FLIP = 2.6
+# Times this near [s] are the same.
+_MOMENT = 1e-9
+# Legs that bend by more than this [rad] make a corner, unless another angle is given.
+_BEND = np.pi / 6
+# Poses nearer than this [m] are repeated ones; a stub is shorter than this share of the steps
+# beside it, and turns the tool by no more than this [rad].
+_REPEATED, _STUB, _TURN_TOLERANCE = 1e-9, 0.05, 1e-2
+# A path of a duration is run up in so long [s] at most.
+_RAMP = 0.5
+# A curve is looked at in so many places between two poses.
+_LOOKS = 9
+# Legs that go back by less than this of the way they came turn round.
+_BACK = 1e-3
+
+
+@dataclass(frozen=True)
+class Pacing:
+    """How a table is followed; see `read_path`."""
+
+    feed: float | None = None
+    duration: float | None = None
+    jump: float = JUMP
+    corners: str = "blend"
+    tolerance: float = 1e-3
+    corner_angle: float | None = None
+    turn_rate: float | None = None
+    acceleration: float | None = None
+    turn_acceleration: float | None = None
+    smoothing: float | None = None
+    within: float | None = None
+    ramp: float | None = None
+    flip_normals: bool = False
+    standoff: float = 0.0
+    along: str | None = None
+    lead: float = 0.0
+
+    @property
+    def bounds(self) -> dict[str, float]:
+        """What bounds a feed, where it is given."""
+        names = ("turn_rate", "acceleration", "turn_acceleration", "smoothing", "within")
+        given = {name: getattr(self, name) for name in names}
+        return {name: value for name, value in given.items() if value is not None}
+
+
+def path_of_rows(path: FilePath, rows: PoseRows, asked: Pacing) -> Path:
+    """Return the tool motion of rows of poses of a file; see `read_path`.
+
+    Raises
+    ------
+    FileFormatError
+        A row cannot be used; the line or pose is named.
+    """
+    if len(rows.positions) < 2:
+        raise FileFormatError(f"{path}: has {len(rows.positions)} poses, expected at least two")
+    _check_rows(path, rows)
+    if asked.flip_normals:
+        rows = _flipped(path, rows)
+    rotations = _rotations(path, rows)
+    _check_jumps(path, rows, rotations, asked.jump)
+    rows, rotations = _without_stubs(rows, rotations, asked)
+    if asked.standoff:
+        rows = _stood_off(path, rows, rotations, asked.standoff)
+    turns = _quaternions(rotations) if rows.orientation else None
+    try:
+        _check_corners(asked)
+        if asked.along is not None:
+            made = _along(rows, rotations, asked)
+        elif asked.lead:
+            raise PathError("lead has no effect without along (x, -x, y, -y); drop it, or give it")
+        elif rows.straight:
+            made = _of_cut(rows, turns, asked)
+        else:
+            made = _of_table(path, rows, turns, asked)
+        is_ramped = asked.ramp is not None and asked.duration is None
+        found = section_at_rest(made, ramp=asked.ramp or 0.0) if is_ramped else made
+    # Splines refuse times that differ, but by less than they can divide by.
+    except (PathError, ValueError) as error:
+        raise FileFormatError(f"{path}: {error}") from error
+    turned = (TURN_NOTE,) if rows.orientation == "normal" else ()
+    return found.noted((*rows.notes, *made.notes, *turned))
+
+
+def _check_corners(asked: Pacing) -> None:
+    """Refuse what corners are not, and what has no effect on them."""
+    as_choice(asked.corners, "corners", ("blend", "stop", "round"), PathError)
+    stops = asked.corners == "stop"
+    if asked.corner_angle is not None and not stops:
+        raise PathError(
+            f"corner_angle has no effect where corners are '{asked.corners}', only where they are "
+            f"'stop'; drop one"
+        )
+    if asked.ramp is not None and asked.duration is not None and stops:
+        raise PathError(
+            "ramp has no effect on a duration where corners are 'stop', whose stretches rest at "
+            "their ends; drop one"
+        )
+
+
+def _of_table(file: FilePath, rows: PoseRows, turns: Array | None, asked: Pacing) -> Path:
+    """Return the tool motion of a table."""
+    feed, duration, bounds = asked.feed, asked.duration, asked.bounds
+    # The ramps are part of the duration, and go half as far as they last.
+    moving = None if duration is None else _moving(file, duration, asked)
+    in_place = asked.corners == "round" and moving is None
+    t = _times(file, rows, feed, moving, turns_in_place=in_place)
+    feeds = rows.feed if feed is None else np.full(len(rows.positions), feed)
+    if bounds and feeds is None:
+        raise PathError(f"{next(iter(bounds))} has no effect without a feed")
+    if asked.corners == "round":
+        if feeds is None:
+            raise PathError("corners are 'round', which needs a feed [m/s]; give it")
+        legs = Polyline(rows.positions, turns, tolerance=asked.tolerance)
+        steady = _steady(rows.positions, feeds, asked.tolerance)
+        return _at_feed(legs, legs.pose_times, steady, bounds)
+    return _noted(_through(t, rows, turns, feeds, asked), t, rows, asked)
+
+
+def _through(
+    t: Array, rows: PoseRows, turns: Array | None, feeds: Array | None, asked: Pacing
+) -> Path:
+    """Return a smooth path through poses."""
+    bend = _BEND if asked.corner_angle is None else asked.corner_angle
+    through = Waypoints(t, rows.positions, turns, corners=asked.corners, corner_angle=bend)
+    through.samples([0.0])
+    if feeds is None:
+        return through if asked.duration is None else _at_rest(through, asked)
+    pieces: list[Path] = []
+    passed = t - t[0]
+    for piece in through.between_corners():
+        # From one rest to the next.
+        here = (passed >= -_MOMENT) & (passed <= piece.duration + _MOMENT)
+        pieces.append(_at_feed(piece, passed[here], feeds[here], asked.bounds))
+        passed = passed - piece.duration
+    return pieces[0] if len(pieces) == 1 else Joined(pieces)
+
+
+def _moving(file: FilePath, duration: float, asked: Pacing) -> float:
+    """Return how long a path that is run up and down takes at its own speed [s]."""
+    ramp = 0.0 if asked.corners == "stop" else _ramp(asked)
+    if not 0.0 <= 2.0 * ramp <= duration:
+        raise FileFormatError(
+            f"{file}: ramp is {ramp:g} s, expected at most half of the duration, {duration:g} s"
+        )
+    return duration - ramp
+
+
+def _at_rest(path: Path, asked: Pacing) -> Path:
+    """Return a path of a duration run up from rest, and down again, unless it rests anyway."""
+    return path if asked.corners == "stop" else section_at_rest(path, ramp=_ramp(asked))
+
+
+def _ramp(asked: Pacing) -> float:
+    """Return how long a path of a duration takes to run up [s]."""
+    return min(_RAMP, 0.25 * (asked.duration or 0.0)) if asked.ramp is None else asked.ramp
+
+
+def _noted(path: Path, t: Array, rows: PoseRows, asked: Pacing) -> Path:
+    """Give a path a note where it leaves the straight lines between its poses."""
+    if asked.corners != "blend" or rows.t is not None:
+        return path
+    legs = np.diff(rows.positions, axis=0)
+    lengths = np.linalg.norm(legs, axis=1)
+    sound = (lengths[:-1] > 0.0) & (lengths[1:] > 0.0)
+    products = np.where(sound, lengths[:-1] * lengths[1:], 1.0)
+    cosines = np.where(sound, (legs[:-1] * legs[1:]).sum(axis=1) / products, 1.0)
+    if not (cosines < np.cos(_BEND)).any():
+        return path
+    curve = Waypoints(t, rows.positions, corners="blend")
+    shares = np.linspace(0.0, 1.0, _LOOKS + 2)[1:-1]
+    times = (t[:-1, None] + np.diff(t)[:, None] * shares - t[0]).ravel()
+    places = curve.samples(times).translation.reshape(len(legs), _LOOKS, 3)
+    places = places - rows.positions[:-1, None]
+    squares = np.where(lengths > 0.0, lengths**2, 1.0)
+    along = np.clip(np.einsum("klc,kc->kl", places, legs) / squares[:, None], 0.0, 1.0)
+    away = np.linalg.norm(places - along[:, :, None] * legs[:, None], axis=2).max(axis=1)
+    worst = int(away.argmax())
+    if away[worst] > asked.tolerance:
+        has_feed = rows.feed is not None or asked.feed is not None
+        remedy = (
+            f"corners round (--corners round) keeps {1e3 * asked.tolerance:g} mm"
+            if has_feed
+            else "give more poses, or corners stop (--corners stop)"
+        )
+        # Of the ends of that leg, the one where it bends more.
+        bends = np.concatenate([[1.0], cosines, [1.0]])[worst : worst + 2]
+        kink = worst + int(bends.argmin())
+        note = (
+            f"the path leaves the straight lines between poses by up to {1e3 * away[worst]:.1f} mm "
+            f"at {rows.places[kink]}: {remedy}"
+        )
+        return path.noted([note])
+    return path
+
+
+def _flipped(file: FilePath, rows: PoseRows) -> PoseRows:
+    """Return rows whose normals point the other way."""
+    if rows.orientation != "normal":
+        raise FileFormatError(
+            f"{file}: flip_normals has no effect: it has no columns nx,ny,nz; drop it"
+        )
+    return replace(rows, values=-rows.values)
+
+
+def _stood_off(file: FilePath, rows: PoseRows, rotations: Array, standoff: float) -> PoseRows:
+    """Return rows whose tip is held back along the tool's z axis."""
+    if not rows.orientation:
+        raise FileFormatError(
+            f"{file}: standoff is along the tool's z axis, which it does not say; add nx,ny,nz"
+        )
+    return replace(rows, positions=rows.positions - standoff * rotations[:, :, 2])
+
+
+def _of_cut(rows: PoseRows, turns: Array | None, asked: Pacing) -> Path:
+    """Return the straight legs of a cut or stroke, which rests where it goes back on itself."""
+    if asked.duration is not None:
+        raise PathError("straight legs go at a feed, so that duration has no effect; drop it")
+    feeds = rows.feed if asked.feed is None else np.full(len(rows.positions), asked.feed)
+    if feeds is None:
+        raise PathError("it says no feed (programs: F, FEDRAT); give a feed [m/s]")
+    still = np.tile([1.0, 0.0, 0.0, 0.0], (len(rows.positions), 1)) if turns is None else turns
+    rapid = np.zeros(len(feeds), dtype=bool) if rows.rapid is None else rows.rapid
+    changes = 1 + np.flatnonzero(np.diff(rapid[:-1]))
+    pieces: list[Path] = []
+    for first, last in pairwise([0, *changes.tolist(), len(rows.positions) - 1]):
+        is_rapid = bool(rapid[first])
+        part = slice(first, last + 1)
+        own = (
+            feeds[part] if is_rapid else _steady(rows.positions[part], feeds[part], asked.tolerance)
+        )
+        ends = first + _rests(rows.positions[part], still[part], asked)
+        for begin, end in pairwise(ends.tolist()):
+            leg = slice(begin, end + 1)
+            piece = Polyline(
+                rows.positions[leg],
+                None if turns is None else turns[leg],
+                tolerance=asked.tolerance,
+            )
+            at = own[begin - first : end + 1 - first]
+            if is_rapid:
+                pieces.append(Feed(piece, RAPID, required=False, **asked.bounds))
+            else:
+                pieces.append(_at_feed(piece, piece.pose_times, at, asked.bounds))
+    return pieces[0] if len(pieces) == 1 else Joined(pieces)
+
+
+class _Piece(NamedTuple):
+    """Places (K, 3), rotations there, feeds from each on, and whether no feed is asked for."""
+
+    places: Array
+    turns: Array
+    feeds: Array
+    is_free: bool
+
+
+def _along(rows: PoseRows, rotations: Array, asked: Pacing) -> Path:
+    """Return straight legs along which an axis of the tool points where it goes."""
+    along = as_choice(asked.along, "along", tuple(AXES), PathError)
+    if asked.corners == "blend":
+        raise PathError(
+            f"along = '{along}' turns the tool in corners: say corners stop (on the spot, at "
+            f"rest) or round (within the tolerance)"
+        )
+    count = len(rows.positions)
+    if rows.t is not None or asked.duration is not None:
+        raise PathError(f"along = '{along}' is for paths at a feed, without times or a duration")
+    if rows.feed is not None and asked.feed is not None and not rows.straight:
+        raise PathError("has a column feed, so that feed has no effect; drop one")
+    feeds = rows.feed if asked.feed is None else np.full(count, asked.feed)
+    if feeds is None:
+        raise PathError(f"along = '{along}' needs a feed [m/s]; give it")
+    axes = rotations[:, :, 2] if rows.orientation else np.tile([0.0, 0.0, -1.0], (count, 1))
+    rapid = np.zeros(count, dtype=bool) if rows.rapid is None else rows.rapid
+    bend = _BEND if asked.corner_angle is None else asked.corner_angle
+    found = stretches_along(rows.positions, axes, rapid, along, asked.lead, bend)
+    pieces: list[_Piece] = []
+    for number, (first, last, turns) in enumerate(found):
+        if number:
+            before = turning(found[number - 1].rotations[-1], turns[0])
+            spot = np.repeat(rows.positions[first : first + 1], len(before), axis=0)
+            pieces.append(_Piece(spot, np.array(before), np.full(len(before), feeds[first]), True))
+        part = slice(first, last + 1)
+        pieces.append(_Piece(rows.positions[part], turns, feeds[part], bool(rapid[first])))
+    if asked.corners == "round":
+        pieces = _run_together(pieces, [bool(rapid[item.first]) for item in found])
+    paths: list[Path] = []
+    for places, turns, own, is_free in pieces:
+        if not is_free or np.ptp(places, axis=0).max() > 0.0 or _is_turned(turns):
+            legs = Polyline(places, _quaternions(turns), tolerance=asked.tolerance)
+            if is_free:
+                paths.append(Feed(legs, RAPID, required=False, **asked.bounds))
+            else:
+                steady = _steady(places, own, asked.tolerance)
+                paths.append(_at_feed(legs, legs.pose_times, steady, asked.bounds))
+    return paths[0] if len(paths) == 1 else Joined(paths)
+
+
+def _is_turned(turns: Array) -> bool:
+    """Whether rotations differ by more than rounding."""
+    return bool(np.abs(turns - turns[0]).max() > _REPEATED)
+
+
+def _run_together(pieces: Sequence[_Piece], rapid: Sequence[bool]) -> list[_Piece]:
+    """Return pieces of which those at a feed, and turns between two of them, are one."""
+    found: list[_Piece] = []
+    for number, piece in enumerate(pieces):
+        # Turns stand between stretches.
+        beside = rapid[number // 2 : number // 2 + 1 + number % 2]
+        at_feed = not any(beside)
+        if found and at_feed and not found[-1].is_free:
+            last = found[-1]
+            pairs = (
+                (last.places, piece.places),
+                (last.turns, piece.turns),
+                (last.feeds, piece.feeds),
+            )
+            joined = [np.concatenate([one, other[1:]]) for one, other in pairs]
+            found[-1] = _Piece(joined[0], joined[1], joined[2], False)
+        else:
+            found.append(piece._replace(is_free=not at_feed))
+    return found
+
+
+def _rests(positions: Array, turns: Array, asked: Pacing) -> Ints:
+    """Return at which poses a tool rests: both ends, where it goes back on itself, or corners."""
+    kept = merged(positions, turns, asked.tolerance, _TURN_TOLERANCE).kept
+    legs = np.diff(positions[kept], axis=0)
+    lengths = np.linalg.norm(legs, axis=1)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        cosines = (legs[:-1] * legs[1:]).sum(axis=1) / (lengths[:-1] * lengths[1:])
+    least = _BACK - 1.0
+    if asked.corners == "stop":
+        least = np.cos(_BEND if asked.corner_angle is None else asked.corner_angle)
+    inner = kept[1 + np.flatnonzero(cosines < least)]
+    return np.array([0, *inner.tolist(), len(positions) - 1])
+
+
+def _steady(positions: Array, feeds: Array, tolerance: float) -> Array:
+    """Return feeds (N,) without those that hold for less way than the tolerance."""
+    found = feeds.copy()
+    steps = np.append(np.linalg.norm(np.diff(positions, axis=0), axis=1), 0.0)
+    edges = [0, *(1 + np.flatnonzero(np.diff(feeds[:-1]))).tolist(), len(feeds)]
+    before: float | None = None
+    for first, last in reversed(list(pairwise(edges))):
+        # A start that is as short goes at what follows it.
+        if before is not None and steps[first:last].sum() < tolerance:
+            found[first:last] = before
+        before = float(found[first])
+    return found
+
+
+def _without_stubs(rows: PoseRows, rotations: Array, asked: Pacing) -> tuple[PoseRows, Array]:
+    """Return rows without repeated ones and those of stubs, where the file says no times.
+
+    A stub is a step shorter than the tolerance, and than a twentieth of those beside it: a curve
+    through its ends would swing for it.
+    """
+    count = len(rows.positions)
+    if rows.t is not None or rows.straight or count < 3:
+        return rows, rotations
+    chosen = [0]
+    for k in range(1, count):
+        step = float(np.linalg.norm(rows.positions[k] - rows.positions[chosen[-1]]))
+        others = [
+            float(np.linalg.norm(rows.positions[b] - rows.positions[a]))
+            for a, b in ((k, k + 1), (chosen[-1] - 1, chosen[-1]))
+            if a >= 0 and b < count
+        ]
+        short = step <= _REPEATED or (step < asked.tolerance and step < _STUB * min(others))
+        cosine = 0.5 * (np.sum(rotations[k] * rotations[chosen[-1]]) - 1.0)
+        if not (short and np.arccos(np.clip(cosine, -1.0, 1.0)) <= _TURN_TOLERANCE):
+            chosen.append(k)
+        elif k == count - 1 and len(chosen) > 1:
+            # The end stays where it is.
+            chosen[-1] = k
+    if len(chosen) in (1, count):
+        return rows, rotations
+    return some_rows(rows, chosen), rotations[chosen]
+
+
+def _at_feed(path: Path, t: Array, feeds: Array, bounds: Mapping[str, Any]) -> Feed:
+    """Return a path at the feeds (N,) that begin at its times (N,); the last one has no way."""
+    changes = 1 + np.flatnonzero(np.diff(feeds[:-1]))
+    stretches = np.stack([t[changes], feeds[changes]], axis=1) if len(changes) else None
+    return Feed(path, float(feeds[0]), stretches=stretches, **bounds)
+
+
+def _check_rows(file: FilePath, rows: PoseRows) -> None:
+    parts = [("position", rows.positions), (rows.orientation, rows.values)]
+    if rows.t is not None:
+        parts.append(("time", rows.t[:, None]))
+    for what, values in parts:
+        flat = values.reshape(len(values), -1)
+        bad = np.flatnonzero(~np.all(np.isfinite(flat), axis=1))
+        if bad.size:
+            place = rows.places[int(bad[0])]
+            raise FileFormatError(f"{file}: {place}: the {what} is not finite; mend or drop it")
+    for what, values, bound, remedy in (
+        ("position", rows.positions, _FAR, f"metres; {_units(file, rows)}"),
+        ("angle", rows.values, TURN, "radians; say roll_deg,… or rx_deg,… if it is degrees"),
+    ):
+        if what == "angle" and rows.orientation not in ("rpy", "rotation_vector"):
+            continue
+        far = np.argwhere(np.abs(values) > bound)
+        if len(far):
+            row, column = far[0]
+            found = f"{what} {values[row, column]:.6g}"
+            raise FileFormatError(f"{file}: {rows.places[row]}: {found} is taken for {remedy}")
+    if rows.t is not None:
+        late = np.flatnonzero(np.diff(rows.t) <= 0.0)
+        if late.size:
+            row = int(late[0]) + 1
+            raise FileFormatError(
+                f"{file}: {rows.places[row]}: time {rows.t[row]:.6g} s does not come after "
+                f"{rows.t[row - 1]:.6g} s; times must increase"
+            )
+
+
+def _rotations(file: FilePath, rows: PoseRows) -> Array:
+    if not rows.orientation:
+        return np.tile(np.eye(3), (len(rows.positions), 1, 1))
+    _, rotation = ORIENTATIONS[rows.orientation]
+    found = list[Array]()
+    for k, (place, values) in enumerate(zip(rows.places, rows.values, strict=True)):
+        try:
+            again = k > 0 and np.array_equal(values, rows.values[k - 1])
+            found.append(found[-1] if again else rotation(values))
+        except (ValueError, PathError) as error:
+            raise FileFormatError(f"{file}: {place}: {error}") from error
+    return np.array(found)
+
+
+def _check_jumps(file: FilePath, rows: PoseRows, rotations: Array, jump: float) -> None:
+    steps = np.linalg.norm(np.diff(rows.positions, axis=0), axis=1)
+    if rows.rapid is not None:
+        # A rapid goes straight as far as the file says.
+        steps = np.where(rows.rapid[:-1], 0.0, steps)
+    cosines = np.einsum("kij,kij->k", rotations[:-1], rotations[1:])
+    turns = np.arccos(np.clip(0.5 * (cosines - 1.0), -1.0, 1.0))
+    if len(steps) == 1 and jump >= JUMP and file.suffix.lower() != DRAWING:
+        # Both ends of a seam: no pose between them is missing.
+        steps = np.zeros(1)
+    for what, amounts, bound, unit, remedy in (
+        ("jumps by", steps, jump, "m", _remedy(jump, _units(file, rows))),
+        ("turns by", turns, _FLIP, "rad", "which has no clear direction; add poses between"),
+    ):
+        far = np.flatnonzero(amounts > bound)
+        if far.size:
+            row = int(far[0]) + 1
+            raise FileFormatError(
+                f"{file}: {rows.places[row]}: the path {what} {amounts[row - 1]:.4g} {unit} from "
+                f"the pose before, {remedy}"
+            )
+
+
+def _remedy(jump: float, units: str) -> str:
+    return f"more than {jump:g} m; give a larger jump if it is meant, or {units}"
+
+
+def _units(file: FilePath, rows: PoseRows) -> str:
+    """Return what to do where lengths are in another unit than they are taken for."""
+    if file.suffix.lower() == DRAWING:
+        return "say in which unit it is drawn if $INSUNITS is wrong (unit = 'mm')"
+    if rows.straight:
+        return "mend the file's units (G20, UNITS/INCHES: inches; G21, UNITS/MM: mm)"
+    return "name the columns x_mm,y_mm,z_mm if they are millimetres"
+
+
+def _times(
+    file: FilePath,
+    rows: PoseRows,
+    feed: float | None,
+    duration: float | None,
+    *,
+    turns_in_place: bool,
+) -> Array:
+    given = {"feed": feed, "duration": duration}
+    named = [name for name, value in given.items() if value is not None]
+    columns = [name for name, own in (("t", rows.t), ("feed", rows.feed)) if own is not None]
+    if len(columns) > 1:
+        raise FileFormatError(f"{file}: has times and a column feed; keep one of them")
+    if columns and named:
+        what = "times" if rows.t is not None else "a column feed"
+        raise FileFormatError(f"{file}: has {what}, so that {named[0]} has no effect; drop one")
+    if rows.t is not None:
+        return rows.t
+    if rows.feed is not None:
+        bad = np.flatnonzero(~(rows.feed > 0.0) | ~np.isfinite(rows.feed))
+        if bad.size:
+            row = int(bad[0])
+            raise FileFormatError(
+                f"{file}: {rows.places[row]}: feed is {rows.feed[row]:.6g} m/s, expected a number "
+                f"above 0"
+            )
+    elif len(named) != 1:
+        raise FileFormatError(
+            f"{file}: has no times; give either a feed [m/s] or a duration [s]"
+            + (", not both" if named else "")
+        )
+    steps = np.linalg.norm(np.diff(rows.positions, axis=0), axis=1)
+    still = np.flatnonzero(steps == 0.0)
+    if still.size and not turns_in_place:
+        raise FileFormatError(
+            f"{file}: {rows.places[int(still[0]) + 1]}: the tool does not move from the pose "
+            f"before, which takes no time by feed or duration; give a column t, or a feed with "
+            f"corners round (--corners round), where the tool turns in place"
+        )
+    if rows.feed is not None:
+        return np.append(0.0, np.cumsum(steps / rows.feed[:-1]))
+    length = np.append(0.0, np.cumsum(steps))
+    return length / feed if feed is not None else length * (float(duration or 0.0) / length[-1])
+
+
+def _quaternions(rotations: Array) -> Array:
+    from scipy.spatial.transform import Rotation
+
+    return np.asarray(Rotation.from_matrix(rotations).as_quat(scalar_first=True))

@@ -1,0 +1,552 @@
+"""Tool motions from files: tables, arrays, lists of poses, programs of machine tools, drawings."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path as FilePath
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from selfmotion.basics import (
+    FileFormatError,
+    as_flag,
+    as_number,
+    as_path,
+    is_number,
+    read_values,
+    shown,
+)
+from selfmotion.model.path import Path
+from selfmotion.shop.cam.cldata import read_cldata
+from selfmotion.shop.cam.drawing import read_drawing
+from selfmotion.shop.cam.gcode import read_gcode
+from selfmotion.shop.cam.path_building import JUMP, Pacing, path_of_rows
+from selfmotion.shop.cam.path_rows import (
+    CLDATA,
+    DRAWING,
+    PROGRAMS,
+    READERS,
+    READING,
+    TABLES,
+    PoseRows,
+    Reading,
+    named,
+    no_such_seam,
+    rows_of_table,
+)
+from selfmotion.shop.cam.peers import compas_poses, peer_table
+
+# Poses as configurations of robots hold them: lists and names, of tables or matrices.
+
+# What lists of poses are called, and what parameters of ROS 2 nodes are in.
+_LISTS = ("poses", "waypoints", "points", "frames", "targets", "path")
+_PARAMETERS = "ros__parameters"
+# So many tables are around the poses at most.
+_DEEPEST = 5
+# Numbers in a list → what they are called; of quaternions the order is not known.
+_QUATERNIONS, _ANGLES = ("orientation", "quaternion", "quat"), ("rpy", "euler")
+_ORDERS = {
+    **dict.fromkeys(("position", "pos", "translation", "xyz"), ("x", "y", "z")),
+    **dict.fromkeys(_ANGLES, ("roll", "pitch", "yaw")),
+}
+_TABLES = ("position", "pos", "translation", *_QUATERNIONS, *_ANGLES)
+_WRITTEN = (".yaml", ".yml", ".json")
+# Keys that move nothing, and those that say where or how large poses are, which is not read.
+_NAMES = frozenset(
+    ("name", "label", "id", "index", "header", "stamp", "time_stamp", "frame_id", "child_frame_id")
+) | frozenset(("comment", "comments", "description", "note", "author", "date", "version"))
+_MOVING = re.compile(r"units?|scale|offset|origin|transform|base|tool|tcp|frame|relative")
+
+
+def read_poses(file: FilePath, reading: Reading) -> Mapping[str, PoseRows]:
+    """Return the poses of a message of ROS, or of a list or table of poses; see `read_path`.
+
+    Raises
+    ------
+    FileFormatError
+        The file cannot be read, holds no poses, or a pose lacks something; it is named.
+    """
+    document = read_values(file)
+    peers = compas_poses(file, document)
+    if peers is not None:
+        return peers
+    beside = dict[str, Any]()
+    found = _poses_in(document, beside)
+    if found is None:
+        return READERS[file.suffix.lower()](file, reading)
+    notes = _passed_over(file, "beside the poses", beside)
+    places, items = [place for place, _ in found], [item for _, item in found]
+    if all(_is_matrix(item) for item in items):
+        matrices = np.array([[[_number(file, place, value) for value in row] for row in item]
+                             for place, item in found])  # fmt: skip
+        rows = PoseRows(places, matrices[:, :3, 3], "rotation", matrices[:, :3, :3], None)
+        return {"": replace(rows, notes=notes)}
+    for place, item in found:
+        if not isinstance(item, Mapping):
+            raise FileFormatError(f"{file}: {place}: is a matrix among poses of another form")
+        inner = item.get("pose")
+        unread = [_unread(item), _unread(inner) if isinstance(inner, Mapping) else {}]
+        notes += _passed_over(
+            file, place, {key: item for each in unread for key, item in each.items()}
+        )
+    flat = [dict(_numbers_of(file, place, item)) for place, item in found]
+    for place, row in zip(places, flat, strict=True):
+        if set(row) != set(flat[0]):
+            odd = sorted(set(row) ^ set(flat[0]))[0]
+            raise FileFormatError(
+                f"{file}: {place}: '{odd}' is in some poses only, expected the same of all"
+            )
+    header = list(flat[0])
+    table = np.array([[row[name] for name in header] for row in flat])
+    rows = rows_of_table(file, header, table, places, {})
+    # What is passed over in each pose is told of the first one.
+    told = {note.partition(": ")[2]: note for note in reversed(notes)}
+    return {"": replace(rows, notes=(*rows.notes, *reversed(told.values())))}
+
+
+def _unread(item: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what of a pose is no number or list of one that is read."""
+    return {
+        key: value
+        for key, value in item.items()
+        if key != "pose"
+        and not isinstance(value, list)
+        and not is_number(value)
+        and not (isinstance(value, Mapping) and key in _TABLES)
+    }
+
+
+def _passed_over(file: FilePath, where: str, values: Mapping[str, Any]) -> tuple[str, ...]:
+    """Return a note of keys that are not read.
+
+    Raises
+    ------
+    FileFormatError
+        One of them says where or how large poses are.
+    """
+    for key, value in values.items():
+        if key not in _NAMES and _MOVING.search(str(key).lower()):
+            raise FileFormatError(
+                f"{file}: {where}: '{key}' is {shown(value)}, which may move the poses and is not "
+                f"read: write them in metres and in one frame (columns x_mm, …; --frame), and drop "
+                f"it"
+            )
+    others = [f"'{key}'" for key in values if key not in _NAMES]
+    return (f"{where}: passed over: {', '.join(others[:_LISTED])}",) if others else ()
+
+
+# So many keys that are passed over are named.
+_LISTED = 6
+
+
+READ: Mapping[str, Callable[[FilePath, Reading], Mapping[str, PoseRows]]] = dict.fromkeys(
+    _WRITTEN, read_poses
+)
+
+
+def _poses_in(document: Any, beside: dict[str, Any]) -> list[tuple[str, Any]] | None:
+    """Return poses by what they are called, None where they are messages or there are none.
+
+    What stands beside their list is put into `beside`.
+    """
+    inner, key = document, ""
+    for _ in range(_DEEPEST):
+        if not isinstance(inner, Mapping) or "header" in inner or _are_poses(inner.values()):
+            break
+        keys = [name for name in (_PARAMETERS, *_LISTS) if isinstance(inner.get(name), dict | list)]
+        keys = keys or (list(inner) if len(inner) == 1 else [])
+        if not keys:
+            break
+        beside |= {str(name): value for name, value in inner.items() if name != keys[0]}
+        key, inner = str(keys[0]), inner[keys[0]]
+    if isinstance(inner, Mapping) and _are_poses(inner.values()):
+        return [(f"'{name}'", item) for name, item in inner.items()]
+    is_message = key in ("", "poses") and isinstance(inner, list) and all(map(_is_of_ros, inner))
+    if isinstance(inner, list) and _are_poses(inner) and not is_message:
+        return [(f"{key}[{k}]", item) for k, item in enumerate(inner)]
+    return None
+
+
+def _are_poses(items: Any) -> bool:
+    several = list(items)
+    return bool(several) and all(_is_pose(item) for item in several)
+
+
+def _is_pose(item: Any) -> bool:
+    if not isinstance(item, Mapping):
+        return _is_matrix(item)
+    inner = item.get("pose", item)
+    has_place = isinstance(inner, Mapping) and bool({*_ORDERS, "x", "x_mm"} & set(inner))
+    return has_place and "poses" not in item
+
+
+def _is_of_ros(item: Any) -> bool:
+    """Whether an item is a Pose or PoseStamped, which messages have lists of."""
+    inner = item.get("pose", item) if isinstance(item, Mapping) else None
+    return isinstance(inner, Mapping) and isinstance(inner.get("position"), Mapping)
+
+
+def _is_matrix(item: Any) -> bool:
+    rows = item if isinstance(item, list) and len(item) == 4 else []
+    return bool(rows) and all(
+        isinstance(row, list) and len(row) == 4 and all(map(is_number, row)) for row in rows
+    )
+
+
+def _numbers_of(file: FilePath, place: str, item: Mapping[str, Any]) -> Iterator[tuple[str, float]]:
+    """Yield the numbers of a pose by what columns of a table are called.
+
+    Texts are passed over, and tables of anything else, such as joints, with a note; of two
+    orientations the quaternion is taken.
+    """
+    turned = any(key in item for key in _QUATERNIONS)
+    for key, value in item.items():
+        if key == "pose" and isinstance(value, Mapping):
+            yield from _numbers_of(file, place, value)
+        elif turned and key in _ANGLES:
+            continue
+        elif isinstance(value, Mapping):
+            stem = "" if key in _ANGLES else f"{key}."
+            for name, number in value.items() if key in _TABLES else ():
+                yield named(f"{stem}{name}"), _number(file, f"{place}: {key}.{name}", number)
+        elif isinstance(value, list):
+            yield from _listed(file, f"{place}: {key}", str(key), value)
+        elif is_number(value):
+            yield named(str(key)), _number(file, f"{place}: {key}", value)
+
+
+def _listed(
+    file: FilePath, where: str, key: str, value: Sequence[Any]
+) -> Iterator[tuple[str, float]]:
+    names = _ORDERS.get(key)
+    if names is None or len(value) != len(names):
+        raise FileFormatError(
+            f"{file}: {where} is a list of {len(value)}, whose order is not known; expected "
+            f"numbers by name, such as x, y, z and qw, qx, qy, qz, or lists of 3: position, rpy"
+        )
+    for name, number in zip(names, value, strict=True):
+        yield name, _number(file, f"{where}.{name}", number)
+
+
+def _number(file: FilePath, where: str, value: Any) -> float:
+    try:
+        if is_number(value):
+            return float(value)
+    except OverflowError:
+        pass
+    raise FileFormatError(f"{file}: {where} is {shown(value)}, expected a number")
+
+
+# Tool motions from files: tables, arrays, what ROS writes, programs of machine tools, drawings.
+
+
+def _read_table(file: FilePath, reading: Reading) -> Mapping[str, PoseRows]:
+    peers = None if reading.columns else peer_table(file)
+    return READERS[file.suffix.lower()](file, reading) if peers is None else peers
+
+
+_READERS: Mapping[str, Callable[[FilePath, Reading], Mapping[str, PoseRows]]] = {
+    **READERS,
+    **dict.fromkeys(TABLES, _read_table),
+    **READ,
+    **dict.fromkeys(PROGRAMS, read_gcode),
+    **dict.fromkeys(CLDATA, lambda file, reading: read_cldata(file, reading.unit)),
+}
+# Programs of robots, which are no paths.
+_CONTROLLERS = {
+    ".mod": "ABB",
+    ".prg": "ABB",
+    ".src": "KUKA",
+    ".dat": "KUKA",
+    ".script": "Universal Robots",
+    ".urscript": "Universal Robots",
+    ".ls": "Fanuc",
+    ".tp": "Fanuc",
+    ".jbi": "Yaskawa",
+    ".as": "Kawasaki",
+    ".pg": "Kawasaki",
+    ".pdl": "Comau",
+    ".pgx": "Stäubli",
+    ".urp": "Universal Robots",
+}
+# Of files that can be nothing but a path.
+PATH_SUFFIXES = (*TABLES, *PROGRAMS, *CLDATA, DRAWING)
+
+
+def read_path(
+    file: str | FilePath,
+    *,
+    feed: float | None = None,
+    duration: float | None = None,
+    jump: float = JUMP,
+    corners: str = "blend",
+    tolerance: float = 1e-3,
+    corner_angle: float | None = None,
+    turn_rate: float | None = None,
+    acceleration: float | None = None,
+    turn_acceleration: float | None = None,
+    smoothing: float | None = None,
+    within: float | None = None,
+    seam: str | None = None,
+    ramp: float | None = None,
+    flip_normals: bool = False,
+    standoff: float = 0.0,
+    along: str | None = None,
+    lead: float = 0.0,
+    columns: Sequence[str] | str | None = None,
+    rotary: str | None = None,
+    rotary_axes: Sequence[str] | str | None = None,
+    rotary_center: npt.ArrayLike | None = None,
+    unit: str | None = None,
+) -> Path:
+    """Read a tool motion through poses.
+
+    - ``.csv .txt .tsv``: columns in any order: ``t`` [s], ``x,y,z`` [m], and one of
+      ``qw,qx,qy,qz``, ``rx,ry,rz`` (rotation vector [rad]), ``roll,pitch,yaw`` [rad],
+      ``nx,ny,nz`` (the tool's z axis) or none; ``feed`` [m/s] from a pose on, instead of ``t``;
+      ``x_mm``, ``x_cm``, ``x_in``, ``feed_mm`` and ``roll_deg`` are in those units, as is ``X
+      [mm]``; ``pos_x``, ``pose.position.x``, ``px`` and ``tx`` are ``x``, and ``orientation.x`` and
+      ``quat_x`` are ``qx``; ``a,b,c`` are KUKA's, and ``x,y,z`` beside them in mm; ``seam`` names
+      the seam that a pose is of, ``event`` what happens there (``arc on; gas on``: both)
+    - ``.npy``: (N, 4, 4) poses, (N, 3) x,y,z or (N, 4) t,x,y,z; any other table
+      with `columns`, which say in which order quaternions are
+    - ``.yaml .json``: ROS ``nav_msgs/Path``, ``geometry_msgs/PoseArray``, or poses in a list or by
+      names (``waypoints``, ``poses``, parameters of a node): ``position`` and ``orientation``,
+      columns of a table by name, or 4 × 4 matrices
+    - tables of IRBCAM (arcs as well), igus (places only) and of motion primitives, frames of compas
+      and print points of compas_slicer, by their titles; what their numbers mean is in a note
+    - ``.nc .ngc .gcode .tap .cnc .eia .mpf .g .gc .gco``: G-code of up to five axes, below
+    - ``.apt .aptsource .cls .clsf .cl .ncl``: APT, cutter location data, below
+    - ``.dxf``: a drawing, below; with ``pip install 'selfmotion[dxf]'``
+
+    Of programs of machine tools, what goes at a feed is a cut, with the rapids along the tool's
+    axis to it and from it, at up to 100 mm/s; all other rapids part cuts, called ``cut 1``,
+    ``cut 2``, …. Legs are straight, their corners rounded within `tolerance`, and the tool rests
+    where it goes back on itself. Positions are those of the tip. The tool's z axis points into the
+    part, against the axis of the machine: down where the file has none. About it the tool turns as
+    little as may be.
+
+    - G-code: ``G0 G1 G2 G3 G17 G18 G19 G20 G21 G90 G91 G93 G94``, ``X Y Z`` in mm unless
+      ``G20``, ``F`` by the minute, of the tip along the part (``G93``: lines a minute); the tool's
+      axis by ``A B C``, Rz(C) Ry(B) Rx(A) z, after ``G43.4 G43.5`` or as `rotary` says, or by ``I J
+      K`` in lines. Arcs lie in the plane that is chosen, by offsets of their centre from the start
+      or ``R``, of their centre itself after ``G90.1``, ``P`` times round, as chords within 0.01 mm.
+      ``G73 G81 G82 G83 G85 G89`` drill holes along Z (``X Y Z R Q P``, ``G98 G99``), until ``G80``.
+      Without any ``Z`` it is 0. ``M2 M30`` end it, other ``M`` and ``G4`` are events;
+      ``G28 G30 G53`` go up as high as the tool has been, with a note; ``G9 G15
+      G40 G43 G49 G50.1 G61 G64 G67 G69``, one of ``G54`` to ``G59``, ``N O S T H D P Q``, ``%`` and
+      comments are passed over, with a note where ``S`` changes from cut to cut
+    - G-code of printers, where lines have ``E``: what extrudes is a cut, what does not a travel.
+      ``M82 M83 G92 E`` set what E means; ``retract`` and ``prime`` are events, as are commands,
+      but for those that move a zero (``M206``, ``SET_GCODE_OFFSET``, …), which are refused
+    - APT: ``GOTO FROM GODLTA GOHOME RAPID FEDRAT UNITS TLAXIS``, with ``i,j,k`` the tool's axis,
+      feeds by the minute (``MMPM``, ``IPM``). Arcs are ``CIRCLE/x,y,z,i,j,k,r`` or ``MOVARC``
+      before a ``GOTO``, right-handed about their axis, those of NX, which have 11 numbers,
+      left-handed; and ``INDIRV`` with ``TLON,GOFWD``, as CATIA writes them. ``CYCLE/DRILL``,
+      ``DEEP`` and ``BRKCHP`` drill a hole at each ``GOTO`` (``FEDTO RAPTO STEP``, …), until
+      ``CYCLE/OFF``. ``SPINDL COOLNT AUXFUN ARCON ARCOFF STOP OPSTOP DELAY`` are events; names,
+      texts, the cutter's shape and number (``LOADTL``, …) are passed over, and ``CUTCOM``,
+      ``INSERT`` and another tool with a note; ``FINI`` or ``END`` ends it. After another ``MSYS``
+      places are those of the first one; another ``OFSTNO`` or ``SETUP`` is refused. Lengths are in
+      mm where neither ``UNITS`` nor `unit` says otherwise; feeds in another unit are refused then
+
+    A hole is a cut of its own, straight down at the feed and out again, out and where it is drilled
+    already in rapids.
+
+    Any other word or statement is refused, by its line.
+
+    Of drawings, what is drawn in model space on one layer is joined end to end, where ends are
+    within 0.01 mm of each other and no third one is there. A stroke has the name of its layer,
+    with a number where the layer has several, and the direction of what was drawn first of it.
+    ``LINE ARC CIRCLE ELLIPSE SPLINE LWPOLYLINE POLYLINE`` and blocks of them are read, curves as
+    chords within 0.01 mm, which are followed as legs of a cut; texts, dimensions, hatches and
+    points are passed over with a note, and any other entity is refused by its handle, but not on
+    layers that are off or frozen, nor beside the layer of `seam`. The unit is `unit`, or
+    that of ``$INSUNITS``; none is refused. The tool's z axis points down, against that of the
+    drawing. A feed has to be given.
+
+    Parameters
+    ----------
+    file : path
+    feed : float, optional
+        Speed of the tool [m/s], from rest to rest, where the file has no times; see `Feed`.
+    duration : float, optional
+        Or the time of the whole motion [s], from rest to rest, at about constant speed in between.
+    jump : float
+        Distance from one pose to the next [m] that is refused.
+    corners : {"blend", "stop", "round"}
+        What to do in kinks: swing through the pose or rest in it as `Waypoints` do, or, with a
+        feed, pass it within `tolerance` between straight legs as a `Polyline` does.
+    tolerance : float
+        [m].
+    corner_angle : float, optional
+        As in `Waypoints`.
+    turn_rate, acceleration, turn_acceleration, smoothing, within : float, optional
+        Bounds of a feed, as in `Feed`.
+    seam : str, optional
+        Which of several seams, cuts or strokes of the file.
+    ramp : float, optional
+        In so long [s] it is run up from rest, and down again; see `section_at_rest`. Of a duration
+        it is a part: by default a quarter, at most 0.5 s.
+    flip_normals : bool
+        Whether ``nx,ny,nz`` point out of the part, as surface normals of CAD do.
+    standoff : float
+        How far the tool's tip is held back from the poses, along its z axis [m].
+    along : {"x", "-x", "y", "-y"}, optional
+        Which axis of the tool is along the path, as of a knife or a nozzle; its z axis is that of
+        the file, or points down. Legs are straight; in corners the tool turns on the spot (corners
+        "stop") or within `tolerance` ("round"), and in bends smaller than `corner_angle` on its
+        way.
+    lead : float
+        By how much its z axis leans towards where it goes then [rad]; below 0 it lags.
+    columns : sequence of str, optional
+        Names of the columns of a table or of an array, in place of a header or where there is none;
+        "-" leaves one out.
+    rotary : {"head", "table"}, optional
+        What ``A B C`` of G-code turn, where it does not say ``G43.4``: the head, positions being
+        those of the tip in the part, or a table with the part on it, positions being the machine's.
+    rotary_axes : str or sequence of str
+        A table's axes, from the machine to the part: ``"BC"`` for a C axis on a B axis, ``"AC"``,
+        or one. Positive words move the tool right-handed about the axis relative to the part (ISO
+        841); ``["B", "-C"]`` where a positive C turns the table right-handed. With ``rotary =
+        "head"`` the axes of a table under tool centre point control.
+    rotary_center : (3,)
+        A point on all of a table's axes, in the program's coordinates [m].
+    unit : {"mm", "cm", "dm", "m", "in", "ft"}, optional
+        Of a drawing or APT that says none, or another one than it is written in.
+
+    Raises
+    ------
+    FileFormatError
+        The file cannot be read, or a row cannot be used: not finite, a zero quaternion, times that
+        do not increase, a jump, other units. The line, pose or entity is named.
+    ProblemError
+        A drawing, and the package that reads them is not installed.
+    """
+    path = as_path(file)
+    asked = _pacing(
+        path,
+        {
+            "feed": feed,
+            "duration": duration,
+            "jump": jump,
+            "corners": corners,
+            "tolerance": tolerance,
+            "corner_angle": corner_angle,
+            "turn_rate": turn_rate,
+            "acceleration": acceleration,
+            "turn_acceleration": turn_acceleration,
+            "smoothing": smoothing,
+            "within": within,
+            "ramp": ramp,
+            "flip_normals": flip_normals,
+            "standoff": standoff,
+            "along": along,
+            "lead": lead,
+        },
+    )
+    reading = Reading.of(
+        path,
+        {
+            "columns": columns,
+            "rotary": rotary,
+            "rotary_axes": rotary_axes,
+            "rotary_center": rotary_center,
+            "unit": unit,
+        },
+    )
+    return path_of_rows(path, one_seam(path, seam, reading), asked)
+
+
+def read_seams(file: FilePath, options: Mapping[str, Any]) -> dict[str, tuple[Path, PoseRows]]:
+    """Read all seams or cuts of a file: name → its motion, and the rows that it is of.
+
+    Options are those of `read_path`.
+
+    Raises
+    ------
+    FileFormatError
+        As by `read_path`, or the file names no seams.
+    """
+    own = {key: options[key] for key in READING if key in options}
+    options = {key: value for key, value in options.items() if key not in own}
+    seams = _read(file, None, Reading.of(file, own))
+    if "" in seams:
+        raise FileFormatError(
+            f"{file}: has no column 'seam', expected one that names the seam of each row"
+        )
+    asked = _pacing(file, options)
+    return {name: (path_of_rows(file, rows, asked), rows) for name, rows in seams.items()}
+
+
+def _pacing(path: FilePath, options: Mapping[str, Any]) -> Pacing:
+    asked = Pacing(**options)
+    as_number(asked.jump, f"{path}: jump", above=0.0, error=FileFormatError)
+    as_number(asked.standoff, f"{path}: standoff", error=FileFormatError)
+    lean = as_number(asked.lead, f"{path}: lead", error=FileFormatError)
+    if not abs(lean) < 0.5 * np.pi:
+        raise FileFormatError(f"{path}: lead is {lean:g} rad, expected less than a quarter turn")
+    as_flag(asked.flip_normals, f"{path}: flip_normals", FileFormatError)
+    for name, value in (("feed", asked.feed), ("duration", asked.duration)):
+        if value is not None:
+            as_number(value, f"{path}: {name}", above=0.0, error=FileFormatError)
+    return asked
+
+
+def _read(path: FilePath, seam: str | None, reading: Reading) -> Mapping[str, PoseRows]:
+    """Return the rows of a file by the names of its seams, of a drawing those of one layer."""
+    suffix = path.suffix.lower()
+    if suffix == DRAWING:
+        return read_drawing(path, seam, reading.unit)
+    reader = _READERS.get(suffix)
+    if reader is None:
+        known = ", ".join((*_READERS, DRAWING))
+        if suffix in _CONTROLLERS:
+            raise FileFormatError(
+                f"{path}: is a program of a robot ({_CONTROLLERS[suffix]}): as a path it is not "
+                f"read. One that selfmotion wrote is judged by `selfmotion check`; of another one "
+                f"write its targets as a table (x_mm,y_mm,z_mm and qw,qx,qy,qz or "
+                f"roll_deg,pitch_deg,yaw_deg; feed_mm), or as G-code"
+            )
+        raise FileFormatError(f"{path}: has suffix '{path.suffix}', expected one of {known}")
+    return reader(path, reading)
+
+
+def events_of(file: FilePath, options: Mapping[str, Any]) -> tuple[str, ...]:
+    """Return what happens along a path of a file, each once; nothing of one that is refused."""
+    try:
+        rows = one_seam(file, options.get("seam"), Reading.of(file, options))
+        return tuple(dict.fromkeys(event for _, event in rows.events))
+    except FileFormatError:
+        return ()
+
+
+def has_normals(file: FilePath, options: Mapping[str, Any]) -> bool:
+    """Return whether a path of a file says the tool's axis by normals; of one refused, no."""
+    try:
+        rows = one_seam(file, options.get("seam"), Reading.of(file, options))
+    except FileFormatError:
+        return False
+    return rows.orientation == "normal"
+
+
+def one_seam(path: FilePath, seam: str | None, reading: Reading) -> PoseRows:
+    """Return the rows of one seam of a file."""
+    seams = _read(path, seam, reading)
+    if seam is None and len(seams) == 1:
+        return next(iter(seams.values()))
+    if seam is not None and seam in seams:
+        return seams[seam]
+    names = [name for name in seams if name]
+    if seam is None:
+        raise FileFormatError(
+            f"{path}: has {len(seams)} seams or cuts, {names[0]} to {names[-1]}: choose one by "
+            f"seam = '{names[0]}', or plan all of them as a job, with [seams] and this file"
+        )
+    if not names:
+        raise FileFormatError(f"{path}: names no seams, so that seam has no effect; drop it")
+    raise no_such_seam(path, seam, names)

@@ -1,0 +1,559 @@
+"""Rows of poses, as files of several kinds hold them."""
+
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path as FilePath
+from typing import Any
+
+import numpy as np
+
+from selfmotion.basics import (
+    LEFT_OUT,
+    TURN,
+    Array,
+    FileFormatError,
+    Flags,
+    ProblemError,
+    as_choice,
+    nearest,
+    read_arrays,
+    read_rows,
+    read_values,
+    shown,
+)
+from selfmotion.shop.cam.rotary import Rotary
+
+_POSITION = ("x", "y", "z")
+# Suffixes of tables, of an array and of G-code.
+TABLES = (".csv", ".txt", ".tsv")
+ARRAY = ".npy"
+PROGRAMS = (".nc", ".ngc", ".gcode", ".tap", ".cnc", ".eia", ".mpf", ".g", ".gc", ".gco")
+
+
+# Columns of an orientation → its key in `ORIENTATIONS`.
+_COLUMNS: Mapping[tuple[str, ...], str] = {
+    ("qw", "qx", "qy", "qz"): "quaternion",
+    ("rx", "ry", "rz"): "rotation_vector",
+    ("roll", "pitch", "yaw"): "rpy",
+    ("nx", "ny", "nz"): "normal",
+}
+
+
+_TURN = ("rx", "ry", "rz")
+_TURN_NOTE = "rx,ry,rz are read as a rotation vector: the axis of a turn, as long as its angle"
+# Half a turn that is written with few digits is more than that by such a share.
+_HALF_TURN = 2e-4
+
+
+# What a table without a header may be, by the number of its columns.
+_HEADERS = {
+    3: "x,y,z",
+    4: "t,x,y,z",
+    6: "x,y,z,nx,ny,nz",
+    7: "x,y,z,qw,qx,qy,qz",
+    8: "t,x,y,z,qw,qx,qy,qz",
+}
+# What the columns of an array are where nothing else is said.
+_ARRAYS = {3: ("x", "y", "z"), 4: ("t", "x", "y", "z")}
+# Units in brackets behind a title → what its name ends in; other names of columns.
+_BRACKETS = {"mm": "_mm", "mm/s": "_mm", "deg": "_deg", "°": "_deg", "degrees": "_deg"}
+_BRACKETS |= {"cm": "_cm", "cm/s": "_cm", "in": "_in", "inch": "_in", "in/s": "_in"}
+_BRACKETS |= dict.fromkeys(("m", "rad", "s", "m/s", "sec", "-", "1"), "")
+_ALSO = {"time": "t", "timestamp": "t"}
+# What other programs call x or qx: pose.position.x, pos_x, px, tx; orientation.x, quat_x.
+_PLACES = re.compile(r"(?:[a-z]+[._])*(?:position|pos|translation)[._]([xyz])|[pt]([xyz])")
+_TURNS = re.compile(r"(?:[a-z]+[._])*(?:orientation|quaternion|quat|q)[._]([wxyz])")
+# The first word of a program.
+_CODE = re.compile(r"[gmn][0-9]+|%")
+_TITLE = re.compile(r"([^\[(]*?)[\s_]*[\[(]([^\])]*)[\])]")
+# Columns of texts: which seam a row is of, and what happens at it.
+SEAM, EVENT = "seam", "event"
+_KNOWN = {"t", "feed", *_POSITION, *(name for names in _COLUMNS for name in names)}
+
+
+# What makers of controllers call orientations → what they are here.
+_MAKERS = {
+    **dict.fromkeys("abc", "A,B,C of KUKA are yaw_deg,pitch_deg,roll_deg here"),
+    **dict.fromkeys(("w", "p", "r"), "W,P,R of Fanuc are roll_deg,pitch_deg,yaw_deg here"),
+    **dict.fromkeys(("q1", "q2", "q3", "q4"), "q1,q2,q3,q4 of ABB are qw,qx,qy,qz here"),
+}
+
+
+# A frame of KUKA's: what its columns are called here. No arm reaches so many metres.
+_KUKA = {"a": "yaw_deg", "b": "pitch_deg", "c": "roll_deg", "x": "x_mm", "y": "y_mm", "z": "z_mm"}
+_KUKA_NOTE = (
+    "columns A,B,C are read as KUKA's: angles about z, y and x in turn in degrees, x,y,z in mm "
+    "where they say no unit"
+)
+_METRES = 10.0
+
+
+# Names that are long enough to be taken for one another.
+_LONG = ("feed", "roll", "pitch", "yaw")
+
+
+_UNITS = {
+    "_mm": ((*_POSITION, "feed"), 1e-3),
+    "_cm": ((*_POSITION, "feed"), 1e-2),
+    "_in": ((*_POSITION, "feed"), 25.4e-3),
+    "_deg": (("rx", "ry", "rz", "roll", "pitch", "yaw"), None),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class PoseRows:
+    """Poses as a file has them, and what to call each of them.
+
+    Attributes
+    ----------
+    places : sequence of str
+        "line 7", "poses[6]", …
+    positions : (N, 3)
+    orientation : str
+        Key in `ORIENTATIONS`; "" for none.
+    values : (N, …)
+        Numbers of the orientations.
+    t : (N,) or None
+    feed : (N,) or None
+        From each pose on [m/s].
+    events : tuple of (int, str)
+        At which pose what happens.
+    straight : bool
+        Whether the tool goes straight from pose to pose.
+    one_way : bool
+        Whether it is meant in its own direction only, as cuts of a machine are.
+    notes : tuple of str
+        What to know of how the file was read.
+    rapid : (N,) or None
+        Whether the tool goes on from each pose as fast as it may, whatever the feed; None for
+        nowhere.
+    """
+
+    places: Sequence[str]
+    positions: Array
+    orientation: str
+    values: Array
+    t: Array | None
+    feed: Array | None = None
+    events: tuple[tuple[int, str], ...] = ()
+    straight: bool = False
+    one_way: bool = False
+    notes: tuple[str, ...] = ()
+    rapid: Flags | None = None
+
+
+# Options of `read_path` that say what a file means.
+READING = ("columns", "rotary", "rotary_axes", "rotary_center", "unit")
+# Metres of the units that a drawing or a file of cutter locations may be said to be in.
+LENGTH_UNITS = {"mm": 1e-3, "cm": 1e-2, "dm": 0.1, "m": 1.0, "in": 25.4e-3, "ft": 0.3048}
+DRAWING = ".dxf"
+# Suffixes of files of cutter locations: of APT, CATIA, NX and Creo.
+CLDATA = (".apt", ".aptsource", ".cls", ".clsf", ".cl", ".ncl")
+
+
+@dataclass(frozen=True)
+class Reading:
+    """What a file does not say itself; see `read_path`.
+
+    Attributes
+    ----------
+    columns : tuple of str or None
+        Of a table.
+    rotary : Rotary or None
+        Of a program of a machine: what its rotary words turn.
+    unit : str or None
+        Of a drawing or of cutter locations, whatever the file says itself.
+    """
+
+    columns: tuple[str, ...] | None = None
+    rotary: Rotary | None = None
+    unit: str | None = None
+
+    @classmethod
+    def of(cls, file: FilePath, options: Mapping[str, Any]) -> "Reading":
+        """Return what options say; others are passed over.
+
+        Raises
+        ------
+        FileFormatError
+            One is of the wrong kind, or of another kind of file.
+        """
+        try:
+            rotary = Rotary.of(options)
+        except (ValueError, ProblemError) as error:
+            raise FileFormatError(f"{file}: {error}") from error
+        if rotary is not None and file.suffix.lower() not in PROGRAMS:
+            raise FileFormatError(f"{file}: rotary has no effect: it is no G-code; drop it")
+        unit, columns = options.get("unit"), options.get("columns")
+        if unit is not None:
+            as_choice(unit, f"{file}: unit", tuple(LENGTH_UNITS), FileFormatError)
+            if file.suffix.lower() not in (DRAWING, *CLDATA):
+                raise FileFormatError(
+                    f"{file}: unit has no effect: it is neither a drawing nor APT; drop it"
+                )
+        if columns is None:
+            return cls(None, rotary, unit)
+        if isinstance(columns, str):
+            columns = columns.split(",")
+        if not isinstance(columns, list | tuple) or not all(isinstance(x, str) for x in columns):
+            raise FileFormatError(f"{file}: columns is {shown(columns)}, expected names")
+        if file.suffix.lower() not in (*TABLES, ARRAY):
+            raise FileFormatError(f"{file}: columns has no effect: it is no table; drop it")
+        return cls(tuple(name.strip() for name in columns))
+
+
+# So many names of seams are listed.
+_LISTED = 5
+
+
+def no_such_seam(file: FilePath, seam: str, names: Sequence[str]) -> FileFormatError:
+    """Return an error that says which seams a file has, those of a like name if there are any."""
+    listed = ", ".join(repr(name) for name in names[:_LISTED])
+    more = f" and {len(names) - _LISTED} more" if len(names) > _LISTED else ""
+    return FileFormatError(
+        f"{file}: has no seam '{seam}'{nearest(seam, names) or f'; it has {listed}{more}'}"
+    )
+
+
+def read_tables(file: FilePath, reading: Reading | None = None) -> dict[str, PoseRows]:
+    """Return the rows of a table by the names in its column ``seam``, "" where it has none."""
+    header, table, lines, texts = read_rows(
+        file,
+        (SEAM, EVENT),
+        check=lambda names: [_meant(file, name) for name in _of_kuka(names)],
+        columns=None if reading is None else reading.columns,
+        named=named,
+        usual=_HEADERS,
+    )
+    whole = rows_of_table(file, header, table, [f"line {number}" for number in lines], texts)
+    if SEAM not in texts:
+        return {"": whole}
+    if not lines:
+        raise FileFormatError(f"{file}: has 0 poses, expected at least two")
+    names = texts[SEAM]
+    blank = next((line for line, name in zip(lines, names, strict=True) if not name), None)
+    if blank is not None:
+        raise FileFormatError(f"{file}: line {blank}: names no seam")
+    return {name: some_rows(whole, [k for k, other in enumerate(names) if other == name])
+            for name in dict.fromkeys(names)}  # fmt: skip
+
+
+def some_rows(rows: PoseRows, chosen: Sequence[int]) -> PoseRows:
+    """Return some of the rows."""
+    new = {old: k for k, old in enumerate(chosen)}
+    return PoseRows(
+        [rows.places[k] for k in chosen],
+        rows.positions[chosen],
+        rows.orientation,
+        rows.values[chosen],
+        None if rows.t is None else rows.t[chosen],
+        None if rows.feed is None else rows.feed[chosen],
+        tuple((new[k], event) for k, event in rows.events if k in new),
+        rows.straight,
+        rows.one_way,
+        rows.notes,
+        None if rows.rapid is None else rows.rapid[chosen],
+    )
+
+
+def rows_of_table(
+    file: FilePath,
+    header: Sequence[str],
+    table: Array,
+    places: Sequence[str],
+    texts: Mapping[str, Sequence[str]],
+) -> PoseRows:
+    """Return rows of poses of the columns of numbers of a table, and of its texts."""
+    notes: tuple[str, ...] = ()
+    if (titles := _of_kuka(header)) != list(header):
+        _check_millimetres(file, header, table)
+        header, notes = titles, (_KUKA_NOTE,)
+    columns = _columns(file, header, table)
+    events = texts.get(EVENT, [""] * len(places))
+    missing = [name for name in _POSITION if name not in columns]
+    if missing:
+        raise FileFormatError(
+            f"{file}: column '{missing[0]}' is missing; the header is "
+            f"{','.join((*header, *texts))}, expected x,y,z [m] (or x_mm,…), t [s], and an "
+            f"orientation"
+        )
+    given = [names for names in _COLUMNS if set(names) & set(columns)]
+    if len(given) > 1:
+        raise FileFormatError(
+            f"{file}: has columns {','.join(given[0])} and {','.join(given[1])}; keep one "
+            f"orientation"
+        )
+    values = np.zeros((len(table), 0))
+    for names in given:
+        lacking = [name for name in names if name not in columns]
+        if lacking:
+            raise FileFormatError(
+                f"{file}: column '{lacking[0]}' is missing, expected {','.join(names)}"
+            )
+        values = np.stack([columns[name] for name in names], axis=1)
+    if given == [_TURN]:
+        unit = "_deg" if any(named(title) == "rx_deg" for title in header) else ""
+        angles = ",".join(f"{name}{unit}" for name in ("roll", "pitch", "yaw"))
+        _check_turns(file, values, places, angles)
+        notes += (f"{_TURN_NOTE}; angles about fixed axes are called {angles}",)
+    return PoseRows(
+        places,
+        np.stack([columns[name] for name in _POSITION], axis=1),
+        _COLUMNS[given[0]] if given else "",
+        values,
+        columns.get("t"),
+        columns.get("feed"),
+        tuple((k, event) for k, text in enumerate(events) for event in _several(text)),
+        notes=notes,
+    )
+
+
+def _of_kuka(titles: Sequence[str]) -> list[str]:
+    """Return titles as they are called here where A, B and C are among them, as KUKA has them."""
+    given = [named(title) for title in titles]
+    return [_KUKA.get(name, name) for name in given] if {"a", "b", "c"} <= set(given) else [*titles]
+
+
+def _check_millimetres(file: FilePath, titles: Sequence[str], table: Array) -> None:
+    """Refuse places beside A, B, C that say no unit and are as small as metres would be."""
+    bare = [k for k, title in enumerate(titles) if named(title) in _POSITION]
+    if bare and len(table) and np.abs(table[:, bare]).max() < _METRES:
+        raise FileFormatError(
+            f"{file}: A,B,C are KUKA's, whose x,y,z are in mm, and all of these are below "
+            f"{_METRES:g}: call them x_mm,y_mm,z_mm; of metres call A,B,C "
+            f"yaw_deg,pitch_deg,roll_deg"
+        )
+
+
+def _check_turns(file: FilePath, turns: Array, places: Sequence[str], angles: str) -> None:
+    """Refuse rotation vectors (K, 3) [rad] of more than half a turn, which angles look like."""
+    sizes = np.linalg.norm(turns, axis=1)
+    # Degrees that are taken for radians are told as such later on.
+    over = (sizes > (1.0 + _HALF_TURN) * np.pi) & (np.abs(turns).max(axis=1) <= TURN)
+    if over.any():
+        k = int(np.argmax(over))
+        raise FileFormatError(
+            f"{file}: {places[k]}: rx,ry,rz is an axis times an angle of "
+            f"{np.degrees(sizes[k]):.7g}°, more than half a turn; are these angles about fixed "
+            f"axes? Call them {angles}; of a rotation vector take the shorter turn, the other way "
+            f"round"
+        )
+
+
+def named(title: str) -> str:
+    """Return a title as its column is called here: x_mm of "X [mm]"."""
+    name = title.strip().lower()
+    found = _TITLE.fullmatch(name)
+    if found and found[2].strip() in _BRACKETS:
+        name = found[1] + _BRACKETS[found[2].strip()]
+    stem, unit = name, ""
+    for suffix in _UNITS:
+        if name.endswith(suffix):
+            stem, unit = name.removesuffix(suffix), suffix
+    if place := _PLACES.fullmatch(stem):
+        stem = place[1] or place[2]
+    elif turn := _TURNS.fullmatch(stem):
+        stem = f"q{turn[1]}"
+    return _ALSO.get(stem, stem) + unit
+
+
+def _several(text: str) -> list[str]:
+    """Return the events of a row, with semicolons between them."""
+    return [event.strip() for event in text.split(";") if event.strip()]
+
+
+def _columns(file: FilePath, header: Sequence[str], table: Array) -> dict[str, Array]:
+    """Return the columns in SI units, by their names without unit."""
+    columns: dict[str, Array] = {}
+    for k, title in enumerate(header):
+        name, scale = _meant(file, title)
+        if name in columns:
+            raise FileFormatError(f"{file}: column '{name}' appears twice, in two units")
+        columns[name] = scale * table[:, k]
+    return columns
+
+
+def _meant(file: FilePath, title: str) -> tuple[str, float]:
+    """Return the name of a column without its unit, and that in SI units."""
+    title = named(title)
+    name, scale = title, 1.0
+    for suffix, (names, factor) in _UNITS.items():
+        if title.endswith(suffix) and title.removesuffix(suffix) in names:
+            name, scale = title.removesuffix(suffix), factor or np.pi / 180.0
+    if name in ("i", "j", "k"):
+        raise FileFormatError(
+            f"{file}: column '{name}': of machines i,j,k points out of the part; nx,ny,nz is the "
+            f"tool's z axis here, into the part: call them nx,ny,nz, and say flip_normals where "
+            f"they point out"
+        )
+    if _CODE.match(title):
+        raise FileFormatError(
+            f"{file}: unknown column '{title}': if this is G-code, call the file .nc or .gcode"
+        )
+    if name in _MAKERS:
+        raise FileFormatError(f"{file}: unknown column '{title}': {_MAKERS[name]}")
+    if name not in _KNOWN:
+        raise FileFormatError(
+            f"{file}: unknown column '{title}'{nearest(title, (*_LONG, SEAM, EVENT))}, expected t, "
+            f"feed, seam, event, x,y,z and {' or '.join(','.join(names) for names in _COLUMNS)}; "
+            f"to leave a column out, call it - in columns (--columns -,x,y,z)"
+        )
+    return name, scale
+
+
+def _read_array(file: FilePath, reading: Reading) -> PoseRows:
+    (array,) = read_arrays(file).values()
+    if array.dtype.kind not in "iuf":
+        raise FileFormatError(f"{file}: holds no array of numbers")
+    places = [f"row {k}" for k in range(1, 1 + (len(array) if array.ndim else 0))]
+    if array.ndim == 3 and array.shape[1:] == (4, 4):
+        return PoseRows(places, array[:, :3, 3] * 1.0, "rotation", array[:, :3, :3] * 1.0, None)
+    if array.ndim != 2:
+        raise FileFormatError(
+            f"{file}: has shape {array.shape}, expected (N, 4, 4) poses, or a table (N, C)"
+        )
+    columns = reading.columns or _ARRAYS.get(array.shape[1])
+    if columns is None and array.shape[1] in (7, 8):
+        before = "t," * (array.shape[1] == 8)
+        raise FileFormatError(
+            f"{file}: has shape {array.shape}, which does not say in which order quaternions are; "
+            f"give columns ('{before}x,y,z,qw,qx,qy,qz' or '{before}x,y,z,qx,qy,qz,qw')"
+        )
+    if columns is None or len(columns) != array.shape[1]:
+        named = "no columns" if columns is None else f"{len(columns)} columns"
+        raise FileFormatError(
+            f"{file}: has shape {array.shape} and {named} are named, expected (N, 4, 4) poses, "
+            f"(N, 3) x,y,z, (N, 4) t,x,y,z, or a name in columns for each"
+        )
+    kept = [k for k, name in enumerate(columns) if name != LEFT_OUT]
+    numbers = array[:, kept] * 1.0
+    return rows_of_table(file, [columns[k] for k in kept], numbers, places, {})
+
+
+# What a list of messages may be called.
+_LISTS = ("paths", "rasters", "pose_arrays")
+
+
+def _read_ros(file: FilePath) -> dict[str, PoseRows]:
+    """Return the poses of a message, or of each of several ones (rasters) as a seam."""
+    document = read_values(file)
+    # Rasters of rasters are one list of strokes, and so are jobs of them.
+    messages = list(_messages(document if isinstance(document, list) else [document]))
+    if not messages:
+        raise FileFormatError(
+            f"{file}: holds no message with poses, expected a nav_msgs/Path or "
+            f"geometry_msgs/PoseArray, or a list of these"
+        )
+    notes = _frames(file, messages)
+    if len(messages) == 1:
+        return {"": replace(_of_message(file, messages[0], ""), notes=notes)}
+    return {
+        f"seam {number}": replace(_of_message(file, message, f"[{number - 1}]."), notes=notes)
+        for number, message in enumerate(messages, 1)
+    }
+
+
+def _frames(file: FilePath, messages: Sequence[Any]) -> tuple[str, ...]:
+    """Return a note of the frame that messages name, which is not looked up.
+
+    Raises
+    ------
+    FileFormatError
+        Poses are in different frames: where these are to each other is not known.
+    """
+    frames: dict[str, None] = {}
+    for message in messages:
+        poses = message.get("poses") if isinstance(message, Mapping) else None
+        for item in (message, *(poses if isinstance(poses, list) else ())):
+            header = item.get("header") if isinstance(item, Mapping) else None
+            name = header.get("frame_id") if isinstance(header, Mapping) else None
+            # An empty one is that of the message.
+            if isinstance(name, str) and name.strip("/ "):
+                frames.setdefault(name.strip("/ "))
+    if len(frames) > 1:
+        first, second, *_ = frames
+        raise FileFormatError(
+            f"{file}: has poses in frame '{first}' and in '{second}', expected one: transform them "
+            f"into the same, whose place is told by a frame (--frame)"
+        )
+    return tuple(
+        f"ROS: poses in metres in frame '{name}', which is taken for the root of the arm, or for "
+        f"what frame (--frame) says"
+        for name in frames
+    )
+
+
+def _messages(items: Sequence[Any]) -> Iterator[Any]:
+    for item in items:
+        keys = _LISTS if isinstance(item, Mapping) else ()
+        listed = next((item[key] for key in keys if isinstance(item.get(key), list)), None)
+        if listed is not None:
+            yield from _messages(listed)
+        elif isinstance(item, list) and item and not _is_pose(item[0]):
+            yield from _messages(item)
+        else:
+            yield {"poses": item} if isinstance(item, list) else item
+
+
+def _is_pose(item: Any) -> bool:
+    return isinstance(item, Mapping) and ("position" in item or "pose" in item)
+
+
+def _of_message(file: FilePath, message: Any, where: str) -> PoseRows:
+    poses = message.get("poses") if isinstance(message, Mapping) else None
+    if not isinstance(poses, list) or not poses:
+        raise FileFormatError(
+            f"{file}: {where and f'{where[:-1]} '}has no list of poses, expected a nav_msgs/Path "
+            f"or geometry_msgs/PoseArray, or poses in a list or by names (waypoints), each with "
+            f"position and orientation or x, y, z"
+        )
+    places = [f"{where}poses[{k}]" for k in range(len(poses))]
+    rows = [_ros_pose(file, place, pose) for place, pose in zip(places, poses, strict=True)]
+    stamps = [_stamp(file, place, pose) for place, pose in zip(places, poses, strict=True)]
+    # Publishers that know no times leave all stamps at the same one.
+    t = None if len(set(stamps)) == 1 else np.array(stamps, dtype=np.float64) - (stamps[0] or 0.0)
+    table = np.array(rows)
+    return PoseRows(places, table[:, :3], "quaternion", table[:, 3:], t)
+
+
+def _ros_pose(file: FilePath, place: str, given: Any) -> list[float]:
+    pose = given.get("pose", given) if isinstance(given, Mapping) else given
+    found = []
+    for part, keys in (("position", "xyz"), ("orientation", "wxyz")):
+        for key in keys:
+            try:
+                found.append(float(pose[part][key]))
+            except (KeyError, OverflowError, TypeError, ValueError):
+                raise FileFormatError(
+                    f"{file}: {place}: {part}.{key} is missing or no number"
+                ) from None
+    return found
+
+
+def _stamp(file: FilePath, place: str, given: Mapping[str, Any]) -> float | None:
+    header = given.get("header")
+    if header is None:
+        return None
+    try:
+        return 1e-9 * nanoseconds(header["stamp"])
+    except (KeyError, OverflowError, TypeError, ValueError):
+        raise FileFormatError(
+            f"{file}: {place}: header.stamp is incomplete, expected sec and nanosec (ROS 1: secs "
+            f"and nsecs)"
+        ) from None
+
+
+READERS: Mapping[str, Callable[[FilePath, Reading], Mapping[str, PoseRows]]] = {
+    **dict.fromkeys(TABLES, read_tables),
+    ARRAY: lambda file, reading: {"": _read_array(file, reading)},
+    ".yaml": lambda file, _: _read_ros(file),
+    ".yml": lambda file, _: _read_ros(file),
+    ".json": lambda file, _: _read_ros(file),
+}
+
+
+def nanoseconds(stamp: Mapping[str, Any]) -> int:
+    """Return a time of ROS 2, or of ROS 1, whose names differ [ns]; KeyError for what is none."""
+    seconds, rest = ("secs", "nsecs") if "secs" in stamp else ("sec", "nanosec")
+    return int(stamp[seconds]) * 1_000_000_000 + int(stamp[rest])

@@ -1,0 +1,60 @@
+"""Joint motions for controllers and simulators, written, read back and judged."""
+
+from selfmotion.shop.controllers.controller_program import (
+    ControllerProgram as ControllerProgram,
+    check_controller as check_controller,
+    check_signals as check_signals,
+)
+from selfmotion.shop.controllers.judged_programs import (
+    PROGRAMS as PROGRAMS,
+    READ_PROGRAMS as READ_PROGRAMS,
+    as_shifted as as_shifted,
+    judged_motion as judged_motion,
+    judged_program as judged_program,
+    judged_ways as judged_ways,
+    keeps_stated as keeps_stated,
+    misswitched as misswitched,
+    of_the_controller as of_the_controller,
+    part_of as part_of,
+    program_miss as program_miss,
+    read_program as read_program,
+    shift_told as shift_told,
+    stated_deviation as stated_deviation,
+    unlike as unlike,
+)
+from selfmotion.shop.controllers.motion_tables import (
+    followers as followers,
+    without_followers as without_followers,
+)
+from selfmotion.shop.controllers.motions import (
+    FORMS as FORMS,
+    MESSAGES as MESSAGES,
+    READABLE as READABLE,
+    SUFFIXES as SUFFIXES,
+    motion_of_program as motion_of_program,
+    read_motion as read_motion,
+    read_parts as read_parts,
+    write_motion as write_motion,
+    write_parts as write_parts,
+)
+from selfmotion.shop.controllers.program_facts import (
+    held_in_words as held_in_words,
+)
+from selfmotion.shop.controllers.program_settings import (
+    ProgramSettings as ProgramSettings,
+    read_program_settings as read_program_settings,
+)
+from selfmotion.shop.controllers.samples import (
+    LinearMiss as LinearMiss,
+    coarsest_rate as coarsest_rate,
+    linear_miss as linear_miss,
+    moving_ends as moving_ends,
+    within_limits_at as within_limits_at,
+)
+from selfmotion.shop.controllers.thinning import (
+    by_targets as by_targets,
+    what_lines_keep as what_lines_keep,
+)
+from selfmotion.shop.controllers.tool_frames import (
+    turned_base as turned_base,
+)

@@ -1,0 +1,352 @@
+"""Tool poses with the speed between them, and how far along its path a tool is."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+from math import ceil
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from selfmotion.basics import Array, FileFormatError
+from selfmotion.model.motion import Trajectory
+from selfmotion.model.path import Path, times_when
+from selfmotion.shop.controllers.steps import put_on_arcs, step_lengths
+from selfmotion.shop.controllers.stretches import Knots, PoseStretch, finer, straight
+from selfmotion.shop.controllers.tool_frames import ToolFrames
+
+# How far a tool has gone along its path, as a function of time, and back.
+
+# Speeds are looked at so often between two samples, and so often in all at least.
+_BETWEEN, _FEWEST = 4, 1600
+
+
+@dataclass(frozen=True, eq=False)
+class PassedLength:
+    """The length that a tool has passed, at times.
+
+    Attributes
+    ----------
+    t : (K,)
+        Times [s].
+    length : (K,)
+        How far it has gone since the first [m].
+    speed : (K,)
+        How fast it is [m/s].
+    """
+
+    t: Array
+    length: Array
+    speed: Array
+
+    @classmethod
+    def of_motion(
+        cls, frames: ToolFrames, motion: Trajectory, first: float, last: float
+    ) -> "PassedLength":
+        """Return that of a joint motion, in the work object, from one time to another [s]."""
+
+        def speeds(times: Array) -> Array:
+            at = np.clip(times, motion.t[0], motion.t[-1])
+            return frames.speeds(motion(at), motion(at, 1))
+
+        return cls._integrated(speeds, motion.t, first, last)
+
+    @classmethod
+    def of_path(cls, path: Path, first: float, last: float) -> "PassedLength":
+        """Return that of a path, in its own frame."""
+
+        def speeds(times: Array) -> Array:
+            twist = path.samples(np.clip(times, 0.0, path.duration)).twist
+            return np.asarray(np.linalg.norm(twist[:, :3], axis=1))
+
+        return cls._integrated(speeds, path.marks, first, last)
+
+    @classmethod
+    def _integrated(
+        cls, speeds: Callable[[Array], Array], marks: Array, first: float, last: float
+    ) -> "PassedLength":
+        """Return the integral of a speed by Simpson's rule."""
+        inside = marks[(marks > first) & (marks < last)]
+        marks = np.concatenate([[first], inside, [last]])
+        count = _BETWEEN * (len(marks) - 1) + 1
+        t = np.interp(np.linspace(0, len(marks) - 1, count), np.arange(len(marks)), marks)
+        t = np.union1d(t, np.linspace(first, last, _FEWEST))
+        # Two that rounding puts beside each other are one.
+        t = t[np.append(np.diff(t) > 1e-9 * (last - first), True)]
+        here, middle = speeds(t), speeds(0.5 * (t[1:] + t[:-1]))
+        steps = np.diff(t) * (here[:-1] + 4.0 * middle + here[1:]) / 6.0
+        return cls(t, np.append(0.0, np.cumsum(steps)), here)
+
+    @property
+    def whole(self) -> float:
+        """How far it goes in all [m]."""
+        return float(self.length[-1])
+
+    def at(self, times: Array) -> Array:
+        """Return how far it has gone at times (K,) [m]."""
+        found: Array = self._spline(np.clip(times, self.t[0], self.t[-1]))
+        return np.clip(found, 0.0, self.whole)
+
+    def when(self, lengths: Array) -> Array:
+        """Return when it has gone as far as lengths (K,) [s]; at both ends the first and last."""
+        k = np.clip(np.searchsorted(self.length, lengths) - 1, 0, len(self.t) - 2)
+        found = times_when(self._spline, lengths, self.t[k], self.t[k + 1])
+        found = np.where(lengths <= 0.0, self.t[0], found)
+        return np.asarray(np.where(lengths >= self.whole, self.t[-1], found))
+
+    @cached_property
+    def _spline(self) -> Any:
+        from scipy.interpolate import CubicHermiteSpline
+
+        return CubicHermiteSpline(self.t, self.length, self.speed)
+
+
+# Tool poses with the speed between them in place of times: what a shop touches up.
+#
+# A controller goes along each straight or circular step at its speed, rounds corners within its
+# zone, and runs up and down by its own acceleration. So a stretch is compared with a motion where
+# the tool has gone as far, not at equal times. Where times are needed, ramps that are even and as
+# long as the planned time leaves stand for those of the controller.
+
+# Corners are rounded within this of a target at most [m]: ABB's z0, and as much in the others.
+ZONE = 3e-4
+# Times of a ramp that are looked at; of a whole stretch at least, and of a step.
+_OF_RAMP, _LOOKS, _OF_STEP = 24, 3200, 16
+# A path that goes less is at rest [m]; speeds are the same up to this share, which digits take.
+_LEAST, _SAME = 1e-6, 1e-4
+
+
+class Ramps(NamedTuple):
+    """An even run-up and an even run-down: a law of time that stands for the controller's.
+
+    Attributes
+    ----------
+    whole : float
+        How long it takes without them [s].
+    seconds : float
+        How long with them [s].
+    """
+
+    whole: float
+    seconds: float
+
+    @property
+    def each(self) -> float:
+        """How long each of them takes [s]."""
+        return min(self.seconds - self.whole, 0.5 * self.seconds)
+
+    def passed(self, times: Array) -> Array:
+        """Return which times without ramps are reached at times (K,) with ramps [s]."""
+        ramp, top = self.each, self.whole / (self.seconds - self.each)
+        begin, end = np.clip(times, 0.0, ramp), np.clip(self.seconds - times, 0.0, ramp)
+        found = top * (times - 0.5 * ramp)
+        found = np.where(times < ramp, 0.5 * top * begin**2 / ramp, found)
+        last = self.whole - 0.5 * top * end**2 / ramp
+        return np.asarray(np.where(times > self.seconds - ramp, last, found))
+
+    def times(self, passed: Array) -> Array:
+        """Return when times without ramps (K,) are reached with ramps [s]."""
+        ramp, top = self.each, self.whole / (self.seconds - self.each)
+        ways = passed, self.whole - passed
+        up, down = (np.sqrt(2.0 * ramp * np.maximum(x, 0.0) / top) for x in ways)
+        found = np.where(up < ramp, up, passed / top + 0.5 * ramp)
+        return np.asarray(np.where(down < ramp, self.seconds - down, found))
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class FeedStretch(PoseStretch):
+    """A motion from rest to rest by tool poses and speeds.
+
+    `t` is when targets would be reached without ramps.
+
+    Attributes
+    ----------
+    speeds : (K,)
+        Of each step [m/s].
+    vias : (K, 3)
+        Through where a circular step goes [m]; no numbers where it is straight.
+    seconds : float
+        How long it was planned to take [s].
+    is_spline : bool
+        Whether a program says that it goes smoothly through its targets, not straight between them.
+    """
+
+    speeds: Array
+    vias: Array
+    seconds: float
+    is_spline: bool = False
+
+    @property
+    def duration(self) -> float:
+        """See `Stretch.duration`."""
+        return self.seconds
+
+    @property
+    def ramps(self) -> Ramps:
+        """How it runs up and down where times are needed."""
+        return Ramps(float(self.t[-1]), self.seconds)
+
+    @cached_property
+    def middles(self) -> PoseStretch:
+        """The middles of its steps as targets: via poses of those that go round, (K,)."""
+        t = 0.5 * (self.t[1:] + self.t[:-1])
+        rows = self._stepped(t)
+        q = self._joints(rows, t)[:, self.order]
+        places = np.where(np.isfinite(self.vias), self.vias, rows[:, :3])
+        return PoseStretch(
+            self.name,
+            t,
+            q,
+            places=places,
+            turns=rows[:, 3:7],
+            frames=self.frames,
+            near=self.near,
+            order=self.order,
+        )
+
+    def goes_round(self, target: int) -> bool:
+        """Whether the step to a target, from 1 on, goes round."""
+        return bool(np.isfinite(self.vias[target - 1, 0]))
+
+    @cached_property
+    def lengths(self) -> Array:
+        """How far the tool has gone at each target, (K + 1,) [m]."""
+        return np.append(0.0, np.cumsum(step_lengths(self.places, self.vias)))
+
+    def looked_at(self) -> Array:
+        """See `Stretch.looked_at`: steps may be as long as the stretch."""
+        count = max(_OF_STEP, ceil(_LOOKS / (len(self.t) - 1)))
+        return finer(self.t, np.linspace(0.0, 1.0, count, endpoint=False))
+
+    def ways(self, times: Array) -> list[Array]:
+        """See `Stretch.ways`: its steps, with corners rounded in their zones, a smooth curve."""
+        return [self._joints(way(times), times)[:, self.order] for way in self._ways]
+
+    @property
+    def _ways(self) -> list[Callable[[Array], Array]]:
+        """Times → rows of poses by each way in which a controller may go, the stated one first."""
+        found: list[Callable[[Array], Array]] = [self._stepped]
+        if len(self.t) > 2:
+            found.append(self._rounded)
+            if not np.isfinite(self.vias).any():
+                found.append(self._spline)
+        return found[::-1] if self.is_spline else found
+
+    def smooth(self) -> tuple[Array, Array, Array]:
+        """See `Stretch.smooth`: with its ramps."""
+        times = self.ramps.times(self.looked_at())
+        ends = np.linspace(0.0, self.ramps.each, _OF_RAMP)
+        times = np.unique(np.concatenate([times, ends, self.seconds - ends]))
+        times = times[np.append(np.diff(times) > 1e-9, True)]
+        times[-1] = self.seconds
+        return next(self._driven(times, self.ramps.passed(times)))
+
+    def joined(self) -> Iterator[Knots]:
+        """See `Stretch.joined`: with its ramps."""
+        times = self.smooth()[0]
+        return self._driven(times, self.ramps.passed(times))
+
+    def matched(self, motion: Trajectory, first: float) -> Array:
+        """See `Stretch.matched`: where the tool has gone as far."""
+        gone = PassedLength.of_motion(self.frames, motion, first, first + self.seconds)
+        return motion(np.clip(gone.when(self._shares * gone.whole), motion.t[0], motion.t[-1]))
+
+    def at_pace(self, gone: PassedLength) -> Iterator[Knots]:
+        """Return what `joined` does, at the pace at which something else has gone as far."""
+        own = np.interp(gone.at(gone.t) * (self.lengths[-1] / gone.whole), self.lengths, self.t)
+        return self._driven(gone.t - gone.t[0], own)
+
+    def along(self, path: Path, first: float) -> Iterator[Knots]:
+        """Return what `joined` does, at the pace of a path that it begins at `first` [s].
+
+        Raises
+        ------
+        FileFormatError
+            A speed is not that of the path.
+        """
+        gone = PassedLength.of_path(path, first, first + self.seconds)
+        if gone.whole < _LEAST:
+            raise FileFormatError(
+                f"'{self.name}' moves where the path rests: the program is of another one"
+            )
+        ends = gone.when(self.lengths * (gone.whole / self.lengths[-1]))
+        for k, (begin, end) in enumerate(pairwise(ends.tolist())):
+            self._check_speed(path, gone, float(self.speeds[k]), (begin, end))
+        return self.at_pace(gone)
+
+    def _check_speed(
+        self, path: Path, gone: PassedLength, speed: float, during: tuple[float, float]
+    ) -> None:
+        """Refuse a speed that is faster than all of the path, or none of the feeds it asks for."""
+        here = (gone.t >= during[0]) & (gone.t <= during[1])
+        fastest, slowest = float(gone.speed[here].max(initial=0.0)), 0.0
+        at = 0.5 * sum(during)
+        # Where less of a step than this is at another feed, its zone is.
+        least = min(ZONE, 0.4 * float(np.ptp(gone.at(np.array(during)))))
+        asked = [
+            (feed, *np.clip(window, *during))
+            for feed in path.feeds
+            for window in feed.during
+            if np.ptp(gone.at(np.clip(window, *during))) > least
+        ]
+        for feed, first, last in asked:
+            fastest, slowest = feed.asked, (1.0 - feed.within) * feed.asked
+            if not slowest <= speed <= (1.0 + _SAME) * fastest:
+                at = 0.5 * (first + last)
+                break
+        if not slowest <= speed <= (1.0 + _SAME) * fastest:
+            raise FileFormatError(
+                f"'{self.name}' is at {1e3 * speed:.5g} mm/s near t = {at:.4g} s, its path at "
+                f"{1e3 * fastest:.5g} mm/s: nothing has judged that speed; plan anew with it as "
+                f"the feed"
+            )
+
+    @property
+    def _shares(self) -> Array:
+        """How far the tool has gone where it is looked at, of the whole."""
+        return np.asarray(self._gone(self.looked_at()) / self.lengths[-1])
+
+    def _driven(self, times: Array, own: Array) -> Iterator[Knots]:
+        from scipy.interpolate import CubicSpline
+
+        for way in self._ways:
+            q = rates = self._joints(way(own), own)[:, self.order]
+            if np.isfinite(q).all():
+                rates = CubicSpline(times, q, bc_type="clamped")(times, 1)
+                rates[[0, -1]] = 0.0
+            yield Knots(times, q, rates)
+
+    def _stepped(self, times: Array) -> Array:
+        rows = straight(times, self.t, self._rows())
+        put_on_arcs(rows, times, self.t, self.places, self.vias)
+        return rows
+
+    def _rounded(self, times: Array) -> Array:
+        """Return rows at times where corners are cut as far from their targets as zones reach."""
+        reach = np.minimum(0.5 * np.diff(self.lengths), ZONE)
+        cuts = [self.lengths[1:-1] - reach[:-1], self.lengths[1:-1] + reach[1:]]
+        edges, gone = np.sort(np.concatenate(cuts)), self._gone(times)
+        # Between two cuts of one target it goes straight, else as it does.
+        rows = self._stepped(times)
+        inside = np.searchsorted(edges, gone) % 2 == 1
+        if inside.any():
+            at_edges = self._stepped(np.interp(edges, self.lengths, self.t))
+            rows[inside] = straight(gone[inside], edges, at_edges)
+        return rows
+
+    def _gone(self, times: Array) -> Array:
+        """Return how far the tool has gone at times [m]: its way is the same at all speeds."""
+        return np.interp(times, self.t, self.lengths)
+
+    def _spline(self, times: Array) -> Array:
+        from scipy.interpolate import CubicSpline
+
+        rows: Array = CubicSpline(self.lengths, self._rows())(self._gone(times))
+        rows[:, 3:7] /= np.linalg.norm(rows[:, 3:7], axis=1, keepdims=True)
+        return rows
+
+
+def times_at(places: Array, vias: Array, speeds: Array | Sequence[float]) -> Array:
+    """Return when targets are reached at speeds (K,) without ramps, (K + 1,) [s]."""
+    return np.append(0.0, np.cumsum(step_lengths(places, vias) / np.asarray(speeds)))

@@ -1,0 +1,647 @@
+"""Programs of controllers as files, cut into the steps of their job, and judged."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+from itertools import combinations, pairwise
+from pathlib import Path as FilePath
+from tempfile import TemporaryDirectory
+from typing import NamedTuple
+
+import numpy as np
+
+from selfmotion.basics import (
+    Array,
+    FileFormatError,
+    ProblemError,
+    Progress,
+    RobotError,
+    silent,
+)
+from selfmotion.certificate import Certificate, Tolerance
+from selfmotion.model.motion import Trajectory
+from selfmotion.model.path import Placed
+from selfmotion.model.robot import RobotModel
+from selfmotion.model.task import log3
+from selfmotion.planning.result import Move, Parts, Piece, Plan, elsewhere, gaps
+from selfmotion.problem.constraints import Constraint
+from selfmotion.problem.problem import Problem
+from selfmotion.shop.controllers.controller_program import (
+    ControllerProgram,
+    Draft,
+    Joints,
+    Switch,
+    constraints_of,
+    drafted,
+)
+from selfmotion.shop.controllers.krl import KrlReader, write_krl
+from selfmotion.shop.controllers.program_facts import check_load
+from selfmotion.shop.controllers.program_lines import ProgramReader
+from selfmotion.shop.controllers.program_settings import ProgramSettings
+from selfmotion.shop.controllers.program_texts import plain
+from selfmotion.shop.controllers.rapid import RapidReader, write_rapid
+from selfmotion.shop.controllers.stretches import Misses, PoseStretch, Stretch
+from selfmotion.shop.controllers.thinning import what_lines_keep, what_targets_keep
+from selfmotion.shop.controllers.tool_frames import WORLD, carrier_in_reference
+from selfmotion.shop.controllers.urscript import UrscriptReader, write_urscript
+from selfmotion.work.job import Program, are_opposite
+
+# Programs of controllers as files: which suffix is which language.
+
+_WRITERS: Mapping[str, Callable[[FilePath, Draft], None]] = {
+    "krl": write_krl,
+    "rapid": write_rapid,
+    "urscript": write_urscript,
+}
+_READERS: Mapping[str, type[ProgramReader]] = {
+    ".src": KrlReader,
+    ".mod": RapidReader,
+    ".script": UrscriptReader,
+}
+# Suffixes of programs of targets; those that are read as such, which linear URScript is as well.
+PROGRAMS = {".src": "krl", ".mod": "rapid"}
+READ_PROGRAMS = tuple(_READERS)
+
+
+def write_program(
+    plan: Plan | Parts | Move | Program,
+    file: FilePath,
+    form: str,
+    settings: ProgramSettings,
+    progress: Progress = silent,
+) -> None:
+    """Write a motion as a program of a controller; see `write_motion`.
+
+    Poses are written where the file, read again, keeps what it states: else joint targets, of free
+    moves first.
+    """
+    verdict = plan.certificate.verdict if isinstance(plan, Plan) else plan.verdict
+    given = plan, file.stem, form, settings, verdict, progress
+    draft = drafted(*given)
+    for moves_only in (True, False):
+        if draft.frames is None:
+            break
+        why = _lost(plan, file, form, draft)
+        if not why:
+            break
+        draft = drafted(*given, Joints(moves_only, why))
+    _WRITERS[form](file, draft)
+
+
+def _lost(plan: Plan | Parts | Move | Program, file: FilePath, form: str, draft: Draft) -> str:
+    """Return why a program of poses, read again, is not the motion, in words; empty where it is."""
+    with TemporaryDirectory() as folder:
+        trial = FilePath(folder) / file.name
+        _WRITERS[form](trial, draft)
+        try:
+            _, stated, found = program_miss(plan, trial)
+        except FileFormatError as error:
+            return f"read again, {str(error).removeprefix(f'{trial}: ')}"
+    if keeps_stated(found, stated):
+        return ""
+    return "read again, poses leave the motion: the arm is singular, or nearly so"
+
+
+def keeps_stated(found: Misses, stated: Misses) -> bool:
+    """Whether a program is no farther off its motion than it states, in the digits of files."""
+    pairs = zip((*found.path, *found.moves), (*stated.path, *stated.moves), strict=True)
+    return all(one <= other + 1e-9 for one, other in pairs)
+
+
+def read_program(file: FilePath, robot: RobotModel | None = None) -> ControllerProgram:
+    """Read a program of a controller, by its suffix; tool poses by the robot that moves to them.
+
+    Raises
+    ------
+    FileFormatError
+        The file cannot be read, or says what is not read; the line is named.
+    """
+    return _READERS[file.suffix.lower()](file, robot).program()
+
+
+def program_miss(
+    plan: Plan | Parts | Move | Program, file: FilePath, read: ControllerProgram | None = None
+) -> tuple[int, Misses, Misses]:
+    """Return what a program file holds: targets, the deviations it states, and what it is.
+
+    The file is read unless it was `read` before.
+
+    Raises
+    ------
+    FileFormatError
+        The file cannot be read, or is of another motion.
+    """
+    found = read or read_program(file, plan.robot)
+    try:
+        return found.targets, found.miss, found.miss_of(plan)
+    except FileFormatError as error:
+        raise FileFormatError(f"{file}: {error}") from error
+
+
+# A controller's program cut into the steps of its job, and slow motions in between judged.
+
+
+class JudgedStep(NamedTuple):
+    """What a certificate says of the targets of a seam or move.
+
+    Attributes
+    ----------
+    name : str
+    verified : bool
+    verdict : str
+    """
+
+    name: str
+    verified: bool
+    verdict: str
+
+
+class ProgramParts(NamedTuple):
+    """What of a program each step of its job is.
+
+    Attributes
+    ----------
+    motions : list of list of Trajectory
+        Of each step, by each way in which a controller may join its targets; of a seam at the pace
+        of its path.
+    slow : sequence of (int, list of Trajectory)
+        Slow motions to where a shifted program goes on: before which step, and what.
+    by_poses : list of bool
+        Whether a step has targets that are poses, or rests.
+    """
+
+    motions: list[list[Trajectory]]
+    slow: Sequence[tuple[int, list[Trajectory]]]
+    by_poses: list[bool]
+
+
+def parts_of(file: FilePath, program: ControllerProgram, job: Program) -> ProgramParts:
+    """Return what of a program each step of its job is.
+
+    Raises
+    ------
+    FileFormatError
+        It is of another job.
+    """
+    names = job.robot.joint_names
+    known = [axis.joint for axis in program.axes]
+    if sorted(known) != sorted(names):
+        raise FileFormatError(f"{file}: has joints {', '.join(known)}, expected {', '.join(names)}")
+    left, found = list(program.stretches), ProgramParts([], slow := [], [])
+
+    def part(stretches: Sequence[Stretch]) -> ControllerProgram:
+        return replace(program, stretches=tuple(stretches))
+
+    for number, step in enumerate(job.steps):
+        taken, seconds = [], 0.0
+        while left and left[0].is_slow:
+            own = part([left.pop(0)])
+            slow.append((number, [motion.of_joints(names) for motion in own.motions()]))
+        while left and seconds < step.motion.duration - _MOMENT:
+            taken.append(left.pop(0))
+            seconds += taken[-1].duration
+        if abs(seconds - step.motion.duration) > _MOMENT:
+            raise FileFormatError(
+                f"{file}: its targets of '{step.name}' take {seconds:.6g} s, the job's "
+                f"{step.motion.duration:.6g} s: it is of another one"
+            )
+        own, made = part(taken), step.made
+        path = None if isinstance(made, Move) else made.problem.path
+        found.motions.append([motion.of_joints(names) for motion in own.motions(path)])
+        # Where the arm rests, it is where the poses around have it.
+        moving = [item for item in taken if not item.is_rest]
+        posed = not moving or any(isinstance(item, PoseStretch) for item in moving)
+        found.by_poses.append(posed)
+    if left:
+        raise FileFormatError(f"{file}: goes on with '{left[0].name}' when the job has ended")
+    return found
+
+
+def slow_steps(
+    parts: ProgramParts, job: Program
+) -> tuple[tuple[JudgedStep, ...], Mapping[int, Sequence[Piece]]]:
+    """Return what is found of slow motions, and these by the step that they are before.
+
+    Each has to keep what the nearest free move has to.
+    """
+    moves = [(k, step.made) for k, step in enumerate(job.steps) if isinstance(step.made, Move)]
+    steps, pieces = list[JudgedStep](), dict[int, list[Piece]]()
+    for number, motions in parts.slow:
+        name = f"slowly to '{job.steps[number].name}'"
+        pieces.setdefault(number, []).append(Piece(name, motions[0]))
+        if not moves:
+            steps.append(JudgedStep(name, False, "not verified: the job has no free moves"))
+            continue
+        _, near = min(moves, key=lambda move: abs(move[0] - number))
+        steps.append(_judged_move(name, near, motions, what_targets_keep))
+    return tuple(steps), pieces
+
+
+# Programs of controllers, judged by what they were made from.
+
+# Files have so many digits of time [s], and of angles [rad].
+_MOMENT, _LEAST = 1e-4, 1e-6
+# Where a program begins and ends is written to so many digits [rad or m], by poses to fewer; what
+# it switches is switched at a target, as near to its time [s].
+_DIGITS, _OF_POSES, _PROMPT = 1e-6, 1e-5, 1e-3
+# A slow motion of a shifted program ends as near as this to where the shift takes it [m].
+_EXPLAINED = 1e-3
+# Times as near as this are one [s].
+_INSTANT = 1e-9
+
+
+def stated_deviation(program: ControllerProgram) -> Tolerance | None:
+    """Return how far off its path a program of a controller says it is; None where it does not."""
+    if program.within is not None:
+        return program.within
+    miss = program.miss.path
+    sound = np.isfinite([miss.position, miss.rotation]).all() and miss.position > 0.0
+    return Tolerance(miss.position, max(miss.rotation, _LEAST)) if sound else None
+
+
+class JudgedProgram(NamedTuple):
+    """What is known of a controller's program, by the job that it is of.
+
+    Attributes
+    ----------
+    steps : tuple of JudgedStep
+    failures : tuple of str
+        What speaks against the whole: its ends, its order, its outputs, the job itself.
+    within : Tolerance or None
+        What seams may miss their paths by, where that is not the job's own.
+    shifted : str
+        By how much the work object was shifted, in words; empty for not at all.
+    unjudged : str
+        What of a program that is verified is the controller's own, in words.
+    """
+
+    steps: tuple[JudgedStep, ...]
+    failures: tuple[str, ...]
+    within: Tolerance | None = None
+    shifted: str = ""
+    unjudged: str = ""
+
+    @property
+    def verified(self) -> bool:
+        """Whether each step is, and nothing speaks against the whole."""
+        return all(step.verified for step in self.steps) and not self.failures
+
+    @property
+    def verdict(self) -> str:
+        """One line: verified, or how many steps are not, and what speaks against the whole."""
+        if self.verified:
+            own = f"; {self.unjudged}" if self.unjudged else ""
+            return f"verified: each step, and the whole{self._allowed}{self._told}{own}"
+        count = sum(not step.verified for step in self.steps)
+        told = [*([f"{count} of {len(self.steps)} steps"] if count else []), *self.failures]
+        return f"not verified: {'; '.join(told)}{self._told}"
+
+    @property
+    def _told(self) -> str:
+        return f"; {self.shifted}" if self.shifted else ""
+
+    @property
+    def _allowed(self) -> str:
+        if self.within is None:
+            return ""
+        return (
+            f"; seams within {1e3 * self.within.position:.3g} mm and {self.within.rotation:.2g} "
+            f"rad of their paths"
+        )
+
+
+def _judged_move(
+    name: str,
+    made: Move,
+    motions: Sequence[Trajectory],
+    kept: Callable[[Sequence[Constraint]], tuple[Constraint, ...]],
+) -> JudgedStep:
+    """Return what is found of a move by each way in which it may be made: the first that fails."""
+    asked, lines = kept(made.constraints), what_lines_keep(kept(made.constraints))
+    ways = [Move(made.robot, lines if k else asked, motion) for k, motion in enumerate(motions)]
+    worst = next((move for move in ways if not move.verified), ways[0])
+    way = "" if worst is ways[0] else _STRAIGHT
+    return JudgedStep(name, worst.verified, f"{worst.verdict}{way}")
+
+
+def judged_ways(
+    motions: Sequence[Trajectory],
+    judge: Callable[[Trajectory], Certificate],
+    judge_lines: Callable[[Trajectory], Certificate] | None = None,
+) -> tuple[Certificate, Trajectory]:
+    """Return the worst certificate of what a controller may make of targets, and its motion.
+
+    The first motion is smooth, the others go straight (`what_lines_keep`).
+
+    That is the first which is not verified; else the one with the largest error of the path.
+    """
+    worst: tuple[Certificate, Trajectory] | None = None
+    for number, motion in enumerate(motions):
+        found = (judge if judge_lines is None or not number else judge_lines)(motion)
+        if not found.verified:
+            said = (*found.failures[:-1], f"{found.failures[-1]}{_STRAIGHT if number else ''}")
+            return replace(found, failures=said), motion
+        if worst is None or found.position_error.value > worst[0].position_error.value:
+            worst = found, motion
+    if worst is None:
+        raise ProblemError("there is no motion to judge")
+    return worst
+
+
+# Said of a motion that is not smooth through its targets.
+_STRAIGHT = " (where the controller goes straight between targets, or rounds their corners)"
+
+
+def judged_program(file: FilePath, job: Program, within: Tolerance | None = None) -> JudgedProgram:
+    """Judge a controller's program by the job that it is of: each step, and the whole.
+
+    Seams by all that their plans had to keep, at the deviation that the file states; moves by all
+    of theirs. Accelerations are the controller's, and not judged. The whole has to begin and end
+    where the job does, and to switch what its events say, when they say it: an output or a comment
+    for each, the same for each event of one name, and nothing else. Where the work object was
+    shifted, seams have to be on their paths shifted with it, and the whole begins and ends
+    elsewhere; slow motions to where it goes on have to keep what the move beside them has to.
+
+    Raises
+    ------
+    FileFormatError
+        The file cannot be read, or is of another job.
+    """
+    program = read_program(file, job.robot)
+    allowed = within or stated_deviation(program)
+    parts = parts_of(file, program, job)
+    steps, pieces = _judged_steps(job, parts.motions, allowed, what_targets_keep, program)
+    slow, between = slow_steps(parts, job)
+    pieces = [piece for k, own in enumerate(pieces) for piece in (*between.get(k, ()), own)]
+    # From axis targets to poses there are digits of both, which the arm's kinematics may magnify.
+    digits = _OF_POSES if any(isinstance(s, PoseStretch) for s in program.stretches) else _DIGITS
+    failures = (
+        *(f"the job itself: {text}" for text in job.failures),
+        *gaps(job.robot, pieces, digits),
+        *_elsewhere(job, pieces, digits, program),
+        *([program.begins_elsewhere] if program.begins_elsewhere else []),
+        *misswitched(program, job),
+        *_off_moves(file, program, job, parts),
+        *unlike(program, job.robot, constraints_of(job)),
+    )
+    left = of_the_controller(program)
+    return JudgedProgram((*steps, *slow), failures, allowed, shift_told(program), left)
+
+
+def _shifted_moves(program: ControllerProgram, job: Program, parts: ProgramParts) -> Iterator[str]:
+    """Yield what of a shifted program is elsewhere without the shift's doing.
+
+    Moves by joint targets, which know no work object; and slow motions that go farther than from
+    where a joint target is to where the shifted pose of it is, or back.
+    """
+    stated = program.miss.moves.joint
+    for step, ways, is_shifted in zip(job.steps, parts.motions, parts.by_poses, strict=True):
+        if isinstance(step.made, Plan) or is_shifted:
+            continue
+        t = np.union1d(step.motion.t, step.motion.t[:-1] + 0.5 * np.diff(step.motion.t))
+        here = step.motion(t)
+        for way in ways:
+            off = np.abs(way(np.minimum(t - t[0], way.t[-1])) - here).max()
+            if off > stated + _DIGITS:
+                yield (
+                    f"'{step.name}' has joints {off:.4g} rad or m off the move of the job, the "
+                    f"file states {stated:.4g}; a work object that is shifted moves no joint target"
+                )
+                break
+    shift = program.shift
+    frame = carrier_in_reference(job.robot, program.carrier)
+    if shift is None or frame is None:
+        return
+    for number, ways in parts.slow:
+        ends = [job.robot.chain.place(q) for q in ways[0].q[[0, -1]]]
+        first, last = (np.asarray(frame.actInv(end.translation)) for end in ends)
+        explained = min(
+            np.linalg.norm(np.asarray(shift.act(first)) - last),
+            np.linalg.norm(np.asarray(shift.act(last)) - first),
+        )
+        if explained > _EXPLAINED:
+            yield (
+                f"before '{job.steps[number].name}' it goes slowly to where neither the job is nor "
+                f"the shift of its work object takes it ({1e3 * explained:.3g} mm)"
+            )
+
+
+def _off_moves(
+    file: FilePath, program: ControllerProgram, job: Program, parts: ProgramParts
+) -> Iterator[str]:
+    """Yield by how much free moves leave those of the job, beyond what the file states."""
+    if program.shift is not None:
+        yield from _shifted_moves(program, job, parts)
+        return
+    _, stated, found = program_miss(job, file, program)
+    if any(one > other + 1e-9 for one, other in zip(found.moves, stated.moves, strict=True)):
+        yield (
+            f"free moves are up to {1e3 * found.moves.position:.4g} mm, joints "
+            f"{found.moves.joint:.4g} rad or m off those of the job, the file states "
+            f"{1e3 * stated.moves.position:.4g} mm and {stated.moves.joint:.4g}"
+        )
+
+
+def unlike(
+    program: ControllerProgram, robot: RobotModel, constraints: Sequence[Constraint]
+) -> Iterator[str]:
+    """Yield what a program rests on that is not so where it is judged: held joints, its load."""
+    facts = program.facts
+    if facts is None:
+        yield (
+            "its head does not state what its targets rest on (flange, held joints, outputs, with "
+            "a checksum): write the program again"
+        )
+        return
+    yield from facts.against(robot, program.load)
+    try:
+        check_load(program.load, robot, constraints, facts.flange)
+    except (ProblemError, RobotError) as error:
+        yield str(error)
+
+
+def of_the_controller(program: ControllerProgram) -> str:
+    """Return what of a program is the controller's own, and not judged, in words."""
+    if program.within is None:
+        return "accelerations are the controller's, and not judged"
+    return (
+        "seams at their feeds are judged with the ramps of the plan: how the controller runs up "
+        "and down, and so when it is where, is its own, and not judged"
+    )
+
+
+def shift_told(program: ControllerProgram) -> str:
+    """Return by how much the work object is elsewhere than planned, in words; empty for not."""
+    if program.shift is None:
+        return ""
+    way = 1e3 * float(np.linalg.norm(program.shift.translation))
+    turn = float(np.degrees(np.linalg.norm(log3(program.shift.rotation))))
+    return (
+        f"the work object is {way:.4g} mm and {turn:.3g}° from where it was planned: judged along "
+        f"the path shifted with it"
+    )
+
+
+def as_shifted(problem: Problem, program: ControllerProgram, begin: Array) -> Problem:
+    """Return a problem whose path is shifted as the work object of a program is.
+
+    Parameters
+    ----------
+    problem : Problem
+    program : ControllerProgram
+    begin : (n,)
+        Where the motion begins.
+
+    Raises
+    ------
+    FileFormatError
+        The path is given in a frame that moves past the work object.
+    """
+    if program.shift is None:
+        return problem
+    robot = problem.robot
+    place = carrier_in_reference(robot, program.carrier)
+    if place is None or problem.also:
+        raise FileFormatError(
+            f"its work object is shifted, and the path is given in '{robot.reference or WORLD}', "
+            f"which moves past it: plan again with the part where it is"
+        )
+    path = Placed(problem.path, place * program.shift * place.inverse())
+    start = None if problem.start is None else begin
+    return replace(problem, path=path, start=start)
+
+
+def misswitched(program: ControllerProgram, made: object) -> tuple[str, ...]:
+    """Return what a controller's program switches otherwise than its job's events, or besides them.
+
+    A plan, parts or a move have no events.
+    """
+    if isinstance(made, Program):
+        return tuple(_otherwise_switched(made, program))
+    return tuple(
+        f"'{switch.output}' is switched at {switch.at:.4f} s, and the motion has no events"
+        for switch in program.switches
+    )
+
+
+def judged_motion(motion: Trajectory, job: Program) -> JudgedProgram:
+    """Judge a motion that was read by the job that it is of: each step, and the whole.
+
+    By all that the job asks for; its outputs are none of a motion's.
+
+    Raises
+    ------
+    FileFormatError
+        It is of other joints.
+    """
+    whole = motion.of_joints(job.robot.joint_names)
+    if abs(whole.duration - job.duration) > _MOMENT:
+        told = f"it lasts {whole.duration:.6g} s, the job {job.duration:.6g} s"
+        return JudgedProgram((), (told,))
+    ends = [*job.begins, job.duration]
+    motions = [[part_of(whole, first, last)] for first, last in pairwise(ends)]
+    steps, pieces = _judged_steps(job, motions, None, tuple)
+    failures = (
+        *(f"the job itself: {text}" for text in job.failures),
+        *gaps(job.robot, pieces),
+        *_elsewhere(job, pieces),
+    )
+    return JudgedProgram(steps, failures)
+
+
+def part_of(motion: Trajectory, first: float, last: float) -> Trajectory:
+    """Return what a motion is from one of its times to another [s], from t = 0 on."""
+    first, last = motion.t[0] + first, min(motion.t[0] + last, motion.t[-1])
+    inside = motion.t[(motion.t > first + _INSTANT) & (motion.t < last - _INSTANT)]
+    t = np.concatenate([[first], inside, [last]])
+    faster = None if motion.qdd is None else motion(t, 2)
+    return Trajectory(t - first, motion(t), motion(t, 1), motion.joint_names, faster)
+
+
+def _judged_steps(
+    job: Program,
+    motions: Sequence[Sequence[Trajectory]],
+    within: Tolerance | None,
+    kept: Callable[[Sequence[Constraint]], tuple[Constraint, ...]],
+    program: ControllerProgram | None = None,
+) -> tuple[tuple[JudgedStep, ...], list[Piece]]:
+    """Return what certificates say of the motions of a job's steps, by what of it is `kept`."""
+    found, pieces = list[JudgedStep](), list[Piece]()
+    for step, ways in zip(job.steps, motions, strict=True):
+        made = step.made
+        if isinstance(made, Move):
+            found.append(_judged_move(step.name, made, ways, kept))
+        else:
+            problem = replace(made.problem, constraints=kept(made.problem.constraints))
+            if program is not None:
+                problem = as_shifted(problem, program, ways[0].q[0])
+            lines = replace(problem, constraints=what_lines_keep(problem.constraints))
+            tolerance = within or made.tolerance
+            certificate, _ = judged_ways(
+                ways,
+                partial(problem.certify, tolerance=tolerance),
+                partial(lines.certify, tolerance=tolerance),
+            )
+            found.append(JudgedStep(step.name, certificate.verified, certificate.verdict))
+        pieces.append(Piece(f"'{step.name}'", ways[0]))
+    return tuple(found), pieces
+
+
+def _elsewhere(
+    job: Program,
+    pieces: Sequence[Piece],
+    digits: float = _DIGITS,
+    program: ControllerProgram | None = None,
+) -> Iterator[str]:
+    """Yield where a program does not begin or end as its job does.
+
+    Poses of a shifted work object are elsewhere, joint targets are not.
+    """
+    for end in (0, -1) if pieces else ():
+        if program is not None and program.shift is not None:
+            moving = [item for item in program.stretches if not item.is_rest]
+            if not moving or isinstance(moving[end], PoseStretch):
+                continue
+        asked = job.steps[end].motion.q[end]
+        yield from elsewhere(job.robot, pieces[end], end, asked, digits)
+
+
+def _otherwise_switched(job: Program, program: ControllerProgram) -> Iterator[str]:
+    """Yield what of a job's events a program does not switch, or switches otherwise."""
+    asked = sorted(job.events, key=lambda event: event[0])
+    made = sorted(program.switches, key=lambda switch: switch.at)
+    stated = None if program.facts is None else program.facts.outputs
+    if asked and stated is None:
+        yield "its head does not say which output each event switches: write the program again"
+    if len(asked) != len(made):
+        yield f"it switches {len(made)} times, the job {len(asked)} times"
+        return
+    known: dict[str, Switch] = {}
+    for (at, seam, event), switch in zip(asked, made, strict=True):
+        if abs(at - switch.at) > _PROMPT:
+            yield (
+                f"event '{event}' of '{seam}' is at {at:.4f} s, but '{switch.output}' is switched "
+                f"at {switch.at:.4f} s"
+            )
+        if switch.value is None and switch.output != plain(event):
+            yield f"event '{event}' of '{seam}' is called '{switch.output}'"
+        if stated is not None and plain(event) in stated:
+            meant = stated[plain(event)]
+            if meant is None and switch.value is not None:
+                yield f"event '{event}' is a comment only, but '{switch.output}' is switched"
+            if meant is not None and meant != (switch.output, switch.value):
+                yield (
+                    f"event '{event}' switches '{switch.output}' to {switch.value} at "
+                    f"{switch.at:.4f} s, it was written to switch '{meant[0]}' to {meant[1]}"
+                )
+        elif stated is not None:
+            yield f"its head does not say which output event '{event}' switches"
+        before = known.setdefault(event, switch)
+        if before[1:] != switch[1:]:
+            yield (
+                f"event '{event}' switches '{before.output}' to {before.value} once, and "
+                f"'{switch.output}' to {switch.value} at {switch.at:.4f} s"
+            )
+    for (one, first), (other, second) in combinations(known.items(), 2):
+        if first.value is not None and first[1:] == second[1:] and are_opposite(one, other):
+            yield f"events '{one}' and '{other}' both switch '{first.output}' to {first.value}"

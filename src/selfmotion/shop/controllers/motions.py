@@ -1,0 +1,433 @@
+"""Joint motions as the files that controllers and simulators read."""
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from selfmotion.basics import (
+    FileFormatError,
+    PlanError,
+    ProblemError,
+    Progress,
+    as_called,
+    as_flag,
+    as_path,
+    read_document,
+    shown,
+    silent,
+    write_bytes,
+    write_document,
+    write_text,
+)
+from selfmotion.model.motion import Trajectory
+from selfmotion.model.robot import RobotModel
+from selfmotion.planning.result import Move, Parts, Plan
+from selfmotion.shop.controllers import ros
+from selfmotion.shop.controllers.controller_program import ControllerProgram, check_signals
+from selfmotion.shop.controllers.judged_programs import (
+    PROGRAMS,
+    READ_PROGRAMS,
+    read_program,
+    write_program,
+)
+from selfmotion.shop.controllers.motion_tables import (
+    keyframes,
+    of_tables,
+    read_npz,
+    write_arrays,
+    write_columns,
+    write_lists,
+)
+from selfmotion.shop.controllers.program_settings import ProgramSettings
+from selfmotion.shop.controllers.ros import bag, motion_of_bag
+from selfmotion.shop.controllers.samples import (
+    MotionSamples,
+    check_ends,
+    coarsest_rate,
+    for_cubics,
+    within_limits_at,
+)
+from selfmotion.shop.controllers.urscript import check_joints, script
+from selfmotion.work.job import Program
+
+
+def write_motion(
+    plan: Plan | Parts | Move | Program,
+    file: str | Path,
+    *,
+    rate: float | None = None,
+    format: str | None = None,
+    settings: ProgramSettings | None = None,
+    force: bool = False,
+    progress: Progress = silent,
+) -> None:
+    """Write the motion of a plan, parts, a move or a program as others read it; atomically.
+
+    - ``csv`` (``.csv``): ``t``, a column per joint, ``NAME_velocity``, ``NAME_acceleration``
+    - ``npz`` (``.npz``): arrays ``t``, ``q``, ``qd``, ``qdd``, ``joint_names``
+    - ``json`` (``.json``): the same as lists
+    - ``ros`` (``.yaml``): ROS 2 ``trajectory_msgs/JointTrajectory``
+    - ``moveit``: ``moveit_msgs/RobotTrajectory``
+    - ``bag`` (``.mcap``): a ROS 2 bag of ``sensor_msgs/JointState`` and the tool's frame
+      (``tf2_msgs/TFMessage``), for Foxglove, PlotJuggler or ``ros2 bag play``
+    - ``mujoco`` (``.xml``): keyframes, to include in an MJCF model made from the same URDF
+    - ``urscript`` (``.script``): a stream of ``servoj``, its settings in the head
+    - ``krl`` (``.src``): KUKA: axis targets with their times in spline blocks
+    - ``rapid`` (``.mod``): ABB: axis targets with their times, rounded corners
+
+    With ``settings=ProgramSettings(targets="poses")`` programs of controllers are linear and
+    circular motions to tool poses in a work object, wherever these keep the motion; seams at a feed
+    have it as their speed, with ramps of the controller's own.
+
+    Parameters
+    ----------
+    plan : Plan, Parts, Move or Program
+    file : path
+    rate : float, optional
+        Samples per second; by default those of the plan: few, whose quintics are its motion, as
+        controllers of ROS 2 join them (URScript: 125). Messages of ROS have the coarsest rate at
+        which straight lines keep the plan's tolerance, where that is fewer. A retimed plan is as
+        much slower as quintics between samples at the rate need to keep its limits, which
+        ``retime(plan, rate=…)`` returns.
+    format : str, optional
+        By default the one that has the file's suffix.
+    settings : ProgramSettings, optional
+        Of a controller's program (``urscript``, ``krl``, ``rapid``): outputs, tool, load, approach.
+        Of ``krl`` and ``rapid`` also axes, and it bounds how far the controller, which passes
+        targets, may be off the motion; there are as many as that takes, and a `rate` has no effect.
+    force : bool
+        Whether a motion that is not verified, or begins or ends moving, is written all the same.
+    progress : callable, optional
+        Told how far a controller's program is: ``("targets", 2, 7)``.
+
+    Raises
+    ------
+    FileFormatError
+        The format is unknown, or the file cannot be written.
+    ProblemError
+        The rate gives no samples, or the arm has what the format cannot say.
+    PlanError
+        It is not verified, a move was not found, or a joint moves at its start or its end, and
+        the problem does not ask for that.
+    """
+    if not isinstance(plan, Plan | Parts | Move | Program):
+        raise ProblemError(f"plan is {shown(plan)}, expected a Plan, Parts, a Move or a Program")
+    if not (settings is None or isinstance(settings, ProgramSettings)):
+        raise ProblemError(f"settings are {shown(settings)}, expected ProgramSettings")
+    as_called(progress, "progress")
+    path = as_path(file)
+    name = form_of(path, format)
+    check_verified(plan, path, as_flag(force, "force"))
+    check_ends(plan, path, force)
+    if name in PROGRAMS.values() or _is_linear(name, settings):
+        if rate is not None:
+            raise ProblemError(f"{path}: rate has no effect: targets are as many as it takes")
+        write_program(plan, path, name, settings or ProgramSettings(), progress)
+        return
+    if name == "urscript":
+        asked = settings or ProgramSettings()
+        if asked != asked.streamed:
+            raise ProblemError(
+                f"{path}: settings: deviation, move_deviation and axes have no effect on URScript, "
+                f"which has all joints in their order at each period; leave them out"
+            )
+        _write_stream(path, plan, STREAM if rate is None else rate, asked)
+        return
+    if settings is not None:
+        raise ProblemError(f"{path}: settings have no effect: they are of controllers' programs")
+    if isinstance(plan, Plan):
+        plan = within_limits_at(plan, rate)
+    motion = plan.motion if isinstance(plan, Move) else plan.trajectory
+    if name == "bag" and rate is None:
+        motion = for_cubics(motion)
+    if name in MESSAGES and rate is None and isinstance(plan, Plan):
+        rate = coarsest_rate(plan)
+    WRITERS[name](path, MotionSamples.of(motion, rate), plan.robot, rate)
+
+
+def _is_linear(form: str, settings: ProgramSettings | None) -> bool:
+    """Whether a program of Universal Robots is one of targets, not a stream."""
+    return form == "urscript" and settings is not None and settings.by_poses
+
+
+def check_verified(plan: Plan | Parts | Move | Program, file: Path, force: bool) -> None:
+    """Raise PlanError for a motion that is not verified, unless it is forced."""
+    if isinstance(plan, Plan):
+        sound, verdict = plan.certificate.verified and not plan.altered, plan.certificate.verdict
+        verdict = plan.altered or verdict
+    else:
+        sound, verdict = plan.verified, plan.verdict
+    if not (sound or force):
+        raise PlanError(
+            f"{file}: is not written: {verdict}; give force=True to write it all the same"
+        )
+
+
+def form_of(path: Path, form: str | None) -> str:
+    """Return the format of a file."""
+    ending = path.suffix.lower()
+    if path.name.lower().endswith(_TIMETABLE):
+        raise FileFormatError(
+            f"{path}: {_TIMETABLE} is the name of a job's timetable, which is no motion: "
+            f"`selfmotion job FILE --out {path.name}` writes it; call the motion otherwise"
+        )
+    own = ending in PROGRAMS
+    name = SUFFIXES.get(ending) if form is None else form
+    if name is None or name not in FORMS:
+        known = ", ".join(f"{form} ({suffix})" for suffix, form in SUFFIXES.items())
+        found = f"suffix '{path.suffix}'" if form is None else f"format '{form}'"
+        raise FileFormatError(f"{path}: {found} is no format of motions: {known}, moveit")
+    if PROGRAMS.get(ending, name) != name or (name in PROGRAMS.values() and not own):
+        # Controllers, and what reads their programs, go by the suffix.
+        suffix = next((end for end, each in PROGRAMS.items() if each == name), "another suffix")
+        raise FileFormatError(f"{path}: format '{name}' is written with {suffix}")
+    return name
+
+
+def read_motion(
+    file: str | Path, *, degrees: bool = False, robot: RobotModel | None = None
+) -> Trajectory:
+    r"""Read a motion that `write_motion`, or something else, wrote.
+
+    In the formats ``csv``, ``npz``, ``json``, ``ros``, ``moveit`` and ``bag``, and programs.
+    With accelerations where the file has them; see `Trajectory`. With `degrees` all coordinates are
+    taken for angles in degrees, in any format.
+
+    Of controllers' programs (``.src``, ``.mod``, ``.script``) those statements are read that
+    `write_motion` writes, with other numbers, spaces and names: any other line is refused, by its
+    number.
+
+    - KRL: ``DEF``, ``END``, comments, ``BAS``, ``$BASE``, ``$TOOL``, ``$LOAD``, ``$VEL``,
+      ``$ORI_TYPE``, ``$CIRC_TYPE``, ``$OUT[n]``, ``PTP {A1 …}``, ``PTP_SPLINE``, ``SPTP {A1 …}``,
+      ``LIN {X …}``, ``SPLINE``, ``SPL {X …}``, ``SLIN {X …}``, ``SCIRC {X …}, {X …}`` (these
+      three ``WITH $VEL.CP``), ``TIME_BLOCK`` with a ``PART`` for each target, ``TRIGGER WHEN PATH =
+      0 DELAY = 0 DO $OUT[n]``, ``ENDSPLINE``, ``WAIT SEC``
+    - RAPID: ``MODULE``, ``PROC`` without parameters, comments, ``tooldata``, ``wobjdata``,
+      ``speeddata``, ``ConfL``, ``CirPathMode \ObjectFrame``, ``MoveAbsJ [[…], […]]\NoEOffs`` with
+      ``\T``, ``MoveL [[…], […], […], […]]`` with ``\T`` or a speed, ``MoveC`` with a speed,
+      ``fine`` or a zone ``z…``, ``\WObj``, ``SetDO``, ``WaitTime``
+    - URScript: ``def selfmotion():``, comments, ``set_tcp``, ``set_payload``, ``feature = p[…]``,
+      ``movel(pose_trans(feature, p[…]), t=…, r=…)`` or with ``a=…, v=…, r=…``, ``movec`` with these
+      and ``mode=0``, ``movej``, ``sleep``, ``set_standard_digital_out``, ``end``
+
+    The motion is the cubic spline through their targets, from rest to rest; of seams at speeds what
+    the makers publish of such motions, with even ramps that fill the time in the comment ``planned
+    time: … s``. Comments ``axes: A1 =
+    joint [deg], …``, as they are written, name the joints and say which of them slide. Tool poses
+    are those of a `robot`; its joints are followed from where the program begins.
+
+    Raises
+    ------
+    FileFormatError
+        The file cannot be read, or is no motion; what is missing is named.
+    """
+    path = as_path(file)
+    if not (robot is None or isinstance(robot, RobotModel)):
+        raise ProblemError(f"robot is {shown(robot)}, expected a RobotModel")
+    if path.suffix.lower() in READ_PROGRAMS:
+        if degrees:
+            raise FileFormatError(f"{path}: is in degrees by itself; drop degrees")
+        return motion_of_program(path, read_program(path, robot))
+    if path.suffix.lower() == ".csv":
+        return Trajectory.from_csv(path, degrees=degrees)
+    if path.suffix.lower() == ".npz":
+        return _in_radians(read_npz(path), degrees)
+    if path.suffix.lower() == ".mcap":
+        return _in_radians(motion_of_bag(path), degrees)
+    if path.suffix.lower() not in (".json", ".yaml", ".yml"):
+        written = ", though it is written" if path.suffix.lower() in SUFFIXES else ""
+        raise FileFormatError(
+            f"{path}: is no motion that is read{written}: expected .csv, .npz, .json, .yaml (ROS), "
+            f".mcap (ROS bag), .src (KUKA), .mod (ABB) or .script (linear URScript)"
+        )
+    document = read_document(path)
+    read = of_tables if "t" in document else ros.trajectory
+    return _in_radians(read(path, document), degrees)
+
+
+def motion_of_program(path: Path, program: ControllerProgram) -> Trajectory:
+    """Return the motion of a program that was read; FileFormatError where its targets are none."""
+    try:
+        return program.trajectory
+    # Numbers that no controller holds make splines that none follows.
+    except (ArithmeticError, ValueError, FileFormatError) as error:
+        raise FileFormatError(f"{path}: its targets are no motion: {error}") from error
+
+
+def _in_radians(motion: Trajectory, degrees: bool) -> Trajectory:
+    """Return a motion whose coordinates were all read in degrees, or not, in radians."""
+    if not degrees:
+        return motion
+    q, qd = np.radians(motion.q), np.radians(motion.qd)
+    qdd = None if motion.qdd is None else np.radians(motion.qdd)
+    return Trajectory(motion.t, q, qd, motion.joint_names, qdd)
+
+
+def _write_ros(file: Path, motion: MotionSamples, robot: RobotModel, rate: float | None) -> None:
+    _write_message(file, motion, ros.joint_trajectory, ros.trajectory_yaml)
+
+
+def _write_moveit(file: Path, motion: MotionSamples, robot: RobotModel, rate: float | None) -> None:
+    _write_message(file, motion, ros.robot_trajectory, ros.robot_yaml)
+
+
+def _write_message(
+    file: Path,
+    motion: MotionSamples,
+    message: Callable[[MotionSamples], Mapping[str, Any]],
+    as_yaml: Callable[[MotionSamples], str],
+) -> None:
+    match file.suffix:
+        case ".json":
+            write_document(file, message(motion))
+        case ".yaml" | ".yml":
+            write_text(file, as_yaml(motion))
+        case _:
+            raise FileFormatError(f"{file}: messages are written as .yaml or .json")
+
+
+def _write_bag(file: Path, motion: MotionSamples, robot: RobotModel, rate: float | None) -> None:
+    write_bytes(file, bag(motion, robot))
+
+
+def _write_mujoco(file: Path, motion: MotionSamples, robot: RobotModel, rate: float | None) -> None:
+    if motion.robot_joints != robot.joint_names:
+        raise ProblemError(f"{file}: keyframes are of all joints of {robot.name} together")
+    write_text(file, keyframes(robot, motion.t, motion.q, motion.qd))
+
+
+def _write_urscript(
+    file: Path, motion: MotionSamples, robot: RobotModel, rate: float | None
+) -> None:
+    write_text(file, script(robot, motion.robot_joints, motion.q, rate or STREAM))
+
+
+def _write_stream(
+    file: Path, plan: Plan | Parts | Move | Program, rate: float, settings: ProgramSettings
+) -> None:
+    """Write URScript with all that is to be said besides the motion."""
+    motion = MotionSamples.of(plan.motion if isinstance(plan, Move) else plan.trajectory, rate)
+    happens = plan.events if isinstance(plan, Program) else ()
+    check_signals({event: seam for _, seam, event in happens}, settings)
+    events = [(int(np.searchsorted(motion.t, at - 1e-9)), event) for at, _, event in happens]
+    joints, q = motion.robot_joints, motion.q
+    write_text(file, script(plan.robot, joints, q, rate, settings, events))
+
+
+# How tables of what happens when are called.
+_TIMETABLE = ".timetable.csv"
+# What is written as messages of ROS, in texts.
+MESSAGES = ("ros", "moveit")
+# Samples per second of a stream to an arm of Universal Robots.
+STREAM = 125.0
+_Writer = Callable[[Path, MotionSamples, RobotModel, float | None], None]
+WRITERS: Mapping[str, _Writer] = {
+    "csv": write_columns,
+    "npz": write_arrays,
+    "json": write_lists,
+    "ros": _write_ros,
+    "moveit": _write_moveit,
+    "bag": _write_bag,
+    "mujoco": _write_mujoco,
+    "urscript": _write_urscript,
+}
+SUFFIXES = {
+    ".csv": "csv",
+    ".npz": "npz",
+    ".json": "json",
+    ".yaml": "ros",
+    ".yml": "ros",
+    ".mcap": "bag",
+    ".xml": "mujoco",
+    ".script": "urscript",
+    **PROGRAMS,
+}
+FORMS = (*WRITERS, *PROGRAMS.values())
+# Those that say all that a check needs.
+READABLE = ("csv", "npz", "json", "ros", "moveit", "bag")
+
+
+# Motions of a cell in a file for each part, in step.
+
+
+def write_parts(
+    plan: Plan,
+    file: str | Path,
+    *,
+    rate: float | None = None,
+    format: str | None = None,
+    force: bool = False,
+) -> dict[str, Path]:
+    """Write the motion of a cell in a file for each part: part → file.
+
+    Of ``motion.yaml`` they are called ``motion.PART.yaml``. All have the same times, and each the
+    names that its joints have in the part's own robot. Parameters as in `write_motion`, which
+    writes all joints into one file.
+
+    Raises
+    ------
+    FileFormatError
+        The format is unknown, or a file cannot be written.
+    ProblemError
+        The robot has no parts, the rate gives no samples, or a part has what the format cannot say.
+    """
+    if not isinstance(plan, Plan):
+        raise ProblemError(f"plan is {shown(plan)}, expected a Plan")
+    names = plan.robot.joint_names
+    alone = [name for name in names if "/" not in name]
+    if alone:
+        raise ProblemError(
+            f"{plan.robot.name}: joint '{alone[0]}' is of no part; only a cell of several robots "
+            f"is written part by part"
+        )
+    path = as_path(file)
+    name = form_of(path, format)
+    if name not in WRITERS:
+        raise FileFormatError(f"{path}: a program moves all joints of a cell; it has no parts")
+    check_verified(plan, path, as_flag(force, "force"))
+    check_ends(plan, path, force)
+    write = WRITERS[name]
+    plan = within_limits_at(plan, rate)
+    rate = STREAM if name == "urscript" and rate is None else rate
+    samples, written = MotionSamples.of(plan.trajectory, rate), {}
+    parts = list(dict.fromkeys(name.partition("/")[0] for name in names))
+    if name == "urscript":
+        # Before the first file is written.
+        for part in parts:
+            check_joints(plan.robot, samples.of_part(part).robot_joints, f"part '{part}'")
+    for part in parts:
+        written[part] = path.with_name(f"{path.stem}.{part}{path.suffix}")
+        write(written[part], samples.of_part(part), plan.robot, rate)
+    return written
+
+
+def read_parts(files: Mapping[str, str | Path]) -> Trajectory:
+    """Read the motion of a cell from a file for each part, as `write_parts` returns them.
+
+    Raises
+    ------
+    FileFormatError
+        A file cannot be read, is no motion, or has other times than the first.
+    """
+    motions = {part: read_motion(file) for part, file in files.items()}
+    if not motions:
+        raise FileFormatError("there is no file of a part, expected part → file")
+    first, one = next(iter(motions.items()))
+    for part, motion in motions.items():
+        if not np.array_equal(motion.t, one.t):
+            raise FileFormatError(
+                f"{files[part]}: has {len(motion.t)} samples over {motion.duration:.6g} s, at "
+                f"other times than {files[first]} with {len(one.t)} over {one.duration:.6g} s: "
+                f"parts that move together are written together"
+            )
+    several = list(motions.values())
+    known = [motion.qdd for motion in several if motion.qdd is not None]
+    return Trajectory(
+        one.t,
+        np.hstack([motion.q for motion in several]),
+        np.hstack([motion.qd for motion in several]),
+        tuple(f"{part}/{name}" for part, motion in motions.items() for name in motion.joint_names),
+        np.hstack(known) if len(known) == len(several) else None,
+    )

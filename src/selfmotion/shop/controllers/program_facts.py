@@ -1,0 +1,269 @@
+"""What a program rests on besides its targets: held joints, outputs, and the load."""
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from hashlib import sha256
+from typing import NamedTuple
+from xml.etree import ElementTree
+
+import numpy as np
+
+from selfmotion.basics import Array, ProblemError
+from selfmotion.model.robot import RobotModel
+from selfmotion.model.task import SE3
+from selfmotion.problem.constraints import Constraint, JointTorqueLimits
+from selfmotion.shop.controllers.program_settings import (
+    ProgramSettings,
+    flange_of,
+    tool_from_flange,
+)
+from selfmotion.shop.controllers.program_texts import KEPT, plain
+
+# What comments begin with that state these facts.
+_HELD, _OUTPUTS, _UNIT, _FLANGE = "held joints: ", "outputs: ", "positioner: ", "flange: "
+_LOAD, _APPROACH = "load: ", "approach: "
+_FACTS = (_FLANGE, _HELD, _OUTPUTS, _UNIT, _LOAD, _APPROACH)
+# What else a head states and a reader believes, and what guards all of it.
+_BELIEVED = (
+    *("axes: ", "deviation: ", "deviation of moves: ", KEPT, "poses: ", "planned work object: "),
+    *_FACTS,
+)
+_CHECKSUM = "checksum of what is stated: "
+# Held joints stand where the file says within its digits [rad or m].
+_DIGITS = 1e-6
+# A load is the same within this share, but at least within 1 g, and its centre within 1 mm: what a
+# scale and a drawing give.
+_SHARE, _GRAM, _MILLIMETRE = 1e-3, 1e-3, 1e-3
+
+
+class Load(NamedTuple):
+    """What the flange carries.
+
+    Attributes
+    ----------
+    mass : float
+        [kg]
+    center : (3,)
+        Its centre of mass from the flange [m].
+    """
+
+    mass: float
+    center: Array
+
+    def is_like(self, other: "Load") -> bool:
+        """Whether it is the same load, as a scale and a drawing give it."""
+        most = max(self.mass, other.mass)
+        if abs(self.mass - other.mass) > max(_SHARE * most, _GRAM):
+            return False
+        return most <= _GRAM or bool(np.abs(self.center - other.center).max() <= _MILLIMETRE)
+
+    def __str__(self) -> str:
+        """Mass and centre, as settings of a program have them."""
+        center = ", ".join(f"{1e3 * value:.4g}" for value in self.center)
+        return f"{self.mass:.4g} kg at ({center}) mm from the flange"
+
+
+@dataclass(frozen=True, eq=False)
+class ProgramFacts:
+    """What the head of a program states that its targets rest on.
+
+    Attributes
+    ----------
+    flange : str
+        The link that the tool and the load are counted from.
+    held : mapping
+        Joint that is held → where [rad or m].
+    outputs : mapping
+        Event → the output that it switches, as the program calls it, and to what; None for an event
+        that is a comment.
+    positioner : str
+        The mechanical unit that carries the work object; empty for none.
+    load : Load or None
+        What the program was written to say of the flange's load; None where it says nothing.
+    approach : float
+        How fast it was written to go to its begin, as a share.
+    is_changed : bool
+        Whether somebody changed what is stated, by its checksum.
+    """
+
+    flange: str = ""
+    held: Mapping[str, float] = field(default_factory=dict)
+    outputs: Mapping[str, tuple[str, bool] | None] = field(default_factory=dict)
+    positioner: str = ""
+    load: Load | None = None
+    approach: float = 1.0
+    is_changed: bool = False
+
+    @classmethod
+    def of(
+        cls, robot: RobotModel, settings: ProgramSettings, events: Sequence[str], *, by_poses: bool
+    ) -> "ProgramFacts":
+        """Return those of a program for a robot, with events (their names)."""
+        outputs = dict[str, tuple[str, bool] | None]()
+        for event in events:
+            signal = settings.signal(event)
+            outputs[plain(event)] = None if signal is None else (str(signal[0]), signal[1])
+        held = {name: round(float(value), 9) + 0.0 for name, value in robot.locked.items()}
+        unit = settings.positioner if by_poses else None
+        load = None if settings.mass is None else Load(settings.mass, np.array(settings.center))
+        named = "" if unit is None else str(unit)
+        return cls(flange_of(robot, settings), held, outputs, named, load, settings.approach)
+
+    @classmethod
+    def stated(cls, notes: Sequence[str]) -> "ProgramFacts | None":
+        """Return those that the comments of a program state; None where they state none."""
+        said = {key: note.removeprefix(key) for note in notes for key in _FACTS if _is(note, key)}
+        sums = [note.removeprefix(_CHECKSUM) for note in notes if _is(note, _CHECKSUM)]
+        if not (said or sums):
+            return None
+        changed = sums != [checksum(notes)]
+        try:
+            flange = str(json.loads(said.get(_FLANGE, '""')))
+            approach = float(json.loads(said.get(_APPROACH, "1.0")))
+            carried = json.loads(said.get(_LOAD, "null"))
+            load = None
+            if carried is not None:
+                load = Load(float(carried[0]), np.array([float(x) for x in carried[1:4]]))
+            held = {name: float(x) for name, x in json.loads(said.get(_HELD, "{}")).items()}
+            outputs = {
+                event: None if value is None else (str(value[0]), bool(value[1]))
+                for event, value in json.loads(said.get(_OUTPUTS, "{}")).items()
+            }
+        except (ValueError, TypeError, AttributeError, IndexError, RecursionError):
+            return cls(is_changed=True)
+        return cls(flange, held, outputs, said.get(_UNIT, ""), load, approach, changed)
+
+    @property
+    def notes(self) -> list[str]:
+        """What the head says of them, without what marks comments as such."""
+        parts = [f"{_FLANGE}{json.dumps(self.flange)}"]
+        parts += [f"{_HELD}{json.dumps(dict(self.held))}"] if self.held else []
+        parts += [f"{_OUTPUTS}{json.dumps(dict(self.outputs))}"] if self.outputs else []
+        parts += [f"{_UNIT}{self.positioner}"] if self.positioner else []
+        if self.load is not None:
+            parts.append(f"{_LOAD}{json.dumps([self.load.mass, *self.load.center.tolist()])}")
+        return [*parts, f"{_APPROACH}{json.dumps(self.approach)}"]
+
+    def against(self, robot: RobotModel, load: Load | None) -> Iterator[str]:
+        """Yield what of it is not as an arm has it, or as the program says its load."""
+        if self.is_changed:
+            yield (
+                "what its head states (axes, deviations, held joints, outputs, frames) was changed "
+                "by hand, as its checksum tells: write the program again"
+            )
+            return
+        known = (load is None) == (self.load is None)
+        if not known or (load and self.load and not load.is_like(self.load)):
+            now, before = ("no load" if x is None else str(x) for x in (load, self.load))
+            yield f"it says that the flange carries {now}, it was written with {before}"
+        for name in sorted({*self.held, *robot.locked}):
+            here, there = self.held.get(name), robot.locked.get(name)
+            if here is None:
+                yield f"it was written for an arm whose joint '{name}' is not held"
+            elif there is None:
+                yield f"it was written with joint '{name}' held at {here:.6g}, here it is not held"
+            elif abs(here - there) > _DIGITS:
+                yield f"it was written with joint '{name}' held at {here:.6g}, here at {there:.6g}"
+
+
+def with_checksum(notes: Sequence[str]) -> list[str]:
+    """Return the comments of a head, with a last one that guards what a reader believes of it."""
+    return [*notes, f"{_CHECKSUM}{checksum(notes)}"]
+
+
+def checksum(notes: Sequence[str]) -> str:
+    """Return the checksum of those comments that a reader believes."""
+    believed = [note for note in notes if note.startswith(_BELIEVED)]
+    return sha256("\n".join(believed).encode()).hexdigest()[:12]
+
+
+def _is(note: str, key: str) -> bool:
+    return note.startswith(key)
+
+
+def held_in_words(robot: RobotModel) -> str:
+    """Return which joints have to stand where while a motion runs; empty for none."""
+    if not robot.locked:
+        return ""
+    each = ", ".join(
+        f"{name} at {value:.4g} {'m' if _slides(robot, name) else 'rad'}"
+        for name, value in robot.locked.items()
+    )
+    return f"joints that are held, and have to stand there: {each}"
+
+
+def _slides(robot: RobotModel, joint: str) -> bool:
+    return robot.urdf.joints[joint].kind == "prismatic"
+
+
+# What torques were verified with, and what a program says that the flange carries.
+
+
+def verified_loads(robot: RobotModel, constraints: Sequence[Constraint], flange: str) -> list[Load]:
+    """Return what the flange carries in each constraint of torques, by payload and URDF."""
+    limits = [item for item in constraints if isinstance(item, JointTorqueLimits)]
+    if not limits:
+        return []
+    settings = ProgramSettings(flange=flange or None)
+    tool, own = tool_from_flange(robot, settings), _beyond(robot, flange)
+    found = []
+    for item in limits:
+        at = tool.act(np.asarray(item.center, dtype=np.float64).reshape(3))
+        found.append(_together([*own, Load(float(item.payload), np.asarray(at))]))
+    return found
+
+
+def check_load(
+    load: Load | None, robot: RobotModel, constraints: Sequence[Constraint], flange: str
+) -> None:
+    """Refuse a load that torques were not verified with.
+
+    Raises
+    ------
+    ProblemError
+        The load is another one; both are named.
+    """
+    if load is None:
+        return
+    for verified in verified_loads(robot, constraints, flange):
+        if not load.is_like(verified):
+            raise ProblemError(
+                f"{robot.name}: the program says that the flange carries {load}, torques were "
+                f"verified with {verified}: give the same to both (JointTorqueLimits(payload=…, "
+                f"center=…), which counts from the tool; ProgramSettings(mass=…, center=…))"
+            )
+
+
+def _beyond(robot: RobotModel, flange: str) -> list[Load]:
+    """Return the masses of links beyond the flange that move with it."""
+    if not flange:
+        return []
+    carrier, place = robot.carrier_of(flange)
+    root = ElementTree.fromstring(robot.urdf.text)
+    children: dict[str, list[str]] = {}
+    for joint in root.iter("joint"):
+        parent, child = joint.find("parent"), joint.find("child")
+        if parent is not None and child is not None:
+            children.setdefault(parent.get("link", ""), []).append(child.get("link", ""))
+    links, found = [flange], list[Load]()
+    while links:
+        name = links.pop()
+        links += [each for each in children.get(name, ()) if robot.carrier_of(each)[0] == carrier]
+        element = root.find(f"link[@name='{name}']/inertial") if "'" not in name else None
+        mass = None if element is None else element.find("mass")
+        if element is None or mass is None:
+            continue
+        origin = element.find("origin")
+        text = "0 0 0" if origin is None else origin.get("xyz", "0 0 0")
+        center = np.array([float(value) for value in text.split()])
+        at: SE3 = place.inverse() * robot.carrier_of(name)[1]
+        found.append(Load(float(mass.get("value", "0")), np.asarray(at.act(center))))
+    return found
+
+
+def _together(loads: Sequence[Load]) -> Load:
+    mass = sum(item.mass for item in loads)
+    if mass <= 0.0:
+        return Load(0.0, np.zeros(3))
+    return Load(mass, np.asarray(sum(item.mass * item.center for item in loads) / mass))

@@ -1,0 +1,412 @@
+"""What a controller's program says besides the motion, and which of its axes each joint is."""
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path as FilePath
+from typing import Any
+
+import numpy as np
+
+from selfmotion.basics import (
+    Array,
+    FileFormatError,
+    ProblemError,
+    SelfmotionError,
+    as_number,
+    as_numbers,
+    as_path,
+    in_si,
+    nearest,
+    read_document,
+    shown,
+)
+from selfmotion.certificate import Tolerance
+from selfmotion.model.path import pose_of
+from selfmotion.model.robot import RobotModel
+from selfmotion.model.task import SE3, as_pose
+
+# What a controller's program says besides the motion.
+
+# Where an output of a signal is, and what it becomes.
+Signal = tuple[str | int, bool]
+_DEVIATION = Tolerance(1e-4, 1e-3)
+# No arm carries more [kg], nor holds it farther from its flange [m].
+_HEAVIEST, _FARTHEST = 3000.0, 5.0
+# A work object stands no farther from the arm's base [m]; the word for the frame of the path.
+_FARTHEST_WORK = 50.0
+OF_PATH = "path"
+# Mechanical units that a KUKA controller has at most.
+_UNITS = 16
+# What targets may be.
+TARGETS = ("joints", "poses", "timed-poses")
+AXES = tuple(f"{kind}{number}" for kind in "AE" for number in range(1, 7))
+
+
+@dataclass(frozen=True)
+class ProgramSettings:
+    """What a program for a controller says besides the motion.
+
+    Parameters
+    ----------
+    deviation : Tolerance
+        How far what the controller makes of the targets may be off the motion: the tool's position
+        [m] and rotation [rad], and each joint by that angle or length as well. Targets are as many
+        as that takes.
+    move_deviation : Tolerance, optional
+        Likewise of moves through the air. By default as far as they keep apart what has to be, up
+        to 5 mm and 5 mrad, and no less than `deviation`.
+    axes : mapping, optional
+        Joint → axis: ``"A1"`` to ``"A6"`` of the robot, ``"E1"`` to ``"E6"`` for others. By
+        default joints that slide, and those of a cell's smaller parts, are others; of an arm with
+        seven the third one is E1, as KUKA's LBR and ABB's IRB 14000 count; the rest in order.
+    signals : mapping, optional
+        Event → output and value, such as ``{"arc on": ("doArc", True)}``; KUKA's and Universal
+        Robots' outputs are numbers. None (in files false) for an event that is a comment only.
+    flange : str, optional
+        The link that is the controller's flange, from which it counts the tool's place; by default
+        ``flange`` or ``tool0`` where the tool rides on the same link, else that link itself.
+    mass : float, optional
+        Of what the flange carries [kg]. ABB's programs need it; in others by default nothing is
+        said of it, and the controller goes on with the load that it has.
+    center : (3,)
+        Its centre of mass from the flange [m].
+    approach : float
+        How fast the arm goes to the start: of the fastest that its joints may (KUKA, Universal
+        Robots) or of 500 mm/s and 100 °/s (ABB).
+    targets : str
+        ``"joints"``: joint targets; or ``"poses"``: linear motions to tool poses in a work object
+        (``MoveL``, ``SPLINE`` with ``SPL`` and ``SLIN``, ``movel``), which can be shifted and
+        touched up. A seam at a feed has its feed as their speed, and arcs are circular motions;
+        its ramps are then the controller's. ``"timed-poses"``: the same with the times of the plan,
+        which takes more of them. Where poses do not keep the motion, joint targets are written all
+        the same, and the head of the file says why.
+    work_object : str or SE3, optional
+        What poses are counted in: a link that stands still or that an external axis carries, a
+        pose [m] in the frame that the controller counts its arm from (link ``base``, else the
+        world), or ``"path"``: the frame that the path is given in, as its table or workpiece is
+        placed. By default the link that the path rides on (`reference`), else the controller's own
+        frame.
+    positioner : str or int, optional
+        The mechanical unit that carries the work object: its name (ABB), or its number in
+        ``MACHINE_DEF`` (KUKA).
+
+    Raises
+    ------
+    ProblemError
+        A value is not what it should be.
+    """
+
+    deviation: Tolerance = _DEVIATION
+    move_deviation: Tolerance | None = None
+    axes: Mapping[str, str] | None = None
+    signals: Mapping[str, Signal | None] | None = None
+    flange: str | None = None
+    mass: float | None = None
+    center: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    approach: float = 0.1
+    targets: str = "joints"
+    work_object: str | SE3 | None = None
+    positioner: str | int | None = None
+
+    def __post_init__(self) -> None:
+        for key in ("deviation", "move_deviation"):
+            value = getattr(self, key)
+            if not isinstance(value, Tolerance) and (value is not None or key == "deviation"):
+                raise ProblemError(f"{key} is {shown(value)}, expected a Tolerance, in m and rad")
+        for name in ("axes", "signals"):
+            if getattr(self, name) is None:
+                continue
+            if not isinstance(getattr(self, name), Mapping):
+                raise ProblemError(f"{name} is {shown(getattr(self, name))}, expected a mapping")
+        for joint, axis in (self.axes or {}).items():
+            if axis not in AXES:
+                raise ProblemError(
+                    f"axes: '{joint}' is axis {shown(axis)}, expected one of A1 to A6, E1 to E6"
+                )
+        given = self.signals or {}
+        signals = {event: _signal(event, value) for event, value in given.items()}
+        object.__setattr__(self, "signals", signals)
+        if self.flange is not None and not isinstance(self.flange, str):
+            raise ProblemError(f"flange is {shown(self.flange)}, expected the name of a link")
+        if self.mass is not None:
+            mass = as_number(self.mass, "mass", above=0.0)
+            if mass > _HEAVIEST:
+                raise ProblemError(
+                    f"mass: {mass:g} kg is more than any arm carries, expected at most "
+                    f"{_HEAVIEST:g}: masses are in kg, not g"
+                )
+            object.__setattr__(self, "mass", mass)
+        center = as_numbers(self.center, "center", "3 finite numbers [m]", (3,))
+        if np.abs(center).max() > _FARTHEST:
+            raise ProblemError(
+                f"center: {np.abs(center).max():g} m is far from any flange, expected at most "
+                f"{_FARTHEST:g}: in m, or center_mm in files"
+            )
+        object.__setattr__(self, "center", tuple(center.tolist()))
+        if self.mass is None and center.any():
+            raise ProblemError("center: has no effect without a mass; give mass as well")
+        approach = as_number(self.approach, "approach", above=0.0, most=1.0)
+        object.__setattr__(self, "approach", approach)
+        self._check_targets()
+
+    def _check_targets(self) -> None:
+        if self.targets not in TARGETS:
+            known = ", ".join(f"'{name}'" for name in TARGETS)
+            raise ProblemError(f"targets are {shown(self.targets)}, expected one of {known}")
+        if not (self.work_object is None or isinstance(self.work_object, str)):
+            work = as_pose(self.work_object, "work_object", ProblemError)
+            far = float(np.abs(work.translation).max())
+            if far > _FARTHEST_WORK:
+                raise ProblemError(
+                    f"work_object: {far:g} m is far from any arm, expected at most "
+                    f"{_FARTHEST_WORK:g}; in millimetres? It is in m (position_mm in files)"
+                )
+            object.__setattr__(self, "work_object", work)
+        unit = self.positioner
+        named = isinstance(unit, str) and unit.isascii() and unit.isidentifier()
+        numbered = isinstance(unit, int) and not isinstance(unit, bool) and 1 <= unit <= _UNITS
+        if not (unit is None or named or numbered):
+            raise ProblemError(
+                f"positioner is {shown(unit)}, expected the name of a mechanical unit (ABB), or "
+                f"its number in MACHINE_DEF, 1 to {_UNITS} (KUKA)"
+            )
+        for key in ("work_object", "positioner"):
+            if getattr(self, key) is not None and not self.by_poses:
+                raise ProblemError(f"{key}: has no effect on joint targets; give targets='poses'")
+
+    @property
+    def by_poses(self) -> bool:
+        """Whether targets are tool poses."""
+        return self.targets != "joints"
+
+    @property
+    def streamed(self) -> "ProgramSettings":
+        """What is of URScript, which has all joints in their order at each of its periods."""
+        return dataclasses.replace(self, deviation=_DEVIATION, move_deviation=None, axes=None)
+
+    def signal(self, event: str) -> Signal | None:
+        """Return what an event switches, None for nothing; KeyError where nothing is said of it."""
+        return (self.signals or {})[event]
+
+    def knows(self, event: str) -> bool:
+        """Whether it is said what an event switches."""
+        return event in (self.signals or {})
+
+
+def read_program_settings(file: str | FilePath, **changes: Any) -> ProgramSettings:
+    """Read the settings of a controller's program: TOML or JSON, keys as in `ProgramSettings`.
+
+    ``deviation`` and ``move_deviation`` are tables with ``position`` (or ``position_mm``) and
+    ``rotation`` (or ``rotation_deg``); a signal is a list of an output and true or false; a work
+    object is the name of a link, or a table as poses of problem files are (``position`` or
+    ``position_mm``, and ``rpy_deg`` or another orientation).
+
+    Parameters
+    ----------
+    file : path
+    **changes
+        Settings that count in place of the file's, as in `ProgramSettings`.
+
+    Raises
+    ------
+    FileFormatError
+        The file cannot be read, or says something else; file and key are named.
+    """
+    path = as_path(file)
+    try:
+        values: dict[str, Any] = in_si(read_document(path))
+    except FileFormatError as error:
+        text = str(error).removeprefix(f"{path}: ")
+        raise FileFormatError(f"{path}: {text}") from error
+    known = [item.name for item in dataclasses.fields(ProgramSettings)]
+    for key in values:
+        if key not in known:
+            raise FileFormatError(
+                f"{path}: unknown key '{key}'{nearest(key, known)}; expected {', '.join(known)}"
+            )
+    try:
+        for key in {"deviation", "move_deviation"} & set(values):
+            given = values[key]
+            if not isinstance(given, dict) or set(given) - {"position", "rotation"}:
+                raise ProblemError(f"{key}: expected a table of position and rotation")
+            values[key] = Tolerance(**{**dataclasses.asdict(_DEVIATION), **given})
+        if not isinstance(values.get("work_object", ""), str):
+            values["work_object"] = pose_of(values["work_object"])
+        return ProgramSettings(**{**values, **changes})
+    except SelfmotionError as error:
+        raise FileFormatError(f"{path}: {error}") from error
+    except ValueError as error:
+        raise FileFormatError(f"{path}: work_object: {error}") from error
+
+
+def _signal(event: object, given: object) -> Signal | None:
+    # Files have no None.
+    if given is None or given is False:
+        return None
+    if isinstance(given, list | tuple) and len(given) == 2:
+        output, value = given
+        named = isinstance(output, str) and output.isascii() and output.isidentifier()
+        numbered = isinstance(output, int) and not isinstance(output, bool) and 0 <= output < 8192
+        if isinstance(value, bool) and (named or numbered):
+            return output, value
+    raise ProblemError(
+        f"signals: '{event}' is {shown(given)}, expected an output (its name or number) and "
+        f"whether it becomes true"
+    )
+
+
+# Which axis of a controller each joint is.
+
+# Of an arm with seven joints the third is the one that six-axis controllers count apart.
+_SEVENTH = 2
+_ROBOT = 6
+# By the conventions of ROS-Industrial `tool0` is the tool that is all zeros.
+_FLANGES = ("tool0", "flange")
+
+
+@dataclass(frozen=True)
+class Axis:
+    """An axis of a controller, and the joint that it is.
+
+    Attributes
+    ----------
+    name : str
+        "A1" to "A6", "E1" to "E6".
+    joint : str
+    slides : bool
+        Whether its coordinate is in mm, not degrees.
+    """
+
+    name: str
+    joint: str
+    slides: bool
+
+
+def axes_of(robot: RobotModel, settings: ProgramSettings) -> tuple[Axis, ...]:
+    """Return the axes in the order of the robot's joints.
+
+    Raises
+    ------
+    ProblemError
+        Joints and axes do not fit; a mapping that would is asked for.
+    """
+    names = dict(settings.axes or {}) or _usual(robot)
+    for joint in robot.joint_names:
+        if joint not in names:
+            raise ProblemError(f"{robot.name}: axes: joint '{joint}' has no axis; give all joints")
+    for joint in names:
+        if joint not in robot.joint_names:
+            known = ", ".join(robot.joint_names)
+            raise ProblemError(f"{robot.name}: axes: '{joint}' is none of its joints: {known}")
+    found = [names[joint] for joint in robot.joint_names]
+    twice = next((name for name in found if found.count(name) > 1), None)
+    if twice is not None:
+        raise ProblemError(f"{robot.name}: axes: two joints are axis {twice}; give each its own")
+    axes = tuple(
+        Axis(names[joint], joint, robot.is_prismatic(joint)) for joint in robot.joint_names
+    )
+    slide = next((axis for axis in axes if axis.slides and axis.name.startswith("A")), None)
+    if slide is not None:
+        raise ProblemError(
+            f"{robot.name}: axes: joint '{slide.joint}' slides, and is axis {slide.name}, which "
+            f"turns; expected E1 to E6"
+        )
+    return axes
+
+
+def _usual(robot: RobotModel) -> dict[str, str]:
+    turning = [name for name in robot.joint_names if not robot.is_prismatic(name)]
+    parts: dict[str, list[str]] = {}
+    for name in turning:
+        parts.setdefault(name.rpartition("/")[0], []).append(name)
+    own = max(parts.values(), key=len, default=[])
+    _check_one_arm(robot, own)
+    others = [name for name in robot.joint_names if name not in own]
+    if len(own) == _ROBOT + 1:
+        # The arm's own seventh is the first of the others.
+        others = [own[_SEVENTH], *others]
+        own = own[:_SEVENTH] + own[_SEVENTH + 1 :]
+    if len(own) > _ROBOT or len(others) > _ROBOT:
+        raise ProblemError(
+            f"{robot.name}: has {len(own)} joints that turn and {len(others)} others, expected at "
+            f"most 6 and 6; say by axes= which joint is which axis (A1 to A6, E1 to E6)"
+        )
+    return {name: f"A{k}" for k, name in enumerate(own, 1)} | {
+        name: f"E{k}" for k, name in enumerate(others, 1)
+    }
+
+
+def _check_one_arm(robot: RobotModel, own: Sequence[str]) -> None:
+    """Refuse joints of one URDF of which only some carry the tool: a table is no wrist."""
+    carriers = robot.chain_to(robot.tool, None).joints
+    carrying = {robot.joint_names[k] for k in carriers.tolist()}
+    beside = [name for name in own if name not in carrying]
+    if beside and len(beside) < len(own):
+        arm = [name for name in own if name in carrying]
+        axes = {name: f"A{k}" for k, name in enumerate(arm, 1)}
+        axes |= {name: f"E{k}" for k, name in enumerate(beside, 1)}
+        raise ProblemError(
+            f"{robot.name}: joint '{beside[0]}' does not carry the tool '{robot.tool}', as "
+            f"{', '.join(arm)} do: say by axes= which joint is which axis of the controller, for "
+            f"example {axes}"
+        )
+
+
+def in_order(axes: Sequence[Axis]) -> list[int]:
+    """Return the joints' numbers in the order of their axes."""
+    return sorted(range(len(axes)), key=lambda k: AXES.index(axes[k].name))
+
+
+def tool_from_flange(robot: RobotModel, settings: ProgramSettings) -> SE3:
+    """Return the tool's pose in the controller's flange.
+
+    Raises
+    ------
+    ProblemError
+        The flange rides on another link than the tool.
+    RobotError
+        There is no such link.
+    """
+    link, tool = flange_of(robot, settings), robot.carrier_of(robot.tool)[1]
+    return robot.carrier_of(link)[1].inverse() * tool if link else tool
+
+
+def flange_of(robot: RobotModel, settings: ProgramSettings) -> str:
+    """Return the link that is the controller's flange; empty for that which carries the tool.
+
+    Raises
+    ------
+    ProblemError
+        The flange rides on another link than the tool.
+    RobotError
+        There is no such link.
+    """
+    carrier = robot.carrier_of(robot.tool)[0]
+    if settings.flange is not None:
+        if robot.carrier_of(settings.flange)[0] != carrier:
+            raise ProblemError(
+                f"{robot.name}: flange '{settings.flange}' does not move with tool '{robot.tool}'"
+            )
+        return settings.flange
+    # In a cell, that of the part which carries the tool.
+    part = robot.tool.rpartition("/")[0]
+    for name in _FLANGES:
+        link = f"{part}/{name}" if part else name
+        if link in robot.urdf.links and robot.carrier_of(link)[0] == carrier:
+            return link
+    return ""
+
+
+def written(q: Array, axes: Sequence[Axis]) -> list[str]:
+    """Return coordinates (n,) as texts: degrees with 5 digits behind the point, or mm with 4."""
+    values = zip(q.tolist(), axes, strict=True)
+    return [_plain(1e3 * x, 4) if axis.slides else _plain(_DEGREE * x, 5) for x, axis in values]
+
+
+def _plain(value: float, digits: int) -> str:
+    text = f"{value:.{digits}f}".rstrip("0").rstrip(".")
+    return "0" if text == "-0" else text
+
+
+_DEGREE = 57.29577951308232

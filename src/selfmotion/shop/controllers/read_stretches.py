@@ -1,0 +1,349 @@
+"""Rows of targets as a file has them, made into stretches; poses by inverse kinematics."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from selfmotion.basics import Array, FileFormatError, Flags, RobotError
+from selfmotion.model.robot import RobotModel
+from selfmotion.model.task import SE3, Quaternion
+from selfmotion.shop.controllers.feed_stretches import FeedStretch, times_at
+from selfmotion.shop.controllers.program_settings import Axis, ProgramSettings, tool_from_flange
+from selfmotion.shop.controllers.steps import put_on_arcs
+from selfmotion.shop.controllers.stretches import PoseStretch, Stretch, finer, on_one_side, straight
+from selfmotion.shop.controllers.tool_frames import ToolFrames
+
+# What slow motions to where a shifted program goes on are called in messages.
+_SLOWLY = "a slow motion"
+# A slow motion to where the arm is already takes no time: digits differ by this [rad or m].
+_THERE = 1e-5
+# How fast slow motions are, where the file was shifted: what is read of them is their way [m/s,
+# rad/s]; how often the joints are followed between two poses, from which step on one by one, and
+# steps that are none [rad].
+_SLOW, _BETWEEN, _STEP, _JUMP = 0.05, 16, 0.2, 0.5
+# So many times as often where steps are at speeds.
+_FINER = 8
+
+
+@dataclass
+class Row:
+    """A stretch while it is read: where it begins, its targets [deg or mm], times between [s].
+
+    A row that is nowhere rests where the arm is.
+    """
+
+    name: str
+    q: list[list[float]]
+    seconds: list[float]
+
+
+@dataclass
+class Pose:
+    """A tool pose of a file: position [m], quaternion x, y, z, w, external axes [deg or mm]."""
+
+    place: Array
+    turn: Array
+    others: list[float]
+    line: int
+
+
+@dataclass
+class PoseRow:
+    """A stretch of poses while it is read: where it begins, its targets, times between [s].
+
+    Of one at speeds the time that was planned for all of it, the speed of each step [m/s], through
+    where it goes round, and whether it goes smoothly through its targets.
+    """
+
+    name: str
+    poses: list[Pose]
+    seconds: list[float]
+    speeds: list[float] = field(default_factory=list)
+    vias: Array = field(default_factory=lambda: np.zeros((0, 3)))
+    is_spline: bool = False
+
+
+@dataclass
+class SlowRow:
+    """A slow motion to where the next stretch begins: an axis target, or a pose."""
+
+    target: list[float] | Pose
+    seconds: list[float] = field(default_factory=list)
+
+
+@dataclass
+class Places:
+    """What a file says of its frames: the tool in the flange, the work object in its carrier.
+
+    And whether it says that an axis carries the work object; None where it does not say.
+    """
+
+    carrier: str = ""
+    work_name: str = ""
+    flange: str = "-"
+    planned: SE3 | None = None
+    tool: SE3 | None = None
+    work: SE3 | None = None
+    is_carried: bool | None = None
+
+    @property
+    def shift(self) -> SE3 | None:
+        """By how much the work object is elsewhere than planned; None for not at all."""
+        if self.planned is None or self.work is None:
+            return None
+        shift = self.work * self.planned.inverse()
+        still = np.abs(shift.homogeneous - np.eye(4)).max() < _STILL
+        return None if still else shift
+
+    def frames(self, robot: RobotModel, axes: Sequence[Axis], file: object) -> ToolFrames:
+        """Return the frames for a robot whose joints the axes are.
+
+        Raises
+        ------
+        FileFormatError
+            The file does not say enough, or says what the robot has not.
+        """
+        by_joint = {axis.joint: axis for axis in axes}
+        if sorted(by_joint) != sorted(robot.joint_names):
+            known = ", ".join(robot.joint_names)
+            raise FileFormatError(f"{file}: has joints {', '.join(by_joint)}, expected {known}")
+        if not self.carrier or self.work is None or self.tool is None:
+            raise FileFormatError(
+                f"{file}: poses need the comment 'poses: work object NAME of LINK, flange LINK', "
+                f"the work object and the tool before them"
+            )
+        settings = ProgramSettings(flange=None if self.flange == "-" else self.flange)
+        try:
+            flange_to_tool = tool_from_flange(robot, settings)
+            own = tuple(by_joint[name] for name in robot.joint_names)
+            found = ToolFrames(
+                robot, own, self.carrier, self.work, self.work_name, self.tool, flange_to_tool
+            )
+            why = found.undetermined()
+        except RobotError as error:
+            raise FileFormatError(f"{file}: {error}") from error
+        if why:
+            raise FileFormatError(f"{file}: has poses, but {why}")
+        if self.is_carried not in (None, found.is_carried):
+            stands, carried = "stands in the world", "is carried by an axis"
+            says, expected = (carried, stands) if self.is_carried else (stands, carried)
+            raise FileFormatError(
+                f"{file}: its work object {says}, expected one that {expected}: its comments "
+                f"say that it is of '{self.carrier}'"
+            )
+        return found
+
+
+# Digits of poses leave this [m, parts of a turn].
+_STILL = 2e-6
+
+
+@dataclass
+class Follower:
+    """Makes stretches of rows, one after the other, from where the arm is.
+
+    Parameters
+    ----------
+    file : path
+    axes : tuple of Axis
+        In the order of the file.
+    frames : ToolFrames or None
+        None where there are no poses.
+    stretches : list of Stretch
+        What is made so far.
+    at : (n,) or None
+        Where the arm is.
+    approach : float
+        How far it goes slowly from its first axis target to its first pose [rad or m].
+    """
+
+    file: object
+    axes: tuple[Axis, ...]
+    frames: ToolFrames | None
+    stretches: list[Stretch] = field(default_factory=list)
+    at: Array | None = None
+    approach: float = 0.0
+
+    def take(self, row: Row | PoseRow | SlowRow) -> None:
+        """Take a row.
+
+        Raises
+        ------
+        FileFormatError
+            The arm cannot follow it.
+        """
+        if isinstance(row, PoseRow):
+            self._poses(row)
+        elif isinstance(row, SlowRow):
+            self._slowly(row)
+        else:
+            t = times_of(row.seconds)
+            at = self.at
+            if row.q:
+                q = self.in_si(np.array(row.q, dtype=np.float64))
+            elif at is not None:
+                q = np.array([at] * len(t))
+            else:
+                raise FileFormatError(f"{self.file}: rests before it has a target")
+            self.stretches.append(Stretch(row.name, t, q))
+            self.at = q[-1]
+
+    def in_si(self, values: Array, kept: Sequence[int] | None = None) -> Array:
+        """Return coordinates in rad or m."""
+        axes = self.axes if kept is None else [self.axes[k] for k in kept]
+        return np.asarray(values * [1e-3 if axis.slides else np.pi / 180.0 for axis in axes])
+
+    def _slowly(self, row: SlowRow) -> None:
+        before = self.at
+        if not isinstance(row.target, Pose):
+            self.at = self.in_si(np.array(row.target, dtype=np.float64))
+            if before is not None and np.abs(self.at - before).max() > _THERE:
+                seconds = float(np.abs(self.at - before).max()) / _SLOW
+                both = np.array([before, self.at])
+                self.stretches.append(Stretch(_SLOWLY, times_of([seconds]), both, is_slow=True))
+            return
+        frames, _ = self._known()
+        if before is None:
+            raise FileFormatError(f"{self.file}: begins with a pose, expected an axis target")
+        place, turn = frames.places(self._by_robot(before[None]))
+        far = float(np.linalg.norm(place[0] - row.target.place))
+        angle = float(np.linalg.norm(frames.turned(turn, row.target.turn[None])))
+        # Slowly from where the arm is, however far that is.
+        seconds = max(far / _SLOW, angle / _SLOW, 0.1)
+        moves = bool(self.stretches) and max(far, angle) > _THERE
+        here = Pose(place[0], turn[0], self._others(before), row.target.line)
+        found = self._stretch(PoseRow(_SLOWLY, [here, row.target], [seconds]))
+        stretch = replace(found, is_slow=True)
+        if not self.stretches:
+            self.approach = float(np.abs(stretch.q[-1] - before).max())
+        if moves:
+            self.stretches.append(stretch)
+        self.at = stretch.q[-1]
+
+    def _poses(self, row: PoseRow) -> None:
+        stretch = self._stretch(row)
+        self.stretches.append(stretch)
+        self.at = stretch.q[-1]
+
+    def _stretch(self, row: PoseRow) -> PoseStretch:
+        """Return the stretch of poses, its joints followed from where the arm is."""
+        frames, order = self._known()
+        places = np.array([pose.place for pose in row.poses])
+        at_speeds = bool(row.speeds)
+        t = times_at(places, row.vias, row.speeds) if at_speeds else times_of(row.seconds)
+        turns = on_one_side(np.array([pose.turn for pose in row.poses]))
+        outer = [k for k, axis in enumerate(self.axes) if axis.name.startswith("E")]
+        if any(len(pose.others) != len(outer) for pose in row.poses):
+            raise FileFormatError(f"{self.file}: poses have axes that its comments do not name")
+        others = self.in_si(np.array([pose.others for pose in row.poses]), outer)
+        # In the robot's order, as frames have them.
+        in_file = {self.axes[k].joint: c for c, k in enumerate(outer)}
+        columns = [in_file[frames.axes[k].joint] for k in frames.external.tolist()]
+        others = others[:, columns]
+        # Steps at speeds may be as long as the stretch.
+        count = _BETWEEN * (_FINER if at_speeds else 1)
+        times = finer(t, np.linspace(0.0, 1.0, count, endpoint=False))
+        rows = straight(times, t, np.hstack([places, turns, others]))
+        if at_speeds:
+            put_on_arcs(rows, times, t, places, row.vias)
+        assert self.at is not None
+        q = self._followed(frames, rows, self._by_robot(self.at[None])[0], row, count)
+        every = q[np.arange(0, len(times), count)]
+
+        def near(asked: Array) -> Array:
+            return np.stack([np.interp(asked, times, column) for column in q.T], axis=1)
+
+        stretch = PoseStretch(
+            row.name,
+            t,
+            every,
+            places=places,
+            turns=turns,
+            frames=frames,
+            near=near,
+            order=np.arange(every.shape[1]),
+        )
+        if at_speeds:
+            speeds, seconds = np.array(row.speeds), sum(row.seconds)
+            stretch = FeedStretch(
+                **vars(stretch),
+                speeds=speeds,
+                vias=row.vias,
+                seconds=seconds,
+                is_spline=row.is_spline,
+            )
+        return stretch.in_order(order)
+
+    def _followed(
+        self, frames: ToolFrames, rows: Array, first: Array, row: PoseRow, count: int
+    ) -> Array:
+        """Return the robot's joints along poses: from one target to the next at once, if they join.
+
+        Else each found from the one before. From one target to the next are `count` poses.
+        """
+        found = np.empty((len(rows), len(first)))
+        at = np.array(first)
+        for k in range(0, len(rows), _BETWEEN):
+            block = rows[k : k + _BETWEEN]
+            q, arrived = self._solved(frames, block, at)
+            steps = np.diff(np.vstack([at, q]), axis=0)[:, frames.arm]
+            # The arm may be somewhere else before its first pose: of a shifted work object.
+            if not arrived.all() or np.abs(steps[1 if k == 0 else 0 :]).max(initial=0.0) > _STEP:
+                q = self._one_by_one(frames, block, at, row, (k, count))
+            found[k : k + _BETWEEN] = q
+            at = q[-1]
+        return found
+
+    def _solved(self, frames: ToolFrames, poses: Array, at: Array) -> tuple[Array, Flags]:
+        seeds = np.repeat(at[None], len(poses), axis=0)
+        seeds[:, frames.external] = poses[:, 7:]
+        return frames.solved(poses[:, :3], poses[:, 3:7], seeds)
+
+    def _one_by_one(
+        self, frames: ToolFrames, poses: Array, at: Array, row: PoseRow, place: tuple[int, int]
+    ) -> Array:
+        found, (first, count) = np.empty((len(poses), len(at))), place
+        for k, pose in enumerate(poses, first):
+            q, arrived = self._solved(frames, pose[None], at)
+            far = np.abs(q[0] - at)[frames.arm].max()
+            if not arrived[0] or (far > _JUMP and k):
+                line = row.poses[min(k // count + 1, len(row.poses) - 1)].line
+                raise FileFormatError(
+                    f"{self.file}: line {line}: the arm does not follow to this pose: it is out of "
+                    f"reach, or singular on the way"
+                )
+            found[k - first] = at = q[0]
+        return found
+
+    def _known(self) -> tuple[ToolFrames, list[int]]:
+        """Return the frames, and which of the robot's joints each axis of the file is."""
+        if self.frames is None:
+            raise FileFormatError(f"{self.file}: has poses, whose joint positions need the robot")
+        names = self.frames.robot.joint_names
+        return self.frames, [names.index(axis.joint) for axis in self.axes]
+
+    def _by_robot(self, q: Array) -> Array:
+        _, order = self._known()
+        return q[:, np.argsort(order)]
+
+    def _others(self, q: Array) -> list[float]:
+        """Return the external axes of joints in the file's order [deg, mm]."""
+        return [
+            float(value) * (1e3 if axis.slides else 180.0 / np.pi)
+            for value, axis in zip(q, self.axes, strict=True)
+            if axis.name.startswith("E")
+        ]
+
+
+def times_of(seconds: Sequence[float]) -> Array:
+    """Return when targets are reached, of times between them, in whole microseconds."""
+    return np.round(np.append(0.0, np.cumsum(seconds)), 6)
+
+
+def pose_of_values(values: Sequence[float]) -> SE3:
+    """Return a pose of position [m] and quaternion x, y, z, w."""
+    x, y, z, w = values[3:7]
+    turn = Quaternion(w, x, y, z)
+    turn.normalize()
+    return SE3(turn.toRotationMatrix(), np.array(values[:3]))

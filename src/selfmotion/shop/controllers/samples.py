@@ -1,0 +1,255 @@
+"""A joint motion at the times that a file has it, and whether it begins and ends at rest."""
+
+from dataclasses import dataclass
+from numbers import Real
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from selfmotion.basics import Array, PlanError, ProblemError, shown
+from selfmotion.model.motion import MOST_SAMPLES, Trajectory
+from selfmotion.planning.result import Move, Parts, Plan, at_rate, is_retimed
+from selfmotion.problem.constraints import ClosedPath, EndVelocity, StartVelocity
+from selfmotion.work.job import Program
+
+# A joint motion at the times that a file has it.
+
+# Messages count whole nanoseconds.
+_DIGITS = 9
+# A motion has so many samples at least.
+_FEWEST = 4
+# Where between two samples straight lines are compared with the motion.
+_BETWEEN = (0.25, 0.5, 0.75)
+# A rate that does not keep the tolerance is raised at least so far for the next trial.
+_FASTER = 1.01
+# Cubics this near to a motion [rad or m] are as good as it; intervals are halved so often for that.
+_AS_GOOD_AS, _MOST_HALVINGS = 1e-8, 12
+
+
+@dataclass(frozen=True, eq=False)
+class MotionSamples:
+    """A joint motion at K times.
+
+    Attributes
+    ----------
+    joint_names : tuple of str
+        As files have them: a part of a cell has names of its own.
+    robot_joints : tuple of str
+        What the robot calls them.
+    t : (K,)
+        From 0 [s], in whole nanoseconds.
+    q, qd, qdd : (K, n)
+        [rad or m], per s, per s².
+    """
+
+    joint_names: tuple[str, ...]
+    robot_joints: tuple[str, ...]
+    t: Array
+    q: Array
+    qd: Array
+    qdd: Array
+
+    @classmethod
+    def of(cls, motion: Trajectory, rate: float | None = None) -> "MotionSamples":
+        """Sample a motion at a `rate` [Hz] and at its end; by default where it has samples.
+
+        Raises
+        ------
+        ProblemError
+            The rate is not positive, or gives no two samples.
+        """
+        if rate is None:
+            t = np.round(motion.t - motion.t[0], _DIGITS)
+        else:
+            known = isinstance(rate, Real) and np.isfinite(float(rate))
+            if not (known and 1.0 <= rate * motion.duration <= MOST_SAMPLES):
+                raise ProblemError(
+                    f"rate is {shown(rate)} Hz, expected a number above "
+                    f"{1.0 / motion.duration:.4g} and up to {MOST_SAMPLES / motion.duration:.4g}, "
+                    f"so that the motion of {motion.duration:.6g} s has samples, not too many"
+                )
+            t = np.round(motion.sample_times(rate), _DIGITS)
+        times = np.clip(motion.t[0] + t, motion.t[0], motion.t[-1])
+        names = motion.joint_names
+        return cls(names, names, t, *(motion(times, order) for order in (0, 1, 2)))
+
+    def of_part(self, part: str) -> "MotionSamples":
+        """Return those of a part of a cell, its joints called as in its own robot."""
+        mine = [k for k, name in enumerate(self.robot_joints) if name.startswith(f"{part}/")]
+        joints = tuple(self.robot_joints[k] for k in mine)
+        names = tuple(name.removeprefix(f"{part}/") for name in joints)
+        orders = (values[:, mine] for values in (self.q, self.qd, self.qdd))
+        return MotionSamples(names, joints, self.t, *orders)
+
+
+class LinearMiss(NamedTuple):
+    """How far a controller that joins samples by straight lines leaves a plan's motion.
+
+    Attributes
+    ----------
+    position, rotation : float
+        Of the tool in its reference, or of another frame that follows a path, where it is farthest
+        off [m, rad].
+    rate : float or None
+        Samples per second at which it would stay within the plan's tolerance; None where files
+        have no so many samples.
+    """
+
+    position: float
+    rotation: float
+    rate: float | None
+
+
+def linear_miss(plan: Plan, rate: float | None = None) -> LinearMiss:
+    """Return what linear interpolation between the samples of a file costs; see `write_motion`.
+
+    Raises
+    ------
+    ProblemError
+        The rate is not positive, or gives no two samples.
+    """
+    misses, _ = _misses(plan, rate)
+    position, rotation = misses.max(axis=0).tolist()
+    return LinearMiss(position, rotation, _rate_that_keeps(plan))
+
+
+def _misses(plan: Plan, rate: float | None) -> tuple[Array, Array]:
+    """Return by how much straight lines between samples leave a motion, (K, 2), and how long."""
+    motion, chains = plan.trajectory, [item.chain for item in plan.problem.follows.items]
+    samples = MotionSamples.of(motion, rate)
+    spans = np.diff(samples.t)
+    misses = np.zeros((len(spans), 2))
+    for share in _BETWEEN:
+        t = np.minimum(motion.t[0] + samples.t[:-1] + share * spans, motion.t[-1])
+        straight, exact = samples.q[:-1] + share * np.diff(samples.q, axis=0), motion(t)
+        for chain in chains:
+            (_, turned, here), (_, facing, there) = chain.along(straight), chain.along(exact)
+            far = np.linalg.norm(here - there, axis=1)
+            # |R - R'| is 2√2 sin(angle / 2).
+            half = np.linalg.norm(turned - facing, axis=(1, 2)) / np.sqrt(8.0)
+            angle = 2.0 * np.arcsin(np.minimum(half, 1.0))
+            misses = np.maximum(misses, np.stack([far, angle], axis=1))
+    return misses, spans
+
+
+def _rate_that_keeps(plan: Plan) -> float | None:
+    """Return a whole rate [Hz] at which the miss is within the tolerance, and hardly a lower one.
+
+    It does not depend on the rate that a file has, and is tried before it is named. None where it
+    takes more samples than files have.
+    """
+    tolerance, duration = plan.tolerance, plan.trajectory.duration
+    lowest = float(np.ceil(1.0 / duration))
+
+    def needed(rate: float | None) -> tuple[float, bool]:
+        misses, spans = _misses(plan, rate)
+        share = (misses / [tolerance.position, tolerance.rotation]).max(axis=1)
+        # The miss of a line over a span h is that of a parabola: it grows with h².
+        found = float(np.ceil((np.sqrt(share) / spans).max()))
+        return max(found, lowest), bool(share.max() <= 1.0)
+
+    # The samples of the plan itself lie too far apart for more than a first guess.
+    rate, _ = needed(None)
+    if rate * duration <= MOST_SAMPLES:
+        rate = needed(rate)[0]
+    while rate * duration <= MOST_SAMPLES:
+        better, kept = needed(rate)
+        if kept:
+            return rate
+        rate = max(better, float(np.ceil(_FASTER * rate)))
+    return None
+
+
+def coarsest_rate(plan: Plan) -> float | None:
+    """Return the lowest whole rate [Hz] at which a plan's samples keep its tolerance.
+
+    Joined by straight lines as well as by quintics, by which the certificate judges them. None
+    where the samples of the plan itself are no more, or nothing coarser is verified.
+    """
+    motion = plan.trajectory
+    needed = _rate_that_keeps(plan)
+    if needed is None:
+        return None
+    rate = max(needed, float(np.ceil(_FEWEST / motion.duration)))
+    if rate * motion.duration >= len(motion.t) - 1:
+        return None
+    samples = MotionSamples.of(motion, rate)
+    coarse = Trajectory(samples.t, samples.q, samples.qd, motion.joint_names, samples.qdd)
+    found = plan.problem.certify(coarse, plan.tolerance, plan.report.ending)
+    return rate if found.verified else None
+
+
+def within_limits_at(plan: Plan, rate: float | None) -> Plan:
+    """Return a retimed plan as slow as its samples at a rate need to keep its limits.
+
+    Any other plan, whose time is what was asked for, is returned as it is, and so is one of which
+    no slower motion is verified.
+    """
+    if rate is None or not (is_retimed(plan) and plan.certificate.verified):
+        return plan
+    samples = MotionSamples.of(plan.trajectory, rate)
+    read = Trajectory(samples.t, samples.q, samples.qd, plan.trajectory.joint_names, samples.qdd)
+    if plan.problem.certify(read, plan.tolerance, plan.report.ending).verified:
+        return plan
+    slower = at_rate(plan, rate)
+    return slower if slower.certificate.verified else plan
+
+
+def for_cubics(motion: Trajectory) -> Trajectory:
+    """Return a motion with so many samples that cubics through q and q̇ are it.
+
+    For files without accelerations: each interval is halved until its cubic is near enough.
+    """
+    for _ in range(_MOST_HALVINGS):
+        t = motion.t
+        middle = 0.5 * (t[1:] + t[:-1])
+        cubic = Trajectory(t, motion.q, motion.qd, motion.joint_names)
+        far = np.abs(cubic(middle) - motion(middle)).max(axis=1) > _AS_GOOD_AS
+        if not far.any():
+            break
+        # Alike on both sides of where it matters.
+        wide = np.convolve(far, np.ones(3), "same") > 0.0
+        finer = np.sort(np.concatenate([t, middle[wide]]))
+        q, qd, qdd = (motion(finer, order) for order in range(3))
+        motion = Trajectory(finer, q, qd, motion.joint_names, qdd)
+    return motion
+
+
+# Motions that begin or end while the arm moves: no controller takes one unasked.
+
+# What is slower than this rests [rad/s or m/s], as certificates judge it.
+_REST = 1e-6
+
+
+def moving_ends(plan: Plan | Parts | Move | Program) -> str:
+    """Return in words which joint moves at an end of a motion that nobody asked to; "" for none.
+
+    A problem asks for it by `StartVelocity`, `EndVelocity`, `ClosedPath` or ``rest=False``.
+    """
+    motion = plan.motion if isinstance(plan, Move) else plan.trajectory
+    asked = plan.problem.constraints if isinstance(plan, Plan) else ()
+    allowed = [
+        any(isinstance(item, kind | ClosedPath) for item in asked)
+        for kind in (StartVelocity, EndVelocity)
+    ]
+    if isinstance(plan, Plan) and not plan.problem.rest:
+        allowed = [True, True]
+    for row, verb, may in ((0, "begins", allowed[0]), (-1, "ends", allowed[1])):
+        speeds = np.abs(motion.qd[row])
+        joint = int(speeds.argmax())
+        if speeds[joint] > _REST and not may:
+            unit = "m/s" if plan.robot.is_prismatic(motion.joint_names[joint]) else "rad/s"
+            return (
+                f"joint '{motion.joint_names[joint]}' {verb} at {speeds[joint]:.3g} {unit} at "
+                f"t = {motion.t[row]:.6g} s, and controllers take motions from rest to rest: plan "
+                f"it with a ramp (--ramp 0.5)"
+            )
+    return ""
+
+
+def check_ends(plan: Plan | Parts | Move | Program, file: Path, force: bool) -> None:
+    """Raise PlanError for a motion that begins or ends moving unasked, unless it is forced."""
+    said = "" if force else moving_ends(plan)
+    if said:
+        raise PlanError(f"{file}: is not written: {said}, or give force=True to write it as it is")

@@ -1,0 +1,294 @@
+"""Straight and circular steps between tool poses, as long as a motion allows."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from selfmotion.basics import Array, Flags
+from selfmotion.model.task import Task
+from selfmotion.shop.controllers.stretches import straight
+from selfmotion.shop.controllers.tool_frames import ToolFrames
+
+# Circular steps between tool poses, as ``SCIRC``, ``MoveC`` and ``movec`` make them.
+#
+# The position goes along the circle through the begin, a via point and the end, evenly; the
+# orientation turns from that of the begin to that of the end about one axis evenly, relative to
+# the work object, and external axes are linear, as in a straight step. The makers document that
+# orientation for ``$CIRC_TYPE = #BASE`` (KUKA), ``CirPathMode \ObjectFrame`` (ABB) and ``mode=0``
+# (Universal Robots). A via pose is in the middle of its step in all of that, so that a controller
+# that heeds its orientation does the same.
+
+# Circles are flatter than this [m of height over the chord's length] where they are lines.
+_FLAT = 1e-6
+# No step goes farther round than this [rad], as ABB's are below 240°, nor less, as controllers ask
+# for points that are apart: ABB by 0.1 mm and 1°.
+MOST_TURN, LEAST_TURN, LEAST_LENGTH = np.radians(200.0), np.radians(3.0), 1e-3
+
+
+class Arc(NamedTuple):
+    """The circle through three points.
+
+    Attributes
+    ----------
+    center, axis : (3,)
+        It goes right-handed about the axis.
+    arm : (3,)
+        From the centre to the begin [m].
+    angle : float
+        How far it goes [rad].
+    """
+
+    center: Array
+    axis: Array
+    arm: Array
+    angle: float
+
+    @property
+    def length(self) -> float:
+        """How long it is [m]."""
+        return self.angle * float(np.linalg.norm(self.arm))
+
+    @property
+    def is_meant(self) -> bool:
+        """Whether controllers make a step of it."""
+        return LEAST_TURN <= self.angle <= MOST_TURN and self.length >= LEAST_LENGTH
+
+    def at(self, share: Array) -> Array:
+        """Return points at shares of it (K,), (K, 3)."""
+        turned = (self.angle * share)[:, None]
+        across = np.cross(self.axis, self.arm)
+        return np.asarray(self.center + np.cos(turned) * self.arm + np.sin(turned) * across)
+
+
+def arc_through(begin: Array, via: Array, end: Array) -> Arc | None:
+    """Return the arc from a point by another to a third (3,); None where they are on a line."""
+    first, second = via - begin, end - begin
+    axis = np.cross(first, second)
+    size, chord = float(np.linalg.norm(axis)), float(np.linalg.norm(second))
+    if size <= _FLAT * max(chord, float(np.linalg.norm(first))) ** 2:
+        return None
+    # The circumcentre, from the begin.
+    away = np.cross(axis, first) * (second @ second) + np.cross(second, axis) * (first @ first)
+    away = away / (2.0 * size**2)
+    axis = axis / size
+    arm = -away
+    last = end - begin - away
+    angle = float(np.arctan2(np.cross(arm, last) @ axis, arm @ last)) % (2.0 * np.pi)
+    return Arc(begin + away, axis, arm, angle)
+
+
+def step_lengths(places: Array, vias: Array) -> Array:
+    """Return how long the steps between places (K + 1, 3) are, (K,) [m].
+
+    Parameters
+    ----------
+    places : (K + 1, 3)
+    vias : (K, 3)
+        Where a step goes round; no numbers where it goes straight.
+    """
+    found = np.linalg.norm(np.diff(places, axis=0), axis=1)
+    for k in np.flatnonzero(np.isfinite(vias[:, 0])):
+        arc = arc_through(places[k], vias[k], places[k + 1])
+        found[k] = found[k] if arc is None else arc.length
+    return np.asarray(found)
+
+
+def put_on_arcs(rows: Array, times: Array, t: Array, places: Array, vias: Array) -> None:
+    """Put the positions of rows (N, 3 + …) at times where steps go round, in place."""
+    step = np.clip(np.searchsorted(t, times, side="right") - 1, 0, len(t) - 2)
+    for k in np.flatnonzero(np.isfinite(vias[:, 0])):
+        arc = arc_through(places[k], vias[k], places[k + 1])
+        here = step == k
+        if arc is not None and here.any():
+            rows[here, :3] = arc.at((times[here] - t[k]) / (t[k + 1] - t[k]))
+
+
+# The longest straight and circular steps that keep near a motion, one after the other.
+
+# Of what is allowed, steps take this much before corners and digits.
+_OF_ALLOWED = 0.9
+# So often the first arc that is tried is made twice as long, where it is not one.
+_DOUBLED = 12
+# Half-turns have two axes [rad].
+_NEARLY_HALF = 3.0
+
+
+class Steps(NamedTuple):
+    """Targets by their places among those that are looked at, and which steps go round."""
+
+    ends: list[int]
+    round: list[bool]
+
+    def halved(self, far: Flags) -> "Steps":
+        """Return them with those halved that are too far off, and their neighbours."""
+        near = np.convolve(far, np.ones(3), mode="same") > 0.0
+        found = Steps(self.ends[:1], [])
+        for k, is_round in enumerate(self.round):
+            first, last = self.ends[k], self.ends[k + 1]
+            if near[k] and last - first >= 2:
+                found.ends.append((first + last) // 2)
+                found.round.append(is_round)
+            found.ends.append(last)
+            found.round.append(is_round)
+        return found
+
+
+class Places(NamedTuple):
+    """A motion at places along a stretch.
+
+    Attributes
+    ----------
+    gone : (N,)
+        How far the tool has gone [m].
+    q : (N, n)
+    rows : (N, 7 + m)
+        Poses and external axes.
+    at : callable
+        How far the tool has gone (K,) → where it is (K, 3), in the work object.
+    """
+
+    gone: Array
+    q: Array
+    rows: Array
+    at: Callable[[Array], Array]
+
+    def middle(self, first: int, last: int) -> Array:
+        """Return where the tool is halfway from one place to another, (3,)."""
+        found: Array = self.at(0.5 * (self.gone[[first]] + self.gone[[last]]))[0]
+        return found
+
+
+class Allowed(NamedTuple):
+    """What steps may be off: of places [m], of turning as prescribed, and of all else [rad or m].
+
+    Attributes
+    ----------
+    position, rotation, free : float
+    """
+
+    position: float
+    rotation: float
+    free: float
+
+    def turned(self, frames: ToolFrames, task: Task, turns: Array, facing: Array) -> Array:
+        """Return how much orientations (K, 4) take of what they may be off others, (K,)."""
+        whole = np.linalg.norm(frames.turned(turns, facing), axis=1)
+        if task.tool_axes:
+            leaned = np.linalg.norm(np.cross(_axes(turns), _axes(facing)), axis=1)
+            return np.asarray(np.maximum(leaned / self.rotation, whole / self.free))
+        return np.asarray(whole / (self.rotation if task.angular else self.free))
+
+
+@dataclass(frozen=True, eq=False)
+class StepSearch:
+    """Looks for the longest steps along a motion.
+
+    Parameters
+    ----------
+    frames : ToolFrames
+    task : Task
+        By whose rows the tool turns as it has to.
+    along : Places
+    allowed : Allowed
+    """
+
+    frames: ToolFrames
+    task: Task
+    along: Places
+    allowed: Allowed
+
+    def between(self, marks: list[int]) -> Steps | int:
+        """Return steps that end at marks and in between; where none is near enough, that place."""
+        found = Steps(marks[:1], [])
+        for first, last in pairwise(marks):
+            part = self._joined(first, last)
+            if not isinstance(part, Steps):
+                return part
+            part = self._even(part)
+            found = Steps(found.ends + part.ends[1:], found.round + part.round)
+        return found
+
+    def _joined(self, first: int, last: int) -> Steps | int:
+        """Return steps as long as they can be, one after the other; see `between`."""
+        steps, at = Steps([first], []), first
+        while at < last:
+            line = self._farthest(at, last, is_round=False, least=at + 1)
+            arc = at
+            if line < last:
+                # The shortest arc has a place in between, and is one that controllers make.
+                long = self.along.gone[at] + LEAST_LENGTH
+                least = max(line + 1, at + 2, int(np.searchsorted(self.along.gone, long)))
+                arc = self._farthest(at, last, is_round=True, least=min(least, last))
+            if max(line, arc) <= at:
+                return at
+            steps.round.append(arc > line + 1)
+            at = max(line, arc)
+            steps.ends.append(at)
+        return steps
+
+    def _farthest(self, at: int, last: int, *, is_round: bool, least: int) -> int:
+        """Return how far ahead one step may go, from `least` on; where it begins for nowhere."""
+        tried = [min(at + (least - at) * 2**k, last) for k in range(_DOUBLED if is_round else 1)]
+        fits = (there for there in dict.fromkeys(tried) if there > at)
+        near = next((there for there in fits if self._is_near(at, there, is_round=is_round)), at)
+        ahead, beyond = 2 * (near - at), last + 1
+        while at < near < last and beyond - near > 1:
+            there = min(at + ahead, last) if beyond > last else (near + beyond) // 2
+            if self._is_near(at, there, is_round=is_round):
+                near, ahead = there, 2 * ahead
+            else:
+                beyond = there
+        return near
+
+    def _even(self, steps: Steps) -> Steps:
+        """Return as many steps of one kind as long as each other, where these do as well."""
+        count = len(steps.round)
+        if count < 2 or len(set(steps.round)) > 1:
+            return steps
+        wanted = np.linspace(
+            self.along.gone[steps.ends[0]], self.along.gone[steps.ends[-1]], count + 1
+        )
+        ends = [int(np.abs(self.along.gone - each).argmin()) for each in wanted]
+        even = all(self._is_near(*pair, is_round=steps.round[0]) for pair in pairwise(ends))
+        return Steps(ends, steps.round) if even else steps
+
+    def _is_near(
+        self,
+        first: int,
+        last: int,
+        *,
+        is_round: bool,
+    ) -> bool:
+        """Whether one step from a place to another keeps near the motion."""
+        part = slice(first, last + 1)
+        gone, exact = self.along.gone[part], self.along.rows[part]
+        place, _, free = (_OF_ALLOWED * each for each in self.allowed)
+        if 2.0 * np.arccos(min(1.0, abs(float(exact[0, 3:7] @ exact[-1, 3:7])))) > _NEARLY_HALF:
+            return False
+        rows = straight(gone, gone[[0, -1]], exact[[0, -1]])
+        if is_round:
+            via = self.along.middle(first, last)
+            arc = arc_through(exact[0, :3], via, exact[-1, :3])
+            if arc is None or not arc.is_meant:
+                return False
+            put_on_arcs(rows, gone, gone[[0, -1]], exact[[0, -1], :3], via[None])
+        if np.linalg.norm(rows[:, :3] - exact[:, :3], axis=1).max() > place:
+            return False
+        if rows.shape[1] > 7 and np.abs(rows[:, 7:] - exact[:, 7:]).max() > free:
+            return False
+        turned = self.allowed.turned(self.frames, self.task, rows[:, 3:7], exact[:, 3:7])
+        if turned.max() > _OF_ALLOWED:
+            return False
+        near = np.array(self.along.q[part])
+        near[:, self.frames.external] = rows[:, 7:]
+        q, arrived = self.frames.solved(rows[:, :3], rows[:, 3:7], near)
+        return bool(arrived.all() and np.abs(q - self.along.q[part]).max() <= free)
+
+
+def _axes(turns: Array) -> Array:
+    """Return the z axes of orientations (K, 4), (K, 3)."""
+    x, y, z, w = turns.T
+    return np.stack([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)], axis=1)

@@ -1,0 +1,375 @@
+"""A motion cut into stretches, each of as few tool poses or joint targets as can be."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from selfmotion.basics import Array, Flags, ProblemError, Progress, silent
+from selfmotion.certificate import Tolerance
+from selfmotion.model.motion import Trajectory
+from selfmotion.shop.controllers.stretches import (
+    NO_MISS,
+    SURE,
+    Event,
+    Miss,
+    Misses,
+    PoseStretch,
+    Stretch,
+    finer,
+    on_one_side,
+)
+from selfmotion.shop.controllers.thinning import TIME_DIGITS, Piece, Span, events_within, rests
+from selfmotion.shop.controllers.tool_frames import Rounding, ToolFrames
+
+# As few tool poses as keep a controller near a motion.
+#
+# A straight line over a time h is off a motion by h²|a|/8, with a the acceleration of the tool in
+# the work object; the joints then by |J⁻¹a| h²/8. Poses are spread evenly in the root of that, as
+# joint targets are (`controllers/thinning.py`), and doubled where they are still too far apart
+# by inverse kinematics of what is in between.
+
+# Targets are at least so dense [of where they are densest]; how often they are doubled; and times
+# between them that no controller interpolates in [s].
+_SPARSE, _TRIES, _SHORTEST = 0.02, 16, 4e-3
+# So often all are made denser, where none is off by more than this share of what is allowed.
+_EVENLY, _MUCH = 5, 9.0
+# Times at which the motion is looked at between two of its samples; from how far the acceleration
+# is taken [s]; and how far poses may take joints that inverse kinematics finds anew [rad].
+_FINER, _AROUND = 4, 2e-3
+# What numbers of poses, and controllers that count with them, may be off [m, rad], in any language:
+# where that alone takes joints as far as is allowed, the arm is singular.
+_OF_POSES = 1e-6
+
+
+class NotByPosesError(ProblemError):
+    """Poses do not keep a motion; the message says why."""
+
+
+@dataclass(frozen=True, eq=False)
+class PoseSpan(Span):
+    """What of a piece lies between two rests, to be written as tool poses.
+
+    Attributes
+    ----------
+    frames : ToolFrames
+    rounding : Rounding
+        Poses as they are when the file is read again.
+    """
+
+    frames: ToolFrames
+    rounding: Rounding
+
+    @classmethod
+    def by(
+        cls,
+        frames: ToolFrames,
+        rounding: Rounding,
+        piece: Piece,
+        slides: Flags,
+        first: float,
+        last: float,
+    ) -> "PoseSpan":
+        """Return that of a piece, with the events that are in it."""
+        return cls(piece, slides, first, last, events_within(piece, first, last), frames, rounding)
+
+    def stretches(self, allowed: Tolerance) -> list[tuple[Stretch, Miss]]:
+        """See `Span.stretches`.
+
+        Raises
+        ------
+        NotByPosesError
+            The arm is singular somewhere, as at an end: its joints do not follow from poses.
+        """
+        self.check_regular(allowed)
+        return super().stretches(allowed)
+
+    def check_regular(self, allowed: Tolerance) -> None:
+        """Raise NotByPosesError where the arm is singular within what is allowed."""
+        motion = self.piece.motion
+        if rests(motion, self.first, self.last):
+            return
+        inside = motion.t[(motion.t > self.first) & (motion.t < self.last)]
+        marks = np.concatenate([[self.first], inside, [self.last]])
+        t = finer(marks, np.linspace(0.0, 1.0, _FINER, endpoint=False))
+        far = _OF_POSES / np.maximum(self.frames.regularity(motion(t)), 1e-12)
+        if far.max() > allowed.rotation:
+            at = float(t[int(far.argmax())] - motion.t[0])
+            raise NotByPosesError(f"'{self.piece.name}': the arm is singular at t = {at:.4g} s")
+
+    def thinned(self, allowed: Tolerance) -> tuple[Stretch, Miss]:
+        """See `Span.thinned`.
+
+        Raises
+        ------
+        NotByPosesError
+            There are no such poses.
+        """
+        stretch, miss = super().thinned(allowed)
+        # More targets are looked at elsewhere: near a singular pose joints swing in between.
+        if isinstance(stretch, PoseStretch) and miss.share(allowed) > 1.0:
+            raise self._singular(self.first, allowed)
+        return stretch, miss
+
+    def _within(self, allowed: Tolerance, fixed: Array) -> Array:
+        """See `Span._within`.
+
+        Raises
+        ------
+        NotByPosesError
+            There are no such poses.
+        """
+        t, more = self._evenly(fixed, allowed, 1.0), 1.0
+        for tries in range(_TRIES):
+            shares = self._shares(self._passing(t), allowed)
+            far, worst = shares > 1.0, float(shares.max())
+            if not far.any():
+                return t
+            if tries < _EVENLY and worst < _MUCH:
+                more *= max(1.05, 1.02 * float(np.sqrt(worst)))
+                t = self._evenly(fixed, allowed, more)
+                continue
+            if np.diff(t)[far].min() < _SHORTEST:
+                break
+            # With their neighbours, so that a smooth curve through all does not swing.
+            near = np.convolve(far, np.ones(3), mode="same") > 0.0
+            t = np.sort(np.append(t, (0.5 * (t[1:] + t[:-1]))[near]))
+        raise self._singular(float(t[:-1][far][0]), allowed)
+
+    def _singular(self, at: float, allowed: Tolerance) -> NotByPosesError:
+        return NotByPosesError(
+            f"'{self.piece.name}': near t = {at - self.piece.motion.t[0]:.4g} s the joints do not "
+            f"follow from poses within {1e3 * allowed.position:.3g} mm and "
+            f"{np.degrees(allowed.rotation):.3g}°: it is singular there, or turns too fast"
+        )
+
+    def _check_digits(self, allowed: Tolerance) -> None:
+        """Digits of poses are finer than those of joints."""
+
+    def _passing(self, t: Array, *, at_rest: bool = False) -> Stretch:
+        """See `Span._passing`."""
+        stretch = super()._passing(t, at_rest=at_rest)
+        if at_rest:
+            return stretch
+        motion = self.piece.motion
+        exact = motion(np.minimum(self.first + stretch.t, self.last))
+        places, turns = self.rounding(*self.frames.places(exact))
+        # External axes in their digits, the arm's joints as they follow.
+        q, arrived = self.frames.solved(places, turns, self._mixed(exact, stretch.q))
+        if not arrived.all():
+            at = float(t[int(np.argmin(arrived))])
+            raise NotByPosesError(
+                f"'{self.piece.name}': the arm is singular at t = {at - motion.t[0]:.4g} s"
+            )
+        events: tuple[Event, ...] = stretch.events
+        return PoseStretch(
+            stretch.name,
+            stretch.t,
+            q,
+            events,
+            places=places,
+            turns=on_one_side(turns),
+            frames=self.frames,
+            near=lambda times: motion(np.minimum(self.first + times, self.last)),
+            order=np.arange(q.shape[1]),
+        )
+
+    def _mixed(self, exact: Array, digits: Array) -> Array:
+        q, others = np.array(exact), self.frames.external
+        q[:, others] = digits[:, others]
+        return q
+
+    def _shares(self, stretch: Stretch, allowed: Tolerance) -> Array:
+        """Return how much of what is allowed each step between two targets takes, (K,)."""
+        times, count = stretch.looked_at(), len(stretch.t) - 1
+        motion = self.piece.motion
+        exact = motion(np.clip(self.first + times, motion.t[0], motion.t[-1]))
+        worst = np.zeros(count)
+        lines = stretch.ways(times)
+        for line in lines:
+            joints = np.abs(line - exact).max(axis=1) / allowed.rotation
+            worst = np.maximum(worst, largest(joints, count))
+        # Where joints are near, the tool is nearly so: only these are placed.
+        for line in lines if worst.max() <= _JOINTS_FAR else []:
+            for chain in self.piece.chains:
+                _, turned, here = chain.along(line)
+                _, facing, there = chain.along(exact)
+                off = np.linalg.norm(here - there, axis=1) / allowed.position
+                # |R - R'| is 2√2 sin(angle / 2).
+                angle = np.linalg.norm(turned - facing, axis=(1, 2)) / np.sqrt(2.0)
+                off = np.maximum(off, angle / allowed.rotation)
+                worst = np.maximum(worst, largest(off, count))
+        return np.where(np.isfinite(worst), SURE * worst, np.inf)
+
+    def _evenly(self, fixed: Array, allowed: Tolerance, more: float) -> Array:
+        found = [self._spread(*ends, allowed, more) for ends in pairwise(fixed)]
+        return np.concatenate([fixed[:1], *found])
+
+    def _spread(self, begin: float, end: float, allowed: Tolerance, more: float) -> Array:
+        """Return times from one to another, even in the root of how much the poses bend."""
+        motion = self.piece.motion
+        inside = motion.t[(motion.t > begin) & (motion.t < end)]
+        marks = np.concatenate([[begin], inside, [end]])
+        count = _FINER * (len(marks) - 1) + 1
+        t = np.interp(np.linspace(0, len(marks) - 1, count), np.arange(len(marks)), marks)
+        rate = np.sqrt(self._bend(t, allowed) / 8.0)
+        rate = np.maximum(rate, _SPARSE * float(rate.max())) + 1e-3 / max(end - begin, 1e-6)
+        way = np.append(0.0, np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(t)))
+        most = max(1, int((end - begin) * 10**TIME_DIGITS / 2))
+        targets = min(max(2, int(np.ceil(more * way[-1]))), most)
+        found: Array = np.interp(np.linspace(0.0, way[-1], targets + 1)[1:], way, t)
+        found[-1] = end
+        return found
+
+    def _bend(self, t: Array, allowed: Tolerance) -> Array:
+        """Return accelerations of poses and joints as shares of what is allowed, (K,) [1/s²]."""
+        motion = self.piece.motion
+        middle = np.clip(t, motion.t[0] + _AROUND, motion.t[-1] - _AROUND)
+        q = [motion(middle + side * _AROUND) for side in (-1.0, 0.0, 1.0)]
+        poses = [self.frames.places(each) for each in q]
+        places = (poses[0][0] - 2.0 * poses[1][0] + poses[2][0]) / _AROUND**2
+        turns = [self.frames.turned(poses[k][1], poses[k + 1][1]) for k in (0, 1)]
+        turned = (turns[1] - turns[0]) / _AROUND**2
+        joints = self.frames.joint_rates(q[1], np.hstack([places, turned]))
+        others = ((q[0] - 2.0 * q[1] + q[2]) / _AROUND**2)[:, self.frames.external]
+        found: Array = np.linalg.norm(places, axis=1) / allowed.position
+        for rates in (
+            np.linalg.norm(turned, axis=1, keepdims=True),
+            np.abs(joints),
+            np.abs(others),
+        ):
+            if rates.shape[1]:
+                found = np.maximum(found, rates.max(axis=1) / allowed.rotation)
+        # Singular configurations are found where they are; they do not decide how dense all is.
+        return np.asarray(np.minimum(found, 8.0 / _SHORTEST**2))
+
+
+# Joints as far off as this, of what is allowed, leave nothing to be said of the tool.
+_JOINTS_FAR = 10.0
+
+
+def largest(values: Array, count: int) -> Array:
+    """Return the largest of the values of each step, (count,), that at its end included."""
+    steps = values[:-1].reshape(count, -1)
+    found: Array = np.maximum(steps.max(axis=1), np.append(steps[1:, 0], values[-1]))
+    return np.where(np.isnan(found), np.inf, found)
+
+
+# A motion cut into stretches from rest to rest, as controllers pass it.
+#
+# A motion is cut where the arm rests, be it for an instant: controllers stop there, and what
+# happens there happens on time. Which targets there are in between says
+# `selfmotion.shop.controllers.thinning`.
+
+# Makes a span of tool poses of a piece, which joints slide, and when it begins and ends.
+PosedSpans = Callable[[Piece, Flags, float, float], Span]
+# The arm rests where it is as slow as this [rad or m/s] for at least so long [s].
+_REST, _WHILE = 1e-7, 0.02
+# Programs go from rest to rest: this is rest [rad or m/s], and so is such a share of the fastest.
+_SLOW, _SHARE = 1e-4, 1e-3
+
+
+def stretches_of(
+    pieces: Sequence[Piece],
+    slides: Flags,
+    allowed: Tolerance,
+    of_moves: Tolerance | None = None,
+    progress: Progress = silent,
+    posed: PosedSpans | None = None,
+) -> tuple[list[Stretch], Misses]:
+    """Return the targets of a motion, as its file has them, and how far they are off it.
+
+    Moves through the air may be off by `of_moves`; by default as far as they keep apart. With
+    `posed` they are tool poses; those of moves that poses do not keep are joint targets.
+
+    Raises
+    ------
+    NotByPosesError
+        Poses do not keep a seam.
+    ProblemError
+        It does not begin and end at rest, or takes more targets than any controller has.
+    """
+    found: list[Stretch] = []
+    worst = Misses(NO_MISS, NO_MISS)
+    for k, piece in enumerate(pieces):
+        progress("targets", k + 1, len(pieces))
+        motion = piece.motion
+        for when in motion.t[[0, -1]]:
+            speed = np.abs(motion(when, 1))
+            if speed.max() > _SLOW:
+                raise ProblemError(
+                    f"'{piece.name}' has joint '{motion.joint_names[int(speed.argmax())]}' at "
+                    f"{speed.max():.3g} rad/s or m/s at t = {when:.6g} s; programs of controllers "
+                    f"go from rest to rest: plan it with a ramp, or rest=True"
+                )
+        within = _allowed(piece, allowed, of_moves)
+        for first, last in _moving(motion, [motion.t[0] + at for at, _ in piece.events]):
+            for stretch, miss in _thinned(piece, slides, first, last, within, posed):
+                both = Misses(NO_MISS, miss) if piece.is_move else Misses(miss, NO_MISS)
+                worst = worst.worse(both)
+                found.append(stretch)
+    return found, worst
+
+
+def _thinned(
+    piece: Piece,
+    slides: Flags,
+    first: float,
+    last: float,
+    within: Tolerance,
+    posed: PosedSpans | None,
+) -> list[tuple[Stretch, Miss]]:
+    if posed is not None:
+        try:
+            return posed(piece, slides, first, last).stretches(within)
+        except NotByPosesError:
+            # A free move goes through singular configurations where it likes.
+            if not piece.is_move:
+                raise
+    return Span.of(piece, slides, first, last).stretches(within)
+
+
+def _allowed(piece: Piece, allowed: Tolerance, of_moves: Tolerance | None) -> Tolerance:
+    """Return how far a controller may be off a piece."""
+    if not piece.is_move:
+        return allowed
+    if of_moves is not None or piece.room is None:
+        return of_moves or allowed
+    room = piece.room
+    return Tolerance(max(allowed.position, room.position), max(allowed.rotation, room.rotation))
+
+
+def _moving(motion: Trajectory, events: Sequence[float]) -> list[tuple[float, float]]:
+    """Return when motions from rest to rest, and rests, begin and end, in turn [s]."""
+    still = np.abs(motion.qd).max(axis=1) < _REST
+    still[:-1] &= np.abs(np.diff(motion.q, axis=0)).max(axis=1) < 1e-9
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], still[:-1], [False]]).astype(int)))
+    marks = [float(motion.t[0])]
+    for begin, end in edges.reshape(-1, 2):
+        if motion.t[end] - motion.t[begin] >= _WHILE:
+            marks += [float(motion.t[begin]), float(motion.t[end])]
+    marks.append(float(motion.t[-1]))
+    for stop in _stops(motion, events):
+        if np.abs(stop - np.array(marks)).min() >= _WHILE and not _within(stop, marks, motion):
+            marks.append(stop)
+    marks = sorted(set(marks))
+    return list(pairwise(marks))
+
+
+def _within(stop: float, marks: Sequence[float], motion: Trajectory) -> bool:
+    """Whether a time is in one of the rests that last."""
+    first, last = max(m for m in marks if m < stop), min(m for m in marks if m > stop)
+    return rests(motion, first, last)
+
+
+def _stops(motion: Trajectory, events: Sequence[float]) -> list[float]:
+    """Return when the arm rests for an instant [s]: where an event is then, at that."""
+    speeds = np.abs(motion.qd).max(axis=1)
+    slow = min(_SLOW, _SHARE * float(speeds.max()))
+    inside = np.clip(events, motion.t[0], motion.t[-1]).tolist()
+    found = [at for at in inside if np.abs(motion(at, 1)).max() < slow]
+    edges = np.diff(np.concatenate([[False], speeds < slow, [False]]).astype(int))
+    for begin, end in np.flatnonzero(edges).reshape(-1, 2):
+        found.append(float(motion.t[begin + int(speeds[begin:end].argmin())]))
+    return found

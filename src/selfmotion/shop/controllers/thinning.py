@@ -1,0 +1,422 @@
+"""What a motion is made of, and as few joint targets as keep a controller near it."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from itertools import islice, pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from selfmotion.basics import Array, Flags, PlanError, ProblemError
+from selfmotion.certificate import JointLimits, Requirement, Separation, Tolerance, arm_limits
+from selfmotion.model.motion import Trajectory
+from selfmotion.model.path import STILL as _STILL, FeedKept, Path
+from selfmotion.model.robot import Chain
+from selfmotion.model.task import Task
+from selfmotion.planning.result import Move, Parts, Plan
+from selfmotion.problem.constraints import (
+    Constraint,
+    JointAccelerationLimits,
+    JointJerkLimits,
+    JointTorqueLimits,
+    ToolLimits,
+)
+from selfmotion.problem.problem import Problem
+from selfmotion.shop.controllers.stretches import (
+    NO_MISS,
+    Event,
+    Miss,
+    Stretch,
+    miss_between,
+    miss_of,
+)
+from selfmotion.work.job import Program
+
+# What a motion is made of: seams, and moves through the air with room around them.
+
+# What a move through the air may be off at most, however much room there is [m, rad].
+_ROOMY = Tolerance(5e-3, 5e-3)
+# How much of the room that is left between bodies is used: distances are found to a fiftieth.
+_SURE = 0.9
+
+
+class Piece(NamedTuple):
+    """A part of a motion with a name, events at times from its start, and the tools' chains.
+
+    Of a move through the air also how far a controller may be off it, where there is room; of a
+    seam the feeds that its tools keep, one list for each chain. `speeds` (n,) are what joints may
+    have [rad/s or m/s]. `keeps` says whether another motion keeps all that a seam's has to but
+    accelerations, within a tolerance; `turns` is the task by whose rows its tool turns as it has
+    to, but for relaxed ones, and `tool_rests` when that rests on its way [s].
+    """
+
+    name: str
+    motion: Trajectory
+    events: tuple[tuple[float, str], ...]
+    chains: tuple[Chain, ...]
+    is_move: bool = False
+    room: Tolerance | None = None
+    feeds: tuple[tuple[FeedKept, ...], ...] = ()
+    speeds: Array | None = None
+    keeps: Callable[[Trajectory, Tolerance], bool] | None = None
+    turns: Task = Task.POSE
+    tool_rests: tuple[float, ...] = ()
+
+
+def pieces_of(plan: Plan | Parts | Move | Program) -> list[Piece]:
+    """Return what a plan, parts, a move or a program is made of, in order.
+
+    Raises
+    ------
+    PlanError
+        A move was not found, or there is nothing.
+    """
+    match plan:
+        case Plan():
+            return [_of_plan("path", plan)]
+        case Move():
+            return [_of_move("move", plan)]
+        case Parts():
+            found = []
+            for number, part in enumerate(plan.plans, 1):
+                found.append(_of_plan(f"part {number}", part))
+                found += [_of_move(f"move {number}", m) for m in plan.moves[number - 1 : number]]
+            return found
+    found = []
+    for step in plan.steps:
+        made = step.made
+        piece = _of_plan(step.name, made) if isinstance(made, Plan) else _of_move(step.name, made)
+        found.append(piece._replace(events=tuple((at, name) for name, at in step.happenings)))
+    if not found:
+        raise PlanError(f"{plan.robot.name}: {plan.verdict}")
+    return found
+
+
+def _of_plan(name: str, plan: Plan) -> Piece:
+    items = plan.problem.follows.items
+    chains = tuple(item.chain for item in items)
+    feeds = tuple(tuple(feed for feed in item.path.feeds if feed.kept) for item in items)
+    speeds = _speeds((*arm_limits(plan.robot, plan.requirements), *plan.requirements))
+
+    def keeps(motion: Trajectory, within: Tolerance) -> bool:
+        return by_targets(plan.problem).certify(motion, within).verified
+
+    relaxed = {row for item in plan.problem.relaxations for row in item.rows}
+    turns = Task.POSITION if relaxed & {"rx", "ry", "rz"} else plan.problem.task
+    return Piece(
+        name,
+        plan.trajectory,
+        (),
+        chains,
+        feeds=feeds,
+        speeds=speeds,
+        keeps=keeps,
+        turns=turns,
+        tool_rests=_rests_of(plan.problem.path),
+    )
+
+
+def _rests_of(path: Path) -> tuple[float, ...]:
+    """Return at which of its marks a path is at rest, but for its ends [s]."""
+    marks = path.marks[1:-1]
+    still = np.linalg.norm(path.samples(marks).twist, axis=1) < _STILL if len(marks) else []
+    return tuple(float(t) for t in marks[still])
+
+
+def by_targets(problem: Problem) -> Problem:
+    """Return what targets can keep of a problem."""
+    return replace(problem, constraints=what_targets_keep(problem.constraints))
+
+
+def what_targets_keep(constraints: Sequence[Constraint]) -> tuple[Constraint, ...]:
+    """Return what targets can keep: how a controller accelerates between them is its own."""
+    own = (JointAccelerationLimits, JointJerkLimits)
+    return tuple(item for item in constraints if not isinstance(item, own))
+
+
+def what_lines_keep(constraints: Sequence[Constraint]) -> tuple[Constraint, ...]:
+    """Return what straight lines between targets can keep: at corners they have no acceleration.
+
+    Nor torques, then, which are judged along the smooth way.
+    """
+    return tuple(
+        replace(item, acceleration=np.inf, turn_acceleration=np.inf)
+        if isinstance(item, ToolLimits)
+        else item
+        for item in what_targets_keep(constraints)
+        if not isinstance(item, JointTorqueLimits)
+    )
+
+
+def _of_move(name: str, move: Move) -> Piece:
+    room = safe_deviation(move)
+    return Piece(
+        name,
+        move.motion,
+        (),
+        (move.robot.chain,),
+        is_move=True,
+        room=room,
+        speeds=_speeds(move.requirements),
+    )
+
+
+def _speeds(asked: Sequence[Requirement]) -> Array | None:
+    """Return the limits of joint speed (n,) among requirements; None for none."""
+    limits = [item.upper for item in asked if isinstance(item, JointLimits) and item.order == 1]
+    return np.minimum.reduce(limits) if limits else None
+
+
+def safe_deviation(move: Move) -> Tolerance | None:
+    """Return how far a controller may be off a move so that it keeps apart; None for not at all.
+
+    The distance of a pair of bodies changes by Σ_j l_j |Δq_j| at most, with l its levers: so joints
+    may be off by the room that is left over what is asked, divided by the largest Σ_j l_j.
+    """
+    joint = _ROOMY.rotation
+    for item, finding in zip(move.requirements, move.findings, strict=True):
+        if isinstance(item, Separation) and item.model.pairs:
+            lever = float(item.model.pair_levers_up_to(_farthest(move)).sum(axis=1).max())
+            joint = min(joint, _SURE * (finding.amount - item.distance) / max(lever, 1e-9))
+    return Tolerance(_ROOMY.position, joint) if joint > 0.0 else None
+
+
+def _farthest(move: Move) -> Array:
+    return np.asarray(np.abs(move.motion.q).max(axis=0))
+
+
+# As few joint targets as keep a controller near a motion.
+#
+# Targets are as far apart as the error of straight joint lines between them allows, h²|Jq̈|/8 ≤
+# deviation, spread over the time evenly in ∫ √(|Jq̈|/8) dt (de Boor, "Good approximation by
+# splines with variable knots", 1973). What is left of it is then measured by forward kinematics.
+# Steps in which the spline through the targets misses a feed, or passes a limit of speed, are
+# halved.
+
+# Programs count times [s], angles [°] and lengths [mm] in so many digits behind the point.
+TIME_DIGITS, ANGLE_DIGITS, LENGTH_DIGITS = 5, 5, 4
+# Targets are at least so dense [of where they are densest].
+_SPARSE = 0.1
+# Share of what a feed leaves that may be taken where it is looked at: the worst is in between.
+_OF_FEED = 0.8
+# Steps are not made shorter than this [s]: no controller has shorter cycles, and the digits of
+# angles would be jumps of speed.
+_SHORTEST = 2e-3
+# Share of a limit of speed that the spline may use where the motion uses no more.
+_OF_SPEED = 0.9995
+# Times at which the motion's curvature is looked at, for each of its samples; targets at least
+# between two events or rests, tries, and more targets than this no controller takes.
+_FINER, _FEWEST, _TRIES, _MOST = 4, 4, 20, 100_000
+
+
+@dataclass(frozen=True, eq=False)
+class Span:
+    """What of a piece lies between two rests.
+
+    Attributes
+    ----------
+    piece : Piece
+    slides : (n,)
+        Which joints slide.
+    first, last : float
+        From when to when [s].
+    events : sequence of (float, str)
+        What happens when [s].
+    """
+
+    piece: Piece
+    slides: Flags
+    first: float
+    last: float
+    events: Sequence[tuple[float, str]]
+
+    @classmethod
+    def of(cls, piece: Piece, slides: Flags, first: float, last: float) -> "Span":
+        """Return that of a piece, with the events that are in it."""
+        return cls(piece, slides, first, last, events_within(piece, first, last))
+
+    def stretches(self, allowed: Tolerance) -> list[tuple[Stretch, Miss]]:
+        """Return what it is written as: one stretch, or several where the tool rests in between.
+
+        Raises
+        ------
+        ProblemError
+            See `thinned`.
+        """
+        return [self.thinned(allowed)]
+
+    def thinned(self, allowed: Tolerance) -> tuple[Stretch, Miss]:
+        """Return its targets, and how far they are off.
+
+        Raises
+        ------
+        ProblemError
+            Digits are too few for what is allowed, or targets too many.
+        """
+        fixed = _apart(self.first, self.last, [at for at, _ in self.events])
+        if rests(self.piece.motion, self.first, self.last):
+            return self._passing(fixed, at_rest=True), NO_MISS
+        self._check_digits(allowed)
+        t = self._within(allowed, fixed)
+        for _ in range(_TRIES):
+            stretch = self._passing(t)
+            missed = self._missed(stretch)
+            if not missed.any():
+                break
+            # With their neighbours, so that steps do not differ much.
+            near = np.convolve(missed, np.ones(3), mode="same") > 0.0
+            near &= np.diff(t) > 2.0 * _SHORTEST
+            if not near.any():
+                break
+            t = np.sort(np.append(t, 0.5 * (t[1:] + t[:-1])[near]))
+        return stretch, self._miss(stretch)
+
+    def _within(self, allowed: Tolerance, fixed: Array) -> Array:
+        """Return times of targets that keep the tool and the joints near the motion."""
+        more = 1.0
+        for _ in range(_TRIES):
+            t = _spread(self.piece, fixed, allowed, more)
+            miss = self._miss(self._passing(t))
+            if miss.share(allowed) <= 1.0:
+                return t
+            more *= max(1.05, 1.02 * float(np.sqrt(miss.share(allowed))))
+        raise ProblemError(
+            f"'{self.piece.name}' is off by {1e3 * miss.position:.3g} mm and "
+            f"{np.degrees(max(miss.rotation, miss.joint)):.3g}° with {len(t)} targets; allow more "
+            f"than {_in_words(self.piece, allowed)}"
+        )
+
+    def _passing(self, t: Array, *, at_rest: bool = False) -> Stretch:
+        """Return targets at times, as the file has them."""
+        if len(t) > _MOST:
+            raise ProblemError(
+                f"'{self.piece.name}' takes more than {_MOST} targets; allow a larger deviation"
+            )
+        offset = np.round(t - self.first, TIME_DIGITS)
+        # Where the arm is at the times that the file has.
+        q = self._in_digits(self.piece.motion(np.minimum(self.first + offset, self.last)))
+        if at_rest:
+            q[:] = q[0]
+        events = (Event(int(np.abs(t - at).argmin()), name) for at, name in self.events)
+        return Stretch(self.piece.name, offset, q, tuple(events))
+
+    def _miss(self, stretch: Stretch) -> Miss:
+        return miss_of(stretch, self.piece.motion, self.piece.chains, self.first)
+
+    def _in_digits(self, q: Array) -> Array:
+        """Return coordinates [rad or m] as they are when their digits in a file are read again."""
+        degrees = np.radians(np.round(np.degrees(q), ANGLE_DIGITS))
+        return np.where(self.slides, 1e-3 * np.round(1e3 * q, LENGTH_DIGITS), degrees)
+
+    def _check_digits(self, allowed: Tolerance) -> None:
+        """Refuse what no number of targets keeps, as they have few digits."""
+        q = self.piece.motion.q
+        miss = miss_between(self._in_digits(q), q, self.piece.chains)
+        if miss.share(allowed) > 1.0:
+            raise ProblemError(
+                f"'{self.piece.name}': programs count angles in {10.0**-ANGLE_DIGITS:g}°, which is "
+                f"up to {1e3 * miss.position:.2g} mm and {np.degrees(miss.rotation):.2g}° of the "
+                f"tool; allow more than {_in_words(self.piece, allowed)}"
+            )
+
+    def _missed(self, stretch: Stretch) -> Flags:
+        """Whether a feed is missed, or a limit of speed passed, between two targets (K,).
+
+        Where the motion itself does not; on the spline through the targets and straight between
+        them. Cut corners are slower than that.
+        """
+        far = np.zeros(len(stretch.t) - 1)
+        for times, q, qd in islice(stretch.joined(), 2):
+            step = np.clip(np.searchsorted(stretch.t, times, side="right") - 1, 0, len(far) - 1)
+            np.maximum.at(far, step, self._taken(times, q, qd))
+        return np.asarray(far > 1.0)
+
+    def _taken(self, times: Array, q: Array, qd: Array) -> Array:
+        """Return how much is taken of what feeds and limits of speed leave, at times (K,)."""
+        motion = self.piece.motion
+        t = np.clip(self.first + times, self.first, motion.t[-1])
+        exact, rates = motion(t), motion(t, 1)
+        taken = np.zeros(len(t))
+        if self.piece.speeds is not None:
+            within = np.abs(rates) <= _OF_SPEED * self.piece.speeds
+            taken = np.where(within, np.abs(qd) / (_OF_SPEED * self.piece.speeds), 0.0).max(axis=1)
+        for chain, feeds in zip(self.piece.chains, self.piece.feeds, strict=False):
+            moved, wanted = (
+                np.einsum("kcn,kn->kc", chain.along(at)[0][:, :3], speeds)
+                for at, speeds in ((q, qd), (exact, rates))
+            )
+            off = np.abs(np.einsum("kc,kc->k", moved - wanted, wanted))
+            for feed in feeds:
+                room = _OF_FEED * feed.slowest * feed.left_over
+                for begin, end in feed.during + motion.t[0]:
+                    asked = (t > begin) & (t < end)
+                    taken = np.maximum(taken, np.where(asked, off / max(room, 1e-12), 0.0))
+        return taken
+
+
+def events_within(piece: Piece, first: float, last: float) -> list[tuple[float, str]]:
+    """Return what happens in a part of a piece, at times of its motion [s]."""
+    start, end = float(piece.motion.t[0]), float(piece.motion.t[-1])
+    return [
+        (start + at, name)
+        for at, name in piece.events
+        if (first == start or first < start + at) and (last == end or start + at <= last)
+    ]
+
+
+def _in_words(piece: Piece, allowed: Tolerance) -> str:
+    """Return what is allowed as the file of settings says it."""
+    key = "move_deviation" if piece.is_move else "deviation"
+    return (
+        f"{key} = {{ position_mm = {1e3 * allowed.position:.3g}, "
+        f"rotation_deg = {np.degrees(allowed.rotation):.3g} }}"
+    )
+
+
+def _apart(first: float, last: float, times: Sequence[float]) -> Array:
+    """Return first, last and times between them, but for those that are written as the same."""
+    least, found = 2.0 * 10.0**-TIME_DIGITS, [first]
+    for t in sorted(times):
+        if found[-1] + least < t < last - least:
+            found.append(t)
+    return np.array([*found, last])
+
+
+def rests(motion: Trajectory, first: float, last: float) -> bool:
+    """Whether nothing moves from one time to another."""
+    times = np.linspace(first, last, 33)
+    return bool(np.abs(motion(times) - motion(first)).max() < 1e-9)
+
+
+def _spread(piece: Piece, fixed: Array, allowed: Tolerance, more: float) -> Array:
+    """Return times between fixed ones, even in the root of how much the motion bends."""
+    found = [fixed[:1]]
+    motion = piece.motion
+    for begin, end in pairwise(fixed):
+        inside = motion.t[(motion.t > begin) & (motion.t < end)]
+        marks = np.concatenate([[begin], inside, [end]])
+        count = _FINER * (len(marks) - 1) + 1
+        t = np.interp(np.linspace(0, len(marks) - 1, count), np.arange(len(marks)), marks)
+        bend = _bend(piece, t, allowed)
+        rate = np.sqrt(bend / 8.0)
+        # A spline swings where long and short steps meet, and it bends nowhere.
+        rate = np.maximum(rate, _SPARSE * float(rate.max())) + 1e-3 / max(end - begin, 1e-6)
+        way = np.append(0.0, np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(t)))
+        targets = max(_FEWEST, int(np.ceil(more * way[-1])))
+        # Programs count whole digits of time: targets may not fall on each other.
+        targets = min(targets, max(1, int((end - begin) * 10**TIME_DIGITS / 2)))
+        found.append(np.interp(np.linspace(0.0, way[-1], targets + 1)[1:], way, t))
+        found[-1][-1] = end
+    return np.concatenate(found)
+
+
+def _bend(piece: Piece, t: Array, allowed: Tolerance) -> Array:
+    """Return the accelerations of tool and joints as shares of what is allowed, (K,) [1/s²]."""
+    motion = piece.motion
+    q, qdd = motion(t), motion(t, 2)
+    found: Array = np.abs(qdd).max(axis=1) / allowed.rotation
+    for chain in piece.chains:
+        rates = np.einsum("kij,kj->ki", chain.along(q)[0], qdd)
+        for rows, limit in ((slice(0, 3), allowed.position), (slice(3, 6), allowed.rotation)):
+            found = np.maximum(found, np.linalg.norm(rates[:, rows], axis=1) / limit)
+    return found

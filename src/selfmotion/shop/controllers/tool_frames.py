@@ -1,0 +1,531 @@
+"""Tool poses as controllers have them: in numbers, in work objects, with configurations."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from selfmotion.basics import Array, Flags, Ints, ProblemError, nearest
+from selfmotion.model.path import Joined, Path, Placed
+from selfmotion.model.robot import Chain, RobotModel
+from selfmotion.model.task import SE3, Quaternion, exp3, log3, rpy, skews
+from selfmotion.shop.controllers.program_settings import (
+    AXES,
+    OF_PATH,
+    Axis,
+    ProgramSettings,
+    tool_from_flange,
+)
+
+# A frame is turned by more than rounding [rad]; frames that differ by less [m, parts of a turn] are
+# one.
+_TURNED, _SAME = 1e-6, 1e-9
+
+# Tool poses in the numbers that each language has for them.
+#
+# - KRL: X, Y, Z [mm], and A, B, C [deg] with R = R_z(A) R_y(B) R_x(C).
+# - RAPID: position [mm], and the quaternion q1 to q4, the real part first.
+# - URScript: position [m], and the rotation vector [rad].
+
+# Positions (K, 3) [m] and quaternions (K, 4) as they are when a file is read again.
+Rounding = Callable[[Array, Array], tuple[Array, Array]]
+# Digits behind the point: of mm, degrees, parts of quaternions, and of m and rad.
+_MM, _DEGREES, _PARTS, _SI = 4, 5, 8, 9
+# A work object farther away than so many times the arm's reach is in another unit.
+_FAR_IN_REACHES = 20.0
+
+
+def krl_numbers(place: Array, turn: Array) -> list[float]:
+    """Return X, Y, Z [mm], A, B, C [deg] of a pose."""
+    c, b, a = np.degrees(rpy.matrixToRpy(_matrix(turn))).tolist()
+    return [*_rounded(1e3 * place, _MM), *_rounded([a, b, c], _DEGREES)]
+
+
+def krl_pose(numbers: Array) -> tuple[Array, Array]:
+    """Return the pose of such numbers: position [m], quaternion x, y, z, w."""
+    a, b, c = np.radians(numbers[3:6]).tolist()
+    return 1e-3 * numbers[:3], _quaternion(rpy.rpyToMatrix(c, b, a))
+
+
+def rapid_numbers(place: Array, turn: Array) -> list[float]:
+    """Return x, y, z [mm], q1, q2, q3, q4 of a pose."""
+    x, y, z, w = (turn if turn[3] >= 0.0 else -turn).tolist()
+    return [*_rounded(1e3 * place, _MM), *_rounded([w, x, y, z], _PARTS)]
+
+
+def rapid_pose(numbers: Array) -> tuple[Array, Array]:
+    """Return the pose of such numbers, whose quaternion need not be of length 1 exactly."""
+    w, x, y, z = (numbers[3:7] / np.linalg.norm(numbers[3:7])).tolist()
+    return 1e-3 * numbers[:3], np.array([x, y, z, w])
+
+
+def urscript_numbers(place: Array, turn: Array) -> list[float]:
+    """Return x, y, z [m], rx, ry, rz [rad] of a pose."""
+    return [*_rounded(place, _SI), *_rounded(log3(_matrix(turn)), _SI)]
+
+
+def urscript_pose(numbers: Array) -> tuple[Array, Array]:
+    """Return the pose of such numbers."""
+    return np.array(numbers[:3]), _quaternion(exp3(numbers[3:6]))
+
+
+_KINDS = {
+    "krl": (krl_numbers, krl_pose),
+    "rapid": (rapid_numbers, rapid_pose),
+    "urscript": (urscript_numbers, urscript_pose),
+}
+
+
+def _rounding(form: str) -> Rounding:
+    written, read = _KINDS[form]
+
+    def rounded(places: Array, turns: Array) -> tuple[Array, Array]:
+        poses = [
+            read(np.array(written(place, turn))) for place, turn in zip(places, turns, strict=True)
+        ]
+        return np.array([place for place, _ in poses]), np.array([turn for _, turn in poses])
+
+    return rounded
+
+
+ROUNDINGS: Mapping[str, Rounding] = {form: _rounding(form) for form in _KINDS}
+
+
+def _matrix(turn: Array) -> Array:
+    x, y, z, w = (turn / np.linalg.norm(turn)).tolist()
+    return np.asarray(Quaternion(w, x, y, z).toRotationMatrix())
+
+
+def _quaternion(rotation: Array) -> Array:
+    return np.array(Quaternion(np.asarray(rotation)).coeffs())
+
+
+def _rounded(values: Array | list[float], digits: int) -> list[float]:
+    return [float(value) + 0.0 for value in np.round(np.asarray(values), digits).tolist()]
+
+
+# Where a controller counts tool poses: in a work object, and its arm's joints from such poses.
+#
+# A controller's work object stands in the frame that it counts its arm from, or on an axis of its
+# own that carries the part (a positioner). A tool pose in it and the external axes determine the
+# six joints of the arm that are near to known ones; they are found by Newton's method, Δq = J⁻¹
+# [Δp; log(R_wanted Rᵀ)], J the six columns of the arm's joints.
+
+# What the frame is called that does not move and is no link.
+WORLD = "world"
+_JOINTS = 6
+# Newton: steps at most, how far one goes [rad], when it has arrived [m, rad], and what keeps steps
+# finite in singular configurations.
+_STEPS, _FARTHEST, _THERE, _DAMPED = 20, 0.3, 1e-10, 1e-14
+# As near as digits of files are, it counts as arrived [m, rad].
+_NEAR = 1e-8
+
+
+def carrier_in_reference(robot: RobotModel, carrier: str) -> SE3 | None:
+    """Return where a work object's carrier stands in the frame of the paths; None if it moves."""
+    link = robot.urdf.root if carrier == WORLD else carrier
+    between = robot.chain_to(link, robot.reference)
+    return None if len(between.joints) else between.place(np.zeros(robot.dof))
+
+
+@dataclass(frozen=True, eq=False)
+class ToolFrames:
+    """A work object, the frame that it stands in, and the tool that is moved in it.
+
+    Attributes
+    ----------
+    robot : RobotModel
+    axes : tuple of Axis
+        In the order of the robot's joints.
+    carrier : str
+        The link that the work object is fixed to, or ``"world"``.
+    work : SE3
+        The work object in that frame.
+    name : str
+        What the work object is called.
+    tool : SE3
+        The tool in the flange, as the program has it.
+    flange_to_tool : SE3
+        The same as the robot has it.
+    """
+
+    robot: RobotModel
+    axes: tuple[Axis, ...]
+    carrier: str
+    work: SE3
+    name: str
+    tool: SE3
+    flange_to_tool: SE3
+
+    @classmethod
+    def of(
+        cls,
+        robot: RobotModel,
+        axes: Sequence[Axis],
+        settings: ProgramSettings,
+        path_frame: SE3 | None = None,
+    ) -> "ToolFrames":
+        """Return those that settings ask for; `path_frame` is where they ask for that of the path.
+
+        It is given in the link that the path rides on.
+
+        Raises
+        ------
+        ProblemError
+            The work object rides on what carries the tool, or there is no such link.
+        """
+        given, tool = settings.work_object, tool_from_flange(robot, settings)
+        carrier, work = base_of(robot), SE3.Identity()
+        name, inside = carrier, SE3.Identity()
+        if given is None:
+            given = robot.reference or work
+        elif isinstance(given, SE3):
+            _check_near(robot, given)
+            name = "given"
+        elif given == OF_PATH:
+            given, inside = robot.reference or robot.urdf.root, path_frame or inside
+            name = OF_PATH
+        else:
+            _check_link(robot, given)
+            name = given
+        if isinstance(given, SE3):
+            work = SE3(given)
+        elif robot.carrier_of(given)[0] == 0:
+            name = given if name == carrier else name
+            base = robot.chain_to(given, None if carrier == WORLD else carrier)
+            work = base.place(np.zeros(robot.dof)) * inside
+        else:
+            name = given if name == carrier else name
+            carrier, work = given, inside
+            _check_beside(robot, given)
+        return cls(robot, tuple(axes), carrier, work, name, tool, tool)
+
+    @property
+    def is_carried(self) -> bool:
+        """Whether an axis moves the work object."""
+        return self.carrier != WORLD and self.robot.carrier_of(self.carrier)[0] != 0
+
+    @cached_property
+    def chain(self) -> Chain:
+        """From the work object's carrier to the tool."""
+        carrier = None if self.carrier == WORLD else self.carrier
+        return self.robot.chain_to(self.robot.tool, carrier)
+
+    @cached_property
+    def arm(self) -> Ints:
+        """The arm's joints A1 to A6 among the robot's, in this order."""
+        names = [axis.name for axis in self.axes]
+        return np.array([names.index(name) for name in AXES[:_JOINTS] if name in names])
+
+    @cached_property
+    def external(self) -> Ints:
+        """The others."""
+        return np.array([k for k in range(len(self.axes)) if k not in self.arm], dtype=np.int64)
+
+    def undetermined(self) -> str:
+        """Return why poses do not determine the arm's joints, in words; empty where they do."""
+        name, arm = self.robot.name, self.arm
+        if len(arm) != _JOINTS:
+            return f"{name} has {len(arm)} axes A1 to A6, and poses are for arms of six"
+        carrying = self.robot.chain_to(self.robot.tool).joints.tolist()
+        if not set(arm.tolist()) <= set(carrying):
+            # A tool that stands still, while the arm holds the part, has poses of another kind.
+            return f"not all of A1 to A6 of {name} carry its tool"
+        between = own_joint(self.robot, self.axes)
+        if between:
+            return (
+                f"joint '{between}' is in the arm itself, so that its controller chooses the elbow "
+                f"of a pose"
+            )
+        if self.chain.is_coupled:
+            return f"joints of {name} mimic others"
+        return ""
+
+    def places(self, q: Array) -> tuple[Array, Array]:
+        """Return the tool in the work object at q (K, n): positions (K, 3), quaternions (K, 4).
+
+        Quaternions are x, y, z, w.
+        """
+        from scipy.spatial.transform import Rotation
+
+        _, rotations, translations = self._tool_along(q)
+        turn = np.asarray(self.work.rotation)
+        places = (translations - self.work.translation) @ turn
+        return places, Rotation.from_matrix(turn.T @ rotations).as_quat()
+
+    def solved(self, places: Array, turns: Array, near: Array) -> tuple[Array, Flags]:
+        """Return q (K, n) for tool poses, from near ones, whose external axes stay; and where.
+
+        The second is whether Newton's method arrived, (K,).
+        """
+        from scipy.spatial.transform import Rotation
+
+        turn = np.asarray(self.work.rotation)
+        wanted = places @ turn.T + self.work.translation
+        facing = turn @ Rotation.from_quat(turns).as_matrix()
+        q = np.array(near)
+        for _ in range(_STEPS):
+            jacobian, rotations, translations = self._tool_along(q)
+            off = np.hstack([wanted - translations, _turned(rotations, facing)])
+            if np.abs(off).max() < _THERE:
+                break
+            step = self._rates(jacobian, off)
+            size = np.maximum(np.abs(step).max(axis=1) / _FARTHEST, 1.0)
+            q[:, self.arm] += step / size[:, None]
+        _, rotations, translations = self._tool_along(q)
+        off = np.hstack([wanted - translations, _turned(rotations, facing)])
+        return q, np.asarray(np.abs(off).max(axis=1) < _NEAR)
+
+    def joint_rates(self, q: Array, rates: Array) -> Array:
+        """Return what rates of the tool in the work object (K, 6) take of the arm's, (K, 6)."""
+        turn = np.asarray(self.work.rotation)
+        turned = np.hstack([rates[:, :3] @ turn.T, rates[:, 3:] @ turn.T])
+        return self._rates(self._tool_along(q)[0], turned)
+
+    def regularity(self, q: Array) -> Array:
+        """Return how far the tool moves at least, of all motions of the arm of 1 rad, (K,).
+
+        The least singular value of the arm's Jacobian, in m and rad: 0 in a singular pose.
+        """
+        own = self._tool_along(q)[0][:, :, self.arm]
+        return np.asarray(np.linalg.svd(own, compute_uv=False)[:, -1])
+
+    def speeds(self, q: Array, qd: Array) -> Array:
+        """Return how fast the tool is in the work object at q and qd (K, n), (K,) [m/s]."""
+        moved = np.einsum("kcn,kn->kc", self._tool_along(q)[0][:, :3], qd)
+        return np.asarray(np.linalg.norm(moved, axis=1))
+
+    @staticmethod
+    def turned(first: Array, last: Array) -> Array:
+        """Return the rotation vectors from quaternions to others (K, 4) in the work object."""
+        from scipy.spatial.transform import Rotation
+
+        found: Array = (Rotation.from_quat(last) * Rotation.from_quat(first).inv()).as_rotvec()
+        return found
+
+    def _rates(self, jacobian: Array, rates: Array) -> Array:
+        own = jacobian[:, :, self.arm]
+        gram = own @ own.transpose(0, 2, 1) + _DAMPED * np.eye(6)
+        solved = np.linalg.solve(gram, rates[:, :, None])[:, :, 0]
+        return np.asarray(np.einsum("kji,kj->ki", own, solved))
+
+    def rounded(self, rounding: Rounding) -> "ToolFrames":
+        """Return the same with work object and tool as they are when a file is read again."""
+        poses = (self.work, self.tool)
+        turns = np.array([Quaternion(pose.rotation).coeffs() for pose in poses])
+        places, turned = rounding(np.array([pose.translation for pose in poses]), turns)
+        both = (
+            SE3(Quaternion(turn).toRotationMatrix(), place)
+            for place, turn in zip(places, turned, strict=True)
+        )
+        work, tool = both
+        return replace(self, work=work, tool=tool)
+
+    def _tool_along(self, q: Array) -> tuple[Array, Array, Array]:
+        """Return Jacobians (K, 6, n) and poses of the program's tool in the carrier's frame."""
+        jacobian, rotations, translations = self.chain.along(q)
+        other = self.flange_to_tool.inverse() * self.tool
+        lever = rotations @ np.asarray(other.translation)
+        moved = jacobian.copy()
+        moved[:, :3] -= skews(lever) @ jacobian[:, 3:]
+        return moved, rotations @ np.asarray(other.rotation), translations + lever
+
+
+def own_joint(robot: RobotModel, axes: Sequence[Axis]) -> str:
+    """Return the external axis that is between the first and the last of A1 to A6; else empty."""
+    carrying = robot.chain_to(robot.tool).joints.tolist()
+    arm = [k for k, joint in enumerate(carrying) if axes[joint].name.startswith("A")]
+    inside = carrying[arm[0] : arm[-1]] if arm else []
+    return next((axes[joint].joint for joint in inside if axes[joint].name.startswith("E")), "")
+
+
+def base_of(robot: RobotModel) -> str:
+    """Return the frame that the controller counts its fixed arm from: link ``base``, or the world.
+
+    By the conventions of ROS-Industrial ``base`` is the controller's frame.
+    """
+    part = robot.tool.rpartition("/")[0]
+    link = f"{part}/base" if part else "base"
+    known = link in robot.urdf.links and robot.carrier_of(link)[0] == 0
+    return link if known else WORLD
+
+
+def turned_base(robot: RobotModel) -> str:
+    """Return how the frame that the controller counts from is turned from the root, in words.
+
+    Empty where it is not.
+    """
+    base = base_of(robot)
+    if base == WORLD:
+        return ""
+    place = robot.chain_to(base).place(np.zeros(robot.dof))
+    turn = float(np.linalg.norm(log3(place.rotation)))
+    if turn < _TURNED:
+        return ""
+    return (
+        f"work objects are counted in '{base}', the controller's frame, which is turned by "
+        f"{np.degrees(turn):.4g}° from '{robot.urdf.root}', in which --frame counts; --wobj "
+        f"{OF_PATH} is the frame of the path"
+    )
+
+
+def frame_of_paths(paths: Sequence[Path]) -> SE3:
+    """Return the frame that paths are given in, in the link that they ride on.
+
+    Raises
+    ------
+    ProblemError
+        They are given in several frames.
+    """
+    frames = [_placed(path) for path in paths] or [SE3.Identity()]
+    for frame in frames[1:]:
+        if np.abs(frame.homogeneous - frames[0].homogeneous).max() > _SAME:
+            raise ProblemError(
+                f"work_object '{OF_PATH}': paths are given in several frames, expected one; give "
+                f"the name of a link, or a pose"
+            )
+    return frames[0]
+
+
+def _placed(path: Path) -> SE3:
+    """Return the frame that a path is given in."""
+    if isinstance(path, Placed):
+        return path.frame * _placed(path.original)
+    if isinstance(path, Joined):
+        return frame_of_paths(path.pieces)
+    inner = getattr(path, "original", None)
+    return SE3.Identity() if inner is None else _placed(inner)
+
+
+def _check_near(robot: RobotModel, work: SE3) -> None:
+    """Raise ProblemError for a work object that the arm is far from reaching."""
+    far = float(np.linalg.norm(work.translation))
+    if far > _FAR_IN_REACHES * robot.reach:
+        raise ProblemError(
+            f"{robot.name}: the work object is {far:.4g} m away, but the arm reaches "
+            f"{robot.reach:.3g} m; in millimetres? It is in m (position_mm in files)"
+        )
+
+
+def _check_link(robot: RobotModel, link: str) -> None:
+    links = list(robot.urdf.links)
+    if link not in links:
+        raise ProblemError(
+            f"{robot.name}: work_object '{link}' is none of its links{nearest(link, links)}; "
+            f"expected one of {', '.join(links)}, '{OF_PATH}' (the frame of the path), or a pose"
+        )
+
+
+def _check_beside(robot: RobotModel, link: str) -> None:
+    """Refuse a link that moves with the arm, or with what carries it."""
+    own = set(robot.chain_to(link).joints.tolist())
+    both = own & set(robot.chain_to(robot.tool).joints.tolist())
+    if both:
+        joint = robot.joint_names[min(both)]
+        raise ProblemError(
+            f"{robot.name}: work_object '{link}' moves with joint '{joint}', which carries the "
+            f"tool as well; expected a link that stands still, or that another axis carries"
+        )
+
+
+def _turned(rotations: Array, wanted: Array) -> Array:
+    """Return the rotation vectors from orientations to wanted ones, (K, 3)."""
+    from scipy.spatial.transform import Rotation
+
+    turns: Array = Rotation.from_matrix(wanted @ rotations.transpose(0, 2, 1)).as_rotvec()
+    return turns
+
+
+# Which of the configurations that reach a pose an arm is in, in the makers' numbers.
+#
+# ABB's ``confdata`` (Technical reference manual, RAPID Instructions, Functions and Data types,
+# 3HAC050917-001): cf1, cf4 and cf6 are quarter turns of axes 1, 4 and 6 from their zeros on,
+# rounded down; cfx counts 4 for a wrist behind axis 1, 2 for one behind the lower arm, and 1
+# where axis 5 is negative. KUKA's status and turn (KSS 8.3, Operating and Programming
+# Instructions for System Integrators): S counts 1 for a wrist behind axis 1 (overhead), 2 for
+# axis 3 beyond the angle at which the arm is stretched, 4 where axis 5 is negative; T counts 2^(k
+# - 1) where axis k is negative.
+#
+# S and cfx are of arms whose wrist axes meet in a point, whose axes 2 and 3 are parallel, and
+# whose zero is that of the maker: the wrist is in front, the arm bent (ABB) or stretched (KUKA).
+# Of others, such as those of Universal Robots, they are not known.
+
+# Axes meet within this [m], are parallel within this sine, and a wrist is in front by this [m].
+_MEET, _PARALLEL, _IN_FRONT = 1e-4, 1e-3, 0.05
+# An arm is bent at zero, as ABB's are, above this sine; KUKA's are stretched but for an offset.
+_BENT = 0.5
+
+
+class Sides(NamedTuple):
+    """How an arm stands: wrist in front of axis 1, bent beyond the stretched arm; and at zero."""
+
+    front: bool
+    bent: bool
+    stands_at_zero: bool
+
+
+def confdata(frames: ToolFrames, q: Array) -> tuple[int, int, int, int | None]:
+    """Return ABB's cf1, cf4, cf6 and cfx at q (n,); None for a cfx that is not known."""
+    angles = q[frames.arm]
+    quarters = [int(np.floor(np.degrees(angles[k]) / 90.0)) for k in (0, 3, 5)]
+    sides = _sides(frames, q)
+    if sides is None or not sides.stands_at_zero:
+        return quarters[0], quarters[1], quarters[2], None
+    cfx = 4 * (not sides.front) + 2 * (not sides.bent) + int(angles[4] < 0.0)
+    return quarters[0], quarters[1], quarters[2], cfx
+
+
+def status_and_turn(frames: ToolFrames, q: Array) -> tuple[int | None, int]:
+    """Return KUKA's S and T at q (n,); None for an S that is not known."""
+    angles = q[frames.arm]
+    turn = sum(1 << k for k in range(6) if angles[k] < 0.0)
+    sides = _sides(frames, q)
+    if sides is None or sides.stands_at_zero:
+        return None, turn
+    return int(not sides.front) + 2 * int(sides.bent) + 4 * int(angles[4] < 0.0), turn
+
+
+def _sides(frames: ToolFrames, q: Array) -> Sides | None:
+    zero = np.array(q)
+    zero[frames.arm] = 0.0
+    at_zero, here = _distances(frames, zero), _distances(frames, q)
+    if at_zero is None or here is None or abs(at_zero[0]) < _IN_FRONT:
+        return None
+    # Axis 3 of some arms turns the other way: at ABB's zero the wrist is in front of the lower arm.
+    stands = abs(at_zero[1]) > _BENT
+    bent = here[1] * at_zero[1] > 0.0 if stands else here[1] > 0.0
+    return Sides(bool(here[0] * at_zero[0] >= 0.0), bool(bent), stands)
+
+
+def _distances(frames: ToolFrames, q: Array) -> tuple[float, float] | None:
+    """Return how far the wrist is ahead of axis 1 [m], and the sine by which the arm is bent."""
+    jacobian, _, tip = frames.robot.chain_to(frames.robot.tool).at(q)
+    axes = jacobian[3:, frames.arm].T
+    # v = a × (tip - p), p the point of the axis that is nearest to the tip.
+    points = tip + np.cross(axes, jacobian[:3, frames.arm].T)
+    wrist = _meeting(axes[3:], points[3:])
+    first, second, third = axes[:3]
+    is_known = (
+        wrist is not None
+        and np.linalg.norm(np.cross(second, third)) < _PARALLEL
+        and abs(first @ second) < _PARALLEL
+    )
+    if wrist is None or not is_known:
+        return None
+    ahead = float((wrist - points[0]) @ np.cross(second, first))
+    # In the plane across axes 2 and 3.
+    lower, fore = (x - third * (x @ third) for x in (points[2] - points[1], wrist - points[2]))
+    size = float(np.linalg.norm(lower) * np.linalg.norm(fore))
+    return (ahead, float(np.cross(lower, fore) @ third) / size) if size > 0.0 else None
+
+
+def _meeting(axes: Array, points: Array) -> Array | None:
+    """Return the point in which lines meet, None where they do not."""
+    across = np.eye(3) - axes[:, :, None] * axes[:, None, :]
+    if np.linalg.cond(across.sum(axis=0)) > 1e6:
+        return None
+    found = np.linalg.solve(across.sum(axis=0), np.einsum("kij,kj->i", across, points))
+    far = np.linalg.norm(np.einsum("kij,kj->ki", across, found - points), axis=1).max()
+    return found if far < _MEET else None

@@ -1,0 +1,1 @@
+"""What is done with plans: jobs, batches, margins, placement."""

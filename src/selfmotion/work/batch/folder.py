@@ -1,0 +1,230 @@
+"""A batch on disk: per problem a plan and a row; ranked tables of all of them."""
+
+import csv
+import dataclasses
+import hashlib
+import html
+import io
+import json
+import urllib.parse
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from selfmotion.basics import SelfmotionError, digest_of_file, write_bytes, write_text
+from selfmotion.certificate import USUAL
+from selfmotion.model.path import Path as ToolPath, Retimed
+from selfmotion.planning.planner import PlanRequest
+from selfmotion.planning.result import Asked, Plan, load_plan, read_kept, write_kept
+from selfmotion.problem.problem import Problem
+from selfmotion.work.batch.items import Item, Row, measured
+from selfmotion.work.batch.maps import labels, maps
+
+# Whether a plan is what a job of a batch asks for.
+
+
+def is_made_for(plan: Plan, job: PlanRequest) -> bool:
+    """Whether a plan is of a job's problem, judged by all that it asks within its tolerance.
+
+    Of a fastest motion: along the same path, at whatever pace.
+    """
+    asked, made = job.problem, plan.problem
+    tolerance = job.tolerance or USUAL
+    if job.goal == "best":
+        return made.digest == asked.digest and plan.tolerance == tolerance
+    wanted = _at_its_own_pace(asked, asked)
+    # Its certificate is of another problem then; what it was judged by is told all the same.
+    alike = replace(plan, problem=_at_its_own_pace(made, asked))
+    held = Asked(
+        wanted.robot,
+        wanted.path,
+        wanted.task,
+        wanted.relaxations,
+        wanted.all_constraints,
+        tolerance=tolerance,
+        also=wanted.also,
+        rest=wanted.rest and wanted.damping is None,
+    )
+    rows = [(item.rows, item.band, item.axes) for item in asked.relaxations]
+    same = rows == [(item.rows, item.band, item.axes) for item in made.relaxations]
+    return same and not list(held.failures(alike))
+
+
+def _at_its_own_pace(problem: Problem, asked: Problem) -> Problem:
+    """Return a problem along what its paths are made of, with the windows that were asked for."""
+    return replace(problem, **problem.along(_original), relaxations=tuple(asked.relaxations))
+
+
+def _original(path: ToolPath) -> ToolPath:
+    while isinstance(path, Retimed):
+        path = path.original
+    return path
+
+
+# A batch on disk: per problem a plan and a row; ranked tables of all of them.
+
+
+class Folder:
+    """The folder of a batch.
+
+    Parameters
+    ----------
+    path : Path
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        # Arms and bodies of plans that were read before.
+        self._known: dict[str, Any] = {}
+
+    def plan_file(self, name: str) -> Path:
+        """Return where a problem's plan is."""
+        return self.path / "plans" / f"{name}.npz"
+
+    def finished(self, item: Item) -> Row | None:
+        """Return the row of a problem that an earlier run finished; None where it has to be run.
+
+        Its plan is measured again: a row is not believed. Where the file is not the one that was
+        written with the row, or not of what is asked, it is planned again.
+        """
+        name = item.name
+        values = read_kept(self._row_file(name))
+        if values is None:
+            return None
+        try:
+            row = Row(file=self.plan_file(name), **values)
+            if row.key != item.key or row.fault:
+                return None
+            if row.error:
+                return replace(row, settings=dict(item.settings))
+            if digest_of_file(row.file) != row.digest:
+                return None
+            plan, job = load_plan(row.file, known=self._known), item.make()
+            if plan.altered or not is_made_for(plan, job):
+                return None
+            row = replace(row, settings=dict(item.settings), goal=job.goal)
+            return replace(row, **measured(plan, job.goal))
+        except (OSError, ValueError, TypeError, SelfmotionError):
+            return None  # not one of ours, or of another version: it is written anew
+
+    def record(self, row: Row, archive: bytes) -> Row:
+        """Write plan and row, in this order: a row says that all is there."""
+        if archive:
+            write_bytes(row.file, archive)
+            row = replace(row, digest=hashlib.sha256(archive).hexdigest())
+        values = {k: v for k, v in dataclasses.asdict(row).items() if k != "file"}
+        write_kept(self._row_file(row.name), values)
+        return row
+
+    def write_tables(self, rows: Sequence[Row], replays: int) -> None:
+        """Write ``table.csv`` and ``index.html``, the best first, with replays of the best ones."""
+        ranked = sorted(rows, key=lambda row: row.rank)
+        planned = [row for row in ranked if not row.error]
+        links = {row.name: self._replay(row, k < replays) for k, row in enumerate(planned)}
+        keys = list(dict.fromkeys(key for row in rows for key in row.settings))
+        said = ["verified", "reason", "cost", "minimum-norm motion", "margin", "clearance"]
+        said += ["duration", "seconds", "plan", "replay", "verdict"]
+        lines = [self._cells(k, row, keys, links) for k, row in enumerate(ranked, 1)]
+        write_text(self.path / "table.csv", _csv([["rank", "name", *keys, *said], *lines]))
+        page = _page(["rank", "name", *labels(keys), *said], lines, maps(rows, links))
+        write_text(self.path / "index.html", page)
+
+    def _cells(
+        self, rank: int, row: Row, keys: Sequence[str], links: Mapping[str, str]
+    ) -> list[str]:
+        numbers = ["", "", "", "", ""]
+        if not row.error:
+            costs = [f"{v:.8g}" for v in (row.cost, row.initial_cost)]
+            margins = ["" if v is None else f"{v:.4g}" for v in (row.margin, row.clearance)]
+            costs = costs if row.ends is None else [row.outcome, ""]
+            numbers = [*costs, *margins, f"{row.duration:.8g}"]
+        settings = [json.dumps(row.settings[key]) if key in row.settings else "" for key in keys]
+        file = "" if row.error else row.file.relative_to(self.path).as_posix()
+        state = "no plan" if row.error else "yes" if row.verified else "no"
+        timing = f"{row.seconds:.3f}"
+        said = row.error or row.verdict
+        start = [str(rank), row.name, *settings, state, row.reason, *numbers, timing]
+        return [*start, file, links.get(row.name, ""), said]
+
+    def _replay(self, row: Row, wanted: bool) -> str:
+        """Return the address of a plan's replay, made once and only where wanted."""
+        file = self.path / "replays" / f"{row.name}.html"
+        # A plan that was made anew is newer than its replay.
+        sound = file.is_file() and file.stat().st_mtime >= row.file.stat().st_mtime
+        if not sound and wanted and Plan.views is not None:
+            Plan.views.write_replay(row.plan(), file)
+            sound = True
+        return file.relative_to(self.path).as_posix() if sound else ""
+
+    def _row_file(self, name: str) -> Path:
+        return self.path / "rows" / f"{name}.json"
+
+
+def _csv(lines: Sequence[Sequence[str]]) -> str:
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerows(lines)
+    return text.getvalue()
+
+
+_PAGE = """<!doctype html>
+<html lang="en"><head><meta charset="utf-8"><title>selfmotion batch</title>
+<meta name="viewport" content="width=device-width,initial-scale=1">
+<style>body{{font:14px/1.4 system-ui,sans-serif;margin:1.5em}}table{{border-collapse:collapse}}
+th,td{{padding:.25em .6em;border-bottom:1px solid #ddd;text-align:left;vertical-align:top}}
+td{{overflow-wrap:break-word}}td.whole{{white-space:nowrap}}td:last-child{{min-width:16em}}
+@media(max-width:1000px){{td{{overflow-wrap:anywhere}}td.whole{{white-space:normal}}
+body{{margin:1em}}thead{{display:none}}tr{{display:block;padding:.6em 0}}
+td{{display:flex;gap:1em;padding:.1em 0;border:0}}td:empty{{display:none}}
+td::before{{content:attr(data-name);flex:0 0 8em;color:#666}}tr{{border-bottom:1px solid #ddd}}}}
+.maps{{display:flex;flex-wrap:wrap;gap:1em 2em;margin-bottom:1em}}svg{{max-width:100%}}
+a:hover rect{{opacity:.85}}
+</style></head><body><h1>{title}</h1>
+{maps}<table><thead><tr>{head}</tr></thead><tbody>
+{body}
+</tbody></table></body></html>
+"""
+
+
+# Columns whose cells are one word or number each.
+_WHOLE = {
+    "rank",
+    "minimum-norm motion",
+    "margin",
+    "clearance",
+    "duration",
+    "seconds",
+    "plan",
+    "replay",
+}
+# What the columns of numbers are of, for people.
+_HEADS = {
+    "margin": "joint margin, rad or m",
+    "clearance": "clearance, m",
+    "duration": "duration, s",
+    "seconds": "planned in, s",
+}
+
+
+def _page(header: Sequence[str], lines: Sequence[Sequence[str]], pictures: Sequence[str]) -> str:
+    linked = {header.index("plan"), header.index("replay")}
+    state, reason = header.index("verified"), header.index("reason")
+    shown = [k for k in range(len(header)) if k != reason]
+    # In few words; the last column has all of them.
+    lines = [[*line[:state], line[reason] or line[state], *line[state + 1 :]] for line in lines]
+
+    def cell(k: int, text: str) -> str:
+        safe = html.escape(text)
+        address = urllib.parse.quote(text)
+        said = f'<a href="{address}">{header[k]}</a>' if k in linked and text else safe
+        name = html.escape(_HEADS.get(header[k], header[k]))
+        whole = ' class="whole"' if header[k] in _WHOLE else ""
+        return f'<td{whole} data-name="{name}">{said}</td>'
+
+    rows = ("".join(cell(k, line[k]) for k in shown) for line in lines)
+    return _PAGE.format(
+        title=f"{len(lines)} problems, best first",
+        maps=f'<div class="maps">{"".join(pictures)}</div>\n' if pictures else "",
+        head="".join(f"<th>{html.escape(_HEADS.get(header[k], header[k]))}</th>" for k in shown),
+        body="\n".join(f"<tr>{row}</tr>" for row in rows),
+    )

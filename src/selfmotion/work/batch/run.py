@@ -1,0 +1,366 @@
+"""Problems to workers, plans to a folder."""
+
+import importlib
+import os
+import signal
+import tempfile
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from selfmotion.basics import (
+    InverseKinematicsError,
+    NoSequenceError,
+    PlanError,
+    ProblemError,
+    SelfmotionError,
+    as_called,
+    as_path,
+    as_whole,
+    check_executor,
+    shown,
+    silent,
+)
+from selfmotion.planning.planner import PlanRequest
+from selfmotion.planning.result import Made
+from selfmotion.problem.problem import Problem, problem_from_dict
+from selfmotion.work.batch.folder import Folder
+from selfmotion.work.batch.items import Item, Row, measured, problem_items
+
+# What runs in another process: a problem's description in, a plan's file out.
+
+# Arms and bodies of problems planned before.
+_made = Made()
+# What errors come to in a few words.
+_REASONS = ((InverseKinematicsError, "out of reach"), (NoSequenceError, "no way through"))
+
+
+def plan_task(task: Mapping[str, Any]) -> tuple[dict[str, Any], bytes]:
+    """Plan what `Item.task` describes.
+
+    Returns
+    -------
+    row : dict
+        How it ended: the keys of `Row` from ``verified`` on. What goes wrong is in its ``error``.
+    archive : bytes
+        The plan's file; empty where there is none.
+    """
+    began = time.perf_counter()
+    try:
+        for name in task["modules"]:
+            importlib.import_module(name)
+        problem = problem_from_dict(task["problem"], _made.of(task["files"]))
+        found = PlanRequest(problem, **task["options"]).plan()
+        with tempfile.TemporaryDirectory() as folder:
+            file = Path(folder, "plan.npz")
+            found.save(file)
+            archive = file.read_bytes()
+    except SelfmotionError as error:
+        reason = next((text for kind, text in _REASONS if isinstance(error, kind)), "no plan")
+        seconds = time.perf_counter() - began
+        return {"error": str(error), "reason": reason, "seconds": seconds}, b""
+    # A fault of ours, or of the user's own code, must not stop the other problems.
+    except Exception as error:
+        what = f"{type(error).__name__}: {error}"
+        return {"error": what, "fault": True, "seconds": time.perf_counter() - began}, b""
+    told = measured(found, task["options"]["goal"])
+    return {**told, "seconds": time.perf_counter() - began}, archive
+
+
+def begin_process() -> None:
+    """Leave Ctrl-C to the process that started this one; end when that does, however it ends."""
+    from multiprocessing import parent_process
+
+    # A plan that is interrupted is the best so far, which must not count as finished.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    parent = parent_process()
+    if parent is None:
+        return
+
+    def watch() -> None:
+        parent.join()
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
+
+
+# Problems to workers, plans to a folder.
+
+# Each worker has this many problems at hand, so that none waits for the next one.
+_AT_HAND = 2
+# Problems that an executor of unknown size is given at a time.
+_WINDOW = 64
+_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+_Result = tuple[dict[str, Any], bytes]
+
+
+@dataclass(frozen=True)
+class BatchProgress:
+    """How far a batch is.
+
+    Attributes
+    ----------
+    done, total : int
+        Problems, those of earlier runs among them.
+    failed : int
+        Those without a plan.
+    rate : float
+        Problems per second in this run.
+    seconds_left : float
+        Estimated from the rate; infinite before there is one.
+    """
+
+    done: int
+    total: int
+    failed: int
+    rate: float
+    seconds_left: float
+
+
+@dataclass(frozen=True)
+class Batch:
+    """What became of many problems.
+
+    Attributes
+    ----------
+    rows : tuple of Row
+        In the order of the problems.
+    folder : Path
+        Has ``table.csv`` and ``index.html``, and the plans in ``plans``.
+    resumed : int
+        How many of them an earlier run had finished.
+    best_files : tuple of Path
+        Of each file with a grid, the problem file of its best combination, where one is verified.
+    """
+
+    rows: tuple[Row, ...]
+    folder: Path
+    resumed: int
+    best_files: tuple[Path, ...] = ()
+
+    @property
+    def best(self) -> Row | None:
+        """The verified plan of the lowest cost, or the fastest if that was asked for; or None."""
+        sound = [row for row in self.rows if row.verified]
+        return min(sound, key=lambda row: row.rank, default=None)
+
+
+def plan_many(
+    problems: Iterable[Problem | PlanRequest],
+    executor: Executor | None = None,
+    *,
+    out: str | Path,
+    workers: int | None = None,
+    replays: int = 0,
+    progress: Callable[[BatchProgress], object] = silent,
+    **options: Any,
+) -> Batch:
+    """Plan many problems, each in one of several processes, into a folder.
+
+    Plans are written as they end. Run again with the same folder, those that are finished are not
+    replanned; so a run that was killed goes on where it stopped. A problem that cannot be
+    planned, or that kills its worker, does not stop the others: its row says why.
+
+    Parameters
+    ----------
+    problems : iterable of Problem or PlanRequest
+        Files that a job would write are left out: plans go to the folder.
+    executor : concurrent.futures.Executor, optional
+        Where to run: for example ``distributed.Client(address).get_executor()``, or mpi4py's
+        ``MPIPoolExecutor()``. selfmotion must be installed there. By default processes on this
+        machine; a script then needs ``if __name__ == "__main__":``.
+    out : path
+        The folder.
+    workers : int, optional
+        How many processes on this machine, by default one for each core.
+    replays : int
+        Of how many of the best plans to write a replay.
+    progress : callable, optional
+        Called with a `BatchProgress` whenever a problem is finished.
+    options
+        Of `plan`, for problems that are no jobs: ``search``, ``optimizer``, ``tolerance``,
+        ``max_evaluations``.
+
+    Returns
+    -------
+    Batch
+
+    Raises
+    ------
+    ProblemError
+        An item is no problem, or an argument is not what it should be, or has no effect.
+    PlanError
+        The executor that was given broke; what was finished by then is in the folder.
+    """
+    if not isinstance(problems, Iterable):
+        raise ProblemError(f"problems are {shown(problems)}, expected a list of problems")
+    items = problem_items(list(problems), options)
+    return plan_items(items, executor, out=out, workers=workers, replays=replays, progress=progress)
+
+
+def plan_items(
+    items: Sequence[Item],
+    executor: Executor | None = None,
+    *,
+    out: str | Path,
+    workers: int | None = None,
+    replays: int = 0,
+    progress: Callable[[BatchProgress], object] = silent,
+) -> Batch:
+    """Plan items as `plan_many` plans problems."""
+    check_executor(executor)
+    as_called(progress, "progress")
+    replays = as_whole(replays, "replays", 0, 10**9)
+    if workers is not None:
+        workers = as_whole(workers, "workers", 1, 10**6)
+        if executor is not None:
+            raise ProblemError("workers: has no effect where an executor is given; leave it out")
+    folder = Folder(as_path(out))
+    run = _Run(folder, items, progress)
+    pending = deque(items)
+    if executor is not None:
+        if run.through(executor, pending, _WINDOW):
+            raise PlanError(
+                f"the executor broke after {len(run.rows)} of {len(items)} problems; what is "
+                f"finished is in '{folder.path}': run again to go on"
+            )
+    else:
+        run.on_this_machine(pending, workers or os.cpu_count() or 1)
+    rows = tuple(run.rows[item.name] for item in items)
+    folder.write_tables(rows, replays)
+    return Batch(rows, folder.path, run.resumed, _write_best(items, run.rows, folder.path))
+
+
+def _write_best(items: Sequence[Item], rows: Mapping[str, Row], folder: Path) -> tuple[Path, ...]:
+    """Write the best combination of each file with a grid as a problem file."""
+    best: dict[Path, tuple[Row, Callable[[Path], None]]] = {}
+    for item in items:
+        row = rows[item.name]
+        if item.file is not None and item.write is not None and item.settings and row.verified:
+            here = row, item.write
+            best[item.file] = min(best.get(item.file, here), here, key=lambda each: each[0].rank)
+    written = []
+    for file, (_, write) in best.items():
+        target = folder / f"{file.stem}-best{file.suffix}"
+        write(target)
+        written.append(target)
+    return tuple(written)
+
+
+class _Run:
+    """One run of a batch: what is finished, and how fast it goes."""
+
+    def __init__(
+        self, folder: Folder, items: Sequence[Item], progress: Callable[[BatchProgress], object]
+    ) -> None:
+        self.rows: dict[str, Row] = {}
+        self._folder, self._items, self._progress = folder, items, progress
+        self._began, self.resumed = time.monotonic(), 0
+
+    def through(self, executor: Executor, pending: deque[Item], window: int) -> list[Item]:
+        """Run what is pending; return what was at work when the executor broke, if it did."""
+        flying: dict[Future[_Result], Item] = {}
+        while pending or flying:
+            while pending and len(flying) < window:
+                item = pending.popleft()
+                task = self._task(item)
+                if task is None:
+                    continue
+                try:
+                    flying[executor.submit(plan_task, task)] = item
+                except BrokenExecutor:
+                    return [*self._lost(flying), item]
+            done, _ = wait(flying, return_when=FIRST_COMPLETED)
+            for future in done:
+                fault = future.exception()
+                if isinstance(fault, BrokenExecutor):
+                    return self._lost(flying)
+                item = flying.pop(future)
+                if fault is None:
+                    self._finish(item, *future.result())
+                else:
+                    # The executor's own words: a worker that was lost more often than it allows.
+                    what = f"{type(fault).__name__}: {fault}"
+                    self._finish(item, {"error": what, "fault": True}, b"")
+        return []
+
+    def _task(self, item: Item) -> dict[str, Any] | None:
+        """Return what a worker needs; None where there is nothing to do."""
+        row = self._folder.finished(item)
+        if row is not None:
+            self.rows[item.name] = row
+            self.resumed += 1
+            item.forget()
+            return None
+        try:
+            return item.task
+        except SelfmotionError as wrong:
+            self._finish(item, {"error": str(wrong)}, b"")
+            return None
+
+    def on_this_machine(self, pending: deque[Item], workers: int) -> None:
+        """Run what is pending in processes; where one dies, begin again with what it left."""
+        suspects: deque[Item] = deque()
+        while pending or suspects:
+            with processes(workers) as pool:
+                # One of these killed its worker: alone, a second death tells which.
+                while suspects:
+                    suspect = suspects.popleft()
+                    if self.through(pool, deque([suspect]), 1):
+                        died = "its process died twice, the second time with nothing else at work"
+                        self._finish(suspect, {"error": died, "fault": True}, b"")
+                        break
+                else:
+                    suspects.extend(self.through(pool, pending, _AT_HAND * workers))
+
+    def _lost(self, flying: dict[Future[_Result], Item]) -> list[Item]:
+        """Keep what had been finished when the executor broke, and return the rest."""
+        lost = []
+        for future, item in flying.items():
+            if future.done() and not future.cancelled() and future.exception() is None:
+                self._finish(item, *future.result())
+            else:
+                lost.append(item)
+        return lost
+
+    def _finish(self, item: Item, found: dict[str, Any], archive: bytes) -> None:
+        file = self._folder.plan_file(item.name)
+        goal = item.task["options"]["goal"] if archive else "best"
+        row = Row(item.name, item.key, file, dict(item.settings), goal=goal, **found)
+        self.rows[item.name] = self._folder.record(row, archive)
+        item.forget()
+        done, total = len(self.rows), len(self._items)
+        rate = (done - self.resumed) / max(time.monotonic() - self._began, 1e-9)
+        failed = sum(bool(row.error) for row in self.rows.values())
+        self._progress(BatchProgress(done, total, failed, rate, (total - done) / rate))
+
+
+@contextmanager
+def processes(workers: int) -> Iterator[Executor]:
+    """Return processes of this machine, each with one thread for linear algebra."""
+    import multiprocessing
+    from concurrent.futures import ProcessPoolExecutor
+
+    # Read by the libraries when they are loaded, in the new processes.
+    before = {name: os.environ.get(name) for name in _THREADS}
+    os.environ.update({name: value or "1" for name, value in before.items()})
+    try:
+        with ProcessPoolExecutor(
+            workers, multiprocessing.get_context("spawn"), initializer=begin_process
+        ) as pool:
+            try:
+                yield pool
+            except BaseException:
+                # Whoever stops a batch waits for the plans at work, not for those in line.
+                pool.shutdown(wait=False, cancel_futures=True)
+                raise
+    finally:
+        for name, value in before.items():
+            if value is None:
+                os.environ.pop(name, None)

@@ -1,0 +1,452 @@
+"""Programs as files: what a job has finished so far, and what an earlier one knows."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Mapping, MutableMapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from selfmotion.basics import (
+    Array,
+    FileFormatError,
+    ProblemError,
+    SelfmotionError,
+    as_path,
+    description_of,
+    digest_of,
+    digest_of_file,
+    shown,
+)
+from selfmotion.certificate import Tolerance
+from selfmotion.model.collision import obstacle_from_dict
+from selfmotion.model.motion import Trajectory
+from selfmotion.model.robot import RobotModel
+from selfmotion.model.task import Task
+from selfmotion.planning.planner import check_joints
+from selfmotion.planning.result import (
+    Move,
+    Plan,
+    another_tool,
+    arm_digest,
+    files_of,
+    key_of,
+    load_move,
+    load_plan,
+    not_judged_by,
+    read_bundle,
+    read_kept,
+    write_bundle,
+    write_kept,
+)
+from selfmotion.problem.constraints import Clearance, Constraint
+from selfmotion.problem.costs import Cost, FunctionCost
+from selfmotion.problem.problem import Problem
+from selfmotion.work.job.program import Program
+from selfmotion.work.job.seam import Seam, Step, waiting
+from selfmotion.work.job.specification import Specification
+
+# Programs as files, and what a job has finished so far.
+
+# A move leads to where it should up to rounding [rad or m].
+_JOINED = 1e-9
+# Raised with every change that older versions cannot read.
+_FORMAT = 2
+
+
+def write_program(program: Program, file: Path) -> None:
+    """Write a program to one file, atomically; see `Program.save`."""
+    found = [step for step in program.steps if not step.is_missing]
+    asked = program.specification
+    troubles = {step.name: step.trouble for step in program.steps if step.is_missing}
+    description: dict[str, Any] = {
+        "steps": [_step_to_dict(step) for step in found],
+        "missing": {**program.missing, **troubles},
+        "bound": program.bound,
+        "notes": list(program.notes),
+        "unjudged": list(program.unjudged),
+        "specification": None if asked is None else asked.to_dict(),
+    }
+    write_bundle(file, "program", _FORMAT, description, [step.made for step in found])
+
+
+def load_program(file: str | Path) -> Program:
+    """Read a program that `Program.save` wrote, and judge all of it anew.
+
+    A file that was changed is never verified.
+
+    Raises
+    ------
+    FileFormatError
+        The file is missing, is no program, lacks something, or was written by another version.
+    """
+    path = as_path(file)
+    description, made, changed = read_bundle(path, "program", _FORMAT)
+    try:
+        pairs = zip(description["steps"], made, strict=True)
+        steps = tuple(_step(values, item) for values, item in pairs)
+        missing = {str(name): str(why) for name, why in description["missing"].items()}
+        notes, bound = tuple(map(str, description["notes"])), float(description["bound"])
+        unjudged = tuple(map(str, description.get("unjudged", ())))
+        asked = description["specification"]
+        specification = None if asked is None else Specification.from_dict(asked, made[0].robot)
+        if not math.isfinite(bound):
+            raise ValueError(f"bound is {bound}, not finite")
+    except (SelfmotionError, KeyError, TypeError, ValueError, AttributeError) as error:
+        raise FileFormatError(f"{path}: is a damaged program: {error!r}") from error
+    if changed:
+        missing[path.name] = "the file was changed after the program was written"
+    return Program(made[0].robot, steps, missing, bound, notes, specification, unjudged=unjudged)
+
+
+def _step_to_dict(step: Step) -> dict[str, Any]:
+    return {
+        "name": step.name,
+        "turned": step.turned,
+        "events": [list(event) for event in step.events],
+        "leaves": [item.to_dict() for item in step.leaves],
+        "may_meet": list(step.may_meet),
+    }
+
+
+def _step(values: Mapping[str, Any], made: Plan | Move) -> Step:
+    return Step(
+        str(values["name"]),
+        made,
+        bool(values["turned"]),
+        tuple((str(name), float(at)) for name, at in values["events"]),
+        tuple(obstacle_from_dict(item) for item in values["leaves"]),
+        tuple(map(str, values["may_meet"])),
+    )
+
+
+class Shelf:
+    """A folder with what a job has finished: plans and moves by what was asked for.
+
+    What is kept is read in one way: written for this very work, whole, unchanged, measured again
+    with today's tolerance and verified; or it is planned again.
+
+    Parameters
+    ----------
+    folder : Path or None
+        None keeps nothing.
+    tolerance : Tolerance
+        What a seam may miss its path by.
+    known : mapping
+        Arms and constraints that are made already; see `load_plan`.
+    """
+
+    def __init__(
+        self, folder: Path | None, tolerance: Tolerance, known: MutableMapping[str, Any]
+    ) -> None:
+        self._folder, self._tolerance, self._known = folder, tolerance, known
+        if folder is not None:
+            try:
+                folder.mkdir(parents=True, exist_ok=True)
+            except OSError as error:
+                raise FileFormatError(f"{folder}: cannot be made: {error.strerror}") from error
+
+    def file(
+        self,
+        name: str,
+        asked: Callable[[], Any],
+        robot: RobotModel,
+        constraints: Sequence[Constraint],
+    ) -> Path | None:
+        """Return the file for what was asked (JSON-safe) under a name; None without a folder.
+
+        Of an arm, with what bodies are made of.
+        """
+        if self._folder is None:
+            return None
+        key = key_of((asked(), asdict(self._tolerance)), self.files(robot, constraints))[:16]
+        plain = re.sub(r"[^A-Za-z0-9]+", "-", name).strip("-")[:40]
+        return self._folder / f"{plain}.{key}.json"
+
+    def files(self, robot: RobotModel, constraints: Sequence[Constraint]) -> dict[str, str]:
+        """Return the digests of what an arm's bodies and those it keeps apart from are made of."""
+        return files_of(robot, constraints, self._known)
+
+    def plans(self, file: Path | None, problem: Problem) -> tuple[list[Plan], str] | None:
+        """Return the plans of a problem that were kept, and why there are none.
+
+        None for nothing kept.
+        """
+        kept = None if file is None else read_kept(file)
+        if file is None or kept is None:
+            return None
+        try:
+            files = _written(kept, file)
+            found, reason = [self._plan(name) for name in files], str(kept["reason"])
+            # Each begins where it was put.
+            problems = [replace(plan.problem, start=problem.start) for plan in found]
+        except (SelfmotionError, KeyError, TypeError, ValueError):
+            return None
+        same = all(own.digest == problem.digest for own in problems)
+        sound = same and all(plan.certificate.verified for plan in found)
+        return (found, reason) if sound else None
+
+    def _plan(self, file: Path) -> Plan:
+        plan = load_plan(file, known=self._known)
+        if plan.tolerance == self._tolerance:
+            return plan
+        return replace(plan, certificate=plan.check(self._tolerance))
+
+    def keep_plans(self, file: Path | None, made: tuple[Sequence[Plan], str]) -> None:
+        """Keep plans, or why there are none."""
+        if file is None:
+            return
+        plans, reason = made
+        for plan, archive in zip(plans, _archives(file, len(plans)), strict=True):
+            plan.save(archive)
+        _write(file, len(plans), {"reason": reason})
+
+    def move(self, file: Path | None, missing: Move, ends: Array) -> Move | None:
+        """Return the move between ends (2, n) that was kept, or `missing` with the reason.
+
+        None for nothing kept.
+        """
+        kept = None if file is None else read_kept(file)
+        if file is None or kept is None:
+            return None
+        try:
+            if kept["trouble"]:
+                return replace(missing, reason=str(kept["trouble"]))
+            (archive,) = _written(kept, file)
+            found = load_move(archive, known=self._known)
+        except (FileFormatError, KeyError, TypeError, ValueError):
+            return None
+        return found if leads(found, missing, ends) else None
+
+    def keep_move(self, file: Path | None, move: Move) -> None:
+        """Keep a move, or why there is none."""
+        if file is None:
+            return
+        count = int(move.trajectory is not None)
+        for archive in _archives(file, count):
+            move.save(archive)
+        _write(file, count, {"trouble": "" if count else move.trouble})
+
+
+def leads(found: Move, missing: Move, ends: Array) -> bool:
+    """Whether a move is verified for what is asked of a `missing` one, between ends (2, n)."""
+    if found.trajectory is None or any(another_tool(found.robot, missing.robot)):
+        return False
+    if float(np.abs(found.motion.q[[0, -1]] - ends).max()) > _JOINED:
+        return False
+    return found.verified and not any(not_judged_by(found.constraints, missing.constraints, None))
+
+
+def _archives(file: Path, count: int) -> list[Path]:
+    """Return where so many plans or moves of one piece of work are."""
+    return [file.with_suffix(f".{number}.npz") for number in range(count)]
+
+
+def _write(file: Path, count: int, values: Mapping[str, Any]) -> None:
+    """Write what is known of a piece of work, last: also the digest of each archive."""
+    digests = [digest_of_file(archive) for archive in _archives(file, count)]
+    write_kept(file, {"digests": digests, **values})
+
+
+def _written(kept: Mapping[str, Any], file: Path) -> list[Path]:
+    """Return the archives that were written with what is known of a piece of work.
+
+    One of other work has a sound motion as well, and may be of the same problem, from elsewhere.
+    """
+    digests = list(kept["digests"])
+    archives = _archives(file, len(digests))
+    for archive, digest in zip(archives, digests, strict=True):
+        if digest_of_file(archive) != digest:
+            raise FileFormatError(f"{archive}: is not the one that was written with {file.name}")
+    return archives
+
+
+# What an earlier program of a job, or of one like it, knows: motions of its seams, and ways.
+
+# A move whose ends are farther away than this in all [rad or m] tells nothing.
+_NEAR = 1.5
+# An old way is told by its corners: so many looks at it, from which straight legs differ by less
+# than this [rad or m].
+_LOOKS, _STRAIGHT = 65, 0.02
+
+
+@dataclass(frozen=True, eq=False)
+class Earlier:
+    """What an earlier program knows.
+
+    Parameters
+    ----------
+    program : Program
+    """
+
+    program: Program
+
+    @cached_property
+    def _of_seams(self) -> dict[str, tuple[Plan, bool]]:
+        steps = self.program.steps
+        return {
+            step.name: (step.made, step.turned) for step in steps if isinstance(step.made, Plan)
+        }
+
+    def plan_of(self, seam: Seam) -> tuple[Plan, bool] | None:
+        """Return the plan of a seam by its name, and whether it is turned; None for none."""
+        plan, turned = self._of_seams.get(seam.name, (None, False))
+        return None if plan is None or (turned and not seam.either_way) else (plan, turned)
+
+    def kept(
+        self,
+        seam: Seam,
+        problem: Problem,
+        constraints: Sequence[Constraint],
+        clearance: Clearance | None,
+    ) -> tuple[Plan | None, str]:
+        """Return the plan of a seam of which the same is asked, as it is, or why there is none.
+
+        Judged anew by its `problem`, in the direction in which it was made: what files of bodies
+        hold may have changed. `constraints` and `clearance` are those of the job.
+        """
+        known = self.plan_of(seam)
+        if seam.name not in self._of_seams:
+            return None, "the earlier program does not make it"
+        if known is None:
+            return None, "it was made from its end to its start, and may not be any more"
+        changed = self._changed(seam, problem.robot, constraints, clearance)
+        if changed:
+            return None, changed
+        plan, _ = known
+        found = replace(plan, problem=replace(problem, start=plan.problem.start))
+        found = replace(found, certificate=found.check())
+        if found.certificate.verified:
+            return found, ""
+        return None, f"it is not verified any more: {found.certificate.summary}"
+
+    def _changed(
+        self,
+        seam: Seam,
+        robot: RobotModel,
+        constraints: Sequence[Constraint],
+        clearance: Clearance | None,
+    ) -> str:
+        """Return in words what is asked otherwise of a seam; "" where nothing is."""
+        before = self.program.specification
+        if before is None:
+            return "the earlier program does not say what was asked for"
+        own = next((item for item in before.seams if item.name == seam.name), None)
+        if own is None:
+            return "the earlier program does not say what was asked of it"
+        if before.arm != arm_digest(robot):
+            return "the arm is another, or its tool, reference, limits or locked joints are"
+        if Task.of(own.task) is not Task.of(seam.task):
+            return "its task is another"
+        if not _cost_the_same(own.costs, seam.costs):
+            return "its costs are others"
+        clear = [[] if item is None else [item] for item in (before.clearance, clearance)]
+        pairs: dict[str, tuple[Sequence[Any], Sequence[Any]]] = {
+            "its path is another": ([own.path], [seam.path]),
+            "its tolerances are others": (own.relaxations, seam.relaxations),
+            "its constraints are others": (own.constraints, seam.constraints),
+            "the constraints of the job are others": (before.constraints, constraints),
+            "what the job is kept clear of is another": (clear[0], clear[1]),
+        }
+        for text, (some, others) in pairs.items():
+            if _described(some) != _described(others):
+                return text
+        return ""
+
+    def kept_in(self, program: Program, changed: Mapping[str, str], why: str) -> dict[str, str]:
+        """Return for each seam of a program "" where its motion is kept, else why it is not.
+
+        What is asked otherwise is `changed`; `why` no program came of what could be kept.
+        """
+        found = dict[str, str]()
+        for name, plan in program.plans.items():
+            known, _ = self._of_seams.get(name, (None, False))
+            motion = None if known is None else known.trajectory
+            same = motion is not None and all(
+                np.array_equal(getattr(motion, part), getattr(plan.trajectory, part))
+                for part in ("t", "q", "qd")
+            )
+            reason = changed.get(name) or f"no program comes of what could be kept: {why}"
+            found[name] = "" if same else reason
+        return found
+
+    def order_of(self, seams: Sequence[Seam]) -> list[Seam] | None:
+        """Return seams in its order, where it made these and no others and they may come so."""
+        named, made = {seam.name: seam for seam in seams}, self.program.order
+        if sorted(made) != sorted(named):
+            return None
+        listed = [named[name] for name in made]
+        return listed if waiting(listed).keeps(range(len(listed))) else None
+
+    def move_like(self, ends: Array) -> Move | None:
+        """Return the move whose ends are nearest to others (2, n), or None for none near."""
+        found = [move for move in self.program.moves if _leads_somewhere(move)]
+        far = [_apart(move.motion.q[[0, -1]], ends) for move in found]
+        k = int(np.argmin(far)) if far else -1
+        return found[k] if k >= 0 and far[k] < _NEAR else None
+
+
+def _described(several: Sequence[Any]) -> str:
+    """Return what tells some values from others."""
+    return digest_of([description_of(item) for item in several])
+
+
+def _cost_the_same(some: Sequence[Cost] | None, others: Sequence[Cost] | None) -> bool:
+    """Whether costs are the same; of functions nobody can tell but where they are one."""
+    if some is None or others is None:
+        return some is others
+    if len(some) != len(others):
+        return False
+    return all(
+        one is other
+        or (not isinstance(one, FunctionCost) and description_of(one) == description_of(other))
+        for one, other in zip(some, others, strict=True)
+    )
+
+
+def check_earlier(earlier: object, robot: RobotModel) -> None:
+    """Raise ProblemError where an earlier program is none, or one of another arm."""
+    if not isinstance(earlier, Program):
+        raise ProblemError(
+            f"warm_start is {shown(earlier)}, expected a Program; load_program reads one"
+        )
+    check_joints(earlier.robot, robot)
+
+
+def way_along(motion: Trajectory, ends: Array) -> Array:
+    """Return the corners (m, n) of a motion whose ends are put elsewhere, (2, n).
+
+    What one end is moved by fades out towards the other one.
+    """
+    q = motion(np.linspace(motion.t[0], motion.t[-1], _LOOKS))
+    gone = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(q, axis=0)).max(axis=1))])
+    share = (gone / gone[-1])[:, None] if gone[-1] > 0.0 else np.linspace(0.0, 1.0, _LOOKS)[:, None]
+    way = q + (1.0 - share) * (ends[0] - q[0]) + share * (ends[1] - q[-1])
+    return np.asarray(way[_corners(way, 0, _LOOKS - 1)])
+
+
+def _corners(way: Array, first: int, last: int) -> list[int]:
+    """Return which points of a way straight legs have to pass (Ramer, Douglas and Peucker)."""
+    share = np.linspace(0.0, 1.0, last - first + 1)[:, None]
+    legs = way[first] + share * (way[last] - way[first])
+    off = np.abs(way[first : last + 1] - legs).max(axis=1)
+    k = first + int(np.argmax(off))
+    if off.max() <= _STRAIGHT:
+        return [first, last]
+    return [*_corners(way, first, k)[:-1], *_corners(way, k, last)]
+
+
+def _leads_somewhere(move: Move) -> bool:
+    """Whether it is a move that was found, not a wait."""
+    motion = move.trajectory
+    return motion is not None and float(np.abs(motion.q[-1] - motion.q[0]).max()) > 0.0
+
+
+def _apart(ends: Array, others: Array) -> float:
+    """Return how far two pairs of ends (2, n) are from each other in all [rad or m]."""
+    return float(np.abs(ends - others).max(axis=1).sum())

@@ -1,0 +1,281 @@
+"""A whole job as one motion: seams, moves between them, and what is known of all of it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import accumulate
+from pathlib import Path, Path as FilePath
+
+from selfmotion.basics import PlanError, ProblemError, as_path, shown, write_text
+from selfmotion.certificate import Tolerance, first_of
+from selfmotion.model.collision import Obstacle
+from selfmotion.model.motion import Trajectory, joined_motions
+from selfmotion.model.robot import RobotModel
+from selfmotion.planning.result import (
+    Move,
+    Piece,
+    Plan,
+    another_tool,
+    gaps,
+    moving_end,
+    reached_text,
+)
+from selfmotion.problem.constraints import Clearance
+from selfmotion.work.job.seam import Step
+from selfmotion.work.job.specification import Specification
+
+# Events may be outside their step by rounding [s].
+_ROUNDING = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Program:
+    """A job as one motion, certified as a whole.
+
+    Attributes
+    ----------
+    robot : RobotModel
+    steps : tuple of Step
+        Seams, and the moves and waits between them, in order of time.
+    missing : mapping
+        Seams that could not be made, and why.
+    bound : float
+        No order of the motions that are known of the seams takes less for moves [s]: of up to
+        twelve seams by the times of the moves themselves, of more by limits of speed and
+        acceleration.
+    notes : tuple of str
+        What a reader should know: which orders were given up, and why.
+    specification : Specification, optional
+        What was asked for, which the steps are held against; None for steps that were put together
+        by hand, and the verdict says so.
+    kept : mapping, optional
+        Where it was begun at an earlier program: each seam, with "" where its motion is that of the
+        earlier one, bit for bit, else with why it is not; else None. Files do not have it.
+    unjudged : tuple of str
+        What nothing was asked of and a reader may take for judged; the verdict says it.
+    """
+
+    robot: RobotModel
+    steps: tuple[Step, ...]
+    missing: Mapping[str, str]
+    bound: float = 0.0
+    notes: tuple[str, ...] = ()
+    specification: Specification | None = None
+    kept: Mapping[str, str] | None = None
+    unjudged: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        """Return a few lines: how many seams in what order, how long, and the verdict."""
+        names = " → ".join(self.order[:_SHOWN]) + (" → …" if len(self.order) > _SHOWN else "")
+        return (
+            f"Program({self.robot.name}, {self.extent}, {self.duration:.6g} s, "
+            f"{self.transfer_time:.6g} s of it moves)\n  {names}\n  {self.verdict}"
+        )
+
+    @property
+    def extent(self) -> str:
+        """How many seams it makes, in words."""
+        count = len(self.order)
+        return f"{count} seam{'s' * (count != 1)}"
+
+    @property
+    def kept_told(self) -> tuple[str, ...]:
+        """What was kept of an earlier program in words: how many seams, and why others were not."""
+        if not self.kept:
+            return ()
+        others = {name: why for name, why in self.kept.items() if why}
+        count, total = len(self.kept) - len(others), len(self.kept)
+        first = f"kept as they were: {count} of {total} seam{'s' * (total != 1)}"
+        return (first, *(f"planned: '{name}', as {why}" for name, why in others.items()))
+
+    @property
+    def order(self) -> tuple[str, ...]:
+        """The names of the seams, as they are made."""
+        return tuple(step.name for step in self.steps if step.is_seam)
+
+    @property
+    def tolerance(self) -> Tolerance:
+        """What each of the seams may miss its path by."""
+        return Tolerance() if self.specification is None else self.specification.tolerance
+
+    @property
+    def plans(self) -> dict[str, Plan]:
+        """The plans of the seams by name, as they are made."""
+        return {step.name: step.made for step in self.steps if isinstance(step.made, Plan)}
+
+    @property
+    def moves(self) -> tuple[Move, ...]:
+        """The moves and waits, in order."""
+        return tuple(step.made for step in self.steps if isinstance(step.made, Move))
+
+    @cached_property
+    def trajectory(self) -> Trajectory:
+        """All of it as one motion from t = 0 on.
+
+        Raises
+        ------
+        PlanError
+            A move was not found, or there is no seam.
+        """
+        if not self.steps:
+            raise PlanError(f"{self.robot.name}: {self.verdict}")
+        return joined_motions([step.motion for step in self.steps])
+
+    @property
+    def begins(self) -> tuple[float, ...]:
+        """When each step begins in `trajectory` [s]."""
+        durations = [step.duration for step in self.steps]
+        return tuple(accumulate(durations[:-1], initial=0.0))[: len(self.steps)]
+
+    @property
+    def duration(self) -> float:
+        """How long all of it takes [s]."""
+        return sum(step.duration for step in self.steps)
+
+    @property
+    def transfer_time(self) -> float:
+        """How long moves and waits take [s]."""
+        return sum(step.duration for step in self.steps if not step.is_seam)
+
+    @property
+    def events(self) -> tuple[tuple[float, str, str], ...]:
+        """What happens when: time in `trajectory` [s], seam, event."""
+        return tuple(
+            (begin + at, step.name, event)
+            for begin, step in zip(self.begins, self.steps, strict=True)
+            for event, at in step.happenings
+        )
+
+    @property
+    def verified(self) -> bool:
+        """Whether every seam is made, and everything is kept at all times."""
+        return not self.failures
+
+    @property
+    def verdict(self) -> str:
+        """One line: verified, or what is wrong with which seam or move."""
+        if self.verified:
+            alone = "" if self.specification else "; the file does not say what was asked for"
+            reached = reached_text(list(self.plans.values()), self.tolerance)
+            beside = "".join(f"; {text}" for text in self.unjudged)
+            return (
+                f"verified at all times: {self.extent}, and all moves in between, from rest to "
+                f"rest; {reached}{alone}{beside}"
+            )
+        return f"not verified: {'; '.join(self.failures)}"
+
+    @property
+    def summary(self) -> str:
+        """The verdict in short: of what is wrong the first."""
+        return self.verdict if self.verified else first_of(self.failures)
+
+    @cached_property
+    def failures(self) -> tuple[str, ...]:
+        """What speaks against it; empty for a verified one."""
+        strangers = [
+            f"'{step.name}': {text}"
+            for step in self.steps
+            for text in another_tool(step.made.robot, self.robot)
+        ]
+        if strangers:
+            return tuple(strangers)
+        return tuple(
+            [
+                *(f"seam '{name}' is not made: {why}" for name, why in self.missing.items()),
+                *([] if self.steps else ["there is no step"]),
+                *(step.trouble for step in self.steps if step.trouble),
+                *self._gaps(),
+                *self._left_out(),
+                *self._beyond(),
+                *self._not_as_asked(),
+            ]
+        )
+
+    def _gaps(self) -> Iterator[str]:
+        """Yield where the arm would jump, or does not rest."""
+        named = ((step, Piece.of(f"'{step.name}'", step.made)) for step in self.steps)
+        pieces = [piece for _, piece in named if piece is not None]
+        for piece, end in [(each, 0) for each in pieces[:1]] + [(each, -1) for each in pieces[-1:]]:
+            yield from moving_end(self.robot, piece, end)
+        yield from gaps(self.robot, pieces)
+
+    def _left_out(self) -> Iterator[str]:
+        """Yield what stands there and was not looked at."""
+        asked = self.specification
+        standing: dict[str, Obstacle] = {}
+        if asked is not None:
+            standing = {item.name: item for item in asked.obstacles}
+        apart = None if asked is None else asked.clearance or Clearance(distance=0.0)
+        for step in self.steps:
+            met = step.meets(standing, apart)
+            if met:
+                yield f"'{step.name}' is not checked against '{met[0]}', which is there by then"
+            standing |= {item.name: item for item in step.leaves}
+
+    def _beyond(self) -> Iterator[str]:
+        """Yield events that are not while their step lasts."""
+        for step in self.steps:
+            lasts = step.duration
+            for event, at in step.events:
+                if not -_ROUNDING <= at <= lasts + _ROUNDING:
+                    yield f"event '{event}' of '{step.name}' is at {at:.6g} s of {lasts:.6g} s"
+
+    def _not_as_asked(self) -> Iterator[str]:
+        """Yield what was asked for and is not so."""
+        if self.specification is not None:
+            yield from self.specification.failures(self.robot, self.steps, self.missing)
+
+    def require(self) -> Program:
+        """Return the program itself if all of it is verified.
+
+        Raises
+        ------
+        PlanError
+            It is not; the message is the verdict.
+        """
+        if not self.verified:
+            raise PlanError(f"{self.robot.name}: {self.verdict}")
+        return self
+
+    def save(self, file: str | FilePath) -> None:
+        """Write the program, without loss, to a file that `load_program` reads; atomically."""
+        from selfmotion.work.job.files import write_program
+
+        write_program(self, as_path(file))
+
+
+# Names in a printed program.
+_SHOWN = 12
+
+
+# When the steps of a program begin and end, and what happens when, as a table.
+
+
+def write_timetable(program: Program, file: str | Path) -> None:
+    """Write when each step begins and ends, and each event is [s], as CSV; atomically.
+
+    Events at one time are in the order in which they were given.
+
+    Raises
+    ------
+    ProblemError
+        It is no program.
+    FileFormatError
+        The file cannot be written.
+    """
+    if not isinstance(program, Program):
+        raise ProblemError(f"program is {shown(program)}, expected a Program")
+    rows = list[tuple[float, float, str, str]]()
+    for begin, step in zip(program.begins, program.steps, strict=True):
+        kind = "seam" if step.is_seam else "move"
+        rows.append((begin, begin + step.duration, kind, step.name))
+        for event, at in step.happenings:
+            rows.append((begin + at, begin + at, "event", f"{step.name}: {event}"))
+    lines = ["begin,end,kind,name"]
+    lines += [
+        f'{begin:.6f},{end:.6f},{kind},"{name.replace(chr(34), chr(34) * 2)}"'
+        for begin, end, kind, name in rows
+    ]
+    write_text(as_path(file), "\n".join(lines) + "\n")

@@ -1,0 +1,388 @@
+"""From seams to a program."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from concurrent.futures import Executor
+from contextlib import nullcontext
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from selfmotion.basics import (
+    Array,
+    PlanError,
+    ProblemError,
+    Progress,
+    as_choice,
+    as_number,
+    as_path,
+    as_several,
+    as_whole,
+    check_executor,
+    held_interruption,
+    nearest,
+    obeying,
+    shown,
+    silent,
+)
+from selfmotion.certificate import Tolerance
+from selfmotion.model.robot import RobotModel
+from selfmotion.planning.result import Move, arm_digest
+from selfmotion.planning.transfer import FreeMotions
+from selfmotion.problem.constraints import Clearance, Constraint
+from selfmotion.problem.problem import KEPT, NO_OVERLAP, check_all_times, check_feeds
+from selfmotion.work.job.files import Earlier, Shelf, check_earlier
+from selfmotion.work.job.growing import Growing
+from selfmotion.work.job.order import EXACT
+from selfmotion.work.job.ordering import Ordering
+from selfmotion.work.job.program import Program
+from selfmotion.work.job.seam import Seam, Step
+from selfmotion.work.job.specification import Specification
+from selfmotion.work.job.work import Asked, Work, check_can_be_sent, seam_steps
+
+# From an order to a program: moves are planned, and the order again where they disappoint.
+
+# Orders that are tried at most: exact ones, and those of many seams.
+_ORDERS, _ORDERS_OF_MANY = 200, 12
+# What a move that is not found counts where no order does without [s].
+_GAP = 1e6
+# From which state to which one; None is the start or the end of the program.
+Pair = tuple[int | None, int | None]
+
+
+class Builder:
+    """Builds the program of a job.
+
+    Parameters
+    ----------
+    ordering : Ordering
+    work : Work
+    ends : ((n,) or None, (n,) or None)
+        Where the program begins and ends.
+    """
+
+    def __init__(self, ordering: Ordering, work: Work, ends: tuple[Array | None, ...]) -> None:
+        self._ordering, self._work, self._ends = ordering, work, ends
+        self._notes: list[str] = []
+
+    def program(self) -> Program:
+        """Return the program; what could not be made is named."""
+        if any(seam.leaves for seam in self._ordering.seams):
+            return Growing(self._ordering, self._work, self._ends).program()
+        return self._of_moves()
+
+    def _of_moves(self) -> Program:
+        ordering, moves = self._ordering, dict[Pair, Move]()
+        bound = ordering.best().bound
+        best: tuple[float, tuple[int, ...]] = (np.inf, ())
+        exact = len(ordering.made) <= EXACT
+        for _ in range(_ORDERS if exact else _ORDERS_OF_MANY):
+            found = ordering.best()
+            if not found.states:
+                break
+            wanted = [pair for pair in self._pairs(found.states) if pair not in moves]
+            self._plan(wanted, moves)
+            cost = self._cost(found.states, moves)
+            bound = max(bound, found.bound) if exact else bound
+            if np.isfinite(cost):
+                best = min(best, (cost, found.states))
+            # Moves not planned yet are estimated below what they take: no other order is better.
+            if not wanted or (np.isfinite(cost) and not exact):
+                break
+        states = best[1] or self._with_gaps(moves)
+        return Program(
+            self._work.asked.robot,
+            tuple(self._steps(states, moves)),
+            dict(ordering.missing),
+            bound,
+            tuple(self._notes),
+        )
+
+    def _with_gaps(self, moves: dict[Pair, Move]) -> tuple[int, ...]:
+        """Return the order with the fewest moves that are not found."""
+        for pair, move in moves.items():
+            if not move.verified:
+                self._ordering.learn(*pair, _GAP)
+        states = self._ordering.best().states
+        self._plan([pair for pair in self._pairs(states) if pair not in moves], moves)
+        return states
+
+    def _pairs(self, states: Sequence[int]) -> list[Pair]:
+        start, end = self._ends
+        first = [] if start is None else [(None, states[0])]
+        last = [] if end is None else [(states[-1], None)]
+        return [*first, *pairwise(states), *last]
+
+    def _plan(
+        self,
+        wanted: Sequence[Pair],
+        moves: dict[Pair, Move],
+    ) -> None:
+        """Plan moves, and let the order know what they take."""
+        asked = [(*self._ends_of(pair), ()) for pair in wanted]
+        named = [self._ordering.name_of_move(*pair) for pair in wanted]
+        for pair, move in zip(wanted, self._work.moves(asked, named), strict=True):
+            moves[pair] = move
+            seconds = move.motion.duration if move.verified else np.inf
+            self._ordering.learn(*pair, seconds)
+            if not move.verified:
+                names = self._ordering.name_of_move(*pair)
+                self._notes.append(f"'{names}' is dropped: {move.trouble}")
+
+    def _ends_of(self, pair: Pair) -> tuple[Array, Array]:
+        """Return where a move begins and ends, (n,) each."""
+        states, (one, other) = self._ordering.states, pair
+        first = self._ends[0] if one is None else states[one].ends[1]
+        last = self._ends[1] if other is None else states[other].ends[0]
+        if first is None or last is None:
+            raise RuntimeError("no move leads to where nothing was asked for")
+        return first, last
+
+    def _cost(self, states: Sequence[int], moves: dict[Pair, Move]) -> float:
+        found = [moves[pair] for pair in self._pairs(states)]
+        if not all(move.verified for move in found):
+            return float(np.inf)
+        own = sum(self._ordering.own(state) for state in states)
+        return own + sum(move.motion.duration for move in found)
+
+    def _steps(self, states: Sequence[int], moves: dict[Pair, Move]) -> list[Step]:
+        pairs, steps = self._pairs(states), list[Step]()
+        by_last = {pair[1]: pair for pair in pairs}
+        for state in states:
+            if state in by_last:
+                pair = by_last[state]
+                steps.append(Step(self._ordering.name_of_move(*pair), moves[pair]))
+            here = self._ordering.states[state]
+            seam = self._ordering.seams[here.seam]
+            plan = self._ordering.made_of(state)
+            steps += seam_steps(seam, plan, here.turned, self._work)
+        if None in by_last:
+            steps.append(Step(self._ordering.name_of_move(*by_last[None]), moves[by_last[None]]))
+        return steps
+
+
+# From seams to a program.
+
+
+def plan_job(
+    robot: RobotModel,
+    seams: Sequence[Seam],
+    *,
+    start: npt.ArrayLike | None = None,
+    end: npt.ArrayLike | None = None,
+    order: str = "free",
+    constraints: Sequence[Constraint] = KEPT,
+    clearance: Clearance | None = NO_OVERLAP,
+    branches: int = 4,
+    seconds_per_cost: float = 0.0,
+    deadline: float = 10.0,
+    folder: str | Path | None = None,
+    executor: Executor | None = None,
+    warm_start: Program | None = None,
+    rng: int = 0,
+    progress: Progress = silent,
+) -> Program:
+    """Plan a job: every seam once, in the best order and directions, with moves in between.
+
+    For each seam several motions are planned that begin in different configurations, and each may
+    be made either way. From the end of each to the start of each other the least time that the
+    limits allow is known. The order, the directions and the motions that take the least are found
+    exactly for up to twelve seams, and beyond that by insertion and exchange, with a bound told.
+    Then the moves are planned. Where one takes longer than it should, or is not found, the order is
+    looked for again: up to twelve seams the one that results is the best of all orders of the
+    motions that are known, by the times of the moves themselves. Where seams leave
+    something behind, motions that meet it come before it: the order is looked for again until
+    every seam and move can be made past what stands there by then.
+
+    Parameters
+    ----------
+    robot : RobotModel
+    seams : sequence of Seam
+    start, end : (n,), optional
+        Configurations in which the program begins and ends [rad or m]; by default where the first
+        seam begins, and the last one ends.
+    order : {"free", "given"}
+        Whether the order is looked for, within what seams say comes after others, or is that of the
+        list. In either case `Seam.either_way` says whether directions are free.
+    constraints : sequence of Constraint
+        What all seams and moves must keep; see `Problem`.
+    clearance : Clearance, optional
+        What keeps the arm apart from obstacles and itself; see `Problem.clearance`.
+    branches : int
+        Motions in different configurations that are planned for each seam.
+    seconds_per_cost : float
+        What a unit of a seam's cost counts, beside the time of moves [s]; by default only time
+        counts.
+    deadline : float
+        After so many seconds of the processor a move counts as not found. A move that takes nearly
+        as long to find may be found on one machine, or on one day, and not on another.
+    folder : path, optional
+        Keeps every plan and move there as soon as it is finished; a job that is begun again takes
+        what it finds, and ends in the same program.
+    executor : Executor, optional
+        Plans seams and moves at the same time; any of `concurrent.futures`, or a Dask client's. The
+        program is the same.
+    warm_start : Program, optional
+        An earlier program of this job, or of one like it, as when a part was moved: seams and moves
+        that did not change are kept bit for bit and in their directions, in its order where it
+        made the same seams, in any other one else; other seams begin at its motions. Only where no
+        verified program comes of that, what is kept is made the other way round, or all is
+        replanned. `Program.kept` says what of it was kept, and why the rest was not.
+    rng : int
+        Seed of all random numbers.
+    progress : callable, optional
+        Told the stage, as in `plan`, and what it is about: ``("seam 'left'", 3, 12)``,
+        ``("move 'left → right'", 1, 11)``.
+
+    Returns
+    -------
+    Program
+        Also where seams could not be made, or moves not be found: `Program.verdict` names them and
+        says why, and `Program.require` raises.
+
+    Raises
+    ------
+    FeedError
+        A seam asks for a feed that its path cannot have; before anything is planned. Of several
+        the slowest one is told: where all ask for one feed, what is possible there is for all.
+    PlanError
+        No seam has a motion.
+    ProblemError
+        An argument is not what it should be, or what has to come first is circular.
+    KeyboardInterrupt
+        It was interrupted; what is finished by then is in the folder, where there is one.
+    """
+    if not isinstance(robot, RobotModel):
+        raise ProblemError(f"robot is {shown(robot)}, expected a RobotModel")
+    listed = as_several(seams, "seams", Seam)
+    _check_names(listed)
+    asked = Asked(
+        robot,
+        _checked_constraints(constraints),
+        _checked_clearance(clearance),
+        as_whole(branches, "branches", 1, 1000),
+        as_number(deadline, "deadline", above=0.0),
+        as_whole(rng, "rng", 0, 2**63),
+    )
+    check_executor(executor)
+    told = obeying(progress)
+    for seam in sorted(listed, key=_slowest):
+        check_feeds(f"seam '{seam.name}'", [seam.path], [*asked.constraints, *seam.constraints])
+    is_free = as_choice(order, "order", ("free", "given")) == "free"
+    if folder is not None or executor is not None:
+        for seam in listed:
+            check_can_be_sent(seam.costs or ())
+    ends = tuple(None if q is None else robot.configuration(q) for q in (start, end))
+    price = as_number(seconds_per_cost, "seconds_per_cost", least=0.0)
+    moves = FreeMotions(robot, asked.of_moves(()), np.random.default_rng(0))
+    for name, q in zip(("start", "end"), ends, strict=True):
+        refused = "" if q is None else moves.refusal(q)
+        if refused:
+            raise ProblemError(f"{robot.name}: the job's {name}: {refused}")
+    # Processes and schedulers wait for Ctrl-C themselves.
+    held = nullcontext() if executor is not None else held_interruption()
+    with held:
+        shelf = Shelf(None if folder is None else as_path(folder), Tolerance(), {})
+        asked_for = Specification(
+            listed,
+            not is_free,
+            ends[0],
+            ends[1],
+            asked.constraints,
+            asked.clearance,
+            arm=arm_digest(robot),
+        )
+        earlier, changed, why = None, dict[str, str](), ""
+        if warm_start is not None:
+            check_earlier(warm_start, robot)
+            earlier = Earlier(warm_start)
+            work = Work(asked, shelf, executor, told, earlier)
+            as_before = earlier.order_of(listed) if is_free else None
+            ordering = Ordering(as_before or listed, work, ends, price, is_free and not as_before)
+            changed = ordering.changed
+            for program in _kept_first(ordering, work, ends, is_free):
+                program = replace(program, specification=asked_for)
+                if program.verified:
+                    return replace(program, kept=earlier.kept_in(program, changed, why))
+                why = why or program.summary
+        work = Work(asked, shelf, executor, told)
+        ordering = Ordering(listed, work, ends, price, is_free)
+        if not ordering.states:
+            reasons = "".join(f"\n  '{name}': {why}" for name, why in ordering.missing.items())
+            raise PlanError(f"{robot.name}: no seam has a motion:{reasons}")
+        program = replace(Builder(ordering, work, ends).program(), specification=asked_for)
+        if earlier is None:
+            return program
+        return replace(program, kept=earlier.kept_in(program, changed, why))
+
+
+def _kept_first(
+    ordering: Ordering, work: Work, ends: tuple[Array | None, ...], is_free: bool
+) -> Iterator[Program]:
+    """Yield programs with what is kept of an earlier one: as it was made there first.
+
+    In the order of that one, where it made the same seams; then in any; then with what is kept the
+    other way round as well. Where nothing is kept, only the first.
+    """
+    if not ordering.states:
+        return
+    yield Builder(ordering, work, ends).program()
+    if ordering.keeps and is_free and not ordering.is_free:
+        ordering.free(order=True, directions=False)
+        yield Builder(ordering, work, ends).program()
+    if ordering.keeps:
+        ordering.free(order=is_free, directions=True)
+        yield Builder(ordering, work, ends).program()
+
+
+def _slowest(seam: Seam) -> float:
+    """Return how fast a seam is where it does not keep its feed [m/s]; inf where it does."""
+    return min((found.slowest for found in seam.path.feeds if not found.kept), default=math.inf)
+
+
+def _checked_constraints(constraints: Sequence[Constraint]) -> tuple[Constraint, ...]:
+    listed = as_several(constraints, "constraints", Constraint)
+    check_all_times(listed, "give it to a seam that has one direction (either_way=False)")
+    for item in listed:
+        if isinstance(item, Clearance):
+            raise ProblemError(
+                "a Clearance is among the constraints of the job; give it as clearance=, so that "
+                "what seams leave behind is kept clear of as well"
+            )
+    return listed
+
+
+def _checked_clearance(clearance: object) -> Clearance | None:
+    if clearance is not None and not isinstance(clearance, Clearance):
+        raise ProblemError(f"clearance is {shown(clearance)}, expected a Clearance, or None")
+    return clearance
+
+
+def _check_names(seams: Sequence[Seam]) -> None:
+    if not seams:
+        raise ProblemError("there are no seams, expected one or more")
+    names = [seam.name for seam in seams]
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise ProblemError(f"seam '{twice[0]}' is there twice; give each its own name")
+    left = [item.name for seam in seams for item in seam.leaves]
+    again = sorted({name for name in left if left.count(name) > 1})
+    if again:
+        raise ProblemError(f"'{again[0]}' is left by two seams; give each body its own name")
+    for seam in seams:
+        for name in seam.may_meet:
+            if name not in left:
+                raise ProblemError(
+                    f"seam '{seam.name}' may meet '{name}', which no seam leaves"
+                    f"{nearest(name, left)}"
+                )
+        for name in (*seam.after, *seam.after_any):
+            if name not in names or name == seam.name:
+                raise ProblemError(
+                    f"seam '{seam.name}' comes after '{name}', which is no other seam of the job"
+                )

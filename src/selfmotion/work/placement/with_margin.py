@@ -1,0 +1,274 @@
+"""Motions that leave room for what may stand elsewhere, and what that room costs.
+
+What would be met first by a part, tool or base that is displaced is kept farther apart, by as much
+as it lacks; then the motion is planned again, and judged as any other (`margins`). So no pair is
+kept farther apart than it has to be.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from selfmotion.basics import (
+    ProblemError,
+    Progress,
+    as_called,
+    as_number,
+    as_numbers,
+    shown,
+    silent,
+)
+from selfmotion.model.collision import CollisionModel
+from selfmotion.planning.optimise import Status
+from selfmotion.planning.planner import plan
+from selfmotion.planning.result import Plan
+from selfmotion.problem.constraints import Clearance
+from selfmotion.problem.problem import Problem, check_problem
+from selfmotion.work.margins import Margin, Shortfall, Shortfalls, shortfalls
+
+# How often pairs are kept farther apart, or less far; and by how much more than what lacks [m].
+_ROUNDS, _MORE = 12, 2e-5
+# What is proved of a margin is a share less than it is; that much more than is wanted will do.
+_SHARE, _ENOUGH = 0.02, 0.01
+_SUBJECTS = ("part", "tool", "base")
+# Why there is no more of it, after Ctrl-C.
+_INTERRUPTED = "it was interrupted"
+
+
+@dataclass(frozen=True, eq=False)
+class PlanWithMargin:
+    """A motion that leaves a margin, and what it costs.
+
+    Attributes
+    ----------
+    plan : Plan
+        Of the problem that was asked, with its own certificate.
+    wanted : Margin
+    of : tuple of str
+        What may be displaced by that much.
+    shortfalls : tuple of Shortfall
+        What is left to be wished; empty where the margin is there, proved.
+    cost, cost_without : float
+        Of this plan, and of the best one that was found without a margin.
+    kept_apart : dict
+        Pair of bodies → distance that they were kept apart by for this plan [m].
+    refused : str
+        Why no more was found, where the margin is not reached; "" where it is.
+    """
+
+    plan: Plan
+    wanted: Margin
+    of: tuple[str, ...]
+    shortfalls: tuple[Shortfall, ...]
+    cost: float
+    cost_without: float
+    kept_apart: dict[tuple[str, str], float]
+    refused: str = ""
+
+    @property
+    def reached(self) -> bool:
+        """Whether the margin is there, in a verified motion."""
+        return self.plan.certificate.verified and not self.shortfalls
+
+    @property
+    def extra_cost(self) -> float:
+        """What the margin costs, as a share of the cost without; 0 where it was there anyway."""
+        return self.cost / self.cost_without - 1.0 if self.cost_without else 0.0
+
+    def __str__(self) -> str:
+        """Return whether the margin is there, and what it costs, in words."""
+        wanted = (
+            f"{self.wanted.position * 1e3:.3g} mm and {np.degrees(self.wanted.rotation):.3g}° of "
+            f"{', '.join(self.of)}"
+        )
+        if not self.plan.certificate.verified:
+            return f"no margin of {wanted}: {self.plan.certificate.verdict}"
+        costs = f"cost {self.cost:.6g}, {self.cost_without:.6g} without ({self.extra_cost:+.2%})"
+        if self.shortfalls:
+            lacks = "; ".join(str(item) for item in self.shortfalls)
+            why = f"; no more was found: {self.refused}" if self.refused else ""
+            return f"no margin of {wanted}: {lacks}{why}; {costs}"
+        return f"margin of {wanted}, proved; {costs}"
+
+    __repr__ = __str__
+
+
+def plan_with_margin(
+    problem: Problem,
+    margin: Margin,
+    *,
+    of: str | Sequence[str] = "part",
+    part: Sequence[str] | None = None,
+    tool: Sequence[str] | None = None,
+    center: npt.ArrayLike | None = None,
+    clearance: float = 0.0,
+    progress: Progress = silent,
+    **options: Any,
+) -> PlanWithMargin:
+    """Plan a motion that survives displacements of a size, and say what that costs.
+
+    Bands of tolerances (`Relaxation`) are planned with as much less as the displacement may use.
+
+    Parameters
+    ----------
+    problem : Problem
+        One that keeps bodies apart.
+    margin : Margin
+        All displacements up to both of its sizes at once.
+    of : str or sequence of str
+        ``"part"``, ``"tool"``, ``"base"``: each alone may be displaced by that much.
+    part, tool, center, clearance
+        As `selfmotion.margin` takes them.
+    progress : callable, optional
+        Told the round, as plans tell their stages.
+    **options
+        For `plan`: search, tolerance, deadline, each time.
+
+    Returns
+    -------
+    PlanWithMargin
+        Also where the margin is not reached: `reached` and `shortfalls` say so. After Ctrl-C what
+        was found by then.
+
+    Raises
+    ------
+    PlanError
+        There is no verified motion without a margin.
+    ProblemError
+        An argument is not what it should be; or a band is narrower than what is asked.
+    KeyboardInterrupt
+        It was interrupted before there was a motion.
+    """
+    check_problem(problem)
+    as_called(progress, "progress")
+    if not isinstance(margin, Margin):
+        raise ProblemError(f"plan_with_margin: margin is {shown(margin)}, expected a Margin")
+    named = (of,) if isinstance(of, str) else tuple(of)
+    if not named or not set(named) <= set(_SUBJECTS):
+        raise ProblemError(f"plan_with_margin: of is {shown(of)}, expected {', '.join(_SUBJECTS)}")
+    as_number(clearance, "plan_with_margin: clearance", least=0.0)
+    about = None if center is None else as_numbers(center, "center", "(3,) [m]", (3,))
+    asked: dict[str, Any] = {"part": part, "tool": tool, "center": about, "clearance": clearance}
+    first = plan(problem, **options).require()
+    # What was given to begin with is for the first one.
+    options.pop("warm_start", None)
+    found = shortfalls(first, margin, named, **asked)
+    narrow = problem.changed(relaxations=_narrowed(problem, margin, found.lever))
+    now = _Made(first, found, {})
+    best, refused, without = None, "", first.report.cost
+    if not found.items and not problem.relaxations:
+        best = now
+    rounds = 0 if best else _ROUNDS
+    if _is_interrupted(first):
+        rounds, refused = 0, _INTERRUPTED
+    for number in range(rounds):
+        progress("margin", number + 1, _ROUNDS)
+        apart = _adjusted(now.apart, now.found, clearance)
+        raised = narrow.changed(constraints=(*narrow.constraints, *_kept(problem, apart)))
+        again = plan(raised, warm_start=now.plan, **options)
+        if not number and not _is_interrupted(again):
+            # Past bodies there are several ways, and the one of before may have become the longer.
+            again = min(again, plan(raised, **options), key=_rank)
+        certificate = problem.certify(again.trajectory, first.tolerance)
+        plan_now = replace(again, problem=problem, certificate=certificate)
+        if certificate.verified:
+            # What keeps more is a motion without a margin, too.
+            without = min(without, again.report.cost)
+        if not again.certificate.verified:
+            refused = again.certificate.verdict.removeprefix("not verified: ")
+            # The attempt may be nearer to it all the same.
+            if certificate.verified:
+                more = shortfalls(plan_now, margin, named, **asked)
+                if more.least > now.found.least:
+                    now = _Made(plan_now, more, apart)
+            break
+        now = _Made(plan_now, shortfalls(plan_now, margin, named, **asked), apart)
+        if not now.found.items and (best is None or again.report.cost < best.plan.report.cost):
+            best = now
+        if _is_interrupted(again):
+            refused = _INTERRUPTED
+            break
+        if not now.found.items and (not apart or now.found.least <= 1.0 + _ENOUGH):
+            break
+    told, refused = best or now, "" if best else refused
+    return PlanWithMargin(
+        told.plan,
+        margin,
+        named,
+        told.found.items,
+        told.plan.report.cost,
+        without,
+        told.apart,
+        refused,
+    )
+
+
+class _Made(NamedTuple):
+    """A plan, what it lacks, and how far which pairs were kept apart for it [m]."""
+
+    plan: Plan
+    found: Shortfalls
+    apart: dict[tuple[str, str], float]
+
+
+def _is_interrupted(found: Plan) -> bool:
+    return found.report.status is Status.INTERRUPTED
+
+
+def _rank(found: Plan) -> tuple[bool, float]:
+    return not found.certificate.verified, found.report.cost
+
+
+def _adjusted(
+    apart: dict[tuple[str, str], float], found: Shortfalls, clearance: float
+) -> dict[tuple[str, str], float]:
+    """Keep pairs farther apart where a margin is missing, and less far where it is more.
+
+    To first order a displacement that is a share larger uses that share more of the distance.
+    """
+    spare = max(found.least - 1.0, 0.0)
+    kept = {pair: far - spare * (far - clearance) for pair, far in apart.items()}
+    for item in found.items:
+        pair = (min(item.pair), max(item.pair))
+        if pair in kept:
+            kept[pair] += (1.0 - item.scale) * item.used + _MORE
+        else:
+            kept[pair] = clearance + (1.0 + _SHARE) * item.used
+    return kept
+
+
+def _narrowed(problem: Problem, margin: Margin, lever: float) -> tuple[Any, ...]:
+    """Return tolerances of which a displacement may use its part."""
+    found = []
+    for item in problem.relaxations:
+        turns = item.rows[0].startswith("r")
+        used = margin.rotation if turns else margin.position + lever * margin.rotation
+        if item.band <= used:
+            raise ProblemError(
+                f"plan_with_margin: the band of {', '.join(item.rows)} is {item.band:.3g}, of "
+                f"which the margin would use {used:.3g}; ask less, or allow more"
+            )
+        found.append(replace(item, band=item.band - used))
+    return tuple(found)
+
+
+def _kept(problem: Problem, apart: dict[tuple[str, str], float]) -> list[Clearance]:
+    """Return clearances of single pairs of bodies."""
+    found = []
+    bodies = {
+        body.name: body
+        for item in (*problem.constraints, problem.clearance)
+        if isinstance(item, Clearance)
+        for body in item.obstacles
+    }
+    for pair, distance in apart.items():
+        own = tuple(bodies[name] for name in pair if name in bodies)
+        every = dict.fromkeys(CollisionModel(problem.robot, own).pairs)
+        others = tuple(names for names in every if set(names) != set(pair))
+        found.append(Clearance(own, distance, disabled=others))
+    return found
