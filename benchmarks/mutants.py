@@ -88,7 +88,8 @@ class Part(NamedTuple):
 
     def tests_of(self, mutant: Mutant) -> tuple[str, ...]:
         """Return the tests that judge a mutant, in order."""
-        own = mutant.file.replace("/", "/test_")
+        file = Path(mutant.file)
+        own = f"{file.parent.name}/test_{file.name}"
         return (own, *self.tests) if self.own_first and (TESTS / own).is_file() else self.tests
 
 
@@ -96,12 +97,12 @@ class Part(NamedTuple):
 PARTS = (
     Part(
         "charts",
-        ("nodes/charts.py", "nodes/motion.py", "nodes/spline.py"),
+        ("planning/nodes/charts.py", "planning/nodes/motion.py", "planning/nodes/spline.py"),
         ("nodes/test_charts.py", "nodes/test_motion.py", "nodes/test_newton.py"),
     ),
     Part(
         "rows",
-        ("nodes/rows.py", "constraints/conditions.py"),
+        ("planning/nodes/rows.py", "problem/constraints/conditions.py"),
         (
             "nodes/test_rows.py",
             "constraints/test_conditions.py",
@@ -112,12 +113,12 @@ PARTS = (
     ),
     Part(
         "objective",
-        ("nodes/objective.py", "nodes/smoothness.py"),
+        ("planning/nodes/objective.py", "planning/nodes/smoothness.py"),
         ("nodes/test_objective.py", "nodes/test_smoothness.py", "nodes/test_newton.py"),
     ),
     Part(
         "newton",
-        ("nodes/newton.py", "nodes/newton_system.py", "nodes/batch.py"),
+        ("planning/nodes/newton.py", "planning/nodes/newton_system.py", "planning/nodes/batch.py"),
         (
             "nodes/test_newton.py",
             "nodes/test_batch.py",
@@ -127,29 +128,33 @@ PARTS = (
     ),
     Part(
         "ends",
-        ("nodes/ends.py", "constraints/ends.py"),
+        ("planning/nodes/ends.py", "problem/constraints/ends.py"),
         ("nodes/test_ends.py", "constraints/test_ends.py"),
     ),
     Part(
         "search",
-        ("search/*.py",),
+        ("planning/search/*.py",),
         ("search", "planning/test_starts.py"),
         own_first=True,
     ),
     Part(
         "virtual joints",
-        ("follow/virtual_joints.py", "follow/augmented.py", "problem/of_arm.py"),
+        (
+            "model/follow/virtual_joints.py",
+            "model/follow/augmented.py",
+            "problem/problem/of_arm.py",
+        ),
         ("follow/test_virtual_joints.py", "planning/test_relaxations.py"),
     ),
     Part(
         "collision",
-        ("collision/*.py",),
+        ("model/collision/*.py",),
         ("collision",),
         own_first=True,
     ),
     Part(
         "optimiser",
-        ("optimise/*.py",),
+        ("planning/optimise/*.py",),
         ("optimise",),
         own_first=True,
     ),
@@ -166,7 +171,7 @@ PARTS = (
     ),
     Part(
         "bounds",
-        ("basics/series.py", "robot/chain_series.py", "motion/spline.py"),
+        ("basics/series.py", "model/robot/chain_series.py", "model/motion/spline.py"),
         (
             "basics/test_series.py",
             "robot/test_chain_series.py",
@@ -179,18 +184,22 @@ PARTS = (
     ),
     Part(
         "placement",
-        ("placement/*.py",),
+        ("work/placement/*.py",),
         ("placement/test_place.py", "placement/test_patience.py", "placement"),
         own_first=True,
     ),
     Part(
         "programs read",
-        ("controllers/read_*.py", "controllers/program_lines.py", "controllers/commented_lines.py"),
+        (
+            "shop/controllers/read_*.py",
+            "shop/controllers/program_lines.py",
+            "shop/controllers/commented_lines.py",
+        ),
         ("controllers/test_programs.py", "controllers/test_pose_programs.py"),
     ),
     Part(
         "cam",
-        ("cam/*.py",),
+        ("shop/cam/*.py",),
         ("cam",),
         own_first=True,
     ),

@@ -30,6 +30,8 @@ from selfmotion.basics import silent
 
 # What a problem leads to: its cost, None for no motion, and whether it is verified.
 Outcome = tuple[float | None, bool]
+# The package of a folder that has not its name.
+PACKAGES = {"planning": "planner"}
 # Random paths that limits bind on, that have no motion as a whole, or none at all.
 HARD = (18, 22, 24, 25, 37, 49, 52)
 FREE = (3, 4, 11, 16)
@@ -155,7 +157,7 @@ def main() -> None:
         # What is compiled on first use is nobody's time.
         run(work)
         before, usual = run(work)
-        package = importlib.import_module(f"selfmotion.{folder}")
+        package = importlib.import_module(f"selfmotion.planning.{PACKAGES.get(folder, folder)}")
         modules = {
             name: module
             for name, module in sys.modules.items()

@@ -29,6 +29,7 @@ from selfmotion import (
     robot as robot,
 )
 from selfmotion.basics import SelfmotionError as SelfmotionError, version as _version
+from selfmotion.basics.moved import tell_moved as _tell_moved
 from selfmotion.certificate import (
     Certificate as Certificate,
     Tolerance as Tolerance,
@@ -232,3 +233,4 @@ class _Views:
 
 
 Plan.views = _Views()
+_tell_moved()

@@ -58,7 +58,7 @@ def test_every_file_is_named_from_where_the_new_document_is(tmp_path: Path) -> N
 
 def test_no_key_that_is_looked_for_beside_the_document_is_left_out() -> None:
     """By the source: what is read beside a document, and its key."""
-    source = Path(sm.__file__).parent / "documents"
+    source = Path(sm.__file__).parent / "shell" / "documents"
     texts = [(source / f"{name}.py").read_text() for name in ("problem_file", "problem_parts")]
     found = {
         key

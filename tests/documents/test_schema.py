@@ -18,7 +18,10 @@ from selfmotion.shell.documents import example_text, job_of
 
 ROOT = Path(__file__).parents[2]
 # Of a process of its own: other tests make classes, which files of this process know as well.
-PRINTED = "import json; from selfmotion.shell.documents import json_schema as made; print(json.dumps(made()))"
+PRINTED = (
+    "import json; from selfmotion.shell.documents import json_schema; "
+    "print(json.dumps(json_schema()))"
+)
 SCHEMA = json.loads(
     subprocess.run([sys.executable, "-c", PRINTED], capture_output=True, check=True).stdout
 )

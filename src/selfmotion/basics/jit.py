@@ -187,8 +187,8 @@ _IS_ALONE = False
 def companion(works: str) -> "subprocess.Popen[str] | None":
     """Let another process compile kernels, at the same time; it prints how many.
 
-    Those of `FIRST_WORKS` or `ALL_WORKS`, see `selfmotion.realtime.warm`. None where there is no other
-    processor, or where nothing is kept that another process compiles.
+    Those of `FIRST_WORKS` or `ALL_WORKS`, see `selfmotion.realtime.warm`. None where there is no
+    other processor, or where nothing is kept that another process compiles.
     """
     if _IS_ALONE or os.cpu_count() == 1 or numba.config.DISABLE_JIT or not sys.executable:
         return None

@@ -1,3 +1,27 @@
 """What is wanted: costs, constraints, and the problem."""
 
-from selfmotion.problem.problem import *  # noqa: F403
+from selfmotion.problem.problem import (
+    KEPT as KEPT,
+    NO_OVERLAP as NO_OVERLAP,
+    START_MISS as START_MISS,
+    BodiesOfArm as BodiesOfArm,
+    Problem as Problem,
+    arm_and_constraints as arm_and_constraints,
+    arm_rest_orders as arm_rest_orders,
+    asked_of_part as asked_of_part,
+    at_all_times as at_all_times,
+    calibrated as calibrated,
+    check_all_times as check_all_times,
+    check_feeds as check_feeds,
+    check_feeds_of as check_feeds_of,
+    check_problem as check_problem,
+    describe_arm as describe_arm,
+    envelope_of as envelope_of,
+    off_nominal as off_nominal,
+    problem_from_dict as problem_from_dict,
+    problem_to_dict as problem_to_dict,
+    rest_orders as rest_orders,
+    sample_problem as sample_problem,
+    start_on_path as start_on_path,
+    times_along as times_along,
+)

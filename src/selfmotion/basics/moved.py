@@ -1,0 +1,57 @@
+"""Full paths of modules that have moved: where they are now, for one version."""
+
+import sys
+from collections.abc import Sequence
+from importlib.machinery import ModuleSpec
+from importlib.util import find_spec
+from types import ModuleType
+
+# Package of before → where it is.
+MOVED = {
+    "batch": "work.batch",
+    "cam": "shop.cam",
+    "cli": "shell.cli",
+    "collision": "model.collision",
+    "controllers": "shop.controllers",
+    "documents": "shell.documents",
+    "follow": "model.follow",
+    "kernels": "model.kernels",
+    "nodes": "planning.nodes",
+    "paper": "planning.paper",
+    "path": "model.path",
+    "planning": "planning.planner",
+    "problem": "problem.problem",
+    "sheet": "shop.sheet",
+    "task": "model.task",
+    "transfer": "planning.transfer",
+    "warm": "realtime.warm",
+}
+
+
+class MovedModules:
+    """Finds no module, and says of those that have moved where they are."""
+
+    def find_spec(
+        self, name: str, path: Sequence[str] | None, target: ModuleType | None = None
+    ) -> ModuleSpec | None:
+        """Raise ModuleNotFoundError with the new path of what has moved; else find nothing."""
+        house, *parts = name.split(".")
+        if house != "selfmotion" or not parts or parts[0] not in MOVED:
+            return None
+        now = f"{house}.{MOVED[parts[0]]}"
+        if name.startswith(now):
+            return None
+        now = ".".join([now, *parts[1:]])
+        try:
+            is_there = find_spec(now) is not None
+        except ModuleNotFoundError:
+            is_there = False
+        if is_there:
+            raise ModuleNotFoundError(f"{name} is {now} now", name=name)
+        return None
+
+
+def tell_moved() -> None:
+    """Let imports of what has moved say where it is; asked only where nothing else is found."""
+    if not any(isinstance(each, MovedModules) for each in sys.meta_path):
+        sys.meta_path.append(MovedModules())
