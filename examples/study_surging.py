@@ -5,8 +5,8 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 import selfmotion as sm
-from selfmotion.study.context import optimum
-from selfmotion.study.published import published_null_motion
+from selfmotion.paper.study.context import optimum
+from selfmotion.paper.study.published import published_null_motion
 
 searches = {
     "the paper's 12 coefficients, H0 = I": (published_null_motion(), False),
