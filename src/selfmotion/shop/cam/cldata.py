@@ -201,9 +201,8 @@ class _Reader:
                 self._only(word, ",".join(given[1:]), "another way to hold the part: one file each")
             case "LOADTL" | "LOAD":
                 if self._first.setdefault("LOADTL", rest) != rest:
-                    machine.note(
-                        f"{word}/{rest[:40]}: another tool than {self._first['LOADTL'][:40]}: the "
-                        f"tip of the arm's tool is taken to be where that of each one is"
+                    machine.note_tool(
+                        f"{word}/{rest[:40]}: another tool than {self._first['LOADTL'][:40]}"
                     )
             case _ if word in _EVENTS:
                 machine.happens(f"{word}/{','.join(given)}" if given else word)
@@ -399,10 +398,7 @@ class _Reader:
         machine = self.machine
         machine.climbs()
         self._to(np.full(3, np.nan), machine.axis, travels=True)
-        machine.note(
-            "GOHOME goes to a place of the machine's own, which is taken to be above all: the tool "
-            "goes up as high as it has been, and where it is then, is not known until the next GOTO"
-        )
+        machine.note_home("GOHOME", "the next GOTO")
 
     def _arc_of(self, word: str, given: list[str]) -> _Arc:
         """Return the circle of ``CIRCLE/x,y,z,i,j,k,r`` or ``MOVARC/x,y,z,i,j,k,r,ANGLE,a``."""

@@ -185,6 +185,17 @@ class Machine:
         if not any(what in note for note in self.notes):
             self.notes.append(f"line {self.number}: {what}")
 
+    def note_home(self, word: str, until: str) -> None:
+        """Note that a word goes to a place of the machine's own."""
+        self.note(
+            f"{word} goes to a place of the machine's own, which is taken to be above all: the "
+            f"tool goes up as high as it has been, and where it is then, is not known until {until}"
+        )
+
+    def note_tool(self, change: str) -> None:
+        """Note that there is another tool."""
+        self.note(f"{change}: the tip of the arm's tool is taken to be where that of each one is")
+
     def text(self) -> str:
         """Return the file's text."""
         try:

@@ -216,10 +216,7 @@ class _Reader:
         if self._prints:
             self.machine.happens(f"T{tool:g}")
         elif self._tool not in (None, tool):
-            self.machine.note(
-                f"T{tool:g} after T{self._tool:g}: another tool: the tip of the arm's tool is "
-                f"taken to be where that of each one is"
-            )
+            self.machine.note_tool(f"T{tool:g} after T{self._tool:g}: another tool")
         self._tool = tool
 
     def _has_p(self, name: str, codes: Sequence[str]) -> bool:
@@ -353,11 +350,7 @@ class _Reader:
         for k in axes:
             self._at[k] = np.nan
         machine.rapid(self._part(self._at), machine.axis)
-        machine.note(
-            f"{code} goes to a place of the machine's own, which is taken to be above all: the "
-            f"tool goes up as high as it has been, and where it is then, is not known until X, Y "
-            f"and Z are given"
-        )
+        machine.note_home(code, "X, Y and Z are given")
 
     def _set(self, values: Mapping[str, float]) -> None:
         """Say how far material is fed by now, or, before anything has moved, where the tool is."""
