@@ -38,7 +38,7 @@ def grid_items(file: Path, *, allow_code: bool = False) -> list[Item]:
             maker(one),
             settings,
             file,
-            partial(write_combination, file, settings),
+            partial(write_combination, file, settings) if settings else None,
         )
         for k, (one, settings) in enumerate(found)
     ]

@@ -33,7 +33,7 @@ class Item:
     file : Path or None
         The problem file whose grid it is of.
     write : callable, optional
-        Writes its problem file to a path; of a grid's combination.
+        Of a grid's combination: writes its problem file to a path.
     """
 
     name: str

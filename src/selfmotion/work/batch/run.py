@@ -242,7 +242,7 @@ def _write_best(items: Sequence[Item], rows: Mapping[str, Row], folder: Path) ->
     best: dict[Path, tuple[Row, Callable[[Path], None]]] = {}
     for item in items:
         row = rows[item.name]
-        if item.file is not None and item.write is not None and item.settings and row.verified:
+        if item.file is not None and item.write is not None and row.verified:
             here = row, item.write
             best[item.file] = min(best.get(item.file, here), here, key=lambda each: each[0].rank)
     written = []
