@@ -30,7 +30,7 @@ from selfmotion.model.collision import Obstacle
 from selfmotion.model.motion import NullMotion, Trajectory
 from selfmotion.model.robot import RobotModel, mesh_digests
 from selfmotion.planning.optimise import Iteration, Status
-from selfmotion.planning.result.report import Attempt, Gap, Report
+from selfmotion.planning.result.report import FUNCTION, Attempt, Gap, Report
 from selfmotion.problem.constraints import ActiveConstraint, Clearance, Constraint
 from selfmotion.problem.problem.problem import Problem
 from selfmotion.problem.problem.saved_problem import problem_from_dict, problem_to_dict
@@ -325,7 +325,11 @@ def _report_to_dict(report: Report) -> dict[str, Any]:
     return {
         **_without(report, "history"),
         "terms": dict(report.terms),
-        "costs": dict(report.costs or {}),
+        # What a function is called in this process says nothing to another one.
+        "costs": {
+            name: "" if known.startswith(FUNCTION) else known
+            for name, known in (report.costs or {}).items()
+        },
         "initial_terms": dict(report.initial_terms),
         "status": report.status.value,
         "gap": None if report.gap is None else dataclasses.asdict(report.gap),

@@ -51,7 +51,7 @@ from selfmotion.planning.result.measured import (
     limits_used,
     null_space_velocity,
 )
-from selfmotion.planning.result.report import Report
+from selfmotion.planning.result.report import FUNCTION, Report
 from selfmotion.problem.costs import Cost, FunctionCost, LostCost, metres_of
 from selfmotion.problem.problem.problem import Problem
 
@@ -74,14 +74,15 @@ class Views(Protocol):
 
 def _digests(costs: Sequence[Cost]) -> dict[str, str]:
     """Return the digest of each cost by its name; "" of a function that no file had."""
-    return {
-        cost.name: ""
-        if isinstance(cost, LostCost)
-        else f"function {id(cost.g)}"
-        if isinstance(cost, FunctionCost)
-        else digest_of(description_of(cost))
-        for cost in costs
-    }
+
+    def digest(cost: Cost) -> str:
+        if isinstance(cost, LostCost):
+            return ""
+        if isinstance(cost, FunctionCost):
+            return f"{FUNCTION}{id(cost.g)}"
+        return digest_of(description_of(cost))
+
+    return {cost.name: digest(cost) for cost in costs}
 
 
 def _are_same(costs: Mapping[str, str], known: Mapping[str, str] | None) -> bool:

@@ -8,6 +8,9 @@ from selfmotion.model.motion import NullMotion
 from selfmotion.planning.optimise import Iteration, Status
 from selfmotion.problem.constraints import ActiveConstraint
 
+# What digests of costs that are functions begin with; only the process that has them knows more.
+FUNCTION = "function "
+
 
 @dataclass(frozen=True)
 class Gap:
