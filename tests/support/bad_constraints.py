@@ -44,6 +44,7 @@ def constraint_rows() -> list[Row]:
         "[('link1',)]": [("link1",)],
         "[(1, 2)]": [(1, 2)],
         "None": None,
+        "[('link1', 'link1')]": [("link1", "link1")],
     }
     return [
         *bad_values_of(

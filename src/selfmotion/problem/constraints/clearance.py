@@ -143,7 +143,7 @@ class Clearance(Constraint):
 def _pair(given: Any) -> tuple[str, str]:
     """Return a pair of links as it was given, or raise ProblemError."""
     match given:
-        case [str() as first, str() as second]:
+        case [str() as first, str() as second] if first != second:
             return first, second
     raise ProblemError(f"clearance: disabled has {shown(given)}, expected pairs of names of links")
 
