@@ -7,6 +7,7 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
+from typing_extensions import override
 
 from selfmotion.basics import Array, Flags, series
 from selfmotion.certificate.bounding import Bounded, Bounds, Stretch, bounded
@@ -194,8 +195,8 @@ class _Pace(Bounded):
         least, most = (self._mean + side * size * self._half for side in (-1.0, 1.0))
         return float(np.sqrt(max(least, 0.0))), float(np.sqrt(most))
 
+    @override
     def series(self, stretch: Stretch) -> Array | None:
-        """See `Bounded.series`."""
         path = path_series(self._path, stretch.middle, stretch.half)
         if path is None:
             return None
@@ -204,15 +205,15 @@ class _Pace(Bounded):
         squared[0] += self._mean
         return np.asarray(squared[None] / self._half)
 
+    @override
     def values(self, stretch: Stretch, u: Array) -> Array:
-        """See `Bounded.values`."""
         twists = self._path.samples(stretch.times(u).ravel()).twist[:, :3]
         squares = np.einsum("kc,kc->k", twists, twists)
         found = (squares - self._mean) / self._half
         return np.asarray(found.reshape(len(stretch.middle), len(u), 1))
 
+    @override
     def sizes(self, values: Array, stretch: Stretch) -> Array:
-        """See `Bounded.sizes`."""
         return np.abs(values)
 
 
@@ -239,8 +240,8 @@ class _Along(Bounded):
             slowest = np.fmax(slowest, least)
         return np.asarray(slowest * max(self._pace.left_over, _TINY))
 
+    @override
     def series(self, stretch: Stretch) -> Array | None:
-        """See `Bounded.series`."""
         path = path_series(self._follow.path, stretch.middle, stretch.half)
         if path is None:
             return None
@@ -249,8 +250,8 @@ class _Along(Bounded):
         apart = series.derivative(place, stretch.half) + speed
         return np.asarray(series.product(apart, speed)[None] / self._room(stretch))
 
+    @override
     def values(self, stretch: Stretch, u: Array) -> Array:
-        """See `Bounded.values`."""
         target = self._follow.path.samples(stretch.times(u).ravel()).twist[:, :3]
         moved, _ = jacobians(self._follow.chain, stretch.motion(u))
         speed = np.einsum("kcn,kn->kc", moved[:, :3], stretch.motion(u, 1))
@@ -258,8 +259,8 @@ class _Along(Bounded):
         shape = len(stretch.middle), len(u), 1
         return np.asarray(along.reshape(shape) / self._room(stretch)[:, None, None])
 
+    @override
     def sizes(self, values: Array, stretch: Stretch) -> Array:
-        """See `Bounded.sizes`."""
         return np.abs(values)
 
 

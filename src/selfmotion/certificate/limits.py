@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from typing_extensions import override
 
 from selfmotion.basics import Array, ProblemError, read_only
 from selfmotion.certificate.requirement import Finding, FinishedMotion, Requirement, of_some
@@ -58,13 +59,13 @@ class JointLimits(Requirement):
             )
 
     @property
+    @override
     def name(self) -> str:  # type: ignore[override]  # it follows from the order
-        """See `Requirement.name`."""
         return LIMIT_NAMES[self.order]
 
     @property
+    @override
     def covers(self) -> tuple[str, ...]:
-        """See `Requirement.covers`."""
         limited = np.isfinite(self.upper) | np.isfinite(self.lower)
         if not limited.any():
             return ()
@@ -74,8 +75,8 @@ class JointLimits(Requirement):
         return (name if every else of_some(name),)
 
     @property
+    @override
     def remarks(self) -> tuple[str, ...]:
-        """See `Requirement.remarks`."""
         count = int(np.sum(~(np.isfinite(self.upper) | np.isfinite(self.lower))))
         told = f"{self.name}: {count} of {len(self.upper)} joints are not limited"
         return (told,) if count else ()
@@ -181,8 +182,8 @@ class EndState(Requirement):
     at_start: bool = False
 
     @property
+    @override
     def name(self) -> str:  # type: ignore[override]  # it follows from the order
-        """See `Requirement.name`."""
         return f"{'start' if self.at_start else 'end'} {QUANTITIES[self.order]}"
 
     def judge(self, motion: FinishedMotion) -> Finding:
@@ -216,8 +217,8 @@ class AtRest(Requirement):
     name: str = "rest"
 
     @property
+    @override
     def covers(self) -> tuple[str, ...]:
-        """See `Requirement.covers`."""
         where = "both ends" if self.start and self.end else "the start" if self.start else "the end"
         return (f"rest at {where}",)
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
+from typing_extensions import override
 
 from selfmotion.basics import Array, ProblemError, Progress, series, silent
 from selfmotion.certificate.bounding import Bounded, Stretch, bounded
@@ -305,8 +306,8 @@ class _PathErrors(Bounded):
             values[1] = 2.0 * np.arcsin(np.minimum(0.5 * values[1], 1.0))
         return values
 
+    @override
     def series(self, stretch: Stretch) -> Array | None:
-        """See `Bounded.series`."""
         path = path_series(self._path, stretch.middle, stretch.half)
         if path is None:
             return None
@@ -324,8 +325,8 @@ class _PathErrors(Bounded):
         share = 1.0 if self._task.tool_axes else _FROBENIUS / 2.0**0.5
         return np.stack([apart, share * turned])
 
+    @override
     def values(self, stretch: Stretch, u: Array) -> Array:
-        """See `Bounded.values`."""
         miss, relative = self._looked_at(stretch, u)
         if not self._task.angular:
             turns = np.zeros((*miss.shape[:2], 1))
@@ -337,8 +338,8 @@ class _PathErrors(Bounded):
             turns = (relative - np.eye(3)).reshape(*miss.shape[:2], 9) / 2.0**0.5
         return np.concatenate([miss, turns], axis=2)
 
+    @override
     def sizes(self, values: Array, stretch: Stretch) -> Array:
-        """See `Bounded.sizes`."""
         if not self._relaxations:
             return np.stack([_length(values[..., :3]), _length(values[..., 3:])], axis=2)
         shape = values.shape[:2]

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+from typing_extensions import override
 
 from selfmotion.basics import Array, Ints, ProblemError, as_number, read_only
 from selfmotion.certificate.bounding import Bounded, Bounds, Stretch, bounded
@@ -170,8 +171,8 @@ class QuantityWithinLimits(Requirement):
     quantity: Quantity
 
     @property
+    @override
     def name(self) -> str:  # type: ignore[override]  # it follows from the quantity
-        """See `Requirement.name`."""
         return self.quantity.name
 
     @property
@@ -182,8 +183,8 @@ class QuantityWithinLimits(Requirement):
         return (self.name,) if self.quantity.covers is None else self.quantity.covers
 
     @property
+    @override
     def remarks(self) -> tuple[str, ...]:
-        """See `Requirement.remarks`."""
         free = [item.label for item in self.quantity.columns]
         free = [free[k] for k in np.flatnonzero(~np.isfinite(self.quantity.bounds))]
         said = [f"not limited: {', '.join(free)}"] if free else []
@@ -259,8 +260,8 @@ class Shares(Bounded):
             known = np.where(far[:, None], np.inf, known)
         return np.asarray(known / self._limit[:, None, None])
 
+    @override
     def values(self, stretch: Stretch, u: Array) -> Array:
-        """See `Bounded.values`."""
         quantity, shape = self._quantity, (len(stretch.middle), len(u))
         away = quantity.away(*(stretch.motion(u, order) for order in range(3)))
         away = away.reshape(*shape, len(quantity.columns), -1)[:, :, self._limited]

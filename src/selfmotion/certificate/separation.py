@@ -9,6 +9,7 @@ beginning with few: pairs that are far apart, or hardly move, are looked at a fe
 from dataclasses import dataclass
 
 import numpy as np
+from typing_extensions import override
 
 from selfmotion.basics import Array
 from selfmotion.certificate.requirement import Extreme, Finding, FinishedMotion, Requirement
@@ -80,14 +81,14 @@ class Separation(Requirement):
         }
 
     @property
+    @override
     def covers(self) -> tuple[str, ...]:
-        """See `Requirement.covers`."""
         links = ("self-collision",) if self.model.checks_links else ()
         return (*links, "obstacles") if self.model.checks_obstacles else links
 
     @property
+    @override
     def obstacles(self) -> tuple[Obstacle, ...]:
-        """See `Requirement.obstacles`."""
         return self.model.obstacles
 
     @property

@@ -8,6 +8,7 @@ from typing import Any, Self
 
 import numpy as np
 import numpy.typing as npt
+from typing_extensions import override
 
 from selfmotion.basics import Array, PathError, as_number, as_numbers, restore
 from selfmotion.model.follow import Follows
@@ -57,8 +58,8 @@ class MovingPose(Path):
         object.__setattr__(self, "seen", as_number(self.seen, "seen", error=PathError))
         object.__setattr__(self, "duration", check_duration(self.duration))
 
+    @override
     def evaluate(self, t: Array) -> PathSamples:
-        """See `Path.evaluate`."""
         twist, since = np.asarray(self.rate), t - self.seen
         turning = float(np.linalg.norm(twist[3:]))
         axis = twist[3:] / turning if turning > 0.0 else np.zeros(3)
@@ -95,25 +96,25 @@ class Conveyed(Path):
     offset: npt.ArrayLike = (0.0, 0.0, 0.0)
 
     @property
+    @override
     def duration(self) -> float:  # type: ignore[override]
-        """See `Path.duration`."""
         return self.carried.duration
 
     @property
+    @override
     def knots(self) -> Array:
-        """See `Path.knots`."""
         return self.carried.knots
 
+    @override
     def evaluate(self, t: Array) -> PathSamples:
-        """See `Path.evaluate`."""
         inner, velocity = self.carried.evaluate(t), np.asarray(self.velocity, dtype=np.float64)
         translation = inner.translation + np.asarray(self.offset) + t[:, None] * velocity
         twist = inner.twist + np.concatenate([velocity, np.zeros(3)])
         return PathSamples(t, translation, inner.rotation, twist)
 
     @classmethod
+    @override
     def from_dict(cls, values: Mapping[str, Any], **context: Any) -> Self:
-        """See `Saved.from_dict`."""
         return cls(**{**values, "carried": restore(Path, values["carried"])})
 
 

@@ -11,6 +11,7 @@ from typing import Any, ClassVar
 import coal
 import numpy as np
 import numpy.typing as npt
+from typing_extensions import override
 
 from selfmotion.basics import (
     Array,
@@ -255,12 +256,12 @@ class Box(Obstacle):
             raise CollisionError(f"{self.label}: size is {size.tolist()}, expected {expected}")
         object.__setattr__(self, "size", read_only(size))
 
+    @override
     def geometry(self) -> Any:
-        """See `Obstacle.geometry`."""
         return coal.Box(*self.size.tolist())
 
+    @override
     def urdf_shapes(self) -> Sequence[UrdfShape]:
-        """See `Obstacle.urdf_shapes`."""
         return [UrdfShape("box", {"size": " ".join(map(repr, self.size.tolist()))})]
 
 
@@ -282,12 +283,12 @@ class Sphere(Obstacle):
         super().__post_init__()
         self._set_length("radius")
 
+    @override
     def geometry(self) -> Any:
-        """See `Obstacle.geometry`."""
         return coal.Sphere(self.radius)
 
+    @override
     def urdf_shapes(self) -> Sequence[UrdfShape]:
-        """See `Obstacle.urdf_shapes`."""
         return [UrdfShape("sphere", {"radius": repr(self.radius)})]
 
 
@@ -311,12 +312,12 @@ class Cylinder(Obstacle):
         self._set_length("radius")
         self._set_length("length")
 
+    @override
     def geometry(self) -> Any:
-        """See `Obstacle.geometry`."""
         return coal.Cylinder(self.radius, self.length)
 
+    @override
     def urdf_shapes(self) -> Sequence[UrdfShape]:
-        """See `Obstacle.urdf_shapes`."""
         return [_cylinder(self.radius, self.length)]
 
 
@@ -340,8 +341,8 @@ class Capsule(Obstacle):
         self._set_length("radius")
         self._set_length("length")
 
+    @override
     def geometry(self) -> Any:
-        """See `Obstacle.geometry`."""
         return coal.Capsule(self.radius, self.length)
 
     def urdf_shapes(self) -> Sequence[UrdfShape]:
@@ -376,8 +377,8 @@ class Mesh(Obstacle):
         self._set_length("scale")
 
     @property
+    @override
     def files(self) -> tuple[Path, ...]:
-        """See `Obstacle.files`."""
         return (self.file,)
 
     def _metres(self) -> float:
@@ -390,8 +391,8 @@ class Mesh(Obstacle):
             )
         return unit * self.scale
 
+    @override
     def geometry(self) -> Any:
-        """See `Obstacle.geometry`."""
         if not is_file(self.file):
             raise CollisionError(f"{self.label}: no such file: {self.file}")
         try:
@@ -409,8 +410,8 @@ class Mesh(Obstacle):
             )
         return found
 
+    @override
     def urdf_shapes(self) -> Sequence[UrdfShape]:
-        """See `Obstacle.urdf_shapes`."""
         self._metres()
         if is_file(self.file):
             # An arm carries nothing of that size either.

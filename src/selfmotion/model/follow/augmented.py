@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, fields, replace
 from typing import Any, cast
 
 import numpy as np
+from typing_extensions import override
 
 from selfmotion.basics import Array, Flags, read_only
 from selfmotion.model.follow.follow import BoundFollow, Follows
@@ -57,12 +58,12 @@ class AugmentedArm(RobotModel):
         return np.concatenate([self.arm.is_revolute, turns])
 
     @property
+    @override
     def coordinate_sizes(self) -> Array:
-        """See `RobotModel.coordinate_sizes`."""
         return np.append(self.arm.coordinate_sizes, [one.scale for one in self.virtual.each])
 
+    @override
     def is_prismatic(self, joint: str) -> bool:
-        """See `RobotModel.is_prismatic`."""
         own = {one.name: not one.turns for one in self.virtual.each}
         return own[joint] if joint in own else self.arm.is_prismatic(joint)
 
@@ -150,8 +151,8 @@ class AugmentedFollows(Follows):
                 found[first + k] = share * most / joint.scale
         return found
 
+    @override
     def within_bands(self, q: Array) -> Array:
-        """See `Follows.within_bands`."""
         found, first = np.full_like(q, np.inf), self.robot.dof - len(self.virtual.each)
         for item in self.virtual.relaxations:
             band = self.virtual.widest(item.indices)
@@ -166,30 +167,30 @@ class AugmentedFollows(Follows):
         return found
 
     @property
+    @override
     def is_plain(self) -> bool:
-        """See `Follows.is_plain`."""
         return False
 
     @property
+    @override
     def names(self) -> str:
-        """See `Follows.names`."""
         return " and ".join(
             f"'{item.chain.tip_name}'" for item in self.items if item.chain.tip_name
         )
 
+    @override
     def held(self, t: Array) -> Flags:
-        """See `Follows.held`."""
         none = np.zeros((len(t), self.robot.dof - len(self.virtual.each)), dtype=np.bool_)
         return np.hstack([none, self.virtual.held(t)])
 
     @property
+    @override
     def holds(self) -> bool:
-        """See `Follows.holds`."""
         return bool(self.virtual.windowed.any())
 
     @property
+    @override
     def edges(self) -> tuple[float, ...]:
-        """See `Follows.edges`."""
         ends = {x for item in self.virtual.relaxations for x in item.window(self.duration)}
         return tuple(sorted(ends - {0.0, self.duration}))
 

@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
+from typing_extensions import override
 
 from selfmotion.basics import Array, Flags, Ints, kernel
 from selfmotion.model.robot import Chain, Kinematics, place_tips
@@ -35,23 +36,23 @@ class TableChain(Chain):
         return self._name, self._table, self._dof, self._held
 
     @property
+    @override
     def dof(self) -> int:
-        """See `Chain.dof`."""
         return self._dof
 
     @property
+    @override
     def tip_name(self) -> str:
-        """See `Chain.tip_name`."""
         return self._name
 
     @property
+    @override
     def table(self) -> Array:
-        """See `Chain.table`."""
         return self._table
 
     @property
+    @override
     def joints(self) -> Ints:
-        """See `Chain.joints`."""
         return np.array(list(dict.fromkeys(self._coordinates.tolist())), dtype=np.int64)
 
     @property
@@ -65,13 +66,13 @@ class TableChain(Chain):
         table[:-1, JOINT, 2] *= ~self._held[self._coordinates]
         return TableKinematics(TableChain(self._name, table, self._dof), data)
 
+    @override
     def place(self, q: Array) -> SE3:
-        """See `Chain.place`."""
         _, rotation, translation = self.at(q)
         return SE3(rotation, translation)
 
+    @override
     def at(self, q: Array) -> tuple[Array, Array, Array]:
-        """See `Chain.at`."""
         jacobians, rotations, translations = self.along(q[None])
         return jacobians[0], rotations[0], translations[0]
 
@@ -89,16 +90,17 @@ class TableKinematics(Kinematics):
         self._table = np.array(chain.table)[None]
         self._at_tip = np.zeros((1, 6, n)), np.empty((1, 3, 3)), np.empty((1, 3))
 
+    @override
     def refresh(self, q: Array) -> None:
-        """See `Kinematics.refresh`."""
         self.data[:] = q
         self.place_frames()
 
+    @override
     def place_frames(self) -> None:
-        """See `Kinematics.place_frames`."""
         _place(self.data, self._table, *self._at_tip)
         _at_base(*self._at_tip, self.jacobian, self.rotation, self.translation)
 
+    @override
     def march(
         self,
         q: Array,
@@ -106,7 +108,6 @@ class TableKinematics(Kinematics):
         *arguments: Any,
         beside: Sequence[Kinematics] = (),
     ) -> int | None:
-        """See `Kinematics.march`."""
         each = [self, *beside]
         for s, configuration in enumerate(q):
             self.data[:] = configuration
@@ -116,13 +117,13 @@ class TableKinematics(Kinematics):
                     return s
         return None
 
+    @override
     def at(self, q: Array) -> Array:
-        """See `Kinematics.at`."""
         self.data[:] = q
         return self.beside()
 
+    @override
     def beside(self) -> Array:
-        """See `Kinematics.beside`."""
         self.place_frames()
         return np.array(self._at_tip[0][0])
 

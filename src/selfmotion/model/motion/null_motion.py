@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 from numpy.polynomial import legendre
+from typing_extensions import override
 
 from selfmotion.basics import (
     Array,
@@ -121,8 +122,8 @@ class PolynomialNullMotion(NullMotion):
         """See `NullMotion.fewest_steps`: four for each coefficient."""
         return 4 * (self.degree + 1)
 
+    @override
     def functions(self, t: Array, duration: float) -> Array:
-        """See `NullMotion.functions`."""
         if self.basis == "monomial":
             return np.asarray(np.vander(t, self.degree + 1, increasing=True))
         norms = np.sqrt((2.0 * np.arange(self.degree + 1) + 1.0) / duration)
@@ -159,8 +160,8 @@ class BSplineNullMotion(NullMotion):
         """See `NullMotion.fewest_steps`: four for each interval."""
         return 4 * self.intervals
 
+    @override
     def functions(self, t: Array, duration: float) -> Array:
-        """See `NullMotion.functions`."""
         from scipy.interpolate import BSpline
 
         inner = np.linspace(0.0, duration, self.intervals + 1)

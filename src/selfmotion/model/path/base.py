@@ -9,6 +9,7 @@ from typing import Any, NamedTuple, Self, overload
 
 import numpy as np
 import numpy.typing as npt
+from typing_extensions import override
 
 from selfmotion.basics import (
     Array,
@@ -243,8 +244,8 @@ class _Derived(Path):
         return known and PathSeries(*(series.composed(item, share) for item in known))
 
     @classmethod
+    @override
     def from_dict(cls, values: Mapping[str, Any], **context: Any) -> Self:
-        """See `Saved.from_dict`."""
         return cls(**{**values, "path": restore(Path, values["path"])})
 
 
@@ -256,23 +257,23 @@ class _InStep(_Derived):
         return wanted
 
     @property
+    @override
     def knots(self) -> Array:
-        """See `Path.knots`."""
         return self._path.knots
 
     @property
+    @override
     def marks(self) -> Array:
-        """See `Path.marks`."""
         return self._path.marks
 
     @property
+    @override
     def rounded(self) -> Array:
-        """See `Path.rounded`."""
         return self._path.rounded
 
     @property
+    @override
     def feeds(self) -> tuple[FeedKept, ...]:
-        """See `Path.feeds`."""
         return self._path.feeds
 
 

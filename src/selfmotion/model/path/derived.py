@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from typing_extensions import override
 
 from selfmotion.basics import Array, PathError, as_number, as_numbers, read_only
 from selfmotion.model.path.base import (
@@ -51,8 +52,8 @@ class Placed(_InStep, kind="placed"):
         """See `Path.at_constant_speed`: as the original."""
         return Placed(self._path.at_constant_speed(), self._frame)
 
+    @override
     def evaluate(self, t: Array) -> PathSamples:
-        """See `Path.evaluate`."""
         inner, turn = self._path.evaluate(t), self._frame.rotation
         twist = np.hstack([inner.twist[:, :3] @ turn.T, inner.twist[:, 3:] @ turn.T])
         translation = inner.translation @ turn.T + self._frame.translation
@@ -62,8 +63,8 @@ class Placed(_InStep, kind="placed"):
         """See `Path.series`: lengths and angles stay."""
         return path_series(self._path, middle, half)
 
+    @override
     def to_dict(self) -> dict[str, Any]:
-        """See `Saved.to_dict`."""
         frame = self._frame.homogeneous.tolist()
         return {"kind": self.kind, "path": self._path.to_dict(), "frame": frame}
 
@@ -90,23 +91,23 @@ class Reversed(_Derived, kind="reversed"):
         self.duration = path.duration
 
     @property
+    @override
     def knots(self) -> Array:
-        """See `Path.knots`."""
         return self._mirrored(self._path.knots)
 
     @property
+    @override
     def marks(self) -> Array:
-        """See `Path.marks`."""
         return self._mirrored(self._path.marks)
 
     @property
+    @override
     def rounded(self) -> Array:
-        """See `Path.rounded`."""
         return read_only(self.duration - self._path.rounded[::-1, ::-1])
 
     @property
+    @override
     def feeds(self) -> tuple[FeedKept, ...]:
-        """See `Path.feeds`."""
         return tuple(item.timed(lambda t: self.duration - t) for item in self._path.feeds)
 
     def at_constant_speed(self) -> Reversed:
@@ -117,8 +118,8 @@ class Reversed(_Derived, kind="reversed"):
         """Return when times of the original (K,) are passed, (K,) [s]."""
         return self.duration - wanted
 
+    @override
     def evaluate(self, t: Array) -> PathSamples:
-        """See `Path.evaluate`."""
         sigma = np.clip(self.duration - t, 0.0, self.duration)
         return self._at_pace(t, sigma, -np.ones_like(t))
 
@@ -126,8 +127,8 @@ class Reversed(_Derived, kind="reversed"):
         """See `Path.series`: bounds of derivatives do not see which way time goes."""
         return path_series(self._path, self.duration - middle, half)
 
+    @override
     def to_dict(self) -> dict[str, Any]:
-        """See `Saved.to_dict`."""
         return {"kind": self.kind, "path": self._path.to_dict()}
 
     def _mirrored(self, times: Array) -> Array:
@@ -252,18 +253,18 @@ class Retimed(_Derived, kind="retimed"):
         """How fast the original is run through: σ(t)."""
         return self._pace
 
+    @override
     def evaluate(self, t: Array) -> PathSamples:
-        """See `Path.evaluate`."""
         sigma = np.clip(self._pace(t), 0.0, self._path.duration)
         return self._at_pace(t, sigma, self._pace(t, 1))
 
+    @override
     def series(self, middle: Array, half: Array) -> PathSeries | None:
-        """See `Path.series`."""
         sigma = np.clip(self._pace(middle), 0.0, self._path.duration)
         return self._series_at(sigma, self._pace.series(middle, half))
 
+    @override
     def to_dict(self) -> dict[str, Any]:
-        """See `Saved.to_dict`."""
         pace = self._pace
         described = {"t": pace.t, "sigma": pace.sigma, "rate": pace.rate, "bend": pace.bend}
         numbers = {name: v.tolist() for name, v in described.items() if v is not None}
@@ -314,14 +315,14 @@ class Section(_Derived, kind="section"):
         self._crowding, self.duration = bool(crowding), last - first
 
     @property
+    @override
     def knots(self) -> Array:
-        """See `Path.knots`."""
         knots = self._within(self._path.knots)
         return self._crowded(knots) if self._crowding else knots
 
     @property
+    @override
     def marks(self) -> Array:
-        """See `Path.marks`."""
         marks = self._within(self._path.marks)
         return np.union1d(self.knots, marks) if self._crowding else marks
 
@@ -354,17 +355,17 @@ class Section(_Derived, kind="section"):
         """Return when times of the original (K,) are passed, (K,) [s]; outside, they never are."""
         return wanted - self._first
 
+    @override
     def evaluate(self, t: Array) -> PathSamples:
-        """See `Path.evaluate`."""
         found = self._path.samples(np.clip(self._first + t, self._first, self._last))
         return PathSamples(t, found.translation, found.rotation, found.twist)
 
+    @override
     def series(self, middle: Array, half: Array) -> PathSeries | None:
-        """See `Path.series`."""
         return path_series(self._path, self._first + middle, half)
 
+    @override
     def to_dict(self) -> dict[str, Any]:
-        """See `Saved.to_dict`."""
         ends = {"first": self._first, "last": self._last, "crowding": self._crowding}
         return {"kind": self.kind, "path": self._path.to_dict(), **ends}
 

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from typing_extensions import override
 
 from selfmotion.basics import (
     Array,
@@ -149,8 +150,8 @@ class Feed(_Derived, kind="feed"):
         return self._moved(self._path.knots)
 
     @cached_property
+    @override
     def marks(self) -> Array:
-        """See `Path.marks`."""
         inner = [pace.t + start for start, _, pace in self._paces]
         # The length as a function of time, and time as one of the length, are splines.
         inner.append(self._moved(np.union1d(self._path.marks, self._nodes.sigma)))
@@ -193,8 +194,8 @@ class Feed(_Derived, kind="feed"):
         sigma = series.composed(series.of_polynomial(part), length / reach)
         return self._series_at(np.clip(spline(reached), 0.0, self._path.duration), sigma)
 
+    @override
     def evaluate(self, t: Array) -> PathSamples:
-        """See `Path.evaluate`."""
         # In a kink the original has two directions, but the tool rests.
         return self._at_pace(t, *self.pace(t))
 
@@ -305,8 +306,8 @@ class Feed(_Derived, kind="feed"):
             path, **limits, within=self._within, stretches=stretches, required=self.required
         )
 
+    @override
     def to_dict(self) -> dict[str, Any]:
-        """See `Saved.to_dict`."""
         described: dict[str, Any] = {**self._limits, "feed": self._own_feed, "within": self._within}
         if len(self._asked) > 1:
             described["stretches"] = self._asked.tolist()

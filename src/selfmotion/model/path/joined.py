@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+from typing_extensions import override
 
 from selfmotion.basics import Array, Ints, PathError, as_number, read_only, restore, series, shown
 from selfmotion.model.path.base import (
@@ -53,8 +54,8 @@ class Dwell(Path, kind="dwell"):
         object.__setattr__(self, "at", path_pose(self.at, "dwell: at"))
         object.__setattr__(self, "duration", check_duration(self.duration))
 
+    @override
     def evaluate(self, t: Array) -> PathSamples:
-        """See `Path.evaluate`."""
         count = len(t)
         return PathSamples(
             t,
@@ -63,8 +64,8 @@ class Dwell(Path, kind="dwell"):
             np.zeros((count, 6)),
         )
 
+    @override
     def series(self, middle: Array, half: Array) -> PathSeries:
-        """See `Path.series`."""
         return turning(np.zeros((series.LENGTH, len(middle))))
 
 
@@ -147,8 +148,8 @@ class Joined(Path, kind="joined"):
         return self._all([piece.knots for piece in self.pieces])
 
     @property
+    @override
     def marks(self) -> Array:
-        """See `Path.marks`."""
         return self._all([piece.marks for piece in self.pieces])
 
     def _all(self, times: list[Array]) -> Array:
@@ -170,8 +171,8 @@ class Joined(Path, kind="joined"):
         pairs = zip(self.pieces, starts.tolist(), strict=True)
         return tuple(item.later(start) for piece, start in pairs for item in piece.feeds)
 
+    @override
     def evaluate(self, t: Array) -> PathSamples:
-        """See `Path.evaluate`."""
         which = self._which(t)
         translation, rotation = np.empty((len(t), 3)), np.empty((len(t), 3, 3))
         twist = np.empty((len(t), 6))
@@ -185,8 +186,8 @@ class Joined(Path, kind="joined"):
             twist[here] = part.twist
         return PathSamples(t, translation, rotation, twist)
 
+    @override
     def series(self, middle: Array, half: Array) -> PathSeries | None:
-        """See `Path.series`."""
         which = self._which(middle)
         found = turning(np.zeros((series.LENGTH, len(middle))))
         for number in np.unique(which):
@@ -204,13 +205,13 @@ class Joined(Path, kind="joined"):
         later = np.searchsorted(self._ends, t, side="right")
         return np.minimum(later, len(self.pieces) - 1)
 
+    @override
     def to_dict(self) -> dict[str, Any]:
-        """See `Saved.to_dict`."""
         return {"kind": self.kind, "pieces": [piece.to_dict() for piece in self.pieces]}
 
     @classmethod
+    @override
     def from_dict(cls, values: Mapping[str, Any], **context: Any) -> Joined:
-        """See `Saved.from_dict`."""
         return cls([restore(Path, piece) for piece in values["pieces"]])
 
 

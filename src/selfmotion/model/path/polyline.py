@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 import numpy as np
 import numpy.typing as npt
+from typing_extensions import override
 
 from selfmotion.basics import (
     Array,
@@ -316,8 +317,8 @@ class Polyline(Path, kind="polyline"):
         return read_only(self._edges)
 
     @property
+    @override
     def rounded(self) -> Array:
-        """See `Path.rounded`."""
         half, at = self._corners.half[1:-1], self.corner_times
         return np.stack([at - half, at + half], axis=1)
 
@@ -388,8 +389,8 @@ class Polyline(Path, kind="polyline"):
                 f"end one polyline there and begin another: Feed(first, …) + Feed(second, …)"
             )
 
+    @override
     def evaluate(self, t: Array) -> PathSamples:
-        """See `Path.evaluate`."""
         from scipy.spatial.transform import Rotation
 
         middles = 0.5 * (self._times[:-1] + self._times[1:])
@@ -411,8 +412,8 @@ class Polyline(Path, kind="polyline"):
         twist = np.hstack([slow + (fast - slow) * share, turning])
         return PathSamples(t, position, rotation.as_matrix(), twist)
 
+    @override
     def series(self, middle: Array, half: Array) -> PathSeries:
-        """See `Path.series`."""
         k = np.searchsorted(0.5 * (self._times[:-1] + self._times[1:]), middle, side="right")
         corners, x = self._corners, middle - self._times[k]
         wide = np.where(corners.half[k] > 0.0, corners.half[k], 1.0)
@@ -430,8 +431,8 @@ class Polyline(Path, kind="polyline"):
         )
         return PathSeries(moved, series.exponential(turned))
 
+    @override
     def to_dict(self) -> dict[str, Any]:
-        """See `Saved.to_dict`."""
         return {
             "kind": self.kind,
             "positions": self._given[0].tolist(),

@@ -9,6 +9,7 @@ from typing import Any, Self
 
 import numpy as np
 import numpy.typing as npt
+from typing_extensions import override
 
 from selfmotion.basics import Array, PathError, as_flag, as_number, read_only, series, shown
 from selfmotion.model.path.base import (
@@ -145,12 +146,12 @@ class Line(Path, kind="line"):
         object.__setattr__(self, "duration", check_duration(self.duration))
         object.__setattr__(self, "time_law", TimeLaw.of(self.time_law))
 
+    @override
     def at_constant_speed(self) -> Line:
-        """See `Path.at_constant_speed`."""
         return replace(self, time_law=TimeLaw.CONSTANT)
 
+    @override
     def evaluate(self, t: Array) -> PathSamples:
-        """See `Path.evaluate`."""
         s, speed = TimeLaw.of(self.time_law)(t / self.duration)
         offset = self.end.translation - self.start.translation
         turn = log3(self.end.rotation @ self.start.rotation.T)
@@ -163,8 +164,8 @@ class Line(Path, kind="line"):
             (speed / self.duration)[:, None] * np.concatenate([offset, turn]),
         )
 
+    @override
     def series(self, middle: Array, half: Array) -> PathSeries:
-        """See `Path.series`."""
         law, last = TimeLaw.of(self.time_law), self.duration
         way = law.series(middle / last, half / last)
         length = float(np.linalg.norm(self.end.translation - self.start.translation))
@@ -240,8 +241,8 @@ class Circle(Round, kind="circle"):
     def _arm(self) -> Array:
         return np.asarray(self.start.translation - self.center)
 
+    @override
     def evaluate(self, t: Array) -> PathSamples:
-        """See `Path.evaluate`."""
         s, speed = TimeLaw.of(self.time_law)(t / self.duration)
         angle = 2.0 * np.pi * self.turns
         turned = rotations_about(self.normal, angle * s)
@@ -251,8 +252,8 @@ class Circle(Round, kind="circle"):
         twist = np.hstack([np.cross(omega, arms), angular])
         return PathSamples(t, self.center + arms, rotation, twist)
 
+    @override
     def series(self, middle: Array, half: Array) -> PathSeries:
-        """See `Path.series`."""
         round_axis = series.exponential(2.0 * np.pi * abs(self.turns) * self._way(middle, half))
         return self._with_tool(self.radius * round_axis, round_axis)
 
@@ -335,8 +336,8 @@ class Spiral(Round, kind="spiral"):
         other = np.eye(3)[np.argmin(np.abs(self.normal))]
         return unit(other - self.normal * (self.normal @ other))
 
+    @override
     def evaluate(self, t: Array) -> PathSamples:
-        """See `Path.evaluate`."""
         s, speed = TimeLaw.of(self.time_law)(t / self.duration)
         angle, first = 2.0 * np.pi * self.turns, self.start_radius
         grown = self.radius - first
@@ -350,8 +351,8 @@ class Spiral(Round, kind="spiral"):
         rotation, omega = self._oriented(turned, angle * self.normal * rate)
         return PathSamples(t, foot + arms + rises, rotation, np.hstack([per_way * rate, omega]))
 
+    @override
     def series(self, middle: Array, half: Array) -> PathSeries:
-        """See `Path.series`."""
         way = self._way(middle, half)
         round_axis = series.exponential(2.0 * np.pi * abs(self.turns) * way)
         away = abs(self.radius - self.start_radius) * way

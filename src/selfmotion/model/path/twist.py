@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 from numpy.polynomial import chebyshev
+from typing_extensions import override
 
 from selfmotion.basics import Array, PathError, as_numbers, series, shown
 from selfmotion.model.path.base import Path, PathSamples, PathSeries, check_duration, path_pose
@@ -96,8 +97,8 @@ class TwistPath(Path, kind="twist"):
         return SE3(self._start)
 
     @property
+    @override
     def knots(self) -> Array:
-        """See `Path.knots`."""
         return self._breaks
 
     @cached_property
@@ -169,8 +170,8 @@ class TwistPath(Path, kind="twist"):
         twist: Array = np.einsum("kd,kdi->ki", basis, self._coefficients[k])
         return twist
 
+    @override
     def evaluate(self, t: Array) -> PathSamples:
-        """See `Path.evaluate`."""
         k, s = self._local(t)
         integrals, offsets = self._displacements
         basis = _chebyshev(s, integrals.shape[1])
@@ -198,8 +199,8 @@ class TwistPath(Path, kind="twist"):
 
         return np.asarray(Rotation.from_quat(self._orientation(t).T).as_matrix())
 
+    @override
     def to_dict(self) -> dict[str, Any]:
-        """See `Saved.to_dict`."""
         return {
             "kind": self.kind,
             "start": self._start.homogeneous.tolist(),

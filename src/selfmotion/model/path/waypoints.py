@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 import numpy.typing as npt
+from typing_extensions import override
 
 from selfmotion.basics import (
     Array,
@@ -324,8 +325,8 @@ class Waypoints(Path, kind="waypoints"):
         a, b = 1.0 * ~self._stops[:-1], 1.0 * ~self._stops[1:]
         return np.stack([a, 10 - 6 * a - 4 * b, -15 + 8 * a + 7 * b, 6 - 3 * a - 3 * b])
 
+    @override
     def evaluate(self, t: Array) -> PathSamples:
-        """See `Path.evaluate`."""
         tau, slope = self._warp(t)
         starts, splines = self._pieces
         piece = np.searchsorted(self._t[starts], tau, side="right") - 1
@@ -365,8 +366,8 @@ class Waypoints(Path, kind="waypoints"):
                 whole[:, here] = series.composed(bounds, tau[:, here] / reach[here])
         return found
 
+    @override
     def to_dict(self) -> dict[str, Any]:
-        """See `Saved.to_dict`."""
         return {
             "kind": self.kind,
             "t": self._t.tolist(),

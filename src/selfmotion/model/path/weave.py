@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from typing_extensions import override
 
 from selfmotion.basics import Array, PathError, as_number, read_only, series
 from selfmotion.model.path.base import (
@@ -132,8 +133,8 @@ class Weave(_InStep, kind="weave"):
         apart = np.append(np.diff(found) > 1e-12 * self.duration, True)
         return read_only(np.append(0.0, found[apart & (found > 1e-12 * self.duration)]))
 
+    @override
     def evaluate(self, t: Array) -> PathSamples:
-        """See `Path.evaluate`."""
         seam, count = self._path.evaluate(t), self._count
         away, slope = self._swing(count(t))
         beside = seam.rotation @ self._axis
@@ -242,8 +243,8 @@ class Weave(_InStep, kind="weave"):
     def _speed(self, t: Array) -> Array:
         return np.asarray(np.linalg.norm(self._path.evaluate(t).twist[:, :3], axis=1))
 
+    @override
     def to_dict(self) -> dict[str, Any]:
-        """See `Saved.to_dict`."""
         return {
             "kind": self.kind,
             "path": self._path.to_dict(),

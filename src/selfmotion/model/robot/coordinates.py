@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
+from typing_extensions import override
 
 from selfmotion.basics import (
     TURN,
@@ -111,12 +112,12 @@ class JointCoordinate(Coordinate):
     joint: str
 
     @property
+    @override
     def name(self) -> str:
-        """See `Coordinate.name`."""
         return f"joint '{self.joint}'"
 
+    @override
     def __call__(self, robot: RobotModel, q: Array) -> tuple[Array, Array]:
-        """See `Coordinate.__call__`."""
         if self.joint not in robot.joint_names:
             raise ProblemError(
                 f"{robot.name}: no joint '{self.joint}' for a coordinate"
@@ -152,19 +153,19 @@ class FrameCoordinate(Coordinate):
             raise ProblemError("coordinate: direction is zero, expected a direction")
 
     @property
+    @override
     def name(self) -> str:
-        """See `Coordinate.name`."""
         return f"place of '{self.frame}'"
 
+    @override
     def __call__(self, robot: RobotModel, q: Array) -> tuple[Array, Array]:
-        """See `Coordinate.__call__`."""
         direction = np.asarray(self.direction, dtype=np.float64)
         direction = direction / np.linalg.norm(direction)
         ((places, jacobians),) = _points(robot, q, (self.frame,))
         return places @ direction, np.einsum("c,kcn->kn", direction, jacobians)
 
+    @override
     def series(self, chain: ChainSeries, q: Array) -> Array:
-        """See `Coordinate.series`."""
         return chain.place(_frame(chain.robot, self.frame))
 
 
@@ -198,12 +199,12 @@ class SwivelAngle(Coordinate):
             raise ProblemError("swivel angle: reference is zero, expected a direction")
 
     @property
+    @override
     def name(self) -> str:
-        """See `Coordinate.name`."""
         return "swivel angle"
 
+    @override
     def __call__(self, robot: RobotModel, q: Array) -> tuple[Array, Array]:
-        """See `Coordinate.__call__`."""
         (s, by_s), (e, by_e), (w, by_w) = _points(robot, q, self.frames(robot))
         r = np.asarray(self.reference, dtype=np.float64)
         r = r / np.linalg.norm(r)

@@ -12,6 +12,7 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
+from typing_extensions import override
 
 from selfmotion.basics import Array, Flags, Ints, ProblemError
 from selfmotion.model.follow import Follows
@@ -71,12 +72,12 @@ class UnitTangents(NodeTangents):
         object.__setattr__(self, "_tables", tables)
         super().__init__(tables[0], tables[1], spline.points)
 
+    @override
     def of_order(self, order: int) -> Array:
-        """See `NodeTangents.of_order`."""
         return self._tables[order]
 
+    @override
     def picked(self, order: int, nodes: Ints, joints: Ints) -> Array:
-        """See `NodeTangents.picked`."""
         return np.asarray(self._tables[order][nodes, joints])
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from typing_extensions import override
 
 from selfmotion.basics import Array, ProblemError, as_number, restore, series, shown
 from selfmotion.certificate import Column, Quantity, Stretch
@@ -68,12 +69,12 @@ class Band(Constraint):
             )
         return cls(SwivelAngle(**names), _SIDES[side], half)
 
+    @override
     def envelope(self, robot: RobotModel) -> Envelope:
-        """See `Constraint.envelope`."""
         return Envelope.of_quantity(self.quantity(robot), robot.dof)
 
+    @override
     def quantity(self, robot: RobotModel) -> Quantity:
-        """See `Constraint.quantity`."""
         coordinate = self.coordinate
         coordinate(robot, np.zeros((1, robot.dof)))
 
@@ -95,6 +96,6 @@ class Band(Constraint):
         return found
 
     @classmethod
+    @override
     def from_dict(cls, values: Mapping[str, Any], **context: Any) -> Band:
-        """See `Saved.from_dict`."""
         return cls(**{**values, "coordinate": restore(Coordinate, values["coordinate"])})

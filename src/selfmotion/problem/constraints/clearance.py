@@ -10,6 +10,7 @@ from typing import Any, ClassVar, cast
 from weakref import WeakKeyDictionary
 
 import numpy as np
+from typing_extensions import override
 
 from selfmotion.basics import Array, Flags, Ints, ProblemError, as_number, shown
 from selfmotion.certificate import Separation
@@ -102,30 +103,30 @@ class Clearance(Constraint):
         """
         return self._models(robot).exact
 
+    @override
     def bind(self, follows: Follows, start: Array, end: Array) -> BoundClearance:
-        """See `Constraint.bind`."""
         return BoundClearance(self._models(follows.robot).smooth, self.distance)
 
     def bind_pieces(self, follows: Follows) -> BoundClearance:
         """Return what `bind` does, with links in convex pieces before obstacles."""
         return BoundClearance(self._models(follows.robot).in_pieces, self.distance)
 
+    @override
     def requirement(self, robot: RobotModel) -> Separation:
-        """See `Constraint.requirement`."""
         return Separation(self.model(robot), self.distance)
 
+    @override
     def envelope(self, robot: RobotModel) -> Envelope:
-        """See `Constraint.envelope`."""
         return replace(Envelope.unbounded(robot.dof), bodies=((self.model(robot), self.distance),))
 
     @classmethod
+    @override
     def from_dict(cls, values: Mapping[str, Any], **context: Any) -> Clearance:
-        """See `Saved.from_dict`."""
         obstacles = tuple(obstacle_from_dict(item) for item in values["obstacles"])
         return cls(**{**values, "obstacles": obstacles})
 
+    @override
     def to_dict(self) -> dict[str, Any]:
-        """See `Saved.to_dict`."""
         return {
             "kind": self.kind,
             "obstacles": [obstacle.to_dict() for obstacle in self.obstacles],

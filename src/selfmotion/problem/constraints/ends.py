@@ -7,6 +7,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
+from typing_extensions import override
 
 from selfmotion.basics import Array, ProblemError, as_flag, as_numbers, per_joint, read_only
 from selfmotion.certificate import QUANTITIES, ClosedMotion, EndState
@@ -116,18 +117,18 @@ class EndConfiguration(Constraint):
 
     q: npt.ArrayLike
 
+    @override
     def bind(self, follows: Follows, start: Array, end: Array) -> BoundEnd:
-        """See `Constraint.bind`."""
         target = read_only(follows.robot.configuration(self.q))
         null = follows.null_basis(target)
         return BoundEnd("end configuration", (0,), target, null, is_whole=True)
 
+    @override
     def requirement(self, robot: RobotModel) -> EndState:
-        """See `Constraint.requirement`."""
         return EndState(0, read_only(robot.configuration(self.q)))
 
+    @override
     def fixed_end(self, robot: RobotModel) -> Array:
-        """See `Constraint.fixed_end`."""
         return robot.configuration(self.q)
 
     def on_part(self) -> None:
@@ -158,14 +159,14 @@ class _EndRate(Constraint):
     def _name(self) -> str:
         return f"{'start' if self.at_start else 'end'} {QUANTITIES[self.order]}"
 
+    @override
     def bind(self, follows: Follows, start: Array, end: Array) -> BoundEnd:
-        """See `Constraint.bind`."""
         null = follows.null_basis(start if self.at_start else end)
         row = 0 if self.at_start else -1
         return BoundEnd(self._name, (self.order,), self.target(follows.robot), null, row)
 
+    @override
     def requirement(self, robot: RobotModel) -> EndState:
-        """See `Constraint.requirement`."""
         return EndState(self.order, self.target(robot), self.at_start)
 
     def target(self, robot: RobotModel) -> Array:
@@ -291,13 +292,13 @@ class ClosedPath(Constraint):
     def __post_init__(self) -> None:
         as_flag(self.velocity, "closed path: velocity")
 
+    @override
     def bind(self, follows: Follows, start: Array, end: Array) -> BoundEnd:
-        """See `Constraint.bind`."""
         orders = (0, 1) if self.velocity else (0,)
         return BoundEnd("closed path", orders, None, follows.null_basis(start), is_whole=True)
 
+    @override
     def requirement(self, robot: RobotModel) -> ClosedMotion:
-        """See `Constraint.requirement`."""
         return ClosedMotion(self.velocity)
 
     def check(self, follows: Follows) -> None:

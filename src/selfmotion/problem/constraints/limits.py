@@ -8,6 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 import numpy.typing as npt
+from typing_extensions import override
 
 from selfmotion.basics import Array, Ints, ProblemError, as_flag, as_number, per_joint, read_only
 from selfmotion.certificate import LIMIT_NAMES, Column, JointLimits, Quantity
@@ -49,17 +50,17 @@ class JointPositionLimits(Constraint):
         _check_margin(self.margin)
         as_flag(self.replace, f"{type(self).__name__}: replace")
 
+    @override
     def bind(self, follows: Follows, start: Array, end: Array) -> BoundLimits:
-        """See `Constraint.bind`."""
         robot = follows.robot
         return BoundLimits.of(robot, self.requirement(robot), self.margin)
 
+    @override
     def requirement(self, robot: RobotModel) -> JointLimits:
-        """See `Constraint.requirement`."""
         return JointLimits(0, *self.limits(robot))
 
+    @override
     def envelope(self, robot: RobotModel) -> Envelope:
-        """See `Constraint.envelope`."""
         return Envelope.of_limits(self.requirement(robot))
 
     def limits(self, robot: RobotModel) -> tuple[Array, Array]:
@@ -119,21 +120,21 @@ class _RateLimits(Constraint):
         own = per_joint(self.limit, robot.dof, what, positive=True)
         return own if self.replace else read_only(np.minimum(own, self.published(robot)))
 
+    @override
     def applies(self, robot: RobotModel) -> bool:
-        """See `Constraint.applies`."""
         return bool(np.isfinite(self.of(robot)).any())
 
+    @override
     def bind(self, follows: Follows, start: Array, end: Array) -> BoundLimits:
-        """See `Constraint.bind`."""
         return BoundLimits.of(follows.robot, self.requirement(follows.robot), self.margin)
 
+    @override
     def requirement(self, robot: RobotModel) -> JointLimits:
-        """See `Constraint.requirement`."""
         limit = self.of(robot)
         return JointLimits(self.order, -limit, limit)
 
+    @override
     def envelope(self, robot: RobotModel) -> Envelope:
-        """See `Constraint.envelope`."""
         return Envelope.of_limits(self.requirement(robot))
 
 
@@ -328,8 +329,8 @@ class JointTorqueLimits(Constraint):
     def __post_init__(self) -> None:
         as_number(self.margin, "joint torque limits: margin", above=0.0, most=1.0)
 
+    @override
     def quantity(self, robot: RobotModel) -> Quantity:
-        """See `Constraint.quantity`."""
         each = self.limit is None
         dynamics = Dynamics(robot, self.payload, self.center, self.inertia, each=each)
         limit = self.of(robot)
@@ -352,8 +353,8 @@ class JointTorqueLimits(Constraint):
             covers=(_covered(robot, self.of(robot)),),
         )
 
+    @override
     def applies(self, robot: RobotModel) -> bool:
-        """See `Constraint.applies`."""
         shared = np.asarray(robot.model.upperEffortLimit)[robot.coupling.shared]
         each = self.limit is None and bool((shared > 0.0).any())
         return each or bool(np.isfinite(self.of(robot)).any())

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+from typing_extensions import override
 
 from selfmotion.basics import Array, ProblemError, as_number, as_numbers, nearest, shown
 from selfmotion.certificate import Column, Quantity, Stretch
@@ -71,8 +72,8 @@ class ToolLimits(Constraint):
         """Speed, turn rate, acceleration and turn acceleration, (4,); inf where there is none."""
         return np.array(self._given, dtype=np.float64)
 
+    @override
     def quantity(self, robot: RobotModel) -> Quantity:
-        """See `Constraint.quantity`."""
         rates, tool = ToolRates(robot.chain), robot.tool
         limited = np.isfinite(self.limit)
         seen = "" if robot.reference is None else f" seen from '{robot.reference}'"
@@ -150,12 +151,12 @@ class Tilt(Constraint):
         as_number(self.within, "tilt: within", above=0.0, most=np.pi * (1.0 - 1e-6))
         as_number(self.margin, "tilt: margin", above=0.0, most=1.0)
 
+    @override
     def envelope(self, robot: RobotModel) -> Envelope:
-        """See `Constraint.envelope`."""
         return Envelope.of_quantity(self.quantity(robot), robot.dof)
 
+    @override
     def quantity(self, robot: RobotModel) -> Quantity:
-        """See `Constraint.quantity`."""
         if self.frame not in robot.urdf.links:
             raise ProblemError(
                 f"{robot.name}: no link '{self.frame}' whose tilt could be limited"
@@ -195,8 +196,8 @@ class Tilt(Constraint):
 class _Angle(Quantity):
     """A quantity that is the chord of an angle, told as the angle."""
 
+    @override
     def said(self, column: int, away: float, time: float) -> str:
-        """See `Quantity.said`."""
         angle, limit = (
             2.0 * float(np.arcsin(min(0.5 * abs(chord), 1.0)))
             for chord in (away, self.bounds[column])

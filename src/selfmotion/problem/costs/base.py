@@ -8,6 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 import numpy.typing as npt
+from typing_extensions import override
 
 from selfmotion.basics import Array, ProblemError, Saved, as_number, as_numbers, shown
 from selfmotion.model.follow import Follows
@@ -154,21 +155,21 @@ class Scaled(Cost):
     def __post_init__(self) -> None:
         object.__setattr__(self, "name", self.cost.name)
 
+    @override
     def value(self, samples: Samples) -> Array:
-        """See `Cost.value`."""
         return self.factor * self.cost.value(samples)
 
+    @override
     def gradient(self, samples: Samples) -> Partials:
-        """See `Cost.gradient`."""
         found = self.cost.gradient(samples)
         parts = (found.q, found.qd, found.qdd, found.qddd, found.error)
         return Partials(*(None if part is None else self.factor * part for part in parts))
 
+    @override
     def curvature(self, dof: int) -> dict[int, Array]:
-        """See `Cost.curvature`."""
         own = self.cost.curvature(dof)
         return {order: self.factor * matrix for order, matrix in own.items()}
 
+    @override
     def check(self, follows: Follows) -> None:
-        """See `Cost.check`."""
         self.cost.check(follows)

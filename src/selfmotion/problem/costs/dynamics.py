@@ -7,6 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 import numpy.typing as npt
+from typing_extensions import override
 
 from selfmotion.basics import Array, ProblemError, shown
 from selfmotion.model.follow import Follows
@@ -51,8 +52,8 @@ class KineticEnergy(Cost):
         _check_arm(self.robot, self.name)
         object.__setattr__(self, "_energy", Energy(self.robot))
 
+    @override
     def value(self, samples: Samples) -> Array:
-        """See `Cost.value`."""
         return self.mu * self._energy.kinetic(samples.q, samples.qd)
 
     def gradient(self, samples: Samples) -> Partials:
@@ -65,8 +66,8 @@ class KineticEnergy(Cost):
         lower, upper = self.robot.finite_limits()
         return {1: self.mu * self._energy.mass(0.5 * (lower + upper))}
 
+    @override
     def check(self, follows: Follows) -> None:
-        """See `Cost.check`."""
         robot = follows.robot
         check_mu(self.mu, self.name)
         _check_robot(self.robot, robot, self.name)
@@ -98,8 +99,8 @@ class GravityTorque(Cost):
         Energy(self.robot)
         object.__setattr__(self, "weight", as_weight(self.weight, self.name))
 
+    @override
     def value(self, samples: Samples) -> Array:
-        """See `Cost.value`."""
         return half_square(np.asarray(self.weight), Energy(self.robot).gravity(samples.q))
 
     def gradient(self, samples: Samples) -> Partials:
@@ -108,8 +109,8 @@ class GravityTorque(Cost):
         torques = weighted(np.asarray(self.weight), energy.gravity(samples.q))
         return Partials(q=np.einsum("si,sij->sj", torques, energy.gravity_slopes(samples.q)))
 
+    @override
     def check(self, follows: Follows) -> None:
-        """See `Cost.check`."""
         robot = follows.robot
         check_weight(np.asarray(self.weight), robot.dof, self.name)
         _check_robot(self.robot, robot, self.name)

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from typing_extensions import override
 
 from selfmotion.basics import Array, ProblemError, is_known, plain_numbers, restore, shown
 from selfmotion.model.robot import RobotModel
@@ -45,12 +46,12 @@ class FunctionCost(Cost):
                     f"(qd, q, t)"
                 )
 
+    @override
     def value(self, samples: Samples) -> Array:
-        """See `Cost.value`."""
         return self._call(samples.qd, samples.q, samples.t)
 
+    @override
     def gradient(self, samples: Samples) -> Partials:
-        """See `Cost.gradient`."""
         qd, q, t = samples.qd, samples.q, samples.t
         if self.g_gradient is not None:
             by_qd, by_q = (np.asarray(part, dtype=float) for part in self.g_gradient(qd, q, t))

@@ -8,6 +8,7 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 import numpy.typing as npt
+from typing_extensions import override
 
 from selfmotion.basics import (
     Array,
@@ -54,8 +55,8 @@ class _Quadratic(Cost):
     def _w(self) -> Array:
         return np.asarray(self.weight)
 
+    @override
     def check(self, follows: Follows) -> None:
-        """See `Cost.check`."""
         check_weight(self._w, follows.robot.dof, self.name)
 
 
@@ -65,8 +66,8 @@ class _Derivative(_Quadratic):
 
     _order: ClassVar[int]
 
+    @override
     def value(self, samples: Samples) -> Array:
-        """See `Cost.value`."""
         return half_square(self._w, self._of(samples))
 
     def gradient(self, samples: Samples) -> Partials:
@@ -189,20 +190,20 @@ class Posture(_Quadratic):
             self, "posture", as_numbers(self.posture, f"cost '{self.name}': posture")
         )
 
+    @override
     def value(self, samples: Samples) -> Array:
-        """See `Cost.value`."""
         return half_square(self._w, samples.q - np.asarray(self.posture))
 
     def gradient(self, samples: Samples) -> Partials:
         """See `Cost.gradient`: W(q - q*)."""
         return Partials(q=weighted(self._w, samples.q - np.asarray(self.posture)))
 
+    @override
     def curvature(self, dof: int) -> dict[int, Array]:
-        """See `Cost.curvature`."""
         return {0: weight_matrix(self._w, dof)}
 
+    @override
     def check(self, follows: Follows) -> None:
-        """See `Cost.check`."""
         robot = follows.robot
         super().check(follows)
         posture = np.asarray(self.posture)
@@ -250,17 +251,17 @@ class JointLimitDistance(Cost):
         if as_whole(self.power, f"cost '{self.name}': power", 2, 1000) % 2:
             raise ProblemError(f"cost '{self.name}': power is {self.power}, expected 2, 4, 6, …")
 
+    @override
     def value(self, samples: Samples) -> Array:
-        """See `Cost.value`."""
         return np.asarray(self.mu * np.sum(self._relative(samples) ** self.power, axis=1))
 
+    @override
     def gradient(self, samples: Samples) -> Partials:
-        """See `Cost.gradient`."""
         relative = self._relative(samples) ** (self.power - 1)
         return Partials(q=self.mu * self.power * relative * self._scale(samples.follows.robot)[1])
 
+    @override
     def check(self, follows: Follows) -> None:
-        """See `Cost.check`."""
         robot = follows.robot
         check_mu(self.mu, self.name)
         for limits in self._range(robot):
@@ -336,8 +337,8 @@ class PathLength(Cost):
         if self.joint_weights is not None:
             object.__setattr__(self, "joint_weights", read_only(self.joint_weights))
 
+    @override
     def value(self, samples: Samples) -> Array:
-        """See `Cost.value`."""
         lengths = np.hypot(samples.qd, self.smoothing) - self.smoothing
         return np.asarray(np.sum(self._w * lengths, axis=1))
 
@@ -345,8 +346,8 @@ class PathLength(Cost):
         """See `Cost.gradient`: w_i q̇_i / √(q̇_i² + δ²)."""
         return Partials(qd=self._w * samples.qd / np.hypot(samples.qd, self.smoothing))
 
+    @override
     def check(self, follows: Follows) -> None:
-        """See `Cost.check`."""
         robot = follows.robot
         check_name(self.name)
         as_number(self.smoothing, f"cost '{self.name}': smoothing", above=0.0)
@@ -395,14 +396,14 @@ class JointReversals(Cost):
     smoothing: float = 0.05
     name: str = "joint reversals"
 
+    @override
     def value(self, samples: Samples) -> Array:
-        """See `Cost.value`."""
         rate = samples.qdd * self._share(samples)
         turns = np.hypot(rate, self.smoothing) - self.smoothing
         return np.asarray(self.weight / np.pi * turns.sum(axis=1))
 
+    @override
     def gradient(self, samples: Samples) -> Partials:
-        """See `Cost.gradient`."""
         share = self._share(samples)
         rate = samples.qdd * share
         slope = self.weight / np.pi * rate / np.hypot(rate, self.smoothing)
@@ -410,8 +411,8 @@ class JointReversals(Cost):
         by_speed = -2.0 / self.speed * samples.qdd * samples.qd * share**2
         return Partials(qd=slope * by_speed, qdd=slope * share)
 
+    @override
     def check(self, follows: Follows) -> None:
-        """See `Cost.check`."""
         check_name(self.name)
         as_number(self.weight, f"cost '{self.name}': weight", least=0.0)
         as_number(self.speed, f"cost '{self.name}': speed", above=0.0)

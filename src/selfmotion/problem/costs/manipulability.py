@@ -7,6 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 import numpy.typing as npt
+from typing_extensions import override
 
 from selfmotion.basics import Array, ProblemError, as_numbers, as_whole, read_only, shown
 from selfmotion.model.follow import Follows
@@ -31,8 +32,8 @@ class InverseManipulability(Cost):
     mu: float = 1.0
     name: str = "inverse manipulability"
 
+    @override
     def value(self, samples: Samples) -> Array:
-        """See `Cost.value`."""
         # Infinite at singular poses, through which damped motions may pass.
         with np.errstate(divide="ignore"):
             return np.asarray(self.mu / samples.gram_determinant)
@@ -41,8 +42,8 @@ class InverseManipulability(Cost):
         """See `Cost.gradient`: ∂G = -G ∂log det(JJᵀ)."""
         return Partials(q=-self.value(samples)[:, None] * samples.log_determinant_gradient)
 
+    @override
     def check(self, follows: Follows) -> None:
-        """See `Cost.check`."""
         check_mu(self.mu, self.name)
 
 
@@ -63,16 +64,16 @@ class Manipulability(Cost):
     mu: float = 1.0
     name: str = "manipulability"
 
+    @override
     def value(self, samples: Samples) -> Array:
-        """See `Cost.value`."""
         return -self.mu * np.sqrt(np.maximum(samples.gram_determinant, 0.0))
 
     def gradient(self, samples: Samples) -> Partials:
         """See `Cost.gradient`: ∂w = ½ w ∂log det(JJᵀ)."""
         return Partials(q=0.5 * self.value(samples)[:, None] * samples.log_determinant_gradient)
 
+    @override
     def check(self, follows: Follows) -> None:
-        """See `Cost.check`."""
         check_mu(self.mu, self.name)
 
 
@@ -105,8 +106,8 @@ class DirectionalManipulability(Cost):
             raise ProblemError(f"{what} is {shown(direction)}, expected {expected}")
         object.__setattr__(self, "direction", read_only(direction / length))
 
+    @override
     def value(self, samples: Samples) -> Array:
-        """See `Cost.value`."""
         return np.asarray(self.mu * (self._solved(samples) @ np.asarray(self.direction)))
 
     def gradient(self, samples: Samples) -> Partials:
@@ -115,8 +116,8 @@ class DirectionalManipulability(Cost):
         back = np.einsum("sm,smn->sn", a, samples.task_jacobian)
         return Partials(q=samples.contract(-2.0 * self.mu * a[:, :, None] * back[:, None, :]))
 
+    @override
     def check(self, follows: Follows) -> None:
-        """See `Cost.check`."""
         check_mu(self.mu, self.name)
         rows = follows.dimension
         if len(np.asarray(self.direction)) != rows:
@@ -152,8 +153,8 @@ class SmallestSingularValue(Cost):
     power: int = 4
     name: str = "smallest singular value"
 
+    @override
     def value(self, samples: Samples) -> Array:
-        """See `Cost.value`."""
         values = np.asarray(np.linalg.eigvalsh(samples.gram), dtype=np.float64)
         return np.asarray(self.mu * self._sum(values) ** (0.5 / self.power))
 
@@ -166,8 +167,8 @@ class SmallestSingularValue(Cost):
         weights = -scale[:, None, None] * (inverse @ samples.task_jacobian)
         return Partials(q=samples.contract(weights))
 
+    @override
     def check(self, follows: Follows) -> None:
-        """See `Cost.check`."""
         check_mu(self.mu, self.name)
         as_whole(self.power, f"cost '{self.name}': power", 1, 100)
 

@@ -7,6 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 import numpy.typing as npt
+from typing_extensions import override
 
 from selfmotion.basics import Array, ProblemError, as_number, per_joint
 from selfmotion.model.follow import Follows
@@ -49,12 +50,12 @@ class LimitUse(Cost):
         check_name(self.name)
         as_number(self.power, f"cost '{self.name}': power", least=4.0, most=100.0)
 
+    @override
     def value(self, samples: Samples) -> Array:
-        """See `Cost.value`."""
         return self._parts(samples)[0]
 
+    @override
     def gradient(self, samples: Samples) -> Partials:
-        """See `Cost.gradient`."""
         use, speed, rate = self._parts(samples)
         v, a = self._limits(samples.q.shape[1])
         # d G / d s = (|s| / G)^(p - 1) sign s, and likewise for the shares of accelerations.
@@ -129,13 +130,13 @@ class BeyondLimits(Cost):
         fast = np.sign(used) * np.maximum(np.abs(used) - 1.0 + _MARGIN, 0.0)
         return above - below, fast
 
+    @override
     def value(self, samples: Samples) -> Array:
-        """See `Cost.value`."""
         far, fast = self._beyond(samples)
         return np.asarray(0.5 * self.weight * np.sum(far**2 + fast**2, axis=1))
 
+    @override
     def gradient(self, samples: Samples) -> Partials:
-        """See `Cost.gradient`."""
         far, fast = self._beyond(samples)
         return Partials(q=self.weight * far, qd=self.weight * fast / self.speed)
 
@@ -162,8 +163,8 @@ class OffPath(Cost):
     rows: int
     name: str = "path error"
 
+    @override
     def value(self, samples: Samples) -> Array:
-        """See `Cost.value`."""
         return np.asarray(0.5 * self.weight * np.sum(_selected(samples) ** 2, axis=1))
 
     def gradient(self, samples: Samples) -> Partials:

@@ -8,6 +8,7 @@ from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
+from typing_extensions import override
 
 from selfmotion.basics import Array, Ints
 from selfmotion.model import kernels
@@ -197,13 +198,13 @@ class PlacedLater(Samples):
         return Samples.along(self.follows, self.sampling, self.q, self.qd)
 
     @cached_property
+    @override
     def tips(self) -> tuple[TipSamples, ...]:
-        """See `Samples`."""
         return self._placed.tips
 
     @cached_property
+    @override
     def task_jacobian(self) -> Array:
-        """See `Samples`."""
         return self._placed.task_jacobian
 
 
@@ -218,13 +219,13 @@ class _OfArm(PlacedLater):
         super().__init__(follows, whole.sampling, q=whole.q[:, :n], qd=whole.qd[:, :n])
 
     @cached_property
+    @override
     def qdd(self) -> Array:
-        """See `Samples`."""
         return self._whole.qdd[:, : self.follows.robot.dof]
 
     @cached_property
+    @override
     def qddd(self) -> Array:
-        """See `Samples`."""
         return self._whole.qddd[:, : self.follows.robot.dof]
 
 

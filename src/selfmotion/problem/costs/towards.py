@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
+from typing_extensions import override
 
 from selfmotion.basics import Array, ProblemError, as_number, restore, shown
 from selfmotion.model.follow import Follows
@@ -56,8 +57,8 @@ class Towards(Cost):
         as_number(self.weight, f"cost '{self.name}': weight", least=0.0)
         self.coordinate(self.robot, np.zeros((1, self.robot.dof)))
 
+    @override
     def value(self, samples: Samples) -> Array:
-        """See `Cost.value`."""
         values, _ = self.coordinate(self.robot, samples.q)
         return 0.5 * self.weight * self.coordinate.away(values, self.target) ** 2
 
@@ -81,7 +82,7 @@ class Towards(Cost):
             )
 
     @classmethod
+    @override
     def from_dict(cls, values: Mapping[str, Any], **context: Any) -> Towards:
-        """See `Saved.from_dict`."""
         coordinate = restore(Coordinate, values["coordinate"])
         return cls(**{**values, "robot": context["robot"], "coordinate": coordinate})

@@ -7,6 +7,7 @@ from functools import cached_property
 from typing import Any, cast
 
 import numpy as np
+from typing_extensions import override
 
 from selfmotion.basics import Array, Progress, read_only, silent
 from selfmotion.certificate import Certificate, Requirement, Tolerance
@@ -72,17 +73,17 @@ class AugmentedProblem(Problem):
         return super()._made - {"follows"}
 
     @property
+    @override
     def asked(self) -> Problem:
-        """See `Problem.asked`."""
         return self._original
 
     @property
+    @override
     def augmented(self) -> "AugmentedProblem":
-        """See `Problem.augmented`."""
         return self
 
+    @override
     def softened(self, cost: float) -> "Problem":
-        """See `Problem.softened`."""
         virtual = self.robot.upper[self._dof :]
         if not np.isfinite(virtual).any() or not 0.0 < cost < np.inf:
             return self
@@ -90,8 +91,8 @@ class AugmentedProblem(Problem):
         return self._with_costs((*self.costs, springs(weights)))
 
     @cached_property
+    @override
     def with_windows_shut(self) -> Problem:
-        """See `Problem.with_windows_shut`."""
         if not self.follows.holds:
             return self
         found = copy(self)
@@ -110,18 +111,18 @@ class AugmentedProblem(Problem):
         found.__dict__.pop("all_costs", None)
         return found
 
+    @override
     def along(
         self, other: Callable[[Path], Path], when: Callable[[Array], Array] | None = None
     ) -> dict[str, Any]:
-        """See `Problem.along`."""
         return self.asked.along(other, when)
 
     @property
     def _dof(self) -> int:
         return self.asked.robot.dof
 
+    @override
     def own(self, trajectory: Trajectory) -> Trajectory:
-        """See `Problem.own`."""
         n, qdd = self._dof, trajectory.qdd
         return Trajectory(
             trajectory.t,
@@ -131,8 +132,8 @@ class AugmentedProblem(Problem):
             None if qdd is None else qdd[:, :n],
         )
 
+    @override
     def at(self, t: Array, q: Array) -> Array:
-        """See `Problem.at`."""
         return self._with_virtual(self.path, t, q)
 
     def _with_virtual(self, path: Path, t: Array, q: Array) -> Array:
@@ -146,8 +147,8 @@ class AugmentedProblem(Problem):
         found[held[:, self._dof :]] = 0.0
         return np.hstack([q, found])
 
+    @override
     def with_own(self, trajectory: Trajectory, path: Path) -> Trajectory:
-        """See `Problem.with_own`."""
         from scipy.interpolate import CubicSpline
 
         t = trajectory.t
@@ -157,17 +158,17 @@ class AugmentedProblem(Problem):
         return Trajectory(t, q, np.hstack([trajectory.qd, rates]), self.robot.joint_names)
 
     @cached_property
+    @override
     def own_collision(self) -> Clearance | None:
-        """See `Problem.own_collision`."""
         return self.asked.own_collision
 
+    @override
     def keeps_off_itself(self, q: Array) -> bool:
-        """See `Problem.keeps_off_itself`."""
         return self.asked.keeps_off_itself(q[:, : self._dof])
 
     @property
+    @override
     def all_constraints(self) -> tuple[Constraint, ...]:
-        """See `Problem.all_constraints`."""
         return self.asked.all_constraints
 
     def bind_constraints(
@@ -217,28 +218,28 @@ class AugmentedProblem(Problem):
         return replace(item, target=target, null=self.follows.null_basis(at))
 
     @cached_property
+    @override
     def rest_orders(self) -> tuple[int, int]:
-        """See `Problem.rest_orders`."""
         return self.asked.rest_orders
 
     @cached_property
+    @override
     def damping_law(self) -> DampingLaw | None:
-        """See `Problem.damping_law`."""
         return self.asked.damping_law
 
     @cached_property
+    @override
     def requirements(self) -> tuple[Requirement, ...]:
-        """See `Problem.requirements`."""
         return self.asked.requirements
 
     @cached_property
+    @override
     def asked_envelope(self) -> Envelope:
-        """See `Problem.asked_envelope`."""
         return self._envelope(self.asked.asked_envelope)
 
     @cached_property
+    @override
     def envelope(self) -> Envelope:
-        """See `Problem.envelope`."""
         return self._envelope(self.asked.envelope)
 
     def _envelope(self, own: Envelope) -> Envelope:
@@ -276,16 +277,16 @@ class AugmentedProblem(Problem):
         own = self.own(trajectory)
         return self.asked.certify(own, tolerance, ending, besides, progress)
 
+    @override
     def errors_between(self, trajectory: Trajectory) -> Array:
-        """See `Problem.errors_between`."""
         return self.asked.errors_between(self.own(trajectory))
 
     @cached_property
+    @override
     def knots(self) -> Array:
-        """See `Problem.knots`."""
         return self.asked.knots
 
     @cached_property
+    @override
     def way_in_reaches(self) -> float:
-        """See `Problem.way_in_reaches`."""
         return self.asked.way_in_reaches

@@ -6,6 +6,7 @@ from typing import ClassVar, cast
 
 import numpy as np
 import numpy.typing as npt
+from typing_extensions import override
 
 from selfmotion.basics import Array, Flags, Ints
 from selfmotion.certificate import Column, Quantity
@@ -38,12 +39,12 @@ class _OfArm(Cost):
         for flag in ("is_quadratic", "is_pointwise"):
             setattr(self, flag, getattr(cost, flag))
 
+    @override
     def value(self, samples: Samples) -> Array:
-        """See `Cost.value`."""
         return self._cost.value(samples.of(self._follows))
 
+    @override
     def gradient(self, samples: Samples) -> Partials:
-        """See `Cost.gradient`."""
         found = self._cost.gradient(samples.of(self._follows))
         names = ("q", "qd", "qdd", "qddd")
         return Partials(**{name: self._filled(getattr(found, name)) for name in names})
@@ -55,8 +56,8 @@ class _OfArm(Cost):
         filled[:, : part.shape[1]] = part
         return filled
 
+    @override
     def curvature(self, dof: int) -> dict[int, Array]:
-        """See `Cost.curvature`."""
         n = self._follows.robot.dof
         found = {}
         for order, weight in self._cost.curvature(n).items():
@@ -83,16 +84,16 @@ class _Springs(Cost):
     def __init__(self, weights: Array) -> None:
         self._weights = weights
 
+    @override
     def value(self, samples: Samples) -> Array:
-        """See `Cost.value`."""
         return np.asarray(0.5 * samples.q**2 @ self._weights)
 
+    @override
     def gradient(self, samples: Samples) -> Partials:
-        """See `Cost.gradient`."""
         return Partials(q=samples.q * self._weights)
 
+    @override
     def curvature(self, dof: int) -> dict[int, Array]:
-        """See `Cost.curvature`."""
         return {0: np.diag(self._weights)}
 
 
@@ -112,12 +113,12 @@ class _ArmTangents(NodeTangents):
         object.__setattr__(self, "_dof", dof)
         super().__init__(whole.q[:, :dof], whole.qd[:, :dof], whole.sampling)
 
+    @override
     def picked(self, order: int, nodes: Ints, joints: Ints) -> Array:
-        """See `NodeTangents.picked`."""
         return self._whole.picked(order, nodes, joints)
 
+    @override
     def of_order(self, order: int) -> Array:
-        """See `NodeTangents.of_order`."""
         return self._whole.of_order(order)[:, : self._dof]
 
 
@@ -263,8 +264,8 @@ class WithinBand(BoundQuantity):
         found[self._outside(samples)] = -1.0
         return found
 
+    @override
     def tangents(self, samples: Samples, motion: NodeTangents) -> Array:
-        """See `BoundConstraint.tangents`."""
         found = super().tangents(samples, motion)
         found[self._outside(samples)] = 0.0
         return found

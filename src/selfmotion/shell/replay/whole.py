@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from typing_extensions import override
 
 from selfmotion.basics import Array, ProblemError
 from selfmotion.certificate import Certificate, Extreme, Tolerance
@@ -299,8 +300,8 @@ class _Performed(Path, kind="_performed"):
         self._robot, self._motion = robot, motion
         self.duration = motion.duration
 
+    @override
     def evaluate(self, t: Array) -> PathSamples:
-        """See `Path.evaluate`."""
         times = np.minimum(self._motion.t[0] + t, self._motion.t[-1])
         chain = self._robot.chain
         placed = [chain.at(q) for q in self._motion(times)]

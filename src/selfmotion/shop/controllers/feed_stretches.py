@@ -8,6 +8,7 @@ from math import ceil
 from typing import Any, NamedTuple
 
 import numpy as np
+from typing_extensions import override
 
 from selfmotion.basics import Array, FileFormatError
 from selfmotion.model.motion import Trajectory
@@ -178,8 +179,8 @@ class FeedStretch(PoseStretch):
     is_spline: bool = False
 
     @property
+    @override
     def duration(self) -> float:
-        """See `Stretch.duration`."""
         return self.seconds
 
     @property

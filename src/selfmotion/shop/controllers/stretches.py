@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
+from typing_extensions import override
 
 from selfmotion.basics import Array, Ints
 from selfmotion.certificate import Tolerance
@@ -315,12 +316,12 @@ class PoseStretch(Stretch):
     near: Callable[[Array], Array]
     order: Ints
 
+    @override
     def in_order(self, order: Sequence[int]) -> "PoseStretch":
-        """See `Stretch.in_order`."""
         return replace(self, q=self.q[:, order], order=self.order[list(order)])
 
+    @override
     def looked_at(self) -> Array:
-        """See `Stretch.looked_at`."""
         return finer(self.t, _BETWEEN_POSES)
 
     def ways(self, times: Array) -> list[Array]:
@@ -334,8 +335,8 @@ class PoseStretch(Stretch):
             found.append(self._spline(times))
         return [self._joints(rows, times)[:, self.order] for rows in found]
 
+    @override
     def smooth(self) -> tuple[Array, Array, Array]:
-        """See `Stretch.smooth`."""
         from scipy.interpolate import CubicSpline
 
         times = self.looked_at()

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from typing_extensions import override
 
 from selfmotion.basics import Array, Flags, ProblemError, Progress, silent
 from selfmotion.certificate import Tolerance
@@ -147,8 +148,8 @@ class PoseSpan(Span):
     def _check_digits(self, allowed: Tolerance) -> None:
         """Digits of poses are finer than those of joints."""
 
+    @override
     def _passing(self, t: Array, *, at_rest: bool = False) -> Stretch:
-        """See `Span._passing`."""
         stretch = super()._passing(t, at_rest=at_rest)
         if at_rest:
             return stretch
