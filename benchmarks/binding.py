@@ -1,4 +1,4 @@
-"""What it takes to keep what binds: `make bench-binding`.
+"""What it takes to keep what binds: `make bench NAME=binding`.
 
 Each problem is planned with a condition that its best motion breaks, and without: limits of one
 joint's jerk or of all of them that a calmer motion keeps, balls that the best one meets beside the

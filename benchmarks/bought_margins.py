@@ -1,4 +1,4 @@
-"""What margins of 5 mm and 0.5° cost, and whether they are there: `make bench-bought`.
+"""What margins of 5 mm and 0.5° cost, and whether they are there: `make bench NAME=bought`.
 
 Random lines and circles, each with a ball, box or cylinder so large that it comes to 2 to 5 mm of
 the arm. Each is planned with the margin (`plan_with_margin`); random displacements of its full

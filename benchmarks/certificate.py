@@ -1,4 +1,4 @@
-"""Tries to refute certificates: `make fuzz-certificate`.
+"""Tries to refute certificates: `make bench NAME=fuzz-certificate`.
 
 900 motions that are hard to judge: thin plates between samples, limits passed between samples,
 noisy seams. An independent judge looks at 1,000 times per interval. No motion may be 'verified'

@@ -1,12 +1,12 @@
 """Programs that somebody changed in one way: none that runs otherwise is verified.
 
-Part of `make fuzz-programs`. Plans and jobs of arms of six axes are written for KUKA, ABB and
-Universal Robots, as joint targets, as poses, at times or at their feed. One thing is changed in
-each file: a target deleted, doubled or moved, a zone, a blend, a speed, an acceleration, an output,
-the tool, the work object, a time, a unit, the order of two lines, or a line is put in that no
-writer writes. `selfmotion check` judges the file; where it says verified, a player that shares no
-code with the package (`tests/support/played_changes.py`) has to find that it runs as the file
-stated when it was written. As they are written, none may be refused.
+Part of `make bench NAME=fuzz-programs`. Plans and jobs of arms of six axes are written for KUKA,
+ABB and Universal Robots, as joint targets, as poses, at times or at their feed. One thing is
+changed in each file: a target deleted, doubled or moved, a zone, a blend, a speed, an acceleration,
+an output, the tool, the work object, a time, a unit, the order of two lines, or a line is put in
+that no writer writes. `selfmotion check` judges the file; where it says verified, a player that
+shares no code with the package (`tests/support/played_changes.py`) has to find that it runs as the
+file stated when it was written. As they are written, none may be refused.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""How far a part may stand elsewhere when it is planned again: `make bench-corrections`.
+"""How far a part may stand elsewhere when it is planned again: `make bench NAME=corrections`.
 
 Random plans among bodies, as in `margins.py`. Of each, how far the part may be moved and turned is
 looked for at the corners; then it is planned again for random displacements within that, in any

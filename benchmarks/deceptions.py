@@ -1,4 +1,4 @@
-"""Motions made to deceive by who reads the source: `make fuzz-deceptions`.
+"""Motions made to deceive by who reads the source: `make bench NAME=fuzz-deceptions`.
 
 2,004 motions of random cells that vanish where the certificate looks, or have features far narrower
 than its intervals; each asks for one thing (a path, a band, a torque, a distance, a feed …), beside

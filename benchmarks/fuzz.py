@@ -1,4 +1,6 @@
-"""Plans many random reachable paths and lets an independent checker judge: `make fuzz`.
+"""Plans many random reachable paths and lets an independent checker judge.
+
+`make bench NAME=fuzz-paths`.
 
 Each pose of a path can be reached by some configuration within the joint limits; whether one
 continuous motion follows it within all limits is what planning has to find out. The

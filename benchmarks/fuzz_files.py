@@ -1,4 +1,4 @@
-"""Reads 20,000 spoiled files through the public readers: `make fuzz-files`.
+"""Reads 20,000 spoiled files through the public readers: `make bench NAME=fuzz-files`.
 
 URDFs, SRDFs, paths, motions, problems, plans, limits and obstacles that were right once: bytes
 flipped, cut, doubled, in other encodings, with numbers that cannot be meant, nested without end,

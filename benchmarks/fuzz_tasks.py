@@ -1,4 +1,6 @@
-"""Position and pointing tasks among boxes, judged by an independent checker: `make fuzz-tasks`.
+"""Position and pointing tasks among boxes, judged by an independent checker.
+
+`make bench NAME=fuzz-tasks`.
 
 The tool's path is that of a random smooth joint motion of a Panda, which is then forgotten, and
 which boxes come near: so there is a motion, and the boxes matter. The judge is that of the suite:

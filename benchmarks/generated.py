@@ -1,4 +1,6 @@
-"""Plans thousands of generated problems and judges each plan anew: `make fuzz-generated`.
+"""Plans thousands of generated problems and judges each plan anew.
+
+`make bench NAME=fuzz-generated`.
 
 Arms of 2 to 9 joints, paths, tasks, constraints and obstacles of all kinds, numbers that cannot be
 meant now and then. Each problem has to end in a plan whose verdict an independent judge confirms,

@@ -1,4 +1,4 @@
-"""A frame of 132 strokes, extruded by a Panda with a nozzle of 80 mm: `make bench-job`.
+"""A frame of 132 strokes, extruded by a Panda with a nozzle of 80 mm: `make bench NAME=job`.
 
 Each stroke once, from either end, begun where it is grounded or at what was made before; what was
 made stands there, but within 5 mm of a node that the stroke shares. The tool's axis stays within

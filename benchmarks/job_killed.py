@@ -1,4 +1,4 @@
-"""A job killed at 20 random times, and begun again each time: `make fuzz-job`.
+"""A job killed at 20 random times, and begun again each time: `make bench NAME=fuzz-job`.
 
 The program in the end is that of a run that nothing stopped, and no run does again what an earlier
 one had finished. With `--workers 2` other processes plan; the run that nothing stopped is of one.

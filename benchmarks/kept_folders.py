@@ -1,4 +1,6 @@
-"""Folders of 50 jobs and 50 batches, each spoilt in one way and begun again: `make fuzz-kept`.
+"""Folders of 50 jobs and 50 batches, each spoilt in one way and begun again.
+
+`make bench NAME=fuzz-kept`.
 
 Whatever was done to a folder, what comes of it is what comes of an empty one: never a wrong
 'verified', never stuck. Ways: files swapped, truncated, touched, of another job; a mesh edited; a

@@ -1,4 +1,4 @@
-"""Jobs of which a seam was added, removed or moved, planned again: `make bench-kept`.
+"""Jobs of which a seam was added, removed or moved, planned again: `make bench NAME=kept`.
 
 100 random jobs of two to six seams on a block, for three arms. Each is planned, saved and loaded;
 then a seam is added, removed or moved, or the job is left as it is, and it is planned again from

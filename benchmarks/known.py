@@ -1,4 +1,4 @@
-"""Problems that have a known motion: is one found? `make bench-known`.
+"""Problems that have a known motion: is one found? `make bench NAME=known`.
 
 A random smooth joint motion draws the tool's path, exactly: its pose and twist are those of
 kinematics that share no code with the planner. Everything that is asked is set just beyond what
@@ -536,7 +536,7 @@ def refuted(plan: sm.Plan, found: Known, asked: Asked) -> list[str]:
         said += judge.judge(motion).refutes
     for item in asked.constraints:
         if isinstance(item, sm.constraints.Clearance):
-            # Distances are the package's own: `make distances` judges these.
+            # Distances are the package's own: `make bench NAME=distances` judges these.
             model = sm.obstacles.CollisionModel(found.robot, item.obstacles)
             near = model.worst(q[::7]).value
             if not near >= item.distance - ROUNDING:

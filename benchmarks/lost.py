@@ -1,4 +1,4 @@
-"""What was found once, is it found again? `make bench-lost`.
+"""What was found once, is it found again? `make bench NAME=lost`.
 
 Costs and verdicts of all problems of other benchmarks are kept in one file, `data/found.csv`: of
 problems whose constraints bind, with tolerances, with known motions, at places around arms, of

@@ -1,4 +1,4 @@
-"""By how much part, tool and base may be displaced: `make bench-margins`.
+"""By how much part, tool and base may be displaced: `make bench NAME=margins`.
 
 Random lines and circles among random bodies are planned. The margins of each verified plan are
 held against a judge of the tests that knows Pinocchio and coal alone: random displacements on the

@@ -1,7 +1,7 @@
 """Plans the paper's planar problem 10,000 times in one process, and tells its resident memory.
 
-`make memory`: at a tenth, half and all of them, or of those that fit into five minutes; exit code
-1 where the second half takes more than 1 MB.
+`make bench NAME=memory`: at a tenth, half and all of them, or of those that fit into five minutes;
+exit code 1 where the second half takes more than 1 MB.
 """
 
 import gc

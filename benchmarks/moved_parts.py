@@ -1,4 +1,4 @@
-"""Jobs whose part was moved, planned again from the program that is kept: `make bench-moved`.
+"""Jobs whose part was moved, planned again from the program that is kept: `make bench NAME=moved`.
 
 30 jobs of two to four seams on a block, with a post beside it, for three arms. Each is planned,
 then the block is moved by up to 50 mm and turned by up to 5°, and the job is planned again: from

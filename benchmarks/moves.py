@@ -1,4 +1,4 @@
-"""Random transfers among boxes, each with a known way: `make bench-moves`.
+"""Random transfers among boxes, each with a known way: `make bench NAME=moves`.
 
 Arms of 6 to 9 joints. How many are found in two seconds, how many are wrong by a look at 4,000
 times with exact distances, and how long they take against the best of 50 tries of OMPL's

@@ -1,11 +1,10 @@
 """Puts faults into the parts that all else stands on, and counts those that tests catch.
 
-`make mutants`: a sample, by a seed, of the mutants that cosmic-ray's operators make of what plans
-(charts, rows, objective, Newton's method, ends, search, virtual joints, bodies), of what judges,
-and of places and readers. Each is judged by the tests of its part, in a process of its own, the
-cheapest first, until one fails.
-Survivors are told with what was changed. Those that change no result are listed in
-data/equivalent_mutants.toml with the reason, and are not counted.
+`make bench NAME=mutants`: a sample, by a seed, of the mutants that cosmic-ray's operators make of
+what plans (charts, rows, objective, Newton's method, ends, search, virtual joints, bodies), of what
+judges, and of places and readers. Each is judged by the tests of its part, in a process of its own,
+the cheapest first, until one fails. Survivors are told with what was changed. Those that change no
+result are listed in data/equivalent_mutants.toml with the reason, and are not counted.
 
 Left out, because every test or none would see them: decorators, annotations, what is called only in
 order to be compiled (`meanwhile`), and replacements that nobody writes for numbers (bits, shifts,

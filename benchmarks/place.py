@@ -1,4 +1,4 @@
-"""Where to put the part: `make bench-place`.
+"""Where to put the part: `make bench NAME=place`.
 
 `selfmotion.place` against places all over the box, each planned on its own, the best of which go
 downhill. The seams, one or three, are random, above a block that belongs to the part, beside a wall

@@ -1,8 +1,8 @@
 """A seam at many places around three arms: what is planned, and how fast a 'no' comes.
 
-`make bench-places`. Each place is drawn at random, near and far, with and without relaxations, and
-with bodies in some; many are bad, as they are when a cell is laid out. A 'yes' is a verified plan;
-a 'no' is held against an exhaustive search that shares nothing with the product's
+`make bench NAME=places`. Each place is drawn at random, near and far, with and without relaxations,
+and with bodies in some; many are bad, as they are when a cell is laid out. A 'yes' is a verified
+plan; a 'no' is held against an exhaustive search that shares nothing with the product's
 (`places_truth.py`).
 """
 

@@ -1,4 +1,6 @@
-"""200 random programs of pockets and holes, held against an interpreter: `make fuzz-pockets`.
+"""200 random programs of pockets and holes, held against an interpreter.
+
+`make bench NAME=fuzz-pockets`.
 
 Depths, several cuts, `G28`, `G53`, `G91`, cycles, M words between (`tests/support/
 pocket_programs.py`). Each is read as a job; where the tool goes is held against the interpreter's

@@ -1,4 +1,6 @@
-"""Random plans as linear programs, judged by kinematics of our own: `make fuzz-programs`.
+"""Random plans as linear programs, judged by kinematics of our own.
+
+`make bench NAME=fuzz-programs`.
 
 Arms of six axes alone, on a rail, and with a plate that tilts and turns; lines, arcs and corners.
 Each is written for KUKA, ABB and Universal Robots, read by patterns that share nothing with the

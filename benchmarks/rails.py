@@ -1,4 +1,4 @@
-"""What a metre of a rail is to count against a radian: `make bench-rails`.
+"""What a metre of a rail is to count against a radian: `make bench NAME=rails`.
 
 Arms of Universal Robots on three rails: a fast light one, a usual one, a slow heavy one. Each
 follows the same seams along its rail, straight ones and ones with waves across and along. The

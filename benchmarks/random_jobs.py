@@ -1,4 +1,4 @@
-"""Random jobs whose seams leave posts where others are: `make fuzz-job`.
+"""Random jobs whose seams leave posts where others are: `make bench NAME=fuzz-job`.
 
 Every program is looked at anew: what stands there by then is measured at many times of each step,
 the order is held against what has to come first, and each seam is made once or named.

@@ -1,4 +1,7 @@
-"""Runs the benchmarks and prints the table of the page on performance: `make bench`."""
+"""Runs the benchmarks and prints the table of the page on performance.
+
+`make bench NAME=timings`.
+"""
 
 from __future__ import annotations
 

@@ -15,7 +15,8 @@ import shown
 from mathml import MathMl
 
 DOCS = Path(__file__).parent
-# Made by `make arms`, `make errors`, `pictures.py` and `two_motions.py`; read on their own as well.
+# Made by `make bench NAME=arms`, `make errors`, `pictures.py` and `two_motions.py`; read on their
+# own as well.
 BESIDE = (
     "arms.md",
     "chains.md",

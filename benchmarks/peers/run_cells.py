@@ -1,4 +1,4 @@
-"""Cells side by side with other tools: `make bench-peers`, after `run_peers.py`.
+"""Cells side by side with other tools: `make bench NAME=peers`, after `run_peers.py`.
 
 A puzzle piece held by an arm against a grinder on two axes, and two arms that carry a bar. What the
 others return is judged as ours is, between waypoints with joints that go straight from one to the

@@ -1,4 +1,4 @@
-"""Measures other tools on the same path, each in its own environment: `make bench-peers`."""
+"""Measures other tools on the same path, each in its own environment: `make bench NAME=peers`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A sample of `make fuzz-deceptions`: what deceives who reads the source is not verified."""
+"""Motions made to deceive are not verified: a sample of `make bench NAME=fuzz-deceptions`."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""A few programs that somebody changed, as `make fuzz-programs` has a thousand of them."""
+"""Programs that were changed by hand: a sample of `make bench NAME=fuzz-programs`."""
 
 from pathlib import Path
 

@@ -18,7 +18,7 @@ def test_every_chain_of_every_file_is_on_the_page() -> None:
     assert list(sections) == sorted(files) == list(files)
     for name, file in files.items():
         tools = re.findall(r"^\| (\S*) \| \d+ \|", sections[name], re.MULTILINE)
-        assert tools == (arms.tips(file) or [""]), "run make arms"
+        assert tools == (arms.tips(file) or [""]), "run make bench NAME=arms"
 
 
 def test_what_is_not_verified_says_why() -> None:

@@ -69,7 +69,7 @@ def test_motions_that_begin_beside_a_relaxed_path_are_gone_on_with(
 
 
 def test_a_motion_that_takes_the_arm_into_itself_is_passed_over_for_another() -> None:
-    """A path of which the cheapest motion does: number 41 of `make bench-starts`."""
+    """A path of which the cheapest motion does: number 41 of `make bench NAME=starts`."""
     start = [
         [0.4700355675781523, 0.8537355921741101, 0.2240582599829922, -0.07655730776130869],
         [-0.07905675572007381, -0.212106666619445, 0.9740435264148128, -0.061082667649131284],

@@ -12,7 +12,7 @@ from support import generated
 from support.generated import Generated, end_of
 from support.strategies import problems
 
-# `make fuzz-generated` plans 5,000, with more evaluations and looking more closely.
+# `make bench NAME=fuzz-generated` plans 5,000, with more evaluations and looking more closely.
 COUNT, EVALUATIONS, PER_INTERVAL = 120, 3, 40
 
 

@@ -10,7 +10,7 @@ import pytest
 import selfmotion as sm
 from support.mutations import Good, good_files, mutated
 
-# `make fuzz-files` reads 20,000, under limits of time and memory.
+# `make bench NAME=fuzz-files` reads 20,000, under limits of time and memory.
 COUNT, SEED = 60, 1
 
 

@@ -23,7 +23,7 @@ from support.scenes import Scene, among_plates, carrying, coarse, near_limits, s
 ROUNDING = 1e-12
 
 
-# Motions of each kind; `make fuzz-certificate` looks at hundreds.
+# Motions of each kind; `make bench NAME=fuzz-certificate` looks at hundreds.
 FEW = range(12)
 
 

@@ -1,8 +1,9 @@
 """How the loop decides: every number that changes a command, in one place.
 
-What they do is seen in `make fuzz-realtime` (1,000 scenarios of pushes, late steps, jumps and
-faults in a closed loop) and `make bench-latency` (percentiles of a step, and what short sight
-costs). None of them is what limits stand on: those hold by `viable`, whatever these are.
+What they do is seen in `make bench NAME=fuzz-realtime` (1,000 scenarios of pushes, late steps,
+jumps and faults in a closed loop) and `make bench NAME=latency` (percentiles of a step, and what
+short sight costs). None of them is what limits stand on: those hold by `viable`, whatever these
+are.
 """
 
 # --- the command

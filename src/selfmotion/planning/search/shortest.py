@@ -46,10 +46,11 @@ _LEVELLED = 1e-9
 # Shorter steps are tried so often, each by this factor.
 _TRIES, _SHORTER = 5, 0.4
 # Around a chain, samples at these distances [rad or m], one after the other. Chains along curves
-# end up to 0.3 % longer with 0.01 as the finest (`make suite`, `make suite-made`).
+# end up to 0.3 % longer with 0.01 as the finest (`make bench NAME=suite`).
 _ROUGH_RINGS = (0.3, 0.1)
 _FINE_RINGS = (0.03, 0.01, 0.003, 0.001)
-# So many of them to each side; of fine ones more, or `make suite-made` has a chain 0.13 % longer.
+# So many of them to each side; of fine ones more, or a chain is 0.13 % longer
+# (`make bench NAME=suite-made`).
 _ROUGH_SIDE, _FINE_SIDE = 2, 4
 
 

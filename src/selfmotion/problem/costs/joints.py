@@ -105,7 +105,7 @@ class JointVelocity(_Derivative):
         """Return that of an arm where no weight is given: W = 1, but for metres among radians.
 
         A joint that moves in metres counts by `RobotModel.speed_weights`, whose squares are W; the
-        name of the cost says so. `make bench-rails` holds that against levers and masses.
+        name of the cost says so. `make bench NAME=rails` holds that against levers and masses.
         """
         slides = [robot.is_prismatic(name) for name in robot.joint_names]
         if all(slides) or not any(slides):

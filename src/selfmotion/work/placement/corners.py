@@ -141,7 +141,7 @@ def correction(
     What is claimed was planned again: in 14 directions, along all axes and into all octants, a
     verified motion was found no joint of which is farther than 0.5 rad or m from the plan's. The
     size is that of the largest ball within these corners: 0.807 of their distance. Between corners
-    nothing is proved; `make bench-corrections` plans again there.
+    nothing is proved; `make bench NAME=corrections` plans again there.
 
     Parameters
     ----------
