@@ -6,7 +6,7 @@ READY := $(VENV)/.ready
 # What is imported by many processes is compiled to bytecode once.
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: help demo check test test-baseline lint format bench short docs errors clean
+.PHONY: help demo check test test-baseline lint format bench short wheel docs errors clean
 
 help:  ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## */\t/' | expand -t 16
@@ -45,6 +45,10 @@ bench: $(READY)  ## a benchmark, make bench NAME=places; without a name, the lis
 short: $(READY)  ## every benchmark with few problems: whether it still runs
 	$(BIN)/python benchmarks --short
 
+wheel: $(READY)  ## a wheel in dist/, with kernels for every x86-64-v3 (or aarch64)
+	PYTHONPATH=tests PIP_CONSTRAINT=constraints.txt $(BIN)/python -m support.baseline \
+		$(BIN)/pip wheel --quiet --no-deps --wheel-dir dist .
+
 docs: $(READY)  ## the site, into out/site
 	@echo "every example runs for it: some minutes; the site takes 32 MB in out/site"
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet --strict --config-file docs/mkdocs.yml
@@ -59,4 +63,5 @@ $(READY): pyproject.toml constraints.txt
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "selfmotion needs Python 3.11 or newer")'
 	$(PYTHON) -m venv $(VENV)
 	PIP_CONSTRAINT=constraints.txt $(BIN)/pip install --quiet --disable-pip-version-check -e '.[dev]'
+	$(BIN)/selfmotion warm-up
 	touch $@

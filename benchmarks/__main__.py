@@ -83,8 +83,8 @@ BENCHMARKS = {
         Run("starts.py", short="--count 2 --out out/short/starts.csv"),
     ),
     "first-plan": Benchmark(
-        "the first plan on a machine; what compiles after a warm-up",
-        Run("first_plan.py", whole="compiles every kernel anew, some minutes"),
+        "pip install, the first plan on a machine, and what is compiled in it",
+        Run("first_plan.py", whole="installs the package in an environment of its own"),
     ),
     "places": Benchmark(
         "a seam at 300 places around three arms, each 'no' held against an exhaustive search",

@@ -138,3 +138,35 @@ def test_kernels_run_as_written_for_a_debugger(
     monkeypatch.setattr(numba.config, "DISABLE_JIT", True)
     assert isinstance(loaded(tmp_path).twice, FunctionType)
     assert loaded(tmp_path).twice(1.5) == 3.0
+
+
+@pytest.mark.parametrize(
+    ("text", "used"),
+    [
+        ('{"cpu": "generic", "features": ""}', True),
+        ('{"cpu": "x86-64-v3", "features": "+none-has-this"}', False),
+        ('{"cpu": "generic"}', False),
+        ("[]", False),
+        ("{", False),
+    ],
+)
+def test_kernels_of_a_wheel_are_used_where_they_fit(
+    text: str, used: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = tmp_path / "kernels.json"
+    file.write_text(text)
+    monkeypatch.setattr(numba.config, "CPU_NAME", None)
+    monkeypatch.setattr(numba.config, "CPU_FEATURES", None)
+    assert jit.use_built_kernels(file) is used
+    assert (numba.config.CPU_NAME is not None) is used
+    assert not jit.use_built_kernels(tmp_path / "none.json")
+
+
+def test_a_processor_that_the_user_chose_stays(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = tmp_path / "kernels.json"
+    file.write_text('{"cpu": "generic", "features": ""}')
+    monkeypatch.setattr(numba.config, "CPU_NAME", "x86-64-v2")
+    assert not jit.use_built_kernels(file)
+    assert numba.config.CPU_NAME == "x86-64-v2"

@@ -39,8 +39,11 @@ def environment() -> dict[str, str]:
     SystemExit
         The processor has no such level.
     """
+    if platform.machine() in ("aarch64", "arm64"):
+        # All of them have the same vectors; there is nothing to leave out.
+        return {"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": ""}
     if platform.machine() not in ("x86_64", "AMD64"):
-        sys.exit(f"a baseline is known of x86-64 only; this is {platform.machine()}")
+        sys.exit(f"a baseline is known of x86-64 and aarch64; this is {platform.machine()}")
     # The names are those of the NumPy that is installed, and of them what this processor has.
     from numpy._core._multiarray_umath import (  # type: ignore[attr-defined]
         __cpu_dispatch__ as dispatched,

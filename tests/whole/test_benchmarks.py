@@ -14,7 +14,8 @@ FOLDER = Path(__file__).parents[2] / "benchmarks"
 @pytest.fixture(scope="module")
 def runner() -> ModuleType:
     spec = importlib.util.spec_from_file_location("benchmarks_runner", FOLDER / "__main__.py")
-    assert spec is not None and spec.loader is not None
+    assert spec is not None
+    assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     sys.modules[spec.name] = module
     spec.loader.exec_module(module)
@@ -43,4 +44,5 @@ def test_an_unknown_name_is_refused_with_those_that_there_are() -> None:
         [sys.executable, str(FOLDER), "place-s"], capture_output=True, text=True, check=False
     )
     assert ended.returncode == 2
-    assert "place-s" in ended.stdout and "places" in ended.stdout
+    assert "place-s" in ended.stdout
+    assert "places" in ended.stdout

@@ -6,6 +6,7 @@ about half of the work.
 """
 
 import contextlib
+import json
 import os
 import subprocess
 import sys
@@ -16,9 +17,37 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
+from llvmlite.binding import get_host_cpu_features
 from numba.core import event
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
+
+
+# Of a wheel for many processors: the one that its kernels are for; `build_kernels.py` writes it.
+BUILT_FOR = Path(__file__).parents[1] / "kernels.json"
+
+
+def use_built_kernels(file: Path = BUILT_FOR) -> bool:
+    """Let numba compile and load for the processor that a wheel was built for; return whether.
+
+    Only where this processor has its features, and nobody has chosen another one. Kernels are
+    compiled for this very processor otherwise.
+    """
+    if numba.config.CPU_NAME is not None:
+        return False
+    try:
+        built = json.loads(file.read_text())
+        cpu, features = str(built["cpu"]), str(built["features"])
+    except (OSError, ValueError, KeyError, TypeError):
+        return False
+    here = get_host_cpu_features()
+    if not all(here.get(name.removeprefix("+")) for name in features.split(",") if name):
+        return False
+    numba.config.CPU_NAME, numba.config.CPU_FEATURES = cpu, features
+    return True
+
+
+use_built_kernels()
 
 
 class _Spent:
