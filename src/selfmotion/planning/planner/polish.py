@@ -160,7 +160,9 @@ class Polisher:
             kept = (begin for begin in self._beginnings(motion) if begin and _is_kept(begin))
             motion = next(kept, motion)
         # What takes long is seldom kept in the end: other beginnings come before the rest of it.
-        first = best = minimise(motion, self._report, multipliers, roughly=True, most=_FEWER)
+        first = best = minimise(
+            motion, self._report, multipliers, roughly=True, max_iterations=_FEWER
+        )
         rank = partial(_rank, begun=motion)
         if not _is_kept(best.motion) and self._ended is None:
             best = self._other(motion, best, free)
@@ -204,7 +206,7 @@ class Polisher:
             near.reverse()
         for begin in chain(*near, self._beginnings(begun), self._aside(begun)):
             if begin is not None and begin.violation <= _TOO_FAR:
-                found = minimise(begin, self._report, roughly=True, most=_FEWER)
+                found = minimise(begin, self._report, roughly=True, max_iterations=_FEWER)
                 best = min(best, found, key=rank)
             if self._ended is not None or _is_kept(best.motion):
                 break
@@ -221,7 +223,9 @@ class Polisher:
             grid = NodeGrid(
                 problem, motion.grid.t, kept, free=self._free, counts=self._effort.counts
             )
-            found = minimise(grid.at(motion.centred), self._noted, roughly=True, most=_FEWER)
+            found = minimise(
+                grid.at(motion.centred), self._noted, roughly=True, max_iterations=_FEWER
+            )
             motion = motion.grid.at(found.motion.centred)
             if _is_kept(motion) or number == _CALM_ROUNDS - 1:
                 yield motion

@@ -194,7 +194,7 @@ class Ranking:
 
     def _roughly(self, begun: NodeMotion) -> NodeMotion:
         """Return the rough optimum near a motion, or that itself where it keeps more."""
-        found = minimise(begun, lambda _: False, roughly=True, most=_ROUGH_ROUNDS).motion
+        found = minimise(begun, lambda _: False, roughly=True, max_iterations=_ROUGH_ROUNDS).motion
         return min(found, begun, key=self._rank)
 
     def _is_pointwise(self) -> bool:
@@ -293,7 +293,7 @@ class Ranking:
             self._progress("start", number, total)
             # It is a long way from where there is no self-motion.
             most = _WITH_CONDITIONS if number <= len(free) else _ROUGH_ROUNDS
-            better = minimise(motion, lambda _: False, roughly=True, most=most).motion
+            better = minimise(motion, lambda _: False, roughly=True, max_iterations=most).motion
             found = sorted([*found, (self._rank(better), better)], key=lambda each: each[0])
             self._ranked = [one for _, one in found]
         return self._different(self._ranked)[:finalists]
