@@ -113,7 +113,7 @@ class _Solver:
 
     def __init__(self, start: NodeMotion, multipliers: Array | None, *, roughly: bool) -> None:
         self.motion, h = start, start.h
-        self._cost_scale = max(abs(start.aim), np.finfo(float).tiny)
+        self._cost_scale = max(abs(start.objective), np.finfo(float).tiny)
         each = self._cost_scale / max(int((h > -1e2).sum()), 1)
         self._rough, last = roughly, SETTINGS.mu_warm if roughly else SETTINGS.mu_last
         self._last_barrier, self._rho = last * each, SETTINGS.rho * self._cost_scale
@@ -322,7 +322,7 @@ class _Solver:
             length = min(length, _to_boundary(values, change))
         while length >= SETTINGS.min_length:
             new = motion.along(length * step.nodes, model.around.changes)
-            if new is not None and np.isfinite(new.aim):
+            if new is not None and np.isfinite(new.objective):
                 elastics = self._elastics + length * step.elastics
                 # A gap below 0 closes for nothing; one above costs the penalty, not ρ: else the
                 # rows' curvature stops the steps.
@@ -353,7 +353,7 @@ class _Solver:
         barrier = self._barrier * float(np.log(slacks).sum() + np.log(elastics).sum())
         gap = np.abs(motion.h[self._active] + slacks - elastics).sum() + np.abs(motion.c).sum()
         elastic = self._rho * float(elastics.sum())
-        return motion.aim + elastic - barrier + self._merit_penalty * float(gap)
+        return motion.objective + elastic - barrier + self._merit_penalty * float(gap)
 
 
 def _to_boundary(values: Array, step: Array) -> float:

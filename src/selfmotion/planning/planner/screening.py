@@ -238,7 +238,7 @@ class Ranking:
 
     def _grid(self, problem: Problem) -> NodeGrid:
         counts = self._effort.counts
-        return NodeGrid(problem, self._t, (), free=self._free, counts=counts, calm=True)
+        return NodeGrid(problem, self._t, (), free=self._free, counts=counts, smoothed=True)
 
     def _decisive(self, found: Batch, finalists: int) -> list[NodeMotion]:
         """Return the cheapest motion that keeps all, then others about as cheap; or none.
@@ -350,7 +350,7 @@ class Ranking:
         problem, still = self._problem, np.zeros_like(q)
         bound = problem.bind_constraints(q[0], q[-1], apart=self._effort.apart)
         counts = self._effort.counts
-        grid = NodeGrid(problem, self._t, bound, free=self._free, counts=counts, calm=True)
+        grid = NodeGrid(problem, self._t, bound, free=self._free, counts=counts, smoothed=True)
         return grid.near(q, still if qd is None else qd, still if qdd is None else qdd)
 
     def _clear(self, motion: NodeMotion) -> bool:
