@@ -132,4 +132,4 @@ class Effort:
     max_evaluations: int | None
     counts: Counts
     apart: bool = False
-    in_pieces: bool = False
+    decomposed: bool = False

@@ -345,20 +345,20 @@ class Problem:
         return tuple(item for item in self.constraints if item.applies(self.robot))
 
     def bind_constraints(
-        self, start: Array, end: Array, *, apart: bool = True, in_pieces: bool = False
+        self, start: Array, end: Array, *, apart: bool = True, decomposed: bool = False
     ) -> tuple[BoundConstraint, ...]:
         """Return the constraints for this arm, given first and last configuration, (n,) each.
 
         Those of the motion that the optimisation begins with. Without `own_collision` where it need
-        not keep `apart` from itself; with links `in_pieces` where their hulls are too large. With
+        not keep `apart` from itself; with links `decomposed` where their hulls are too large. With
         the arm's own limits where nothing is said of them: no motion beyond these is verified.
         """
         asked = [*self._own_limits, *(self.all_constraints if apart else self._asking)]
         if all(self.rests):
             asked = [item.at_rest() for item in asked]
         return tuple(
-            item.bind_pieces(self.follows)
-            if in_pieces and isinstance(item, Clearance)
+            item.bind_decomposed(self.follows)
+            if decomposed and isinstance(item, Clearance)
             else item.bind(self.follows, start, end)
             for item in asked
         )
