@@ -86,7 +86,7 @@ class ClearanceModel:
         Up to here the values are the distances of the hulls [m].
     width : float
         Over this distance beyond, they level off [m].
-    links_in_pieces : bool, optional
+    decompose_links : bool, optional
         Whether non-convex links are decomposed before obstacles, too: that takes longer.
 
     Attributes

@@ -290,3 +290,7 @@ class AugmentedProblem(Problem):
     @override
     def way_in_reaches(self) -> float:
         return self.asked.way_in_reaches
+
+
+# `Problem.augmented` makes one; this file imports that one, so that the class is set here.
+Problem._augmentation = AugmentedProblem

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -149,6 +149,9 @@ class Problem:
     them.
     """
 
+    # Class of the problem that planners see; set by `augmented`, which derives from this one.
+    _augmentation: ClassVar[type]
+
     robot: RobotModel
     path: Path
     task: _TaskField = _TaskField()  # a descriptor, meant to be shared
@@ -239,9 +242,10 @@ class Problem:
     @cached_property
     def augmented(self) -> Problem:
         """The problem as planners see it: its tolerances are virtual joints."""
-        from selfmotion.problem.problem.augmented import AugmentedProblem
-
-        return AugmentedProblem(self) if self.relaxations else self
+        if not self.relaxations:
+            return self
+        found: Problem = self._augmentation(self)
+        return found
 
     @property
     def asked(self) -> Problem:
