@@ -117,7 +117,12 @@ PARTS = (
     ),
     Part(
         "newton",
-        ("planning/nodes/newton.py", "planning/nodes/newton_system.py", "planning/nodes/batch.py"),
+        (
+            "planning/nodes/newton.py",
+            "planning/nodes/newton_system.py",
+            "planning/nodes/settings.py",
+            "planning/nodes/batch.py",
+        ),
         (
             "nodes/test_newton.py",
             "nodes/test_batch.py",

@@ -1,10 +1,10 @@
 """What each number of the planner decides: `python benchmarks/sensitivity.py`.
 
-The numbers at the heads of files of `planning`, `search` and `transfer` are doubled and halved, one
-at a time, and a few problems are planned that lead through these: prints how many plans change,
-which are lost or found, how their costs change, and the time of the processor. A number that
-changes nothing may go, or follow from another one. Of those that are compiled into kernels nothing
-is told.
+The numbers at the heads of files of `planner`, `nodes`, `search` and `transfer`, and the fields of
+settings there, are doubled and halved, one at a time, and a few problems are planned that lead
+through these. Prints how many plans change, which are lost or found, how their costs change, and
+the processor time. A number that changes nothing may go, or follow from another one. Numbers that
+are compiled into kernels are left out.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import inspect
 import sys
 import time
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import fields, is_dataclass, replace
 from typing import Any
 
 import moves
@@ -83,7 +83,7 @@ def works(folder: str) -> dict[str, Callable[[], Outcome]]:
         each = (("panda", 1), ("ur5", 2), ("xarm7", 0), ("panda, table", 0))
         return {f"{name} {which}": moved(name, which) for name, which in each}
     hard = {f"random {k}": planned(random_path(k)) for k in HARD}
-    if folder == "planning":
+    if folder in ("planning", "nodes"):
         return hard | {f"start {k}": planned(starts.random_problem(k)) for k in FREE}
     search = sm.Search(mode="global")
     pointing = replace(starts.random_problem(4), task="pointing")
@@ -116,13 +116,28 @@ def scaled(value: Any, factor: float) -> Any:
 
 
 def numbers(module: Any) -> list[str]:
-    """Return the names of the numbers at the head of a module."""
+    """Return the names of the numbers at the head of a module, and of fields of its settings."""
     found = []
     for node in ast.parse(inspect.getsource(module)).body:
         for target in node.targets if isinstance(node, ast.Assign) else ():
             names = [each.id for each in ast.walk(target) if isinstance(each, ast.Name)]
-            found += [name for name in names if _is_number(getattr(module, name))]
+            for name in names:
+                value = getattr(module, name)
+                if _is_number(value):
+                    found.append(name)
+                elif is_dataclass(value) and not isinstance(value, type):
+                    numeric = (x.name for x in fields(value) if _is_number(getattr(value, x.name)))
+                    found += [f"{name}.{field}" for field in numeric]
     return found
+
+
+def changed(module: Any, name: str, factor: float) -> Any:
+    """Return the value of a module's attribute with a number of it, by its name, times a factor."""
+    name, _, field = name.partition(".")
+    value = getattr(module, name)
+    if not field:
+        return scaled(value, factor)
+    return replace(value, **{field: scaled(getattr(value, field), factor)})
 
 
 def _is_number(value: Any) -> bool:
@@ -149,7 +164,7 @@ def compared(before: dict[str, Outcome], after: dict[str, Outcome]) -> str:
 def main() -> None:
     """Print a row for each number."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("folders", nargs="*", default=["planning", "search", "transfer"])
+    parser.add_argument("folders", nargs="*", default=["planning", "nodes", "search", "transfer"])
     parser.add_argument("--only", default="", help="numbers whose name has this in it")
     options = parser.parse_args()
     for folder in options.folders:
@@ -165,20 +180,22 @@ def main() -> None:
         }
         for where, module in sorted(modules.items()):
             for name in numbers(module):
-                value = getattr(module, name)
                 if options.only not in name:
                     continue
+                whole = name.split(".")[0]
+                value = getattr(module, whole)
                 # Where it is imported to as well; private ones are not.
-                users = [each for each in modules.values() if hasattr(each, name)]
+                users = [each for each in modules.values() if getattr(each, whole, None) is value]
                 users = [module] if name.startswith("_") else users
                 for factor in (2.0, 0.5):
+                    new = changed(module, name, factor)
                     for each in users:
-                        setattr(each, name, scaled(value, factor))
+                        setattr(each, whole, new)
                     after, seconds = run(work)
                     for each in users:
-                        setattr(each, name, value)
+                        setattr(each, whole, value)
                     print(
-                        f"{where.removeprefix('selfmotion.'):24} {name:22} x {factor:3}: "
+                        f"{where.removeprefix('selfmotion.'):24} {name:36} x {factor:3}: "
                         f"{compared(before, after)}, time x {seconds / usual:.2f}",
                         flush=True,
                     )

@@ -106,7 +106,7 @@ def test_in_lots_a_motion_is_what_it_is_at_once(
         return motion(times, order), motion.travelled(times)
 
     at_once = looked_at()
-    monkeypatch.setattr("selfmotion.model.motion.spline._LOT", 7)
+    monkeypatch.setattr("selfmotion.model.motion.spline._CHUNK", 7)
     for found, expected in zip(looked_at(), at_once, strict=True):
         np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-12)
 

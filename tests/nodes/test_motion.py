@@ -30,8 +30,8 @@ def test_what_is_forgotten_is_the_same_again(case: Case) -> None:
             motion.checked.qdd,
             motion.samples.qddd,
             motion.curve_ends,
-            np.array([motion.cost, motion.aim, motion.violation]),
-            motion.broken_between(),
+            np.array([motion.cost, motion.objective, motion.violation]),
+            motion.broken_intervals(),
         ]
 
     before = known()

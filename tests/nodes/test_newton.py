@@ -173,13 +173,13 @@ def test_limits_of_all_jerks_that_the_calmest_motion_nearly_needs_are_kept(
     path = sm.paths.Circle.around(panda.pose(start), rng.uniform(0.06, 0.12), 4.0, normal=normal)
     task = "position" if rng.random() < 0.4 else "pose"
     free = sm.Problem(panda, path, task, start, constraints=[sm.constraints.JointPositionLimits()])
-    calm = sm.plan(replace(free, costs=[sm.costs.JointJerk()])).require()
-    limits = 1.1 * largest_jerks(calm)
+    smoothed = sm.plan(replace(free, costs=[sm.costs.JointJerk()])).require()
+    limits = 1.1 * largest_jerks(smoothed)
     assert (largest_jerks(sm.plan(free)) > 1.5 * limits).any()
     asked = [*free.constraints, sm.constraints.JointJerkLimits(limits)]
     plan = sm.plan(replace(free, constraints=asked)).require()
     assert (largest_jerks(plan) <= limits).all()
-    assert plan.report.cost <= calm.evaluate(sm.costs.JointVelocity())
+    assert plan.report.cost <= smoothed.evaluate(sm.costs.JointVelocity())
 
 
 @pytest.mark.parametrize("share", [0.3, 0.6, 0.9])

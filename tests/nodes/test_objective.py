@@ -52,13 +52,13 @@ def test_gradient_and_curvature_are_central_differences(case: Case, rest: bool) 
     # As large in q, q̇ and q̈ between the nodes.
     step = random_step(motion, 2) * motion.grid.scale
     above, below = (moved(motion, sign * NEAR * step) for sign in (1.0, -1.0))
-    slope = (above.aim - below.aim) / (2 * NEAR)
+    slope = (above.objective - below.objective) / (2 * NEAR)
     own = gradient(motion)
-    allowed = GRADIENT * np.abs(own * step).sum() + 1e-9 * motion.aim
+    allowed = GRADIENT * np.abs(own * step).sum() + 1e-9 * motion.objective
     assert abs(np.sum(own * step) - slope) < allowed
-    bent = (above.aim - 2.0 * motion.aim + below.aim) / NEAR**2
+    bent = (above.objective - 2.0 * motion.objective + below.objective) / NEAR**2
     product = float(step.ravel() @ matrix_of(motion).dense() @ step.ravel())
-    assert product == pytest.approx(bent, rel=1e-4, abs=1e-4 * motion.aim)
+    assert product == pytest.approx(bent, rel=1e-4, abs=1e-4 * motion.objective)
     # The change of what the cost weighs along a step is that of its ends.
     change = (above.curve_ends - below.curve_ends) / (2 * NEAR)
     found = along(motion, around_of(motion).changes, step)
@@ -86,10 +86,10 @@ def test_curvature_of_other_costs_is_right_to_second_order(case: Case, kind: str
         shape = np.sin(np.linspace(0.0, 3.0, count + 1))[:, None]
         step = shape * np.ones(3 * motion.nu.shape[1])
         dense = matrix_of(motion).dense()
-        above, below = (moved(motion, sign * 1e-4 * step).aim for sign in (1.0, -1.0))
-        bent = (above - 2.0 * motion.aim + below) / 1e-8
+        above, below = (moved(motion, sign * 1e-4 * step).objective for sign in (1.0, -1.0))
+        bent = (above - 2.0 * motion.objective + below) / 1e-8
         product = float(step.ravel() @ dense @ step.ravel())
-        off.append(abs(product - bent) / max(abs(bent), motion.aim))
+        off.append(abs(product - bent) / max(abs(bent), motion.objective))
     assert off[1] < max(0.3 * off[0], 1e-3), off
     assert off[1] < 0.05
 
@@ -97,11 +97,11 @@ def test_curvature_of_other_costs_is_right_to_second_order(case: Case, kind: str
 def test_what_is_minimised_besides_is_no_cost(case: Case) -> None:
     resting, motion = nodes_of(problem_of(case, rest=True)), nodes_of(problem_of(case))
     # At rest, starts and stops count; elsewhere nothing does unless the motion is to be calm.
-    assert resting.aim > resting.cost
-    assert motion.aim == motion.cost
-    calm = motion.on(motion.grid.on(motion.grid.t, calm=True))
-    assert calm is not None
-    assert calm.cost < calm.aim < 1.01 * calm.cost
+    assert resting.objective > resting.cost
+    assert motion.objective == motion.cost
+    smoothed = motion.on(motion.grid.on(motion.grid.t, smoothed=True))
+    assert smoothed is not None
+    assert smoothed.cost < smoothed.objective < 1.01 * smoothed.cost
 
 
 def test_the_cost_converges_quickly(case: Case) -> None:
@@ -121,6 +121,6 @@ def test_in_lots_the_curvature_is_the_same(case: Case, monkeypatch: pytest.Monke
     motion = nodes_of(problem_of(case))
     both = motion.grid.spline.changes(around_of(motion).changes)
     at_once = motion.grid.cost.curvature(motion.samples, motion.partials, both)
-    monkeypatch.setattr("selfmotion.planning.nodes.objective._LOT", 5)
+    monkeypatch.setattr("selfmotion.planning.nodes.objective._CHUNK", 5)
     found = motion.grid.cost.curvature(motion.samples, motion.partials, both)
     np.testing.assert_allclose(found, at_once, rtol=1e-12, atol=1e-12 * np.abs(at_once).max())

@@ -156,7 +156,7 @@ def test_intervals_are_divided_where_something_is_beyond_between_points(
     limit = 0.7 * float(turn_rates(free.trajectory, whole).max())
     asked = sm.constraints.ToolLimits(turn_rate=limit)
     motion = nodes_of(small_circle(panda, task="position", constraints=[asked]))
-    parts = motion.parts_between()
+    parts = motion.subdivisions()
     t = motion.grid.t
     looks = np.linspace(t[:-1], t[1:], 8, endpoint=False, axis=1)
     most = turn_rates(motion.trajectory, looks.ravel()).reshape(looks.shape).max(axis=1)

@@ -75,7 +75,7 @@ def test_what_is_held_for_a_while_begins_and_ends_without_a_jump() -> None:
     problem = problem_of((robot, "pose", start, path), relaxations=[held]).augmented
     t = np.linspace(0.0, path.duration, 201)
     spline = Quintic(t)
-    found = smoothing_of(problem, spline, calm=False)
+    found = smoothing_of(problem, spline, smoothed=False)
     assert found is not None
     times = spline.sampling.t
     for order in (2, 3):

@@ -129,7 +129,7 @@ def test_verdicts_follow_the_numbers() -> None:
     pages = []
     for shown in (claim, turned):
         parts = (Chapter("s", "S", claims=(shown,)),)
-        from selfmotion.paper.study.run import html
+        from selfmotion.paper.study.page import html
 
         pages.append(html(Study(parts, 0.0, "test")))
     assert 'class="refuted"' in pages[0]

@@ -1,25 +1,17 @@
-"""Plans the next seconds again and again while the arm moves."""
+"""Replanner: plans the next seconds repeatedly while the arm moves (receding horizon)."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from selfmotion.basics import (
     Array,
-    PathError,
-    ProblemError,
-    RobotError,
     as_number,
-    as_numbers,
-    as_several,
     as_whole,
     one_blas_thread,
-    plain_numbers,
-    shown,
 )
 from selfmotion.model.follow import Follows
 from selfmotion.model.motion import NullMotion, PolynomialNullMotion
@@ -29,105 +21,20 @@ from selfmotion.model.task import SE3, Task
 from selfmotion.problem.constraints import Constraint
 from selfmotion.problem.costs import Cost, JointVelocity
 from selfmotion.realtime import law
+from selfmotion.realtime.checks import (
+    age_of_target,
+    check_kinds,
+    check_null_space,
+    checked_state,
+    checked_terms,
+    measured_state,
+    observed_target,
+)
 from selfmotion.realtime.clear import Surroundings
 from selfmotion.realtime.commands import Commands, Flag, Segment, joint_limits, planned_limits
 from selfmotion.realtime.horizon import Horizon
-from selfmotion.realtime.reference import Approach, LastPath, MovingPose, Reference
+from selfmotion.realtime.reference import Approach, LastPath, Reference
 from selfmotion.realtime.settings import AHEAD, SOON
-
-# What a replanner is given, checked before the first step.
-
-
-def check_kinds(robot: Any, null_motion: Any, approach: Any) -> None:
-    """Refuse what is no arm, no null motion or no approach."""
-    for name, given, kind, example in (
-        ("robot", robot, RobotModel, "a RobotModel (load_robot)"),
-        ("null_motion", null_motion, NullMotion | None, "a NullMotion or None"),
-        ("approach", approach, Approach | None, "an Approach or None"),
-    ):
-        if not isinstance(given, kind):
-            raise ProblemError(f"{name} is {shown(given)}, expected {example}")
-
-
-def as_asked(
-    follows: Follows, costs: Any, constraints: Any
-) -> tuple[Sequence[Cost], Sequence[Constraint]]:
-    """Return costs and constraints as tuples, of kinds that fit the arm and a task it can follow.
-
-    Raises
-    ------
-    ProblemError
-        They do not.
-    """
-    robot, task = follows.robot, follows.task
-    if not robot.can_follow(task):
-        able = [other.value for other in Task if robot.can_follow(other)]
-        raise ProblemError(
-            f"{robot.name}: cannot move the tool in every row of task '{task.value}'; "
-            f"expected one of those that it can: {', '.join(able) or 'none'}"
-        )
-    wanted = as_several(costs, "costs", Cost)  # type: ignore[type-abstract]
-    for cost in wanted:
-        cost.check(follows)
-    kept = as_several(constraints, "constraints", Constraint)
-    return wanted, kept
-
-
-def as_begun(values: Any, what: str, dof: int) -> Array:
-    """Return the state (n,) that the command begins with; RobotError where it is none."""
-    return as_numbers(values, what, f"{dof} finite numbers, one for each joint", (dof,), RobotError)
-
-
-def as_measured(values: Any, dof: int) -> Array:
-    """Return a measured state (n,) as it is, or NaN where it is no numbers at all."""
-    numbers = plain_numbers(values)
-    return np.full(dof, np.nan) if numbers is None else numbers
-
-
-def as_seen(
-    path: object, target: Any, twist: Any, seen: float, reasons: list[str]
-) -> MovingPose | None:
-    """Return the motion of a target as it was seen; None where it is none, and add the reason.
-
-    A camera that sees nothing, or what is not finite, must not leave the arm without a command.
-
-    Raises
-    ------
-    ProblemError
-        There is a path, too, or no target.
-    """
-    if path is not None or target is None:
-        named = "path and target" if path is not None else "twist and seen"
-        raise ProblemError(
-            f"{named}: a target moves by its twist from when it was seen, in place of a path; "
-            f"give target= with them, and no path"
-        )
-    try:
-        return MovingPose(target, np.zeros(6) if twist is None else twist, seen)
-    except PathError as error:
-        reasons.append(f"the target is of no use: {error}")
-        return None
-
-
-def age_of(path: Path | None, t: float) -> float:
-    """Return how long ago a target was seen [s]; of a path, which is no observation, 0."""
-    while path is not None and not isinstance(path, MovingPose):
-        # Of what is placed, carried along or retimed, the path that it is made of.
-        path = next((item for item in vars(path).values() if isinstance(item, Path)), None)
-    return 0.0 if path is None else t - path.seen
-
-
-def in_null_space(motion: NullMotion) -> NullMotion:
-    """Return a null motion; ProblemError unless it is one in the null space."""
-    if motion.space != "null":
-        raise ProblemError(
-            f"null motion: space is '{motion.space}', expected 'null': while the arm moves, "
-            f"self-motions are in the null space"
-        )
-    return motion
-
-
-# Plans the next seconds again and again while the arm moves.
 
 
 class Replanner:
@@ -211,9 +118,9 @@ class Replanner:
         as_number(reserve, "reserve", least=0.0, most=self.horizon)
         somewhere = Dwell(robot.pose(robot.dexterous_configuration()), self.horizon)
         follows = Follows.of(robot, somewhere, self.task)
-        costs, constraints = as_asked(follows, costs, constraints)
+        costs, constraints = checked_terms(follows, costs, constraints)
         self.limits = limits = joint_limits(robot, constraints)
-        null_motion = in_null_space(null_motion or PolynomialNullMotion())
+        null_motion = check_null_space(null_motion or PolynomialNullMotion())
         steps = as_whole(steps, "steps", null_motion.fewest_steps, 1000)
         bodies = [pair for item in constraints for pair in item.envelope(robot).bodies]
         self._around = Surroundings(robot, bodies) if bodies else None
@@ -303,8 +210,8 @@ class Replanner:
         """
         t, reasons = as_number(t, "t"), list[str]()
         if target is not None or twist is not None or seen is not None:
-            path = as_seen(path, target, twist, t if seen is None else seen, reasons)
-        age = age_of(path, t)
+            path = observed_target(path, target, twist, t if seen is None else seen, reasons)
+        age = age_of_target(path, t)
         if abs(age) > self._patience:
             when = f"{age:.3g} s ago" if age > 0.0 else f"in {-age:.3g} s: on another clock?"
             reasons.append(
@@ -326,8 +233,8 @@ class Replanner:
     ) -> Segment:
         dof = self.robot.dof
         if not self._begun:
-            self._begin(t, as_begun(q, "q", dof), as_begun(qd, "qd", dof))
-        q, qd = as_measured(q, dof), as_measured(qd, dof)
+            self._start(t, checked_state(q, "q", dof), checked_state(qd, "qd", dof))
+        q, qd = measured_state(q, dof), measured_state(qd, dof)
         commands = self._commands
         passed = commands.go_on(t)
         if self._around is not None:
@@ -349,7 +256,7 @@ class Replanner:
         self._follows = follows or flag is Flag.STOPPING
         return commands.segment(first, flag, tuple(reasons), follows, error)
 
-    def _begin(self, t: float, q: Array, qd: Array) -> None:
+    def _start(self, t: float, q: Array, qd: Array) -> None:
         self._commands.begin(t, q, qd)
         self._path = LastPath(self._patience)
         self._without_state = self._without_way = 0.0

@@ -10,11 +10,12 @@ import numpy as np
 from numba.core import event
 
 import selfmotion as sm
-from selfmotion import realtime
 from selfmotion.basics import FIRST_WORKS, Counts, compile_alone, read_only
 from selfmotion.model.collision.kernels import winding_number
 from selfmotion.model.task import SE3
 from selfmotion.planning.nodes import NodeGrid
+from selfmotion.realtime.loop import warm_up
+from selfmotion.realtime.replanner import Replanner
 from selfmotion.work.job.order import improved
 from selfmotion.work.job.stops import Stops
 
@@ -92,7 +93,7 @@ def small_works() -> Iterator[tuple[str, Callable[[], object]]]:
     yield "limits on the way", lambda: nodes.motion_towards(home, home, 1.0)
     yield "orders of many seams", lambda: improved(_two_stops())
     yield "moves", lambda: sm.move(arm, home, home + 0.3, clearance=box)
-    yield "a replanner", lambda: realtime.warm_up(realtime.Replanner(arm, "position"))
+    yield "a replanner", lambda: warm_up(Replanner(arm, "position"))
 
 
 def _refused(problem: sm.Problem) -> str:

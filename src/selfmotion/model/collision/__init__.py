@@ -1,13 +1,13 @@
 """Collisions: exact distances for certificates, smooth conservative ones for optimisation."""
 
-from selfmotion.model.collision.as_made import (
-    overlapping_as_made as overlapping_as_made,
-    told_as_made as told_as_made,
-)
 from selfmotion.model.collision.bodies import (
     Body as Body,
     link_bodies as link_bodies,
     place_of as place_of,
+)
+from selfmotion.model.collision.by_design import (
+    overlap_warning as overlap_warning,
+    overlapping_by_design as overlapping_by_design,
 )
 from selfmotion.model.collision.clearance import (
     ClearanceModel as ClearanceModel,

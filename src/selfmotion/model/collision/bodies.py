@@ -1,4 +1,4 @@
-"""What can collide, and how far its points move with the joints."""
+"""Collision bodies, and bounds of their motion by the joints."""
 
 import xml.etree.ElementTree as ElementTree
 from collections import Counter
@@ -14,12 +14,10 @@ from selfmotion.model.collision.obstacles import Obstacle
 from selfmotion.model.collision.solids import Solid
 from selfmotion.model.robot import RobotModel, Urdf
 
-# What can collide: the links' collision geometry and the obstacles, complete or refused.
-
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """A piece of geometry and what carries it.
+    """Geometry and the frame that carries it.
 
     Attributes
     ----------
@@ -54,7 +52,7 @@ def link_bodies(robot: RobotModel) -> list[Body]:
     RobotError
         A mesh file is missing or cannot be read.
     CollisionError
-        An element is no body, or is missing among what Pinocchio made of them.
+        An element is no body, or Pinocchio has read none for it.
     """
     pieces = robot.geometry(pin.GeometryType.COLLISION).geometryObjects
     links = [robot.link_of(piece.parentFrame) for piece in pieces]
@@ -71,7 +69,7 @@ def link_bodies(robot: RobotModel) -> list[Body]:
 def obstacle_bodies(obstacles: Sequence[Obstacle], robot: RobotModel) -> list[Body]:
     """Return the obstacles as bodies, those that ride on links before those of the world.
 
-    What a link carries that no joint moves stands in the world.
+    A body on a link that no joint moves belongs to the world.
 
     Raises
     ------
@@ -117,8 +115,6 @@ def _check_count(urdf: Urdf, links: Sequence[str]) -> None:
             )
 
 
-# How far points of a body can move per unit of each joint's travel, whatever the configuration.
-
 Ints = npt.NDArray[np.int64]
 
 
@@ -129,9 +125,9 @@ def axis_distances(robot: RobotModel, bodies: Sequence[Body]) -> Array:
 
     They hold at all configurations within the joint limits. Of a body and an axis that one joint
     parts, it is the largest distance of the body's outline from the axis. Beyond, the distances
-    from one joint's origin to the next on the way through the tree add to it, and the travel of
-    prismatic joints between them. Bodies on either side of the joint are measured; those beyond it
-    are moved by it, the others stand still.
+    from one joint's origin to the next along the tree add to it, and the travel of prismatic
+    joints between them. Bodies on either side of the joint are measured: those beyond it are moved
+    by it, the others are at rest.
 
     For a prismatic joint it is 1 [m/m]: there every point moves as far as the joint.
     """
@@ -147,7 +143,7 @@ def axis_distances(robot: RobotModel, bodies: Sequence[Body]) -> Array:
 
 
 def moved_by(bodies: Sequence[Body], robot: RobotModel) -> npt.NDArray[np.bool_]:
-    """Return which bodies each joint of the model moves, (B, N): all that it carries."""
+    """Return the mask of bodies that each joint of the model carries, (B, N)."""
     tree = _Tree(robot)
     found = np.zeros((len(bodies), robot.model.nv), dtype=bool)
     for b, body in enumerate(bodies):
@@ -168,25 +164,25 @@ def pair_levers(distances: Array, moved: npt.NDArray[np.bool_], pairs: Ints) -> 
 
 
 def is_turned(robot: RobotModel) -> npt.NDArray[np.bool_]:
-    """Return which joints of the model are revolute, (N,)."""
+    """Return the mask of revolute joints of the model, (N,)."""
     return robot.tree.is_revolute
 
 
 def travel_beyond(robot: RobotModel, farthest: Array) -> float:
-    """Return how much longer levers get where joints go as far as `farthest` (n,) from 0 [m]."""
+    """Return the increase of lever arms where joints are up to `farthest` (n,) from 0 [m]."""
     far = _of_joints(robot, farthest)
     return float(np.maximum(far - _travel(robot), 0.0)[~is_turned(robot)].sum())
 
 
 def _travel(robot: RobotModel) -> Array:
-    """Return how far prismatic joints go from 0 within their limits, 0 for the others, (N,)."""
+    """Return the largest |q| of prismatic joints within limits, 0 for the others, (N,)."""
     lower, upper = robot.finite_limits()
     far = _of_joints(robot, np.maximum(np.abs(lower), np.abs(upper)))
     return np.where(is_turned(robot), 0.0, far)
 
 
 def _of_joints(robot: RobotModel, farthest: Array) -> Array:
-    """Return how far the model's joints (N,) are from 0 at most where coordinates (n,) are."""
+    """Return the largest |q| of the model's joints (N,) for coordinates up to `farthest` (n,)."""
     coupling = robot.coupling
     return np.asarray(coupling.bounds(np.eye(len(coupling.scales))) @ farthest) + np.abs(
         coupling.offsets
@@ -214,7 +210,7 @@ class _Tree:
         return found[::-1]
 
     def distance(self, points: Array, carrier: int, joint: int) -> float:
-        """Return how far points (V, 3) of a body are from a joint's axis at most [m]."""
+        """Return the largest distance of points (V, 3) of a body from a joint's axis [m]."""
         way = self.supports(carrier)
         if joint in way:
             down = way[way.index(joint) + 1 :]

@@ -14,7 +14,7 @@ from selfmotion.model.collision.exact import CollisionModel
 from selfmotion.model.collision.pairs import SAMPLES, hull_overlaps
 from selfmotion.model.task import SE3
 
-# The share of sampled configurations in which hulls of links that meet elsewhere may overlap alone.
+# Share of sampled configurations in which hulls of a pair may overlap although its links do not.
 _FALSE_ALARMS = 0.1
 
 
@@ -38,7 +38,7 @@ class Clearances:
     slopes: Array = field(repr=False)
 
     def along(self, tangents: Array) -> Array:
-        """Return how the distances change along motions of the samples, (K, P, d).
+        """Return the changes of the distances along motions of the samples, (K, P, d).
 
         Parameters
         ----------
@@ -71,12 +71,12 @@ class Clearances:
 class ClearanceModel:
     """Signed distances of the bodies' convex hulls, with derivatives.
 
-    An obstacle that is a mesh with hollows is taken apart: each of the convex pieces that contain
-    it (`Solid.pieces`) is a body here. The distance of two hulls (GJK, and minus the depth by EPA
-    where they overlap) is never more than that of the bodies. It is differentiable but where the
-    closest points jump. From `near` on it is levelled off: with s = d - near and w = `width`, it is
-    near + s - s²/(2w), and near + w/2 from s = w on. Pairs that are farther than that cost no more
-    than a look at the boxes around them.
+    A non-convex mesh obstacle is decomposed: each of the convex pieces that contain it
+    (`Solid.pieces`) is a body here. The distance of two hulls (GJK, and minus the depth by EPA
+    where they overlap) is a lower bound of that of the bodies. It is differentiable but where the
+    closest points jump. From `near` on it saturates: with s = d - near and w = `width`, it is
+    near + s - s²/(2w), and near + w/2 from s = w on. Pairs farther apart than that cost no more
+    than a test of their bounding boxes.
 
     Parameters
     ----------
@@ -86,8 +86,8 @@ class ClearanceModel:
         Up to here the values are the distances of the hulls [m].
     width : float
         Over this distance beyond, they level off [m].
-    links_in_pieces : bool, optional
-        Whether links with hollows are taken apart before obstacles, too: that is dearer.
+    decompose_links : bool, optional
+        Whether non-convex links are decomposed before obstacles, too: that takes longer.
 
     Attributes
     ----------
@@ -110,10 +110,10 @@ class ClearanceModel:
         near: float = 0.02,
         width: float = 0.02,
         *,
-        links_in_pieces: bool = False,
+        decompose_links: bool = False,
     ) -> None:
         self.robot, self._exact, self._near, self._width = exact.robot, exact, near, width
-        self._hulls, self._of = exact.in_pieces(links=links_in_pieces)
+        self._hulls, self._of = exact.decomposed(links=decompose_links)
         self._kept = self._useful()
         self.pairs = tuple(exact.pairs[i] for i in self._of[self._kept])
         first, second = exact.hulls.pairs[self._of[self._kept]].T
@@ -172,7 +172,7 @@ class ClearanceModel:
 
     @property
     def left_out(self) -> tuple[tuple[str, str], ...]:
-        """The pairs of bodies of which no piece is looked at here: only the exact model knows."""
+        """Pairs of bodies without any piece here: the exact model alone checks them."""
         kept = set(self._of[self._kept].tolist())
         return tuple(pair for k, pair in enumerate(self._exact.pairs) if k not in kept)
 

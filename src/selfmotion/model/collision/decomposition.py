@@ -1,11 +1,14 @@
-"""Convex pieces that together contain a mesh: what is planned with in place of its hull.
+"""Convex decomposition of a mesh: pieces that together contain it, for planning.
 
-The solid is cut along planes of its own faces, which for what is made of bars and plates gives
-these back, and otherwise through the middle; pieces whose common hull holds hardly more than they
-do are joined again. Cutting and hulls are Manifold's, which keeps solids closed (E. Lalish,
-"Manifold", https://github.com/elalish/manifold); cutting along planes until what hulls add is
-little, and joining, is the way of X. Wei et al., "Approximate convex decomposition for 3D meshes
-with collision-aware concavity and tree search", SIGGRAPH 2022.
+The solid is cut along planes of its own faces, which recovers bars and plates, and otherwise
+through the
+middle; pieces whose common hull adds little volume are joined again. Cutting and hulls are
+Manifold's,
+which keeps solids closed (E. Lalish, "Manifold", https://github.com/elalish/manifold). The order of
+cuts
+and joins is that of X. Wei et al., "Approximate convex decomposition for 3D meshes with
+collision-aware
+concavity and tree search", SIGGRAPH 2022.
 """
 
 import heapq
@@ -20,32 +23,37 @@ import numpy.typing as npt
 
 from selfmotion.basics import Array
 
-# No more pieces than this are planned with: each is a pair with each link.
+# Largest number of pieces: each is a pair with each link.
 MOST = 32
-# A piece is cut while its hull adds more than this share of the whole hull's volume ...
+# A part is cut while its hull adds more than this share of the whole hull's volume.
 _EXCESS = 2e-3
-# ... and two are joined where their common hull adds less than this.
+# Two are joined where their common hull adds less than this share.
 _JOINED = 5e-4
-# Planes of so many of its faces are tried for each cut, among so many of the largest; one only of
-# parts of more triangles than this, which take long to cut.
-_TRIED, _LARGEST, _FINE = 6, 100, 3000
-# Faces whose normals and places differ by less are of one plane [rad, share of the size].
-_SAME_NORMAL, _SAME_PLACE = 0.05, 0.01
-# A face cuts a solid if that reaches so far to both of its sides [share of the size].
+# Planes tried for each cut …
+_TRIED = 6
+# … among those of so many of the largest faces.
+_LARGEST = 100
+# Parts of more triangles try a single plane, since cuts take long.
+_FINE = 3000
+# Faces with normals within this angle [rad] …
+_SAME_NORMAL = 0.05
+# … and offsets within this share of the size are of one plane.
+_SAME_PLACE = 0.01
+# Smallest extent of a solid on both sides of a plane that cuts it [share of the size].
 _CUTS = 2e-3
-# Meshes of more triangles are not cut: it takes half a minute already.
+# Meshes of more triangles are not cut, which would take above half a minute.
 _MOST_TRIANGLES = 100_000
-# Joined are pieces with one of so many whose middles are nearest.
+# Pairs of pieces that are candidates for joining: each with so many nearest ones.
 _NEIGHBOURS = 10
-# Two smaller remainders are preferred to a large one that counts as much.
+# Factor by which a cut with two small remainders is preferred to one with a large one.
 _PREFERENCE = 0.75
-# Faces are cut along unless a cut through the middle leaves so much less.
+# Factor by which a cut through the middle has to be better than one along a face.
 _MIDDLE = 1.3
 
 
 @dataclass(frozen=True, eq=False)
 class _Part:
-    """A closed part of the solid, or what several parts were joined to: their hull."""
+    """A closed part of the solid, or the hull of several joined parts."""
 
     solid: Any
 
@@ -60,7 +68,7 @@ class _Part:
 
     @cached_property
     def excess(self) -> float:
-        """What its hull adds to its volume."""
+        """Volume of the hull minus its own."""
         return max(self.size - float(self.solid.volume()), 0.0)
 
     @cached_property
@@ -78,7 +86,7 @@ def convex_pieces(corners: Array, faces: npt.NDArray[np.int64]) -> tuple[Array, 
     ----------
     corners : (V, 3)
     faces : (T, 3)
-        Indices of corners; which way round is for the whole mesh to decide.
+        Indices of corners, of either orientation; it is the same for the whole mesh.
     """
     import manifold3d
 
@@ -102,7 +110,7 @@ def convex_pieces(corners: Array, faces: npt.NDArray[np.int64]) -> tuple[Array, 
 
 
 def _shells(faces: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
-    """Return which closed surface each triangle is of, (T,).
+    """Return the number of the closed surface of each triangle, (T,).
 
     Surfaces hang together by edges of two triangles; solids that touch may have edges in common.
     """
@@ -122,7 +130,7 @@ def _cut(solid: Any, whole: float) -> list[_Part]:
     order = itertools.count()
     queue = [(-part.excess, next(order), part) for part in _connected(solid)]
     heapq.heapify(queue)
-    # What is cut finely is joined again: there may be more than in the end.
+    # Fine parts are joined again, so that more than the limit are allowed here.
     while len(queue) < 2 * MOST and -queue[0][0] > _EXCESS * whole:
         _, _, worst = heapq.heappop(queue)
         for part in _best_cut(worst):
@@ -131,7 +139,7 @@ def _cut(solid: Any, whole: float) -> list[_Part]:
 
 
 def _best_cut(part: _Part) -> list[_Part]:
-    """Return what a part falls into by the plane after which hulls add least."""
+    """Return the parts on both sides of the plane after which hulls add the least volume."""
     cuts: list[tuple[float, int, list[_Part]]] = []
     for normal, offset, weight in _planes(part):
         sides = part.solid.split_by_plane(normal.tolist(), offset)
@@ -152,7 +160,7 @@ def _connected(solid: Any) -> list[_Part]:
 def _planes(part: _Part) -> Iterator[tuple[Array, float, float]]:
     """Yield normals, offsets and weights of planes to cut a part along.
 
-    Those of its faces and through its middle; what hulls add after a cut counts by the weight.
+    Planes of its faces and through its middle; the weight multiplies the excess after a cut.
     """
     mesh = part.solid.to_mesh64()
     triangles = mesh.vert_properties[mesh.tri_verts.astype(np.int64), :3]

@@ -1,13 +1,13 @@
-"""How near bodies come to others when they are put elsewhere by any small rigid motion.
+"""Distances of bodies after any small rigid displacement of one of them.
 
 A displacement is x → c + d + R (x - c), with |d| and the angle θ of R given, their directions
 unknown. Two bounds of the distance that is left hold for all of them at once:
 
-- A point a of the displaced body moves by |d| + θ |a - c| at most, so the distance shrinks by no
-  more than that with the largest |a - c|, of the one body or, seen from the displaced one, of the
-  other.
-- A plane with normal n between two convex bodies, at rest with the one, parts them still: a point
-  of the other, turned by θ at most, is at most |a - c| cos(max(0, φ - θ)) along n, φ being the
+- A point a of the displaced body moves by |d| + θ |a - c| at most. The distance shrinks by no
+  more than that with the largest |a - c|, of the one body or, seen from the displaced one, of
+  the other.
+- A separating plane with normal n between two convex bodies, at rest with the one: a point of
+  the other, rotated by θ at most, is at most |a - c| cos(max(0, φ - θ)) along n, φ being the
   angle between a - c and n. To first order that is the distance of the contact's normal from c
   times θ, which is sharp.
 """
@@ -26,7 +26,7 @@ from selfmotion.model.collision.exact import CollisionModel
 
 
 @dataclass(frozen=True, eq=False)
-class Outline:
+class ConvexOutline:
     """A convex body about a point: it is in the hull of balls, or of discs, of one radius.
 
     Attributes
@@ -36,7 +36,7 @@ class Outline:
     radius : float
         [m].
     axis : (3,) or None
-        What the discs are normal to; None of balls.
+        Normal of the discs; None of balls.
     """
 
     points: Array
@@ -45,12 +45,12 @@ class Outline:
 
     @property
     def farthest(self) -> float:
-        """How far a point of it is from that point at most [m]."""
+        """Largest distance of a point of it from that point [m]."""
         return float(np.linalg.norm(self.points, axis=1).max()) + self.radius
 
 
-class Heights:
-    """How far an outline reaches along a unit normal when it is turned about anything.
+class SupportFunction:
+    """Support function of a convex outline along n, maximised over rotations of at most θ.
 
     Parameters
     ----------
@@ -58,11 +58,11 @@ class Heights:
     normal : (3,)
     """
 
-    def __init__(self, outline: Outline, normal: Array) -> None:
+    def __init__(self, outline: ConvexOutline, normal: Array) -> None:
         along = outline.points @ normal
         self._points, self._radius = outline.points, outline.radius
         self._lengths = np.sqrt(np.einsum("vi,vi->v", outline.points, outline.points))
-        # A point at the centre stays there, whatever its angle is.
+        # A point at the centre is there whatever its angle.
         shares = along / np.maximum(self._lengths, 1e-300)
         self._angles = np.arccos(np.clip(shares, -1.0, 1.0))
         self._upright = 0.5 * np.pi
@@ -71,7 +71,7 @@ class Heights:
         self.still = float(along.max()) + self._radius * float(np.sin(self._upright))
 
     def most(self, angles: Array) -> Array:
-        """Return the largest height after turns by so much at most (G,), (G,) [m]."""
+        """Return the largest support after rotations by at most these angles (G,), (G,) [m]."""
         heights = self._heights(angles[:, None]).max(axis=1)
         share = np.sin(np.minimum(self._upright + angles, 0.5 * np.pi))
         return np.asarray(heights + self._radius * share)
@@ -85,7 +85,7 @@ class Heights:
         return np.asarray(self._lengths * np.cos(turned))
 
 
-class Parted:
+class SeparatingPlane:
     """Two convex bodies with a plane between them.
 
     Parameters
@@ -96,12 +96,15 @@ class Parted:
         Of the plane, from the displaced body to the other, in world axes.
     """
 
-    def __init__(self, displaced: Outline, other: Outline, normal: Array) -> None:
+    def __init__(self, displaced: ConvexOutline, other: ConvexOutline, normal: Array) -> None:
         self.normal = normal
-        self._displaced, self._other = Heights(displaced, normal), Heights(other, -normal)
+        self._displaced, self._other = (
+            SupportFunction(displaced, normal),
+            SupportFunction(other, -normal),
+        )
 
     def distances(self, angles: Array) -> Array:
-        """Return what is left between them after turns by angles (G,) at most, (G,) [m]."""
+        """Return the remaining distance after rotations by at most these angles (G,), (G,) [m]."""
         first, second = self._both(angles)
         return np.maximum(first, second)
 
@@ -111,7 +114,7 @@ class Parted:
         return -other.still - displaced.most(angles), -other.most(angles) - displaced.still
 
     def moment(self, angle: float) -> Array:
-        """Return about what a turn by an angle brings them nearest, times its lever, (3,) [m]."""
+        """Return the moment of the rotation that brings them nearest, (3,) [m]."""
         first, second = self._both(np.array([angle]))
         side = self._displaced if first[0] >= second[0] else self._other
         return np.cross(side.highest(angle), self.normal)
@@ -119,7 +122,7 @@ class Parted:
 
 @dataclass(frozen=True, eq=False)
 class Separation:
-    """What is known of the distance of two bodies while one of them may be displaced.
+    """Bound of the distance of two bodies while one of them may be displaced.
 
     Attributes
     ----------
@@ -133,17 +136,17 @@ class Separation:
 
     distance: float
     lever: float
-    parts: tuple[Parted, ...]
+    parts: tuple[SeparatingPlane, ...]
 
     def least(self, positions: Array, angles: Array) -> Array:
-        """Return what is left after displacements by positions (G,) [m] and angles (G,) [rad]."""
+        """Return bounds after displacements by positions (G,) [m] and angles (G,) [rad]."""
         by_points = self.distance - self.lever * angles
         if not angles.any():
             return np.asarray(by_points - positions)
         by_planes = np.min([part.distances(angles) for part in self.parts], axis=0)
         return np.asarray(np.maximum(by_points, by_planes) - positions)
 
-    def nearest(self, angle: float) -> Parted:
+    def nearest(self, angle: float) -> SeparatingPlane:
         """Return the two convex bodies that come nearest to each other."""
         left = [part.distances(np.array([angle]))[0] for part in self.parts]
         return self.parts[int(np.argmin(left))]
@@ -161,7 +164,7 @@ class DisplacedBodies:
         Index of the joint that carries them, 0 for the world; those of the names that something
         else carries stay.
     center : (3,)
-        What they turn about, in the frame of the joint [m].
+        Centre of the rotations, in the frame of the joint [m].
 
     Attributes
     ----------
@@ -186,7 +189,7 @@ class DisplacedBodies:
         ordered = [(i, j) if self._is_displaced[i] else (j, i) for i, j in kept]
         self._sides = np.array(ordered, dtype=np.int64).reshape(-1, 2)
         self._others, self._other_of = np.unique(self._sides[:, 1], return_inverse=True)
-        self._hulls, of = self.model.in_pieces()
+        self._hulls, of = self.model.decomposed()
         self._pieces = [np.flatnonzero(of == pair) for pair in range(len(kept))]
 
     @property
@@ -196,8 +199,8 @@ class DisplacedBodies:
         return tuple((names[first], names[other]) for first, other in self._sides.tolist())
 
     @cached_property
-    def levers(self) -> Array:
-        """How far points of each pair's displaced body are from the centre at most, (P,) [m]."""
+    def lever_arms(self) -> Array:
+        """Largest distance of points of each pair's displaced body from the centre, (P,) [m]."""
         bodies = self.model.every_body
         far = {
             index: _outline(bodies[index], bodies[index].place, self._center).farthest
@@ -205,8 +208,8 @@ class DisplacedBodies:
         }
         return np.array([far[index] for index in self._sides[:, 0].tolist()])
 
-    def other_levers(self, q: Array) -> Array:
-        """Return the same of the other bodies at q (n,), (P,): no less than they are."""
+    def other_lever_arms(self, q: Array) -> Array:
+        """Return upper bounds of the same of the other bodies at q (n,), (P,)."""
         places = self.model.hulls.place(q)
         solids = [self.model.every_body[index].solid for index in self._others.tolist()]
         middles = [
@@ -219,7 +222,7 @@ class DisplacedBodies:
         return np.asarray(far[self._other_of])
 
     def _center_in_world(self, q: Array) -> Array:
-        """Return where the centre is at q (n,)."""
+        """Return the position of the centre at q (n,)."""
         if not self._joint:
             return self._center
         # From a body that the same joint carries.
@@ -228,7 +231,7 @@ class DisplacedBodies:
         return np.asarray(self.model.hulls.place(q)[index].act(place.inverse().act(self._center)))
 
     def at(self, q: Array, pair: int) -> Separation:
-        """Return what is known of a pair at q (n,).
+        """Return the bound of a pair at q (n,).
 
         Raises
         ------
@@ -254,21 +257,21 @@ class DisplacedBodies:
                     f"{' and '.join(self.pairs[pair])}: coal finds no direction between them"
                 )
             # Contacts' normals point from the second body to the first.
-            parts.append(Parted(one, other, (normal if swapped else -normal) / length))
+            parts.append(SeparatingPlane(one, other, (normal if swapped else -normal) / length))
         distance = float(contacts.values.min())
         if not self.model.is_convex(pair):
             asked = np.full((1, len(self.pairs)), -np.inf)
             asked[0, pair] = np.inf
             distance = float(self.model.distances(q[None], asked)[0, pair])
-        lever = min(float(self.levers[pair]), farthest)
+        lever = min(float(self.lever_arms[pair]), farthest)
         return Separation(distance, lever, tuple(parts))
 
 
-def _outline(body: Body, place: pin.SE3, center: Array) -> Outline:
+def _outline(body: Body, place: pin.SE3, center: Array) -> ConvexOutline:
     """Return a body that is at a place as an outline about a centre."""
     points, radius = body.solid.outline
     is_round = isinstance(body.solid.hull, coal.Cylinder)
-    return Outline(
+    return ConvexOutline(
         points @ place.rotation.T + place.translation - center,
         radius,
         place.rotation[:, 2] if is_round else None,

@@ -19,12 +19,12 @@ from selfmotion.model.robot import RobotModel
 Ints = npt.NDArray[np.int64]
 
 # Relative accuracy of squared distances. At coal's 1e-6 the closest points wander by some tenths
-# of a millimetre from one configuration to the next, which an optimiser takes for slope. Asked
-# for less than about 1e-11 of round bodies, its GJK (3.0.3) cannot see from rounding that it has
-# arrived: it takes a flat simplex for an overlap, and returns 0 or minus the largest float.
-# Depths of overlap keep coal's accuracy: asked for more, its EPA now and then fails.
+# of a millimetre between neighbouring configurations, which an optimiser takes for a slope. Below
+# about 1e-11 for round bodies, its GJK (3.0.3) does not detect convergence: it takes a flat simplex
+# for an overlap, and returns 0 or minus the largest float. Depths of overlap keep coal's accuracy:
+# its EPA fails now and then at a smaller one.
 TOLERANCE = 1e-9
-# What distances may be below those of the bounding boxes, from rounding [m].
+# Allowance for rounding below the distances of the bounding boxes [m].
 _ROUNDING = 1e-5
 
 
@@ -58,7 +58,7 @@ class BoundingBoxes:
         return np.asarray(np.linalg.norm(self._halves, axis=1))
 
     def lower_bounds(self, q: Array, pairs: Ints, limit: float = math.inf) -> Array:
-        """Return what each pair's signed distance is at least, (K, P) [m].
+        """Return lower bounds of each pair's signed distance, (K, P) [m].
 
         Parameters
         ----------
@@ -66,8 +66,8 @@ class BoundingBoxes:
         pairs : (P, 2)
             Indices of bodies.
         limit : float
-            Where the spheres around the boxes, or faces of these, are this far apart, that is
-            enough [m].
+            Bounds at or above this need not be sharp: spheres around the boxes, or their faces,
+            are enough [m].
         """
         # Here, because importing numba takes longer than everything else in the package.
         from selfmotion.model.collision import kernels
@@ -76,10 +76,10 @@ class BoundingBoxes:
 
 
 def _request() -> Any:
-    """Return how distances are asked for: accurately, as functions of the placement alone.
+    """Return a distance request that is accurate, and a function of the placement alone.
 
-    Pinocchio has each search begin where the last one of the pair ended, by an attribute that coal
-    warns about. From the middles of the bodies' boxes it takes a fifth longer.
+    Pinocchio starts each search at the last result of the pair, by an attribute that coal
+    deprecates. Starting at the middles of the bodies' boxes takes a fifth longer.
     """
     request = coal.DistanceRequest()
     with warnings.catch_warnings():
@@ -90,7 +90,7 @@ def _request() -> Any:
     return request
 
 
-# Made on import: filters of warnings belong to the process, not to a thread.
+# Created on import: filters of warnings belong to the process, not to a thread.
 _REQUEST = _request()
 
 
@@ -156,7 +156,7 @@ class HullDistances:
         return self._bodies
 
     def lower_bounds(self, q: Array, limit: float = math.inf) -> Array:
-        """Return what the distances at q (K, n) are at least, (K, P); see `BoundingBoxes`."""
+        """Return lower bounds of the distances at q (K, n), (K, P); see `BoundingBoxes`."""
         return self._boxes.lower_bounds(q, self.pairs, limit)
 
     def move(self, obstacle: str, place: pin.SE3) -> None:
@@ -176,7 +176,7 @@ class HullDistances:
         return places.oMg
 
     def _own(self) -> tuple[Any, Any]:
-        """Return where this thread keeps the chain's placements, and the bodies'."""
+        """Return this thread's data of the chain's placements and of the bodies'."""
         own = self._per_thread.__dict__
         if not own:
             places = self._model.createData()
@@ -192,11 +192,11 @@ class HullDistances:
         Raises
         ------
         CollisionError
-            It contradicts the bound, asked for twice in different ways.
+            Two different computations contradict the bound.
         """
         _, places = self._own()
         value = pin.computeDistance(self._model, places, pair).min_distance
-        # Written so that NaN is asked for again, too.
+        # Written so that NaN is computed again, too.
         if not bound - _ROUNDING <= value <= bound + self._sizes[pair]:
             value = self._again(pair, bound).min_distance
         return float(value)
@@ -221,11 +221,11 @@ class HullDistances:
         -------
         met : (K,)
         left : list of (int, int, float)
-            Sample, pair and distance of others that are closer, as far as they were looked at.
+            Sample, pair and distance of others that are closer, of those computed so far.
         """
         rows, pairs = np.nonzero(bounds < margin)
         least = bounds[rows, pairs]
-        # Of each sample what seems nearest first: it decides, as a rule.
+        # Of each sample the smallest bound first: it usually decides.
         order = np.lexsort((least, rows))
         found, left = np.zeros(len(q), dtype=bool), []
         placed = met = -1
@@ -246,7 +246,7 @@ class HullDistances:
         return found, left
 
     def contacts(self, q: Array, rows: Ints, pairs: Ints, bounds: Array) -> "Contacts":
-        """Return distances with derivatives of many pairs at many samples.
+        """Return distances with derivatives of several pairs at several samples.
 
         Parameters
         ----------
@@ -270,7 +270,7 @@ class HullDistances:
         wanted = zip(rows.tolist(), pairs.tolist(), bounds.tolist(), strict=True)
         for k, (row, pair, bound) in enumerate(wanted):
             if row != placed:
-                # Of one joint Pinocchio returns a vector.
+                # For a single joint Pinocchio returns a vector.
                 columns = pin.computeJointJacobians(chain, data, coupling.spread(q[row]))
                 jacobians[row], placed = coupling.gathered(columns.reshape(6, -1)), row
                 pin.updateGeometryPlacements(chain, data, model, places)

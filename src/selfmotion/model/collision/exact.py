@@ -27,27 +27,27 @@ from selfmotion.model.collision.pairs import (
 )
 from selfmotion.model.robot import RobotModel
 
-# Bodies that are put in touch may overlap by this much [m]: rounding.
+# Overlap of bodies in contact that counts as rounding [m].
 _TOUCHING = 1e-6
-# What the links of an arm are called together.
+# Name of the links of an arm as a whole.
 ITSELF = "the arm itself"
 _NO_PAIR = Closest(math.inf, "", "")
 
 
 class CollisionModel:
-    """Exact clearance of an arm, and of what rides on it, from itself and from obstacles.
+    """Exact clearance of an arm, and of attached bodies, from itself and from obstacles.
 
-    Every body is a solid. While two bodies are apart their distance is that of the real meshes.
-    When they overlap, the value is minus the depth by which their convex hulls do, an upper bound
-    of the true depth; a mesh that fills its hull to 0.1 % of the volume counts as the hull. A body
-    wholly inside another one overlaps it, which the distance of two surfaces alone would miss.
+    Every body is a solid. The distance of two disjoint bodies is that of the real meshes. When
+    they overlap, the value is minus the depth by which their convex hulls do, an upper bound of the
+    true depth; a mesh that fills its hull to 0.1 % of the volume counts as the hull. A body wholly
+    inside another one overlaps it, which the distance of two surfaces alone would miss.
 
     Parameters
     ----------
     robot : RobotModel
         The arm. All its links count, those on locked joints too, where they are held.
     obstacles : sequence of Obstacle
-        The world, and what rides on links: those count as links that are fixed to theirs. The
+        Obstacles in the world, and bodies attached to links, which count as parts of these. The
         robot's immovable base is not checked against the world.
     disabled : sequence of (str, str)
         Pairs of links or obstacles that are left out; see `disabled_links` for those of an SRDF.
@@ -59,15 +59,15 @@ class CollisionModel:
     bodies : tuple of str
         Names of the B bodies, likewise.
     to_world : (P,)
-        Which pairs are of what the robot carries along and an obstacle of the world.
+        Mask of pairs of an attached body and an obstacle of the world.
     checks_links, checks_obstacles : bool
-        Whether some pair is of links or of what rides on them, and of an obstacle.
+        Whether any pair is of links or attached bodies, and of an obstacle.
     overlapping : tuple of Overlap
-        Pairs of links that overlap in half or more of 500 sampled configurations. Those that do
-        in each, or are known to touch as they are made (`RobotModel.touching`), are not checked,
-        but for those of parts of a cell that were placed in each other.
+        Pairs of links that overlap in half or more of 500 sampled configurations. Those that
+        overlap in each, or touch by design (`RobotModel.touching`), are not checked, but for
+        parts of a cell that were placed in each other.
     disabled : tuple of (str, str)
-        Pairs of links that are left out only because that was asked for.
+        Pairs of links that are disabled by the user alone.
 
     Raises
     ------
@@ -135,7 +135,7 @@ class CollisionModel:
     def groups(self) -> dict[str, CollisionModel]:
         """The models of "the arm itself", its links alone, and of each obstacle or carried body.
 
-        With all that can meet it, by name. What has no pair is left out.
+        With all candidates to meet it, by name. Groups without pairs are left out.
         """
         names = dict.fromkeys(body.name for body in self._bodies if body.link != body.name)
         found: dict[str, list[tuple[int, int]]] = {}
@@ -146,7 +146,7 @@ class CollisionModel:
 
     @cached_property
     def stuck(self) -> Closest | None:
-        """The links that held joints or placed parts put deepest into each other, if any."""
+        """Deepest overlap of links that held joints or placed parts cause, if any."""
         pairs = held_pairs(self._bodies, self.robot.urdf, self.robot.locked, self._disabled)
         if not pairs:
             return None
@@ -167,11 +167,11 @@ class CollisionModel:
         """Whether all bodies that are checked are their own convex hulls."""
         return all(self.is_convex(pair) for pair in range(len(self.pairs)))
 
-    def in_pieces(self, *, links: bool = False) -> tuple[HullDistances, Ints]:
+    def decomposed(self, *, links: bool = False) -> tuple[HullDistances, Ints]:
         """Return distances of hulls, obstacles in convex pieces, and which pair each is of, (Q,).
 
-        Links are made convex as a rule: they are taken apart where that is asked for, and before
-        obstacles only. Where nothing is, these are `hulls`.
+        Links are hulls as a rule: they are decomposed on request, and before obstacles only.
+        Without any decomposition, these are `hulls`.
         """
         names = {item.name for item in self.obstacles}
         met = [names & {self._bodies[i].name, self._bodies[j].name} for i, j in self._index]
@@ -225,7 +225,7 @@ class CollisionModel:
 
     @cached_property
     def lever_arms(self) -> Array:
-        """How far points of the bodies move at most per unit of each joint, (B, n).
+        """Largest motion of points of the bodies per unit of each joint, (B, n).
 
         Row b bounds |∂x/∂q_j| over all points x of body b, in [m/rad] for revolute joints and
         [m/m] for prismatic ones, at every configuration within the joint limits. So no point moves
@@ -236,11 +236,12 @@ class CollisionModel:
 
     @cached_property
     def pair_levers(self) -> Array:
-        """How much the distance of each pair changes at most per unit of each joint, (P, n).
+        """Largest change of the distance of each pair per unit of each joint, (P, n).
 
-        At every configuration within the joint limits, in the order of `pairs`: from one
-        configuration to another the distance of bodies that are apart changes by
-        Σ_j lever_pj |Δq_j| at most. Joints that move both bodies as one block count nothing.
+        At every configuration within the joint limits, in the order of `pairs`: between two
+        configurations the distance of disjoint bodies changes by Σ_j lever_pj |Δq_j| at most.
+        Joints
+        that move both bodies as one block have lever 0.
         """
         return self.robot.coupling.bounds(self._levers)
 
@@ -249,15 +250,16 @@ class CollisionModel:
         """Those of all joints of the model, (P, N)."""
         return of_bodies.pair_levers(self._axis_distances, self._moved, self.hulls.pairs)
 
-    def pair_levers_up_to(self, farthest: Array, aside: Array | None = None) -> Array:
+    def pair_levers_up_to(self, farthest: Array, displacement: Array | None = None) -> Array:
         """Return `pair_levers` where joints go as far as `farthest` (n,) from 0, (P, n).
 
-        A prismatic joint beyond its limits lengthens the levers of all revolute ones, and so does
-        a body of the pair that is put `aside` by so much at most (P,) [m].
+        A prismatic joint beyond its limits lengthens the lever arms of all revolute ones, and so
+        does
+        a displacement (P,) of a body of the pair [m].
         """
         extra: Any = of_bodies.travel_beyond(self.robot, farthest)
-        if aside is not None:
-            extra = extra + aside[:, None]
+        if displacement is not None:
+            extra = extra + displacement[:, None]
         counted = of_bodies.is_turned(self.robot) & (self._levers > 0.0)
         return self.robot.coupling.bounds(self._levers + np.where(counted, extra, 0.0))
 
@@ -302,7 +304,7 @@ class CollisionModel:
         if not len(q) or not self.pairs:
             return _NO_PAIR
         value, pair = self._near.closest(q[0], self.hulls.lower_bounds(q[:1])[0])
-        # Pairs that are farther apart need no close look.
+        # Pairs farther apart than the best need no exact distance.
         bounds, worst = self.hulls.lower_bounds(q, value), 0
         lowest = bounds.min(axis=1)
         for row in np.argsort(lowest, kind="stable").tolist():
@@ -325,10 +327,11 @@ class CollisionModel:
         ----------
         q_samples : (K, n)
         within : float or (K, P)
-            Pairs that are farther apart than this need no exact number [m]: theirs is a lower
-            bound of the distance that is not below `within`. -inf where none is needed.
-        exact_below : float or (K, P)
-            For pairs that are farther apart than this, the distance of their hulls will do, a lower
+            Pairs farther apart than this need no exact number [m]: theirs is a lower bound of the
+            distance that is not below `within`. -inf for exact distances of none.
+            exact_below : float or (K, P)
+                For pairs farther apart than this, the distance of their hulls suffices, a lower
+                bound
             bound that is not below this [m]: it takes a twentieth of the time.
 
         Raises
@@ -341,10 +344,10 @@ class CollisionModel:
         return self._near.distances(q, asked, np.minimum(asked, exact_below))
 
     def collides(self, q: Array, margin: float = 0.0) -> bool:
-        """Whether some pair is closer than `margin` [m] at `q` (n,); made for many calls.
+        """Whether some pair is closer than `margin` [m] at `q` (n,); fast for many calls.
 
-        The convex hulls decide alone where they are apart by more than the margin, and where both
-        meshes are convex to 0.1 % of the volume; only other meshes are visited.
+        The convex hulls decide where they are apart by more than the margin, and where both meshes
+        are convex to 0.1 % of the volume; the surfaces of other meshes are searched.
 
         Raises
         ------
@@ -356,7 +359,7 @@ class CollisionModel:
         return bool(self._near.closer(q[None], margin)[0])
 
     def colliding(self, q_samples: Array, margin: float = 0.0) -> npt.NDArray[np.bool_]:
-        """Return at which of many configurations (K, n) `collides` holds, (K,).
+        """Return the mask of configurations (K, n) at which `collides` holds, (K,).
 
         Raises
         ------
@@ -378,7 +381,7 @@ class CollisionModel:
         return tuple(Closest(float(values[i]), *self.pairs[i]) for i in rows)
 
     def overlap_counts(self) -> tuple[Ints, Ints]:
-        """Return in how many of 500 configurations bodies overlap, and their hulls alone, (P,)."""
+        """Count overlaps of bodies, and of their hulls alone, in 500 configurations, (P,) each."""
         known = [self._counts.get((i, j)) for i, j in self._index.tolist()]
         unknown = np.flatnonzero([counts is None for counts in known])
         met, alone = count_overlaps(self.robot, self.hulls, self._near.meshes, unknown)

@@ -1,4 +1,4 @@
-"""What is compiled: bounding boxes of all pairs at all samples, and winding numbers."""
+"""Compiled: bounding boxes of all pairs at all samples, and winding numbers."""
 
 import math
 
@@ -20,9 +20,9 @@ def separation(
 ) -> float:
     """Return the signed distance of two boxes along the best of 15 axes.
 
-    These are the normals of all faces, and what is normal to an edge of each (S. Gottschalk, M.
+    These are the normals of all faces, and the normals of an edge of each (S. Gottschalk, M.
     Lin, D. Manocha, "OBBTree", SIGGRAPH 1996). Of boxes that overlap it is minus the depth, of
-    others at most the distance. Where the faces separate them by `limit`, that is enough.
+    others at most the distance. The faces alone suffice if they separate by `limit`.
 
     Parameters
     ----------
@@ -120,7 +120,7 @@ def _dot(a: Vector, b: Vector) -> float:
 
 @kernel
 def winding_number(corners: Array, point: Array) -> float:
-    """Return how often the triangles (T, 3, 3) wind around the point: 1 inside, 0 outside.
+    """Return the winding number of the triangles (T, 3, 3) around the point: 1 inside, 0 outside.
 
     The sum of their solid angles over 4π, after Van Oosterom and Strackee (1983).
     """

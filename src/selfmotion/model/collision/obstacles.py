@@ -25,9 +25,9 @@ from selfmotion.basics import (
 from selfmotion.model.robot import UrdfShape, unit_of
 from selfmotion.model.task import SE3, as_pose
 
-# An obstacle so large, or so far away [m], may be one in millimetres.
+# An obstacle larger or farther away than this [m] may be in millimetres.
 _HUGE = 100.0
-# What every obstacle has besides the lengths of its shape.
+# Fields of every obstacle besides the lengths of its shape.
 _PLACE = ("name", "pose", "frame")
 # Shape → class, filled as the classes are made.
 _shapes: dict[str, type[Obstacle]] = {}
@@ -35,7 +35,7 @@ _shapes: dict[str, type[Obstacle]] = {}
 
 @dataclass(frozen=True, eq=False)
 class Obstacle(ABC):
-    """What every obstacle has; use `Box`, `Sphere`, `Cylinder`, `Capsule`, `Mesh` or an own shape.
+    """Base of obstacles: use `Box`, `Sphere`, `Cylinder`, `Capsule`, `Mesh` or an own shape.
 
     An own shape is a frozen dataclass derived from this one. It names its `shape`, adds its
     lengths as fields, and returns its `geometry`; it is then known to `obstacle_from_dict`::
@@ -54,7 +54,7 @@ class Obstacle(ABC):
     Attributes
     ----------
     name : str
-        What reports call it; unique among the obstacles and links of a model.
+        Its name in reports; unique among the obstacles and links of a model.
     pose : pinocchio.SE3
         The obstacle's frame in world axes; a position (3,) [m] is taken as a pose along them.
     frame : str or None
@@ -105,7 +105,7 @@ class Obstacle(ABC):
 
     @property
     def hint(self) -> str:
-        """What looks like a slip of units, in words; "" where nothing does."""
+        """Suspected error of units, in words; "" for none."""
         geometry = self.geometry()
         geometry.computeLocalAABB()
         size = 2.0 * float(geometry.aabb_radius)
@@ -125,7 +125,7 @@ class Obstacle(ABC):
         """
 
     def urdf_shapes(self) -> Sequence[UrdfShape]:
-        """Return what it is in a URDF, where an arm carries it (`load_robot`, bodies).
+        """Return its shapes in a URDF, where an arm carries it (`load_robot`, bodies).
 
         Raises
         ------
@@ -162,7 +162,7 @@ def obstacle_shapes() -> list[tuple[str, type[Obstacle]]]:
 
 
 def obstacle_from_dict(values: Mapping[str, Any]) -> Obstacle:
-    """Build an obstacle from what `Obstacle.to_dict` returns.
+    """Build an obstacle of the values of `Obstacle.to_dict`.
 
     Parameters
     ----------
@@ -398,7 +398,7 @@ class Mesh(Obstacle):
         try:
             found = coal.MeshLoader().load(str(self.file), np.full(3, self._metres()))
         except (RuntimeError, ValueError) as error:
-            # What comes before is where in the source of coal it was found.
+            # The text before is a place in the source of coal.
             reason = " ".join(str(error).rpartition("message:")[2].split())
             raise CollisionError(f"{self.label}: {self.file} cannot be read: {reason}") from error
         corners = np.array(found.vertices()).reshape(-1, 3)

@@ -16,7 +16,7 @@ from selfmotion.model.robot import RobotModel
 
 # Distances of meshes, where those of their convex hulls do not decide.
 
-# What distances of surfaces may be below those of the hulls, by the accuracy of both [m].
+# Allowance for rounding of distances of surfaces below those of the hulls [m].
 _ROUNDING = 1e-5
 
 
@@ -28,14 +28,14 @@ class MeshDistances:
     solids : sequence of Solid
         The bodies.
     names : sequence of str
-        What messages call them.
+        Their names in messages.
     pairs : (P, 2)
         Indices of bodies.
 
     Attributes
     ----------
     hulls_decide : list of bool
-        For which pairs the hulls alone tell whether the bodies overlap.
+        Pairs whose hulls alone decide whether the bodies overlap.
     """
 
     def __init__(self, solids: Sequence[Solid], names: Sequence[str], pairs: Ints) -> None:
@@ -90,9 +90,9 @@ class MeshDistances:
         return bool(contact) or self._is_nested(places, pair)
 
     def _surfaces(self, places: Any, pair: int, beyond: float) -> float:
-        """Return the distance of the surfaces, and of what is no mesh the solid's."""
+        """Return the distance of the surfaces, or of the solid where there is no mesh."""
         result = coal.DistanceResult()
-        # coal looks for something nearer than what it has already.
+        # coal searches for distances below its initial value.
         if beyond < math.inf:
             result.min_distance = beyond
         return float(coal.distance(*self._placed(places, pair), self._request, result))
@@ -107,7 +107,7 @@ class MeshDistances:
         return *first, *second
 
     def _is_nested(self, places: Any, pair: int) -> bool:
-        """Whether one body is inside the other, their surfaces apart."""
+        """Whether one body is inside the other, without contact of their surfaces."""
         i, j = self._pairs[pair]
         return self._holds(places, i, j) or self._holds(places, j, i)
 
@@ -123,7 +123,7 @@ class MeshDistances:
 
 # Distances of pairs of bodies: of their hulls first, of the meshes where those do not decide.
 
-# Joints that differ by less than this [rad or m] place bodies alike, to rounding of distances.
+# Joints that differ by less than this [rad or m] give the same distances, to rounding.
 _ALIKE = 1e-9
 
 
@@ -186,18 +186,19 @@ class PairDistances:
         undecided: dict[int, list[tuple[int, float]]] = {}
         for row, pair, hulls in open_:
             undecided.setdefault(pair, []).append((row, hulls))
-        # What is deepest inside decides first, as a rule.
+        # The smallest bound usually decides, and comes first.
         for pair, near in sorted(undecided.items(), key=lambda item: min(h for _, h in item[1])):
-            looked = [(row, hulls) for row, hulls in near if not found[row]]
-            rows = np.array([row for row, _ in looked], dtype=np.int64)
-            found[rows] = self._by_meshes(pair, q[rows], [hulls for _, hulls in looked], margin)
+            open_rows = [(row, hulls) for row, hulls in near if not found[row]]
+            rows = np.array([row for row, _ in open_rows], dtype=np.int64)
+            found[rows] = self._by_meshes(pair, q[rows], [hulls for _, hulls in open_rows], margin)
         return found
 
     def _by_meshes(self, pair: int, q: Array, hulls: Sequence[float], margin: float) -> Flags:
-        """Return where a pair whose hulls are closer than the margin is so itself, (K,).
+        """Return the mask of a pair whose hulls and meshes are closer than the margin, (K,).
 
-        Configurations (K, n) in which the bodies are alike to each other are looked at once: along
-        a self-motion it is often the same joints that rest.
+        Configurations (K, n) with the same relative placement of the bodies are computed once:
+        along a
+        self-motion the same joints often rest.
         """
         joints = np.round(q[:, self._moving[pair]] / _ALIKE)
         _, once, which = np.unique(joints, axis=0, return_index=True, return_inverse=True)

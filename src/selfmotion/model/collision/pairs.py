@@ -1,4 +1,4 @@
-"""Which pairs of bodies are checked, how often they overlap, and what is found of them."""
+"""Pairs of bodies that are checked, their overlaps in samples, and the closest pair."""
 
 import itertools
 import xml.etree.ElementTree as ElementTree
@@ -27,13 +27,13 @@ def candidate_pairs(
 
     Left out are pairs whose distance no joint changes (so also the robot's base against the
     world: an arm bolted to a table touches it; see `held_pairs`), the two links that a movable
-    joint joins, and pairs that are `disabled`. What is fixed to joined links, a tool to the one
-    and a bracket to the other, can meet.
+    joint joins, and pairs that are `disabled`. A tool on one of two such links and a bracket on the
+    other can meet.
 
     Raises
     ------
     CollisionError
-        What is disabled is neither a link of the arm nor an obstacle.
+        A disabled name is neither a link of the arm nor an obstacle.
     """
     left_out = {frozenset((x.parent, x.child)) for x in _movable(urdf)}
     known = dict.fromkeys((*urdf.links, *(body.name for body in bodies)))
@@ -48,7 +48,7 @@ def candidate_pairs(
         left_out.add(frozenset(pair))
 
     def can_meet(first: Body, second: Body) -> bool:
-        # A pair that is left out is that of two links alone, not of all that is fixed to them.
+        # Disabling is of two links alone, not of all that is fixed to them.
         names = frozenset((first.name, second.name))
         return first.joint != second.joint and names not in left_out
 
@@ -91,8 +91,8 @@ def held_pairs(
         if first.joint != second.joint or frozenset((first.name, second.name)) in left_out:
             return False
         ways, links = above[first.link] ^ above[second.link], (first.link, second.link)
-        # What only a placement puts there may touch what carries it.
-        return bool(ways - placements) or (bool(ways) and are_placed_apart(*links, urdf))
+        # An overlap by placement may be with its carrier.
+        return bool(ways - placements) or (bool(ways) and are_separate_parts(*links, urdf))
 
     return [
         (i, j)
@@ -101,10 +101,10 @@ def held_pairs(
     ]
 
 
-def are_placed_apart(first: str, second: str, urdf: Urdf) -> bool:
+def are_separate_parts(first: str, second: str, urdf: Urdf) -> bool:
     """Return whether two links are of parts of a cell of which none carries the other.
 
-    What overlaps there does not so as it is made, but as it is placed.
+    Overlaps of these are by placement, not by design.
     """
     carriers = {_part(x.child): _part(x.parent) for x in urdf.joints.values() if is_placement(x)}
     one, other = _part(first), _part(second)
@@ -114,7 +114,7 @@ def are_placed_apart(first: str, second: str, urdf: Urdf) -> bool:
 
 
 def are_neighbours(first: str, second: str, urdf: Urdf) -> bool:
-    """Return whether a movable joint joins two links, or what is fixed to them."""
+    """Return whether a movable joint joins two links, or links fixed to them."""
     part = _rigid_parts(urdf)
     parts = frozenset((part[first], part[second]))
     return any(frozenset((part[x.parent], part[x.child])) == parts for x in _movable(urdf))
@@ -150,11 +150,11 @@ def disabled_links(
     Parameters
     ----------
     srdf : path
-        Also one that is xacro: it is expanded.
-    arguments : dict, optional
-        Those of the arm's own xacro; what the file does not declare is left out.
+        An SRDF, or a xacro of one, which is expanded.
+        arguments : dict, optional
+            Those of the arm's own xacro; undeclared ones are left out.
     packages : sequence of path
-        Folders in which packages are looked for.
+        Folders that are searched for packages.
 
     Raises
     ------
@@ -194,32 +194,33 @@ def disabled_links(
 
 # How often bodies overlap in sampled configurations, and how often their convex hulls alone do.
 
-# How many configurations are tried.
+# Number of configurations that are sampled.
 SAMPLES = 500
 
 
 @dataclass(frozen=True, eq=False)
 class Links:
-    """The bodies of a robot, and what 500 configurations tell of their pairs.
+    """Bodies of a robot, and overlaps of their pairs in 500 configurations.
 
     Attributes
     ----------
     bodies : tuple of Body
         Its links' pieces.
     counts : dict
-        Index pair of bodies → in how many configurations these overlap, and their hulls alone.
+        Index pair of bodies → number of configurations in which these overlap, and their hulls
+        alone.
     """
 
     bodies: tuple[Body, ...]
     counts: dict[tuple[int, int], tuple[int, int]]
 
 
-# To read the meshes of an arm and to try its pairs takes longer than many a plan.
+# Cached: reading meshes and sampling pairs takes longer than many a plan.
 _known: WeakKeyDictionary[RobotModel, Links] = WeakKeyDictionary()
 
 
 def links_of(robot: RobotModel) -> Links:
-    """Return the bodies of a robot and its pairs; made once.
+    """Return the bodies of a robot and its pairs, cached.
 
     Raises
     ------
@@ -249,7 +250,7 @@ def counts_of(
 def count_overlaps(
     robot: RobotModel, hulls: HullDistances, meshes: MeshDistances, among: Ints
 ) -> tuple[Ints, Ints]:
-    """Return in how many of 500 configurations bodies overlap, and in how many their hulls alone.
+    """Count the configurations, of 500, in which bodies overlap, and those of hulls alone.
 
     Both (P,), and zero but for the pairs `among` them.
     """
@@ -262,7 +263,7 @@ def count_overlaps(
 
 
 def hull_overlaps(robot: RobotModel, hulls: HullDistances, among: Ints) -> Ints:
-    """Return in how many of 500 configurations the hulls of the pairs `among` overlap, (A,)."""
+    """Count the configurations, of 500, in which the hulls of the pairs `among` overlap, (A,)."""
     counts = np.zeros(len(hulls.pairs), dtype=np.int64)
     for _, pair, distance in _near(robot, hulls, among):
         counts[pair] += distance <= 0.0
@@ -280,9 +281,6 @@ def _near(robot: RobotModel, hulls: HullDistances, among: Ints) -> Iterator[tupl
         places = hulls.place(q[row])
         for pair in among[bounds[among] <= 0.0].tolist():
             yield places, pair, hulls.distance(pair, bounds[pair])
-
-
-# What a collision model finds, with the names of the bodies.
 
 
 @dataclass(frozen=True)
@@ -306,7 +304,7 @@ class Closest:
 
 
 def how_near(distance: float, digits: int = 2) -> str:
-    """Return in words how far two bodies are apart [m], or how deep one is in the other."""
+    """Return in words the distance of two bodies [m], or the depth of one in the other."""
     length = f"{abs(distance) * 1e3:.{digits}f} mm"
     return f"are {length} apart" if distance >= 0.0 else f"overlap by {length}"
 
@@ -320,10 +318,10 @@ class Overlap:
     first, second : str
         The links.
     share : float
-        In how many of the configurations.
+        Share of the configurations.
     is_checked : bool
-        False for those that overlap in each, or are known to touch as they are made: they are left
-        out. Of links of several pieces, others may still be checked.
+        False for those that overlap in each, or touch by design: they are left out. Of links
+        with several bodies, others may still be checked.
     """
 
     first: str
@@ -333,7 +331,7 @@ class Overlap:
 
     @property
     def remedy(self) -> str:
-        """In how many configurations, and what to do where that is how they are made."""
+        """Share of configurations, and the remedy for an overlap by design."""
         return (
             f"these links overlap in {100 * self.share:.0f} % of all configurations: if that is "
             f"how they are made, leave them out: --disabled {self.first},{self.second}, or srdf= a "
@@ -346,22 +344,20 @@ def srdf_line(first: str, second: str) -> str:
     return f'<disable_collisions link1="{first}" link2="{second}" reason="Default"/>'
 
 
-# Which pairs of bodies are checked: all that can meet, but for what touches as it is made.
-
-# The share of sampled configurations from which on an overlap of links is worth telling.
+# Share of sampled configurations from which on an overlap of links is reported.
 _OFTEN = 0.5
 
 
 @dataclass(frozen=True, eq=False)
 class Checked:
-    """The pairs of bodies that are checked, and what is known of all.
+    """Pairs of bodies that are checked, and overlaps of all.
 
     Attributes
     ----------
     pairs : tuple of (int, int)
         Indices of bodies.
     counts : dict
-        See `Links.counts`, with what rides on links.
+        See `Links.counts`, with attached bodies.
     overlapping, disabled
         See `CollisionModel`.
     """
@@ -375,7 +371,7 @@ class Checked:
 def checked_pairs(
     robot: RobotModel, bodies: Sequence[Body], disabled: Sequence[tuple[str, str]]
 ) -> Checked:
-    """Return which pairs of bodies are checked, the robot's own links first among these.
+    """Return the pairs of bodies that are checked, the robot's own links first among these.
 
     Raises
     ------
@@ -386,14 +382,14 @@ def checked_pairs(
     known = links_of(robot).counts
     riding = [(i, j) for i, j in candidates if (i, j) not in known and not bodies[j].is_obstacle]
     counts = {**known, **counts_of(robot, bodies, riding)}
-    # What overlaps in each configuration, and was not placed there, is made to.
+    # An overlap in each configuration that is not by placement is by design.
     always = {
         (i, j)
         for (i, j), (met, _) in counts.items()
-        if met == SAMPLES and not are_placed_apart(bodies[i].link, bodies[j].link, robot.urdf)
+        if met == SAMPLES and not are_separate_parts(bodies[i].link, bodies[j].link, robot.urdf)
     }
-    # Next to a joint, all pieces of two links of which some are.
-    as_made = {frozenset(pair) for pair in robot.touching} | {
+    # Next to a joint, all bodies of two links of which some touch.
+    by_design = {frozenset(pair) for pair in robot.touching} | {
         frozenset((bodies[i].name, bodies[j].name))
         for i, j in always
         if are_neighbours(bodies[i].link, bodies[j].link, robot.urdf)
@@ -403,7 +399,7 @@ def checked_pairs(
     for pair in candidates:
         met, _ = counts.get(pair, (0, 0))
         names = bodies[pair[0]].name, bodies[pair[1]].name
-        is_checked = pair not in always and frozenset(names) not in as_made
+        is_checked = pair not in always and frozenset(names) not in by_design
         if is_checked:
             pairs.append(pair)
         if met >= _OFTEN * SAMPLES or (met and not is_checked):

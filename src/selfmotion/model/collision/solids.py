@@ -1,4 +1,4 @@
-"""Solids as coal knows them: convex hulls, what is inside a mesh, how far a body extends."""
+"""Solids for coal: convex hulls, points inside a mesh, extent of a body."""
 
 from functools import cached_property
 from typing import Any
@@ -11,34 +11,37 @@ from selfmotion.basics import Array, CollisionError
 
 Indices = npt.NDArray[np.int64]
 
-# A mesh whose hull is larger by less than this share of its volume counts as convex.
+# Largest relative excess of a hull's volume over that of a mesh that counts as convex.
 _CONVEX = 1e-3
-# A body that reaches farther from its origin [m] is an error of units, if not worse.
+# A body that reaches farther from its origin [m] has wrong units, at least.
 _LARGEST = 1e4
 # A mesh thinner than this share of its size is flat.
 _FLAT = 1e-7
-# What the hull of a flat mesh reaches beyond it to both sides [m].
+# Half thickness of the hull of a flat mesh [m].
 _HALF_THICKNESS = 1e-6
-# What counts as being in a piece [share of the size], and how many points are looked for at most.
-_INSIDE, _LOOKED_FOR = 1e-6, 20_000
-# What is farther outside of all pieces than this was no sliver [share of the size].
+# Tolerance for a point to be in a piece [share of the size].
+_INSIDE = 1e-6
+# Largest number of points that are checked for it.
+_MOST_CHECKED = 20_000
+# Points outside of all pieces by more than this belong to a lost part, not to a sliver [share].
 _SLIVER = 1e-2
-# Meshes → their pieces, of the last ones: each model of a cell asks anew.
+# Cache of decompositions: each model of a cell needs them.
 _cut: "dict[tuple[bytes, bytes], tuple[Solid, ...]]" = {}
+# Largest number of these.
 _MOST_CUT = 32
-# coal takes no corner of a hull with 255 neighbours or more.
+# coal rejects hulls with a corner of 255 neighbours or more.
 _NEIGHBOURS = 250
 
 
 class Solid:
-    """A body's geometry and its convex hull, and what coal cannot tell of a mesh.
+    """Geometry of a body, its convex hull, and point membership, which coal has not for meshes.
 
     Parameters
     ----------
     geometry : coal geometry
         Its frame is that of all points here.
     label : str
-        What messages call it.
+        Its name in messages.
 
     Attributes
     ----------
@@ -67,9 +70,9 @@ class Solid:
             self.hull, self._planes = _hull_of(corners, label)
         elif isinstance(geometry, coal.Sphere):
             # coal's formula for a sphere and a cylinder that overlap (3.0.3) is wrong for spheres
-            # with their centre near the cylinder's axis; a capsule of no length has none.
+            # with their centre near the cylinder's axis; a capsule of length 0 is correct.
             self.hull = coal.Capsule(geometry.radius, 0.0)
-        # Empty until it is asked for, and what the hull's depends on.
+        # Not computed before it is needed, here and for the hull.
         self.hull.computeLocalAABB()
         box = self.hull.aabb_local
         self.low, self.high = np.array(box.min_), np.array(box.max_)
@@ -101,7 +104,7 @@ class Solid:
         return self._box, 0.0
 
     def surface(self) -> tuple[Array, Indices]:
-        """Return corners (V, 3) and triangles (T, 3) of what to draw for it.
+        """Return corners (V, 3) and triangles (T, 3) of its surface, for drawings.
 
         The mesh itself; of other geometry the hull of its corners, or else the box around it.
         """
@@ -130,8 +133,9 @@ class Solid:
     def pieces(self) -> "tuple[Solid, ...]":
         """Convex solids that together contain it: itself where it is convex, or cannot be cut.
 
-        Its corners and the middles of its triangles (20,000 of these points at most are looked at)
-        are in the pieces, to a millionth of its size.
+        Its corners and the middles of its triangles (20,000 of these points at most are checked)
+        are
+        in the pieces, to a millionth of its size.
         """
         if self.is_convex or self.is_flat or not self.is_closed:
             return (self,)
@@ -147,7 +151,7 @@ class Solid:
         from selfmotion.model.collision.decomposition import convex_pieces
 
         points = np.concatenate([self._corners, self._triangles.mean(axis=1)])
-        points = points[:: -(-len(points) // _LOOKED_FOR)]
+        points = points[:: -(-len(points) // _MOST_CHECKED)]
         size = float(np.ptp(self._corners, axis=0).max())
         pieces = list(convex_pieces(self._corners, self._welded))
         try:
@@ -202,7 +206,7 @@ class Solid:
         """Whether one of the points (S, 3) is inside a mesh, farther than rounding from it.
 
         Inside means a winding number above one half, which also serves most meshes with holes.
-        Of other geometry, whose distances coal counts from the solid, there is nothing to add.
+        Other geometry, whose distances coal measures from the solid, needs no such test.
         """
         if not self.is_mesh or self.is_flat:
             return False
@@ -237,7 +241,7 @@ class Solid:
 
 
 def _outside(solids: list[Array], points: Array) -> tuple[Array, Indices]:
-    """Return how far points (K, 3) are beyond the planes of the nearest convex solid, and which."""
+    """Return distances of points (K, 3) from the nearest convex solid's planes, and its number."""
     least, nearest = np.full(len(points), np.inf), np.zeros(len(points), dtype=np.int64)
     for k, planes in enumerate(solids):
         beyond = (points @ planes[:, :3].T + planes[:, 3]).max(axis=1)
@@ -247,21 +251,20 @@ def _outside(solids: list[Array], points: Array) -> tuple[Array, Indices]:
 
 
 def _thickened(points: Array, label: str) -> tuple[bool, Array]:
-    """Return whether points (V, 3) are in one plane, and they, or else copies to both sides."""
+    """Return whether points (V, 3) are in one plane; if so, copies to both sides instead."""
     _, extents, axes = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)
     if len(extents) < 3 or not extents[1] > _FLAT * extents[0]:
         raise CollisionError(f"{label}: all corners of its mesh are on one line; give it a width")
     if extents[2] > _FLAT * extents[0]:
         return False, points
-    aside = _HALF_THICKNESS * axes[2]
-    return True, np.concatenate([points + aside, points - aside])
+    offset = _HALF_THICKNESS * axes[2]
+    return True, np.concatenate([points + offset, points - offset])
 
 
 def _hull_of(points: Array, label: str) -> tuple[Any, Array]:
     """Return the convex hull of points (V, 3), and its planes n · x + c = 0 as rows (n, c).
 
-    Made of the corners that scipy finds: coal's own way to hulls ends the process where there is
-    none.
+    Of the corners that scipy finds: coal's own function ends the process where there is no hull.
     """
     from scipy.spatial import ConvexHull, QhullError
 

@@ -1,4 +1,4 @@
-"""When a motion is looked at, and the times at which it is integrated."""
+"""Samples of a motion, and the grid of times on which it is integrated."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -113,7 +113,7 @@ class Grid:
     Attributes
     ----------
     nodes : (N + 1,)
-        Times at which steps begin and end [s].
+        Start and end times of the steps [s].
     """
 
     nodes: Array
@@ -162,7 +162,7 @@ class Grid:
         return Sampling(self.stage_times, self.weights, self.node_stages)
 
     def derivative(self, values: Array) -> Array:
-        """Return the derivative at the nodes of what has these values (N + 1, n) there."""
+        """Return the derivative at the nodes of a function with these values (N + 1, n) there."""
         return np.asarray(self.sampling.differentiation(1)[self.node_stages] @ values)
 
     @cached_property

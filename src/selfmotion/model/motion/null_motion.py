@@ -22,13 +22,13 @@ from selfmotion.basics import (
     shown,
 )
 
-# Polynomials of higher degree than this resolve nothing more and take minutes.
+# Highest degree of polynomials: more resolves nothing, and takes minutes.
 _HIGHEST = 100
-# So do splines of more intervals.
+# Largest number of intervals of splines, for the same reason.
 _MOST_INTERVALS = 2000
 
 
-# A null motion that was found by a search fades in this share of the duration.
+# Share of the duration in which a null motion found by a search fades to 0 at the ends.
 _FADE = 0.05
 
 
@@ -95,8 +95,8 @@ class PolynomialNullMotion(NullMotion):
     ``space="joint", basis="monomial"`` is the paper's: ε(t) = Σ e_k t^k (eq. 6), with the decision
     vector [e_00 … e_0p e_10 …] (eq. 8), n(p + 1) entries of which only the null-space part acts.
     The default has r(p + 1): polynomials in a basis R(t) of the null space, transported along the
-    x = 0 motion. The projector (I - J⁺J) of eq. 4 still acts, so that nothing is lost where the
-    motion leaves that of x = 0.
+    x = 0 motion. The projector (I - J⁺J) of eq. 4 still acts: the basis need not be exact where the
+    motion differs from that of x = 0.
 
     Parameters
     ----------
@@ -174,7 +174,7 @@ class FreeNullMotion(NullMotion):
     """Any ε(t): the motion is optimised at nodes, as many as its cost asks for.
 
     Newton's method finds where each node lies on its self-motion; `Report.null_motion` tells which
-    nodes. Where an optimiser of one's own or damping asks for the published method, it is a cubic.
+    nodes. An optimiser of one's own, or damping, uses the published method; there, it is a cubic.
     """
 
     @property
@@ -251,7 +251,7 @@ class NullMotionTable:
     frame : callable or None
         Returns R at the stages, (S, n, r), once it counts; None for the identity.
     rows : int
-        Rows of E: r, or n where there is no frame.
+        Rows of E: r, or n without a frame.
     offset : (S, n) or None
         ε_0, the null motion of x = 0; None for zero.
     """
@@ -286,7 +286,7 @@ class NullMotionTable:
         return np.asarray((inner.T @ self.functions).ravel())
 
     def matrix(self, before: int = 0) -> Array:
-        """Return ∂ε/∂x at the stages, (S, n, size), after as many columns of zeros."""
+        """Return ∂ε/∂x at the stages, (S, n, size), after `before` columns of zeros."""
         frame = np.eye(self.rows)[None] if self._frame is None else self._frame
         (stages, count), n = self.functions.shape, frame.shape[1]
         full = np.zeros((stages, n, before + self.size))

@@ -1,4 +1,4 @@
-"""The polynomials of a motion between its samples: many at once, and the ways that joints make.
+"""Polynomial segments of a motion between its samples, and path lengths of its joints.
 
 p(s) = Σ c_k s^k on 0 ≤ s ≤ 1, coefficients (m + 1, …) lowest first.
 """
@@ -13,16 +13,16 @@ import numpy.typing as npt
 
 from selfmotion.basics import Array, Ints
 
-# A leading coefficient of no more than this share of the largest one is none.
+# Relative size below which a leading coefficient counts as zero.
 _NOTHING = 1e-13
-# Roots with a smaller imaginary part are real ones, or two that rounding keeps apart.
+# Largest imaginary part of a real root, and of two that rounding has separated.
 _REAL = 1e-6
-# How far outside a root is still looked at.
+# Distance outside of 0..1 at which a root is still polished.
 _NEAR = 1e-3
-# Newton's steps that a root gets.
+# Newton iterations of a root.
 _STEPS = 3
-# Intervals that are looked at together.
-_LOT = 16_384
+# Intervals, or times, that are evaluated at once, to bound memory.
+_CHUNK = 16_384
 
 
 def evaluated(coefficients: Array, s: Array) -> Array:
@@ -42,7 +42,7 @@ def differentiated(coefficients: Array) -> Array:
 
 
 def may_pass(coefficients: Array, least: Array, largest: Array) -> npt.NDArray[np.bool_]:
-    """Return which polynomials (m + 1, P, n) may leave least..largest (n,) inside, (P, n).
+    """Return the mask of polynomials (m + 1, P, n) that may leave least..largest (n,), (P, n).
 
     A polynomial lies in the hull of its Bernstein coefficients, the first and last of which are
     its ends.
@@ -54,7 +54,7 @@ def may_pass(coefficients: Array, least: Array, largest: Array) -> npt.NDArray[n
 
 
 def may_vanish(coefficients: Array) -> npt.NDArray[np.bool_]:
-    """Return which polynomials (m + 1, …) may be 0 somewhere inside: not those of one sign."""
+    """Return the mask of polynomials (m + 1, …) that may have a root: not those of one sign."""
     inner = np.tensordot(_bernstein(len(coefficients) - 1), coefficients, 1)
     hull = np.concatenate([coefficients[:1], inner, coefficients.sum(axis=0, keepdims=True)])
     return np.asarray((hull.max(axis=0) >= 0.0) & (hull.min(axis=0) <= 0.0))
@@ -154,24 +154,24 @@ class Spline:
     qdd: Array | None
 
     @cached_property
-    def before(self) -> Array:
-        """The way made by the beginning of each interval, and in all, (N, n)."""
-        whole = np.concatenate([self.way(k, np.ones(len(k))) for k in self.lots()])
+    def lengths_before(self) -> Array:
+        """Path lengths of the joints up to the start of each interval, and in all, (N, n)."""
+        whole = np.concatenate([self.path_length(k, np.ones(len(k))) for k in self.chunks()])
         return np.vstack([np.zeros(whole.shape[1]), np.cumsum(whole, axis=0)])
 
-    def way(self, k: Ints, s: Array) -> Array:
-        """Return the ways from the beginning of intervals k (K,) up to s (K,), (K, n)."""
+    def path_length(self, k: Ints, s: Array) -> Array:
+        """Return the path lengths from the start of intervals k (K,) up to s (K,), (K, n)."""
         edge = np.broadcast_to(s[:, None, None], (len(k), 1, self.q.shape[1]))
-        stops = [np.zeros_like(edge), np.minimum(self._turns(k), edge), edge]
-        passed = evaluated(self.pieces(k)[:, :, None], np.concatenate(stops, axis=1))
+        stops = [np.zeros_like(edge), np.minimum(self._turning_points(k), edge), edge]
+        passed = evaluated(self.segments(k)[:, :, None], np.concatenate(stops, axis=1))
         return np.asarray(np.abs(np.diff(passed, axis=1)).sum(axis=1))
 
-    def _turns(self, k: Ints) -> Array:
-        """Where joints turn round in intervals k (K,), sorted, (K, m, n); 0 for nowhere."""
-        pieces = self.pieces(k, 1)
-        turns = np.zeros((len(pieces) - 1, *pieces.shape[1:]))
-        some, joints = np.nonzero(may_vanish(pieces))
-        turns[:, some, joints] = inner_roots(pieces[:, some, joints])
+    def _turning_points(self, k: Ints) -> Array:
+        """Return the joints' turning points in intervals k (K,), sorted, (K, m, n); 0 for none."""
+        segments = self.segments(k, 1)
+        turns = np.zeros((len(segments) - 1, *segments.shape[1:]))
+        some, joints = np.nonzero(may_vanish(segments))
+        turns[:, some, joints] = inner_roots(segments[:, some, joints])
         return np.sort(turns.transpose(1, 0, 2), axis=1)
 
     def place(self, t: Array) -> tuple[Ints, Array]:
@@ -181,40 +181,40 @@ class Spline:
 
     def at(self, t: Array, order: int = 0) -> Array:
         """Return the motion or a derivative at times t (…), (…, n)."""
-        return _by_lots(lambda part: self._at(part, order), t)
+        return _in_chunks(lambda part: self._at(part, order), t)
 
     def within(self, shares: Array, order: int) -> Array:
-        """Return the same at these shares (S,) of each interval, then at the end, (…, n)."""
+        """Return a derivative at these shares (S,) of each interval, then at the end, (…, n)."""
         found = []
-        for k in self.lots():
-            pieces = self.pieces(k, order)
-            each = np.tensordot(shares[:, None] ** np.arange(len(pieces)), pieces, 1)
-            found.append(each.swapaxes(0, 1).reshape(-1, pieces.shape[-1]))
+        for k in self.chunks():
+            segments = self.segments(k, order)
+            each = np.tensordot(shares[:, None] ** np.arange(len(segments)), segments, 1)
+            found.append(each.swapaxes(0, 1).reshape(-1, segments.shape[-1]))
         return np.concatenate([*found, self._at(self.t[-1:], order)])
 
     def _at(self, t: Array, order: int) -> Array:
         k, s = self.place(t)
-        return evaluated(self.pieces(k, order), s[..., None])
+        return evaluated(self.segments(k, order), s[..., None])
 
     def travelled(self, t: Array) -> Array:
-        """Return the ways made by times t (K,), (K, n)."""
-        return _by_lots(self._travelled, t)
+        """Return the path lengths up to times t (K,), (K, n)."""
+        return _in_chunks(self._travelled, t)
 
     def _travelled(self, t: Array) -> Array:
         k, s = self.place(t)
-        return np.asarray(self.before[k] + self.way(k, s))
+        return np.asarray(self.lengths_before[k] + self.path_length(k, s))
 
-    def lots(self) -> Iterator[Ints]:
-        """Yield the numbers of all intervals in lots that fit into memory."""
-        for first in range(0, len(self.t) - 1, _LOT):
-            yield np.arange(first, min(first + _LOT, len(self.t) - 1))
+    def chunks(self) -> Iterator[Ints]:
+        """Yield the numbers of all intervals, in chunks that fit into memory."""
+        for first in range(0, len(self.t) - 1, _CHUNK):
+            yield np.arange(first, min(first + _CHUNK, len(self.t) - 1))
 
-    def pieces(self, k: Ints, order: int = 0) -> Array:
+    def segments(self, k: Ints, order: int = 0) -> Array:
         """Return the coefficients of 1, s, s² … of a derivative in intervals k (…), (m, …, n).
 
         s goes from 0 to 1 in each.
         """
-        if len(self.t) > _LOT:
+        if len(self.t) > _CHUNK:
             return self._differentiated(k, order)
         if order not in self._derivatives:
             every = np.arange(len(self.t) - 1)
@@ -223,7 +223,7 @@ class Spline:
 
     @cached_property
     def _derivatives(self) -> dict[int, Array]:
-        """The pieces of some orders, of a motion with few samples."""
+        """Cached segments of derivatives, of a motion with few samples."""
         return {}
 
     def _differentiated(self, k: Ints, order: int) -> Array:
@@ -239,11 +239,11 @@ class Spline:
         return hermite(h[..., None], *((table[ends[0]], table[ends[1]]) for table in given))
 
 
-def _by_lots(function: Callable[[Array], Array], t: Array) -> Array:
-    """Return what a function returns for times t, of many a lot after the other.
+def _in_chunks(function: Callable[[Array], Array], t: Array) -> Array:
+    """Evaluate `function` at times t in chunks, to bound memory.
 
-    The coefficients that it needs are several times as large as what it returns.
+    Its coefficients are several times as large as its result.
     """
-    if t.ndim != 1 or len(t) <= _LOT:
+    if t.ndim != 1 or len(t) <= _CHUNK:
         return function(t)
-    return np.concatenate([function(t[k : k + _LOT]) for k in range(0, len(t), _LOT)])
+    return np.concatenate([function(t[k : k + _CHUNK]) for k in range(0, len(t), _CHUNK)])

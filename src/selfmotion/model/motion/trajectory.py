@@ -1,4 +1,4 @@
-"""A joint motion over time: what it is, how it is read, joined and turned round."""
+"""Joint motions over time: interpolation, files, joining and reversal."""
 
 from __future__ import annotations
 
@@ -24,17 +24,17 @@ from selfmotion.basics import (
 )
 from selfmotion.model.motion.spline import Spline, differentiated, evaluated, inner_roots, may_pass
 
-# What follows a joint's name in the header of the columns of its velocity and acceleration.
+# Suffixes of the columns of a joint's rates → the word for several.
 _MANY = {"_velocity": "velocities", "_acceleration": "accelerations"}
 _RATES = tuple(_MANY)
-# A last sample as near to its end as this [s] is at its end.
+# A last sample as near as this to the end counts as the end [s].
 _MOMENT = 0.5e-9
-# More samples than this do not fit into memory, and no controller wants them.
+# Largest number of samples: more do not fit into memory, and no controller takes them.
 MOST_SAMPLES = 1e7
 
 
 def column_names(joint_names: Sequence[str]) -> list[str]:
-    """Return what the columns of a motion's table are called: t, and each joint's q, q̇ and q̈."""
+    """Return the names of the columns of a motion's table: t, and each joint's q, q̇ and q̈."""
     return ["t", *(name + ending for ending in ("", *_RATES) for name in joint_names)]
 
 
@@ -150,7 +150,7 @@ class Trajectory:
 
     @classmethod
     def from_csv(cls, file: str | Path, *, degrees: bool = False) -> Trajectory:
-        """Read a motion that something else made.
+        """Read a motion of any other tool.
 
         The columns are ``t`` [s], one per joint for q under the joint's name [rad or m], and
         optionally ``NAME_velocity`` for q̇ and ``NAME_acceleration`` for q̈; in any order, separated
@@ -181,7 +181,7 @@ class Trajectory:
 
     @cached_property
     def digest(self) -> str:
-        """What tells it from any other motion: a digest of all its numbers and names."""
+        """Digest of all numbers and names, which identifies the motion."""
         return digest_of(self.joint_names, self.t, self.q, self.qd, self.qdd)
 
     def of_joints(self, names: Sequence[str]) -> Trajectory:
@@ -190,7 +190,7 @@ class Trajectory:
         Raises
         ------
         FileFormatError
-            A joint is missing, or there is one more; it is named.
+            A joint is missing, or there is an additional one; it is named.
         """
         wanted, own = tuple(names), self.joint_names
         if wanted == own:
@@ -225,20 +225,20 @@ class Trajectory:
         Returns
         -------
         t, values : (2, n)
-            When, and what: the least in the first row, the largest in the second.
+            Times and values: the least in the first row, the largest in the second.
         """
         self._check_order(order)
         n = len(self.joint_names)
         t = np.full((2, n), self.t[0])
-        values = np.tile(self._spline.pieces(np.zeros(1, dtype=np.intp), order)[0], (2, 1))
-        for k in self._spline.lots():
-            pieces = self._spline.pieces(k, order)
-            ends = np.stack([pieces[0], pieces.sum(axis=0)])
+        values = np.tile(self._spline.segments(np.zeros(1, dtype=np.intp), order)[0], (2, 1))
+        for k in self._spline.chunks():
+            segments = self._spline.segments(k, order)
+            ends = np.stack([segments[0], segments.sum(axis=0)])
             least = np.minimum(ends.min(axis=(0, 1)), values[0])
             largest = np.maximum(ends.max(axis=(0, 1)), values[1])
-            # Only where the polynomials may go beyond all their ends, they are looked at inside.
-            some, joints = np.nonzero(may_pass(pieces, least, largest))
-            chosen = pieces[:, some, joints]
+            # Inner extrema only where the Bernstein hull of a polynomial exceeds all ends.
+            some, joints = np.nonzero(may_pass(segments, least, largest))
+            chosen = segments[:, some, joints]
             roots = inner_roots(differentiated(chosen))
             inner = evaluated(chosen, roots)
             steps = self.t[k + 1] - self.t[k]
@@ -259,13 +259,13 @@ class Trajectory:
         """
         if self.qdd is not None or len(self.t) < 3:
             return np.full(self.q.shape[1], self.t[0]), np.zeros(self.q.shape[1])
-        pieces = self._spline.pieces(np.arange(len(self.t) - 1), 2)
-        jumps = np.abs(pieces[0, 1:] - pieces[:, :-1].sum(axis=0))
+        segments = self._spline.segments(np.arange(len(self.t) - 1), 2)
+        jumps = np.abs(segments[0, 1:] - segments[:, :-1].sum(axis=0))
         worst = np.argmax(jumps, axis=0)
         return self.t[1 + worst], jumps[worst, np.arange(jumps.shape[1])]
 
     def travelled(self, t: Array) -> Array:
-        """Return the way that each joint has made by times (K,), (K, n) [rad or m]: ∫ |q̇| dt.
+        """Return each joint's path length up to times (K,), (K, n) [rad or m]: ∫ |q̇| dt.
 
         Exact: from one turn, where q̇ = 0, to the next.
         """
@@ -303,7 +303,7 @@ class Trajectory:
         return self._spline.at(times, order)
 
     def within(self, shares: Array, order: int = 0) -> Array:
-        """Return the same at these shares (S,) of each interval in turn, and at the end, (…, n)."""
+        """Return a derivative at these shares (S,) of each interval, and at the end, (…, n)."""
         return self._spline.within(shares, order)
 
     def polynomials(self, middle: Array, half: Array) -> Array:
@@ -314,7 +314,7 @@ class Trajectory:
         """
         k, s = self._spline.place(middle)
         share = (half / (self.t[k + 1] - self.t[k]))[:, None]
-        return series.recentred(self._spline.pieces(k), s[:, None], share)
+        return series.recentred(self._spline.segments(k), s[:, None], share)
 
     def sample_times(self, rate: float) -> Array:
         """Return the times from the start [s] of `rate` samples per second, and of the end, (K,).
@@ -364,7 +364,7 @@ class Evaluation:
     x : (size,)
         The decision vector.
     terms : dict
-        What each cost contributes to F.
+        Contribution of each cost to F.
     trajectory : Trajectory
         Its nodes put onto the path, unless damped.
     damped : bool
@@ -385,9 +385,11 @@ class Evaluation:
 def joined_motions(motions: Sequence[Trajectory]) -> Trajectory:
     """Return motions one after the other as one, from t = 0 on.
 
-    Each begins in the configuration in which the one before it ends, as fast, and accelerating as
-    much. Cubic where all of them are; where some are, these are quintic in the whole, and so not
-    quite the same between their samples.
+    Each starts in the configuration, and with the velocity and acceleration, in which the one
+    before it
+    ends. Cubic where all of them are. Otherwise all become quintic, and the cubics change slightly
+    between
+    their samples.
     """
     orders = _orders(motions)
     t, tables = [motions[0].t[:1] * 0.0], [[motions[0](motions[0].t[:1], k)] for k in orders]
@@ -407,14 +409,14 @@ def reversed_motion(motion: Trajectory) -> Trajectory:
 
 
 def _orders(motions: Sequence[Trajectory]) -> range:
-    """Return which derivatives say what motions are between their samples."""
+    """Return the orders of derivatives that define motions between their samples."""
     return range(2 if all(motion.qdd is None for motion in motions) else 3)
 
 
 def slowdown_of(motion: Trajectory, limits: Sequence[Array]) -> float:
-    """Return how many times as long a motion would have to take to keep limits at all times.
+    """Return the factor by which a motion has to be slowed to be within limits at all times.
 
-    Of q̇, q̈, … in turn, (n,) each; inf where there is none. Below 1 it might be faster.
+    Of q̇, q̈, … in turn, (n,) each; inf for none. Below 1 it might be faster.
     """
     shares = (
         float((np.abs(motion.extremes(order)[1]) / limit).max()) ** (1.0 / order)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Self, overload
 
@@ -172,9 +172,11 @@ class Path(Saved, ABC, family="path"):
 
     def __add__(self, other: Path) -> Path:
         """Return this path and then the other one; see `Joined`."""
-        from selfmotion.model.path.joined import Joined
-
-        return Joined([self, other]) if isinstance(other, Path) else NotImplemented
+        if not isinstance(other, Path):
+            return NotImplemented
+        # By its registered kind: its file imports this one.
+        joined: Callable[[Sequence[Path]], Path] = Path.kinds()["joined"]
+        return joined([self, other])
 
     @overload
     def pose(self, t: float) -> SE3: ...

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from selfmotion.basics import Array
-from selfmotion.model.path import path_pose
+from selfmotion.model.path.base import path_pose
 from selfmotion.model.task import SE3, Quaternion, exp3, rpy
 
 # A quaternion shorter than this has no direction.

@@ -10,6 +10,7 @@ from selfmotion.model.robot.calibration import (
     calibrated_robot as calibrated_robot,
     nominal_robot as nominal_robot,
 )
+from selfmotion.model.robot.cells import is_placement as is_placement
 from selfmotion.model.robot.chain import (
     WORLD as WORLD,
     Chain as Chain,
@@ -36,7 +37,6 @@ from selfmotion.model.robot.loading import load_robot as load_robot
 from selfmotion.model.robot.model import LIMITS as LIMITS, RobotModel as RobotModel
 from selfmotion.model.robot.mounting import (
     UrdfShape as UrdfShape,
-    is_placement as is_placement,
     mounting_of as mounting_of,
 )
 from selfmotion.model.robot.named import (

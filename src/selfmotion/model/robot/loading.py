@@ -15,10 +15,10 @@ import pinocchio as pin
 from selfmotion.basics import RobotError, is_folder, nearest, read_only, shown
 from selfmotion.model.robot.building import build_robot
 from selfmotion.model.robot.calibration import calibrated_urdf
+from selfmotion.model.robot.cells import composed
 from selfmotion.model.robot.model import RobotModel
 from selfmotion.model.robot.mounting import (
     CarriedBody,
-    composed,
     with_base,
     with_bodies,
     with_tool_offset,

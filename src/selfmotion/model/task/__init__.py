@@ -1,4 +1,4 @@
-"""What of the tool's motion is prescribed: rows, bands around them, damping near singular poses."""
+"""Tasks: prescribed rows of the tool's motion, relaxations, and damping near singular poses."""
 
 from selfmotion.model.task.damping import (
     Damping as Damping,
@@ -18,9 +18,9 @@ from selfmotion.model.task.poses import (
     turn as turn,
     turning as turning,
 )
-from selfmotion.model.task.rows import (
+from selfmotion.model.task.relaxation import (
     POSITION_ROWS as POSITION_ROWS,
     ROW_NAMES as ROW_NAMES,
     Relaxation as Relaxation,
-    Task as Task,
 )
+from selfmotion.model.task.rows import Task as Task

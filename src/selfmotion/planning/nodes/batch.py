@@ -1,9 +1,12 @@
 """Many motions at once: rough optima of all, by Newton's method on the nodes of all.
 
-The motions know nothing of each other: one after the other, with gaps between them, they are one
-motion of many nodes, so that what is compiled and what is an array sees all of them in one pass.
-Each takes steps of its own. Conditions do not count: what keeps them all the same is the best near
-by, and of what does not, the cost is a bound from below on what may become of it.
+The motions are independent: they are put one after the other, with gaps between them, into one
+motion
+of many nodes, so that compiled kernels and array operations handle all of them in one pass. Each
+has
+its own step length. Constraints are left out: an optimum that satisfies them all the same is the
+best
+near it; the cost of one that does not is a lower bound of the constrained optimum's.
 """
 
 from dataclasses import dataclass
@@ -18,17 +21,22 @@ from selfmotion.planning.nodes.objective import LocalModel
 from selfmotion.planning.nodes.spline import GAUSS
 from selfmotion.planning.optimise import Banded
 
-# A motion is left alone when a step promises less than this share of what it costs.
+# A motion is finished when a step predicts less than this share of its cost.
 _ENOUGH = 1e-3
-# Shares of Newton's step that are tried, what each has to do of what it promises, and how far nodes
-# go in one [rad or m].
-_SHARES, _DONE, _FARTHEST = (1.0, 0.25, 0.0625), 1e-4, 0.5
-# More of a matrix's diagonal, as in `newton`: this share of its usual entry; where it is not
-# positive definite this one of its largest entry, and so many times more.
-_FLAT, _SHIFT, _MORE = 1e-11, 1e-6, 8.0
-# What a place is made of.
+# Shares of Newton's step that are tried in turn.
+_SHARES = (1.0, 0.25, 0.0625)
+# Share of the predicted decrease that a step has to reach (Armijo).
+_ARMIJO = 1e-4
+# Largest change of a node's coordinate in one step [rad or m].
+_MAX_CHANGE = 0.5
+# Added to the diagonal, as a share of its median entry.
+_FLAT = 1e-11
+# Inertia correction: first, as a share of the largest entry, and its factor.
+_DELTA_FIRST = 1e-6
+_KAPPA_PLUS = 8.0
+# Fields of `Place`.
 _PLACE = ("q", "qd", "qdd", "tangents", "table")
-_LEAVES = "of several motions, one that is not to be had leaves the others"
+_LEAVES = "a motion that cannot be evaluated is to leave the others valid"
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,13 +46,13 @@ class Batch:
     Attributes
     ----------
     motion : NodeMotion
-        All of them, one after the other.
+        All motions, one after the other.
     costs : (K,)
-        F of each; inf of one that is not to be had.
+        F of each; inf where the motion could not be evaluated.
     going : (K,)
-        Whether Newton's method may still lead somewhere.
+        Whether Newton's method goes on.
     promised : (K,)
-        By how much the last step was to lower the cost, twice; inf before the first.
+        Twice the decrease that the last step predicted; inf before the first.
     """
 
     motion: NodeMotion
@@ -56,17 +64,17 @@ class Batch:
     def near(cls, grid: NodeGrid, motions: Array) -> "Batch":
         """Return motions without self-motion whose nodes are those nearest to q (K, N + 1, n)."""
         many, q = grid.copied(len(motions)), motions.reshape(-1, motions.shape[2])
-        begun = many.manifolds.near(q, np.zeros_like(q), np.zeros_like(q))
-        if begun is None:
+        started = many.manifolds.near(q, np.zeros_like(q), np.zeros_like(q))
+        if started is None:
             raise RuntimeError(_LEAVES)
         count = len(motions)
-        return cls._of(many.at(begun), np.ones(count, dtype=np.bool_), np.full(count, np.inf))
+        return cls._of(many.at(started), np.ones(count, dtype=np.bool_), np.full(count, np.inf))
 
     @classmethod
     def _of(cls, motion: NodeMotion, going: Flags, promised: Array) -> "Batch":
-        """Return the motions of nodes, of which those on their way are looked at anew."""
+        """Return the motions of nodes, with costs of those that go on evaluated."""
         samples, grid, count = motion.samples, motion.grid, len(going)
-        # That looks at the clock as well.
+        # This also checks the deadline.
         grid.counts.evaluated()
         grid.counts.evaluations += int(going.sum()) - 1
         each = np.sum([cost.value(samples) for cost in grid.problem.all_costs], axis=0)
@@ -89,16 +97,16 @@ class Batch:
 
     @property
     def qd(self) -> Array:
-        """How fast they are there, (K, N + 1, n)."""
+        """Joint velocities at the nodes, (K, N + 1, n)."""
         return self._each(self.motion.place.qd)
 
     @property
     def qdd(self) -> Array:
-        """Their accelerations there, (K, N + 1, n)."""
+        """Joint accelerations at the nodes, (K, N + 1, n)."""
         return self._each(self.motion.place.qdd)
 
     def picked(self, which: Ints) -> "Batch":
-        """Return some of them."""
+        """Return a subset of the motions."""
         motion, whole = self.motion, self.motion.place
         grid = motion.grid.copied(len(which))
         rows = self._rows(which)
@@ -108,14 +116,14 @@ class Batch:
         return Batch(some, self.costs[which], self.going[which], self.promised[which])
 
     def advanced(self) -> "Batch":
-        """Return them after one of Newton's steps with each that is on its way."""
+        """Return the motions after one Newton step of each that goes on."""
         which = np.flatnonzero(self.going)
         if len(which) == self.count:
             return self._stepped()
         return self._with(which, self.picked(which)._stepped()) if len(which) else self
 
     def _with(self, which: Ints, others: "Batch") -> "Batch":
-        """Return them with others in place of some."""
+        """Return the motions with some replaced by others."""
         mine, own = self.motion, others.motion
         rows = self._rows(which)
 
@@ -141,14 +149,14 @@ class Batch:
         )
 
     def _rows(self, which: Ints) -> Ints:
-        """Return which nodes are those of some motions."""
+        """Return the numbers of the nodes of some motions."""
         size = len(self.motion.nu) // self.count
         return np.asarray((which[:, None] * size + np.arange(size)).ravel())
 
     def _stepped(self) -> "Batch":
         motion, grid = self.motion, self.motion.grid
         grid.counts.gradients += self.count
-        # Beside what is not to be had, others know nothing of that.
+        # A gap's slopes may be NaN.
         spline = grid.spline
         slopes = grid.cost.slopes(motion.samples, motion.curve_ends, motion.partials)
         slopes[spline.gaps] = 0.0
@@ -170,7 +178,9 @@ class Batch:
         rights = rights.reshape(step.shape)
         sound = self.going & np.isfinite(rights).all(axis=1)
         for k in np.flatnonzero(sound).tolist():
-            solved = matrix.part_solved(k, self.count, rights[k], (_FLAT, _SHIFT, _MORE))
+            solved = matrix.part_solved(
+                k, self.count, rights[k], (_FLAT, _DELTA_FIRST, _KAPPA_PLUS)
+            )
             if solved is None:
                 sound[k] = False
             else:
@@ -182,11 +192,11 @@ class Batch:
         return self._moved(step, promised, going)
 
     def _moved(self, step: Array, promised: Array, going: Flags) -> "Batch":
-        """Return them along their steps, each as far as it does what it promises."""
+        """Line search: move each motion along its step until the cost falls as predicted."""
         motion, r, due = self.motion, self.motion.nu.shape[1], np.where(going, promised, 0.0)
         by_node = step.reshape(self.count, -1, 3, r)
         farthest = np.abs(by_node[:, :, 0]).max(axis=(1, 2))
-        most = np.where(going, _FARTHEST / np.maximum(farthest, _FARTHEST), 0.0)
+        most = np.where(going, _MAX_CHANGE / np.maximum(farthest, _MAX_CHANGE), 0.0)
         left, length = going.copy(), most.copy()
         for share in (*_SHARES, 0.0):
             length[left] = share * most[left]
@@ -194,7 +204,7 @@ class Batch:
             if found is None:
                 raise RuntimeError(_LEAVES)
             new = Batch._of(found, going & (length > 0.0), promised)
-            left[left] = ~(new.costs <= self.costs - _DONE * length * due)[left]
+            left[left] = ~(new.costs <= self.costs - _ARMIJO * length * due)[left]
             if not left.any():
                 break
         return new

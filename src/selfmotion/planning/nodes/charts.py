@@ -1,4 +1,4 @@
-"""All nodes of a motion at once: where they are on their self-motion manifolds, and eq. 4 there."""
+"""Charts of the self-motion manifolds of all nodes, and eq. 4 there."""
 
 from copy import copy
 from dataclasses import dataclass, replace
@@ -12,7 +12,7 @@ from selfmotion.model import kernels
 from selfmotion.model.follow import Follows
 from selfmotion.model.path import twist_rates
 from selfmotion.model.robot import null_space
-from selfmotion.planning.nodes.kernels import accelerate, bend_of, look
+from selfmotion.planning.nodes.kernels import accelerate, bend_of, retract
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,7 +25,7 @@ class Place:
     tangents : (N + 1, n, r)
         T = ∂q/∂z.
     table : (N + 1, columns)
-        What eq. 4 leaves for its derivatives.
+        Intermediate values of eq. 4, for its derivatives.
     """
 
     q: Array
@@ -41,7 +41,7 @@ class Place:
 
 
 class Bases(NamedTuple):
-    """How q̇ and q̈ change with ν and α at nodes.
+    """Derivatives of q̇ and q̈ by ν and α at the nodes.
 
     Attributes
     ----------
@@ -94,60 +94,61 @@ class Charts:
     bases: Array
 
     def at(self, z: Array, nu: Array, alpha: Array) -> Place | None:
-        """Return the nodes at z, ν and α, (N + 1, r) each; None where one is not to be had."""
-        found = self._looked(z, self.spread(nu), self.spread(alpha), centred=False)
+        """Return the nodes at z, ν and α, (N + 1, r) each; None where Newton's iteration fails."""
+        found = self._retracted(z, self.spread(nu), self.spread(alpha), centred=False)
         return None if found is None else found[0]
 
     def around(self, z: Array, nu: Array, alpha: Array) -> tuple[Place, Bases] | None:
-        """Return the same with how it changes with ν and α there."""
+        """Return the same with its derivatives by ν and α."""
         given = z, self.spread(nu), self.spread(alpha)
-        found = self._looked(*given, centred=False, full=True)
+        found = self._retracted(*given, centred=False, full=True)
         return None if found is None or found[1] is None else (found[0], found[1])
 
     def repeated(self, count: int) -> "Charts":
-        """Return the charts so many times, one after the other: looked at in one pass."""
+        """Return `count` copies of the charts, one after the other, for one pass."""
         if count == 1:
             return self
         tiled = np.tile(self.q, (count, 1)), np.tile(self.bases, (count, 1, 1))
         return Charts(self.manifolds.repeated(count), *tiled)
 
     def bases_at(self, place: Place) -> Bases:
-        """Return how the motion at a place at the reference changes with ν and α."""
+        """Return the derivatives of q̇ and q̈ by ν and α at a place at the reference."""
         other = replace(place, qdd=np.empty_like(place.qdd))
         return self.manifolds.accelerated(other, np.zeros_like(place.q), self.bases)
 
     def centred(
         self, z: Array, epsilon: Array, a: Array, *, carried: bool = False
     ) -> Centred | None:
-        """Return charts around the nodes at z (N + 1, r), with what of ε and a (N + 1, n) acts.
+        """Return charts around the nodes at z (N + 1, r); ε and a (N + 1, n) are projected.
 
-        Of the bases, only the first need be known where they are to be `carried` from node to node.
-        None where a node is not to be had.
+        Of the bases, only the first need be given where they are `carried` from node to node. None
+        where a
+        node cannot be put onto its manifold.
         """
-        looked = self._looked(z, epsilon, a, centred=True, carried=carried)
-        if looked is None:
+        found = self._retracted(z, epsilon, a, centred=True, carried=carried)
+        if found is None:
             return None
-        place = looked[0]
+        place = found[0]
         around = Charts(self.manifolds, place.q, place.tangents)
         own, turned = self.manifolds.rates(place.table)[1], np.swapaxes(place.tangents, 1, 2)
         nu, alpha = ((turned @ each[:, :, None])[:, :, 0] for each in (own, a))
         return Centred(around, nu, alpha, place)
 
     def places(self, z: Array) -> Array | None:
-        """Return q at z (N + 1, r), (N + 1, n); None where a node is not to be had."""
+        """Return q at z (N + 1, r), (N + 1, n); None where Newton's iteration fails."""
         none = np.zeros_like(self.q)
         q, table, tangents = (
             np.empty_like(self.q),
             self.manifolds.table(),
             np.empty_like(self.bases),
         )
-        return q if self._look(q, table, tangents, z, none, centred=False) else None
+        return q if self._retract(q, table, tangents, z, none, centred=False) else None
 
     def spread(self, coordinates: Array) -> Array:
         """Return ε = N0 ν or a = N0 α, (N + 1, n)."""
         return np.asarray((self.bases @ coordinates[:, :, None])[:, :, 0])
 
-    def _looked(
+    def _retracted(
         self,
         z: Array,
         epsilon: Array,
@@ -159,14 +160,14 @@ class Charts:
     ) -> tuple[Place, Bases | None] | None:
         own, bases = self.manifolds, self.bases
         q, table, tangents = np.empty_like(self.q), own.table(), np.empty_like(bases)
-        if not self._look(q, table, tangents, z, epsilon, centred=centred, carried=carried):
+        if not self._retract(q, table, tangents, z, epsilon, centred=centred, carried=carried):
             return None
         qd, _ = own.rates(table)
         place = Place(q, np.array(qd), np.empty_like(q), tangents, table)
         around = own.accelerated(place, a, bases if full else None)
         return place, around if full else None
 
-    def _look(
+    def _retract(
         self,
         q: Array,
         table: Array,
@@ -177,12 +178,14 @@ class Charts:
         centred: bool,
         carried: bool = False,
     ) -> bool:
-        """Set q, a table and tangents at z; return whether all nodes are to be had."""
+        """Set q, a table and tangents at z; return whether all nodes are on their manifolds."""
         own = self.manifolds
         own.rates(table)[1][:] = epsilon
         along = len(q) // own.copies if carried else 0
         z, given = np.ascontiguousarray(z), (own.targets, own.chains, own.layout)
-        failed = look(q, z, self.bases, self.q, *given, table, tangents, own.held, centred, along)
+        failed = retract(
+            q, z, self.bases, self.q, *given, table, tangents, own.held, centred, along
+        )
         return failed < 0 or not own.is_whole
 
 
@@ -195,9 +198,11 @@ class Manifolds:
     t : (N + 1,)
         Times [s].
     copies : int, optional
-        Of how many motions these are the nodes, one after the other, at times `t` each. There, one
-        that is not to be had leaves the others: q̇ of its nodes that are nowhere is no number. By
-        default they are those of one motion, all of which have to be had.
+        Number of motions that are put one after the other, at times `t` each. A node that cannot be
+        put onto
+        its manifold then has q̇ = NaN, and the others are valid. By default there is one motion,
+        all of whose
+        nodes have to be.
     """
 
     def __init__(self, follows: Follows, t: Array, copies: int | None = None) -> None:
@@ -205,26 +210,28 @@ class Manifolds:
         self.follows, self.t, self.copies = follows, np.tile(t, copies), copies
         self.chains, self.layout = follows.chains, follows.layout
         self._sizes = follows.robot.dof, follows.dimension, len(follows.items)
-        self._paths, asked = [], []
+        self._paths, accelerations = [], []
         for item in follows.items:
             own = item.target(t)
             parts = own.translation, own.rotation.reshape(-1, 9), own.twist
             self._paths.append(np.tile(np.hstack(parts), (copies, 1)))
-            asked.append(twist_rates(item.path, t))
+            accelerations.append(twist_rates(item.path, t))
         self.held = np.tile(follows.held(t), (copies, 1))
         self.targets = np.ascontiguousarray(np.hstack([path[:, :12] for path in self._paths]))
         # ẍ of the paths, (N + 1, 6 F).
-        self._asked = np.ascontiguousarray(np.tile(np.hstack(asked), (copies, 1)))
+        self._path_accelerations = np.ascontiguousarray(
+            np.tile(np.hstack(accelerations), (copies, 1))
+        )
         self._repeated: dict[int, Manifolds] = {}
 
     def repeated(self, count: int) -> "Manifolds":
-        """Return the same so many times, one after the other."""
+        """Return `count` copies of the manifolds, one after the other."""
         if count == 1:
             return self
         if count not in self._repeated:
             found = copy(self)
             found.copies, found.t = count * self.copies, np.tile(self.t, count)
-            for name in ("held", "targets", "_asked"):
+            for name in ("held", "targets", "_path_accelerations"):
                 setattr(found, name, np.tile(getattr(self, name), (count, 1)))
             found._paths = [np.tile(path, (count, 1)) for path in self._paths]
             found._repeated = {}
@@ -232,7 +239,7 @@ class Manifolds:
         return self._repeated[count]
 
     def table(self) -> Array:
-        """Return a table with nothing in it but the paths."""
+        """Return a table that holds the paths alone."""
         n, m, count = self._sizes
         table = np.zeros((len(self.t), kernels.columns(n, m, count)))
         for f, path in enumerate(self._paths):
@@ -246,7 +253,7 @@ class Manifolds:
     def accelerated(self, place: Place, a: Array, bases: Array | None) -> Bases:
         """Set q̈ of a place for a null acceleration a (N + 1, n).
 
-        Returns how the motion changes with ν and α, for `bases`; without, nothing of use.
+        Returns the derivatives of the motion by ν and α, for `bases`; without, empty arrays.
         """
         full = bases is not None
         by = np.empty(place.tangents.shape if full else (0, 0, 0))
@@ -255,7 +262,7 @@ class Manifolds:
             place.table,
             self.layout,
             self.follows.every_column(place.q),
-            self._asked,
+            self._path_accelerations,
             np.ascontiguousarray(a),
             np.ascontiguousarray(bases) if full else by,
             full,
@@ -276,8 +283,8 @@ class Manifolds:
     def with_held_last(self, q: Array, bases: Array) -> Array:
         """Return bases (N + 1, n, r) at q (N + 1, n) whose last vectors are those of held joints.
 
-        These move no tip, so that they are in the null spaces. Where they are last already, bases
-        stay as they are.
+        These move no tip, so that they are in the null spaces. Bases with these last already are
+        returned as they are.
         """
         found = bases.copy()
         for k in np.flatnonzero(self.held.any(axis=1)):
@@ -292,13 +299,13 @@ class Manifolds:
         moving = np.delete(np.arange(len(unit)), joints)
         free = null_space(self.follows.jacobian(q)[:, moving])
         own = np.zeros((len(unit), free.shape[1]))
-        # As near as may be to what they were.
+        # The rotation nearest to the old basis (orthogonal Procrustes).
         left, _, right = np.linalg.svd(free.T @ bases[k, moving, : free.shape[1]])
         own[moving] = free @ (left @ right)
         bases[k] = np.hstack([own, unit])
 
     def _bases(self, q: Array) -> Array:
-        """Return bases of the null spaces at q (N + 1, n), each turned to the one before."""
+        """Return bases of the null spaces at q (N + 1, n), each rotated towards the one before."""
         rows = np.where(self.held[:, None], 0.0, self.follows.jacobians(q))
         spaces = np.ascontiguousarray(null_space(rows))
         for k in range(len(q)):
@@ -310,10 +317,11 @@ class Manifolds:
         return spaces
 
     def near(self, q: Array, epsilon: Array, a: Array) -> Centred | None:
-        """Return charts around the nodes nearest to q, with what of ε and a acts there.
+        """Return charts around the nodes nearest to q, with ε and a projected into the null spaces.
 
-        (N + 1, n) each. Their bases turn no more than they must from each node to the next. None
-        where a node does not come onto its manifold.
+        (N + 1, n) each. Bases rotate as little as possible from one node to the next. None where a
+        node cannot
+        be put onto its manifold.
         """
         n, m, _ = self._sizes
         none = np.zeros((len(q), n - m))
@@ -328,7 +336,7 @@ class Manifolds:
 
 @meanwhile
 def _call_what_follows() -> None:
-    """Call the kernels that follow the largest one, `look`, for no nodes at all."""
+    """Compile the kernels that are called after the largest one, `retract`: called for no nodes."""
     layout = layout_of([(np.arange(1), False, np.arange(2))], 2)
     table, rates = np.zeros((0, kernels.columns(2, 1, 1))), np.zeros((0, 2))
     bases = np.zeros((0, 2, 1))
@@ -338,7 +346,7 @@ def _call_what_follows() -> None:
 
 
 def orthonormal(tangents: Array) -> Array:
-    """Return orthonormal bases of the spans of full-rank matrices (K, n, r): Gram-Schmidt."""
+    """Return orthonormal bases of the columns of matrices (K, n, r): Gram-Schmidt."""
     found = np.array(tangents)
     for x in range(found.shape[2]):
         for y in range(x):

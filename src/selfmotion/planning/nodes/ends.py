@@ -1,4 +1,4 @@
-"""What is asked of the first and the last node: c(w_0, w_N) = 0."""
+"""Conditions on the first and the last node: c(w_0, w_N) = 0."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -8,16 +8,20 @@ import numpy as np
 from selfmotion.basics import Array, Ints
 from selfmotion.problem.constraints import BoundEnd
 
-_FIRST, _LAST, _ORDERS = 0, 1, 3
+# Index of the first and the last node.
+_FIRST = 0
+_LAST = 1
+# Derivatives that conditions know: q, q̇, q̈.
+_ORDERS = 3
 
 
 class Border(NamedTuple):
-    """What is off at the ends, and how it changes with all coordinates.
+    """Residuals of the conditions at the ends, with their derivatives by all coordinates.
 
     Attributes
     ----------
     c : (E,)
-    columns : (K s, E)
+    ∂c/∂w, transposed.
         ∂c/∂w, turned round.
     """
 
@@ -25,15 +29,15 @@ class Border(NamedTuple):
     columns: Array
 
     def met_by(self, solved: Array) -> tuple[Array, Array]:
-        """Return the step that meets them to first order, and their multipliers.
+        """Return the step that satisfies the linearised conditions, and their multipliers.
 
-        For the step that knows nothing of them and what each of them moves, side by side.
+        `solved` has the step without conditions, then the response to each column, side by side.
         """
         step, moved = solved[:, 0], solved[:, 1:]
         if not len(self.c):
             return step, self.c
         turned = self.columns.T
-        # Least squares: what is held may be asked for as well.
+        # Least squares: conditions on coordinates that are held have no derivatives.
         multipliers = np.asarray(np.linalg.lstsq(turned @ moved, turned @ step + self.c)[0], float)
         return step - moved @ multipliers, multipliers
 
@@ -48,7 +52,7 @@ class NodeEnds:
     Attributes
     ----------
     count : int
-        How many numbers have to be 0: E.
+        Number of equations: E.
     """
 
     def __init__(self, items: Sequence[BoundEnd]) -> None:
@@ -69,22 +73,23 @@ class NodeEnds:
 
     @property
     def last(self) -> Array | None:
-        """Where the motion has to end, (n,); None where that is not asked for."""
+        """Configuration at the end, (n,); None where it is not prescribed."""
         for item in self._items:
             if item.is_whole and item.row and item.target is not None:
                 return item.target
         return None
 
     def elsewhere(self, nodes: Array) -> dict[str, float]:
-        """Return how far an end is from the configuration that is asked for, by condition.
+        """Return the distance of an end from its prescribed configuration, by condition.
 
-        Of those that it is at another configuration of the same pose, for (q, q̇, q̈) of the nodes.
+        Only of ends that are at another configuration of the same pose, for (q, q̇, q̈) of the
+        nodes.
         """
         found = {item.name: item.elsewhere(nodes[0, 0], nodes[-1, 0]) for item in self._items}
         return {name: far for name, far in found.items() if far > 0.0}
 
     def border(self, c: Array, changes: Array, held: Ints) -> Border:
-        """Return what is off, c (E,), with its derivatives; nothing moves what is `held`.
+        """Return the residuals c (E,) with their derivatives; rows of `held` coordinates are 0.
 
         `changes` (N + 1, 3, n, s) is ∂(q, q̇, q̈)/∂w of the nodes.
         """

@@ -1,4 +1,4 @@
-"""What numba compiles: nodes put onto their self-motion manifolds, and eq. 4 and its rate there.
+"""Compiled: nodes are put onto their self-motion manifolds, and eq. 4 and its rate evaluated.
 
 Each node's chart is around a reference on the manifold, with an orthonormal basis N0 of the null
 space there: z are the coordinates N0ᵀ(q - q_ref) of q on the manifold {q : F(q) = x}, and ε = N0 ν
@@ -42,14 +42,16 @@ from selfmotion.model.kernels.algebra import (
 )
 from selfmotion.model.robot import place_tips
 
-# A node this near to its place [m, rad] is there; Newton's method is quadratic from nearby.
-_THERE, _STEPS = 1e-12, 12
-# A guess need not be nearer; the step after that makes it a square of this.
+# Residual [m, rad] at which a node counts as on its manifold; Newton's method is quadratic nearby.
+_THERE = 1e-12
+# Newton iterations of a node.
+_STEPS = 12
+# Residual of a guess that is near enough: the next iteration squares it.
 _NEAR = 1e-4
 
 
 @kernel
-def look(
+def retract(
     q: Array,
     coordinates: Array,
     bases: Array,
@@ -67,12 +69,14 @@ def look(
 
     For charts with `bases` (K, n, r) and `references` (K, n), and `targets` (K, 12 F). Rows of the
     `table` hold paths and null motions already; q̇ and all else is set, q (K, n), and T in
-    `tangents` (K, n, r). Or, `centred`, an orthonormal basis of the null space instead of T, and of
-    ε what is in it: the same motion in charts around it. Where bases are to be `carried`, along
-    motions of so many nodes, the first is that of a motion's first node, and each other one becomes
-    what is found at the node before; 0 for none. Joints that are `held` (K, n) at 0 move no tip;
-    see `Charts`. Returns the first node for which that is impossible, or -1; of all such nodes, q̇
-    is no number.
+    `tangents` (K, n, r). If `centred`, an orthonormal basis of the null space instead of T, and the
+    projection of ε onto it: the same motion in charts around it. `carried` is the number of nodes
+    of a
+    motion whose bases are carried along: the first node's is given, each other one is that of the
+    node
+    before; 0 for given bases. Joints that are `held` (K, n) at 0 move no tip; see `Charts`. Returns
+    the
+    first node that cannot be put onto its manifold, or -1; q̇ of all such nodes is NaN.
     """
     failed = -1
     (count, n), m, r = q.shape, rows_of(layout), bases.shape[2]
@@ -109,7 +113,7 @@ def look(
                 system,
                 factor,
             )
-            # Singular, not a number, or there: what that step has moved is rounding.
+            # Singular, NaN, or converged: after that step the rest is rounding.
             if not off >= _THERE:
                 break
         if not 0.0 <= off < _THERE:
@@ -143,7 +147,7 @@ def look(
                 at.factor[i, j] = factor[i, j]
         for f in range(tips):
             tip = tip_of(row, f, n, m)
-            _note(tip, rotations[f], positions[f], jacobians[f])
+            _write_tip(tip, rotations[f], positions[f], jacobians[f])
             select(layout, f, tip.rotation, tip.command, at.y)
         respond(at.task_jacobian, at.factor, at.y, at.epsilon, at.qd)
         if not finite(at.qd):
@@ -163,7 +167,7 @@ def _hold(held: Flags, jacobians: Array) -> None:
 
 @inlined
 def _centre(tangents: Array, epsilon: Array, rest: Array) -> None:
-    """Make tangents (n, r) orthonormal by Gram-Schmidt, and ε what of it they span."""
+    """Orthonormalise tangents (n, r) by Gram-Schmidt, and project ε onto them."""
     n, r = tangents.shape
     for j in range(n):
         rest[j] = epsilon[j]
@@ -187,8 +191,8 @@ def _centre(tangents: Array, epsilon: Array, rest: Array) -> None:
 
 
 @inlined
-def _note(tip: Tip, turn: Array, place: Array, six: Array) -> None:
-    """Set where a tip is, its Jacobian, and that its command is its path's twist."""
+def _write_tip(tip: Tip, turn: Array, place: Array, six: Array) -> None:
+    """Write a tip's pose and Jacobian into the table; its command is its path's twist."""
     for i in range(3):
         tip.translation[i] = place[i]
         for j in range(3):
@@ -204,7 +208,7 @@ def accelerate(
     table: Array,
     layout: Layout,
     every: Every | None,
-    asked: Array,
+    accelerations: Array,
     alpha: Array,
     bases: Array,
     full: bool,
@@ -212,39 +216,39 @@ def accelerate(
     by_rate: Array,
     by_both: Array,
 ) -> None:
-    """Set q̈ (K, n) of nodes whose motion `look` has evaluated: q̈ = a + J⁺(b - J a).
+    """Set q̈ (K, n) of nodes whose motion `retract` has evaluated: q̈ = a + J⁺(b - J a).
 
-    With a (K, n) = `alpha` the null acceleration, b = S(ẍ - J̇q̇) + Ṡ(ẋ - Jq̇), and ẍ = `asked`
-    (K, 6 F). If `full`, also ∂q̇/∂ν = ∂q̈/∂α = B = (I - J⁺J) N0 (K, n, r) = `by_rate`, and
-    ∂q̈/∂ν = J⁺ ∂b/∂q̇ B (K, n, r) = `by_both`: b is quadratic in q̇, so that its central
-    difference is exact.
+    With a (K, n) = `alpha` the null acceleration, b = S(ẍ - J̇q̇) + Ṡ(ẋ - Jq̇), and
+    ẍ = `accelerations` (K, 6 F). If `full`, also ∂q̇/∂ν = ∂q̈/∂α = B = (I - J⁺J) N0 (K, n, r) =
+    `by_rate`, and ∂q̈/∂ν = J⁺ ∂b/∂q̇ B (K, n, r) = `by_both`: b is quadratic in q̇, so that its
+    central difference is exact.
     """
     (count, n), m, r = qdd.shape, rows_of(layout), bases.shape[2]
     right, other, six = np.empty(m), np.empty(m), np.empty(6)
-    rates, way = np.empty(n), np.empty(n)
+    rates, direction = np.empty(n), np.empty(n)
     for k in range(count):
         at = stage_of(table[k], n, m)
-        _needed(table[k], layout, every, k, asked[k], at.qd, six, right)
-        _answer(at.task_jacobian, at.factor, right, alpha[k], qdd[k])
+        _required(table[k], layout, every, k, accelerations[k], at.qd, six, right)
+        _projected(at.task_jacobian, at.factor, right, alpha[k], qdd[k])
         if not full:
             continue
         for x in range(r):
             for j in range(n):
-                way[j] = bases[k, j, x]
+                direction[j] = bases[k, j, x]
             for i in range(m):
                 right[i] = 0.0
-            _answer(at.task_jacobian, at.factor, right, way, rates)
+            _projected(at.task_jacobian, at.factor, right, direction, rates)
             for j in range(n):
-                by_rate[k, j, x], way[j] = rates[j], at.qd[j] + rates[j]
-            _needed(table[k], layout, every, k, asked[k], way, six, right)
+                by_rate[k, j, x], direction[j] = rates[j], at.qd[j] + rates[j]
+            _required(table[k], layout, every, k, accelerations[k], direction, six, right)
             for j in range(n):
-                way[j] = at.qd[j] - rates[j]
-            _needed(table[k], layout, every, k, asked[k], way, six, other)
+                direction[j] = at.qd[j] - rates[j]
+            _required(table[k], layout, every, k, accelerations[k], direction, six, other)
             for i in range(m):
                 right[i] = 0.5 * (right[i] - other[i])
             for j in range(n):
-                way[j] = 0.0
-            _answer(at.task_jacobian, at.factor, right, way, rates)
+                direction[j] = 0.0
+            _projected(at.task_jacobian, at.factor, right, direction, rates)
             for j in range(n):
                 by_both[k, j, x] = rates[j]
 
@@ -258,7 +262,7 @@ def bend_of(
     For λ = `force` (K, n) and u = `directions` (K, n, d): -λᵀJ⁺ Q(u, u), with J̇q̇ = Q(q̇, q̇).
     """
     (count, n, size), m = directions.shape, rows_of(layout)
-    out, way, six = np.zeros((count, size)), np.empty(n), np.empty(6)
+    out, direction, six = np.zeros((count, size)), np.empty(n), np.empty(6)
     right, other, by = np.empty(m), np.empty(m), np.empty(m)
     none = np.zeros(6 * layout.shape[0])
     for k in range(count):
@@ -270,28 +274,28 @@ def bend_of(
         solve_cholesky(at.factor, by)
         for x in range(size):
             for j in range(n):
-                way[j] = directions[k, j, x]
-            _needed(table[k], layout, every, k, none, way, six, right)
+                direction[j] = directions[k, j, x]
+            _required(table[k], layout, every, k, none, direction, six, right)
             for j in range(n):
-                way[j] = -way[j]
-            _needed(table[k], layout, every, k, none, way, six, other)
+                direction[j] = -direction[j]
+            _required(table[k], layout, every, k, none, direction, six, other)
             for i in range(m):
                 out[k, x] += 0.5 * by[i] * (right[i] + other[i])
     return out
 
 
 @called
-def _needed(
+def _required(
     row: Array,
     layout: Layout,
     every: Every | None,
     s: int,
-    asked: Array,
+    accelerations: Array,
     rates: Array,
     six: Array,
     out: Array,
 ) -> None:
-    """Set `out` (m,) to what q̈ has to make of the rows at q̇ = `rates`; `six` is to work in.
+    """Set `out` (m,) to the right side b of q̈ at q̇ = `rates`; `six` is work space.
 
     Rows in tool axes turn with the tool: there, Ṡ(ẋ - Jq̇) = -S(ω × ω_d).
     """
@@ -303,7 +307,7 @@ def _needed(
         else:
             spin = _turned_every(every[1], f, every[0][s, f], rates, six)
         for i in range(6):
-            six[i] = asked[6 * f + i] - six[i]
+            six[i] = accelerations[6 * f + i] - six[i]
         if layout[f, KIND] == POINTING:
             add_angular(six, -1.0, cross(spin, angular_part(tip.target_twist)))
         select(layout, f, tip.rotation, six, out)
@@ -344,22 +348,22 @@ def _turned_every(members: Ints, f: int, own: Array, rates: Array, out: Array) -
 def _added(
     place: Vector, axis: Vector, rate: float, spin: Vector, v: Vector, w: Vector
 ) -> tuple[Vector, Vector, Vector]:
-    """Return the sums v, w and W with one joint more."""
+    """Return the sums v, w and W with the next joint added."""
     own = (rate * axis[0], rate * axis[1], rate * axis[2])
     twice = plus(own, 2.0, spin)
     return plus(v, rate, cross(twice, place)), plus(w, 1.0, cross(spin, own)), plus(own, 1.0, spin)
 
 
 @inlined
-def _answer(jacobian: Array, factor: Array, right: Array, way: Array, out: Array) -> None:
-    """Set `out` (n,) to p + J⁺(b - J p) for p = `way`; `right` (m,) is b, and is written over."""
+def _projected(jacobian: Array, factor: Array, right: Array, direction: Array, out: Array) -> None:
+    """Set `out` (n,) to p + J⁺(b - J p) for p = `direction`; b = `right` (m,) is overwritten."""
     m, n = jacobian.shape
     for i in range(m):
         for j in range(n):
-            right[i] -= jacobian[i, j] * way[j]
+            right[i] -= jacobian[i, j] * direction[j]
     solve_cholesky(factor, right)
     for j in range(n):
-        out[j] = way[j]
+        out[j] = direction[j]
         for i in range(m):
             out[j] += jacobian[i, j] * right[i]
 
@@ -377,15 +381,16 @@ def follow(
 ) -> int:
     """Set q (K, n) to configurations on targets (K, 12 F), each near the one before it.
 
-    From one to the next, the self-motion goes a `share` (K,) of the way to `wanted` (n,); joints
-    that are `held` (K, n) are at 0. Returns the first one that is not to be had, or -1.
+    From one to the next, the self-motion covers a `share` (K,) of the difference to `wanted` (n,);
+    joints
+    that are `held` (K, n) are at 0. Returns the first node that fails, or -1.
     """
     (count, n), m, tips = q.shape, rows_of(layout), layout.shape[0]
     turns, places = np.empty((chains.shape[1], 3, 3)), np.empty((chains.shape[1], 3))
     rotations, positions = np.empty((tips, 3, 3)), np.empty((tips, 3))
     jacobians = np.zeros((tips, 6, n))
     rows, factor, b = np.empty((m, n)), np.empty((m, m)), np.empty(m)
-    way, here = np.empty(n), start.copy()
+    direction, here = np.empty(n), start.copy()
     for k in range(count):
         off = np.inf
         for j in range(n):
@@ -399,18 +404,19 @@ def follow(
             for x in range(m):
                 if not abs(b[x]) <= off:
                     off = abs(b[x])
-            # First Jᵀ(JJᵀ)⁻¹(e - J p) + p: towards what is wanted by p, then what is left of e.
+            # First Jᵀ(JJᵀ)⁻¹(e - J p) + p with p towards `wanted`, then corrections of e alone.
             for j in range(n):
-                way[j] = share[k] * (wanted[j] - here[j]) if i == 0 and not held[k, j] else 0.0
+                goes = i == 0 and not held[k, j]
+                direction[j] = share[k] * (wanted[j] - here[j]) if goes else 0.0
             for x in range(m):
                 for j in range(n):
-                    b[x] -= rows[x, j] * way[j]
+                    b[x] -= rows[x, j] * direction[j]
             gram(rows, factor)
             if not off < np.inf or not cholesky(factor):
                 return k
             solve_cholesky(factor, b)
             for j in range(n):
-                here[j] += way[j]
+                here[j] += direction[j]
                 for x in range(m):
                     here[j] += rows[x, j] * b[x]
             if i > 0 and off < _NEAR:

@@ -12,9 +12,9 @@ from selfmotion.planning.nodes.charts import Centred, Charts, Manifolds, Place
 from selfmotion.planning.nodes.ends import NodeEnds
 from selfmotion.planning.nodes.kernels import follow
 from selfmotion.planning.nodes.objective import NodeCost
-from selfmotion.planning.nodes.rows import NodeRows, accelerates_of, counts_at_once, looked
+from selfmotion.planning.nodes.rows import NodeRows, accelerates_of, counts_at_once, sampled_curve
 from selfmotion.planning.nodes.samples import CurveSamples
-from selfmotion.planning.nodes.smoothness import quickness, smoothing_of, would_be_calm
+from selfmotion.planning.nodes.smoothness import can_be_smoothed, quickness, smoothing_of
 from selfmotion.planning.nodes.spline import AT_GAUSS, FINE_POINTS, POINTS, Quintic
 from selfmotion.problem.constraints import BoundConstraint, BoundEnd
 from selfmotion.problem.costs import Partials
@@ -22,7 +22,7 @@ from selfmotion.problem.problem import Problem
 
 
 class NodeGrid:
-    """What all motions of a problem on the same nodes share.
+    """Problem, times and costs that all motions on the same nodes share.
 
     Parameters
     ----------
@@ -34,14 +34,13 @@ class NodeGrid:
     free : bool
         Whether the start may move along its self-motion.
     counts : Counts
-        Where work is added up.
-    calm : bool
-        Whether motions are kept from wavering everywhere, see `smoothing_of`.
+        Counters of the work.
+    smoothed : bool
+        Whether q̈ is penalised everywhere, against oscillation; see `smoothing_of`.
     quick : float
-        In what share of the usual time the self-motion starts and stops, see `smoothing_of`.
+        Share of the usual time in which the self-motion starts and stops, see `smoothing_of`.
     copies : int, optional
-        Of how many motions these are the nodes, one after the other, at times `t` each; see
-        `Manifolds`.
+        Number of motions that are put one after the other, at times `t` each; see `Manifolds`.
 
     Attributes
     ----------
@@ -52,9 +51,9 @@ class NodeGrid:
     rows : NodeRows
     ends : NodeEnds
     scale : (3r,)
-        What makes w all rad: 1, and the reciprocals of a usual step and of its square.
+        Scales that make w [rad]: 1, and the reciprocals of the median step and of its square.
     held : (k,)
-        Numbers of the coordinates w (N + 1, 3r), in one row, that stay as they are.
+        Indices of the coordinates w (N + 1, 3r), flattened, that are constant.
     """
 
     def __init__(
@@ -65,24 +64,24 @@ class NodeGrid:
         *,
         free: bool,
         counts: Counts,
-        calm: bool = False,
+        smoothed: bool = False,
         quick: float = 1.0,
         copies: int | None = None,
     ) -> None:
         self.problem, self.free, self.counts = problem, free, counts
-        self.calm, self.quick = calm, quick
+        self.smoothed, self.quick = smoothed, quick
         follows = problem.follows
         self.manifolds = Manifolds(follows, t, copies)
         copies = self.manifolds.copies
         accelerates = any(accelerates_of(item, follows.robot.dof) for item in constraints)
         self.spline = Quintic(t, copies, FINE_POINTS if accelerates else POINTS)
-        smoothing = smoothing_of(problem, self.spline, calm=calm, quick=quick)
+        smoothing = smoothing_of(problem, self.spline, smoothed=smoothed, quick=quick)
         self.cost = NodeCost(follows, self.spline, problem.all_costs, smoothing)
         self.ends = NodeEnds([item for item in constraints if isinstance(item, BoundEnd)])
         others = [item for item in constraints if not item.equality]
         self.rows = NodeRows(self.spline, others, follows.robot.dof)
         self.constraints = tuple(constraints)
-        self._one = t
+        self._times = t
         r = follows.robot.dof - follows.dimension
         usual = float(np.median(np.diff(t)))
         self.scale = np.repeat([1.0, 1.0 / usual, 1.0 / usual**2], r)
@@ -106,35 +105,35 @@ class NodeGrid:
         """Times of the nodes [s], (N + 1,)."""
         return self.spline.t
 
-    def on(self, t: Array, *, calm: bool = False, quick: float | None = None) -> "NodeGrid":
-        """Return the same on other nodes, and from now on `calm` and so `quick` if wanted."""
-        found = self._other(t, calm=calm, quick=quick)
+    def on(self, t: Array, *, smoothed: bool = False, quick: float | None = None) -> "NodeGrid":
+        """Return the grid on other nodes, with `smoothed` and `quick` replaced if given."""
+        found = self._other(t, smoothed=smoothed, quick=quick)
         found.rows = self.rows.on(found.spline)
         return found
 
     def without_rows(self) -> "NodeGrid":
-        """Return the same with nothing asked but what its ends are, and what counts at once."""
-        return self.asking(
+        """Return the grid with conditions on its ends and rows of tolerances alone."""
+        return self.with_constraints(
             [item for item in self.constraints if item.equality or counts_at_once(item)]
         )
 
-    def asking(self, constraints: Sequence[BoundConstraint]) -> "NodeGrid":
-        """Return the same nodes, asked for other constraints."""
-        return self._other(self._one, constraints)
+    def with_constraints(self, constraints: Sequence[BoundConstraint]) -> "NodeGrid":
+        """Return the grid with other constraints."""
+        return self._other(self._times, constraints)
 
     def copied(self, copies: int) -> "NodeGrid":
-        """Return the nodes of so many motions, one after the other, for `Batch`.
+        """Return the grid of `copies` motions, one after the other, for `Batch`.
 
-        Of what belongs to several, `NodeMotion` knows places, samples and costs alone.
+        Of these, `NodeMotion` provides places, samples and costs alone.
         """
-        return self._other(self._one, copies=copies)
+        return self._other(self._times, copies=copies)
 
     def _other(
         self,
         t: Array,
         constraints: Sequence[BoundConstraint] | None = None,
         *,
-        calm: bool = False,
+        smoothed: bool = False,
         quick: float | None = None,
         copies: int | None = None,
     ) -> "NodeGrid":
@@ -144,7 +143,7 @@ class NodeGrid:
             self.constraints if constraints is None else constraints,
             free=self.free,
             counts=self.counts,
-            calm=calm or self.calm,
+            smoothed=smoothed or self.smoothed,
             quick=self.quick if quick is None else quick,
             copies=copies,
         )
@@ -152,7 +151,7 @@ class NodeGrid:
     def near(self, q: Array, qd: Array, qdd: Array | None = None) -> "NodeMotion | None":
         """Return the motion whose nodes are those nearest to q (N + 1, n) at q̇ and q̈.
 
-        Without q̈, what differences of q and q̇ make of it. None where a node does not come onto its
+        By default q̈ follows from differences of q and q̇. None where a node cannot be put onto its
         manifold.
         """
         if qdd is None:
@@ -161,8 +160,8 @@ class NodeGrid:
         return None if found is None else self.at(found)
 
     def _accelerations(self, q: Array, qd: Array) -> Array:
-        """Return q̈ at the nodes: the means of what cubics through q and q̇ have on both sides."""
-        h, size = self.spline.steps[:, None], len(self._one)
+        """Return q̈ at the nodes: means of those of the Hermite cubics on both sides."""
+        h, size = self.spline.steps[:, None], len(self._times)
         rise, first, second = (q[1:] - q[:-1]) / h, qd[:-1], qd[1:]
         left = (6.0 * rise - 4.0 * first - 2.0 * second) / h
         right = (-6.0 * rise + 2.0 * first + 4.0 * second) / h
@@ -182,7 +181,7 @@ class NodeGrid:
         return None if found is None else self.at(found)
 
     def rested(self, rates: Array, order: int) -> Array:
-        """Return what rates are where the arm does not rest."""
+        """Return rates with those of resting ends and of held joints set to 0."""
         found = np.where(self.manifolds.held, 0.0, rates)
         found[self._resting[order - 1]] = 0.0
         return found
@@ -192,13 +191,14 @@ class NodeGrid:
     ) -> "NodeMotion | None":
         """Return a motion from a start (n,) whose self-motion goes towards `wanted` (n,).
 
-        It is there, as far as the path lets it, after about so much time [s]; by default at the
-        end, from rest to rest. None where the path cannot be followed like that.
+        It arrives, as far as the path allows, after about `time` [s]; by default at the end, from
+        rest to rest.
+        None where the path cannot be followed.
         """
         own = self.manifolds
         q = np.empty((len(self.t), len(start)))
         if time is None:
-            # What is left of the way falls as a motion of minimum jerk.
+            # The remaining distance falls as a motion of minimum jerk.
             u = 1.0 - self.t / self.t[-1]
             left = u**3 * (10.0 + u * (6.0 * u - 15.0))
             share = np.append(0.0, 1.0 - left[1:] / left[:-1])
@@ -262,7 +262,7 @@ class NodeMotion:
 
     @cached_property
     def terms(self) -> dict[str, float]:
-        """What each cost contributes."""
+        """Contribution of each cost."""
         self.grid.counts.evaluated()
         return self.grid.cost.terms(self.samples)
 
@@ -272,8 +272,8 @@ class NodeMotion:
         return sum(self.terms.values())
 
     @cached_property
-    def aim(self) -> float:
-        """What is minimised: F and what keeps the motion smooth."""
+    def objective(self) -> float:
+        """Objective of the optimisation: F and the smoothing."""
         return self.cost + self.grid.cost.roughness(self.curve_ends)
 
     @cached_property
@@ -283,26 +283,26 @@ class NodeMotion:
 
     @cached_property
     def h(self) -> Array:
-        """All rows, less what is granted of their tolerances, (R,); see `NodeRows`."""
+        """Residuals of all rows, (R,); half of each tolerance is used; see `NodeRows`."""
         return self.grid.rows.residuals(self.checked, self.curve_ends)
 
     @cached_property
     def c(self) -> Array:
-        """What is off at the ends, (E,)."""
+        """Residuals of the conditions at the ends, (E,)."""
         return self.grid.ends.residuals(self.place.nodes)
 
     @cached_property
     def elsewhere(self) -> dict[str, float]:
-        """How far its ends are from where they should be, though `c` is 0; see `NodeEnds`."""
+        """Distance of ends from their prescribed configurations where `c` is 0; see `NodeEnds`."""
         return self.grid.ends.elsewhere(self.place.nodes)
 
     @cached_property
     def violation(self) -> float:
-        """By how much the worst row is beyond its tolerance [units of h]; 0 where all are kept."""
+        """Largest excess of a row over its tolerance [units of h]; 0 where all are satisfied."""
         return float(np.max(self.h - self.grid.rows.granted, initial=0.0))
 
     def breaks_hard(self, most: float = 0.0) -> bool:
-        """Whether a row is beyond its tolerance by more than that, other than of a tolerance."""
+        """Whether a row that is none of a tolerance is violated by more than `most`."""
         rows = self.grid.rows
         beyond = rows.split(self.h - rows.granted)
         pairs = zip(rows.constraints, beyond, strict=True)
@@ -310,13 +310,13 @@ class NodeMotion:
             not np.max(own, initial=0.0) <= most for item, own in pairs if not counts_at_once(item)
         )
 
-    def would_be_calm(self) -> bool:
-        """Whether it may be kept from wavering, see `smoothing_of`."""
-        return would_be_calm(self.grid.problem, self.samples, self.cost)
+    def can_be_smoothed(self) -> bool:
+        """Whether q̈ may be penalised everywhere, see `smoothing_of`."""
+        return can_be_smoothed(self.grid.problem, self.samples, self.cost)
 
     @cached_property
     def quickness(self) -> float:
-        """In what share of the usual time it should start and stop, see `quickness`."""
+        """Share of the usual time in which it should start and stop, see `quickness`."""
         return quickness(self.grid.problem, self.samples, self.cost, self.grid.quick)
 
     @property
@@ -356,17 +356,17 @@ class NodeMotion:
         found = self.charts.centred(z, qd, qdd)
         return None if found is None else grid.at(found)
 
-    def parts_between(self) -> Ints:
+    def subdivisions(self) -> Ints:
         """Return into how many parts intervals have to be divided, (N,); see `NodeRows`."""
         grid = self.grid
-        if not grid.rows.looks_between:
+        if not grid.rows.has_point_rows:
             return np.ones(grid.spline.count, dtype=np.int64)
-        curve = looked(grid.spline, grid.manifolds.follows, self.curve_ends)
-        return grid.rows.parts_between(curve)
+        curve = sampled_curve(grid.spline, grid.manifolds.follows, self.curve_ends)
+        return grid.rows.subdivisions(curve)
 
-    def broken_between(self) -> Flags:
+    def broken_intervals(self) -> Flags:
         """Return on which intervals something is broken between the points, or nearly so, (N,)."""
-        return np.asarray(self.parts_between() > 1)
+        return np.asarray(self.subdivisions() > 1)
 
     def forget(self) -> None:
         """Let go of what can be computed anew."""

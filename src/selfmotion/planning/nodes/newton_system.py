@@ -1,4 +1,4 @@
-"""The linear system of a step of Newton's method: what a motion is like near by, and the step.
+"""Linear system of a step of Newton's method: second-order model of a motion, and the step.
 
 Rows h + s - e = 0 have slacks s, elastic variables e and multipliers λ below a price ρ. Eliminated,
 their steps leave a block-tridiagonal matrix of the nodes alone; see `newton`.
@@ -13,28 +13,12 @@ from selfmotion.planning.nodes.ends import Border
 from selfmotion.planning.nodes.motion import NodeMotion
 from selfmotion.planning.nodes.objective import LocalModel
 from selfmotion.planning.nodes.rows import LinearRows
+from selfmotion.planning.nodes.settings import SETTINGS
 from selfmotion.planning.optimise import Banded
-
-# While a row is broken by more than this, its own curvature is none to trust: Gauss-Newton.
-WILD = 1e-2
-# Motions that cost nothing, as of a joint whose axis the tool is on, are left alone: the matrix has
-# this share of its usual entry, over the square of the number of nodes, more on the diagonal: above
-# what differences leave there, and below what slow motions cost.
-_FLAT = 2.5e-5
-# So many times that where it is not positive definite: there rounding may say anything.
-_FLATTER = 16.0
-# One that is not positive definite gets on the diagonal this share of how each coordinate bends
-# without rows, or a third of what the last one needed; then more by this factor, up to the last
-# one. The same for all would stop some of them: with costs of jerks they differ by 1e9.
-_SHIFT, _LESS, _MORE, _MOST_SHIFT = 1e-6, 1.0 / 3.0, 8.0, 1e6
-# Or this share of the largest entry of all, where nothing else bends.
-_LEAST_SHIFT = 1e-18
-# Nodes that would go farther than this [rad or m] are none of a matrix that says something.
-_TRUSTED = 5.0
 
 
 class ElasticRows(NamedTuple):
-    """The rows that count, with their unknowns, (K,) each.
+    """Active rows with their unknowns, (K,) each.
 
     Attributes
     ----------
@@ -43,8 +27,8 @@ class ElasticRows(NamedTuple):
         s, e and λ.
     price : float
         ρ.
-    kept : (R,)
-        Which of all rows count.
+    active : (R,)
+        Mask of the active ones among all rows.
     """
 
     h: Array
@@ -52,7 +36,7 @@ class ElasticRows(NamedTuple):
     elastics: Array
     multipliers: Array
     price: float
-    kept: Flags
+    active: Flags
 
     @property
     def left(self) -> Array:
@@ -61,18 +45,18 @@ class ElasticRows(NamedTuple):
 
     @property
     def stiff(self) -> Array:
-        """How much a change of h changes multipliers, (K,)."""
+        """∂λ/∂h once steps of s and e are eliminated, (K,)."""
         return 1.0 / (self.slacks / self.multipliers + self.elastics / self.left)
 
     def of_all(self, own: Array) -> Array:
-        """Return what belongs to rows that count, (K,), in a row of all, (R,)."""
-        found = np.zeros(len(self.kept))
-        found[self.kept] = own
+        """Return values of active rows, (K,), among those of all rows, (R,)."""
+        found = np.zeros(len(self.active))
+        found[self.active] = own
         return found
 
 
 class Model(NamedTuple):
-    """What a motion is like near by, to second order.
+    """Second-order model of a motion.
 
     Attributes
     ----------
@@ -81,9 +65,9 @@ class Model(NamedTuple):
     both : (N, n, 6, 6r)
         ∂y/∂w of both ends of each interval.
     around : LocalModel
-        How the nodes move, to second order along what pulls at them.
+        Motion of the nodes by their coordinates; curvature along the forces on them.
     intervals : (N, 6r, 6r)
-        What bends by costs.
+        Second derivatives of costs, and of rows that are sums of squares.
     rows : LinearRows
     border : Border
     """
@@ -97,17 +81,17 @@ class Model(NamedTuple):
 
     @classmethod
     def of(cls, motion: NodeMotion, own: ElasticRows, end_multipliers: Array) -> Self | None:
-        """Look around a motion; None where a neighbour is not to be had.
+        """Return the model at a motion; None where a neighbour cannot be evaluated.
 
-        `end_multipliers` (E,) are those of what is asked of the ends.
+        `end_multipliers` (E,) are those of the conditions on the ends.
         """
         grid, spline = motion.grid, motion.grid.spline
         grid.counts.gradients += 1
         slopes = grid.cost.slopes(motion.samples, motion.curve_ends, motion.partials)
         by_cost = spline.scattered(slopes)
-        rows = grid.rows.linearised(motion.checked, own.kept)
+        rows = grid.rows.linearised(motion.checked, own.active)
         force, multipliers = by_cost, own.of_all(own.multipliers)
-        wild = float(np.max(own.h, initial=0.0)) > WILD
+        wild = float(np.max(own.h, initial=0.0)) > SETTINGS.gauss_newton_violation
         if not wild and own.multipliers.size:
             force = force + spline.scattered(rows.pulled(multipliers))
         if not wild and len(motion.c):
@@ -118,9 +102,10 @@ class Model(NamedTuple):
         around = around.scaled(grid.scale)
         both = spline.changes(around.changes)
         intervals = grid.cost.curvature(motion.samples, motion.partials, both)
-        # Squares bend as they do, however far they are broken; those of tolerances not past others.
-        apart = wild and motion.breaks_hard(WILD)
-        bending = grid.rows.bending(motion.checked, multipliers, both, without_tolerances=apart)
+        # Sums of squares keep their curvature however far they are violated; those of tolerances
+        # only while other rows hold.
+        without = wild and motion.breaks_hard(SETTINGS.gauss_newton_violation)
+        bending = grid.rows.bending(motion.checked, multipliers, both, without_tolerances=without)
         if bending is not None:
             intervals = intervals + bending
         gradient = around.pulled(by_cost)
@@ -141,7 +126,7 @@ class Model(NamedTuple):
         return found if of_points is None else found + of_points
 
     def along(self, step: Array) -> Array:
-        """Return how y changes along a step of the nodes (N + 1, 3r), (N, 6, n)."""
+        """Return the change of y, (N, 6, n), along a step of the nodes (N + 1, 3r)."""
         count, n, _, size = self.both.shape
         pair = np.concatenate([step[:-1], step[1:]], axis=1)
         changes = self.both.reshape(count, n * 6, size) @ pair[:, :, None]
@@ -149,7 +134,7 @@ class Model(NamedTuple):
 
 
 class Change(NamedTuple):
-    """A step of all unknowns, and by how much it would lower what is minimised."""
+    """Step of all unknowns, and the decrease of the objective that it predicts."""
 
     nodes: Array
     slacks: Array
@@ -160,18 +145,18 @@ class Change(NamedTuple):
 
 
 class System(NamedTuple):
-    """A model, and the step of its nodes for any barrier μ: solved[:, 0] + μ solved[:, 1].
+    """Solved linear system: the step of the nodes for any μ is solved[:, 0] + μ solved[:, 1].
 
     Attributes
     ----------
     model : Model
     own : ElasticRows
     right : (2, (N + 1) 3r)
-        What pulls at the nodes, without barrier and by each unit of it.
+        Right sides with their sign changed: without barrier, and per unit of μ.
     solved : ((N + 1) 3r, 2 + E)
-        Also of what is asked of the ends.
+        Solutions for both right sides, and for the columns of the border.
     shift : float
-        What the matrix needed on its diagonal.
+        δ that was added to the diagonal.
     """
 
     model: Model
@@ -184,9 +169,9 @@ class System(NamedTuple):
     def of(
         cls, motion: NodeMotion, model: Model, own: ElasticRows, barrier: float, shift: float
     ) -> Self | None:
-        """Solve for any barrier; None where the matrix says nothing for the present one.
+        """Solve for any μ; None where the matrix is singular at the present one.
 
-        `shift` is what the last one needed on its diagonal.
+        `shift` is the δ of the last system.
         """
         grid, multipliers = motion.grid, own.multipliers
         gradient, intervals = model.gradient, model.intervals
@@ -204,7 +189,7 @@ class System(NamedTuple):
         return None if found is None else cls(model, own, right, *found)
 
     def step(self, barrier: float) -> Change:
-        """Return Newton's step of all unknowns for a barrier."""
+        """Return Newton's step of all unknowns for a μ."""
         own, model = self.own, self.model
         slacks, elastics, multipliers, left = own.slacks, own.elastics, own.multipliers, own.left
         step, end_multipliers = _nodes_of(model, self.solved, barrier)
@@ -219,7 +204,7 @@ class System(NamedTuple):
 
 
 def _nodes_of(model: Model, solved: Array, barrier: float) -> tuple[Array, Array]:
-    """Return the step of the nodes for a barrier, and the multipliers of the ends."""
+    """Return the step of the nodes for a μ, and the multipliers of the ends."""
     own = solved[:, 0] + barrier * solved[:, 1]
     return model.border.met_by(np.column_stack([own, solved[:, 2:]]))
 
@@ -232,44 +217,46 @@ def _solved(
     barrier: float,
     last: float,
 ) -> tuple[Array, float] | None:
-    """Return the steps for two right sides (2, …), and of what is asked of the ends; the shift.
+    """Return the solutions for two right sides (2, …) and the border's columns; and δ.
 
-    `intervals` (N, 6r, 6r) are those of the model with what its rows make stiff.
+    `intervals` (N, 6r, 6r) are the model's with the stiffness of its active rows.
     """
     curved = model.around.curvature
     count, size = model.gradient.shape
     largest = float(np.abs(curved).max() + np.abs(intervals).max())
     diagonals = np.abs(np.diagonal(intervals, axis1=1, axis2=2)).ravel()
     usual = float(np.partition(diagonals, len(diagonals) // 2)[len(diagonals) // 2])
-    flat, shift, bends = _FLAT / count**2 * usual, 0.0, np.zeros(0)
+    flat, shift, bounds = SETTINGS.flat_share / count**2 * usual, 0.0, np.zeros(0)
     columns = np.column_stack([-right.T, model.border.columns])
-    while flat <= _MOST_SHIFT * largest and shift <= _MOST_SHIFT:
+    while flat <= SETTINGS.delta_max * largest and shift <= SETTINGS.delta_max:
         matrix = Banded(count, size, 1)
         matrix.add(0, 0, curved)
         matrix.add_pairs(0, intervals)
-        matrix.add_diagonal(_FLATTER * flat + shift * bends if shift else flat)
+        matrix.add_diagonal(SETTINGS.flat_factor * flat + shift * bounds if shift else flat)
         matrix.hold(motion.grid.held)
         solved = matrix.solve(columns)
         if solved is not None:
             step, _ = _nodes_of(model, solved, barrier)
-            if np.abs(step.reshape(count, 3, -1)[:, 0]).max() <= _TRUSTED:
+            if np.abs(step.reshape(count, 3, -1)[:, 0]).max() <= SETTINGS.max_trusted:
                 return solved, shift
         if solved is not None and not shift:
-            flat = max(_MORE * flat, _LEAST_SHIFT * largest)
+            flat = max(SETTINGS.kappa_plus * flat, SETTINGS.delta_floor * largest)
         else:
-            # Most matrices need none of it.
-            if not bends.size:
-                bends = _bends(model.intervals, curved) + _LEAST_SHIFT * largest
-            shift = max(_MORE * shift, _LESS * last, _SHIFT)
+            # Most matrices are positive definite without.
+            if not bounds.size:
+                bounds = _curvature_bounds(model.intervals, curved) + SETTINGS.delta_floor * largest
+            shift = max(
+                SETTINGS.kappa_plus * shift, SETTINGS.kappa_minus * last, SETTINGS.delta_first
+            )
     return None
 
 
-def _bends(intervals: Array, nodes: Array) -> Array:
-    """Return how much each coordinate of the nodes bends without rows, (K,).
+def _curvature_bounds(intervals: Array, nodes: Array) -> Array:
+    """Return a bound of each coordinate's curvature without rows, (K,).
 
-    For matrices of intervals (N, d, d) by both ends, and of nodes (N + 1, d/2, d/2): the sums of
-    their rows, in units of what each kind of coordinate usually bends by. With that on the diagonal
-    a matrix is positive definite.
+    For matrices of intervals (N, d, d) by both ends, and of nodes (N + 1, d/2, d/2): the absolute
+    sums of their rows, scaled by the median curvature of each kind of coordinate. With these on
+    the diagonal a matrix is positive definite (Gershgorin).
     """
     count, size = len(intervals), intervals.shape[1] // 2
     own = np.abs(np.diagonal(intervals, axis1=1, axis2=2)).reshape(2 * count, size)

@@ -27,16 +27,20 @@ from selfmotion.planning.nodes.smoothness import Smoothing
 from selfmotion.planning.nodes.spline import AT_GAUSS, GAUSS, WEIGHTS, Quintic
 from selfmotion.problem.costs import Cost, Partials, PlacedLater, Samples
 
-# Differences along a manifold are taken this far to both sides [rad or m]: first ones are right to
-# 1e-8 then, second ones to 1e-6.
+# Step of central differences along a manifold [rad or m]: first derivatives are right to 1e-8,
+# second
+# ones to 1e-6.
 _REACH = 1e-4
-# Those of costs are taken to one side, so far [rad, m and their rates]: they are second derivatives
-# of a matrix that need not be exact.
+# Step of one-sided differences of costs' gradients [rad, m and their rates]: this matrix need not
+# be
+# exact.
 _NEAR = 1e-6
+# Derivatives of a sample, by order.
 _NAMES = ("q", "qd", "qdd", "qddd")
-# Intervals whose matrices are multiplied at once: what that takes is several times what it leaves.
-_LOT = 2048
-# Samples, or nodes, that are looked at together, of several directions.
+# Intervals in one chunk of a matrix product, which bounds memory: factors are larger than the
+# product.
+_CHUNK = 2048
+# Samples, or nodes, that are evaluated in one pass, of several directions.
 _TOGETHER = 4096
 
 
@@ -86,11 +90,11 @@ class NodeCost:
         return np.asarray(scale[:, None, None] * (table.T @ weighted))
 
     def terms(self, samples: Samples) -> dict[str, float]:
-        """Return what each cost contributes to F."""
+        """Return the contribution of each cost to F."""
         return {cost.name: float(samples.weights @ cost.value(samples)) for cost in self._costs}
 
     def roughness(self, ends: Array) -> float:
-        """Return what the smoothing adds, for y (N, 6, n)."""
+        """Return the contribution of the smoothing, for y (N, 6, n)."""
         if self._smoothing is None:
             return 0.0
         stiffness, weight = self._smoothing
@@ -116,7 +120,7 @@ class NodeCost:
         return found
 
     def _of_bent(self, partials: Sequence[Partials]) -> Partials:
-        """Return the derivatives of all costs that are no quadratic forms."""
+        """Return the summed derivatives of all costs that are not quadratic forms."""
         both = zip(self._costs, partials, strict=True)
         return _summed([own for cost, own in both if not cost.is_quadratic])
 
@@ -127,8 +131,8 @@ class NodeCost:
         """
         count, n, _, size = both.shape
         found = np.zeros((count, size, size))
-        for first in range(0, count, _LOT):
-            part = slice(first, first + _LOT)
+        for first in range(0, count, _CHUNK):
+            part = slice(first, first + _CHUNK)
             own = both[part]
             turned = _bent_by(self._forms, part, own)
             flat = own.reshape(len(own), 6 * n, size)
@@ -138,7 +142,7 @@ class NodeCost:
         return found
 
     def _bending(self, samples: CurveSamples, here: Partials, both: Array) -> Array:
-        """Return what costs that are no quadratic forms, with derivatives `here`, add to it.
+        """Return the contribution of costs that are not quadratic forms, with derivatives `here`.
 
         By differences along the self-motion, and by one joint's rate after the other.
         """
@@ -149,7 +153,7 @@ class NodeCost:
             * np.repeat(spline.rates(order), each)[:, None, None]
             for order, table in enumerate(AT_GAUSS)
         ]
-        # Along the self-motion at the samples: between what it is at the nodes.
+        # Self-motion directions at the samples: interpolated between the nodes.
         left, right = both[:, None, :, 0, :r], both[:, None, :, 3, 3 * r : 4 * r].copy()
         right[spline.gaps] = left[spline.gaps]
         share = GAUSS[:, None, None]
@@ -158,8 +162,8 @@ class NodeCost:
         along = orthonormal(along)
         turned = np.swapaxes(along, 1, 2)
         moved, weights = turned @ by[0], samples.weights[:, None, None]
-        ways = [("q", along[:, :, x]) for x in range(r)]
-        changed = self._changes(samples, here, ways)
+        directions = [("q", along[:, :, x]) for x in range(r)]
+        changed = self._changes(samples, here, directions)
         found = np.zeros((count, size, size))
         if "q" in changed:
             found += _squared(count, moved, weights * (turned @ changed["q"]) @ moved)
@@ -177,28 +181,31 @@ class NodeCost:
         return np.asarray(0.5 * (found + np.swapaxes(found, 1, 2)))
 
     def _changes(
-        self, samples: CurveSamples, here: Partials, ways: Sequence[tuple[str, Array]]
+        self, samples: CurveSamples, here: Partials, directions: Sequence[tuple[str, Array]]
     ) -> dict[str, Array]:
-        """Return how the derivatives `here` of bent costs change in directions, (S, n, D) each.
+        """Return changes of non-quadratic costs' derivatives `here` in directions, (S, n, D) each.
 
-        A direction is of q or one of its rates, (S, n) or (n,). Those of which there are few
-        samples are looked at together.
+        A direction is of q or one of its rates, (S, n) or (n,). Several are evaluated in one pass
+        where there
+        are few samples.
         """
         together = max(1, _TOGETHER // len(samples.t))
         found: dict[str, list[Array]] = {}
-        for first in range(0, len(ways), together):
-            for name, part in self._changed(samples, here, ways[first : first + together]).items():
+        for first in range(0, len(directions), together):
+            for name, part in self._changed(
+                samples, here, directions[first : first + together]
+            ).items():
                 found.setdefault(name, []).append(part)
         return {name: np.concatenate(parts, axis=2) for name, parts in found.items()}
 
     def _changed(
-        self, samples: CurveSamples, here: Partials, ways: Sequence[tuple[str, Array]]
+        self, samples: CurveSamples, here: Partials, directions: Sequence[tuple[str, Array]]
     ) -> dict[str, Array]:
-        """Return what `_changes` does, all directions at once."""
-        count, copies = len(samples.t), len(ways)
+        """Return the result of `_changes`, all directions in one pass."""
+        count, copies = len(samples.t), len(directions)
         flat = {name: np.tile(getattr(samples, name), (copies, 1)) for name in _NAMES}
-        for k, (name, way) in enumerate(ways):
-            flat[name][k * count : (k + 1) * count] += _NEAR * way
+        for k, (name, direction) in enumerate(directions):
+            flat[name][k * count : (k + 1) * count] += _NEAR * direction
         t, weights = (np.tile(values, copies) for values in (samples.t, samples.weights))
         sampling = Sampling(t, weights, np.arange(len(t)))
         shifted = PlacedLater(samples.follows, sampling, **flat)
@@ -243,7 +250,7 @@ def _summed(each: Sequence[Partials]) -> Partials:
 
 @dataclass(frozen=True, eq=False)
 class LocalModel:
-    """How nodes move when their coordinates do, to second order.
+    """Derivatives of the nodes by their coordinates, to second order.
 
     Attributes
     ----------
@@ -260,7 +267,7 @@ class LocalModel:
     def of(
         cls, charts: Charts, nu: Array, alpha: Array, place: Place, force: Array
     ) -> "LocalModel | None":
-        """Look around the reference of charts; None where a neighbour is not to be had.
+        """Return the model at the reference of charts; None where a neighbour cannot be evaluated.
 
         `place` is that of the nodes there, `force` (N + 1, 3, n) is λ.
         """
@@ -271,12 +278,12 @@ class LocalModel:
         changes[:, 1, :, r : 2 * r] = changes[:, 2, :, 2 * r :] = here.by_rate
         changes[:, 2, :, r : 2 * r] = here.by_both
         middle, axes = _along(force, place.nodes), np.eye(r)
-        sides = _looked(charts, np.concatenate([axes, -axes]), nu, alpha)
+        sides = _displaced(charts, np.concatenate([axes, -axes]), nu, alpha)
         if sides is None:
             return None
         nodes, bases = sides
-        apart = (nodes[:r] - nodes[r:]) / (2.0 * _REACH)
-        changes[:, 1:, :, :r] = np.moveaxis(apart[:, :, 1:], 0, -1)
+        differences = (nodes[:r] - nodes[r:]) / (2.0 * _REACH)
+        changes[:, 1:, :, :r] = np.moveaxis(differences[:, :, 1:], 0, -1)
         values = _along(force, nodes)
         bends = (values[:r] - 2.0 * middle + values[r:]) / _REACH**2
         curvature[:, np.arange(r), np.arange(r)] = bends.T
@@ -287,7 +294,7 @@ class LocalModel:
         if r > 1:
             x, y = np.tril_indices(r, -1)
             both = axes[x] + axes[y]
-            sides = _looked(charts, np.concatenate([both, -both]), nu, alpha)
+            sides = _displaced(charts, np.concatenate([both, -both]), nu, alpha)
             if sides is None:
                 return None
             values = _along(force, sides[0])
@@ -298,7 +305,7 @@ class LocalModel:
         return cls(changes, curvature)
 
     def scaled(self, scale: Array) -> "LocalModel":
-        """Return the same by coordinates that are these (3r,) times as small."""
+        """Return the model in coordinates that are divided by `scale` (3r,)."""
         return LocalModel(self.changes * scale, self.curvature * scale * scale[:, None])
 
     def pulled(self, force: Array) -> Array:
@@ -314,8 +321,8 @@ class LocalModel:
         """Add the second derivatives by two of ν: q̈ is quadratic in q̇."""
         r, by = here.by_rate.shape[2], here.by_rate
         pairs = [(x, y) for x in range(r) for y in range(x)]
-        ways = [by, *(by[:, :, x : x + 1] + by[:, :, y : y + 1] for x, y in pairs)]
-        half = charts.manifolds.bends(place, force[:, 2], np.concatenate(ways, axis=2))
+        directions = [by, *(by[:, :, x : x + 1] + by[:, :, y : y + 1] for x, y in pairs)]
+        half = charts.manifolds.bends(place, force[:, 2], np.concatenate(directions, axis=2))
         for x in range(r):
             curvature[:, r + x, r + x] += 2.0 * half[:, x]
         for number, (x, y) in enumerate(pairs, r):
@@ -324,16 +331,20 @@ class LocalModel:
             curvature[:, r + y, r + x] += mixed
 
 
-def _looked(charts: Charts, ways: Array, nu: Array, alpha: Array) -> tuple[Array, Bases] | None:
-    """Return all nodes a little along ways (K, r): (q, q̇, q̈) (K, N + 1, 3, n), and their bases.
+def _displaced(
+    charts: Charts, directions: Array, nu: Array, alpha: Array
+) -> tuple[Array, Bases] | None:
+    """Return all nodes displaced along directions (K, r): (q, q̇, q̈) (K, N + 1, 3, n), and bases.
 
-    None where one is not to be had. Ways along which there are few nodes are looked at together.
+    None where one cannot be evaluated. Several directions are evaluated in one pass where there are
+    few
+    nodes.
     """
     count = len(nu)
     together = max(1, _TOGETHER // count)
     found = []
-    for first in range(0, len(ways), together):
-        own = ways[first : first + together]
+    for first in range(0, len(directions), together):
+        own = directions[first : first + together]
         z = np.repeat(_REACH * own, count, axis=0)
         rates = (np.tile(each, (len(own), 1)) for each in (nu, alpha))
         there = charts.repeated(len(own)).around(z, *rates)
@@ -341,7 +352,7 @@ def _looked(charts: Charts, ways: Array, nu: Array, alpha: Array) -> tuple[Array
             return None
         found.append((there[0].nodes, *there[1]))
     nodes, by_rate, by_both = (
-        np.concatenate(parts).reshape(len(ways), count, *parts[0].shape[1:])
+        np.concatenate(parts).reshape(len(directions), count, *parts[0].shape[1:])
         for parts in zip(*found, strict=True)
     )
     return nodes, Bases(by_rate, by_both)

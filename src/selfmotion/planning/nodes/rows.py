@@ -1,8 +1,10 @@
-"""What is asked of a motion of nodes as rows h ≤ 0: each touches one interval, or two nodes.
+"""Constraints on a motion of nodes as rows h ≤ 0: each touches one interval, or two nodes.
 
-Limits of joints are asked of the control points of q, q̇, q̈ and the jerk, which the curve cannot
-leave: what they keep, the whole curve keeps. Everything else is asked at points of each interval.
-Only rows that are near to being broken count; the others are looked at after each step.
+Limits of joints apply to the control points of q, q̇, q̈ and the jerk: the curve is within their
+convex
+hull. All other constraints apply at points of each interval. Only rows that are near to being
+violated
+are active; the others are checked after each step.
 """
 
 from collections.abc import Sequence
@@ -35,22 +37,25 @@ from selfmotion.problem.constraints import (
 )
 from selfmotion.problem.costs import Samples
 
-# Rows of limits, and others, come in where h is above this [units of h]: a distance levels off
-# there.
-_NEAR_LIMIT, _NEAR = -0.3, -0.19
-# Where less than this is left of a limit, it is used up [units of h].
+# Rows of limits become active where h is above this [units of h].
+_NEAR_LIMIT = -0.3
+# The same of other rows: distances level off there.
+_NEAR = -0.19
+# A limit with less room than this is in use [units of h].
 _USED = 0.01
 # A limit whose control point is this near to it binds there [units of h].
 _BINDS = 1e-3
-# Control points that two intervals share are asked for once: the other counts as kept by this much.
+# h of control points that two intervals share, on one of the two: it never becomes active.
 _SHARED = -1e3
-# What is refined is looked at so often on each interval.
-_LOOKS = np.linspace(0.0, 1.0, 8, endpoint=False)
-_AT_LOOKS = unit_bases(_LOOKS)
-# What is broken between points is to be within this share of what is left of its tolerance after
-# intervals are divided, into so many parts at most.
-_ROOM, _MOST_PARTS = 0.5, 4
-# Limits that bind are looked at so often there.
+# Shares of an interval at which constraints are checked between points.
+_CHECKED = np.linspace(0.0, 1.0, 8, endpoint=False)
+_AT_CHECKED = unit_bases(_CHECKED)
+# Share of the unused tolerance that a violation between points may use once intervals are
+# subdivided.
+_ROOM = 0.5
+# Largest number of parts of an interval at once.
+_MOST_PARTS = 4
+# Shares of an interval at which the curve is compared with the control points.
 _FINE = unit_bases(np.linspace(0.0, 1.0, 17))
 
 
@@ -124,13 +129,13 @@ class NodeRows:
     """All rows of the conditions on a motion of nodes, one constraint after the other.
 
     Of limits (N, 6 - o, 2, j): by interval, control point, upper and lower side, joint. Of others
-    (2 N + 1, C): by point and column. In one row, (R,).
+    (2 N + 1, C): by point and column. Flattened, (R,).
 
     Parameters
     ----------
     spline : Quintic
     constraints : sequence of BoundConstraint
-        None that is an equality or a condition on the whole motion.
+        Neither equalities nor conditions on the whole motion.
     dof : int
 
     Attributes
@@ -142,7 +147,7 @@ class NodeRows:
     def __init__(self, spline: Quintic, constraints: Sequence[BoundConstraint], dof: int) -> None:
         self.spline, self.constraints = spline, tuple(constraints)
         self.dof = dof
-        # Columns of each that is no limit, once they were looked at on any nodes.
+        # Number of columns of each that is no limit, once it was evaluated on any nodes.
         self._columns: dict[int, int] = {}
 
     @cached_property
@@ -150,9 +155,9 @@ class NodeRows:
         return UnitTangents(self.spline, self.dof)
 
     def residuals(self, samples: Samples, ends: Array) -> Array:
-        """Return h of all rows, less what is granted of it, (R,).
+        """Return h of all rows, minus the part of the tolerance that is used, (R,).
 
-        Half of each tolerance is left, for rounding and for what is between points.
+        Half of each tolerance is reserved for rounding and for the motion between points.
         """
         found = [np.zeros(0)]
         for number, item in enumerate(self.constraints):
@@ -182,7 +187,7 @@ class NodeRows:
 
     @cached_property
     def _places(self) -> list[tuple[slice, tuple[int, ...]]]:
-        """Where each constraint's rows are among all, and their shape."""
+        """Slice of each constraint's rows among all, and their shape."""
         shapes = [self._shape(number) for number in range(len(self.constraints))]
         ends = np.cumsum([0, *(int(np.prod(shape)) for shape in shapes)]).tolist()
         places = (slice(first, last) for first, last in pairwise(ends))
@@ -195,17 +200,17 @@ class NodeRows:
         return len(self.spline.points.t), self._columns[number]
 
     def on(self, spline: Quintic) -> "NodeRows":
-        """Return the same on other nodes."""
+        """Return the rows on other nodes."""
         found = NodeRows(spline, self.constraints, self.dof)
         found._columns = self._columns
         return found
 
     def split(self, values: Any) -> list[Any]:
-        """Return what is like h, (R,), for each constraint, in the shape of its rows."""
+        """Return values of all rows, (R,), by constraint, in the shape of its rows."""
         return [values[place].reshape(shape) for place, shape in self._places]
 
     def near(self, h: Array) -> Flags:
-        """Return which rows are near to being broken, (R,): of limits all of a joint and side."""
+        """Return the mask of nearly violated rows, (R,): of limits all of a joint and side."""
         found = [np.zeros(0, dtype=np.bool_)]
         for item, own in zip(self.constraints, self.split(h), strict=True):
             if isinstance(item, BoundLimits):
@@ -215,16 +220,16 @@ class NodeRows:
                 found.append((own > _NEAR).ravel())
         return np.concatenate(found)
 
-    def linearised(self, samples: Samples, kept: Flags) -> "LinearRows":
-        """Return the derivatives of the rows that count, (R,)."""
+    def linearised(self, samples: Samples, active: Flags) -> "LinearRows":
+        """Return the derivatives of the active rows, (R,)."""
         parts: list[PointRows | None] = []
-        for item, own in zip(self.constraints, self.split(kept), strict=True):
+        for item, own in zip(self.constraints, self.split(active), strict=True):
             if isinstance(item, BoundLimits):
                 parts.append(None)
                 continue
             which = np.flatnonzero(own)
             parts.append(self._points(item, samples, which, own.shape[1]))
-        return LinearRows(self, kept, parts)
+        return LinearRows(self, active, parts)
 
     def _points(
         self, item: BoundConstraint, samples: Samples, which: Ints, columns: int
@@ -245,7 +250,7 @@ class NodeRows:
         *,
         without_tolerances: bool = False,
     ) -> Array | None:
-        """Return Σ multipliers · ∂²h/∂w² of rows that are sums of squares: what they bend by.
+        """Return Σ multipliers · ∂²h/∂w² of rows that are sums of squares: their curvature.
 
         By w of both ends of each interval, (N, d, d); None where there are none.
         """
@@ -265,7 +270,7 @@ class NodeRows:
         return found
 
     def multipliers_of(self, multipliers: Array, ends: Array) -> list[Multipliers]:
-        """Return what the rows of each constraint cost, (R,), in the order of time."""
+        """Return the multipliers by constraint, in the order of time, for those of all (R,)."""
         found = []
         for item, own in zip(self.constraints, self.split(multipliers), strict=True):
             if not isinstance(item, BoundLimits):
@@ -276,7 +281,7 @@ class NodeRows:
             if item.order < ORDERS - 1:
                 once[:-1, -1] = False
             times = self.spline.times_of(item.order)[once]
-            # The control points are beyond the curve.
+            # The control polygon is outside of the curve.
             at = unit_bases(np.linspace(0.0, 1.0, CONTROLS[item.order]))
             used = self._limits(item, ends, at) > _granted(item) - _USED
             shape = len(times), -1
@@ -287,17 +292,17 @@ class NodeRows:
 
     @cached_property
     def granted(self) -> Array:
-        """What more h may be and still count as kept, (R,)."""
+        """Tolerance of each row that is not used, (R,)."""
         each = [
             np.full(place.stop - place.start, item.tolerance - _granted(item))
             for item, (place, _) in zip(self.constraints, self._places, strict=True)
         ]
         return np.concatenate([np.zeros(0), *each])
 
-    def given_away(self, multipliers: Array, ends: Array) -> Array:
-        """Return by how much F might fall if limits were asked of the curve itself, (N,).
+    def conservatism(self, multipliers: Array, ends: Array) -> Array:
+        """Return a bound of the decrease of F if limits applied to the curve itself, (N,).
 
-        Where control points are beyond the curve by as much, multipliers times that.
+        To first order: multipliers times the distance of the control points from the curve.
         """
         found = np.zeros(self.spline.count)
         for item, own in zip(self.constraints, self.split(multipliers), strict=True):
@@ -306,12 +311,14 @@ class NodeRows:
                 found += (own.sum(axis=1) * np.maximum(-h, 0.0)).sum(axis=(1, 2))
         return found
 
-    def parts_between(self, curve: CurveSamples) -> Ints:
-        """Return into how many parts intervals have to be divided for others than limits, (N,).
+    def subdivisions(self, curve: CurveSamples) -> Ints:
+        """Return the number of parts of each interval that rows other than limits need, (N,).
 
-        For the curve as `looked` has it: 1 where it is within their tolerances between the points
-        as well. What it is beyond that of the points falls with the square of the parts. Where one
-        interval has to be divided, so is what is nearly beyond: on the next nodes it would be.
+        For the curve of `sampled_curve`: 1 where constraints are within their tolerances between
+        the points as
+        well. An excess over that at the points falls with the square of the parts. Where one
+        interval has to be
+        divided, so is one that is nearly violated: on the next nodes it would be.
         """
         found, count = np.ones(self.spline.count, dtype=np.int64), self.spline.count
         for item in self.constraints:
@@ -321,23 +328,23 @@ class NodeRows:
                 beyond = np.asarray(item.above(curve, item.tolerance)).reshape(count, -1)
                 found[beyond.any(axis=1)] = np.maximum(found[beyond.any(axis=1)], 2)
                 continue
-            # Of a quantity that nothing limits there are no rows.
+            # A quantity without limits has no rows.
             h = np.asarray(item.residual(curve)).reshape(count, -1).max(axis=1, initial=-np.inf)
             if not (h <= item.tolerance).all():
-                kept = _granted(item)
-                need = np.sqrt(np.maximum(h - kept, 0.0) / (_ROOM * (item.tolerance - kept)))
+                used = _granted(item)
+                need = np.sqrt(np.maximum(h - used, 0.0) / (_ROOM * (item.tolerance - used)))
                 # Written so that NaN is divided.
                 need = np.where(h > -np.inf, need, _MOST_PARTS)
                 found = np.maximum(found, np.clip(np.ceil(need), 1, _MOST_PARTS).astype(np.int64))
         return found
 
     @property
-    def looks_between(self) -> bool:
-        """Whether anything but limits is asked."""
+    def has_point_rows(self) -> bool:
+        """Whether there are constraints other than limits."""
         return any(not isinstance(item, BoundLimits) for item in self.constraints)
 
     def kinks(self, ends: Array) -> Flags:
-        """Return in or beside which intervals limits of q̈ or jerk begin or end to bind, (N,)."""
+        """Return the mask of intervals next to which limits of q̈ or jerk start to bind, (N,)."""
         found = np.zeros(self.spline.count, dtype=np.bool_)
         for item in self.constraints:
             if isinstance(item, BoundLimits) and item.order > 1:
@@ -352,7 +359,7 @@ class NodeRows:
         return found
 
     def carried(self, before: "NodeRows", multipliers: Array) -> Array:
-        """Return the multipliers of rows on other nodes, (R,): of the nearest ones, by density."""
+        """Return the multipliers of these rows, (R,), by those of the nearest rows before."""
         spline, old, found = self.spline, before.spline, [np.zeros(0)]
         middles = 0.5 * (spline.t[:-1] + spline.t[1:])
         k = np.searchsorted(old.t, middles) - 1
@@ -360,7 +367,7 @@ class NodeRows:
             if isinstance(item, BoundLimits):
                 each = own.copy()
                 if item.order < ORDERS - 1:
-                    # What the row is, not where it is kept.
+                    # The shared control point's, which is not stored here.
                     each[:-1, -1] = each[1:, 0]
                 share = (spline.times_of(item.order) - old.t[k][:, None]) / old.steps[k][:, None]
                 degree = CONTROLS[item.order] - 1
@@ -375,42 +382,42 @@ class NodeRows:
         return np.concatenate(found)
 
 
-def looked(spline: Quintic, follows: Follows, ends: Array) -> CurveSamples:
-    """Return the motion of y = `ends` at several shares of each interval."""
-    times = (spline.t[:-1, None] + spline.steps[:, None] * _LOOKS).ravel()
+def sampled_curve(spline: Quintic, follows: Follows, ends: Array) -> CurveSamples:
+    """Return the motion with ends y at several shares of each interval."""
+    times = (spline.t[:-1, None] + spline.steps[:, None] * _CHECKED).ravel()
 
     def at(order: int) -> Array:
-        return spline.at(_AT_LOOKS, order, ends).reshape(-1, ends.shape[2])
+        return spline.at(_AT_CHECKED, order, ends).reshape(-1, ends.shape[2])
 
     return CurveSamples(follows, Sampling.trapezoidal(times), at)
 
 
 def _granted(item: BoundConstraint) -> float:
-    """Return how much of a tolerance is used: control points need little in reserve."""
+    """Return the part of a tolerance that is used: control points need little in reserve."""
     return 0.5 * item.tolerance
 
 
 @dataclass(frozen=True, eq=False)
 class LinearRows:
-    """The derivatives of the rows that count, at one motion.
+    """Derivatives of the active rows at one motion.
 
     Attributes
     ----------
     rows : NodeRows
-    kept : (R,)
-        Which count.
+    active : (R,)
+        Mask of the active rows.
     points : list of PointRows or None
         Of each constraint; None of limits.
     """
 
     rows: NodeRows
-    kept: Flags
+    active: Flags
     points: list[PointRows | None]
 
     def along(self, changes: Array) -> Array:
-        """Return ∂h of the rows that count along changes of y (N, 6, n)."""
+        """Return ∂h of the active rows along changes of y (N, 6, n)."""
         found, spline = [np.zeros(0)], self.rows.spline
-        for item, own, part in self._each(self.kept):
+        for item, own, part in self._each(self.active):
             if part is not None:
                 found.append(part.along(changes))
             elif isinstance(item, BoundLimits) and own.any():
@@ -421,13 +428,13 @@ class LinearRows:
     def pulled(self, multipliers: Array) -> Array:
         """Return Σ multipliers ∂h/∂y, (N, 6, n), for multipliers of all rows.
 
-        They are 0 of those that do not count.
+        They are 0 of inactive rows.
         """
         spline = self.rows.spline
         found = np.zeros((spline.count, 6, self.rows.dof))
-        for (item, own, part), kept in zip(self._each(multipliers), self._counting, strict=True):
+        for (item, own, part), active in zip(self._each(multipliers), self._counting, strict=True):
             if part is not None:
-                found += part.pulled(own[kept], spline.count)
+                found += part.pulled(own[active], spline.count)
             elif isinstance(item, BoundLimits) and own.any():
                 by = (own[:, :, 0] - own[:, :, 1]) / item.scale
                 by *= spline.rates(item.order)[:, None, None]
@@ -450,11 +457,11 @@ class LinearRows:
         return found
 
     def squared_points(self, weights: Array, both: Array) -> Array | None:
-        """Return the same of all others, by w of both ends of intervals; None for none."""
+        """Return Σ weights ∂h ∂hᵀ of others, by w of both ends of intervals; None for none."""
         found = None
-        for (_, own, part), kept in zip(self._each(weights), self._counting, strict=True):
+        for (_, own, part), active in zip(self._each(weights), self._counting, strict=True):
             if part is not None and len(part.intervals):
-                one = part.squared(own[kept], both)
+                one = part.squared(own[active], both)
                 found = one if found is None else found + one
         return found
 
@@ -463,16 +470,16 @@ class LinearRows:
 
     @cached_property
     def _counting(self) -> list[Flags]:
-        """Which rows of each constraint count."""
-        return self.rows.split(self.kept)
+        """Mask of the active rows of each constraint."""
+        return self.rows.split(self.active)
 
 
 def counts_at_once(item: BoundConstraint) -> bool:
-    """Whether a constraint is what a tolerance is: a joint that it leaves free has no cost."""
+    """Whether rows are those of a tolerance: they bound a virtual joint, which has no cost."""
     return bool(getattr(item, "counts_at_once", False))
 
 
 def accelerates_of(item: BoundConstraint, dof: int) -> bool:
-    """Whether a constraint is on a quantity of q̈, for motions of so many joints."""
+    """Whether a constraint's quantity involves q̈, for motions of `dof` joints."""
     own = getattr(item, "is_of_accelerations", None)
     return own is not None and bool(own(dof))

@@ -1,4 +1,4 @@
-"""What costs and constraints see of a motion of nodes."""
+"""Samples of a motion of nodes, which costs and constraints are functions of."""
 
 from collections.abc import Callable
 from functools import cached_property
@@ -53,6 +53,6 @@ class CurveSamples(PlacedLater):
         return read_only(made)
 
     def forget(self) -> None:
-        """Let go of what can be computed anew."""
+        """Drop cached values."""
         for name in ("q", "qd", "qdd", "qddd", "_placed", "_of_arm"):
             self.__dict__.pop(name, None)

@@ -1,4 +1,4 @@
-"""What keeps a motion of nodes smooth where its costs do not ask for it."""
+"""Penalty on q̈ where the costs have none: the motion of nodes stays smooth."""
 
 from dataclasses import dataclass
 
@@ -9,24 +9,29 @@ from selfmotion.planning.nodes.spline import Quintic
 from selfmotion.problem.costs import JointVelocity, Samples
 from selfmotion.problem.problem import Problem
 
-# An arm that rests takes about this share of the duration to start and to stop its self-motion;
-# that is asked for over so many times as long.
-_STARTING, _NEAR_REST = 0.02, 4.0
-# Costs of joint speed say nothing of accelerations: on few nodes these waver, and under limits of
-# theirs they jump from one to the other where that costs nothing. This share of the duration takes
-# most of both away, and costs some 1e-5 of F at most.
+# Time in which the self-motion of a resting arm starts and stops, as a share of the duration.
+_STARTING = 0.02
+# The penalty covers this many times that.
+_NEAR_REST = 4.0
+# Time constant of the penalty everywhere, as a share of the duration. Costs of joint speed leave
+# accelerations free: on few nodes these oscillate, and under limits they jump between them. This
+# value
+# removes most of both, and adds at most some 1e-5 of F.
 _EVERYWHERE = 0.004
-# It is asked for where it is less than this share of F: what accelerates more does so for a reason,
-# beside a singular pose.
+# Largest penalty everywhere, as a share of F: a larger one has a cause, such as a singular pose
+# nearby.
 _LITTLE = 0.02
-# What starting and stopping adds is about what it costs: where that is more than the second share
-# of F, they are made quicker until it is the first, but no more than so many times.
-_STARTS_COST, _TOO_MUCH, _QUICKEST = 1e-3, 2e-3, 1e-3
+# Where starting and stopping adds more than this share of F …
+_TOO_MUCH = 2e-3
+# … it is made faster until it adds this share …
+_STARTS_COST = 1e-3
+# … by this factor at most.
+_QUICKEST = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
 class Smoothing:
-    """What keeps a motion from starting and stopping at once: ½ ∫ Σ_o b_o(t) xᵀWx dt.
+    """Penalty on starting and stopping at once: ½ ∫ Σ_o b_o(t) xᵀWx dt.
 
     Of x = q̈ (2) and the jerk (3).
 
@@ -43,21 +48,23 @@ class Smoothing:
 
 
 def smoothing_of(
-    problem: Problem, spline: Quintic, *, calm: bool, quick: float = 1.0
+    problem: Problem, spline: Quintic, *, smoothed: bool, quick: float = 1.0
 ) -> Smoothing | None:
-    """Return what makes the self-motion start and stop as the arm does where it rests.
+    """Return the penalty that makes the self-motion start and stop smoothly where the arm rests.
 
-    And joints that are held for a while; and everywhere a little where the motion is to be `calm`.
-    It starts and stops in the share `quick` of the usual time. None where there is nothing of that,
-    or the costs ask for smoothness themselves.
+    Also where joints are held for a while; and everywhere a little if `smoothed`. Starting and
+    stopping
+    takes the share `quick` of the usual time. None without any of that, or where the costs penalise
+    q̈
+    themselves.
     """
     if _is_smooth(problem):
         return None
     t = spline.sampling.t.reshape(spline.count, -1)
     shares, of_jerks = _of_held(problem, t)
     shares = np.maximum(shares, _of_rest(problem, t, quick))
-    if calm:
-        # No more than where it starts: there it would make that as slow.
+    if smoothed:
+        # No more than at the ends, which it would slow down.
         little = min(_EVERYWHERE, quick * _STARTING) * problem.path.duration
         shares = np.maximum(shares, little**2)
     if not shares.any():
@@ -73,9 +80,9 @@ def rest_times(problem: Problem) -> Array:
 
 
 def quickness(problem: Problem, samples: Samples, cost: float, quick: float) -> float:
-    """Return in what share of the usual time a motion of such a cost should start and stop.
+    """Return the share of the usual time in which a motion of this cost should start and stop.
 
-    Where it does so in the share `quick` now: that, unless it costs too much.
+    The present share `quick`, unless its penalty is too large.
     """
     if _is_smooth(problem):
         return quick
@@ -88,13 +95,13 @@ def quickness(problem: Problem, samples: Samples, cost: float, quick: float) -> 
 
 
 def _is_smooth(problem: Problem) -> bool:
-    """Whether the costs ask for smoothness themselves."""
+    """Whether the costs penalise q̈ or the jerk themselves."""
     orders = [order for cost in problem.all_costs for order in cost.curvature(problem.robot.dof)]
     return max(orders, default=0) > 1
 
 
 def _of_rest(problem: Problem, t: Array, quick: float) -> Array:
-    """Return b of q̈ at times, of the shape of t, that starting and stopping has."""
+    """Return b of q̈ at times, of the shape of t, of starting and stopping."""
     starting = quick * _STARTING * problem.path.duration
     found = np.zeros_like(t)
     for end in rest_times(problem):
@@ -103,9 +110,9 @@ def _of_rest(problem: Problem, t: Array, quick: float) -> Array:
 
 
 def _of_held(problem: Problem, t: Array) -> tuple[Array, Array]:
-    """Return b of q̈ and of the jerk at times where joints begin or end to be held.
+    """Return b of q̈ and of the jerk at times where joints start or end to be held.
 
-    They do so without jumps of accelerations, as what rests does.
+    Accelerations do not jump there, as at rests.
     """
     starting = _STARTING * problem.path.duration
     faded = np.zeros_like(t)
@@ -115,22 +122,23 @@ def _of_held(problem: Problem, t: Array) -> tuple[Array, Array]:
 
 
 def _faded(away: Array, starting: float) -> Array:
-    """Return 1, fading out: where b ended at once, accelerations would jump."""
+    """Return 1 that fades out: where b ended abruptly, accelerations would jump."""
     return np.asarray(np.maximum(1.0 - (away / (_NEAR_REST * starting)) ** 2, 0.0) ** 3)
 
 
-def would_be_calm(problem: Problem, samples: Samples, cost: float) -> bool:
-    """Return whether a motion of such a cost may be asked to be calm, see `smoothing_of`."""
+def can_be_smoothed(problem: Problem, samples: Samples, cost: float) -> bool:
+    """Return whether q̈ may be penalised everywhere at this cost, see `smoothing_of`."""
     squares = samples.qdd**2 @ _weights(problem)
     share = (_EVERYWHERE * problem.path.duration) ** 2
     return bool(0.5 * share * float(samples.weights @ squares) <= _LITTLE * abs(cost))
 
 
 def _weights(problem: Problem) -> Array:
-    """Return what the squares of rates weigh, (n,): of virtual joints nothing, as in costs.
+    """Return the weights of squared rates, (n,): 0 of virtual joints, as in costs.
 
-    As much as where speeds cost what they usually do; where they cost so many times more or less,
-    so does this: the best motion is the same whatever the unit of its cost.
+    The usual weights of joint speed, scaled to those of the costs: the optimum is independent of
+    the unit of
+    the cost.
     """
     arm, dof = problem.asked.robot, problem.robot.dof
     found = np.zeros(dof)

@@ -1,12 +1,12 @@
-"""A motion between nodes: quintic pieces through (q, q̇, q̈), and where they are looked at.
+"""A motion between nodes: quintic segments through (q, q̇, q̈), and their evaluation points.
 
-On an interval of length h the piece is a polynomial of s = (t - t_k)/h, linear in its ends
+On an interval of length h the segment is a polynomial of s = (t - t_k)/h, linear in its ends
 
     y = (q, h q̇, h² q̈) of the left node, then of the right one:  (d/dt)^o q = h^-o U_o(s) y,
 
 with the same tables U_o for all intervals. Its control points (of the Bernstein form, G. Farin,
 "Curves and Surfaces for CAGD", ch. 5) are linear in y as well, and the curve stays within their
-convex hull: what all control points of a derivative keep, the whole curve keeps.
+convex hull: bounds on all control points of a derivative are bounds on the whole curve.
 """
 
 from functools import cached_property
@@ -17,16 +17,20 @@ import numpy as np
 from selfmotion.basics import Array, Ints
 from selfmotion.model.motion import Sampling
 
-# Orders of derivatives that are known: q, q̇, q̈ and the jerk.
+# Orders of derivatives: q, q̇, q̈ and the jerk.
 ORDERS = 4
-# Control points of each.
+# Number of control points of each.
 CONTROLS = (6, 5, 4, 3)
 # Gauss points on an interval: the square of a quintic's derivative is integrated exactly.
-_ROOTS, _SHARES = np.polynomial.legendre.leggauss(5)
-GAUSS, WEIGHTS = 0.5 * (1.0 + _ROOTS), 0.5 * _SHARES
-# Where constraints that are no limits of joints look at an interval, besides the last node. Where
-# one is of accelerations, twice as often: q̈ is a cubic, and swings between two points if it may.
-POINTS, FINE_POINTS = np.array([0.0, 0.5]), np.array([0.0, 0.25, 0.5, 0.75])
+_ROOTS, _WEIGHTS = np.polynomial.legendre.leggauss(5)
+GAUSS = 0.5 * (1.0 + _ROOTS)
+WEIGHTS = 0.5 * _WEIGHTS
+# Shares of an interval at which constraints other than limits of joints apply, besides the last
+# node.
+POINTS = np.array([0.0, 0.5])
+# The same where a constraint is on accelerations: q̈ is a cubic, which may oscillate between two
+# points.
+FINE_POINTS = np.array([0.0, 0.25, 0.5, 0.75])
 
 
 def _powers(s: Array, order: int) -> Array:
@@ -47,7 +51,7 @@ def unit_bases(s: Array) -> tuple[Array, ...]:
 
 
 def _controls() -> tuple[Array, ...]:
-    """Return how control points of q, q̇, q̈ and the jerk follow from y, (6 - o, 6) each."""
+    """Return the matrices of the control points of q, q̇, q̈ and jerk by y, (6 - o, 6) each."""
     found = []
     for order, count in enumerate(CONTROLS):
         s, degree = np.linspace(0.0, 1.0, count), count - 1
@@ -57,28 +61,30 @@ def _controls() -> tuple[Array, ...]:
     return tuple(found)
 
 
-# Nodes that tell derivatives at one of them.
+# Nodes in a finite-difference stencil.
 _STENCIL = 5
-AT_GAUSS, AT_CONTROLS = unit_bases(GAUSS), _controls()
+AT_GAUSS = unit_bases(GAUSS)
+AT_CONTROLS = _controls()
 AT_END = unit_bases(np.ones(1))
 # How (q, q̇, q̈) of both ends scale with h to become y.
 _SCALED = np.array([0, 1, 2, 0, 1, 2])
 
 
 class Quintic:
-    """Quintic pieces on given times.
+    """Quintic segments on given times.
 
     Of several motions on the same nodes, one after the other, the interval from the end of one to
-    the start of the next is a gap: it weighs nothing, and nothing moves there.
+    the start
+    of the next is a gap: it has no weight, and nothing moves there.
 
     Parameters
     ----------
     t : (N + 1,)
         Times of the nodes [s].
     copies : int
-        How many motions there are; below, N + 1 nodes are those of all.
+        Number of motions; below, N + 1 is the number of nodes of all.
     shares : (P,)
-        Where constraints look at an interval, as shares of it; 0 is the first.
+        Shares of an interval at which constraints apply; 0 is the first.
 
     Attributes
     ----------
@@ -88,7 +94,7 @@ class Quintic:
     gaps : (K,)
         Which intervals are gaps.
     sampling : Sampling
-        What costs look at: the Gauss points of each interval.
+        Samples of costs: the Gauss points of each interval.
     """
 
     def __init__(self, t: Array, copies: int = 1, shares: Array = POINTS) -> None:
@@ -111,13 +117,13 @@ class Quintic:
 
     @cached_property
     def points(self) -> Sampling:
-        """What constraints look at that are no limits of joints."""
+        """Samples of constraints other than limits of joints."""
         inner = (self.t[:-1, None] + self.steps[:, None] * self._shares).ravel()
         return Sampling.trapezoidal(np.append(inner, self.t[-1]))
 
     @cached_property
     def _stencils(self) -> tuple[Ints, Array]:
-        """Which nodes tell derivatives at each node, and by how much: (N + 1, S), (2, N + 1, S)."""
+        """Nodes of each node's difference stencil, and weights: (N + 1, S), (2, N + 1, S)."""
         count = len(self.t)
         width = min(_STENCIL, count)
         first = np.clip(np.arange(count) - width // 2, 0, count - width)
@@ -131,16 +137,16 @@ class Quintic:
         return which, np.moveaxis(found, 2, 0)
 
     def differences(self, x: Array) -> tuple[Array, Array]:
-        """Return the first two derivatives at the nodes of what is x (N + 1, n) there, by time.
+        """Return the first two time derivatives at the nodes of values x (N + 1, n) there.
 
-        Of polynomials through five nodes. Of one motion only.
+        Of polynomials through five nodes; for one motion only.
         """
         which, shares = self._stencils
         first, second = (shares[:, :, None, :] @ x[which])[:, :, 0]
         return first, second
 
     def times_of(self, order: int) -> Array:
-        """Return where control points belong [s], (N, 6 - o)."""
+        """Return the times of the control points [s], (N, 6 - o)."""
         shares = np.linspace(0.0, 1.0, CONTROLS[order])
         return np.asarray(self.t[:-1, None] + self.steps[:, None] * shares)
 
@@ -163,7 +169,7 @@ class Quintic:
         return found
 
     def changes(self, changes: Array) -> Array:
-        """Return how y changes with w of both ends of each interval, (N, n, 6, 2 d).
+        """Return ∂y/∂w for both ends of each interval, (N, n, 6, 2 d).
 
         `changes` (N + 1, 3, n, d) is ∂(q, q̇, q̈)/∂w of the nodes.
         """
@@ -181,7 +187,7 @@ class Quintic:
         return np.asarray(self.steps ** float(-order))
 
     def at(self, tables: tuple[Array, ...], order: int, ends: Array) -> Array:
-        """Return a derivative at shares of all intervals, (N, S, n), for U_o there and y."""
+        """Return a derivative at shares of all intervals, (N, S, n), for their U_o and y."""
         return np.asarray((tables[order] @ ends) * self.rates(order)[:, None, None])
 
     @cached_property
@@ -195,7 +201,7 @@ class Quintic:
         return np.concatenate([inner, last])
 
     def point_shares(self, which: Ints) -> tuple[Ints, Array]:
-        """Return the intervals of some points (R,), and how q … jerk there follow from y.
+        """Return the intervals of some points (R,), and q … jerk there as matrices of y.
 
         (R,) and (R, 4, 6).
         """

@@ -1,12 +1,16 @@
-"""A linear programme whose rows touch three neighbouring unknowns: an interior point, banded.
+"""Linear programme with rows of three neighbouring unknowns: a banded interior-point method.
 
     maximise g·c   subject to   lower ≤ R c ≤ upper,   least ≤ c ≤ most
 
-Mehrotra's predictor and corrector (S. Mehrotra, SIAM J. Optimization 2(4), 1992), kept near enough
-to the central path that no product of slack and price falls far behind their mean (S. J. Wright,
-Primal-Dual Interior-Point Methods, 1997, ch. 5). The normal matrix is pentadiagonal, so that a step
-costs O(N). Most rows bind nowhere near: a programme is solved with those that might, and again with
-those that its optimum breaks, until there are none.
+Mehrotra's predictor and corrector (S. Mehrotra, SIAM J. Optimization 2(4), 1992), within a
+neighbourhood
+of the central path: no product of slack and multiplier is far below their mean (S. J. Wright,
+Primal-Dual
+Interior-Point Methods, 1997, ch. 5). The normal matrix is pentadiagonal, so that a step costs O(N).
+Most
+rows are far from binding: a programme is solved with those near to it, then again with those that
+its
+optimum violates, until there are none (constraint generation).
 """
 
 from dataclasses import dataclass
@@ -15,36 +19,52 @@ import numpy as np
 
 from selfmotion.basics import Array, Flags, Ints, called, kernel
 
-# Rows are met to this share of their limits, or to this where they are smaller than 1.
+# Feasibility tolerance of rows, relative to their limits or 1, whichever is larger.
 MET = 1e-7
-_STEPS = 200
-# Products of slack and price are aimed at this share of the gap, no less: the smaller they are, the
-# more multipliers of steep rows round.
-_AIMED = 0.1
-# Where rounding leaves so much of g·c unpaid, by shares, and so many steps each leave more than
-# this of what the one before left, multipliers pay as exactly as they can.
-_ROUNDED, _STALLED, _SAME = 1e-2, 3, 0.7
-# Share of the way to the boundary that a step goes.
-_TO_BOUNDARY = 0.99
-# A product of slack and price is at least this share of their mean; steps are shortened for that.
-_NEAR, _SHORTER, _TRIES = 1e-3, 0.7, 12
-# A step that goes less far than this leads along the boundary: the next one goes to products this
-# much smaller, away from it.
-_POOR, _CENTRED = 0.1, 0.5
-# Shorter steps lead nowhere.
-_STUCK = 1e-8
-# Stands on the diagonal for an unknown that stays, and rounding on that of the others.
-_STAYS, _ROUNDING = 1e200, 1e-14
+_MAX_ITERATIONS = 200
+# Smallest target of a product of slack and multiplier, as a share of the gap per row: the smaller
+# it is,
+# the more rounding there is in multipliers of steep rows.
+_MU_FLOOR = 0.1
+# Rounding ends the iteration where the dual residual is below this share of g·c …
+_STALL_RESIDUAL = 1e-2
+# … and in so many iterations …
+_STALL_ITERATIONS = 3
+# … has each time been above this share of the one before.
+_STALL_FACTOR = 0.7
+# Fraction to the boundary of a step.
+_TAU = 0.99
+# Smallest product of slack and multiplier, as a share of their mean (γ of the neighbourhood) …
+_NEIGHBOURHOOD = 1e-3
+# … for which steps are shortened by this factor …
+_SHORTENING = 0.7
+# … at most so often.
+_SHORTENINGS = 12
+# A shorter step than this runs along the boundary: it is replaced by a centring step …
+_SHORT_STEP = 0.1
+# … towards this share of the mean product.
+_CENTRING = 0.5
+# Shorter steps than this end the iteration.
+_MIN_STEP = 1e-8
+# Diagonal entry of an unknown that is fixed.
+_FIXED = 1e200
+# Relative increase of the other diagonal entries, against rounding.
+_ROUNDING = 1e-14
 # Unknowns that a row touches.
 WIDTH = 3
-# Rows with less room than this share of their limit are looked at, and then near an optimum these;
-# where some are broken by more, those that are by this share of the worst.
-_BESIDE, _NEARER, _AMONG = 0.5, 0.2, 0.5
-# So often; then all rows are.
+# Rows of the first programme: those with less room than this share of their limit.
+_ROOM_FIRST = 0.5
+# Rows that are added later: those with less room than this share …
+_ROOM_LATER = 0.2
+# … or, where some are violated by more, those violated by this share of the worst.
+_SHARE_OF_WORST = 0.5
+# Programmes with a part of the rows; then one with all.
 _ROUNDS = 12
-# Rows that are left out may be broken by this share of their limits, and so many places beside one
-# that is come in with it: with few, what is broken only moves on.
-_BROKEN, _WIDE = 1e-5, 20
+# Largest violation of a row that was left out, relative to its limit.
+_VIOLATED = 1e-5
+# Neighbours on both sides that are added with each violated row; with fewer, the violation only
+# moves.
+_NEIGHBOURS = 20
 
 
 @kernel
@@ -70,55 +90,75 @@ def interior_optimum(
     limit : (R,)
     start : (N,)
     gap : float
-        What may be missing, as a share of g·c.
+        Relative duality gap, as a share of g·c.
     """
     count, size, c = len(limit), len(gradient), start.copy()
     slack, price = np.empty(count), np.empty(count)
-    value = _begin(gradient, matrix, place, limit, c, slack, price)
-    missed, ds, dz = np.empty(count), np.empty(count), np.empty(count)
+    value = _initialise(gradient, matrix, place, limit, c, slack, price)
+    residuals, ds, dz = np.empty(count), np.empty(count), np.empty(count)
     band, paid, dc = np.empty((3, size)), np.empty(size), np.empty(size)
     stalled, before = 0, np.inf
-    for _ in range(_STEPS):
-        products, met = _measure(c, matrix, place, limit, slack, price, missed, band, paid)
-        whole, left = _unpaid(gradient, free, paid, c, value)
-        stalled = stalled + 1 if left > _SAME * before else 0
+    for _ in range(_MAX_ITERATIONS):
+        products, met = _update_residuals(
+            c, matrix, place, limit, slack, price, residuals, band, paid
+        )
+        whole, left = _dual_residual(gradient, free, paid, c, value)
+        stalled = stalled + 1 if left > _STALL_FACTOR * before else 0
         before = left
-        rounded = stalled >= _STALLED and left <= _ROUNDED * whole
+        rounded = stalled >= _STALL_ITERATIONS and left <= _STALL_RESIDUAL * whole
         if met <= MET and products <= gap * whole and (left <= gap * whole or rounded):
             return c, True
         if not _factored(band, free):
             break
         mu = products / count
-        _direct(0.0, 0.0, gradient, free, matrix, place, slack, price, missed, ds, dz, band, dc)
-        primal, dual = _longest(matrix, place, dc, slack, price, missed, ds, dz, 0.0, 0.0, 1.0)
+        _search_direction(
+            0.0, 0.0, gradient, free, matrix, place, slack, price, residuals, ds, dz, band, dc
+        )
+        primal, dual = _step_lengths(
+            matrix, place, dc, slack, price, residuals, ds, dz, 0.0, 0.0, 1.0
+        )
         after, _ = _products(slack, price, ds, dz, primal, dual)
         centre = mu * min((after / count / mu) ** 3, 1.0)
-        centre = max(centre, min(_AIMED * gap * whole / count, mu))
-        _direct(centre, 1.0, gradient, free, matrix, place, slack, price, missed, ds, dz, band, dc)
-        primal, dual = _longest(
-            matrix, place, dc, slack, price, missed, ds, dz, centre, 1.0, _TO_BOUNDARY
+        centre = max(centre, min(_MU_FLOOR * gap * whole / count, mu))
+        _search_direction(
+            centre, 1.0, gradient, free, matrix, place, slack, price, residuals, ds, dz, band, dc
         )
-        if min(primal, dual) < _POOR:
-            centre = _CENTRED * mu
-            _direct(
-                centre, 0.0, gradient, free, matrix, place, slack, price, missed, ds, dz, band, dc
+        primal, dual = _step_lengths(
+            matrix, place, dc, slack, price, residuals, ds, dz, centre, 1.0, _TAU
+        )
+        if min(primal, dual) < _SHORT_STEP:
+            centre = _CENTRING * mu
+            _search_direction(
+                centre,
+                0.0,
+                gradient,
+                free,
+                matrix,
+                place,
+                slack,
+                price,
+                residuals,
+                ds,
+                dz,
+                band,
+                dc,
             )
-            primal, dual = _longest(
-                matrix, place, dc, slack, price, missed, ds, dz, centre, 0.0, _TO_BOUNDARY
+            primal, dual = _step_lengths(
+                matrix, place, dc, slack, price, residuals, ds, dz, centre, 0.0, _TAU
             )
-        primal, dual = _balanced(slack, price, ds, dz, primal, dual)
+        primal, dual = _into_neighbourhood(slack, price, ds, dz, primal, dual)
         for k in range(size):
             c[k] += primal * dc[k]
         for r in range(count):
             slack[r] += primal * ds[r]
             price[r] += dual * dz[r]
-        if primal < _STUCK:
+        if primal < _MIN_STEP:
             break
     return c, False
 
 
 @called
-def _begin(
+def _initialise(
     gradient: Array,
     matrix: Array,
     place: Ints,
@@ -127,7 +167,7 @@ def _begin(
     slack: Array,
     price: Array,
 ) -> float:
-    """Fill slacks and multipliers to begin with; return about how large g·c may be."""
+    """Set initial slacks and multipliers; return an estimate of the size of g·c."""
     count, value = len(limit), 0.0
     for k in range(len(gradient)):
         value += abs(gradient[k]) * max(abs(c[k]), 1.0)
@@ -139,10 +179,10 @@ def _begin(
 
 
 @called
-def _unpaid(
+def _dual_residual(
     gradient: Array, free: Flags, paid: Array, c: Array, value: float
 ) -> tuple[float, float]:
-    """Return how large g·c is, and what of it multipliers do not pay for."""
+    """Return the size of g·c, and the dual residual weighted by c."""
     reached, left = 0.0, 0.0
     for k in range(len(gradient)):
         reached += gradient[k] * c[k]
@@ -152,15 +192,15 @@ def _unpaid(
 
 
 @called
-def _balanced(
+def _into_neighbourhood(
     slack: Array, price: Array, ds: Array, dz: Array, primal: float, dual: float
 ) -> tuple[float, float]:
-    """Return how far to go so that no product falls far below the others."""
-    for _ in range(_TRIES):
+    """Return step lengths after which every product is within the neighbourhood."""
+    for _ in range(_SHORTENINGS):
         after, least = _products(slack, price, ds, dz, primal, dual)
-        if least >= _NEAR * after / len(slack):
+        if least >= _NEIGHBOURHOOD * after / len(slack):
             break
-        primal, dual = _SHORTER * primal, _SHORTER * dual
+        primal, dual = _SHORTENING * primal, _SHORTENING * dual
     return primal, dual
 
 
@@ -172,24 +212,24 @@ def _product(matrix: Array, place: Ints, c: Array, r: int) -> float:
 
 
 @called
-def _measure(
+def _update_residuals(
     c: Array,
     matrix: Array,
     place: Ints,
     limit: Array,
     slack: Array,
     price: Array,
-    missed: Array,
+    residuals: Array,
     band: Array,
     paid: Array,
 ) -> tuple[float, float]:
-    """Fill what rows miss, the normal matrix (3, N) and what is paid; return Σ s z, the most."""
+    """Set residuals, the normal matrix (3, N) and Rᵀz; return Σ s z and the largest residual."""
     band[:], paid[:] = 0.0, 0.0
     products, met = 0.0, 0.0
     for r in range(len(limit)):
         k = place[r]
-        missed[r] = slack[r] - limit[r] + _product(matrix, place, c, r)
-        met = max(met, abs(missed[r]) / max(abs(limit[r]), 1.0))
+        residuals[r] = slack[r] - limit[r] + _product(matrix, place, c, r)
+        met = max(met, abs(residuals[r]) / max(abs(limit[r]), 1.0))
         products += slack[r] * price[r]
         ratio = price[r] / slack[r]
         for a in range(3):
@@ -205,7 +245,7 @@ def _factored(band: Array, free: Flags) -> bool:
     """Replace a pentadiagonal matrix by its factors L D Lᵀ: D, and L below; whether there are."""
     size = band.shape[1]
     for k in range(size):
-        pivot = band[0, k] * (1.0 + _ROUNDING) if free[k] else _STAYS
+        pivot = band[0, k] * (1.0 + _ROUNDING) if free[k] else _FIXED
         if k > 0:
             pivot -= band[1, k - 1] ** 2 * band[0, k - 1]
         if k > 1:
@@ -237,7 +277,7 @@ def _solve(band: Array, right: Array) -> None:
 
 
 @called
-def _direct(
+def _search_direction(
     centre: float,
     second: float,
     gradient: Array,
@@ -246,7 +286,7 @@ def _direct(
     place: Ints,
     slack: Array,
     price: Array,
-    missed: Array,
+    residuals: Array,
     ds: Array,
     dz: Array,
     band: Array,
@@ -258,8 +298,8 @@ def _direct(
         wanted = centre
         if second > 0.0:
             wanted -= ds[r] * dz[r]
-        # What the price becomes where c stays.
-        becomes = (price[r] * missed[r] + wanted) / slack[r]
+        # The multiplier where c is constant.
+        becomes = (price[r] * residuals[r] + wanted) / slack[r]
         k = place[r]
         for a in range(3):
             dc[k + a] -= becomes * matrix[r, a]
@@ -273,13 +313,13 @@ def _direct(
 
 
 @called
-def _longest(
+def _step_lengths(
     matrix: Array,
     place: Ints,
     dc: Array,
     slack: Array,
     price: Array,
-    missed: Array,
+    residuals: Array,
     ds: Array,
     dz: Array,
     centre: float,
@@ -293,8 +333,8 @@ def _longest(
         if second > 0.0:
             wanted -= ds[r] * dz[r]
         change = _product(matrix, place, dc, r)
-        ds[r] = -missed[r] - change
-        dz[r] = (price[r] * (missed[r] + change) + wanted) / slack[r] - price[r]
+        ds[r] = -residuals[r] - change
+        dz[r] = (price[r] * (residuals[r] + change) + wanted) / slack[r] - price[r]
         falls = min(falls, ds[r] / slack[r])
         drops = min(drops, dz[r] / price[r])
     primal = 1.0 if -falls <= share else -share / falls
@@ -323,7 +363,7 @@ class BandedRows:
     ----------
     matrix : (3, K, M)
     lower, upper : (K, M)
-        lower < upper; ±inf where there is none.
+        lower < upper; ±inf for none.
     """
 
     matrix: Array
@@ -354,36 +394,39 @@ def banded_optimum(
     least, most : (N,)
         Finite; an unknown with both the same stays as it is.
     gap : float
-        What may be missing, as a share of g·c.
+        Relative duality gap, as a share of g·c.
     """
     room = _room(rows, start)
-    chosen = room[0] < _BESIDE, room[1] < _BESIDE
+    chosen = room[0] < _ROOM_FIRST, room[1] < _ROOM_FIRST
     for number in range(_ROUNDS + 1):
         if number == _ROUNDS:
             chosen = np.isfinite(room[0]), np.isfinite(room[1])
         c, reached = _solved(gradient, rows, chosen, start, least, most, gap)
         room = _room(rows, c)
-        if not reached or min(float(side.min(initial=0.0)) for side in room) >= -_BROKEN:
+        if not reached or min(float(side.min(initial=0.0)) for side in room) >= -_VIOLATED:
             break
         # Where rows are far beyond their limits, those farthest beyond stand for the others.
         worst = np.minimum(*(side.min(axis=1, initial=0.0) for side in room))[:, None]
-        near = np.where(worst < -_NEARER, _AMONG * worst, _NEARER)
-        chosen = chosen[0] | _wide(room[0], near), chosen[1] | _wide(room[1], near)
+        near = np.where(worst < -_ROOM_LATER, _SHARE_OF_WORST * worst, _ROOM_LATER)
+        chosen = (
+            chosen[0] | _with_neighbours(room[0], near),
+            chosen[1] | _with_neighbours(room[1], near),
+        )
     return c, reached
 
 
-def _wide(room: Array, near: Array) -> Flags:
-    """Return rows (K, M) with less room, and the same of places beside: an optimum evades there."""
+def _with_neighbours(room: Array, near: Array) -> Flags:
+    """Return rows (K, M) with less room than `near`, and their neighbours."""
     rows = room < near
     wide = rows.copy()
-    for k in range(1, _WIDE + 1):
+    for k in range(1, _NEIGHBOURS + 1):
         wide[k:] |= rows[:-k]
         wide[:-k] |= rows[k:]
     return np.asarray(wide & np.isfinite(room))
 
 
 def _room(rows: BandedRows, c: Array) -> tuple[Array, Array]:
-    """Return how far rows at c are from `upper` and `lower`, as shares of these, (K, M) each."""
+    """Return the room of rows to `upper` and `lower`, relative to these, (K, M) each."""
     reached, sides = rows.times(c), []
     for sign, limit in ((1.0, rows.upper), (-1.0, rows.lower)):
         size = np.where(np.isfinite(limit), np.maximum(np.abs(limit), 1.0), 1.0)

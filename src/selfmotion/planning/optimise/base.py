@@ -1,4 +1,4 @@
-"""What is minimised, what minimises it, and what comes of it."""
+"""Functions, optimisers and their results."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -11,11 +11,11 @@ from selfmotion.basics import Array
 
 
 class Function(Protocol):
-    """What is minimised."""
+    """Objective of an optimiser."""
 
     @property
     def evaluations(self) -> int:
-        """How often F was computed so far."""
+        """Number of evaluations of F."""
 
     def value(self, x: Array) -> float:
         """Return F(x), infinite where it is not defined."""
@@ -27,11 +27,11 @@ class Function(Protocol):
         """Return the derivative of F at x along `direction`."""
 
     def metric(self, x: Array) -> Array:
-        """Return the Gauss-Newton matrix at x, (size, size): what is known of the Hessian."""
+        """Return the Gauss-Newton matrix at x, (size, size): an approximation of the Hessian."""
 
 
 class Status(Enum):
-    """How an optimisation ended."""
+    """Reason why an optimisation ended."""
 
     CONVERGED = "converged"
     PRECISION = "precision"
@@ -46,7 +46,7 @@ class Status(Enum):
 
     @property
     def message(self) -> str:
-        """What it means and what to do about it."""
+        """Meaning of the status, and a remedy."""
         return _MESSAGES[self]
 
     @property
@@ -90,7 +90,7 @@ class Iteration:
     step : float
         α of the line search.
     evaluations : int
-        Evaluations of F so far.
+        Number of evaluations of F.
     """
 
     x: Array
@@ -106,7 +106,7 @@ Callback = Callable[[Iteration], bool | None]
 
 @dataclass(frozen=True, eq=False)
 class Minimum:
-    """What an optimiser found.
+    """Result of an optimiser.
 
     Attributes
     ----------
@@ -148,8 +148,9 @@ class Optimizer(Protocol):
         function : Function
         x0 : (size,)
         inverse_hessian : (size, size), optional
-            An estimate of the inverse Hessian from a function much like this one. Without it the
-            optimiser begins as it likes.
+            An estimate of the inverse Hessian from a similar function. The default is the
+            optimiser's
+            own.
         max_evaluations : int, optional
             Limit on `Function.evaluations`.
         callback : callable, optional

@@ -1,4 +1,4 @@
-"""Symmetric block-banded systems, of nodes that know their neighbours."""
+"""Symmetric block-banded systems, of nodes coupled to their neighbours."""
 
 import numpy as np
 
@@ -29,7 +29,7 @@ class Banded:
                 self._table[u + i - j - offset * s, begin + j : end : s] += blocks[:, i, j]
 
     def add_pairs(self, first: int, blocks: Array) -> None:
-        """Add blocks (L, 2s, 2s) of neighbours, the first of which begins in row `first`."""
+        """Add blocks (L, 2s, 2s) of neighbours, the first of which starts in row `first`."""
         s = self._size
         self.add(0, first, blocks[:, :s, :s])
         self.add(0, first + 1, blocks[:, s:, s:])
@@ -60,22 +60,22 @@ class Banded:
         """Return the solution for right sides (K s,) or (K s, c); None if not positive definite."""
         from scipy.linalg.lapack import dpbsv
 
-        # `solveh_banded` looks at what it is given for as long as this takes.
+        # `solveh_banded` would check its input for as long as this takes.
         _, solved, wrong = dpbsv(self._table, right)
         return None if wrong else np.asarray(solved)
 
     def part_solved(
         self, part: int, parts: int, right: Array, shifts: tuple[float, float, float]
     ) -> Array | None:
-        """Return the solution of one of `parts` equal parts that know nothing of each other.
+        """Return the solution of one of `parts` equal, uncoupled parts.
 
         Parameters
         ----------
         part, parts : int
         right : (K s / parts,)
         shifts : (float, float, float)
-            What is added to the diagonal: a share of its usual entry, and where the part is not
-            positive definite a share of its largest one, then so many times more, again and again.
+            Additions to the diagonal: a share of its median entry; where the part is not positive
+            definite a share of the largest entry; the factor from one such addition to the next.
 
         Returns
         -------

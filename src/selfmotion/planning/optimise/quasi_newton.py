@@ -1,6 +1,6 @@
 """The Broyden-family quasi-Newton method with Fletcher's switch and line search.
 
-It knows only x → (F, ∇F).
+Its only input is x → (F, ∇F).
 """
 
 from collections.abc import Callable
@@ -18,12 +18,13 @@ from selfmotion.planning.optimise.base import (
     inverse_metric,
 )
 
-# Evaluations of one search, by far.
-_MOST = 60
-# The difference is taken over this share of the step that the method wanted, and means something
-# where it is so many times its own rounding.
-_SHARE, _ABOVE_ROUNDING = 1e-4, 1e3
-# The slope and the difference are taken for the same within this factor.
+# Limit of evaluations in one line search; a few are usual.
+_MAX_EVALUATIONS = 60
+# Step of a central difference, as a share of the method's step.
+_SHARE = 1e-4
+# A predicted difference below this many times its rounding proves nothing.
+_ABOVE_ROUNDING = 1e3
+# Slope and difference count as equal within this factor.
 _FACTOR = 2.0
 
 
@@ -77,11 +78,11 @@ class LineSearch:
         Parameters
         ----------
         value, slope : callable
-            φ and φ'; `slope` is only asked at the point that `value` was asked last.
+            φ and φ'; `slope` is only called at the last point of `value`.
         value0, slope0 : float
             φ(0) and φ'(0) < 0.
         first, longest : float
-            The first step to try, and one that is accepted when φ still falls there.
+            First step to try, and one that is accepted when φ still falls there.
         more : callable
             Whether another evaluation is allowed.
 
@@ -92,7 +93,7 @@ class LineSearch:
         """
         start = _Point(0.0, value0, slope0)
         before, alpha = start, first
-        for _ in range(_MOST):
+        for _ in range(_MAX_EVALUATIONS):
             if not more():
                 break
             here = _Point(alpha, value(alpha))
@@ -124,7 +125,7 @@ class LineSearch:
         """Shrink a bracket; `low` is its best end, of known slope, pointing into it."""
         slope0 = _slope(start)
         rounding = 4.0 * np.finfo(float).eps * abs(start.value)
-        for _ in range(_MOST):
+        for _ in range(_MAX_EVALUATIONS):
             if not more():
                 break
             length = high.alpha - low.alpha
@@ -164,7 +165,7 @@ def _slope(point: _Point) -> float:
 
 
 def _minimizer(a: _Point, b: _Point, nearest: float, farthest: float) -> float:
-    """Return where the polynomial through a and b is least between two steps.
+    """Return the minimiser of the interpolating polynomial through a and b between two steps.
 
     Cubic where both slopes are known, quadratic with a's slope alone; where b is infinite, the
     step next to a.
@@ -215,7 +216,7 @@ def renewed(h: Array, s: Array, y: Array, update: str) -> tuple[Array, str]:
 def is_misleading(
     value: Callable[[Array], float], x: Array, cost: float, step: Array, slope: float
 ) -> bool:
-    """Return whether F does not change along `step` as its slope there says.
+    """Return whether the change of F along `step` contradicts its slope.
 
     One central difference; False where rounding hides the answer, or F is infinite nearby.
 
@@ -259,7 +260,7 @@ class QuasiNewton:
     tolerance : float
         Converged when the decrease that the model predicts, ½ ∇Fᵀ H ∇F, is below this times |F|.
     max_iterations : int
-        After so many it stops where it is.
+        Limit of iterations.
     line_search : LineSearch
         How far it goes along each direction.
     unbounded : float
@@ -324,7 +325,7 @@ class QuasiNewton:
 
 
 class _Minimisation:
-    """The state of one minimisation."""
+    """Iterate of one minimisation."""
 
     def __init__(
         self,

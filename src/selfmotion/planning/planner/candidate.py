@@ -183,7 +183,7 @@ class Candidate:
         effort.counts.jacobians += jacobians
         self.problem, self.effort, self.free = problem, effort, free
         self.constraints = problem.bind_constraints(
-            start, begun.end, apart=effort.apart, in_pieces=effort.in_pieces
+            start, begun.end, apart=effort.apart, decomposed=effort.decomposed
         )
         _require_known(self.constraints)
         self._ends = begun.start, begun.end
@@ -346,7 +346,7 @@ class Candidate:
             return False
         self.effort = replace(self.effort, apart=True)
         self.constraints = self.problem.bind_constraints(
-            *self._ends, in_pieces=self.effort.in_pieces
+            *self._ends, decomposed=self.effort.decomposed
         )
         self.still = replace(self.still, constraints=self.constraints)
 

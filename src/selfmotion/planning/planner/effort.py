@@ -123,7 +123,7 @@ class Effort:
         Where work is added up.
     apart : bool
         Whether the optimisation keeps the arm apart from itself where only the default asks for it.
-    in_pieces : bool
+    decomposed : bool
         Whether it knows links by convex pieces before obstacles, not by their hulls.
     """
 
@@ -132,4 +132,4 @@ class Effort:
     max_evaluations: int | None
     counts: Counts
     apart: bool = False
-    in_pieces: bool = False
+    decomposed: bool = False

@@ -145,7 +145,7 @@ class Polisher:
         does so least. None where the cost there is not finite, or it would cost more than
         `cost_to_beat`.
         """
-        if not np.isfinite(motion.aim):
+        if not np.isfinite(motion.objective):
             return None
         free = None
         if cost_to_beat < np.inf:
@@ -160,7 +160,9 @@ class Polisher:
             kept = (begin for begin in self._beginnings(motion) if begin and _is_kept(begin))
             motion = next(kept, motion)
         # What takes long is seldom kept in the end: other beginnings come before the rest of it.
-        first = best = minimise(motion, self._report, multipliers, roughly=True, most=_FEWER)
+        first = best = minimise(
+            motion, self._report, multipliers, roughly=True, max_iterations=_FEWER
+        )
         rank = partial(_rank, begun=motion)
         if not _is_kept(best.motion) and self._ended is None:
             best = self._other(motion, best, free)
@@ -204,7 +206,7 @@ class Polisher:
             near.reverse()
         for begin in chain(*near, self._beginnings(begun), self._aside(begun)):
             if begin is not None and begin.violation <= _TOO_FAR:
-                found = minimise(begin, self._report, roughly=True, most=_FEWER)
+                found = minimise(begin, self._report, roughly=True, max_iterations=_FEWER)
                 best = min(best, found, key=rank)
             if self._ended is not None or _is_kept(best.motion):
                 break
@@ -221,7 +223,9 @@ class Polisher:
             grid = NodeGrid(
                 problem, motion.grid.t, kept, free=self._free, counts=self._effort.counts
             )
-            found = minimise(grid.at(motion.centred), self._noted, roughly=True, most=_FEWER)
+            found = minimise(
+                grid.at(motion.centred), self._noted, roughly=True, max_iterations=_FEWER
+            )
             motion = motion.grid.at(found.motion.centred)
             if _is_kept(motion) or number == _CALM_ROUNDS - 1:
                 yield motion
@@ -234,7 +238,7 @@ class Polisher:
     def _costs_of_limits(self, begun: NodeMotion) -> tuple[Cost, ...]:
         """Return what uses of the limits of q̈ and jerk that a motion breaks cost; none for none."""
         grid, problem = begun.grid, self._problem
-        found, most = list[Cost](), _CALM * abs(begun.aim) / problem.path.duration
+        found, most = list[Cost](), _CALM * abs(begun.objective) / problem.path.duration
         for item, h in zip(grid.rows.constraints, grid.rows.split(begun.h), strict=True):
             if isinstance(item, BoundLimits) and item.order in _CALMED and (h > 0.0).any():
                 weight = np.zeros(problem.robot.dof)
@@ -334,7 +338,7 @@ class Polisher:
         """
         grid = known.motion.grid
         has_bodies = any(isinstance(item, BoundClearance) for item in grid.constraints)
-        if self._ended is not None or not (has_bodies and known.motion.broken_between().any()):
+        if self._ended is not None or not (has_bodies and known.motion.broken_intervals().any()):
             return None
         for far in _FARTHER_APART:
             asked = [
@@ -343,9 +347,9 @@ class Polisher:
                 else item
                 for item in grid.constraints
             ]
-            optimum = self._minimise(grid.asking(asked).at(known.motion.centred))
+            optimum = self._minimise(grid.with_constraints(asked).at(known.motion.centred))
             found = replace(optimum, motion=grid.at(optimum.motion.centred))
-            if _is_kept(found.motion) and not found.motion.broken_between().any():
+            if _is_kept(found.motion) and not found.motion.broken_intervals().any():
                 return self._solution(found)
         return None
 
@@ -358,11 +362,11 @@ class Polisher:
         wanted = _WANTED_NEAR_PATH if errors.max() > _NEAR_PATH else _NEAR_PATH
         parts = np.ceil((errors / wanted) ** _FINER_POWER - 1e-9)
         parts = np.clip(parts, 1.0, _MOST_PARTS).astype(int)
-        away = grid.rows.given_away(known.multipliers, motion.curve_ends)
-        least = NOTHING * abs(motion.aim)
+        away = grid.rows.conservatism(known.multipliers, motion.curve_ends)
+        least = NOTHING * abs(motion.objective)
         if away.sum() > least:
             parts[(away > least / spline.count) & (parts == 1)] = 2
-        parts = np.maximum(parts, motion.parts_between())
+        parts = np.maximum(parts, motion.subdivisions())
         t = spline.t if (parts == 1).all() else _divided(spline.t, parts)
         if motion.quickness < grid.quick:
             t = with_starts(self._problem, t, motion.quickness)
@@ -384,7 +388,7 @@ class Polisher:
         if self.latest is None:
             return True
         last = self.latest.motion
-        return len(motion.grid.t) > len(last.grid.t) or motion.aim < last.aim
+        return len(motion.grid.t) > len(last.grid.t) or motion.objective < last.objective
 
     def _noted(self, step: Step) -> bool:
         """Note an iteration; return whether to stop."""
@@ -435,11 +439,11 @@ def _rank(optimum: Optimum, begun: NodeMotion) -> tuple[bool, bool, float]:
 
 def _rank_of(motion: NodeMotion, begun: NodeMotion) -> tuple[bool, bool, float]:
     """Return what sorts motions; see `_rank`."""
-    most = UNKEPT * abs(begun.aim)
+    most = UNKEPT * abs(begun.objective)
     if _is_kept(motion):
-        return False, False, motion.aim
+        return False, False, motion.objective
     of_all = min(1.0, _unmet(begun)) or 1.0
-    return True, motion.aim > most, motion.aim + most * _unmet(motion) / of_all
+    return True, motion.objective > most, motion.objective + most * _unmet(motion) / of_all
 
 
 def _unmet(motion: NodeMotion) -> float:

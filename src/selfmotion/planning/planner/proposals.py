@@ -307,7 +307,7 @@ def along_chain(
         motion = _through(grid, q)
         if motion is None:
             return None
-        broken = motion.broken_between() | _beyond_limits(motion)
+        broken = motion.broken_intervals() | _beyond_limits(motion)
         if not broken.any():
             none = np.zeros(len(motion.h))
             return NodeSolution(motion, Status.PRECISION, none, is_chain=True)

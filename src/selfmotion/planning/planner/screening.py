@@ -194,7 +194,7 @@ class Ranking:
 
     def _roughly(self, begun: NodeMotion) -> NodeMotion:
         """Return the rough optimum near a motion, or that itself where it keeps more."""
-        found = minimise(begun, lambda _: False, roughly=True, most=_ROUGH_ROUNDS).motion
+        found = minimise(begun, lambda _: False, roughly=True, max_iterations=_ROUGH_ROUNDS).motion
         return min(found, begun, key=self._rank)
 
     def _is_pointwise(self) -> bool:
@@ -238,7 +238,7 @@ class Ranking:
 
     def _grid(self, problem: Problem) -> NodeGrid:
         counts = self._effort.counts
-        return NodeGrid(problem, self._t, (), free=self._free, counts=counts, calm=True)
+        return NodeGrid(problem, self._t, (), free=self._free, counts=counts, smoothed=True)
 
     def _decisive(self, found: Batch, finalists: int) -> list[NodeMotion]:
         """Return the cheapest motion that keeps all, then others about as cheap; or none.
@@ -293,7 +293,7 @@ class Ranking:
             self._progress("start", number, total)
             # It is a long way from where there is no self-motion.
             most = _WITH_CONDITIONS if number <= len(free) else _ROUGH_ROUNDS
-            better = minimise(motion, lambda _: False, roughly=True, most=most).motion
+            better = minimise(motion, lambda _: False, roughly=True, max_iterations=most).motion
             found = sorted([*found, (self._rank(better), better)], key=lambda each: each[0])
             self._ranked = [one for _, one in found]
         return self._different(self._ranked)[:finalists]
@@ -350,7 +350,7 @@ class Ranking:
         problem, still = self._problem, np.zeros_like(q)
         bound = problem.bind_constraints(q[0], q[-1], apart=self._effort.apart)
         counts = self._effort.counts
-        grid = NodeGrid(problem, self._t, bound, free=self._free, counts=counts, calm=True)
+        grid = NodeGrid(problem, self._t, bound, free=self._free, counts=counts, smoothed=True)
         return grid.near(q, still if qd is None else qd, still if qdd is None else qdd)
 
     def _clear(self, motion: NodeMotion) -> bool:

@@ -115,7 +115,7 @@ class NodeSolution:
         """Return the one at an optimum."""
         motion: NodeMotion = optimum.motion
         promised = optimum.promised if np.isfinite(optimum.promised) else 0.0
-        away = motion.grid.rows.given_away(optimum.multipliers, motion.curve_ends)
+        away = motion.grid.rows.conservatism(optimum.multipliers, motion.curve_ends)
         return cls(motion, status, optimum.multipliers, promised + float(away.sum()), optimum)
 
     @classmethod
@@ -206,9 +206,9 @@ class NodeSolution:
         """
         beside, new = t.copy(), ~np.isin(t, self.motion.grid.t)
         beside[new] += BESIDE * np.diff(t, append=t[-1])[new]
-        calm, quick = self.motion.would_be_calm(), self.motion.quickness
+        smoothed, quick = self.motion.can_be_smoothed(), self.motion.quickness
         for times in (t, beside):
-            motion = self.motion.on(self.motion.grid.on(times, calm=calm, quick=quick))
+            motion = self.motion.on(self.motion.grid.on(times, smoothed=smoothed, quick=quick))
             if motion is not None:
                 multipliers = motion.grid.rows.carried(self.motion.grid.rows, self.multipliers)
                 self.motion.forget()

@@ -205,12 +205,12 @@ def _judge_on_meshes(planner: Planner) -> bool:
 def _take_links_apart(planner: Planner) -> bool:
     """Optimise again with links in convex pieces, where only their hulls meet something."""
     search, effort = planner.search, planner.effort
-    if effort.in_pieces or not (planner.is_sought and planner.is_unmet):
+    if effort.decomposed or not (planner.is_sought and planner.is_unmet):
         return False
     best = next(planner.free_by_meshes(just=True), None)
     if best is None:
         return False
-    planner.effort = replace(effort, in_pieces=True)
+    planner.effort = replace(effort, decomposed=True)
     known = best.evaluation().trajectory
     candidate = planner.begin(known.q[0], free=best.free)
     if candidate is not None:

@@ -107,9 +107,9 @@ class Clearance(Constraint):
     def bind(self, follows: Follows, start: Array, end: Array) -> BoundClearance:
         return BoundClearance(self._models(follows.robot).smooth, self.distance)
 
-    def bind_pieces(self, follows: Follows) -> BoundClearance:
+    def bind_decomposed(self, follows: Follows) -> BoundClearance:
         """Return what `bind` does, with links in convex pieces before obstacles."""
-        return BoundClearance(self._models(follows.robot).in_pieces, self.distance)
+        return BoundClearance(self._models(follows.robot).decomposed, self.distance)
 
     @override
     def requirement(self, robot: RobotModel) -> Separation:
@@ -171,8 +171,8 @@ class _Models:
         return ClearanceModel(self.exact, self._near)
 
     @cached_property
-    def in_pieces(self) -> ClearanceModel:
-        return ClearanceModel(self.exact, self._near, links_in_pieces=True)
+    def decomposed(self) -> ClearanceModel:
+        return ClearanceModel(self.exact, self._near, decompose_links=True)
 
 
 # Models take a good part of a second to make, and each start of a plan needs them.

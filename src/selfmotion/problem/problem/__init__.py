@@ -9,6 +9,7 @@ from selfmotion.problem.problem.along import (
     rest_orders as rest_orders,
     times_along as times_along,
 )
+from selfmotion.problem.problem.augmented import AugmentedProblem as AugmentedProblem
 from selfmotion.problem.problem.calibrated import (
     calibrated as calibrated,
     off_nominal as off_nominal,

@@ -172,11 +172,11 @@ class AugmentedProblem(Problem):
         return self.asked.all_constraints
 
     def bind_constraints(
-        self, start: Array, end: Array, *, apart: bool = True, in_pieces: bool = False
+        self, start: Array, end: Array, *, apart: bool = True, decomposed: bool = False
     ) -> tuple[BoundConstraint, ...]:
         """See `Problem.bind_constraints`: with the bands, and that pinned ends are on the path."""
         n, ends = self._dof, (start, end)
-        own = self.asked.bind_constraints(start[:n], end[:n], apart=apart, in_pieces=in_pieces)
+        own = self.asked.bind_constraints(start[:n], end[:n], apart=apart, decomposed=decomposed)
         found = [self._bound(item, ends) for item in own]
         bands = [item for item in self.asked.relaxations if np.isfinite(item.band)]
         limited = set[frozenset[int]]()
@@ -290,3 +290,7 @@ class AugmentedProblem(Problem):
     @override
     def way_in_reaches(self) -> float:
         return self.asked.way_in_reaches
+
+
+# `Problem.augmented` makes one; this file imports that one, so that the class is set here.
+Problem._augmentation = AugmentedProblem

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -149,6 +149,9 @@ class Problem:
     them.
     """
 
+    # Class of the problem that planners see; set by `augmented`, which derives from this one.
+    _augmentation: ClassVar[type]
+
     robot: RobotModel
     path: Path
     task: _TaskField = _TaskField()  # a descriptor, meant to be shared
@@ -239,9 +242,10 @@ class Problem:
     @cached_property
     def augmented(self) -> Problem:
         """The problem as planners see it: its tolerances are virtual joints."""
-        from selfmotion.problem.problem.augmented import AugmentedProblem
-
-        return AugmentedProblem(self) if self.relaxations else self
+        if not self.relaxations:
+            return self
+        found: Problem = self._augmentation(self)
+        return found
 
     @property
     def asked(self) -> Problem:
@@ -345,20 +349,20 @@ class Problem:
         return tuple(item for item in self.constraints if item.applies(self.robot))
 
     def bind_constraints(
-        self, start: Array, end: Array, *, apart: bool = True, in_pieces: bool = False
+        self, start: Array, end: Array, *, apart: bool = True, decomposed: bool = False
     ) -> tuple[BoundConstraint, ...]:
         """Return the constraints for this arm, given first and last configuration, (n,) each.
 
         Those of the motion that the optimisation begins with. Without `own_collision` where it need
-        not keep `apart` from itself; with links `in_pieces` where their hulls are too large. With
+        not keep `apart` from itself; with links `decomposed` where their hulls are too large. With
         the arm's own limits where nothing is said of them: no motion beyond these is verified.
         """
         asked = [*self._own_limits, *(self.all_constraints if apart else self._asking)]
         if all(self.rests):
             asked = [item.at_rest() for item in asked]
         return tuple(
-            item.bind_pieces(self.follows)
-            if in_pieces and isinstance(item, Clearance)
+            item.bind_decomposed(self.follows)
+            if decomposed and isinstance(item, Clearance)
             else item.bind(self.follows, start, end)
             for item in asked
         )

@@ -8,7 +8,7 @@ import numpy as np
 
 from selfmotion.basics import Array
 from selfmotion.certificate import Requirement
-from selfmotion.model.collision import Body, Obstacle, Solid, told_as_made
+from selfmotion.model.collision import Body, Obstacle, Solid, overlap_warning
 from selfmotion.model.follow import Follows
 from selfmotion.model.path import TURN_NOTE, spread_along
 from selfmotion.model.robot import RobotModel, mounting_of
@@ -104,7 +104,7 @@ def remarks_on(
             )
     for model, _ in envelope.bodies:
         yield from _body_remarks(robot, model.every_body)
-        if told := told_as_made(robot, model):
+        if told := overlap_warning(robot, model):
             yield told
     yield from _unit_remarks(robot, constraints)
     for item in constraints:

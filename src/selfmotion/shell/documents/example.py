@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from selfmotion.basics import Array, ProblemError
-from selfmotion.model.collision import disabled_links, overlapping_as_made
+from selfmotion.model.collision import disabled_links, overlapping_by_design
 from selfmotion.model.path import Circle, Line, Path
 from selfmotion.model.robot import NAMED_ARMS, RobotModel, load_robot
 from selfmotion.model.task import SE3, Quaternion, Task
@@ -350,7 +350,7 @@ def _clearance(
     """Return the lines of a file that say which links are kept apart."""
     asked = [(one, other) for one, other in disabled]
     known = () if srdf is None else disabled_links(srdf, loaded["arguments"], loaded["packages"])
-    pairs = dict.fromkeys(asked, "as asked") | overlapping_as_made(arm, (*asked, *known))
+    pairs = dict.fromkeys(asked, "as asked") | overlapping_by_design(arm, (*asked, *known))
     if not pairs and srdf is None:
         return "# clearance = false    # leaves self-collision out"
     said = ["distance = 0"]

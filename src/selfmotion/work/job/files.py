@@ -41,13 +41,13 @@ from selfmotion.planning.result import (
     not_judged_by,
     read_bundle,
     read_kept,
-    write_bundle,
     write_kept,
 )
 from selfmotion.problem.constraints import Clearance, Constraint
 from selfmotion.problem.costs import Cost, FunctionCost
 from selfmotion.problem.problem import Problem
 from selfmotion.work.job.program import Program
+from selfmotion.work.job.program_files import FORMAT
 from selfmotion.work.job.seam import Seam, Step, waiting
 from selfmotion.work.job.specification import Specification
 
@@ -55,24 +55,6 @@ from selfmotion.work.job.specification import Specification
 
 # A move leads to where it should up to rounding [rad or m].
 _JOINED = 1e-9
-# Raised with every change that older versions cannot read.
-_FORMAT = 2
-
-
-def write_program(program: Program, file: Path) -> None:
-    """Write a program to one file, atomically; see `Program.save`."""
-    found = [step for step in program.steps if not step.is_missing]
-    asked = program.specification
-    troubles = {step.name: step.trouble for step in program.steps if step.is_missing}
-    description: dict[str, Any] = {
-        "steps": [_step_to_dict(step) for step in found],
-        "missing": {**program.missing, **troubles},
-        "bound": program.bound,
-        "notes": list(program.notes),
-        "unjudged": list(program.unjudged),
-        "specification": None if asked is None else asked.to_dict(),
-    }
-    write_bundle(file, "program", _FORMAT, description, [step.made for step in found])
 
 
 def load_program(file: str | Path) -> Program:
@@ -86,7 +68,7 @@ def load_program(file: str | Path) -> Program:
         The file is missing, is no program, lacks something, or was written by another version.
     """
     path = as_path(file)
-    description, made, changed = read_bundle(path, "program", _FORMAT)
+    description, made, changed = read_bundle(path, "program", FORMAT)
     try:
         pairs = zip(description["steps"], made, strict=True)
         steps = tuple(_step(values, item) for values, item in pairs)
@@ -102,16 +84,6 @@ def load_program(file: str | Path) -> Program:
     if changed:
         missing[path.name] = "the file was changed after the program was written"
     return Program(made[0].robot, steps, missing, bound, notes, specification, unjudged=unjudged)
-
-
-def _step_to_dict(step: Step) -> dict[str, Any]:
-    return {
-        "name": step.name,
-        "turned": step.turned,
-        "events": [list(event) for event in step.events],
-        "leaves": [item.to_dict() for item in step.leaves],
-        "may_meet": list(step.may_meet),
-    }
 
 
 def _step(values: Mapping[str, Any], made: Plan | Move) -> Step:

@@ -23,6 +23,7 @@ from selfmotion.planning.result import (
     reached_text,
 )
 from selfmotion.problem.constraints import Clearance
+from selfmotion.work.job.program_files import write_program
 from selfmotion.work.job.seam import Step
 from selfmotion.work.job.specification import Specification
 
@@ -241,8 +242,6 @@ class Program:
 
     def save(self, file: str | FilePath) -> None:
         """Write the program, without loss, to a file that `load_program` reads; atomically."""
-        from selfmotion.work.job.files import write_program
-
         write_program(self, as_path(file))
 
 

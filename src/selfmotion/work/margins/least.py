@@ -118,7 +118,7 @@ class _Search:
 
     def _levers(self) -> Array:
         """Return the pairs' levers (P, n) while bodies are displaced as far as is in question."""
-        aside = self._size.position + self._size.rotation * self._bodies.levers
+        aside = self._size.position + self._size.rotation * self._bodies.lever_arms
         model = self._bodies.model
         return model.pair_levers_up_to(self._farthest, self._best.scale * aside)
 
@@ -150,8 +150,8 @@ class _Search:
         size, bodies = self._size, self._bodies
         rates = np.full((len(q), len(bodies.pairs)), size.position)
         if size.rotation:
-            others = [bodies.other_levers(each) for each in q]
-            rates += size.rotation * np.minimum(others, bodies.levers)
+            others = [bodies.other_lever_arms(each) for each in q]
+            rates += size.rotation * np.minimum(others, bodies.lever_arms)
         apart = bodies.model.hulls.lower_bounds(q) - self._left
         found: Array = (apart[row, pairs] - slack) / np.maximum(rates[row, pairs], 1e-12)
         return np.clip(found, 0.0, self._best.scale)

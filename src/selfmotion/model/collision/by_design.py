@@ -1,4 +1,4 @@
-"""Links that overlap as they are made: telescopes, bellows, what is built one into the other."""
+"""Links that overlap by design: telescopes, bellows, links built one into the other."""
 
 from collections.abc import Sequence
 
@@ -8,12 +8,13 @@ from selfmotion.model.collision.exact import CollisionModel
 from selfmotion.model.collision.pairs import SAMPLES, srdf_line
 from selfmotion.model.robot import RobotModel
 
-# In so many configurations overlap is how links are made; in so many it is, where they overlap in
-# the pose in which the arm is drawn as well.
-_ALWAYS, _OFTEN = 0.95, 0.2
+# Share of configurations above which an overlap is by design.
+_ALWAYS = 0.95
+# The same where the links also overlap in the pose in which the arm is drawn.
+_OFTEN = 0.2
 
 
-def overlapping_as_made(
+def overlapping_by_design(
     arm: RobotModel, disabled: Sequence[tuple[str, str]] = ()
 ) -> dict[tuple[str, str], str]:
     """Return the pairs of links that overlap in nearly all configurations, or as they are drawn.
@@ -37,10 +38,10 @@ def overlapping_as_made(
     return found
 
 
-def told_as_made(arm: RobotModel, model: CollisionModel) -> str:
-    """Return in words which links of a model overlap as they seem to be made; "" for none.
+def overlap_warning(arm: RobotModel, model: CollisionModel) -> str:
+    """Return in words which links of a model seem to overlap by design; "" for none.
 
-    All in one go, with how often and how deep, and what leaves them out.
+    One sentence for all, with share of configurations, depth and remedy.
     """
     often = {
         (pair.first, pair.second): f"overlap in {100.0 * pair.share:.0f} % of all configurations"
@@ -49,7 +50,7 @@ def told_as_made(arm: RobotModel, model: CollisionModel) -> str:
     }
     if not often:
         return ""
-    found = often | overlapping_as_made(arm, model.disabled)
+    found = often | overlapping_by_design(arm, model.disabled)
     listed = "; ".join(f"{one} - {other}: these links {why}" for (one, other), why in found.items())
     options = " ".join(f"--disabled {one},{other}" for one, other in found)
     lines = "".join(srdf_line(one, other) for one, other in found)

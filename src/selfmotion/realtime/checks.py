@@ -1,0 +1,116 @@
+"""Checks of a replanner's arguments and measurements."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from selfmotion.basics import (
+    Array,
+    PathError,
+    ProblemError,
+    RobotError,
+    as_numbers,
+    as_several,
+    plain_numbers,
+    shown,
+)
+from selfmotion.model.follow import Follows
+from selfmotion.model.motion import NullMotion
+from selfmotion.model.path import Path
+from selfmotion.model.robot import RobotModel
+from selfmotion.model.task import Task
+from selfmotion.problem.constraints import Constraint
+from selfmotion.problem.costs import Cost
+from selfmotion.realtime.reference import Approach, MovingPose
+
+
+def check_kinds(robot: Any, null_motion: Any, approach: Any) -> None:
+    """Refuse what is no arm, no null motion or no approach."""
+    for name, given, kind, example in (
+        ("robot", robot, RobotModel, "a RobotModel (load_robot)"),
+        ("null_motion", null_motion, NullMotion | None, "a NullMotion or None"),
+        ("approach", approach, Approach | None, "an Approach or None"),
+    ):
+        if not isinstance(given, kind):
+            raise ProblemError(f"{name} is {shown(given)}, expected {example}")
+
+
+def checked_terms(
+    follows: Follows, costs: Any, constraints: Any
+) -> tuple[Sequence[Cost], Sequence[Constraint]]:
+    """Return costs and constraints as tuples, of kinds that fit the arm and a task it can follow.
+
+    Raises
+    ------
+    ProblemError
+        They do not.
+    """
+    robot, task = follows.robot, follows.task
+    if not robot.can_follow(task):
+        able = [other.value for other in Task if robot.can_follow(other)]
+        raise ProblemError(
+            f"{robot.name}: cannot move the tool in every row of task '{task.value}'; "
+            f"expected one of those that it can: {', '.join(able) or 'none'}"
+        )
+    wanted = as_several(costs, "costs", Cost)  # type: ignore[type-abstract]
+    for cost in wanted:
+        cost.check(follows)
+    kept = as_several(constraints, "constraints", Constraint)
+    return wanted, kept
+
+
+def checked_state(values: Any, what: str, dof: int) -> Array:
+    """Return the state (n,) that the command begins with; RobotError where it is none."""
+    return as_numbers(values, what, f"{dof} finite numbers, one for each joint", (dof,), RobotError)
+
+
+def measured_state(values: Any, dof: int) -> Array:
+    """Return a measured state (n,) as it is, or NaN where it is no numbers at all."""
+    numbers = plain_numbers(values)
+    return np.full(dof, np.nan) if numbers is None else numbers
+
+
+def observed_target(
+    path: object, target: Any, twist: Any, seen: float, reasons: list[str]
+) -> MovingPose | None:
+    """Return the motion of a target as it was seen; None where it is none, and add the reason.
+
+    A camera that sees nothing, or what is not finite, must not leave the arm without a command.
+
+    Raises
+    ------
+    ProblemError
+        There is a path, too, or no target.
+    """
+    if path is not None or target is None:
+        named = "path and target" if path is not None else "twist and seen"
+        raise ProblemError(
+            f"{named}: a target moves by its twist from when it was seen, in place of a path; "
+            f"give target= with them, and no path"
+        )
+    try:
+        return MovingPose(target, np.zeros(6) if twist is None else twist, seen)
+    except PathError as error:
+        reasons.append(f"the target is of no use: {error}")
+        return None
+
+
+def age_of_target(path: Path | None, t: float) -> float:
+    """Return how long ago a target was seen [s]; of a path, which is no observation, 0."""
+    while path is not None and not isinstance(path, MovingPose):
+        # Of what is placed, carried along or retimed, the path that it is made of.
+        path = next((item for item in vars(path).values() if isinstance(item, Path)), None)
+    return 0.0 if path is None else t - path.seen
+
+
+def check_null_space(motion: NullMotion) -> NullMotion:
+    """Return a null motion; ProblemError unless it is one in the null space."""
+    if motion.space != "null":
+        raise ProblemError(
+            f"null motion: space is '{motion.space}', expected 'null': while the arm moves, "
+            f"self-motions are in the null space"
+        )
+    return motion
