@@ -6,7 +6,7 @@ READY := $(VENV)/.ready
 # What is imported by many processes is compiled to bytecode once.
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: help demo check test test-baseline lint format bench short wheel docs errors clean
+.PHONY: help demo check quick test test-baseline lint format bench short wheel docs errors clean
 
 help:  ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## */\t/' | expand -t 16
@@ -17,7 +17,10 @@ demo: $(READY)  ## plan, check and replay the paper's planar arm and a Panda, in
 test: $(READY)  ## the whole test run, on two cores
 	$(BIN)/pytest --numprocesses 2 --dist loadfile --no-loadscope-reorder --keep-durations
 
-check: lint  ## style, types, layers and all tests below 0.1 s, on a few arms: a minute
+check: $(READY)  ## style, types, layers and all tests below 0.1 s, on a few arms: a minute
+	$(MAKE) --jobs 2 --output-sync lint quick
+
+quick: $(READY)
 	$(BIN)/pytest --numprocesses 2 --dist worksteal --below 0.1 --arms few
 
 # What plans, and what is computed with it: the rest reads and writes files and pages.
@@ -34,6 +37,7 @@ lint: $(READY)  ## style, types and layers
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+	$(BIN)/pytest tests/docs/test_words.py
 
 format: $(READY)  ## fixes of style that need no thought
 	$(BIN)/ruff check --fix .

@@ -78,6 +78,8 @@ def main() -> int:
             f"  of these the wheel with its kernels: {built.clock:.0f} s by the clock, "
             f"{built.processor:.0f} s processor, {size:.1f} MB"
         )
+        # Examples draw and read with packages that a plan does not need.
+        run([*pip, "install", "matplotlib", "ezdxf", "mcap-ros2-support"], folder)
         # They write beside themselves.
         for each in ("examples", "robots"):
             shutil.copytree(ROOT / each, folder / each)
