@@ -32,9 +32,9 @@ from selfmotion.planning.planner.effort import Search
 from selfmotion.planning.planner.run import plan, plan_along
 from selfmotion.planning.result import Move, Parts, Plan
 from selfmotion.planning.search import (
+    ChainSegment,
+    ChainSegments,
     Sequence,
-    Stretch,
-    Stretches,
     has_curves,
     turned_towards,
 )
@@ -139,14 +139,14 @@ class _PartPlanner:
     def __init__(
         self,
         problem: Problem,
-        stretches: Stretches,
+        segments: ChainSegments,
         retreat: Array | None,
         ramp: float,
         rng: np.random.Generator | int,
         tolerance: Tolerance,
         progress: Progress,
     ) -> None:
-        self._problem, self._stretches, self._ramp = problem, stretches, ramp
+        self._problem, self._stretches, self._ramp = problem, segments, ramp
         self._tolerance, self._progress = tolerance, progress
         self._closed = any(item.closes for item in problem.constraints)
         generator = np.random.default_rng(rng)
@@ -156,24 +156,24 @@ class _PartPlanner:
         self._known: dict[tuple[int, bytes], Plan] = {}
         self._turning = np.isinf(problem.robot.lower) & np.isinf(problem.robot.upper)
 
-    def plan(self, chains: list[Stretch]) -> tuple[Parts | None, set[int]]:
+    def plan(self, chains: list[ChainSegment]) -> tuple[Parts | None, set[int]]:
         """Return the parts, and the waypoints where a cut has led to one that fails.
 
         None where one has no complete motion; `failure` then says why.
         """
         plans: list[Plan] = []
         failed: set[int] = set()
-        for number, stretch in enumerate(chains, 1):
+        for number, segment in enumerate(chains, 1):
             self._progress("part", number, len(chains))
             try:
-                plans.append(self._part(stretch, plans[-1] if plans else None))
+                plans.append(self._part(segment, plans[-1] if plans else None))
             except (BreakdownError, InverseKinematicsError, NoSequenceError) as error:
                 self.failure = error
-                return None, failed | self._around(stretch)
+                return None, failed | self._around(segment)
             if not plans[-1].certificate.verified:
-                failed |= self._around(stretch)
-        cuts = tuple(float(stretch.t[-1]) for stretch in chains[:-1])
-        endings = tuple(stretch.ending for stretch in chains[:-1])
+                failed |= self._around(segment)
+        cuts = tuple(float(segment.t[-1]) for segment in chains[:-1])
+        endings = tuple(segment.ending for segment in chains[:-1])
         moves = self._moves(plans)
         parts = Parts(self._problem, tuple(plans), moves, cuts, endings, tolerance=self._tolerance)
         return parts, failed
@@ -189,21 +189,21 @@ class _PartPlanner:
         ends = [(one.trajectory.q[-1], other.trajectory.q[0]) for one, other in pairs]
         return tuple(self._mover.move(*each) for each in ends)
 
-    def _around(self, stretch: Stretch) -> set[int]:
+    def _around(self, segment: ChainSegment) -> set[int]:
         """Return the waypoints at which the parts to both sides of a stretch's ends are not cut."""
         last = len(self._stretches.t) - 1
         width = max(1, round(_ELSEWHERE * last))
-        cuts = {stretch.first, stretch.last} - {0, last}
+        cuts = {segment.first, segment.last} - {0, last}
         return {i for cut in cuts for i in range(cut - width, cut + width + 1)}
 
-    def _part(self, stretch: Stretch, before: Plan | None) -> Plan:
+    def _part(self, segment: ChainSegment, before: Plan | None) -> Plan:
         """Return the plan along a stretch that follows another one's plan."""
-        t, q = stretch.t, stretch.q
+        t, q = segment.t, segment.q
         if before is not None:
             q = turned_towards(q, before.trajectory.q[-1], self._turning)
-        key = stretch.first, q.tobytes()
+        key = segment.first, q.tobytes()
         if key not in self._known:
-            self._known[key] = self._planned(self._part_problem(stretch), t, q)
+            self._known[key] = self._planned(self._part_problem(segment), t, q)
         return self._known[key]
 
     def _planned(self, problem: Problem, t: Array, q: Array) -> Plan:
@@ -218,21 +218,21 @@ class _PartPlanner:
         guide = Sequence(t, q, 0.0)
         return plan_along(problem, guide, self._tolerance, self._progress)
 
-    def _part_problem(self, stretch: Stretch) -> Problem:
+    def _part_problem(self, segment: ChainSegment) -> Problem:
         """Return the problem of a stretch: at rest where it is cut, with what is asked of it."""
         whole, last = self._problem, len(self._stretches.t) - 1
-        cut = stretch.first > 0 or self._closed, stretch.last < last or self._closed
+        cut = segment.first > 0 or self._closed, segment.last < last or self._closed
         if not any(cut):
             return whole
-        ends = float(stretch.t[0]), float(stretch.t[-1])
+        ends = float(segment.t[0]), float(segment.t[-1])
         orders = rest_orders(Section(whole.path, *ends), whole.task)
         ramped = cut[0] and orders[0] < _AT_REST, cut[1] and orders[1] < _AT_REST
         path = section_at_rest(whole.path, *ends, min(self._ramp, ends[1] - ends[0]), ramped)
         return replace(
             whole,
             **whole.along(lambda _: path, times_along(path, ends)),
-            start=whole.start if stretch.first == 0 else None,
-            constraints=list(asked_of_part(whole, stretch.first == 0, stretch.last == last)),
+            start=whole.start if segment.first == 0 else None,
+            constraints=list(asked_of_part(whole, segment.first == 0, segment.last == last)),
             rest=True,
         )
 
@@ -319,8 +319,8 @@ def _parts(
     missed = _MISSED_CUTS if problem.relaxations or not has_curves(problem) else 0
     refused, chains = None, []
     try:
-        stretches = Stretches.of(problem, rng, progress)
-        chains = stretches.fewest(set())
+        segments = ChainSegments.of(problem, rng, progress)
+        chains = segments.fewest(set())
     except NoSequenceError as error:
         if not missed:
             raise
@@ -331,11 +331,11 @@ def _parts(
             return Parts(problem, (whole,), tolerance=tolerance)
     if refused is not None:
         raise refused
-    planner = _PartPlanner(problem, stretches, retreats, ramp, rng, tolerance, progress)
-    return _best_of(planner, stretches, chains)
+    planner = _PartPlanner(problem, segments, retreats, ramp, rng, tolerance, progress)
+    return _best_of(planner, segments, chains)
 
 
-def _best_of(planner: _PartPlanner, stretches: Stretches, chains: list[Stretch]) -> Parts:
+def _best_of(planner: _PartPlanner, segments: ChainSegments, chains: list[ChainSegment]) -> Parts:
     """Return the parts along chains, or along others where some of these fail."""
     best: Parts | None = None
     forbidden: set[int] = set()
@@ -347,7 +347,7 @@ def _best_of(planner: _PartPlanner, stretches: Stretches, chains: list[Stretch])
             break
         forbidden |= failed
         try:
-            chains = stretches.fewest(forbidden)
+            chains = segments.fewest(forbidden)
         except NoSequenceError:
             break
     if best is None:
