@@ -25,7 +25,7 @@ from selfmotion.basics import Array, silent
 DATA = Path(__file__).parent / "data"
 DURATION, WAYPOINTS, KNOTS = 30.0, 60, 5
 # How far the lift goes at least, there and back [m], and a joint between two knots at most [rad].
-LONG_WAY, LARGEST = 0.3, 0.5
+LONG_PATH, LARGEST = 0.3, 0.5
 # From limits [rad or m], and from itself [m]; and a share of the limits of speed.
 EDGE, CLEAR, SPEED = 0.02, 2e-3, 0.8
 # What a metre of the lift counts [rad].
@@ -45,7 +45,7 @@ def known_motion(robot: sm.RobotModel, model: sm.obstacles.CollisionModel, numbe
         t = np.linspace(0.0, 1.0, WAYPOINTS)
         q = np.asarray(PchipInterpolator(np.linspace(0.0, 1.0, KNOTS), corners)(t))
         fastest = np.abs(np.gradient(q, DURATION * t, axis=0)).max(axis=0)
-        kept = way_of(q[:, lift]) >= LONG_WAY and np.all(fastest <= SPEED * robot.velocity_limit)
+        kept = way_of(q[:, lift]) >= LONG_PATH and np.all(fastest <= SPEED * robot.velocity_limit)
         if kept and model.worst(q).value >= CLEAR:
             return q
 

@@ -29,7 +29,7 @@ class SumBand(sm.constraints.Constraint):
             self.upper,
             values=lambda q, qd, qdd: q @ SUM,
             derivatives=lambda q, qd, qdd: (np.tile(SUM, (len(q), 1)),),
-            series=lambda stretch: np.tensordot(SUM, stretch.chain().joints, 1),
+            series=lambda segments: np.tensordot(SUM, segments.chain().joints, 1),
             unit="rad",
         )
 

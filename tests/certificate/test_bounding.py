@@ -5,15 +5,15 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.basics import Array, series
-from selfmotion.certificate import Stretch
-from selfmotion.certificate.bounding import Bounded, bounded
+from selfmotion.certificate import MotionSegments
+from selfmotion.certificate.bounding import BoundedFunction, bounded
 from support.arms import robot_named
 from support.motions import motion_of
 
 ROUNDING = 1e-12
 
 
-class Wave(Bounded):
+class Wave(BoundedFunction):
     """most · cos(10 (q2 - top)) e^(-(q2 - top)²) and its half, with a majorant or without."""
 
     def __init__(self, most: float, top: float = 2.345, *, known: bool = True) -> None:
@@ -21,23 +21,23 @@ class Wave(Bounded):
         self.blocks, self.of = np.arange(2), np.arange(2)
         self.allowed, self.wanted = np.ones(2), np.full(2, 1e-6)
 
-    def series(self, stretch: Stretch) -> Array | None:
+    def series(self, segments: MotionSegments) -> Array | None:
         """The product of cos x and e^(-y) for 10 q and q²; |e^(-y)| ≤ 1 for y ≥ 0."""
         if not self.known:
             return None
-        joint = stretch.chain().joints[1]
+        joint = segments.chain().joints[1]
         away = joint.copy()
-        away[0] = np.abs(stretch.motion(np.zeros(1))[:, 1] - self.top) + series.after_first(joint)
+        away[0] = np.abs(segments.motion(np.zeros(1))[:, 1] - self.top) + series.after_first(joint)
         bell = series.exponential(series.product(away, away))
         swing = abs(self.most) * series.product(series.exponential(10.0 * joint), bell)
         return np.stack([swing, 0.5 * swing])
 
-    def values(self, stretch: Stretch, u: Array) -> Array:
-        away = stretch.motion(u)[:, 1] - self.top
+    def values(self, segments: MotionSegments, u: Array) -> Array:
+        away = segments.motion(u)[:, 1] - self.top
         swing = self.most * np.cos(10.0 * away) * np.exp(-(away**2))
         return np.stack([swing, 0.5 * swing], axis=1).reshape(-1, len(u), 2)
 
-    def sizes(self, values: Array, stretch: Stretch) -> Array:
+    def sizes(self, values: Array, segments: MotionSegments) -> Array:
         return np.abs(values)
 
 
@@ -61,9 +61,9 @@ def test_a_touched_limit_is_undecided_and_its_interval_named() -> None:
     motion = motion_of([[0.0] * 3, [0.0, 1.0, 0.0]], [[0.0, 1.0, 0.0]] * 2)
 
     class Rough(Wave):
-        def series(self, stretch: Stretch) -> Array:
-            near = np.abs(stretch.middle - 1.0 / 3.0) <= stretch.half
-            known = super().series(stretch)
+        def series(self, segments: MotionSegments) -> Array:
+            near = np.abs(segments.middle - 1.0 / 3.0) <= segments.half
+            known = super().series(segments)
             assert known is not None
             return np.where(near, np.inf, known)
 
@@ -77,9 +77,9 @@ def test_what_is_not_a_number_is_not_kept() -> None:
     motion = motion_of([[0.0] * 3, [0.0, 1.0, 0.0]], [[0.0, 1.0, 0.0]] * 2)
 
     class Gone(Wave):
-        def values(self, stretch: Stretch, u: Array) -> Array:
-            found = super().values(stretch, u)
-            return np.where(stretch.times(u)[:, :, None] > 0.99, np.nan, found)
+        def values(self, segments: MotionSegments, u: Array) -> Array:
+            found = super().values(segments, u)
+            return np.where(segments.times(u)[:, :, None] > 0.99, np.nan, found)
 
     found = bounded(Gone(0.5), motion.robot, motion.trajectory, motion.trajectory.t)
     assert not np.all(found.values <= 1.0)
@@ -99,15 +99,15 @@ def test_a_stretch_is_the_trajectory(degree: int) -> None:
     tables = [rng.normal(size=(6, 7)) for _ in range(3)]
     motion = sm.Trajectory(t, *tables[:2], robot.joint_names, tables[2] if degree == 5 else None)
     edges = np.sort(np.concatenate([t, rng.uniform(t[0], t[-1], 9)]))
-    stretch = Stretch(robot, motion, np.stack([edges[:-1], edges[1:]], axis=1))
+    segments = MotionSegments(robot, motion, np.stack([edges[:-1], edges[1:]], axis=1))
     u = np.linspace(-0.999, 0.999, 7)
     for order in range(4):
-        expected = motion(stretch.times(u).ravel(), order)
-        found = stretch.motion(u, order)
+        expected = motion(segments.times(u).ravel(), order)
+        found = segments.motion(u, order)
         np.testing.assert_allclose(found, expected, rtol=1e-8, atol=1e-8 * np.abs(expected).max())
     # No derivative passes the joints' majorants.
-    for joint, known in enumerate(stretch.chain().joints):
+    for joint, known in enumerate(segments.chain().joints):
         for order in range(4):
-            most = known[order] * [1.0, 1.0, 2.0, 6.0][order] / stretch.half**order
-            largest = np.abs(stretch.motion(u, order)[:, joint]).reshape(-1, len(u)).max(axis=1)
+            most = known[order] * [1.0, 1.0, 2.0, 6.0][order] / segments.half**order
+            largest = np.abs(segments.motion(u, order)[:, joint]).reshape(-1, len(u)).max(axis=1)
             assert np.all(largest <= most * (1.0 + ROUNDING) + ROUNDING)

@@ -7,8 +7,8 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.basics import Array
-from selfmotion.certificate import Stretch
-from selfmotion.certificate.bounding import Bounded, _measured
+from selfmotion.certificate import MotionSegments
+from selfmotion.certificate.bounding import BoundedFunction, _measured
 from selfmotion.certificate.path_error import _PathErrors
 from selfmotion.certificate.quantity import Shares
 from selfmotion.model.follow import BoundFollow
@@ -37,7 +37,7 @@ def random_motion(robot: sm.RobotModel, rng: np.random.Generator) -> sm.Trajecto
 class Wide:
     """The same function, with everything allowed."""
 
-    def __init__(self, function: Bounded) -> None:
+    def __init__(self, function: BoundedFunction) -> None:
         self._function = function
         self.blocks, self.of = function.blocks, function.of
         self.allowed = np.full(len(function.of), np.inf)
@@ -47,7 +47,7 @@ class Wide:
         return getattr(self._function, name)
 
 
-def kinds(robot: sm.RobotModel, motion: sm.Trajectory) -> dict[str, Bounded]:
+def kinds(robot: sm.RobotModel, motion: sm.Trajectory) -> dict[str, BoundedFunction]:
     pose = robot.pose(motion.q[0])
     path = sm.paths.Circle.around(pose, 0.1, float(motion.t[-1]), turns=0.05, turn_tool=True)
     free = (sm.Relaxation("rz", 0.1), sm.Relaxation(("x", "y"), 1e-2, axes="tool"))
@@ -106,9 +106,9 @@ def test_bounds_are_never_below_the_truth_nor_far_above(name: str) -> None:
     function = Wide(kinds(robot, motion)[name])
     # The swivel of a nearly stretched arm is known on short intervals only.
     ends = motion.t[:-1] + np.diff(motion.t) * (0.1 if name == "swivel" else 1.0)
-    stretch = Stretch(robot, motion, np.stack([motion.t[:-1], ends], axis=1))
-    found = _measured(function, stretch)  # type: ignore[arg-type]  # it has all that is asked for
-    truth = _truth(function, stretch)
+    segments = MotionSegments(robot, motion, np.stack([motion.t[:-1], ends], axis=1))
+    found = _measured(function, segments)  # type: ignore[arg-type]  # it has all that is asked for
+    truth = _truth(function, segments)
     assert found.proved
     known = np.isfinite(found.values).all(axis=1)
     # Near the stretched arm a swivel has none.
@@ -117,9 +117,9 @@ def test_bounds_are_never_below_the_truth_nor_far_above(name: str) -> None:
     assert np.all(np.median(found.values[known] / np.maximum(truth[known], 1e-6), axis=0) <= 100.0)
 
 
-def _truth(function: Wide, stretch: Stretch) -> Array:
-    values = function.values(stretch, DENSE)  # type: ignore[operator]
-    return np.asarray(function.sizes(values, stretch).max(axis=1))  # type: ignore[operator]
+def _truth(function: Wide, segments: MotionSegments) -> Array:
+    values = function.values(segments, DENSE)  # type: ignore[operator]
+    return np.asarray(function.sizes(values, segments).max(axis=1))  # type: ignore[operator]
 
 
 def standing(robot: sm.RobotModel) -> tuple[sm.Trajectory, sm.paths.Path]:
@@ -139,8 +139,8 @@ def test_majorants_follow_a_path_that_turns(axes: str, angular: bool) -> None:
     motion, path = standing(robot)
     rows = [sm.Relaxation("x", 0.1, axes=axes)] + [sm.Relaxation("rz", 0.1)] * angular
     follow = BoundFollow(robot.chain, path, sm.Task.POSE)
-    stretch = Stretch(robot, motion, np.stack([motion.t[:-1], motion.t[1:]], axis=1))
-    check_majorants(_PathErrors(follow, sm.Tolerance(), rows), stretch)
+    segments = MotionSegments(robot, motion, np.stack([motion.t[:-1], motion.t[1:]], axis=1))
+    check_majorants(_PathErrors(follow, sm.Tolerance(), rows), segments)
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -149,8 +149,8 @@ def test_majorants_are_above_all_derivatives(name: str) -> None:
     robot, rng = robot_of(name), np.random.default_rng(1 + sum(map(ord, name)))
     motion = random_motion(robot, rng)
     ends = motion.t[:-1] + np.diff(motion.t) * (0.1 if name == "swivel" else 1.0)
-    stretch = Stretch(robot, motion, np.stack([motion.t[:-1], ends], axis=1)[::10])
-    check_majorants(kinds(robot, motion)[name], stretch)
+    segments = MotionSegments(robot, motion, np.stack([motion.t[:-1], ends], axis=1)[::10])
+    check_majorants(kinds(robot, motion)[name], segments)
 
 
 def test_a_bound_without_its_remainder_is_caught() -> None:
@@ -158,6 +158,6 @@ def test_a_bound_without_its_remainder_is_caught() -> None:
     robot, rng = robot_named("panda"), np.random.default_rng(0)
     motion = random_motion(robot, rng)
     function = Wide(kinds(robot, motion)["path"])
-    stretch = Stretch(robot, motion, np.stack([motion.t[:-1], motion.t[1:]], axis=1))
-    coarse = function.sizes(function.values(stretch, np.zeros(1)), stretch).max(axis=1)  # type: ignore[operator]
-    assert np.any(_truth(function, stretch) > coarse + 1e-3)
+    segments = MotionSegments(robot, motion, np.stack([motion.t[:-1], motion.t[1:]], axis=1))
+    coarse = function.sizes(function.values(segments, np.zeros(1)), segments).max(axis=1)  # type: ignore[operator]
+    assert np.any(_truth(function, segments) > coarse + 1e-3)

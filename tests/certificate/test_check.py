@@ -10,7 +10,7 @@ import pytest
 import selfmotion as sm
 from selfmotion.basics import Array
 from selfmotion.certificate import check
-from selfmotion.certificate.check import _because, _damped_stretches, _told, _undecided
+from selfmotion.certificate.check import _damped_intervals, _damping_cause, _undecided, _violations
 from selfmotion.certificate.path_error import PathCheck, smallest_singular_values
 from selfmotion.model.task import DampingLaw
 from support.arms import PANDA_HOME, Case, robot_named
@@ -29,14 +29,14 @@ def test_a_finished_motion_is_looked_at_from_its_start_to_its_end() -> None:
 def test_where_damping_acts_is_told_stretch_by_stretch() -> None:
     law, t = DampingLaw(0.2, 0.1), np.arange(8.0)
     singular = np.array([0.1, 0.3, 0.3, 0.15, 0.05, 0.2, 0.3, 0.1])
-    damped = _damped_stretches(law, t, singular)
+    damped = _damped_intervals(law, t, singular)
     assert [(x.start, x.end, x.singular_value) for x in damped] == [
         (0.0, 0.0, 0.1),
         (3.0, 4.0, 0.05),
         (7.0, 7.0, 0.1),
     ]
     np.testing.assert_allclose([x.factor for x in damped], law.factor(np.array([0.1, 0.05, 0.1])))
-    assert _damped_stretches(law, t, np.full(8, 0.2)) == ()
+    assert _damped_intervals(law, t, np.full(8, 0.2)) == ()
     for time, words in (
         (0.0, "where"),
         (1.0, "after"),
@@ -45,8 +45,8 @@ def test_where_damping_acts_is_told_stretch_by_stretch() -> None:
         (5.0, "after"),
     ):
         last = damped[0] if time < 3.0 else damped[1]
-        assert _because(time, damped) == f", {words} damping was active, {last}"
-    assert _because(2.0, damped[1:]) == ""
+        assert _damping_cause(time, damped) == f", {words} damping was active, {last}"
+    assert _damping_cause(2.0, damped[1:]) == ""
 
 
 def test_what_is_undecided_is_counted() -> None:
@@ -293,5 +293,5 @@ def test_what_no_slower_motion_mends_is_told_first() -> None:
         for name in ("speeds", "clearance")
     )
     fast = dataclasses.replace(fast, of_pace=True, factor=1.5)
-    assert list(_told((fast, near))) == ["clearance", "speeds"]
-    assert list(_told((dataclasses.replace(near, satisfied=True), fast))) == ["speeds"]
+    assert list(_violations((fast, near))) == ["clearance", "speeds"]
+    assert list(_violations((dataclasses.replace(near, satisfied=True), fast))) == ["speeds"]

@@ -9,7 +9,7 @@ import pinocchio as pin
 import pytest
 
 import selfmotion as sm
-from selfmotion.certificate import Stretch
+from selfmotion.certificate import MotionSegments
 from selfmotion.certificate.feed import FeedReached, _Along, _OwnPace, _Pace, _rounded_down
 from selfmotion.model.follow import Follows
 from selfmotion.model.path import section_at_rest
@@ -221,9 +221,9 @@ def test_a_feed_is_proved_where_its_path_has_bounds(tmp_path: FilePath) -> None:
         assert ["feed" in text for text in certificate.remarks].count(True) == told
         robot, still = gantry(tmp_path), np.zeros((2, 4))
         motion = sm.Trajectory([0.0, path.duration], still, still, robot.joint_names)
-        stretch = Stretch(robot, motion, np.array([[0.4, 0.6]]) * path.duration)
+        segments = MotionSegments(robot, motion, np.array([[0.4, 0.6]]) * path.duration)
         follow = sm.Follows.of(robot, path, "position").only
-        known = _Along(follow, LEFT).series(stretch)
+        known = _Along(follow, LEFT).series(segments)
         assert (known is None) is bool(told)
 
 
@@ -233,13 +233,13 @@ def test_majorants_of_the_speed_along_a_path_are_above_all_derivatives(tmp_path:
     wild = [rng.normal(size=(len(t), 4)) for _ in range(3)]
     motion = sm.Trajectory(t, *wild[:2], robot.joint_names, wild[2])
     follow = sm.Follows.of(robot, path, "position").only
-    stretch = Stretch(robot, motion, np.stack([t[:-1], t[1:]], axis=1))
+    segments = MotionSegments(robot, motion, np.stack([t[:-1], t[1:]], axis=1))
     alone = np.isin(t[1:], path.marks[1:][np.diff(path.marks) > 1e-3])
-    check_majorants(_Along(follow, LEFT), stretch.some(np.flatnonzero(alone)))
+    check_majorants(_Along(follow, LEFT), segments.some(np.flatnonzero(alone)))
     # The path's own speed, of one that varies: a constant one is rounding alone.
     places = np.array([[0.4, 0.0, 0.4], [0.5, 0.1, 0.4], [0.5, 0.2, 0.5], [0.4, 0.3, 0.5]])
     free = sm.paths.Waypoints([0.0, 1.0, 1.5, 3.0], places)
-    own = Stretch(robot, motion, np.stack([free.marks[:-1], free.marks[1:]], axis=1))
+    own = MotionSegments(robot, motion, np.stack([free.marks[:-1], free.marks[1:]], axis=1))
     for low in (-0.2, 0.1):
         check_majorants(_Pace(free, low, 0.2), own)
 

@@ -78,7 +78,7 @@ def sum_of(series: bool, reach: float = 1.0) -> Quantity:
         lambda q, *_: q[:, :1] + q[:, 1:2],
         lambda q, *_: (np.tile([1.0, 1.0, 0.0], (len(q), 1, 1)),),
         limit=reach,
-        series=(lambda stretch: stretch.chain().joints[:2].sum(axis=0)[None]) if series else None,
+        series=(lambda segments: segments.chain().joints[:2].sum(axis=0)[None]) if series else None,
     )
 
 
@@ -133,7 +133,7 @@ def test_a_number_between_two_ends_is_kept_up_to_each(name: str) -> None:
             upper,
             lambda q, *_: q[:, 0] + q[:, 1],
             lambda q, *_: (np.tile([1.0, 1.0, 0.0], (len(q), 1)),),
-            lambda stretch: stretch.chain().joints[0] + stretch.chain().joints[1],
+            lambda segments: segments.chain().joints[0] + segments.chain().joints[1],
             "rad",
         )
         assert made.bounds.tolist() == [0.2]

@@ -115,7 +115,7 @@ def test_in_lots_the_same_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
         lambda q: np.full(len(q), 0.35), lambda q: 0.01 + np.minimum(np.abs(q[:, 0] - 0.7), 0.3)
     )
     at_once = closest_at_all_times(bodies, motion.trajectory, 0.0)  # type: ignore[arg-type]
-    monkeypatch.setattr("selfmotion.certificate.separation._LOT", 3)
+    monkeypatch.setattr("selfmotion.certificate.separation._CHUNK", 3)
     assert closest_at_all_times(bodies, motion.trajectory, 0.0) == at_once  # type: ignore[arg-type]
 
 

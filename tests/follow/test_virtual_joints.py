@@ -236,7 +236,7 @@ def test_gradients_along_nodes_equal_central_differences(
     direction = random_step(motion, 4)
     size = 1e-5
     here = centred(here)
-    aims = [moved(here, side * direction).aim for side in (size, -size)]
+    aims = [moved(here, side * direction).objective for side in (size, -size)]
     slopes = here.grid.cost.slopes(here.samples, here.curve_ends, here.partials)
     force = here.grid.spline.scattered(slopes)
     gradient = np.einsum("konw,kon->kw", around_of(here).changes, force)

@@ -10,7 +10,7 @@ from selfmotion.basics import Counts, silent
 from selfmotion.planning.planner.effort import Effort
 from selfmotion.planning.planner.grids import first_nodes
 from selfmotion.planning.planner.planner import Planner
-from selfmotion.planning.planner.proposals import VERY_LONG_WAY, is_long
+from selfmotion.planning.planner.proposals import VERY_LONG_PATH, is_long
 from support.arms import PANDA_HOME, robot_named
 
 NAME = "posture of a stretch"
@@ -63,7 +63,7 @@ def test_the_way_is_measured_however_many_loops_there_are(
 def test_a_loop_costs_the_same_however_many_there_are(planar: sm.RobotModel, free: sm.Plan) -> None:
     plans = {LOOPS: free, 2 * LOOPS: sm.plan(loops(planar, 2 * LOOPS)).require()}
     for plan in plans.values():
-        assert plan.problem.way_in_reaches > VERY_LONG_WAY
+        assert plan.problem.way_in_reaches > VERY_LONG_PATH
         assert plan.report.attempts[1].name == NAME
         assert plan.report.attempts[1].outcome == "all constraints are met"
     each = [plan.report.cost / count for count, plan in plans.items()]

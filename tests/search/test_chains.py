@@ -7,7 +7,7 @@ import pytest
 
 from selfmotion.basics import Array
 from selfmotion.planning.search.chains import best_chains, diverse_chains
-from selfmotion.planning.search.nodes import Admissible
+from selfmotion.planning.search.vertices import Admissible
 
 
 def brute_force(layers: list[Array], step: Array) -> float:

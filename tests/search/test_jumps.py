@@ -7,8 +7,8 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.basics import Array
-from selfmotion.planning.search import Stretch, Stretches
-from selfmotion.planning.search.stretches import jumps_of
+from selfmotion.planning.search import ChainSegment, ChainSegments
+from selfmotion.planning.search.segments import jumps_of
 from support.arms import robot_named
 
 # Arms and tasks: redundancy 1, by a joint or by a row that is free.
@@ -74,15 +74,15 @@ def test_chains_do_without_jumps(monkeypatch: pytest.MonkeyPatch) -> None:
         return np.linspace(0.0, problem.path.duration, WAYPOINTS)
 
     monkeypatch.setattr(sys.modules["selfmotion.planning.search.guides"], "waypoint_times", few)
-    stretches = Stretches.of(wound())
+    segments = ChainSegments.of(wound())
     # What the samples alone would do.
-    assert any(_jumps(stretches, item) for item in stretches._found(set()))
-    found = stretches.fewest(set())
-    assert not any(_jumps(stretches, item) for item in found)
+    assert any(_jumps(segments, item) for item in segments._found(set()))
+    found = segments.fewest(set())
+    assert not any(_jumps(segments, item) for item in found)
     assert [item.first for item in found[1:]] == [item.last for item in found[:-1]]
-    assert (found[0].first, found[-1].last) == (0, len(stretches.t) - 1)
+    assert (found[0].first, found[-1].last) == (0, len(segments.t) - 1)
 
 
-def _jumps(stretches: Stretches, item: Stretch) -> bool:
+def _jumps(segments: ChainSegments, item: ChainSegment) -> bool:
     times, q = item.t, item.q
-    return bool(jumps_of(stretches.problem, times[:-1], times[1:], q[:-1], q[1:]).any())
+    return bool(jumps_of(segments.problem, times[:-1], times[1:], q[:-1], q[1:]).any())

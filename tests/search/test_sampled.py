@@ -8,9 +8,9 @@ from selfmotion.basics import Array, silent
 from selfmotion.basics.errors import NoSequenceError
 from selfmotion.model.follow import Follows
 from selfmotion.planning.search.manifold import Manifold, OnPath
-from selfmotion.planning.search.nodes import Admissible
 from selfmotion.planning.search.sampled import sampled_layers
 from selfmotion.planning.search.sequences import best_sequences
+from selfmotion.planning.search.vertices import Admissible
 from support.arms import robot_named
 from support.followed import standing
 from support.paths import line_of

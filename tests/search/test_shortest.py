@@ -10,8 +10,8 @@ from selfmotion.basics import Array
 from selfmotion.model.follow import Follows
 from selfmotion.planning.search.manifold import OnPath
 from selfmotion.planning.search.measures import Length, RunningCost
-from selfmotion.planning.search.nodes import Admissible
 from selfmotion.planning.search.shortest import Shortest, improved_by
+from selfmotion.planning.search.vertices import Admissible
 from support.arms import robot_named
 from support.paths import line_of
 

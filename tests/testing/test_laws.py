@@ -283,8 +283,8 @@ class ElbowBand(sm.constraints.Constraint, kind="elbow band"):
             self.limit,
             values=lambda q, qd, qdd: q @ row,
             derivatives=lambda q, qd, qdd: (np.tile(row, (len(q), 1)),),
-            series=lambda stretch: (
-                stretch.chain().joints[2] + self.times * stretch.chain().joints[3]
+            series=lambda segments: (
+                segments.chain().joints[2] + self.times * segments.chain().joints[3]
             ),
         )
 
@@ -492,7 +492,7 @@ class Misshapen(sm.constraints.Constraint):
             *("elbow", -1.8, -1.2),
             values=lambda q, qd, qdd: q @ row,
             derivatives=lambda q, qd, qdd: (np.tile(row, (len(q), 1)),),
-            series=lambda stretch: stretch.chain().joints[3][None],
+            series=lambda segments: segments.chain().joints[3][None],
         )
 
 

@@ -127,11 +127,11 @@ def refuted(scenes: list[Scene]) -> list[tuple[str, ...]]:
 def test_a_certificate_that_looks_at_the_samples_alone_is_refuted(
     panda: sm.RobotModel, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def at_ends(function: Any, stretch: Any, count: int, rest: Array) -> tuple[Array, ...]:
+    def at_ends(function: Any, segments: Any, count: int, rest: Array) -> tuple[Array, ...]:
         """Bounds of what is measured at both ends of each interval, and no more."""
-        values = function.sizes(function.values(stretch, np.array([-1.0, 1.0])), stretch)
+        values = function.sizes(function.values(segments, np.array([-1.0, 1.0])), segments)
         largest = values.max(axis=1)
-        return largest, stretch.intervals[:, :1] + 0.0 * largest, largest
+        return largest, segments.intervals[:, :1] + 0.0 * largest, largest
 
     path = sm.paths.Circle.around(panda.pose(PANDA_HOME), 0.1, 4.0)
     motion = sm.plan(sm.Problem(panda, path, start=PANDA_HOME), max_evaluations=3).trajectory

@@ -1,6 +1,9 @@
 """Re-checks finished motions: the path, and each requirement."""
 
-from selfmotion.certificate.bounding import Bounded as Bounded, Stretch as Stretch
+from selfmotion.certificate.bounding import (
+    BoundedFunction as BoundedFunction,
+    MotionSegments as MotionSegments,
+)
 from selfmotion.certificate.check import certify as certify
 from selfmotion.certificate.limits import (
     ARRIVED as ARRIVED,
@@ -39,8 +42,8 @@ from selfmotion.certificate.separation import Separation as Separation
 from selfmotion.certificate.verdict import (
     Certificate as Certificate,
     allowed_text as allowed_text,
-    apart_text as apart_text,
     first_of as first_of,
+    relaxed_text as relaxed_text,
 )
 
 __all__ = [

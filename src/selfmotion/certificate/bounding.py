@@ -1,16 +1,16 @@
-"""How large functions of a motion become at any time: one loop of bounds, each a theorem.
+"""Proved bounds of functions of a motion at all times: one loop, each bound a theorem.
 
 On an interval |t - m| ≤ h on which the motion is smooth, a function f with values in a normed space
-is measured at K Chebyshev nodes. The polynomial p through them misses it by at most
+is evaluated at K Chebyshev nodes. The interpolating polynomial p differs from it by at most
 
     |f - p| ≤ sup |∂ᴷf/∂uᴷ| / K! / 2^(K-1),    u = (t - m) / h
 
 (P. J. Davis, Interpolation and Approximation, 1963, th. 3.1.1), and the K-th derivative is bounded
-by the majorant series of f. Between two of the places u_i at which p is looked at, δ apart, p
-leaves its chord by at most δ²/8 sup|p''|, and |p''| ≤ Σ |a_k| k²(k² - 1)/3 for p = Σ a_k T_k
-(V. A. Markov). A convex size of f that grows no faster than |f| is then at most its largest value
-at the u_i plus both. Intervals on which this does not decide are halved. What is not known is
-rounding: some 1e-15 of the size of what is measured.
+by the majorant series of f. Between two of the points u_i at which p is evaluated, δ apart, p
+leaves its chord by at most δ²/8 sup|p''|, and |p''| ≤ Σ |a_k| k²(k² - 1)/3 for p = Σ a_k T_k (V. A.
+Markov). A convex size of f that grows no faster than |f| is then at most its largest value at the
+u_i plus both. Intervals on which this does not decide are halved. Rounding is not bounded: it is
+some 1e-15 of the size of the values.
 
 A function without a majorant is bounded as measured: by the last two coefficients a_k in place of
 the first bound. That is no proof.
@@ -28,16 +28,23 @@ from selfmotion.basics import Array, Ints, Progress, series, silent
 from selfmotion.model.motion import Trajectory
 from selfmotion.model.robot import ChainSeries, RobotModel
 
-# Nodes of an interval: at least, and without a majorant.
-_FEWEST, _MEASURED = 3, 9
-# The polynomials are looked at in so many places of an interval.
+# Fewest nodes of an interval.
+_FEWEST = 3
+# Nodes of an interval without a majorant.
+_MEASURED = 9
+# Points of an interval at which polynomials are evaluated.
 _PLACES = 33
-# Intervals that are looked at together, and how often one is halved; of a lot so many times as many
-# are looked at then, or so many.
-_LOT, _DEPTH, _TIMES, _MOST = 2048, 16, 32, 4096
+# Intervals in one chunk, which bounds memory.
+_CHUNK = 2048
+# Largest number of halvings of an interval.
+_DEPTH = 16
+# Largest number of intervals in work per chunk, in multiples of its own …
+_TIMES = 32
+# … or this many, whichever is more.
+_MOST = 4096
 
 
-class Stretch:
+class MotionSegments:
     """The motion of an arm on I intervals, none of which contains a sample.
 
     Parameters
@@ -62,14 +69,14 @@ class Stretch:
         joints = series.of_polynomial(self._joints).transpose(2, 0, 1)
         return ChainSeries(self.robot, joints, self.half)
 
-    def some(self, rows: Ints) -> "Stretch":
+    def some(self, rows: Ints) -> "MotionSegments":
         """Return some of the intervals."""
-        return Stretch(self.robot, self.trajectory, self.intervals[rows])
+        return MotionSegments(self.robot, self.trajectory, self.intervals[rows])
 
     def times(self, u: Array) -> Array:
         """Return the times of places u (P,) of each interval, -1 to 1, (I, P)."""
         inner = self.middle[:, None] + self.half[:, None] * u
-        # By rounding the last one may be after the end.
+        # Rounding may put the last one after the end.
         return np.clip(inner, self.intervals[:, :1], self.intervals[:, 1:])
 
     def motion(self, u: Array, order: int = 0) -> Array:
@@ -84,17 +91,17 @@ class Stretch:
         return np.ascontiguousarray(found.reshape(-1, found.shape[2]))
 
 
-class Bounded(ABC):
+class BoundedFunction(ABC):
     """A function of a motion: vectors in blocks, and sizes of them.
 
     Attributes
     ----------
     blocks : (B,)
-        Where each block begins among the C components.
+        Index of each block's first component, of C.
     of : (G,)
         Which block's errors each size inherits.
     allowed : (G,)
-        What sizes should not exceed; inf where all is allowed.
+        Allowed sizes; inf for any.
     wanted : (B,)
         How well the blocks are to be interpolated at least.
     """
@@ -105,21 +112,21 @@ class Bounded(ABC):
     wanted: Array
 
     @abstractmethod
-    def series(self, stretch: Stretch) -> Array | None:
+    def series(self, segments: MotionSegments) -> Array | None:
         """Return the blocks' majorants (B, K + 1, I); None where they are not known."""
 
     @abstractmethod
-    def values(self, stretch: Stretch, u: Array) -> Array:
+    def values(self, segments: MotionSegments, u: Array) -> Array:
         """Return the components at places u (P,) of the intervals, (I, P, C)."""
 
     @abstractmethod
-    def sizes(self, values: Array, stretch: Stretch) -> Array:
+    def sizes(self, values: Array, segments: MotionSegments) -> Array:
         """Return the sizes of components (I, P, C), (I, P, G): convex, growing no faster."""
 
 
 @dataclass(frozen=True, eq=False)
 class Bounds:
-    """What is known of a function on a whole motion.
+    """Bounds of a function on a whole motion.
 
     Attributes
     ----------
@@ -130,7 +137,7 @@ class Bounds:
     proved : bool
         Whether the bounds are theorems everywhere.
     samples : int
-        How many times were looked at.
+        Number of times at which it was evaluated.
     """
 
     values: Array
@@ -151,7 +158,7 @@ class _Found(NamedTuple):
 
 
 def bounded(
-    function: Bounded,
+    function: BoundedFunction,
     robot: RobotModel,
     trajectory: Trajectory,
     edges: Array,
@@ -159,8 +166,8 @@ def bounded(
 ) -> Bounds:
     """Bound a function of a motion between all edges (E,) [s], which contain the samples.
 
-    A long motion is looked at by lots, so that memory does not grow with it; `progress` is called
-    with ``("checking", lot, lots)``.
+    A long motion is bounded in chunks, to bound memory; `progress` is called with ``("checking",
+    chunk, chunks)``.
     """
     values, times = np.zeros(len(function.of)), np.full(len(function.of), edges[0])
     undecided: list[tuple[float, float]] = []
@@ -178,22 +185,22 @@ def bounded(
 
 
 def _settled(
-    function: Bounded,
+    function: BoundedFunction,
     robot: RobotModel,
     trajectory: Trajectory,
     edges: Array,
     progress: Progress,
 ) -> Iterator[tuple[Array, _Found]]:
-    """Yield by lots the intervals (I, 2) that never settle, and what was found of all that did."""
-    lots = range(0, len(edges) - 1, _LOT)
-    for number, first in enumerate(lots, 1):
-        if len(lots) > 1:
-            progress("checking", number, len(lots))
-        part = edges[first : first + _LOT + 1]
+    """Yield by chunks the undecided intervals (I, 2), and the bounds of all others."""
+    chunks = range(0, len(edges) - 1, _CHUNK)
+    for number, first in enumerate(chunks, 1):
+        if len(chunks) > 1:
+            progress("checking", number, len(chunks))
+        part = edges[first : first + _CHUNK + 1]
         pending = np.stack([part[:-1], part[1:]], axis=1)
         most = max(_MOST, _TIMES * len(pending))
         for depth in range(_DEPTH + 1):
-            found = _measured(function, Stretch(robot, trajectory, pending))
+            found = _measured(function, MotionSegments(robot, trajectory, pending))
             # Written so that NaN settles nothing and is no small error either.
             kept = np.asarray(found.values <= function.allowed).all(axis=1)
             broken = ~np.asarray(found.measured <= function.allowed).all(axis=1)
@@ -201,7 +208,7 @@ def _settled(
             left = np.flatnonzero(~settled)
             last = depth == _DEPTH or len(left) > most
             told = np.arange(len(pending)) if last else np.flatnonzero(settled)
-            # Where there is no bound, what was measured: it is broken, or undecided.
+            # Without a bound, the samples: violated, or undecided.
             values = np.where(np.isfinite(found.values), found.values, found.measured)
             yield (
                 pending[left if last else left[:0]],
@@ -212,12 +219,12 @@ def _settled(
             pending = halves(pending[left])
 
 
-def _measured(function: Bounded, stretch: Stretch) -> _Found:
-    """Bound all sizes on the intervals of a stretch."""
-    count = len(stretch.middle)
-    # What is too wild for numbers is halved.
+def _measured(function: BoundedFunction, segments: MotionSegments) -> _Found:
+    """Bound all sizes on the given intervals."""
+    count = len(segments.middle)
+    # Overflow counts as no bound: the interval is halved.
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-        known = function.series(stretch)
+        known = function.series(segments)
     sizes = len(function.of)
     values, times, measured = (np.empty((count, sizes)) for _ in range(3))
     nodes = np.full(count, _MEASURED)
@@ -227,15 +234,15 @@ def _measured(function: Bounded, stretch: Stretch) -> _Found:
     samples = 0
     for number in np.unique(nodes):
         rows = np.flatnonzero(nodes == number)
-        some = stretch.some(rows) if len(rows) < count else stretch
+        some = segments.some(rows) if len(rows) < count else segments
         found = _interpolated(function, some, int(number), rest[:, rows])
         values[rows], times[rows], measured[rows] = found
         samples += len(rows) * int(number)
     return _Found(values, times, measured, known is not None, samples)
 
 
-def _nodes(known: Array, function: Bounded) -> tuple[Ints, Array]:
-    """Return how many nodes each interval gets (I,), and what the polynomials miss (B, I)."""
+def _nodes(known: Array, function: BoundedFunction) -> tuple[Ints, Array]:
+    """Return the number of nodes of each interval (I,), and interpolation errors (B, I)."""
     powers = np.arange(_FEWEST, series.ORDER + 1)
     missed = known[:, powers] / 2.0 ** (powers - 1.0)[:, None]
     good = (missed <= function.wanted[:, None, None]).all(axis=0)
@@ -249,20 +256,20 @@ def _nodes(known: Array, function: Bounded) -> tuple[Ints, Array]:
 
 
 def _interpolated(
-    function: Bounded, stretch: Stretch, count: int, rest: Array
+    function: BoundedFunction, segments: MotionSegments, count: int, rest: Array
 ) -> tuple[Array, Array, Array]:
     """Return bounds, about when, and measured sizes (I, G) by polynomials through nodes."""
     u, places, into, between, bends = _matrices(count)
-    values = function.values(stretch, u)
+    values = function.values(segments, u)
     coefficients = np.einsum("kp,ipc->ikc", into, values)
     lengths = _lengths(coefficients, function.blocks)
     if np.isnan(rest).all():
         rest = 2.0 * lengths[:, -2:].sum(axis=1).T
     left = rest.T + np.einsum("k,ikb->ib", bends, lengths)
-    dense = function.sizes(np.einsum("pk,ikc->ipc", between, coefficients), stretch)
-    measured = function.sizes(values, stretch).max(axis=1)
+    dense = function.sizes(np.einsum("pk,ikc->ipc", between, coefficients), segments)
+    measured = function.sizes(values, segments).max(axis=1)
     which = np.argmax(np.where(np.isnan(dense), np.inf, dense), axis=1)
-    times = stretch.times(places)
+    times = segments.times(places)
     rows = np.arange(len(times))[:, None]
     bounds = dense[rows, which, np.arange(dense.shape[2])] + left[:, function.of]
     return bounds, times[rows, which], measured

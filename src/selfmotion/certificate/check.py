@@ -35,13 +35,13 @@ from selfmotion.model.path import Path, check_oriented
 from selfmotion.model.robot import RobotModel
 from selfmotion.model.task import DampingLaw, Relaxation, Task
 
-# Of a long motion the distance from singular poses, which proves nothing, is looked at so often,
-# and then at all times around where it may be smallest.
+# Samples at which the distance from singular poses, which proves nothing, is computed on a long
+# motion; then at all times around its smallest values.
 _MOST_POSES = 2_000
-# Files write times in some digits: a motion may end so much before or after its path [s], where all
-# is within the tolerance until both have ended.
+# A motion may end this much before or after its path [s], since files write times with some digits;
+# then all has to be within the tolerance until both have ended.
 _CLOCK = 1e-4
-# What is said of paths without bounds of their derivatives.
+# Note of paths without bounds of their derivatives.
 _MEASURED = "the path is checked at samples only: it gives no bounds (Path.series)"
 
 
@@ -59,29 +59,29 @@ def certify(
     ending: str = "",
     progress: Progress = silent,
 ) -> Certificate:
-    """Check a motion against its path, the arm's limits and what else is required.
+    """Check a motion against its path, the arm's limits and further requirements.
 
     Parameters
     ----------
     robot, path, task, trajectory
-        The motion and what it should do; times of the trajectory are those of the path, its joints
-        are those of the arm by name, in any order.
+        Motion and specification; times of the trajectory are those of the path, its joints are
+        those of the arm by name, in any order.
     tolerance : Tolerance, optional
-        What the motion may miss the path by.
+        Allowed error of the motion from the path.
     requirements : sequence of Requirement
-        What it must keep besides. The arm's own limits of position and velocity are always judged,
-        unless these contain `JointLimits` of the same order.
+        Further conditions. The arm's own limits of position and velocity are always judged, unless
+        these contain `JointLimits` of the same order.
     also : sequence of Follow
-        What else of the arm has to follow a path.
+        Further task frames on paths.
     relaxations : sequence of Relaxation
         Rows in which the tool may leave its path: only what is beyond them counts as an error.
     damping : DampingLaw, optional
-        No requirement: how the motion was damped near singular poses, to tell where and what for.
+        No requirement: the law by which the motion was damped near singular poses, for the report.
     ending : str
         Why the motion ends before its path does, where it is known to; such a motion is never
         verified.
     progress : callable, optional
-        Called with ``("checking", lot, lots)`` while a long motion is looked at.
+        Called with ``("checking", chunk, chunks)`` during the check of a long motion.
 
     Returns
     -------
@@ -111,14 +111,14 @@ def certify(
     path_check = checks[0]
     t = motion.t if damping is not None else _near_singular(follows, trajectory, motion.t)
     singular = smallest_singular_values(follows, trajectory(t))
-    damped = () if damping is None else _damped_stretches(damping, t, singular)
+    damped = () if damping is None else _damped_intervals(damping, t, singular)
     _check(requirements)
     feeds = tuple(FeedReached(feed, item) for item in follows.items for feed in item.path.feeds)
     wanted = (*arm_limits(robot, requirements), *requirements, *feeds)
     findings = tuple(_judged(item, motion) for item in wanted)
     cut = _cut_short(ending, follows, trajectory, checks, tolerance)
     off = tuple(text for check in checks for text in _off_path(check, tolerance, damped))
-    # A time that differs by digits is nothing to tell where the tool is off its path.
+    # A time that differs by digits is not worth a message where the tool is off its path.
     by_digits = not ending and abs(trajectory.duration - path.duration) <= _CLOCK
     return Certificate(
         path_check.position,
@@ -131,7 +131,7 @@ def certify(
         failures=(
             *((off or cut) if by_digits else cut + off),
             *(text for check in checks for text in _undecided(check)),
-            *with_feeds(tuple(_told(findings)), feeds, findings),
+            *with_feeds(tuple(_violations(findings)), feeds, findings),
         ),
         covers=("path", *covered_by(wanted)),
         remarks=tuple(remark for item in wanted for remark in item.remarks),
@@ -144,17 +144,17 @@ def certify(
     )
 
 
-def _told(findings: Sequence[Finding]) -> Iterator[str]:
-    """Yield what is not kept: first what no slower motion would mend."""
+def _violations(findings: Sequence[Finding]) -> Iterator[str]:
+    """Yield the violations: first those that no slower motion would mend."""
     broken = [item for item in findings if not item.satisfied]
     yield from (item.text for item in broken if not item.of_pace)
-    # Of the others first what takes the longest motion, with which the rest is kept as well.
+    # Of the others first the one that needs the longest motion, which mends the rest as well.
     slower = [item for item in broken if item.of_pace]
-    yield from (item.text for item in sorted(slower, key=_takes, reverse=True))
+    yield from (item.text for item in sorted(slower, key=_required_factor, reverse=True))
 
 
-def _takes(item: Finding) -> float:
-    """Return by what factor a motion has to be longer, as far as that is known."""
+def _required_factor(item: Finding) -> float:
+    """Return the factor by which a motion has to be longer, if known."""
     return item.factor if np.isfinite(item.factor) else 0.0
 
 
@@ -189,8 +189,8 @@ def _judged(requirement: Requirement, motion: FinishedMotion) -> Finding:
     return found
 
 
-def _damped_stretches(law: DampingLaw, t: Array, singular: Array) -> tuple[DampedStretch, ...]:
-    """Return where the law damps, for smallest singular values (K,) at times (K,)."""
+def _damped_intervals(law: DampingLaw, t: Array, singular: Array) -> tuple[DampedStretch, ...]:
+    """Return the intervals of damping, for smallest singular values (K,) at times (K,)."""
     factor = law.factor(singular)
     edges = np.flatnonzero(np.diff(np.concatenate([[0], factor > 0.0, [0]])))
     return tuple(
@@ -204,9 +204,9 @@ def _damped_stretches(law: DampingLaw, t: Array, singular: Array) -> tuple[Dampe
     )
 
 
-def _because(time: float, damped: tuple[DampedStretch, ...]) -> str:
-    """Return what damping has to do with being off the path at a time; "" for nothing."""
-    before = [stretch for stretch in damped if stretch.start <= time]
+def _damping_cause(time: float, damped: tuple[DampedStretch, ...]) -> str:
+    """Return damping as the cause of an error of the path at a time; "" for none."""
+    before = [interval for interval in damped if interval.start <= time]
     if not before:
         return ""
     when = "where" if time <= before[-1].end else "after"
@@ -216,8 +216,8 @@ def _because(time: float, damped: tuple[DampedStretch, ...]) -> str:
 def _near_singular(follows: Follows, trajectory: Trajectory, t: Array) -> Array:
     """Return those of times t (K,) around which the arm may be nearest to a singular pose.
 
-    Wherever a few values, less by what they change nearby, are below the least of all: of many
-    loops each one has a dip.
+    Around values that are, minus their change nearby, below the least of all: of several loops each
+    has a minimum.
     """
     every = 1 + len(t) // _MOST_POSES
     if every == 1:
@@ -227,7 +227,7 @@ def _near_singular(follows: Follows, trajectory: Trajectory, t: Array) -> Array:
     nearby = np.maximum(change, np.maximum(np.append(change[1:], 0.0), np.append(0.0, change[:-1])))
     may_be = few - nearby < few.min()
     may_be[np.argmin(few)] = True
-    # All between one of these and those beside it.
+    # All samples between one of these and its neighbours.
     between = np.repeat(may_be | np.append(may_be[1:], False), every)[: len(t)]
     between[1:] |= between[:-1].copy()
     return np.asarray(t[between])
@@ -278,16 +278,16 @@ def _cut_short(
 def _ends_within(
     item: BoundFollow, trajectory: Trajectory, apart: float, check: PathCheck, tolerance: Tolerance
 ) -> bool:
-    """Whether what lasts longer, path or tip, moves on by no more than is left of a tolerance."""
+    """Whether the remainder of what lasts longer, path or tip, is within the tolerance."""
     if apart < 0.0:
         path = item.path.samples([item.path.duration + apart, item.path.duration])
         rotation, translation = path.rotation, path.translation
     else:
         _, rotation, translation = item.chain.along(trajectory(trajectory.t[-1] - [apart, 0.0]))
     moved = float(np.linalg.norm(translation[1] - translation[0]))
-    # ‖R₁ − R₀‖ = √8 sin(θ/2), which knows small angles to rounding.
-    apart_by = float(np.linalg.norm(rotation[1] - rotation[0])) / np.sqrt(8.0)
-    turned = 2.0 * float(np.arcsin(min(apart_by, 1.0)))
+    # ‖R₁ − R₀‖ = √8 sin(θ/2), accurate for small angles.
+    angle = float(np.linalg.norm(rotation[1] - rotation[0])) / np.sqrt(8.0)
+    turned = 2.0 * float(np.arcsin(min(angle, 1.0)))
     return (
         check.position.value + moved <= tolerance.position
         and check.rotation.value + turned <= tolerance.rotation
@@ -303,12 +303,12 @@ def _off_path(
     if not position.value <= tolerance.position:
         failures.append(
             f"'{position.name}' is {position.value:.2e} m {off} at t = {position.time:.3f} "
-            f"s (allowed: {tolerance.position:.3g} m){_because(position.time, damped)}"
+            f"s (allowed: {tolerance.position:.3g} m){_damping_cause(position.time, damped)}"
         )
     if not rotation.value <= tolerance.rotation:
         failures.append(
             f"'{rotation.name}' is {rotation.value:.2e} rad {off} at t = "
             f"{rotation.time:.3f} s (allowed: {tolerance.rotation:.3g} rad)"
-            f"{_because(rotation.time, damped)}"
+            f"{_damping_cause(rotation.time, damped)}"
         )
     return tuple(failures)

@@ -1,4 +1,4 @@
-"""The feed that was asked for, and the one that is reached."""
+"""Prescribed feeds, and the feeds that a motion reaches."""
 
 import re
 from collections.abc import Iterator, Sequence
@@ -10,33 +10,33 @@ import numpy as np
 from typing_extensions import override
 
 from selfmotion.basics import Array, Flags, series
-from selfmotion.certificate.bounding import Bounded, Bounds, Stretch, bounded
+from selfmotion.certificate.bounding import BoundedFunction, Bounds, MotionSegments, bounded
 from selfmotion.certificate.path_error import jacobians, smooth_between
 from selfmotion.certificate.requirement import Finding, FinishedMotion, Requirement
 from selfmotion.model.follow import BoundFollow
 from selfmotion.model.path import FeedKept, FeedPossible, Path, path_series
 
-# Shares of the room that is left are interpolated this well at least.
+# Relative accuracy of the interpolation of speed margins.
 _FINE = 1e-3
-# A feed that is asked for no longer than this, as a share of the duration, is asked for nowhere.
+# Shorter windows of a feed, as a share of the duration, are ignored.
 _INSTANT = 1e-9
-# Where a path leaves nothing over, this is what is left [m/s].
+# Smallest speed margin of a path [m/s].
 _TINY = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
 class FeedReached(Requirement):
-    """The tool keeps a feed while it is asked for: at all times, and not only at nodes.
+    """The tool keeps a feed in its windows: at all times, and not only at nodes.
 
-    First the path at that feed is judged by itself: its own speed |v_d| is bounded between its
-    nodes, from below where the feed counts, from above everywhere (`_Pace`). Then the tool: with v
-    and v_d the velocities of tool and path, the tool's speed along the path is |v_d| + f/|v_d| with
-    f = (v - v_d)·v_d: it keeps the feed where |f| is at most |v_d| times what the path leaves over.
+    First the path itself is judged at that feed: its own speed |v_d| is bounded between its nodes,
+    from below where the feed counts, from above everywhere (`_Pace`). Then the tool: with v and v_d
+    the velocities of tool and path, the tool's speed along the path is |v_d| + f/|v_d| with f = (v
+    - v_d)·v_d: it keeps the feed where |f| is at most |v_d| times the path's speed margin.
 
     Attributes
     ----------
     found : FeedKept
-        What the path makes of it.
+        The feed that the path itself keeps.
     follow : BoundFollow
         The tip on that path.
     """
@@ -77,7 +77,7 @@ class FeedReached(Requirement):
         )
 
     def _pace(self, motion: FinishedMotion) -> "_OwnPace":
-        """Return what is known of the path's own speed, at all times."""
+        """Return bounds of the path's own speed, at all times."""
         found = self.found
         intervals, counts = found.pieces
         low, high = ((1.0 + side * found.within) * found.asked for side in (-1.0, 1.0))
@@ -86,7 +86,7 @@ class FeedReached(Requirement):
             within = _Pace(found.path, low if is_counted else -high, high)
             edges = np.union1d(intervals[first : last + 1].ravel(), _marks(found, first, last))
             known = bounded(within, motion.robot, motion.trajectory, edges)
-            # A motion may be so near to a bound that no halving decides.
+            # A motion may be so near to its limit that halving does not decide.
             if _is_off(known):
                 own = known.undecided[0][0] if known.undecided else float(known.times[0])
                 return _OwnPace(0.0, self._when(own))
@@ -108,13 +108,13 @@ class FeedReached(Requirement):
         )
 
     def _speeds(self, motion: FinishedMotion, pace: "_OwnPace") -> Iterator[Bounds]:
-        """Yield what is known of the tool's speed each time that the feed is asked for."""
+        """Yield bounds of the tool's speed, by window of the feed."""
         edges = smooth_between(self.follow.path, motion.trajectory)
         along = _Along(self.follow, pace)
         for window in self.found.during:
             if window[1] - window[0] <= _INSTANT * self.follow.path.duration:
                 continue
-            # Where feeds change the path has marks: rounding apart these are the nearest edges.
+            # Where feeds change the path has marks: the nearest edges, up to rounding.
             first, last = (int(np.argmin(np.abs(edges - time))) for time in window)
             first = min(first, len(edges) - 2)
             part = edges[first : max(last, first + 1) + 1]
@@ -123,7 +123,7 @@ class FeedReached(Requirement):
     def _off(
         self, speeds: Bounds, pace: "_OwnPace", allowed: float
     ) -> tuple[float, float, bool, str]:
-        """Return when the tool leaves the path's pace, and what is said of it."""
+        """Return the time at which the tool leaves the path's speed, and a message."""
         time = speeds.undecided[0][0] if speeds.undecided else float(speeds.times[0])
         by = f"by {speeds.values[0] * pace.left_over:.2g} m/s " if not speeds.undecided else ""
         text = (
@@ -139,7 +139,7 @@ class FeedReached(Requirement):
 
 
 class _OwnPace(NamedTuple):
-    """What a path leaves over at a feed [m/s], when it does not keep it itself [s], its slowest."""
+    """Speed margin of a path at a feed [m/s], time of its own violation [s], its slowest speed."""
 
     left_over: float
     off: float | None
@@ -164,12 +164,12 @@ def _marks(found: FeedKept, first: int, last: int) -> Array:
 
 
 def _is_off(speeds: Bounds) -> bool:
-    """Return whether a tool is, or may be, faster or slower than is left."""
+    """Return whether a tool's speed exceeds, or may exceed, the margin."""
     # Written so that NaN is.
     return bool(speeds.undecided or not speeds.values[0] <= 1.0)
 
 
-class _Pace(Bounded):
+class _Pace(BoundedFunction):
     """(|v_d|² - m) / r: at most 1 in size where low ≤ |v_d| ≤ high.
 
     With m and r the mean and half the difference of the squares of both. A negative `low` is none:
@@ -196,32 +196,32 @@ class _Pace(Bounded):
         return float(np.sqrt(max(least, 0.0))), float(np.sqrt(most))
 
     @override
-    def series(self, stretch: Stretch) -> Array | None:
-        path = path_series(self._path, stretch.middle, stretch.half)
+    def series(self, segments: MotionSegments) -> Array | None:
+        path = path_series(self._path, segments.middle, segments.half)
         if path is None:
             return None
-        speed = series.derivative(path.translation, stretch.half)
+        speed = series.derivative(path.translation, segments.half)
         squared = series.product(speed, speed)
         squared[0] += self._mean
         return np.asarray(squared[None] / self._half)
 
     @override
-    def values(self, stretch: Stretch, u: Array) -> Array:
-        twists = self._path.samples(stretch.times(u).ravel()).twist[:, :3]
+    def values(self, segments: MotionSegments, u: Array) -> Array:
+        twists = self._path.samples(segments.times(u).ravel()).twist[:, :3]
         squares = np.einsum("kc,kc->k", twists, twists)
         found = (squares - self._mean) / self._half
-        return np.asarray(found.reshape(len(stretch.middle), len(u), 1))
+        return np.asarray(found.reshape(len(segments.middle), len(u), 1))
 
     @override
-    def sizes(self, values: Array, stretch: Stretch) -> Array:
+    def sizes(self, values: Array, segments: MotionSegments) -> Array:
         return np.abs(values)
 
 
-class _Along(Bounded):
-    """(v - v_d)·v_d, as a share of what it may be: |v_d| times what the path leaves over.
+class _Along(BoundedFunction):
+    """(v - v_d)·v_d, as a share of its bound: |v_d| times the path's speed margin.
 
-    |v_d| is bounded from below on each interval: what it is in the middle, less all that its
-    majorant lets it change by.
+    |v_d| is bounded from below on each interval: its value in the middle, minus the variation that
+    its majorant allows.
     """
 
     def __init__(self, follow: BoundFollow, pace: _OwnPace) -> None:
@@ -229,49 +229,49 @@ class _Along(Bounded):
         self.blocks = self.of = np.zeros(1, dtype=np.intp)
         self.allowed, self.wanted = np.ones(1), np.full(1, _FINE)
 
-    def _room(self, stretch: Stretch) -> Array:
-        """Return what (v - v_d)·v_d may be on intervals, (I,) [m²/s²]."""
-        slowest = np.full(len(stretch.middle), self._pace.slowest)
-        path = path_series(self._follow.path, stretch.middle, stretch.half)
+    def _room(self, segments: MotionSegments) -> Array:
+        """Return the bounds of (v - v_d)·v_d on intervals, (I,) [m²/s²]."""
+        slowest = np.full(len(segments.middle), self._pace.slowest)
+        path = path_series(self._follow.path, segments.middle, segments.half)
         if path is not None:
-            speed = series.derivative(path.translation, stretch.half)
-            middle = self._follow.path.samples(stretch.middle).twist[:, :3]
+            speed = series.derivative(path.translation, segments.half)
+            middle = self._follow.path.samples(segments.middle).twist[:, :3]
             least = np.linalg.norm(middle, axis=1) - speed[1:].sum(axis=0)
             slowest = np.fmax(slowest, least)
         return np.asarray(slowest * max(self._pace.left_over, _TINY))
 
     @override
-    def series(self, stretch: Stretch) -> Array | None:
-        path = path_series(self._follow.path, stretch.middle, stretch.half)
+    def series(self, segments: MotionSegments) -> Array | None:
+        path = path_series(self._follow.path, segments.middle, segments.half)
         if path is None:
             return None
-        place, _ = stretch.chain().relative(self._follow.chain)
-        speed = series.derivative(path.translation, stretch.half)
-        apart = series.derivative(place, stretch.half) + speed
-        return np.asarray(series.product(apart, speed)[None] / self._room(stretch))
+        place, _ = segments.chain().relative(self._follow.chain)
+        speed = series.derivative(path.translation, segments.half)
+        apart = series.derivative(place, segments.half) + speed
+        return np.asarray(series.product(apart, speed)[None] / self._room(segments))
 
     @override
-    def values(self, stretch: Stretch, u: Array) -> Array:
-        target = self._follow.path.samples(stretch.times(u).ravel()).twist[:, :3]
-        moved, _ = jacobians(self._follow.chain, stretch.motion(u))
-        speed = np.einsum("kcn,kn->kc", moved[:, :3], stretch.motion(u, 1))
+    def values(self, segments: MotionSegments, u: Array) -> Array:
+        target = self._follow.path.samples(segments.times(u).ravel()).twist[:, :3]
+        moved, _ = jacobians(self._follow.chain, segments.motion(u))
+        speed = np.einsum("kcn,kn->kc", moved[:, :3], segments.motion(u, 1))
         along = np.einsum("kc,kc->k", speed - target, target)
-        shape = len(stretch.middle), len(u), 1
-        return np.asarray(along.reshape(shape) / self._room(stretch)[:, None, None])
+        shape = len(segments.middle), len(u), 1
+        return np.asarray(along.reshape(shape) / self._room(segments)[:, None, None])
 
     @override
-    def sizes(self, values: Array, stretch: Stretch) -> Array:
+    def sizes(self, values: Array, segments: MotionSegments) -> Array:
         return np.abs(values)
 
 
-# What limits of rates tell of motions that are too fast; a feed leaves no duration to choose.
+# Remedy in findings of rates; a feed leaves no duration to choose.
 _LONGER = re.compile(r": give it ([0-9.e+-]+|inf) times the duration")
 
 
 def with_feeds(
     told: Sequence[str], feeds: Sequence[FeedReached], findings: Sequence[Finding]
 ) -> tuple[str, ...]:
-    """Return what is told of an arm that is too slow, of motions at feeds in words of these.
+    """Return findings of an arm that is too slow, of motions at feeds in terms of these.
 
     The first of it says which feed the arm can keep, where that is known.
     """
@@ -285,10 +285,10 @@ def with_feeds(
 
 
 def possible_feed(feeds: Sequence[FeedReached], findings: Sequence[Finding]) -> str:
-    """Return which feeds a motion could have whose arm is too slow for those that were asked for.
+    """Return the feeds that an arm could reach that is too slow for the prescribed ones.
 
-    Empty where something else is wrong, too, the path itself does not keep a feed, or none was
-    asked for.
+    Empty without a prescribed feed, with other violations, or where the path itself does not keep a
+    feed.
     """
     broken = [item for item in findings if not item.satisfied]
     factor = max((item.factor for item in broken), default=1.0)

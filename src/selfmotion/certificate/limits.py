@@ -10,11 +10,9 @@ from selfmotion.basics import Array, ProblemError, read_only
 from selfmotion.certificate.requirement import Finding, FinishedMotion, Requirement, of_some
 from selfmotion.model.robot import RobotModel
 
-# Limits of joint position, velocity, acceleration and jerk, judged at all times.
-
-# A jump of acceleration counts as one within this time [s]: no controller looks closer.
+# Duration within which a change of acceleration counts as a jump [s]: no controller resolves less.
 _INSTANT = 1e-6
-# A joint that stands at its limit may be beyond it by rounding [rad or m].
+# Excess of a joint at its limit that counts as rounding [rad or m].
 _ROUNDING = 1e-12
 
 LIMIT_NAMES = (
@@ -23,7 +21,7 @@ LIMIT_NAMES = (
     "joint acceleration limits",
     "joint jerk limits",
 )
-# What a verdict calls them.
+# Their names in verdicts.
 _COVERED = ("joint limits", "speeds", "accelerations", "jerks")
 
 
@@ -35,7 +33,7 @@ class JointLimits(Requirement):
     ----------
     order : {0, 1, 2, 3}
     lower, upper : (n,)
-        [rad or m] per s^order, ±inf where there is none; symmetric from order 1 on.
+        [rad or m] per s^order, ±inf for none; symmetric from order 1 on.
     """
 
     order: int
@@ -109,7 +107,7 @@ class JointLimits(Requirement):
         return Finding(self.name, name, time, amount, allowed, kept, text, self.order > 0, factor)
 
     def _jump(self, motion: FinishedMotion) -> Finding | None:
-        """Return the worst jump of q̈ that no limited jerk makes, if there is one."""
+        """Return the largest jump of q̈, which no limited jerk allows, if there is one."""
         times, jumps = motion.trajectory.acceleration_jumps()
         shares = jumps / (_INSTANT * self.upper)
         joint = int(np.argmax(shares))
@@ -157,17 +155,17 @@ _POWERS = ("", "/s", "/s²", "/s³")
 
 # Conditions on the end of a motion: a configuration, a velocity, a closed loop.
 
-# Of orders 0 to 2.
+# Names of orders 0 to 2.
 QUANTITIES = ("configuration", "velocity", "acceleration")
-# What closed paths, end configurations and end velocities may miss by [rad or m, per s].
+# Tolerance of closed paths, end configurations and end velocities [rad or m, per s].
 ARRIVED = 1e-6
-# Likewise of accelerations [rad/s² or m/s²], which are differences of velocities.
+# The same of accelerations [rad/s² or m/s²], which are differences of velocities.
 _ACCELERATED = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
 class EndState(Requirement):
-    """q(T) (order 0), q̇(T) (order 1) or q̈(T) (order 2) is the one asked for, or at the start.
+    """q(T) (order 0), q̇(T) (order 1) or q̈(T) (order 2) is as prescribed, or as at the start.
 
     Attributes
     ----------
@@ -187,20 +185,20 @@ class EndState(Requirement):
         return f"{'start' if self.at_start else 'end'} {QUANTITIES[self.order]}"
 
     def judge(self, motion: FinishedMotion) -> Finding:
-        """See `Requirement.judge`: the joint that misses most."""
+        """See `Requirement.judge`: of the joint with the largest error."""
         row = 0 if self.at_start else -1
         reached = motion.trajectory(motion.trajectory.t[row], self.order)
         words = "off the one asked for" if self.order else "away from where it should"
         return _miss(self.name, motion, reached - self.target, self.order, words, row)
 
 
-# Likewise of an arm at rest, to tell a standstill from a step of acceleration [rad/s² or m/s²].
+# Largest acceleration of an arm at rest [rad/s² or m/s²]; more is a step of acceleration.
 STILL_ACCELERATION = 1e-3
 
 
 @dataclass(frozen=True)
 class AtRest(Requirement):
-    """The arm is at rest at the start, at the end, or both: q̇ = 0 there, and q̈ = 0 where asked.
+    """The arm is at rest at the start, at the end, or both: q̇ = 0, and q̈ = 0 if required.
 
     Attributes
     ----------
@@ -234,7 +232,7 @@ class AtRest(Requirement):
         return max(found, key=lambda item: item.amount / item.allowed)
 
     def _judged(self, motion: FinishedMotion, rates: Array, row: int, order: int) -> Finding:
-        """Return what there is to say of q̇ or q̈ (n,) at an end."""
+        """Return the finding of q̇ or q̈ (n,) at an end."""
         worst = int(np.argmax(np.abs(rates)))
         joint, amount = motion.robot.joint_names[worst], float(np.abs(rates[worst]))
         unit = motion.robot.unit_of(joint) + ("/s", "/s²")[order - 1]
@@ -252,13 +250,13 @@ class AtRest(Requirement):
 
 @dataclass(frozen=True)
 class ClosedMotion(Requirement):
-    """The motion ends as it began: q(T) = q(0), and q̇(T) = q̇(0) where velocity is asked for."""
+    """The motion ends as it starts: q(T) = q(0), and q̇(T) = q̇(0) if required."""
 
     velocity: bool
     name: str = "closed path"
 
     def judge(self, motion: FinishedMotion) -> Finding:
-        """See `Requirement.judge`: the joint that misses most."""
+        """See `Requirement.judge`: of the joint with the largest error."""
         q, qd = motion.trajectory.q, motion.trajectory.qd
         apart = _miss(self.name, motion, q[-1] - q[0], 0, "away from the start")
         if not (apart.satisfied and self.velocity):

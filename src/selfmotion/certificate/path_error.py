@@ -1,4 +1,4 @@
-"""Where a motion takes the tool, and how far off its path at any time."""
+"""Pose of the tool along a motion, and its error from the path at all times."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -8,7 +8,7 @@ import pinocchio as pin
 from typing_extensions import override
 
 from selfmotion.basics import Array, ProblemError, Progress, series, silent
-from selfmotion.certificate.bounding import Bounded, Stretch, bounded
+from selfmotion.certificate.bounding import BoundedFunction, MotionSegments, bounded
 from selfmotion.certificate.requirement import Extreme, Tolerance
 from selfmotion.model.follow import BoundFollow, Follows
 from selfmotion.model.motion import Trajectory
@@ -22,7 +22,7 @@ _AXES = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 
 
 def deviation_from(follow: BoundFollow, t: Array, q: Array, in_tool_axes: bool) -> Array:
-    """Return how the tool deviates from the path, (K, 6).
+    """Return the deviation of the tool from the path, (K, 6).
 
     Rows x, y, z [m] and rx, ry, rz [rad] as `Relaxation` has them; zero where the task leaves them
     free.
@@ -56,7 +56,7 @@ def jacobians(chain: Chain, q: Array) -> tuple[Array, Array]:
     world = np.empty((len(frames), len(q), 6, model.nv))
     turns, places = np.empty((len(frames), len(q), 3, 3)), np.empty((len(frames), len(q), 3))
     placed = [data.oMf[frame] for frame in frames]
-    # Views of what each placement sets.
+    # Views of data that each placement overwrites.
     seen = [(pose.rotation, pose.translation) for pose in placed]
     coupling = chain.coupling
     for k, configuration in enumerate(q @ coupling.matrix.T + coupling.offsets):
@@ -80,7 +80,7 @@ def jacobians(chain: Chain, q: Array) -> tuple[Array, Array]:
 def poses(chain: Chain, q: Array) -> tuple[Array, Array]:
     """Return rotations and translations of a chain's tip in its base frame at q (K, n).
 
-    By calls of its own: what checks a motion must not share a fault with what made it.
+    Computed by own calls: a check of a motion must not share a fault with its planner.
     """
     model, data, tip, base = chain.model, chain.model.createData(), chain.tip, chain.base
     rotation, translation = np.empty((len(q), 3, 3)), np.empty((len(q), 3))
@@ -110,7 +110,7 @@ def rotation_vectors(task: Task, relative: Array) -> Array:
     if not task.angular:
         return np.zeros(relative.shape[:-1])
     if task.tool_axes:
-        # From (0, 0, 1) to the z axis as seen from the target, by the shortest way.
+        # From (0, 0, 1) to the z axis as seen from the target, by the shortest rotation.
         axis = relative[..., 2]
         normal = np.stack([-axis[..., 1], axis[..., 0], np.zeros(axis.shape[:-1])], axis=-1)
         cosine = axis[..., 2]
@@ -132,7 +132,7 @@ def rotation_vectors(task: Task, relative: Array) -> Array:
 
 
 def excess(relaxations: Sequence[Relaxation], duration: float, t: Array, deviation: Array) -> Array:
-    """Return what deviations are beyond the relaxations, (K, 6) [m, rad].
+    """Return the part of deviations that exceeds the relaxations, (K, 6) [m, rad].
 
     Parameters
     ----------
@@ -155,7 +155,7 @@ def excess(relaxations: Sequence[Relaxation], duration: float, t: Array, deviati
 
 
 def deviation_size(item: Relaxation, duration: float, t: Array, deviation: Array) -> Array:
-    """Return how far the rows of a relaxation are off the path in its window, (K,).
+    """Return the deviation of a relaxation's rows from the path in its window, (K,).
 
     Zero outside the window. Parameters as in `excess`.
     """
@@ -173,18 +173,19 @@ def deviation_size(item: Relaxation, duration: float, t: Array, deviation: Array
 # of its rows are relaxed: (sin θ) n g(cos θ) with g(c) = arccos(c) / √(1 - c²) = ∫ dx / (x² + 2cx
 # + 1) over x > 0, whose derivatives |g⁽ᵏ⁾|/k! are at most g(c) / (1 + c)ᵏ.
 
-# Marks nearer to each other than this share of the duration are one.
+# Marks nearer to each other than this share of the duration count as one.
 _SAME = 1e-12
-# Deviations are interpolated to this share of the tolerance at least.
+# Accuracy of the interpolation of deviations, as a share of the tolerance.
 _FINE = 1e-4
-# Where the tool is turned by more than this cosine, rotation vectors have no bound.
+# Rotations with a cosine below this are too near to a half turn for a bound of rotation vectors.
 _TURNED = -0.99
+# Frobenius norm of a rotation matrix.
 _FROBENIUS = 3.0**0.5
 
 
 @dataclass(frozen=True, eq=False)
 class PathCheck:
-    """What is known of a motion's errors.
+    """Path errors of a motion, proved or measured.
 
     Attributes
     ----------
@@ -193,11 +194,11 @@ class PathCheck:
     deviations : tuple of Extreme
         Bounds of the deviation of each relaxation's rows.
     undecided : tuple of (float, float)
-        Intervals [s] on which the bounds do not settle.
+        Intervals [s] on which the bounds do not decide.
     proved : bool
         Whether the bounds are theorems; else the path is checked at samples only.
     samples : int
-        How many poses were looked at.
+        Number of poses that were evaluated.
     """
 
     position: Extreme
@@ -251,7 +252,7 @@ def errors_at(follow: BoundFollow, t: Array, q: Array, relaxations: Sequence[Rel
 
 
 def _check_times(path: Path, trajectory: Trajectory) -> None:
-    """Refuse a motion that begins before or after its path: a part of one would not be judged."""
+    """Refuse a motion that starts before or after its path: a part of one would not be judged."""
     first = float(trajectory.t[0])
     if not abs(first) <= 1e-9 * path.duration:
         raise ProblemError(
@@ -271,17 +272,17 @@ def smooth_between(
     near = _SAME * path.duration
     marks = np.unique(np.clip([*path.marks, *windows], start, end))
     marks = marks[np.append(True, np.diff(marks) > near)]
-    # Samples stay however near they are to each other: between two the arm may go anywhere.
+    # Close samples are kept: between two of them the arm may be anywhere.
     place = np.searchsorted(samples, marks)
     before, after = samples[np.maximum(place - 1, 0)], samples[place]
     return np.union1d(samples, marks[np.minimum(marks - before, after - marks) > near])
 
 
-class _PathErrors(Bounded):
+class _PathErrors(BoundedFunction):
     """Errors of position and rotation beyond relaxations, and the deviation of each.
 
     The first block is the position's deviation, the second one the rotation's: its rotation vector
-    where some of its rows are relaxed, else what `relative_turns` returns.
+    if some of its rows are relaxed, else the result of `relative_turns`.
     """
 
     def __init__(
@@ -293,7 +294,7 @@ class _PathErrors(Bounded):
         self._in_tool_axes = any(item.in_tool_axes for item in relaxations)
         self.blocks = np.array([0, 3])
         self.of = np.array([0, 1, *(int(item.angular) for item in relaxations)])
-        # No turn is more than half a one.
+        # No rotation is above half a turn.
         rotation = tolerance.rotation if tolerance.rotation < np.pi else np.inf
         if rotation < np.pi and not self._as_vectors:
             rotation = 2.0 * np.sin(0.5 * rotation)
@@ -307,15 +308,15 @@ class _PathErrors(Bounded):
         return values
 
     @override
-    def series(self, stretch: Stretch) -> Array | None:
-        path = path_series(self._path, stretch.middle, stretch.half)
+    def series(self, segments: MotionSegments) -> Array | None:
+        path = path_series(self._path, segments.middle, segments.half)
         if path is None:
             return None
-        place, turn = stretch.chain().relative(self._chain)
+        place, turn = segments.chain().relative(self._chain)
         apart = place + path.translation
         turned = series.product(path.rotation, turn)
         if self._in_tool_axes or self._as_vectors:
-            miss, relative = self._looked_at(stretch, np.zeros(1))
+            miss, relative = self._looked_at(segments, np.zeros(1))
             apart[0] = _length(miss[:, 0]) + series.after_first(apart)
             apart = series.product(path.rotation, apart)
         if not self._task.angular:
@@ -326,8 +327,8 @@ class _PathErrors(Bounded):
         return np.stack([apart, share * turned])
 
     @override
-    def values(self, stretch: Stretch, u: Array) -> Array:
-        miss, relative = self._looked_at(stretch, u)
+    def values(self, segments: MotionSegments, u: Array) -> Array:
+        miss, relative = self._looked_at(segments, u)
         if not self._task.angular:
             turns = np.zeros((*miss.shape[:2], 1))
         elif self._as_vectors:
@@ -339,7 +340,7 @@ class _PathErrors(Bounded):
         return np.concatenate([miss, turns], axis=2)
 
     @override
-    def sizes(self, values: Array, stretch: Stretch) -> Array:
+    def sizes(self, values: Array, segments: MotionSegments) -> Array:
         if not self._relaxations:
             return np.stack([_length(values[..., :3]), _length(values[..., 3:])], axis=2)
         shape = values.shape[:2]
@@ -349,24 +350,24 @@ class _PathErrors(Bounded):
         deviation[..., 3:] = turns
         flat = deviation.reshape(-1, 6)
         # The windows of an interval are those of its middle.
-        t, last = np.repeat(stretch.middle, shape[1]), self._path.duration
+        t, last = np.repeat(segments.middle, shape[1]), self._path.duration
         beyond = excess(self._relaxations, last, t, flat).reshape(*shape, 6)
         turned = beyond[..., 3:] if self._as_vectors else values[..., 3:]
         sizes = [_length(beyond[..., :3]), _length(turned)]
         sizes += [deviation_size(x, last, t, flat).reshape(shape) for x in self._relaxations]
         return np.stack(sizes, axis=2)
 
-    def _looked_at(self, stretch: Stretch, u: Array) -> tuple[Array, Array]:
+    def _looked_at(self, segments: MotionSegments, u: Array) -> tuple[Array, Array]:
         """Return the position's deviation (I, P, 3) and R_dᵀR (I, P, 3, 3) at places u (P,)."""
-        target = self._path.samples(stretch.times(u).ravel())
-        rotation, translation = poses(self._chain, stretch.motion(u))
+        target = self._path.samples(segments.times(u).ravel())
+        rotation, translation = poses(self._chain, segments.motion(u))
         rows = self._task.rows[self._task.rows < 3]
         miss = np.zeros((len(translation), 3))
         miss[:, rows] = (translation - target.translation)[:, rows]
         if self._in_tool_axes:
             miss = np.einsum("kji,kj->ki", target.rotation, miss)
         relative = relative_turns(target.rotation, rotation)
-        shape = len(stretch.middle), len(u)
+        shape = len(segments.middle), len(u)
         return miss.reshape(*shape, 3), relative.reshape(*shape, 3, 3)
 
     def _cosine(self, relative: Array) -> Array:

@@ -1,4 +1,4 @@
-"""What constraints measure along a motion, written once for optimiser and certificate."""
+"""Quantities that constraints limit, defined once for optimiser and certificate."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ import numpy.typing as npt
 from typing_extensions import override
 
 from selfmotion.basics import Array, Ints, ProblemError, as_number, read_only
-from selfmotion.certificate.bounding import Bounded, Bounds, Stretch, bounded
+from selfmotion.certificate.bounding import BoundedFunction, Bounds, MotionSegments, bounded
 from selfmotion.certificate.requirement import Finding, FinishedMotion, Requirement
 
-# Shares of limits are interpolated this well at least.
+# Relative accuracy of the interpolation of shares of limits.
 _FINE = 1e-6
 
 
@@ -26,7 +26,7 @@ class Column(NamedTuple):
     subject : str
         Whose: a joint, a frame.
     label : str
-        What to call it in sentences: "torque of joint 'elbow'".
+        Its name in sentences: "torque of joint 'elbow'".
     unit : str
     slows : int
         The power of the duration that it falls with at a slower pace: 1 for speeds, 2 for
@@ -41,33 +41,33 @@ class Column(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Quantity:
-    """Numbers or vectors that follow from q, q̇ and q̈, and what they may be.
+    """Numbers or vectors that are functions of q, q̇ and q̈, with limits.
 
     Attributes
     ----------
     name : str
-        What to call it in verdicts.
+        Its name in verdicts.
     columns : sequence of Column
     values : callable
         ``values(q, qd, qdd)`` of motions (K, n) each → numbers (K, m), or vectors (K, m, c).
     derivatives : callable
-        ``derivatives(q, qd, qdd)`` → their derivatives with respect to q, q̇ and q̈, as many of the
-        three as there are, (K, m, n) or (K, m, c, n).
+        ``derivatives(q, qd, qdd)`` → their derivatives by q, q̇ and q̈, as many of the three as
+        they depend on, (K, m, n) or (K, m, c, n).
     limit : (m,)
-        |value - center| ≤ limit, of vectors their length; inf where there is none.
+        |value - center| ≤ limit, of vectors their length; inf for none.
     center : (m,) or float
         0 for vectors.
     series : callable, optional
-        ``series(stretch)`` → majorants of the values (m, K + 1, I), of their lengths where they are
-        vectors (`selfmotion.basics.series`). By default none: it is checked at samples.
+        ``series(segments)`` → majorants of the values (m, K + 1, I), of vectors those of their
+        lengths (`selfmotion.basics.series`). By default none: it is checked at samples.
     components : int
         Length c of vectors; 1 for numbers.
     of_pace : bool
         Whether a slower pace may keep its limits.
     period : float
-        What two equal values may differ by: 2π for angles.
+        Difference of two equal values: 2π for angles.
     covers : tuple of str, optional
-        What a verdict may say was checked; by default its name.
+        Checks that a verdict may claim; by default its name.
     """
 
     name: str
@@ -76,7 +76,7 @@ class Quantity:
     derivatives: Callable[[Array, Array, Array], tuple[Array, ...]]
     limit: npt.ArrayLike
     center: npt.ArrayLike = 0.0
-    series: Callable[[Stretch], Array | None] | None = None
+    series: Callable[[MotionSegments], Array | None] | None = None
     components: int = 1
     of_pace: bool = False
     period: float = np.inf
@@ -102,7 +102,7 @@ class Quantity:
         upper: float,
         values: Callable[[Array, Array, Array], Array],
         derivatives: Callable[[Array, Array, Array], tuple[Array, ...]],
-        series: Callable[[Stretch], Array] | None = None,
+        series: Callable[[MotionSegments], Array] | None = None,
         unit: str = "",
     ) -> Quantity:
         """Return one number that is to stay within a band.
@@ -119,7 +119,7 @@ class Quantity:
             lambda *motion: tuple(np.asarray(by)[:, None] for by in derivatives(*motion)),
             limit=0.5 * (upper - lower),
             center=0.5 * (upper + lower),
-            series=None if series is None else lambda stretch: series(stretch)[None],
+            series=None if series is None else lambda segments: series(segments)[None],
         )
 
     @property
@@ -138,7 +138,7 @@ class Quantity:
         return np.flatnonzero(np.isfinite(self.bounds))
 
     def away(self, q: Array, qd: Array, qdd: Array) -> Array:
-        """Return how far values are from the centres, of angles the short way, (K, m) or (…, c)."""
+        """Return the distances of values from the centres, modulo the period, (K, m) or (…, c)."""
         found = np.asarray(self.values(q, qd, qdd))
         away = found - (self.middle if found.ndim == 2 else self.middle[:, None])
         if np.isfinite(self.period):
@@ -146,7 +146,7 @@ class Quantity:
         return away
 
     def said(self, column: int, away: float, time: float) -> str:
-        """Return in words what a column is at a time, and what it may be."""
+        """Return in words a column's value at a time, and its limit."""
         one, middle, limit = self.columns[column], self.middle[column], self.bounds[column]
         unit = f" {one.unit}" if one.unit else ""
         found = f"{one.label} is {middle + away:.4g}{unit} at t = {time:.3f} s"
@@ -201,7 +201,7 @@ class QuantityWithinLimits(Requirement):
         worst = int(np.argmax(np.where(np.isnan(found.values), np.inf, found.values)))
         column, share = int(quantity.limited[worst]), float(found.values[worst])
         time, subject = float(found.times[worst]), quantity.columns[column].subject
-        # Written so that NaN is not kept.
+        # Written so that NaN is a violation.
         kept = not found.undecided and bool(share <= 1.0)
         text = quantity.said(column, self._amount(motion, column, time, share), time)
         if found.undecided and not share > 1.0:
@@ -212,7 +212,7 @@ class QuantityWithinLimits(Requirement):
         return Finding(self.name, subject, time, share, 1.0, kept, text, quantity.of_pace, factor)
 
     def _amount(self, motion: FinishedMotion, column: int, time: float, share: float) -> float:
-        """Return how far a column is from its centre at a time, in size what was bounded."""
+        """Return the distance of a column from its centre at a time: the bounded size."""
         state = (motion.trajectory(np.array([time]), order) for order in range(3))
         away = self.quantity.away(*state)[0, column]
         sign = -1.0 if np.ndim(away) == 0 and away < 0.0 else 1.0
@@ -226,8 +226,8 @@ class QuantityWithinLimits(Requirement):
         )
 
 
-class Shares(Bounded):
-    """What of its limits a quantity uses, a block for each column that has one.
+class Shares(BoundedFunction):
+    """Shares that a quantity uses of its limits, a block for each limited column.
 
     Parameters
     ----------
@@ -241,13 +241,13 @@ class Shares(Bounded):
         self.of, self.allowed = np.arange(count), np.ones(count)
         self.wanted, self.blocks = np.full(count, _FINE), np.arange(count) * quantity.components
 
-    def series(self, stretch: Stretch) -> Array | None:
-        """See `Bounded.series`; inf where an angle may turn so far that it is another one."""
+    def series(self, segments: MotionSegments) -> Array | None:
+        """See `BoundedFunction.series`; inf where an angle may turn by a period."""
         quantity = self._quantity
-        known = quantity.series and quantity.series(stretch)
+        known = quantity.series and quantity.series(segments)
         if known is None:
             return None
-        asked = len(quantity.columns), len(stretch.middle)
+        asked = len(quantity.columns), len(segments.middle)
         if np.ndim(known) != 3 or (known.shape[0], known.shape[2]) != asked:
             raise ProblemError(
                 f"quantity '{quantity.name}': series() has shape {np.shape(known)}, expected "
@@ -261,14 +261,14 @@ class Shares(Bounded):
         return np.asarray(known / self._limit[:, None, None])
 
     @override
-    def values(self, stretch: Stretch, u: Array) -> Array:
-        quantity, shape = self._quantity, (len(stretch.middle), len(u))
-        away = quantity.away(*(stretch.motion(u, order) for order in range(3)))
+    def values(self, segments: MotionSegments, u: Array) -> Array:
+        quantity, shape = self._quantity, (len(segments.middle), len(u))
+        away = quantity.away(*(segments.motion(u, order) for order in range(3)))
         away = away.reshape(*shape, len(quantity.columns), -1)[:, :, self._limited]
         if np.isfinite(quantity.period):
             away = np.unwrap(away, period=quantity.period, axis=1)
         return np.asarray((away / self._limit[:, None]).reshape(*shape, -1))
 
-    def sizes(self, values: Array, stretch: Stretch) -> Array:
-        """See `Bounded.sizes`: lengths, in units of the limits."""
+    def sizes(self, values: Array, segments: MotionSegments) -> Array:
+        """See `BoundedFunction.sizes`: lengths, in units of the limits."""
         return np.asarray(np.sqrt(np.add.reduceat(values**2, self.blocks, axis=2)))

@@ -1,4 +1,4 @@
-"""What a finished motion must keep, and what was found of it."""
+"""Requirements on a finished motion, and findings."""
 
 from __future__ import annotations
 
@@ -14,12 +14,10 @@ from selfmotion.model.collision import Obstacle
 from selfmotion.model.motion import Trajectory
 from selfmotion.model.robot import RobotModel
 
-# What a certificate is made of: tolerances, and what was found.
-
 
 @dataclass(frozen=True)
 class Tolerance:
-    """What a verified motion may miss the path by, at any time.
+    """Allowed error of a verified motion from the path, at any time.
 
     Attributes
     ----------
@@ -54,7 +52,7 @@ class Tolerance:
         return cls(value, value)
 
 
-# What a motion may miss its path by where nobody says otherwise.
+# Default tolerance.
 USUAL = Tolerance()
 
 
@@ -66,9 +64,9 @@ class Extreme:
     ----------
     value : float
     time : float
-        When [s].
+        Its time [s].
     name : str
-        Of what: a joint, a frame, a pair of bodies.
+        Its subject: a joint, a frame, a pair of bodies.
     """
 
     value: float
@@ -78,31 +76,31 @@ class Extreme:
 
 @dataclass(frozen=True)
 class Finding:
-    """What one requirement found on a motion.
+    """Result of one requirement on a motion.
 
     Attributes
     ----------
     requirement : str
         Its name.
     subject : str
-        What it is about at the worst place: a joint, a pair of bodies.
+        Its subject at the worst place: a joint, a pair of bodies.
     time : float
         When that is [s].
     amount : float
-        What was found there.
+        Value there.
     allowed : float
-        What is allowed.
+        Limit there.
     satisfied : bool
         Whether the requirement is satisfied at all times.
     text : str
-        In words: who, how much, when, what was wanted, and what to do about it.
+        In words: subject, amount, time, limit, and a remedy.
     of_pace : bool
-        Whether a slower pace may keep what is not kept.
+        Whether a slower pace may satisfy what is violated.
     factor : float
-        By what factor it takes longer where it is kept, at the same pace but slower; 1 where it is
-        kept, inf where that is not known.
+        Factor by which the motion has to take longer at the same pace profile; 1 if satisfied, inf
+        if unknown.
     at_least : bool
-        Whether no less than what is allowed has to be found, rather than no more.
+        Whether the limit is a lower bound of the value, rather than an upper one.
     unit : str
         Of both, such as "rad/s²"; "" of shares.
     """
@@ -121,13 +119,13 @@ class Finding:
 
     @property
     def extreme(self) -> Extreme:
-        """The worst value, when, and of what."""
+        """The worst value, its time and its subject."""
         return Extreme(self.amount, self.time, self.subject)
 
 
 @dataclass(frozen=True)
 class DampedStretch:
-    """A stretch of time over which the inverse was damped.
+    """An interval of time on which the inverse was damped.
 
     Attributes
     ----------
@@ -145,18 +143,16 @@ class DampedStretch:
     factor: float
 
     def __str__(self) -> str:
-        """Return the stretch in words."""
+        """Return the interval in words."""
         return (
             f"{self.start:.3f} to {self.end:.3f} s (smallest singular value "
             f"{self.singular_value:.3g}, λ up to {self.factor:.3g})"
         )
 
 
-# What a requirement is: something that a finished motion must keep, and that judges whether.
-
-# Points per interval of the trajectory's samples: odd, so that none but the samples are symmetric.
+# Points per interval of the trajectory's samples: odd, so that only the samples are symmetric.
 _REFINEMENT = 5
-# Of more samples than this, nothing is put between.
+# Above this number of samples, none are inserted.
 _MANY = 20_000
 
 
@@ -197,24 +193,25 @@ class FinishedMotion:
 class Requirement(ABC):
     """Something that a finished motion must keep besides its path.
 
-    The certificate asks each requirement, and a motion is verified only when all are kept. One of
-    your own gives `name` and `judge`; it is made by `Constraint.requirement`, or handed to
-    `certify`. `selfmotion.testing.check_constraint` shows that it refuses what its constraint does.
+    The certificate judges each requirement, and a motion is verified only when all are satisfied. A
+    user's own class gives `name` and `judge`; it is returned by `Constraint.requirement`, or passed
+    to `certify`. `selfmotion.testing.check_constraint` shows that it refuses what its constraint
+    does.
 
     Attributes
     ----------
     name : str
-        What to call it in findings.
+        Its name in findings.
     """
 
     name: str
 
     @abstractmethod
     def judge(self, motion: FinishedMotion) -> Finding:
-        """Return what there is to say about a motion, on its worst place."""
+        """Return the finding on a motion, at its worst place."""
 
     def approaches(self, motion: FinishedMotion) -> Mapping[str, Extreme]:
-        """Return how near bodies come at all times, in detail.
+        """Return the smallest distances of bodies at all times, in detail.
 
         Of each obstacle, each carried body and the arm itself: the distance [m], when, and which
         two bodies. It takes about as long as to judge them.
@@ -228,19 +225,19 @@ class Requirement(ABC):
 
     @property
     def covers(self) -> tuple[str, ...]:
-        """What a verdict may say was checked, when this was; by default its name."""
+        """Checks that a verdict may claim; by default its name."""
         return (self.name,)
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """What it leaves out or cannot know, for whoever reads the certificate."""
+        """Notes on its gaps, for readers of the certificate."""
         return ()
 
 
 def approaches(
     requirements: Sequence[Requirement], motion: FinishedMotion
 ) -> Mapping[str, Extreme]:
-    """Return how near bodies come, in detail, the nearest first; see `Requirement.approaches`."""
+    """Return the smallest distances of bodies, the nearest first; see `Requirement.approaches`."""
     found: dict[str, Extreme] = {}
     for requirement in requirements:
         for name, each in requirement.approaches(motion).items():
@@ -250,11 +247,11 @@ def approaches(
 
 
 def of_some(name: str) -> str:
-    """Return what is covered of such rates where not every joint has a limit."""
+    """Return the claim for rates of which not every joint has a limit."""
     return f"{name} of some joints"
 
 
 def covered_by(requirements: Sequence[Requirement]) -> tuple[str, ...]:
-    """Return what requirements cover together; what one covers of all joints is not of some."""
+    """Return the claims of all requirements; a claim for all joints replaces that for some."""
     found = dict.fromkeys(what for item in requirements for what in item.covers)
     return tuple(what for what in found if what not in map(of_some, found))

@@ -1,9 +1,9 @@
 """Distance of the arm from obstacles and from itself, at all times.
 
 Between two times a and b the distance d of a pair of bodies changes by Σ_j l_j V_j at most, with
-V_j the way that joint j makes and l_j the pair's lever (`CollisionModel.pair_levers_up_to`). So
+V_j the path length of joint j and l_j the pair's lever arm (`CollisionModel.pair_levers_up_to`). So
 d(t) ≥ ½ (d(a) + d(b) - Σ_j l_j V_j) in between. Intervals on which this does not decide are halved,
-beginning with few: pairs that are far apart, or hardly move, are looked at a few times only.
+starting with few: distant pairs, and pairs that hardly move, are evaluated a few times only.
 """
 
 from dataclasses import dataclass
@@ -16,21 +16,26 @@ from selfmotion.certificate.requirement import Extreme, Finding, FinishedMotion,
 from selfmotion.model.collision import Closest, CollisionModel, Obstacle, how_near, srdf_line
 from selfmotion.model.motion import Trajectory
 
-# Intervals to begin with; each is halved so often before it counts as undecided.
-_FIRST, _DEPTH = 16, 40
-# More intervals than this at once are not looked at: what is left is undecided.
+# Intervals at the start.
+_FIRST = 16
+# Halvings of an interval before it counts as undecided.
+_DEPTH = 40
+# Largest number of intervals at once: the others are undecided.
 _MOST = 200_000
-# Of these, so many are looked at together.
-_LOT = 4096
-# Hulls will do where some halvings more settle a pair with them; meshes are slow.
+# Intervals in one chunk, which bounds memory.
+_CHUNK = 4096
+# Hulls are used in place of meshes, which are slow, for pairs that some more halvings decide: share
+# of the distance that is left.
 _HULLS_DO = 0.05
-# The distance that is reported is the smallest one to this share, or to this [m].
-_SHARE, _SLACK = 0.02, 1e-4
+# Relative accuracy of the reported smallest distance …
+_SHARE = 0.02
+# … or absolute [m], whichever is larger.
+_SLACK = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
 class Separation(Requirement):
-    """Bodies keep a distance from each other.
+    """Bodies have a minimum distance from each other.
 
     Attributes
     ----------
@@ -116,7 +121,7 @@ class Separation(Requirement):
     def of_given_start(self, q: Array) -> str:
         """Return in words that a start (n,) that was given is too near; "" where it is not.
 
-        Nor of links that overlap as they are made, or stand where they do: no other start helps.
+        Nor of links that overlap by design, or by placement: no other start helps.
         """
         start = self.model.distance(q)
         made = [{pair.first, pair.second} for pair in self.model.overlapping]
@@ -140,16 +145,16 @@ class Separation(Requirement):
 
 @dataclass(frozen=True)
 class Approach:
-    """How near two bodies come on a motion, at all times.
+    """Smallest distance of two bodies on a motion, at all times.
 
     Attributes
     ----------
     closest : Closest
         The smallest distance found.
     time : float
-        When [s]; where something is undecided, when that begins.
+        Its time [s]; where something is undecided, the start of that.
     open_until : float or None
-        When what is undecided ends [s]; None where all is decided.
+        End of the undecided interval [s]; None where all is decided.
     """
 
     closest: Closest
@@ -184,27 +189,27 @@ def closest_at_all_times(
     sides = np.stack([values[:-1], values[1:]], axis=1)
     for _ in range(_DEPTH):
         # Written so that NaN settles nothing.
-        lots = _lots(len(sides))
-        settled = [_bounds(made[lot], sides[lot], levers) >= goal for lot in lots]
+        chunks = _chunks(len(sides))
+        settled = [_bounds(made[chunk], sides[chunk], levers) >= goal for chunk in chunks]
         rows = np.flatnonzero(~np.concatenate([each.all(axis=1) for each in settled]))
         if not rows.size or approach.closest.value < distance:
             return approach
         if len(rows) > _MOST:
             break
         intervals, made, sides = intervals[rows], made[rows], sides[rows]
-        # Pairs that are settled need no number any more.
+        # Decided pairs need no number.
         known = np.concatenate(settled)[rows]
         np.copyto(sides, np.inf, where=known[:, None])
         middle = intervals.mean(axis=1)
         between, inner = way(middle), np.empty_like(sides[:, 0])
-        for lot in _lots(len(rows)):
-            (before, after), here = made[lot].swapaxes(0, 1), between[lot]
+        for chunk in _chunks(len(rows)):
+            (before, after), here = made[chunk].swapaxes(0, 1), between[chunk]
             need = np.maximum((here - before) @ levers.T, (after - here) @ levers.T)
             exact_below = goal + _HULLS_DO * need
-            asked = np.where(known[lot], -np.inf, goal + need)
-            found = model.distances(trajectory(middle[lot]), asked, exact_below)
-            inner[lot] = np.where(known[lot], np.inf, found)
-            approach = _nearer(approach, model, middle[lot], inner[lot], exact_below)
+            asked = np.where(known[chunk], -np.inf, goal + need)
+            found = model.distances(trajectory(middle[chunk]), asked, exact_below)
+            inner[chunk] = np.where(known[chunk], np.inf, found)
+            approach = _nearer(approach, model, middle[chunk], inner[chunk], exact_below)
         intervals, made, sides = (
             _halves(each, own)
             for each, own in ((intervals, middle), (made, between), (sides, inner))
@@ -214,19 +219,19 @@ def closest_at_all_times(
     return _undecided(model, approach, intervals, sides[:, 0], bounds, distance)
 
 
-def _lots(count: int) -> list[slice]:
-    """Return so many intervals in lots: what they need for a while is much more than they are."""
-    return [slice(first, first + _LOT) for first in range(0, count, _LOT)]
+def _chunks(count: int) -> list[slice]:
+    """Return slices of `count` in chunks: intermediate values need more memory than results."""
+    return [slice(first, first + _CHUNK) for first in range(0, count, _CHUNK)]
 
 
 def _halves(sides: Array, middle: Array) -> Array:
-    """Return what is at both ends of the halves of intervals, (2 I, 2, …), for theirs (I, 2, …)."""
+    """Return values at both ends of the halves of intervals, (2 I, 2, …), for theirs (I, 2, …)."""
     both = np.stack([sides[:, 0], middle, middle, sides[:, 1]], axis=1)
     return both.reshape(2 * len(sides), *sides.shape[1:])
 
 
 def _bounds(made: Array, sides: Array, levers: Array) -> Array:
-    """Return how near pairs may come, (I, P): for ways (I, 2, n) and distances at both ends."""
+    """Return lower bounds (I, P) for path lengths (I, 2, n) and distances at both ends."""
     bounds: Array = sides[:, 0] + sides[:, 1]
     bounds -= (made[:, 1] - made[:, 0]) @ levers.T
     bounds *= 0.5
@@ -234,7 +239,7 @@ def _bounds(made: Array, sides: Array, levers: Array) -> Array:
 
 
 def _levers(model: CollisionModel, trajectory: Trajectory) -> Array:
-    """Return the pairs' levers (P, n), also where joints leave the URDF's limits."""
+    """Return the pairs' lever arms (P, n), also beyond the URDF's joint limits."""
     return model.pair_levers_up_to(np.abs(trajectory.extremes(0)[1]).max(axis=0))
 
 
@@ -264,8 +269,8 @@ def _undecided(
 ) -> Approach:
     """Return the approach that halving does not decide, unless it only concerns the report.
 
-    Pairs (P) come no nearer than `bounds` (I, P) on intervals (I, 2) that they begin at distances
-    `first` (I, P).
+    Pairs (P) have lower bounds `bounds` (I, P) on intervals (I, 2), and distances `first` (I, P) at
+    their starts.
     """
     # Written so that NaN is open.
     if np.all(bounds >= distance) or approach.closest.value < distance:

@@ -1,4 +1,4 @@
-"""What is known about a finished motion, and the verdict."""
+"""Certificate of a finished motion, and the verdict."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ from selfmotion.certificate.requirement import (
     of_some,
 )
 
-# What a reader of a verdict would take to have been checked, unless told otherwise.
+# Usual requirements, which a verdict names where they were not judged.
 NOT_JUDGED = (
     "its certificate is of another motion or problem: judge it again, "
     "replace(plan, certificate=plan.check())"
@@ -24,32 +24,32 @@ _EXPECTED = ("path", "joint limits", "speeds", "accelerations", "self-collision"
 
 
 def allowed_text(tolerance: Tolerance) -> str:
-    """Return what a verdict adds where more is allowed than usual, "" where it is not."""
+    """Return the clause of a verdict for a larger tolerance than usual, "" for the usual one."""
     if tolerance.position <= USUAL.position and tolerance.rotation <= USUAL.rotation:
         return ""
     return f" ({tolerance.position:.2g} m and {tolerance.rotation:.2g} rad are allowed)"
 
 
-def apart_text(relaxed: bool) -> str:
-    """Return what a verdict adds where rows may leave the path, "" where none may."""
+def relaxed_text(relaxed: bool) -> str:
+    """Return the clause of a verdict for relaxed rows, "" without any."""
     return ", apart from its tolerances, which are kept" if relaxed else ""
 
 
 def first_of(failures: Sequence[str]) -> str:
-    """Return the first of what speaks against a motion, and how much more there is."""
+    """Return the first failure, and the number of others."""
     more = len(failures) - 1
     return f"not verified: {failures[0]}{f'; and {more} more' if more else ''}"
 
 
 @dataclass(frozen=True)
 class Certificate:
-    """What forward kinematics says about a finished motion, at all times.
+    """Judgement of a finished motion by forward kinematics, at all times.
 
     Attributes
     ----------
     position_error : Extreme
-        Largest distance of the tool from the path, in the prescribed rows and beyond what is
-        relaxed [m].
+        Largest distance of the tool from the path, in the prescribed rows, in excess of relaxations
+        [m].
     rotation_error : Extreme
         Largest angle from the path's orientation, likewise [rad].
     smallest_singular_value : Extreme
@@ -57,29 +57,29 @@ class Certificate:
     closure : float
         max |q(T) - q(0)| [rad or m].
     samples : int
-        Number of times looked at.
+        Number of times at which the motion was evaluated.
     tolerance : Tolerance
-        What the path may be missed by.
+        Allowed error from the path.
     findings : tuple of Finding
-        What each requirement found, the arm's own limits first.
+        Result of each requirement, the arm's own limits first.
     failures : tuple of str
-        What speaks against the motion; empty for a verified one.
+        Violations, in words; empty for a verified motion.
     covers : tuple of str
-        What was checked, at all times: "path", "joint limits", "speeds", "self-collision", …
+        Checks at all times: "path", "joint limits", "speeds", "self-collision", …
     remarks : tuple of str
-        What the requirements leave out or cannot know: pairs of links, open meshes.
+        Gaps of the requirements: pairs of links, open meshes.
     deviations : tuple of Extreme
         For each relaxation the largest deviation of its rows from the path, in its window [m or
         rad].
     damped : tuple of DampedStretch
         Where the inverse was damped, in order of time.
     notes : tuple of str
-        What a reader should know, though it speaks neither for nor against the motion.
+        Notes for readers that speak neither for nor against the motion.
     others : tuple of (Extreme, Extreme)
-        Errors of position and rotation of what else follows a path, as those of the tool.
+        Errors of position and rotation of further task frames.
     motion, problem : str
-        Digests of the motion that was judged, and of what it was judged by; "" where a motion was
-        judged that is of no `Problem`.
+        Digests of the motion and of its problem; "" where the motion was judged without a
+        `Problem`.
     version : str
         Of the package that judged.
     """
@@ -103,7 +103,7 @@ class Certificate:
     version: str = ""
 
     def of_another(self) -> "Certificate":
-        """Return what a motion has that was not judged: this one's tolerance, and no number."""
+        """Return the certificate of a motion that was not judged: this tolerance, and no number."""
         nothing = Extreme(np.nan, np.nan, self.position_error.name)
         return Certificate(
             nothing, nothing, nothing, np.nan, 0, self.tolerance, (), (NOT_JUDGED,), covers=()
@@ -121,17 +121,17 @@ class Certificate:
 
     @property
     def acceleration_ratio(self) -> Extreme | None:
-        """Largest |q̈| relative to the limits asked for; None without any."""
+        """Largest |q̈| relative to its limits; None without any."""
         return self._worst(LIMIT_NAMES[2], max)
 
     @property
     def clearance(self) -> Extreme | None:
-        """Smallest distance between bodies [m], with their names; None where not asked for."""
+        """Smallest distance between bodies [m], with their names; None if not required."""
         return self._worst("clearance", min)
 
     @property
     def not_checked(self) -> tuple[str, ...]:
-        """What a motion should keep and nothing here has looked at."""
+        """Usual requirements that were not judged."""
         return tuple(
             f"{name} of the other joints" if of_some(name) in self.covers else name
             for name in _EXPECTED
@@ -140,7 +140,7 @@ class Certificate:
 
     @property
     def on_path(self) -> bool:
-        """Whether the tool follows the path within the tolerance, beyond what is relaxed."""
+        """Whether the tool follows the path within the tolerance, in excess of relaxations."""
         allowed = self.tolerance
         # Written so that NaN fails.
         return all(
@@ -153,17 +153,17 @@ class Certificate:
 
     @property
     def verified(self) -> bool:
-        """Whether the motion follows the path within tolerance and keeps what is required."""
+        """Whether the motion follows the path within tolerance and satisfies all requirements."""
         return not self.failures
 
     @property
     def verdict(self) -> str:
-        """One line: verified, or what is wrong."""
+        """One line: verified, or the violations."""
         if self.verified:
             return (
                 f"verified at all times ({', '.join(self.covers)}): at most "
                 f"{self.position_error.value:.1e} m and {self.rotation_error.value:.1e} rad off "
-                f"the path{apart_text(bool(self.deviations))}{allowed_text(self.tolerance)}"
+                f"the path{relaxed_text(bool(self.deviations))}{allowed_text(self.tolerance)}"
                 f"{self._others_text}"
                 f"{self._besides}"
             )
@@ -171,9 +171,9 @@ class Certificate:
 
     @property
     def summary(self) -> str:
-        """The verdict in short: the largest error, or the first of what is wrong; see `verdict`.
+        """The verdict in short: the largest error, or the first violation; see `verdict`.
 
-        What was not checked, where the inverse was damped, and what there is to note is in it.
+        It includes requirements that were not judged, damping, and notes.
         """
         if not self.verified:
             return "; ".join((first_of(self.failures), *self.notes))
@@ -181,7 +181,7 @@ class Certificate:
         rotation = max(one.value for _, one in self._errors)
         return (
             f"verified at all times: at most {position:.1e} m and {rotation:.1e} rad off the path"
-            f"{apart_text(bool(self.deviations))}{allowed_text(self.tolerance)}"
+            f"{relaxed_text(bool(self.deviations))}{allowed_text(self.tolerance)}"
             f"{self._besides}"
         )
 
@@ -191,7 +191,7 @@ class Certificate:
 
     @property
     def _besides(self) -> str:
-        """Where the inverse was damped, what was not checked, and what there is to note."""
+        """Damping, requirements that were not judged, and notes."""
         left_out = f"; not checked: {', '.join(self.not_checked)}" if self.not_checked else ""
         return f"{self._damping_text}{left_out}{''.join(f'; {note}' for note in self.notes)}"
 

@@ -125,9 +125,9 @@ def axis_distances(robot: RobotModel, bodies: Sequence[Body]) -> Array:
 
     They hold at all configurations within the joint limits. Of a body and an axis that one joint
     parts, it is the largest distance of the body's outline from the axis. Beyond, the distances
-    from one joint's origin to the next along the tree add to it, and the travel of prismatic
-    joints between them. Bodies on either side of the joint are measured: those beyond it are moved
-    by it, the others are at rest.
+    from one joint's origin to the next along the tree add to it, and the travel of prismatic joints
+    between them. Bodies on either side of the joint are measured: those beyond it are moved by it,
+    the others are at rest.
 
     For a prismatic joint it is 1 [m/m]: there every point moves as far as the joint.
     """

@@ -74,9 +74,9 @@ class ClearanceModel:
     A non-convex mesh obstacle is decomposed: each of the convex pieces that contain it
     (`Solid.pieces`) is a body here. The distance of two hulls (GJK, and minus the depth by EPA
     where they overlap) is a lower bound of that of the bodies. It is differentiable but where the
-    closest points jump. From `near` on it saturates: with s = d - near and w = `width`, it is
-    near + s - s²/(2w), and near + w/2 from s = w on. Pairs farther apart than that cost no more
-    than a test of their bounding boxes.
+    closest points jump. From `near` on it saturates: with s = d - near and w = `width`, it is near
+    + s - s²/(2w), and near + w/2 from s = w on. Pairs farther apart than that cost no more than a
+    test of their bounding boxes.
 
     Parameters
     ----------

@@ -1,14 +1,11 @@
 """Convex decomposition of a mesh: pieces that together contain it, for planning.
 
 The solid is cut along planes of its own faces, which recovers bars and plates, and otherwise
-through the
-middle; pieces whose common hull adds little volume are joined again. Cutting and hulls are
-Manifold's,
-which keeps solids closed (E. Lalish, "Manifold", https://github.com/elalish/manifold). The order of
-cuts
-and joins is that of X. Wei et al., "Approximate convex decomposition for 3D meshes with
-collision-aware
-concavity and tree search", SIGGRAPH 2022.
+through the middle; pieces whose common hull adds little volume are joined again. Cutting and hulls
+are Manifold's, which keeps solids closed (E. Lalish, "Manifold",
+https://github.com/elalish/manifold). The order of cuts and joins is that of X. Wei et al.,
+"Approximate convex decomposition for 3D meshes with collision-aware concavity and tree search",
+SIGGRAPH 2022.
 """
 
 import heapq

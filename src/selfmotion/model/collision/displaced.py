@@ -4,12 +4,12 @@ A displacement is x → c + d + R (x - c), with |d| and the angle θ of R given,
 unknown. Two bounds of the distance that is left hold for all of them at once:
 
 - A point a of the displaced body moves by |d| + θ |a - c| at most. The distance shrinks by no
-  more than that with the largest |a - c|, of the one body or, seen from the displaced one, of
-  the other.
+  more than that with the largest |a - c|, of the one body or, seen from the displaced one, of the
+  other.
 - A separating plane with normal n between two convex bodies, at rest with the one: a point of
-  the other, rotated by θ at most, is at most |a - c| cos(max(0, φ - θ)) along n, φ being the
-  angle between a - c and n. To first order that is the distance of the contact's normal from c
-  times θ, which is sharp.
+  the other, rotated by θ at most, is at most |a - c| cos(max(0, φ - θ)) along n, φ being the angle
+  between a - c and n. To first order that is the distance of the contact's normal from c times θ,
+  which is sharp.
 """
 
 from collections.abc import Iterable

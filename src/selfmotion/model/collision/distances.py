@@ -18,8 +18,8 @@ from selfmotion.model.robot import RobotModel
 
 Ints = npt.NDArray[np.int64]
 
-# Relative accuracy of squared distances. At coal's 1e-6 the closest points wander by some tenths
-# of a millimetre between neighbouring configurations, which an optimiser takes for a slope. Below
+# Relative accuracy of squared distances. At coal's 1e-6 the closest points wander by some tenths of
+# a millimetre between neighbouring configurations, which an optimiser takes for a slope. Below
 # about 1e-11 for round bodies, its GJK (3.0.3) does not detect convergence: it takes a flat simplex
 # for an overlap, and returns 0 or minus the largest float. Depths of overlap keep coal's accuracy:
 # its EPA fails now and then at a smaller one.
@@ -66,8 +66,8 @@ class BoundingBoxes:
         pairs : (P, 2)
             Indices of bodies.
         limit : float
-            Bounds at or above this need not be sharp: spheres around the boxes, or their faces,
-            are enough [m].
+            Bounds at or above this need not be sharp: spheres around the boxes, or their faces, are
+            enough [m].
         """
         # Here, because importing numba takes longer than everything else in the package.
         from selfmotion.model.collision import kernels

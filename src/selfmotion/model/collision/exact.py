@@ -37,9 +37,9 @@ _NO_PAIR = Closest(math.inf, "", "")
 class CollisionModel:
     """Exact clearance of an arm, and of attached bodies, from itself and from obstacles.
 
-    Every body is a solid. The distance of two disjoint bodies is that of the real meshes. When
-    they overlap, the value is minus the depth by which their convex hulls do, an upper bound of the
-    true depth; a mesh that fills its hull to 0.1 % of the volume counts as the hull. A body wholly
+    Every body is a solid. The distance of two disjoint bodies is that of the real meshes. When they
+    overlap, the value is minus the depth by which their convex hulls do, an upper bound of the true
+    depth; a mesh that fills its hull to 0.1 % of the volume counts as the hull. A body wholly
     inside another one overlaps it, which the distance of two surfaces alone would miss.
 
     Parameters
@@ -64,8 +64,8 @@ class CollisionModel:
         Whether any pair is of links or attached bodies, and of an obstacle.
     overlapping : tuple of Overlap
         Pairs of links that overlap in half or more of 500 sampled configurations. Those that
-        overlap in each, or touch by design (`RobotModel.touching`), are not checked, but for
-        parts of a cell that were placed in each other.
+        overlap in each, or touch by design (`RobotModel.touching`), are not checked, but for parts
+        of a cell that were placed in each other.
     disabled : tuple of (str, str)
         Pairs of links that are disabled by the user alone.
 
@@ -240,8 +240,7 @@ class CollisionModel:
 
         At every configuration within the joint limits, in the order of `pairs`: between two
         configurations the distance of disjoint bodies changes by Σ_j lever_pj |Δq_j| at most.
-        Joints
-        that move both bodies as one block have lever 0.
+        Joints that move both bodies as one block have lever 0.
         """
         return self.robot.coupling.bounds(self._levers)
 
@@ -254,8 +253,7 @@ class CollisionModel:
         """Return `pair_levers` where joints go as far as `farthest` (n,) from 0, (P, n).
 
         A prismatic joint beyond its limits lengthens the lever arms of all revolute ones, and so
-        does
-        a displacement (P,) of a body of the pair [m].
+        does a displacement (P,) of a body of the pair [m].
         """
         extra: Any = of_bodies.travel_beyond(self.robot, farthest)
         if displacement is not None:

@@ -20,9 +20,9 @@ def separation(
 ) -> float:
     """Return the signed distance of two boxes along the best of 15 axes.
 
-    These are the normals of all faces, and the normals of an edge of each (S. Gottschalk, M.
-    Lin, D. Manocha, "OBBTree", SIGGRAPH 1996). Of boxes that overlap it is minus the depth, of
-    others at most the distance. The faces alone suffice if they separate by `limit`.
+    These are the normals of all faces, and the normals of an edge of each (S. Gottschalk, M. Lin,
+    D. Manocha, "OBBTree", SIGGRAPH 1996). Of boxes that overlap it is minus the depth, of others at
+    most the distance. The faces alone suffice if they separate by `limit`.
 
     Parameters
     ----------

@@ -197,8 +197,7 @@ class PairDistances:
         """Return the mask of a pair whose hulls and meshes are closer than the margin, (K,).
 
         Configurations (K, n) with the same relative placement of the bodies are computed once:
-        along a
-        self-motion the same joints often rest.
+        along a self-motion the same joints often rest.
         """
         joints = np.round(q[:, self._moving[pair]] / _ALIKE)
         _, once, which = np.unique(joints, axis=0, return_index=True, return_inverse=True)

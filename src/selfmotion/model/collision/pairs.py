@@ -25,10 +25,10 @@ def candidate_pairs(
 ) -> list[tuple[int, int]]:
     """Return the index pairs of `bodies` that can meet and are not meant to.
 
-    Left out are pairs whose distance no joint changes (so also the robot's base against the
-    world: an arm bolted to a table touches it; see `held_pairs`), the two links that a movable
-    joint joins, and pairs that are `disabled`. A tool on one of two such links and a bracket on the
-    other can meet.
+    Left out are pairs whose distance no joint changes (so also the robot's base against the world:
+    an arm bolted to a table touches it; see `held_pairs`), the two links that a movable joint
+    joins, and pairs that are `disabled`. A tool on one of two such links and a bracket on the other
+    can meet.
 
     Raises
     ------
@@ -320,8 +320,8 @@ class Overlap:
     share : float
         Share of the configurations.
     is_checked : bool
-        False for those that overlap in each, or touch by design: they are left out. Of links
-        with several bodies, others may still be checked.
+        False for those that overlap in each, or touch by design: they are left out. Of links with
+        several bodies, others may still be checked.
     """
 
     first: str

@@ -134,8 +134,7 @@ class Solid:
         """Convex solids that together contain it: itself where it is convex, or cannot be cut.
 
         Its corners and the middles of its triangles (20,000 of these points at most are checked)
-        are
-        in the pieces, to a millionth of its size.
+        are in the pieces, to a millionth of its size.
         """
         if self.is_convex or self.is_flat or not self.is_closed:
             return (self,)

@@ -1,4 +1,4 @@
-"""What the arm follows: chains, their paths, and the rows of them that are prescribed."""
+"""Task frames on their paths: chains, paths, and the prescribed rows of all."""
 
 from selfmotion.model.follow.augmented import (
     AugmentedFollows as AugmentedFollows,

@@ -1,4 +1,4 @@
-"""What an arm with virtual joints follows, and the arm itself."""
+"""The arm with virtual joints, and its task frames."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, fields, replace
@@ -15,7 +15,7 @@ from selfmotion.model.path import Dwell
 from selfmotion.model.robot import RobotModel, mean_lever
 from selfmotion.model.task import SE3, Relaxation, Task
 
-# What is put back within a band is so by this share of it.
+# Share of a band that a motion put back into it uses.
 _INSIDE = 0.999
 
 
@@ -68,7 +68,7 @@ class AugmentedArm(RobotModel):
         return own[joint] if joint in own else self.arm.is_prismatic(joint)
 
     def told(self, k: int) -> str:
-        """See `RobotModel.told`: virtual joints are what they let the tool do."""
+        """See `RobotModel.told`: of virtual joints, the deviation that they allow."""
         number = k - self.arm.dof
         return self.arm.told(k) if number < 0 else self.virtual.told(number)
 
@@ -87,7 +87,7 @@ class AugmentedArm(RobotModel):
 
 @dataclass(frozen=True, eq=False)
 class AugmentedFollows(Follows):
-    """What is followed with virtual joints: their tip is on the path of the first tool.
+    """Task frames with virtual joints: their tip is on the path of the first tool.
 
     Attributes
     ----------
@@ -100,7 +100,7 @@ class AugmentedFollows(Follows):
     def with_tolerances(
         cls, follows: Follows, relaxations: Sequence[Relaxation]
     ) -> "AugmentedFollows":
-        """Return what an arm follows where rows of its first path are relaxed."""
+        """Return the task frames of an arm with rows of its first path relaxed."""
         arm, (first, *others) = follows.robot, follows.items
         virtual = VirtualJoints(first.task, relaxations, follows.duration, mean_lever(arm))
         robot = AugmentedArm.of(arm, virtual)
@@ -119,7 +119,7 @@ class AugmentedFollows(Follows):
 
     @property
     def with_windows_shut(self) -> "AugmentedFollows":
-        """The same where integrated motions make no use of what has a window, at any time."""
+        """The same with joints of windows held at 0 at all times, for integrated motions."""
         none = np.zeros(self.robot.dof - len(self.virtual.each), dtype=np.bool_)
         held = np.append(none, self.virtual.windowed)
 
@@ -132,7 +132,7 @@ class AugmentedFollows(Follows):
         return replace(self, items=tuple(shut(item) for item in self.items))
 
     def deviation(self, item: Relaxation, q: Array) -> Array:
-        """Return how far the rows of a relaxation are off the path at q (K, n), (K, k) [m, rad]."""
+        """Return the deviations of a relaxation's rows at q (K, n), (K, k) [m, rad]."""
         return self.virtual.rows_of(item, q[:, self.robot.dof - len(self.virtual.each) :])[0]
 
     def limits_within(self, item: Relaxation, band: float = np.inf) -> Array:
@@ -144,7 +144,7 @@ class AugmentedFollows(Follows):
         first = self.robot.dof - len(self.virtual.each)
         for k, joint in enumerate(self.virtual.each):
             if joint.row in item.indices:
-                # Half of a tilt is what its first hinge turns by.
+                # The first hinge of a tilt turns by half of it.
                 halved = self.virtual.swing is not None and k == self.virtual.swing[0]
                 share = 0.5 if halved else 1.0
                 most = min(band, self.virtual.widest([joint.row]))

@@ -1,4 +1,4 @@
-"""What an arm follows: tips on their paths, and the rows of all of them stacked."""
+"""Task frames on their paths: the prescribed rows of all of them, stacked."""
 
 from __future__ import annotations
 
@@ -16,8 +16,6 @@ from selfmotion.model.path import Dwell, Path, PathSamples
 from selfmotion.model.robot import Chain, RobotModel, null_space
 from selfmotion.model.robot.tree_arrays import JOINT
 from selfmotion.model.task import SE3, Task, as_pose
-
-# A tip that follows a path, in the rows that are prescribed: as asked for, and on an arm.
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +54,7 @@ class Follow:
                 raise ProblemError(f"follow: {name} is {shown(given)}, expected the name of a link")
 
     def on(self, robot: RobotModel, duration: float) -> BoundFollow:
-        """Return the same of an arm, for so many seconds.
+        """Return the same bound to an arm, for a duration [s].
 
         Raises
         ------
@@ -80,7 +78,7 @@ class Follow:
         return BoundFollow(chain, path, Task.of(self.task))
 
     def along(self, path: Path) -> Follow:
-        """Return the same on another path."""
+        """Return the same with another path."""
         return replace(self, path=path)
 
 
@@ -103,9 +101,9 @@ class BoundFollow:
     _last: list[PathSamples] = field(default_factory=list, init=False, repr=False)
 
     def target(self, t: Array) -> PathSamples:
-        """Return where the tip has to be at times t (K,), and how it moves.
+        """Return the prescribed pose and twist of the tip at times t (K,).
 
-        Those of the last times are kept: many motions are looked at on the same grid.
+        The last times are cached: many motions are evaluated on the same grid.
         """
         for kept in self._last:
             if np.array_equal(kept.t, t):
@@ -125,13 +123,13 @@ class BoundFollow:
         return self.task.select_along(target.twist[:, :, None], target.rotation)[:, :, 0]
 
     def error(self, t: float, q: Array) -> Array:
-        """Return what takes the tip at q (n,) to its path at t [s], in the rows, (m,) [m, rad]."""
+        """Return the tip's error from its path at q (n,) and t [s], in the rows, (m,) [m, rad]."""
         actual = self.chain.place(q)
         twist = self.task.twist_error(self.path.pose(t), actual)
         return self.task.select(twist[:, None], actual.rotation)[:, 0]
 
     def miss(self, pose: SE3, q: Array) -> tuple[float, float]:
-        """Return how far the tip at q (n,) is from a pose in the rows, (m, rad)."""
+        """Return the distance of the tip at q (n,) from a pose in the rows, (m, rad)."""
         return self.task.miss(pose, self.chain.place(q))
 
 
@@ -172,7 +170,7 @@ class TipKinematics:
 
 @dataclass(frozen=True, eq=False)
 class Follows:
-    """What an arm follows: the one thing that planners, costs and constraints are told.
+    """All task frames of an arm: the input of planners, costs and constraints.
 
     Attributes
     ----------
@@ -199,7 +197,7 @@ class Follows:
 
     @property
     def duration(self) -> float:
-        """How long the motion lasts [s]."""
+        """Duration of the motion [s]."""
         return self.items[0].path.duration
 
     @property
@@ -240,11 +238,11 @@ class Follows:
         return np.concatenate([item.task.rows < 3 for item in self.items]).astype(np.float64)
 
     def kinematics(self) -> TipKinematics:
-        """Return the kinematics of all tips with data of their own, for whoever asks often."""
+        """Return the kinematics of all tips with own data, for repeated calls."""
         return TipKinematics([item.chain for item in self.items])
 
     def targets(self, t: Array) -> Array:
-        """Return where the tips have to be at times t (W,): translation and rotation, (W, 12 F)."""
+        """Return the prescribed poses of the tips at times t (W,), rotations as rows, (W, 12 F)."""
         parts = []
         for item in self.items:
             samples = item.target(t)
@@ -253,14 +251,14 @@ class Follows:
 
     @cached_property
     def layout(self) -> Layout:
-        """What compiled kernels need of the rows."""
+        """Layout of the rows for compiled kernels."""
         return layout_of(
             [(f.task.rows, f.task.tool_axes, f.chain.joints) for f in self.items], self.robot.dof
         )
 
     @cached_property
     def chains(self) -> Array:
-        """What compiled kernels need of the chains, (F, c + 1, 6, 3): their tables, filled up."""
+        """Tables of the chains for compiled kernels, padded, (F, c + 1, 6, 3)."""
         tables = [item.chain.table for item in self.items]
         found = np.zeros((len(tables), max(map(len, tables)), *tables[0].shape[1:]))
         for own, table in zip(found, tables, strict=True):
@@ -301,7 +299,7 @@ class Follows:
         return np.concatenate([item.jacobian(q) for item in self.items])
 
     def jacobians(self, q: Array) -> Array:
-        """Return the same at many configurations (K, n), (K, m, n)."""
+        """Return the stacked Jacobians at configurations (K, n), (K, m, n)."""
         rows = []
         for item in self.items:
             jacobian, rotation, _ = item.chain.along(q)
@@ -327,7 +325,7 @@ class Follows:
         return " and ".join(f"'{item.chain.tip_name}'" for item in self.items)
 
     def held(self, t: Array) -> Flags:
-        """Return which coordinates have to stand still at 0 at times t (K,), (K, n)."""
+        """Return the mask of coordinates that are held at 0 at times t (K,), (K, n)."""
         return np.zeros((len(t), self.robot.dof), dtype=np.bool_)
 
     def within_bands(self, q: Array) -> Array:
@@ -344,7 +342,7 @@ class Follows:
 
     @property
     def edges(self) -> tuple[float, ...]:
-        """When coordinates begin and end to stand still [s]."""
+        """Times at which coordinates start or end to be held [s]."""
         return ()
 
     def for_robot(self, robot: RobotModel) -> Follows:

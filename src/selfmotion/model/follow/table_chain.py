@@ -57,7 +57,7 @@ class TableChain(Chain):
 
     @property
     def _coordinates(self) -> Ints:
-        """The coordinate of each joint on the way."""
+        """Number of the coordinate of each joint of the chain."""
         return self._table[:-1, JOINT, 0].astype(np.int64)
 
     def kinematics(self, data: Any = None) -> Kinematics:
@@ -78,7 +78,7 @@ class TableChain(Chain):
 
 
 class TableKinematics(Kinematics):
-    """What `Kinematics` are to other chains; its data are the configuration."""
+    """`Kinematics` of a table chain; its data are the configuration."""
 
     __slots__ = ("_at_tip", "_table")
 

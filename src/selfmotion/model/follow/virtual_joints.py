@@ -1,10 +1,10 @@
 """A tolerance is a virtual joint between the tool and its path.
 
-Where rows are relaxed, more joints follow the tool's, or come before the arm's, and their tip is
-exactly on the path: a row of position in world axes is a slide under the arm, one in tool axes a
-slide behind the tool; a row of rotation is a hinge behind the tool. What takes the tool's
-orientation to the path's is exp(-[δ]×), and two rows of δ are those of a joint that tilts without
-twisting: with hinges about the rows' axes i and j,
+Relaxed rows become joints that follow the tool's, or precede the arm's, and their tip is exactly on
+the path: a row of position in world axes is a prismatic joint under the arm, one in tool axes a
+prismatic joint behind the tool; a row of rotation is a hinge behind the tool. The rotation from the
+tool's orientation to the path's is exp(-[δ]×), and two rows of δ are a joint that tilts without
+twist: with hinges about the rows' axes i and j,
 
     exp([δ]×) = R_i(α) R_j(2β) R_i(α),   δ = 2 θ/sin θ (sin α cos β, sin β),   cos θ = cos α cos β,
 
@@ -13,9 +13,9 @@ Its first and last hinge are two joints, and that they turn alike is one row mor
 Where the third row is relaxed, too, a hinge about it comes first. Of a task that prescribes where
 the tool's axis points, tilting it needs no third hinge, unless rows have bands of their own.
 
-A virtual joint's coordinate is 1 where the tool is at its band, or a radian, or what moves as far
-as a radian of the arm does, whichever is less: so do joints of both kinds, of wide bands and narrow
-ones, weigh alike where motions are as short as they can be.
+A virtual joint's coordinate is 1 at the tool's band, or at a radian, or at the distance that a
+radian of the arm moves, whichever is less. So wide bands, narrow bands and both kinds of joints
+have similar weight in the shortest motion.
 """
 
 from collections.abc import Sequence
@@ -30,9 +30,9 @@ from selfmotion.model.robot import Chain
 from selfmotion.model.robot.tree_arrays import AXIS, JOINT, POSITION, ROTATION
 from selfmotion.model.task import POSITION_ROWS, ROW_NAMES, Relaxation, Task
 
-# A window's end is what rounding makes of it, by this share of the motion.
+# A window's end may be off by this share of the motion, from rounding.
 _ROUNDING = 1e-9
-# Of a half turn no axis is known: below this, closed forms of θ / sin θ have series.
+# Angles below this use the series of θ / sin θ; a half turn has no unique axis.
 _SMALL = 1e-2
 
 
@@ -50,7 +50,7 @@ class VirtualJoint:
     scale : float
         How far it goes [rad or m] where its coordinate is 1.
     row : int or None
-        The row x, y, z, rx, ry, rz that is 0 when it stands still; None for what moves always.
+        Row x, y, z, rx, ry, rz that is 0 while it is held; None for one that always moves.
     limit : float
         Of |coordinate|.
     sign : float
@@ -74,9 +74,9 @@ class VirtualJoints:
     task : Task
     relaxations : sequence of Relaxation
     duration : float
-        Of the motion [s].
+        Duration of the motion [s].
     lever : float
-        What moves by a radian goes so far [m].
+        Distance that is equivalent to a radian [m].
 
     Attributes
     ----------
@@ -103,7 +103,7 @@ class VirtualJoints:
         return (*self.under, *self.behind)
 
     def told(self, number: int) -> str:
-        """Return in words what one of them lets the tool do."""
+        """Return in words the deviation that one of them allows."""
         row, of = self.each[number].row, ""
         if self.swing is not None and number in self.swing:
             row, of = self.each[self.swing[0]].row, "half of "
@@ -113,7 +113,7 @@ class VirtualJoints:
 
     @cached_property
     def swing(self) -> tuple[int, int] | None:
-        """The places of the two hinges of a tilt that turn alike; None where there is no tilt."""
+        """Numbers of the two hinges of a tilt, which turn alike; None without a tilt."""
         alike = [k for k, joint in enumerate(self.each) if joint.name.startswith("tilt")]
         return (alike[0], alike[2]) if len(alike) == 3 else None
 
@@ -131,7 +131,7 @@ class VirtualJoints:
     def _hinges(
         self, task: Task, axes: list[int], in_tool: bool
     ) -> tuple[list[VirtualJoint], Task]:
-        """Return the hinges, and the rows in which what is behind them is on the path."""
+        """Return the hinges, and the rows of the frame behind them that are on the path."""
         if task is Task.POINTING:
             together = {item.rows for item in self.relaxations if item.angular}
             alone = bool(axes) and {frozenset(rows) for rows in together} != {frozenset(_TILT)}
@@ -141,7 +141,7 @@ class VirtualJoints:
                 return (self._tilt(*axes, alike=False) if axes else []), task
             return [_heading(), *self._about(axes)], Task.POSE
         if task is Task.POSITION and in_tool:
-            # Its path's axes say what is relaxed, and it may be turned against them in any way.
+            # The band is in its path's axes, from which the tool may be rotated by any angle.
             free = [VirtualJoint(f"tilt {k}", k % 2, True, 1.0 if k % 2 else 0.5) for k in range(3)]
             return [_heading(), *free], Task.POSE
         return self._about(axes), task
@@ -198,7 +198,7 @@ class VirtualJoints:
         return pairs.pop() if pairs else 2
 
     def _relaxed(self, t: Array) -> Flags:
-        """Return which of the six rows are relaxed at times t (K,), (K, 6)."""
+        """Return the mask of relaxed rows at times t (K,), (K, 6)."""
         found = np.zeros((len(t), 6), dtype=np.bool_)
         near = _ROUNDING * self._duration
         for item in self.relaxations:
@@ -209,7 +209,7 @@ class VirtualJoints:
         return found
 
     def held(self, t: Array) -> Flags:
-        """Return which joints stand still at times t (K,), outside of all windows, (K, v)."""
+        """Return the mask of joints held at times t (K,), outside of all windows, (K, v)."""
         relaxed = self._relaxed(t)
         rows = [joint.row for joint in self.each]
         free = [np.ones(len(t), bool) if row is None else relaxed[:, row] for row in rows]
@@ -217,7 +217,7 @@ class VirtualJoints:
 
     @cached_property
     def windowed(self) -> Flags:
-        """Which joints stand still at some time, (v,)."""
+        """Mask of joints that are held at some time, (v,)."""
         ends = {x for item in self.relaxations for x in item.window(self._duration)}
         times = np.array(sorted(ends | {0.0, self._duration}))
         return np.asarray(self.held(times).any(axis=0))
@@ -228,7 +228,7 @@ class VirtualJoints:
         return np.array([joint.row is not None or joint.name == "tilt back" for joint in self.each])
 
     def table(self, chain: Chain, first: int) -> Array:
-        """Return the table of an arm's chain with them, whose coordinates begin with a number."""
+        """Return the table of an arm's chain with them; coordinates start at number `first`."""
         own, count = chain.table, len(self.under)
         extra = np.zeros((count + len(self.behind), 6, 3))
         extra[:, ROTATION:] = np.eye(3)
@@ -246,7 +246,7 @@ class VirtualJoints:
     def alike(self, first: int) -> Array | None:
         """Return the table of two slides that are at 0 where a tilt's hinges turn alike, or None.
 
-        Their coordinates are those of the hinges, and begin with a number.
+        Their coordinates are those of the hinges, from number `first` on.
         """
         if self.swing is None:
             return None
@@ -258,14 +258,14 @@ class VirtualJoints:
         return table
 
     def weights(self, metre: float) -> Array:
-        """Return what a unit of each coordinate counts, (v,): as a joint of the arm that moves so.
+        """Return the weight of each coordinate, (v,): that of a joint of the arm with equal motion.
 
-        `metre` is what a metre counts [rad/m].
+        `metre` is the weight of a metre [rad/m].
         """
         return np.array([joint.scale * (1.0 if joint.turns else metre) for joint in self.each])
 
     def widest(self, rows: Sequence[int]) -> float:
-        """Return how far rows are off together at most, at the time when that is most [rad or m].
+        """Return the largest common deviation of rows, over all times [rad or m].
 
         By the bands that hold then: rows that share one have another one in another window.
         """
@@ -274,7 +274,7 @@ class VirtualJoints:
         return max(self._allowed(rows, time) for time in middles)
 
     def _allowed(self, rows: Sequence[int], time: float) -> float:
-        """Return how far rows may be off together at a time, 0 where they are not relaxed."""
+        """Return the allowed deviation of rows at a time, 0 where they are not relaxed."""
         windows = [(item, item.window(self._duration)) for item in self.relaxations]
         here = [item for item, (first, last) in windows if first < time < last]
         each = [min((x.band for x in here if row in x.indices), default=0.0) for row in rows]
@@ -284,7 +284,7 @@ class VirtualJoints:
     def joint_of(self, item: Relaxation) -> tuple[int, float] | None:
         """Return the number of the joint by which a relaxation's one row is off, and its scale.
 
-        None where it has several rows, or that is not what a joint's coordinate says.
+        None for several rows, or a deviation that is not one joint's coordinate.
         """
         tilts = any(joint.name.startswith("tilt") for joint in self.each)
         if len(item.rows) > 1 or (item.angular and tilts):
@@ -343,7 +343,7 @@ class VirtualJoints:
             by_both[:, :, place] += half * (-z * vector + c * turned)
             by_both[:, :, place] += half * c * real[:, None] * axis
             vector = c * vector + z * turned + z * real[:, None] * axis
-            # Of both quaternions of a turn, the one of less than half a turn.
+            # Of both quaternions of a rotation, the one below half a turn.
             side = np.where(whole < 0.0, -1.0, 1.0)
             real, vector = side * whole, side[:, None] * vector
             by_real, by_vector = side[:, None] * by_whole, side[:, None, None] * by_both
@@ -356,7 +356,7 @@ class VirtualJoints:
     def coordinates(self, tool: tuple[Array, Array], path: tuple[Array, Array]) -> Array:
         """Return the coordinates that take tools to the path: rotations (K, 3, 3), places (K, 3).
 
-        Of tools that deviate from their path in nothing but what is relaxed.
+        For tools that deviate from their path in relaxed rows alone.
         """
         from scipy.spatial.transform import Rotation
 
@@ -378,7 +378,7 @@ class VirtualJoints:
             joint = self.each[k]
             if k in tilting:
                 continue
-            # A twist that comes before the rest, or all there is.
+            # A twist that precedes the rest, or is all of it.
             angle = 2.0 * np.arctan2(vector[:, joint.axis], real)
             found[:, k] = angle / joint.scale
             rest = Rotation.from_rotvec(-angle[:, None] * np.eye(3)[joint.axis])
@@ -400,7 +400,7 @@ class VirtualJoints:
 
 
 _TILT = ("rx", "ry")
-# What is the same however the tool is turned about its axis.
+# Sets of rows that are invariant to a rotation about the tool's axis.
 _ROUND: tuple[set[str], ...] = ({"z"}, {"x", "y"}, set(POSITION_ROWS))
 
 

@@ -386,10 +386,8 @@ def joined_motions(motions: Sequence[Trajectory]) -> Trajectory:
     """Return motions one after the other as one, from t = 0 on.
 
     Each starts in the configuration, and with the velocity and acceleration, in which the one
-    before it
-    ends. Cubic where all of them are. Otherwise all become quintic, and the cubics change slightly
-    between
-    their samples.
+    before it ends. Cubic where all of them are. Otherwise all become quintic, and the cubics change
+    slightly between their samples.
     """
     orders = _orders(motions)
     t, tables = [motions[0].t[:1] * 0.0], [[motions[0](motions[0].t[:1], k)] for k in orders]

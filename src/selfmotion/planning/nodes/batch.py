@@ -1,12 +1,9 @@
 """Many motions at once: rough optima of all, by Newton's method on the nodes of all.
 
 The motions are independent: they are put one after the other, with gaps between them, into one
-motion
-of many nodes, so that compiled kernels and array operations handle all of them in one pass. Each
-has
-its own step length. Constraints are left out: an optimum that satisfies them all the same is the
-best
-near it; the cost of one that does not is a lower bound of the constrained optimum's.
+motion of many nodes, so that compiled kernels and array operations handle all of them in one pass.
+Each has its own step length. Constraints are left out: an optimum that satisfies them all the same
+is the best near it; the cost of one that does not is a lower bound of the constrained optimum's.
 """
 
 from dataclasses import dataclass

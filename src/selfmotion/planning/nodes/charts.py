@@ -122,8 +122,7 @@ class Charts:
         """Return charts around the nodes at z (N + 1, r); ε and a (N + 1, n) are projected.
 
         Of the bases, only the first need be given where they are `carried` from node to node. None
-        where a
-        node cannot be put onto its manifold.
+        where a node cannot be put onto its manifold.
         """
         found = self._retracted(z, epsilon, a, centred=True, carried=carried)
         if found is None:
@@ -199,10 +198,8 @@ class Manifolds:
         Times [s].
     copies : int, optional
         Number of motions that are put one after the other, at times `t` each. A node that cannot be
-        put onto
-        its manifold then has q̇ = NaN, and the others are valid. By default there is one motion,
-        all of whose
-        nodes have to be.
+        put onto its manifold then has q̇ = NaN, and the others are valid. By default there is one
+        motion, all of whose nodes have to be.
     """
 
     def __init__(self, follows: Follows, t: Array, copies: int | None = None) -> None:
@@ -320,8 +317,7 @@ class Manifolds:
         """Return charts around the nodes nearest to q, with ε and a projected into the null spaces.
 
         (N + 1, n) each. Bases rotate as little as possible from one node to the next. None where a
-        node cannot
-        be put onto its manifold.
+        node cannot be put onto its manifold.
         """
         n, m, _ = self._sizes
         none = np.zeros((len(q), n - m))

@@ -71,12 +71,10 @@ def retract(
     `table` hold paths and null motions already; q̇ and all else is set, q (K, n), and T in
     `tangents` (K, n, r). If `centred`, an orthonormal basis of the null space instead of T, and the
     projection of ε onto it: the same motion in charts around it. `carried` is the number of nodes
-    of a
-    motion whose bases are carried along: the first node's is given, each other one is that of the
-    node
-    before; 0 for given bases. Joints that are `held` (K, n) at 0 move no tip; see `Charts`. Returns
-    the
-    first node that cannot be put onto its manifold, or -1; q̇ of all such nodes is NaN.
+    of a motion whose bases are carried along: the first node's is given, each other one is that of
+    the node before; 0 for given bases. Joints that are `held` (K, n) at 0 move no tip; see
+    `Charts`. Returns the first node that cannot be put onto its manifold, or -1; q̇ of all such
+    nodes is NaN.
     """
     failed = -1
     (count, n), m, r = q.shape, rows_of(layout), bases.shape[2]
@@ -382,8 +380,7 @@ def follow(
     """Set q (K, n) to configurations on targets (K, 12 F), each near the one before it.
 
     From one to the next, the self-motion covers a `share` (K,) of the difference to `wanted` (n,);
-    joints
-    that are `held` (K, n) are at 0. Returns the first node that fails, or -1.
+    joints that are `held` (K, n) are at 0. Returns the first node that fails, or -1.
     """
     (count, n), m, tips = q.shape, rows_of(layout), layout.shape[0]
     turns, places = np.empty((chains.shape[1], 3, 3)), np.empty((chains.shape[1], 3))

@@ -192,8 +192,7 @@ class NodeGrid:
         """Return a motion from a start (n,) whose self-motion goes towards `wanted` (n,).
 
         It arrives, as far as the path allows, after about `time` [s]; by default at the end, from
-        rest to rest.
-        None where the path cannot be followed.
+        rest to rest. None where the path cannot be followed.
         """
         own = self.manifolds
         q = np.empty((len(self.t), len(start)))

@@ -255,8 +255,8 @@ def _curvature_bounds(intervals: Array, nodes: Array) -> Array:
     """Return a bound of each coordinate's curvature without rows, (K,).
 
     For matrices of intervals (N, d, d) by both ends, and of nodes (N + 1, d/2, d/2): the absolute
-    sums of their rows, scaled by the median curvature of each kind of coordinate. With these on
-    the diagonal a matrix is positive definite (Gershgorin).
+    sums of their rows, scaled by the median curvature of each kind of coordinate. With these on the
+    diagonal a matrix is positive definite (Gershgorin).
     """
     count, size = len(intervals), intervals.shape[1] // 2
     own = np.abs(np.diagonal(intervals, axis1=1, axis2=2)).reshape(2 * count, size)

@@ -28,12 +28,10 @@ from selfmotion.planning.nodes.spline import AT_GAUSS, GAUSS, WEIGHTS, Quintic
 from selfmotion.problem.costs import Cost, Partials, PlacedLater, Samples
 
 # Step of central differences along a manifold [rad or m]: first derivatives are right to 1e-8,
-# second
-# ones to 1e-6.
+# second ones to 1e-6.
 _REACH = 1e-4
 # Step of one-sided differences of costs' gradients [rad, m and their rates]: this matrix need not
-# be
-# exact.
+# be exact.
 _NEAR = 1e-6
 # Derivatives of a sample, by order.
 _NAMES = ("q", "qd", "qdd", "qddd")
@@ -186,8 +184,7 @@ class NodeCost:
         """Return changes of non-quadratic costs' derivatives `here` in directions, (S, n, D) each.
 
         A direction is of q or one of its rates, (S, n) or (n,). Several are evaluated in one pass
-        where there
-        are few samples.
+        where there are few samples.
         """
         together = max(1, _TOGETHER // len(samples.t))
         found: dict[str, list[Array]] = {}
@@ -337,8 +334,7 @@ def _displaced(
     """Return all nodes displaced along directions (K, r): (q, q̇, q̈) (K, N + 1, 3, n), and bases.
 
     None where one cannot be evaluated. Several directions are evaluated in one pass where there are
-    few
-    nodes.
+    few nodes.
     """
     count = len(nu)
     together = max(1, _TOGETHER // count)

@@ -1,10 +1,8 @@
 """Constraints on a motion of nodes as rows h ≤ 0: each touches one interval, or two nodes.
 
 Limits of joints apply to the control points of q, q̇, q̈ and the jerk: the curve is within their
-convex
-hull. All other constraints apply at points of each interval. Only rows that are near to being
-violated
-are active; the others are checked after each step.
+convex hull. All other constraints apply at points of each interval. Only rows that are near to
+being violated are active; the others are checked after each step.
 """
 
 from collections.abc import Sequence
@@ -315,10 +313,9 @@ class NodeRows:
         """Return the number of parts of each interval that rows other than limits need, (N,).
 
         For the curve of `sampled_curve`: 1 where constraints are within their tolerances between
-        the points as
-        well. An excess over that at the points falls with the square of the parts. Where one
-        interval has to be
-        divided, so is one that is nearly violated: on the next nodes it would be.
+        the points as well. An excess over that at the points falls with the square of the parts.
+        Where one interval has to be divided, so is one that is nearly violated: on the next nodes
+        it would be.
         """
         found, count = np.ones(self.spline.count, dtype=np.int64), self.spline.count
         for item in self.constraints:

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 class NewtonSettings:
     """Settings of the interior-point method and of its linear system.
 
-    Symbols are those of `newton`: rows h, slacks s, elastic variables e, multipliers λ, their
-    upper bound ρ, barrier parameter μ. Units of rows are those of h, F is the cost.
+    Symbols are those of `newton`: rows h, slacks s, elastic variables e, multipliers λ, their upper
+    bound ρ, barrier parameter μ. Units of rows are those of h, F is the cost.
     """
 
     # --- termination
@@ -74,8 +74,8 @@ class NewtonSettings:
     min_length: float = 1e-7
     # Largest change of a node's coordinate in one step [rad or m].
     max_change: float = 0.5
-    # Where no step is accepted and the predicted decrease is below this share of F, rounding is
-    # the reason; above it the gradient is wrong, or rows contradict each other.
+    # Where no step is accepted and the predicted decrease is below this share of F, rounding is the
+    # reason; above it the gradient is wrong, or rows contradict each other.
     rounding: float = 1e-5
 
     # --- rows: slacks and elastic variables

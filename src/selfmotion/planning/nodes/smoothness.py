@@ -15,8 +15,7 @@ _STARTING = 0.02
 _NEAR_REST = 4.0
 # Time constant of the penalty everywhere, as a share of the duration. Costs of joint speed leave
 # accelerations free: on few nodes these oscillate, and under limits they jump between them. This
-# value
-# removes most of both, and adds at most some 1e-5 of F.
+# value removes most of both, and adds at most some 1e-5 of F.
 _EVERYWHERE = 0.004
 # Largest penalty everywhere, as a share of F: a larger one has a cause, such as a singular pose
 # nearby.
@@ -53,10 +52,8 @@ def smoothing_of(
     """Return the penalty that makes the self-motion start and stop smoothly where the arm rests.
 
     Also where joints are held for a while; and everywhere a little if `smoothed`. Starting and
-    stopping
-    takes the share `quick` of the usual time. None without any of that, or where the costs penalise
-    q̈
-    themselves.
+    stopping takes the share `quick` of the usual time. None without any of that, or where the costs
+    penalise q̈ themselves.
     """
     if _is_smooth(problem):
         return None
@@ -137,8 +134,7 @@ def _weights(problem: Problem) -> Array:
     """Return the weights of squared rates, (n,): 0 of virtual joints, as in costs.
 
     The usual weights of joint speed, scaled to those of the costs: the optimum is independent of
-    the unit of
-    the cost.
+    the unit of the cost.
     """
     arm, dof = problem.asked.robot, problem.robot.dof
     found = np.zeros(dof)

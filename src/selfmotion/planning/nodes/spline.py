@@ -74,8 +74,7 @@ class Quintic:
     """Quintic segments on given times.
 
     Of several motions on the same nodes, one after the other, the interval from the end of one to
-    the start
-    of the next is a gap: it has no weight, and nothing moves there.
+    the start of the next is a gap: it has no weight, and nothing moves there.
 
     Parameters
     ----------

@@ -3,14 +3,10 @@
     maximise g·c   subject to   lower ≤ R c ≤ upper,   least ≤ c ≤ most
 
 Mehrotra's predictor and corrector (S. Mehrotra, SIAM J. Optimization 2(4), 1992), within a
-neighbourhood
-of the central path: no product of slack and multiplier is far below their mean (S. J. Wright,
-Primal-Dual
-Interior-Point Methods, 1997, ch. 5). The normal matrix is pentadiagonal, so that a step costs O(N).
-Most
-rows are far from binding: a programme is solved with those near to it, then again with those that
-its
-optimum violates, until there are none (constraint generation).
+neighbourhood of the central path: no product of slack and multiplier is far below their mean (S. J.
+Wright, Primal-Dual Interior-Point Methods, 1997, ch. 5). The normal matrix is pentadiagonal, so
+that a step costs O(N). Most rows are far from binding: a programme is solved with those near to it,
+then again with those that its optimum violates, until there are none (constraint generation).
 """
 
 from dataclasses import dataclass
@@ -23,8 +19,7 @@ from selfmotion.basics import Array, Flags, Ints, called, kernel
 MET = 1e-7
 _MAX_ITERATIONS = 200
 # Smallest target of a product of slack and multiplier, as a share of the gap per row: the smaller
-# it is,
-# the more rounding there is in multipliers of steep rows.
+# it is, the more rounding there is in multipliers of steep rows.
 _MU_FLOOR = 0.1
 # Rounding ends the iteration where the dual residual is below this share of g·c …
 _STALL_RESIDUAL = 1e-2

@@ -149,8 +149,7 @@ class Optimizer(Protocol):
         x0 : (size,)
         inverse_hessian : (size, size), optional
             An estimate of the inverse Hessian from a similar function. The default is the
-            optimiser's
-            own.
+            optimiser's own.
         max_evaluations : int, optional
             Limit on `Function.evaluations`.
         callback : callable, optional

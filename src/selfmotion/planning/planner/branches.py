@@ -1,4 +1,4 @@
-"""Several motions along one path that begin in different configurations."""
+"""Several motions along one path from different start configurations."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -16,11 +16,11 @@ from selfmotion.planning.search import carried, start_candidates
 from selfmotion.planning.transfer import Room
 from selfmotion.problem.problem import Problem
 
-# So many starts are tried for each branch that is asked for, until so many have failed; plans from
-# each take so many evaluations at most, and are the same where both their ends are as near as this
-# [rad or m].
+# Starts that are tried for each requested branch.
 _BRANCH_TRIES = 4
+# Limit of evaluations of each plan.
 _BRANCH_EVALUATIONS = 60
+# Plans with both ends nearer than this are the same [rad or m].
 _SAME_ENDS = 0.2
 
 
@@ -31,11 +31,11 @@ def branches(
     allowed: Problem | None = None,
     progress: Progress = silent,
 ) -> tuple[list[Plan], str]:
-    """Return up to `count` verified plans of a problem that begin far from each other.
+    """Return up to `count` verified plans of a problem with distant starts.
 
-    Each begins at a configuration that puts the tool on the start of the path and is allowed there,
-    the next one as far as any from those before. Where none of these leads to a verified plan, all
-    that `plan` does is done.
+    Each starts at an allowed configuration on the start of the path, the next one as far as
+    possible from those before. If none of these leads to a verified plan, the result is that of
+    `plan`.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ def branches(
 
 
 def like_before(problem: Problem, before: Plan) -> Plan | None:
-    """Return the verified plan that begins at the motion of another one, or None."""
+    """Return the verified plan of a warm start at another one's motion, or None."""
     start = near_start(problem, before.trajectory.q[0])
     return None if start is None else from_start(problem, start, before)[0]
 
@@ -85,9 +85,9 @@ def like_before(problem: Problem, before: Plan) -> Plan | None:
 def from_start(
     problem: Problem, start: Array, before: Plan | None = None
 ) -> tuple[Plan | None, str]:
-    """Return the verified plan from a start (n,), or None and why there is none.
+    """Return the verified plan from a start (n,), or None and the cause.
 
-    It may begin at the motion of one `before`.
+    `before` may be a warm start.
     """
     given = replace(problem, start=start)
     try:
@@ -101,7 +101,7 @@ def from_start(
 
 
 def _whole(make: Callable[[], Plan]) -> Plan:
-    """Make a plan; where it was interrupted KeyboardInterrupt goes on, whatever it found."""
+    """Make a plan; KeyboardInterrupt of an interrupted one is raised again, whatever it found."""
     pressed = presses()
     made = make()
     if presses() > pressed or made.report.status is Status.INTERRUPTED:
@@ -138,7 +138,7 @@ def _spread(problem: Problem, rng: np.random.Generator) -> list[Array]:
     starts = starts[room.free(starts)]
     if not len(starts):
         return []
-    # A wrist need not begin a whole turn away from where people expect it.
+    # Wrists start near their usual angle, not a turn away.
     motions, arrived = carried(follows, starts, rough_grid(problem).nodes)
     back = np.array([wound_back(robot, motion)[0] for motion in motions])
     starts = np.where((arrived & room.free(back))[:, None], back, starts)
@@ -153,13 +153,13 @@ def _spread(problem: Problem, rng: np.random.Generator) -> list[Array]:
 
 
 def _apart(one: Plan, other: Plan) -> float:
-    """Return how far the ends of two plans are apart, of that end where they are farther apart."""
+    """Return the larger distance of both ends of two plans."""
     ends = one.trajectory.q[[0, -1]] - other.trajectory.q[[0, -1]]
     return float(np.abs(ends).max(axis=1).max())
 
 
 def _nowhere(problem: Problem) -> str:
-    """Return why a path cannot even be begun."""
+    """Return the cause why a path has no start."""
     asked, follows = problem.envelope, problem.follows.for_robot(problem.robot)
     try:
         starts = np.array(start_candidates(follows, _BRANCH_TRIES, np.random.default_rng(0)))

@@ -1,4 +1,4 @@
-"""What is asked of a plan besides its problem, which all its optimisations share."""
+"""Options of a plan besides its problem, shared by all its optimisations."""
 
 import time
 from dataclasses import dataclass
@@ -21,24 +21,24 @@ _MODES = ("auto", "local", "global")
 
 @dataclass(frozen=True)
 class Search:
-    """Where motions begin, when the start is free.
+    """Initial guesses of a free start.
 
     Parameters
     ----------
     starts : int
-        So many at most: for redundancy 1 along all self-motions of the first pose, else what
-        Newton's method finds from twice as many seeds.
+        Largest number: for redundancy 1 along all self-motions of the first pose, else of the
+        solutions of Newton's method from twice as many seeds.
     finalists : int
-        How many starts are optimised to the end, at most: those with the best rough optima on few
-        nodes. With as many as `starts`, starts are not screened.
+        Largest number of starts that are optimised to the end: those with the best rough optima on
+        few nodes. With as many as `starts`, starts are not screened.
     mode : {"auto", "local", "global"}
         Optimise from many starts (local), or from the best sequences over all self-motions: sampled
         evenly where the redundancy is 1, at random where it is more.
         ``"auto"``: from many starts first, and from
         sequences where none of them leads to a motion that keeps the constraints.
     compare : bool
-        Search globally whatever the other search finds, also where the start is given, so that
-        `Report.gap` tells how far the plan is from the best motion of all. Needs redundancy 1.
+        Search globally whatever the other search finds, also with a given start, for `Report.gap`:
+        the distance of the plan from the best motion of all. Needs redundancy 1.
     rng : Generator or int
         Shifts the seeds; the same one gives the same plan.
 
@@ -63,10 +63,10 @@ class Search:
 
 @dataclass
 class Deadline(Counts):
-    """Counts of work that look at the clock: when it is over, the best so far has to do.
+    """Counters of work that raise KeyboardInterrupt at the deadline.
 
-    It interrupts once, at an evaluation of the cost or between two stages: what is left to do then,
-    such as judging the motion, is done.
+    Once, at an evaluation of the cost or between two stages: the work after it, such as the
+    judgement of the motion, is done.
 
     Attributes
     ----------
@@ -81,7 +81,7 @@ class Deadline(Counts):
 
     @classmethod
     def after(cls, seconds: float | None) -> "Deadline":
-        """Return the one so many seconds from now; None for none."""
+        """Return the deadline in `seconds` from now; None for none."""
         return cls() if seconds is None else cls(end=time.perf_counter() + seconds)
 
     def evaluated(self) -> None:
@@ -97,7 +97,7 @@ class Deadline(Counts):
             raise KeyboardInterrupt
 
     def checked_by(self, progress: Progress) -> Progress:
-        """Return a progress that looks at the clock as well; ProblemError for no function."""
+        """Return a progress that checks the deadline as well; ProblemError for no function."""
         as_called(progress, "progress")
 
         def told(stage: str, done: int, total: int) -> None:
@@ -109,22 +109,22 @@ class Deadline(Counts):
 
 @dataclass(frozen=True)
 class Effort:
-    """What all candidates of a plan share.
+    """Options that all candidates of a plan share.
 
     Attributes
     ----------
     optimizer : Optimizer or None
-        Of the published method, where one is asked for.
+        Of the published method, if requested.
     callback : callable or None
         Called with each `Iteration`.
     max_evaluations : int or None
         Limit on evaluations of each candidate.
     counts : Counts
-        Where work is added up.
+        Counters of the work.
     apart : bool
-        Whether the optimisation keeps the arm apart from itself where only the default asks for it.
+        Whether the default clearance of the arm from itself is a constraint of the optimisation.
     decomposed : bool
-        Whether it knows links by convex pieces before obstacles, not by their hulls.
+        Whether links are convex pieces before obstacles, not hulls.
     """
 
     optimizer: Optimizer | None

@@ -32,21 +32,25 @@ from selfmotion.problem.constraints import Constraint, JointVelocityLimits
 from selfmotion.problem.costs import Cost, LimitUse, Samples, Scaled
 from selfmotion.problem.problem import Problem, check_problem
 
-# After so many seconds the best so far has to do.
+# Default deadline [s].
 _FASTEST_DEADLINE = 60.0
-# Rounds end when one gains less than this share, or after so many.
+# Rounds end at a relative gain below this …
 _ROUND_GAIN = 2e-3
+# … and after this number.
 ROUNDS = 8
-# Costs that are to be kept and are not count as so many times the motion's time, then more.
-_KEPT_WEIGHT, _KEPT_GROWTH = 0.05, 4.0
-# The power of the cost: the larger, the nearer to the largest share, and the harder to minimise.
+# Weight of limited costs, in multiples of the motion's time …
+_KEPT_WEIGHT = 0.05
+# … and its growth while they are exceeded.
+_KEPT_GROWTH = 4.0
+# Power p of `LimitUse`: larger ones are nearer to the maximum, and harder to minimise.
 _POWER = 16.0
-# Intervals of the pace at which a round plans, and its degree.
+# Intervals of the pace of a round.
 _COARSE = 32
+# Degree of the pace.
 _DEGREE = 5
 
 
-# Steps at which costs are measured, at least.
+# Smallest number of steps for the evaluation of costs.
 _STEPS = 300
 
 
@@ -54,17 +58,17 @@ _STEPS = 300
 class _KeptCosts:
     """Costs of a problem, and by which factor a motion may cost more than the best by all costs.
 
-    What a motion costs depends on its pace, and all faster ones cost more by their joint speeds. So
-    joint paths are compared: each costs what it does at the time law of the problem's own path.
+    The cost of a motion depends on its pace, and faster ones cost more by their joint speeds. So
+    joint paths are compared: each at the time law of the problem's own path.
 
     Attributes
     ----------
     problem : Problem
     costs : tuple of Cost
-        Those of the problem's that are kept.
+        Limited costs of the problem.
     factors : tuple of float
-        How many times as much they may be, at least 1; of what is negative, by how many times its
-        size less 1 it may rise.
+        Largest multiples, at least 1; of a negative cost, the allowed increase is this minus 1
+        times its size.
     """
 
     problem: Problem
@@ -88,7 +92,7 @@ class _KeptCosts:
         return cls(problem, tuple(costs), tuple(factors))
 
     def values(self, plan: Plan) -> Array:
-        """Return what the joint path of a plan costs at the time law of the problem's path, (K,).
+        """Return the costs of a plan's joint path at the time law of the problem's path, (K,).
 
         Parameters
         ----------
@@ -106,11 +110,11 @@ class _KeptCosts:
         return np.array([samples.weights @ cost.value(samples) for cost in self.costs])
 
     def bounds(self, best: Array) -> Array:
-        """Return what costs may be, (K,), where the motion that is best by them costs `best`."""
+        """Return the limits of the costs, (K,), if the best motion by them costs `best`."""
         return np.asarray(best + (np.array(self.factors) - 1.0) * np.abs(best))
 
     def weighted(self, costs: Array, weight: float) -> tuple[Cost, ...]:
-        """Return the costs so that each counts about as a weight [s], of what they are."""
+        """Return the costs scaled so that each has about a weight [s]."""
         sizes = np.maximum(np.abs(costs), 1e-12)
         each = zip(self.costs, sizes.tolist(), strict=True)
         return tuple(Scaled(cost, weight / size) for cost, size in each)
@@ -129,13 +133,13 @@ def _by(nodes: Array, q: Array, t: Array) -> tuple[Array, Array]:
     return np.asarray(spline(t)), np.asarray(spline(t, 1))
 
 
-# What brings a path to another pace.
+# Map of a path to another pace.
 _Repaced = Callable[[Path], Path]
 
 
 @dataclass(frozen=True, eq=False)
 class Fastest:
-    """The fastest motion found, and what it began with.
+    """The fastest motion found, and its initial one.
 
     Attributes
     ----------
@@ -177,32 +181,31 @@ def fastest(
 ) -> Fastest:
     """Return the fastest motion along the problem's path, whatever its own pace and costs.
 
-    It begins with the motion that is best by the problem's costs and with the minimum-norm motion,
-    each at its fastest pace (`retime`). Then in turn the null motion minimises what is used of the
-    limits at the pace found so far (`LimitUse`), and the pace is the fastest for that joint path;
-    rounds go on while they gain. The best motion is returned: never slower than the first two.
+    The initial motions are the best one by the problem's costs and the minimum-norm motion, each at
+    its fastest pace (`retime`). Then alternately the null motion minimises the use of limits at the
+    present pace (`LimitUse`), and the pace is the fastest for that joint path; rounds go on while
+    they gain. The best motion is returned: never slower than the first two.
 
     Parameters
     ----------
     problem : Problem
-        Its constraints are kept; its costs decide only what is begun with.
+        Its constraints apply; its costs determine the initial motion alone.
     acceleration : (n,) or float, optional
         Limits [rad/s² or m/s²]; by default those of the arm's maker.
     velocity : (n,) or float, optional
-        Limits [rad/s or m/s]; by default those that the problem asks for, or the URDF's.
+        Limits [rad/s or m/s]; by default those of the problem, or the URDF's.
     keep : mapping of str to float, optional
-        How many times as much a cost of the problem, by its kind or name, may be as that of the
-        motion which is best by all costs: ``{"JointVelocity": 1.1}``. What is compared is the cost
-        of the joint path at the time law of the problem's own path, since any motion costs more in
-        less time.
+        Largest multiple of a cost of the problem, by its kind or name, of that of the best motion
+        by all costs: ``{"JointVelocity": 1.1}``. It is evaluated of the joint path at the time law
+        of the problem's own path, since any motion costs more in less time.
     search : Search, optional
         See `plan`.
     tolerance : Tolerance, optional
         See `plan`.
     deadline : float, optional
-        After so many seconds the best so far has to do; None looks as long as rounds gain. Nothing
-        is begun that would take longer, by what the same took before; the first motion is judged
-        whatever the time. Ctrl-C keeps the best so far as well.
+        Time after which the best motion so far is returned [s]; None for as long as rounds gain. No
+        step is started that would take longer, by its duration before; the first motion is judged
+        whatever the time. Ctrl-C also returns the best so far.
     progress : callable, optional
         Called with ``("fastest", round, rounds)``, and with the stages of `plan` in between. It may
         raise `KeyboardInterrupt` to stop.
@@ -244,7 +247,7 @@ def fastest(
 
 
 class _Rounds:
-    """The best so far, and what it is looked for with.
+    """Rounds of the search for the fastest motion.
 
     Parameters
     ----------
@@ -273,21 +276,21 @@ class _Rounds:
         self._progress = clock.checked_by(progress)
         self._kept, self._bounds = kept, np.full(len(kept.costs), np.inf)
         geometric = (item for item in problem.constraints if not item.of_pace)
-        # At the pace that it comes to have, limits of speed are kept; at this one nothing is.
+        # Limits of speed apply at the final pace, not at this one.
         any_speed = JointVelocityLimits(np.inf, replace=True)
         self._free = replace(problem, constraints=(*geometric, any_speed))
         self.best: Plan | None = None
         self.verdict = "nothing was planned yet"
         self.times: list[float] = []
         self.retimed = {"x = 0": np.inf, "costs": np.inf}
-        # What the pace of a motion took at most [s].
+        # Longest time of a pace's computation so far [s].
         self.longest = 0.0
 
     def run(self) -> None:
         """Go on while rounds gain; KeyboardInterrupt where they were stopped."""
         planned = self._plan(self._free)
         if planned.report.ending or not planned.certificate.on_path:
-            # At no pace can it be followed to its end: what else is wrong says nothing.
+            # At no pace can it be followed to its end: other violations do not matter.
             self.verdict = planned.report.ending or planned.certificate.verdict
             return
         costs = self._kept.values(planned)
@@ -310,7 +313,7 @@ class _Rounds:
             try:
                 paced = _at_pace(asked, pace)
             except PathError:
-                # No pace as smooth as the path is near the one found: that one stands.
+                # No pace as smooth as the path is near the one found: that one is the result.
                 return
             planned = self._plan(paced, self.longest)
             self.verdict = planned.certificate.verdict
@@ -327,7 +330,7 @@ class _Rounds:
             pace = _stand_in(self._problem.path, planned.path, found.path)
 
     def _left(self, kept: float = 0.0) -> float:
-        """Return the time that is left but for what is kept [s]; KeyboardInterrupt for none."""
+        """Return the remaining time minus a reserve [s]; KeyboardInterrupt for none."""
         self._clock.check()
         left = self._clock.end - time.perf_counter() - kept
         if left <= 0.0:
@@ -335,9 +338,9 @@ class _Rounds:
         return left
 
     def _plan(self, problem: Problem, kept: float = 0.0) -> Plan:
-        """Plan, in the time that is left but for what is kept for its pace [s].
+        """Plan in the remaining time minus a reserve for its pace [s].
 
-        KeyboardInterrupt where something stopped it, or there is none.
+        KeyboardInterrupt after an interruption, or without time.
         """
         left = self._left(kept)
         try:
@@ -357,11 +360,11 @@ class _Rounds:
         return np.inf if self.best is None else self.best.path.duration
 
     def _keeps(self, planned: Plan) -> bool:
-        """Return whether a motion's joint path costs no more than it may."""
+        """Return whether the costs of a motion's joint path are within their limits."""
         return bool(np.all(self._kept.values(planned) <= self._bounds))
 
     def _taken(self, name: str, planned: Plan) -> Plan:
-        """Return a motion at its fastest: the best so far if none is faster and costs are kept."""
+        """Return a motion at its fastest: the best so far unless it is faster within the costs."""
         began = time.perf_counter()
         found = _at_its_fastest(planned, self._problem, self._v, self._a)
         self.longest = max(self.longest, time.perf_counter() - began)
@@ -374,7 +377,7 @@ class _Rounds:
 
 
 def _at_its_fastest(planned: Plan, problem: Problem, v: Array, a: Array) -> Plan:
-    """Return a motion at the fastest pace that keeps all that the problem asks for."""
+    """Return a motion at the fastest pace that satisfies the problem."""
     constraints: tuple[Constraint, ...] = tuple(problem.constraints)
     whole = replace(planned, problem=replace(planned.problem, constraints=constraints))
     return retime(whole, a, v)
@@ -392,7 +395,7 @@ def _own(path: Path) -> Path:
 
 
 def _stand_in(original: Path, current: Path, found: Path) -> _Repaced:
-    """Return what brings a path to about the pace of `found`, which is a pace of `current`.
+    """Return the map of a path to about the pace of `found`, which is a pace of `current`.
 
     As smooth as the path: its accelerations do not jump from limit to limit.
     """

@@ -15,23 +15,24 @@ from selfmotion.planning.planner.screening import ROUGH_MOTIONS
 from selfmotion.planning.search import Reach
 from selfmotion.problem.problem import Problem
 
-# Share of the time to the edge of the workspace that is given up, since joint speeds grow without
-# bound towards it.
+# Share of the time to the edge of the workspace that is left out: joint speeds grow without bound
+# there.
 _EDGE_MARGIN = 1e-4
-# The end of the part is found to this share of it, and a part below this share of the path, and of
-# the first piece of it, is none.
+# Relative accuracy of the end of the part.
 _END_AGREEMENT = 4e-3
+# Smallest part, as a share of the path, and of its first segment.
 _LEAST_PART = 1e-2
-# Ends that are tried, at most.
+# Largest number of ends that are tried.
 _PROBES = 10
-# Motions are followed in so many steps, until they are off the path by this share of its extent.
+# Steps in which motions are followed …
 _FOLLOWED_STEPS = 128
-# Where the last bit of a part is too rough, parts that end by this share earlier.
-_PART_BACK = 0.02
+# … until their path error is above this share of the path's extent.
 _OFF_PATH = 1e-2
-# Constant null motions that stand for x = 0 where that breaks down: joint angles over the path.
+# A part that is too rough near its end is shortened by this share.
+_PART_BACK = 0.02
+# Constant null motions in place of x = 0 where that breaks down: joint angles over the path [rad].
 _PUSHES = (0.5, 2.0)
-# Why a part ends where its end is no limit that was broken.
+# Cause of an end that is at no violated limit.
 _ROUGH = "beyond that it is off the path or past limits between its nodes"
 
 
@@ -63,7 +64,7 @@ class Part:
 
 @dataclass(frozen=True, eq=False)
 class _Attempt:
-    """What came of a start on a part: no candidate where it broke down; how far all was kept."""
+    """Result of a start on a part: no candidate at a breakdown; the extent without violations."""
 
     begin: _Begin
     problem: Problem
@@ -82,7 +83,7 @@ class _Attempt:
 
     @property
     def reason(self) -> str:
-        """Why nothing is made of it."""
+        """Cause of its failure."""
         if self.candidate is None:
             return self.trouble
         return "; ".join(self.candidate.violations)
@@ -105,9 +106,9 @@ def largest_part(problem: Problem, reach: Reach, effort: Effort) -> Part | None:
     problem : Problem
         Of the whole path.
     reach : Reach
-        How far single poses are in reach.
+        Extent to which single poses are reachable.
     effort : Effort
-        What candidates share.
+        Options of the candidates.
 
     Returns
     -------
@@ -143,7 +144,7 @@ def _largest_part(problem: Problem, reach: Reach, effort: Effort) -> Part | None
 
 
 def _least(problem: Problem) -> float:
-    """Return how long the part of a path has to last to be one [s]."""
+    """Return the smallest duration of a part of a path [s]."""
     first = float(edges_of(problem.path.knots)[1])
     return _LEAST_PART * min(first, problem.path.duration)
 
@@ -155,7 +156,7 @@ def _bisect(problem: Problem, failed: _Attempt, reach: Reach, effort: Effort) ->
     back = _END_AGREEMENT
     for _ in range(_PROBES):
         if arrived is None:
-            # What was kept until then is a good guess; where it is not, further and further back.
+            # The extent without violations is a good guess; if it fails, the next ones are shorter.
             probe = max(min(failed.kept_until, high * (1.0 - back)), 0.5 * high)
             back *= 2.0
         else:
@@ -220,7 +221,7 @@ def _start_of(part: Problem, problem: Problem, q: Array) -> Array:
 
 
 def _begin_of(part: Problem, failed: _Attempt) -> _Begin:
-    """Return where another part begins as a start of a part, which may have fewer joints."""
+    """Return the start of another part as that of a part, which may have fewer joints."""
     start, guide = failed.begin
     if isinstance(guide, _Push):
         guide = guide.of(part.asked.robot.dof, part.robot.dof)
@@ -241,7 +242,7 @@ def _attempt(problem: Problem, begin: _Begin, effort: Effort) -> _Attempt:
         candidate.end(Status.INTERRUPTED)
     found = candidate.evaluation()
     motion = found.trajectory
-    # Constraints that cannot be met may throw it far off: x = 0 then tells more.
+    # Infeasible constraints may distort it: then x = 0 is a better guess.
     until = max(_kept_until(problem, motion.t, motion.q, motion.qd), -_rank(problem, *begin)[1])
     return _Attempt(begin, problem, candidate, until, found)
 
@@ -279,14 +280,14 @@ class _Push:
 
 
 def _pushes(problem: Problem, start: Array) -> list[Guide]:
-    """Return null motions to either side: x = 0 may keep to a plane that has no way on."""
+    """Return null motions to either side: x = 0 may stay in a plane without a continuation."""
     basis = problem.follows.null_basis(start) / problem.path.duration
     angles = [sign * angle for angle in _PUSHES for sign in (1.0, -1.0)]
     return [_Push(angle * direction) for direction in basis.T for angle in angles]
 
 
 def _rank(problem: Problem, start: Array, guide: Guide | None) -> tuple[float, float, float]:
-    """Return how far a motion stays on the path and within its limits [-s], and its effort.
+    """Return the negative times of path and limits without violation [s], and the effort.
 
     That without self-motion, from a start; the smaller, the better.
     """

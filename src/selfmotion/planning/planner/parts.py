@@ -32,9 +32,9 @@ from selfmotion.planning.planner.effort import Search
 from selfmotion.planning.planner.run import plan, plan_along
 from selfmotion.planning.result import Move, Parts, Plan
 from selfmotion.planning.search import (
+    ChainSegment,
+    ChainSegments,
     Sequence,
-    Stretch,
-    Stretches,
     has_curves,
     turned_towards,
 )
@@ -50,21 +50,22 @@ from selfmotion.problem.problem import (
     times_along,
 )
 
-# Where samples do not tell for sure how many parts are needed, a single motion is looked for before
-# as many cuts.
+# Cuts up to which a single motion is sought first, where samples do not prove that parts are
+# needed.
 _MISSED_CUTS = 1
-# Other cuts are tried where parts could not be planned, so often; they are so far away at least, as
-# a share of the path's waypoints.
+# Searches for other cuts where parts could not be planned …
 _ATTEMPTS = 4
+# … at least this far away, as a share of the path's waypoints.
 _ELSEWHERE = 0.03
-# A guide has at least so many samples.
+# Smallest number of samples of a guide.
 _GUIDE_SAMPLES = 13
-# A retreat goes at this speed on average [m/s], and takes no less than this [s].
+# Average speed of a retreat [m/s] …
 _RETREAT_SPEED = 0.1
+# … and its shortest time [s].
 _BRIEFEST_RETREAT = 0.5
-# How smoothly a tool motion has to rest that needs no ramp; see `rest_orders`.
+# Orders of rest of a tool motion that needs no ramp; see `rest_orders`.
 _AT_REST = 2
-# Where the tool leaves the path to, in its own axes.
+# Direction of a retreat, in tool axes.
 _BACK = (0.0, 0.0, -1.0)
 
 
@@ -74,7 +75,7 @@ class _Mover:
     Parameters
     ----------
     problem : Problem
-        What it asks of all times is asked of moves as well.
+        Its conditions at all times also apply to moves.
     retreat : (3,) or None
         How far the tool leaves the path before a move, and comes back after, in tool axes [m].
     rng : Generator
@@ -92,7 +93,7 @@ class _Mover:
         self._free = FreeMotions(problem.robot, problem.all_constraints, rng, progress)
 
     def move(self, first: Array, last: Array) -> Move:
-        """Return a move from a configuration (n,) to another one, or why there is none."""
+        """Return a move between configurations (n,), or the cause why there is none."""
         if self._retreat is None:
             return self._free.between(first, last)
         try:
@@ -116,7 +117,7 @@ class _Mover:
 
 
 def between_parts(problem: Problem) -> Problem:
-    """Return a problem with what it asks of all times, and nothing that it asks of an end."""
+    """Return a problem with the conditions at all times, without those at an end."""
     return replace(
         problem,
         start=None,
@@ -139,41 +140,41 @@ class _PartPlanner:
     def __init__(
         self,
         problem: Problem,
-        stretches: Stretches,
+        segments: ChainSegments,
         retreat: Array | None,
         ramp: float,
         rng: np.random.Generator | int,
         tolerance: Tolerance,
         progress: Progress,
     ) -> None:
-        self._problem, self._stretches, self._ramp = problem, stretches, ramp
+        self._problem, self._stretches, self._ramp = problem, segments, ramp
         self._tolerance, self._progress = tolerance, progress
         self._closed = any(item.closes for item in problem.constraints)
         generator = np.random.default_rng(rng)
         self._mover = _Mover(between_parts(problem), retreat, generator, progress)
         self.failure: SelfmotionError = PlanError("no part was planned")
-        # Other chains have many parts in common.
+        # Chains have many parts in common.
         self._known: dict[tuple[int, bytes], Plan] = {}
         self._turning = np.isinf(problem.robot.lower) & np.isinf(problem.robot.upper)
 
-    def plan(self, chains: list[Stretch]) -> tuple[Parts | None, set[int]]:
+    def plan(self, chains: list[ChainSegment]) -> tuple[Parts | None, set[int]]:
         """Return the parts, and the waypoints where a cut has led to one that fails.
 
         None where one has no complete motion; `failure` then says why.
         """
         plans: list[Plan] = []
         failed: set[int] = set()
-        for number, stretch in enumerate(chains, 1):
+        for number, segment in enumerate(chains, 1):
             self._progress("part", number, len(chains))
             try:
-                plans.append(self._part(stretch, plans[-1] if plans else None))
+                plans.append(self._part(segment, plans[-1] if plans else None))
             except (BreakdownError, InverseKinematicsError, NoSequenceError) as error:
                 self.failure = error
-                return None, failed | self._around(stretch)
+                return None, failed | self._around(segment)
             if not plans[-1].certificate.verified:
-                failed |= self._around(stretch)
-        cuts = tuple(float(stretch.t[-1]) for stretch in chains[:-1])
-        endings = tuple(stretch.ending for stretch in chains[:-1])
+                failed |= self._around(segment)
+        cuts = tuple(float(segment.t[-1]) for segment in chains[:-1])
+        endings = tuple(segment.ending for segment in chains[:-1])
         moves = self._moves(plans)
         parts = Parts(self._problem, tuple(plans), moves, cuts, endings, tolerance=self._tolerance)
         return parts, failed
@@ -189,21 +190,21 @@ class _PartPlanner:
         ends = [(one.trajectory.q[-1], other.trajectory.q[0]) for one, other in pairs]
         return tuple(self._mover.move(*each) for each in ends)
 
-    def _around(self, stretch: Stretch) -> set[int]:
-        """Return the waypoints at which the parts to both sides of a stretch's ends are not cut."""
+    def _around(self, segment: ChainSegment) -> set[int]:
+        """Return the waypoints around a segment's ends that the parts on both sides share."""
         last = len(self._stretches.t) - 1
         width = max(1, round(_ELSEWHERE * last))
-        cuts = {stretch.first, stretch.last} - {0, last}
+        cuts = {segment.first, segment.last} - {0, last}
         return {i for cut in cuts for i in range(cut - width, cut + width + 1)}
 
-    def _part(self, stretch: Stretch, before: Plan | None) -> Plan:
-        """Return the plan along a stretch that follows another one's plan."""
-        t, q = stretch.t, stretch.q
+    def _part(self, segment: ChainSegment, before: Plan | None) -> Plan:
+        """Return the plan of a segment that follows another one's plan."""
+        t, q = segment.t, segment.q
         if before is not None:
             q = turned_towards(q, before.trajectory.q[-1], self._turning)
-        key = stretch.first, q.tobytes()
+        key = segment.first, q.tobytes()
         if key not in self._known:
-            self._known[key] = self._planned(self._part_problem(stretch), t, q)
+            self._known[key] = self._planned(self._part_problem(segment), t, q)
         return self._known[key]
 
     def _planned(self, problem: Problem, t: Array, q: Array) -> Plan:
@@ -211,28 +212,28 @@ class _PartPlanner:
         if isinstance(problem.path, Retimed):
             t = problem.path.when(t - t[0])
         if len(t) < _GUIDE_SAMPLES:
-            # As close as they are: where the tool stands still, there are few.
+            # The given samples where the tool rests: there are few.
             few, places = t, np.linspace(0.0, len(t) - 1.0, _GUIDE_SAMPLES)
             t = np.interp(places, np.arange(len(few)), few)
             q = np.stack([np.interp(t, few, joint) for joint in q.T], axis=1)
         guide = Sequence(t, q, 0.0)
         return plan_along(problem, guide, self._tolerance, self._progress)
 
-    def _part_problem(self, stretch: Stretch) -> Problem:
-        """Return the problem of a stretch: at rest where it is cut, with what is asked of it."""
+    def _part_problem(self, segment: ChainSegment) -> Problem:
+        """Return the problem of a segment: at rest at cuts, with the conditions on it."""
         whole, last = self._problem, len(self._stretches.t) - 1
-        cut = stretch.first > 0 or self._closed, stretch.last < last or self._closed
+        cut = segment.first > 0 or self._closed, segment.last < last or self._closed
         if not any(cut):
             return whole
-        ends = float(stretch.t[0]), float(stretch.t[-1])
+        ends = float(segment.t[0]), float(segment.t[-1])
         orders = rest_orders(Section(whole.path, *ends), whole.task)
         ramped = cut[0] and orders[0] < _AT_REST, cut[1] and orders[1] < _AT_REST
         path = section_at_rest(whole.path, *ends, min(self._ramp, ends[1] - ends[0]), ramped)
         return replace(
             whole,
             **whole.along(lambda _: path, times_along(path, ends)),
-            start=whole.start if stretch.first == 0 else None,
-            constraints=list(asked_of_part(whole, stretch.first == 0, stretch.last == last)),
+            start=whole.start if segment.first == 0 else None,
+            constraints=list(asked_of_part(whole, segment.first == 0, segment.last == last)),
             rest=True,
         )
 
@@ -249,13 +250,12 @@ def plan_in_parts(
 ) -> Parts:
     """Plan a path in the fewest parts, with changes of configuration in between.
 
-    The global search looks for the fewest chains of configurations that together follow the path,
-    and among these for the shortest, none of which has a step that no motion takes. Where one will
-    do, or the samples of the search may have missed that, `plan` comes first, and its plan is the
-    only part if it is verified. Else each chain becomes a plan. At a cut the tool comes to rest
-    on the path and goes on from there in another configuration. The move to that is a joint motion
-    from rest to rest that keeps what the problem asks of all times, judged like a plan: straight,
-    or by a few stops where that meets something.
+    The global search finds the fewest chains of configurations that together follow the path, and
+    among these the shortest, without a step that no motion takes. If one suffices, or samples may
+    have missed that, `plan` comes first, and its plan is the only part if it is verified. Otherwise
+    each chain becomes a plan. At a cut the tool rests on the path and goes on in another
+    configuration. The move between them is a joint motion from rest to rest within the problem's
+    conditions at all times, judged like a plan: straight, or by a few stops around obstacles.
 
     The number of parts is the least among the samples of the search; nothing proves that no
     continuous motion slips between them.
@@ -263,11 +263,11 @@ def plan_in_parts(
     Parameters
     ----------
     problem : Problem
-        Conditions on the start or the end hold for the first or the last part. For a `ClosedPath`
-        a last move leads back to the start. At cuts the arm rests, whatever `rest` says.
+        Conditions on the start or the end apply to the first or the last part. For a `ClosedPath` a
+        last move leads back to the start. At cuts the arm rests, whatever `rest` is.
     retreat : float
-        How far the tool leaves the path along `axis` before each move, and from how far it comes
-        back [m]; by default the move begins on the path.
+        Distance that the tool leaves the path along `axis` before each move, and returns by [m]; by
+        default the move starts on the path.
     axis : (3,), optional
         Where to, in tool axes: by default back along the tool's z axis.
     ramp : float
@@ -275,7 +275,7 @@ def plan_in_parts(
     rng : Generator or int
         Shifts the seeds of the searches.
     tolerance : Tolerance, optional
-        What a motion may miss the path by.
+        Allowed error of the motion from the path.
     progress : callable, optional
         As in `plan`.
 
@@ -288,14 +288,12 @@ def plan_in_parts(
     Raises
     ------
     FeedError
-        The path asks for a feed that it cannot have, whatever the arm; before anything is searched.
+        The path has a feed that is impossible for any arm; before any search.
     NoSequenceError
-        No parts, however many, follow the path: some pose of it is out of reach, beyond limits or
-        blocked in every configuration, or its neighbours are beyond the step limits. Tells when
-        and why.
+        No number of parts follows the path: a pose is out of reach, beyond limits or blocked in
+        every configuration, or its neighbours are beyond the step limits. With the time and why.
     ProblemError
-        An argument is not what it should be, the problem is damped, or has no self-motion to
-        search.
+        An argument is invalid, the problem is damped, or has no self-motion to search.
     """
     retreats = _checked(problem, retreat, axis)
     ramp = as_number(ramp, "ramp", above=0.0)
@@ -314,13 +312,13 @@ def _parts(
     tolerance: Tolerance,
     progress: Progress,
 ) -> Parts:
-    # Samples of curves tell whether parts are needed; those of larger spaces may miss a way or two,
-    # and all are on the path itself.
+    # Samples of curves prove that parts are needed; those of larger spaces may miss chains, and all
+    # are on the path itself.
     missed = _MISSED_CUTS if problem.relaxations or not has_curves(problem) else 0
     refused, chains = None, []
     try:
-        stretches = Stretches.of(problem, rng, progress)
-        chains = stretches.fewest(set())
+        segments = ChainSegments.of(problem, rng, progress)
+        chains = segments.fewest(set())
     except NoSequenceError as error:
         if not missed:
             raise
@@ -331,11 +329,11 @@ def _parts(
             return Parts(problem, (whole,), tolerance=tolerance)
     if refused is not None:
         raise refused
-    planner = _PartPlanner(problem, stretches, retreats, ramp, rng, tolerance, progress)
-    return _best_of(planner, stretches, chains)
+    planner = _PartPlanner(problem, segments, retreats, ramp, rng, tolerance, progress)
+    return _best_of(planner, segments, chains)
 
 
-def _best_of(planner: _PartPlanner, stretches: Stretches, chains: list[Stretch]) -> Parts:
+def _best_of(planner: _PartPlanner, segments: ChainSegments, chains: list[ChainSegment]) -> Parts:
     """Return the parts along chains, or along others where some of these fail."""
     best: Parts | None = None
     forbidden: set[int] = set()
@@ -347,7 +345,7 @@ def _best_of(planner: _PartPlanner, stretches: Stretches, chains: list[Stretch])
             break
         forbidden |= failed
         try:
-            chains = stretches.fewest(forbidden)
+            chains = segments.fewest(forbidden)
         except NoSequenceError:
             break
     if best is None:
@@ -395,7 +393,7 @@ def _whole(
 
 
 def _standing(parts: Parts) -> tuple[int, int, int]:
-    """Return how many parts and moves are missing or not verified, and how many parts there are."""
+    """Return the numbers of parts and moves that are missing or not verified, and of parts."""
     plans = sum(not part.certificate.verified for part in parts.plans)
     moves = sum(not move.verified for move in parts.moves)
     return plans, moves, len(parts.plans)

@@ -1,4 +1,4 @@
-"""What is known of one plan while it is made, and how its motion is judged."""
+"""State of one plan while it is made, and the judgement of its motion."""
 
 import time
 from collections import abc
@@ -20,26 +20,25 @@ from selfmotion.planning.result import Attempt, Plan
 from selfmotion.planning.search import Obstruction, Reach, Sequence, reachable
 from selfmotion.problem.problem import Problem
 
-# Between its nodes a motion may be off the path by this share of the tolerance where that is looked
-# at, in the middle; and by this share of what it was before steps were halved.
+# Path error between nodes, as a share of the tolerance, up to which a grid is fine enough …
 _RESOLVED = 0.3
+# … and as a share of that on the grid before.
 _FALLS = 0.7
-# Limits that are exceeded between the nodes on more grids than this are so on any; and nothing is
-# optimised again on grids with more than so many times the steps.
+# Number of grids on which limits are exceeded between nodes before they count as infeasible.
 _ROUGH_GRIDS = 3
+# Grids with more steps than this multiple of the first are not optimised again.
 _FINER = 4
-# Evaluations of the cost on each of many parts of the path.
+# Evaluations of the cost on each of several parts of the path.
 _PART_EVALUATIONS = 150
-# The same where the start is free: of many, the one that gets farthest needs no more, and who tries
-# many places waits for it.
+# The same with a free start: the start with the largest part is among many.
 _FREE_PART_EVALUATIONS = 30
-# Where the last bit of a part is too rough, so many shorter ones are tried, at most.
+# Largest number of shorter parts where the end of one is too rough.
 _SHORTER_PARTS = 3
 
 
 @dataclass(frozen=True, eq=False)
 class Judged:
-    """What a plan is made of: a motion along all of the path or a part of it, and its check.
+    """Content of a plan: a motion along all of the path or a part of it, and its certificate.
 
     Attributes
     ----------
@@ -68,7 +67,7 @@ class Judged:
 
 
 def judge(problem: Problem, part: Part, tolerance: Tolerance, progress: Progress) -> Judged:
-    """Return what there is on the first grid on which the motion holds the tolerance."""
+    """Return the motion on the first grid on which it is within the tolerance, with its check."""
     candidate = part.candidate
     judged: Judged | None = None
     coarse: Trajectory | None = None
@@ -89,11 +88,12 @@ def judge(problem: Problem, part: Part, tolerance: Tolerance, progress: Progress
             if judged.certificate.on_path and (spent or not rough):
                 break
             trajectory = judged.motion.trajectory
-            # What damping costs stays on any grid: there, the motion stands when the tool does.
+            # The path error of damping is the same on any grid: the grid is fine when the tool's
+            # motion is.
             if coarse is not None and _same(problem, coarse, trajectory, tolerance):
                 break
             coarse = trajectory if judged.motion.damped else None
-            # What is out of reach is so on any grid.
+            # Poses out of reach are so on any grid.
             check = judged.certificate
             misses.append(check.position_error.value + check.rotation_error.value)
             if coarse is None and len(misses) > 2 and misses[-1] > 0.5 * misses[-3]:
@@ -128,20 +128,20 @@ def _resolved(problem: Problem, candidate: Candidate, tolerance: Tolerance) -> E
 
 
 def _meets_itself(problem: Problem, certificate: Certificate) -> bool:
-    """Whether nothing else is wrong than that the arm meets itself, which only the default asks."""
+    """Whether self-collision, under the default clearance, is the only violation."""
     asked = problem.own_collision is not None and len(certificate.failures) == 1
     return asked and not certificate.findings[-1].satisfied
 
 
 def _rough(problem: Problem, judged: Judged, candidate: Candidate) -> bool:
-    """Whether what was asked for and is kept at the nodes is not so between them."""
+    """Whether a required condition holds at the nodes, but not between them."""
     if candidate.violations or not judged.certificate.on_path:
         return False
     asked = {item.name for item in problem.requirements}
-    # The arm's own limits are always kept.
+    # The arm's own limits always apply.
     asked |= set(LIMIT_NAMES[:2])
     if problem.own_collision is not None:
-        # Where only the default asks it, it was not asked of the nodes either.
+        # The default clearance need not have been a constraint of the nodes.
         asked.discard(problem.requirements[-1].name)
     nodes = judged.motion.trajectory.t
     # Rates are judged on both sides of a node; anything else that is wrong there stays so.
@@ -174,14 +174,14 @@ def _check(problem: Problem, part: Part, tolerance: Tolerance) -> Judged:
 
 @dataclass(eq=False)
 class Planner:
-    """What is known of one plan while it is made; the steps of `steps.py` change it.
+    """State of one plan while it is made; the steps of `steps.py` change it.
 
     Attributes
     ----------
     problem : Problem
         With its tolerances as virtual joints, see `Problem.augmented`.
     effort : Effort
-        What all candidates share.
+        Options of all candidates.
     search : Search
     tolerance : Tolerance
     progress : Progress
@@ -190,7 +190,7 @@ class Planner:
     guide : Sequence or None
         Likewise a motion that a search over the whole path has found.
     attempts : list of Attempt
-        What was tried, in order.
+        Proposals so far, in order.
     began : float
         When, by the clock `time.perf_counter` [s].
     blocked : Obstruction or None
@@ -202,23 +202,22 @@ class Planner:
     broken : list of Candidate
         Those that were optimised and break something.
     sequences : list of Sequence
-        What the global search found; empty where it was not asked for or in vain.
+        Results of the global search; empty without one, or if it failed.
     rival : Candidate or None
         The best motion from these. It is not chosen where the start is given or the search local,
         and only compared with.
     stops, advice : str
-        What stops a motion that is not verified, and what may help, in words; empty where nothing
-        is known.
+        The obstruction of a motion that is not verified, and remedies, in words; empty if unknown.
     failure : SelfmotionError or None
-        Why there is no motion, if there is none: the last reason.
+        The last cause of having no motion, if there is none.
     notes : list of str
-        Why a search was in vain; what would help.
+        Causes of failed searches, and remedies.
     waiting : sequence of Candidate
         Complete motions that are not optimised yet.
     ranking : Ranking or None
         Rough motions of starts.
     judged : Judged or None
-        What the plan is made of.
+        The judged content of the plan.
     """
 
     problem: Problem
@@ -255,17 +254,17 @@ class Planner:
 
     @property
     def is_begun(self) -> bool:
-        """Whether a motion is known to begin with."""
+        """Whether there is an initial motion."""
         return self.warm_start is not None or self.guide is not None
 
     @property
     def is_searchable(self) -> bool:
-        """Whether there is anything to search: a self-motion."""
+        """Whether there is a self-motion to search."""
         return self.problem.follows.redundancy > 0
 
     @property
     def chooses_globally(self) -> bool:
-        """Whether what the global search finds may be chosen, and is not only compared with."""
+        """Whether results of the global search may be chosen, and are not only compared."""
         return self.is_free and self.search.mode != "local"
 
     @property
@@ -276,7 +275,7 @@ class Planner:
 
     @property
     def is_sought(self) -> bool:
-        """Whether a motion is still looked for."""
+        """Whether a motion is still sought."""
         return self.judged is None and not self.is_over
 
     @property
@@ -286,17 +285,17 @@ class Planner:
 
     @property
     def is_unmet(self) -> bool:
-        """Whether no motion is known yet that keeps all constraints that are asked of it."""
+        """Whether no motion so far satisfies all its constraints."""
         return self.best is None or not (self.is_published or self.best.will_do)
 
     @property
     def is_published(self) -> bool:
-        """Whether the published method is asked for: it keeps nothing but given ends."""
+        """Whether the published method is requested: its constraints are given ends alone."""
         return is_published(self.problem, self.effort)
 
     @property
     def cost_to_beat(self) -> float:
-        """What a motion costs that is known and will do; inf where there is none."""
+        """Cost of a sufficient motion so far; inf for none."""
         best = self.best
         return best.solution.cost if best is not None and best.will_do else np.inf
 
@@ -311,7 +310,7 @@ class Planner:
             return None
 
     def taken_up(self, motion: Trajectory) -> Candidate | None:
-        """Return the candidate that begins at a rough motion; None where it breaks down at once."""
+        """Return the candidate of a rough motion; None if it breaks down at once."""
         candidate = self.begin(motion.q[0], free=self.is_free)
         if candidate is not None:
             candidate.resume(motion)
@@ -319,7 +318,7 @@ class Planner:
 
     def polish(self, candidate: Candidate, *, chosen: bool = True) -> None:
         """Optimise a candidate; keep it if it is the best one and may be chosen."""
-        # What is only compared with is optimised to the end.
+        # Comparisons are optimised to the end.
         cost_to_beat = self.cost_to_beat if chosen else np.inf
         try:
             candidate.polish(cost_to_beat)
@@ -331,7 +330,7 @@ class Planner:
             self.consider(candidate)
             self.broken += [candidate] if candidate.violations else []
         if candidate.violations and candidate.effort.apart:
-            # Others are asked at once to keep the arm off itself.
+            # Later candidates have self-collision as a constraint at once.
             self.effort = candidate.effort
         if candidate.cut_short and self.best is not None:
             self.best.end(candidate.status)
@@ -342,7 +341,7 @@ class Planner:
             self.best, self.second = candidate, self.best
 
     def reach(self, suspect: float = 0.0) -> Reach:
-        """Return how far single poses are in reach, after a closer look at a time [s].
+        """Return the extent to which single poses are reachable, with more poses about a time [s].
 
         That is left out where something is known to be beyond.
         """
@@ -363,14 +362,14 @@ class Planner:
         return isinstance(failure, BreakdownError) and bool(self.reach(failure.time).reason)
 
     def judge(self, best: Candidate) -> None:
-        """Let the best motion be what the plan is made of, on grids that are fine enough."""
+        """Judge the best motion, on grids that are fine enough."""
         rival_cost = _settle_both(best, self.rival, self.progress)
         self.judged = self._judged(Part(self.problem, best), rival_cost)
         if self.judged.certificate.verified:
             return
         known = [best.as_adopted()]
         if best.cut_short:
-            # What it is on the way to an optimum may break more than what was known before.
+            # An iterate on the way to an optimum may violate more than earlier motions.
             known += [self.second, best.as_begun()]
         for one in filter(None, known):
             if best.cut_short:
@@ -379,10 +378,10 @@ class Planner:
                 return
 
     def free_by_meshes(self, *, just: bool = False) -> abc.Iterator[Candidate]:
-        """Yield candidates whose bodies are apart by their meshes, though not by their hulls.
+        """Yield candidates whose meshes are apart, though their hulls are not.
 
-        The best first; apart as far as asked for, or `just` so. Where nothing keeps everything, a
-        motion whose hulls meet by little may be the only one whose meshes do not.
+        The best first; apart by the required distance, or `just` apart. Without any motion that
+        satisfies all, one whose hulls overlap slightly may be the only one whose meshes do not.
         """
         bodies = self.problem.envelope.bodies
         if not self.is_unmet or all(model.is_all_convex for model, _ in bodies):
@@ -400,7 +399,7 @@ class Planner:
         return judged.certificate.verified
 
     def judge_part(self, suspect: float = 0.0) -> bool:
-        """Let the largest part be it, a time [s] looked at closely; return whether there is one."""
+        """Judge the largest part, with more poses about a time [s]; return whether there is one."""
         effort = self.effort
         if effort.max_evaluations is None:
             most = _FREE_PART_EVALUATIONS if self.is_free else _PART_EVALUATIONS
@@ -445,7 +444,7 @@ class Planner:
 
 
 def _settle_both(best: Candidate, rival: Candidate | None, progress: Progress) -> float | None:
-    """Settle a motion, and what it is compared with; return what the latter costs, if it will do.
+    """Refine a motion, and the one it is compared with; return the latter's cost, if sufficient.
 
     An interruption ends both as they are.
     """

@@ -19,38 +19,46 @@ from selfmotion.problem.constraints import BoundClearance, BoundConstraint, Boun
 from selfmotion.problem.costs import Cost, JointAcceleration, JointJerk
 from selfmotion.problem.problem import Problem
 
-# Between its nodes a motion may be off its path by this [m, rad]. Where it is by more, intervals
-# are divided so that it is by that, as the error falls with their third power or more; at most into
-# so many parts.
-_NEAR_PATH, _WANTED_NEAR_PATH, _FINER_POWER, _MOST_PARTS = 2e-7, 1e-7, 0.3, 8.0
-# More nodes are put in so often, at most.
+# Largest path error between nodes [m, rad] …
+_NEAR_PATH = 2e-7
+# … intervals above which are divided for this one …
+_WANTED_NEAR_PATH = 1e-7
+# … by this power of the ratio, since the error falls with the third power or more …
+_FINER_POWER = 0.3
+# … into this number of parts at most.
+_MOST_PARTS = 8.0
+# Refinement rounds.
 _NODE_ROUNDS = 14
-# Where nodes keep bodies apart and the motion between them does not, they are kept so much farther
-# apart at the points [m].
-_FARTHER_APART = (5e-4, 1e-3, 2e-3)
-# Steps of Newton's method from each of several beginnings: what takes longer mostly leads nowhere.
+# Extra clearance [m] at collocation points when the motion between them collides; tried in turn.
+_EXTRA_CLEARANCE = (5e-4, 1e-3, 2e-3)
+# Newton iterations from each of several initial guesses: longer ones mostly fail.
 _FEWER = 25
-# Where nothing keeps the conditions, nodes are put in so near to rest, as shares of the first and
-# the last interval: limits hardly above the mean speed leave no more time to start and stop.
+# Additional nodes next to rests, as shares of the first and last interval, where no motion is
+# feasible: limits little above the mean speed leave little time to start and stop.
 _BESIDE_REST = 0.5 ** np.arange(2.0, 5.0)
-# Finer where limits of q̈ or jerk begin and end to bind only while that saves this share.
+# Relative gain above which nodes are added where limits of q̈ or jerk start or end to bind.
 _PAYS = 3e-4
-# Where limits of these are broken, what uses of them costs this many times what the motion does;
-# so many times on twice as many nodes: control points of few of them use more than the curve.
-_CALM, _CALM_ROUNDS, _CALMED = 1e3, 3, {2: JointAcceleration, 3: JointJerk}
-# What breaks a condition by more than this [units of h] is no beginning: on the way from there, all
-# that made it one is lost.
+# Penalty of the use of limits of q̈ or jerk where these are violated, in multiples of the cost.
+_SMOOTHING = 1e3
+# Refinement rounds of that: with few nodes the Bernstein bound is loose.
+_SMOOTHING_ROUNDS = 3
+# Cost by order of the limit.
+_SMOOTHING_COSTS = {2: JointAcceleration, 3: JointJerk}
+# Violation above which a motion is no initial guess [units of h].
 _TOO_FAR = 100.0
-# What is broken by less than this is broken by little [units of h].
+# Violation that counts as small [units of h].
 _LITTLE = 1.0
-# Where the motion at x = 0 does not lead to what keeps the conditions: the self-motion goes towards
-# the middle of the limits in such shares of the duration.
+# Initial guesses where x = 0 fails: the self-motion goes towards the middle of the limits in these
+# shares of the duration …
 _TOWARDS_MIDDLE = (1.0 / 16.0, 1.0 / 64.0, 1.0 / 4.0)
-# And to either side of the start by so much along its self-motion, after this share of the
-# duration; so many of these at most.
-_ASIDE, _ASIDE_AFTER, _MOST_ASIDE = (0.4, -0.4, 0.8, -0.8), 1.0 / 4.0, 4
+# … and to either side of the start by these distances along its self-motion [rad or m] …
+_SIDEWAYS = (0.4, -0.4, 0.8, -0.8)
+# … after this share of the duration …
+_SIDEWAYS_AFTER = 1.0 / 4.0
+# … at most so many of them.
+_MOST_SIDEWAYS = 4
 
-
+# Statuses of an optimum.
 _ARRIVED = (Status.CONVERGED, Status.PRECISION)
 
 
@@ -218,7 +226,7 @@ class Polisher:
         if not costs:
             return
         problem, motion = self._problem.changed(costs=costs), begun
-        for number in range(_CALM_ROUNDS):
+        for number in range(_SMOOTHING_ROUNDS):
             kept = [item for item in motion.grid.constraints if item.equality]
             grid = NodeGrid(
                 problem, motion.grid.t, kept, free=self._free, counts=self._effort.counts
@@ -227,7 +235,7 @@ class Polisher:
                 grid.at(motion.centred), self._noted, roughly=True, max_iterations=_FEWER
             )
             motion = motion.grid.at(found.motion.centred)
-            if _is_kept(motion) or number == _CALM_ROUNDS - 1:
+            if _is_kept(motion) or number == _SMOOTHING_ROUNDS - 1:
                 yield motion
                 return
             finer = motion.on(motion.grid.on(Grid(motion.grid.t).halved().nodes))
@@ -238,12 +246,12 @@ class Polisher:
     def _costs_of_limits(self, begun: NodeMotion) -> tuple[Cost, ...]:
         """Return what uses of the limits of q̈ and jerk that a motion breaks cost; none for none."""
         grid, problem = begun.grid, self._problem
-        found, most = list[Cost](), _CALM * abs(begun.objective) / problem.path.duration
+        found, most = list[Cost](), _SMOOTHING * abs(begun.objective) / problem.path.duration
         for item, h in zip(grid.rows.constraints, grid.rows.split(begun.h), strict=True):
-            if isinstance(item, BoundLimits) and item.order in _CALMED and (h > 0.0).any():
+            if isinstance(item, BoundLimits) and item.order in _SMOOTHING_COSTS and (h > 0.0).any():
                 weight = np.zeros(problem.robot.dof)
                 weight[item.joints] = most / (0.5 * (item.upper - item.lower)) ** 2
-                found.append(_CALMED[item.order](weight, name=item.name))
+                found.append(_SMOOTHING_COSTS[item.order](weight, name=item.name))
         return (*problem.costs, *found) if found else ()
 
     def _beginnings(self, begun: NodeMotion) -> Iterator[NodeMotion | None]:
@@ -268,11 +276,11 @@ class Polisher:
         if self._free:
             return
         grid, start = begun.grid, begun.place.q[0]
-        time = _ASIDE_AFTER * self._problem.path.duration
-        goals = [start + far * way for way in begun.charts.bases[0].T for far in _ASIDE]
+        time = _SIDEWAYS_AFTER * self._problem.path.duration
+        goals = [start + far * way for way in begun.charts.bases[0].T for far in _SIDEWAYS]
         found = [grid.motion_towards(start, goal, time) for goal in goals]
         rank = partial(_rank_of, begun=begun)
-        yield from sorted((motion for motion in found if motion), key=rank)[:_MOST_ASIDE]
+        yield from sorted((motion for motion in found if motion), key=rank)[:_MOST_SIDEWAYS]
 
     def _on_halved(self, optimum: Optimum) -> Optimum:
         """Return the optimum on twice as many nodes, more beside rest, or what there is."""
@@ -340,7 +348,7 @@ class Polisher:
         has_bodies = any(isinstance(item, BoundClearance) for item in grid.constraints)
         if self._ended is not None or not (has_bodies and known.motion.broken_intervals().any()):
             return None
-        for far in _FARTHER_APART:
+        for far in _EXTRA_CLEARANCE:
             asked = [
                 replace(item, distance=item.distance + far, _last=[])
                 if isinstance(item, BoundClearance)

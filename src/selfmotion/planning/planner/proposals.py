@@ -1,12 +1,12 @@
-"""Proposals that are more than a line: many starts, chains over all self-motions, postures.
+"""Proposals of more than a line: many starts, chains over all self-motions, postures.
 
-The shortest chain is a motion of nodes at once, where length is all that is asked for.
+The shortest chain becomes a motion of nodes directly, where length is the only cost.
 
-Along paths that are many times as long as the arm, motions keep to a posture. Without self-motion
-an arm drifts from loop to loop, until it is folded or stretched, and rough motions of few steps
-tell nothing of hundreds of loops. A stretch of such a path tells in which posture the rest is best
-followed, too: from a motion whose self-motion goes back to it, Newton's method on nodes takes a
-handful of iterations, however many loops there are.
+Along paths that are many times as long as the arm, motions keep a posture. Without self-motion an
+arm drifts from loop to loop, until it is folded or stretched, and rough motions of few steps say
+nothing about hundreds of loops. The best posture on a segment of such a path is a good one for the
+rest: from a motion whose self-motion returns to it, Newton's method on nodes takes a few
+iterations, for any number of loops.
 """
 
 import contextlib
@@ -49,30 +49,32 @@ from selfmotion.planning.search import (
 from selfmotion.problem.constraints import BoundConstraint
 from selfmotion.problem.problem import Problem, asked_of_part
 
-# A path is long where the tool goes more than so many times the arm's reach: x = 0 begins to drift
-# away. Of one that is longer than the second, rough motions from many starts tell nothing any more.
-LONG_WAY, VERY_LONG_WAY = 5.0, 12.0
-# What a stretch of it is long that tells the posture, likewise.
-_STRETCH_WAY = 2.0
-# Nodes to begin with.
+# Length of a long path, in reaches of the arm: x = 0 starts to drift.
+LONG_PATH = 5.0
+# Length above which rough motions from many starts say nothing.
+VERY_LONG_PATH = 12.0
+# Length of a segment that determines the posture, likewise.
+_SEGMENT_LENGTH = 2.0
+# Number of the first nodes.
 _FIRST_NODES = 64
-# The shortest chain of a sequence becomes a motion of so many times its waypoints, with more where
-# it does not keep the conditions between them, so often.
+# Nodes per waypoint of a chain that becomes a motion …
 _FINER_CHAIN = 3
+# … which are refined between violated ones in this number of rounds.
 _CHAIN_ROUNDS = 4
-# Sequences are not worth refining when dearer by this factor than one that keeps all constraints.
+# Sequences dearer by this factor than a feasible one are not refined.
 _DEARER = 1.25
-# The same where that is the chain of a sequence itself, on which optimising gains next to nothing.
+# The same if that is a chain itself, which optimisation hardly improves.
 _DEARER_CHAIN = 1.005
-# What a joint at rest takes of a velocity that is lacking, where the fastest takes 1; and where all
-# are as slow as this [rad/s or m/s], none is.
-_LEAST, _STILL = 1e-2, 1e-9
-# Limits are looked at so often between two nodes.
-_LOOKS = 16
+# Share of a joint at rest in the correction of a velocity, relative to the fastest joint's.
+_LEAST = 1e-2
+# Speed below which all joints rest [rad/s or m/s].
+_STILL = 1e-9
+# Samples between two nodes for limits.
+_SAMPLES = 16
 
 
 def optimise_starts(planner: Planner, count: int, finalists: int) -> None:
-    """Draw so many starts, and optimise from the best of them; from all where they are few.
+    """Draw `count` starts, and optimise the best of them; all if they are few.
 
     Raises
     ------
@@ -102,10 +104,10 @@ def optimise_starts(planner: Planner, count: int, finalists: int) -> None:
 def optimise_where_it_breaks(
     planner: Planner, breaks_at: float, count: int, finalists: int
 ) -> None:
-    """Draw so many configurations where the best motion breaks most, a time [s], and optimise.
+    """Draw configurations at the largest violation, a time [s], and optimise.
 
-    There the fewest configurations keep all, as a rule: motions that begin with one of these, and
-    are carried to both ends of the path from there, need not find it.
+    The fewest configurations are feasible there, as a rule: motions through one of these, which are
+    carried to both ends of the path from there, start feasible.
     """
     problem, t = planner.problem, rough_grid(planner.problem).nodes
     at = int(np.argmin(np.abs(t - breaks_at)))
@@ -120,7 +122,7 @@ def optimise_where_it_breaks(
 
 
 def may_stack(planner: Planner) -> bool:
-    """Whether a quantity of q is violated, or a motion may be shared in several ways."""
+    """Whether a quantity of q is violated, or several parts share the motion."""
     problem, best = planner.problem, planner.best
     names = [item.name for item in problem.envelope.quantities]
     broken = (
@@ -153,7 +155,7 @@ def optimise_stacked(planner: Planner, finalists: int) -> bool:
 
 
 def _stacked(planner: Planner, t: Array) -> Iterator[Array]:
-    """Yield motions (K, N, n) through times t (N,) [s] that keep conditions all the way."""
+    """Yield motions (K, N, n) through times t (N,) [s] that satisfy conditions at all of them."""
     problem, asked = planner.problem, planner.problem.envelope
     drawn = _begun_at(planner, t)
     for weights in metrics(problem.robot):
@@ -167,9 +169,9 @@ def _stacked(planner: Planner, t: Array) -> Iterator[Array]:
 
 
 def _begun_at(planner: Planner, t: Array) -> dict[int, Array]:
-    """Return configurations (K, n) to begin with, by the number of their time among some (N,).
+    """Return initial configurations (K, n), by the number of their time among some (N,).
 
-    The given start; or what is drawn at both ends, and where the best motion breaks something.
+    The given start; or random ones at both ends, and at the largest violation of the best motion.
     """
     problem, best = planner.problem, planner.best
     if problem.given_start is not None:
@@ -180,7 +182,7 @@ def _begun_at(planner: Planner, t: Array) -> dict[int, Array]:
     arm = problem.follows.for_robot(problem.envelope.arm(problem.robot))
     for place in sorted(places):
         with contextlib.suppress(InverseKinematicsError):
-            # What keeps everything by chance is rare: they are put there.
+            # Few random ones satisfy all conditions: they are moved there.
             drawn = start_candidates(arm, planner.search.starts, planner.rng, time=float(t[place]))
             found[place] = np.array(drawn)
     return found
@@ -195,7 +197,7 @@ def _best(problem: Problem, starts: abc.Sequence[Array]) -> list[Array]:
 
 
 def _starts(planner: Planner, count: int) -> list[Array]:
-    """Return so many starts: on the path itself, or as near to it as tolerances allow."""
+    """Return `count` starts: on the path itself, or as near to it as tolerances allow."""
     problem = planner.problem
     try:
         found = _drawn(problem.asked, planner, count)
@@ -207,7 +209,7 @@ def _starts(planner: Planner, count: int) -> list[Array]:
 
 
 def _drawn(problem: Problem, planner: Planner, count: int, time: float = 0.0) -> list[Array]:
-    """Return so many configurations that are on the path at a time [s]."""
+    """Return `count` configurations on the path at a time [s]."""
     arm, asked = problem.envelope.arm(problem.robot), problem.envelope
     admits = asked.admits if asked.quantities else None
     return start_candidates(problem.follows.for_robot(arm), count, planner.rng, admits, time)
@@ -221,14 +223,14 @@ def _optimise_each(planner: Planner, candidates: Iterable[Candidate], count: int
         planner.waiting = (*planner.waiting, candidate)
         planner.progress("optimising start", number, count)
         planner.polish(candidate)
-        # What nothing can reach, no other start will.
+        # A pose out of reach is so for any start.
         if planner.is_out_of_reach():
             break
     planner.waiting = ()
 
 
 def _resumed(planner: Planner, rough: abc.Sequence[NodeMotion]) -> Iterator[Candidate]:
-    """Yield candidates that begin at rough motions, only when their turn comes."""
+    """Yield candidates with rough motions as warm starts, lazily."""
     for motion in rough:
         candidate = None if planner.is_over else planner.taken_up(motion.trajectory)
         if candidate is not None:
@@ -238,7 +240,7 @@ def _resumed(planner: Planner, rough: abc.Sequence[NodeMotion]) -> Iterator[Cand
 def optimise_sequences(planner: Planner, *, chosen: bool) -> None:
     """Search, and optimise from the best sequences, one after another; note a search in vain.
 
-    What is found is compared with what stands, and `chosen` only if it may be.
+    They are compared with the present motion, and `chosen` only if allowed.
     """
     try:
         planner.sequences = guides(planner.problem, planner.search.rng, planner.progress)
@@ -265,7 +267,7 @@ def optimise_sequences(planner: Planner, *, chosen: bool) -> None:
 
 
 def _is_hopeless(planner: Planner, guide: Sequence, candidate: Candidate, best: Candidate) -> bool:
-    """Whether a sequence is much dearer than the best, and costs more than what there is.
+    """Whether a sequence is much dearer than the best one, and costs more than the present motion.
 
     Optimising gains some percent on a sequence.
     """
@@ -285,9 +287,9 @@ def along_chain(
 ) -> NodeSolution | None:
     """Return the motion through the shortest chain near a sequence; None where it will not do.
 
-    Where length is all that is asked for, joints rest and start again all over the path: a motion
-    of few nodes cannot, and Newton's method has no use for second derivatives of kinks. The chain
-    is at its optimum already, so that it only needs velocities.
+    Where length is the only cost, joints rest and start again all over the path: a motion of few
+    nodes cannot, and second derivatives at kinks are useless for Newton's method. The chain is at
+    its optimum already, so that only velocities are missing.
     """
     if not is_on_nodes(problem, effort) or not asks_length(problem):
         return None
@@ -318,7 +320,7 @@ def along_chain(
 def _beyond_limits(motion: NodeMotion) -> Flags:
     """Return on which intervals a joint passes a limit, also for a moment, (N,)."""
     asked, t = motion.grid.problem.envelope, motion.grid.t
-    looks = (t[:-1, None] + np.diff(t)[:, None] * np.arange(_LOOKS) / _LOOKS).ravel()
+    looks = (t[:-1, None] + np.diff(t)[:, None] * np.arange(_SAMPLES) / _SAMPLES).ravel()
     q, qd = motion.trajectory(looks), motion.trajectory(looks, 1)
     beyond = (q < asked.lower) | (q > asked.upper) | (np.abs(qd) > asked.speed)
     return np.asarray(beyond.reshape(len(t) - 1, -1).any(axis=1))
@@ -335,9 +337,9 @@ def _through(grid: NodeGrid, q: Array) -> NodeMotion | None:
 
 
 def _resting(motion: NodeMotion, near: Array) -> Array:
-    """Return q̇ on the path that is nearest to another one, `near` (K, n), in what rests there.
+    """Return q̇ on the path that is nearest to another one, `near` (K, n), with the same rests.
 
-    What this is off the path is left to the joints that move, so that others go on resting.
+    The error from the path is left to the joints that move, so that others go on resting.
     """
     share = np.abs(near) / np.maximum(np.abs(near).max(axis=1, keepdims=True), _STILL)
     rows = motion.grid.problem.follows.jacobians(motion.place.q)
@@ -347,15 +349,15 @@ def _resting(motion: NodeMotion, near: Array) -> Array:
 
 
 def is_long(planner: Planner) -> bool:
-    """Whether the tool's way is many times the arm's reach, and nodes will do for the problem."""
+    """Whether the path is many times the arm's reach, and the problem is solved on nodes."""
     problem = planner.problem
-    return problem.way_in_reaches > LONG_WAY and is_on_nodes(problem, planner.effort)
+    return problem.way_in_reaches > LONG_PATH and is_on_nodes(problem, planner.effort)
 
 
 def keep_to_posture(planner: Planner) -> None:
-    """Optimise a stretch in the middle, then the whole path from motions in its postures.
+    """Optimise a segment in the middle, then the whole path from motions in its postures.
 
-    Where the user wants no more after the stretch, the motion in its posture has to do.
+    After an interruption of the segment, the motion in its posture is the result.
     """
     postures, ended = _postures(planner)
     for number, posture in enumerate(postures, 1):
@@ -368,7 +370,7 @@ def keep_to_posture(planner: Planner) -> None:
 
 
 def _end(planner: Planner, ended: Status) -> None:
-    """Let what stands be it, where the user wants no more; KeyboardInterrupt where nothing does."""
+    """Keep the present motion after an interruption; KeyboardInterrupt if there is none."""
     if planner.best is not None:
         planner.best.end(ended)
     elif ended is Status.INTERRUPTED:
@@ -422,7 +424,7 @@ def _postures(planner: Planner) -> tuple[list[Array], Status | None]:
     And what ended the search for them, if the user did.
     """
     problem = planner.problem
-    middle, half = 0.5, 0.5 * _STRETCH_WAY / problem.way_in_reaches
+    middle, half = 0.5, 0.5 * _SEGMENT_LENGTH / problem.way_in_reaches
     first, last = (problem.path.duration * share for share in (middle - half, middle + half))
     stretch = problem.changed(
         **problem.along(lambda path: Section(path, first, last)),

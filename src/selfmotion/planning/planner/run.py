@@ -1,4 +1,4 @@
-"""From a problem to a plan, and what is said of it."""
+"""From a problem to a plan and its report."""
 
 import time
 from collections import abc
@@ -31,7 +31,7 @@ from selfmotion.planning.result import Gap, Plan, Report
 from selfmotion.planning.search import SPACING, Sequence
 from selfmotion.problem.problem import Problem, check_feeds_of, check_problem
 
-# Evaluations of the cost that a damped motion may take.
+# Limit of evaluations of the cost of a damped motion.
 _DAMPED_EVALUATIONS = 400
 
 
@@ -93,7 +93,7 @@ def gathered(planner: Planner, deadline: Deadline) -> Plan:
 
 
 def _gap(planner: Planner, judged: Judged) -> Gap | None:
-    """Compare a plan with what the global search knows; None where it knows nothing."""
+    """Compare a plan with the global search; None without one."""
     if not planner.sequences or judged.part.candidate is not planner.best:
         return None
     motion, rival, rival_cost = judged.motion, planner.rival, judged.rival_cost
@@ -112,7 +112,7 @@ def _gap(planner: Planner, judged: Judged) -> Gap | None:
 
 
 def status_of(status: Status, certificate: Certificate) -> Status:
-    """Return how the optimisation ended; what the certificate finds kept is not infeasible."""
+    """Return the status of the optimisation; a verified motion is not infeasible."""
     kept = status is Status.INFEASIBLE and certificate.verified
     return Status.PRECISION if kept else status
 
@@ -126,7 +126,7 @@ def message_of(
     notes: abc.Sequence[str] = (),
     published: bool = False,
 ) -> str:
-    """Return in words how the optimisation ended, and what came of it."""
+    """Return the status of the optimisation and its result in words."""
     said = status.message
     if status is Status.GRADIENT and not certificate.on_path:
         least = certificate.smallest_singular_value
@@ -175,9 +175,9 @@ def plan(
     problem : Problem
     optimizer : Optimizer, optional
         Minimises by the published method: over the coefficients of the problem's null motion, a
-        cubic by default, with nothing asked but given ends and closure. By default Newton's method
-        on nodes keeps all constraints, and `QuasiNewton` serves where a null motion or damping
-        asks for the published method.
+        cubic by default, with given ends and closure as the only constraints. By default Newton's
+        method on nodes satisfies all constraints, and `QuasiNewton` is used where a null motion or
+        damping selects the published method.
     search : Search, optional
         How to search where the start is free, and whether to compare with a global search.
     warm_start : Plan, optional
@@ -193,15 +193,15 @@ def plan(
         the path (30 where the start is free), where limits of joint speed often cannot be met and
         trying would take minutes.
     deadline : float, optional
-        After so many seconds planning stops with the best motion so far: no worse than the
-        minimum-norm motion, or than what the search began with. It is then judged like any other
-        plan, which takes some more time.
+        Time after which planning stops with the best motion so far [s]: no worse than the
+        minimum-norm motion, or the warm start. It is then judged like any other plan, which takes
+        additional time.
     callback : callable, optional
         Called with each `Iteration`; returning True stops, keeping the best so far.
     progress : callable, optional
-        Told the stage, how much of it has begun, and of how many: ``("start", 3, 24)``; of 0, news:
-        that no motion passes a pose is told at once, before the part of the path that can be
-        followed is planned. It may raise `KeyboardInterrupt` to stop.
+        Called with the stage, its item and their number: ``("start", 3, 24)``; of 0, news: a pose
+        that no motion passes is reported at once, before the reachable part of the path is planned.
+        It may raise `KeyboardInterrupt` to stop.
 
     Returns
     -------
@@ -220,13 +220,13 @@ def plan(
     InverseKinematicsError
         The start is free and no configuration reaches the start of the path.
     FeedError
-        The path asks for a feed that it cannot have, whatever the arm; before anything is planned.
+        The path has a feed that is impossible for any arm; before any planning.
     NoSequenceError
         The global search finds that no motion follows the path; says where it ends and why.
     PlanError
         The deadline came before there was a complete motion.
     ProblemError
-        An argument is not what it should be, or has no effect on this problem.
+        An argument is invalid, or has no effect on this problem.
     KeyboardInterrupt
         The interruption came before there was a complete motion.
     """
@@ -285,14 +285,14 @@ def plan_along(problem: Problem, guide: Sequence, tolerance: Tolerance, progress
 
 
 def _planned(planner: Planner, clock: Deadline) -> Plan:
-    """Return the plan, told of an interruption that came when all was done."""
+    """Return the plan, with an interruption at its end in the report."""
     go_through(planner)
     found = gathered(planner, clock)
     return told_of(found, Status.INTERRUPTED) if was_interrupted() else found
 
 
 def told_of(plan: Plan, status: Status) -> Plan:
-    """Return a plan whose report says what kept another one from being tried to the end."""
+    """Return a plan whose report has the cause why another one was not completed."""
     message = f"{status.message}; before: {plan.report.message}"
     return replace(plan, report=replace(plan.report, status=status, message=message))
 

@@ -1,4 +1,4 @@
-"""Rough motions from many starts, and which of them are worth more: on nodes, all at once."""
+"""Rough motions from many starts on nodes, in one pass, and the ranking of these starts."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -16,21 +16,23 @@ from selfmotion.problem.constraints import penalised
 from selfmotion.problem.costs import Samples
 from selfmotion.problem.problem import Problem
 
-# Steps of Newton's method for rough motions.
+# Newton iterations of rough motions.
 _ROUGH_ROUNDS = 30
-# Rough optima on nodes whose costs differ by less than this share are mirror images; and joints are
-# within their limits to this share of a turn.
+# Relative difference of the costs of mirror images; also rounding of limits, as a share of a turn.
 _SAME_TO_DIGITS = 1e-9
-# Violations of images of one motion differ by less than this share.
+# Relative difference of the violations of images of one motion.
 _SAME_VIOLATION = 1e-6
-# So many rough motions at most; where conditions count, with so many steps more that know them.
-ROUGH_MOTIONS, _WITH_CONDITIONS = 16, 12
-# And so many of those that keep conditions from the beginning.
+# Largest number of rough motions.
+ROUGH_MOTIONS = 16
+# Newton iterations with constraints after these.
+_WITH_CONDITIONS = 12
+# Largest number of rough motions that are feasible from the start.
 _WITHIN = 6
-# Motions at x = 0 that are this near at all times [rad or m] lie in one valley of the cost, as a
-# rule; rough optima this near are the same.
+# Distance of motions at x = 0 [rad or m] in one valley of the cost, as a rule.
 ONE_VALLEY = 0.6
+# Distance of rough optima that are the same.
 _SAME_OPTIMUM = 0.1
+# A whole turn [rad].
 _TURN = 2.0 * np.pi
 
 
@@ -43,7 +45,7 @@ def usual_posture(robot: RobotModel) -> Array:
 
 
 def far_from_usual(robot: RobotModel, motions: Array) -> Array:
-    """Return how far motions (K, N, n) are from the usual posture on average, (K,) [rad]."""
+    """Return the mean distances of motions (K, N, n) from the usual posture, (K,) [rad]."""
     away = np.abs(motions - usual_posture(robot)) @ robot.joint_weights
     return np.asarray(away.mean(axis=1))
 
@@ -51,7 +53,7 @@ def far_from_usual(robot: RobotModel, motions: Array) -> Array:
 def wound_back(robot: RobotModel, motion: Array) -> Array:
     """Return a motion (N, n) with joints turned by whole turns, as near to usual as limits allow.
 
-    The tool is where it was. What fits nowhere within its limits is put in the middle of them.
+    The tool's motion is the same. Joints outside of their limits at any turn are put in the middle.
     """
     lowest, highest = motion.min(axis=0), motion.max(axis=0)
     middle, shift = 0.5 * (lowest + highest), np.zeros(robot.dof)
@@ -76,9 +78,9 @@ Apart = Callable[[Array, Array], Array]
 class Ranking:
     """Ranks starts by rough optima on nodes.
 
-    Of all of them at once first, in which conditions do not count: where the cheapest one keeps
-    them all the same, it is the best. Where none does for sure, a few steps with conditions tell
-    from which of the cheapest ones they can be kept, and what that costs.
+    All starts in one pass first, without constraints: if the cheapest motion satisfies them all the
+    same, it is the best. If none does for sure, a few iterations with constraints rank the cheapest
+    ones by feasibility and cost.
 
     Parameters
     ----------
@@ -90,7 +92,7 @@ class Ranking:
     def __init__(self, problem: Problem, effort: Effort, progress: Progress) -> None:
         self._problem, self._effort, self._progress = problem, effort, progress
         self._free = problem.given_start is None
-        # Whole turns are told by the limits that are asked for, not by the arm's own.
+        # Whole turns depend on the required limits, not on the arm's own.
         self._arm = problem.envelope.arm(problem.robot)
         self._apart = apart_of(problem.robot)
         self._t = rough_grid(problem).nodes
@@ -101,9 +103,9 @@ class Ranking:
 
     @property
     def ranked(self) -> list[NodeMotion]:
-        """The motions that were found so far, the best first."""
+        """The motions so far, the best first."""
         if not self._ranked and self._found is not None:
-            # Interrupted: the cheapest one that keeps all will do.
+            # After an interruption, the cheapest feasible one.
             near = (self._motion(self._found, k) for k in _cheapest(self._found))
             motions = [motion for motion in near if motion is not None]
             kept = (one for one in motions if one.violation <= 0.0)
@@ -116,7 +118,7 @@ class Ranking:
 
         The motions are at them where `at` of their times is, by default at the start of the path.
 
-        Returns whether that tells which starts are best.
+        Returns whether the ranking is complete.
         """
         problem = self._problem
         motions, arrived = carried(problem.follows, np.array(starts), self._t, at)
@@ -131,7 +133,7 @@ class Ranking:
                 return False
             free = optima
         if not self._ranked:
-            # Optima lie where nothing was asked: what keeps everything may begin elsewhere.
+            # Unconstrained optima may be elsewhere than feasible motions.
             begun = self._begun(max(ROUGH_MOTIONS, finalists))
             self._ranked = self._with_conditions(free, begun, finalists)
         return bool(self._ranked)
@@ -139,8 +141,8 @@ class Ranking:
     def left_aside(self, known: Sequence[Trajectory], finalists: int) -> list[NodeMotion]:
         """Return rough motions with conditions, unlike those that are known, the best first.
 
-        For where none of the best came to keep everything: between rough nodes a body may be met
-        that no node meets, so that what seems the best of all is none.
+        For the case that none of the best becomes feasible: a body may be met between rough nodes,
+        so that the ranking was wrong.
         """
         near = (self._near(motion(self._t)) for motion in known)
         others = [motion for motion in near if motion is not None]
@@ -153,7 +155,7 @@ class Ranking:
         return sorted(found, key=self._rank)[:finalists]
 
     def _begun(self, count: int) -> list[NodeMotion]:
-        """Return so many motions at starts with conditions, none an image of another one."""
+        """Return `count` motions at starts with constraints, none an image of another one."""
         found = list[NodeMotion]()
         for carried_on in self._carried:
             motion = self._near(carried_on)
@@ -166,8 +168,8 @@ class Ranking:
     def run_along(self, motions: Array, t: Array, finalists: int) -> bool:
         """Leave the best `finalists` of motions (K, N, n) on the path at times t (N,) [s].
 
-        Of those that are unlike each other the cheapest ones, with what they violate; after some
-        steps with conditions. Returns whether there is one.
+        Of different ones the cheapest, with their violations; after some iterations with
+        constraints. Returns whether there is one.
         """
         from scipy.interpolate import CubicSpline
 
@@ -198,7 +200,7 @@ class Ranking:
         return min(found, begun, key=self._rank)
 
     def _is_pointwise(self) -> bool:
-        """Whether costs can be told of motions side by side, and nothing is asked of ends.
+        """Whether costs are pointwise, and there is no condition on ends.
 
         Not where accelerations cost: few nodes say little of them.
         """
@@ -212,7 +214,7 @@ class Ranking:
     def _freely(self, motions: Array, finalists: int) -> list[NodeMotion] | None:
         """Return the rough optima near motions (K, N + 1, n), the cheapest first.
 
-        Those that are the best for sure are ranked. None where none is to be had.
+        Those that are the best for sure are ranked. None if none can be evaluated.
         """
         problem = self._problem
         nodes = self._grid(problem)
@@ -252,12 +254,12 @@ class Ranking:
             if found.costs[k] > dearest or len(kept) + len(others) == finalists:
                 break
             motion = self._motion(found, k)
-            # What costs the same to the last digits is one of the arm's mirror images.
+            # Equal costs to the last digits are mirror images.
             if motion is None or any(_same(motion.cost, one.cost) for one in kept):
                 continue
             if found.going[k] or not resolves(motion):
                 return []
-            # What got stuck may become better as well.
+            # One without progress may improve as well.
             stuck = found.promised[k] > ABOUT_AS_GOOD * abs(motion.cost)
             if stuck or motion.breaks_hard():
                 others.append(motion)
@@ -273,7 +275,7 @@ class Ranking:
     def _with_conditions(
         self, free: Sequence[NodeMotion], others: Sequence[NodeMotion], finalists: int
     ) -> list[NodeMotion]:
-        """Return the best of what a few steps with conditions make of motions, different ones.
+        """Return the best results of a few iterations with constraints, different ones.
 
         Of optima without conditions, the cheapest first; and of others where none of these keeps
         everything.
@@ -288,10 +290,10 @@ class Ranking:
             if free and number > len(free) and found and found[0][1].violation <= 0.0:
                 break
             if number <= len(free) and found and (False, motion.cost) >= found[0][0]:
-                # With conditions it would cost more still.
+                # With constraints it would cost more still.
                 continue
             self._progress("start", number, total)
-            # It is a long way from where there is no self-motion.
+            # Motions without self-motion are far from optima.
             most = _WITH_CONDITIONS if number <= len(free) else _ROUGH_ROUNDS
             better = minimise(motion, lambda _: False, roughly=True, max_iterations=most).motion
             found = sorted([*found, (self._rank(better), better)], key=lambda each: each[0])
@@ -305,19 +307,19 @@ class Ranking:
         return [motions[k] for k in alone]
 
     def _rank(self, motion: NodeMotion) -> tuple[bool, float]:
-        """Return what sorts motions, the best first: what is not kept yet has its price."""
+        """Return the sort key of motions, the best first: violations have a penalty."""
         cost = motion.cost
         return not self._clear(motion), cost + UNKEPT * abs(cost) * motion.violation
 
     def _motion(self, found: Batch, k: int) -> NodeMotion | None:
-        """Return one of the motions, with the conditions that are asked of it.
+        """Return one of the motions, with its constraints.
 
-        Its joints are turned by whole turns to where people expect them. What knows no limits may
-        have gone far beyond them, and the tool is where it was.
+        Its joints are turned by whole turns towards the usual posture. Without limits they may have
+        gone far beyond them, and the tool's motion is the same.
         """
         q = found.q[k]
         motion = self._near(wound_back(self._arm, q), found.qd[k], found.qdd[k])
-        # Costs may know one turn from another.
+        # Costs may depend on whole turns.
         if motion is not None and motion.cost <= (1.0 + _SAME_TO_DIGITS) * found.costs[k]:
             return motion
         return self._near(self._turned_inside(q), found.qd[k], found.qdd[k])
@@ -328,7 +330,7 @@ class Ranking:
         if not order.size:
             return order
         robot, costs = self._arm, found.costs[order]
-        # Each motion belongs with the cheapest one that is about as cheap.
+        # Each motion belongs to the cheapest one of about the same cost.
         group, first = np.zeros(len(order), dtype=np.int64), 0
         for k in range(1, len(order)):
             if costs[k] - costs[first] > NOTHING * abs(costs[first]):
@@ -358,13 +360,13 @@ class Ranking:
 
 
 def _cheapest(found: Batch) -> Ints:
-    """Return the numbers of motions, the cheapest first, without those that are not to be had."""
+    """Return the numbers of motions, the cheapest first, without those of infinite cost."""
     order = np.argsort(found.costs, kind="stable")
     return np.asarray(order[np.isfinite(found.costs[order])])
 
 
 def _hopeful(found: Batch) -> Flags:
-    """Return which motions are on their way, and may come to cost less than what has arrived."""
+    """Return the mask of motions that go on, and may become cheaper than the finished ones."""
     least = found.costs[~found.going].min(initial=np.inf)
     dearest = least + ABOUT_AS_GOOD * abs(least) if np.isfinite(least) else least
     return np.asarray(found.going & (found.costs - found.promised < dearest))
@@ -373,7 +375,7 @@ def _hopeful(found: Batch) -> Flags:
 def _is_image(motion: NodeMotion, others: Sequence[NodeMotion]) -> bool:
     """Whether one of others costs and violates the same to the last digits.
 
-    As where only a turn of the tool about its free axis tells them apart, or a mirror.
+    Those that differ by a rotation of the tool about its free axis, or by a mirror.
     """
     return any(
         _same(motion.cost, one.cost)
@@ -396,9 +398,9 @@ def most_promising(
 ) -> list[int]:
     """Return numbers of starts, the best first, and those last that are near a better one.
 
-    By what the motions cost that follow the path from them without self-motion, and by how much
-    these violate: the start of one that is near a better one moves there by itself. Last of all
-    come those from which the path cannot be followed like that.
+    By the cost of the motions that follow the path from them without self-motion, and their
+    violations: the start of one near a better one moves there by itself. Starts that cannot follow
+    the path come last.
 
     Parameters
     ----------
@@ -407,9 +409,9 @@ def most_promising(
     motions : (K, N, n)
         The motions from them, at few times t (N,) [s].
     arrived : (K,)
-        Which of them follow the path to its end.
+        Mask of those that follow the path to its end.
     apart : callable
-        How far motions are from each other.
+        Distance of motions.
     """
     merits = np.full(len(starts), np.inf)
     twists = problem.follows.twists(t)
@@ -440,13 +442,13 @@ def _merit(problem: Problem, q: Array, twists: Array, sampling: Sampling) -> flo
 
 
 def problem_cost(problem: Problem, samples: Samples) -> float:
-    """Return what a motion costs."""
+    """Return the cost of a motion."""
     weights = samples.sampling.weights
     return sum(float(weights @ cost.value(samples)) for cost in problem.all_costs)
 
 
 def apart_of(robot: RobotModel) -> Apart:
-    """Return how far motions of an arm are from each other, at most, up to whole turns."""
+    """Return the largest distance of an arm's motions, modulo whole turns, as a function."""
     turning, sizes = robot.is_revolute, robot.coordinate_sizes
 
     def apart(motion: Array, others: Array) -> Array:

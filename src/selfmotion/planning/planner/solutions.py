@@ -1,4 +1,4 @@
-"""What is known of a motion that was found, by the published method or on nodes, as one value."""
+"""Solutions, of the published method or on nodes, as values."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -24,12 +24,11 @@ from selfmotion.problem.constraints import (
 )
 from selfmotion.problem.costs import Samples
 
-# What is asked of the ends is met to this [rad, rad/s].
+# Residual of conditions at the ends [rad, rad/s].
 ENDS_MET = 1e-8
-# What would save less than this share of the cost does not bind.
+# Relative saving below which a constraint does not bind.
 _LEAST_SAVING = 1e-6
-# An easing that would save more than this share is told smaller: multipliers are slopes, which hold
-# very near only.
+# Largest relative saving in reports: multipliers are first derivatives, which are valid nearby.
 _MOST_SAVING = 1e-2
 
 
@@ -40,19 +39,19 @@ class PublishedSolution(paper.Solution):
     Attributes
     ----------
     constraints : sequence of BoundConstraint
-        Judged, not asked.
+        Judged, not required.
     """
 
     constraints: Sequence[BoundConstraint] = ()
 
     @cached_property
     def violations(self) -> tuple[str, ...]:
-        """What is wrong for each constraint that it could not meet."""
+        """Violations, one for each constraint."""
         return violated(self.constraints, self._samples)
 
     @property
     def active(self) -> tuple[ActiveConstraint, ...]:
-        """Nothing: constraints are not asked of it, only judged."""
+        """No constraint: they are judged, not required."""
         return ()
 
     @property
@@ -61,7 +60,7 @@ class PublishedSolution(paper.Solution):
 
     @cached_property
     def keeps_off_itself(self) -> bool:
-        """Whether the arm does where only the default asks it to, at the nodes and by meshes."""
+        """Whether the default clearance from itself holds, at the nodes and by meshes."""
         return self.method.problem.keeps_off_itself(self.nodes)
 
     @property
@@ -75,7 +74,7 @@ class PublishedSolution(paper.Solution):
         return penalised(self.cost, self.constraints, self._samples)
 
     def refined(self, where: Flags | None = None) -> Self:
-        """Return it with half the step length, everywhere or for some of the steps (N,).
+        """Return it with half the step length, for all or some of the steps (N,).
 
         As it is where it breaks down on that grid.
         """
@@ -96,9 +95,9 @@ class NodeSolution:
     multipliers : (R,)
         Of all rows of its conditions.
     remaining : float or None
-        What more nodes and another step might still save [cost]; None where that is not known.
+        Possible decrease of the cost by more nodes and another step; None if unknown.
     optimum : Optimum or None
-        What it was found as; None of what is none.
+        The optimum it is; None for other motions.
     is_chain : bool
         Whether it is a chain of the global search, which is at its optimum.
     """
@@ -125,12 +124,12 @@ class NodeSolution:
 
     @cached_property
     def active(self) -> tuple[ActiveConstraint, ...]:
-        """What kept the optimum from a lower cost; on the way to one, multipliers say nothing."""
+        """Constraints that limit the optimum; none before convergence, without multipliers."""
         return _active(self.optimum) if self.optimum is not None and self.has_arrived else ()
 
     @property
     def has_arrived(self) -> bool:
-        """Whether it is an optimum, and no motion on the way to one."""
+        """Whether it is an optimum."""
         return self.optimum is None or self.optimum.status in (Status.CONVERGED, Status.PRECISION)
 
     @property
@@ -155,18 +154,18 @@ class NodeSolution:
 
     @cached_property
     def keeps_off_itself(self) -> bool:
-        """Whether the arm does where only the default asks it to, at the nodes and by meshes."""
+        """Whether the default clearance from itself holds, at the nodes and by meshes."""
         return self.motion.grid.problem.keeps_off_itself(self.motion.place.q)
 
     @cached_property
     def violations(self) -> tuple[str, ...]:
-        """What is wrong for each constraint that it could not meet."""
+        """Violations, one for each constraint."""
         motion = self.motion
         ends = np.abs(motion.c).max(initial=0.0)
-        # Written so that NaN is not kept.
+        # Written so that NaN is a violation.
         if motion.violation <= 0.0 and ends <= ENDS_MET and not motion.elsewhere:
             return ()
-        # What control points exceed, the curve may keep.
+        # The curve may satisfy limits that control points exceed.
         broken = violated(motion.grid.constraints, motion.checked)
         return broken + tuple(
             f"{name}: the motion ends {far:.3g} rad or m away from it, in another configuration "
@@ -176,7 +175,7 @@ class NodeSolution:
 
     @property
     def breaks_at(self) -> float | None:
-        """When [s] constraints are violated most; None where those of all times are kept."""
+        """Time [s] of the largest violation; None where conditions at all times hold."""
         return worst_time(self.motion.grid.constraints, self.motion.checked)
 
     def merit(self) -> float:
@@ -195,12 +194,12 @@ class NodeSolution:
         return found
 
     def after(self, before: float) -> "NodeSolution":
-        """Return it as what came of a motion on fewer nodes that cost so much."""
+        """Return it as the refinement of a motion on fewer nodes that cost `before`."""
         remaining = (self.remaining or 0.0) + max(before - self.cost, 0.0)
         return replace(self, remaining=remaining)
 
     def on(self, t: Array) -> "NodeSolution | None":
-        """Return it on other nodes (N + 1,); None where one of them is out of reach.
+        """Return it on other nodes (N + 1,); None if one of them is out of reach.
 
         Beside a singular pose the path may be so, by next to nothing: a little later it is not.
         """
@@ -216,7 +215,7 @@ class NodeSolution:
         return None
 
     def refined(self, where: Flags | None = None) -> "NodeSolution":
-        """Return it with all intervals halved, or some (N,); as it is where that cannot be."""
+        """Return it with all intervals halved, or some (N,); unchanged where that fails."""
         return self.on(Grid(self.motion.grid.t).halved(where).nodes) or self
 
 
@@ -225,7 +224,7 @@ Solution = PublishedSolution | NodeSolution
 
 
 def score(solution: Solution) -> tuple[bool, bool, float]:
-    """Return what ranks motions, the smaller, the better.
+    """Return the sort key of motions, the smaller, the better.
 
     Whether constraints are violated, whether the arm meets itself, which would be refused in the
     end, and the cost. Of two that violate constraints, the one that does so less is nearer to a
@@ -237,7 +236,7 @@ def score(solution: Solution) -> tuple[bool, bool, float]:
 
 
 def _active(optimum: Optimum) -> tuple[ActiveConstraint, ...]:
-    """Return what kept an optimum from a lower cost."""
+    """Return the constraints that limit an optimum."""
     if not (optimum.multipliers.any() or optimum.end_multipliers.size):
         return ()
     motion, grid = optimum.motion, optimum.motion.grid

@@ -1,8 +1,8 @@
-"""The list that a plan goes through: look, propose and polish, judge; in this order, and when.
+"""The steps of a plan: look, propose and polish, judge; in this order, each with its condition.
 
-A proposal is a motion to begin with, or several, cheap ones first. `Planner.polish` optimises each
-and keeps the best; a proposal is left out where what is known will do. In the end the best is
-judged, on finer grids until its certificate finds nothing wrong, or a part of it is.
+A proposal is one or several initial guesses, cheap ones first. `Planner.polish` optimises each and
+keeps the best; a proposal is skipped where the present motion suffices. In the end the best is
+judged, on finer grids until its certificate has no failure, or a part of it is.
 """
 
 import time
@@ -24,7 +24,7 @@ from selfmotion.planning.planner.effort import Search
 from selfmotion.planning.planner.grids import is_on_nodes
 from selfmotion.planning.planner.planner import Planner
 from selfmotion.planning.planner.proposals import (
-    VERY_LONG_WAY,
+    VERY_LONG_PATH,
     is_long,
     keep_to_posture,
     may_stack,
@@ -44,7 +44,8 @@ _WHERE_IT_BREAKS = "starts where it breaks"
 def go_through(planner: Planner) -> None:
     """Try everything that applies, in order.
 
-    An interruption ends one step; of those after it, what applies to the best so far is done.
+    An interruption ends one step; of those after it, the ones that apply to the best so far are
+    done.
 
     Raises
     ------
@@ -66,7 +67,7 @@ def go_through(planner: Planner) -> None:
 
 
 def _outcome(planner: Planner) -> tuple[str, float | None]:
-    """Return in words what is best, and what it costs."""
+    """Return the best motion in words, and its cost."""
     judged, best = planner.judged, planner.best
     if judged is not None:
         parts = (judged.part.ending, judged.certificate.verdict)
@@ -88,13 +89,13 @@ def _look(planner: Planner) -> bool:
         return False
     blocked = planner.blocked = _looked_at(planner.problem, planner.search)
     if blocked is not None:
-        # What can be planned all the same takes many times as long as the 'no'.
+        # Planning the rest takes many times as long as this message.
         planner.progress(f"no motion passes t = {blocked.time:.6g} s: {blocked.reason}", 0, 0)
     return True
 
 
 def _plan_before_blocked_pose(planner: Planner) -> bool:
-    """Plan what comes before a pose that is out of reach."""
+    """Plan the part before a pose that is out of reach."""
     blocked = planner.blocked
     if blocked is None or blocked.is_met:
         return False
@@ -139,8 +140,8 @@ def _begin_at_plan(planner: Planner) -> bool:
 
 
 def _keep_to_posture(planner: Planner) -> bool:
-    """Optimise from motions in the postures that are best on a stretch, on a very long path."""
-    return planner.problem.way_in_reaches > VERY_LONG_WAY and _try_postures(planner)
+    """Optimise from motions in the best postures of a segment, on a very long path."""
+    return planner.problem.way_in_reaches > VERY_LONG_PATH and _try_postures(planner)
 
 
 def _begin_at_start(planner: Planner) -> bool:
@@ -167,7 +168,7 @@ def _draw_starts(planner: Planner) -> bool:
 
 def _compare_postures(planner: Planner) -> bool:
     """Do so on a path that is long, where it may lead to a better motion than other starts."""
-    return planner.problem.way_in_reaches <= VERY_LONG_WAY and _try_postures(planner)
+    return planner.problem.way_in_reaches <= VERY_LONG_PATH and _try_postures(planner)
 
 
 def _try_postures(planner: Planner) -> bool:
@@ -229,7 +230,7 @@ def _draw_where_it_breaks(planner: Planner) -> bool:
         return False
     if best is None and not isinstance(failure, BreakdownError):
         return False
-    # Of what is asked of the ends, and of an arm that meets itself, no time is told: others there.
+    # Conditions on ends and self-collision have no time: others do.
     at = best.breaks_at if best is not None else cast(BreakdownError, failure).time
     optimise_where_it_breaks(planner, at or 0.0, search.starts, search.finalists)
     return True
@@ -246,7 +247,7 @@ def _search_globally(planner: Planner) -> bool:
 
 
 def _plan_largest_part(planner: Planner) -> bool:
-    """Plan the part that can be followed, where there is no motion, or poses are out of reach.
+    """Plan the largest part, where there is no motion, or poses are out of reach.
 
     No other motion on finer grids would be better then.
     """
@@ -297,7 +298,7 @@ def _plan_part_instead(planner: Planner) -> bool:
     if best is None or judged is None or best is not judged.part.candidate:
         return False
     check = judged.certificate
-    # With damping the motion goes on where the path cannot be followed: so it was asked for.
+    # With damping the motion goes on off the path, as requested.
     if best.is_spent or planner.problem.damping is not None:
         return False
     out_of_limits = bool(best.violations) and check.limit_margin.value < 0.0
@@ -335,7 +336,7 @@ def _draw_where_proof_fails(planner: Planner) -> bool:
 
 
 def _look_what_stops(planner: Planner) -> bool:
-    """Look what stops a motion that is not verified: whether the arm can be there at all."""
+    """Find the obstruction of a motion that is not verified: whether single poses are reachable."""
     judged, problem = planner.judged, planner.problem
     if judged is None or judged.certificate.verified or judged.part.candidate.cut_short:
         return False
@@ -369,12 +370,12 @@ def _passing(blocked: Obstruction) -> str:
     )
 
 
-# By name, as reports have it; each says whether it was tried.
+# Names as in reports; each function returns whether it was tried.
 STEPS: tuple[tuple[str, Callable[[Planner], bool]], ...] = (
     # Look: a 'no' before anything is planned.
     ("look at single poses", _look),
     ("part before a pose out of reach", _plan_before_blocked_pose),
-    # Propose and polish, until one will do.
+    # Propose and polish until one suffices.
     ("motion that is known", _follow_guide),
     ("warm start", _begin_at_plan),
     ("posture of a stretch", _keep_to_posture),
@@ -396,17 +397,17 @@ STEPS: tuple[tuple[str, Callable[[Planner], bool]], ...] = (
 
 
 def _looked_at(problem: Problem, search: Search) -> Obstruction | None:
-    """Return a pose that the arm cannot be at; None where it can be at all that were looked at.
+    """Return an unreachable pose; None if all sampled ones are reachable.
 
-    Or where it goes on all the same: damped motions leave their path, and what only keeps the arm
-    apart from itself was not asked for.
+    Also None where the motion can go on: damped motions leave their path, and self-collision under
+    the default clearance is not required.
 
     Raises
     ------
     InverseKinematicsError
         It is the first pose, which is out of reach.
     NoSequenceError
-        Bodies that were asked to be kept apart are met there.
+        Bodies with a required clearance are met there.
     """
     if problem.damping is not None:
         return None
@@ -421,7 +422,7 @@ def _looked_at(problem: Problem, search: Search) -> Obstruction | None:
 
 
 def _is_in_own_reach(problem: Problem, pose: SE3) -> bool:
-    """Whether limits that were asked for, and not the arm's own, keep it from a pose."""
+    """Whether required limits, and not the arm's own, exclude a pose."""
     asked = problem.asked
     if not any(isinstance(item, JointPositionLimits) for item in problem.constraints):
         return False
@@ -433,7 +434,7 @@ def _is_in_own_reach(problem: Problem, pose: SE3) -> bool:
 
 
 def _no_way(problem: Problem, blocked: Obstruction) -> SelfmotionError:
-    """Return the error that says what is in the way, and what would help."""
+    """Return the error with the obstruction and remedies."""
     robot, pose = problem.robot, problem.path.pose(blocked.time)
     task = problem.asked.task.value
     if not blocked.is_met and blocked.time == 0.0:

@@ -33,8 +33,8 @@ from selfmotion.certificate import (
     Requirement,
     Tolerance,
     allowed_text,
-    apart_text,
     approaches,
+    relaxed_text,
 )
 from selfmotion.model.collision import Obstacle
 from selfmotion.model.motion import Trajectory
@@ -384,7 +384,7 @@ def reached_text(plans: Sequence[Plan], tolerance: Tolerance) -> str:
     relaxed = any(plan.certificate.deviations for plan in plans)
     return (
         f"at most {position:.1e} m and {rotation:.1e} rad off the path"
-        f"{apart_text(relaxed)}{allowed_text(tolerance)}"
+        f"{relaxed_text(relaxed)}{allowed_text(tolerance)}"
     )
 
 

@@ -1,4 +1,4 @@
-"""Where to begin: start configurations, self-motion curves, chains over them, reach."""
+"""Initial guesses: start configurations, self-motion curves, chains over them, reachability."""
 
 from selfmotion.planning.search.chains import Sequence as Sequence
 from selfmotion.planning.search.curves import (
@@ -20,14 +20,14 @@ from selfmotion.planning.search.obstruction import (
     obstruction as obstruction,
     reachable as reachable,
 )
+from selfmotion.planning.search.segments import (
+    ChainSegment as ChainSegment,
+    ChainSegments as ChainSegments,
+    turned_towards as turned_towards,
+)
 from selfmotion.planning.search.stacked import Stacked as Stacked, metrics as metrics
 from selfmotion.planning.search.starts import (
     carried as carried,
     spread as spread,
     start_candidates as start_candidates,
-)
-from selfmotion.planning.search.stretches import (
-    Stretch as Stretch,
-    Stretches as Stretches,
-    turned_towards as turned_towards,
 )

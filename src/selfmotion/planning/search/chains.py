@@ -1,4 +1,4 @@
-"""Dynamic programming over the waypoints: the best chains of nodes, and why there is none."""
+"""Dynamic programming over waypoints: the best chains of vertices, and why there is none."""
 
 import itertools
 from collections.abc import Callable
@@ -11,14 +11,15 @@ from selfmotion.basics import Array, Flags, Ints, read_only
 from selfmotion.model.collision import Closest, CollisionModel
 from selfmotion.planning.search.curves import CurveSet, SelfMotion
 from selfmotion.planning.search.measures import Length, Measure
-from selfmotion.planning.search.nodes import Admissible
+from selfmotion.planning.search.vertices import Admissible
 
-# The jagged chain of samples is smoothed by a spline with this many of them per interval.
+# Intervals of the spline that smooths a chain, per interval of the chain.
 _SMOOTHING = 3
-# Chains are unlike when some joint differs by this [rad or m] at this share of the waypoints.
+# Difference of some joint [rad or m] by which chains count as different …
 UNLIKE = 0.3
+# … at this share of the waypoints.
 _UNLIKE_FOR = 0.1
-# Stations: so many waypoints, evenly.
+# Evenly spread waypoints through which different chains are sought.
 _STATIONS = 7
 
 
@@ -35,7 +36,7 @@ class Sequence:
     length : float
         Σ w|Δq| over waypoints and joints, w being the joints' weights (`RobotModel.joint_weights`).
     cost : float
-        What it was chosen by; see `Measure`.
+        Its cost by the measure; see `Measure`.
     """
 
     t: Array
@@ -63,20 +64,19 @@ class Sequence:
         return make_lsq_spline(t, self.q, knots).derivative()
 
     def __call__(self, t: Array) -> Array:
-        """Return q̇ at times `t` (S,), (S, n): what stands for x = 0 where it is a guide."""
+        """Return q̇ at times `t` (S,), (S, n): the motion of x = 0 along a guide."""
         return np.asarray(self._rate(t))
 
 
 @dataclass(frozen=True, eq=False)
 class Chains:
-    """The cheapest chains to every node, or from every node when made backwards.
+    """The cheapest chains to every vertex, or from every vertex when made backwards.
 
-    Attributes
-    ----------
+    Attributes Least cost from the first waypoint; inf where no chain arrives.
     cost : tuple of (N_i,)
         The least from the first waypoint; inf where no chain arrives.
     parent : tuple of (N_i,)
-        The node before on that chain, -1 where there is none.
+        The vertex before on that chain, -1 for none.
     """
 
     cost: tuple[Array, ...]
@@ -90,9 +90,9 @@ class Chains:
                 return i
         return None
 
-    def back(self, waypoint: int, node: int) -> list[int]:
-        """Return the nodes of the chain that arrives at a node, first to last."""
-        chain = [node]
+    def back(self, waypoint: int, vertex: int) -> list[int]:
+        """Return the vertices of the chain that arrives at a vertex, first to last."""
+        chain = [vertex]
         for i in range(waypoint, 0, -1):
             chain.append(int(self.parent[i][chain[-1]]))
         return chain[::-1]
@@ -106,7 +106,7 @@ def best_chains(
     Parameters
     ----------
     layers : list of (N_i, n)
-        Nodes at the waypoints, each layer sorted by the first joint.
+        Vertices at the waypoints, each layer sorted by the first joint.
     largest_step : (n,) or (W - 1, n)
         No joint may move more between waypoints.
     turning : (n,)
@@ -133,9 +133,9 @@ def diverse_chains(
     count: int,
     measure: Measure | None = None,
 ) -> list[list[int]]:
-    """Return up to `count` chains of nodes: the cheapest one, then the cheapest unlike the others.
+    """Return up to `count` chains: the cheapest one, then the cheapest unlike the others.
 
-    Each is the cheapest chain through some node of a few waypoints spread over the motion. Mirror
+    Each is the cheapest chain through some vertex of a few waypoints spread over the motion. Mirror
     images, whose joints move by the same amounts (a wrist turned over), come only where there are
     too few others.
     """
@@ -151,14 +151,14 @@ def diverse_chains(
     chosen: list[list[int]] = []
     mirrored: list[list[int]] = []
     taken: list[Array] = []
-    # A chain through a node near a chosen one is rarely unlike it, and another node finds it.
+    # A chain through a vertex near a chosen one is rarely different, and another vertex finds it.
     covered = {i: np.zeros(len(layers[i]), dtype=bool) for i in stations}
-    for total, i, node in sorted(through):
+    for total, i, vertex in sorted(through):
         if not np.isfinite(total) or len(chosen) == count:
             break
-        if covered[i][node]:
+        if covered[i][vertex]:
             continue
-        chain = forward.back(i, node) + reverse.back(len(layers) - 1 - i, node)[-2::-1]
+        chain = forward.back(i, vertex) + reverse.back(len(layers) - 1 - i, vertex)[-2::-1]
         q = np.array([layer[k] for layer, k in zip(layers, chain, strict=True)])
         if all(unlike(q, other, turning) for other in taken):
             images = any(_mirrors(q, other, turning) for other in taken)
@@ -190,12 +190,12 @@ def ranked(
 
 
 def stations_of(count: int) -> list[int]:
-    """Return a few waypoints of so many, first and last included, as evenly as can be."""
+    """Return numbers of a few waypoints of `count`, first and last included, evenly spread."""
     return sorted({round(k) for k in np.linspace(0, count - 1, _STATIONS).tolist()})
 
 
 def in_order(q: Array) -> Array:
-    """Return nodes (K, n) of one waypoint, sorted by the first joint."""
+    """Return vertices (K, n) of one waypoint, sorted by the first joint."""
     return np.ascontiguousarray(q[np.argsort(q[:, 0], kind="stable")])
 
 
@@ -229,7 +229,7 @@ def why_blocked(
     target: Array,
     curves: CurveSet,
     alive: Array,
-    nodes: Array,
+    vertices: Array,
     bounds: Admissible,
     largest_step: Array,
 ) -> str:
@@ -243,24 +243,24 @@ def why_blocked(
     curves : CurveSet
         All configurations there.
     alive : (A, n)
-        Nodes of the waypoint before that chains reach; empty at the first waypoint.
-    nodes : (N, n)
-        Nodes at the waypoint.
+        Vertices of the waypoint before that chains reach; empty at the first waypoint.
+    vertices : (N, n)
+        Vertices at the waypoint.
     bounds : Admissible
     largest_step : (n,)
     """
     if not curves.curves:
         return f"no configuration puts '{motion.robot.tool}' on the path there"
-    if len(nodes) == 0:
+    if len(vertices) == 0:
         samples = np.vstack([curve.q for curve in curves.curves])
         return f"of all configurations there, {_refusals(samples, bounds, motion)}"
     continued, arrived = motion.project_all(alive, target)
     ending = continued[arrived]
     ending = ending[~bounds.free(ending)]
-    step = _step(alive, nodes, bounds, largest_step, motion)
+    step = _step(alive, vertices, bounds, largest_step, motion)
     if not len(ending):
         return step
-    # What ends is the cause; that the others are out of reach only follows.
+    # The one that ends is the cause; the others are out of reach in consequence.
     return (
         f"of the configurations that continue what was reached before, "
         f"{_refusals(ending, bounds, motion)}; to the others there is {step}"
@@ -268,7 +268,7 @@ def why_blocked(
 
 
 def _refusals(samples: Array, bounds: Admissible, motion: SelfMotion) -> str:
-    """Say what excludes configurations: the joint or the pair nearest to allowing one."""
+    """Return in words what excludes configurations: the joint or pair nearest to being allowed."""
     excess = bounds.excess(samples)
     outside = excess.max(axis=1) > 0.0
     parts = []
@@ -295,15 +295,15 @@ def _refusals(samples: Array, bounds: Admissible, motion: SelfMotion) -> str:
 
 
 def _roomiest(model: CollisionModel, configurations: Array) -> Closest:
-    """Return the closest pair of the configuration (of K, n) where that pair is farthest apart."""
+    """Return the closest pair of the configuration (of K, n) with the largest distance."""
     return max((model.distance(q) for q in configurations), key=lambda closest: closest.value)
 
 
 def _step(
-    alive: Array, nodes: Array, bounds: Admissible, largest_step: Array, motion: SelfMotion
+    alive: Array, vertices: Array, bounds: Admissible, largest_step: Array, motion: SelfMotion
 ) -> str:
-    """Name the joint whose step limit keeps the nearest node away."""
-    steps = np.abs(unturned(nodes[None] - alive[:, None], bounds.turning))
+    """Name the joint whose step limit keeps the nearest vertex away."""
+    steps = np.abs(unturned(vertices[None] - alive[:, None], bounds.turning))
     ratios = (steps / largest_step).max(axis=-1)
     a, b = np.unravel_index(int(np.argmin(ratios)), ratios.shape)
     k = int(np.argmax(steps[a, b] / largest_step))
@@ -315,7 +315,7 @@ def _step(
 
 
 def _amount(motion: SelfMotion, k: int, change: float) -> str:
-    """Return in words how far a joint goes where its coordinate changes by so much."""
+    """Return in words the motion of a joint for a change of its coordinate."""
     robot = motion.robot
     far = change * robot.coordinate_sizes[k]
     return f"{far:.3g} {robot.unit_of(robot.joint_names[k])}"

@@ -15,23 +15,24 @@ from selfmotion.planning.search.measures import wrapped
 
 # Largest distance of samples along a curve [rad or m], configuration norm.
 SPACING = 0.1
-# Corrections of a sample before its step is halved, and the share of the largest step below which
-# a curve ends.
+# Corrections of a sample before its step is halved.
 _CORRECTIONS = 6
+# Smallest step as a share of the largest: a curve ends there.
 _SMALLEST_STEP = 1.0 / 64.0
-# Neighbours whose tangents differ by more than acos of this are too far apart to be trusted to
-# lie on the same branch.
+# Neighbours with tangents at more than acos of this may be on different branches.
 _ALIGNED = 0.93
 # A configuration this near [rad or m] to a curve's polyline is on the curve.
 ON_CURVE = 0.02
-# Samples after which a curve is given up.
+# Largest number of samples of a curve.
 _MOST_SAMPLES = 5000
-# Of the samples of a curve, every so manieth looks for the curve at the next waypoint.
+# One in this many samples of a curve is a seed at the next waypoint.
 _CARRIED = 6
 
 
-# What is known of a curve on the way.
-GOING, CLOSED, ENDED = 0, 1, 2
+# States of the continuation of a curve.
+GOING = 0
+CLOSED = 1
+ENDED = 2
 
 
 @kernel
@@ -47,7 +48,7 @@ def walk(
 ) -> tuple[int, bool]:
     """Follow a self-motion curve from `start` (n,) along `tangent`.
 
-    Sets `samples` (K, n); returns how many there are, and whether they lead back to the start.
+    Sets `samples` (K, n); returns their number, and whether they lead back to the start.
     """
     n, tips = len(start), layout.shape[0]
     r, p = np.empty((chains.shape[1], 3, 3)), np.empty((chains.shape[1], 3))
@@ -93,7 +94,7 @@ def _advance(
 
     q is the iterate at which the Jacobian was taken, and on return the one to take it at next.
     `samples` (K, n) receives the curve. `tangents` (3, n): at the last sample, at the iterate, at
-    the start. `state`: step, corrections so far, samples so far, largest step.
+    the start. `state`: step, corrections and samples so far, largest step.
     """
     n, count = q.shape[0], int(state[2])
     last = samples[count - 1]
@@ -134,7 +135,7 @@ def _advance(
 
 @inlined
 def _passes_start(samples: Array, count: int, revolute: Flags, tangents: Array) -> bool:
-    """Whether the last segment passes the start, modulo turns; then it is made to end there."""
+    """Whether the last segment passes the start, modulo turns; it is then cut there."""
     n = samples.shape[1]
     square, dot, cosine = 0.0, 0.0, 0.0
     home = np.empty(n)
@@ -164,8 +165,8 @@ def locate(
 ) -> tuple[int, float, float]:
     """Return the nearest segment's first sample, the share along it, and the distance to q.
 
-    `samples` (K, n) are polylines one after the other, `curve` (K,) says which one each is of.
-    Only segments that start within `near` of q in each coordinate count; -1 when there is none.
+    `samples` (K, n) are polylines one after the other, `curve` (K,) has their numbers. Only
+    segments that start within `near` of q in each coordinate count; -1 for none.
     """
     n, count = samples.shape[1], samples.shape[0]
     best, best_share, best_square = -1, 0.0, np.inf
@@ -264,7 +265,7 @@ class CurveSet:
             return np.full(len(q), -1), np.zeros(len(q))
         i, share, distance = locate_all(q, self._samples, self._curve, self._revolute, self._near)
         found = distance < ON_CURVE
-        # Of what is on no curve any segment will do.
+        # Rows without a curve may take any segment.
         i = np.where(found, i, 0)
         arc = self._arcs[i] + share * (self._arcs[i + 1] - self._arcs[i])
         return np.where(found, self._curve[i], -1), arc
@@ -318,7 +319,7 @@ class SelfMotion:
     def project_all(
         self, q: Array, target: Array, *, far: bool = False
     ) -> tuple[Array, npt.NDArray[np.bool_]]:
-        """Return what Newton's method reaches from configurations (K, n), and where it does, (K,).
+        """Return the results of Newton's method from configurations (K, n), and convergence, (K,).
 
         Parameters
         ----------
@@ -388,9 +389,9 @@ def curves_along(
 ) -> list[CurveSet]:
     """Return the self-motion curves at all waypoints.
 
-    Curves of one waypoint are looked for at the next and then, from the last waypoint back, at the
+    Curves of one waypoint are continued to the next and then, from the last waypoint back, to the
     previous one; `seeds` are tried at every `every`-th waypoint and at the last one. So a curve is
-    missed only when it lives between two such waypoints alone, or no seed leads to it.
+    missed only when it exists between two such waypoints alone, or no seed leads to it.
 
     Parameters
     ----------

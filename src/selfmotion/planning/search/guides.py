@@ -11,35 +11,38 @@ from selfmotion.model.task import log3
 from selfmotion.planning.search.chains import Sequence
 from selfmotion.planning.search.manifold import OnPath
 from selfmotion.planning.search.measures import Length, measure_of
-from selfmotion.planning.search.nodes import Admissible
 from selfmotion.planning.search.sampled import sampled_layers
 from selfmotion.planning.search.sequences import Layers, best_sequences, curve_layers
 from selfmotion.planning.search.shortest import Shortest
+from selfmotion.planning.search.vertices import Admissible
 from selfmotion.problem.costs import PathLength
 from selfmotion.problem.problem import Problem
 
-# Sequences refined; the best among the samples is not always that of the best motion.
+# Number of refined sequences: the best among the samples is not always that of the best motion.
 _REFINED = 3
-# From one of the search's times to the next the tool moves by so much [m, rad], whatever the path's
-# own waypoints: more times would take longer, and what comes of them is smoothed anyway.
+# Motion of the tool between two times of the search [m], [rad], whatever the path's own waypoints:
+# more times take longer, and chains are smoothed anyway.
 _STRIDE = 0.02
 _TURN = 0.1
-# At fewer times than these a search would miss obstacles: self-motion curves allow for more than
-# samples of larger spaces do in the same time. More would take too long.
+# Smallest number of times with self-motion curves, which resolve more than samples of larger
+# spaces.
 _FEWEST_OF_CURVES = 150
+# The same without: fewer would miss obstacles.
 _FEWEST = 60
+# Largest number of times.
 _MOST = 400
-# The path is looked at so often to see how far the tool moves.
-_PATH_LOOKS = 2000
-# What the sequences keep beyond the clearance asked for, since they are only checked at waypoints.
+# Samples of the path for the length of the tool's motion.
+_PATH_SAMPLES = 2000
+# Clearance of sequences in addition to the required one [m]: they are checked at waypoints only.
 _MARGIN = 2.5e-4
-# Where the best chain itself is made the motion, it moves aside in the stages with the least δ, so
-# far from limits [rad or m] and at this share of the largest speeds: between waypoints it bulges.
+# The best chain is made a motion at the smallest δ with this distance from limits [rad or m], and
+# at this share of the largest speeds: between waypoints it bulges.
 _CHAIN_EDGE = 5e-4
 _CHAIN_SPEED = 0.95
-# A node that does not come onto the path is put so far towards the next one; not in the middle,
-# where a halved grid would have one of the same times again.
+# Shift of a time at which a vertex does not converge, towards the next one; not 0.5, since a halved
+# grid could then have equal times.
 BESIDE = 0.3
+# δ of the last stages, as multiples of the chain's mean step.
 LAST_SMOOTHINGS = (3.0, 1.0, 0.3, 0.1, 0.03)
 
 
@@ -60,13 +63,13 @@ def guides(problem: Problem, rng: np.random.Generator | int, progress: Progress)
 def layers_of(
     problem: Problem, weights: Array, rng: np.random.Generator | int, progress: Progress
 ) -> Layers:
-    """Return the nodes of a problem: samples of all self-motions, free and within limits.
+    """Return the vertices of a problem: samples of all self-motions, free and within limits.
 
     Parameters
     ----------
     problem : Problem
     weights : (n,)
-        What a unit of each joint counts.
+        Weight of a unit of each joint.
     rng : Generator or int
     progress : Progress
     """
@@ -110,7 +113,7 @@ def shortest_along(
 
 
 def _between(t: Array, q: Array, where: Array) -> Array:
-    """Return what lies straight between configurations q (W, n) at t, at times `where`, (K, n)."""
+    """Return the linear interpolation of configurations q (W, n) at t, at times `where`, (K, n)."""
     return np.column_stack([np.interp(where, t, joint) for joint in q.T])
 
 
@@ -132,12 +135,12 @@ def waypoint_times(problem: Problem) -> Array:
 
 def search_times(path: Path, fewest: int) -> Array:
     """Return times (W,) [s] at which to search for configurations, as the tool moves on."""
-    t = spread_along(path, _PATH_LOOKS)
+    t = spread_along(path, _PATH_SAMPLES)
     tool = path.samples(t)
     moved = np.linalg.norm(np.diff(tool.translation, axis=0), axis=1) / _STRIDE
     turned = np.array([np.linalg.norm(log3(a.T @ b)) for a, b in itertools.pairwise(tool.rotation)])
     travel = np.concatenate([[0.0], np.cumsum(moved + turned / _TURN)])
-    # Where the tool stands still, time counts, so that there is always one time after another.
+    # Time counts as well, so that times increase where the tool rests.
     count = int(np.clip(np.ceil(travel[-1]), fewest, _MOST))
     travel += t * (1e-3 * count / path.duration)
     times = np.interp(np.linspace(0.0, travel[-1], count + 1), travel, t)
@@ -146,7 +149,7 @@ def search_times(path: Path, fewest: int) -> Array:
 
 
 def _weights(problem: Problem) -> Array:
-    """Return what a unit of each joint counts, (n,): as the path's length does, if it is a cost."""
+    """Return the weight of each joint's unit, (n,): that of the path's length, if it is a cost."""
     for cost in problem.costs:
         if isinstance(cost, PathLength) and cost.joint_weights is not None:
             return np.asarray(cost.joint_weights, dtype=np.float64)

@@ -15,21 +15,23 @@ from selfmotion.model.kernels import (
 )
 from selfmotion.model.robot import null_space, place_tips
 
-# Longest single correction or round [rad or m]: a far start wanders where J is nearly singular.
+# Largest correction in one step [rad or m]: far starts diverge where J is nearly singular.
 LONGEST_CORRECTION = 0.5
-# Newton's steps onto the path, from near it and from anywhere.
+# Newton steps onto the path from nearby …
 _NEAR_STEPS = 10
+# … and from anywhere.
 _FAR_STEPS = 60
-# Of the slower method, which has as many, those that gain less than this share of what is left, so
-# often in turn, are the last ones: what arrives gains nearly all of it in each.
-_LITTLE_GAIN, _LITTLE_GAINS = 1e-3, 5
+# The damped method ends when its relative gain is below this …
+_LITTLE_GAIN = 1e-3
+# … in so many steps in turn.
+_LITTLE_GAINS = 5
 
 
-# A Newton correction of this size [rad or m] leaves an error of its square.
+# Size of a Newton correction [rad or m] at convergence: the error is its square.
 CONVERGED = 1e-6
-# What a solution may miss by [m, rad].
+# Error of a converged solution [m, rad].
 NOTHING_LEFT = 1e-12
-# Compiled kinematics and Pinocchio's differ by rounding alone [m, or rows of a rotation].
+# Difference of compiled kinematics and Pinocchio's by rounding [m, or rows of a rotation].
 _AGREE = 1e-9
 
 
@@ -106,16 +108,15 @@ def project_all(
     layout: Layout,
     lower: Array,
     upper: Array,
-    still: Flags,
+    locked: Flags,
     longest: float,
     steps: int,
     arrived: Flags,
 ) -> None:
     """Put each of q (K, n) onto its target (K, 12 F) by Newton's method, in place.
 
-    A joint that would leave its limits (K, n) stays at the limit, and the others do the rest;
-    joints that are to stand `still` (K, n) are at 0. `arrived`
-    (K,) says of which that was possible within so many steps.
+    A joint that would leave its limits (K, n) stays at the limit, and the others move on; joints
+    that are `locked` (K, n) are at 0. `arrived` (K,) is the mask of convergence within the steps.
     """
     n, tips = q.shape[1], layout.shape[0]
     r, p = np.empty((chains.shape[1], 3, 3)), np.empty((chains.shape[1], 3))
@@ -125,8 +126,8 @@ def project_all(
     for k in range(len(q)):
         arrived[k] = False
         for j in range(n):
-            held[j] = still[k, j]
-            if still[k, j]:
+            held[j] = locked[k, j]
+            if locked[k, j]:
                 q[k, j] = 0.0
         length = np.inf
         for _ in range(steps):
@@ -153,16 +154,16 @@ def approach_all(
     layout: Layout,
     lower: Array,
     upper: Array,
-    still: Flags,
+    locked: Flags,
     iterations: int,
-    misses: Array,
+    errors: Array,
 ) -> None:
-    """Bring each of q (K, n) as near to a target as limits let it.
+    """Move each of q (K, n) as near to a target as limits allow.
 
-    Levenberg-Marquardt with steps that are cut off at the limits, which arrives also where Newton's
-    method does not, and at the nearest place where nothing arrives; joints that are to stand
-    `still` (n,) are at 0. `misses` (K, m) are what is left in the rows [m, rad]; infinite where
-    that is no number from the beginning.
+    Levenberg-Marquardt with steps that are cut off at the limits. It converges also where Newton's
+    method does not, and to the nearest point where nothing converges; joints that are `locked` (n,)
+    are at 0. `errors` (K, m) are the remaining ones in the rows [m, rad]; inf where the first one
+    is NaN.
     """
     n, tips, m = q.shape[1], layout.shape[0], rows_of(layout)
     r, p = np.empty((n + 1, 3, 3)), np.empty((n + 1, 3))
@@ -175,9 +176,9 @@ def approach_all(
         trial[:], error[:] = q[k], np.inf
         for _ in range(iterations):
             for j in range(n):
-                trial[j] = 0.0 if still[j] else min(max(trial[j], lower[j]), upper[j])
+                trial[j] = 0.0 if locked[j] else min(max(trial[j], lower[j]), upper[j])
             place_tips(trial, chains, r, p, rotations, positions, jacobians)
-            clear_held(still, jacobians)
+            clear_held(locked, jacobians)
             errors_and_rows(layout, target, jacobians, rotations, positions, step, steep)
             size = 0.0
             for i in range(m):
@@ -189,7 +190,7 @@ def approach_all(
                 hold(q[k], lower, upper, error, jacobian)
             else:
                 damping *= 10.0
-                # Before anything is known it is not a number: there is no way on from there.
+                # NaN at the first step: there is no direction.
                 if damping > 1e6 or best == np.inf:
                     break
             if best < NOTHING_LEFT**2 or idle == _LITTLE_GAINS:
@@ -206,7 +207,7 @@ def approach_all(
                 for i in range(m):
                     along += jacobian[i, j] * step[i]
                 trial[j] = q[k, j] + along
-        misses[k] = error
+        errors[k] = error
 
 
 @called
@@ -227,7 +228,7 @@ class Manifold:
     ----------
     follows : Follows
     lower, upper : (n,)
-        Joint limits [rad or m], ±inf where there is none. Joints stop there while others go on.
+        Joint limits [rad or m], ±inf for none. Joints stop there while others go on.
 
     Attributes
     ----------
@@ -245,7 +246,7 @@ class Manifold:
 
     def __init__(self, follows: Follows, lower: Array, upper: Array) -> None:
         self.follows, self.robot = follows, follows.robot
-        # Copies: kernels are compiled anew for what may not be written to.
+        # Copies: kernels would be compiled again for read-only arrays.
         self._limits = np.array(lower), np.array(upper)
         self._limited = np.isfinite(upper)
         self.chains = follows.chains
@@ -271,48 +272,48 @@ class Manifold:
             Joints that have to stand at 0; by default none.
         """
         wanted = np.array(np.broadcast_to(target, (len(q), np.shape(target)[-1])), order="C")
-        still = np.array(np.broadcast_to(False if held is None else held, q.shape))
-        found, arrived = self._within(q, wanted, still, _FAR_STEPS if far else _NEAR_STEPS)
-        # Near singular poses Newton's method takes many steps, from near as well.
+        locked = np.array(np.broadcast_to(False if held is None else held, q.shape))
+        found, arrived = self._within(q, wanted, locked, _FAR_STEPS if far else _NEAR_STEPS)
+        # Near singular poses Newton's method takes many steps, from nearby as well.
         alone = ~arrived if np.ndim(target) == 2 else np.full(len(q), not arrived.any())
         if not far and alone.any():
             found[alone], arrived[alone] = self._within(
-                q[alone], wanted[alone], still[alone], _FAR_STEPS
+                q[alone], wanted[alone], locked[alone], _FAR_STEPS
             )
         # Joints that share a band may be within their limits, and beyond that together.
         within = np.where(self._limited, self.follows.within_bands(found), np.inf)
         beyond = arrived & (np.abs(found) > within).any(axis=1)
         if beyond.any():
-            given = found[beyond], wanted[beyond], still[beyond], _FAR_STEPS, within[beyond]
+            given = found[beyond], wanted[beyond], locked[beyond], _FAR_STEPS, within[beyond]
             found[beyond], arrived[beyond] = self._within(*given)
         return found, arrived
 
     def approach(self, q: Array, target: Array, held: Flags) -> tuple[Array, Array]:
-        """Return configurations (K, n) brought as near to a target (12 F,) as limits let them.
+        """Return configurations (K, n) moved as near to a target (12 F,) as limits allow.
 
         Slower than `project`, it arrives at stretched poses and with joints at their limits, too;
-        joints that are `held` (n,) stand at 0.
+        joints that are `locked` (n,) stand at 0.
 
         Returns
         -------
         q : (K, n)
         misses : (K, 2)
-            What is left [m], [rad].
+            Remaining errors [m], [rad].
         """
         found, left = np.array(q), np.zeros((len(q), self.follows.dimension))
         limits = *self._limits, np.array(held)
         approach_all(found, target, self.chains, self.layout, *limits, _FAR_STEPS, left)
         linear = self.follows.linear > 0.0
         parts = np.where(linear, left, 0.0), np.where(linear, 0.0, left)
-        misses = [np.sqrt(np.einsum("km,km->k", part, part)) for part in parts]
-        return found, np.stack(misses, axis=1)
+        errors = [np.sqrt(np.einsum("km,km->k", part, part)) for part in parts]
+        return found, np.stack(errors, axis=1)
 
     def _within(
-        self, q: Array, targets: Array, still: Flags, steps: int, most: Array | float = np.inf
+        self, q: Array, targets: Array, locked: Flags, steps: int, most: Array | float = np.inf
     ) -> tuple[Array, Flags]:
-        """Return what Newton's method makes of q (K, n), no |q| more than `most` besides limits."""
+        """Return the result of Newton's method from q (K, n), with |q| ≤ `most` besides limits."""
         found, arrived = np.array(q, order="C"), np.zeros(len(q), dtype=bool)
-        # In one order of memory: each is a kernel of its own.
+        # One memory order: each is a kernel of its own.
         sides = np.maximum(self._limits[0], -most), np.minimum(self._limits[1], most)
         lower, upper = (np.array(np.broadcast_to(side, q.shape), order="C") for side in sides)
         project_all(
@@ -322,7 +323,7 @@ class Manifold:
             self.layout,
             lower,
             upper,
-            np.array(still, order="C"),
+            np.array(locked, order="C"),
             LONGEST_CORRECTION,
             steps,
             arrived,
@@ -339,8 +340,8 @@ class Manifold:
             target = np.concatenate(
                 [part for pose in poses for part in (pose.translation, pose.rotation.ravel())]
             )
-            still = np.zeros((1, len(q)), dtype=np.bool_)
-            found, arrived = self._within(q[None], target[None], still, _NEAR_STEPS)
+            locked = np.zeros((1, len(q)), dtype=np.bool_)
+            found, arrived = self._within(q[None], target[None], locked, _NEAR_STEPS)
             for item, pose in zip(items, poses, strict=True):
                 miss = max(item.miss(pose, found[0]))
                 if not (arrived[0] and miss < _AGREE):
@@ -368,7 +369,7 @@ class OnPath:
         self._held, self.redundancy = follows.held(t), follows.redundancy
 
     def project(self, q: Array, i: int, *, far: bool = False) -> tuple[Array, Flags]:
-        """Return what Newton's method makes of q (K, n) at waypoint i, and where it arrives."""
+        """Return the result of Newton's method from q (K, n) at waypoint i, and its convergence."""
         return self._manifold.project(q, self._targets[i], far=far, held=self._held[i])
 
     def project_each(self, q: Array, i: Ints) -> tuple[Array, Flags]:
@@ -376,7 +377,7 @@ class OnPath:
         return self._manifold.project(q, self._targets[i], held=self._held[i])
 
     def bases(self, q: Array) -> Array:
-        """Return bases of the directions that a motion q (W, n) may move aside in, (W, n, d).
+        """Return bases of the directions in which a motion q (W, n) may be displaced, (W, n, d).
 
         Each turned to the one before.
         """

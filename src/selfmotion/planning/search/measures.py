@@ -1,4 +1,4 @@
-"""What a chain of configurations costs: its length, or what the problem minimises."""
+"""Measures of chains of configurations: their length, or the problem's costs."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -11,10 +11,10 @@ from selfmotion.model.follow import Follows
 from selfmotion.model.motion import Sampling
 from selfmotion.problem.costs import Cost, PathLength, Samples
 
-# Steps faster than this many times the mean speed of the shortest chain are changes from sample to
-# sample, which the finished motion spreads over more time.
+# Steps faster than this many times the mean speed of the shortest chain are sampling noise, which
+# the finished motion spreads over more time.
 _FAST = 2.0
-# Layers whose kinematics are kept, per waypoint: memory, not what is found.
+# Layers with cached kinematics, per waypoint; they bound memory alone.
 _LAYERS_KEPT = 3
 
 
@@ -68,7 +68,7 @@ def extend(
 def near_pairs(
     before: Array, after: Array, largest_step: Array, turning: Flags
 ) -> tuple[Ints, Ints]:
-    """Return the pairs of nodes (P,), (P,) from `before` (N, n) to `after` (M, n) that are near.
+    """Return the pairs of vertices (P,), (P,) from `before` (N, n) to `after` (M, n) that are near.
 
     No joint may move by more than `largest_step`; otherwise as `extend`.
     """
@@ -125,14 +125,14 @@ class Length:
     def extended(
         self, k: int, before: Array, cost: Array, after: Array, step: Array, turning: Flags
     ) -> tuple[Array, Ints]:
-        """Return the least cost at the nodes of waypoint k + 1, and the nodes that it comes from.
+        """Return the least costs at the vertices of waypoint k + 1, and their predecessors.
 
         Parameters
         ----------
         k : int
             The waypoint before.
         before, cost : (N, n), (N,)
-            Its nodes, sorted by the first joint, and what chains to them cost.
+            Its vertices, sorted by the first joint, and the costs of chains to them.
         after : (M, n)
         step : (n,)
             No joint may move more.
@@ -150,7 +150,7 @@ class Length:
         return reach, source
 
     def of(self, q: Array) -> float:
-        """Return what a motion (W, n) costs."""
+        """Return the cost of a motion (W, n)."""
         return float((np.abs(np.diff(q, axis=0)) * self.weights).sum())
 
     def backwards(self) -> Self:
@@ -160,14 +160,13 @@ class Length:
 
 @dataclass(frozen=True, eq=False)
 class RunningCost:
-    """∫ G dt of a problem's costs, as far as chains of samples tell it.
+    """∫ G dt of a problem's costs, as far as it is a function of chains of samples.
 
-    A step from q to q + Δq within Δt costs ½Δt (G(0, q) + G(0, q + Δq)) for being where it is, and
-    τ (G(Δq/τ, q + ½Δq) - G(0, q + ½Δq)) for moving, with τ = max(Δt, |Δq| / v). v is twice the mean
-    speed of the shortest chain: samples are as far apart as many intervals of a slow drift along
-    the self-motion, which no change from one sample to the next can follow, so that such a change
-    counts as if it were spread over the time it takes. Costs of accelerations and jerks are left
-    out.
+    A step from q to q + Δq within Δt costs ½Δt (G(0, q) + G(0, q + Δq)) for its place, and τ
+    (G(Δq/τ, q + ½Δq) - G(0, q + ½Δq)) for its motion, with τ = max(Δt, |Δq| / v). v is twice the
+    mean speed of the shortest chain: samples are as far apart as many intervals of a slow drift
+    along the self-motion, so that a change from one sample to the next counts as if it were spread
+    over the time it takes. Costs of accelerations and jerks are left out.
 
     Attributes
     ----------
@@ -257,7 +256,7 @@ class RunningCost:
     def _prices(
         self, k: int, before: Array, after: Array, first: Ints, second: Ints, turning: Flags
     ) -> Array:
-        """Return what the steps between pairs of nodes cost, (P,)."""
+        """Return the costs of the steps between pairs of vertices, (P,)."""
         span = float(self.t[k + 1] - self.t[k])
         here, there = self._at(k, before), self._at(k + 1, after)
         price = 0.5 * span * (here.cost[first] + there.cost[second])
@@ -274,7 +273,7 @@ class RunningCost:
             sampling=sampling,
             q=before[first] + 0.5 * difference,
             qd=difference / lasting[:, None],
-            # The kinematics hardly change on the way.
+            # The kinematics hardly change within a step.
             tips=tuple(tip.at(first) for tip in here.samples.tips),
             task_jacobian=here.samples.task_jacobian[first],
         )
@@ -294,10 +293,10 @@ class RunningCost:
         return known
 
 
-# Layers are known by what they are, and kept, so that nothing else gets their number.
+# Layers are keys of a cache by identity, and kept alive, so that no other one gets their id.
 @dataclass(frozen=True, eq=False)
 class _Places:
-    """A layer (N, n), its samples at rest, and what the costs of q alone are there, (N,)."""
+    """A layer (N, n), its samples at rest, and the costs of q alone there, (N,)."""
 
     q: Array
     samples: Samples
@@ -306,7 +305,7 @@ class _Places:
 
 @dataclass(frozen=True, eq=False)
 class _Steps:
-    """Two layers, the pairs of near nodes (P,), (P,), and what steps between them cost, (P,)."""
+    """Two layers, the pairs of near vertices (P,), (P,), and the costs of these steps, (P,)."""
 
     before: Array
     after: Array
@@ -324,7 +323,7 @@ def _note(known: dict[Any, Any], key: Any, value: Any, most: int) -> None:
 def cheapest(
     first: Ints, second: Ints, price: Array, cost: Array, count: int
 ) -> tuple[Array, Ints]:
-    """Return what `Length.extended` does, of pairs of nodes (P,), (P,) and the price of each."""
+    """Return the result of `Length.extended` for pairs of vertices (P,), (P,) with given costs."""
     reach, source = np.full(count, np.inf), np.full(count, -1, dtype=np.intp)
     lower_to_cheapest(first, second, price, cost, reach, source)
     return reach, source
@@ -335,7 +334,7 @@ Measure = Length | RunningCost
 
 
 def measure_of(follows: Follows, costs: Sequence[Cost], t: Array, weights: Array) -> Measure:
-    """Return what chains over waypoints at times t (W,) are measured by.
+    """Return the measure of chains over waypoints at times t (W,).
 
     The costs, or the length with `weights` (n,) where it is all that they ask for.
     """

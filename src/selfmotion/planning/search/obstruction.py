@@ -1,4 +1,4 @@
-"""Poses of a path that the arm cannot be at: which, why, what would help, how far it gets."""
+"""Unreachable poses of a path: their causes and remedies, and how far the arm can follow it."""
 
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -11,35 +11,40 @@ from selfmotion.model.collision import Closest, how_near
 from selfmotion.model.follow import AugmentedFollows
 from selfmotion.model.path import edges_of, spread_along
 from selfmotion.model.task import POSITION_ROWS, ROW_NAMES, Relaxation
-from selfmotion.planning.search.nodes import AT_LIMIT
 from selfmotion.planning.search.single_poses import CLIMBERS, MOST_LOOKED_AT, Found, SinglePoses
 from selfmotion.planning.search.starts import start_candidates
+from selfmotion.planning.search.vertices import AT_LIMIT
 from selfmotion.problem.problem import Problem
 
-# Poses along the path that are looked at, bisections of the time at which no branch goes on, and
-# poses at which it is looked at how far they are out of reach.
+# Poses along the path that are tried.
 _POSES = 64
+# Bisections of the time at which no branch goes on.
 _BISECTIONS = 16
-_LOOKS = 6
-# Poses about a time of trouble, in shares of the piece of the path that it is in.
+# Poses at which the excess is computed.
+_EXCESS_POSES = 6
+# Poses about a suspected time, in shares of the segment of the path that it is in.
 _ABOUT = (-1e-3, 0.0, 1e-3, 4e-3)
 # A singular value below this share of the dexterous configuration's counts as stretched or folded.
 _STRETCHED = 0.1
-# Poses along a path at which to look before anything else.
+# Poses along a path that are tried before all others.
 _COARSE_POSES = 9
-# What would help is looked for in so many rounds, in each of which a deviation has to be this share
-# of the least before.
-_SHRINKS, _SHRUNK = 6, 0.75
-# A path is moved so often, each time a bit farther than needed at the pose where nothing was found,
-# and no farther than this [m].
-_MOVE_TRIES, _OVERSHOOT, _FARTHEST = 4, 0.05, 0.5
+# Rounds of the search for a remedy …
+_SHRINKS = 6
+# … in each of which a deviation has to be below this share of the least one so far.
+_SHRUNK = 0.75
+# Attempts to move a path …
+_MOVE_TRIES = 4
+# … by the necessary distance at the obstructed pose, increased by this share each time …
+_OVERSHOOT = 0.05
+# … up to this distance [m].
+_FARTHEST = 0.5
 
 
 _ROTATION_ROWS = ROW_NAMES[len(POSITION_ROWS) :]
 
 
 def remedies(poses: SinglePoses, t: float, times: Array) -> list[str]:
-    """Return in words what would let the arm be at the pose at t [s], each by itself.
+    """Return remedies for the pose at t [s] in words, each of which suffices alone.
 
     The path moved as a whole, so that at the other times [s], too, there are configurations; the
     tool turned away from its path at t; and one joint that goes farther, also at t.
@@ -47,7 +52,7 @@ def remedies(poses: SinglePoses, t: float, times: Array) -> list[str]:
     found = []
     shift = nearest_place(poses, times)
     if shift is not None:
-        # Rounded away from where the path is: what is told has to suffice.
+        # Rounded away from the path: the remedy has to suffice.
         far = np.copysign(np.ceil(1e4 * np.abs(shift) - 1e-3) / 10.0, shift) + 0.0
         told = ", ".join(f"{axis} {x:+.4g}" for axis, x in zip("xyz", far, strict=True) if x)
         found.append(f"the path moved by {np.linalg.norm(far):.3g} mm ({told})")
@@ -63,7 +68,7 @@ def remedies(poses: SinglePoses, t: float, times: Array) -> list[str]:
 
 
 def nearest_place(poses: SinglePoses, times: Array) -> Array | None:
-    """Return a short way (3,) [m] by which the path has to be moved, None where none is found.
+    """Return a short displacement (3,) [m] of the path as a remedy, None if none is found.
 
     So that at all the times [s] something is found: by as much as the first that is not needs, and
     then on. Bodies stay where they are.
@@ -86,8 +91,8 @@ def nearest_place(poses: SinglePoses, times: Array) -> Array | None:
 def least_deviation(poses: SinglePoses, t: float, rows: tuple[str, ...]) -> Array | None:
     """Return the least deviation of some rows (3,) at t [s] with which something free is found.
 
-    As far as tries tell: the least of many, and then less and less. None where nothing is found, or
-    the task does not prescribe these rows.
+    By sampling: the least of many, which is then reduced. None if nothing is found, or the task
+    does not prescribe these rows.
     """
     asked = poses.problem.asked
     prescribed = [ROW_NAMES[k] for k in asked.task.rows]
@@ -132,7 +137,7 @@ def least_deviation(poses: SinglePoses, t: float, rows: tuple[str, ...]) -> Arra
 def least_excess(poses: SinglePoses, t: float) -> tuple[str, float] | None:
     """Return the joint that would have to leave its limits least for a pose, and how far.
 
-    None where no single joint is in the way.
+    None if no single joint is the cause.
     """
     lower, upper = poses.bounds.lower, poses.bounds.upper
     seeds = poses.some(t, CLIMBERS)
@@ -167,11 +172,11 @@ class Obstruction:
     is_met : bool
         Whether the pose is in reach, but for bodies that are met.
     poses : SinglePoses
-        What looked for it.
+        The search for configurations.
     found : Found
-        What there is at the pose.
+        Its result at the pose.
     times : (K,)
-        When to look again, if something is changed, this time first [s].
+        Times to try first after a change, this one before all [s].
     """
 
     time: float
@@ -186,13 +191,13 @@ class Obstruction:
 
     @property
     def misses(self) -> tuple[float, float]:
-        """What the nearest configuration misses the pose by, (m, rad)."""
+        """Error of the nearest configuration from the pose, (m, rad)."""
         position, rotation = self._nearest[1][0]
         return float(position), float(rotation)
 
     @property
     def reason(self) -> str:
-        """What is in the way at that pose, and how closely it was looked at."""
+        """The cause at that pose, and the extent of the search."""
         poses, found = self.poses, self.found
         name = poses.robot.tool
         if self.is_met:
@@ -210,17 +215,17 @@ class Obstruction:
 
     @property
     def _least_clearance(self) -> float:
-        """How far bodies are apart at the pose at most, where that is less than was asked [m]."""
+        """Largest distance of bodies at the pose, if it is below the required one [m]."""
         if not self.is_met:
             return 0.0
         worst, asked = _roomiest_pair(self.poses, self.found.met)
-        # Rounded down: what is told has to suffice.
+        # Rounded down: the remedy has to suffice.
         known = np.floor(1e4 * worst.value) / 1e4
         return float(known) if 0.0 < worst.value < asked else 0.0
 
     @cached_property
     def help(self) -> str:
-        """What would help, each by itself; "" for nothing that is known."""
+        """Remedies, each of which suffices alone; "" for none."""
         found = remedies(self.poses, self.time, self.times)
         least = self._least_clearance
         found += [f"a clearance of {1e3 * least:.3g} mm"] if least > 0.0 else []
@@ -228,7 +233,7 @@ class Obstruction:
 
 
 def _roomiest(poses: SinglePoses, met: Array) -> str:
-    """Return what is met at the configuration (of K, n) that bodies are least near to."""
+    """Return the collision of the configuration (of K, n) with the smallest overlap."""
     worst, asked = _roomiest_pair(poses, met)
     return (
         f"at best '{worst.first}' and '{worst.second}' {how_near(worst.value)} (wanted: "
@@ -237,8 +242,8 @@ def _roomiest(poses: SinglePoses, met: Array) -> str:
 
 
 def _roomiest_pair(poses: SinglePoses, met: Array) -> tuple[Closest, float]:
-    """Return the nearest bodies where these are least near, and how far apart they should be."""
-    # The last ones were moved aside from what they met.
+    """Return the nearest bodies at the smallest overlap of all, and the required distance."""
+    # The last ones were moved away from obstacles.
     _, worst, asked = max((poses.room(q) for q in met[-MOST_LOOKED_AT:]), key=lambda each: each[0])
     return worst, asked
 
@@ -246,13 +251,12 @@ def _roomiest_pair(poses: SinglePoses, met: Array) -> tuple[Closest, float]:
 def obstruction(
     problem: Problem, rng: np.random.Generator, suspect: float | None = None
 ) -> Obstruction | None:
-    """Return a pose of the path that no configuration was found for; None where there is none.
+    """Return a pose of the path without any configuration; None if all have one.
 
-    Poses all along the path, that at a `suspect` time [s] first, then the first, then those that
-    are farthest from the others. A
-    pose is given up when thousands of tries lead nowhere: Newton's method from all over the
-    limits, and of the bands of tolerances; where self-motions are curves, these as a whole; and
-    what met bodies least, moved aside.
+    Poses all along the path: that at a `suspect` time [s] first, then the first, then those
+    farthest from the others. A pose is given up after thousands of tries: Newton's method from all
+    over the limits, and within the bands of tolerances; where self-motions are curves, all of
+    these; and the configurations with the smallest overlaps, moved away.
     """
     poses = SinglePoses(problem, rng)
     times = spread_along(problem.path, _COARSE_POSES)
@@ -275,8 +279,7 @@ def obstruction(
 def _worst_first(problem: Problem, times: Array) -> list[float]:
     """Return times [s], after the first of the poses farthest from the middle of all.
 
-    Where the path cannot be begun, no part of it can be planned; else, what is too far, too near or
-    in the way is mostly so at an end.
+    Without a solution at the start, no part can be planned; otherwise causes are mostly at an end.
     """
     places = problem.path.samples(times).translation
     away = np.linalg.norm(places - places.mean(axis=0), axis=1)
@@ -285,7 +288,7 @@ def _worst_first(problem: Problem, times: Array) -> list[float]:
 
 
 def cause(poses: SinglePoses, q: Array) -> str:
-    """Return what keeps the arm from reaching further at q (n,); "" where nothing shows."""
+    """Return the cause why the arm reaches no further at q (n,); "" for none found."""
     robot, follows, causes = poses.robot, poses.follows, []
     near = np.minimum(q - robot.lower, robot.upper - q)[: poses.problem.asked.robot.dof] < AT_LIMIT
     if np.any(near):
@@ -302,7 +305,7 @@ def cause(poses: SinglePoses, q: Array) -> str:
 
 @dataclass(frozen=True, eq=False)
 class Reach:
-    """How far along the path single poses can be reached at all.
+    """Extent to which single poses along the path are reachable.
 
     Attributes
     ----------
@@ -311,7 +314,7 @@ class Reach:
     starts : list of (n,)
         Configurations at the start of the path.
     reason : str
-        What is beyond; "" where nothing is.
+        The cause beyond; "" for none.
     """
 
     time: float
@@ -322,12 +325,11 @@ class Reach:
 def reachable(
     problem: Problem, starts: int, rng: np.random.Generator, suspect: float = 0.0
 ) -> Reach:
-    """Return how far single poses of the path can be reached, within the joint limits.
+    """Return the extent to which single poses of the path are reachable, within joint limits.
 
-    With what tolerances allow. Inverse kinematics from the solutions of the pose before, and from
-    elsewhere where these do not go on: a pose that nothing leads to is out of reach, as far as can
-    be told. Poses all along the path, and more about the time `suspect` [s], where a motion had
-    trouble.
+    Within the tolerances. Inverse kinematics from the solutions of the pose before, and from other
+    seeds where these end: a pose that no seed leads to is out of reach. Poses all along the path,
+    and more about the time `suspect` [s], where a motion has failed.
     """
     poses = SinglePoses(problem, rng, clear=False)
     path, given = problem.path, poses.problem.given_start
@@ -365,7 +367,7 @@ def _edge(poses: SinglePoses, interval: tuple[float, float], known: Array) -> tu
 
 
 def _out_of_reach(poses: SinglePoses, time: float, q: Array, beyond: Array) -> str:
-    """Return in words that later poses are out of reach, by how much, and what the arm looks like.
+    """Return in words that later poses are out of reach, by which distance, with the arm's state.
 
     q (n,) is its configuration at `time`, the last one; `beyond` are later times.
     """
@@ -373,7 +375,7 @@ def _out_of_reach(poses: SinglePoses, time: float, q: Array, beyond: Array) -> s
     if len(poses.problem.asked.follows.items) > 1:
         names = poses.follows.names
         return f"{begin}: no configuration was found that puts {names} on their paths"
-    looks = beyond[np.unique(np.linspace(0, len(beyond) - 1, _LOOKS).round().astype(int))]
+    looks = beyond[np.unique(np.linspace(0, len(beyond) - 1, _EXCESS_POSES).round().astype(int))]
     misses = [(*poses.nearest(float(t))[1][0], float(t)) for t in looks]
     position, rotation, when = max(misses, key=lambda miss: miss[0] + miss[1])
     turned = f" and {rotation:.2g} rad" if poses.problem.asked.task.angular else ""

@@ -1,4 +1,4 @@
-"""The search for two and more degrees of redundancy: samples of smooth motions as nodes."""
+"""The search for two and more degrees of redundancy: samples of smooth motions as vertices."""
 
 import numpy as np
 
@@ -7,24 +7,25 @@ from selfmotion.model.collision import CollisionModel
 from selfmotion.planning.search.chains import in_order, stations_of
 from selfmotion.planning.search.manifold import OnPath
 from selfmotion.planning.search.measures import Length
-from selfmotion.planning.search.nodes import Admissible
 from selfmotion.planning.search.sequences import Layers
 from selfmotion.planning.search.starts import spread
+from selfmotion.planning.search.vertices import Admissible
 
-# Motions begin at stations, from so many configurations each: of those that inverse kinematics
-# finds from so many seeds.
-_BEGUN = 45
-_BEGINNING_SEEDS = 200
-# Constant null motions drift so far over the whole path [rad or m], one standard deviation; every
+# Initial configurations of motions at each station …
+_STARTS = 45
+# … of the solutions of inverse kinematics from this number of seeds.
+_START_SEEDS = 200
+# Standard deviation of the drift of constant null motions over the whole path [rad or m]; every
 # other motion has none.
 _DRIFT = 1.0
-# Of the samples that a chain reaches, so many are followed to the next waypoint, those that are so
-# far from each other [rad or m] first.
+# Reached samples that are followed to the next waypoint …
 _PARENTS = 80
-_PARENTS_APART = (1.6, 0.8, 0.4, 0.2, 0.1)
-# So many tries around each of them, about this far off [rad].
-_STRAYS = 2
-_STRAYED = 0.15
+# … chosen by these distances from each other, the largest first [rad or m].
+_PARENT_DISTANCES = (1.6, 0.8, 0.4, 0.2, 0.1)
+# Random tries around each of them …
+_TRIES = 2
+# … with this standard deviation [rad].
+_SPREAD = 0.15
 
 
 def sampled_layers(
@@ -40,9 +41,9 @@ def sampled_layers(
     """Return samples of smooth motions of a task that leaves any redundancy.
 
     Self-motions of two and more dimensions are too large to be sampled evenly at every waypoint.
-    The nodes are those of many smooth motions instead, which begin all over the self-motions of
-    some waypoints and follow the path both ways, with different constant null motions: chains
-    change from one to another where that is cheaper, or where one ends or meets something.
+    The vertices are those of many smooth motions instead, which start all over the self-motions of
+    some waypoints and follow the path in both directions, with different constant null motions:
+    chains change between them where that is cheaper, or where one ends or collides.
 
     Parameters
     ----------
@@ -54,7 +55,7 @@ def sampled_layers(
     limits : (n,), (n,)
         Joint limits [rad or m].
     bodies : tuple of (CollisionModel, float)
-        Bodies to keep apart at the waypoints, and the distance [m].
+        Bodies with a minimum distance at the waypoints [m].
     weights : (n,)
         Of the joints in a chain's length.
     rng : Generator or int
@@ -88,8 +89,8 @@ def _layers(
 ) -> list[Array]:
     """Return free samples at all waypoints, each (K, n), sorted by the first joint.
 
-    Those of smooth motions; what follows from samples that a chain reaches, without self-motion;
-    and what is near that: so there is a way around where smooth motions end.
+    Vertices of smooth motions; continuations of reached samples without self-motion; and samples
+    near these: so there is a detour where smooth motions end.
     """
     smooth = _smooth_motions(waypoints, bounds, rng, progress)
     turning = bounds.turning
@@ -99,8 +100,8 @@ def _layers(
         before = layers[-1]
         cost = np.zeros(len(before)) if i == 1 else cost
         parents = _spread_out(before[np.isfinite(cost)], cost[np.isfinite(cost)], _PARENTS)
-        strays = np.repeat(parents, _STRAYS, axis=0)
-        away = rng.normal(scale=_STRAYED, size=strays.shape) / weights
+        strays = np.repeat(parents, _TRIES, axis=0)
+        away = rng.normal(scale=_SPREAD, size=strays.shape) / weights
         step = 0.5 * largest_step[i - 1]
         guesses = np.concatenate([parents, strays + np.clip(away, -step, step)])
         q, arrived = waypoints.project(guesses, i)
@@ -110,7 +111,7 @@ def _layers(
             i - 1, before, cost, layers[-1], largest_step[i - 1], turning
         )
         if not np.any(np.isfinite(cost)):
-            # What lies beyond is for chains that begin here.
+            # Later layers are for chains that start here.
             cost = np.zeros(len(cost))
     return layers
 
@@ -120,49 +121,49 @@ def _smooth_motions(
 ) -> list[Array]:
     """Return at all waypoints where motions with constant null motions are, each (K, n)."""
     dof, last = waypoints.robot.dof, waypoints.count - 1
-    nodes = [[np.empty((0, dof))] for _ in range(waypoints.count)]
+    vertices = [[np.empty((0, dof))] for _ in range(waypoints.count)]
     stations = stations_of(waypoints.count)
     for number, station in enumerate(stations, 1):
         progress("search: motions from waypoint", number, len(stations))
-        begun = _starts(waypoints, bounds, station, rng)
-        drift = rng.normal(scale=_DRIFT / max(last, 1), size=begun.shape)
+        started = _starts(waypoints, bounds, station, rng)
+        drift = rng.normal(scale=_DRIFT / max(last, 1), size=started.shape)
         drift[::2] = 0.0
-        nodes[station].append(begun)
+        vertices[station].append(started)
         for direction in (1, -1):
-            q, slope = begun, direction * drift
+            q, slope = started, direction * drift
             end = waypoints.count if direction > 0 else -1
             for i in range(station + direction, end, direction):
                 q, arrived = waypoints.project(q + slope, i)
                 q, slope = q[arrived], slope[arrived]
-                nodes[i].append(q)
-    return [np.concatenate(parts) for parts in nodes]
+                vertices[i].append(q)
+    return [np.concatenate(parts) for parts in vertices]
 
 
 def _spread_out(q: Array, cost: Array, count: int) -> Array:
     """Return up to `count` of q (K, n), far from each other first, the cheaper of near ones."""
     ranked = np.ascontiguousarray(q[np.argsort(cost, kind="stable")])
-    return np.asarray(ranked[spread_out(ranked, np.array(_PARENTS_APART), count)])
+    return np.asarray(ranked[spread_out(ranked, np.array(_PARENT_DISTANCES), count)])
 
 
 def _starts(waypoints: OnPath, bounds: Admissible, station: int, rng: np.random.Generator) -> Array:
     """Return configurations within the limits, free where there are such, (K, n)."""
-    seeds = spread(waypoints.robot, _BEGINNING_SEEDS, rng)
+    seeds = spread(waypoints.robot, _START_SEEDS, rng)
     q, arrived = waypoints.project(seeds, station, far=True)
     q = q[arrived]
     free = bounds.keep(q)
-    return np.concatenate([q[free], q[~free]])[:_BEGUN]
+    return np.concatenate([q[free], q[~free]])[:_STARTS]
 
 
 @kernel
-def spread_out(q: Array, apart: Array, most: int) -> Ints:
-    """Return the rows of q (K, n) to keep, at most so many: the earlier ones of near ones.
+def spread_out(q: Array, distances: Array, most: int) -> Ints:
+    """Return the rows of q (K, n) to keep, at most `most`: the earlier ones of near ones.
 
     First those farther from all kept ones in some coordinate than apart[0], then apart[1], ….
     """
     n, many = q.shape[1], len(q)
     kept, count = np.empty(min(most, many), dtype=np.intp), 0
     taken = np.zeros(many, dtype=np.bool_)
-    for distance in apart:
+    for distance in distances:
         for k in range(many):
             if taken[k] or count == len(kept):
                 continue

@@ -1,4 +1,4 @@
-"""The global search: curves at all waypoints, nodes on them, the shortest chains of nodes."""
+"""The global search: curves at all waypoints, vertices on them, the shortest chains of vertices."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -24,19 +24,19 @@ from selfmotion.planning.search.chains import (
 from selfmotion.planning.search.curves import SPACING, CurveSet, SelfMotion, curves_along
 from selfmotion.planning.search.manifold import OnPath
 from selfmotion.planning.search.measures import Length, Measure, RunningCost
-from selfmotion.planning.search.nodes import Admissible, place_nodes
 from selfmotion.planning.search.shortest import improved_by
 from selfmotion.planning.search.starts import TRACING_SEEDS, spread
+from selfmotion.planning.search.vertices import Admissible, place_vertices
 
-# Inverse kinematics starts anew at every so manieth waypoint.
-_ANEW_EVERY = 10
-# So many chains go through the first stage, after which it shows which are worth the others.
-_LOOKED_AT = 8
+# Inverse kinematics is restarted at every 10th waypoint.
+_RESTART_EVERY = 10
+# Chains in the first stage, which decides which ones are refined.
+_CANDIDATES = 8
 
 
 @dataclass(frozen=True, eq=False)
 class Layers:
-    """The nodes of a search: free configurations at the waypoints of a path.
+    """The vertices of a search: free configurations at the waypoints of a path.
 
     Attributes
     ----------
@@ -49,8 +49,8 @@ class Layers:
     samples : list of (K, n)
         Each at one of its turns.
     why : callable
-        Returns why no chain reaches a waypoint, by its number, what chains reach before it (A, n),
-        the nodes there (K, n), and the bounds that these keep.
+        Returns the cause why no chain reaches a waypoint: for its number, reached vertices before
+        it (A, n), the vertices there (K, n), and their bounds.
     """
 
     waypoints: OnPath
@@ -61,7 +61,7 @@ class Layers:
     why: Callable[[int, Array, Array, Admissible], str]
 
     def refused(self, i: int, reason: str, parts: str = "") -> NoSequenceError:
-        """Return the error that no motion, in however many parts, passes waypoint i."""
+        """Return the error that no motion, in any number of parts, passes waypoint i."""
         time = float(self.t[i])
         return NoSequenceError(
             f"{self.waypoints.robot.name}: no motion along the path{parts} passes "
@@ -93,9 +93,9 @@ def curve_layers(
     steps : (W - 1, n)
         Largest change of each joint from one waypoint to the next [rad or m].
     limits : (n,), (n,)
-        Joint limits [rad or m]; ±inf for joints without. An angle is what it is: turns count.
+        Joint limits [rad or m]; ±inf for joints without. Angles are not taken modulo turns.
     bodies : tuple of (CollisionModel, float)
-        Bodies to keep apart at the waypoints, and the distance [m].
+        Bodies with a minimum distance at the waypoints [m].
     rng : Generator or int
         Shifts the seeds of the inverse kinematics.
     progress : Progress
@@ -104,7 +104,7 @@ def curve_layers(
     motion, x = SelfMotion(follows, SPACING), follows.targets(t)
     bounds = Admissible(*limits, motion.revolute, bodies)
     seeds = spread(follows.robot, TRACING_SEEDS, np.random.default_rng(rng))
-    curves = curves_along(motion, x, seeds, _ANEW_EVERY, progress)
+    curves = curves_along(motion, x, seeds, _RESTART_EVERY, progress)
     samples = _free_samples(motion, x, curves, bounds, progress)
 
     def why(i: int, alive: Array, layer: Array, kept: Admissible) -> str:
@@ -114,22 +114,22 @@ def curve_layers(
 
 
 def best_sequences(
-    layers: Layers, count: int, asked: Measure | None, progress: Progress
+    layers: Layers, count: int, given: Measure | None, progress: Progress
 ) -> list[Sequence]:
-    """Return the best joint sequences over nodes that are unlike each other.
+    """Return the best joint sequences over vertices that differ from each other.
 
-    Dynamic programming finds the chain of least Σ w|Δq|, or of the least of another measure, with
-    every step within the largest: the global optimum over the nodes. The best chains, unlike each
-    other by 0.3 rad in some joint at a tenth of the waypoints, are then moved aside, locally, to
-    where they are better: see `shortest.py`.
+    Dynamic programming finds the chain of least Σ w|Δq|, or least by another measure, with every
+    step within the largest: the global optimum over the vertices. The best chains, which differ
+    from each other by 0.3 rad in some joint at a tenth of the waypoints, are then optimised
+    locally: see `shortest.py`.
 
     Parameters
     ----------
     layers : Layers
     count : int
-        How many sequences at most.
-    asked : Measure or None
-        What they are chosen by; by default their length.
+        Largest number of sequences.
+    given : Measure or None
+        Their measure; by default their length.
     progress : Progress
         Told the sequence that is worked on.
 
@@ -141,13 +141,15 @@ def best_sequences(
     Raises
     ------
     NoSequenceError
-        No chain exists among the nodes; tells the waypoint at which the last one ends, and why.
+        No chain exists among the vertices; with the waypoint at which the last one ends, and the
+        cause.
     """
-    rough, turning, measure = _rough_motions(layers, asked)
+    rough, turning, measure = _rough_motions(layers, given)
     better = improved_by(layers.waypoints, layers.bounds, layers.steps, measure)
     stages = [("search: optimising finalist", False)]
     if isinstance(measure, Length):
-        # A chain's length says little of that of the shortest one near it, a rough look says much.
+        # Lengths of chains predict those of the shortest ones nearby badly; a rough stage does it
+        # well.
         stages.insert(0, ("search: optimising sequence", True))
     else:
         del rough[count:]
@@ -161,28 +163,28 @@ def best_sequences(
     return best
 
 
-def _rough_motions(nodes: Layers, asked: Measure | None) -> tuple[list[Array], Flags, Measure]:
-    """Return the best unlike motions (W, n) over samples, whose turns did not count, and by what.
+def _rough_motions(vertices: Layers, given: Measure | None) -> tuple[list[Array], Flags, Measure]:
+    """Return the best different motions (W, n) over samples modulo turns, and their measure.
 
-    Turns of joints with room for several are left out at first, and the motion put inside the
-    limits as a whole; where it does not fit, it is looked for among all turns of these joints.
+    Turns of joints with room for several are ignored at first, and the motion put inside the limits
+    as a whole; if it does not fit, the search is repeated with all turns of these joints.
     """
-    bounds = nodes.bounds
-    length = asked if isinstance(asked, Length) else Length(nodes.waypoints.robot.joint_weights)
+    bounds = vertices.bounds
+    length = given if isinstance(given, Length) else Length(vertices.waypoints.robot.joint_weights)
     any_turn = bounds.without_turns()
     while True:
-        layers, turning = [any_turn.layer(q) for q in nodes.samples], any_turn.turning
-        chains = best_chains(layers, nodes.steps, turning, length)
+        layers, turning = [any_turn.layer(q) for q in vertices.samples], any_turn.turning
+        chains = best_chains(layers, vertices.steps, turning, length)
         if chains.blocked is not None:
             i = chains.blocked
             alive = layers[i - 1][np.isfinite(chains.cost[i - 1])] if i else layers[0][:0]
-            raise nodes.refused(i, nodes.why(i, alive, layers[i], any_turn))
+            raise vertices.refused(i, vertices.why(i, alive, layers[i], any_turn))
         measure: Measure = length
-        if isinstance(asked, RunningCost):
+        if isinstance(given, RunningCost):
             shortest = chains.back(len(layers) - 1, int(np.argmin(chains.cost[-1])))
-            measure = asked.at_pace_of(connected(layers, shortest, turning))
-            chains = best_chains(layers, nodes.steps, turning, measure)
-        found = diverse_chains(layers, chains, nodes.steps, turning, _LOOKED_AT, measure)
+            measure = given.at_pace_of(connected(layers, shortest, turning))
+            chains = best_chains(layers, vertices.steps, turning, measure)
+        found = diverse_chains(layers, chains, vertices.steps, turning, _CANDIDATES, measure)
         rough = [bounds.turned_inside(connected(layers, q, turning)) for q in found]
         beyond = bounds.beyond(rough[0])
         if not np.any(beyond):
@@ -199,6 +201,6 @@ def _free_samples(
     for number, (target, here) in enumerate(zip(x, curves, strict=True), 1):
         progress("search: sampling waypoint", number, len(x))
         carried, arrived = motion.project_all(before, target)
-        before = place_nodes(motion, target, here, carried[arrived], bounds, SPACING)
+        before = place_vertices(motion, target, here, carried[arrived], bounds, SPACING)
         found.append(before)
     return found

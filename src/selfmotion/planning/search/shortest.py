@@ -1,4 +1,4 @@
-"""Chains that move aside to where they are shortest, by reweighted least squares.
+"""Shortest chains by reweighted least squares, from chains over samples.
 
 The length Σ w|Δq| of a chain, smoothed to Σ √((wΔq)² + δ²) - δ, is never above the quadratic with
 the same value and slope whose curvature is w²/√((wΔq)² + δ²) (E. Weiszfeld, "Sur le point pour
@@ -18,40 +18,45 @@ from selfmotion.planning.optimise import Banded
 from selfmotion.planning.search.chains import best_chains, connected, in_order
 from selfmotion.planning.search.manifold import LONGEST_CORRECTION, OnPath
 from selfmotion.planning.search.measures import Length, Measure
-from selfmotion.planning.search.nodes import AT_LIMIT, Admissible
+from selfmotion.planning.search.vertices import AT_LIMIT, Admissible
 from selfmotion.problem.problem import BodiesOfArm
 
-# δ, one stage after the other, as multiples of the chain's mean step.
+# δ of the stages, as multiples of the chain's mean step.
 SMOOTHINGS = (10.0, 3.0, 1.0, 0.3, 0.1)
-# Rounds of each stage or ring at most, and the gain below which it ends [share].
+# Largest number of rounds of each stage or ring …
 _ROUNDS = 20
+# … which ends at this relative gain.
 _GAIN = 1e-3
-# Rounds go so many times as far as their quadratics say, which are never below what they stand for.
-_FURTHER = 1.6
-# Joints at a limit stay there if they would leave it; rounds of that.
+# Over-relaxation: the quadratics are majorants.
+_OVERSHOOT = 1.6
+# Rounds in which joints that would leave their limits are held there.
 _LIMITS_HELD = 4
-# Steps are kept below this share of the largest; more counts as length times this [1/rad].
+# Allowed share of the largest step …
 _STEP_KEPT = 0.97
+# … and the penalty of the excess, in units of length [1/rad].
 _STEPS_STIFF = 30.0
-# Bodies are kept apart by so much more than asked for [m]; less counts as length times this [1/m²];
-# and a joint that is held at its limit is as stiff.
+# Clearance in addition to the required one [m] …
 _NEAR_BODIES = 1e-4
+# … and the penalty of a smaller one, in units of length [1/m²]; also of a joint held at its limit.
 _STIFF = 1e6
 
 
-# Of directions along which nothing changes.
+# Regularisation of directions without any change.
 _DAMPING = 1e-3
-# Distances beyond what is wanted do not count: over so little they level off [m].
-_LEVELLED = 1e-9
-# Shorter steps are tried so often, each by this factor.
-_TRIES, _SHORTER = 5, 0.4
-# Around a chain, samples at these distances [rad or m], one after the other. Chains along curves
-# end up to 0.3 % longer with 0.01 as the finest (`make bench NAME=suite`).
+# Distances saturate within this above the required one [m].
+_SATURATED = 1e-9
+# Shorter steps of the line search …
+_TRIES = 5
+# … each by this factor.
+_SHORTER = 0.4
+# Distances of the rings of samples around a chain [rad or m]. Chains along curves are up to 0.3 %
+# longer with 0.01 as the finest (`make bench NAME=suite`).
 _ROUGH_RINGS = (0.3, 0.1)
 _FINE_RINGS = (0.03, 0.01, 0.003, 0.001)
-# So many of them to each side; of fine ones more, or a chain is 0.13 % longer
-# (`make bench NAME=suite-made`).
-_ROUGH_SIDE, _FINE_SIDE = 2, 4
+# Samples to each side in rough rings …
+_ROUGH_SIDE = 2
+# … and in fine ones; with fewer, a chain of `make bench NAME=suite-made` is 0.13 % longer.
+_FINE_SIDE = 4
 
 
 class Shortest:
@@ -61,7 +66,7 @@ class Shortest:
     ----------
     waypoints : OnPath
     bounds : Admissible
-        What each configuration has to keep.
+        Conditions on each configuration.
     largest_step : (W - 1, n)
         No joint may move more from one waypoint to the next [rad or m].
     weights : (n,)
@@ -78,8 +83,8 @@ class Shortest:
     def near(self, q: Array, smoothings: Sequence[float] = SMOOTHINGS) -> Array:
         """Return a shorter chain near q (W, n), which keeps all that q keeps; else q itself.
 
-        In stages with these δ, as multiples of the mean step of q. Configurations of q that meet
-        something are led away from it where they can be, whatever the length.
+        In stages with these δ, as multiples of the mean step of q. Configurations of q in collision
+        are moved away first where possible, whatever the length.
         """
         self._free = self._bounds.keep(q)
         self._watched = ~self._free
@@ -111,13 +116,13 @@ class Shortest:
     ) -> tuple["_State | None", float]:
         """Return a better chain, no joint of which has moved farther than `reach`, and the next.
 
-        Configurations that would meet something stay where they are, are `blocked` (W,) from now
-        on, and watched; the others are asked again.
+        Configurations that would collide are left unmoved, become `blocked` (W,) and watched; the
+        step is computed again for the others.
         """
         every, step = np.arange(len(before.q)), self._step(before, blocked)
         for _ in range(_TRIES):
             longest = float(np.abs(step).max())
-            moved = min(_FURTHER * longest, reach)
+            moved = min(_OVERSHOOT * longest, reach)
             guess = before.q + (moved / longest if longest > 0.0 else 0.0) * step
             q, arrived = self._waypoints.project_each(guess, every)
             arrived &= np.abs(q - guess).max(axis=1) < max(reach, AT_LIMIT)
@@ -137,7 +142,7 @@ class Shortest:
         return None, reach
 
     def _state(self, q: Array, smoothing: float) -> "_State":
-        """Return how long a chain is, smoothed, and by how much it breaks what is watched."""
+        """Return the smoothed length of a chain, and the penalty of watched conditions."""
         steps = np.diff(q, axis=0)
         lengths = np.hypot(self._weights * steps, smoothing)
         over = np.maximum(np.abs(steps) - self._kept, 0.0) * self._weights
@@ -147,7 +152,7 @@ class Shortest:
         return _State(q, smoothing, steps, lengths, over, rows, lack, slopes, float(merit))
 
     def _lacking(self, q: Array) -> tuple[Ints, Array, Array]:
-        """Return what watched configurations lack of their distances [m], (L,), and ∂/∂q, (L, n).
+        """Return the missing distances of watched configurations [m], (L,), and ∂/∂q, (L, n).
 
         With the waypoints at which.
         """
@@ -171,10 +176,10 @@ class Shortest:
         return self._models
 
     def _step(self, state: "_State", blocked: Flags) -> Array:
-        """Return how far each configuration should move, (W, n): the least of the quadratics.
+        """Return the step of each configuration, (W, n): the minimiser of the quadratics.
 
-        Those that are `blocked` (W,) stay where they are, and joints that would leave their limits
-        at these; the others are asked again.
+        `blocked` ones (W,) do not move, and joints that would leave their limits stay there; the
+        step is computed again for the others.
         """
         bases = self._waypoints.bases(state.q)
         slope, curvature = state.slope(self._weights), state.curvature(self._weights)
@@ -192,7 +197,7 @@ class Shortest:
         return step
 
     def _leaving(self, q: Array, step: Array) -> Flags:
-        """Return which joints that are near a limit would pass it, (W, n)."""
+        """Return the mask of joints near a limit that would pass it, (W, n)."""
         lower, upper, ahead = self._bounds.lower, self._bounds.upper, q + step
         above = (ahead > upper) & (q > upper - AT_LIMIT)
         below = (ahead < lower) & (q < lower + AT_LIMIT)
@@ -201,7 +206,7 @@ class Shortest:
 
 @dataclass(frozen=True, eq=False)
 class _State:
-    """A chain q (W, n), its steps (W - 1, n), and what it lacks of distances between bodies."""
+    """A chain q (W, n), its steps (W - 1, n), and its missing distances between bodies."""
 
     q: Array
     smoothing: float
@@ -248,16 +253,16 @@ def _least(bases: Array, slope: Array, own: Array, between: Array, state: _State
 
 
 def _smooth(model: CollisionModel | BodiesOfArm, distance: float) -> tuple[ClearanceModel, float]:
-    """Return the distances that have slopes, and what is wanted of them [m]."""
+    """Return differentiable distances, and the required one [m]."""
     wanted = distance + _NEAR_BODIES
     own = model.own if isinstance(model, BodiesOfArm) else model
-    return ClearanceModel(own, wanted, width=_LEVELLED), wanted
+    return ClearanceModel(own, wanted, width=_SATURATED), wanted
 
 
 def improved_by(
     waypoints: OnPath, bounds: Admissible, largest_step: Array, measure: Measure
 ) -> Callable[[Array, bool], Array]:
-    """Return what makes a better chain near q (W, n), never a worse one; shorter ones also roughly.
+    """Return a better chain near q (W, n), never a worse one; shorter ones also roughly.
 
     Where something else than length counts, Newton's method goes on from there, and chains only
     have to be near enough.
@@ -269,7 +274,7 @@ def improved_by(
 
     def shorter(q: Array, roughly: bool) -> Array:
         q = shortest.near(q, SMOOTHINGS[:1] if roughly else SMOOTHINGS)
-        # Along curves samples are few: they lead over what quadratics do not see beyond.
+        # Along curves samples are few: they pass obstacles that the quadratics do not.
         is_last = roughly or waypoints.redundancy > 1
         return q if is_last else _cheaper(*asked, q, _FINE_RINGS, _FINE_SIDE)
 
@@ -303,8 +308,8 @@ def _cheaper(
 def _around(waypoints: OnPath, bounds: Admissible, q: Array, away: Array) -> list[Array]:
     """Return q (W, n) and the free samples around it at each waypoint, each (K, n).
 
-    As far `away` (S,) to both sides along each axis of a basis of the null space that is carried
-    along q: so a chain can move aside as a whole, without zigzag.
+    At distances `away` (S,) to both sides along each axis of a null-space basis that is carried
+    along q: so a chain can be displaced as a whole, without zigzag.
     """
     basis = waypoints.bases(q)
     offsets = np.concatenate([-away[::-1], away])

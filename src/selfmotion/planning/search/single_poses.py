@@ -10,29 +10,35 @@ from selfmotion.model.collision import Closest
 from selfmotion.model.robot import RobotModel
 from selfmotion.planning.search.curves import SPACING, SelfMotion
 from selfmotion.planning.search.manifold import Manifold
-from selfmotion.planning.search.nodes import Admissible
 from selfmotion.planning.search.starts import TRACING_SEEDS, spread
+from selfmotion.planning.search.vertices import Admissible
 from selfmotion.problem.problem import Problem
 
-# Branches of solutions that are followed from one pose to the next, and seeds where none of them
-# goes on.
+# Branches of solutions that are followed from one pose to the next.
 _BRANCHES = 12
+# Seeds where none of them goes on.
 _SEEDS = 24
-# Before a pose counts as out of reach, so many seeds more are tried, and a slower method from some:
-# poses at joint limits are missed from 24.
+# Additional seeds before a pose counts as out of reach: poses at joint limits are missed from 24.
 _MORE_SEEDS = 300
-# Who gets so near [m + rad] counts as there.
+# Error that counts as 0 [m + rad].
 _NEARLY = 1e-5
-# The slower method brings so many seeds nearer; and so many where a pose would be given up: near
-# limits it arrives from a third of them, Newton's from one in 300.
-_APPROACHED, _MORE_APPROACHED = 48, 400
-# Of those that meet something, so many are looked at, and so many of these, which meet the least,
-# moved aside at random, by less and less [rad].
-MOST_LOOKED_AT, CLIMBERS = 80, 8
-# Random walks along the self-motions, so many at a time, so often, in steps of these sizes [rad].
-_WALKERS, _WALKS, _WALK_STEPS = 64, 12, (0.1, 0.3, 0.8)
+# Seeds of the damped method …
+_APPROACHED = 48
+# … and before a pose is given up: near limits a third of them converges, of Newton's one in 300.
+_MORE_APPROACHED = 400
+# Configurations in collision that are evaluated.
+MOST_LOOKED_AT = 80
+# Of these, the ones with the smallest overlap that are moved at random.
+CLIMBERS = 8
+# Random walks along the self-motions: number at a time …
+_WALKERS = 64
+# … rounds …
+_WALKS = 12
+# … and sizes of steps [rad].
+_WALK_STEPS = (0.1, 0.3, 0.8)
+# Standard deviations of the random moves, in turn [rad].
 _CLIMBS = (0.3, 0.3, 0.2, 0.2, 0.1, 0.1, 0.05, 0.05, 0.02, 0.02)
-# Seeds near a pose are its nearest configurations, each so far off [rad], and some others.
+# Standard deviations around known nearest configurations, as seeds of a pose [rad].
 _CLOSE = (0.0, 0.03, 0.1, 0.3)
 
 
@@ -45,9 +51,9 @@ class Found:
     free : (K, n)
         Within the limits, and clear of bodies.
     met : (K', n)
-        Within the limits, but not clear; looked for only while none was free.
+        Solutions within limits, but in collision; computed only without free ones.
     tries : int
-        From so many configurations it was tried to get there.
+        Number of seeds that were tried.
     """
 
     free: Array
@@ -56,7 +62,7 @@ class Found:
 
 
 class SinglePoses:
-    """Inverse kinematics of single poses, within limits, clear of bodies, tolerances made use of.
+    """Inverse kinematics of single poses, within limits and tolerances, free of collisions.
 
     Parameters
     ----------
@@ -79,7 +85,7 @@ class SinglePoses:
         )
         self._seeds = spread(self.robot, _SEEDS, rng)
         self._shift = np.zeros(3)
-        # A path takes a millisecond to say where it is, and is asked again and again.
+        # Cached: a path takes a millisecond to evaluate.
         self._targets: dict[float, Array] = {}
 
     def of(self, problem: Problem) -> "SinglePoses":
@@ -89,7 +95,7 @@ class SinglePoses:
         return other
 
     def shifted(self, shift: Array) -> "SinglePoses":
-        """Return that of the path moved by so much (3,) [m], among the same bodies."""
+        """Return the same with the path displaced by (3,) [m], among the same bodies."""
         other = copy(self)
         other._shift = self._shift + shift
         return other
@@ -102,7 +108,7 @@ class SinglePoses:
         return other
 
     def target(self, t: float) -> Array:
-        """Return where the tips are at a time [s], (12 F,)."""
+        """Return the poses of the tips at a time [s], (12 F,)."""
         if t not in self._targets:
             self._targets[t] = self.follows.targets(np.array([t]))[0]
         target = self._targets[t].copy()
@@ -113,14 +119,14 @@ class SinglePoses:
         return np.asarray(self.follows.held(np.array([t]))[0])
 
     def project(self, q: Array, t: float, *, far: bool = False) -> tuple[Array, Flags]:
-        """Return what Newton's method makes of q (K, n) at a time [s], and where it arrives, (K,).
+        """Return the result of Newton's method from q (K, n) at a time [s], and convergence, (K,).
 
         `far` says that q is any configuration, instead of one near a solution.
         """
         return self._manifold.project(q, self.target(t), far=far, held=self._held(t))
 
     def first_blocked(self, times: Array) -> float | None:
-        """Return the first of some times [s] at whose poses nothing is found by a quick look."""
+        """Return the first of some times [s] at whose poses a quick search finds nothing."""
         known = np.empty((0, self.robot.dof))
         for t in times.tolist():
             found = self.look(t, known)
@@ -133,7 +139,7 @@ class SinglePoses:
         return None
 
     def look(self, t: float, known: Array) -> Found:
-        """Return what is found at t [s] from configurations nearby (K, n), and from anywhere."""
+        """Return the solutions at t [s] from configurations nearby (K, n), and from anywhere."""
         near = self._reached(t, known[:_BRANCHES])
         free = near[self.bounds.keep(near)]
         if len(free):
@@ -143,7 +149,7 @@ class SinglePoses:
         return Found(free, np.concatenate([near, far]), len(known[:_BRANCHES]) + len(self._seeds))
 
     def look_closely(self, t: float, before: Found) -> Found:
-        """Return what is found by everything that is known, where a look found nothing free."""
+        """Return the solutions by all methods, after a search without a free one."""
         seeds = spread(self.robot, _MORE_SEEDS, self._rng)
         far = self._reached(t, seeds, far=True)
         tries = before.tries + len(seeds)
@@ -165,12 +171,12 @@ class SinglePoses:
         return Found(free, met, tries)
 
     def _reached(self, t: float, seeds: Array, *, far: bool = False) -> Array:
-        """Return what Newton's method makes of seeds (K, n) for the pose at t, (K', n)."""
+        """Return the solutions of Newton's method from seeds (K, n) for the pose at t, (K', n)."""
         found, arrived = self.project(seeds, t, far=far)
         return np.asarray(found[arrived])
 
     def _by_damped_steps(self, t: float, count: int) -> Array:
-        """Return what the slower method finds, which comes to limits and edges, (K, n)."""
+        """Return solutions of the damped method, which also reaches limits and edges, (K, n)."""
         q, misses = self.nearest(t, count)
         near = q[misses.sum(axis=1) < _NEARLY]
         within = (np.abs(near) <= self.follows.within_bands(near)).all(axis=1)
@@ -178,7 +184,7 @@ class SinglePoses:
         return np.concatenate([near[within], pulled[arrived]])
 
     def nearest(self, t: float, count: int = _APPROACHED) -> tuple[Array, Array]:
-        """Return configurations as near to a pose as limits let them (K, n), misses [m, rad]."""
+        """Return configurations as near to a pose as limits allow (K, n), and errors [m, rad]."""
         seeds = spread(self.robot, count, self._rng)
         q, misses = self._manifold.approach(seeds, self.target(t), self._held(t))
         order = np.argsort(misses.sum(axis=1), kind="stable")
@@ -241,7 +247,7 @@ class SinglePoses:
         return best
 
     def room(self, q: Array) -> tuple[float, Closest, float]:
-        """Return what bodies have beyond what is asked at q (n,) [m], the worst pair, and that."""
+        """Return the excess clearance at q (n,) [m], the worst pair, and the required distance."""
         each = [(model.distance(q), asked) for model, asked in self.bounds.bodies]
         rooms = ((closest.value - asked, closest, asked) for closest, asked in each)
         return min(rooms, key=lambda found: found[0])

@@ -1,14 +1,14 @@
 """Motions that follow a path with limits and quantities of q as rows of the task, in any metric.
 
-Without self-motion, an arm leaves what else is asked of it, and a motion that has left it far
-behind is no beginning for Newton's method: a torch that leans does not become upright by small
-steps, when a table has to turn once round for that. Here what is about to be broken is a row of the
-task while it binds,
+Without self-motion an arm violates other conditions, and a motion that has violated one far is no
+initial guess for Newton's method: a torch that leans does not become upright by small steps, if a
+table has to turn once round for that. Here a condition about to be violated is a row of the task
+while it binds,
 
     q̇ = W⁻¹Aᵀ(A W⁻¹Aᵀ)⁻¹ [ẋ; ḣ],   A = [J; ∂h/∂q of what binds],
 
-with a metric W by which some joints are heavy: of all ways to share a motion between the parts of a
-cell, the one in which these move least.
+with a metric W by which some joints are heavy: of all distributions of a motion among the parts of
+a cell, the one in which these move least.
 """
 
 from collections.abc import Sequence
@@ -21,22 +21,26 @@ from selfmotion.model.follow import Follows
 from selfmotion.model.robot import RobotModel
 from selfmotion.planning.search.manifold import Manifold
 
-# Rows bind at this share of their limits, and are kept once they are within so much of that.
-_SHARE, _MET = 0.9, 0.02
-# Corrections after a step along the path, and from any configuration; each goes this far at most
-# [rad or m].
-_NEAR_ROUNDS, _FAR_ROUNDS, _FARTHEST = 4, 40, 0.3
-# Of the sum of the metric's diagonal this is added, so that rows that depend on each other do not
-# stop a motion.
+# Share of its limit from which on a row binds …
+_SHARE = 0.9
+# … and the distance from that which counts as satisfied.
+_MET = 0.02
+# Corrections after a step along the path …
+_NEAR_ROUNDS = 4
+# … and from any configuration …
+_FAR_ROUNDS = 40
+# … with this largest change [rad or m].
+_FARTHEST = 0.3
+# Damping as a share of the metric's trace: dependent rows do not stop a motion.
 _DAMPED = 1e-9
-# A joint that is heavy counts so many times as much.
+# Factor of the weight of a heavy joint.
 _HEAVY = 100.0
-# A joint that may turn by this or more [rad] can be wound back by whole turns: no limit binds it.
+# Range of a joint [rad] from which on it can be wound back by whole turns: no limit binds it.
 _WHOLE_TURN = 2.0 * np.pi
 
 
 class Stacked:
-    """The rows of a task with what else is asked of configurations.
+    """The rows of a task, and further conditions on configurations as rows.
 
     Parameters
     ----------
@@ -73,7 +77,7 @@ class Stacked:
         return self._kept(q, target, held, _FAR_ROUNDS)
 
     def carried(self, starts: Array, t: Array, at: int = 0) -> tuple[Array, Flags]:
-        """Return the motions through configurations (K, n), (K, N, n), and which go all the way.
+        """Return the motions through configurations (K, n), (K, N, n), and which are complete.
 
         From the one of the times t (N,) [s] of number `at` to both ends.
         """
@@ -121,7 +125,7 @@ class Stacked:
         light = stacked * self._light
         gram = light @ stacked.transpose(0, 2, 1)
         count = gram.shape[1]
-        # What does not bind is a row of its own, and asks for nothing.
+        # A row that does not bind is decoupled, with right side 0.
         gram[:, range(count), range(count)] += _DAMPED * self._light.sum()
         found = np.linalg.solve(gram, wanted[:, :, None])
         return np.asarray((light.transpose(0, 2, 1) @ found)[:, :, 0])
@@ -129,7 +133,7 @@ class Stacked:
     def _rows(self, q: Array) -> tuple[Array, Array]:
         """Return rows (K, R, n) of all that may bind, and by how much each does, (K, R).
 
-        In shares of what is allowed.
+        In shares of the limits.
         """
         count, n = q.shape
         still, slopes, beyond = np.zeros_like(q), [], []

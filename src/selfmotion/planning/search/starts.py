@@ -11,16 +11,17 @@ from selfmotion.model.robot import RobotModel
 from selfmotion.planning.search.chains import UNLIKE
 from selfmotion.planning.search.curves import SPACING, SelfMotion
 from selfmotion.planning.search.manifold import Manifold
-from selfmotion.planning.search.nodes import Admissible
+from selfmotion.planning.search.vertices import Admissible
 
-# Where all self-motions of the first pose can be traced: from so many seeds.
+# Seeds where all self-motions of the first pose can be traced.
 TRACING_SEEDS = 60
-# Where they cannot: so many seeds for each configuration that is asked for.
+# Seeds for each requested configuration where they cannot.
 _TRIES = 2
-# Where most of them do not keep what else is asked of a configuration: so many rounds of these at
-# most, until there is this share of the starts.
-_START_ROUNDS, _ENOUGH_STARTS = 12, 0.5
-# What a slower method leaves [m, rad] where Newton's method does the rest.
+# Rounds of these where most solutions violate other conditions …
+_START_ROUNDS = 12
+# … until there is this share of the starts.
+_ENOUGH_STARTS = 0.5
+# Error of the damped method [m, rad] from which Newton's converges.
 _NEARLY = 1e-6
 
 
@@ -45,12 +46,12 @@ def start_candidates(
     ----------
     follows : Follows
     count : int
-        How many at most.
+        Largest number of configurations.
     rng : Generator
         Shifts the sequence.
     admits : callable, optional
-        Which configurations (K, n) keep what else is asked of them, (K,). Where none is found that
-        does, others are returned.
+        Mask of configurations (K, n) that satisfy further conditions, (K,). Others are returned if
+        none does.
     time : float
         When [s].
 
@@ -82,7 +83,7 @@ def start_candidates(
             rotation_miss=np.inf,
         )
     if not found:
-        # Many more attempts, and an error that names the miss.
+        # Many more attempts, and an error that names the distance.
         found = [follows.robot.inverse_kinematics(follows.path.pose(time), follows.task, rng=rng)]
     return found
 
@@ -100,7 +101,7 @@ def _along_curves(
     curves = motion.curves(
         follows.targets(np.array([time]))[0], spread(robot, TRACING_SEEDS, rng)
     ).curves
-    # The last sample of a closed curve is its first one.
+    # The last sample of a closed curve equals its first one.
     samples = [curve.q[: len(curve.q) - curve.closed] for curve in curves]
     inside = [q[bounds.free(q) & admits(q)] for q in samples]
     total = sum(map(len, inside))
@@ -124,7 +125,7 @@ def _scattered(
         for one in q[arrived][admits(q[arrived])]:
             if len(found) < count and all(np.linalg.norm(one - other) > UNLIKE for other in found):
                 found.append(one)
-        # Without anything else to keep, one round tells what there is.
+        # Without further conditions, one round finds all.
         if admits is _all or len(found) >= _ENOUGH_STARTS * count:
             break
     return found

@@ -1,4 +1,4 @@
-"""What a motion must keep: limits, end conditions, closed paths, clearance."""
+"""Constraints on a motion: limits, end conditions, closed paths, clearance."""
 
 from selfmotion.problem.constraints.band import Band as Band
 from selfmotion.problem.constraints.base import Constraint as Constraint, Envelope as Envelope

@@ -10,11 +10,11 @@ import numpy as np
 from typing_extensions import override
 
 from selfmotion.basics import Array, ProblemError, as_number, restore, series, shown
-from selfmotion.certificate import Column, Quantity, Stretch
+from selfmotion.certificate import Column, MotionSegments, Quantity
 from selfmotion.model.robot import Coordinate, RobotModel, SwivelAngle
 from selfmotion.problem.constraints.base import Constraint, Envelope, check_changes
 
-# Centre of the swivel angle from upwards, about the direction from shoulder to wrist [rad].
+# Angle of the band's centre from upwards, about the direction from shoulder to wrist [rad].
 _SIDES = {"up": 0.0, "left": -0.5 * np.pi, "right": 0.5 * np.pi, "down": np.pi}
 
 
@@ -54,9 +54,9 @@ class Band(Constraint):
     def of_elbow(cls, side: str, half: float = 0.5 * np.pi, **names: str) -> Band:
         """Return the band that keeps the elbow 'up', 'down', 'left' or 'right'.
 
-        Left and right are those of who looks from the shoulder to the wrist with the head up; the
-        angle is `SwivelAngle`'s, its links are `names` where the arm is not of seven revolute
-        joints. `half` is how far the elbow may swivel to each side of that [rad].
+        Left and right are as seen from the shoulder towards the wrist with the head up; the angle
+        is `SwivelAngle`'s, its links are `names` for arms other than of seven revolute joints.
+        `half` is the allowed swivel of the elbow to each side [rad].
         """
         if side not in _SIDES:
             raise ProblemError(
@@ -78,8 +78,8 @@ class Band(Constraint):
         coordinate = self.coordinate
         coordinate(robot, np.zeros((1, robot.dof)))
 
-        def known(stretch: Stretch) -> Array | None:
-            found = coordinate.series(stretch.chain(), stretch.motion(np.zeros(1)))
+        def known(segments: MotionSegments) -> Array | None:
+            found = coordinate.series(segments.chain(), segments.motion(np.zeros(1)))
             return None if found is None else found[None]
 
         found = Quantity(

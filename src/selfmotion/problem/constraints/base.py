@@ -1,4 +1,4 @@
-"""What a constraint is: something that a motion must keep, written down without an arm."""
+"""Base of constraints: conditions on a motion, written down without an arm."""
 
 from __future__ import annotations
 
@@ -16,21 +16,19 @@ from selfmotion.model.follow import Follows
 from selfmotion.model.robot import RobotModel
 from selfmotion.problem.constraints.conditions import BoundConstraint, BoundQuantity
 
-# What single configurations and single steps must keep, for searches that see no whole motion.
-
 
 @dataclass(frozen=True, eq=False)
 class Envelope:
-    """The part of constraints that can be told of a configuration or a velocity alone.
+    """The part of constraints that applies to a configuration or a velocity alone.
 
     Attributes
     ----------
     lower, upper : (n,)
-        Position limits [rad or m]; ±inf where there is none.
+        Position limits [rad or m]; ±inf for none.
     speed, acceleration, jerk : (n,)
-        Limits of |q̇|, |q̈| and of the jerk; inf where there is none.
+        Limits of |q̇|, |q̈| and of the jerk; inf for none.
     bodies : tuple of (CollisionModel, float)
-        Bodies to keep apart, and the distance [m].
+        Bodies with a minimum distance [m].
     quantities : tuple of Quantity
         Of q alone, with limits.
     """
@@ -67,7 +65,7 @@ class Envelope:
         return replace(cls.unbounded(dof), quantities=(quantity,))
 
     def __and__(self, other: Envelope) -> Envelope:
-        """Return the envelope of what both allow."""
+        """Return the envelope that satisfies both."""
         return Envelope(
             read_only(np.maximum(self.lower, other.lower)),
             read_only(np.minimum(self.upper, other.upper)),
@@ -79,7 +77,7 @@ class Envelope:
         )
 
     def admits(self, q: Array) -> npt.NDArray[np.bool_]:
-        """Return which configurations (K, n) keep the quantities, (K,)."""
+        """Return the mask of configurations (K, n) that satisfy the quantities, (K,)."""
         kept, still = np.ones(len(q), dtype=bool), np.zeros_like(q)
         for item in self.quantities:
             away = item.away(q, still, still)
@@ -97,22 +95,17 @@ class Envelope:
         return bool(np.any(np.isfinite(self.lower)) or np.any(np.isfinite(self.upper)))
 
     def keeps(self, q: Array, qd: Array) -> Array:
-        """Return whether q and q̇ (N, n) are within the limits, bodies not looked at, (N,) bool."""
+        """Return the mask of q and q̇ (N, n) within the limits, bodies left out, (N,)."""
         inside = (q >= self.lower) & (q <= self.upper) & (np.abs(qd) <= self.speed)
         return np.asarray(inside.all(axis=1))
-
-
-# What a constraint is: something that a motion must keep, written down without an arm.
-#
-# It is bound to one when a plan is made (`selfmotion.problem.constraints.conditions`).
 
 
 class Constraint(Saved, ABC, family="constraint"):
     """Something that a motion must keep, not yet bound to an arm.
 
-    One of one's own says what it measures, once: `quantity`. From that follow the conditions that
-    the optimiser keeps (`bind`), and what the certificate judges the finished motion by, on its own
-    (`requirement`). What is no quantity within limits gives these two instead.
+    A user's own class gives the `quantity` that it limits. From that follow the conditions of the
+    optimiser (`bind`), and the independent judgement of the finished motion by the certificate
+    (`requirement`). A constraint that is no limited quantity gives these two instead.
     `selfmotion.testing.check_constraint` checks either.
 
     Attributes
@@ -120,15 +113,14 @@ class Constraint(Saved, ABC, family="constraint"):
     margin : float
         Share of a quantity's limits that is aimed to be left unused; at least half of it is.
     of_pace : bool
-        Whether it limits the pace of a motion rather than its way.
+        Whether it limits the pace of a motion rather than its path in joint space.
     closes : bool
-        Whether it asks that the motion ends as it began, so that no part of it can keep it.
+        Whether it requires that the motion ends as it starts, so that no part of it can.
     kept_moving : bool
-        Whether what its envelope says is all that it asks, so that it can be kept while the arm
-        moves.
+        Whether its envelope is the whole constraint, so that it can be kept while the arm moves.
     pins : (bool, bool)
-        Whether the tool has to be on the path itself, not only within what is relaxed, at the start
-        and at the end of the motion.
+        Whether the tool has to be on the path itself, in spite of relaxations, at the start and at
+        the end of the motion.
     sets_velocity : (bool, bool)
         Whether it says how fast the arm is at the start and at the end of the motion, which else
         is at rest where the tool is.
@@ -145,7 +137,7 @@ class Constraint(Saved, ABC, family="constraint"):
     sets_acceleration: ClassVar[tuple[bool, bool]] = (False, False)
 
     def quantity(self, robot: RobotModel) -> Quantity:
-        """Return what it measures and what that may be; ProblemError where it misfits the arm."""
+        """Return the quantity and its limits; ProblemError if it does not fit the arm."""
         raise ProblemError(
             f"constraint {type(self).__name__} does not say what it asks for: give it "
             f"quantity(robot), or bind(…) and requirement(robot)"
@@ -154,16 +146,16 @@ class Constraint(Saved, ABC, family="constraint"):
     def bind(self, follows: Follows, start: Array, end: Array) -> BoundConstraint:
         """Return the conditions on the motion of an arm; ProblemError where it misfits.
 
-        `start` and `end` (n,) are those of the motion that the optimisation begins with.
+        `start` and `end` (n,) are those of the initial motion of the optimisation.
         """
         return BoundQuantity(self.quantity(follows.robot), self.margin)
 
     def requirement(self, robot: RobotModel) -> Requirement:
-        """Return what the certificate judges; ProblemError where it misfits the arm."""
+        """Return the requirement for the certificate; ProblemError if it does not fit the arm."""
         return QuantityWithinLimits(self.quantity(robot))
 
     def applies(self, robot: RobotModel) -> bool:
-        """Return whether it asks anything of an arm: not where it keeps limits nobody knows."""
+        """Return whether it applies to an arm: not if its limits are unknown."""
         return True
 
     def check(self, follows: Follows) -> None:
@@ -173,7 +165,7 @@ class Constraint(Saved, ABC, family="constraint"):
         """Raise ProblemError where it does not fit the start, (n,) or None for a free one."""
 
     def envelope(self, robot: RobotModel) -> Envelope:
-        """Return what it asks of single configurations and velocities; by default nothing."""
+        """Return its envelope for single configurations and velocities; by default an empty one."""
         return Envelope.unbounded(robot.dof)
 
     def fixed_end(self, robot: RobotModel) -> Array | None:
@@ -181,15 +173,15 @@ class Constraint(Saved, ABC, family="constraint"):
         return None
 
     def at_rest(self) -> Constraint:
-        """Return what is left to ask of a motion that rests at both ends by itself."""
+        """Return the remainder for a motion that rests at both ends by itself."""
         return self
 
     def on_part(self) -> Constraint | None:
-        """Return what it asks of a motion along the first part of the path; None for nothing."""
+        """Return the constraint for a first part of the path; None for none."""
         return self
 
     def on_last_part(self) -> Constraint | None:
-        """Return what it asks of a motion along the last part of the path; None for nothing."""
+        """Return the constraint for a last part of the path; None for none."""
         return self
 
 
@@ -197,7 +189,7 @@ def check_changes(quantity: Quantity, robot: RobotModel) -> None:
     """Raise ProblemError where no joint changes a quantity of q."""
     q = robot.generic_configurations()
     slopes = quantity.derivatives(q, np.zeros_like(q), np.zeros_like(q))[0]
-    # Written so that NaN, of what has no value somewhere, passes.
+    # Written so that NaN, of a quantity undefined somewhere, passes.
     if np.all(np.abs(slopes) <= _NEVER):
         raise ProblemError(
             f"{robot.name}: {quantity.name}: no joint changes {quantity.columns[0].label}; leave "
@@ -205,5 +197,5 @@ def check_changes(quantity: Quantity, robot: RobotModel) -> None:
         )
 
 
-# Derivatives up to here are rounding of zero [m or rad per rad or m].
+# Derivatives up to this are rounding of zero [m or rad per rad or m].
 _NEVER = 1e-12

@@ -1,4 +1,4 @@
-"""Distance from obstacles, and of links from each other."""
+"""Clearance: distance from obstacles, and between links."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ from selfmotion.problem.constraints.base import Constraint, Envelope
 from selfmotion.problem.constraints.conditions import NodeTangents, motion_of_order
 from selfmotion.problem.costs import Samples
 
-# No arm keeps farther from what it could meet [m].
+# Largest distance that is accepted [m].
 _FARTHEST = 3.0
 
 
 @dataclass(frozen=True, eq=False)
 class Clearance(Constraint):
-    """The arm, and what rides on it, keep a distance from obstacles and from each other.
+    """The arm and attached bodies have a minimum distance from obstacles and from each other.
 
     An obstacle with a `frame` rides on that link, like another link that is fixed to it. While
     optimising, links are their convex hulls and obstacles with hollows convex pieces that contain
@@ -46,7 +46,7 @@ class Clearance(Constraint):
     Parameters
     ----------
     obstacles : Obstacle or sequence of Obstacle
-        The world, and what rides on links.
+        Obstacles in the world, and bodies attached to links.
     distance : float
         Smallest distance [m].
     srdf : path, optional
@@ -94,7 +94,7 @@ class Clearance(Constraint):
         object.__setattr__(self, "distance", distance)
 
     def model(self, robot: RobotModel) -> CollisionModel:
-        """Return the exact model that the certificate measures with, made once per arm.
+        """Return the exact model that the certificate uses, cached by arm.
 
         Raises
         ------
@@ -108,7 +108,7 @@ class Clearance(Constraint):
         return BoundClearance(self._models(follows.robot).smooth, self.distance)
 
     def bind_decomposed(self, follows: Follows) -> BoundClearance:
-        """Return what `bind` does, with links in convex pieces before obstacles."""
+        """Return `bind` with links decomposed into convex pieces before obstacles."""
         return BoundClearance(self._models(follows.robot).decomposed, self.distance)
 
     @override
@@ -220,7 +220,7 @@ class BoundClearance:
         return (len(now.values), now.values.shape[1]), _Pull(now)
 
     def _clearances(self, samples: Samples) -> Clearances:
-        """Return the distances at the nodes; those of the last motion are kept."""
+        """Return the distances at the nodes; those of the last motion are cached."""
         q = self._of_arm(samples)
         if not self._knows(q):
             self._last[:] = [q, self.model.clearances(q)]
@@ -253,7 +253,7 @@ class BoundClearance:
 
 @dataclass(frozen=True, eq=False)
 class _Pull:
-    """How clearances change with the motion."""
+    """Derivatives of clearances by the motion."""
 
     clearances: Clearances
 
@@ -270,8 +270,8 @@ class _Pull:
         return motion.q[:, : self.clearances.slopes.shape[1]]
 
 
-# So far beyond the distance asked for, clearances begin to level off [m]: well outside of where
-# the optimiser feels the constraint.
+# Distances saturate this far beyond the required one [m]: well outside of the optimiser's active
+# range.
 _NEAR = 0.01
-# Clearances count in units of this, to weigh about as much as joint angles.
+# Unit of clearances [m]: with it they have about the weight of joint angles.
 _METRE = 0.1

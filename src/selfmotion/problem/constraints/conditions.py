@@ -1,4 +1,4 @@
-"""Conditions h ≤ 0 or h = 0 at the nodes of the grid: as the optimiser sees them, kept, active."""
+"""Conditions h ≤ 0 or h = 0 at the nodes of the grid, their violations and multipliers."""
 
 from __future__ import annotations
 
@@ -17,13 +17,11 @@ from selfmotion.problem.costs import Samples
 
 # Conditions h ≤ 0 or h = 0 on the motion at the nodes of the grid, as the optimiser sees them.
 #
-# Limits are kept with a margin, so that the motion between nodes and the last digits of the
-# optimisation stay within the limits themselves.
 
 
 @dataclass(frozen=True, eq=False)
 class NodeTangents:
-    """How the motion at the nodes changes with d decision variables.
+    """Derivatives of the motion at the nodes by d decision variables.
 
     Attributes
     ----------
@@ -69,7 +67,7 @@ class BoundConstraint(Protocol):
 
     @property
     def name(self) -> str:
-        """What to call it in messages."""
+        """Its name in messages."""
 
     @property
     def equality(self) -> bool:
@@ -77,7 +75,7 @@ class BoundConstraint(Protocol):
 
     @property
     def tolerance(self) -> float:
-        """What h (|h| for an equality) may be and still count as kept."""
+        """Largest h (|h| for an equality) that counts as satisfied."""
 
     def residual(self, samples: Samples) -> Array:
         """Return h: (N + 1, C) for conditions at every node, (1, C) for those on the ends."""
@@ -86,11 +84,11 @@ class BoundConstraint(Protocol):
         """Return ∂h/∂x for d variables: h's shape with d appended."""
 
     def describe(self, samples: Samples, row: int, column: int) -> str:
-        """Return what is wrong where h[row, column] is too large, with names and numbers."""
+        """Return the violation at h[row, column] in words, with names and numbers."""
 
 
 class Linear(Protocol):
-    """How conditions change with the motion of the nodes, at one motion."""
+    """Derivatives of conditions by the motion of the nodes, at one motion."""
 
     def picked(self, motion: NodeTangents, rows: Ints, columns: Ints) -> Array:
         """Return the tangents of some rows and columns of h, (k,) each: (k, d)."""
@@ -125,9 +123,9 @@ class Linearised:
 def linearised(bound: BoundConstraint, samples: Samples, motion: NodeTangents) -> Linearised:
     """Return the derivatives of a constraint's conditions at a motion.
 
-    What its own ``linearised_at(samples)`` returns, where it has one: the shape of h, and a
-    `Linear` that computes as much as it is asked for. By default all `tangents`; ProblemError where
-    these are not of the shape that they should have.
+    The result of its own ``linearised_at(samples)``, if any: the shape of h, and a `Linear` that
+    computes the requested rows alone. By default all `tangents`; ProblemError if these do not have
+    the expected shape.
     """
     own = getattr(bound, "linearised_at", None)
     if callable(own):
@@ -142,12 +140,11 @@ def linearised(bound: BoundConstraint, samples: Samples, motion: NodeTangents) -
 
 
 def easing_of(bound: BoundConstraint, column: int) -> tuple[float, str]:
-    """Return how much larger h may be to ask for a little less, and what that means in words.
+    """Return a relaxation of h for a little less strict condition, and the same in words.
 
-    What a constraint's own `easing(column)` says, where it has one: ``(0.02, "2 % more speed for
-    joint 'elbow'")``. Columns with the same words are eased together. Words that begin with a
-    number are told with a smaller one where the cost would fall by more than a first derivative
-    knows.
+    The result of a constraint's own `easing(column)`, if any: ``(0.02, "2 % more speed for joint
+    'elbow'")``. Columns with the same words are relaxed together. A number at the start of the
+    words is reduced where the cost would fall by more than a first derivative can predict.
     """
     own = getattr(bound, "easing", None)
     return (0.01, f"0.01 more of {bound.name}") if own is None else own(column)
@@ -216,7 +213,7 @@ class BoundQuantity:
         return np.asarray(2.0 * np.einsum("kmc,kmcd->kmd", self._used(samples), by))
 
     def is_of_accelerations(self, dof: int) -> bool:
-        """Whether what has a limit depends on q̈, for an arm of so many joints."""
+        """Whether a limited quantity depends on q̈, for an arm of `dof` joints."""
         somewhere = np.full((1, dof), 0.3)
         changes = self.quantity.derivatives(somewhere, somewhere, somewhere)
         return len(changes) > 2 and bool(np.any(changes[2][:, self.quantity.limited]))
@@ -225,8 +222,8 @@ class BoundQuantity:
     def squares(self) -> Callable[[Samples], Array] | None:
         """``squares(samples)`` → slopes (K, c, n) whose squares h bends by; None of numbers.
 
-        Where it is narrow, what it bends by is all that stops a step: a vector at the edge of its
-        limit is as long to first order wherever it turns to.
+        Where a limit is narrow, its curvature is all that limits a step: a vector at the edge of
+        its limit keeps its length to first order whichever way it turns.
         """
         is_vector = self.quantity.components > 1 and len(self.quantity.columns) == 1
         return self._squares if is_vector else None
@@ -234,7 +231,7 @@ class BoundQuantity:
     def _squares(self, samples: Samples) -> Array:
         changes = self.quantity.derivatives(*motion_at_nodes(samples))
         slopes = np.sqrt(2.0) / float(self.quantity.bounds[0]) * changes[0][:, 0]
-        # What depends on q̇ as well is left to its slopes.
+        # The dependence on q̇, if any, is left to the first derivatives.
         return np.asarray(slopes if len(changes) == 1 else np.zeros_like(slopes))
 
     def easing(self, column: int) -> tuple[float, str]:
@@ -264,15 +261,12 @@ class BoundQuantity:
         return np.asarray(away / (self._limit if away.ndim == 2 else self._limit[:, None]))
 
 
-# How far a motion keeps what is asked of it, in words and as one number.
-
-# A constraint whose violation, squared and integrated, is above this counts as much as ten times
-# the cost.
+# Weight of a violation, squared and integrated, at which a constraint counts as ten times the cost.
 _NOTICED = 2e-3
 
 
 def violated(constraints: Sequence[BoundConstraint], samples: Samples) -> tuple[str, ...]:
-    """Return a message for each constraint that is not kept, on its worst place."""
+    """Return a message for each violated constraint, on its worst place."""
     messages = []
     for item in constraints:
         h = item.residual(samples)
@@ -286,7 +280,7 @@ def violated(constraints: Sequence[BoundConstraint], samples: Samples) -> tuple[
 
 
 def worst_time(constraints: Sequence[BoundConstraint], samples: Samples) -> float | None:
-    """Return when [s] inequalities are violated most, by residuals; None where all are kept."""
+    """Return the time [s] of the largest violation of inequalities; None where all hold."""
     worst, time = 0.0, None
     for item in constraints:
         if not item.equality:
@@ -303,7 +297,7 @@ def penalised(cost: float, constraints: Sequence[BoundConstraint], samples: Samp
 
 
 def penalty(constraints: Sequence[BoundConstraint], samples: Samples) -> float:
-    """Return up to 10 for each constraint that is violated, 0 where all are kept."""
+    """Return up to 10 for each violated constraint, 0 where all hold."""
     steps, total = np.diff(samples.sampling.node_times), 0.0
     shares = 0.5 * (np.append(steps, 0.0) + np.append(0.0, steps))
     for item in constraints:
@@ -316,10 +310,10 @@ def penalty(constraints: Sequence[BoundConstraint], samples: Samples) -> float:
 
 # Active constraints, from the multipliers of conditions.
 
-# A condition is active where its multiplier is above this share of its largest one: interior points
-# leave a little everywhere.
+# A condition is active if its multiplier is above this share of its largest one: interior points
+# leave small multipliers everywhere.
 _ACTIVE = 1e-3
-# How the words of an easing begin: with its size.
+# Number at the start of the words of a relaxation.
 _SIZE = re.compile(r"\d+(\.\d+)?")
 
 
@@ -334,11 +328,11 @@ class ActiveConstraint:
     easing : str
         A small relaxation of it in words, with the joint or the pair.
     saving : float
-        What that relaxation would take off F, to first order: the sum of the Lagrange multipliers
-        times its amount. A larger relaxation saves less than in proportion; the amount is so small
-        that this is some hundredth of F at most.
+        Decrease of F by that relaxation, to first order: the sum of the Lagrange multipliers times
+        its amount. A larger relaxation saves less than in proportion; the amount is so small that
+        this is some hundredth of F at most.
     spans : tuple of (float, float)
-        First and last time [s] of each stretch on which it is active.
+        First and last time [s] of each interval on which it is active.
     """
 
     constraint: str
@@ -348,16 +342,16 @@ class ActiveConstraint:
 
 
 class Multipliers(NamedTuple):
-    """What the conditions of a constraint cost.
+    """Lagrange multipliers of a constraint's conditions.
 
     Attributes
     ----------
     item : BoundConstraint
     multipliers : (K, C)
     times : (K,)
-        When [s], increasing; one for what is asked of the whole motion.
+        Times [s], increasing; a single one for a condition on the whole motion.
     used : (K, C)
-        Where what is asked for is used up, as far as multipliers say.
+        Mask of conditions without room, as far as multipliers show.
     """
 
     item: BoundConstraint
@@ -369,10 +363,10 @@ class Multipliers(NamedTuple):
 def active_of(
     each: Sequence[Multipliers], span: Array, least: float, most: float = np.inf
 ) -> tuple[ActiveConstraint, ...]:
-    """Return what is active, what saves most first; what would save less than `least` is left out.
+    """Return the active constraints by decreasing saving, without those that save below `least`.
 
-    `span` (2,) is when the motion begins and ends [s]. What would save more than `most` is eased
-    by less: so far a first derivative tells nothing.
+    `span` (2,) is the time of start and end of the motion [s]. A relaxation that would save more
+    than `most` is reduced: a first derivative is not valid that far.
     """
     found: dict[tuple[str, str], tuple[float, Array, Array, Array]] = {}
     for item, signed, times, used in each:
@@ -397,7 +391,7 @@ def active_of(
 
 
 def _eased(words: str, saving: float, most: float) -> tuple[str, float]:
-    """Return an easing in words and its saving, by so much less that it saves `most` at most."""
+    """Return a relaxation in words and its saving, reduced so that it saves at most `most`."""
     size = _SIZE.match(words)
     if size is None or saving <= most:
         return words, saving
@@ -407,7 +401,7 @@ def _eased(words: str, saving: float, most: float) -> tuple[str, float]:
 
 
 def _spans(active: Flags, times: Array, span: Array) -> tuple[tuple[float, float], ...]:
-    """Return the stretches of active times, `span` of one; one free time between is none."""
+    """Return the intervals of active times, `span` for a single one; gaps of one are closed."""
     if len(active) == 1:
         return ((float(span[0]), float(span[-1])),)
     nodes = np.flatnonzero(active)

@@ -18,13 +18,14 @@ from selfmotion.problem.constraints.base import Constraint
 from selfmotion.problem.constraints.conditions import NodeTangents, motion_of_order
 from selfmotion.problem.costs import Samples
 
-# What is asked of an end of the motion, bound to an arm.
-
-# The optimiser need only come near [rad, rad/s]: Newton's method then closes the rest.
+# Distance from the target at which the optimiser's end counts as near [rad, rad/s]: Newton's method
+# closes the rest.
 _NEAR = 1e-4
-# A configuration is another one than the one asked for where it is farther away than its own
-# coordinates tell, by this factor and this distance [rad or m].
-_FARTHER, _ELSEWHERE = 2.0, 1e-3
+# A configuration is another solution of the same pose if its distance from the target is above this
+# factor of that of its null coordinates …
+_FARTHER = 2.0
+# … and above this distance [rad or m].
+_ELSEWHERE = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +63,7 @@ class BoundEnd:
         return np.concatenate(parts)[None]
 
     def elsewhere(self, first: Array, last: Array) -> float:
-        """Return how far q is from the target where it is another one on the same pose, else 0.
+        """Return the distance of q from the target if it is another solution of the pose, else 0.
 
         For q at the first and the last node, (n,) each [rad or m].
         """
@@ -88,16 +89,16 @@ class BoundEnd:
 
 # Conditions on the end of the motion: a configuration, rest, repetition.
 #
-# The tool's rows of q(T) and q̇(T) are given by the path already. What is left to ask for are the
-# r coordinates along the self-motion: h = Nᵀ(x(T) - target), with N an orthonormal null-space
-# basis at the target configuration, at the start for closed paths, or at the end of the motion
-# that the optimisation begins with. Two configurations on the same pose with equal coordinates
-# are equal, near the reference, and so are two velocities with the same tool velocity; the
-# residual is free of what the integration leaves of the path error.
+# The tool's rows of q(T) and q̇(T) are given by the path. The remaining conditions are the r
+# coordinates along the self-motion: h = Nᵀ(x(T) - target), with N an orthonormal null-space basis
+# at the target configuration, at the start for closed paths, or at the end of the initial motion.
+# Two configurations on the same pose with equal coordinates are equal, near the reference, and so
+# are two velocities with the same tool velocity; the residual is free of the path error of the
+# integration.
 
-# A start velocity may be this far off that of the path [m/s, rad/s].
+# Largest difference of a start velocity from that of the path [m/s, rad/s].
 _NEAR_TWIST = 1e-6
-# Poses nearer than this are the same: far above rounding, far below any tolerance.
+# Poses nearer than this are equal: far above rounding, far below any tolerance.
 _SAME_POSE = 1e-7
 
 
@@ -151,7 +152,7 @@ class _EndRate(Constraint):
 
     @property
     def asked(self) -> npt.ArrayLike:
-        """What is asked for, (n,) or one number."""
+        """The prescribed value, (n,) or one number."""
         given: npt.ArrayLike = getattr(self, "q" + "d" * self.order)
         return given
 
@@ -170,16 +171,16 @@ class _EndRate(Constraint):
         return EndState(self.order, self.target(robot), self.at_start)
 
     def target(self, robot: RobotModel) -> Array:
-        """Return what is asked for of an arm, (n,) [rad or m, per s^order]."""
+        """Return the prescribed value for an arm, (n,) [rad or m, per s^order]."""
         what = f"{robot.name}: {self._name}"
         return as_numbers(per_joint(self.asked, robot.dof, what), what)
 
     def on_part(self) -> Constraint | None:
-        """See `Constraint.on_part`: a part begins as the whole, but ends elsewhere."""
+        """See `Constraint.on_part`: a first part has the same start, but another end."""
         return self if self.at_start else None
 
     def on_last_part(self) -> Constraint | None:
-        """See `Constraint.on_last_part`: it ends as the whole, but begins elsewhere."""
+        """See `Constraint.on_last_part`: a last part has the same end, but another start."""
         return None if self.at_start else self
 
 
@@ -212,7 +213,7 @@ class EndVelocity(_EndRate, order=1, at_start=False):
 
 @dataclass(frozen=True, eq=False)
 class StartVelocity(_EndRate, order=1, at_start=True):
-    """The motion begins with a joint velocity: that of an arm that moves already.
+    """The motion starts with a joint velocity: that of an arm that moves already.
 
     Needs a given start, where the tool's rows of it have to be those of the path's start.
 
@@ -225,7 +226,7 @@ class StartVelocity(_EndRate, order=1, at_start=True):
     qd: npt.ArrayLike = 0.0
 
     def check_start(self, follows: Follows, start: Array | None) -> None:
-        """See `Constraint.check_start`: the tool has to begin as the path does."""
+        """See `Constraint.check_start`: the tool's twist at the start has to be the path's."""
         robot = follows.robot
         if start is None:
             raise ProblemError("a start velocity needs a given start (start=)")
@@ -243,10 +244,10 @@ class StartVelocity(_EndRate, order=1, at_start=True):
 
 @dataclass(frozen=True, eq=False)
 class StartAcceleration(_EndRate, order=2, at_start=True):
-    """The motion begins with a joint acceleration: with `StartVelocity`, the hand-over of an arm.
+    """The motion starts with a joint acceleration: with `StartVelocity`, the hand-over of an arm.
 
-    Its part that moves the tool has to be what the path and the velocity make of it. An arm that
-    is not said to move begins at rest.
+    Its part that moves the tool has to agree with the path and the velocity. Without a
+    `StartVelocity` the arm starts at rest.
 
     Parameters
     ----------

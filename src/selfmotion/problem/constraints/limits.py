@@ -34,9 +34,9 @@ class JointPositionLimits(Constraint):
     lower, upper : (n,), optional
         [rad or m]; ±inf for none. By default only the URDF's.
     margin : float
-        Distance aimed to be kept from them [rad or m]; at least half of it is.
+        Target distance from them [rad or m]; at least half of it is kept.
     replace : bool
-        Whether these stand in place of the URDF's limits. By default both are kept.
+        Whether these replace the URDF's limits. By default both apply.
     """
 
     kept_moving: ClassVar[bool] = True
@@ -149,7 +149,7 @@ class JointVelocityLimits(_RateLimits):
     margin : float
         Share of the limit that is aimed to be left unused; at least half of it is.
     replace : bool
-        Whether these stand in place of the URDF's limits. By default both are kept.
+        Whether these replace the URDF's limits. By default both apply.
     """
 
     order: ClassVar[int] = 1
@@ -171,7 +171,7 @@ class JointAccelerationLimits(_RateLimits):
     margin : float
         Share of the limit that is aimed to be left unused; at least half of it is.
     replace : bool
-        Whether these stand in place of the maker's limits. By default both are kept.
+        Whether these replace the maker's limits. By default both apply.
     """
 
     order: ClassVar[int] = 2
@@ -193,7 +193,7 @@ class JointJerkLimits(_RateLimits):
     margin : float
         Share of the limit that is aimed to be left unused; at least half of it is.
     replace : bool
-        Whether these stand in place of the maker's limits. By default both are kept.
+        Whether these replace the maker's limits. By default both apply.
     """
 
     order: ClassVar[int] = 3
@@ -228,7 +228,7 @@ class BoundLimits:
 
     @classmethod
     def of(cls, robot: RobotModel, limits: JointLimits, margin: float) -> BoundLimits:
-        """Return what is judged, for the joints with a finite limit on either side."""
+        """Return the judged limits, for the joints with a finite limit on either side."""
         lower, upper, order = limits.lower, limits.upper, limits.order
         joints = np.flatnonzero(np.isfinite(lower) | np.isfinite(upper))
         scale = np.ones(len(joints)) if order == 0 else upper[joints]
@@ -293,8 +293,7 @@ class BoundLimits:
         )
 
 
-# Limits of joint torque, with what the tool holds.
-
+# Clause of a message about joints that mimic others.
 _WITH = " and of those that mimic it"
 
 
@@ -302,9 +301,9 @@ _WITH = " and of those that mimic it"
 class JointTorqueLimits(Constraint):
     """Joint torques stay below limits: gravity, inertia and Coriolis forces, with a payload.
 
-    Of joints that mimic another one motor may turn all, or each its own, which no URDF says. Both
-    are kept: what all of them ask of the joint that they mimic (Cᵀτ) stays below its effort, and
-    what each carries (τ) below its own. Limits of one's own are those of the former alone.
+    Whether one motor drives all joints that mimic one, or each has its own, is not in a URDF. Both
+    limits apply: the common torque at the mimicked joint (Cᵀτ) is below its effort, and the torque
+    of each (τ) below its own. Limits given here are those of the former alone.
 
     Parameters
     ----------
@@ -349,7 +348,7 @@ class JointTorqueLimits(Constraint):
             dynamics.derivatives,
             limit=limit,
             of_pace=True,
-            series=lambda stretch: dynamics.series(stretch.chain()),
+            series=lambda segments: dynamics.series(segments.chain()),
             covers=(_covered(robot, self.of(robot)),),
         )
 
@@ -374,7 +373,7 @@ class JointTorqueLimits(Constraint):
 
 
 def _covered(robot: RobotModel, limit: Array) -> str:
-    """Return what a verdict may claim: of some motors nobody may have said what they can.
+    """Return the claim of a verdict: the limits of some motors may be unknown.
 
     Torques are those of rigid bodies: where a URDF has damping or friction, the verdict says so.
     """

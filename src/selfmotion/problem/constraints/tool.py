@@ -9,13 +9,13 @@ import numpy.typing as npt
 from typing_extensions import override
 
 from selfmotion.basics import Array, ProblemError, as_number, as_numbers, nearest, shown
-from selfmotion.certificate import Column, Quantity, Stretch
+from selfmotion.certificate import Column, MotionSegments, Quantity
 from selfmotion.model.robot import RobotModel, ToolRates
 from selfmotion.problem.constraints.base import Constraint, Envelope, check_changes
 
 # Limits of how fast the tool moves and accelerates.
 
-# What of the tool is limited, as [v, ω] and [dv/dt, dω/dt] have it, and in which units.
+# Limited rates of the tool, as in [v, ω] and [dv/dt, dω/dt], and their units.
 TOOL_RATES = (
     ("speed", "m/s"),
     ("turn rate", "rad/s"),
@@ -28,9 +28,9 @@ TOOL_RATES = (
 class ToolLimits(Constraint):
     """The tool moves and turns no faster, and accelerates no more, than it may.
 
-    All are as the arm's reference sees them, where it has one, and the verdict says so.
-    What the path prescribes is the path's: a limit that it passes itself cannot be kept, and the
-    verdict says by how much. What the task leaves free, such as turning, keeps the limits.
+    All are relative to the arm's reference, if it has one, and the verdict says so. Rows that the
+    task prescribes are the path's: a limit that the path itself exceeds cannot be kept, and the
+    verdict says by how much. Free rows, such as rotation about an axis, keep the limits.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ class ToolLimits(Constraint):
 
     @property
     def limit(self) -> Array:
-        """Speed, turn rate, acceleration and turn acceleration, (4,); inf where there is none."""
+        """Speed, turn rate, acceleration and turn acceleration, (4,); inf for none."""
         return np.array(self._given, dtype=np.float64)
 
     @override
@@ -87,8 +87,8 @@ class ToolLimits(Constraint):
             pairs = zip((*speeds, np.zeros_like(speeds[0])), accelerations, strict=True)
             return tuple(np.stack(pair, axis=1).reshape(-1, 4, 3, robot.dof) for pair in pairs)
 
-        def known(stretch: Stretch) -> Array:
-            found = rates.series(stretch.chain())
+        def known(segments: MotionSegments) -> Array:
+            found = rates.series(segments.chain())
             length = min(map(len, found))
             return np.stack([item[:length] for item in found])
 
@@ -177,8 +177,8 @@ class Tilt(Constraint):
             slopes = np.cross(jacobians[:, 3:].transpose(0, 2, 1), turned)
             return (slopes.transpose(0, 2, 1)[:, None],)
 
-        def known(stretch: Stretch) -> Array:
-            return np.asarray(stretch.chain().orientation(chain.tip)[None])
+        def known(segments: MotionSegments) -> Array:
+            return np.asarray(segments.chain().orientation(chain.tip)[None])
 
         found = _Angle(
             f"tilt of '{self.frame}'",
@@ -194,7 +194,7 @@ class Tilt(Constraint):
 
 
 class _Angle(Quantity):
-    """A quantity that is the chord of an angle, told as the angle."""
+    """A quantity that is the chord of an angle, reported as the angle."""
 
     @override
     def said(self, column: int, away: float, time: float) -> str:

@@ -1,4 +1,4 @@
-"""What a motion costs: integrands G(q̇, q, t) of F = ∫ G dt, each with exact derivatives."""
+"""Costs: integrands G(q̇, q, t) of F = ∫ G dt, each with exact derivatives."""
 
 from selfmotion.problem.costs.base import (
     ERROR as ERROR,

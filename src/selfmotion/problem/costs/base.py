@@ -1,4 +1,4 @@
-"""What a cost is: an integrand G of samples, with its derivatives."""
+"""Base of costs: an integrand G of samples, with its derivatives."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from selfmotion.basics import Array, ProblemError, Saved, as_number, as_numbers,
 from selfmotion.model.follow import Follows
 from selfmotion.problem.costs.samples import Samples
 
-# In place of an order of derivative: the pose error e, in the rows of the task.
+# Stands for the pose error e, in the rows of the task, among orders of derivatives.
 ERROR = -1
 
 
@@ -45,13 +45,13 @@ class Cost(Saved, ABC, family="cost"):
     Attributes
     ----------
     name : str
-        What to call the cost in reports.
+        Name of the cost in reports.
     is_quadratic : bool
         Whether G is of second degree in q and its derivatives, with `curvature` for all that bends:
         Newton's method takes that, and differences of gradients of other costs.
     is_pointwise : bool
-        Whether G at a sample depends on that sample alone, so that several motions can be looked at
-        as if they were one; no by default. Starts are ranked faster then.
+        Whether G at a sample depends on that sample alone, so that samples of several motions can
+        be evaluated together; no by default. Starts are ranked faster then.
     """
 
     name: str
@@ -69,8 +69,8 @@ class Cost(Saved, ABC, family="cost"):
     def curvature(self, dof: int) -> dict[int, Array]:
         """Return W (n, n) by order of derivative, where G is ½ xᵀWx of q (0), q̇ (1), q̈ (2), q⃛ (3).
 
-        The Gauss-Newton matrix that starts the optimiser is made of these; {} (the default) where G
-        is no quadratic form.
+        The Gauss-Newton matrix at the start of the optimiser consists of these; {} (the default) if
+        G is no quadratic form.
         """
         return {}
 
@@ -145,7 +145,7 @@ class Scaled(Cost):
     cost : Cost
         The other cost.
     factor : float
-        What it is multiplied by.
+        Factor of the cost.
     """
 
     cost: Cost

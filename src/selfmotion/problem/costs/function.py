@@ -113,7 +113,7 @@ class LostCost(Cost):
     was: str
 
     def value(self, samples: Samples) -> Array:
-        """Raise ProblemError: what the cost was is not known."""
+        """Raise ProblemError: the function of the cost is not saved."""
         raise ProblemError(
             f"cost '{self.name}' was a {self.was}, which the plan's file does not carry; give it "
             f"again: dataclasses.replace(problem, costs=[…])"

@@ -1,4 +1,4 @@
-"""Costs of the joints alone: quadratic forms of motion, length of the way, reversals."""
+"""Costs of the joints alone: quadratic forms of motion, path length, reversals."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ from selfmotion.problem.costs.samples import Samples
 
 @dataclass(frozen=True, eq=False)
 class _Quadratic(Cost):
-    """What the quadratic costs share: the weight W."""
+    """Base of the quadratic costs: the weight W."""
 
     is_pointwise: ClassVar[bool] = True
     is_quadratic: ClassVar[bool] = True
@@ -104,8 +104,9 @@ class JointVelocity(_Derivative):
     def usual(cls, robot: RobotModel) -> JointVelocity:
         """Return that of an arm where no weight is given: W = 1, but for metres among radians.
 
-        A joint that moves in metres counts by `RobotModel.speed_weights`, whose squares are W; the
-        name of the cost says so. `make bench NAME=rails` holds that against levers and masses.
+        A joint that moves in metres has the weight of `RobotModel.speed_weights`, whose squares are
+        W; the name of the cost says so. `make bench NAME=rails` compares these with levers and
+        masses.
         """
         slides = [robot.is_prismatic(name) for name in robot.joint_names]
         if all(slides) or not any(slides):
@@ -125,7 +126,7 @@ class JointVelocity(_Derivative):
 
 
 def metres_of(costs: Sequence[Cost], robot: RobotModel) -> dict[str, float]:
-    """Return what a metre of each joint that slides counts in the first cost of joint rates [rad].
+    """Return the weight of a metre of each prismatic joint in the first cost of joint rates [rad].
 
     Against a radian of the revolute ones, on average; of an arm of one kind of joints nothing.
     """
@@ -299,7 +300,7 @@ _BOTH = ("lower", "upper")
 
 
 def _limits(values: npt.ArrayLike, what: str) -> Array:
-    """Return limits (n,), infinite where there is none; ProblemError where they are no numbers."""
+    """Return limits (n,), infinite for none; ProblemError if they are no numbers."""
     array = plain_numbers(values)
     if array is None or array.ndim != 1 or np.any(np.isnan(array)):
         raise ProblemError(
@@ -308,15 +309,12 @@ def _limits(values: npt.ArrayLike, what: str) -> Array:
     return read_only(array)
 
 
-# The length of the way in joint space.
-
-
 @dataclass(frozen=True, eq=False)
 class PathLength(Cost):
     """Length of the joint path, joint by joint: G = Σ_i w_i (√(q̇_i² + δ²) - δ) [rad/s].
 
-    Its integral is Σ_i w_i ∫ |q̇_i| dt, the sum over joints of what each travels, but smooth where
-    a joint turns round.
+    Its integral is Σ_i w_i ∫ |q̇_i| dt, the weighted path lengths of the joints, but smooth where a
+    joint reverses.
 
     Parameters
     ----------
@@ -376,15 +374,18 @@ class JointReversals(Cost):
     """Changes of direction of the joints: G = w / π Σ_i (√(u_i² + δ²) - δ) [1/s].
 
     u_i = q̈_i v / (v² + q̇_i²) is the rate of atan(q̇_i / v), which goes from -π/2 to π/2 where a
-    joint turns round from speeds far above v: the integral of G is about w for each reversal, and
-    half of that for each joint that begins or ends at rest. Gears have their play there, and
-    polished surfaces their marks. It belongs beside another cost, such as `JointVelocity`: alone it
-    has many optima, and takes long. `Plan.reversals` counts what is left.
+    joint
+    reverses from speeds far above v: the integral of G is about w for each reversal, and half of
+    that
+    for each joint that starts or ends at rest. Reversals cause backlash of gears, and marks on
+    polished
+    surfaces. Use it with another cost, such as `JointVelocity`: alone it has many optima, and takes
+    long. `Plan.reversals` counts the remaining ones.
 
     Parameters
     ----------
     weight : float
-        w, what a reversal costs.
+        w, the cost of a reversal.
     speed : float
         v [rad/s or m/s]: a joint that is slower nearly rests.
     smoothing : float

@@ -16,25 +16,25 @@ from selfmotion.problem.costs.samples import Samples
 
 # How much of their limits joints use: a smooth stand-in for the time that a motion needs.
 
-# Where nothing moves, G is this: it keeps the root smooth.
+# G at rest: it keeps the root differentiable.
 _LEAST = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
 class LimitUse(Cost):
-    """What the fastest joint uses of its limits: G = (Σ|q̇ᵢ/vᵢ|ᵖ + Σ|q̈ᵢ/aᵢ|^(p/2))^(1/p).
+    """Use of limits by the fastest joint: G = (Σ|q̇ᵢ/vᵢ|ᵖ + Σ|q̈ᵢ/aᵢ|^(p/2))^(1/p).
 
     At c times the pace velocities are c, and accelerations c² times as large, so that G is c times
-    as large and its integral over time stays: it is, for large p, the time [s] that the motion
-    needs at its fastest, as far as that is limited by velocities, and by accelerations that are
-    used as much then as now. `fastest` minimises it, again and again at the pace found so far.
+    as large and its time integral is constant. For large p it is the time [s] that the motion needs
+    at its fastest, as far as that is limited by velocities, and by accelerations at their present
+    use. `fastest` minimises it repeatedly, at the best pace so far.
 
     Parameters
     ----------
     velocity : (n,) or float
         v [rad/s or m/s].
     acceleration : (n,) or float
-        a [rad/s² or m/s²]; inf where there is none.
+        a [rad/s² or m/s²]; inf for none.
     power : float
         p, at least 4.
     """
@@ -96,14 +96,14 @@ class LimitUse(Cost):
 
 # The price of limits that are passed, for motions that are optimised without constraints.
 
-# The price begins so far before a limit of position [rad or m], and before this share of a speed is
-# used.
+# The penalty starts at this distance from a limit of position [rad or m], and at this unused share
+# of a speed.
 _MARGIN = 0.02
 
 
 @dataclass(frozen=True, eq=False)
 class BeyondLimits(Cost):
-    """How far joints are beyond their limits: G = ½ w Σ (q - u)₊² + (l - q)₊² + (|q̇|/v - 1)₊².
+    """Excess of joints over limits: G = ½ w Σ (q - u)₊² + (l - q)₊² + (|q̇|/v - 1)₊².
 
     With the limits l, u and v drawn in by a margin, in which the price of the other costs is paid.
     A damped problem has this cost besides its own, see `Damping`.
@@ -113,7 +113,7 @@ class BeyondLimits(Cost):
     weight : float
         w.
     lower, upper, speed : (n,)
-        l, u [rad or m] and v [rad/s or m/s]; infinite where there is none.
+        l, u [rad or m] and v [rad/s or m/s]; infinite for none.
     """
 
     weight: float

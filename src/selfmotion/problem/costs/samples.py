@@ -21,7 +21,7 @@ _ARRAYS = ("q", "qd", "task_jacobian")
 
 @dataclass(frozen=True, eq=False)
 class TipSamples:
-    """Where a tip is that follows a path, at S times, in its chain's base frame.
+    """Poses of a tip that follows a path, at S times, in its chain's base frame.
 
     Attributes
     ----------
@@ -60,7 +60,7 @@ class Samples:
     q, qd : (S, n)
         Joint coordinates and velocities.
     follows : Follows
-        What the arm follows.
+        Task frames of the arm.
     tips : tuple of TipSamples
     task_jacobian : (S, m, n)
         The prescribed rows of all tips.
@@ -141,7 +141,7 @@ class Samples:
     def of(self, follows: Follows) -> Samples:
         """Return the motion of the arm alone, without the virtual joints after its own.
 
-        What is asked for again is not made again.
+        The result is cached.
         """
         if self.follows is follows:
             return self
@@ -179,7 +179,7 @@ class Samples:
 
 
 class PlacedLater(Samples):
-    """A motion as costs and constraints see it; tips are placed when they are asked for.
+    """A motion whose tips are placed when costs or constraints need them.
 
     Parameters
     ----------

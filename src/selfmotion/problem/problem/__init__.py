@@ -1,4 +1,4 @@
-"""What to plan, and every check of whether arm, path and task fit."""
+"""Problems, and checks that arm, path and task fit."""
 
 from selfmotion.problem.problem.along import (
     arm_rest_orders as arm_rest_orders,

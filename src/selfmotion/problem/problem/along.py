@@ -1,4 +1,4 @@
-"""What is asked along a path: where it is smooth, at rest, how far it goes, and parts of it."""
+"""Derived quantities of a path: smoothness, rest at ends, length, and constraints of parts."""
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import reduce
@@ -18,8 +18,6 @@ from selfmotion.problem.constraints import Constraint, Envelope
 if TYPE_CHECKING:
     from selfmotion.problem.problem.problem import Problem
 
-# Times between which everything that is asked for is smooth.
-
 
 def smooth_knots(follows: Follows, relaxations: Sequence[Relaxation]) -> Array:
     """Return the knots of all paths, and the ends of the windows of tolerances, [s] (K,)."""
@@ -33,7 +31,7 @@ def smooth_knots(follows: Follows, relaxations: Sequence[Relaxation]) -> Array:
 
 
 def _with_times(knots: list[float], times: Iterable[float], duration: float) -> list[float]:
-    """Return knots and times; nearer to each other than rounding, two are one."""
+    """Return knots and times; times nearer to each other than rounding are merged."""
     found = list(knots)
     for time in times:
         if np.abs(np.array(found) - time).min() > 1e-9 * duration:
@@ -41,17 +39,15 @@ def _with_times(knots: list[float], times: Iterable[float], duration: float) -> 
     return found
 
 
-# How smoothly a tool, and the arm with it, begins and ends.
-
-# Speeds are compared this share of the path's first or last piece from an end, and twice as far
-# from it: what comes after that piece says nothing of how it begins.
+# Speeds are compared at this share of the path's first or last segment from an end, and at twice
+# that: a later segment is independent of them.
 _NEAR_END = 1e-4
-# Speed that grows with at least this power of the time has no acceleration at the end.
+# Speed that grows with at least this power of time starts without acceleration.
 _SMOOTH = 1.5
 
 
 def arm_rest_orders(follows: Follows, constraints: Sequence[Constraint]) -> tuple[int, int]:
-    """Return how smoothly an arm comes to rest with all its tips, unless constraints say how fast.
+    """Return the orders of rest of an arm at both ends, unless constraints give its speed.
 
     Of each end, as in `rest_orders`.
     """
@@ -68,7 +64,7 @@ def _allowed(order: int, constraints: Sequence[Constraint], end: int) -> int:
 
 
 def rest_orders(path: Path, task: Task) -> tuple[int, int]:
-    """Return how smoothly the prescribed rows begin and end.
+    """Return the orders up to which the prescribed rows rest at start and end.
 
     Of each end: 0 where the tool moves, 1 where it rests, 2 where it rests and does not accelerate
     either, so that a motion from standstill is smooth there.
@@ -94,14 +90,18 @@ def _order(speeds: list[float]) -> int:
 
 # How far a tool goes along its path.
 
-# Samples of the way to begin with and at most; more of them would make it longer by less.
-_SAMPLES, _MOST_SAMPLES, _GROWS = 101, 100_000, 1.05
+# Samples of a path's length at the start …
+_SAMPLES = 101
+# … and at most …
+_MOST_SAMPLES = 100_000
+# … which are doubled while the length grows by this factor.
+_GROWS = 1.05
 
 
 def way_of(path: Path) -> float:
-    """Return how far the tool goes [m], through so many points that more hardly lengthen it."""
+    """Return the path length of the tool [m], by samples that are refined until it converges."""
     way, before, samples = 0.0, -1.0, _SAMPLES
-    # Loops are many or few: the way through more and more points, of which none are the same.
+    # Loops may be few or many: each refinement has no time in common with the one before.
     while way > _GROWS * before and samples < _MOST_SAMPLES:
         places = path.samples(spread_along(path, samples)).translation
         before, way = way, float(np.linalg.norm(np.diff(places, axis=0), axis=1).sum())
@@ -109,17 +109,14 @@ def way_of(path: Path) -> float:
     return way
 
 
-# What constraints, and the arm's own limits, ask of single configurations and velocities.
-
-
 def envelope_of(robot: RobotModel, constraints: Sequence[Constraint]) -> Envelope:
-    """Return what constraints ask of single configurations, with the arm's own limits."""
+    """Return the envelope of constraints and of the arm's own limits."""
     requirements = [item.requirement(robot) for item in constraints]
     return with_own_limits(robot, requirements, asked_envelope(robot, constraints))
 
 
 def asked_envelope(robot: RobotModel, constraints: Sequence[Constraint]) -> Envelope:
-    """Return what constraints ask, without the arm's own limits."""
+    """Return the envelope of constraints, without the arm's own limits."""
     free = Envelope.unbounded(robot.dof)
     return reduce(and_, (item.envelope(robot) for item in constraints), free)
 
@@ -132,14 +129,12 @@ def with_own_limits(
     return reduce(and_, own, asked)
 
 
-# What of a problem is asked along a part of its path, and of moves between parts.
-
-# On a part, a window is none where it is open for less than this share of the part, and of itself.
+# Shortest window on a part, as a share of the part and of the window: shorter ones are dropped.
 _SHORTEST_WINDOW = 1e-2
 
 
 def asked_of_part(problem: "Problem", is_first: bool, is_last: bool) -> Iterator[Constraint]:
-    """Yield what the constraints ask of a part that is the first or the last one, or neither."""
+    """Yield the constraints for a part that is the first or the last one, or neither."""
     for item in problem.constraints:
         kept: Constraint | None = None if item.closes else item
         if kept is not None and not is_last:
@@ -151,14 +146,14 @@ def asked_of_part(problem: "Problem", is_first: bool, is_last: bool) -> Iterator
 
 
 def at_all_times(constraints: Sequence[Constraint]) -> list[Constraint]:
-    """Return what constraints ask of all times, and nothing that they ask of an end."""
+    """Return the conditions of constraints at all times, without those at an end."""
     parts = (item.on_part() for item in constraints)
     inner = (part.on_last_part() for part in parts if part is not None)
     return [item for item in inner if item is not None]
 
 
 def check_all_times(constraints: Sequence[Constraint], remedy: str) -> None:
-    """Raise ProblemError, with a remedy, where a constraint asks something of an end alone."""
+    """Raise ProblemError, with a remedy, where a constraint is on an end alone."""
     for item in constraints:
         if item.on_part() is None or item.on_last_part() is None:
             raise ProblemError(
@@ -167,14 +162,14 @@ def check_all_times(constraints: Sequence[Constraint], remedy: str) -> None:
 
 
 def times_along(path: Retimed, ends: tuple[float, float]) -> Callable[[Array], Array]:
-    """Return when windows of the whole path (first, last) are open on a stretch of it.
+    """Return the map from windows of the whole path (first, last) to those on a part of it.
 
     As (0, 0) where that is hardly at all.
     """
 
     def when(window: Array) -> Array:
         first, last = path.when(np.clip(window, *ends) - ends[0]).tolist()
-        # A ramp hardly moves at its end: when it gets there is known to some digits only.
+        # A ramp hardly moves at its end, so that its end time has few digits.
         first = 0.0 if window[0] <= ends[0] else first
         last = path.duration if window[1] >= ends[1] else last
         least = _SHORTEST_WINDOW * min(path.duration, float(window[1] - window[0]))

@@ -15,19 +15,21 @@ from selfmotion.model.robot import RobotModel, calibrated_robot, nominal_robot
 from selfmotion.model.task import Task
 from selfmotion.problem.problem.problem import Problem, check_problem
 
-# Newton steps onto the path, each of which halves what is missing at least, and what is on it.
-_STEPS, _ON_PATH = 50, 1e-10
-# Times that are looked at for each sample of a motion.
+# Newton steps onto the path, each of which at least halves the error …
+_STEPS = 50
+# … and the error at which they end [m, rad].
+_ON_PATH = 1e-10
+# Times that are compared for each sample of a motion.
 _PER_SAMPLE = 4
 
 
 def calibrated(problem: Problem, calibration: str | Path | Mapping[str, str | Path]) -> Problem:
     """Return a problem on the same arm, its joints where a calibration puts them.
 
-    A given start is moved onto the path: to the nearest configuration by least-norm steps
-    Δq = J⁺ e. So ``plan(calibrated(plan.problem, file), warm_start=plan)`` plans anew for the arm
-    that there is, and ``calibrated(…).certify(plan.trajectory)`` judges what the arm would do as
-    it was planned.
+    A given start is moved onto the path: to the nearest configuration by least-norm steps Δq = J⁺
+    e. So
+    ``plan(calibrated(plan.problem, file), warm_start=plan)`` plans for the real arm, and
+    ``calibrated(…).certify(plan.trajectory)`` judges the nominal plan on the real arm.
 
     Parameters
     ----------
@@ -72,7 +74,7 @@ def start_on_path(follows: Follows, start: Array) -> Array:
 
 
 def off_nominal(robot: RobotModel, motion: Trajectory) -> tuple[Extreme, Extreme]:
-    """Return how far the tool of a calibrated arm is from where the arm as drawn would have it.
+    """Return the largest distance of a calibrated arm's tool from the nominal arm's.
 
     The largest distance [m] and angle [rad] on a motion, at its samples and between; both 0 for an
     arm that is not calibrated.

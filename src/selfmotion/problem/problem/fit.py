@@ -1,4 +1,4 @@
-"""Whether what a problem was given is right, and whether its path fits its arm."""
+"""Checks of a problem's arguments, and of the fit of its path to its arm."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -34,24 +34,22 @@ from selfmotion.problem.constraints import (
 from selfmotion.problem.costs import Cost, JointVelocity
 from selfmotion.problem.problem.least_tolerance import that_would_do
 
-# What a problem is given where nothing else is said: values, meant to be shared.
-
-# Links must not overlap; one object, so that its bodies are made once for each arm.
+# Default: links must not overlap; one object, so that its bodies are built once by arm.
 NO_OVERLAP = Clearance(distance=0.0)
+# Default null motion.
 ANY_NULL_MOTION = FreeNullMotion()
+# Default constraints.
 KEPT: tuple[Constraint, ...] = (
     JointPositionLimits(),
     JointVelocityLimits(),
     JointAccelerationLimits(),
     JointJerkLimits(),
 )
-# Stands for the usual cost of whatever arm it is.
+# Stands for the usual cost of the problem's arm.
 USUAL_COSTS: tuple[Cost, ...] = (JointVelocity(),)
 
 
-# Whether what a problem was given is of the right kind, and agrees with the rest.
-
-# The parameters of a problem that are sequences, and what of.
+# Parameters of a problem that are sequences, and the type of their items.
 SEQUENCES = {
     "costs": Cost,
     "constraints": Constraint,
@@ -75,9 +73,9 @@ _EXAMPLES = {
 }
 # A start nearer to the path than this is on it: far above rounding, far below any tolerance.
 _ON_PATH = 1e-7
-# It is put onto it by as much at most [rad or m].
+# Largest correction of a start towards the path [rad or m].
 START_MISS = 1e-5
-# An end configuration may be this far off its own [m, rad]: what the certificate grants it.
+# Largest error of a given end configuration [m, rad]: the certificate's tolerance for it.
 _NEAR_END = 1e-6
 
 
@@ -112,7 +110,7 @@ def check_judged(constraints: Sequence[Constraint], found: Sequence[Requirement]
 
 
 def _beyond(robot: RobotModel, start: Array) -> str:
-    """Return which joint of a configuration (n,) is beyond its limits, "" for none."""
+    """Return the joint of a configuration (n,) that is beyond its limits, "" for none."""
     for k, name in enumerate(robot.joint_names):
         low, high = robot.lower[k], robot.upper[k]
         if not low <= start[k] <= high:
@@ -138,7 +136,7 @@ def check_start(follows: Follows, start: Array, relaxations: Sequence[Relaxation
 
 
 def check_end(follows: Follows, end: Array, relaxations: Sequence[Relaxation]) -> None:
-    """Raise ProblemError where an end (n,) that is asked for is off one of the paths likewise."""
+    """Raise ProblemError where a given end (n,) is off one of the paths likewise."""
     missed = _missed(follows, end, relaxations, at_end=True)
     if missed is not None:
         raise ProblemError(
@@ -150,7 +148,7 @@ def check_end(follows: Follows, end: Array, relaxations: Sequence[Relaxation]) -
 def _missed(
     follows: Follows, q: Array, relaxations: Sequence[Relaxation], *, at_end: bool
 ) -> tuple[float, float, str] | None:
-    """Return by how much an end of a motion (n,) is off its path [m, rad], in words; or None.
+    """Return the error of an end of a motion (n,) from its path [m, rad], in words; or None.
 
     Relaxations are those of the first path.
     """
@@ -197,9 +195,7 @@ def first_tool(several: Sequence[Follow], robot: RobotModel) -> tuple[Follow, Ro
     return first, robot
 
 
-# Feeds that no motion has, whatever the arm: told before anything is planned.
-
-# What is left of a limit of the tool's speed where a feed is named by it.
+# Share of a limit of the tool's speed that a recommended feed uses.
 _BELOW = 0.98
 
 
@@ -207,20 +203,20 @@ def check_feeds(whose: str, paths: Sequence[Path], constraints: Sequence[Constra
     """Refuse feeds that paths do not keep by themselves, or that the tool may not have.
 
     A feed counts but for run-up, run-down and rounded corners; a motion that does not keep it there
-    is never verified (`FeedKept`). Nothing of the arm is asked here.
+    is never verified (`FeedKept`). The arm is not involved.
 
     Parameters
     ----------
     whose : str
-        What messages begin with.
+        Start of messages.
     paths : sequence of Path
-        Those that are followed, that of the tool first.
+        The paths, that of the tool first.
     constraints : sequence of Constraint
 
     Raises
     ------
     FeedError
-        It says which feed is possible, and what would allow more.
+        With the largest possible feed, and remedies for more.
     """
     for path in paths:
         for found in path.feeds:
@@ -234,7 +230,7 @@ def check_feeds(whose: str, paths: Sequence[Path], constraints: Sequence[Constra
                 )
     most = min((item.speed for item in constraints if isinstance(item, ToolLimits)), default=None)
     for found in paths[0].feeds:
-        # What is as fast along the path as it has to be is at least as fast altogether.
+        # The speed along the path is a lower bound of the total speed.
         if most is not None and (1.0 - found.within) * found.asked > most:
             feed = _BELOW * most
             raise FeedError(
@@ -246,29 +242,35 @@ def check_feeds(whose: str, paths: Sequence[Path], constraints: Sequence[Constra
             )
 
 
-# Does this path fit this arm? Its rows, its units, its pace, what is relaxed.
-
-# Columns of Jacobians below this [m, rad] are zero.
+# Entries of Jacobians below this [m, rad] are zero.
 _NO_RATE = 1e-6
-# A path that is nowhere nearer than so many times the arm's reach is in other units.
+# A path farther away than this many reaches of the arm is in other units.
 _FAR = 20.0
-# Joints without a limit of speed are taken to have this one [rad/s or m/s]; a path that is so many
-# times faster than the arm is in other units. What is less is planned, to be slowed down.
-_FAST, _HOPELESS = 100.0, 100.0
-# Reach that counts for the speed of an arm on an endless slide [m].
+# Speed of joints without a limit [rad/s or m/s].
+_FAST = 100.0
+# A path this many times faster than the arm is in other units; below, it is planned, and may be
+# slowed.
+_HOPELESS = 100.0
+# Reach of an arm on an endless slide, for its speed [m].
 _LONG = 1e3
-# What a path is looked at for: between so many of its marks about, and evenly, at so many times;
-# changes of its speed at this share of the way to the next mark, as a share of its duration at
-# least.
-_MIDDLES, _EVENLY, _BESIDE, _SHORTEST = 400, 9, 0.1, 1e-9
-# No tool accelerates like this [m/s²]: the fastest arms there are reach a tenth of it.
-_WILD, _GRAVITY = 2000.0, 9.81
+# Samples of a path between its marks, at most about …
+_MIDDLES = 400
+# … and evenly spaced ones.
+_EVENLY = 9
+# Distance from a mark of samples of its speed, as a share of the way to the next mark …
+_BESIDE = 0.1
+# … and at least, as a share of the duration.
+_SHORTEST = 1e-9
+# No tool accelerates more [m/s²]: the fastest arms reach a tenth of it.
+_WILD = 2000.0
+# Standard gravity, rounded [m/s²].
+_GRAVITY = 9.81
 
 
 def check_fit(follows: Follows, relaxations: Sequence[Relaxation], start: Any = None) -> None:
     """Refuse a path that an arm cannot follow in a task's rows, whatever the joint motion.
 
-    A `start` is what a tolerance that would do is looked for from.
+    `start` is the initial configuration of the search for a sufficient tolerance.
 
     Raises
     ------
@@ -292,7 +294,7 @@ def check_fit(follows: Follows, relaxations: Sequence[Relaxation], start: Any = 
 
 
 def check_relaxations(relaxations: Sequence[Relaxation], path: Path, task: Task) -> None:
-    """Check that relaxations fit a path and a task, and each other.
+    """Check that relaxations fit a path, a task, and one another.
 
     Raises
     ------
@@ -325,7 +327,7 @@ def check_relaxations(relaxations: Sequence[Relaxation], path: Path, task: Task)
             raise ProblemError(f"row {', '.join(sorted(twice))} is relaxed twice at the same time")
     if len({item.in_tool_axes for item in relaxations if not item.angular}) > 1:
         raise ProblemError("positions are relaxed in world axes and in tool axes; choose one")
-    # They are virtual joints, which not all of them can be together.
+    # Not all combinations can be virtual joints: this raises.
     VirtualJoints(task, relaxations, path.duration, 1.0)
 
 
@@ -333,7 +335,7 @@ def _prescribed(path: Path, task: Task) -> list[str]:
     """Return the rows of the deviation that the task prescribes."""
     rows = [ROW_NAMES[k] for k in task.rows]
     if task is Task.PLANAR_POSE:
-        # Its angle is about the world's z axis: only there is rz that angle.
+        # The task's angle is about the world's z axis: rz is the same only there.
         axes = path.samples(spread_along(path, 9)).rotation[:, :, 2]
         if not np.allclose(axes, [0.0, 0.0, 1.0]):
             rows.remove("rz")
@@ -379,7 +381,7 @@ def _check_redundancy(follows: Follows, relaxations: Sequence[Relaxation], start
 
 
 def _can_with(follows: Follows, relaxations: Sequence[Relaxation]) -> bool:
-    """Return whether all rows can be moved when tolerances are joints, too."""
+    """Return whether the arm with tolerances as joints can move in all rows."""
     if not relaxations:
         return False
     item = follows.items[0]
@@ -416,7 +418,7 @@ def _check_several(follows: Follows, relaxations: Sequence[Relaxation]) -> None:
 
 
 def _moves_in_plane(robot: RobotModel, chain: Chain) -> bool:
-    """Return whether a chain's tip moves in the x-y plane of its base: else, no angle is its ωz."""
+    """Return whether a chain's tip moves in the x-y plane of its base: else ωz is no angle."""
     jacobians, _, _ = chain.along(robot.generic_configurations())
     return bool(np.abs(jacobians[:, 2:5]).max() <= _NO_RATE)
 
@@ -466,7 +468,7 @@ def _check_pace(robot: RobotModel, path: Path, reach: float) -> None:
 
 
 def _inside(path: Path) -> Array:
-    """Return times in the middle between marks of a path, of many some, and evenly spread ones."""
+    """Return sample times: middles between some marks of a path, and evenly spread ones."""
     marks = np.asarray(path.marks)
     middles = 0.5 * (marks[:-1] + marks[1:])
     some = middles[:: 1 + len(middles) // _MIDDLES]

@@ -11,15 +11,26 @@ from selfmotion.model.path import spread_along
 from selfmotion.model.robot import RobotModel
 from selfmotion.model.task import ROW_NAMES, Task
 
-# So many places of the path are looked at, in so many steps each at most, from so many
-# configurations where no start is given.
-_PLACES, _STEPS, _STARTS = 41, 100, 8
-# What is near enough [m], what a step moves at most [rad or m], and directions that count.
-_NEAR, _MOST, _RANK = 1e-6, 0.1, 1e-3
-# Steps go so far towards a smaller lean; one that is smaller than this is the last [rad or m].
-_DAMPED, _LAST = 0.5, 1e-7
-# From this tolerance on nothing is prescribed any more [rad]; tolerances need as much room.
-_USELESS, _ROOM = 1.5, 1.01
+# Sampled poses of the path.
+_PLACES = 41
+# Largest number of steps at each.
+_STEPS = 100
+# Initial configurations without a given start.
+_STARTS = 8
+# Position error that counts as 0 [m].
+_NEAR = 1e-6
+# Largest step [rad or m].
+_MOST = 0.1
+# Relative singular value of directions that count.
+_RANK = 1e-3
+# Share of a step towards a smaller tilt.
+_DAMPED = 0.5
+# Step at which the iteration ends [rad or m].
+_LAST = 1e-7
+# Tilt from which on orientation is not prescribed any more [rad].
+_USELESS = 1.5
+# Factor of the recommended tolerance: tolerances need room.
+_ROOM = 1.01
 
 
 def that_would_do(follows: Follows, start: Any) -> str:
@@ -29,13 +40,13 @@ def that_would_do(follows: Follows, start: Any) -> str:
         try:
             given = follows.robot.configuration(start)
         except RobotError:
-            # What is wrong with the start is told when the rest of the problem is right.
+            # An error of the start has a message of its own, after other checks.
             return ""
     least = least_tolerance(follows, given)
     if least is None or not 0.0 < least < _USELESS:
         return ""
     rows = ",".join(ROW_NAMES[k] for k in follows.items[0].task.rows if k >= 3)
-    # Two digits, rounded up: what is less is out of reach.
+    # Two digits, rounded up: less would be out of reach.
     digits = 1 - int(np.floor(np.log10(least)))
     enough = float(np.ceil(_ROOM * least * 10.0**digits) / 10.0**digits)
     where = "where it was tried" if given is None else "this start"
@@ -52,7 +63,7 @@ def least_tolerance(follows: Follows, start: Array | None) -> float | None:
     ----------
     follows : Follows
     start : (n,), optional
-        Where the arm begins; by default the best of a few configurations.
+        Initial configuration; by default the best of a few.
     """
     if follows.items[0].task not in (Task.POSE, Task.POINTING) or len(follows.items) > 1:
         return None
@@ -79,7 +90,7 @@ def _largest_lean(follows: Follows, start: Array) -> float | None:
             inverse = np.linalg.pinv(jacobian[:3], rcond=_RANK)
             onto = inverse @ left
             free = np.eye(robot.dof) - inverse @ jacobian[:3]
-            # What turns about the tool's own axis is no lean of it.
+            # Rotation about the tool's own axis is no tilt.
             across = np.eye(3) - np.outer(pose.rotation[:, 2], pose.rotation[:, 2]) * points
             turns = across @ jacobian[3:] @ free
             step = onto + _DAMPED * np.linalg.pinv(turns, rcond=_RANK) @ (

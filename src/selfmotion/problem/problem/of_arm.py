@@ -17,9 +17,12 @@ from selfmotion.problem.constraints import BoundConstraint, BoundLimits, NodeTan
 from selfmotion.problem.constraints.conditions import BoundQuantity, motion_of_order
 from selfmotion.problem.costs import Cost, Partials, Samples
 
-# Share of a band that is aimed to be left unused, but at least so much [m or rad], about what a
-# certificate tells apart, and at most so large a share; half of it is left.
-_MARGIN, _LEAST, _MOST = 5e-4, 6e-7, 0.5
+# Target share of a band that is left unused; half of it is guaranteed.
+_MARGIN = 5e-4
+# At least [m or rad]: about the resolution of a certificate.
+_LEAST = 6e-7
+# Largest such share.
+_MOST = 0.5
 
 
 class _OfArm(Cost):

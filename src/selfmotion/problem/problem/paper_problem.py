@@ -23,7 +23,7 @@ def sample_problem(
     mu : float
         μ.
     duration : float
-        [s]; 1 for the way there, 2 for there and back.
+        [s]; 1 for one way, 2 for the way and back.
     null_motion : NullMotion, optional
         Default: cubic in the null space. The paper's own is
         ``PolynomialNullMotion(degree=3, space="joint", basis="monomial")``.

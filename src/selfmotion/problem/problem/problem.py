@@ -1,4 +1,4 @@
-"""What to plan: an arm, a tool motion, the rows that count, and what to minimise."""
+"""Problem: an arm, a tool motion, its prescribed rows, costs and constraints."""
 
 from __future__ import annotations
 
@@ -72,8 +72,8 @@ from selfmotion.problem.problem.fit import (
 )
 from selfmotion.problem.problem.remarks import remarks_on
 
-# Joints of a damped motion are held within their limits by springs of this stiffness, in shares of
-# a limit of speed or radians.
+# Stiffness of springs that hold joints of a damped motion within limits, in shares of a limit of
+# speed, or radians.
 _BEYOND_LIMITS = 1e4
 
 
@@ -100,25 +100,25 @@ class Problem:
     task : Task or str
         The rows of it that are prescribed; ``"pose"`` by default.
     start : (n,) or "free", optional
-        q(0) [rad or m]; must put the tool on the start of the path. By default free: many starts
-        are tried, and the best ones optimised along with the rest of the motion.
+        q(0) [rad or m]; must put the tool on the start of the path. By default free: starts are
+        sampled, and the best ones optimised with the rest of the motion.
     null_motion : NullMotion
         The parameterisation of the self-motion. By default any, optimised at nodes.
     costs : sequence of Cost
         Their integrals are added up. By default ∫ ½ q̇ᵀq̇ dt; see `JointVelocity.usual`.
     constraints : sequence of Constraint
-        What the motion must keep, each judged by the certificate. By default the URDF's limits of
-        joint position and velocity, and those of acceleration and jerk that the arm's maker
-        publishes (`RobotModel.acceleration_limit`). The URDF's are kept, too, where these say
-        nothing of position or velocity: they are always judged.
+        Conditions on the motion, each judged by the certificate. By default the URDF's limits of
+        joint position and velocity, and the limits of acceleration and jerk that the arm's maker
+        publishes (`RobotModel.acceleration_limit`). The URDF's always apply in addition, unless
+        these replace limits of position or velocity.
     relaxations : sequence of Relaxation
         Rows in which the tool may leave its path, by how much and when. Each is one more joint
         between tool and path, which costs nothing, so that the deviation is part of the
-        self-motion. By default none. A given start, or an end configuration, may use them; the
-        end of a path with other conditions there is on the path itself; where a path is closed,
-        the deviation is so, too. Of several paths the first is relaxed.
+        self-motion. By default none. A given start, or an end configuration, may use them; with
+        other conditions there, the end is on the path itself; on a closed path, the deviation is
+        closed, too. Of several paths the first is relaxed.
     clearance : Clearance, optional
-        How the arm keeps apart from itself and from obstacles, besides what constraints say: by
+        Minimum distance of the arm from itself and from obstacles, in addition to constraints: by
         default its links must not overlap, where its URDF has bodies and no constraint is a
         `Clearance`. None to leave that out; the verdict then says so.
     rest : bool
@@ -126,8 +126,9 @@ class Problem:
         for, unless a constraint says how fast it is there: the null motion then vanishes, and its
         derivative too where the tool does not accelerate either. The paper's does not.
     also : sequence of Follow
-        What else of the arm follows a path at the same time: their rows are prescribed besides. A
-        list of `Follow` in place of the path is the same; its first one is then the tool.
+        Further task frames of the arm that follow paths at the same time: their rows are prescribed
+        in addition. A list of `Follow` in place of the path is the same; its first one is then the
+        tool.
     damping : Damping, optional
         Go through singular poses, and past the edge of the workspace, at the price of the path: by
         default the tool stays on the path, and there is no motion through such poses. Adds the
@@ -145,8 +146,7 @@ class Problem:
 
     Notes
     -----
-    What it has besides its parameters and `certify` is what planners ask it, and may change with
-    them.
+    Attributes other than its parameters and `certify` are for planners, and may change with them.
     """
 
     # Class of the problem that planners see; set by `augmented`, which derives from this one.
@@ -208,8 +208,8 @@ class Problem:
         return found
 
     def __getstate__(self) -> tuple[dict[str, Any], bool, list[int]]:
-        # What follows from the rest is made anew: bodies as they are placed belong to a thread. The
-        # usual clearance and limits are told from such that somebody asks for by which they are.
+        # Derived values are computed anew: placed bodies belong to a thread. The default clearance
+        # and limits are identified by object identity.
         kept = {name: item for name, item in self.__dict__.items() if name not in self._made}
         usual = [
             next((k for k, each in enumerate(KEPT) if each is item), -1)
@@ -228,7 +228,7 @@ class Problem:
 
     @property
     def _made(self) -> set[str]:
-        """The names of what is made of the rest when it is asked for."""
+        """Names of cached derived values."""
         several = (vars(cls).items() for cls in type(self).__mro__)
         return {
             name for each in several for name, item in each if isinstance(item, cached_property)
@@ -236,7 +236,7 @@ class Problem:
 
     @cached_property
     def follows(self) -> Follows:
-        """What the arm follows: the one thing that planners are told."""
+        """Task frames of the arm: the input of planners."""
         return Follows.of(self.robot, self.path, self.task, self.also)
 
     @cached_property
@@ -249,11 +249,11 @@ class Problem:
 
     @property
     def asked(self) -> Problem:
-        """The problem as it was asked, where this is `augmented`."""
+        """The original problem, where this is `augmented`."""
         return self
 
     def own(self, trajectory: Trajectory) -> Trajectory:
-        """Return what the arm's own joints do in a motion of all."""
+        """Return the arm's own joints of a motion of all."""
         return trajectory
 
     def at(self, t: Array, q: Array) -> Array:
@@ -265,9 +265,9 @@ class Problem:
         return trajectory
 
     def softened(self, cost: float) -> Problem:
-        """Return the same where using tolerances costs, for who does not ask bands to be kept.
+        """Return the problem with a cost of deviations in place of limits of their bands.
 
-        Where `cost` is what a motion costs, being at a band all the time costs as much.
+        At `cost`, the cost of a motion, being at a band all the time doubles it.
         """
         return self
 
@@ -277,7 +277,7 @@ class Problem:
         return self
 
     def changed(self, **changes: Any) -> Problem:
-        """Return the same with other parameters."""
+        """Return the problem with other parameters."""
         return replace(self, **changes)
 
     def along(
@@ -316,10 +316,10 @@ class Problem:
 
     @cached_property
     def own_collision(self) -> Clearance | None:
-        """What keeps the arm apart, besides the constraints; None for nothing.
+        """Clearance of the arm in addition to the constraints; None for none.
 
-        The default is left out where a constraint keeps the arm apart, or it has no bodies; what
-        was given never is.
+        The default is left out where a constraint is a clearance, or the arm has no bodies; a given
+        one never is.
         """
         if self.clearance is not NO_OVERLAP:
             return self.clearance
@@ -330,9 +330,9 @@ class Problem:
         return self.clearance
 
     def keeps_off_itself(self, q: Array) -> bool:
-        """Whether configurations (K, n) keep the arm apart from itself by its meshes.
+        """Whether the arm's meshes in configurations (K, n) are free of self-collision.
 
-        Where only the default asks it to: what constraints ask is for the optimisation to keep.
+        Only for the default clearance: constraints are the optimisation's.
         """
         if self.own_collision is None:
             return True
@@ -340,7 +340,7 @@ class Problem:
 
     @property
     def all_constraints(self) -> tuple[Constraint, ...]:
-        """The constraints that ask something, with `own_collision` last where there is one."""
+        """The constraints that apply, with `own_collision` last if there is one."""
         own = self.own_collision
         return (*self._asking, *([] if own is None else [own]))
 
@@ -353,9 +353,9 @@ class Problem:
     ) -> tuple[BoundConstraint, ...]:
         """Return the constraints for this arm, given first and last configuration, (n,) each.
 
-        Those of the motion that the optimisation begins with. Without `own_collision` where it need
-        not keep `apart` from itself; with links `decomposed` where their hulls are too large. With
-        the arm's own limits where nothing is said of them: no motion beyond these is verified.
+        Those of the initial motion. Without `own_collision` unless `apart`; with links `decomposed`
+        where their hulls are too large. With the arm's own limits where constraints have none: no
+        motion beyond these is verified.
         """
         asked = [*self._own_limits, *(self.all_constraints if apart else self._asking)]
         if all(self.rests):
@@ -381,7 +381,7 @@ class Problem:
 
     @cached_property
     def rest_orders(self) -> tuple[int, int]:
-        """How smoothly the arm comes to rest at the start and at the end; see `rest_orders`."""
+        """Orders of rest of the arm at the start and at the end; see `rest_orders`."""
         return arm_rest_orders(self.follows, self.constraints) if self.rest else (0, 0)
 
     @property
@@ -408,7 +408,7 @@ class Problem:
 
     @cached_property
     def requirements(self) -> tuple[Requirement, ...]:
-        """What the certificate has to judge besides the path: rest, and one of each constraint."""
+        """Requirements of the certificate besides the path: rest, and one for each constraint."""
         return (*self._rest(*self.rest_orders), *self._asked)
 
     @cached_property
@@ -416,15 +416,15 @@ class Problem:
         return tuple(item.requirement(self.robot) for item in self.all_constraints)
 
     def _rest(self, start: int, end: int) -> tuple[Requirement, ...]:
-        """Return what judges rest of so high orders; see `rest_orders`."""
-        # A damped motion is under way to the path wherever it is off it.
+        """Return the requirements of rest of given orders; see `rest_orders`."""
+        # A damped motion off its path is still moving.
         if self.damping is not None or not (start or end):
             return ()
         return (AtRest(start > 0, end > 0, (start > 1, end > 1)),)
 
     @cached_property
     def asked_envelope(self) -> Envelope:
-        """What the constraints ask of single configurations and velocities."""
+        """The envelope of the constraints, without the arm's own limits."""
         return asked_envelope(self.robot, self.all_constraints)
 
     @cached_property
@@ -434,7 +434,7 @@ class Problem:
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """What to know before planning: links that overlap, limits or places that look wrong."""
+        """Notes before planning: overlapping links, suspicious limits or placements."""
         found = remarks_on(
             self.robot, self.follows, self.constraints, self.requirements, self.envelope
         )
@@ -448,10 +448,10 @@ class Problem:
         besides: Sequence[Requirement] = (),
         progress: Progress = silent,
     ) -> Certificate:
-        """Return the certificate of a motion, by all that the problem asks for; see `certify`.
+        """Return the certificate of a motion, by all conditions of the problem; see `certify`.
 
-        And by requirements `besides`, and where it begins if a start is given. A motion with an
-        `ending` stops before it can rest at the end of the path.
+        Also by requirements `besides`, and by its start if one is given. A motion with an `ending`
+        stops before the end of the path, and need not rest there.
         """
         start, end = self.rest_orders
         rests = self._rest(start, 0 if ending else end)
@@ -483,7 +483,7 @@ class Problem:
         return tuple(filter(None, (item.of_given_start(start) for item in apart)))
 
     def _elsewhere(self, trajectory: Trajectory) -> tuple[str, ...]:
-        """Return that a motion does not begin at the given start, in words."""
+        """Return in words that a motion does not start at the given start."""
         apart = np.abs(trajectory.of_joints(self.robot.joint_names).q[0] - self.given_start)
         worst = int(np.argmax(apart))
         # Written so that NaN is elsewhere.
@@ -498,10 +498,10 @@ class Problem:
 
     @cached_property
     def digest(self) -> str:
-        """What tells it from problems whose motions are judged by something else.
+        """Identifier of the certificate's conditions.
 
-        A digest of the arm, of what is followed and how nearly, from which start, and of what has
-        to be kept; not of costs and the null motion, which no certificate judges.
+        A digest of the arm, task frames, tolerances, start and constraints; costs and the null
+        motion are left out, since no certificate judges them.
         """
         robot = self.robot
         arm = (robot.urdf.sha256, robot.joint_names, robot.tools, robot.reference)
@@ -518,7 +518,7 @@ class Problem:
             robot.lower,
             robot.upper,
             robot.velocity_limit,
-            # What constraints take from the arm where they say no more.
+            # Limits of the arm that constraints use by default.
             robot.acceleration_limit,
             robot.jerk_limit,
             robot.effort_limit,
@@ -532,7 +532,7 @@ class Problem:
         )
 
     def _mesh_digests(self) -> dict[str, str]:
-        """Return what the files of all bodies hold that are kept apart: their names are not it."""
+        """Return digests of the mesh files of all collision bodies: names may stay the same."""
         if not self.asked_envelope.bodies:
             return {}
         bodies = (body for item in self._asked for body in item.obstacles)
@@ -554,11 +554,11 @@ class Problem:
 
     @cached_property
     def way_in_reaches(self) -> float:
-        """How far the tool goes along the path, as a multiple of the arm's reach."""
+        """Path length of the tool, as a multiple of the arm's reach."""
         return way_of(self.path) / self.robot.reach
 
 
-# What help() shows of a field that is a descriptor.
+# Signature in help() of a field that is a descriptor.
 Problem.__init__.__annotations__["task"] = "Task | str"
 
 

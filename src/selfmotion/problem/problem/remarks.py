@@ -1,4 +1,4 @@
-"""What to know of a problem before planning: limits, bodies or places that look wrong."""
+"""Notes on a problem before planning: suspicious limits, bodies or placements."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -24,8 +24,10 @@ from selfmotion.problem.problem.fit import KEPT
 
 # A path that goes through obstacles, which nothing notices where the tool has no body.
 
-# Where a path is looked at, and how deep it may be in what it works on [m].
-_LOOKS, _DEEP = 101, 2e-3
+# Samples of a path.
+_SAMPLES = 101
+# Depth in a workpiece up to which no note is made [m].
+_DEEP = 2e-3
 
 
 def inside_remarks(
@@ -35,7 +37,7 @@ def inside_remarks(
     first = follows.items[0]
     if mounting_of(robot.urdf, robot.tool).bodies:
         return
-    t = spread_along(first.path, _LOOKS)
+    t = spread_along(first.path, _SAMPLES)
     places = first.path.samples(t).translation
     for item in dict.fromkeys(obstacles):
         # Of others it depends on how the arm stands.
@@ -51,7 +53,7 @@ def inside_remarks(
 
 
 def _depths(obstacle: Obstacle, places: Array) -> Array:
-    """Return how deep points (K, 3) are inside an obstacle (K,) [m], 0 outside."""
+    """Return the depths of points (K, 3) inside an obstacle (K,) [m], 0 outside."""
     solid = Solid(obstacle.geometry(), obstacle.label)
     points = (places - obstacle.pose.translation) @ obstacle.pose.rotation
     found = np.zeros(len(points))
@@ -66,16 +68,18 @@ def _depths(obstacle: Obstacle, places: Array) -> Array:
     return found
 
 
-# What to know of a problem before planning: limits, bodies or places that look wrong.
-
-# Limits so many times the arm's own are in other units, and so are those that no arm has: of joints
-# by order, and of the tool's speed [m/s].
+# Limits this many times the arm's own are in other units.
 _FAR_ABOVE = 10.0
+# The same of limits that no joint has, by order of derivative: unit and value.
 _RATES = {1: ("rad/s", 50.0), 2: ("rad/s²", 200.0), 3: ("rad/s³", 5e4)}
+# Limit of the tool's speed that no arm has [m/s].
 _FASTEST_TOOL = 50.0
-# Meshes with more triangles than these take long; a link is no larger than so many times its arm,
-# or so many times this [m] if it is smaller.
-_MANY_TRIANGLES, _LARGE, _SMALL_ARM = 200_000, 5.0, 0.5
+# Meshes with more triangles are slow.
+_MANY_TRIANGLES = 200_000
+# A link larger than this many times its arm is in other units …
+_LARGE = 5.0
+# … for arms smaller than this, in multiples of it [m].
+_SMALL_ARM = 0.5
 # No process is as slow as this [m/s].
 _SLOWEST_FEED = 1e-4
 
@@ -87,9 +91,10 @@ def remarks_on(
     requirements: Sequence[Requirement],
     envelope: Envelope,
 ) -> Iterator[str]:
-    """Yield what is to be known: links that overlap, limits in other units or of nothing known.
+    """Yield notes on overlapping links, suspicious limits, files and placements.
 
-    And what of its file is left out, and places inside what the tool works on.
+    Limits may be in other units or of unknown quantities, elements of the file ignored, and points
+    of the path inside the workpiece.
     """
     yield from robot.urdf.notes
     for followed in follows.items:
@@ -108,7 +113,7 @@ def remarks_on(
             yield told
     yield from _unit_remarks(robot, constraints)
     for item in constraints:
-        # What nobody asked for by name is not missed, nor what another constraint gives.
+        # A default, or a limit that another constraint has, needs no note.
         known = (type(each) is type(item) and each.applies(robot) for each in constraints)
         if not (item.applies(robot) or any(item is usual for usual in KEPT) or any(known)):
             option = "--acceleration, or " * isinstance(item, JointAccelerationLimits)

@@ -27,7 +27,7 @@ def problem_to_dict(
     """Return a problem as JSON-safe values: the document of plans' files and of problem files.
 
     By default with the URDF's text, and without functions of the user's. A problem file names the
-    arm instead, and refuses what it cannot carry.
+    arm instead, and raises for values that it cannot contain.
     """
     start, clearance = problem.given_start, problem.clearance
     document: dict[str, Any] = {
@@ -48,7 +48,7 @@ def problem_to_dict(
     if problem.damping is not None:
         document["damping"] = dataclasses.asdict(problem.damping)
     if clearance != NO_OVERLAP:
-        # The key that it has had in files of plans from the first one on.
+        # Key of the first version of plan files.
         document["collision"] = False if clearance is None else describe(clearance)
     if not problem.rest:
         document["rest"] = False
@@ -72,7 +72,7 @@ def _follow_to_dict(item: Follow, describe: Callable[[Saved], dict[str, Any]]) -
 
 
 def follow_from_dict(values: Mapping[str, Any]) -> Follow:
-    """Return what a problem's document says of a frame that follows a path, or a pose."""
+    """Return the task frame of a problem's document: a frame with a path, or a pose."""
     path = restore(Path, values["path"]) if "path" in values else values["pose"]
     return Follow(path, values["task"], values.get("tool"), values.get("reference"))
 
@@ -124,7 +124,7 @@ def problem_from_dict(
 
 
 def describe_arm(robot: RobotModel, constraints: Sequence[Constraint]) -> dict[str, Any]:
-    """Return an arm and what it has to keep as JSON-safe values, with the URDF's text."""
+    """Return an arm and its constraints as JSON-safe values, with the URDF's text."""
     return {
         "robot": _robot_to_dict(robot),
         "constraints": [item.to_dict() for item in constraints],
@@ -134,7 +134,7 @@ def describe_arm(robot: RobotModel, constraints: Sequence[Constraint]) -> dict[s
 def arm_and_constraints(
     values: Mapping[str, Any], known: MutableMapping[str, Any]
 ) -> tuple[RobotModel, tuple[Constraint, ...]]:
-    """Return what `describe_arm` described, taken from what is known, or put there."""
+    """Return the values of `describe_arm`, from a cache of arms or into it."""
     given = values["robot"]
     robot = _once(known, given, lambda: rebuild_robot(**given))
     constraints = tuple(

@@ -8,13 +8,13 @@ import numpy as np
 
 from selfmotion.basics import Array
 from selfmotion.certificate import (
-    Bounded,
+    BoundedFunction,
     Finding,
     FinishedMotion,
+    MotionSegments,
     QuantityWithinLimits,
     Requirement,
     Shares,
-    Stretch,
 )
 from selfmotion.model.motion import Grid, Trajectory
 from selfmotion.model.robot import RobotModel
@@ -39,7 +39,9 @@ _PLACES = np.linspace(-1.0, 1.0, 41)
 _ROUNDING, _DIGITS = 1e-6, 32.0
 
 
-def check_majorants(function: Bounded, stretch: Stretch, name: str = "a function") -> None:
+def check_majorants(
+    function: BoundedFunction, segments: MotionSegments, name: str = "a function"
+) -> None:
     """Require of orders k from 1 to 4 that sup |∂ᵏf/∂uᵏ| / k! is at most the k-th of the series.
 
     Parameters
@@ -55,12 +57,12 @@ def check_majorants(function: Bounded, stretch: Stretch, name: str = "a function
     AssertionError
         A derivative is larger: what a verdict says of its function is no proof.
     """
-    known = function.series(stretch)
+    known = function.series(segments)
     if known is None:
         raise AssertionError(f"{name}: no series on this motion")
     u = np.polynomial.chebyshev.chebpts1(_NODES)
     into = np.linalg.inv(np.polynomial.chebyshev.chebvander(u, _NODES - 1))
-    values = function.values(stretch, u)
+    values = function.values(segments, u)
     taken = np.einsum("kp,ipc->kic", into, values)
     wrong = _DIGITS * np.finfo(float).eps * float(np.abs(values).max(initial=0.0))
     for order in range(1, _ORDERS + 1):
@@ -75,7 +77,7 @@ def check_majorants(function: Bounded, stretch: Stretch, name: str = "a function
         # Written so that NaN fails.
         if not np.all(sizes <= allowed):
             interval, block = np.unravel_index(np.argmax(sizes - allowed), sizes.shape)
-            first, last = stretch.intervals[interval]
+            first, last = segments.intervals[interval]
             raise AssertionError(
                 f"{name}: series() is no majorant: the derivative of order {order} of number "
                 f"{block}, over {order}!, reaches {sizes[interval, block]:.4g} from t = "
@@ -191,7 +193,7 @@ def _majorised(
     first = t[rng.choice(len(t) - 1, min(_INTERVALS, len(t) - 1), replace=False)]
     step = np.array([t[np.searchsorted(t, time, "right")] - time for time in first])
     ends = np.sort(rng.random((2, len(first))), axis=0) * step + first
-    stretch = Stretch(robot, trajectory, np.stack(ends, axis=1))
-    known = shares.series(stretch)
+    segments = MotionSegments(robot, trajectory, np.stack(ends, axis=1))
+    known = shares.series(segments)
     if known is not None:
-        check_majorants(shares, stretch, f"constraint '{requirement.name}'")
+        check_majorants(shares, segments, f"constraint '{requirement.name}'")

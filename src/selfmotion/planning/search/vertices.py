@@ -1,4 +1,4 @@
-"""Nodes of the search: samples of self-motion curves inside the limits and free of collision."""
+"""Vertices of the search: samples of self-motion curves inside the limits and free of collision."""
 
 import itertools
 from collections.abc import Sequence
@@ -11,27 +11,28 @@ from selfmotion.basics import Array, Flags, Ints
 from selfmotion.model.collision import CollisionModel
 from selfmotion.planning.search.curves import ON_CURVE, CurveSet, SelfMotion
 
-# Where samples are free or not by turns, the border is enclosed to this share of the spacing.
+# Ends of free intervals are found to this share of the spacing.
 _BORDER = 0.25
-# A joint this near to its limit [rad or m] is at it.
+# Distance at which a joint is at its limit [rad or m].
 AT_LIMIT = 1e-3
-# Carried samples nearer to each other than this share of the spacing are merged.
+# Samples nearer to each other than this share of the spacing are merged.
 _MERGED = 0.4
+# A whole turn [rad].
 _TURN = 2.0 * np.pi
 
 
 @dataclass(frozen=True, eq=False)
 class Admissible:
-    """What a node must keep.
+    """Conditions on a vertex of a chain: limits, bodies and quantities.
 
     Attributes
     ----------
     lower, upper : (n,)
-        Joint limits [rad or m], ±inf where there is none.
+        Joint limits [rad or m], ±inf for none.
     revolute : (n,)
         Whether a turn leads to the same pose.
     bodies : tuple of (CollisionModel, float)
-        Bodies to keep apart, and the distance [m].
+        Bodies with a minimum distance [m].
     """
 
     lower: Array
@@ -48,7 +49,7 @@ class Admissible:
     def without_turns(self) -> "Admissible":
         """Return bounds in which joints with room for a whole turn turn without end.
 
-        The search is much smaller then: six joints of two turns each make 64 nodes of one.
+        The search is much smaller then: six joints of two turns each make 64 vertices of one.
         """
         wide = self.revolute & (self.upper - self.lower >= _TURN)
         return replace(
@@ -58,7 +59,7 @@ class Admissible:
         )
 
     def counting_turns(self, which: Flags, bounds: "Admissible") -> "Admissible":
-        """Return it with the limits of others for some joints (n,), whose turns count again."""
+        """Return it with the limits of `bounds` for some joints (n,), whose turns count again."""
         return replace(
             self,
             lower=np.where(which, bounds.lower, self.lower),
@@ -73,14 +74,14 @@ class Admissible:
         return q + _TURN * np.where(bounded, np.round(off / _TURN), 0.0)
 
     def beyond(self, q: Array) -> npt.NDArray[np.bool_]:
-        """Return which joints leave their limits in a motion (W, n), (n,)."""
+        """Return the mask of joints that leave their limits in a motion (W, n), (n,)."""
         return np.asarray(np.any((q < self.lower) | (q > self.upper), axis=0))
 
     def layer(self, q: Array) -> Array:
         """Return free samples (K, n) at all their turns, sorted by the first joint, (K', n)."""
         # A turn there and back may round a joint that stands at its limit beyond that.
-        nodes = np.clip(self.all_turns(q), self.lower, self.upper)
-        return np.ascontiguousarray(nodes[np.argsort(nodes[:, 0], kind="stable")])
+        vertices = np.clip(self.all_turns(q), self.lower, self.upper)
+        return np.ascontiguousarray(vertices[np.argsort(vertices[:, 0], kind="stable")])
 
     def representative(self, q: Array) -> Array:
         """Return q (…, n) with each revolute joint at or above its lower limit by the least turn.
@@ -93,7 +94,7 @@ class Admissible:
         return np.where(self.revolute, base + np.mod(q - base, _TURN), q)
 
     def excess(self, q: Array) -> Array:
-        """Return by how much q (…, n) is outside the limits, at the nearest turn, (…, n)."""
+        """Return the distance of q (…, n) from within the limits, at the nearest turn, (…, n)."""
         first = self.representative(q)
         above = np.maximum(first - self.upper, 0.0)
         below = np.maximum(self.lower - first, 0.0)
@@ -133,7 +134,7 @@ class Admissible:
         return q
 
 
-def place_nodes(
+def place_vertices(
     motion: SelfMotion,
     target: Array,
     curves: CurveSet,
@@ -143,9 +144,9 @@ def place_nodes(
 ) -> Array:
     """Return the free samples of the curves of one waypoint, (K, n), without turns.
 
-    Samples carried from the waypoint before keep their place: chains can follow them without
-    changing along the curve from sample to sample, which would add to their length. Gaps between
-    them are filled to `spacing`, and halved where free samples begin or end.
+    Samples carried from the waypoint before are kept: chains can follow them without a change along
+    the curve from sample to sample, which would add to their length. Gaps between them are filled
+    to `spacing`, and halved where free samples start or end.
 
     Parameters
     ----------
@@ -161,7 +162,7 @@ def place_nodes(
     if not curves.curves:
         return np.empty((0, motion.robot.dof))
     sampler = _Sampler(motion, target, curves, bounds, spacing)
-    return np.vstack(sampler.nodes(carried))
+    return np.vstack(sampler.vertices(carried))
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,7 +175,7 @@ class _Sampler:
     bounds: Admissible
     spacing: float
 
-    def nodes(self, carried: Array) -> list[Array]:
+    def vertices(self, carried: Array) -> list[Array]:
         """Return the free samples in pieces (K, n)."""
         on, places = self.curves.locate(carried)
         numbers: list[Ints] = []
@@ -193,7 +194,8 @@ class _Sampler:
         fresh = row < 0
         q = np.empty((len(row), self.motion.robot.dof))
         q[~fresh], q[fresh] = carried[row[~fresh]], self.curves.at(number[fresh], arc[fresh])
-        # What is farther outside of the limits stays there when it is put onto its curve.
+        # Samples farther outside of the limits would stay outside after projection onto their
+        # curve.
         near = np.all(self.bounds.excess(q) < ON_CURVE, axis=1)
         new = np.flatnonzero(near & fresh)
         q[new], near[new] = self.motion.project_all(q[new], self.target)
@@ -202,7 +204,7 @@ class _Sampler:
         return [q[free], *self._borders(number, arc, free)]
 
     def _borders(self, number: Ints, arc: Array, free: Flags) -> list[Array]:
-        """Return free samples (K, n) nearer to where curves begin or end to be free."""
+        """Return free samples (K, n) nearer to the ends of free intervals of curves."""
         on, inside, outside = _changes(number, arc, free, self.curves)
         lengths = np.array([curve.length for curve in self.curves.curves])
         found: list[Array] = []
@@ -220,7 +222,7 @@ class _Sampler:
 
 
 def _changes(number: Ints, arc: Array, free: Flags, curves: CurveSet) -> tuple[Ints, Array, Array]:
-    """Return where neighbours along a curve are free and not: its number, and both arc lengths."""
+    """Return the pairs of a free and a blocked neighbour: curve number, and both arc lengths."""
     on: list[Ints] = []
     inside, outside = [], []
     for k, curve in enumerate(curves.curves):
@@ -236,11 +238,11 @@ def _changes(number: Ints, arc: Array, free: Flags, curves: CurveSet) -> tuple[I
     return np.concatenate(on), np.concatenate(inside), np.concatenate(outside)
 
 
-def _thinned(arcs: Array, apart: float) -> list[int]:
-    """Return which of sorted arc lengths (K,) to keep: those farther from the last one kept."""
+def _thinned(arcs: Array, spacing: float) -> list[int]:
+    """Return the sorted arc lengths (K,) to keep: each farther than `spacing` from the last."""
     kept: list[int] = []
     for k, arc in enumerate(arcs.tolist()):
-        if not kept or arc - arcs[kept[-1]] > apart:
+        if not kept or arc - arcs[kept[-1]] > spacing:
             kept.append(k)
     return kept
 

@@ -1,4 +1,4 @@
-"""The fewest chains of nodes that together follow a path which no single one follows."""
+"""The fewest chains of vertices that together follow a path which no single one follows."""
 
 import itertools
 from collections.abc import Sequence
@@ -11,21 +11,24 @@ from selfmotion.planning.search.chains import best_chains, connected, unturned
 from selfmotion.planning.search.guides import layers_of
 from selfmotion.planning.search.manifold import OnPath
 from selfmotion.planning.search.measures import Length, cheapest, near_pairs
-from selfmotion.planning.search.nodes import Admissible
 from selfmotion.planning.search.sequences import Layers
+from selfmotion.planning.search.vertices import Admissible
 from selfmotion.problem.problem import Problem
 
-# What a change to another configuration counts: more than any motion in between.
+# Cost of a change to another configuration: above that of any motion in between.
 _BREAK = 1e6
-# A step is put onto the path in so many places, less one. What an arm can follow has no part that
-# is more than this share of it, nor farther than this [rad or m].
-_JUMP_LOOKS, _JUMP_SHARE, _LEAST_JUMP = 8, 0.4, 0.05
-# Chains are looked for again without the jumps they have, so often.
+# Points at which a step is projected onto the path, plus one.
+_STEP_POINTS = 8
+# Largest share of a step between two of these for which an arm can follow …
+_JUMP_SHARE = 0.4
+# … or the largest distance [rad or m].
+_LEAST_JUMP = 0.05
+# Searches for chains, each without the jumps of the one before.
 _JUMP_ROUNDS = 12
 
 
 class _Jumps:
-    """What is known of jumps along a path: chains are looked for again without them.
+    """Known jumps along a path: chains are searched again without them.
 
     Parameters
     ----------
@@ -40,7 +43,7 @@ class _Jumps:
         self._problem, self._t, self._steps = problem, t, steps
         # The largest share of these that is no jump, as far as is known.
         self._most = 1.0
-        # Waypoints at which each step is looked at, and what was found there.
+        # Waypoints at which steps were checked, and the results.
         self._at: set[int] = set()
         self._known: dict[tuple[int, bytes], tuple[Ints, Ints]] = {}
 
@@ -89,13 +92,13 @@ class _Jumps:
 
 
 def jumps_of(problem: Problem, early: Array, late: Array, here: Array, there: Array) -> Flags:
-    """Return which steps from q (K, n) at times (K,) to others, (K, n) at (K,), no motion takes.
+    """Return the mask of steps from q (K, n) at times (K,) to others that no motion follows.
 
-    Between its ends a step is put onto the path in a few places, within limits. Where arms can go
-    that way, these are about evenly apart; between two branches most of the step is left between
-    two of them, or nothing arrives.
+    A step is projected onto the path at a few points between its ends, within limits. Where arms
+    can follow, these are about evenly spaced; between two branches most of the step is between two
+    of them, or the projection fails.
     """
-    share = np.arange(1, _JUMP_LOOKS) / _JUMP_LOOKS
+    share = np.arange(1, _STEP_POINTS) / _STEP_POINTS
     times = (early[:, None] + (late - early)[:, None] * share).ravel()
     straight = here[:, None] + (there - here)[:, None] * share[:, None]
     where = OnPath(problem.follows, times, problem.envelope.lower, problem.envelope.upper)
@@ -105,13 +108,13 @@ def jumps_of(problem: Problem, early: Array, late: Array, here: Array, there: Ar
     whole = np.concatenate([here[:, None], between, there[:, None]], axis=1)
     parts = np.linalg.norm(np.diff(whole, axis=1), axis=2).max(axis=1)
     most = np.maximum(_JUMP_SHARE * np.linalg.norm(there - here, axis=1), _LEAST_JUMP)
-    # Also where there are no steps at all.
+    # Correct also for no steps at all.
     return np.asarray((parts > most) | ~arrived.reshape(len(here), len(share)).all(axis=1))
 
 
 @dataclass(frozen=True, eq=False)
-class Stretch:
-    """A chain of configurations along a stretch of a path.
+class ChainSegment:
+    """A chain of configurations along a segment of a path.
 
     Attributes
     ----------
@@ -122,7 +125,7 @@ class Stretch:
     q : (W, n)
         Configurations [rad or m].
     ending : str
-        Why no chain from its first waypoint goes all the way; "" for the last one.
+        The cause why no chain from its first waypoint is complete; "" for the last one.
     """
 
     first: int
@@ -133,8 +136,8 @@ class Stretch:
 
 
 @dataclass(frozen=True, eq=False)
-class Stretches:
-    """Nodes along a path, over which the fewest chains are looked for; made by `Stretches.of`."""
+class ChainSegments:
+    """Vertices along a path, and the fewest chains over them; made by `ChainSegments.of`."""
 
     problem: Problem
     _layers: Layers
@@ -148,13 +151,13 @@ class Stretches:
     @classmethod
     def of(
         cls, problem: Problem, rng: np.random.Generator | int = 0, progress: Progress = silent
-    ) -> "Stretches":
-        """Return the nodes of a problem: samples of all self-motions, free and within limits.
+    ) -> "ChainSegments":
+        """Return the vertices of a problem: samples of all self-motions, free and within limits.
 
         Raises
         ------
         NoSequenceError
-            A pose of the path has no node at all; tells the time and why.
+            A pose of the path has no vertex at all; with the time and cause.
         """
         layers = layers_of(problem, problem.robot.joint_weights, rng, progress)
         found = cls(problem, layers, _Jumps(problem, layers.t, layers.steps))
@@ -162,11 +165,11 @@ class Stretches:
         found._check()
         return found
 
-    def fewest(self, forbidden: set[int]) -> list[Stretch]:
+    def fewest(self, forbidden: set[int]) -> list[ChainSegment]:
         """Return the fewest chains that follow the path one after the other, the shortest such.
 
-        Each begins in the pose in which the one before it ends, in another configuration; the ways
-        to these count as well. None has a step that no motion takes, as far as is known.
+        Each starts at the pose at which the one before ends, in another configuration; the motions
+        between these count as well. None has a known jump.
 
         Parameters
         ----------
@@ -176,7 +179,7 @@ class Stretches:
         Raises
         ------
         NoSequenceError
-            No chains, however many, follow the path; tells the time and why.
+            No number of chains follows the path; with the time and cause.
         """
         for _ in range(_JUMP_ROUNDS):
             found = self._found(forbidden)
@@ -184,7 +187,7 @@ class Stretches:
                 break
         return found
 
-    def _found(self, forbidden: set[int]) -> list[Stretch]:
+    def _found(self, forbidden: set[int]) -> list[ChainSegment]:
         """Return the fewest chains without the jumps that are known; see `fewest`."""
         bounds = self._layers.bounds
         # Joints with room for several turns turn without end at first: see `best_sequences`.
@@ -202,7 +205,7 @@ class Stretches:
                 break
             any_turn = any_turn.counting_turns(beyond, bounds)
         return [
-            Stretch(
+            ChainSegment(
                 first,
                 first + len(q) - 1,
                 self.t[first : first + len(q)],
@@ -213,7 +216,7 @@ class Stretches:
         ]
 
     def _pin_ends(self) -> None:
-        """Let nothing but a given start, and a given end, be a node there."""
+        """Let nothing but a given start, and a given end, be a vertex there."""
         start, samples = self.problem.given_start, self._layers.samples
         if start is not None:
             samples[0] = start[None]
@@ -246,12 +249,12 @@ class Stretches:
     def _chains(
         self, layers: list[Array], bounds: Admissible, forbidden: set[int]
     ) -> list[tuple[int, list[int]]]:
-        """Return the first waypoint of each chain, and its nodes, first to last."""
+        """Return the first waypoint of each chain, and its vertices, first to last."""
         length, turning = Length(self.problem.robot.joint_weights), bounds.turning
         anywhere = np.full(len(turning), np.inf)
         cost = np.zeros(len(layers[0]))
         parents: list[Ints] = [np.arange(len(cost))]
-        # From which node of its own waypoint a node is changed to; itself where it is not.
+        # From which vertex of its own waypoint a vertex is changed to; itself where it is not.
         changes: list[Ints] = [np.arange(len(cost))]
         for i, (before, after) in enumerate(itertools.pairwise(layers), 1):
             cost, parent = self._jumps.extended(i - 1, length, before, cost, after, turning)
@@ -282,19 +285,19 @@ class Stretches:
 
 
 def _traced_back(
-    parents: list[Ints], changes: list[Ints], node: int
+    parents: list[Ints], changes: list[Ints], vertex: int
 ) -> list[tuple[int, list[int]]]:
-    """Return the chains that end in a node of the last waypoint; see `Stretches`."""
+    """Return the chains that end in a vertex of the last waypoint; see `ChainSegments`."""
     chains: list[tuple[int, list[int]]] = []
     chain: list[int] = []
     for i in range(len(parents) - 1, 0, -1):
-        chain.append(node)
-        source = int(changes[i][node])
-        if source != node:
+        chain.append(vertex)
+        source = int(changes[i][vertex])
+        if source != vertex:
             chains.append((i, chain[::-1]))
-            node, chain = source, [source]
-        node = int(parents[i][node])
-    chains.append((0, [*chain, node][::-1]))
+            vertex, chain = source, [source]
+        vertex = int(parents[i][vertex])
+    chains.append((0, [*chain, vertex][::-1]))
     return chains[::-1]
 
 
