@@ -57,10 +57,17 @@ def test_a_band_is_half_its_width_from_its_middle() -> None:
         assert f"expected {center - half:.4g} to {center + half:.4g}" in found.text
 
 
+def motion_at_rest(robot: sm.RobotModel) -> sm.Trajectory:
+    q = np.tile(robot.dexterous_configuration("pose"), (2, 1))
+    return sm.Trajectory([0.0, 1.0], q, 0.0 * q, robot.joint_names)
+
+
 def test_what_has_no_limit_is_not_covered_and_said() -> None:
     robot = robot_named("panda")
     none = sm.constraints.JointTorqueLimits(np.full(7, np.inf)).requirement(robot)
     assert none.covers == ()
+    still = sm.certificate.FinishedMotion(robot, motion_at_rest(robot))
+    assert none.judge(still).satisfied
     assert all(name in none.remarks[0] for name in robot.joint_names)
     assert "not limited" in none.remarks[0]
     one = np.full(7, np.inf)

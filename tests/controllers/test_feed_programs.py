@@ -247,6 +247,26 @@ def test_a_feed_that_is_never_reached_is_refused(
         read_program(file, line.robot)
 
 
+def test_the_least_acceleration_that_is_named_is_read_and_less_is_not(
+    line: sm.Plan, tmp_path: Path
+) -> None:
+    file = tmp_path / "weld.script"
+    sm.files.write_motion(line, file, settings=settings(file.name))
+    text = file.read_text()
+
+    def with_acceleration(value: float) -> None:
+        found = rf"a={value:.6g}\1"
+        file.write_text(re.sub(r"a=[\d.e-]+(, v=[\d.e-]+, r=)", found, text))
+        read_program(file, line.robot)
+
+    with pytest.raises(sm.errors.FileFormatError, match="never is at its speed") as refused:
+        with_acceleration(1e-6)
+    least = float(re.search(r"expected ([\d.e-]+) or more", str(refused.value))[1])
+    with_acceleration(least)
+    with pytest.raises(sm.errors.FileFormatError, match="never is at its speed"):
+        with_acceleration(0.97 * least)
+
+
 def test_only_one_work_object_and_one_tool_are_read(line: sm.Plan, tmp_path: Path) -> None:
     """Poses of another one than the last would be somewhere else."""
     file = tmp_path / "weld.mod"

@@ -54,3 +54,18 @@ def test_roots_beside_the_interval_are_none_of_it(away: float) -> None:
     found = np.sort(inner_roots(parabolas), axis=0)
     np.testing.assert_allclose(found[0], 0.25 * (places == 0.5), atol=1e-12)
     np.testing.assert_allclose(found[1], np.where(places == 0.5, 0.5, 0.25), atol=1e-12)
+
+
+def test_roots_that_lie_close_are_polished() -> None:
+    """Two roots 1e-3 apart beside a tiny leading coefficient: Newton's steps give back the digits."""
+    rng, wrong = np.random.default_rng(4), []
+    for _ in range(200):
+        first = rng.uniform(0.1, 0.9)
+        roots = np.array([first, first + 1e-3])
+        low = np.array([roots.prod(), -roots.sum(), 1.0])
+        tiny = 10.0 ** rng.uniform(-11.0, -6.0)
+        coefficients = np.append(low, [0.0, 0.0]) + tiny * np.append([0.0, 0.0], low)
+        found = np.sort(inner_roots(coefficients[:, None])[:, 0])[-2:]
+        wrong.append(np.abs(found - roots).max())
+    # A root is known to the rounding of the value over the slope, 1e-3 here.
+    assert max(wrong) < 1e-12

@@ -61,6 +61,24 @@ def test_each_corner_is_a_verified_motion_by_its_own(plan: sm.Plan) -> None:
     assert "confirmed at 28 corners" in str(found)
 
 
+def test_the_room_of_joints_is_the_least_along_the_motion(plan: sm.Plan) -> None:
+    """Of displacements of the part, and of the base the other way."""
+    problem, h = plan.problem, 1e-7
+    for way in (np.array([1.0, 0.0]), np.array([0.6, -0.8])):
+        part, base = (
+            Places((problem,), of, frozenset(), np.zeros(3), ("x", "y")) for of in ("part", "base")
+        )
+        room = corners._room(part, plan, way)
+        assert corners._room(base, plan, -way) == pytest.approx(room, rel=1e-4)
+        least = np.inf
+        for q in plan.trajectory(np.linspace(0.0, 2.0, 41)):
+            jacobian = problem.robot.jacobian(q)[:2]
+            step = np.linalg.pinv(jacobian) @ way
+            ends = np.where(step > 0.0, problem.robot.upper - q, q - problem.robot.lower)
+            least = min(least, float((ends / np.maximum(np.abs(step), h)).min()))
+        assert room == pytest.approx(least, rel=0.05)
+
+
 def test_no_more_than_the_reach_is_claimed() -> None:
     """The seam ends 4 cm before the arm is stretched; a corner takes it nearer by its share."""
     robot = robot_named("planar_3r")

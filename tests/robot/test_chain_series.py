@@ -114,3 +114,25 @@ def test_rates_are_derivatives_of_the_pose(panda: sm.RobotModel, free: sm.Plan) 
         for part in (slice(0, 3), slice(3, 6)):
             np.testing.assert_allclose(velocity[k, part], turn @ twist[part], atol=1e-8)
             np.testing.assert_allclose(acceleration[k, part], turn @ change[part], atol=1e-4)
+
+
+def test_derivatives_of_rates_are_differences(panda: sm.RobotModel) -> None:
+    """By q, q̇ and q̈, at random states of motion."""
+    rates, rng, h = ToolRates(panda.chain), np.random.default_rng(3), 1e-6
+    q, qd, qdd = (rng.normal(scale=0.5, size=(4, panda.dof)) for _ in range(3))
+    velocity, acceleration = rates.derivatives(q, qd, qdd)
+
+    def differences(which: int, by: int) -> np.ndarray:
+        found = np.empty((len(q), 6, panda.dof))
+        for j in range(panda.dof):
+            ends = []
+            for sign in (1.0, -1.0):
+                moved = [q.copy(), qd.copy(), qdd.copy()]
+                moved[by][:, j] += sign * h
+                ends.append(rates(*moved)[which])
+            found[:, :, j] = (ends[0] - ends[1]) / (2.0 * h)
+        return found
+
+    for which, parts in enumerate((velocity, acceleration)):
+        for by, part in enumerate(parts):
+            np.testing.assert_allclose(part, differences(which, by), atol=2e-8)

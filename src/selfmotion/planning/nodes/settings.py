@@ -3,7 +3,7 @@
 Sources: [WB] A. Wächter, L. Biegler, "On the implementation of an interior-point filter line-search
 algorithm for large-scale nonlinear programming", Math. Program. 106, 2006; [NW] J. Nocedal, S.
 Wright, "Numerical Optimization", 2nd ed. Numbers without a source were chosen on the project's
-benchmarks; `make bench-numbers` doubles and halves each and shows what changes.
+benchmarks; `make bench NAME=numbers` doubles and halves each and shows what changes.
 """
 
 from dataclasses import dataclass
