@@ -57,7 +57,7 @@ def test_roots_beside_the_interval_are_none_of_it(away: float) -> None:
 
 
 def test_roots_that_lie_close_are_polished() -> None:
-    """Two roots 1e-3 apart beside a tiny leading coefficient: Newton's steps give back the digits."""
+    """Roots 1e-3 apart beside a tiny leading coefficient: Newton steps give the digits back."""
     rng, wrong = np.random.default_rng(4), []
     for _ in range(200):
         first = rng.uniform(0.1, 0.9)

@@ -344,7 +344,7 @@ _DIGITS = 3
 # With what accelerations and turn rates grow, over that of the feed.
 _POWERS = {"acceleration": 2, "turn_acceleration": 2, "turn_rate": 1}
 _UNITS = {"acceleration": "m/s²", "turn_acceleration": "rad/s²", "turn_rate": "rad/s"}
-# What is looked at first.
+# The first look.
 _FIRST = {
     "the turn rate": "turn_rate",
     "the turn acceleration in a bend": "turn_acceleration",

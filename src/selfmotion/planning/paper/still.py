@@ -1,4 +1,4 @@
-"""Where a motion begins, and the motion at x = 0: what the arm does without self-motion."""
+"""The start of a motion, and the minimum-norm motion: the optimiser's variables at 0."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -238,7 +238,7 @@ def _resumed(planner: Planner, rough: abc.Sequence[NodeMotion]) -> Iterator[Cand
 
 
 def optimise_sequences(planner: Planner, *, chosen: bool) -> None:
-    """Search, and optimise from the best sequences, one after another; note a search in vain.
+    """Search, and optimise from the best sequences in turn; note a search that finds nothing.
 
     They are compared with the present motion, and `chosen` only if allowed.
     """

@@ -46,7 +46,7 @@ def in_order_of(robot: RobotModel, motion: Trajectory) -> Trajectory:
     return motion.of_joints(names)
 
 
-# What finished work is kept under: a digest of all that decides what comes of it.
+# The key of finished work: a digest of everything that decides its result.
 
 
 def key_of(asked: Any, files: Any) -> str:

@@ -44,7 +44,7 @@ _BY_A_LITTLE, _BEYOND = 1.002, 1.0 + 1e-6
 # Samples at a rate are a whole number of periods, to rounding [periods]. A motion is made slower
 # for them in steps of this part of what limits are passed by, so often at most for all else.
 _WHOLE, _PART, _SLOWER = 1e-6, 0.1, 12
-# Accelerations that jump from one side to the other this often, of all joints, are told of.
+# Accelerations that jump from one side to the other this often, over all joints, are reported.
 _OFTEN = 12
 
 

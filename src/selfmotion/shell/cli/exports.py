@@ -69,7 +69,7 @@ def export(
     asked = outputs.program_settings(settings, targets, wobj, mass)
     if rate is not None and all(reread.is_program(target, form, asked) for target in out):
         raise sm.errors.ProblemError(
-            "--rate has no effect on programs: targets are as many as it takes"
+            "--rate has no effect on programs, which have the targets that they need"
         )
     if parts and all(reread.is_program(target, form, asked) for target in out):
         raise sm.errors.ProblemError(

@@ -201,7 +201,7 @@ def led(path: Path, values: Mapping[str, Any]) -> Path:
     return Joined(kept).noted((*path.notes, *told))
 
 
-# What is told of leads that a program needs none of.
+# The note on leads that a program does not need.
 OWN_RAPIDS = "leads are left out where the program has a rapid along the tool's axis"
 
 

@@ -88,7 +88,7 @@ def render_gif(
 ) -> Path:
     """Draw the first plan's motion, in real time, as an animated GIF that repeats.
 
-    Parameters and errors are those of `render_png`; `progress` is told of each picture, as in
+    Parameters and errors are those of `render_png`; `progress` hears of each picture, as in
     `plan`.
     """
     from PIL import Image

@@ -92,7 +92,7 @@ class Cut:
         self.events.append((len(self.places) - 1, event))
 
     def rows(self) -> PoseRows:
-        """Return the poses, the tool's z axis against the axes, turned as little as may be."""
+        """Return the poses, the tool's z axis against the axes, turned as little as possible."""
         # The feed of a table is from a pose on, that of a machine up to one.
         feeds = np.array([*self.feeds[1:], self.feeds[-1]])
         rapid = np.array([*self.rapid[1:], self.rapid[-1]])

@@ -103,7 +103,7 @@ def read_poses(file: FilePath, reading: Reading) -> Mapping[str, PoseRows]:
     header = list(flat[0])
     table = np.array([[row[name] for name in header] for row in flat])
     rows = rows_of_table(file, header, table, places, {})
-    # What is passed over in each pose is told of the first one.
+    # A note on keys that every pose has names the first pose.
     told = {note.partition(": ")[2]: note for note in reversed(notes)}
     return {"": replace(rows, notes=(*rows.notes, *reversed(told.values())))}
 
@@ -328,7 +328,7 @@ def read_path(
     ``cut 2``, …. Legs are straight, their corners rounded within `tolerance`, and the tool rests
     where it goes back on itself. Positions are those of the tip. The tool's z axis points into the
     part, against the axis of the machine: down where the file has none. About it the tool turns as
-    little as may be.
+    little as possible.
 
     - G-code: ``G0 G1 G2 G3 G17 G18 G19 G20 G21 G90 G91 G93 G94``, ``X Y Z`` in mm unless
       ``G20``, ``F`` by the minute, of the tip along the part (``G93``: lines a minute); the tool's

@@ -123,7 +123,9 @@ def write_motion(
     check_ends(plan, path, force)
     if name in PROGRAMS.values() or _is_linear(name, settings):
         if rate is not None:
-            raise ProblemError(f"{path}: rate has no effect: targets are as many as it takes")
+            raise ProblemError(
+                f"{path}: rate has no effect on a program, which has the targets that it needs"
+            )
         write_program(plan, path, name, settings or ProgramSettings(), progress)
         return
     if name == "urscript":

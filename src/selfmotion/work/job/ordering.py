@@ -315,7 +315,7 @@ class Ordering:
         return first, last, between
 
     def _add_alike(self) -> None:
-        """Add a motion of each seam that begins as near as may be to where the program does.
+        """Add a motion of each seam that begins as near as possible to the start of the program.
 
         What is near to the same configuration is near to each other.
         """

@@ -49,7 +49,7 @@ from selfmotion.work.job.work import Asked, Work, check_can_be_sent, seam_steps
 
 # Orders that are tried at most: exact ones, and those of many seams.
 _ORDERS, _ORDERS_OF_MANY = 200, 12
-# What a move that is not found counts where no order does without [s].
+# Penalty of a move that was not found, where every order needs one [s].
 _GAP = 1e6
 # From which state to which one; None is the start or the end of the program.
 Pair = tuple[int | None, int | None]

@@ -1,7 +1,7 @@
 """What a job plans: branches of seams and moves, here or in other processes, kept when finished.
 
-Each piece of work depends on what it is asked alone, its random numbers too: so the same comes
-of it wherever it is done, and whenever.
+A piece of work depends on its parameters alone, its random numbers too: the result is the same in
+every process, and in any order.
 """
 
 import tempfile
@@ -47,7 +47,7 @@ from selfmotion.work.job.seam import Seam, Step, backwards
 _REMEMBERED = 8
 
 
-# What is asked of a piece of work, by name, and what comes of it.
+# A piece of work by its parameters, and its result.
 _Task = Mapping[str, Any]
 _Made = TypeVar("_Made")
 # Which task is finished, and what came of it.
@@ -183,7 +183,7 @@ class Work:
         ]
 
     def nearby(self, wanted: Sequence[tuple[Seam, Problem, Array]]) -> list[list[Plan]]:
-        """Return the plans that begin as near as may be to configurations (n,), none or one."""
+        """Return the plans that begin nearest to configurations (n,), none or one."""
         tasks: list[_Task] = [
             {"problem": problem, "name": seam.name, "near": q.tolist()}
             for seam, problem, q in wanted
