@@ -199,12 +199,16 @@ PARTS = (
             "shop/controllers/program_lines.py",
             "shop/controllers/commented_lines.py",
         ),
-        ("controllers/test_programs.py", "controllers/test_pose_programs.py"),
+        (
+            "controllers/test_programs.py",
+            "controllers/test_pose_programs.py",
+            "controllers/test_feed_programs.py",
+        ),
     ),
     Part(
         "cam",
         ("shop/cam/*.py",),
-        ("cam",),
+        ("cam", "documents/test_cases.py"),
         own_first=True,
     ),
 )
