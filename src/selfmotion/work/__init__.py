@@ -1,1 +1,1 @@
-"""What is done with plans: jobs, batches, margins, placement."""
+"""Uses of plans: jobs, batches, margins, placement."""

@@ -34,7 +34,7 @@ def is_made_for(plan: Plan, job: PlanRequest) -> bool:
     if job.goal == "best":
         return made.digest == asked.digest and plan.tolerance == tolerance
     wanted = _at_its_own_pace(asked, asked)
-    # Its certificate is of another problem then; what it was judged by is told all the same.
+    # The certificate belongs to another problem then; its requirements are reported all the same.
     alike = replace(plan, problem=_at_its_own_pace(made, asked))
     held = Asked(
         wanted.robot,
@@ -79,11 +79,11 @@ class Folder:
         self._known: dict[str, Any] = {}
 
     def plan_file(self, name: str) -> Path:
-        """Return where a problem's plan is."""
+        """Return the file of a problem's plan."""
         return self.path / "plans" / f"{name}.npz"
 
     def finished(self, item: Item) -> Row | None:
-        """Return the row of a problem that an earlier run finished; None where it has to be run.
+        """Return the row of a problem that an earlier run finished; None if it has to be run.
 
         Its plan is measured again: a row is not believed. Where the file is not the one that was
         written with the row, or not of what is asked, it is planned again.
@@ -197,7 +197,7 @@ _WHOLE = {
     "plan",
     "replay",
 }
-# What the columns of numbers are of, for people.
+# Titles of the columns of numbers.
 _HEADS = {
     "margin": "joint margin, rad or m",
     "clearance": "clearance, m",

@@ -1,4 +1,4 @@
-"""What a batch plans, and what became of it: a row for each problem."""
+"""Items of a batch and their results: a row for each problem."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -12,9 +12,9 @@ from selfmotion.planning.result import Plan, files_of, key_of, load_plan, own_mo
 from selfmotion.problem.costs import FunctionCost
 from selfmotion.problem.problem import Problem, problem_to_dict
 
-# What a batch plans: problems with names, or what is wrong with them.
+# Items: problems with names, or the error of one that cannot be read.
 
-# What `plan` may be given besides each problem.
+# Arguments of `plan` besides the problem.
 OPTIONS = ("search", "optimizer", "tolerance", "max_evaluations")
 
 
@@ -44,7 +44,7 @@ class Item:
 
     @cached_property
     def task(self) -> dict[str, Any]:
-        """What a worker is sent.
+        """The task for a worker.
 
         Raises
         ------
@@ -107,12 +107,12 @@ def problem_items(problems: list[Problem | PlanRequest], options: Mapping[str, A
     return items
 
 
-# What became of one problem of a batch.
+# The result of one problem of a batch.
 
 
 @dataclass(frozen=True)
 class Row:
-    """What became of one problem.
+    """The result of one problem.
 
     Attributes
     ----------
@@ -130,7 +130,7 @@ class Row:
     error : str
         "" where there is a plan.
     reason : str
-        In a few words, why it is not verified; "" where it is.
+        A short reason why it is not verified; "" if it is.
     fault : bool
         Whether the error is a fault of a program rather than of the problem; such are tried again.
     verified, verdict, cost, initial_cost, duration, evaluations
@@ -143,7 +143,7 @@ class Row:
     margin_unit : str
         Its unit, by the joint.
     clearance : float or None
-        Smallest distance between bodies [m]; None where it was not asked for.
+        Smallest distance between bodies [m]; None without a clearance.
     ends : float or None
         When the motion ends where that is before the path does [s].
     seconds : float
@@ -190,7 +190,7 @@ class Row:
 
 
 def measured(plan: Plan, goal: str) -> dict[str, Any]:
-    """Return what a row says of a plan that was made for a goal (`PlanRequest.goal`)."""
+    """Return the entries of a row for a plan with a goal (`PlanRequest.goal`)."""
     report, certificate, duration = plan.report, plan.certificate, plan.trajectory.duration
     nearest = {certificate.limit_margin.name} & set(plan.robot.joint_names)
     is_part = bool(report.ending)
@@ -206,14 +206,14 @@ def measured(plan: Plan, goal: str) -> dict[str, Any]:
         "initial_cost": report.initial_cost,
         "duration": duration,
         "evaluations": report.evaluations,
-        # What is only a part of the path is not compared with the whole.
+        # A part of the path is not compared with the whole.
         "aim": float("inf") if is_part else aim,
         "ends": duration if is_part else None,
     }
 
 
 def _reason(plan: Plan) -> str:
-    """Say in a few words why a plan is not verified; "" where it is."""
+    """Return a short reason why a plan is not verified; "" if it is."""
     certificate = plan.certificate
     if certificate.verified:
         return ""

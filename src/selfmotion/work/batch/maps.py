@@ -1,4 +1,4 @@
-"""What a grid of problems costs, as pictures: a cell each, a map for each of what else varies."""
+"""Maps of the costs of a grid of problems: two axes each, one map for each further value."""
 
 import html
 import json
@@ -18,17 +18,25 @@ _OF_POSES = {
     "rpy": ("roll [rad]", "pitch [rad]", "yaw [rad]"),
     "rpy_deg": ("roll [°]", "pitch [°]", "yaw [°]"),
 }
-# From the best to the worst, as red, green and blue.
-_BEST, _WORST = (0, 105, 92), (255, 243, 205)
-# Of a cell [px], as wide as a reason in two words; of the frame around all of them.
-_WIDE, _HIGH = 74, 46
-_LEFT, _TOP, _RIGHT, _BOTTOM = 76, 30, 12, 64
+# Colour of the best cell (red, green, blue).
+_BEST = (0, 105, 92)
+# Colour of the worst cell.
+_WORST = (255, 243, 205)
+# Width of a cell: a reason in two words [px].
+_WIDE = 74
+# Height of a cell [px].
+_HIGH = 46
+# Frame around all cells [px].
+_LEFT = 76
+_TOP = 30
+_RIGHT = 12
+_BOTTOM = 64
 # Letters on one line of a cell.
 _LINE = 9
 
 
 def labels(keys: Sequence[str]) -> list[str]:
-    """Return what people call keys of a grid: their last words, where these differ."""
+    """Return short names of the keys of a grid: their last words, if these differ."""
     words = []
     for key in keys:
         *way, last = key.split(".")
@@ -126,7 +134,7 @@ class _Scale:
         """Return the colour of a cell, and of what is written in it."""
         share = 0.0
         if self.most > self.least > 0.0:
-            # By ratios: beside a place at ten times the cost others can still be told apart.
+            # Colours follow ratios: beside a place at ten times the cost others still differ.
             share = math.log(aim / self.least) / math.log(self.most / self.least)
         elif self.most > self.least:
             share = (aim - self.least) / (self.most - self.least)

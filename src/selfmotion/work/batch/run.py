@@ -33,11 +33,11 @@ from selfmotion.problem.problem import Problem, problem_from_dict
 from selfmotion.work.batch.folder import Folder
 from selfmotion.work.batch.items import Item, Row, measured, problem_items
 
-# What runs in another process: a problem's description in, a plan's file out.
+# Work in another process: the description of a problem in, the file of a plan out.
 
 # Arms and bodies of problems planned before.
 _made = Made()
-# What errors come to in a few words.
+# Short forms of errors.
 _REASONS = ((InverseKinematicsError, "out of reach"), (NoSequenceError, "no way through"))
 
 
@@ -125,7 +125,7 @@ class BatchProgress:
 
 @dataclass(frozen=True)
 class Batch:
-    """What became of many problems.
+    """Results of many problems.
 
     Attributes
     ----------
@@ -291,7 +291,7 @@ class _Run:
         return []
 
     def _task(self, item: Item) -> dict[str, Any] | None:
-        """Return what a worker needs; None where there is nothing to do."""
+        """Return the task of a worker; None if there is nothing to do."""
         row = self._folder.finished(item)
         if row is not None:
             self.rows[item.name] = row

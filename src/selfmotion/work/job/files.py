@@ -53,7 +53,7 @@ from selfmotion.work.job.specification import Specification
 
 # Programs as files, and what a job has finished so far.
 
-# A move leads to where it should up to rounding [rad or m].
+# Rounding of the end of a move [rad or m].
 _JOINED = 1e-9
 
 
@@ -155,7 +155,7 @@ class Shelf:
         try:
             files = _written(kept, file)
             found, reason = [self._plan(name) for name in files], str(kept["reason"])
-            # Each begins where it was put.
+            # Each begins at its own place.
             problems = [replace(plan.problem, start=problem.start) for plan in found]
         except (SelfmotionError, KeyError, TypeError, ValueError):
             return None
@@ -215,7 +215,7 @@ def leads(found: Move, missing: Move, ends: Array) -> bool:
 
 
 def _archives(file: Path, count: int) -> list[Path]:
-    """Return where so many plans or moves of one piece of work are."""
+    """Return the files of the plans or moves of one task."""
     return [file.with_suffix(f".{number}.npz") for number in range(count)]
 
 
@@ -238,18 +238,19 @@ def _written(kept: Mapping[str, Any], file: Path) -> list[Path]:
     return archives
 
 
-# What an earlier program of a job, or of one like it, knows: motions of its seams, and ways.
+# Motions of seams and paths of moves from an earlier program of the same or a similar job.
 
 # A move whose ends are farther away than this in all [rad or m] tells nothing.
 _NEAR = 1.5
-# An old way is told by its corners: so many looks at it, from which straight legs differ by less
-# than this [rad or m].
-_LOOKS, _STRAIGHT = 65, 0.02
+# Samples of an earlier move, from which its corners are found.
+_LOOKS = 65
+# Deviation of the samples from straight legs between these corners [rad or m].
+_STRAIGHT = 0.02
 
 
 @dataclass(frozen=True, eq=False)
 class Earlier:
-    """What an earlier program knows.
+    """Results of an earlier program.
 
     Parameters
     ----------
@@ -277,7 +278,7 @@ class Earlier:
         constraints: Sequence[Constraint],
         clearance: Clearance | None,
     ) -> tuple[Plan | None, str]:
-        """Return the plan of a seam of which the same is asked, as it is, or why there is none.
+        """Return the plan of an unchanged seam, or the reason why there is none.
 
         Judged anew by its `problem`, in the direction in which it was made: what files of bodies
         hold may have changed. `constraints` and `clearance` are those of the job.
@@ -348,7 +349,7 @@ class Earlier:
         return found
 
     def order_of(self, seams: Sequence[Seam]) -> list[Seam] | None:
-        """Return seams in its order, where it made these and no others and they may come so."""
+        """Return the seams in its order, if it has the same seams and this order is allowed."""
         named, made = {seam.name: seam for seam in seams}, self.program.order
         if sorted(made) != sorted(named):
             return None
@@ -364,12 +365,12 @@ class Earlier:
 
 
 def _described(several: Sequence[Any]) -> str:
-    """Return what tells some values from others."""
+    """Return a digest of values."""
     return digest_of([description_of(item) for item in several])
 
 
 def _cost_the_same(some: Sequence[Cost] | None, others: Sequence[Cost] | None) -> bool:
-    """Whether costs are the same; of functions nobody can tell but where they are one."""
+    """Whether costs are equal; functions are equal only if they are the same object."""
     if some is None or others is None:
         return some is others
     if len(some) != len(others):

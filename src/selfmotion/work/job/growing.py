@@ -14,8 +14,10 @@ from selfmotion.work.job.program import Program
 from selfmotion.work.job.seam import Seam, Step
 from selfmotion.work.job.work import Asked, Work, seam_steps
 
-# For a seam other ways are looked for so often; those whose ends are so near [rad or m] are one.
-_TRIES, _SAME = 3, 1e-6
+# Tries to find another motion of a seam.
+_TRIES = 3
+# Motions whose ends are nearer than this are one [rad or m].
+_SAME = 1e-6
 # Moves to a seam that are not found, each after its whole deadline; from then on only those that
 # were found before lead to it.
 _NOT_FOUND = 20
@@ -23,7 +25,7 @@ _NOT_FOUND = 20
 _Way = tuple[int | None, int | None, frozenset[str]]
 
 
-# What stands there, by name.
+# Obstacles by name.
 Standing = dict[str, Obstacle]
 
 
@@ -37,7 +39,7 @@ class Meeting:
 
     def __init__(self, asked: Asked) -> None:
         self._asked = asked
-        # What plans are known to keep clear of.
+        # Obstacles that plans are known to keep clear of.
         self._clear: dict[Plan, set[str]] = {}
 
     def is_near(self, q: Array, *bodies: Obstacle) -> bool:
@@ -48,7 +50,7 @@ class Meeting:
         )
 
     def met(self, plan: Plan, past: Standing) -> tuple[set[str], str]:
-        """Return what of all that stands there a plan meets, and how it meets the first."""
+        """Return the obstacles that a plan collides with, and a sentence on the first."""
         asked = self._asked
         clear = self._clear.setdefault(plan, set())
         met, why = set[str](), ""
@@ -60,13 +62,13 @@ class Meeting:
                 clear |= set(new)
                 break
             why = why or found.text
-            # What is not named may be any of them.
+            # An obstacle without a name may be any of them.
             met |= {name for name in found.subject.split(" - ") if name in new} or set(new)
         return met, why
 
 
 def without(standing: Standing, *seams: Seam | None) -> Standing:
-    """Return what stands there but for what seams may meet."""
+    """Return the obstacles without those that seams may touch."""
     may = {name for seam in seams if seam is not None for name in seam.may_meet}
     return {name: item for name, item in standing.items() if name not in may}
 
@@ -95,7 +97,7 @@ class Growing:
         self._leaves_it = {
             item.name: number for number, seam in enumerate(ordering.seams) for item in seam.leaves
         }
-        # What plans meet; states that were checked past something; moves; what states end in.
+        # Collisions of plans; states checked against obstacles; moves; obstacles at the ends.
         self._meeting = Meeting(work.asked)
         self._checked: dict[tuple[int, frozenset[str]], Plan] = {}
         self._moves: dict[_Way, Move] = {}
@@ -118,7 +120,7 @@ class Growing:
         return Program(robot, steps, missing, bound, tuple(self._notes))
 
     def _goes(self, states: Sequence[int]) -> bool:
-        """Whether an order can be made as it is; what is in its way is learnt."""
+        """Whether an order is possible; obstacles in its way are recorded."""
         return self._all_clear(states) and self._all_verified(states) and self._all_reached(states)
 
     def _places(self, states: Sequence[int]) -> Iterator[tuple[int, Array | None, Standing]]:
@@ -160,7 +162,7 @@ class Growing:
         return not held or (seam.wait == 0.0 and (is_over or held <= may))
 
     def _held_by(self, state: int) -> set[str]:
-        """Return what a state ends in of that which its seam leaves: few moves lead away."""
+        """Return the obstacles left by its own seam at the end of a state: few moves lead away."""
         if state not in self._held:
             q, seam = self._ordering.states[state].ends[1], self._seam(state)
             left = without({item.name: item for item in seam.leaves}, seam)
@@ -205,7 +207,7 @@ class Growing:
         goes = True
         for way, past in ways.items():
             first, last, _ = way
-            # The end of the program is where it was asked for, whatever the order.
+            # The end of the program is the given one in every order.
             if last is not None and not self._moves[way].verified:
                 goes = False
                 self._ordering.learn(first, last, np.inf)
@@ -246,7 +248,7 @@ class Growing:
         return (first is not None or asked[0]) and (last is not None or asked[1])
 
     def _ends_of(self, way: _Way) -> tuple[Array, Array]:
-        """Return where a move begins and ends, (n,) each."""
+        """Return start and end of a move, (n,) each."""
         states = self._ordering.states
         first = self._ends[0] if way[0] is None else states[way[0]].ends[1]
         last = self._ends[1] if way[1] is None else states[way[1]].ends[0]

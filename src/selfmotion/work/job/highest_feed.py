@@ -15,8 +15,12 @@ from selfmotion.basics import (
 )
 from selfmotion.work.job.program import Program
 
-# Feeds are tried so often; slower ones are none [m/s]; digits of a feed.
-_TRIES, _SLOWEST, _DIGITS = 30, 1e-3, 3
+# Feeds that are tried at most.
+_TRIES = 30
+# The slowest feed that is worth a motion [m/s].
+_SLOWEST = 1e-3
+# Significant digits of the feed that is returned.
+_DIGITS = 3
 # As fast as `Feed` allows [m/s].
 FASTEST_FEED = 3.0
 

@@ -6,15 +6,18 @@ import numpy as np
 
 from selfmotion.basics import Array, Flags, Ints, called, kernel
 
-# Stretches that are turned round are at most so long, those that are moved so long and moved so
-# far.
-_TURNED, _MOVED, _FARTHEST = 40, 3, 40
-# What gains less than this [s] is rounding.
+# Longest segment of an order that is reversed [stops].
+_TURNED = 40
+# Longest segment of an order that is moved [stops] …
+_MOVED = 3
+# … and how far [stops].
+_FARTHEST = 40
+# A gain below this is rounding [s].
 _GAIN = 1e-9
 
 
 class Tables(NamedTuple):
-    """What stops cost, as compiled functions take it: rows of -1 filled up to one length.
+    """Costs of stops as arrays for compiled functions: rows, filled up with -1.
 
     Attributes
     ----------
@@ -45,7 +48,7 @@ class Tables(NamedTuple):
 
 @called
 def _alone(state: int, position: int, place: Ints, tables: Tables) -> float:
-    """Return what a state costs by itself at a position."""
+    """Return the cost of a state at a position, without moves."""
     for stop in tables.lost[state]:
         if stop < 0:
             break
@@ -123,7 +126,7 @@ def _tried(
     place: Ints,
     tables: Tables,
 ) -> float:
-    """Return what an order costs that is another one from `low` to `high` only; inf for none."""
+    """Return the cost of an order that differs from `low` to `high` only; inf if not allowed."""
     n, total = len(trial), np.inf
     present = np.empty(high - low + 1, np.int64)
     for i in range(low, high + 1):

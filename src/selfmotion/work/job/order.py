@@ -51,7 +51,7 @@ def improved(stops: Stops, near: Sequence[int] | None = None) -> Round:
 
 
 def _with_prices(stops: Stops) -> Stops:
-    """Return the same where what cannot be done costs more than any round that can."""
+    """Return finite costs: a forbidden transition costs more than any allowed round."""
     tables = stops.between, stops.first, stops.last
     dearest = max(float(np.abs(table[np.isfinite(table)]).max(initial=0.0)) for table in tables)
     price = (stops.count + 1) * (1.0 + dearest) + float(np.abs(stops.own).sum())
@@ -60,7 +60,7 @@ def _with_prices(stops: Stops) -> Stops:
 
 
 def lower_bound(stops: Stops) -> float:
-    """Return what no round costs less than: each stop has one before it, and one after it.
+    """Return a lower bound of all rounds: each stop has one before it, and one after it.
 
     The cheapest assignment of these, which need not form one round.
     """

@@ -15,11 +15,14 @@ from selfmotion.work.job.seam import JOB_END, JOB_START, Seam, backwards_plan, w
 from selfmotion.work.job.stops import Round, Stops
 from selfmotion.work.job.work import Work
 
-# So often motions are added that begin where the seam before ends, at most: of few seams and of
-# many.
-_NEARBY_ROUNDS, _NEARBY_ROUNDS_OF_MANY = 4, 2
-# Moves that take less than this need none [s]; an added motion shortens one by this at least.
-_SHORT, _WORTH = 0.1, 0.02
+# Rounds in which motions are added that begin where the seam before ends.
+_NEARBY_ROUNDS = 4
+# The same with many seams.
+_NEARBY_ROUNDS_OF_MANY = 2
+# Moves shorter than this need no such motion [s].
+_SHORT = 0.1
+# Least time that an added motion has to save [s].
+_WORTH = 0.02
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,12 +98,12 @@ class Ordering:
         self._mirrored: dict[int, Plan] = {}
         self.missing: dict[str, str] = {}
         self._check_order()
-        # What is known better than by limits: from state to state, None for the ends.
+        # Times that are known better than by limits, from state to state; None for the ends.
         self._known: dict[tuple[int | None, int | None], float] = {}
         # The seams that plans cannot come after.
         self._too_late: dict[Plan, set[int]] = {}
         self.problems: list[Problem] = [asked.problem(seam) for seam in self.seams]
-        # What is begun at an earlier program's motions stays near to them.
+        # Orders that begin with an earlier program stay near its motions.
         known = work.earlier
         before = [None if known is None else known.plan_of(seam) for seam in self.seams]
         self._begun = {number for number, one in enumerate(before) if one is not None}
@@ -151,7 +154,7 @@ class Ordering:
             self.__dict__.pop("estimates", None)
 
     def made_of(self, state: int) -> Plan:
-        """Return the plan of a state as it is made, of the problem in its direction."""
+        """Return the plan of a state in the direction in which it is followed."""
         one = self.states[state]
         if not one.mirrored:
             return one.plan
@@ -169,7 +172,7 @@ class Ordering:
         self.__dict__.pop("estimates", None)
 
     def own(self, state: int) -> float:
-        """Return what a state costs by itself [s]."""
+        """Return the cost of a state without moves [s]."""
         return self._price * self.states[state].plan.report.cost
 
     def name_of(self, state: int) -> str:
@@ -182,7 +185,7 @@ class Ordering:
         return f"{one} → {JOB_END if last is None else self.name_of(last)}"
 
     def seconds(self, first: Array, last: Array) -> float:
-        """Return what a move between configurations (n,) takes at least [s]."""
+        """Return a lower bound of the time of a move between configurations (n,) [s]."""
         return float(self._free.time_of(first, last))
 
     def drop(self, seam: int, reason: str) -> None:
@@ -235,7 +238,7 @@ class Ordering:
         )
 
     def learn(self, first: int | None, last: int | None, seconds: float) -> None:
-        """Take it from now on that a move between states takes so long; inf for none at all."""
+        """Record the time of a move between states; inf if there is none."""
         self._known[first, last] = seconds
 
     def learn_late(self, state: int, seams: Iterable[int]) -> None:
@@ -304,7 +307,7 @@ class Ordering:
 
     @cached_property
     def estimates(self) -> tuple[Array, Array, Array]:
-        """What moves take at least: to states (m,), from them (m,), and between them (m, m) [s]."""
+        """Least times of moves: to states (m,), from them (m,), between them (m, m) [s]."""
         begins = np.array([state.ends[0] for state in self.states])
         ends = np.array([state.ends[1] for state in self.states])
         start, end = self._ends

@@ -83,7 +83,7 @@ class Program:
 
     @property
     def kept_told(self) -> tuple[str, ...]:
-        """What was kept of an earlier program in words: how many seams, and why others were not."""
+        """How many seams were kept from an earlier program, and why others were not, in words."""
         if not self.kept:
             return ()
         others = {name: why for name, why in self.kept.items() if why}
@@ -98,7 +98,7 @@ class Program:
 
     @property
     def tolerance(self) -> Tolerance:
-        """What each of the seams may miss its path by."""
+        """The tolerances of the seams."""
         return Tolerance() if self.specification is None else self.specification.tolerance
 
     @property
@@ -142,7 +142,7 @@ class Program:
 
     @property
     def events(self) -> tuple[tuple[float, str, str], ...]:
-        """What happens when: time in `trajectory` [s], seam, event."""
+        """Events: time in `trajectory` [s], seam, name."""
         return tuple(
             (begin + at, step.name, event)
             for begin, step in zip(self.begins, self.steps, strict=True)
@@ -174,7 +174,7 @@ class Program:
 
     @cached_property
     def failures(self) -> tuple[str, ...]:
-        """What speaks against it; empty for a verified one."""
+        """Faults; empty for a verified program."""
         strangers = [
             f"'{step.name}': {text}"
             for step in self.steps

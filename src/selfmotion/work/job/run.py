@@ -47,8 +47,10 @@ from selfmotion.work.job.work import Asked, Work, check_can_be_sent, seam_steps
 
 # From an order to a program: moves are planned, and the order again where they disappoint.
 
-# Orders that are tried at most: exact ones, and those of many seams.
-_ORDERS, _ORDERS_OF_MANY = 200, 12
+# Orders that are tried at most, where the best order is computed exactly.
+_ORDERS = 200
+# Orders that are tried at most, where there are too many seams for that.
+_ORDERS_OF_MANY = 12
 # Penalty of a move that was not found, where every order needs one [s].
 _GAP = 1e6
 # From which state to which one; None is the start or the end of the program.
@@ -135,7 +137,7 @@ class Builder:
                 self._notes.append(f"'{names}' is dropped: {move.trouble}")
 
     def _ends_of(self, pair: Pair) -> tuple[Array, Array]:
-        """Return where a move begins and ends, (n,) each."""
+        """Return start and end of a move, (n,) each."""
         states, (one, other) = self._ordering.states, pair
         first = self._ends[0] if one is None else states[one].ends[1]
         last = self._ends[1] if other is None else states[other].ends[0]
@@ -341,7 +343,7 @@ def _kept_first(
 
 
 def _slowest(seam: Seam) -> float:
-    """Return how fast a seam is where it does not keep its feed [m/s]; inf where it does."""
+    """Return the speed of a seam that does not keep its feed [m/s]; inf for one that does."""
     return min((found.slowest for found in seam.path.feeds if not found.kept), default=math.inf)
 
 

@@ -74,13 +74,13 @@ class Step:
 
     @property
     def constraints(self) -> tuple[Constraint, ...]:
-        """What it is judged by."""
+        """The certificate of its plan."""
         made = self.made
         return made.constraints if isinstance(made, Move) else made.problem.all_constraints
 
     @property
     def trouble(self) -> str:
-        """What is wrong with it, "" for nothing."""
+        """The fault, "" for none."""
         if isinstance(self.made, Move):
             return "" if self.made.verified else f"move '{self.name}': {self.made.trouble}"
         check = self.made.certificate
@@ -112,8 +112,9 @@ def _same(one: Obstacle | None, other: Obstacle) -> bool:
 
 # One of the seams of a job.
 
-# What the ends of a job are called; no seam is.
-JOB_START, JOB_END = "job start", "job end"
+# Names of the ends of a job, which no seam may have.
+JOB_START = "job start"
+JOB_END = "job end"
 # Names are columns of tables, and words of files and pages [characters].
 _LONGEST_NAME = 200
 
@@ -310,7 +311,7 @@ def _names(given: object, what: str) -> tuple[str, ...]:
 
 
 def waiting(seams: Sequence[Seam]) -> Before:
-    """Return what has to come before what of seams, by their places in the list."""
+    """Return the precedences of seams, by their places in the list."""
     places = {seam.name: k for k, seam in enumerate(seams)}
     after, after_any = (
         [frozenset(places[name] for name in wanted if name in places) for wanted in several]

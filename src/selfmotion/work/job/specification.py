@@ -1,4 +1,4 @@
-"""What a job asks for, which its program is held against."""
+"""The specification of a job, by which its program is judged."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _ROUNDING = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Specification:
-    """What a job asks for.
+    """The specification of a job.
 
     Attributes
     ----------
@@ -55,7 +55,7 @@ class Specification:
 
     @property
     def obstacles(self) -> tuple[Obstacle, ...]:
-        """What stands there from the beginning."""
+        """The obstacles that are there from the beginning."""
         return () if self.clearance is None else self.clearance.obstacles
 
     def failures(
@@ -101,7 +101,7 @@ class Specification:
                 yield f"seam '{name}' is made before any of those that support it"
 
     def _ends(self, robot: RobotModel, steps: Sequence[Step]) -> Iterator[str]:
-        """Yield where it begins or ends elsewhere; moves that were not found are told elsewhere."""
+        """Yield faults of the start and the end, without those of moves that were not found."""
         for q, at in ((self.start, 0), (self.end, -1)):
             piece = Piece.of("it", steps[at].made) if steps and q is not None else None
             if piece is not None and q is not None:
@@ -139,7 +139,7 @@ class Specification:
                 yield f"'{step.name}': {text}"
 
     def to_dict(self) -> dict[str, Any]:
-        """Return it as JSON-safe values; FileFormatError for what no file can carry."""
+        """Return JSON-safe values; FileFormatError for values that no file can carry."""
         return {
             "seams": [_seam_to_dict(seam) for seam in self.seams],
             "in_order": self.in_order,
@@ -153,7 +153,7 @@ class Specification:
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any], robot: RobotModel) -> Specification:
-        """Return what `to_dict` described."""
+        """Return the specification that `to_dict` described."""
         ends = (values[end] for end in ("start", "end"))
         start, end = (None if q is None else robot.configuration(q) for q in ends)
         apart = values["clearance"]

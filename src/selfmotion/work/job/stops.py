@@ -17,7 +17,7 @@ from selfmotion.basics import Array, Flags, Ints
 
 @dataclass(frozen=True, eq=False)
 class Before:
-    """What has to come before what.
+    """Precedences.
 
     Attributes
     ----------
@@ -47,7 +47,7 @@ class Before:
 
 @dataclass(frozen=True, eq=False)
 class Stops(Before):
-    """What there is to order.
+    """Stops to be ordered.
 
     Attributes
     ----------
@@ -85,7 +85,7 @@ class Stops(Before):
         return [np.flatnonzero(self.of == stop) for stop in range(self.count)]
 
     def cost(self, states: Sequence[int]) -> float:
-        """Return what a round of states, in order, costs."""
+        """Return the cost of a round of states in order."""
         made = np.zeros(self.count, dtype=bool)
         total = self.first[states[0]] + self.last[states[-1]]
         total += sum(self.between[a, b] for a, b in pairwise(states))
@@ -95,7 +95,7 @@ class Stops(Before):
         return float(total)
 
     def made_after(self, made: Flags, states: Sequence[int] | Ints) -> Array:
-        """Return what states cost by themselves when stops (n,) are made before."""
+        """Return the costs of states, without moves, after stops (n,)."""
         is_late = (self.too_late[states] & made).any(axis=1)
         return np.asarray(np.where(is_late, self.late_price, 0.0) + self.own[states])
 
@@ -149,7 +149,7 @@ def along(stops: Stops, order: Sequence[int]) -> tuple[tuple[int, ...], float]:
 
 # So many stops are looked at as the next one, at most: some seconds.
 _LOOKS = 300_000
-# What to go on with: a stop, and which of its states can be reached.
+# A partial round: its last stop, and the states of it that can be reached.
 _Next = tuple[int, int]
 
 

@@ -1,4 +1,4 @@
-"""What a job plans: branches of seams and moves, here or in other processes, kept when finished.
+"""Work of a job: plans of seams and moves, in this or other processes, saved when finished.
 
 A piece of work depends on its parameters alone, its random numbers too: the result is the same in
 every process, and in any order.
@@ -56,7 +56,7 @@ _Finished = tuple[int, Any]
 
 @dataclass(frozen=True, eq=False)
 class Asked:
-    """What a job asks of all seams and moves.
+    """The settings that all seams and moves of a job share.
 
     Attributes
     ----------
@@ -107,7 +107,7 @@ class Asked:
         return backwards(given) if turned else given
 
     def of_moves(self, standing: Sequence[Any]) -> tuple[Constraint, ...]:
-        """Return what moves have to keep, with what stands there by then."""
+        """Return the constraints of moves, with the obstacles that are there by then."""
         apart = self.apart(standing)
         has_bodies = self.robot.urdf.has_collisions or bool(apart and apart.obstacles)
         return self.constraints if apart is None or not has_bodies else (*self.constraints, apart)
@@ -248,7 +248,7 @@ class Work:
         kept: Sequence[_Made | None],
         keep: Callable[[Path | None, _Made], None],
     ) -> list[_Made]:
-        """Return what comes of tasks: what was kept, and the others, kept as they are finished."""
+        """Return the results of tasks: saved ones, and new ones, which are saved when finished."""
         found = {k: known for k, known in enumerate(kept) if known is not None}
         todo = {k: task for k, task in enumerate(tasks) if k not in found}
         with closing(self._done(todo, kind)) as fresh:
@@ -266,7 +266,7 @@ class Work:
         return [found[k] for k in range(len(tasks))]
 
     def _done(self, tasks: Mapping[int, _Task], kind: str) -> Generator[_Finished, None, None]:
-        """Yield what comes of which task, as it is finished; elsewhere all are begun at once."""
+        """Yield task and result as each is finished; other processes begin all at once."""
         if self._executor is None:
             for k, task in tasks.items():
                 yield k, _move_here(task) if kind == "move" else _plans_here(task)
@@ -283,7 +283,7 @@ class Work:
                 else:
                     yield k, ([_unpacked(data, load_plan, known) for data in found], why)
         finally:
-            # Nobody waits for the others where it was interrupted.
+            # After an interruption the others are not waited for.
             for future in sent:
                 future.cancel()
 
@@ -309,7 +309,7 @@ def check_can_be_sent(costs: Sequence[Any]) -> None:
 
 
 def _constraints_of(task: _Task) -> list[Constraint]:
-    """Return what the plans of a task have to keep, and their starts."""
+    """Return the constraints of the plans of a task, and their starts."""
     problems = (task["problem"], task.get("allowed"))
     return [item for problem in problems if problem for item in problem.all_constraints]
 
@@ -359,7 +359,7 @@ def _plans_asked(task: _Task) -> dict[str, Any]:
 
 
 def _move_asked(task: _Task) -> dict[str, Any]:
-    # What it is called changes nothing of it.
+    # The name is not part of the key.
     asked = {key: value for key, value in task.items() if key != "named"}
     return {**asked, "arm": describe_arm(*task["arm"]), "ends": task["ends"].tolist()}
 
@@ -421,7 +421,7 @@ def seam_steps(
         q = np.tile(plan.trajectory.q[-1], (2, 1))
         times, names = np.array([0.0, seam.wait]), plan.robot.joint_names
         still = Trajectory(times, q, np.zeros_like(q), names, np.zeros_like(q))
-        # What it leaves stands there by then.
+        # The obstacles that it leaves are there by then.
         left = [item for item in seam.leaves if item.name not in seam.may_meet]
         wait = Move(plan.robot, work.asked.of_moves((*standing, *left)), still)
         steps.append(Step(f"{seam.name}, wait", wait, may_meet=tuple(seam.may_meet)))

@@ -1,4 +1,4 @@
-"""What a program survives: margins as values, and in words."""
+"""Margins as values, and in words."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from selfmotion.basics import Array
 
-# A direction within so much of an axis is called by it (cosine).
+# Cosine of the angle to an axis below which a direction has the name of the axis.
 _ALONG = 0.95
 
 
@@ -27,7 +27,7 @@ class Displacement:
     stops : str
         What a larger one meets, in words; "" where nothing was met as far as was looked.
     time : float
-        When [s]; NaN where it has none.
+        Time [s]; NaN for none.
     direction : (3,) or None
         The direction of the worst translation, or, without one, the axis of the worst rotation;
         of the tool at that time, in world axes.
@@ -52,7 +52,7 @@ class Displacement:
 
     @property
     def reason(self) -> str:
-        """What stops it, in which direction and when, in words."""
+        """What limits the margin, in which direction and when, in words."""
         if not self.stops:
             return "no contact in the range that was searched"
         towards = ""

@@ -15,12 +15,18 @@ from selfmotion.basics import Array, Ints
 from selfmotion.model.collision import DisplacedBodies
 from selfmotion.model.motion import Trajectory
 
-# Intervals to begin with, and how often each is halved.
-_FIRST, _DEPTH = 32, 40
-# What is proved is the bound at single times but for this share.
+# Intervals of time to begin with.
+_FIRST = 32
+# Bisections of each at most.
+_DEPTH = 40
+# Share of the bound at single times that a proof may lose.
 _SHARE = 0.02
-# A bound is solved for to this share, in so many rounds at most of so many parts each.
-_EXACT, _ROUNDS, _PARTS = 1e-4, 12, 16
+# Relative accuracy to which a bound is solved for.
+_EXACT = 1e-4
+# Rounds of that at most.
+_ROUNDS = 12
+# Sections of each round.
+_PARTS = 16
 
 
 @dataclass(frozen=True)
@@ -113,7 +119,7 @@ class _Search:
 
     @property
     def _goal(self) -> float:
-        """What suffices to be proved."""
+        """The margin that is enough to be proved."""
         return (1.0 - _SHARE) * self._best.scale
 
     def _levers(self) -> Array:
@@ -179,7 +185,7 @@ class _Search:
         return True
 
     def found(self, open_: _Open) -> Least:
-        """Return what is proved, some intervals being left undecided."""
+        """Return the proved margin while some intervals are undecided."""
         scale = min(self._proved, self._best.scale)
         return replace(self._best, scale=0.0 if len(open_.pairs) else max(scale, 0.0))
 

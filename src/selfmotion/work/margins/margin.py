@@ -22,8 +22,10 @@ from selfmotion.work.margins.subjects import (
     tool_of,
 )
 
-# Larger displacements are not looked at [m], [rad].
-_FARTHEST, _MOST_TURNED = 1.0, 0.5
+# The largest shift that is considered [m].
+_FARTHEST = 1.0
+# The largest rotation that is considered [rad].
+_MOST_TURNED = 0.5
 
 
 def margin(
@@ -159,7 +161,7 @@ def _margin_of(
 def _of_tolerance(
     subject: Subject, tolerance: Tolerance | None, size: Size, limit: float
 ) -> tuple[Least, str]:
-    """Return what the process lets a displacement be, up to a limit, and what stops it."""
+    """Return the displacement that the process allows, up to a limit, and what limits it."""
     found = limit, ""
     if tolerance is None:
         return Least(limit), ""
@@ -168,7 +170,7 @@ def _of_tolerance(
         room = tolerance.position - miss.position
         text = f"'{miss.tip}' is {tolerance.position * 1e3:.3g} mm off its path"
         if moved * found[0] > room:
-            # What is too far off its path as it is may be displaced by nothing.
+            # A tool that already is at its tolerance allows no displacement.
             found = (room / moved if room > 0.0 else 0.0), text
         room = tolerance.rotation - miss.rotation
         text = f"'{miss.tip}' is {np.degrees(tolerance.rotation):.3g}° off its path"

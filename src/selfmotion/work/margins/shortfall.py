@@ -1,4 +1,4 @@
-"""What a plan lacks of a margin that is wanted."""
+"""By how much a plan falls short of a required margin."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from selfmotion.planning.result import Plan
 from selfmotion.work.margins.least import Size, least_scale
 from selfmotion.work.margins.subjects import base_of, models_of, part_of, tool_of
 
-# So many times a wanted margin is looked for: by what is there too much, too, a motion is told.
+# Margins are computed up to this multiple of the required one: an excess tells motions apart.
 _BEYOND = 1.3
 
 
@@ -79,7 +79,7 @@ class Shortfall:
 
 
 class Shortfalls(NamedTuple):
-    """What is met first, and how far the path is from what is turned about at most [m].
+    """The first contact, and the largest distance of the path from the centre of rotation [m].
 
     Of each subject the pair that meets first, where displacements that are little larger than
     wanted do so.
@@ -90,12 +90,12 @@ class Shortfalls(NamedTuple):
 
     @property
     def items(self) -> tuple[Shortfall, ...]:
-        """What falls short."""
+        """The subjects that fall short."""
         return tuple(item for item in self.nearest if item.scale < 1.0)
 
     @property
     def least(self) -> float:
-        """What the wanted displacements may be multiplied by, 1.3 at most."""
+        """The factor by which the required displacements may be multiplied, at most 1.3."""
         return min((item.scale for item in self.nearest), default=_BEYOND)
 
 
@@ -109,7 +109,7 @@ def shortfalls(
     center: Array | None = None,
     clearance: float = 0.0,
 ) -> Shortfalls:
-    """Return what a verified plan lacks of a margin, the worst pair of each subject."""
+    """Return how far a verified plan falls short of a margin: the worst pair of each subject."""
     subjects = {
         "part": lambda: part_of(plan, part, center),
         "tool": lambda: tool_of(plan, tool),

@@ -1,4 +1,4 @@
-"""What of a cell may stand elsewhere than planned: the part, the tool, the base."""
+"""Bodies of a cell that may be displaced: the part, the tool, the base."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -42,7 +42,7 @@ class Miss:
 
 @dataclass(frozen=True, eq=False)
 class Subject:
-    """What is displaced, and about what.
+    """A displaced body, and the centre of its rotation.
 
     Attributes
     ----------
@@ -140,7 +140,7 @@ def base_of(plan: Plan) -> Subject:
     """Return the base of the arm, or of the whole cell, in the world."""
     urdf = plan.robot.urdf
     link = urdf.joints[BASE_JOINT].child if BASE_JOINT in urdf.joints else urdf.root
-    # What is mounted on the base goes with it.
+    # Obstacles that are mounted on the base move with it.
     mounted = {body.name for body in plan.obstacles if body.frame is not None}
     bodies = tuple(name for name in _on_joint(plan, 0) if name not in mounted)
     center = root_place(plan.robot)

@@ -41,8 +41,10 @@ _AROUND = np.vstack(
 # The largest ball within the hull of these, of length 1: a face of it is spanned by an axis and two
 # diagonals beside it, all at this distance from its plane's normal (1, √3 - 1, 0).
 _WITHIN = 1.0 / math.hypot(1.0, math.sqrt(3.0) - 1.0)
-# A size that is confirmed everywhere is tried larger by this, and then halved so often between.
-_GROWTH, _HALVINGS = 1.6, 5
+# Growth of a size that is confirmed in all directions.
+_GROWTH = 1.6
+# Bisections between the largest confirmed size and the smallest refused one.
+_HALVINGS = 5
 # Sizes below this share of the largest one that is looked at are none.
 _LEAST = 1e-3
 
@@ -218,7 +220,7 @@ class _Corners:
             worst = tried[-1]
             if worst.reason:
                 high, stops = size, f"{worst.name} by {_told(what, size)}: {worst.reason}"
-                # What failed last is tried first: it decides, as a rule.
+                # The corner that failed last is tried first: usually it fails again.
                 first = names.index(worst.name)
                 names.insert(0, names.pop(first))
                 ways.insert(0, ways.pop(first))

@@ -1,4 +1,4 @@
-"""What is found of places: the best one, and what others around it cost."""
+"""Results of a placement: the best place, and a map of costs around it."""
 
 from __future__ import annotations
 
@@ -23,14 +23,16 @@ if TYPE_CHECKING:
 
 # A coordinate nearer to its bound than this share of the box is on it.
 _ON_BOUND = 1e-6
-# Nothing changes along a coordinate where so far to either side [share of the box] the cost differs
-# by less than this share.
-_ASIDE, _SAME = 0.1, 1e-5
+# Distance to either side at which costs are compared, to see whether a coordinate matters [share of
+# the box].
+_ASIDE = 0.1
+# Relative difference of costs below which a coordinate does not matter.
+_SAME = 1e-5
 
 
 @dataclass(frozen=True, eq=False)
 class PlaceMap:
-    """What places cost around the best one, over two coordinates.
+    """A map of the costs of places around the best one, over two coordinates.
 
     Attributes
     ----------
@@ -51,7 +53,7 @@ class PlaceMap:
     reasons: tuple[tuple[str, ...], ...]
 
     def svg(self) -> str:
-        """Return it as a picture: a cell for each place, why it fails where the pointer rests."""
+        """Return an SVG: a cell for each place, with the reason of a failure as its tooltip."""
         rows: list[Row] = []
         for i, high in enumerate(self.up.tolist()):
             for j, far in enumerate(self.across.tolist()):
@@ -74,7 +76,7 @@ class PlaceMap:
         return "\n".join(maps(rows, {}))
 
     def figure(self) -> Figure:
-        """Return it as a matplotlib figure (``pip install 'selfmotion[plots]'``).
+        """Return a matplotlib figure (``pip install 'selfmotion[plots]'``).
 
         Raises
         ------
@@ -149,7 +151,7 @@ class Placement:
 
     @property
     def binds(self) -> tuple[str, ...]:
-        """What keeps the cost from being lower: ends of the box, and active constraints."""
+        """What stops the cost from falling further: ends of the box, and active constraints."""
         active = [
             f"{item.constraint}: {item.easing} would save about {item.saving:.3g}"
             for plan in self.plans
@@ -187,7 +189,7 @@ class Placement:
     __repr__ = __str__
 
     def map(self, names: Sequence[str] | None = None, points: int = 9) -> PlaceMap:
-        """Return what places cost around this one, all over the box in two coordinates.
+        """Return a map of the costs of places around this one, in two coordinates of the box.
 
         Each is planned from the nearest place that is, and from nothing; where both lead nowhere,
         with all that a plan does, for 10 s of the processor: only what fails then as well is told

@@ -106,7 +106,7 @@ def place(
     listed = None if part is None else _names(part)
     places = places_of(several, of, listed, about, names)
     run = _Here(places, box, progress) if executor is None else _There(places, box, executor)
-    # Of where it stands a quick 'no', or a cost that took no pains, is not to be told.
+    # The present place is planned thoroughly: its cost is reported.
     here = np.zeros(len(names))
     known = [places.tried(here, thorough=True)] if box.holds(here) else []
     best, tried = best_place(places, box, run.every, run.near, run.descents, known)

@@ -31,23 +31,28 @@ from selfmotion.planning.result import Plan
 from selfmotion.problem.constraints import Clearance
 from selfmotion.problem.problem import Problem, problem_from_dict, start_on_path
 
-# How motions are looked for where some are known near by, and where none is: among many places a
-# quick 'no' is worth more than the last start.
-_NEAR, _QUICK = Search(1, 1, "local"), Search(16, 2, "local")
-# So long a place is worked at [s of the processor, so that it is the same on a busy machine]: near
-# known motions, what comes at all comes in a tenth of that.
-_PATIENCE_NEAR, _PATIENCE = 0.3, 0.6
-# And so long before it is said that there is none [s of the processor].
+# Search at a place with a known motion near by.
+_NEAR = Search(1, 1, "local")
+# Search at other places: among many, a quick 'no' is worth more than the last start.
+_QUICK = Search(16, 2, "local")
+# Time limit of a place near known motions, most of which take a tenth of it [s of the processor, so
+# that a busy machine finds the same].
+_PATIENCE_NEAR = 0.3
+# Time limit of other places [s of the processor].
+_PATIENCE = 0.6
+# Time limit before 'no plan' is reported [s of the processor].
 _PATIENCE_SURE = 10.0
-# What a place is told by: a shift [m] and roll, pitch and yaw [rad], as URDFs have them.
+# Coordinates of a place: a shift [m] and roll, pitch and yaw [rad], as in URDFs.
 COORDINATES = ("x", "y", "z", "roll", "pitch", "yaw")
-# Poses of each path that have to be reached before a place is planned, and tries of each.
-_POSES, _TRIES = 5, 20
+# Poses of each path that have to be reached before a place is planned.
+_POSES = 5
+# Tries of inverse kinematics for each of them.
+_TRIES = 20
 
 
 @dataclass(frozen=True, eq=False)
 class Tried:
-    """What became of a place.
+    """The result at a place.
 
     Attributes
     ----------
@@ -114,7 +119,7 @@ class Places:
     def tried(self, place: Array, near: Sequence[Plan] = (), thorough: bool = False) -> Tried:
         """Plan at a place; from plans of one `near`, where they are given.
 
-        As well as it can be, where it is to be `thorough`; among many places a quick 'no' counts.
+        With a full search if `thorough`; among many places a quick 'no' is enough.
         """
 
         def planned(k: int, problem: Problem) -> Plan:
@@ -130,7 +135,7 @@ class Places:
     def surely(self, place: Array) -> Tried:
         """Plan at a place with all that a plan does, from nothing, for 10 s of the processor each.
 
-        What fails here is told as having no motion.
+        A place that fails here is reported as 'no plan'.
         """
 
         def planned(_: int, problem: Problem) -> Plan:
@@ -151,7 +156,7 @@ class Places:
         return self._each(place, planned)
 
     def _each(self, place: Array, planned: Callable[[int, Problem], Plan]) -> Tried:
-        """Return what comes of all problems at a place, each planned in some way."""
+        """Return the result of all problems at a place, each planned by a function."""
         plans: list[Plan] = []
         for k, problem in enumerate(self.at(place)):
             try:
@@ -186,7 +191,7 @@ def places_of(
     center: Array | None,
     names: tuple[str, ...],
 ) -> Places:
-    """Return what is moved of problems.
+    """Return the bodies of problems that move along.
 
     Raises
     ------

@@ -12,23 +12,34 @@ import numpy as np
 from selfmotion.basics import Array
 from selfmotion.work.placement.places import Places, Tried
 
-# Beginnings that are planned where a part may be moved in one direction, twice as many with each
-# more, so many at most; many more if none of these can be; and how many of the best go on: with
-# half as many one of 20 random placements in three directions was 7 % dearer than the best.
-_IN_ONE, _BEGINNINGS, _MOST_BEGINNINGS, _FINALISTS = 8, 32, 64, 3
+# First places to plan if a part moves in one direction; twice as many for each further one.
+_IN_ONE = 8
+# First places at most. With half as many, one of 20 random placements in three directions was 7 %
+# dearer than the best.
+_BEGINNINGS = 32
+# First places at most if none of these has a motion.
+_MOST_BEGINNINGS = 64
+# Best first places that the descent starts from.
+_FINALISTS = 3
 # Beginnings nearer to each other than this go on once [share of the box].
 _APART = 0.15
 # Differences are taken over this share of the box.
 _DIFFERENCE = 4e-3
-# Steps, halvings of each, the longest one and the shortest [share of the box].
-_STEPS, _HALVINGS, _LONGEST, _SHORTEST = 12, 4, 0.3, 3e-3
+# Steps of the descent.
+_STEPS = 12
+# Halvings of a step.
+_HALVINGS = 4
+# The longest step [share of the box].
+_LONGEST = 0.3
+# The shortest step [share of the box].
+_SHORTEST = 3e-3
 # A step that takes less off the cost is the last one [share].
 _GAIN = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
 class Box:
-    """What a place may be: from low to high (d,) [m or rad]."""
+    """The box of places: from low to high (d,) [m or rad]."""
 
     low: Array
     high: Array

@@ -31,10 +31,14 @@ from selfmotion.problem.constraints import Clearance
 from selfmotion.problem.problem import Problem, check_problem
 from selfmotion.work.margins import Margin, Shortfall, Shortfalls, shortfalls
 
-# How often pairs are kept farther apart, or less far; and by how much more than what lacks [m].
-_ROUNDS, _MORE = 12, 2e-5
-# What is proved of a margin is a share less than it is; that much more than is wanted will do.
-_SHARE, _ENOUGH = 0.02, 0.01
+# Rounds in which the clearances of pairs are adapted.
+_ROUNDS = 12
+# Clearance beyond the missing margin [m].
+_MORE = 2e-5
+# Share of a margin that its proof may lose.
+_SHARE = 0.02
+# Excess over the required margin that ends the rounds, as a share.
+_ENOUGH = 0.01
 _SUBJECTS = ("part", "tool", "base")
 # Why there is no more of it, after Ctrl-C.
 _INTERRUPTED = "it was interrupted"
@@ -58,7 +62,7 @@ class PlanWithMargin:
     kept_apart : dict
         Pair of bodies → distance that they were kept apart by for this plan [m].
     refused : str
-        Why no more was found, where the margin is not reached; "" where it is.
+        The reason why the margin is not reached; "" if it is.
     """
 
     plan: Plan
@@ -77,7 +81,7 @@ class PlanWithMargin:
 
     @property
     def extra_cost(self) -> float:
-        """What the margin costs, as a share of the cost without; 0 where it was there anyway."""
+        """The added cost as a share of the cost without the margin; 0 if none was needed."""
         return self.cost / self.cost_without - 1.0 if self.cost_without else 0.0
 
     def __str__(self) -> str:
@@ -155,7 +159,7 @@ def plan_with_margin(
     about = None if center is None else as_numbers(center, "center", "(3,) [m]", (3,))
     asked: dict[str, Any] = {"part": part, "tool": tool, "center": about, "clearance": clearance}
     first = plan(problem, **options).require()
-    # What was given to begin with is for the first one.
+    # The given warm start is for the first plan only.
     options.pop("warm_start", None)
     found = shortfalls(first, margin, named, **asked)
     narrow = problem.changed(relaxations=_narrowed(problem, margin, found.lever))
@@ -177,7 +181,7 @@ def plan_with_margin(
         certificate = problem.certify(again.trajectory, first.tolerance)
         plan_now = replace(again, problem=problem, certificate=certificate)
         if certificate.verified:
-            # What keeps more is a motion without a margin, too.
+            # A motion that keeps pairs farther apart is one without a margin, too.
             without = min(without, again.report.cost)
         if not again.certificate.verified:
             refused = again.certificate.verdict.removeprefix("not verified: ")
@@ -227,7 +231,7 @@ def _rank(found: Plan) -> tuple[bool, float]:
 def _adjusted(
     apart: dict[tuple[str, str], float], found: Shortfalls, clearance: float
 ) -> dict[tuple[str, str], float]:
-    """Keep pairs farther apart where a margin is missing, and less far where it is more.
+    """Keep pairs farther apart if a margin is missing, and less far if it is larger than needed.
 
     To first order a displacement that is a share larger uses that share more of the distance.
     """
