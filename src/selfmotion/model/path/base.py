@@ -292,7 +292,7 @@ def turning(bounds: Array) -> PathSeries:
 
 # What is slower than this [m/s, rad/s] is at rest: waypoints and velocity functions come to rest
 # up to their own rounding.
-STILL = 1e-7
+REST_SPEED = 1e-7
 
 
 def path_pose(pose: SE3 | npt.ArrayLike, name: str) -> SE3:

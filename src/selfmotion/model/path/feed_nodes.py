@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from selfmotion.basics import Array, Flags, Ints, PathError
-from selfmotion.model.path.base import STILL, Path
+from selfmotion.model.path.base import REST_SPEED, Path
 from selfmotion.model.path.pace import Pace, largest_pace
 
 # What holds a tool that is slower than its feed.
@@ -69,7 +69,7 @@ class FeedNodes:
         after = self.path.samples(inner + beside[1:]).twist
         jump = np.abs(after - before).max(axis=1)
         size = np.maximum(np.abs(before), np.abs(after)).max(axis=1)
-        kinks = inner[jump > _KINK * size + STILL]
+        kinks = inner[jump > _KINK * size + REST_SPEED]
         return [0.0, *kinks.tolist(), self.path.duration]
 
     @cached_property

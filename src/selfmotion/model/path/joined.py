@@ -13,7 +13,7 @@ from typing_extensions import override
 
 from selfmotion.basics import Array, Ints, PathError, as_number, read_only, restore, series, shown
 from selfmotion.model.path.base import (
-    STILL,
+    REST_SPEED,
     Path,
     PathSamples,
     PathSeries,
@@ -226,7 +226,7 @@ def _check_joint(one: Path, other: Path, number: int) -> None:
             f"Line between them"
         )
     jump = float(np.abs(other.twist(0.0) - one.twist(one.duration)).max())
-    if jump > STILL:
+    if jump > REST_SPEED:
         raise PathError(
             f"{where} {jump:.3g} m/s or rad/s faster or slower than piece {number} ends; let both "
             f"rest there (time_law='minimum_jerk', section_at_rest)"

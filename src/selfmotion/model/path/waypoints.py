@@ -137,7 +137,7 @@ class Turning:
 _COLUMNS = ("t", "x", "y", "z")
 _QUATERNION = ("qw", "qx", "qy", "qz")
 # Poses nearer than this [m], and cosine of half the angle, are the same.
-_STILL = 1e-12
+_REST = 1e-12
 # Legs that turn by less than this [rad] have no direction of rotation.
 _TURNED = 1e-3
 
@@ -280,7 +280,7 @@ class Waypoints(Path, kind="waypoints"):
             stops[[0, -1]] = True
         # Two equal poses in a row are a pause: the tool comes to rest, and stays.
         alike = np.abs(np.einsum("ki,ki->k", self._turns[:-1], self._turns[1:]))
-        pauses = (lengths <= _STILL) & (alike >= 1.0 - _STILL)
+        pauses = (lengths <= _REST) & (alike >= 1.0 - _REST)
         stops[:-1] |= pauses
         stops[1:] |= pauses
         return stops

@@ -142,7 +142,7 @@ class RobotModel:
         found = {"m" if self.is_prismatic(name) else "rad" for name in joints or self.joint_names}
         return found.pop() if len(found) == 1 else "rad or m"
 
-    def told(self, k: int) -> str:
+    def label(self, k: int) -> str:
         """Return what the joint of a coordinate is called in messages."""
         return f"joint '{self.joint_names[k]}'"
 

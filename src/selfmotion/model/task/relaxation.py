@@ -96,7 +96,7 @@ class Relaxation:
         return f"({', '.join(self.rows)})"
 
     @property
-    def told(self) -> str:
+    def label(self) -> str:
         """The rows and the window, for what is said of one among several."""
         if self.during is None:
             return self.name

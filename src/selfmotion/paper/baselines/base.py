@@ -243,10 +243,10 @@ def plan_by(problem: Problem, method: Method, tolerance: Tolerance | None = None
     began = time.perf_counter()
     found = method.solve(problem)
     seconds = time.perf_counter() - began
-    still = pseudo_inverse(problem)
+    minimum_norm = pseudo_inverse(problem)
     trajectory, certificate = _sampled(problem, found, tolerance)
     grid = Grid(trajectory.t)
-    terms, initial_terms = costs(problem, found, grid), costs(problem, still, grid)
+    terms, initial_terms = costs(problem, found, grid), costs(problem, minimum_norm, grid)
     report = Report(
         cost=sum(terms.values()),
         initial_cost=sum(initial_terms.values()),
@@ -262,7 +262,7 @@ def plan_by(problem: Problem, method: Method, tolerance: Tolerance | None = None
         message=found.message,
         seconds=seconds,
     )
-    initial = _smooth(problem, still, grid)
+    initial = _smooth(problem, minimum_norm, grid)
     return Plan(problem, trajectory, initial, read_only([]), report, certificate)
 
 

@@ -134,15 +134,15 @@ class GradientProjection:
             tried.append((cost, motion))
             return cost
 
-        still = cost_of(0.0)
-        if not np.isfinite(still):
+        minimum_norm = cost_of(0.0)
+        if not np.isfinite(minimum_norm):
             # Raises again, with the time at which it breaks down.
             self._follow(problem, 0.0)
         scale = self._scale(problem, tried[0][1])
         gains = scale * np.geomspace(1e-3, 1e1, _TRIALS // 2)
         coarse = [cost_of(gain) for gain in gains]
         best = int(np.argmin(coarse))
-        if coarse[best] < still:
+        if coarse[best] < minimum_norm:
             low, high = gains[max(best - 1, 0)], gains[min(best + 1, len(gains) - 1)]
             minimize_scalar(
                 lambda logarithm: cost_of(float(np.exp(logarithm))),
@@ -155,10 +155,10 @@ class GradientProjection:
         message = f"{found.message}, the best of {len(tried)}"
         return Motion(found.at, message, len(tried), spent)
 
-    def _scale(self, problem: Problem, still: Motion) -> float:
+    def _scale(self, problem: Problem, minimum_norm: Motion) -> float:
         """Return the gain at which ε is as fast as the motion without it."""
         t = np.linspace(0.0, problem.path.duration, 9)
-        q, qd = still.at(t)
+        q, qd = minimum_norm.at(t)
         slopes = [
             pose_gradient(problem, self.criterion, time, row)
             for time, row in zip(t, q, strict=True)

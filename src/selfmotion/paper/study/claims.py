@@ -293,15 +293,19 @@ def _agreement(context: Context) -> Claim:
 def _local_methods(table: Table) -> Claim:
     costs = {str(row[0]): row[1] for row in table.rows}
     ours, projection = costs["ours, cubic"], costs["gradient projection"]
-    still = costs["pseudo-inverse (x = 0)"]
-    if not (isinstance(ours, float) and isinstance(projection, float) and isinstance(still, float)):
+    minimum_norm = costs["pseudo-inverse (x = 0)"]
+    if not (
+        isinstance(ours, float)
+        and isinstance(projection, float)
+        and isinstance(minimum_norm, float)
+    ):
         raise TypeError("a cost in the table is no number")
-    share = (still - projection) / (still - ours)
+    share = (minimum_norm - projection) / (minimum_norm - ours)
     return Claim(
         "better_than_local",
         "It can hopefully be shown as an improvement over locally optimal methods.",
         Verdict.CONFIRMED if ours < projection else Verdict.REFUTED,
         f"{ours:.4f}, against {projection:.4f} of gradient projection",
         f"With its gain tuned on this very cost, gradient projection gets {100 * share:.0f} % of "
-        f"the way from x = 0 ({still:.4f}); without tuning there is no telling.",
+        f"the way from x = 0 ({minimum_norm:.4f}); without tuning there is no telling.",
     )

@@ -16,7 +16,7 @@ from selfmotion.paper.study.published import (
     published_optimizer,
 )
 from selfmotion.planning.optimise import LineSearch, Minimum, QuasiNewton, inverse_metric
-from selfmotion.planning.paper import Objective, StillMotion
+from selfmotion.planning.paper import MinimumNormMotion, Objective
 from selfmotion.planning.planner import plan
 from selfmotion.planning.result import Plan
 from selfmotion.problem.costs import Cost, InverseManipulability, JointVelocity
@@ -67,7 +67,7 @@ class Scale:
 def bind(problem: Problem, steps: int = 64) -> Objective:
     """Return the objective of a problem on a grid of about `steps` Runge-Kutta steps."""
     grid = Grid.aligned(problem.path.knots, steps)
-    return Objective.of(problem, StillMotion.on(problem, start_of(problem), grid))
+    return Objective.of(problem, MinimumNormMotion.on(problem, start_of(problem), grid))
 
 
 def optimum(
@@ -204,7 +204,7 @@ class Context:
         return self._published[mu]
 
     @cached_property
-    def still(self) -> Result:
+    def minimum_norm(self) -> Result:
         """The motion at x = 0."""
         return finely(self.problem, np.zeros(12))
 

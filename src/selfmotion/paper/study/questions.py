@@ -240,9 +240,9 @@ def _nothing(context: Context, least: float) -> tuple[float, str, str]:
 def _differences(context: Context) -> _Answer:
     """Return the error of eq. 13 against the exact gradient, over δ, at x = 0 and away from it."""
     away = 0.5 * context.published().minimum.x
-    still = np.zeros_like(away)
+    zero = np.zeros_like(away)
     cases = {
-        "x = 0, ode23's default tolerance": (still, ODE23_TOLERANCE),
+        "x = 0, ode23's default tolerance": (zero, ODE23_TOLERANCE),
         "halfway to x*, default tolerance": (away, ODE23_TOLERANCE),
         f"halfway to x*, tolerance {_TIGHT:.0e}": (away, _TIGHT),
     }
@@ -303,7 +303,7 @@ def _accuracy(context: Context) -> _Answer:
         tuple(rows),
         "The motion found on a coarse grid, integrated finely, is nearly as good as any.",
     )
-    error = abs(run.minimum.history[0].cost / context.still.cost - 1.0)
+    error = abs(run.minimum.history[0].cost / context.minimum_norm.cost - 1.0)
     lost = truth / context.best.cost - 1.0
     return (
         table,
