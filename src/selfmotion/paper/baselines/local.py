@@ -15,9 +15,11 @@ from selfmotion.problem.problem import Problem
 
 # Methods that decide from the present pose alone: pseudo-inverse, gradient projection, damping.
 
-# Steps of the quadrature that compares gains, and cost evaluations of the search for the best.
-_STEPS, _TRIALS = 64, 16
-# The criterion that is followed where none is given.
+# Steps of the quadrature that compares gains.
+_STEPS = 64
+# Cost evaluations of the search for the best gain.
+_TRIALS = 16
+# Default criterion.
 MANIPULABILITY = Manipulability()
 
 
@@ -182,7 +184,7 @@ def pose_gradient(problem: Problem, criterion: Cost, t: float, q: Array) -> Arra
 # The attraction to the stationary pose, times the duration.
 _ATTRACTION = 20.0
 
-# Of the central differences of the projected gradient [rad or m].
+# Step of the central differences of the projected gradient [rad or m].
 _DIFFERENCE = 1e-5
 
 

@@ -1,4 +1,4 @@
-"""What the paper claims about the method, tested one by one, and other works beside it."""
+"""The paper's claims about the method, tested one by one, and other works."""
 
 from dataclasses import replace
 
@@ -25,9 +25,7 @@ from selfmotion.planning.result import Plan
 from selfmotion.problem.costs import InverseManipulability, JointVelocity, Manipulability
 from selfmotion.problem.problem import Problem, sample_problem
 
-# What the paper claims about the method, tested one by one.
-
-# A norm of the coefficients at which, in the test of growth, the guard steps in.
+# Norm of the coefficients at which the guard stops the test of growth.
 _GUARD = 1e3
 
 
@@ -202,7 +200,7 @@ _COLUMNS = (
     "check",
 )
 
-# Two optima agree to four digits.
+# Relative agreement of two optima: four digits.
 _AGREEMENT = 1e-4
 
 

@@ -7,9 +7,10 @@ from selfmotion.paper.study.context import Context, Result, finely, optimum
 from selfmotion.paper.study.results import Chapter, Claim, Plot, PlottedCurve, Table, Verdict
 from selfmotion.problem.costs import Cost, InverseManipulability, JointVelocity, Manipulability
 
+# Lengths of the links [m].
 _LINKS = np.array([2.0, 2.0, 1.0])
 
-# Without a velocity term the search need not end: the table shows how far it is after these.
+# Without a velocity term the search need not end: the table has the result after these iterations.
 _MOST_ITERATIONS = 60
 
 _COLUMNS = (
