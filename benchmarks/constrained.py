@@ -28,7 +28,7 @@ from rich.table import Table
 import selfmotion as sm
 from selfmotion.basics import Array
 from selfmotion.planning.optimise import inverse_metric
-from selfmotion.planning.paper import Objective, StillMotion, settled_still_motion
+from selfmotion.planning.paper import MinimumNormMotion, Objective, converged_minimum_norm
 from selfmotion.problem.problem import problem_from_dict, problem_to_dict
 
 DATA = Path(__file__).parent / "data"
@@ -90,10 +90,10 @@ def _made(robot: sm.RobotModel, task: str, kind: str, seed: int, number: int) ->
     for _ in range(STARTS):
         free = _without(robot, task, kind, rng)
         try:
-            still, _ = settled_still_motion(free, free.given_start)
+            minimum_norm, _ = converged_minimum_norm(free, free.given_start)
         except sm.SelfmotionError:
             continue
-        constraints = _constraints(kind, free, still, rng)
+        constraints = _constraints(kind, free, minimum_norm, rng)
         if constraints is not None:
             break
     else:
@@ -147,7 +147,7 @@ def _without(robot: sm.RobotModel, task: str, kind: str, rng: np.random.Generato
 
 
 def _constraints(
-    kind: str, problem: sm.Problem, still: StillMotion, rng: np.random.Generator
+    kind: str, problem: sm.Problem, minimum_norm: MinimumNormMotion, rng: np.random.Generator
 ) -> list[sm.constraints.Constraint] | None:
     """Return constraints that the motion at x = 0 breaks and another one keeps; None for none.
 
@@ -163,10 +163,10 @@ def _constraints(
     if kind == "at rest":
         return [*limits, sm.constraints.EndVelocity()]
     if kind == "clearance":
-        spheres = _sphere(problem, still, rng)
+        spheres = _sphere(problem, minimum_norm, rng)
         return None if spheres is None else [*limits, sm.constraints.Clearance(spheres, DISTANCE)]
     orders = {"position": (0,), "velocity": (1,), "acceleration": (2,)}.get(kind, (0, 1, 2))
-    found = _calmer(problem, still, orders[-1], rng)
+    found = _calmer(problem, minimum_norm, orders[-1], rng)
     if found is None:
         return None
     first, other = found
@@ -178,7 +178,7 @@ def _constraints(
         bounds[joint] = 1.03 * calm[joint]
         bounds = np.array([float(f"{bound:.3g}") for bound in bounds])
         if order == 0:
-            start = still.start
+            start = minimum_norm.start
             limits[0] = sm.constraints.JointPositionLimits(start - bounds, start + bounds)
         elif order == 1:
             limits[1] = sm.constraints.JointVelocityLimits(bounds)
@@ -215,10 +215,10 @@ def _random(objective: Objective, rng: np.random.Generator) -> tuple[Array, Arra
 
 
 def _calmer(
-    problem: sm.Problem, still: StillMotion, order: int, rng: np.random.Generator
+    problem: sm.Problem, minimum_norm: MinimumNormMotion, order: int, rng: np.random.Generator
 ) -> tuple[_Motion, _Motion] | None:
     """Return the motion at x = 0 and one whose busiest joints move less, by random search."""
-    objective = Objective.of(problem, still)
+    objective = Objective.of(problem, minimum_norm)
     first = _motion(objective, np.zeros(objective.size))
     if first is None:
         return None
@@ -241,12 +241,12 @@ def _calmer(
 
 
 def _sphere(
-    problem: sm.Problem, still: StillMotion, rng: np.random.Generator
+    problem: sm.Problem, minimum_norm: MinimumNormMotion, rng: np.random.Generator
 ) -> tuple[sm.obstacles.Sphere] | None:
     """Return a sphere that the motion at x = 0 runs into, and another one does not."""
-    robot, objective = problem.robot, Objective.of(problem, still)
+    robot, objective = problem.robot, Objective.of(problem, minimum_norm)
     data = robot.model.createData()
-    pin.forwardKinematics(robot.model, data, still.q[len(still.q) // 2])
+    pin.forwardKinematics(robot.model, data, minimum_norm.q[len(minimum_norm.q) // 2])
     others = [_motion(objective, _random(objective, rng)[1]) for _ in range(4)]
     known = [motion[0] for motion in others if motion is not None]
     for _ in range(TRIES):
@@ -254,8 +254,10 @@ def _sphere(
         center = np.round(data.oMi[joint].translation + rng.normal(size=3) * 0.5 * NEAR, 3)
         sphere = sm.obstacles.Sphere("ball", center, float(np.round(rng.uniform(0.03, 0.08), 3)))
         model = sm.obstacles.CollisionModel(robot, (sphere,))
-        worst = model.worst(still.q).value
-        if not (-0.03 < worst < DISTANCE and model.worst(still.q[:1]).value > 2.0 * DISTANCE):
+        worst = model.worst(minimum_norm.q).value
+        if not (
+            -0.03 < worst < DISTANCE and model.worst(minimum_norm.q[:1]).value > 2.0 * DISTANCE
+        ):
             continue
         if any(model.worst(q).value > 1.5 * DISTANCE for q in known):
             return (sphere,)

@@ -9,7 +9,7 @@ import pinocchio as pin
 
 import selfmotion as sm
 from selfmotion.model.motion import Grid
-from selfmotion.planning.paper import Objective, StillMotion
+from selfmotion.planning.paper import MinimumNormMotion, Objective
 
 
 def objective_on(problem: sm.Problem, steps: int) -> Objective:
@@ -17,8 +17,8 @@ def objective_on(problem: sm.Problem, steps: int) -> Objective:
     start = problem.given_start
     if start is None:
         start = problem.robot.inverse_kinematics(problem.path.pose(0.0), problem.task)
-    still = StillMotion.on(problem, start, Grid.aligned(problem.path.knots, steps))
-    return Objective.of(problem, still)
+    minimum_norm = MinimumNormMotion.on(problem, start, Grid.aligned(problem.path.knots, steps))
+    return Objective.of(problem, minimum_norm)
 
 
 class Measured:

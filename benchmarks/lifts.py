@@ -45,12 +45,14 @@ def known_motion(robot: sm.RobotModel, model: sm.obstacles.CollisionModel, numbe
         t = np.linspace(0.0, 1.0, WAYPOINTS)
         q = np.asarray(PchipInterpolator(np.linspace(0.0, 1.0, KNOTS), corners)(t))
         fastest = np.abs(np.gradient(q, DURATION * t, axis=0)).max(axis=0)
-        kept = way_of(q[:, lift]) >= LONG_PATH and np.all(fastest <= SPEED * robot.velocity_limit)
+        kept = length_of(q[:, lift]) >= LONG_PATH and np.all(
+            fastest <= SPEED * robot.velocity_limit
+        )
         if kept and model.worst(q).value >= CLEAR:
             return q
 
 
-def way_of(x: Array) -> float:
+def length_of(x: Array) -> float:
     """Return how far a joint goes in all."""
     return float(np.abs(np.diff(x)).sum())
 
@@ -98,13 +100,13 @@ def main() -> int:
         try:
             plan = sm.plan(sm.Problem(robot, path, constraints=limits, rest=False))
             good, said = plan.certificate.verified, plan.certificate.verdict
-            way = f"{way_of(plan.trajectory.q[:, lift]):.3f} m"
+            way = f"{length_of(plan.trajectory.q[:, lift]):.3f} m"
         except sm.SelfmotionError as error:
             good, said, way = False, str(error), "-"
         seconds.append(time.process_time() - began)
         found += good
         print(
-            f"{number:3d}  lift {way_of(known[:, lift]):.3f} m, found {way:8s} "
+            f"{number:3d}  lift {length_of(known[:, lift]):.3f} m, found {way:8s} "
             f"{seconds[-1]:6.1f} s  {'yes' if good else 'NO: ' + said}",
             flush=True,
         )

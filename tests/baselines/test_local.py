@@ -21,9 +21,9 @@ def test_pseudo_inverse_is_x_0(ours: sm.Plan) -> None:
 
 def test_gradient_projection_climbs(panda_circle: Circle) -> None:
     problem = panda_circle("position", rest=False)
-    still = sm.plan_by(problem, sm.baselines.PseudoInverse())
+    minimum_norm = sm.plan_by(problem, sm.baselines.PseudoInverse())
     moving = sm.plan_by(problem, sm.baselines.GradientProjection(gain=1.0))
-    end = still.trajectory.q[-1], moving.trajectory.q[-1]
+    end = minimum_norm.trajectory.q[-1], moving.trajectory.q[-1]
     w = [np.prod(np.linalg.svd(problem.robot.task_jacobian(q, problem.task))[1]) for q in end]
     assert w[1] > w[0]
     assert moving.certificate.verified

@@ -12,7 +12,7 @@ from selfmotion.basics import Array
 from selfmotion.certificate import EndState, JointLimits
 from selfmotion.model.motion.grid import Grid
 from selfmotion.model.motion.null_motion import PolynomialNullMotion
-from selfmotion.planning.paper import Objective, StillMotion
+from selfmotion.planning.paper import MinimumNormMotion, Objective
 from selfmotion.problem.constraints import NodeTangents, linearised
 from selfmotion.shell.cli.tables import show
 from support.arms import PANDA_HOME, central_difference, robot_named, short_line, start_of
@@ -56,9 +56,9 @@ def objective_with(
     grid = Grid.aligned(path.knots, 12)
     motion = PolynomialNullMotion(1, "joint")
     problem = sm.Problem(robot, path, rows, start, motion, constraints=(), rest=False)
-    still = StillMotion.on(problem, start, grid)
+    minimum_norm = MinimumNormMotion.on(problem, start, grid)
     bound = constraint.bind(standing(robot, rows), start, start)
-    return Objective.of(problem, still, free=True), bound
+    return Objective.of(problem, minimum_norm, free=True), bound
 
 
 def rows_of(objective: Objective, bound: sm.constraints.BoundConstraint, x: Array) -> Array:

@@ -8,7 +8,7 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.certificate import ClosedMotion, EndState
-from selfmotion.planning.paper.still import FreeStart
+from selfmotion.planning.paper.minimum_norm import FreeStart
 from support.arms import PANDA_HOME, short_line
 from support.followed import standing
 

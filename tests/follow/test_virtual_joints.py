@@ -209,9 +209,9 @@ def test_what_is_said_of_a_band_is_the_deviation_in_its_unit(
                 said += 1
     bands = [item for item in relaxations if np.isfinite(item.band)]
     assert said >= len(bands)
-    told = [follows.robot.told(n + k) for k in range(len(virtual.each))]
+    told = [follows.robot.label(n + k) for k in range(len(virtual.each))]
     assert not any("tilt" in words or "relaxed" in words for words in told)
-    assert follows.robot.told(0) == f"joint '{robot.joint_names[0]}'"
+    assert follows.robot.label(0) == f"joint '{robot.joint_names[0]}'"
 
 
 @pytest.mark.parametrize("relaxations", [item[2] for item in TOLERANCES[:4]])

@@ -248,16 +248,16 @@ def test_a_way_that_is_known_is_taken_where_it_is_free(monkeypatch) -> None:
     free = FreeMotions(panda, asked, np.random.default_rng(0))
     # Back, round behind the post, and out again.
     back = np.array([0.0, -0.8, 0.0, 0.0, 0.0, 0.0, 0.0])
-    way = np.stack([first, first + back, last + back, last])
+    polyline = np.stack([first, first + back, last + back, last])
     looked = []
-    found = free_motion.find_way
+    found = free_motion.find_path
 
-    def find_way(*given):
+    def find_path(*given):
         looked.append(given)
         return found(*given)
 
-    monkeypatch.setattr(free_motion, "find_way", find_way)
-    free.between(first, last, known=way).require()
+    monkeypatch.setattr(free_motion, "find_path", find_path)
+    free.between(first, last, known=polyline).require()
     assert not looked
     # One that is blocked is not taken: others are looked for.
     through = np.stack([first, 0.5 * (first + last), last])

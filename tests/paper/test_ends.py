@@ -13,7 +13,7 @@ from selfmotion.planning.paper import (
     FreeStart,
     Solution,
     closed,
-    settled_still_motion,
+    converged_minimum_norm,
     solve,
 )
 from support.arms import PANDA_HOME, central_difference, robot_named
@@ -55,9 +55,9 @@ def solved(
     name: str, asked: list[sm.constraints.Constraint], *, free: bool = False, **options
 ) -> Solution:
     problem = problem_of(name)
-    still, _ = settled_still_motion(problem, np.array(problem.given_start))
-    ends = [item.bind(problem.follows, still.start, still.end) for item in asked]
-    return solve(problem, still, ends=ends, free=free, **options)
+    minimum_norm, _ = converged_minimum_norm(problem, np.array(problem.given_start))
+    ends = [item.bind(problem.follows, minimum_norm.start, minimum_norm.end) for item in asked]
+    return solve(problem, minimum_norm, ends=ends, free=free, **options)
 
 
 def eliminated(found: Solution) -> Eliminated:

@@ -10,9 +10,9 @@ from selfmotion.basics import Array
 from selfmotion.model.follow import Follows
 from selfmotion.model.motion import NullMotionTable, PolynomialNullMotion
 from selfmotion.model.motion.grid import Grid
-from selfmotion.planning.paper import Objective, StillMotion
+from selfmotion.planning.paper import MinimumNormMotion, Objective
+from selfmotion.planning.paper.minimum_norm import FixedStart
 from selfmotion.planning.paper.rollout import Rollout
-from selfmotion.planning.paper.still import FixedStart
 from support.arms import (
     PANDA_HOME,
     Case,
@@ -36,7 +36,7 @@ def test_the_metric_is_the_differenced_gauss_newton_matrix(
     motion = PolynomialNullMotion(3, "joint")
     problem = sm.Problem(panda, path, "pose", PANDA_HOME, motion, costs=[cost], constraints=())
     objective = Objective.of(
-        problem, StillMotion.on(problem, PANDA_HOME, Grid.aligned(path.knots, 12))
+        problem, MinimumNormMotion.on(problem, PANDA_HOME, Grid.aligned(path.knots, 12))
     )
     x = 0.05 * np.random.default_rng(0).normal(size=objective.size)
     sampling = objective.grid.sampling
@@ -158,20 +158,20 @@ def test_a_free_start_is_a_variable_and_a_guide_stands_for_no_null_motion() -> N
     start = start_of(robot, "pose")
     problem = sm.Problem(robot, short_line(robot, start), "pose", start, rest=False)
     steps = Grid.aligned(problem.knots, 12)
-    still = StillMotion.on(problem, start, steps)
-    given, free = (Objective.of(problem, still, free=free) for free in (False, True))
+    minimum_norm = MinimumNormMotion.on(problem, start, steps)
+    given, free = (Objective.of(problem, minimum_norm, free=free) for free in (False, True))
     assert free.size == given.size + 1
     zero = np.zeros(given.size)
-    assert_same(given.samples(zero).q[steps.node_stages], still.q)
+    assert_same(given.samples(zero).q[steps.node_stages], minimum_norm.q)
 
     def guide(t: Array) -> Array:
         return np.tile(0.3 * np.eye(7)[0], (len(t), 1))
 
-    guided = StillMotion.on(problem, start, steps, guide)
-    assert np.abs(guided.q[-1] - still.q[-1]).max() > 1e-3
+    guided = MinimumNormMotion.on(problem, start, steps, guide)
+    assert np.abs(guided.q[-1] - minimum_norm.q[-1]).max() > 1e-3
     along = Objective.of(problem, guided)
     assert_same(along.samples(zero).q[steps.node_stages], guided.q)
     # What is given in its place counts instead.
     around = np.zeros((len(steps.stage_times), 7))
     back = Objective.of(problem, guided, around=around)
-    assert_same(back.samples(zero).q[steps.node_stages], still.q)
+    assert_same(back.samples(zero).q[steps.node_stages], minimum_norm.q)

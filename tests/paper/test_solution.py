@@ -11,7 +11,7 @@ import selfmotion as sm
 from selfmotion.basics import Array, Counts
 from selfmotion.model.motion import BSplineNullMotion, Grid, NullMotion, PolynomialNullMotion
 from selfmotion.planning.optimise import Function, Iteration, Minimum, Status
-from selfmotion.planning.paper import Solution, StillMotion, settled_still_motion, solve
+from selfmotion.planning.paper import MinimumNormMotion, Solution, converged_minimum_norm, solve
 from support.arms import PANDA_HOME, robot_named, short_line, start_of
 
 # The notes' costs are of a fine integration, and of optima that steps of 1e-8 of it end at: here
@@ -21,8 +21,8 @@ AGREEMENT = 1e-4
 PUBLISHED = PolynomialNullMotion(3, "joint", "monomial")
 
 
-def still_of(problem: sm.Problem) -> StillMotion:
-    return settled_still_motion(problem, np.array(problem.given_start))[0]
+def still_of(problem: sm.Problem) -> MinimumNormMotion:
+    return converged_minimum_norm(problem, np.array(problem.given_start))[0]
 
 
 def solved(problem: sm.Problem, **options) -> Solution:
@@ -34,9 +34,9 @@ def closed_circle(**options) -> Solution:
     circle = sm.paths.Circle.around(robot.pose(PANDA_HOME), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
     cubic = PolynomialNullMotion()
     problem = sm.Problem(robot, circle, "pose", PANDA_HOME, cubic, constraints=(), rest=False)
-    still = still_of(problem)
-    end = sm.constraints.ClosedPath().bind(problem.follows, still.start, still.end)
-    return solve(problem, still, ends=[end], **options)
+    minimum_norm = still_of(problem)
+    end = sm.constraints.ClosedPath().bind(problem.follows, minimum_norm.start, minimum_norm.end)
+    return solve(problem, minimum_norm, ends=[end], **options)
 
 
 @pytest.mark.parametrize(
@@ -55,10 +55,12 @@ def test_the_sample_problem_costs_what_an_independent_integration_says(
     assert found.null_motion == null_motion
     assert found.coefficients.shape == (size,)
     assert found.cost == pytest.approx(cost, rel=AGREEMENT)
-    still = found.still_evaluation()
-    assert still.cost == pytest.approx(15.500547, rel=AGREEMENT)
-    assert still.terms["inverse manipulability"] == pytest.approx(0.085116, rel=1e-3)
-    np.testing.assert_allclose(still.trajectory.q[-1], [-1.582881, 4.814126, -0.269540], atol=1e-4)
+    minimum_norm = found.minimum_norm_evaluation()
+    assert minimum_norm.cost == pytest.approx(15.500547, rel=AGREEMENT)
+    assert minimum_norm.terms["inverse manipulability"] == pytest.approx(0.085116, rel=1e-3)
+    np.testing.assert_allclose(
+        minimum_norm.trajectory.q[-1], [-1.582881, 4.814126, -0.269540], atol=1e-4
+    )
 
 
 @pytest.mark.parametrize("null_motion", [PolynomialNullMotion(), PUBLISHED])
@@ -67,7 +69,7 @@ def test_its_variants_lead_to_optima(mu: float, duration: float, null_motion: Nu
     """No coefficient changes the cost to first order, relative to what it may be changed by."""
     found = solved(sm.sample_problem(mu, duration, null_motion))
     assert found.status is Status.CONVERGED
-    assert found.cost < 0.95 * found.still_evaluation().cost
+    assert found.cost < 0.95 * found.minimum_norm_evaluation().cost
     gradient = found.objective.gradient(found.x)
     step = np.linalg.pinv(found.objective.metric(found.x), rcond=1e-4) @ gradient
     assert gradient @ step < 1e-5 * found.cost
@@ -86,11 +88,11 @@ def test_the_cost_agrees_with_that_on_a_finer_grid() -> None:
 
 def test_a_solution_knows_its_motion() -> None:
     found = closed_circle(free=True)
-    evaluation, still = found.evaluation(), found.still_evaluation()
+    evaluation, minimum_norm = found.evaluation(), found.minimum_norm_evaluation()
     assert found.nodes.shape == (found.steps + 1, 7)
     assert evaluation.cost == pytest.approx(found.cost, rel=1e-12)
     np.testing.assert_allclose(evaluation.trajectory.q, found.nodes, atol=1e-5)
-    np.testing.assert_allclose(still.trajectory.q[0], PANDA_HOME, atol=1e-9)
+    np.testing.assert_allclose(minimum_norm.trajectory.q[0], PANDA_HOME, atol=1e-9)
     # A free start moved, and costs less.
     assert np.abs(found.nodes[0] - PANDA_HOME).max() > 1e-2
     assert found.cost < closed_circle().cost
@@ -146,7 +148,7 @@ def test_evaluations_are_counted_and_limited() -> None:
     assert found.status is Status.MAX_EVALUATIONS
     # The limit is looked at between steps.
     assert 110 <= counts.evaluations <= 113
-    assert found.cost < found.still_evaluation().cost
+    assert found.cost < found.minimum_norm_evaluation().cost
 
 
 def test_a_callback_stops() -> None:
@@ -237,9 +239,9 @@ def test_without_coefficients_there_is_nothing_to_optimise(
     start = start_of(robot, "pose")
     motion = NoNullMotion(space)
     problem = sm.Problem(robot, short_line(robot, start), "pose", start, motion, constraints=())
-    still = still_of(problem)
-    ends = [item.bind(problem.follows, still.start, still.end) for item in asked]
-    found = solve(problem, still, ends=ends, optimizer=Scipy())
+    minimum_norm = still_of(problem)
+    ends = [item.bind(problem.follows, minimum_norm.start, minimum_norm.end) for item in asked]
+    found = solve(problem, minimum_norm, ends=ends, optimizer=Scipy())
     # The path does not end at rest by itself in all joints.
     assert found.status is (Status.INFEASIBLE if found.unmet else Status.CONVERGED)
     assert found.coefficients.shape == (0,)
@@ -264,7 +266,7 @@ def test_a_damped_motion_leaves_the_path() -> None:
     found = solved(edge(5.2, sm.Damping()))
     assert found.status is Status.CONVERGED
     assert found.evaluation().damped
-    assert found.cost < found.still_evaluation().cost
+    assert found.cost < found.minimum_norm_evaluation().cost
     assert not solved(edge(4.0, sm.Damping())).evaluation().damped
 
 
@@ -275,7 +277,7 @@ def test_a_motion_that_breaks_down_is_refused_with_the_time() -> None:
     end.translation = 1.1 * end.translation
     line, cubic = sm.paths.Line(robot.pose(start), end, 1.0), PolynomialNullMotion()
     problem = sm.Problem(robot, line, "planar", start, cubic, constraints=())
-    broken = StillMotion.on(problem, start, Grid.aligned(problem.knots, 32))
+    broken = MinimumNormMotion.on(problem, start, Grid.aligned(problem.knots, 32))
     assert broken.broken == 0.0
     with pytest.raises(
         sm.errors.BreakdownError, match=r"eq\. 4 breaks down near t = 0 s"

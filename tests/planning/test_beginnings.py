@@ -36,8 +36,8 @@ def test_a_motion_that_breaks_nothing_is_begun_with() -> None:
     start = robot.inverse_kinematics(path.pose(0.0), seed=[0, -0.5, 0, -2, 0, 1.6, 0.8])
     plan = sm.plan(sm.Problem(robot, path, start=start))
     assert plan.certificate.verified
-    still = plan.initial_trajectory.q
-    assert ((still < robot.lower) | (still > robot.upper)).any()
+    minimum_norm = plan.initial_trajectory.q
+    assert ((minimum_norm < robot.lower) | (minimum_norm > robot.upper)).any()
     first = plan.report.history[0]
     assert plan.report.initial_cost < first.cost
     # From x = 0 it takes several times as many.

@@ -297,13 +297,13 @@ def test_the_arms_own_tool_by_its_name_is_seen_from_the_arms_reference() -> None
 def test_parts_that_stand_in_each_other_are_not_verified(at: float) -> None:
     """No joint changes their distance, so only the places of the parts can be wrong."""
     robot = positioned(base={"table": pin.SE3(np.eye(3), np.array([at, 0.0, 0.0]))})
-    still = sm.Trajectory(
+    at_rest = sm.Trajectory(
         np.array([0.0, 1.0]), np.zeros((2, robot.dof)), np.zeros((2, robot.dof)), robot.joint_names
     )
     finding = (
         sm.constraints.Clearance(distance=0.0)
         .requirement(robot)
-        .judge(FinishedMotion(robot, still))
+        .judge(FinishedMotion(robot, at_rest))
     )
     stands = {"arm/panda_link0 - table/stand", "table/stand - arm/panda_link0"}
     assert (finding.subject in stands and "into each other" in finding.text) is (at < 0.2)

@@ -12,7 +12,7 @@ import selfmotion as sm
 from selfmotion.basics import Counts
 from selfmotion.model.follow import Follows
 from selfmotion.model.motion.grid import Grid
-from selfmotion.planning.paper import Rollout, settled_still_motion
+from selfmotion.planning.paper import Rollout, converged_minimum_norm
 from selfmotion.planning.planner.candidate import Candidate
 from selfmotion.planning.planner.effort import Effort
 from selfmotion.planning.planner.largest_part import Part, shorter_part
@@ -173,7 +173,7 @@ def test_another_null_motion_where_x_0_breaks_down(planar: sm.RobotModel) -> Non
     line = sm.paths.Line(inner, outer, 4.0)
     problem = sm.Problem(planar, line, "planar", start)
     with pytest.raises(sm.errors.BreakdownError):
-        settled_still_motion(problem, start)
+        converged_minimum_norm(problem, start)
     plan = sm.plan(problem)
     assert plan.certificate.verified
     assert plan.trajectory.t[-1] == line.duration

@@ -57,13 +57,13 @@ def test_the_way_is_measured_however_many_loops_there_are(
 ) -> None:
     problem = loops(planar, count)
     way = 2.0 * np.pi * RADIUS * count / planar.reach
-    assert problem.way_in_reaches == pytest.approx(way, rel=0.03)
+    assert problem.length_in_reaches == pytest.approx(way, rel=0.03)
 
 
 def test_a_loop_costs_the_same_however_many_there_are(planar: sm.RobotModel, free: sm.Plan) -> None:
     plans = {LOOPS: free, 2 * LOOPS: sm.plan(loops(planar, 2 * LOOPS)).require()}
     for plan in plans.values():
-        assert plan.problem.way_in_reaches > VERY_LONG_PATH
+        assert plan.problem.length_in_reaches > VERY_LONG_PATH
         assert plan.report.attempts[1].name == NAME
         assert plan.report.attempts[1].outcome == "all constraints are met"
     each = [plan.report.cost / count for count, plan in plans.items()]

@@ -43,9 +43,9 @@ def test_moves_go_round_what_is_in_the_way(tmp_path) -> None:
     assert move.trajectory is not None
     np.testing.assert_array_equal(move.trajectory.q[[0, -1]], [first, last])
     assert not refuted(move.trajectory)
-    still = np.zeros((2, 7))
+    at_rest = np.zeros((2, 7))
     duration = move.trajectory.duration
-    straight = sm.Trajectory([0.0, duration], [first, last], still, robot.joint_names, still)
+    straight = sm.Trajectory([0.0, duration], [first, last], at_rest, robot.joint_names, at_rest)
     assert any(fault.startswith("apart") for fault in refuted(straight))
     # Into the ball there is no way, and that is said.
     missing = mover.move(first, 0.5 * (first + last))

@@ -8,8 +8,8 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.model.task import SE3
-from selfmotion.planning.result import Asked, Piece, gaps
-from selfmotion.planning.result.asked import same_path
+from selfmotion.planning.result import MotionSpecification, Piece, gaps
+from selfmotion.planning.result.specification import same_path
 from support.arms import robot_named
 
 # A bump of the path: far above what paths that are one may differ by [m].
@@ -152,7 +152,9 @@ def test_a_path_with_a_bump_between_two_looks_is_another(plan: sm.Plan) -> None:
 
 def test_what_a_plan_was_not_judged_by_is_told(plan: sm.Plan) -> None:
     problem = plan.problem
-    asked = Asked(problem.robot, problem.path, problem.task, constraints=problem.all_constraints)
+    asked = MotionSpecification(
+        problem.robot, problem.path, problem.task, constraints=problem.all_constraints
+    )
     assert not list(asked.failures(plan))
     for changes, said in (
         ({"robot": robot_named("panda")}, "another arm"),

@@ -7,7 +7,7 @@ from selfmotion.basics import Array, Counts
 from selfmotion.model.motion import Trajectory
 from selfmotion.planning.nodes import NodeGrid, NodeMotion
 from selfmotion.planning.nodes.objective import LocalModel
-from selfmotion.planning.paper import settled_still_motion
+from selfmotion.planning.paper import converged_minimum_norm
 from support.arms import Case
 
 
@@ -22,10 +22,12 @@ def problem_of(case: Case, **options) -> sm.Problem:
 def nodes_of(problem: sm.Problem, count: int = 12, *, free: bool = False) -> NodeMotion:
     """Return the nodes at x = 0."""
     start = np.array(problem.given_start)
-    still, _ = settled_still_motion(problem, start)
-    trajectory = Trajectory(still.grid.nodes, still.q, still.qd, problem.robot.joint_names)
+    minimum_norm, _ = converged_minimum_norm(problem, start)
+    trajectory = Trajectory(
+        minimum_norm.grid.nodes, minimum_norm.q, minimum_norm.qd, problem.robot.joint_names
+    )
     # Where nothing is asked, these laws are those of motions without any limits.
-    constraints = problem.bind_constraints(start, still.end) if problem.constraints else ()
+    constraints = problem.bind_constraints(start, minimum_norm.end) if problem.constraints else ()
     t = np.linspace(0.0, problem.path.duration, count + 1)
     grid = NodeGrid(problem, t, constraints, free=free, counts=Counts())
     motion = grid.near(trajectory(t), trajectory(t, 1))

@@ -13,8 +13,8 @@ from selfmotion.model.follow import Follows
 from selfmotion.model.motion import NullMotionTable, PolynomialNullMotion
 from selfmotion.model.motion.grid import Grid
 from selfmotion.model.task.damping import DampingLaw
+from selfmotion.planning.paper.minimum_norm import FixedStart
 from selfmotion.planning.paper.rollout import Rollout
-from selfmotion.planning.paper.still import FixedStart
 from selfmotion.problem.costs import OffPath
 from support.arms import Case, central_difference, objective_of
 from support.rollouts import assert_sensitivities

@@ -1,4 +1,4 @@
-"""What every part of the package stands on: errors, arrays, progress, files, compilation."""
+"""Foundations: errors, arrays, progress, files, compilation."""
 
 from selfmotion.basics import series as series
 from selfmotion.basics.arrays import (

@@ -1,4 +1,4 @@
-"""Arrays that cannot be written to, and what users give, made into them or refused."""
+"""Read-only arrays, and conversion and checks of users' values."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def per_joint(values: npt.ArrayLike, dof: int, what: str, *, positive: bool = Fa
     Raises
     ------
     ProblemError
-        There is another number of them, one is NaN, or not positive where that is asked for.
+        Their number is wrong, one is NaN, or not positive if `positive`.
     """
     given = plain_numbers(values)
     if given is None or given.shape not in ((), (dof,)):
@@ -62,14 +62,14 @@ def plain_numbers(values: Any) -> Array | None:
 
 
 def is_ragged(values: Any) -> bool:
-    """Return whether it is a list of lists of which some are longer than others."""
+    """Return whether it is a list of lists of different lengths."""
     rows = values if isinstance(values, list | tuple) else ()
     lengths = {len(row) for row in rows if isinstance(row, list | tuple | np.ndarray)}
     return len(lengths) > 1
 
 
 def shown(value: Any) -> str:
-    """Return what a message says of a value: short, on one line."""
+    """Return a value for a message: short, on one line."""
     if isinstance(value, type):
         return f"the class {value.__name__}, not an object of it"
     if isinstance(value, np.ndarray):
@@ -82,7 +82,7 @@ def shown(value: Any) -> str:
 _Kind = TypeVar("_Kind")
 _Called = TypeVar("_Called", bound=Callable[..., Any])
 
-# A larger angle [rad] can only be meant in degrees.
+# Larger angles [rad] are in degrees.
 TURN = 2.0 * np.pi + 1e-6
 
 
@@ -99,12 +99,12 @@ def as_numbers(
     ----------
     values : array_like
     what : str
-        What messages call them.
+        Their name in messages.
     expected : str
-        What they should be, for messages.
+        Expected form, for messages.
     shape : tuple of int, optional
     error : type
-        What is raised.
+        Class of the exception.
 
     Raises
     ------
@@ -138,7 +138,7 @@ def as_number(
     Raises
     ------
     error
-        It is no such number; `what` is what the message calls it.
+        It is no such number; `what` is its name in the message.
     """
     array = plain_numbers(value)
     number = float(array) if array is not None and array.ndim == 0 else np.nan
@@ -178,21 +178,21 @@ def is_number(value: Any) -> bool:
 
 
 def as_flag(value: Any, what: str, error: type[Exception] = ProblemError) -> bool:
-    """Return `value`, True or False; `error` otherwise, whose message calls it `what`."""
+    """Return `value`, True or False; `error` otherwise, with the name `what`."""
     if not isinstance(value, bool | np.bool_):
         raise error(f"{what} is {shown(value)}, expected True or False")
     return bool(value)
 
 
 def as_called(value: _Called, what: str) -> _Called:
-    """Return `value`, which can be called; ProblemError otherwise, which calls it `what`."""
+    """Return `value`, if callable; ProblemError otherwise, with the name `what`."""
     if not callable(value):
         raise ProblemError(f"{what} is {shown(value)}, expected a function")
     return value
 
 
 def check_executor(value: Any) -> None:
-    """Raise ProblemError for what is neither an executor nor None."""
+    """Raise ProblemError for a value that is neither an executor nor None."""
     if value is not None and not callable(getattr(value, "submit", None)):
         raise ProblemError(
             f"executor is {shown(value)}, expected one of concurrent.futures, or None"
@@ -215,7 +215,7 @@ def as_choice(
     return value
 
 
-# In which namespace users find the classes that they derive their own from.
+# Namespaces of the classes that users derive from.
 _NAMESPACES = {
     "Constraint": "constraints",
     "Cost": "costs",
@@ -227,7 +227,7 @@ _NAMESPACES = {
 
 
 def public_name(kind: type) -> str:
-    """Return what users call a class from which they derive: ``selfmotion.costs.Cost``."""
+    """Return the public name of a class to derive from: ``selfmotion.costs.Cost``."""
     return ".".join(("selfmotion", _NAMESPACES[kind.__name__], kind.__name__))
 
 
@@ -243,7 +243,7 @@ def as_several(items: Any, name: str, kind: type[_Kind]) -> tuple[_Kind, ...]:
 
 
 def _remedy(item: Any, kind: type) -> str:
-    """Say what to give in place of an item that is not of its kind."""
+    """Return the remedy for an item of the wrong kind."""
     if isinstance(item, type) and issubclass(item, kind):
         return f", expected a {kind.__name__}: {item.__name__}(…)"
     if not isinstance(kind, ABCMeta):

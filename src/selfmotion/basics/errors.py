@@ -35,8 +35,10 @@ def nearest(name: str, names: Iterable[str], alike: float = 0.5) -> str:
 #
 # Each message names the thing, what was found, what was expected and what to do about it.
 
-# Words and messages that are longer come from damaged files; of them the ends are shown.
-_WORD, _MESSAGE = 120, 1500
+# Longest word in a message: longer ones come from damaged files, and are cut in the middle.
+_WORD = 120
+# Longest message, likewise.
+_MESSAGE = 1500
 
 
 class SelfmotionError(Exception):
@@ -47,7 +49,7 @@ class SelfmotionError(Exception):
 
 
 def _legible(message: str) -> str:
-    """Return a message without what a file may do to a terminal: control codes, endless words."""
+    """Return a message without control codes and endless words, which a file may contain."""
     plain = "".join(c if c.isprintable() or c == "\n" else repr(c)[1:-1] for c in message)
     words = re.sub(rf"[^\s/]{{{_WORD},}}", lambda found: _ends(found.group(), _WORD), plain)
     return _ends(words, _MESSAGE)
@@ -130,7 +132,7 @@ class InverseKinematicsError(SelfmotionError):
     Attributes
     ----------
     position_miss, rotation_miss : float
-        What the best attempt left over [m], [rad].
+        Errors of the best attempt [m], [rad].
     """
 
     def __init__(self, message: str, *, position_miss: float, rotation_miss: float) -> None:
@@ -144,7 +146,7 @@ class CollisionError(SelfmotionError):
 
 
 class BreakdownError(SelfmotionError):
-    """Eq. 4 cannot be integrated: the task Jacobian loses rank on the way.
+    """Eq. 4 cannot be integrated: the task Jacobian loses rank within the path.
 
     Attributes
     ----------

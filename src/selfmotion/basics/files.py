@@ -24,16 +24,16 @@ from selfmotion.basics.errors import FileFormatError
 # Archives and tables on disk: written atomically, read with errors that name the place.
 
 _DESCRIPTION = "description"
-# Files that hold several plans.
+# Suffixes of files with several plans.
 _OF_MANY = (".program", ".parts")
-# Files of arrays beyond this many bytes are not read: 250,000 samples of a plan are a tenth.
+# Largest file of arrays that is read [bytes]: 250,000 samples of a plan are a tenth.
 _LARGEST = 250_000_000
-# What texts have besides letters: blanks, ends of lines and pages, of tapes and files.
+# Characters of texts besides letters: blanks, ends of lines, pages, tapes and files.
 _BLANKS = "\t\n\v\f\r\x11\x13\x1a\x1c\x1d\x1e\x1f"
 
 
 def is_file(path: Path) -> bool:
-    """Whether there is a file; of a name that none can have, such as a long one, no."""
+    """Whether there is a file; no for impossible names, such as long ones."""
     return os.path.isfile(path)
 
 
@@ -45,7 +45,7 @@ def is_folder(path: Path) -> bool:
 def write_atomically(file: Path, write: Callable[[IO[bytes]], object]) -> None:
     """Let `write` fill a temporary file beside `file`, then put it in place.
 
-    A symbolic link stays, and what it leads to is written; a file keeps its mode.
+    A symbolic link is kept, and its target is written; a file keeps its mode.
 
     Raises
     ------
@@ -64,7 +64,7 @@ def write_atomically(file: Path, write: Callable[[IO[bytes]], object]) -> None:
         with os.fdopen(handle, "wb") as stream:
             write(stream)
         if mode is None:
-            # mkstemp makes the file private; give it what a newly created file would have.
+            # mkstemp makes the file private; the mode is that of a new file.
             mask = os.umask(0)
             os.umask(mask)
             mode = 0o666 & ~mask
@@ -89,8 +89,8 @@ def write_text(file: Path, text: str) -> None:
 def text_of(file: Path, content: bytes) -> str:
     """Return the text of a file: in UTF-8, in UTF-16 with its mark, or in letters of one byte each.
 
-    What other machines write in their own letters (Latin-1, Windows) are comments and units, such
-    as °; nothing else of a table or a program is beyond ASCII.
+    Other encodings (Latin-1, Windows) of other machines occur in comments and units, such as °;
+    nothing else of a table or a program is beyond ASCII.
 
     Raises
     ------
@@ -110,7 +110,7 @@ def text_of(file: Path, content: bytes) -> str:
     return text
 
 
-# Where lines of a file end: other marks, at which Python ends one as well, may stand in comments.
+# Ends of lines of a file: Python also splits at others, which comments may contain.
 _LINE_END = re.compile(r"\r\n|\n|\r")
 
 
@@ -131,7 +131,7 @@ def write_archive(file: Path, description: Mapping[str, Any], arrays: Mapping[st
 
 
 def read_archive(file: Path) -> tuple[dict[str, Any], dict[str, Array]]:
-    """Read what `write_archive` wrote.
+    """Read an archive of `write_archive`.
 
     Raises
     ------
@@ -183,7 +183,7 @@ def read_arrays(file: Path) -> dict[str, Array]:
         raise FileFormatError(f"{file}: no such file") from None
     except OSError as error:
         raise FileFormatError(f"{file}: cannot be read: {error.strerror or error}") from error
-    # What is wrong with archives, heads and bodies is raised as whatever it meets first.
+    # Damaged archives, heads and bodies raise several exceptions.
     except Exception as error:
         reason = " ".join(str(error).split()) or type(error).__name__
         what = "NumPy arrays" if file.suffix == ".npz" else "a NumPy array"
@@ -191,7 +191,7 @@ def read_arrays(file: Path) -> dict[str, Array]:
 
 
 def _read_array(stream: Any, size: int, name: str) -> Array:
-    """Return an array of a stream of so many bytes; ValueError if its head says another size."""
+    """Return an array of a stream of `size` bytes; ValueError if its head has another size."""
     form = np.lib.format
     reads = {(1, 0): form.read_array_header_1_0, (2, 0): form.read_array_header_2_0}
     version = form.read_magic(stream)
@@ -201,7 +201,7 @@ def _read_array(stream: Any, size: int, name: str) -> Array:
     if kind.hasobject:
         raise ValueError(f"{name}: holds objects of Python, expected numbers")
     announced = math.prod(shape) * kind.itemsize
-    # Before room is made for what is announced.
+    # Before memory is allocated for the announced size.
     if min(shape, default=0) < 0 or announced > min(size, _LARGEST):
         raise ValueError(f"{name}: announces an array of shape {shape}, which it does not hold")
     body = stream.read(announced)
@@ -232,9 +232,7 @@ def as_path(file: Any) -> Path:
     return Path(file)
 
 
-# What tells values apart, and the version of the package that made them.
-
-# Of the format of marshal: the last one that writes equal values as equal bytes.
+# Version of the format of marshal: the last one that writes equal values as equal bytes.
 _PLAIN = 2
 
 
@@ -263,7 +261,7 @@ def _plain(value: Any) -> Any:
     if isinstance(value, Mapping):
         return tuple((str(key), _plain(value[key])) for key in sorted(value, key=str))
     if isinstance(value, list | tuple):
-        # Long lists are of numbers: looking at each would take longer than all the rest.
+        # Long lists are of numbers: a type check of each is fastest.
         if all(type(item) is float for item in value):
             return tuple(value)
         return tuple(_plain(item) for item in value)

@@ -1,8 +1,8 @@
 """Compiling the numerical kernels with numba: once per machine, announced when it happens.
 
-No two processes compile the same kernel: the second waits for what the first one keeps, and
-compiles others meanwhile. So a companion, a process that begins with the largest kernels, takes
-about half of the work.
+No two processes compile the same kernel: the second waits for the result of the first, and compiles
+others meanwhile. So a companion process that starts with the largest kernels does about half of the
+work.
 """
 
 import contextlib
@@ -59,7 +59,7 @@ class _Spent:
 
     @property
     def seconds(self) -> float:
-        """What it took so far [s], with what goes on."""
+        """Time so far [s], including the present interval."""
         return self._ended + (self._clock() - self._began if self._depth else 0.0)
 
     def __enter__(self) -> None:
@@ -77,7 +77,7 @@ _spent, _waited = _Spent(time.process_time), _Spent(time.monotonic)
 
 
 def seconds_of_kernels() -> float:
-    """Return the processor time [s] that this process took to compile and load kernels so far.
+    """Return the processor time [s] of this process for compiling and loading kernels.
 
     Who limits work by the processor's time leaves that out: it comes once.
     """
@@ -85,7 +85,7 @@ def seconds_of_kernels() -> float:
 
 
 def seconds_waited_for_kernels() -> float:
-    """Return how long [s] this process has waited until kernels were compiled and loaded.
+    """Return the time [s] that this process has waited for kernels.
 
     By the clock on the wall, with the time in which another process compiled them. Who says how
     long work will take leaves that out.
@@ -123,9 +123,9 @@ class _Announcement(event.Listener):  # type: ignore[misc]  # numba ships no typ
 def kernel(function: _Function) -> _Function:
     """Compile a numeric function when it is first called.
 
-    The machine code is kept in numba's cache; where neither the package folder nor the user's
-    cache folder can be written, each process compiles anew. Division follows NumPy (no error).
-    With NUMBA_DISABLE_JIT=1 kernels run as they are written, for a debugger.
+    The machine code is stored in numba's cache; if neither the package folder nor the user's cache
+    folder is writable, each process compiles anew. Division follows NumPy (no error). With
+    NUMBA_DISABLE_JIT=1 kernels are interpreted, for a debugger.
     """
     if numba.config.DISABLE_JIT:
         return function
@@ -147,7 +147,7 @@ def _forgive(compiled: Any) -> None:
     turn = contextlib.ExitStack()
 
     def load_if_possible(*given: Any) -> Any:
-        # A garbled file raises whatever unpickling it meets.
+        # A damaged file raises any exception of unpickling.
         try:
             return load(*given)
         except Exception:
@@ -162,7 +162,7 @@ def _forgive(compiled: Any) -> None:
     def load_in_turn(*given: Any) -> Any:
         found = load_if_possible(*given)
         if found is None:
-            # After an interruption it is this one's turn still.
+            # After an interruption the lock is still held.
             turn.close()
             turn.enter_context(_turn(cache))
             found = load_if_possible(*given)
@@ -181,7 +181,7 @@ _meanwhile: list[Callable[[], object]] = []
 
 
 def meanwhile(work: Callable[[], object]) -> Callable[[], object]:
-    """Have a small piece of work done where another process compiles what this one waits for.
+    """Register a small piece of work for the time of waiting for another process.
 
     It calls kernels that are needed soon, as they are called at all: they are compiled by then.
     """
@@ -209,15 +209,18 @@ def _turn(cache: Any) -> Iterator[None]:
         yield
 
 
-FIRST_WORKS, ALL_WORKS = "first", "all"
+# Kernels of a first plan.
+FIRST_WORKS = "first"
+# All kernels.
+ALL_WORKS = "all"
 _IS_ALONE = False
 
 
 def companion(works: str) -> "subprocess.Popen[str] | None":
-    """Let another process compile kernels, at the same time; it prints how many.
+    """Compile kernels in another process, in parallel; it prints their number.
 
-    Those of `FIRST_WORKS` or `ALL_WORKS`, see `selfmotion.realtime.warm`. None where there is no
-    other processor, or where nothing is kept that another process compiles.
+    Those of `FIRST_WORKS` or `ALL_WORKS`, see `selfmotion.realtime.warm`. None with a single
+    processor, or without a cache.
     """
     if _IS_ALONE or os.cpu_count() == 1 or numba.config.DISABLE_JIT or not sys.executable:
         return None

@@ -1,7 +1,7 @@
 """How the rows of several tips are stacked: a table for compiled kernels.
 
-A layout (F, 9 + n) tells of each of F tips that are followed how its angles are measured, its first
-row among all, how many it has, these rows of [v, ω], and the joints in the order of its chain.
+A layout (F, 9 + n) has, for each of F tips: the kind of its angular error, its first row among all,
+the number of its rows, these rows of [v, ω], and the joints in the order of its chain.
 """
 
 from collections.abc import Sequence
@@ -13,10 +13,16 @@ from selfmotion.basics.arrays import Ints
 
 Layout = npt.NDArray[np.int64]
 
-# How a task measures its angular error.
-NO_ANGLE, LOGARITHM, POINTING = 0, 1, 2
+# Kinds of angular errors of a task.
+NO_ANGLE = 0
+LOGARITHM = 1
+POINTING = 2
 # Columns of a layout.
-KIND, FIRST, COUNT, ROWS, ORDER = 0, 1, 2, 3, 9
+KIND = 0
+FIRST = 1
+COUNT = 2
+ROWS = 3
+ORDER = 9
 
 
 def layout_of(tasks: Sequence[tuple[Ints, bool, Ints]], dof: int) -> Layout:

@@ -6,7 +6,7 @@ from importlib.machinery import ModuleSpec
 from importlib.util import find_spec
 from types import ModuleType
 
-# Package of before → where it is.
+# Former package → present one.
 MOVED = {
     "batch": "work.batch",
     "cam": "shop.cam",
@@ -34,7 +34,7 @@ class MovedModules:
     def find_spec(
         self, name: str, path: Sequence[str] | None, target: ModuleType | None = None
     ) -> ModuleSpec | None:
-        """Raise ModuleNotFoundError with the new path of what has moved; else find nothing."""
+        """Raise ModuleNotFoundError with the new path of a moved module; else find nothing."""
         house, *parts = name.split(".")
         if house != "selfmotion" or not parts or parts[0] not in MOVED:
             return None
@@ -52,6 +52,6 @@ class MovedModules:
 
 
 def tell_moved() -> None:
-    """Let imports of what has moved say where it is; asked only where nothing else is found."""
+    """Register `MovedModules`, which is used only after all other finders fail."""
     if not any(isinstance(each, MovedModules) for each in sys.meta_path):
         sys.meta_path.append(MovedModules())

@@ -1,4 +1,4 @@
-"""Long work: what it tells, counts, and how it is interrupted; threads of linear algebra."""
+"""Progress, counters and interruption of long work; threads of linear algebra."""
 
 import signal
 import threading
@@ -10,8 +10,6 @@ from types import FrameType
 from typing import Any
 
 from selfmotion.basics.arrays import as_called
-
-# What long work tells about itself while it runs.
 
 Progress = Callable[[str, int, int], object]
 """Called with a stage, how much of it has begun, and of how many: ``("start", 3, 24)``.
@@ -45,9 +43,9 @@ class Counts:
     Attributes
     ----------
     evaluations, gradients : int
-        How often F and ∇F were computed.
+        Number of evaluations of F and ∇F.
     jacobians : int
-        How often Pinocchio was asked for the frame Jacobian.
+        Number of evaluations of the frame Jacobian by Pinocchio.
     """
 
     evaluations: int = 0
@@ -55,7 +53,7 @@ class Counts:
     jacobians: int = 0
 
     def evaluated(self) -> None:
-        """Count an evaluation of F that begins."""
+        """Count the start of an evaluation of F."""
         self.evaluations += 1
 
 
@@ -87,8 +85,8 @@ _pressed = _Interruption()
 def held_interruption() -> Iterator[None]:
     """Within this, Ctrl-C is obeyed where `obey_interruption` is called; at once the second time.
 
-    In the main thread, and where nobody else handles the signal; nothing changes elsewhere. What
-    was not obeyed by the end is so there.
+    In the main thread, and unless the signal has another handler; nothing changes elsewhere. A
+    pending interruption is raised at the end.
 
     Raises
     ------
@@ -121,12 +119,12 @@ def was_interrupted() -> bool:
 
 
 def presses() -> int:
-    """Return how often Ctrl-C was held so far: who stops work himself tells it from that."""
+    """Return the number of held Ctrl-C so far, for code that stops by itself."""
     return _pressed.count
 
 
 def obeying(progress: Progress) -> Progress:
-    """Return a progress that obeys Ctrl-C, too; ProblemError for what cannot be called."""
+    """Return a progress that raises on Ctrl-C, too; ProblemError if not callable."""
     as_called(progress, "progress")
 
     def told(stage: str, done: int, total: int) -> None:

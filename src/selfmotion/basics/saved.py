@@ -1,4 +1,4 @@
-"""Values that files carry: each class registers its kind and knows its own description."""
+"""Saved values: each class registers its kind and describes itself for files."""
 
 import dataclasses
 from collections.abc import Mapping
@@ -74,7 +74,7 @@ class Saved:
     def from_dict(cls, values: Mapping[str, Any], **context: Any) -> Self:
         """Return the value with that description, ``kind`` left out.
 
-        `context` holds what descriptions leave out; a class takes what it needs of it.
+        `context` has the values that descriptions leave out; a class takes its own.
         """
         given = {name: value for name, value in context.items() if name in cls.context}
         return cls(**values, **given)
@@ -103,7 +103,7 @@ def restore(family: type[Saved], description: Mapping[str, Any], **context: Any)
 
 
 def description_of(value: Saved) -> dict[str, Any]:
-    """Return what tells a value from others: its description, or which one it is without any."""
+    """Return the identity of a value: its description, or its class and id without any."""
     try:
         return value.to_dict()
     except (FileFormatError, TypeError):

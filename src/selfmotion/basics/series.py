@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from selfmotion.basics.arrays import Array
 
-# Coefficients that a series has: up to ORDER nodes of an interval, and two derivatives besides.
+# Nodes of an interval: with two derivatives besides, a series has this many coefficients, at most.
 ORDER = 12
 LENGTH = ORDER + 3
 
@@ -60,10 +60,10 @@ def composed(outer: Array, inner: Array) -> Array:
     length = len(inner)
     moved = np.zeros((2 * length - 1, *inner.shape[1:]))
     moved[length:] = inner[1:]
-    # By row and column: what multiplies a coefficient, of g without its first, for the later ones.
+    # By row and column: factor of a coefficient, of g without its first, for the later ones.
     by = moved[np.arange(length)[:, None] - np.arange(length) + length - 1]
     found = np.zeros_like(inner)
-    # Horner's scheme: each product shifts by one at least, so that the first ones need few terms.
+    # Horner's scheme: each product shifts by at least one, so that the first ones need few terms.
     for left, coefficient in zip(range(len(outer) - 1, -1, -1), outer[::-1], strict=True):
         k = max(length - left, 1)
         found[:k] = np.einsum("kji,ji->ki", by[:k, :k], found[:k])
@@ -109,7 +109,7 @@ def of_vectors(coefficients: Array) -> Array:
 
 
 def of_pieces(breaks: Array, coefficients: Array, middle: Array, half: Array) -> Array:
-    """Return what piecewise polynomials are on intervals, as polynomials of u, (m + 1, I, …).
+    """Return piecewise polynomials on intervals, as polynomials of u, (m + 1, I, …).
 
     Coefficients (m + 1, P, …) are those of 1, x, x² … with x from the beginning of each piece; the
     piece is that of the middle.
@@ -147,7 +147,7 @@ def recentred(coefficients: Array, middle: Array, half: Array) -> Array:
 
 
 def holds_for(item: object, *methods: str) -> bool:
-    """Return whether the `series` of an object was written for these methods of it as they are.
+    """Return whether an object's `series` is valid for these methods of its class.
 
     A class of one's own that derives from one of ours and moves otherwise has none.
     """
@@ -157,7 +157,7 @@ def holds_for(item: object, *methods: str) -> bool:
 
 
 def after_first(a: Array) -> Array:
-    """Return how far the function is from its value in the middle of the interval at most, (I,)."""
+    """Return a bound of the function's distance from its value in the interval's middle, (I,)."""
     return np.asarray(a[1:].sum(axis=0))
 
 

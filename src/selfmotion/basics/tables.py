@@ -17,14 +17,14 @@ from selfmotion.basics.files import lines_of, text_of, write_text
 
 # Tables of numbers, as programs write them: with any of the usual separators and headers.
 
-# What begins a line that says nothing.
+# Marks of comment lines.
 _COMMENTS = ("#", "%", "//")
 _DECIMAL_COMMA = re.compile(r"[+-]?[0-9]*,[0-9]+([eE][+-]?[0-9]+)?")
-# A title in quotation marks that has a mark in it which separates columns, or such a mark itself.
+# A title in quotation marks with a separator of columns in it, or such a mark itself.
 _QUOTED = re.compile(r'"[^"]*[,;\t"(\[][^"]*"')
-# A line of a table has so many characters at most: more are a file of another kind.
+# Largest number of characters of a line: files with more are of another kind.
 _LONGEST = 100_000
-# The name of a column that is left out.
+# Name of a column that is left out.
 LEFT_OUT = "-"
 
 
@@ -43,7 +43,7 @@ def read_rows(
     named: Callable[[str], str] = str,
     usual: Mapping[int, str] | None = None,
 ) -> tuple[list[str], Array, list[int], dict[str, list[str]]]:
-    """Read a table of numbers with a header line, and tell on which line each row stands.
+    """Read a table of numbers with a header line, and return the line of each row.
 
     Columns are separated by comma, semicolon or tab, whichever the header has most of, or else by
     spaces. Lines that begin with #, % or // and empty ones are left out, a byte order mark is not
@@ -59,9 +59,9 @@ def read_rows(
         Is called with the names of the columns of numbers before rows are read: it raises for one
         that has no meaning.
     columns : sequence of str, optional
-        Names of the columns, in place of a header or where there is none; "-" leaves one out.
+        Names of the columns, in place of a header or without one; "-" leaves one out.
     named : callable
-        Returns what a title means.
+        Returns the meaning of a title.
     usual : dict, optional
         Number of columns → the header that such a table may be missing, for messages.
 
@@ -154,13 +154,13 @@ def _titles(line: str) -> list[str]:
 
 
 def _mark(line: str) -> str:
-    """Return what separates the columns of a line, "" for spaces."""
+    """Return the separator of a line's columns, "" for spaces."""
     for mark in (";", "\t", ""):
         # The commas of 0,4;-0,05;0,3 are decimal ones.
         cells = _cells(line, mark)
         if len(cells) > 1 and all(_as_float(cell, mark) is not None for cell in cells):
             return mark
-    # What is in quotation marks separates nothing.
+    # Quotation marks protect separators.
     bare = _QUOTED.sub("", line)
     mark = max(",;\t", key=bare.count)
     return mark if mark in bare else ""
@@ -225,29 +225,34 @@ def _number(cell: str, where: str, mark: str) -> float:
 PER_JOINT = ("limit", "lock", "lower", "posture", "q", "qd", "qdd", "start", "upper")
 # Keys that may end in _deg or _mm: nothing else is an angle or a length, or a rate of one.
 _BANDS = ("acceleration", "band", "center", "half", "speed", "target", "velocity")
-# What is beyond a turn here can only be meant in degrees.
+# Values above a turn are in degrees.
 _WITHIN_A_TURN = ("corner_angle", "rotation", "rotation_vector", "rpy", "turn_tolerance")
 _TURNS = (*_WITHIN_A_TURN, "lead", "margin", "turn_acceleration", "turn_rate", "within")
 ANGLES = frozenset((*_BANDS, *_TURNS, *PER_JOINT))
 _SIZES = ("length", "radius", "rise", "rotary_center", "size", "standoff", "tolerance")
 _WAYS = ("amplitude", "by", "distance", "feed", "jump", "pitch", "position", "positions", "retreat")
 LENGTHS = frozenset((*_BANDS, *_WAYS, *_SIZES))
-# What files of before call `clearance`.
+# Former name of `clearance`.
 FORMER_CLEARANCE = "collision"
-# Tables or lists in each other; files of the trade have less than ten.
+# Largest depth of nested tables or lists; real files have less than ten.
 _DEEPEST = 50
 _SUFFIXES = {"_deg": (ANGLES, math.pi / 180.0), "_mm": (LENGTHS, 1e-3)}
-# Of joints, each with its angle.
+# Tables of joints with angles.
 _TABLES_OF_NUMBERS = tuple(f"{name}_deg" for name in PER_JOINT)
-# How like a known key one has to be to be taken for it.
+# Similarity at which an unknown key is taken for a known one.
 _ALIKE = 0.8
-# Rows of relaxations, by what they are.
-_MOVED, _TURNED = ("x", "y", "z"), ("rx", "ry", "rz")
-# Tables whose numbers have no unit; and keys that are shares there, of a feed.
+# Rows of relaxations, of position …
+_MOVED = ("x", "y", "z")
+# … and of rotation.
+_TURNED = ("rx", "ry", "rz")
+# Tables whose numbers have no unit.
 _UNITLESS = ("optimiser.",)
+# Keys that are shares there, of a feed.
 _SHARES = ("path.within",)
-# Of limits of position alone a margin is an angle or a length; of all else it is a share.
-_MARGIN, _OF_POSITIONS = "margin", "JointPositionLimits"
+# A margin is a share …
+_MARGIN = "margin"
+# … but of limits of position an angle or a length.
+_OF_POSITIONS = "JointPositionLimits"
 
 
 def read_document(file: Path) -> dict[str, Any]:
@@ -305,7 +310,7 @@ def _parse_yaml(file: Path, text: str) -> Any:
     loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
     class Loader(loader):  # type: ignore[misc, valid-type]  # its base is known when it runs
-        """Reads what the safe one does, but neither keys given twice nor what stands for others."""
+        """Safe loader without duplicate keys and aliases."""
 
         def construct_mapping(self, node: Any, deep: bool = False) -> Any:
             keys = [self.construct_object(key) for key, _ in node.value]
@@ -331,7 +336,7 @@ def _without_twins(pairs: list[tuple[Any, Any]]) -> dict[Any, Any]:
 
 
 def _check_events(file: Path, events: Iterable[Any]) -> None:
-    """Refuse what a small file can use up a machine with, before anything is built of it."""
+    """Refuse events of a small file that would exhaust memory, before anything is built."""
     import yaml
 
     depth = 0

@@ -9,7 +9,7 @@ from selfmotion.certificate.limits import (
     ARRIVED as ARRIVED,
     LIMIT_NAMES as LIMIT_NAMES,
     QUANTITIES as QUANTITIES,
-    STILL_ACCELERATION as STILL_ACCELERATION,
+    REST_ACCELERATION as REST_ACCELERATION,
     AtRest as AtRest,
     ClosedMotion as ClosedMotion,
     EndState as EndState,

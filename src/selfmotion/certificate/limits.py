@@ -193,7 +193,7 @@ class EndState(Requirement):
 
 
 # Largest acceleration of an arm at rest [rad/s² or m/s²]; more is a step of acceleration.
-STILL_ACCELERATION = 1e-3
+REST_ACCELERATION = 1e-3
 
 
 @dataclass(frozen=True)
@@ -236,7 +236,7 @@ class AtRest(Requirement):
         worst = int(np.argmax(np.abs(rates)))
         joint, amount = motion.robot.joint_names[worst], float(np.abs(rates[worst]))
         unit = motion.robot.unit_of(joint) + ("/s", "/s²")[order - 1]
-        allowed = ARRIVED if order == 1 else STILL_ACCELERATION
+        allowed = ARRIVED if order == 1 else REST_ACCELERATION
         verb = ("moves", "accelerates")[order - 1]
         text = (
             f"joint '{joint}' {verb} at {'the end' if row else 'the start'}, where it should rest: "

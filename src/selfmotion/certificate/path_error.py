@@ -225,7 +225,7 @@ def bound_errors(
         errors, robot, trajectory, smooth_between(path, trajectory, relaxations), progress
     )
     values = errors.angles(found.values)
-    names = (tip, tip, *(item.told for item in relaxations))
+    names = (tip, tip, *(item.label for item in relaxations))
     extremes = tuple(
         Extreme(float(value), float(time), name)
         for value, time, name in zip(values, found.times, names, strict=True)

@@ -1,1 +1,1 @@
-"""What the published method is compared with: its study, and other works' methods."""
+"""Comparison of the published method: its study, and other works' methods."""

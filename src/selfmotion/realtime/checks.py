@@ -28,7 +28,7 @@ from selfmotion.realtime.reference import Approach, MovingPose
 
 
 def check_kinds(robot: Any, null_motion: Any, approach: Any) -> None:
-    """Refuse what is no arm, no null motion or no approach."""
+    """Check the types of arm, null motion and approach."""
     for name, given, kind, example in (
         ("robot", robot, RobotModel, "a RobotModel (load_robot)"),
         ("null_motion", null_motion, NullMotion | None, "a NullMotion or None"),
@@ -63,7 +63,7 @@ def checked_terms(
 
 
 def checked_state(values: Any, what: str, dof: int) -> Array:
-    """Return the state (n,) that the command begins with; RobotError where it is none."""
+    """Return the initial state (n,) of the command; RobotError if it is none."""
     return as_numbers(values, what, f"{dof} finite numbers, one for each joint", (dof,), RobotError)
 
 
@@ -78,7 +78,7 @@ def observed_target(
 ) -> MovingPose | None:
     """Return the motion of a target as it was seen; None where it is none, and add the reason.
 
-    A camera that sees nothing, or what is not finite, must not leave the arm without a command.
+    A camera without a detection, or with NaN, must not leave the arm without a command.
 
     Raises
     ------
@@ -99,9 +99,9 @@ def observed_target(
 
 
 def age_of_target(path: Path | None, t: float) -> float:
-    """Return how long ago a target was seen [s]; of a path, which is no observation, 0."""
+    """Return the age of a target's observation [s]; 0 of a path, which is none."""
     while path is not None and not isinstance(path, MovingPose):
-        # Of what is placed, carried along or retimed, the path that it is made of.
+        # Of derived paths, the original.
         path = next((item for item in vars(path).values() if isinstance(item, Path)), None)
     return 0.0 if path is None else t - path.seen
 

@@ -13,10 +13,10 @@ from selfmotion.realtime.settings import CLEAR_FOR, CLEARANCE_MARGIN, LEAVING, L
 
 
 class Surroundings:
-    """Keeps the arm apart from itself and from obstacles, wherever these are by now.
+    """Minimum distance of the arm from itself and from obstacles at their present poses.
 
-    While a plan is made they are taken to stay there. Links are their convex hulls, and so are
-    obstacles, or convex pieces that contain them.
+    During a plan they are taken to be at rest. Links are their convex hulls, and obstacles hulls,
+    or convex pieces that contain them.
 
     Parameters
     ----------
@@ -27,13 +27,13 @@ class Surroundings:
     Attributes
     ----------
     blocked : bool
-        Whether the last plan comes nearer than the distance soon.
+        Whether the last plan violates the distance soon.
     message : str
-        What is too near, and when.
+        The violated pair, and its time.
     """
 
     def __init__(self, robot: RobotModel, bodies: Sequence[tuple[CollisionModel, float]]) -> None:
-        # Models of its own: those of the certificate have obstacles that stand still.
+        # Own models: those of the certificate have fixed obstacles.
         exact = [CollisionModel(robot, own.obstacles, own.disabled) for own, _ in bodies]
         self._models = [
             (ClearanceModel(own, far + LEVEL), far)
@@ -70,7 +70,7 @@ class Surroundings:
         return np.asarray(np.min(each, axis=0))
 
     def rows(self, samples: Samples, by_q: Array) -> tuple[Array, Array]:
-        """Return what keeps a step of the plan clear: rows (R, d) and their largest values (R,).
+        """Return the constraints of a step of the plan: rows (R, d) and upper limits (R,).
 
         Notes whether the plan is blocked as it is.
         """
@@ -107,8 +107,8 @@ class Surroundings:
                 f"{distance * 1e3:.1f} mm"
             )
         rows = -(found.slopes[:, None] @ by_q[nodes[found.rows]])[:, 0]
-        # From where the arm is, no more can be asked for than to come no nearer. Obstacles that
-        # came too near are to be left again, at this speed; links need not.
+        # At the present pose the only requirement is not to come nearer. Obstacles that came too
+        # near are left at this speed; links need not be.
         leaving = np.array([LEAVING * (pair[1] in standing) for pair in model.pairs])
         reached = values[0] + times[:, None] * leaving
         room = values - np.minimum(distance + CLEARANCE_MARGIN, reached)

@@ -1,4 +1,4 @@
-"""What is commanded: limits of the joints, segments, a state for each cycle."""
+"""Commands: limits of the joints, segments, and a state for each cycle."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def joint_limits(robot: RobotModel, constraints: Sequence[Constraint]) -> Array:
     Raises
     ------
     ProblemError
-        A constraint is not of the kinds that are kept while moving; a joint has no limit of
+        A constraint is of a kind that cannot be kept while moving; a joint has no limit of
         acceleration.
     """
     for item in constraints:
@@ -47,7 +47,7 @@ def joint_limits(robot: RobotModel, constraints: Sequence[Constraint]) -> Array:
                 f"joint position, velocity and acceleration, or a Clearance"
             )
     kinds = {type(item) for item in constraints}
-    # Where none are given, those of the arm and its maker.
+    # Without given ones, those of the arm and its maker.
     asked = [*constraints, *(kind() for kind in _USUAL if kind not in kinds)]
     envelope = reduce(and_, (item.envelope(robot) for item in asked))
     limits = np.array([envelope.lower, envelope.upper, envelope.speed, envelope.acceleration])
@@ -62,14 +62,14 @@ def joint_limits(robot: RobotModel, constraints: Sequence[Constraint]) -> Array:
 
 
 def planned_limits(limits: Array) -> Array:
-    """Return what plans aim at, within the limits (4, n) of commands."""
+    """Return the limits of plans, within the limits (4, n) of commands."""
     lower, upper = limits[:2]
     margin = np.minimum(ENDS, 0.1 * (upper - lower))
     return np.stack([lower + margin, upper - margin, SPEED * limits[2], ACCELERATION * limits[3]])
 
 
 def stoppable(robot: RobotModel, limits: Array, q: Array, qd: Array, cycle: float) -> Array:
-    """Return the control point c (n,) of a motion that begins at q with q̇, see `viable`.
+    """Return the control point c (n,) of a motion that starts at q with q̇, see `viable`.
 
     Raises
     ------
@@ -100,11 +100,8 @@ def stoppable(robot: RobotModel, limits: Array, q: Array, qd: Array, cycle: floa
     return np.asarray(c)
 
 
-# What a step hands to the controller.
-
-
 class Flag(Enum):
-    """By what a segment follows the path, from the best to the last resort."""
+    """How a segment follows the path, from the best to the last resort."""
 
     PLANNED = "planned"
     KEPT = "kept"
@@ -113,7 +110,7 @@ class Flag(Enum):
 
     @property
     def message(self) -> str:
-        """What it means."""
+        """Its meaning."""
         return _MESSAGES[self]
 
 
@@ -141,13 +138,13 @@ class Segment:
     q, qd, qdd : (M, n)
         Positions, velocities and accelerations [rad or m, and per s, per s²].
     flag : Flag
-        By what it follows the path.
+        How it follows the path.
     reasons : tuple of str
-        Why it is not planned as usual, or what was noticed; empty where nothing was.
+        Causes of an unusual segment, and observations; empty for none.
     follows : bool
-        Whether the tool moves as asked: not where limits of the joints are in the way.
+        Whether the tool moves as planned: not with joints at their limits.
     tool_error : (2,)
-        How far the tool is from the path where the segment begins, by the measured state [m, rad].
+        Distance of the tool from the path at the segment's start, by the measured state [m, rad].
     """
 
     t: Array
@@ -170,11 +167,8 @@ class Segment:
         return min(max(round((float(t) - float(self.t[0])) / float(step)), 0), last)  # type: ignore[arg-type]
 
 
-# What is commanded: a state for each cycle, from which the arm can always be stopped.
-
-
 class Commands:
-    """The commands of a segment, and what the arm is off them.
+    """Commands of a segment, and the deviation of the arm from them.
 
     Parameters
     ----------
@@ -184,11 +178,11 @@ class Commands:
     cycle : float
         Time between commands [s].
     cycles : int
-        So many of a segment follow the path; those after them bring the arm to rest.
+        Number of cycles of a segment that follow the path; later ones bring the arm to rest.
     latency : float
         How old a measured position is [s].
     settling : float
-        Time constant [s] of the filter of what the arm is off its command.
+        Time constant [s] of the filter of the arm's deviation from its command.
 
     Attributes
     ----------
@@ -206,9 +200,9 @@ class Commands:
         settling: float,
     ) -> None:
         self._robot, self._cycle, self._settling = robot, cycle, settling
-        # The last row is what the arm is off its command.
+        # The last row is the arm's deviation from its command.
         self._limits = np.vstack([tightened(limits), np.zeros(robot.dof)])
-        # In so many cycles every joint comes to rest from its highest speed.
+        # Number of cycles in which every joint stops from its highest speed.
         stopping = int(np.ceil((limits[2] / (limits[3] * cycle)).max())) + 3
         # c, w and a of each cycle; see `viable`.
         self._states = np.zeros((cycles + stopping + 1, 3, robot.dof))
@@ -240,7 +234,7 @@ class Commands:
 
     @property
     def deviation(self) -> Array:
-        """What the arm is off its command, filtered, (n,) [rad or m]."""
+        """Filtered deviation of the arm from its command, (n,) [rad or m]."""
         return np.asarray(self._limits[4])
 
     @property
@@ -250,7 +244,7 @@ class Commands:
 
     @property
     def place(self) -> Array:
-        """Where the arm is now, as far as is known, (n,)."""
+        """Estimated configuration of the arm now, (n,)."""
         return np.asarray(self._positions(self._states[:1])[0] + self.deviation)
 
     def measure(self, q: Array, passed: float) -> str:
@@ -266,7 +260,7 @@ class Commands:
     def follow(self, kinematics: Kinematics, layout: Layout, table: Array) -> bool:
         """Command the cycles of a `table` one after the other; see `law.command`.
 
-        Returns whether the tool moves as asked.
+        Returns whether the tool moves as planned.
         """
         states, limits, h, n = self._states, self._limits, self._cycle, self._robot.dof
         table[0, :n] = states[0, 0] + 0.5 * h * states[0, 1] + limits[4]
@@ -287,10 +281,10 @@ class Commands:
     def segment(
         self, first: int, flag: Flag, reasons: tuple[str, ...], follows: bool, error: Array
     ) -> Segment:
-        """Return what is commanded: from cycle `first` on, the arm is brought to rest."""
+        """Return the commands: from cycle `first` on, the arm is brought to rest."""
         h = self._cycle
         end = law.brake(self._states, first, self._limits, h)
-        # What comes after the end is rest, too.
+        # After the end the arm rests.
         self._states[end + 1 :] = self._states[end]
         end = max(end, 1)
         states = self._states[: end + 1]

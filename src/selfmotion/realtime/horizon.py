@@ -23,7 +23,7 @@ from selfmotion.realtime.settings import (
     GUESS_MORE,
     LEAST_GUESS,
     MOST_GUESS,
-    NODES_APART,
+    NODE_STEP,
     PIVOT,
     REACH,
     REGULAR,
@@ -32,21 +32,19 @@ from selfmotion.realtime.settings import (
     WILD,
 )
 
-# The quadratic programme of a step: its model, and an answer whatever it asks.
-
 
 def elastic_step(
     metric: Array, gradient: Array, rows: Array, low: Array, high: Array
 ) -> tuple[Array, bool]:
     """Return the step p of least cost that keeps low ≤ rows p ≤ high, found by the few that bind.
 
-    The cost is ½ pᵀ metric p + gradientᵀ p. Where rows contradict each other, the step that breaks
-    them little; and whether it does.
+    The cost is ½ pᵀ metric p + gradientᵀ p. Where rows contradict each other, the step with small
+    violations; and whether it has any.
 
     Raises
     ------
     numpy.linalg.LinAlgError
-        The numbers are beyond what can be solved with.
+        The numbers are too large for a solution.
     """
     reach = np.full(len(gradient), REACH)
     chosen = np.zeros(len(rows), dtype=bool)
@@ -68,9 +66,9 @@ def elastic_step(
 
 
 def _elastic(metric: Array, gradient: Array, rows: Array, low: Array, high: Array) -> Array:
-    """Return the step of least cost and least squares of what rows are broken by.
+    """Return the step of least cost plus squared violations of rows.
 
-    Limits are the command's to keep: what counts here is that the motion gets better.
+    The command keeps the limits: here the motion has to improve.
     """
     width = high - low
     scale = np.where(np.isfinite(width) & (width > 0.0), width, DISTANCES)[:, None]
@@ -97,8 +95,8 @@ def model_of(
 ) -> tuple[Array, Array]:
     """Return the gradient of the cost and its Gauss-Newton matrix, (d,) and (d, d).
 
-    `metrics` are what costs tell of their curvature, order of the derivative and weight (n, n); a
-    `guess` for the others is so many times that of the joints' speed. Tangents are (S, n, d).
+    `metrics` are second derivatives of costs, order of the derivative and weight (n, n); for the
+    others, `guess` is a multiple of that of joint speed. Tangents are (S, n, d).
     """
     d, sampling = by_q.shape[-1], samples.sampling
     weights = samples.weights[:, None]
@@ -127,11 +125,10 @@ def model_of(
 def graded(duration: float, steps: int) -> Array:
     """Return nodes from 0 to `duration` [s]: the first ones near each other, later ones farther.
 
-    Even ones where there are enough for that. What comes next is commanded, what comes later is
-    what it is to be good for.
+    Even ones if there are enough. The near future is commanded, the rest evaluates it.
     """
     s = np.linspace(0.0, 1.0, steps + 1)
-    even = np.clip((NODES_APART / duration * steps**2 - 1.0) / (steps - 1.0), 0.0, 1.0)
+    even = np.clip((NODE_STEP / duration * steps**2 - 1.0) / (steps - 1.0), 0.0, 1.0)
     return np.asarray(duration * (even * s + (1.0 - even) * s * s))
 
 
@@ -155,7 +152,7 @@ class Horizon:
         Its path is another one at each step.
     costs : sequence of Cost
     limits : (4, n)
-        Lower, upper, speed, acceleration: what is aimed at.
+        Lower, upper, speed, acceleration: targets.
     null_motion : NullMotion
         φ, in the null space.
     duration : float
@@ -163,7 +160,7 @@ class Horizon:
     steps : int
         Runge-Kutta steps.
     surroundings : Surroundings, optional
-        What the arm keeps apart from.
+        Collision constraints.
 
     Attributes
     ----------
@@ -231,7 +228,7 @@ class Horizon:
         return "a cost or its derivative is not finite over the horizon"
 
     def shift(self, seconds: float) -> None:
-        """Go on from so much later: coefficients and frame are those of the same motion."""
+        """Shift the horizon in time: coefficients and frame are those of the same motion."""
         if seconds <= 0.0 or not len(self._frames):
             return
         if seconds not in self._shifts:
@@ -267,9 +264,9 @@ class Horizon:
         Returns
         -------
         bool
-            Whether there is a motion: if not, nothing has changed but what `forget` forgets.
+            Whether there is a motion: if not, only the effect of `forget` has changed.
         """
-        # Near singular poses numbers may be beyond all bounds: what is not finite is no motion.
+        # Near singular poses numbers may overflow: such motions are rejected.
         with np.errstate(over="ignore", invalid="ignore"):
             return self._improve(q, rate, jacobian, reference)
 
@@ -314,7 +311,7 @@ class Horizon:
         return float(samples.weights @ sum(cost.value(samples) for cost in self._costs))
 
     def _falls(self, q: Array, stages: Array, better: Array, cost: float, predicted: float) -> bool:
-        """Return whether to take a step whose fall of the cost was guessed; learn from it."""
+        """Return whether to take a step with a guessed decrease of the cost; adapt the guess."""
         if predicted <= 0.0:
             # It is for the limits.
             return True
@@ -322,7 +319,7 @@ class Horizon:
         fall = -np.inf
         if self._run(q, outer[:, :, 0]):
             fall = cost - self._cost(self.rollout.samples())
-        # What is not taken does not break down.
+        # A rejected step does not break down.
         self.breakdown = np.inf
         ratio = fall / predicted if np.isfinite(fall) else -np.inf
         if not ratio >= BADLY:
@@ -341,7 +338,7 @@ class Horizon:
         return True
 
     def _run(self, q: Array, epsilon: Array) -> bool:
-        """Integrate; return whether there is a motion, and one that an arm could think of."""
+        """Integrate; return whether there is a motion of plausible size."""
         broken = self.rollout.run(q, epsilon)
         self.breakdown = np.inf if broken is None else broken
         wild = (np.abs(self.rollout.samples().qd) > self._wild).any(axis=1)
@@ -382,7 +379,7 @@ class Horizon:
     def _conditions(
         self, samples: Samples, by_q: Array, by_qd: Array
     ) -> tuple[Array, Array, Array]:
-        """Return rows (R, d) of the limits and distances, and what they may be, (R,) each."""
+        """Return rows (R, d) of the limits and distances, and their bounds, (R,) each."""
         rows, low, high = self._rows(samples, by_q, by_qd)
         if self._around is not None:
             more, room = self._around.rows(samples, by_q)
@@ -391,7 +388,7 @@ class Horizon:
         return rows, low, high
 
     def _rows(self, samples: Samples, by_q: Array, by_qd: Array) -> tuple[Array, Array, Array]:
-        """Return the limits at the nodes as rows of the step, with what they may be."""
+        """Return the limits at the nodes as rows of the step, with their bounds."""
         nodes, d = samples.nodes, self.size
         pause = np.diff(self.grid.nodes)[:, None]
         qd, moves = samples.qd[nodes], by_qd[nodes]

@@ -34,7 +34,7 @@ from selfmotion.realtime.settings import FOLLOWED, PIVOT
 # from which it can stop in time, and a = -A (or what brings w to 0) leads from each to another
 # one: there is always a next command.
 
-# What rounding may add to a limit: the set is that much smaller, relative to each limit.
+# Allowance for rounding of limits: the set is smaller by this, relative to each limit.
 _ROUNDING = 1e-9
 
 
@@ -47,7 +47,7 @@ def braking_distance(w: float, most: float, h: float) -> float:
 
 @inlined
 def fastest(room: float, most: float, h: float) -> float:
-    """Return the largest w⁺ after which a joint with so much room ahead can still stop in it.
+    """Return the largest w⁺ after which a joint can stop within `room`.
 
     It moves by h w⁺ at once, so that D(w⁺ + h A) = room; D is a polygon, inverted in closed form.
     """
@@ -62,7 +62,7 @@ def fastest(room: float, most: float, h: float) -> float:
 def viable_accelerations(
     c: float, w: float, lower: float, upper: float, speed: float, most: float, h: float
 ) -> tuple[float, float]:
-    """Return the least and the largest a after which a joint's state can still be stopped.
+    """Return the least and the largest a after which a joint can still stop.
 
     Never empty: where rounding, or a state from outside, would make it so, it is the harder
     braking.
@@ -76,7 +76,7 @@ def viable_accelerations(
 
 
 def tightened(limits: Array) -> Array:
-    """Return limits (4, n) smaller by what rounding may add to them."""
+    """Return limits (4, n) reduced by the allowance for rounding."""
     inner = limits.copy()
     inner[0] += _ROUNDING
     inner[1] -= _ROUNDING
@@ -103,9 +103,9 @@ def saturated_rates(
 ) -> bool:
     """Set `rates` (n,) within low..high, so that Jq̇ is `wanted` (m,) where that is possible.
 
-    With q̇ = J⁺u + (I - J⁺J) ε where no bound is in the way. Where the tool would not move as
-    wanted, the self-motion gives: the middle of the bounds is tried in place of ε. Returns whether
-    the tool moves as wanted.
+    With q̇ = J⁺u + (I - J⁺J) ε where no bound is active. Where the tool would not move as wanted,
+    the
+    self-motion is replaced by the middle of the bounds. Returns whether the tool moves as wanted.
     """
     if saturate(jacobian, wanted, epsilon, low, high, rates):
         return True
@@ -189,7 +189,7 @@ def command(
     limits : (5, n)
         Lower, upper, speed, acceleration, and how far the arm is from its command.
 
-    Returns whether the tool moves as the reference asks.
+    Returns whether the tool moves as the reference does.
     """
     n, m, row = world_jacobian.shape[1], rows_of(layout), table[cycle]
     jacobian, task, error = np.empty((6, n)), np.empty((m, n)), np.zeros(6)
@@ -216,7 +216,7 @@ def command(
 
 @inlined
 def viable_rates(state: Array, limits: Array, h: float, low: Array, high: Array) -> None:
-    """Set what the rates (n,) of the next cycle may be, from c, w and a now (3, n)."""
+    """Set the bounds of the rates (n,) of the next cycle, by c, w and a now (3, n)."""
     for k in range(state.shape[1]):
         c, w = state[0, k], state[1, k]
         low[k], high[k] = viable_accelerations(
@@ -250,7 +250,7 @@ def brake(states: Array, first: int, limits: Array, h: float) -> int:
             moves = moves or w != 0.0 or states[cycle, 2, k] != 0.0
         if not moves:
             return cycle
-        # In so many cycles the slowest to brake can rest.
+        # In this number of cycles the slowest to brake can rest.
         share = 1.0 / max(1.0, longest)
         for k in range(n):
             c, w = states[cycle, 0, k], states[cycle, 1, k]
@@ -269,7 +269,7 @@ def brake(states: Array, first: int, limits: Array, h: float) -> int:
 def approach(offset: Array, rate: Array, law: Array, step: float, table: Array) -> None:
     """Set `table` (G, 12) to how an offset (6,) [m, rad] and its rate fade away, every `step`.
 
-    Of second order, apart for position and rotation: the rate goes to that of the offset's speed
+    Of second order, separately for position and rotation: the rate approaches the offset's speed
     min(K d, √(A d), V) towards zero, with time constant 1/(4K), by at most A. `law` (5,) are K, V
     and A of positions, V and A of rotations.
     """

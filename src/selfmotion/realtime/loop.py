@@ -24,12 +24,10 @@ from selfmotion.problem.problem import Problem
 from selfmotion.realtime.commands import Segment
 from selfmotion.realtime.replanner import Replanner
 
-# The loop around a replanner: reads states, writes segments, knows no transport.
-
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """What is known when a step is made.
+    """Measurements at a step.
 
     Attributes
     ----------
@@ -62,7 +60,7 @@ def follow(
     *,
     lead: float = 0.0,
 ) -> int:
-    """Plan a segment from each state that is read, and write it, until there is none.
+    """Plan a segment for each state that is read, and write it, until there is none.
 
     Parameters
     ----------
@@ -71,15 +69,15 @@ def follow(
     read : callable
         Waits for the next state, about a period later, and returns it; None ends the loop.
     write : callable
-        Hands a segment to what commands the arm: its samples come one per cycle, from its first
-        time on, until another segment takes over. What it holds ends at rest.
+        Sends a segment to the controller: its samples are commanded one per cycle, from its first
+        time on, until another segment replaces it. Each ends at rest.
     lead : float
-        How long after its state a segment begins to be commanded [s]: what planning and the way
-        there and back take, in whole cycles.
+        Time from its state to the start of a segment [s]: for planning and communication, in whole
+        cycles.
 
     Returns
     -------
-    int
+    Number of segments.
         How many segments were written.
 
     Raises
@@ -112,14 +110,14 @@ def follow(
 
 @dataclass(frozen=True)
 class Plant:
-    """How a simulated arm answers.
+    """Dynamics of a simulated arm.
 
     Attributes
     ----------
     lag : float
         Time constant with which each joint goes to its command [s].
     delay : float
-        Age of a command when it begins to act [s].
+        Time from a command to its effect [s].
     noise : float
         Standard deviation of measured positions [rad or m].
     """
@@ -153,7 +151,7 @@ class SimulatedArm:
     q : (n,)
         Where the arm is.
     pushed : (n,)
-        What pushes it off its command, by now [rad or m]; to be set.
+        External displacement from its command [rad or m]; to be set.
     commanded : list of (q, qd, qdd)
         All commands so far.
     """
@@ -207,26 +205,26 @@ class SimulatedArm:
 
 # A closed loop with a simulated arm, recorded.
 
-# What counts as on the path for an arm that is measured [m, rad].
+# Errors of a measured arm that count as on the path [m, rad].
 _BACK = 1e-3, 1e-2
 
 
 class Scene(Protocol):
-    """What happens around the arm; all times [s]."""
+    """Events around the arm; all times [s]."""
 
     def path(self, t: float) -> Path:
         """Return the tool's motion, as it is known at a time."""
 
     def obstacles(self, t: float) -> Mapping[str, SE3]:
-        """Return where obstacles are by then."""
+        """Return the poses of obstacles at a time."""
 
     def pushed(self, t: float) -> Array:
-        """Return what pushes the arm off its command, (n,) [rad or m]."""
+        """Return the external displacement of the arm from its command, (n,) [rad or m]."""
 
 
 @dataclass(frozen=True, eq=False)
 class Record:
-    """What a closed loop did, a sample per period.
+    """History of a closed loop, a sample per period.
 
     Attributes
     ----------
@@ -241,7 +239,7 @@ class Record:
     seconds : (K,)
         How long each step took, by the clock [s].
     flags : Counter
-        How many segments had which flag.
+        Number of segments by flag.
     reasons : Counter
         How often something was noticed.
     commanded : (M, 3, n)
@@ -269,7 +267,7 @@ class Record:
     ) -> Plan:
         """Return the arm's motion as a plan, judged by the certificate, to show and to save.
 
-        Its path is what the target did; where that jumped, as fast as between two samples.
+        Its path is the target's; jumps are linear between two samples.
         """
         robot, task = replanner.robot, replanner.task
         path = Waypoints.from_poses(self.t, list(self.targets))
@@ -299,9 +297,9 @@ class Record:
 
 
 def track(replanner: Replanner, arm: SimulatedArm, scene: Scene, seconds: float) -> Record:
-    """Close the loop between a replanner and a simulated arm for so many seconds.
+    """Simulate the loop of a replanner and an arm for a duration.
 
-    Time stands still while a step is made: `Record.seconds` tells how long it would have.
+    Time stops during a step: `Record.seconds` has the steps' durations.
     """
     robot, task = replanner.robot, replanner.task
     times: list[float] = []
@@ -348,7 +346,7 @@ def track(replanner: Replanner, arm: SimulatedArm, scene: Scene, seconds: float)
 
 # Everything compiled and allocated before the arm moves.
 
-# Steps until what a step needs is made: the first ones begin a plan, the others shift it.
+# Steps until all kernels are compiled: the first ones start a plan, the others shift it.
 _STEPS = 5
 
 
@@ -361,7 +359,7 @@ def warm_up(replanner: Replanner) -> None:
     Parameters
     ----------
     replanner : Replanner
-        As it will be used; it must not have begun.
+        The one to be used, before its first step.
     """
     robot = replanner.robot
     q = robot.dexterous_configuration(replanner.task)
@@ -369,7 +367,7 @@ def warm_up(replanner: Replanner) -> None:
     later = SE3(pose.rotation, pose.translation + np.array([0.0, 0.0, 0.01]))
     far = SE3(pose.rotation, pose.translation + 10.0 * robot.reach)
     still = np.zeros(robot.dof)
-    # On the path, then without a state, then towards what is out of reach.
+    # On the path, then without a state, then towards an unreachable pose.
     for goal, measured in ((later, q), (later, np.full(robot.dof, np.nan)), (far, q)):
         replanner.reset()
         path = Line(pose, goal, 1.0)

@@ -1,4 +1,4 @@
-"""What the tool is to do over the horizon, on paths and poses that move."""
+"""Reference of the tool over the horizon, for moving paths and poses."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from selfmotion.realtime.settings import OFFSET_STEP
 
 # A pose that goes on as it was seen to move.
 
-# Who follows it has another pose long before [s].
+# Duration of moving poses [s]: replaced long before.
 LONG = 1e9
 
 
@@ -86,7 +86,7 @@ class Conveyed(Path):
     carried : Path
         The tool's motion where nothing moves.
     velocity : (3,)
-        Of what carries it [m/s].
+        Of its carrier [m/s].
     offset : (3,)
         How far it would have been carried at time 0 [m].
     """
@@ -119,16 +119,14 @@ class Conveyed(Path):
 
 
 # What the tool is to do over the horizon: from where it is now, back to its path.
-
-
 @dataclass(frozen=True)
 class Approach:
-    """How the tool comes back to a path that jumped, or that it was pushed off.
+    """Return of the tool to a path after a jump or a displacement.
 
     Attributes
     ----------
     rate : float
-        Near the path, what is left fades with this rate [1/s].
+        Rate at which a small error fades [1/s].
     speed, acceleration : float
         Limits of the approach, on top of the path's own motion [m/s, m/s²].
     turning, turning_acceleration : float
@@ -152,7 +150,7 @@ class Approach:
 
 
 class Reference:
-    """A tool motion that begins where the tool is, as fast as it is, and fades to the path.
+    """A tool motion that starts with the tool's pose and twist, and fades to the path.
 
     Parameters
     ----------
@@ -177,14 +175,14 @@ class Reference:
         self._offsets = np.zeros((int(np.ceil(times.max() / OFFSET_STEP)) + 2, 12))
         self.table = np.zeros((len(times), law.REFERENCE))
         self.jacobian = np.zeros((task.dimension, follows.robot.dof))
-        # What the task does not prescribe is left where it is; of an axis all three rows turn.
+        # Free rows are constant; of an axis all three rows turn.
         self._free = np.full(6, not task.tool_axes)
         self._free[task.rows] = False
 
     def begin(
         self, q: Array, rate: Array, target: PathSamples, twist: Array | None = None
     ) -> Array:
-        """Let the motion begin at q with q̇ = `rate`, and fade to a path given at the times.
+        """Start the motion at q with q̇ = `rate`, and fade to a path given at the times.
 
         With `twist` (6,) in place of the tool's own. Returns how far the tool is off the path, (2,)
         [m, rad].
@@ -237,11 +235,8 @@ def _left_jacobian(phi: Array) -> Array:
     return np.asarray(Jexp3(-phi))
 
 
-# The path that was given last: what is followed for a while where a new one fails.
-
-
 class LastPath:
-    """Looks at a path, or at the last one that could be looked at.
+    """Samples a path, or the last one without an error.
 
     Parameters
     ----------
@@ -259,17 +254,15 @@ class LastPath:
     ) -> PathSamples | None:
         """Return the path at times (K,); the last one where it fails, and add the reason.
 
-        The last one, too, where none is given: targets come at their own rate. None after too long,
-        of which `waited` [s] have passed since it was asked last, and `age` [s] since a given
-        target was seen.
+        Also the last one if none is given: targets have their own rate. None after too long:
+        `waited` [s] since the last call, and `age` [s] since the observation of a given target.
         """
         if path is not None:
             try:
                 found = resting(path, t)
                 self._path, self._without = path, age
                 return found
-            # A path is the user's code: whatever it raises must not leave the arm without a
-            # command.
+            # A path is the user's code: its exceptions must not leave the arm without a command.
             except Exception as error:
                 reasons.append(f"the path failed: {type(error).__name__}: {error}")
         self._without += waited

@@ -41,13 +41,12 @@ class Replanner:
     """Plans the motion of the next seconds, from where the arm is, once a period.
 
     Each `step` makes one step of the optimisation over the horizon, warm-started from the last
-    coefficients, shifted in time, and commands the beginning of it. The command goes on from the
-    command: position, velocity and acceleration are continuous. What the arm is measured to be off
-    its command is filtered, and the tool is planned for where the arm is, so that the command makes
-    up for it.
+    coefficients, shifted in time, and commands its first part. Commands are continuous in position,
+    velocity and acceleration. The measured deviation of the arm from its command is filtered, and
+    the tool is planned for the arm's pose, so that the command compensates for it.
 
-    Limits of position, velocity and acceleration hold for every command, at all times and whatever
-    happens (`selfmotion.realtime.law`): where they are in the way of the path, the path gives.
+    Limits of position, velocity and acceleration hold for every command, at all times and in all
+    events (`selfmotion.realtime.law`): where they conflict with the path, the path is left.
 
     Parameters
     ----------
@@ -72,9 +71,9 @@ class Replanner:
     steps : int
         Runge-Kutta steps of the horizon.
     latency : float
-        How old the measured state is when its segment begins [s].
+        Age of the measured state at the start of its segment [s].
     settling : float
-        Time constant [s] of the filter of what the arm is off its command: no shorter than its
+        Time constant [s] of the filter of the arm's deviation from its command: no shorter than its
         own time constant and delay.
     patience : float
         Without a path, a target that was seen, or a measured state for this long [s], or with a
@@ -86,7 +85,7 @@ class Replanner:
     ------
     ProblemError
         The arm cannot move in all rows; a limit of acceleration is missing; a constraint is of a
-        kind that is not kept while moving; a number is out of range.
+        kind that cannot be kept while moving; a number is out of range.
     """
 
     def __init__(
@@ -146,12 +145,12 @@ class Replanner:
         self._stages = np.append(four.ravel(), 2 * grid.steps)
 
     def reset(self) -> None:
-        """Forget all: the next step begins at its measured state."""
+        """Reset: the next step starts at its measured state."""
         self._begun = False
 
     @property
     def deviation(self) -> Array:
-        """What the arm is off its command, filtered, (n,) [rad or m]."""
+        """Filtered deviation of the arm from its command, (n,) [rad or m]."""
         return np.array(self._commands.deviation)
 
     def step(
@@ -168,21 +167,21 @@ class Replanner:
     ) -> Segment:
         """Return the motion to command from `t` on.
 
-        What the tool is to do is a `path`, or a `target` as a camera sees it. A target may come at
-        its own rate: where neither is given, the last one goes on, for as long as the replanner's
-        `patience`; then the arm is brought to rest.
+        The task is a `path`, or a `target` as a camera sees it. A target may have its own rate:
+        without either, the last one continues, within the replanner's `patience`; then the arm is
+        brought to rest.
 
         Parameters
         ----------
         t : float
-            When the segment begins to be commanded [s]: a period after the last one, or later
-            where that was missed. It is taken to the nearest cycle.
+            Start time of the segment's command [s]: a period after the last one, or later if that
+            was missed. It is rounded to the nearest cycle.
         q, qd : (n,)
-            Measured state [rad or m, per s]: at the first step, where the command begins. Later
-            ones tell where the arm is at ``t - latency``; numbers that are not finite are left out.
+            Measured state [rad or m, per s]: the initial command at the first step. Later the state
+            at ``t - latency``; NaN is ignored.
         path : Path, optional
-            The tool's motion, at the time of `t`; another one at each step, if need be. Before it
-            begins and after it ends, it rests.
+            The tool's motion, at the time of `t`; it may change at each step. Outside of its
+            duration, it rests.
         obstacles : mapping, optional
             Where obstacles of the `Clearance` are by now: name → pose in the world, or in the
             frame of the link that carries it.
@@ -198,7 +197,7 @@ class Replanner:
         Returns
         -------
         Segment
-            Always, also where something failed: `Segment.flag` and `Segment.reasons` tell.
+            Also after a failure: see `Segment.flag` and `Segment.reasons`.
 
         Raises
         ------
@@ -264,7 +263,7 @@ class Replanner:
         self._follows = self._begun = True
 
     def _held_up(self, passed: float) -> Array | None:
-        """Return the twist that the reference had come to, where limits kept the tool from it.
+        """Return the twist that the reference had where limits stopped the tool.
 
         Begun anew with the tool's own, it would never get faster than in one period: too little to
         leave a singular pose by.
@@ -308,7 +307,7 @@ class Replanner:
                 flag = Flag.STOPPING
         else:
             flag = Flag.KEPT if np.any(kept) else Flag.TRACKING
-        # On the way into a singular pose an arm may end up on its other side.
+        # Through a singular pose an arm may continue on its other side.
         soon = horizon.breakdown < SOON
         self._without_way = self._without_way + max(passed, self.cycle) if soon else 0.0
         held_up = horizon.breakdown < AHEAD and not self._follows
@@ -325,7 +324,7 @@ class Replanner:
             if self._horizon.improve(place, rate, self._reference.jacobian, reference):
                 return True
             reasons.append(self._horizon.failure)
-        # Costs are the user's code: whatever they raise must not leave the arm without a command.
+        # Costs are the user's code: their exceptions must not leave the arm without a command.
         except Exception as error:
             reasons.append(f"planning failed: {type(error).__name__}: {error}")
             self._horizon.forget()

@@ -1,68 +1,75 @@
-"""How the loop decides: every number that changes a command, in one place.
+"""Settings of the control loop: every number that changes a command, in one place.
 
-What they do is seen in `make bench NAME=fuzz-realtime` (1,000 scenarios of pushes, late steps,
-jumps and faults in a closed loop) and `make bench NAME=latency` (percentiles of a step, and what
-short sight costs). None of them is what limits stand on: those hold by `viable`, whatever these
-are.
+`make bench NAME=fuzz-realtime` shows their effect (1,000 scenarios of pushes, late steps, jumps and
+faults in a closed loop), `make bench NAME=latency` percentiles of a step and the cost of a short
+horizon. The guarantee of limits is independent of them: see `viable`.
 """
 
 # --- the command
-# The pose feedback between two steps [1/s].
+# Gain of the pose feedback between two steps [1/s].
 GAIN = 20.0
-# A command so far from the arm [rad or m] is not what it does: the arm is brought to rest.
+# Distance of a command from the arm above which the arm is brought to rest [rad or m].
 FARTHEST = 0.5
-# Below this pivot of JJᵀ [m², rad²] the inverse is damped, by up to λ² = the same.
+# Pivot of JJᵀ [m², rad²] below which the inverse is damped, by up to λ² = the same.
 PIVOT = 1e-3
-# What the tool may lack of the rate that was asked for, and count as following [m/s, rad/s].
+# Error of the tool's rate that counts as following [m/s, rad/s].
 FOLLOWED = 1e-3
-# An offset of the tool is known every so many seconds.
+# Sampling interval of an offset of the tool [s].
 OFFSET_STEP = 2e-3
 
 # --- when it stops
-# A motion that breaks down within this time [s] is not followed: the arm can stop in less.
+# Motions that break down within this time [s] are not followed: the arm stops in less.
 SOON = 0.5
-# Where limits already hold the tool up, nor one that breaks down within this time [s].
+# The same where limits already delay the tool [s].
 AHEAD = 2.0
-# A joint that moves so many times as fast as it may has been thrown out of a singular pose.
+# Multiple of its largest speed at which a joint breaks down near a singular pose.
 WILD = 20.0
 
 # --- the plan over the horizon
-# What a plan leaves of the limits to the command, since the tool's feedback and the time between
-# nodes need some: distance from the ends [rad or m], and share of speed and acceleration.
+# Reserve of limits in plans, for the feedback and the time between nodes: distance from the ends
+# [rad or m] …
 ENDS = 5e-3
+# … share of the speed …
 SPEED = 0.98
+# … and of the acceleration.
 ACCELERATION = 0.9
-# The first nodes are so far apart [s], unless there are enough for less.
-NODES_APART = 0.1
-# Added to the Gauss-Newton matrix, relative to its trace: directions that do not act stay put.
+# Distance of the first nodes [s], or less if there are enough.
+NODE_STEP = 0.1
+# Regularisation of the Gauss-Newton matrix, relative to its trace: ineffective directions do not
+# move.
 REGULAR = 1e-8
-# Where a cost does not tell its curvature, that of the joints' speed is added, so many times: less
-# where the cost falls as predicted, more where it does not, from the least to the most.
+# Costs without second derivatives get a multiple of joint speed's: factor after the predicted
+# decrease …
 GUESS_LESS = 0.3
+# … factor after a smaller one …
 GUESS_MORE = 4.0
+# … smallest multiple …
 LEAST_GUESS = 1e-3
+# … and largest.
 MOST_GUESS = 1e6
-# Of the predicted fall, what counts as well predicted, and as badly.
+# Ratio of the decrease to the predicted one that counts as good …
 WELL = 0.75
+# … and as bad.
 BADLY = 0.25
-# What rows may be broken by, relative to their range.
+# Largest violation of rows, relative to their range.
 BROKEN = 1e-6
-# How far coefficients may go in one cycle [rad/s √s].
+# Largest change of coefficients in one cycle [rad/s √s].
 REACH = 1.0
-# Programmes of a cycle: each has the rows that the one before broke.
+# Programmes of a cycle: each has the rows that the one before violated.
 ROUNDS = 4
-# What breaking a row by all of its range costs, next to a step's cost; the range of distances [m].
+# Penalty of violating a row by its range, relative to a step's cost.
 BREAKING = 1e3
+# Range of distances [m].
 DISTANCES = 0.1
 
 # --- obstacles that move
-# Plans aim at this much more than the distance that is asked for [m]: nodes are apart.
+# Clearance of plans in addition to the required one, for the time between nodes [m].
 CLEARANCE_MARGIN = 5e-3
-# From so much beyond on, distances level off [m].
+# Excess of the required distance at which distances saturate [m].
 LEVEL = 0.01
-# A plan that comes too near within this time [s] is not begun: the arm can stop in less.
+# Plans that violate the distance within this time [s] are not started: the arm stops in less.
 CLEAR_FOR = 0.5
-# How fast what came too near is to be left [m/s].
+# Speed of leaving a violated distance [m/s].
 LEAVING = 0.05
-# What is no more than this nearer than now comes no nearer [m].
+# Decrease of a distance that counts as none [m].
 NEARER = 1e-4

@@ -21,7 +21,7 @@ from selfmotion.work.job.stops import Stops
 
 
 class Compiled(event.Listener):  # type: ignore[misc]  # numba ships no types
-    """Counts what numba compiles."""
+    """Listener that counts compilations of numba."""
 
     def __init__(self) -> None:
         self.count = 0
@@ -35,7 +35,7 @@ class Compiled(event.Listener):  # type: ignore[misc]  # numba ships no types
 
 
 def main(which: str) -> None:
-    """Do the works that a plan needs first, or all, the last one first; print what was compiled."""
+    """Compile the kernels of a first plan, or all, the last one first; print their number."""
     compile_alone()
     counted = Compiled()
     with event.install_listener("numba:compile", counted):
@@ -57,7 +57,7 @@ def small_works() -> Iterator[tuple[str, Callable[[], object]]]:
     def plan(problem: sm.Problem, **options: Any) -> Callable[[], object]:
         return lambda: sm.plan(problem, **options)
 
-    # What takes longest comes first: another process begins with what comes before it in a plan.
+    # The slowest compilation first: another process starts with the earlier ones of a plan.
     t, still = np.linspace(0.0, 4.0, 5), np.zeros((5, 7))
     nodes = NodeGrid(alone, t, (), free=False, counts=Counts())
     yield "nodes", lambda: nodes.near(np.tile(home, (5, 1)), still, still)
@@ -109,7 +109,7 @@ def _far(pose: SE3) -> SE3:
 
 
 def _two_stops() -> Stops:
-    """Return two seams that can be made one way each, in any order."""
+    """Return two seams, each with one direction, in any order."""
     none, any_, free = [frozenset[int]()] * 2, np.ones(2), np.zeros((2, 2), dtype=bool)
     return Stops(none, none, np.arange(2), any_, np.ones((2, 2)), any_, any_, free)
 

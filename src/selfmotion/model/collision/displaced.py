@@ -68,7 +68,7 @@ class SupportFunction:
         self._upright = 0.5 * np.pi
         if outline.axis is not None:
             self._upright = float(np.arccos(min(abs(float(outline.axis @ normal)), 1.0)))
-        self.still = float(along.max()) + self._radius * float(np.sin(self._upright))
+        self.at_zero = float(along.max()) + self._radius * float(np.sin(self._upright))
 
     def most(self, angles: Array) -> Array:
         """Return the largest support after rotations by at most these angles (G,), (G,) [m]."""
@@ -76,7 +76,7 @@ class SupportFunction:
         share = np.sin(np.minimum(self._upright + angles, 0.5 * np.pi))
         return np.asarray(heights + self._radius * share)
 
-    def highest(self, angle: float) -> Array:
+    def farthest(self, angle: float) -> Array:
         """Return the point (3,) that is highest then."""
         return np.asarray(self._points[int(np.argmax(self._heights(np.array(angle))))])
 
@@ -111,13 +111,13 @@ class SeparatingPlane:
     def _both(self, angles: Array) -> tuple[Array, Array]:
         """Return it with a plane at rest with the other body, and with the displaced one."""
         displaced, other = self._displaced, self._other
-        return -other.still - displaced.most(angles), -other.most(angles) - displaced.still
+        return -other.at_zero - displaced.most(angles), -other.most(angles) - displaced.at_zero
 
     def moment(self, angle: float) -> Array:
         """Return the moment of the rotation that brings them nearest, (3,) [m]."""
         first, second = self._both(np.array([angle]))
         side = self._displaced if first[0] >= second[0] else self._other
-        return np.cross(side.highest(angle), self.normal)
+        return np.cross(side.farthest(angle), self.normal)
 
 
 @dataclass(frozen=True, eq=False)

@@ -67,10 +67,10 @@ class AugmentedArm(RobotModel):
         own = {one.name: not one.turns for one in self.virtual.each}
         return own[joint] if joint in own else self.arm.is_prismatic(joint)
 
-    def told(self, k: int) -> str:
-        """See `RobotModel.told`: of virtual joints, the deviation that they allow."""
+    def label(self, k: int) -> str:
+        """See `RobotModel.label`: of virtual joints, the deviation that they allow."""
         number = k - self.arm.dof
-        return self.arm.told(k) if number < 0 else self.virtual.told(number)
+        return self.arm.label(k) if number < 0 else self.virtual.label(number)
 
     @property
     def joint_weights(self) -> Array:

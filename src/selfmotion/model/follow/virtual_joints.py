@@ -102,7 +102,7 @@ class VirtualJoints:
         """All of them, in the order of their coordinates."""
         return (*self.under, *self.behind)
 
-    def told(self, number: int) -> str:
+    def label(self, number: int) -> str:
         """Return in words the deviation that one of them allows."""
         row, of = self.each[number].row, ""
         if self.swing is not None and number in self.swing:

@@ -1,4 +1,4 @@
-"""What numba compiles: the small dense algebra around Pinocchio's Jacobians.
+"""Compiled: the small dense algebra around Pinocchio's Jacobians.
 
 Notation, per stage: J6 (6, n) a tip's Jacobian [v; ω] in the axes of its chain's base, S the
 selection of its task's rows, J = S J6 (m, n) the rows of all tips, one below the other, ε the null
@@ -8,9 +8,9 @@ one solve:
 
     q̇ = Jᵀy + ε = J⁺u + (I - J⁺J) ε.
 
-Python calls `advance`, `pullback`, `sensitivities`, `contract_task` and
-`transport`. Each is made of small kernels, which LLVM inlines, and is compiled for what it is
-given: who has no damping, or a path that does not move, does not wait for theirs.
+Python calls `advance`, `pullback`, `sensitivities`, `contract_task` and `transport`. Each consists
+of small kernels, which LLVM inlines, and is compiled for the types of its arguments: problems
+without damping, or with a fixed path, do not wait for these.
 """
 
 from selfmotion.model.kernels.algebra import (

@@ -10,10 +10,12 @@ from selfmotion.basics import Array, called, inlined, kernel
 
 Vector = tuple[float, float, float]
 
-# A pivot this small against its diagonal is rounding: the matrix is singular.
+# Pivot, relative to its diagonal, that counts as rounding: the matrix is singular.
 _SINGULAR = 1e-13
-# Rotations of Jacobi's method converge quadratically; what is left to rotate then is rounding.
-_SWEEPS, _ROTATED = 30, 1e-32
+# Largest number of sweeps of Jacobi's method, which converges quadratically.
+_SWEEPS = 30
+# Squared size of the remaining off-diagonal, relative, that counts as rounding.
+_ROTATED = 1e-32
 
 
 @inlined
@@ -106,7 +108,7 @@ def cholesky(a: Array) -> bool:
 
 @called
 def solve_cholesky(factor: Array, b: Array) -> None:
-    """Replace `b` by A⁻¹b, given what `cholesky` made of A."""
+    """Replace `b` by A⁻¹b, for the factor of `cholesky`."""
     m = b.shape[0]
     for i in range(m):
         total = b[i]
@@ -204,17 +206,17 @@ def _rotate(a: Array, vectors: Array, i: int, j: int) -> None:
 
 # Bases of null spaces, carried along a motion without turning inside the null space.
 
-# Steps of the iteration: it converges quadratically once a basis is nearly orthonormal.
+# Largest number of iterations: quadratic convergence once a basis is nearly orthonormal.
 _POLAR = 40
-# Jacobians with a pivot of JJᵀ [m², rad²] below this are taken for singular.
+# Pivot of JJᵀ [m², rad²] below which Jacobians count as singular.
 _NO_BASIS = 1e-12
 
 
 def carried(first: Array, jacobians: Array) -> Array:
     """Return a basis `first` (n, r) of the null space carried along a motion, (N, n, r).
 
-    A discrete parallel transport, see `transport`: continuous whatever the signs and order of the
-    singular vectors of its Jacobians (N, m, n) do.
+    A discrete parallel transport, see `transport`: continuous, whatever the signs and order of the
+    singular vectors of its Jacobians (N, m, n).
     """
     bases = np.empty((len(jacobians), *first.shape))
     transport(first, np.ascontiguousarray(jacobians), _NO_BASIS, bases)

@@ -46,7 +46,7 @@ def damp(gram: Array, law: Law, out: Array) -> float:
 
     λ² = λ0² f with f = (1 - σ²/σ0²)² where the smallest singular value σ of J is below the
     threshold σ0, exactly 0 elsewhere. `out` (3 + m,) becomes λ0², f, df/dσ² and the unit vector v
-    of σ² = vᵀJJᵀv, all 0 where there is no damping.
+    of σ² = vᵀJJᵀv, all 0 without damping.
     """
     m = gram.shape[0]
     square = law[0] * law[0]
@@ -58,8 +58,8 @@ def damp(gram: Array, law: Law, out: Array) -> float:
         for j in range(i + 1):
             full[i, j] = full[j, i] = spare[i, j] = gram[i, j]
         spare[i, i] -= square
-    # Mostly σ > σ0, which a Cholesky factor tells at a fraction of the price of eigenvalues. NaN is
-    # left to the factor of `gram` itself.
+    # Mostly σ > σ0, which a Cholesky factor decides faster than eigenvalues. NaN is left to the
+    # factor of `gram`.
     if cholesky(spare) or not isfinite(trace):
         return 1.0
     v = view(out, 3, (m,))
@@ -76,7 +76,7 @@ def damp(gram: Array, law: Law, out: Array) -> float:
 
 @inlined
 def damping_slope(row: Array, n: int, layout: Layout, gain: float, z: Array) -> float:
-    """Return 2 df/dσ² (λ0² zᵀy + K zᵀS e): what ⟨v (Jᵀv)ᵀ, ∂J⟩ has to be multiplied by."""
+    """Return 2 df/dσ² (λ0² zᵀy + K zᵀS e): the factor of ⟨v (Jᵀv)ᵀ, ∂J⟩."""
     m = rows_of(layout)
     at, full = stage_of(row, n, m), np.empty(6)
     slope = 0.0
@@ -100,7 +100,7 @@ def pull_damping(
     weights: Array,
     twist: Array,
 ) -> None:
-    """Add what `factor` ⟨v (Jᵀv)ᵀ, ∂J⟩ leaves: on J6 to `weights` (6, n), on S to `twist` (6,).
+    """Add `factor` ⟨v (Jᵀv)ᵀ, ∂J⟩: on J6 to `weights` (6, n), on S to `twist` (6,).
 
     For tip f; see `damping_slope`.
     """
@@ -228,7 +228,7 @@ def step(table: Array, s: int, n: int, h: float) -> None:
 
 
 class Space(NamedTuple):
-    """What the kernels here work in, as views of one array.
+    """Work space of the kernels here, as views of one array.
 
     Attributes
     ----------
@@ -243,7 +243,7 @@ class Space(NamedTuple):
     weights : (6, n)
         M, of which ⟨M, ∂J6⟩ is taken.
     by_epsilon, by_q : (n,), (n,)
-        What a stage's pullback gives.
+        Results of a stage's pullback.
     by_slope : (4, n)
         The last four of `by_q`.
     """
@@ -278,7 +278,7 @@ def space_of(space: Array, n: int, m: int) -> Space:
 
 
 def space_size(n: int, m: int) -> int:
-    """Return how long the array to work in is."""
+    """Return the length of the work space."""
     return 13 * n + m + 24
 
 

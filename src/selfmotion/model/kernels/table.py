@@ -1,4 +1,4 @@
-"""The table that a rollout works on: one row per stage, and what the parts of a row are.
+"""Table of a rollout: one row per stage, and the parts of a row.
 
 A call from Python costs as much per array argument as a good part of the arithmetic, hence one
 table in place of a dozen arrays.
@@ -168,13 +168,13 @@ def qd_of(table: Array, s: int, n: int) -> Array:
 
 @inlined
 def shared_columns(n: int, m: int) -> int:
-    """Return the length of what a row holds once."""
+    """Return the length of a row's common part."""
     return 3 * n + 4 + m * n + m * m + 2 * m
 
 
 @inlined
 def tip_columns(n: int) -> int:
-    """Return the length of what a row holds for each tip."""
+    """Return the length of a row's part for each tip."""
     return 42 + 6 * n
 
 

@@ -18,9 +18,7 @@ from selfmotion.model.kernels.algebra import (
 )
 from selfmotion.model.kernels.table import view
 
-# Tips, compiled: their pose errors and the rows of their tasks, both ways.
-
-# Below this angle the closed forms in sin θ lose digits and their series serve: to 1e-15 there.
+# Angle below which closed forms in sin θ lose digits, and series are used: to 1e-15 there.
 _SMALL = 0.05
 
 
@@ -33,7 +31,7 @@ def pose_error(
     rotation: Array,
     out: Array,
 ) -> None:
-    """Set `out` (6,) to the pose error e: to the target's position, then by what rotation vector.
+    """Set `out` (6,) to the pose error e: difference of positions, then the rotation vector.
 
     The angular part, in world axes, is as `angle_kind` says: none, `rotation_error` or
     `pointing_error`.
@@ -212,9 +210,9 @@ def rows_of(layout: Layout) -> int:
 #
 #     ∂J6_i/∂q_k = [ω_k × v_i; ω_k × ω_i]  for k ≤ i,   [ω_i × v_k; 0]  for k > i.
 
-# Where joints mimic others on a chain, the columns of all its joints have to be known: those of
-# samples and tips, (S, F, 6, W), each times its scale, and (F + 1, W): their order along the chain
-# of each tip, and last the coordinate of each.
+# Columns of all joints of a chain, needed where joints mimic others: those of samples and tips, (S,
+# F, 6, W), each times its scale, and (F + 1, W): their order along the chain of each tip, and last
+# the coordinate of each.
 Every = tuple[Array, Ints]
 
 
@@ -224,8 +222,8 @@ def contract(
 ) -> None:
     """Add ⟨M, ∂J6/∂q_k⟩ + twist·J6_k to out[k], for M = `weights` (6, n) and `twist` (6,).
 
-    Two running sums of cross products along the chain of tip f, which start from what acts on all
-    columns alike.
+    Two running sums of cross products along the chain of tip f, which start from the weights common
+    to all columns.
     """
     n = jacobian.shape[1]
     # Σ_{i ≥ k} v_i × M_v,i + ω_i × M_ω,i
@@ -284,7 +282,7 @@ def contract_task(
     here, full = np.empty((6, n)), np.empty((6, n))
     turn, values, moment, twist = np.empty((3, 3)), np.empty(m), np.empty(6), np.empty(6)
     for s in range(samples):
-        # Copies: whatever the caller's arrays look like in memory, the rest is compiled once.
+        # Copies: the memory layout of the caller's arrays is independent of the compiled types.
         for i in range(3):
             twist[i] = twist[3 + i] = 0.0
             for j in range(3):

@@ -1,7 +1,7 @@
-"""Tool motion over time: what the tool frame is to do, as pose and twist at any time."""
+"""Tool motions over time: pose and twist of the tool frame at any time."""
 
 from selfmotion.model.path.base import (
-    STILL as STILL,
+    REST_SPEED as REST_SPEED,
     Path as Path,
     PathSamples as PathSamples,
     PathSeries as PathSeries,

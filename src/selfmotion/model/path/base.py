@@ -1,4 +1,4 @@
-"""What every tool motion offers."""
+"""Base of tool motions."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ from selfmotion.basics import (
 from selfmotion.model.path.feed_kept import FeedKept
 from selfmotion.model.task import SE3, Task, as_pose, skew
 
-# Rounding of a last time such as 50 * 0.02 must not count as outside the motion.
+# Excess of a last time such as 50 * 0.02 that counts as rounding, relative.
 _TIME_SLACK = 1e-9
-# Stands for no time at all.
+# Stands for a zero duration in divisions.
 _TINY = np.finfo(float).tiny
 # Longer motions than this [s] are typing errors.
 _LONGEST = 1e9
@@ -86,7 +86,7 @@ class Path(Saved, ABC, family="path"):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What to know before it is followed, in words."""
+        """Notes before it is followed, in words."""
         return tuple(self.__dict__.get("_notes", ()))
 
     def __repr__(self) -> str:
@@ -106,18 +106,18 @@ class Path(Saved, ABC, family="path"):
     def marks(self) -> Array:
         """Times [s] between which the motion is smooth to any order, the knots among them.
 
-        Where waypoints are given, theirs: a certificate looks there, whatever lies between.
+        Times of given waypoints, if any: a certificate evaluates them, whatever is between.
         """
         return self.knots
 
     @property
     def rounded(self) -> Array:
-        """Where corners are rounded: first and last times [s], (C, 2)."""
+        """Intervals of rounded corners: first and last times [s], (C, 2)."""
         return np.zeros((0, 2))
 
     @property
     def feeds(self) -> tuple[FeedKept, ...]:
-        """How well the feeds that were asked for are kept; a certificate judges that."""
+        """Feeds of the path with their own errors; a certificate judges them."""
         return ()
 
     @abstractmethod
@@ -162,12 +162,12 @@ class Path(Saved, ABC, family="path"):
         """Give the path notes, unless there are none; return it."""
         found = tuple(notes)
         if found:
-            # Paths may be frozen; what is noted is no part of their value.
+            # Paths may be frozen; notes are no part of their value.
             object.__setattr__(self, "_notes", found)
         return self
 
     def at_constant_speed(self) -> Path:
-        """Return the same path at a pace at which it rests nowhere, where it knows one."""
+        """Return the same path at a pace without rests, if it has one."""
         return self
 
     def __add__(self, other: Path) -> Path:
@@ -209,13 +209,13 @@ class Path(Saved, ABC, family="path"):
 
 
 class _Derived(Path):
-    """A tool motion made of another one."""
+    """A tool motion derived from another one."""
 
     _path: Path
 
     @property
     def original(self) -> Path:
-        """The path that it is made of."""
+        """The original path."""
         return self._path
 
     @abstractmethod
@@ -290,9 +290,9 @@ def turning(bounds: Array) -> PathSeries:
     return PathSeries(np.zeros_like(bounds), series.exponential(bounds))
 
 
-# What is slower than this [m/s, rad/s] is at rest: waypoints and velocity functions come to rest
-# up to their own rounding.
-STILL = 1e-7
+# Speed below which the tool is at rest [m/s, rad/s]: waypoints and velocity functions rest up to
+# rounding.
+REST_SPEED = 1e-7
 
 
 def path_pose(pose: SE3 | npt.ArrayLike, name: str) -> SE3:
@@ -343,7 +343,7 @@ def rotations_about(axis: Array, angles: Array) -> Array:
 
 
 def rotvecs(turns: Array) -> Array:
-    """Return how the tool turns from each quaternion (N, 4) to the next, (N - 1, 3) [rad]."""
+    """Return the rotation vectors from each quaternion (N, 4) to the next, (N - 1, 3) [rad]."""
     from scipy.spatial.transform import Rotation
 
     rotations = Rotation.from_quat(turns, scalar_first=True)

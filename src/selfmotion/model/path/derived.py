@@ -1,4 +1,4 @@
-"""Paths made of another one: placed, the other way round, cut, run through at another pace."""
+"""Paths derived from another one: placed, reversed, cut, at another pace."""
 
 from __future__ import annotations
 
@@ -69,9 +69,6 @@ class Placed(_InStep, kind="placed"):
         return {"kind": self.kind, "path": self._path.to_dict(), "frame": frame}
 
 
-# A tool motion the other way round.
-
-
 class Reversed(_Derived, kind="reversed"):
     """A tool motion from its end to its start, as fast as from its start to its end.
 
@@ -124,7 +121,7 @@ class Reversed(_Derived, kind="reversed"):
         return self._at_pace(t, sigma, -np.ones_like(t))
 
     def series(self, middle: Array, half: Array) -> PathSeries | None:
-        """See `Path.series`: bounds of derivatives do not see which way time goes."""
+        """See `Path.series`: bounds of derivatives are the same in reversed time."""
         return path_series(self._path, self.duration - middle, half)
 
     @override
@@ -138,7 +135,7 @@ class Reversed(_Derived, kind="reversed"):
 
 # A tool motion run through at another pace.
 
-# The original is run through at its own pace where that is as near to it [share].
+# Relative difference of paces that count as the original's own.
 _OWN = 1e-9
 
 
@@ -218,7 +215,7 @@ class Retimed(_Derived, kind="retimed"):
     @property
     def feeds(self) -> tuple[FeedKept, ...]:
         """See `Path.feeds`: those of the original, where it is run through at its own pace."""
-        # At its own pace, all the way from one sample of the pace to the next.
+        # At the original's pace, whole intervals between samples of the pace.
         pace = self._pace
         straight = np.abs(np.diff(pace.sigma) - np.diff(pace.t)) <= _OWN * np.diff(pace.t)
         level = np.abs(pace.rate - 1.0) <= _OWN
@@ -230,7 +227,7 @@ class Retimed(_Derived, kind="retimed"):
         for item in self._path.feeds:
             t = self.when(item.t)
             k = np.clip(np.searchsorted(pace.t, t, side="right") - 1, 0, len(others) - 1)
-            # A time between two pieces is one of each.
+            # A time between two intervals belongs to both.
             at = np.isclose(t, pace.t[k], rtol=0.0, atol=_OWN * self.duration)
             # Between two rows with another piece in between nothing is known.
             apart = replace(item, rows=item.rows + before[k])
@@ -250,7 +247,7 @@ class Retimed(_Derived, kind="retimed"):
 
     @property
     def pace(self) -> Pace:
-        """How fast the original is run through: σ(t)."""
+        """Time of the original as a function of time: σ(t)."""
         return self._pace
 
     @override
@@ -271,15 +268,14 @@ class Retimed(_Derived, kind="retimed"):
         return {"kind": self.kind, "path": self._path.to_dict(), **numbers}
 
 
-# A stretch of a tool motion.
-
-# Knots this near to an end, as a share of the duration, are the end.
+# Distance of a knot from an end, as a share of the duration, that counts as the end.
 _CLOSE = 1e-9
-# Crowding knots: the time left is halved as often, down to 6e-5 of it.
+# Halvings of the remaining time for additional knots near an end, down to 6e-5 of it.
 _HALVED = 14
-# But not below this [s]: a jerk between knots h from each other is rounded by 1e-14 rad / h³.
+# Smallest of these intervals [s]: jerks between knots h apart have a rounding error of 1e-14 rad /
+# h³.
 _LEAST_LEFT = 1e-4
-# Of two knots this close, as a share of the time left, one is enough.
+# Knots nearer than this, as a share of the remaining time, are merged.
 _ENOUGH = 1e-3
 
 
@@ -291,7 +287,7 @@ class Section(_Derived, kind="section"):
     path : Path
         The whole motion.
     first, last : float
-        Where the stretch begins and ends [s].
+        Start and end of the section [s].
     crowding : bool
         Whether knots crowd towards the end: a motion that ends near a singular pose changes there
         faster than any equal steps resolve.
@@ -341,13 +337,13 @@ class Section(_Derived, kind="section"):
 
     @property
     def rounded(self) -> Array:
-        """See `Path.rounded`: those in the stretch."""
+        """See `Path.rounded`: those in the section."""
         corners = np.clip(self._path.rounded, self._first, self._last) - self._first
         return read_only(corners[corners[:, 1] > corners[:, 0]])
 
     @property
     def feeds(self) -> tuple[FeedKept, ...]:
-        """See `Path.feeds`: those that count in the stretch."""
+        """See `Path.feeds`: those that count in the section."""
         found = (item.between(self._first, self._last) for item in self._path.feeds)
         return tuple(item.later(-self._first) for item in found if item)
 
@@ -377,7 +373,7 @@ def section_at_rest(
     ramp: float = 0.5,
     ramped: tuple[bool, bool] = (True, True),
 ) -> Retimed:
-    """Return a stretch of a motion, run up from rest and brought to rest: only its ends are slower.
+    """Return a section of a motion with ramps from and to rest: only its ends are slower.
 
     The time σ of the original has dσ/dt = u²(3 - 2u) with u = t / ramp at the start, likewise at
     the end, and 1 in between: velocity and acceleration are continuous, and nothing but the first
@@ -388,7 +384,7 @@ def section_at_rest(
     path : Path
         The original.
     first, last : float
-        Where the stretch begins and ends [s]; by default all of it.
+        Start and end of the section [s]; by default all of it.
     ramp : float
         How long each ramp lasts [s].
     ramped : (bool, bool)
@@ -397,7 +393,7 @@ def section_at_rest(
     Raises
     ------
     PathError
-        The times are not in order, the ramp is not above 0, or longer than the stretch.
+        The times are not in order, the ramp is not above 0, or longer than the section.
     """
     last = check_path(path, "section at rest").duration if last is None else last
     section = path if (first, last) == (0.0, path.duration) else Section(path, first, last)
@@ -412,6 +408,6 @@ def section_at_rest(
     t = np.array([0.0, up, end + 0.5 * (up - down), end + 0.5 * (up + down)])
     sigma = np.array([0.0, 0.5 * up, end - 0.5 * down, end])
     rate = np.array([0.0 if ramped[0] else 1.0, 1.0, 1.0, 0.0 if ramped[1] else 1.0])
-    # Without a ramp, or between two that fill the stretch, there is nothing.
+    # Without a ramp, or between two that fill the section, there is none.
     kept = np.append(True, np.diff(t) > _CLOSE * end)
     return Retimed(section, t[kept], sigma[kept], rate[kept], np.zeros(int(kept.sum())))

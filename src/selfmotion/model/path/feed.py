@@ -29,16 +29,16 @@ from selfmotion.model.path.pace import Pace, times_when
 
 # A path at a constant feed.
 
-# Faster feeds [m/s] are slips of units.
+# Faster feeds [m/s] are errors of units.
 _FASTEST = 3.0
 
 
 class Feed(_Derived, kind="feed"):
     """A path at a constant feed, from rest to rest.
 
-    The tool keeps its feed wherever turn rate and accelerations allow: it is slower in bends, at
-    both ends, and rests where the path has a kink. As much of the acceleration as is spent on
-    bends, and as much as is spent on changes of speed, is at most half of what is allowed.
+    The tool has its feed wherever turn rate and accelerations allow: it is slower in bends and at
+    both ends, and rests at kinks. At most half of the acceleration is for bends, and at most half
+    for changes of speed.
 
     Over the length λ of the path, measured by the time that it takes at the feed, dλ/dt is the
     largest by these limits, forwards and backwards from node to node (J. E. Bobrow, S. Dubowsky,
@@ -60,12 +60,11 @@ class Feed(_Derived, kind="feed"):
     smoothing : float
         How long an acceleration takes to build up [s].
     within : float
-        What may be missing of the feed, as a share, but in run-up, run-down and rounded corners:
-        a certificate judges that.
+        Allowed relative error of the feed, except in run-up, run-down and rounded corners: a
+        certificate judges it.
     stretches : (M, 2), optional
         Times of the original [s], increasing, and the feed from each of them on [m/s], `feed`
-        before the first. The tool runs up to a faster feed, and down to a slower one before that
-        begins.
+        before the first. Before a slower feed starts, the tool has slowed down.
     required : bool
         Whether the feed has to be reached. Where it need not, as of retracts, it is a bound: the
         tool is as fast as the limits allow up to it, and `feeds` has none.
@@ -73,7 +72,7 @@ class Feed(_Derived, kind="feed"):
     Raises
     ------
     PathError
-        A number is not above 0, or the path rests on its way.
+        A number is not above 0, or the path has a rest inside.
     """
 
     def __init__(
@@ -104,7 +103,7 @@ class Feed(_Derived, kind="feed"):
         }
         self._own_feed = self._limits["feed"]
         self._asked = self._checked(stretches)
-        # Elsewhere it is held below the fastest one.
+        # Elsewhere it is below the fastest one.
         self._limits["feed"] = float(self._asked[:, 1].max())
         if self.feed > _FASTEST:
             raise PathError(
@@ -115,7 +114,7 @@ class Feed(_Derived, kind="feed"):
         self.duration = float(self._paces[-1][1])
 
     def _checked(self, stretches: npt.ArrayLike | None) -> Array:
-        """Return when which feed begins, with that of the start, (M + 1, 2)."""
+        """Return the start times of the feeds, with that of the first, (M + 1, 2)."""
         table = as_numbers(
             [] if stretches is None else stretches, "feed: stretches", error=PathError
         )
@@ -136,7 +135,7 @@ class Feed(_Derived, kind="feed"):
 
     @property
     def feed(self) -> float:
-        """Speed of the tool where nothing is in its way [m/s]; of several feeds the fastest."""
+        """Speed of the tool without limits in its way [m/s]; the fastest of several feeds."""
         return self._limits["feed"]
 
     @property
@@ -153,7 +152,7 @@ class Feed(_Derived, kind="feed"):
     @override
     def marks(self) -> Array:
         inner = [pace.t + start for start, _, pace in self._paces]
-        # The length as a function of time, and time as one of the length, are splines.
+        # Length over time, and time over length, are splines.
         inner.append(self._moved(np.union1d(self._path.marks, self._nodes.sigma)))
         return _apart(np.concatenate(inner), self.duration)
 
@@ -176,7 +175,7 @@ class Feed(_Derived, kind="feed"):
         return sigma, rate * np.maximum(self._nodes.time_at(reached, nu=1), 0.0)
 
     def _stretches(self, t: Array) -> Iterator[tuple[Array, Array, Pace]]:
-        """Yield for each stretch which of times (K,) lie in it, its own times, and its pace."""
+        """Yield for each section the mask of times (K,) in it, its own times, and its pace."""
         which = np.searchsorted([end for _, end, _ in self._paces[:-1]], t, side="right")
         for number, (start, end, pace) in enumerate(self._paces):
             here = which == number
@@ -205,7 +204,7 @@ class Feed(_Derived, kind="feed"):
 
     @cached_property
     def _paces(self) -> list[tuple[float, float, Pace]]:
-        """Start, end and pace of each stretch from rest to rest, the pace over the length."""
+        """Start, end and pace of each section from rest to rest, the pace over the length."""
         stretches, start = [], 0.0
         for _, ramp, _ in self._nodes.ramps:
             pace = ramp.smoothed(self._limits["smoothing"])
@@ -216,7 +215,7 @@ class Feed(_Derived, kind="feed"):
 
     @cached_property
     def feeds(self) -> tuple[FeedKept, ...]:
-        """See `Path.feeds`: how well its own feeds are kept, each where it is asked for."""
+        """See `Path.feeds`: errors of its own feeds, each in its interval."""
         if not self.required:
             return ()
         t, counts, causes, asked = self._counted
@@ -240,7 +239,7 @@ class Feed(_Derived, kind="feed"):
 
     @property
     def _counted(self) -> tuple[Array, Flags, list[str], Array]:
-        """Return when nodes are passed (K,), whether the feed counts, what holds it, and which."""
+        """Return times of nodes (K,), whether the feed counts, limiting cause, and node numbers."""
         nodes, window = self._nodes, self._limits["smoothing"]
         sigma, causes, corners = nodes.sigma, nodes.causes, self._path.rounded
         inside = (sigma[:, None] >= corners[:, 0]) & (sigma[:, None] <= corners[:, 1])
@@ -250,7 +249,7 @@ class Feed(_Derived, kind="feed"):
             own, feeds = free[part].copy(), nodes.feeds[part]
             own[[0, -1]] = True
             times.append(start + pace.t + 0.5 * window)
-            # Down to a slower feed, and up from one, the tool runs as at the ends.
+            # Changes of feed are ramps, like the ends.
             slower = nodes.feeds[nodes.narrowest][part][anchors] < feeds
             exempt.append(own[anchors] | slower)
             held += [causes[part][k] for k in anchors]
@@ -269,7 +268,7 @@ class Feed(_Derived, kind="feed"):
         return self._limits
 
     def changed(self, feeds: Mapping[float, float], **limits: float) -> Feed:
-        """Return the same with other feeds in place of some [m/s], and other limits by name."""
+        """Return the same with some feeds replaced [m/s], and other limits by name."""
         asked = self._asked.copy()
         for old, new in feeds.items():
             asked[self._asked[:, 1] == old, 1] = new
@@ -278,9 +277,9 @@ class Feed(_Derived, kind="feed"):
         return self._like(self._path, changed, stretches)
 
     def along(self, path: Path, later: float) -> Feed:
-        """Return the same along a longer path, on which the original begins `later` [s].
+        """Return the same along a longer path, on which the original starts `later` [s].
 
-        Before it the feed is that of its begin.
+        Before it the first feed applies.
         """
         asked = self._asked + np.array([later, 0.0])
         changed = {**self._limits, "feed": float(asked[0, 1])}
@@ -301,7 +300,7 @@ class Feed(_Derived, kind="feed"):
         return self._like(self._path, limits, stretches)
 
     def _like(self, path: Path, limits: Mapping[str, float], stretches: Any) -> Feed:
-        """Return another path with other limits, kept as well as here."""
+        """Return another path with other limits and the same requirements."""
         return Feed(
             path, **limits, within=self._within, stretches=stretches, required=self.required
         )
@@ -324,27 +323,28 @@ def _apart(times: Array, duration: float) -> Array:
     return read_only(unique)
 
 
-# The feed that a path can have, and what would allow the one that was asked for.
-
-# A feed is named that leaves this share of what may be missing to the tool.
+# Share of the allowed error that a recommended feed leaves to the tool.
 _LEFT = 0.5
-# Feeds and limits are tried so often.
-_LESS, _MORE = 20, 3
-# A feed this much larger than the one that is named is not kept.
+# Attempts at feeds …
+_LESS = 20
+# … and at limits.
+_MORE = 3
+# Factor above the recommended feed at which a feed has to fail.
 _NEAR = 1.05
-# Limits are raised by this much more than what is missing; a limit that gains a smaller share of
-# what is missing is none.
-_OVER, _GAIN = 1.02, 0.3
-# Larger accelerations are not advised [m/s²].
+# Factor by which limits are raised above the necessary.
+_OVER = 1.02
+# Smallest relative gain of a limit that is recommended.
+_GAIN = 0.3
+# Largest acceleration that is recommended [m/s²].
 _WILD = 100.0
-# A tool that is slower than this share of its feed rests.
+# Share of its feed below which the tool rests.
 _RESTS = 1e-6
-# Digits of numbers that are named.
+# Digits of recommended numbers.
 _DIGITS = 3
-# With what accelerations and turn rates grow, over that of the feed.
+# Powers of the feed by which accelerations and turn rates grow.
 _POWERS = {"acceleration": 2, "turn_acceleration": 2, "turn_rate": 1}
 _UNITS = {"acceleration": "m/s²", "turn_acceleration": "rad/s²", "turn_rate": "rad/s"}
-# The first look.
+# Order in which limits are tried.
 _FIRST = {
     "the turn rate": "turn_rate",
     "the turn acceleration in a bend": "turn_acceleration",
@@ -353,23 +353,23 @@ _FIRST = {
 
 @dataclass(frozen=True, eq=False)
 class FeedPossible:
-    """What can be had where a path does not keep a feed, whatever arm follows it.
+    """Feeds and limits that are possible where a path does not keep a feed, for any arm.
 
     Attributes
     ----------
     found : FeedKept
-        What was asked for, and what is reached.
+        The given feed and the reached one.
     """
 
     found: FeedKept
 
     @cached_property
     def feed(self) -> float | None:
-        """The largest feed of three digits that is kept instead [m/s]; None where none was found.
+        """The largest feed of three digits that is kept [m/s]; None if none was found.
 
-        From above, each feed that is not kept leads to the slowest speed that it leaves. From the
-        first that is kept it goes up again while one that is larger by a twentieth is kept, too:
-        where corners are passed slower, a lower feed leaves more way to run up.
+        From above, each feed that is not kept leads to its slowest speed. From the first that is
+        kept it increases while one that is larger by a twentieth is kept, too: where corners are
+        slower, a lower feed has a longer run-up.
         """
         own, feed = self.found, self.found.asked
         for _ in range(_LESS):
@@ -378,27 +378,27 @@ class FeedPossible:
             if _leaves(own):
                 return self._larger(feed)
             lower = _rounded(own.slowest, down=True)
-            # What is missing may be less than what is left to the tool.
+            # The error may be smaller than the share that is left to the tool.
             feed = lower if lower < feed else _rounded(feed * (1.0 - 1e-2), down=True)
             own = self._at(feed)
         return None
 
     def _larger(self, feed: float) -> float:
-        """Return a feed that is kept, and a larger one is not."""
+        """Return a feed that is kept, while a larger one is not."""
         larger = _rounded(_NEAR * feed, down=True)
         while larger < self.found.asked and _leaves(self._at(larger)):
             feed, larger = larger, _rounded(_NEAR * larger, down=True)
         return feed
 
     def _at(self, feed: float) -> FeedKept:
-        """Return how another feed is kept instead."""
+        """Return the errors of another feed."""
         return _kept_by(self.found.path.changed({self.found.asked: feed}), feed)
 
     @cached_property
     def limits(self) -> dict[str, float]:
-        """Limits of the path with which the feed is kept as asked, by name; none if not found.
+        """Limits of the path with which the feed is kept, by name; none if not found.
 
-        Of each what the feed lacks, one limit alone before all of them.
+        The limiting one alone before all of them.
         """
         first = _FIRST.get(self.found.held_by, "acceleration")
         for names in ((first,), tuple(_POWERS)):
@@ -418,7 +418,7 @@ class FeedPossible:
         return {}
 
     def text(self, path: Path) -> str:
-        """Return what is missing on a path that has the feed in it, where, why, and what to do."""
+        """Return the error of a path's feed in words: where, the cause, and remedies."""
         found = self.found
         place = ", ".join(f"{x:.3f}" for x in path.samples(np.array([found.time])).translation[0])
         where = f"at t = {found.time:.3f} s near ({place})"
@@ -433,13 +433,13 @@ class FeedPossible:
 
     @property
     def within(self) -> float:
-        """What would have to be allowed to be missing, as a share."""
+        """Relative error that would have to be allowed."""
         share = 1.0 - self.found.slowest / self.found.asked
         return min(_rounded(1.01 * share + 1e-3, down=False), 1.0)
 
     @property
     def remedies(self) -> str:
-        """What to do, in words."""
+        """Remedies, in words."""
         told = [] if self.feed is None else [f"ask for {self.feed:g} m/s"]
         if self.limits:
             named = (
@@ -453,12 +453,12 @@ class FeedPossible:
 
 
 def _leaves(found: FeedKept) -> bool:
-    """Return whether a feed is kept, and enough of what may be missing left to the tool."""
+    """Return whether a feed is kept with room for the tool."""
     return found.kept and found.left_over >= _LEFT * found.within * found.asked * (1.0 - 1e-9)
 
 
 def _kept_by(path: Feed, feed: float) -> FeedKept:
-    """Return how well a path keeps one of its feeds."""
+    """Return the errors of one of a path's feeds."""
     return next(item for item in path.feeds if item.asked == feed)
 
 
@@ -466,6 +466,6 @@ def _rounded(value: float, *, down: bool) -> float:
     """Return a number of three digits that is no larger, or no smaller."""
     digits = _DIGITS - 1 - floor(log10(value))
     scaled = value * 10.0**digits
-    # What has three digits but for rounding stays as it is.
+    # Numbers of three digits up to rounding are unchanged.
     whole = floor(scaled * (1.0 + 1e-12)) if down else ceil(scaled * (1.0 - 1e-12))
     return float(f"{whole * 10.0**-digits:.{_DIGITS}g}")

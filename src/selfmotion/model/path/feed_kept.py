@@ -1,4 +1,4 @@
-"""How well a path at a feed keeps it: what was asked, what is reached, and what holds it."""
+"""Feeds of a path with their errors: given and reached speeds, and limiting causes."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -12,13 +12,13 @@ from selfmotion.basics import Array, Flags, Ints
 if TYPE_CHECKING:
     from selfmotion.model.path.feed import Feed
 
-# Times that are told are alike up to this [s].
+# Times within this are the same in messages [s].
 _SAME = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
 class FeedKept:
-    """What a `Feed` makes of one of the feeds that were asked for, where it was.
+    """Errors of one of the feeds of a `Feed`, in its intervals.
 
     Stretches count but for run-up and run-down, rounded corners, and turning on the spot; each has
     to reach it.
@@ -28,23 +28,23 @@ class FeedKept:
     asked : float
         [m/s].
     within : float
-        What may be missing of it, as a share.
+        Allowed relative error.
     during : (W, 2)
-        From when to when it is asked for [s].
+        First and last times of its intervals [s].
     t, speeds : (K,)
         Times of these [s], and how fast the tool is then [m/s].
     lasts : (K,)
-        What time each stands for [s].
+        Duration that each time represents [s].
     counts : (K,)
         When the feed counts.
     causes : (K,)
-        What holds the tool at each time, in words.
+        Limiting cause at each time, in words.
     path : Feed
-        The one at this feed, whatever was made of it since: its own speed between these times.
+        The original path at this feed: its own speed between these times.
     own : (K,)
         The times on that path [s].
     rows : (K,)
-        Their numbers there: between two that follow each other is no other.
+        Their numbers there: consecutive ones are neighbours.
     """
 
     asked: float
@@ -66,7 +66,7 @@ class FeedKept:
 
     @property
     def slowest(self) -> float:
-        """The smallest speed where it counts [m/s]; of a stretch where none does, the largest."""
+        """Smallest speed where it counts [m/s]; of an interval without any, the largest."""
         return float(self.speeds[self._worst])
 
     @property
@@ -82,11 +82,11 @@ class FeedKept:
 
     @property
     def held_by(self) -> str:
-        """What holds it where it is slowest."""
+        """Limiting cause at the slowest time."""
         return self.causes[self._worst] if self.counts[self._worst] else "run-up and run-down"
 
     def named(self, time: float, duration: float) -> str:
-        """Return the feed in words, and when on a path it is asked for near a time [s]."""
+        """Return the feed in words, and its interval on a path near a time [s]."""
         first, last = self.during[int(np.argmin(np.abs(self.during - time).min(axis=1)))]
         ends = 0.0, duration
         whole = len(self.during) == 1 and np.allclose((first, last), ends, rtol=0.0, atol=_SAME)
@@ -100,13 +100,13 @@ class FeedKept:
 
     @property
     def left_over(self) -> float:
-        """How much faster or slower than the path the tool may be where the feed counts [m/s]."""
+        """Allowed difference of the tool's speed from the path's where the feed counts [m/s]."""
         most = max((1.0 + self.within) * self.asked, self.reached)
         return max(min(most - self.reached, self.slowest - (1.0 - self.within) * self.asked), 0.0)
 
     @cached_property
     def _worst(self) -> int:
-        """The slowest time where it counts; of a stretch where none does, its fastest one."""
+        """Index of the slowest time where it counts; of an interval without any, the fastest."""
         chosen = []
         for own in range(len(self.during)):
             here = self._stretch == own
@@ -119,11 +119,11 @@ class FeedKept:
 
     @cached_property
     def _stretch(self) -> Ints:
-        """In which stretch each time lies, (K,)."""
+        """Number of each time's interval, (K,)."""
         return np.maximum(np.searchsorted(self.during[:, 0], self.t, side="right") - 1, 0)
 
     def timed(self, when: Callable[[Array], Array]) -> "FeedKept":
-        """Return the same at other times, given by a function of those here."""
+        """Return the same at other times, given by a function of these."""
         during = np.sort(when(self.during.ravel()).reshape(-1, 2), axis=1)
         return replace(self, during=during[np.argsort(during[:, 0])], t=when(self.t))
 
@@ -140,18 +140,18 @@ class FeedKept:
         return ends[next_to], (counts[:-1] & counts[1:])[next_to]
 
     def later(self, seconds: float) -> "FeedKept":
-        """Return the same, begun later."""
+        """Return the same, started later."""
         return self.timed(lambda t: t + seconds)
 
     def between(self, first: float, last: float) -> "FeedKept | None":
-        """Return it from one time to another [s]; None where it does not count in between."""
+        """Return it between two times [s]; None if it does not count there."""
         found = self.where((self.t >= first) & (self.t <= last))
         return found and replace(found, during=np.clip(found.during, first, last))
 
     def where(self, rows: Flags) -> "FeedKept | None":
-        """Return it at some of the times (K,); without stretches where it counts at none of them.
+        """Return it at some of the times (K,), without intervals where it counts at none of them.
 
-        None where it counts in no stretch.
+        None if it counts in no interval.
         """
         if rows.all():
             return self

@@ -1,4 +1,4 @@
-"""What limits the pace of a tool at nodes along a path."""
+"""Limits of the pace of a tool at nodes along a path."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -9,31 +9,34 @@ from typing import Any
 import numpy as np
 
 from selfmotion.basics import Array, Flags, Ints, PathError
-from selfmotion.model.path.base import STILL, Path
+from selfmotion.model.path.base import REST_SPEED, Path
 from selfmotion.model.path.pace import Pace, largest_pace
 
-# What holds a tool that is slower than its feed.
+# Limiting causes of a tool that is slower than its feed.
 _CAUSES = "the turn rate", "the acceleration in a bend", "the turn acceleration in a bend"
-# Nodes of the pace between two knots of the original, at least.
+# Smallest number of nodes between two knots of the original.
 _FEWEST = 16
-# Nodes of the pace in all, about: a feed is kept between them as far as splines through them do.
+# Approximate number of nodes: between them a feed is as accurate as splines.
 _ABOUT = 1000
-# How far from a node, by the distance of knots, the original's accelerations are measured.
+# Distance from a node at which accelerations are evaluated, relative to that of knots.
 _BESIDE = 1e-4
-# How far from a knot it is measured whether the twist jumps there.
+# Distance from a knot at which jumps of the twist are evaluated, likewise.
 _AT = 1e-8
-# The pace of the original is followed between nodes to this share, by so many halvings at most.
-_ROUGH, _FINER = 0.05, 24
-# Half way between two nodes the tool is as fast as at them, up to this share.
+# Relative accuracy of the original's pace between nodes …
+_ROUGH = 0.05
+# … and largest number of halvings for it.
+_FINER = 24
+# Relative difference of the tool's speed half way between two nodes.
 _UNEVEN = 2e-3
-# A monotone spline's slopes, by those of the chords beside them.
+# Largest slope of a monotone spline, in multiples of the smaller neighbouring chord's.
 _STEEPEST = 3.0
-# Halvings by which it is found where the turn rate begins to hold the tool, and how near to a node,
-# as a share of the way to the next one, that is the node.
-_HALVINGS, _CLOSE = 40, 1e-6
-# A tool that is slower than this share of what it may be rests.
+# Bisections of the point from which on the turn rate limits the tool …
+_HALVINGS = 40
+# … and its distance from a node that counts as the node, as a share of the interval.
+_CLOSE = 1e-6
+# Share of the allowed speed below which the tool rests.
 _RESTS = 1e-6
-# The twist before and after a knot may differ by this share of it: by rounding.
+# Relative jump of the twist at a knot that counts as rounding.
 _KINK = 1e-6
 
 
@@ -50,7 +53,7 @@ class FeedNodes:
     limits : dict
         Those of a `Feed`, by name.
     asked : (M, 2)
-        From which times of the path on which feed is asked for [s, m/s].
+        Start times of the path's feeds [s], and the feeds [m/s].
     """
 
     path: Path
@@ -69,7 +72,7 @@ class FeedNodes:
         after = self.path.samples(inner + beside[1:]).twist
         jump = np.abs(after - before).max(axis=1)
         size = np.maximum(np.abs(before), np.abs(after)).max(axis=1)
-        kinks = inner[jump > _KINK * size + STILL]
+        kinks = inner[jump > _KINK * size + REST_SPEED]
         return [0.0, *kinks.tolist(), self.path.duration]
 
     @cached_property
@@ -86,7 +89,7 @@ class FeedNodes:
             rough = np.abs(found - between) > _ROUGH * found
             if not rough.any():
                 break
-            # Where the tool all but rests, its pace changes much faster than elsewhere.
+            # Near rests the pace changes much faster than elsewhere.
             sigma = np.union1d(sigma, middle[rough])
         return self._evened(self._with_changes(self._with_crossings(sigma)))
 
@@ -102,7 +105,7 @@ class FeedNodes:
             middle = sigma[:-1] + 0.5 * rise + 0.125 * h * (slopes[:-1] - slopes[1:])
             slope = 1.5 * rise / h - 0.25 * (slopes[:-1] + slopes[1:])
             uneven = np.abs(self._share_of(middle) * slope - 1.0) > _UNEVEN
-            # Where the tool all but rests no pace is even.
+            # Near rests no pace is even.
             uneven &= rise > _CLOSE * np.diff(self.path.knots).min()
             if not uneven.any():
                 break
@@ -110,7 +113,7 @@ class FeedNodes:
         return sigma
 
     def _along(self, sigma: Array) -> tuple[Array, Array]:
-        """Return how long the way to each node (K,) takes at the feed [s], and dσ/dλ, (K,).
+        """Return the time to each node (K,) at the feed [s], and dσ/dλ, (K,).
 
         By Simpson's rule. With slopes up to three times those of the chords beside them a spline
         never falls (F. N. Fritsch, R. E. Carlson, SIAM J. Numer. Anal. 17, 1980).
@@ -124,7 +127,7 @@ class FeedNodes:
         return np.append(0.0, np.cumsum(steps)), slopes
 
     def _with_changes(self, sigma: Array) -> Array:
-        """Return nodes, and where feeds change; however short, a stretch has one of its own."""
+        """Return nodes with changes of feed; however short, an interval has one of its own."""
         if len(self.asked) == 1:
             return sigma
         changes = np.append(self.asked[:, 0], self.path.duration)
@@ -135,7 +138,7 @@ class FeedNodes:
         return np.union1d(changes, np.append(inner, between))
 
     def _with_crossings(self, sigma: Array) -> Array:
-        """Return nodes, and where the turn rate begins or ends to hold the tool: a kink of σ(λ)."""
+        """Return nodes with the ends of intervals that the turn rate limits: kinks of σ(λ)."""
         turns = self._turns(sigma)
         (cells,) = np.nonzero(turns[:-1] != turns[1:])
         if not len(cells):
@@ -154,7 +157,7 @@ class FeedNodes:
 
     @cached_property
     def _shares(self) -> Array:
-        """What the original's own pace takes of the feed or the turn rate at the nodes, (K,)."""
+        """Shares that the original's own pace uses of feed or turn rate at the nodes, (K,)."""
         share = self._share_of(self.sigma)
         if share.min() <= _RESTS * share.max():
             at = self.sigma[int(np.argmin(share))]
@@ -169,7 +172,7 @@ class FeedNodes:
         return np.asarray(self._shares_of(sigma).max(axis=1))
 
     def _shares_of(self, sigma: Array) -> Array:
-        """Return what the original's pace takes of the feed, and of the turn rate, (K, 2)."""
+        """Return the shares that the original's pace uses of feed and turn rate, (K, 2)."""
         speeds = twist_sizes(self.path.samples(sigma).twist)
         return speeds / [self.limits["feed"], self.limits["turn_rate"]]
 
@@ -180,7 +183,7 @@ class FeedNodes:
 
     @cached_property
     def _spaced(self) -> tuple[Array, Array]:
-        """How long the way to each node takes at the feed [s], and dσ/dλ there, (K,) each."""
+        """Time to each node at the feed [s], and dσ/dλ there, (K,) each."""
         return self._along(self.sigma)
 
     @property
@@ -204,13 +207,13 @@ class FeedNodes:
             self.path.samples(at).twist / self._share_of(at)[:, None]
             for at in (inner - beside, inner, inner + beside)
         )
-        # Before and after by themselves: where the turn rate begins to hold, they differ.
+        # Before and after separately: they differ where the turn rate starts to limit.
         sides = (twist_sizes((b - a) / beside / share) for a, b in ((early, here), (here, late)))
         return np.maximum(*sides)
 
     @cached_property
     def _caps(self) -> Array:
-        """What the square of the pace may be by feed and accelerations, (K, 3)."""
+        """Largest square of the pace by feed and accelerations, (K, 3)."""
         bends = 1.0 / np.maximum(self._bends / self._half, 1e-300)
         if len(self.asked) == 1:
             return np.hstack([np.ones((len(bends), 1)), bends])
@@ -219,7 +222,7 @@ class FeedNodes:
 
     @cached_property
     def feeds(self) -> Array:
-        """The feed that is asked for at each node, where it changes the slower one, (K,)."""
+        """Feed at each node, at changes the slower one, (K,)."""
         times, feeds = self.asked.T
         after = feeds[np.searchsorted(times, self.sigma, side="right") - 1]
         before = feeds[np.maximum(np.searchsorted(times, self.sigma) - 1, 0)]
@@ -227,7 +230,7 @@ class FeedNodes:
 
     @cached_property
     def _most(self) -> Array:
-        """What the square of the pace may be by the feed and by bends near each node, (K,)."""
+        """Largest square of the pace by the feed and by bends near each node, (K,)."""
         most: Array = self._caps.min(axis=1)[self.narrowest]
         return most
 
@@ -235,11 +238,11 @@ class FeedNodes:
     def narrowest(self) -> Ints:
         """The node near each one at which the pace may be least, (K,)."""
         most = self._caps.min(axis=1)
-        # What is kept half a window before and after is kept by the mean in the middle.
+        # A bound half a window before and after is one of the mean in the middle.
         lengths, reach = self._lengths, 0.5 * self.limits["smoothing"] * np.sqrt(most)
         before = later = lengths
         if len(self.asked) > 1:
-            # A feed changes at one node: between the two beside it the pace does, too.
+            # A feed changes at one node: the pace changes between its neighbours.
             before, later = np.append(lengths[0], lengths[:-1]), np.append(lengths[1:], lengths[-1])
         first = np.searchsorted(lengths, before - reach)
         after = np.searchsorted(lengths, later + reach, side="right")
@@ -248,12 +251,12 @@ class FeedNodes:
 
     @cached_property
     def _gain(self) -> Array:
-        """How much the square of the pace may change per length by changes of speed, (K,)."""
+        """Largest change of the square of the pace per length, (K,)."""
         return np.asarray(2.0 / np.maximum((self.speeds / self._half).max(axis=1), 1e-300))
 
     @cached_property
     def ramps(self) -> list[tuple[slice, Pace, Ints]]:
-        """The nodes of each stretch from rest to rest, its pace, and which node limits each."""
+        """Nodes of each section from rest to rest, its pace, and the limiting node of each."""
         found = []
         for first, last in pairwise(np.searchsorted(self.sigma, self._stops)):
             part = slice(int(first), int(last) + 1)
@@ -264,7 +267,7 @@ class FeedNodes:
 
     @property
     def causes(self) -> list[str]:
-        """What holds the tool at each node where it is slower than its feed."""
+        """Limiting cause at each node where the tool is slower than its feed."""
         return [_CAUSES[k] for k in np.argmin(self._caps, axis=1)[self.narrowest]]
 
     @property

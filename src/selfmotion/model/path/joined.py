@@ -13,7 +13,7 @@ from typing_extensions import override
 
 from selfmotion.basics import Array, Ints, PathError, as_number, read_only, restore, series, shown
 from selfmotion.model.path.base import (
-    STILL,
+    REST_SPEED,
     Path,
     PathSamples,
     PathSeries,
@@ -29,9 +29,7 @@ from selfmotion.model.path.feed_kept import FeedKept
 from selfmotion.model.path.shapes import Line
 from selfmotion.model.task import SE3, exp3, log3
 
-# Tool motions one after the other, and waiting in between.
-
-# Pieces may end this far from where the next one begins [m, rad].
+# Largest gap between consecutive paths [m, rad].
 _GAP = 1e-6
 
 
@@ -108,7 +106,7 @@ class Joined(Path, kind="joined"):
     Parameters
     ----------
     pieces : sequence of Path
-        Each begins where the one before it ends, in pose and speed.
+        Each starts at the end of the one before, in pose and speed.
 
     Raises
     ------
@@ -226,34 +224,34 @@ def _check_joint(one: Path, other: Path, number: int) -> None:
             f"Line between them"
         )
     jump = float(np.abs(other.twist(0.0) - one.twist(one.duration)).max())
-    if jump > STILL:
+    if jump > REST_SPEED:
         raise PathError(
             f"{where} {jump:.3g} m/s or rad/s faster or slower than piece {number} ends; let both "
             f"rest there (time_law='minimum_jerk', section_at_rest)"
         )
 
 
-# Strokes that keep their feed from their begin to their end: run-up and run-down are outside.
-
-# Ways are looked for so often, and a little longer than the last one lacked [of its length].
-_TRIES, _MORE = 12, 0.02
+# Attempts at the lengths of run-up and run-down …
+_TRIES = 12
+# … each longer than the last one lacked by this share.
+_MORE = 0.02
 
 # A line turns by less than that [rad].
 _HALF_TURN = 3.1
 
 
 class Stroke(NamedTuple):
-    """A path at a feed with what is put before and after it.
+    """A path at a feed with run-up and run-down.
 
     Attributes
     ----------
     path : Feed
         From rest to rest.
     begin, end : float
-        When the tool is at the begin and at the end of what was given [s]: in between it is at the
-        feed, wherever bends and corners allow.
+        Times of the given path's start and end [s]: in between the tool has the feed, wherever
+        bends and corners allow.
     run_up, run_down : float
-        How long the ways before and after are [m].
+        Lengths of the run-up and the run-down [m].
     """
 
     path: Feed
@@ -264,18 +262,18 @@ class Stroke(NamedTuple):
 
 
 def with_run_ups(path: Feed) -> Stroke:
-    """Return a path at a feed, made longer at both ends by what it takes to run up and down.
+    """Return a path at a feed, extended at both ends by run-up and run-down.
 
-    The ways go on as the path begins and ends, straight, turning evenly where it turns. They are
-    as long as the acceleration of the feed and its smoothing ask for, so that the feed counts
-    (`FeedKept`), and is judged, from the begin of the path to its end.
+    These continue the path's ends, straight, with a constant turn rate. They are as long as the
+    feed's acceleration and smoothing need, so that the feed counts (`FeedKept`), and is judged,
+    from the start of the path to its end.
 
     Raises
     ------
     PathError
-        It is no `Feed`; the feed does not count at its ends, however long the ways are; or the path
-        begins or ends on the spot, or turning too fast. A feed that the path does not keep in
-        between is none of this: it is refused when it is planned.
+        It is no `Feed`; the feed does not count at its ends with run-ups of any length; or the path
+        starts or ends without translation, or turning too fast. A feed that the path does not keep
+        in between is accepted: it is refused when it is planned.
     """
     if not isinstance(path, Feed):
         raise PathError(f"run-ups: path is {shown(path)}, expected a Feed(path, feed)")
@@ -293,7 +291,7 @@ def with_run_ups(path: Feed) -> Stroke:
             return Stroke(longer, begin, end, *ways.tolist())
         ways += path.feed * np.maximum(missing, 0.0) + _MORE * ways * (missing > 0.0)
         if len(path.feeds) == 1:
-            # Both as long, so that what happens at the ends is on time either way.
+            # Both as long: the ends are symmetric in time.
             ways[:] = ways.max()
     raise PathError(
         f"run-ups: the feed of {path.feed:g} m/s is not reached at the ends of the path with "
@@ -311,7 +309,7 @@ def _lengthened(path: Feed, original: Path, ways: Array) -> tuple[Feed, float, f
 
 
 def _way(path: Path, end: int, length: float) -> Line:
-    """Return the line on which the tool comes to the begin of a path (0), or goes on from its end.
+    """Return the line on which the tool comes to the start of a path (0), or leaves its end.
 
     At the speed of the path, turning on as it turns.
     """

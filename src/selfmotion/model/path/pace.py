@@ -1,4 +1,4 @@
-"""How fast something is run through: a time σ of its own as a function of the time t."""
+"""Paces: a time σ of a motion's own as a function of time t."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -10,18 +10,21 @@ import numpy as np
 
 from selfmotion.basics import Array, Ints, series
 
-# Of samples within this share of a window the first is kept: the jerk of more would be rounding.
+# Samples within this share of a window are merged: more would add rounding to the jerk.
 _CLOSE = 0.1
+# The same across such shares.
 _SAME = 1e-4
-# A pace falls where its rate is below minus this share of the largest; it is looked at so often.
-_FALL, _PLACES = 1e-6, 33
-# Intervals of time are halved so often to find when something is reached.
+# A pace decreases if its rate is below minus this share of the largest …
+_FALL = 1e-6
+# … at this number of places of an interval.
+_PLACES = 33
+# Bisections of the time at which σ has a value.
 _HALVINGS = 52
 
 
 @dataclass(frozen=True, eq=False)
 class Pace:
-    """σ(t) at times, and what it is in between.
+    """σ(t) at times, with interpolation.
 
     Quintic where the second derivative is known, cubic where it jumps.
 
@@ -43,16 +46,17 @@ class Pace:
     bend: Array | None = None
 
     def slower(self, factor: float) -> "Pace":
-        """Return the same, taking `factor` times as long."""
+        """Return the same, `factor` times as long."""
         bend = None if self.bend is None else self.bend / factor**2
         return Pace(factor * self.t, self.sigma, self.rate / factor, bend)
 
     def smoothed(self, window: float) -> "Pace":
         """Return the mean over a window in time [s]: its second derivative jumps no more.
 
-        It rests before its start and after its end, and takes a window longer. From one bend to
-        another the third derivative is at most their difference by the window. The mean of what
-        does not fall does not fall: where one through fewer samples would, it has them all.
+        It rests before its start and after its end, and takes a window longer. Between two bends
+        the third derivative is at most their difference divided by the window. The mean of a
+        function that does not decrease does not decrease either: if fewer samples would make it, it
+        has all.
         """
         thinned = self._mean(window, _CLOSE)
         return thinned if thinned.falls_at() is None else self._mean(window, _SAME)
@@ -68,7 +72,7 @@ class Pace:
         way = spline.antiderivative()
         new = np.union1d(self.t, self.t + window)
         new = new[np.unique(np.floor(new / (close * window)), return_index=True)[1]]
-        # Two that rounding puts on both sides of such a share are one as well.
+        # Neighbours on both sides of such a share are merged as well.
         new = new[np.append(True, np.diff(new) > _SAME * window)]
         new[-1] = self.t[-1] + window
         before = new - window
@@ -89,7 +93,7 @@ class Pace:
     def falls_at(self) -> float | None:
         """Return about when σ falls most, by more than rounding; None where it never does."""
         h = np.diff(self.t)
-        # dσ/dt in Bernstein form: what its control points keep, all of it keeps.
+        # dσ/dt in Bernstein form: bounds of its control points are bounds of all of it.
         coefficients = self._spline.c[::-1][1:]
         degree = len(coefficients) - 1
         powers = np.arange(degree + 1.0)
@@ -99,7 +103,7 @@ class Pace:
         late = np.flatnonzero(points.min(axis=0) < -allowed)
         if not len(late):
             return None
-        # Control points are below the curve: where they are, it is looked at.
+        # Control points are below the curve: it is evaluated where they are negative.
         u = np.linspace(0.0, 1.0, _PLACES)
         rates = np.vander(u, degree + 1, increasing=True) @ local[:, late]
         place, piece = np.unravel_index(int(np.argmin(rates)), rates.shape)
@@ -121,7 +125,7 @@ class Pace:
         if self.bend is None:
             return CubicHermiteSpline(self.t, self.sigma, self.rate)
         h, start, end = np.diff(self.t), 0.5 * self.bend[:-1], 0.5 * self.bend[1:]
-        # What is left at the end of each interval, of the value and of two derivatives.
+        # Remainder at the end of each interval, of the value and of two derivatives.
         rise = (np.diff(self.sigma) - h * (self.rate[:-1] + h * start)) / h**3
         gain = (np.diff(self.rate) - 2.0 * h * start) / h**2
         surge = (end - start) / h
@@ -135,7 +139,7 @@ class Pace:
 
 @cache
 def _bernstein(degree: int) -> Array:
-    """Return what control points are of coefficients of 1, u, u² … on 0 ≤ u ≤ 1."""
+    """Return the matrix from coefficients of 1, u, u² … on 0 ≤ u ≤ 1 to control points."""
     size = degree + 1
     return np.array([[comb(j, k) / comb(degree, k) for k in range(size)] for j in range(size)])
 

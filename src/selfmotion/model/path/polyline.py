@@ -1,4 +1,4 @@
-"""Straight legs with rounded corners, and as few of them as keep near many poses."""
+"""Polylines with rounded corners, and their simplification through poses within tolerances."""
 
 from __future__ import annotations
 
@@ -35,9 +35,12 @@ if TYPE_CHECKING:
 # tolerance. A pose from which the tool goes back along the leg, or that is turned otherwise,
 # divides it as well.
 
-# Legs miss poses by this share of the tolerances: rounding of files. Where they cut off a stub, by
-# that; a stub is shorter than this share of the legs beside it.
-_ROUNDING, _CUT, _STUB = 2e-3, 0.5, 0.25
+# Share of the tolerances by which legs may be off poses: rounding of files.
+_ROUNDING = 2e-3
+# The same where they cut off a stub …
+_CUT = 0.5
+# … which is shorter than this share of the legs next to it.
+_STUB = 0.25
 
 
 class Merged(NamedTuple):
@@ -50,7 +53,7 @@ class Merged(NamedTuple):
     shares : (N,)
         Where each pose is passed: the leg's number, and as its fraction the share of the leg.
     missed, turned : (M - 1,)
-        By how much each leg misses poses at most [m, rad].
+        Largest distance of each leg from its poses [m, rad].
     """
 
     kept: Ints
@@ -60,11 +63,11 @@ class Merged(NamedTuple):
 
 
 def merged(points: Array, turns: Array, tolerance: float, turn_tolerance: float) -> Merged:
-    """Return which of poses (N, 3), (N, 4) legs have to end at.
+    """Return the numbers of poses (N, 3), (N, 4) at which legs have to end.
 
-    Legs miss poses by next to nothing, so that curves of short chords stay what they are. Where a
-    leg shorter than the tolerance stands between legs that are far longer, these miss one of its
-    ends, by half of the tolerances [m, rad] at most.
+    Legs are off poses by next to nothing, so that curves of short chords are unchanged. Where a leg
+    shorter than the tolerance is between legs that are far longer, these are off one of its ends,
+    by half of the tolerances [m, rad] at most.
     """
     measure = _Measure(points, turns, tolerance, turn_tolerance)
     kept = measure.without_stubs(measure.divided(_ROUNDING))
@@ -90,7 +93,7 @@ class _Leg(NamedTuple):
 
 
 class _Measure:
-    """Poses, and what legs between them may miss."""
+    """Poses, and allowed distances of legs from them."""
 
     def __init__(
         self, points: Array, turns: Array, tolerance: float, turn_tolerance: float
@@ -99,16 +102,16 @@ class _Measure:
         self._tolerance, self._turn_tolerance = tolerance, turn_tolerance
 
     def leg(self, first: int, last: int) -> _Leg:
-        """Return what a leg from one pose to another does to those between them."""
+        """Return the leg from one pose to another, with its distances from those between them."""
         return _leg(self._points, self._turns, first, last)
 
     def miss(self, leg: _Leg) -> Array:
-        """Return by how much it misses each, as shares of the tolerances."""
+        """Return its distance from each, as shares of the tolerances."""
         moved = np.maximum(leg.away, leg.back) / self._tolerance
         return np.asarray(np.maximum(moved, leg.turned / self._turn_tolerance))
 
     def divided(self, most: float) -> list[int]:
-        """Return the ends of legs that miss poses by a share of the tolerances."""
+        """Return the ends of legs that are off poses by a share of the tolerances."""
         kept, waiting = [0], [(0, len(self._points) - 1)]
         while waiting:
             first, last = waiting.pop()
@@ -132,7 +135,7 @@ class _Measure:
         lengths = np.linalg.norm(np.diff(self._points[kept], axis=0), axis=1)
         beside = np.concatenate([[np.inf], lengths, [np.inf]])
         bounds = np.minimum(_STUB * np.minimum(beside[:-2], beside[2:]), self._tolerance)
-        # Of thousands of chords none is a stub as a rule.
+        # Thousands of chords rarely have a stub.
         if not (lengths < bounds).any():
             return kept
         found = list(kept)
@@ -184,7 +187,7 @@ def _gone_back(along: Array, passed: Array) -> Array:
 
 
 def _turned(turns: Array, first: int, last: int, shares: Array) -> Array:
-    """Return by how much poses are turned otherwise than a leg passes them [rad]."""
+    """Return the rotations of poses relative to a leg that passes them [rad]."""
     if (turns[first : last + 1] == turns[first]).all():
         return np.zeros(len(shares))
     from scipy.spatial.transform import Rotation
@@ -197,29 +200,29 @@ def _turned(turns: Array, first: int, last: int, shares: Array) -> Array:
 
 # Straight legs with rounded corners.
 
-# The pace of a polyline itself, to be replaced by `Feed` [m/s].
+# Speed of a polyline before `Feed` [m/s].
 _SPEED = 1.0
 # The same where it only turns [rad/s].
 _TURN_RATE = 10.0
 # Poses nearer than this [s of the pace above] are the same.
 _SAME = 1e-9
-# Two corners that are apart by this share of either meet.
+# Corners that are apart by less than this share of either meet.
 _HARDLY = 1e-2
-# The corner is passed at this share of d |Δv|, where the velocity changes by Δv within ± d.
-_MISS = 5.0 / 32.0
-# m(x) / d over u = x / d in the corner, coefficients of 1, u, u² …: ∫∫ 15/16 (1 - u²)² du du.
-_WAY = np.array([_MISS, 0.5, 15.0 / 32.0, 0.0, -15.0 / 96.0, 0.0, 1.0 / 32.0])
+# Distance of the path from a corner, in units of d |Δv|, for a change of velocity Δv within ± d.
+_ROUNDED = 5.0 / 32.0
+# Coefficients of m(x) / d by u = x / d in the corner, of 1, u, u² …: ∫∫ 15/16 (1 - u²)² du du.
+_CORNER = np.array([_ROUNDED, 0.5, 15.0 / 32.0, 0.0, -15.0 / 96.0, 0.0, 1.0 / 32.0])
 
 
 class Polyline(Path, kind="polyline"):
-    """Straight legs from pose to pose; corners are rounded, and missed by no more than tolerances.
+    """Straight legs from pose to pose; corners are rounded within tolerances.
 
-    In a leg the tool moves at a constant speed and turns about a fixed axis. Within a time ± d
-    of a corner its velocity goes over from that of one leg to that of the next by v₁ + Δv m'(x)
-    with m''(x) ∝ (1 - x²/d²)²: the path is C³, and its miss of the corner is 5/32 d |Δv|.
+    In a leg the tool moves at a constant speed and turns about a fixed axis. Within a time ± d of a
+    corner its velocity changes from that of one leg to that of the next by v₁ + Δv m'(x) with
+    m''(x) ∝ (1 - x²/d²)²: the path is C³, and its distance from the corner is 5/32 d |Δv|.
 
-    Poses that legs pass anyway make no corners, nor do legs shorter than the tolerance that stand
-    between far longer ones: what is below the tolerance hardly counts.
+    Poses on legs are no corners, and legs shorter than the tolerance between far longer ones are
+    left out.
 
     Its own pace is 1 m/s, or 10 rad/s where it mostly turns: `Feed` gives it one that fits.
 
@@ -300,10 +303,10 @@ class Polyline(Path, kind="polyline"):
 
     @property
     def knots(self) -> Array:
-        """See `Path.knots`: where corners begin and end, so that steps end there.
+        """See `Path.knots`: starts and ends of corners, so that steps end there.
 
-        Where hardly anything is straight between two corners, the second begins where the first
-        ends: steps of next to no time would turn rounding into accelerations.
+        Where there is hardly any straight leg between two corners, the second starts at the end of
+        the first: very short steps would turn rounding into accelerations.
         """
         half = self._corners.half
         ends, starts = self._times[:-1] + half[:-1], self._times[1:] - half[1:]
@@ -313,7 +316,7 @@ class Polyline(Path, kind="polyline"):
 
     @property
     def marks(self) -> Array:
-        """See `Path.marks`: where corners begin and end, all of them."""
+        """See `Path.marks`: starts and ends of all corners."""
         return read_only(self._edges)
 
     @property
@@ -343,14 +346,14 @@ class Polyline(Path, kind="polyline"):
 
     @cached_property
     def _lasts(self) -> Array:
-        """How long each leg lasts, (N - 1,)."""
+        """Duration of each leg, (N - 1,)."""
         way = np.linalg.norm(np.diff(self._points, axis=0), axis=1) / _SPEED
         turning = np.linalg.norm(self._rotvecs, axis=1) / _TURN_RATE
         return np.asarray(np.maximum(way, turning))
 
     @cached_property
     def _rotvecs(self) -> Array:
-        """How each leg turns, in tool axes [rad], (N - 1, 3)."""
+        """Rotation vector of each leg, in tool axes [rad], (N - 1, 3)."""
         return rotvecs(self._turns)
 
     @cached_property
@@ -369,11 +372,11 @@ class Polyline(Path, kind="polyline"):
         jumps = np.linalg.norm(speeds[after] - speeds[before], axis=1)
         turns = np.linalg.norm(rates[after] - rates[before], axis=1)
         tiny = np.finfo(float).tiny
-        # What legs miss poses by is no longer left to the corners at their ends.
+        # The error of legs reduces the tolerance of the corners at their ends.
         missed, turned = (np.maximum(off[before], off[after]) for off in self._merged[2:])
         half = np.minimum(
-            (self._tolerance - missed) / (_MISS * np.maximum(jumps, tiny)),
-            (self._turn_tolerance - turned) / (_MISS * np.maximum(turns, tiny)),
+            (self._tolerance - missed) / (_ROUNDED * np.maximum(jumps, tiny)),
+            (self._turn_tolerance - turned) / (_ROUNDED * np.maximum(turns, tiny)),
         )
         half = np.minimum(half, 0.5 * np.minimum(lasts[before], lasts[after]))
         return _Corners(speeds[before], speeds[after], rates[before], rates[after], half)
@@ -418,7 +421,7 @@ class Polyline(Path, kind="polyline"):
         corners, x = self._corners, middle - self._times[k]
         wide = np.where(corners.half[k] > 0.0, corners.half[k], 1.0)
         inside = np.abs(x) < corners.half[k]
-        bend = wide * series.recentred(_WAY[:, None], x / wide, half / wide)
+        bend = wide * series.recentred(_CORNER[:, None], x / wide, half / wide)
         beside = np.zeros_like(bend)
         beside[:2] = np.where(x > 0.0, np.stack([x, half]), 0.0)
         after = np.where(inside, bend, beside)
@@ -462,6 +465,6 @@ def _passed(x: Array, half: Array) -> tuple[Array, Array]:
     u = np.clip(x / np.where(half > 0.0, half, 1.0), -1.0, 1.0)
     # ∫ 15/16 (1 - u²)² du.
     share = 0.5 + 15.0 / 16.0 * (u - 2.0 / 3.0 * u**3 + u**5 / 5.0)
-    way = np.polynomial.polynomial.polyval(u, _WAY)
+    way = np.polynomial.polynomial.polyval(u, _CORNER)
     inside = np.abs(x) < half
     return np.where(inside, half * way, np.maximum(x, 0.0)), np.where(inside, share, x > 0.0)

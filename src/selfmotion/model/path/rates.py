@@ -1,27 +1,28 @@
-"""How a tool's velocity changes, and pieces of a path by which steps in time are measured."""
+"""Rates of a tool's velocity by differences, with steps by intervals of the path."""
 
 import numpy as np
 
 from selfmotion.basics import Array, Ints
 from selfmotion.model.path.base import Path
 
-# Marks nearer to each other than this share of the duration are one: times know no better.
+# Marks nearer to each other than this share of the duration are merged: rounding of times.
 _SAME = 1e-9
-# Differences are taken over this share of the piece that a time is in, however long the path
-# around it lasts: a loop is one of many, and all of them are seen.
+# Step of differences, as a share of the interval that a time is in: a loop is one of many, and each
+# is resolved.
 _STEP = 2e-5
-# But not over less than this share of the duration, beside which times are rounded, and never over
-# more than leaves room for all that a difference takes.
-_LEAST_STEP, _ROOM = 1e-8, 5.0
-# Where values are taken: in steps from the middle of a difference.
+# Smallest step, as a share of the duration: times are rounded.
+_LEAST_STEP = 1e-8
+# Steps that have to fit into an interval.
+_ROOM = 5.0
+# Offsets of a difference's samples from its middle, in steps.
 _OFFSETS = np.arange(-2.0, 3.0)
 
 
 def edges_of(times: Array) -> Array:
     """Return the knots or marks of a path, each once, (E,) [s]: from 0 to the duration.
 
-    A step in time that is to see what the tool does is a share of what lies between two of them: a
-    path may be a short motion beside a long wait.
+    Steps in time for the tool's motion are shares of the distance of two of them: a path may be a
+    short motion next to a long wait.
     """
     times, near = np.asarray(times), _SAME * float(times[-1])
     inner = times[(times > near) & (times < times[-1] - near)]
@@ -30,11 +31,10 @@ def edges_of(times: Array) -> Array:
 
 
 def spread_along(path: Path, count: int) -> Array:
-    """Return so many times at which a path is looked at, from 0 to the duration, (count,) [s].
+    """Return `count` sample times of a path, from 0 to the duration, (count,) [s].
 
-    Half of them are spread evenly in time, and half evenly over the pieces of the path: what lasts
-    a moment beside a long wait is looked at as well as the wait. Evenly in time where there is but
-    one piece.
+    Half of them are spread evenly in time, and half evenly over the intervals of the path: a short
+    motion is resolved next to a long wait. Evenly in time for a single interval.
     """
     edges = edges_of(path.marks)
     share = edges / path.duration + np.linspace(0.0, 1.0, len(edges))
@@ -66,7 +66,7 @@ def _rates_within(path: Path, edges: Array, piece: Ints, t: Array) -> Array:
     first, last = edges[piece], edges[piece + 1]
     step = np.maximum(_STEP * (last - first), _LEAST_STEP * path.duration)
     step = np.minimum(step, (last - first) / _ROOM)
-    # Half a step off the edges: an edge itself belongs to one of its pieces only.
+    # Half a step off the edges: an edge belongs to one interval only.
     middle = np.clip(t, first + 2.5 * step, last - 2.5 * step)
     times = middle[:, None] + step[:, None] * _OFFSETS
     twists = path.samples(np.clip(times.ravel(), 0.0, path.duration)).twist

@@ -31,14 +31,14 @@ _JERK = (0.0, 0.0, 0.0, 10.0, -15.0, 6.0)
 
 
 class TimeLaw(Enum):
-    """How far along the path (0 to 1) the tool is at normalised time τ (0 to 1)."""
+    """Share of the path (0 to 1) at normalised time τ (0 to 1)."""
 
     CONSTANT = "constant"
     MINIMUM_JERK = "minimum_jerk"
 
     @classmethod
     def of(cls, law: TimeLaw | str) -> TimeLaw:
-        """Return the time law of that name; PathError where there is none."""
+        """Return the time law of that name; PathError for an unknown one."""
         try:
             return cls(law)
         except ValueError:
@@ -72,9 +72,6 @@ _TIME_LAWS: dict[TimeLaw, Callable[[Array], tuple[Array, Array]]] = {
 }
 
 
-# What circles and spirals share: an axis, and a tool that may turn with them.
-
-
 class Round(Path):
     """A tool motion about an axis; see `Circle` and `Spiral` for its fields."""
 
@@ -104,7 +101,7 @@ class Round(Path):
         return replace(self, time_law=TimeLaw.CONSTANT)  # type: ignore[type-var]  # dataclasses
 
     def _oriented(self, turned: Array, omega: Array) -> tuple[Array, Array]:
-        """Return the tool's orientations and angular velocities where the way has turned so far."""
+        """Return the tool's orientations and angular velocities after turns of the path."""
         if self.turn_tool:
             return turned @ self.start.rotation, omega
         return np.tile(self.start.rotation, (len(turned), 1, 1)), np.zeros_like(omega)
@@ -188,7 +185,7 @@ class Circle(Round, kind="circle"):
     duration : float
         [s].
     turns : float
-        How many times round; negative for clockwise.
+        Number of turns; negative for clockwise.
     turn_tool : bool
         Whether the tool turns with the circle. By default its orientation stays.
     time_law : {"minimum_jerk", "constant"}
@@ -218,7 +215,7 @@ class Circle(Round, kind="circle"):
         normal: npt.ArrayLike = (0.0, 0.0, 1.0),
         **options: Any,
     ) -> Circle:
-        """Return a circle of `radius` [m] that begins at `start`.
+        """Return a circle of `radius` [m] that starts at `start`.
 
         Its centre lies from the start in the direction of -x, or of -y where the axis is x.
         `options` are those of the class.
@@ -258,9 +255,7 @@ class Circle(Round, kind="circle"):
         return self._with_tool(self.radius * round_axis, round_axis)
 
 
-# Spirals in a plane, helices, and what is both.
-
-# Nearer to the axis [m] there is no direction away from it.
+# Distance from the axis [m] below which there is no radial direction.
 _ON_AXIS = 1e-9
 
 
@@ -281,7 +276,7 @@ class Spiral(Round, kind="spiral"):
     duration : float
         [s].
     turns : float
-        How many times round; negative for clockwise.
+        Number of turns; negative for clockwise.
     radius : float
         Distance from the axis at the end [m].
     rise : float
@@ -330,7 +325,7 @@ class Spiral(Round, kind="spiral"):
 
     @property
     def _direction(self) -> Array:
-        """Where the spiral begins, seen from the axis; from on it some direction."""
+        """Radial direction of the start, seen from the axis; on it any direction."""
         if self.start_radius > _ON_AXIS:
             return unit(self._away)
         other = np.eye(3)[np.argmin(np.abs(self.normal))]

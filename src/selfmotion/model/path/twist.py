@@ -16,28 +16,33 @@ from selfmotion.basics import Array, PathError, as_numbers, series, shown
 from selfmotion.model.path.base import Path, PathSamples, PathSeries, check_duration, path_pose
 from selfmotion.model.task import SE3, Quaternion
 
+# Degree of the Chebyshev segments.
 _DEGREE = 24
-# Chebyshev tail, relative to the largest velocity, at which a piece counts as resolved.
+# Chebyshev tail, relative to the largest velocity, at which a segment counts as resolved.
 _TAIL = 1e-13
+# Shortest segment, as a share of the duration.
 _SHORTEST = 2.0**-12
-# Between its nodes a piece is compared with the velocity at so many places, or as many of so many
-# on the whole path as lie in it; and may differ by this share of the largest velocity.
-_BESIDES, _IN_ALL, _MISSED = 16, 2048, 1e-9
-# What two pieces may differ by where they meet, relative to the largest velocity.
+# Places between its nodes at which a segment is compared with the velocity …
+_BESIDES = 16
+# … or as many of so many on the whole path as are in it …
+_IN_ALL = 2048
+# … and the largest difference, relative to the largest velocity.
+_MISSED = 1e-9
+# Largest difference of two segments at their common end, likewise.
 _JUMP = 1e-9
-# The longest step of the orientation's integration, as a share of a piece.
+# Largest step of the orientation's integration, as a share of a segment.
 _STEP = 0.25
-# A path that turns farther than this [rad] is not meant.
+# A path that turns farther than this [rad] is an error.
 _MOST_TURNED = 300.0
 
 
 class TwistPath(Path, kind="twist"):
     """A start pose and a velocity function.
 
-    The function is represented by piecewise Chebyshev polynomials to 13 digits where it is looked
-    at, which is at 2,048 places at least: what comes and goes within less than a thousandth of the
-    duration may be missed. Positions are their exact integral, orientations that of an eighth-order
-    Runge-Kutta method (DOP853) from piece to piece.
+    The function is approximated by piecewise Chebyshev polynomials to 13 digits at its samples, of
+    which there are 2,048 at least: changes within less than a thousandth of the duration may be
+    missed. Positions are their exact integral, orientations that of an eighth-order Runge-Kutta
+    method (DOP853) by segments.
 
     Parameters
     ----------
@@ -126,7 +131,7 @@ class TwistPath(Path, kind="twist"):
             x, w = quaternion[:3], quaternion[3]
             return 0.5 * np.append(w * omega + np.cross(omega, x), -omega @ x)
 
-        # Piece by piece: what a piece resolves, steps from afar would pass over.
+        # Segment by segment: steps across segments would not resolve them.
         at, solutions = Quaternion(self._start.rotation).coeffs(), []
         for left, right in pairwise(self._breaks.tolist()):
             # Of errors too small for numbers the solver divides nothing by nothing.
@@ -253,7 +258,7 @@ def _fits(
     duration: float,
     scale: float,
 ) -> bool:
-    """Return whether a piece is the velocity at places in between, which its nodes may miss."""
+    """Return whether a segment equals the velocity between its nodes."""
     count = max(_BESIDES, int(np.ceil(_IN_ALL * (right - left) / duration)))
     s = np.linspace(-1.0, 1.0, count + 1)[:-1] + 1.0 / count
     values = np.array([_sample(velocity, t) for t in 0.5 * (left + right + (right - left) * s)])
@@ -276,7 +281,7 @@ def _check_jumps(breaks: list[float], pieces: list[Array], scale: float) -> None
 def _check_ends(
     velocity: Callable[[float], npt.ArrayLike], duration: float, pieces: list[Array], scale: float
 ) -> None:
-    """Refuse a velocity that jumps next to an end, where no point lies that is looked at."""
+    """Refuse a velocity that jumps next to an end, beyond all samples."""
     for time, place, piece in ((0.0, -1.0, pieces[0]), (duration, 1.0, pieces[-1])):
         jump = float(np.abs(chebyshev.chebval(place, piece) - _sample(velocity, time)).max())
         if not jump <= _JUMP * max(scale, 1e-300):

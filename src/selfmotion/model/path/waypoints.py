@@ -32,23 +32,23 @@ from selfmotion.model.task import SE3, Quaternion, turn, turning
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
 
-# What waypoints are given, checked; and where they bend.
-
-# What quaternions are called in files, and as an argument.
-_IN_FILES, _ARGUMENT = "quaternions", "quaternions_wxyz"
+# Key of quaternions in files.
+_IN_FILES = "quaternions"
+# Their argument.
+_ARGUMENT = "quaternions_wxyz"
 
 
 def bends(legs: Array, angle: float, least: float) -> npt.NDArray[np.bool_]:
-    """Return where legs (N - 1, 3) change their direction by more than `angle`, (N - 2,)."""
+    """Return the mask of direction changes of legs (N - 1, 3) above `angle`, (N - 2,)."""
     lengths = np.linalg.norm(legs, axis=1)
     cosine = np.einsum("ki,ki->k", legs[:-1], legs[1:])
-    # What hardly moves on one side has no direction there, hence no kink.
+    # Very short legs have no direction, hence no kink.
     moves = (lengths[:-1] > least) & (lengths[1:] > least)
     return np.asarray((cosine < np.cos(angle) * lengths[:-1] * lengths[1:]) & moves)
 
 
 def as_table(values: npt.ArrayLike, name: str) -> Array:
-    """Return numbers of waypoints; PathError names what is none."""
+    """Return numbers of waypoints; PathError with the first that is none."""
     return as_numbers(values, f"waypoints: {name}", error=PathError)
 
 
@@ -60,7 +60,7 @@ def scalar_first(orientations: npt.ArrayLike | Rotation) -> npt.ArrayLike:
 
 
 def of_file(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what a file says as arguments: its `quaternions` are w, x, y, z."""
+    """Return the values of a file as arguments: its `quaternions` are w, x, y, z."""
     given = dict(values)
     if _IN_FILES in given:
         if _ARGUMENT in given:
@@ -137,7 +137,7 @@ class Turning:
 _COLUMNS = ("t", "x", "y", "z")
 _QUATERNION = ("qw", "qx", "qy", "qz")
 # Poses nearer than this [m], and cosine of half the angle, are the same.
-_STILL = 1e-12
+_REST = 1e-12
 # Legs that turn by less than this [rad] have no direction of rotation.
 _TURNED = 1e-3
 
@@ -159,9 +159,9 @@ class Waypoints(Path, kind="waypoints"):
         numbers have to be in this one. By default none is prescribed, for
         tasks that leave it free ('position').
     corners : {"blend", "stop"}
-        What to do where the path has a kink (see `corner_angle`): swing smoothly through the
-        waypoint, leaving the straight legs a little on both sides, or come to rest in it, and at
-        both ends, and keep the legs. Either way each waypoint is met at its time.
+        Motion at kinks of the path (see `corner_angle`): a smooth one through the waypoint, which
+        deviates from the straight legs on both sides, or a rest in it, and at both ends, on the
+        legs. Either way each waypoint is reached at its time.
     corner_angle : float
         Change of direction from one leg to the next, of motion or of rotation, that counts as a
         kink [rad].
@@ -280,14 +280,14 @@ class Waypoints(Path, kind="waypoints"):
             stops[[0, -1]] = True
         # Two equal poses in a row are a pause: the tool comes to rest, and stays.
         alike = np.abs(np.einsum("ki,ki->k", self._turns[:-1], self._turns[1:]))
-        pauses = (lengths <= _STILL) & (alike >= 1.0 - _STILL)
+        pauses = (lengths <= _REST) & (alike >= 1.0 - _REST)
         stops[:-1] |= pauses
         stops[1:] |= pauses
         return stops
 
     @cached_property
     def _bounds(self) -> npt.NDArray[np.intp]:
-        """Waypoints at which pieces of the path begin and end."""
+        """Waypoints at the ends of the path's smooth sections."""
         return np.flatnonzero(self._stops | (self._t == 0.0) | (self._t == self.duration))
 
     @cached_property

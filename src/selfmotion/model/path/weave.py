@@ -22,27 +22,26 @@ from selfmotion.model.path.base import (
 )
 from selfmotion.model.path.pace import Pace, times_when
 
-# The length of the seam is measured about so often, and from mark to mark.
+# Approximate number of samples of the seam's length, and all marks.
 _ABOUT = 400
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(8)
-# How far from a node, by the distance of nodes, changes of the speed are measured.
+# Distance from a node at which changes of the speed are evaluated, relative to that of nodes.
 _BESIDE = 1e-4
-# More swings than this take longer than anybody plans for: an hour of a fast weld has some 6,000.
+# Largest number of swings: an hour of a fast weld has some 6,000.
 _MOST_SWINGS = 20_000
-# A swing as wide as this [m] is a slip of units.
+# A swing as wide as this [m] is an error of units.
 _WIDEST = 0.5
-# From 0 to 1 with slopes and curvatures 0 at both ends: 10x³ - 15x⁴ + 6x⁵.
+# Polynomial from 0 to 1 with slopes and curvatures 0 at both ends: 10x³ - 15x⁴ + 6x⁵.
 _STEP = np.array([0.0, 0.0, 0.0, 10.0, -15.0, 6.0])
 
 
 class Weave(_InStep, kind="weave"):
     """A path along which the tool swings from side to side, as welders do.
 
-    At the time t the tool is beside the path by y(ψ(t)) along an axis of its own frame, with the
-    orientation that the path has there. ψ counts swings by the length of the path, so that they are
-    as long as each other whatever the feed is; their number is whole. The swing grows over the
-    first one and vanishes over the last one as g(x) = 10x³ - 15x⁴ + 6x⁵, so that y, y′ and y″ are 0
-    at both ends.
+    At the time t the tool is next to the path by y(ψ(t)) along an axis of its own frame, with the
+    path's orientation. ψ counts swings by the length of the path, so that they are equally long at
+    any feed; their number is whole. The swing grows over the first one and vanishes over the last
+    one as g(x) = 10x³ - 15x⁴ + 6x⁵, so that y, y′ and y″ are 0 at both ends.
 
     Parameters
     ----------
@@ -55,9 +54,9 @@ class Weave(_InStep, kind="weave"):
     axis : (3,)
         Direction of the swing in the tool's frame.
     dwell : float
-        For what share of a swing the tool stays at each edge, from 0 to below 0.5. With 0 the swing
-        is the sine y = amplitude · g · sin 2πψ; otherwise the tool goes from edge to edge as g
-        over ½ - dwell of a swing, with continuous accelerations, half of it at whole ψ.
+        Share of a swing that the tool stays at each edge, from 0 to below 0.5. With 0 the swing is
+        the sine y = amplitude · g · sin 2πψ; otherwise the tool goes from edge to edge as g over ½
+        - dwell of a swing, with continuous accelerations, half of it at whole ψ.
 
     Raises
     ------
@@ -114,7 +113,7 @@ class Weave(_InStep, kind="weave"):
 
     @property
     def swings(self) -> int:
-        """How many times the tool goes there and back."""
+        """Number of swings there and back."""
         return round(float(self._lengths[1][-1]) / self._pitch)
 
     @cached_property
@@ -129,7 +128,7 @@ class Weave(_InStep, kind="weave"):
         ends = np.zeros(len(breaks)), np.full(len(breaks), self.duration)
         found = np.concatenate([self._path.marks, pace.t, times_when(pace, breaks, *ends)])
         found = np.unique(found[(found >= 0.0) & (found <= self.duration)])
-        # Of two within rounding one is enough, the last one being the end.
+        # Of two equal times one is dropped; the last one is the end.
         apart = np.append(np.diff(found) > 1e-12 * self.duration, True)
         return read_only(np.append(0.0, found[apart & (found > 1e-12 * self.duration)]))
 
@@ -158,7 +157,7 @@ class Weave(_InStep, kind="weave"):
         return PathSeries(known.translation + beside, known.rotation)
 
     def _swing(self, count: Array) -> tuple[Array, Array]:
-        """Return y and dy/dψ after so many swings (K,)."""
+        """Return y and dy/dψ at numbers of swings (K,)."""
         grown, grows = self._grown(count)
         inside = count - np.floor(count)
         if self._dwell:
@@ -174,7 +173,7 @@ class Weave(_InStep, kind="weave"):
         return a * grown * beside, a * (grows * beside + grown * slope)
 
     def _grown(self, count: Array) -> tuple[Array, Array]:
-        """Return what share of the amplitude a swing has, and its slope."""
+        """Return the share of the amplitude of a swing, and its slope."""
         last = float(self.swings)
         near = np.clip(np.minimum(count, last - count), 0.0, 1.0)
         slope = _horner(_STEP[1:, None] * np.arange(1.0, 6.0)[:, None], near)
@@ -201,7 +200,7 @@ class Weave(_InStep, kind="weave"):
 
     @cached_property
     def _cycle(self) -> tuple[Array, Array]:
-        """Return where pieces of a swing with dwells begin, (P + 1,), and those, (6, P).
+        """Return ends and coefficients of segments of a swing with dwells, (P + 1,), (6, P).
 
         From the middle to one edge, across to the other one, and back to the middle.
         """
@@ -217,7 +216,7 @@ class Weave(_InStep, kind="weave"):
 
     @cached_property
     def _count(self) -> Pace:
-        """How many swings were made by when."""
+        """Number of swings as a function of time."""
         t, lengths = self._lengths
         share = self.swings / lengths[-1]
         step = _BESIDE * np.min(np.diff(t))

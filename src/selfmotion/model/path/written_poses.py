@@ -11,7 +11,7 @@ from selfmotion.model.task import SE3, Quaternion, exp3, rpy
 
 # A quaternion shorter than this has no direction.
 _ZERO = 1e-9
-# No position or angle is beyond this, NaN and infinity included.
+# Largest position or angle; excludes NaN and infinity.
 _HUGE = 1e15
 
 
@@ -25,7 +25,7 @@ def from_quaternion(values: Array) -> Array:
     return np.asarray(Quaternion(w, x, y, z).toRotationMatrix())
 
 
-# What is to be known of a path whose file says no more of orientations than the tool's z axis.
+# Note on a path whose file has no orientations but the tool's z axis.
 TURN_NOTE = (
     "nx,ny,nz say where the tool's z axis points, not how the tool is turned about it: that turn "
     "is made up (the x axis near the world's x), and kept by task 'pose'; task 'pointing' leaves "
@@ -55,7 +55,7 @@ def _from_matrix(values: Array) -> Array:
     return np.asarray(path_pose(matrix, "the pose").rotation)
 
 
-# Key → shape of its numbers, and what makes a rotation of them.
+# Key → shape of its numbers, and function to a rotation.
 ORIENTATIONS: Mapping[str, tuple[tuple[int, ...], Callable[[Array], Array]]] = {
     "rotation": ((3, 3), _from_matrix),
     "quaternion": ((4,), from_quaternion),
@@ -75,7 +75,7 @@ def pose_of(value: Any) -> SE3:
     Raises
     ------
     ValueError, PathError
-        It is none; the message says what was found and expected.
+        It is no pose; the message has the value and the expected form.
     """
     if isinstance(value, list):
         return path_pose(numbers(value, (4, 4), "the matrix"), "the pose")

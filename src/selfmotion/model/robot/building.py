@@ -15,7 +15,7 @@ from selfmotion.model.robot.named import names_of
 from selfmotion.model.robot.tree_arrays import Follower, coupling_of, follower_of, tighter_limits
 from selfmotion.model.robot.urdf import BASE_JOINT, Urdf, UrdfJoint, parse_urdf
 
-# A joint that is held may be this far beyond its limits [rad or m]: rounding of a file.
+# Excess of a held joint over its limits that counts as rounding of a file [rad or m].
 _BESIDE = 1e-9
 
 
@@ -160,7 +160,7 @@ def rebuild_robot(
     reference: str | None = None,
     limits: Mapping[str, Sequence[float]] | None = None,
 ) -> RobotModel:
-    """Build an arm from what a saved plan carries of it; files of before say no `limits`."""
+    """Build an arm from the values of a saved plan; files of older versions have no `limits`."""
     urdf = parse_urdf(text, source=source, package_dirs=tuple(package_dirs))
     # The text has the continuous joints as revolute ones already.
     urdf = urdf.with_continuous(continuous)
@@ -200,7 +200,7 @@ def with_moved_base(robot: RobotModel, by: pin.SE3) -> RobotModel:
 
 
 def root_place(robot: RobotModel) -> Array:
-    """Return where the root link of an arm as it is drawn stands in the world, (3,) [m]."""
+    """Return the position of an arm's nominal root link in the world, (3,) [m]."""
     urdf = robot.urdf
     link = urdf.joints[BASE_JOINT].child if BASE_JOINT in urdf.joints else urdf.root
     return np.array(robot.carrier_of(link)[1].translation)
@@ -237,7 +237,7 @@ def _locked_joints(
     lock: Mapping[str, float],
     followers: Mapping[str, Follower],
 ) -> dict[str, float]:
-    """Return where the joints off the chain are held, but for those that mimic one on it."""
+    """Return the positions of held joints off the chain, but for those that mimic one on it."""
     locked: dict[str, float] = {}
 
     def hold(name: str) -> float:

@@ -1,7 +1,7 @@
 """Arms as they were measured: joints elsewhere than the URDF draws them.
 
-What is measured replaces the placements of joints in the URDF's text, so that kinematics, bodies,
-saved plans and replays know of it without a word; the drawn ones stay there beside it.
+Measured values replace the placements of joints in the URDF's text, so that kinematics, bodies,
+saved plans and replays include them; the nominal ones are kept next to them.
 """
 
 import dataclasses
@@ -25,8 +25,9 @@ from selfmotion.model.robot.calibration_files import (
 from selfmotion.model.robot.model import RobotModel
 from selfmotion.model.robot.urdf import CALIBRATION, NOMINAL, Urdf
 
+# Link of the tool flange in calibration files.
 _TOOL = "tool0"
-# By this much a rotation may be missed by its angles.
+# Error of a rotation by its angles that counts as rounding.
 _ROUNDING = 1e-12
 
 
@@ -110,7 +111,7 @@ def _of_file(
 
 
 def _ending(joints: Mapping[str, ElementTree.Element], prefix: str, name: str, file: Path) -> str:
-    """Return the joint of that name, whatever stands before it."""
+    """Return the joint of that name, with any prefix."""
     found = [known for known in joints if known.startswith(prefix) and known.endswith(name)]
     if len(found) != 1:
         raise RobotError(
@@ -152,7 +153,7 @@ def _axis(joint: ElementTree.Element) -> Array:
 
 
 def _moved(joint: ElementTree.Element, offset: float) -> pin.SE3:
-    """Return what a joint does when its coordinate grows by an offset."""
+    """Return the motion of a joint when its coordinate grows by an offset."""
     if joint.get("type") == "prismatic":
         return pin.SE3(np.eye(3), offset * _axis(joint))
     if joint.get("type") not in ("revolute", "continuous"):

@@ -20,18 +20,20 @@ from selfmotion.basics import (
     shown,
 )
 
-# What Universal Robots' kinematics file has for each of its six frames, and their names.
+# Frames of Universal Robots' kinematics file.
 FRAMES = ("shoulder", "upper_arm", "forearm", "wrist_1", "wrist_2", "wrist_3")
+# Their coordinates there.
 _COORDINATES = ("x", "y", "z", "roll", "pitch", "yaw")
 # Corrections of Denavit-Hartenberg parameters in their calibration.conf.
 DELTAS = ("delta_theta", "delta_a", "delta_d", "delta_alpha")
 _DELTA = re.compile(r"^\s*(delta_\w+)\s*=\s*\[([^\]]*)\]", re.MULTILINE)
+# Keys of a joint's placement.
 _PLACEMENT = ("position", "rpy")
 
 
 @dataclass(frozen=True, eq=False)
 class CalibrationFile:
-    """What a calibration file holds; what it does not is empty.
+    """Content of a calibration file; missing values are empty.
 
     Attributes
     ----------
@@ -176,7 +178,7 @@ JOINTS = (
     "wrist_2_joint",
     "wrist_3_joint",
 )
-# By this much axes of a URDF may differ from the maker's [m, rad].
+# Difference of axes of a URDF from the maker's that counts as rounding [m, rad].
 _ALIKE = 1e-6
 _QUARTER = 0.5 * np.pi
 # α of the maker's Denavit-Hartenberg parameters.
@@ -314,7 +316,7 @@ def _corrected(
         turn = pin.SE3(pin.rpy.rpyToMatrix(0.0, 0.0, theta[k]), np.zeros(3))
         found.append(_nearest_on_axis(place * turn, nominal[k]))
         place = place * turn * _moved(a[k], 0.0, d[k]) * _turned(_ALPHA[k] + alpha[k])
-    # The last one is the flange, whose axis it is.
+    # The last one is the flange's axis.
     return [*found[:5], place]
 
 

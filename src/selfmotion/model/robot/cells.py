@@ -34,7 +34,7 @@ _NAMES = (
 
 
 def is_placement(joint: UrdfJoint) -> bool:
-    """Return whether a joint puts a part of a cell where it stands."""
+    """Return whether a joint places a part of a cell."""
     return joint.kind == "fixed" and joint.name == f"{joint.child.partition('/')[0]}/{_PLACEMENT}"
 
 

@@ -21,7 +21,7 @@ from selfmotion.basics import Array, Ints
 from selfmotion.model.robot.placements import place_along, rebase
 from selfmotion.model.robot.tree_arrays import JOINT, ChainArrays, Coupling, serial_arrays
 
-# The frame that does not move.
+# Number of the world's frame.
 WORLD = 0
 _AXES = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 
@@ -64,7 +64,7 @@ class Kinematics:
         else:
             self.jacobian = np.zeros((6, chain.dof), order="F")
             self.rotation, self.translation = np.zeros((3, 3), order="F"), np.zeros(3)
-        # The columns of all joints of the model, of which some may mimic others.
+        # Columns of all joints of the model, of which some may mimic others.
         is_plain = chain.coupling.is_plain
         self._every = self.jacobian if is_plain else np.zeros((6, chain.model.nv), order="F")
 
@@ -130,7 +130,7 @@ class Kinematics:
         return self.beside()
 
     def beside(self) -> Array:
-        """Return the same where the data are those of the configuration already."""
+        """Return the same for data that are of the configuration already."""
         self.place_frames()
         chain = self.chain
         if chain.is_rooted:
@@ -179,7 +179,7 @@ class Chain:
         return self.model, self.tip, self.base, self.coupling
 
     def __setstate__(self, state: tuple[Any, int, int, Coupling]) -> None:
-        # What belongs to a thread does not travel to another process.
+        # Data of a thread are not sent to another process.
         self.__init__(*state)  # type: ignore[misc]
 
     @property
@@ -189,7 +189,7 @@ class Chain:
 
     @property
     def is_rooted(self) -> bool:
-        """Whether the base is the world, all joints are on the way to the tip, none mimics one."""
+        """Whether the base is the world, all joints are on the chain, and none mimics one."""
         return self.base == WORLD and self.coupling.is_plain and len(self.joints) == self.dof
 
     def to_base(self) -> "Chain":
@@ -212,7 +212,7 @@ class Chain:
         return str(self.model.frames[self.tip].name)
 
     def kinematics(self, data: Any = None) -> Kinematics:
-        """Return the chain's kinematics for whoever asks often.
+        """Return the chain's kinematics, for repeated calls.
 
         With data of their own, or those of another chain of the tree.
         """
@@ -236,10 +236,10 @@ class Chain:
         return own.at(q), np.array(own.rotation), np.array(own.translation)
 
     def along(self, q: Array) -> tuple[Array, Array, Array]:
-        """Return the same at many configurations (K, n): (K, 6, n), (K, 3, 3) and (K, 3)."""
+        """Return the same at configurations (K, n): (K, 6, n), (K, 3, 3) and (K, 3)."""
         jacobians = np.zeros((len(q), 1, 6, self.dof))
         rotations, translations = np.empty((len(q), 1, 3, 3)), np.empty((len(q), 1, 3))
-        # A copy: kernels are compiled anew for what may not be written to.
+        # A copy: kernels would be compiled again for read-only arrays.
         place_along(np.array(q), self.table[None], jacobians, rotations, translations)
         return jacobians[:, 0], rotations[:, 0], translations[:, 0]
 
@@ -281,7 +281,7 @@ class Chain:
         return len(self.joints) < len(self.table) - 1
 
     def every_along(self, q: Array) -> Array:
-        """Return the columns of the tip's Jacobian by each joint on the way at q (K, n), (K, 6, c).
+        """Return the tip's Jacobian by each joint of the chain at q (K, n), (K, 6, c).
 
         Each times its scale, so that those of a coordinate add up to its column.
         """
@@ -314,7 +314,7 @@ class Chain:
 
     @cached_property
     def table(self) -> Array:
-        """What compiled kinematics need of its joints, then of its tip, (c + 1, 6, 3)."""
+        """Table of its joints and tip for compiled kinematics, (c + 1, 6, 3)."""
         return self.arrays.table
 
     @cached_property

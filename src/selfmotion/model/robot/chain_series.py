@@ -1,4 +1,4 @@
-"""How fast a chain moves: bounds of all derivatives, and rates along a motion."""
+"""Majorant series of a chain's motion: bounds of all derivatives, and rates along a motion."""
 
 from collections.abc import Iterator
 from functools import cached_property
@@ -10,14 +10,12 @@ from selfmotion.basics import Array, series
 from selfmotion.model.robot.chain import WORLD, Chain
 from selfmotion.model.robot.model import RobotModel
 
-# Bounds of all derivatives of where and how a chain moves, by majorant series.
-
 
 class ChainSeries:
     """Majorants of a chain's motion over I intervals of time; see `selfmotion.basics.series`.
 
-    A joint that turns by q is bounded by exp(Q), a product of rotations by the exponential of the
-    sum, a place by the sum of what is carried times what carries it.
+    A joint's rotation by q is bounded by exp(Q), a product of rotations by the exponential of the
+    sum, a position by the sum of products of carried offset and carrier.
 
     Parameters
     ----------
@@ -77,7 +75,7 @@ class ChainSeries:
         return found
 
     def is_revolute(self, joint: int) -> bool:
-        """Return whether a joint turns."""
+        """Return whether a joint is revolute."""
         return bool(self._is_revolute[joint])
 
     def parent(self, joint: int) -> int:
@@ -89,22 +87,22 @@ class ChainSeries:
         return series.derivative(self._every[joint], self.half)
 
     def place(self, frame: int) -> Array:
-        """Return where a frame is [m], by its number."""
+        """Return the position of a frame [m], by its number."""
         at = self.robot.model.frames[frame]
         length = float(np.linalg.norm(at.placement.translation))
         parent = int(at.parentJoint)
         return np.asarray(self.places[parent] + length * self.turned[parent])
 
     def orientation(self, frame: int) -> Array:
-        """Return how a frame is turned."""
+        """Return the orientation of a frame."""
         return self.turned[int(self.robot.model.frames[frame].parentJoint)]
 
     def spin(self, frame: int) -> Array:
-        """Return how fast a frame turns [rad/s]."""
+        """Return the angular velocity of a frame [rad/s]."""
         return self.spins[int(self.robot.model.frames[frame].parentJoint)]
 
     def relative(self, chain: Chain) -> tuple[Array, Array]:
-        """Return where the tip of a chain is in its base frame [m], and how it is turned there."""
+        """Return the position of a chain's tip in its base frame [m], and its orientation there."""
         if chain.base == WORLD:
             return self.place(chain.tip), self.orientation(chain.tip)
         tree, _, last = chain.arrays
@@ -121,7 +119,7 @@ class ChainSeries:
         return place + float(np.linalg.norm(last)) * turned, turned
 
     def relative_spin(self, chain: Chain) -> Array:
-        """Return how fast the tip of a chain turns in its base frame [rad/s]."""
+        """Return the angular velocity of a chain's tip in its base frame [rad/s]."""
         if chain.base == WORLD:
             return self.spin(chain.tip)
         total, spin = np.zeros_like(self.joints[0]), np.zeros_like(self.joints[0][1:])

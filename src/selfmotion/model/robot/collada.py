@@ -3,13 +3,13 @@
 import re
 from pathlib import Path
 
-# How much of a file is looked at: the unit stands at its head.
+# Bytes at the head of a file that are searched for its unit.
 _HEAD = 100_000
 _UNIT = re.compile(rb"<unit\b[^>]{0,200}?\bmeter\s*=\s*[\"']\s*([0-9.eE+-]+)\s*[\"']")
 
 
 def unit_of(file: Path) -> float:
-    """Return the metres of a length 1 in a mesh file: what a ``.dae`` says, else 1.
+    """Return the metres of a length 1 in a mesh file: of a ``.dae`` its unit, else 1.
 
     RViz, Gazebo and MoveIt scale by it; Pinocchio's and coal's loaders do not.
     """

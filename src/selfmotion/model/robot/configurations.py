@@ -63,20 +63,18 @@ def _checked(robot: RobotModel, q: npt.ArrayLike, several: bool) -> Array:
     return np.array(array)
 
 
-# What a unit of each joint counts where joints of both kinds are added up.
-
-# A metre counts so many radians at most: a lift that is slower still is left alone by as much
-# already, and a weight of hundreds makes optima badly conditioned.
+# Largest weight of a metre [rad/m]: a slower prismatic joint hardly moves already, and weights of
+# hundreds make optima badly conditioned.
 _MOST = 10.0
 
 
 def joint_weights(robot: RobotModel) -> Array:
-    """Return what a unit of each joint counts, (n,); see `RobotModel.joint_weights`."""
+    """Return the weight of each joint's unit, (n,); see `RobotModel.joint_weights`."""
     return np.where(robot.is_revolute, 1.0, 1.0 / mean_lever(robot))
 
 
 def speed_weights(robot: RobotModel) -> Array:
-    """Return what a unit of each joint counts, (n,); see `RobotModel.speed_weights`."""
+    """Return the weight of each joint's unit, (n,); see `RobotModel.speed_weights`."""
     turns, limits = robot.is_revolute, robot.velocity_limit
     known = np.isfinite(limits) & (limits > 0.0)
     if not (turns & known).any():
@@ -87,7 +85,7 @@ def speed_weights(robot: RobotModel) -> Array:
 
 
 def mean_lever(robot: RobotModel) -> float:
-    """Return how far [m] the tool goes where a revolute joint turns by a radian: their mean."""
+    """Return the mean motion of the tool [m] per radian of a revolute joint."""
     arrays = robot.chain.arrays
     beyond = np.cumsum(arrays.link_lengths[:0:-1])[::-1]
     levers = beyond[arrays.tree.is_revolute]
@@ -114,9 +112,9 @@ def part_weights(robot: RobotModel, weights: Mapping[str, float]) -> Array:
 
 # Singular values, and rates of rows, below this [m, rad] are zero.
 _ZERO = 1e-6
-# Singular values below this share of the largest one are rounding.
+# Relative singular values below this are rounding.
 _ROUNDING = 1e-12
-# Samples among which the most dexterous one is.
+# Samples of which the most dexterous one is chosen.
 _SAMPLES = 1000
 
 
@@ -127,7 +125,7 @@ def redundancy(robot: RobotModel, task: Task) -> int:
 
 
 def can_follow(robot: RobotModel, task: Task) -> bool:
-    """Return whether the tool can be moved in all rows of a task; see `RobotModel.can_follow`."""
+    """Return whether the tool can move in all rows of a task; see `RobotModel.can_follow`."""
     if task is Task.PLANAR_POSE:
         jacobians = np.array([robot.jacobian(q) for q in robot.generic_configurations()])
         if np.abs(jacobians[:, 2:5]).max() > _ZERO:
@@ -151,7 +149,7 @@ def null_space_at(robot: RobotModel, q: Array, task: Task) -> Array:
     _, values, right = np.linalg.svd(jacobians)
     large = values > _ROUNDING * values.max(axis=-1, keepdims=True)
     ranks = np.atleast_1d(np.sum(large, axis=-1))
-    # Of no configurations there is none; then as it is in general.
+    # Without configurations, the generic rank.
     rank = int(ranks[0]) if len(ranks) else robot.dof - redundancy(robot, task)
     other = np.flatnonzero(ranks != rank)
     if len(other):
@@ -165,9 +163,9 @@ def null_space_at(robot: RobotModel, q: Array, task: Task) -> Array:
 
 # Inverse kinematics: Levenberg-Marquardt on the rows of a task, within joint limits.
 
-# What a solution may miss by, far below what a certificate accepts.
+# Error of a solution, far below a certificate's tolerance.
 _IK_TOLERANCE = 1e-10
-# Steps from one start at most.
+# Largest number of steps from one start.
 _IK_STEPS = 100
 
 

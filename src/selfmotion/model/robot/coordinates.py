@@ -1,4 +1,4 @@
-"""Numbers that tell how an arm stands: a joint, the place of a link, the swivel of the elbow."""
+"""Coordinates of an arm's posture: a joint, the position of a link, the swivel of the elbow."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from selfmotion.model.robot.model import RobotModel
 
 # Whether joint coordinates are in radians.
 
-# Joints with limits turn less than this [rad].
+# Largest range of joints with limits [rad].
 _MOST_TURNS = 4.0 * np.pi
 
 
@@ -40,13 +40,11 @@ def check_radians(robot: RobotModel, values: Array, what: str, called: str) -> N
             )
 
 
-# Numbers that tell how an arm stands: a joint, the place of a link, the swivel of the elbow.
-
 _AXES = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
-# An elbow nearer than this share of the arm to the line from shoulder to wrist has no swivel, and a
-# reference nearer than this to the line gives it no zero.
+# Relative distance of an elbow from the line from shoulder to wrist below which there is no swivel,
+# and of a reference below which it gives no zero.
 _STRAIGHT = 1e-9
-# Names that a message lists at most.
+# Largest number of names in a message.
 _FEW = 12
 
 
@@ -56,7 +54,7 @@ class Coordinate(Saved, ABC, family="coordinate"):
     Attributes
     ----------
     period : float
-        What two equal values may differ by: 2π for an angle; inf where there is none.
+        Difference of two equal values: 2π for an angle; inf for none.
     unit : str
     """
 
@@ -66,7 +64,7 @@ class Coordinate(Saved, ABC, family="coordinate"):
     @property
     @abstractmethod
     def name(self) -> str:
-        """What to call it in messages."""
+        """Its name in messages."""
 
     @abstractmethod
     def __call__(self, robot: RobotModel, q: Array) -> tuple[Array, Array]:
@@ -81,19 +79,19 @@ class Coordinate(Saved, ABC, family="coordinate"):
     def series(self, chain: ChainSeries, q: Array) -> Array | None:
         """Return majorants (K + 1, I) on intervals whose middles are q (I, n); None for unknown.
 
-        Where there is no bound, inf. Only rows from 1 on count. A coordinate without is judged as
-        measured: no proof.
+        Inf without a bound. Only rows from 1 on count. A coordinate without series is judged by
+        samples: no proof.
         """
         return None
 
     def check_value(self, value: float, what: str) -> None:
-        """Raise ProblemError for what is no value of it, or of an angle only in degrees."""
+        """Raise ProblemError for an invalid value, or an angle in degrees."""
         number = as_number(value, what)
         if np.isfinite(self.period) and abs(number) > TURN:
             raise ProblemError(f"{what} is {number:g} rad, more than a turn; in degrees?")
 
     def away(self, values: Array, center: float) -> Array:
-        """Return how far values (K,) are from a centre; of angles the short way."""
+        """Return the distances of values (K,) from a centre, modulo the period."""
         away = values - center
         if np.isfinite(self.period):
             away = away - self.period * np.round(away / self.period)
@@ -133,7 +131,7 @@ class JointCoordinate(Coordinate):
 
 @dataclass(frozen=True, eq=False)
 class FrameCoordinate(Coordinate):
-    """Where a link or frame is along a direction [m]: d · p(q), world axes.
+    """Position of a link or frame along a direction [m]: d · p(q), world axes.
 
     Parameters
     ----------
@@ -301,6 +299,6 @@ def _frame(robot: RobotModel, name: str) -> int:
 
 
 def _choice(names: Sequence[str]) -> str:
-    """Return what is said where no name is near: which there are, but for a crowd of them."""
+    """Return the clause of known names without a near one, unless there are too many."""
     listed = ", ".join(repr(name) for name in names[:_FEW])
     return f", expected one of: {listed}{', …' if len(names) > _FEW else ''}"

@@ -11,7 +11,7 @@ from selfmotion.model.robot.chain_series import ChainSeries
 from selfmotion.model.robot.model import RobotModel
 from selfmotion.model.robot.tree_arrays import Coupling
 
-# Of an inertia this share is rounding: of files with nine digits, and of products of matrices.
+# Relative rounding of an inertia: files with nine digits, products of matrices.
 _ROUNDING = 1e-9
 
 

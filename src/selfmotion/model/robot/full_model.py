@@ -84,7 +84,7 @@ def mesh_digests(urdf: Urdf, tag: str) -> dict[str, str]:
     return {str(place): digest_of_file(place) for place in places if place is not None}
 
 
-# Each plan asks for them, and reading the text takes as long as a seventh of a plan.
+# Cached: reading the text takes as long as a seventh of a plan.
 @lru_cache(maxsize=16)
 def _mesh_names(text: str, tag: str) -> tuple[str, ...]:
     """Return the addresses of the meshes of all such elements."""
@@ -93,13 +93,13 @@ def _mesh_names(text: str, tag: str) -> tuple[str, ...]:
 
 
 def _place(urdf: Urdf, file: str) -> Path | None:
-    """Return where a mesh is on this machine, if it is there."""
+    """Return the path of a mesh on this machine, if it exists."""
     scheme, _, rest = file.rpartition("://")
     folders = urdf.package_dirs if scheme in ("package", "model") else ("",)
     return next((Path(folder, rest) for folder in folders if is_file(Path(folder, rest))), None)
 
 
-# Of an address on another machine.
+# Clause about an address on another machine.
 _ELSEWHERE = " here; name the folder that has its package: --packages DIR (packages=)"
 
 
@@ -130,7 +130,7 @@ def _fault(urdf: Urdf, file: str) -> str:
     try:
         coal.MeshLoader().load(str(found), np.ones(3))
     except (RuntimeError, ValueError) as error:
-        # What comes before is where in the source of coal it was found, after it a guess.
+        # The text before is a place in the source of coal, the text after it a guess.
         said = str(error).rpartition("message:")[2].partition("Hint:")[0]
         return f"the mesh file cannot be read ({' '.join(said.split()[5:])})"
     return ""
@@ -138,17 +138,15 @@ def _fault(urdf: Urdf, file: str) -> str:
 
 # Pinocchio's model of a whole URDF, before joints are locked: complete, or refused.
 #
-# urdfdom, which reads for Pinocchio, writes its complaints to the terminal and often goes on
-# without the part that it could not read; here they are caught, and each is an error. Where a
-# link has the name of a joint, Pinocchio cannot tell which is meant: such links have other names
-# inside of it.
-
-# The terminal's file descriptor belongs to the process: one thread at a time may take it.
+# urdfdom, Pinocchio's parser, writes errors to the terminal and often goes on without the element;
+# here they are caught, and each is an error. Where a link has the name of a joint, Pinocchio cannot
+# distinguish them: such links have other names inside of it. The terminal's file descriptor belongs
+# to the process: one thread at a time may redirect it.
 _terminal = threading.Lock()
 # Meshes that are only drawn are read once, as long as their files are those that were read.
 _drawn = coal.CachedMeshLoader()
 
-# How to go on without bodies; of what is not drawn it is told that it is not.
+# Remedy for missing bodies.
 _BARE = "; or go on without looking at self-collision: --no-self-collision (clearance = false)"
 
 
@@ -169,19 +167,19 @@ def full_model(urdf: Urdf) -> Any:
         except ValueError as error:
             said.insert(0, str(error))
     if said:
-        # What comes last only says that the whole is none.
+        # The last one only says that the whole is none.
         raise RobotError(f"{urdf.source}: is not read by Pinocchio: {'; '.join(said[-3:])}")
     _add_rotors(model, text)
     return model
 
 
 def _add_rotors(model: Any, text: str) -> None:
-    """Give a model the inertias of rotors that its text has, which no parser of URDFs knows."""
+    """Set the rotor inertias of a model from its text: no parser of URDFs reads them."""
     if ARMATURE not in text:
         return
     for joint in ElementTree.fromstring(text).findall("joint"):
         turning, name = joint.find("dynamics"), joint.get("name", "")
-        # Joints that are fixed are none of the model.
+        # Fixed joints are not in the model.
         if turning is not None and turning.get(ARMATURE) and model.existJointName(name):
             index = model.joints[model.getJointId(name)].idx_v
             armature = np.array(model.armature)
@@ -219,7 +217,7 @@ def link_geometry(urdf: Urdf, model: Any, kind: pin.GeometryType) -> Any:
 
 
 def inner_names(urdf: Urdf) -> dict[str, str]:
-    """Return what the links are called inside of Pinocchio that cannot have their own names."""
+    """Return the names inside of Pinocchio of links that cannot have their own."""
     taken = {*urdf.joints, *urdf.links, "universe"}
     found = {}
     for link in urdf.links:
@@ -270,9 +268,9 @@ def _in_metres(urdf: Urdf, text: str) -> str:
 
 @contextlib.contextmanager
 def _complaints() -> Iterator[list[str]]:
-    """Yield a list that holds, afterwards, what C++ wrote to the terminal as errors.
+    """Yield a list that has, afterwards, the errors that C++ wrote to the terminal.
 
-    What else was written there meanwhile is passed on.
+    Other output is passed on.
     """
     said: list[str] = []
     with _terminal, tempfile.TemporaryFile() as caught:
@@ -295,7 +293,6 @@ def _complaints() -> Iterator[list[str]]:
 
 # The visual or collision geometry of a robot whose joints are locked in part.
 #
-# An arm without visuals is drawn by its bodies, and one without bodies by its joints and axes.
 
 
 def reduced_geometry(urdf: Urdf, locked: Mapping[str, float], kind: pin.GeometryType) -> Any:
@@ -307,8 +304,9 @@ def reduced_geometry(urdf: Urdf, locked: Mapping[str, float], kind: pin.Geometry
     return reduced[0]
 
 
-# What stands in for visuals is drawn in this; bones are as thick as a share of the arm's reach.
+# Colour of bodies and bones in place of visuals, RGBA.
 _GREY = np.array([0.6, 0.62, 0.66, 1.0])
+# Thickness of bones, as a share of the arm's reach.
 _THICK = 0.015
 
 
@@ -328,7 +326,7 @@ def readable_visuals(
 
 
 def stand_in(urdf: Urdf, locked: Mapping[str, float], model: Any, tip: int) -> tuple[Any, str]:
-    """Return what draws an arm without visuals, and what that is, in words."""
+    """Return the geometry in place of missing visuals, and its description in words."""
     bodies, _ = readable_visuals(urdf, locked, "collision")
     for item in bodies.geometryObjects:
         item.meshColor = _GREY

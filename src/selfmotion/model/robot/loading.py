@@ -29,7 +29,7 @@ from selfmotion.model.robot.urdf import Urdf, UrdfPart, read_urdf, urdf_of_file
 from selfmotion.model.robot.urdf_text import Packages, expand
 from selfmotion.model.task import as_pose
 
-# What the text of a URDF is called in messages.
+# Name of a URDF's text in messages.
 _TEXT = "the URDF text"
 
 
@@ -68,7 +68,7 @@ def load_robot(
         reference are held anyway, at 0 or the nearest limit unless given here.
     geometry : pinocchio.GeometryModel, optional
         Of a ``pinocchio.Model``: its collision bodies (boxes, spheres, cylinders, meshes of files).
-        Without, self-collision is not looked at.
+        Without, there is no check of self-collision.
     reference : str, optional
         The link in whose frame poses, twists and paths are given: a part that a table turns, or
         that another hand holds. By default the world.
@@ -80,9 +80,9 @@ def load_robot(
     tool_offset : SE3 or (4, 4), optional
         Pose of the frame that follows the path in that of `tool`: a pen in a gripper.
     bodies : sequence of Obstacle, optional
-        What the arm carries: a torch, a camera. Their poses are, as `tool_offset` is, in the frame
-        of `tool`, or in that of the link that a `frame=` of theirs names. They become links of the
-        arm, without masses; shapes of one's own cannot.
+        Carried bodies: a torch, a camera. Their poses are, as `tool_offset` is, in the frame of
+        `tool`, or in that of the link that their `frame=` names. They become links of the arm,
+        without masses; shapes of one's own cannot.
     arguments : dict, optional
         Of a xacro file; of several robots a dict of these, by part.
     packages : path or sequence of path, optional
@@ -93,8 +93,8 @@ def load_robot(
     calibration : path, optional
         File that says where the joints of this very arm are: Universal Robots' kinematics
         (``.yaml``) or ``calibration.conf``; or a ``.yaml`` or ``.toml`` file with ``joints``, for
-        each its ``position`` and ``rpy`` in its parent link, and ``offsets``, what the coordinate
-        of each is where it says zero [rad or m]. Of several robots a dict, by part.
+        each its ``position`` and ``rpy`` in its parent link, and ``offsets``, the position of each
+        at its nominal zero [rad or m]. Of several robots a dict, by part.
 
     Returns
     -------
@@ -170,7 +170,7 @@ def _tool_frames(tool: Any, urdf: Urdf) -> list[str]:
 
 @dataclass(frozen=True)
 class _Source:
-    """What is known of a robot before its joints are chosen.
+    """A robot before its joints are chosen.
 
     Attributes
     ----------
@@ -180,7 +180,7 @@ class _Source:
     touching : tuple of (str, str)
         See `NamedArm.touching`.
     limits : dict
-        What its maker publishes, by kind and joint.
+        Limits that its maker publishes, by kind and joint.
     """
 
     urdf: Urdf
@@ -211,7 +211,7 @@ def _read(
 
 
 def _called(robot: str | Path | pin.Model) -> str:
-    """Return what messages and parts call a robot that is given."""
+    """Return the name of a given robot in messages and cells."""
     if isinstance(robot, pin.Model):
         return f"pinocchio.Model '{robot.name}'"
     return _TEXT if str(robot).lstrip().startswith("<") else str(robot)
@@ -343,7 +343,7 @@ def _check_no_arguments(given: str, arguments: Mapping[str, Any]) -> None:
 def _only_leaf(urdf: Urdf) -> str:
     parents = {joint.parent for joint in urdf.joints.values()}
     leaves = [link for link in urdf.links if link not in parents]
-    # A frame that stands still, as a base's, is no tool.
+    # A fixed frame, as a base's, is no tool.
     leaves = [
         link for link in leaves if any(joint.kind != "fixed" for joint in urdf.chain(link))
     ] or leaves

@@ -31,7 +31,7 @@ from selfmotion.model.robot.tree_arrays import Coupling, TreeArrays, tree_arrays
 from selfmotion.model.robot.urdf import Urdf
 from selfmotion.model.task import Task
 
-# What of an arm its URDF limits, where nobody gave it other limits.
+# Limits of a URDF that other ones may replace.
 LIMITS = ("lower", "upper", "velocity_limit", "effort_limit")
 
 
@@ -61,9 +61,9 @@ class RobotModel:
     model : pinocchio.Model
         The tree of its joints and of those that mimic them, nq = nv = N. Not to be modified.
     urdf : Urdf
-        What it was made from.
+        Its source.
     touching : tuple of (str, str)
-        Pairs of links whose bodies overlap as they are made, which no check looks at.
+        Pairs of links whose bodies overlap by design, which no check includes.
     effort_limit : (n,)
         Torque or force limits [Nm or N]; inf where the URDF gives none.
     acceleration_limit, jerk_limit : (n,)
@@ -125,7 +125,7 @@ class RobotModel:
 
     @cached_property
     def tree(self) -> TreeArrays:
-        """What compiled kinematics need of all joints, placed in the world."""
+        """Arrays of all joints for compiled kinematics, placed in the world."""
         return tree_arrays(self.model, self.coupling)
 
     @property
@@ -142,17 +142,17 @@ class RobotModel:
         found = {"m" if self.is_prismatic(name) else "rad" for name in joints or self.joint_names}
         return found.pop() if len(found) == 1 else "rad or m"
 
-    def told(self, k: int) -> str:
-        """Return what the joint of a coordinate is called in messages."""
+    def label(self, k: int) -> str:
+        """Return the name of a coordinate's joint in messages."""
         return f"joint '{self.joint_names[k]}'"
 
     @property
     def reach(self) -> float:
-        """How far from its root the tool can be at most [m]: an upper bound, link by link."""
+        """Largest distance of the tool from its root [m]: an upper bound, link by link."""
         return self.reach_of(self.chain)
 
     def reach_of(self, chain: Chain) -> float:
-        """Return how far from its base the tip of a chain can be at most [m]."""
+        """Return the largest distance of a chain's tip from its base [m]."""
         slides = ~self.tree.is_revolute
         farthest = np.maximum(np.abs(self.lower), np.abs(self.upper))[self.coupling.coordinates]
         farthest = np.abs(self.coupling.scales) * farthest + np.abs(self.coupling.offsets)
@@ -160,26 +160,26 @@ class RobotModel:
 
     @property
     def coordinate_sizes(self) -> Array:
-        """How far each joint goes where its coordinate grows by 1, (n,) [rad or m]: 1."""
+        """Motion of each joint per unit of its coordinate, (n,) [rad or m]: 1."""
         return np.ones(self.dof)
 
     @property
     def joint_weights(self) -> Array:
-        """What a unit of each joint counts where joints are added up, (n,).
+        """Weight of each joint's unit in sums over joints, (n,).
 
-        1 for a revolute joint. A metre of a prismatic one counts as many radians as move the tool
-        by a metre at the arm's mean lever: the mean over revolute joints of the lengths of all
-        links beyond [rad/m].
+        1 for a revolute joint. A metre of a prismatic one has the weight of the radians that move
+        the tool by a metre at the arm's mean lever: the mean over revolute joints of the lengths of
+        all links beyond [rad/m].
         """
         return joint_weights(self)
 
     @property
     def speed_weights(self) -> Array:
-        """What a unit of each joint counts by the limits of speed, (n,).
+        """Weight of each joint's unit by the limits of speed, (n,).
 
-        1 for a revolute joint. A metre of a prismatic one counts as many radians as revolute
-        joints turn in the same time, each at its limit of speed: the mean of their limits over its
-        own, at most 10 [rad/m]. One without a limit counts as in `joint_weights`.
+        1 for a revolute joint. A metre of a prismatic one has the weight of the radians that
+        revolute joints turn in the same time, each at its limit of speed: the mean of their limits
+        over its own, at most 10 [rad/m]. One without a limit has that of `joint_weights`.
         """
         return speed_weights(self)
 
@@ -204,7 +204,7 @@ class RobotModel:
         Raises
         ------
         RobotError
-            It is not known of a part.
+            A part has none.
         """
         return home_of(self.urdf, self.joint_names, self.lower, self.upper)
 
@@ -264,8 +264,8 @@ class RobotModel:
         Raises
         ------
         RobotError
-            `q` is no configuration; or the rank is not the same at all K, so that there is no array
-            of all bases: ask for one at a time there.
+            `q` is no configuration; or the rank differs between the K, so that there is no array of
+            all bases: call it for each of them.
         """
         return null_space_at(self, as_configurations(self, q), Task.of(task))
 
@@ -274,10 +274,10 @@ class RobotModel:
         return redundancy(self, Task.of(task))
 
     def can_follow(self, task: Task | str) -> bool:
-        """Return whether the arm can move the tool in every row that the task prescribes.
+        """Return whether the arm can move the tool in every row of the task.
 
-        ``planar_pose`` also wants an arm that moves in the x-y plane: elsewhere there is no angle
-        about z that the rate ωz would be the derivative of.
+        ``planar_pose`` also needs an arm that moves in the x-y plane: elsewhere no angle about z
+        has the rate ωz.
         """
         return can_follow(self, Task.of(task))
 
@@ -297,7 +297,7 @@ class RobotModel:
         """Return a configuration well inside the limits and far from singular poses, (n,).
 
         Of 1000 samples (fixed seed) in the middle half of the limits, the one with the largest
-        manipulability √det(JJᵀ) of the task: a start for motions that may begin anywhere.
+        manipulability √det(JJᵀ) of the task: a start for motions with a free one.
         """
         return most_dexterous(self, Task.of(task))
 
@@ -325,7 +325,7 @@ class RobotModel:
         rng : Generator or int
             Source of the restarts; the same one gives the same answer.
         attempts : int
-            How many starts to try.
+            Number of starts.
 
         Returns
         -------
@@ -335,9 +335,9 @@ class RobotModel:
         Raises
         ------
         InverseKinematicsError
-            No attempt arrived; says what the best one left over.
+            No attempt converged; with the error of the best one.
         RobotError
-            The pose is none.
+            The pose is invalid.
         """
         return solved(self, pose, Task.of(task), seed, random_numbers(rng), attempts)
 
@@ -400,7 +400,7 @@ class RobotModel:
         return reduced_geometry(self.urdf, self.locked, kind)
 
     def visuals(self) -> tuple[Any, tuple[str, ...]]:
-        """Return the visual geometry as far as its meshes can be read, and what is missing.
+        """Return the visual geometry with all readable meshes, and the missing ones.
 
         Where nothing is left, collision bodies stand for it, or joints and their axes.
 
@@ -409,7 +409,7 @@ class RobotModel:
         geometry : pinocchio.GeometryModel
             See `geometry`.
         missing : tuple of str
-            Link, file and reason of each mesh that is left out, and what stands for the whole.
+            Link, file and cause of each missing mesh, and the replacement of the whole.
         """
         geometry, missing = readable_visuals(self.urdf, self.locked)
         if not geometry.ngeoms:

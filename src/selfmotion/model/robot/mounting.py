@@ -28,7 +28,7 @@ _COLOR = "0.32 0.36 0.42 1"
 
 
 class UrdfShape(NamedTuple):
-    """A shape that a URDF knows.
+    """A shape of a URDF.
 
     Attributes
     ----------
@@ -37,7 +37,7 @@ class UrdfShape(NamedTuple):
     values : dict
         Its attributes.
     height : float
-        Where it is along the z axis of what it is a part of [m].
+        Its position along the z axis of its body [m].
     """
 
     tag: str
@@ -47,7 +47,7 @@ class UrdfShape(NamedTuple):
 
 @runtime_checkable
 class CarriedBody(Protocol):
-    """What of an obstacle makes a link of it."""
+    """Fields of an obstacle that make a link of it."""
 
     shape: str
     name: str
@@ -56,14 +56,14 @@ class CarriedBody(Protocol):
 
     @property
     def label(self) -> str:
-        """What messages call it."""
+        """Its name in messages."""
 
     def urdf_shapes(self) -> Sequence[UrdfShape]:
         """Return the shapes that it consists of, the first with all its lengths."""
 
 
 class Mounting(NamedTuple):
-    """What was added to the URDF of an arm.
+    """Additions to the URDF of an arm.
 
     Attributes
     ----------
@@ -146,7 +146,7 @@ def _element(kind: str, shape: str, item: UrdfShape) -> ElementTree.Element:
 
 
 def mounting_of(urdf: Urdf, tool: str) -> Mounting:
-    """Return what was added by `with_base`, `with_tool_offset` and `with_bodies`."""
+    """Return the additions of `with_base`, `with_tool_offset` and `with_bodies`."""
     root = ElementTree.fromstring(urdf.text)
     links = {link.get("name"): link for link in root.findall("link")}
     found: dict[str, tuple[list[float], list[float]]] = {}

@@ -1,4 +1,4 @@
-"""Arms that are known by name: their files, tools, and what their makers publish."""
+"""Named arms: their files, tools, and limits that their makers publish."""
 
 import dataclasses
 import importlib.metadata
@@ -15,7 +15,7 @@ from selfmotion.model.robot.urdf import Urdf, read_urdf
 
 @dataclass(frozen=True)
 class NamedArm:
-    """An arm that `load_robot` knows by name.
+    """A named arm of `load_robot`.
 
     Attributes
     ----------
@@ -24,10 +24,10 @@ class NamedArm:
     tool : str
         The usual tool frame.
     home : tuple of float or None
-        The configuration that its maker calls ready [rad], where there is one.
+        Ready configuration of its maker [rad], if any.
     touching : tuple of (str, str)
-        Pairs of links whose meshes overlap in more than half of all configurations, as they are
-        made; no joint between them can keep them apart.
+        Pairs of links whose meshes overlap in more than half of all configurations, by design; no
+        joint between them can separate them.
     """
 
     urdf: str
@@ -36,7 +36,7 @@ class NamedArm:
     touching: tuple[tuple[str, str], ...] = ()
 
 
-# Upright, as `initial_positions.yaml` of Universal Robots' ROS 2 description has it.
+# Upright, from `initial_positions.yaml` of Universal Robots' ROS 2 description.
 _UPRIGHT = (0.0, -np.pi / 2, 0.0, -np.pi / 2, 0.0, 0.0)
 
 NAMED_ARMS: Mapping[str, NamedArm] = {
@@ -46,8 +46,8 @@ NAMED_ARMS: Mapping[str, NamedArm] = {
         "panda_hand_tcp",
         home=(0.0, -np.pi / 4, 0.0, -3 * np.pi / 4, 0.0, np.pi / 2, np.pi / 4),
     ),
-    # As in UFACTORY's semantic description, which comes with the URDF.
-    # Its maker's home, all zeros, is singular: no motion with a prescribed pose begins there.
+    # From UFACTORY's semantic description, which comes with the URDF. Its maker's home, all zeros,
+    # is singular: no motion with a prescribed pose starts there.
     "xarm7": NamedArm(
         "xarm_description/urdf/xarm7.urdf", "link_eef", home=(0.0, -0.4, 0.0, 1.2, 0.0, 1.6, 0.0)
     ),
@@ -71,18 +71,18 @@ NAMED_ARMS: Mapping[str, NamedArm] = {
     "z1": NamedArm("z1_description/urdf/z1.urdf", "gripperStator"),
 }
 
-# Tables, rails and hands have no more joints than this: home, they are at zero.
+# Largest number of joints of tables, rails and hands, whose home is zero.
 _OF_A_TABLE = 3
 
-# What arms work with, known by name like these.
+# Named parts of a cell besides arms.
 NAMED_PARTS: Mapping[str, NamedArm] = {"positioner": NamedArm("positioner.urdf", "plate")}
 
-# Beside this module in an installed package, at the top of the repository in a checkout.
+# Next to this module in an installed package, at the top of the repository in a checkout.
 _OWN_ARMS = (Path(__file__).parent / "arms", Path(__file__).parents[4] / "robots")
 
 
 def published(name: str) -> Mapping[str, Any]:
-    """Return what the maker of a named arm publishes: limits by kind and joint."""
+    """Return the limits that the maker of a named arm publishes, by kind and joint."""
     import tomllib
 
     known = tomllib.loads((Path(__file__).parent / "limits.toml").read_text("utf-8"))

@@ -12,11 +12,13 @@ from selfmotion.basics import Array, RobotError, is_file
 from selfmotion.model.robot.urdf_elements import ARMATURE
 from selfmotion.model.task import rpy
 
-# Angles beyond the first are no limits [rad]; speeds and efforts beyond the second are none.
-_ENDLESS, _NONE = 1e5, 1e30
-# Gravity is the usual one within this [m/s²].
+# Larger angles are no limits [rad].
+_ENDLESS = 1e5
+# Larger speeds and efforts are no limits.
+_NONE = 1e30
+# Largest difference of gravity from the standard one [m/s²].
 _SAME_GRAVITY = 0.02
-# What of a model has a name that a tool may have; the others are joints.
+# Types of frames whose names a tool may have; the others are joints.
 _NAMED = (pin.FrameType.BODY, pin.FrameType.OP_FRAME, pin.FrameType.SENSOR)
 
 
@@ -25,22 +27,22 @@ def urdf_text_of(model: Any, geometry: Any, source: str) -> str:
 
     Its bodies and frames become links, its revolute and prismatic joints are joints with their
     limits, and the inertia of each joint is that of the link it carries. Damping and friction are
-    those of the joints; the inertia of a rotor (``armature``) is an attribute of ``<dynamics>``
-    that only this package knows.
+    those of the joints; the inertia of a rotor (``armature``) is an attribute of ``<dynamics>`` of
+    this package's own.
 
     Parameters
     ----------
     model : pinocchio.Model
     geometry : pinocchio.GeometryModel or None
-        Its collision bodies, without which there are none.
+        Its collision bodies; None for none.
     source : str
-        What messages call it.
+        Its name in messages.
 
     Raises
     ------
     RobotError
-        A joint is neither revolute nor prismatic, a name is there twice, a URDF knows no such
-        body, or gravity does not act along -z.
+        A joint is neither revolute nor prismatic, a name is there twice, a URDF has no such body,
+        or gravity does not act along -z.
     """
     _check_gravity(model, source)
     robot = ElementTree.Element("robot", name=model.name or "robot")
@@ -131,7 +133,7 @@ def _bodies(
     for item in geometry.geometryObjects:
         link, place = links.of_joint[item.parentJoint], item.placement
         if item.parentFrame in links.others:
-            # Of what was built in code it may be no frame at all.
+            # The parent of geometry that was built in code may be no frame.
             frame = model.frames[item.parentFrame]
             link, place = frame.name, frame.placement.actInv(place)
         element = ElementTree.Element("collision", name=item.name)

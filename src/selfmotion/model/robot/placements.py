@@ -1,4 +1,4 @@
-"""Where joints and tips are, compiled: for many configurations at once."""
+"""Compiled kinematics: poses of joints and tips at many configurations at once."""
 
 import math
 
@@ -6,8 +6,6 @@ import numpy as np
 
 from selfmotion.basics import Array, Flags, Ints, called, inlined, kernel
 from selfmotion.model.robot.tree_arrays import AXIS, JOINT, POSITION, ROTATION
-
-# Where joints are, compiled: for many configurations at once, of which Python would ask singly.
 
 
 @inlined
@@ -60,7 +58,7 @@ def placements(
     (c, 3).
     """
     # Loops, here and in all kernels: for an array assigned to a slice of another, numba compiles
-    # for seconds what NumPy says of shapes that differ.
+    # NumPy's message about different shapes, which takes seconds.
     for a in range(3):
         p[0, a] = 0.0
         for b in range(3):
@@ -106,9 +104,6 @@ def rebase(
                 linear += base_rotation[a, i] * moving[a]
                 angular += base_rotation[a, i] * world[3 + a, k]
             jacobian[i, k], jacobian[3 + i, k] = signs[k] * linear, signs[k] * angular
-
-
-# Where tips are, compiled: for many configurations at once, of which Python would ask singly.
 
 
 @kernel
@@ -157,7 +152,7 @@ def place_tips(
 @inlined
 def _jacobian(r: Array, p: Array, chain: Array, joints: int, tip: Array, jacobian: Array) -> None:
     """Write the columns of a tip's Jacobian [v, ω] (6, n) at its origin, in the base's axes."""
-    # Joints that mimic each other have one column.
+    # Joints that mimic each other share a column.
     for j in range(joints):
         column = int(chain[j, JOINT, 0])
         for a in range(6):

@@ -95,7 +95,7 @@ class Coupling:
 
 @dataclass(frozen=True)
 class Follower:
-    """What a joint is moved by.
+    """The joint that moves a joint, and how.
 
     Attributes
     ----------
@@ -111,7 +111,7 @@ class Follower:
 
 
 def follower_of(urdf: Urdf, name: str) -> Follower:
-    """Return what a joint is moved by in the end, through joints that mimic each other."""
+    """Return the joint that finally moves a joint, through joints that mimic each other."""
     scale, offset, joint = 1.0, 0.0, urdf.joints[name]
     while joint.mimics is not None:
         # x = a y + b of y = m z + d.
@@ -122,7 +122,7 @@ def follower_of(urdf: Urdf, name: str) -> Follower:
 
 
 def coupling_of(names: Sequence[str], followers: Mapping[str, Follower]) -> Coupling:
-    """Return the coupling of a model's joints, by what each is moved by."""
+    """Return the coupling of a model's joints, by their followers."""
     masters = [name for name in names if followers[name].joint == name]
     each = [followers[name] for name in names]
     return Coupling(
@@ -163,14 +163,19 @@ def tighter_limits(
 
 # Trees and chains as arrays, for compiled kinematics.
 
-# What a chain's table tells of a joint, (6, 3): its coordinate, or -1 for the tip, whether it
-# turns, and by how much [rad or m] where the coordinate is 1; its axis; where it is in the frame of
-# the joint before, and how it is turned there.
-JOINT, AXIS, POSITION, ROTATION = 0, 1, 2, 3
+# Rows of a chain's table for a joint, (6, 3). Its coordinate, or -1 for the tip, whether it is
+# revolute, and its motion [rad or m] per unit of the coordinate.
+JOINT = 0
+# Its axis.
+AXIS = 1
+# Its position in the frame of the joint before.
+POSITION = 2
+# First row of its orientation there.
+ROTATION = 3
 
 
 class TreeArrays(NamedTuple):
-    """What compiled kinematics need of c joints; see `placements`.
+    """Arrays of c joints for compiled kinematics; see `placements`.
 
     Attributes
     ----------
@@ -213,7 +218,7 @@ class ChainArrays(NamedTuple):
 
     @property
     def table(self) -> Array:
-        """What compiled kinematics need, of each joint, then of the tip: (c + 1, 6, 3)."""
+        """Table of each joint, then of the tip, for compiled kinematics: (c + 1, 6, 3)."""
         tree, count = self.tree, len(self.tree.joints)
         found = np.zeros((count + 1, 6, 3))
         found[:, JOINT, 0] = [*tree.joints, -1.0]
@@ -226,12 +231,12 @@ class ChainArrays(NamedTuple):
 
     @property
     def link_lengths(self) -> Array:
-        """How far each joint is from the one before, and the tip from the last, (c + 1,) [m]."""
+        """Distance of each joint from the one before, and of the tip, (c + 1,) [m]."""
         return np.asarray(np.linalg.norm([*self.tree.positions, self.tip_position], axis=1))
 
 
 def tree_arrays(model: Any, coupling: Coupling) -> TreeArrays:
-    """Return what compiled kinematics need of all joints of a model, placed in the world."""
+    """Return the arrays of all joints of a model for compiled kinematics, in the world."""
     joints, places = np.arange(model.nv, dtype=np.int64), list(model.jointPlacements)[1:]
     parents = list(model.parents)[1:]
     return serial_arrays(model, coupling, joints, parents, places, np.ones(model.nv))
@@ -276,7 +281,7 @@ def serial_arrays(
 
 
 def _moved(axis: Array, turns: bool, by: float) -> pin.SE3:
-    """Return how a joint places what it carries."""
+    """Return the placement by a joint's motion."""
     if turns:
         return pin.SE3(pin.exp3(by * axis), np.zeros(3))
     return pin.SE3(np.eye(3), by * axis)

@@ -36,13 +36,19 @@ from selfmotion.model.robot.urdf_text import (
     root_of,
 )
 
-# Fixed joints that are ours: where the base stands, how the tool is held, and before the name of a
-# body that the arm carries.
-BASE_JOINT, TOOL_JOINT, BODY_JOINT = "base_placement", "tool_offset", "carried_body/"
-# What a calibrated robot says of its file, and before the keys of the placements that it had drawn.
-CALIBRATION, NOMINAL = "calibration", "nominal_"
-# What a file says it is written in, and the marks of UTF-16.
-_SAYS = re.compile(rb"\s*<\?xml[^>]*encoding=[\"']([A-Za-z0-9._-]{1,40})[\"']")
+# Fixed joint of a placed base.
+BASE_JOINT = "base_placement"
+# Fixed joint of a tool offset.
+TOOL_JOINT = "tool_offset"
+# Prefix of the fixed joints of carried bodies.
+BODY_JOINT = "carried_body/"
+# Attribute of a calibrated robot with its file.
+CALIBRATION = "calibration"
+# Prefix of the attributes with nominal placements.
+NOMINAL = "nominal_"
+# Declared encoding of a file.
+_ENCODING = re.compile(rb"\s*<\?xml[^>]*encoding=[\"']([A-Za-z0-9._-]{1,40})[\"']")
+# Byte order marks of UTF-16.
 _UTF16 = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
 
 
@@ -75,7 +81,7 @@ class UrdfPart:
     Attributes
     ----------
     name : str
-        What its links and joints are called after.
+        Prefix of the names of its links and joints.
     source : str
         The name of an arm, or a file.
     base : pinocchio.SE3 or None
@@ -103,24 +109,24 @@ class Urdf:
     Attributes
     ----------
     source : str
-        Path of the file, or what the text came from; used in messages.
+        Path of the file, or origin of the text; for messages.
     text : str
         XML with continuous joints turned into revolute ones and mesh files made absolute or
         left as ``package://``.
     package_dirs : tuple of str
-        Folders in which ``package://`` addresses are looked up.
+        Folders that are searched for ``package://`` addresses.
     joints : dict
         Joint name → `UrdfJoint`.
     links : tuple of str
         Names of all links, in file order.
     parts : tuple of UrdfPart
-        What it was composed of; none of a robot of its own, or read from a saved plan.
+        Its parts; empty for a single robot, or one from a saved plan.
     notes : tuple of str
-        What of it is not drawn or not weighed, and why.
+        Elements that are not drawn or weighed, and causes.
     packages : tuple of str
         Folders of packages that the user named.
     lacking_efforts : tuple of str
-        Joints of which it does not say what effort they have.
+        Joints without an effort limit.
     """
 
     source: str
@@ -135,7 +141,7 @@ class Urdf:
 
     @property
     def readable_text(self) -> str:
-        """The text without what parsers refuse and no motion needs."""
+        """The text without elements that parsers refuse and no motion needs."""
         if not self.lacking_inertials:
             return self.text
         root = without_lacking(ElementTree.fromstring(self.text))
@@ -143,7 +149,7 @@ class Urdf:
 
     @cached_property
     def lacking_inertials(self) -> Mapping[str, str]:
-        """What incomplete ``<inertial>`` elements lack, in words → the link's name."""
+        """Missing values of incomplete ``<inertial>`` elements, in words → the link's name."""
         return lacking_inertials(ElementTree.fromstring(self.text))
 
     @property
@@ -182,7 +188,7 @@ class Urdf:
         return ElementTree.fromstring(self.text).get(CALIBRATION)
 
     def nominal(self) -> "Urdf":
-        """Return the same with its joints as they were drawn."""
+        """Return the same with its nominal joints."""
         root = ElementTree.fromstring(self.text)
         _draw_again(root)
         return replace(self, text=ElementTree.tostring(root, encoding="unicode"))
@@ -205,7 +211,7 @@ class Urdf:
         return {joint.name for joint in self.joints.values() if joint.kind == "continuous"}
 
     def with_continuous(self, names: Iterable[str]) -> "Urdf":
-        """Return the same, some joints of which were continuous before they became revolute."""
+        """Return the same, with joints that were continuous before they became revolute."""
         joints = dict(self.joints)
         for name in names:
             joints[name] = replace(joints[name], kind="continuous")
@@ -259,7 +265,7 @@ def read_urdf(path: Path, packages: Iterable[str] = ()) -> Urdf:
     path : Path
         The file.
     packages : sequence of str
-        Folders in which packages are looked up besides; see `Packages`.
+        Additional folders that are searched for packages; see `Packages`.
 
     Returns
     -------
@@ -282,7 +288,7 @@ def read_urdf(path: Path, packages: Iterable[str] = ()) -> Urdf:
 
 def _text_of(path: Path, content: bytes) -> str:
     """Return the text of a file of XML, in the letters that it says, or else in UTF-8."""
-    said = _SAYS.match(content)
+    said = _ENCODING.match(content)
     encoding = "utf-16" if content.startswith(_UTF16) else said[1].decode() if said else "utf-8"
     try:
         text = content.decode(encoding).removeprefix("\ufeff")
@@ -303,14 +309,14 @@ def urdf_of_file(text: str, packages: Packages) -> Urdf:
 
 
 def package_folders(path: Path) -> tuple[str, ...]:
-    """Return the folders above a file, in which ``package://NAME/…`` is looked up."""
+    """Return the folders above a file, which are searched for ``package://NAME/…``."""
     return tuple(str(parent) for parent in path.resolve().parents if parent.parts[1:])
 
 
 def parse_urdf(
     text: str, *, source: str, package_dirs: tuple[str, ...], packages: Packages | None = None
 ) -> Urdf:
-    """Validate URDF text; see `read_urdf`. Addresses of meshes are looked up by `packages`."""
+    """Validate URDF text; see `read_urdf`. `packages` are searched for meshes."""
     root = root_of(text, source)
     check_expanded(root, source)
     notes = [*split_planar(root, source), *mend_cosmetics(root, check_shape)]

@@ -1,4 +1,4 @@
-"""Joints and links of a URDF, read strictly: each part is what it says, or refused by name."""
+"""Joints and links of a URDF, read strictly: invalid elements are errors with their names."""
 
 import math
 import xml.etree.ElementTree as ElementTree
@@ -6,9 +6,7 @@ from collections.abc import Callable
 
 from selfmotion.basics import RobotError, nearest
 
-# Numbers, names and single elements of a URDF, read strictly: what is wrong is named.
-
-# Nothing about an arm is larger, in any of its units; beyond it lie typing errors.
+# Largest number in any unit of an arm; larger ones are typing errors.
 LARGEST = 1e9
 
 
@@ -43,7 +41,7 @@ def number(element: ElementTree.Element, key: str, where: str, largest: float = 
 
 
 def only(parent: ElementTree.Element, tag: str, where: str) -> ElementTree.Element | None:
-    """Return the one child with that tag, or None where there is none.
+    """Return the one child with that tag, or None.
 
     Raises
     ------
@@ -80,12 +78,10 @@ def check_origin(parent: ElementTree.Element, where: str) -> None:
             numbers(origin, key, 3, f"{where}: <origin>")
 
 
-# What of a URDF only draws, names or weighs: where it is wrong, the arm is none the worse.
-#
-# urdfdom refuses a whole file for a material without a name. Here such elements are mended or
-# left out, and what changes the picture is noted. An ``<inertial>`` that lacks something stays in
-# the text, so that whoever asks for torques is told; parsers get the text without it.
-
+# Elements that only draw, name or weigh: errors in these do not matter to motions. urdfdom refuses
+# a whole file for a material without a name. Here such elements are mended or left out, and visible
+# changes are noted. An incomplete ``<inertial>`` is kept in the text, for messages about torques;
+# parsers get the text without it.
 _UNNAMED = "unnamed_material"
 MOMENTS = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
 
@@ -93,7 +89,7 @@ MOMENTS = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
 def mend_cosmetics(
     root: ElementTree.Element, check_shape: Callable[[ElementTree.Element, str], None]
 ) -> list[str]:
-    """Mend or drop what only draws, in place; return what was done, in words.
+    """Mend or drop elements that only draw, in place; return the changes in words.
 
     `check_shape` raises RobotError for a shape that cannot be drawn.
     """
@@ -141,8 +137,8 @@ def without_limits(root: ElementTree.Element) -> dict[str, list[str]]:
 def split_planar(root: ElementTree.Element, source: str) -> list[str]:
     """Turn planar joints with limits into x, y and a turn about the axis, in place; return notes.
 
-    The plane is that of its frame's x and y where its axis is z, as MoveIt and Tesseract read it;
-    of another axis that frame turned the shortest way.
+    The plane is that of its frame's x and y if its axis is z, as in MoveIt and Tesseract; for
+    another axis that frame is rotated by the shortest rotation.
 
     Raises
     ------
@@ -193,7 +189,7 @@ def split_planar(root: ElementTree.Element, source: str) -> list[str]:
 
 
 def _plane_of(normal: list[float]) -> tuple[list[float], list[float]]:
-    """Return the x and y axes of the frame whose z axis was turned the shortest way to a normal."""
+    """Return the x and y axes of the frame whose z axis is rotated shortest to a normal."""
     length = math.hypot(*normal)
     x, y, z = (value / length for value in normal) if length > 0.0 else (0.0, 0.0, 1.0)
     if z < -1.0 + 1e-9:
@@ -202,12 +198,12 @@ def _plane_of(normal: list[float]) -> tuple[list[float], list[float]]:
     return [1.0 - share * x * x, -share * x * y, -x], [-share * x * y, 1.0 - share * y * y, -y]
 
 
-# Kinds of joints that have limits.
+# Types of joints with limits.
 _MOVING = ("revolute", "prismatic", "continuous")
 
 
 def _is_colour(material: ElementTree.Element, where: str, notes: list[str]) -> bool:
-    """Return whether a material has a colour or a texture; one that is none is taken out."""
+    """Return whether a material has a colour or a texture; an invalid one is removed."""
     for tag in ("color", "texture"):
         for extra in material.findall(tag)[1:]:
             material.remove(extra)
@@ -231,7 +227,7 @@ def _is_colour(material: ElementTree.Element, where: str, notes: list[str]) -> b
 
 
 def lacking_inertials(root: ElementTree.Element) -> dict[str, str]:
-    """Return what incomplete ``<inertial>`` elements lack, in words → the link's name."""
+    """Return missing values of incomplete ``<inertial>`` elements, in words → the link's name."""
     found = {}
     for link in root.findall("link"):
         inertial = link.find("inertial")
@@ -268,14 +264,14 @@ def without_lacking(root: ElementTree.Element) -> ElementTree.Element:
 # terminal at most: a box with two sizes, numbers with commas, a capsule, a mass that is none.
 # What is not there cannot be hit, so such files must not pass.
 
-# Shape → its numbers, and how many of each.
+# Shape → its numbers, and their count.
 _SIZES = {
     "box": {"size": 3},
     "cylinder": {"radius": 1, "length": 1},
     "sphere": {"radius": 1},
     "mesh": {},
 }
-# How far below 0 CAD programs round the inertia of a small part [kg m²].
+# Negative inertia of a small part by rounding of CAD programs [kg m²].
 _ROUNDING = 1e-9
 
 
@@ -287,14 +283,14 @@ def check_link_elements(root: ElementTree.Element, source: str) -> None:
     root : Element
         The ``<robot>``.
     source : str
-        What messages call the file.
+        Name of the file in messages.
 
     Raises
     ------
     RobotError
         A name is missing or there twice, a mass or inertia is negative or no number; a collision
-        element has no shape, one that URDF does not know, or numbers that are none, not finite, too
-        few or too many, or sizes that are not above 0. Link, element and value are named.
+        element has no shape, an unknown one, or numbers that are invalid, not finite, too few or
+        too many, or sizes that are not above 0. With link, element and value.
     """
     for element in root.iter("collision"):
         if not any(element in list(link) for link in root.findall("link")):
@@ -320,7 +316,7 @@ def _check_inertial(link: ElementTree.Element, where: str) -> None:
     for tag, part in parts.items():
         for key in ("value",) if tag == "mass" else MOMENTS:
             if part is None or part.get(key) is None:
-                # Missed only where torques are asked for.
+                # Needed for torques alone.
                 continue
             value = number(part, key, f"{where}: <{tag}>")
             if tag == "mass" and value < 0.0:
@@ -330,7 +326,7 @@ def _check_inertial(link: ElementTree.Element, where: str) -> None:
 
 
 def check_shape(element: ElementTree.Element, where: str) -> None:
-    """Raise RobotError where a ``<collision>`` or ``<visual>`` has no shape that URDF knows."""
+    """Raise RobotError where a ``<collision>`` or ``<visual>`` has no shape of a URDF."""
     check_origin(element, where)
     shapes = [shape for geometry in element.findall("geometry") for shape in geometry]
     if len(shapes) != 1 or shapes[0].tag not in _SIZES:
@@ -360,12 +356,12 @@ def check_shape(element: ElementTree.Element, where: str) -> None:
 
 SINGLE_COORDINATE = ("revolute", "prismatic", "continuous")
 _KNOWN_TYPES = (*SINGLE_COORDINATE, "fixed", "floating", "planar")
-# What Pinocchio calls the world's frame.
+# Name of the world's frame in Pinocchio.
 _WORLD = "universe"
 
 
 def check_joint_elements(root: ElementTree.Element, source: str) -> None:
-    """Check every ``<joint>`` of the ``<robot>``; `source` is what messages call the file.
+    """Check every ``<joint>`` of the ``<robot>``; `source` is the file's name in messages.
 
     Raises
     ------
@@ -455,7 +451,7 @@ def _limit_number(
         raise RobotError(f"{error}{remedy}") from None
 
 
-# The attribute of ``<dynamics>`` that has a rotor's inertia, counted at the joint [kg m² or kg].
+# Attribute of ``<dynamics>`` with a rotor's inertia at the joint [kg m² or kg].
 ARMATURE = "armature"
 
 

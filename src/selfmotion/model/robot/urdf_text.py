@@ -1,4 +1,4 @@
-"""From a file to the text of a URDF: packages that it names, xacro, and what is no URDF."""
+"""From a file to the text of a URDF: its packages, xacro, and files that are no URDF."""
 
 import contextlib
 import io
@@ -31,15 +31,18 @@ from selfmotion.model.robot.xacro_expressions import only_arithmetic
 # 4. three levels below the folders above the file, up to six of them, or to the root of a
 #    repository
 
-# How many levels below a folder are looked at, below how many folders above a file, and at how many
-# folders in all: a home is larger than any workspace.
-_BELOW, _ABOVE, _MOST = 3, 6, 5000
+# Levels below a folder that are searched …
+_BELOW = 3
+# … below this number of folders above a file …
+_ABOVE = 6
+# … up to this number of folders in all: a home is larger than any workspace.
+_MOST = 5000
 _SKIPPED = {"node_modules", "__pycache__", "build", "log"}
 
 
 @dataclass(frozen=True)
 class Packages:
-    """Where a file's packages are looked for.
+    """Search for a file's packages.
 
     Attributes
     ----------
@@ -53,7 +56,7 @@ class Packages:
     given: tuple[str, ...] = ()
 
     def folder(self, name: str) -> Path | None:
-        """Return the folder of a package, None where there is none."""
+        """Return the folder of a package, None if not found."""
         return next(self._places(name), None)
 
     def place(self, address: str) -> Path | None:
@@ -74,7 +77,7 @@ class Packages:
         return path if is_file(path) else self._moved(path)
 
     def searched(self, name: str) -> str:
-        """Return in words where a package was looked for, and what helps."""
+        """Return in words the places that were searched for a package, and a remedy."""
         given = "".join(f"{folder}, " for folder in self.given)
         variables = ("AMENT_PREFIX_PATH", "ROS_PACKAGE_PATH")
         known = " and ".join(
@@ -103,8 +106,6 @@ class Packages:
             if (folder / ".git").exists():
                 break
         return tuple(found)
-
-    # A description names the same package for each of its meshes: folders are looked at once.
 
     @cached_property
     def _given(self) -> tuple["_Walk", ...]:
@@ -140,7 +141,7 @@ class Packages:
         return None
 
     def _near(self, name: str) -> Iterator[Path]:
-        # Any word of a path would be looked for: below folders only where it is a package's.
+        # Words of a path are searched below folders only if they look like a package's name.
         if "_" in name or name.endswith("description"):
             yield from self._places(name)
             return
@@ -161,7 +162,7 @@ def _is(folder: Path, name: str) -> bool:
 
 
 def _package_name(folder: Path) -> str | None:
-    """Return what a folder's ``package.xml`` calls it; None where it has none."""
+    """Return the name in a folder's ``package.xml``; None without one."""
     try:
         found = ElementTree.parse(folder / "package.xml").findtext("name")
     except (OSError, ElementTree.ParseError):
@@ -170,7 +171,7 @@ def _package_name(folder: Path) -> str | None:
 
 
 class _Walk:
-    """Folders and those below them, level by level, each looked at once and not before it counts.
+    """Folders and those below them, level by level, each listed once, on demand.
 
     Parameters
     ----------
@@ -229,7 +230,7 @@ def _inside(folder: Path) -> list[Path]:
 # Xacro keeps its state in its modules: one file at a time.
 _alone = threading.Lock()
 _FIND = re.compile(r"\$\(find\s+([^)\s]+)\s*\)")
-# Files that include each other are followed so deep when their arguments are listed.
+# Largest depth of included files whose arguments are listed.
 _DEEPEST_INCLUDE = 10
 
 
@@ -244,7 +245,7 @@ def expand(
     arguments : dict
         Values of its ``<xacro:arg>``.
     packages : Packages
-        Where ``$(find NAME)`` is looked up.
+        Search for ``$(find NAME)``.
     of_others : bool
         Whether arguments that it does not have are left out: they are those of another file.
 
@@ -277,7 +278,7 @@ def expand(
     # A xacro file holds expressions of Python, which may raise anything.
     except Exception as error:
         said = " ".join(str(error).split()) or type(error).__name__
-        # What was not found is said as it is, once, without what passed it on.
+        # Only the first cause, without the chain of includes.
         missing = said.split("package '")
         reason = f"package '{missing[1].strip()}" if missing[1:] else said
         empty = [key for key, value in declared.defaults.items() if not value]
@@ -311,7 +312,7 @@ def _check_called(path: Path) -> None:
     )
 
 
-# So many files that include another are named.
+# Largest number of including files in a message.
 _FEW = 3
 
 
@@ -332,7 +333,7 @@ def _text(value: Any) -> str:
 
 
 class _Declared:
-    """The arguments of a xacro file and of what it includes.
+    """The arguments of a xacro file and of its includes.
 
     Attributes
     ----------
@@ -348,7 +349,7 @@ class _Declared:
 
     @property
     def defaults(self) -> dict[str, str | None]:
-        """Name → default; None where there is none."""
+        """Name → default; None for none."""
         return {**self._used, **self._given}
 
     def read(self, file: Path, depth: int = 0) -> None:
@@ -395,7 +396,7 @@ class _Declared:
 
 @contextlib.contextmanager
 def _finding(packages: Packages) -> Iterator[None]:
-    """Let xacro find packages without ROS: its own way asks for a module of ROS 2."""
+    """Let xacro find packages without ROS: its own function needs a module of ROS 2."""
     from xacro import substitution_args
 
     def find(name: str) -> str:
@@ -408,17 +409,15 @@ def _finding(packages: Packages) -> Iterator[None]:
         yield
 
 
-# The text of a URDF: what is no URDF at all, and what is written in it for Pinocchio.
-
-# A limit that no motion reaches; Pinocchio wants finite numbers for a revolute joint.
+# Limit beyond any motion; Pinocchio needs finite numbers for a revolute joint.
 _UNLIMITED = 1e6
-# Elements in each other; URDFs have six.
+# Largest depth of nested elements; URDFs have six.
 _DEEPEST = 100
 _XACRO = "is xacro; give it as a file with the suffix .xacro"
 
 
 def root_of(text: str, source: str) -> ElementTree.Element:
-    """Return the ``<robot>`` of URDF text; RobotError where there is none."""
+    """Return the ``<robot>`` of URDF text; RobotError without one."""
     if not text.strip():
         raise RobotError(f"{source}: is empty, expected a URDF")
     try:
@@ -448,7 +447,7 @@ def root_of(text: str, source: str) -> ElementTree.Element:
     return root
 
 
-# Attributes that name a robot, a link, a joint or a frame.
+# Attributes with the name of a robot, a link, a joint or a frame.
 _NAMING = ("name", "link", "joint")
 
 
@@ -466,7 +465,7 @@ def _check_names(root: ElementTree.Element, source: str) -> None:
 
 
 def check_expanded(root: ElementTree.Element, source: str) -> None:
-    """Raise RobotError for what xacro should have replaced."""
+    """Raise RobotError for expressions that xacro should have replaced."""
     for part in (root, *root.findall("link"), *root.findall("joint")):
         for element in [root] if part is root else part.iter():
             for key, value in element.items():
@@ -479,7 +478,7 @@ def check_expanded(root: ElementTree.Element, source: str) -> None:
 
 
 def parsed_by_yourdfpy(text: str, source: str) -> Any:
-    """Return what yourdfpy makes of URDF text, `yourdfpy.Robot`; RobotError where it cannot."""
+    """Return the result of yourdfpy for URDF text, `yourdfpy.Robot`; RobotError if it fails."""
     import yourdfpy
 
     logging.getLogger("yourdfpy").setLevel(logging.CRITICAL)
@@ -488,7 +487,7 @@ def parsed_by_yourdfpy(text: str, source: str) -> Any:
             return yourdfpy.URDF.load(
                 io.BytesIO(text.encode()), load_meshes=False, build_scene_graph=False
             ).robot
-    # It raises what its parsers do, of which there are several.
+    # It raises the exceptions of several parsers.
     except Exception as error:
         raise RobotError(f"{source}: is not a valid URDF: {error}") from error
 
@@ -510,8 +509,8 @@ def make_meshes_absolute(
 ) -> None:
     """Turn addresses of meshes into paths on this machine, as far as they are there.
 
-    What is found as ``package://`` in the `folders` stays as it is; a relative name that is nowhere
-    is taken to be beside the file.
+    Addresses ``package://`` in the `folders` are kept; a relative name that is not found is
+    relative to the file.
     """
     for mesh in root.iter("mesh"):
         name = mesh.get("filename", "")

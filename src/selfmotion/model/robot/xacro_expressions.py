@@ -6,9 +6,9 @@ import contextlib
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-# Xacro evaluates what stands in ${…} and $(eval …) as Python. It forbids some names, but a lambda,
-# a dictionary of methods or a frame leads past that, and $(eval …) has all of Python's functions.
-# A description is a text that somebody else wrote: only these forms are evaluated.
+# Xacro evaluates ${…} and $(eval …) as Python. It forbids some names, but a lambda, a dictionary of
+# methods or a frame circumvents that, and $(eval …) has all of Python's functions. Descriptions
+# come from others: only these forms are evaluated.
 _FORMS = (
     *(ast.Expression, ast.Constant, ast.Name, ast.Load, ast.Store, ast.Attribute, ast.Subscript),
     *(ast.Slice, ast.List, ast.Tuple, ast.Dict, ast.Set, ast.Starred, ast.Call, ast.keyword),
@@ -16,12 +16,13 @@ _FORMS = (
     *(ast.FormattedValue, ast.ListComp, ast.SetComp, ast.DictComp, ast.GeneratorExp),
     *(ast.comprehension, ast.boolop, ast.operator, ast.unaryop, ast.cmpop),
 )
-# What leads from a value to the code that made it.
+# Prefixes of attributes that lead from a value to its code.
 _INNER = ("gi_", "cr_", "ag_", "tb_", "co_", "func_")
+# Such attributes of frames.
 _FRAMES = ("f_back", "f_builtins", "f_code", "f_globals", "f_locals", "mro")
-# Functions of xacro's that hand out what is inside of values, or make classes.
+# Functions of xacro that expose values' internals, or make classes.
 _LEFT_OUT = ("type", "vars")
-# Names of Python that $(eval …) has besides its own, as xacro's documentation lists them.
+# Python's functions of $(eval …) in xacro's documentation.
 _FUNCTIONS = ("list", "dict", "map", "str", "float", "int")
 
 
@@ -59,7 +60,7 @@ def check_expression(text: str) -> None:
 def only_arithmetic(find: Any) -> Iterator[None]:
     """Let xacro evaluate nothing but arithmetic, and find packages by a function, meanwhile.
 
-    What xacro keeps between files, and what it adds to the reader of YAML, is gone afterwards.
+    State of xacro between files, and its additions to the reader of YAML, are removed afterwards.
     """
     import xacro
     import yaml

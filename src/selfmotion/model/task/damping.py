@@ -43,8 +43,8 @@ class Damping:
         at the threshold.
     path_weight : float
         w of the term "path error" ∫ ½ w |e|² dt of the cost, without which the optimisation would
-        go singular to save joint motion; as a multiple of (K/σ0)², K the rate [1/s] of the pose
-        feedback. At 1, an error costs what the joint motion would that takes it out at the
+        go singular to reduce joint motion; as a multiple of (K/σ0)², K the rate [1/s] of the pose
+        feedback. At 1, an error costs as much as the joint motion that corrects it at the
         threshold.
 
     Raises
@@ -95,7 +95,7 @@ class DampingLaw:
 
 # How fast the tool is brought back to its path where integration or damping let it off.
 
-# The pose feedback removes an error e at the rate K e; this is K times the motion's duration.
+# Rate K of the pose feedback, which reduces an error e by K e, times the motion's duration.
 _FEEDBACK = 20.0
 
 

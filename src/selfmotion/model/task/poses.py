@@ -16,12 +16,9 @@ from pinocchio import (
 
 from selfmotion.basics import Array, ProblemError, as_numbers, read_only
 
-# Poses and rotations, by Pinocchio: the values that all of the house speaks of.
-
-
 # Poses as they are given: an SE3, or a homogeneous matrix.
 
-# How far a rotation matrix that was written down may be from orthonormal.
+# Largest deviation of a given rotation matrix from orthonormal.
 _ROTATION_TOLERANCE = 1e-6
 
 
@@ -54,8 +51,8 @@ def as_pose(pose: Any, what: str = "pose", error: type[Exception] = ProblemError
     Raises
     ------
     error
-        It is something else, not finite, or its rotation is not orthonormal or a mirror; `what` is
-        what the message calls it.
+        It is no pose, not finite, or its rotation is not orthonormal or a mirror; `what` is its
+        name in the message.
     """
     values = pose.homogeneous if isinstance(pose, pin.SE3) else pose
     matrix = as_numbers(values, what, "an SE3 or a (4, 4) matrix of finite numbers", (4, 4), error)
@@ -75,7 +72,7 @@ def as_pose(pose: Any, what: str = "pose", error: type[Exception] = ProblemError
 
 # Rotation vectors that vary: exp([δ]×), the left Jacobian of SO(3) and its derivative.
 
-# Below this angle the closed forms lose digits and their series serve.
+# Angle below which closed forms lose digits, and series are used.
 SMALL_TURN = 5e-2
 
 

@@ -96,8 +96,8 @@ class Relaxation:
         return f"({', '.join(self.rows)})"
 
     @property
-    def told(self) -> str:
-        """The rows and the window, for what is said of one among several."""
+    def label(self) -> str:
+        """The rows and the window, for messages about one of several."""
         if self.during is None:
             return self.name
         return f"{self.name} at {self.during[0]:.6g} to {self.during[1]:.6g} s"
@@ -122,7 +122,7 @@ class Relaxation:
         return (0.0, duration) if self.during is None else self.during
 
     def moved(self, when: Callable[[Array], Array]) -> Relaxation | None:
-        """Return the same with its window at other times [s]; None where nothing is left of it."""
+        """Return the same with its window at other times [s]; None for an empty window."""
         if self.during is None:
             return self
         first, last = when(np.array(self.during)).tolist()

@@ -116,7 +116,7 @@ class Task(Enum):
         return np.concatenate([target.translation - actual.translation, angular])
 
     def miss(self, target: pin.SE3, actual: pin.SE3) -> tuple[float, float]:
-        """Return how far `actual` is from `target` in the prescribed rows, (m, rad)."""
+        """Return the distance of `actual` from `target` in the prescribed rows, (m, rad)."""
         error = self.select(self.twist_error(target, actual)[:, None], actual.rotation)[:, 0]
         linear = self.rows < 3
         return float(np.linalg.norm(error[linear])), float(np.linalg.norm(error[~linear]))

@@ -1,4 +1,4 @@
-"""Other works' ways to resolve redundancy, each usable as ``plan(problem, method=…)``."""
+"""Other works' methods of redundancy resolution, each usable as ``plan(problem, method=…)``."""
 
 from selfmotion.paper.baselines.base import (
     Method as Method,

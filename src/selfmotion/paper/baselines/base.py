@@ -1,4 +1,4 @@
-"""What a method is: velocity fields, integrated, and the plan made of the motion."""
+"""Base of methods: velocity fields, integrated, and plans of their motions."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 Rate = Callable[[float, Array], Array]
 
-# Of the integrator: far below what a certificate accepts.
+# Tolerance of the integrator: far below a certificate's.
 _TOLERANCE = 1e-9
 
 # Joint speeds, in path durations per radian, at which a motion counts as broken down.
@@ -59,7 +59,7 @@ class Here:
 
 
 class PoseFeedback:
-    """t, q → `Here`: what the arm must do at that time to stay on, or return to, the path."""
+    """t, q → `Here`: velocity of the tool for the path, with feedback of the pose error."""
 
     def __init__(self, problem: Problem) -> None:
         self._robot, self._path, self._task = problem.robot, problem.path, problem.task
@@ -176,15 +176,15 @@ def _guarded(problem: Problem, rate: Rate) -> Rate:
     return guarded
 
 
-# What a method is, and the plan made of the motion it finds.
-
-# Samples of a motion to begin with; doubled until the quintics between them hold the tolerance.
-_FEWEST_STEPS, _MOST_DOUBLINGS = 64, 6
+# Samples of a motion at the start …
+_FEWEST_STEPS = 64
+# … and doublings until the quintics between them are within the tolerance.
+_MOST_DOUBLINGS = 6
 
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """What a method found.
+    """Result of a method.
 
     Attributes
     ----------
@@ -193,9 +193,9 @@ class Motion:
     message : str
         How it was found, for the report.
     evaluations : int
-        Motions whose cost was computed on the way.
+        Number of motions whose cost was computed.
     jacobian_evaluations : int
-        Jacobians computed on the way.
+        Number of Jacobians.
     status : Status
     """
 
@@ -207,7 +207,7 @@ class Motion:
 
 
 class Method(Protocol):
-    """A way to resolve the redundancy of a problem other than by optimising coefficients."""
+    """A method of redundancy resolution other than by optimised coefficients."""
 
     def solve(self, problem: Problem) -> Motion:
         """Return a joint motion along the problem's path.
@@ -243,10 +243,10 @@ def plan_by(problem: Problem, method: Method, tolerance: Tolerance | None = None
     began = time.perf_counter()
     found = method.solve(problem)
     seconds = time.perf_counter() - began
-    still = pseudo_inverse(problem)
+    minimum_norm = pseudo_inverse(problem)
     trajectory, certificate = _sampled(problem, found, tolerance)
     grid = Grid(trajectory.t)
-    terms, initial_terms = costs(problem, found, grid), costs(problem, still, grid)
+    terms, initial_terms = costs(problem, found, grid), costs(problem, minimum_norm, grid)
     report = Report(
         cost=sum(terms.values()),
         initial_cost=sum(initial_terms.values()),
@@ -262,7 +262,7 @@ def plan_by(problem: Problem, method: Method, tolerance: Tolerance | None = None
         message=found.message,
         seconds=seconds,
     )
-    initial = _smooth(problem, still, grid)
+    initial = _smooth(problem, minimum_norm, grid)
     return Plan(problem, trajectory, initial, read_only([]), report, certificate)
 
 
@@ -287,7 +287,7 @@ def _check(problem: Problem, method: Method) -> None:
 
 
 def costs(problem: Problem, motion: Motion, grid: Grid) -> dict[str, float]:
-    """Return what each cost of the problem contributes to F along a motion."""
+    """Return the contribution of each cost of the problem to F along a motion."""
     q, qd = motion.at(grid.stage_times)
     samples = Samples.along(problem.follows, grid.sampling, q, qd)
     return {cost.name: float(samples.weights @ cost.value(samples)) for cost in problem.costs}
@@ -313,7 +313,7 @@ def pseudo_inverse(problem: Problem) -> Motion:
 def _sampled(
     problem: Problem, motion: Motion, tolerance: Tolerance
 ) -> tuple[Trajectory, Certificate]:
-    """Return the motion as quintics, at as many samples as the tolerance needs."""
+    """Return the motion as quintics, with as many samples as the tolerance needs."""
     grid = Grid.aligned(problem.path.knots, _FEWEST_STEPS)
     before = np.inf
     for attempt in range(_MOST_DOUBLINGS + 1):

@@ -16,13 +16,13 @@ from selfmotion.planning.result import Plan
 from selfmotion.problem.costs import Cost, JointVelocity, Samples, weight_matrix
 from selfmotion.problem.problem import Problem
 
-# The pose feedback removes what collocation lets in at the rate K e; K times the duration.
+# Rate K of the pose feedback, which removes errors of the collocation, times the duration.
 _FEEDBACK = 5.0
 
 # Ends of a path nearer than this [m, rad] are the same.
 _CLOSED = 1e-6
 
-# Mesh to begin with; `solve_bvp` refines it.
+# Number of nodes of the first mesh; `solve_bvp` refines it.
 _MESH = 101
 
 

@@ -15,9 +15,11 @@ from selfmotion.problem.problem import Problem
 
 # Methods that decide from the present pose alone: pseudo-inverse, gradient projection, damping.
 
-# Steps of the quadrature that compares gains, and cost evaluations of the search for the best.
-_STEPS, _TRIALS = 64, 16
-# The criterion that is followed where none is given.
+# Steps of the quadrature that compares gains.
+_STEPS = 64
+# Cost evaluations of the search for the best gain.
+_TRIALS = 16
+# Default criterion.
 MANIPULABILITY = Manipulability()
 
 
@@ -134,15 +136,15 @@ class GradientProjection:
             tried.append((cost, motion))
             return cost
 
-        still = cost_of(0.0)
-        if not np.isfinite(still):
+        minimum_norm = cost_of(0.0)
+        if not np.isfinite(minimum_norm):
             # Raises again, with the time at which it breaks down.
             self._follow(problem, 0.0)
         scale = self._scale(problem, tried[0][1])
         gains = scale * np.geomspace(1e-3, 1e1, _TRIALS // 2)
         coarse = [cost_of(gain) for gain in gains]
         best = int(np.argmin(coarse))
-        if coarse[best] < still:
+        if coarse[best] < minimum_norm:
             low, high = gains[max(best - 1, 0)], gains[min(best + 1, len(gains) - 1)]
             minimize_scalar(
                 lambda logarithm: cost_of(float(np.exp(logarithm))),
@@ -155,10 +157,10 @@ class GradientProjection:
         message = f"{found.message}, the best of {len(tried)}"
         return Motion(found.at, message, len(tried), spent)
 
-    def _scale(self, problem: Problem, still: Motion) -> float:
+    def _scale(self, problem: Problem, minimum_norm: Motion) -> float:
         """Return the gain at which ε is as fast as the motion without it."""
         t = np.linspace(0.0, problem.path.duration, 9)
-        q, qd = still.at(t)
+        q, qd = minimum_norm.at(t)
         slopes = [
             pose_gradient(problem, self.criterion, time, row)
             for time, row in zip(t, q, strict=True)
@@ -182,7 +184,7 @@ def pose_gradient(problem: Problem, criterion: Cost, t: float, q: Array) -> Arra
 # The attraction to the stationary pose, times the duration.
 _ATTRACTION = 20.0
 
-# Of the central differences of the projected gradient [rad or m].
+# Step of the central differences of the projected gradient [rad or m].
 _DIFFERENCE = 1e-5
 
 

@@ -1,4 +1,4 @@
-"""What the paper claims about the method, tested one by one, and other works beside it."""
+"""The paper's claims about the method, tested one by one, and other works."""
 
 from dataclasses import replace
 
@@ -25,9 +25,7 @@ from selfmotion.planning.result import Plan
 from selfmotion.problem.costs import InverseManipulability, JointVelocity, Manipulability
 from selfmotion.problem.problem import Problem, sample_problem
 
-# What the paper claims about the method, tested one by one.
-
-# A norm of the coefficients at which, in the test of growth, the guard steps in.
+# Norm of the coefficients at which the guard stops the test of growth.
 _GUARD = 1e3
 
 
@@ -202,7 +200,7 @@ _COLUMNS = (
     "check",
 )
 
-# Two optima agree to four digits.
+# Relative agreement of two optima: four digits.
 _AGREEMENT = 1e-4
 
 
@@ -293,15 +291,19 @@ def _agreement(context: Context) -> Claim:
 def _local_methods(table: Table) -> Claim:
     costs = {str(row[0]): row[1] for row in table.rows}
     ours, projection = costs["ours, cubic"], costs["gradient projection"]
-    still = costs["pseudo-inverse (x = 0)"]
-    if not (isinstance(ours, float) and isinstance(projection, float) and isinstance(still, float)):
+    minimum_norm = costs["pseudo-inverse (x = 0)"]
+    if not (
+        isinstance(ours, float)
+        and isinstance(projection, float)
+        and isinstance(minimum_norm, float)
+    ):
         raise TypeError("a cost in the table is no number")
-    share = (still - projection) / (still - ours)
+    share = (minimum_norm - projection) / (minimum_norm - ours)
     return Claim(
         "better_than_local",
         "It can hopefully be shown as an improvement over locally optimal methods.",
         Verdict.CONFIRMED if ours < projection else Verdict.REFUTED,
         f"{ours:.4f}, against {projection:.4f} of gradient projection",
         f"With its gain tuned on this very cost, gradient projection gets {100 * share:.0f} % of "
-        f"the way from x = 0 ({still:.4f}); without tuning there is no telling.",
+        f"the way from x = 0 ({minimum_norm:.4f}); without tuning there is no telling.",
     )

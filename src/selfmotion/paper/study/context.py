@@ -1,4 +1,4 @@
-"""Runs that several parts of the study look at, each done once, and objectives for them."""
+"""Runs that several parts of the study share, cached, and their objectives."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -16,18 +16,16 @@ from selfmotion.paper.study.published import (
     published_optimizer,
 )
 from selfmotion.planning.optimise import LineSearch, Minimum, QuasiNewton, inverse_metric
-from selfmotion.planning.paper import Objective, StillMotion
+from selfmotion.planning.paper import MinimumNormMotion, Objective
 from selfmotion.planning.planner import plan
 from selfmotion.planning.result import Plan
 from selfmotion.problem.costs import Cost, InverseManipulability, JointVelocity
 from selfmotion.problem.problem import Problem, sample_problem
 
-# What the parts of the study share: objectives on a given grid, and sizes of the run.
-
 
 @dataclass(frozen=True)
 class Scale:
-    """How much of the study is run.
+    """Size of the study.
 
     Attributes
     ----------
@@ -60,14 +58,14 @@ class Scale:
 
     @classmethod
     def reduced(cls) -> "Scale":
-        """Return what the tests run: the same claims on less work."""
+        """Return the size for tests: the same claims with less work."""
         return cls("reduced", 6, (3, 5, 8), (1.0,), (1e-2, 1e-4, 1e-9), False)
 
 
 def bind(problem: Problem, steps: int = 64) -> Objective:
     """Return the objective of a problem on a grid of about `steps` Runge-Kutta steps."""
     grid = Grid.aligned(problem.path.knots, steps)
-    return Objective.of(problem, StillMotion.on(problem, start_of(problem), grid))
+    return Objective.of(problem, MinimumNormMotion.on(problem, start_of(problem), grid))
 
 
 def optimum(
@@ -84,7 +82,7 @@ def optimum(
     """Minimise with exact gradients from `x0`, with H0 from the Gauss-Newton matrix or = I."""
     objective = bind(problem, steps)
     x = np.zeros(objective.size)
-    # The matrix is that of the motion at x = 0, wherever the search begins.
+    # The matrix is that of the motion at x = 0, wherever the search starts.
     h = inverse_metric(objective.metric(x)) if metric else None
     optimizer = QuasiNewton(
         tolerance=tolerance,
@@ -96,9 +94,7 @@ def optimum(
     return objective, optimizer.minimize(objective, x if x0 is None else x0, h)
 
 
-# Runs that several parts of the study look at, each done once.
-
-# Steps of the Runge-Kutta grid on which all costs of tables are computed: right to seven digits.
+# Steps of the Runge-Kutta grid for costs in tables: right to seven digits.
 FINE = 256
 
 
@@ -140,9 +136,9 @@ class Result:
     Attributes
     ----------
     terms : dict
-        What each cost contributes.
+        Contribution of each cost.
     smallest_w : float
-        Least manipulability √det(JJᵀ) on the way [m²].
+        Smallest manipulability √det(JJᵀ) along the path [m²].
     t, q, qd : arrays
         At the nodes.
     """
@@ -204,7 +200,7 @@ class Context:
         return self._published[mu]
 
     @cached_property
-    def still(self) -> Result:
+    def minimum_norm(self) -> Result:
         """The motion at x = 0."""
         return finely(self.problem, np.zeros(12))
 

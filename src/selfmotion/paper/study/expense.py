@@ -1,4 +1,4 @@
-"""What the published scheme costs in floating-point operations, and how that grows with n."""
+"""Floating-point operations of the published scheme, and their growth with n."""
 
 import tempfile
 from dataclasses import replace
@@ -23,8 +23,10 @@ from selfmotion.problem.problem import Problem, sample_problem
 # Iterations of the published scheme on each chain: the same for all, so that costs compare.
 _ITERATIONS = 4
 
-# What the paper reports [flop]: a short run of 8 iterations, and one of 31.
-_SHORT, _LONG = (8, 4e6), (31, 23e6)
+# Operations in the paper: iterations of a short run, and [flop].
+_SHORT = (8, 4e6)
+# The same of a long run.
+_LONG = (31, 23e6)
 
 
 def chapter(context: Context) -> Chapter:
@@ -65,7 +67,7 @@ def _flops(run: PublishedRun) -> Claim:
     )
 
 
-# Of the table of chains.
+# Columns of the table of chains.
 _COLUMNS = (
     "joints",
     "evaluations of F",
@@ -122,7 +124,7 @@ def _growth(context: Context) -> tuple[Table, Plot, Claim]:
 
 
 def _growth_verdict(power: float) -> Verdict:
-    """Judge 'at least n²'; what is between 1.5 and 2 counts as nearly so."""
+    """Judge 'at least n²'; powers between 1.5 and 2 count as nearly so."""
     if power >= 2.0:
         return Verdict.CONFIRMED
     return Verdict.QUALIFIED if power >= 1.5 else Verdict.REFUTED

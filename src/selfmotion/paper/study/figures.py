@@ -12,8 +12,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-# Text and axes are drawn in this near-black; in the page it becomes the colour of the text there,
-# so that figures follow dark mode.
+# Colour of text and axes, near-black; in the page it becomes the text colour, for dark mode.
 _INK = "#010203"
 
 # Legible on white and on dark grey (Tol's "bright", without its yellow).
@@ -79,7 +78,7 @@ def to_svg(plot: Plot) -> str:
     import matplotlib
 
     stream = io.StringIO()
-    # The salt keeps the ids of several figures in one page apart, and the file the same each time.
+    # The salt separates the ids of several figures in one page, and makes files reproducible.
     with matplotlib.rc_context({**_STYLE, "svg.hashsalt": plot.name}):
         figure.savefig(stream, format="svg", transparent=True, metadata={"Date": None})
     text = stream.getvalue()

@@ -109,7 +109,7 @@ def _badge(claim: Claim) -> str:
 
 
 def _plain(value: Any) -> Any:
-    """Return dataclasses, enums and numbers as JSON knows them; what is not finite as null."""
+    """Return dataclasses, enums and numbers as JSON values; null for NaN and infinity."""
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         return {f.name: _plain(getattr(value, f.name)) for f in dataclasses.fields(value)}
     if isinstance(value, Enum):

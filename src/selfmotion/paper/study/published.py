@@ -60,7 +60,7 @@ class PublishedFunction:
         return total if np.isfinite(total) else np.inf
 
     def terms(self, x: Array) -> dict[str, float] | None:
-        """Return what each cost contributes to F(x); None where the integrator gives up."""
+        """Return the contribution of each cost to F(x); None if the integrator fails."""
         samples = self.samples(x)
         if samples is None:
             return None
@@ -100,7 +100,7 @@ class PublishedFunction:
         return (ahead - self.value(x)) / self._delta * length
 
     def metric(self, x: Array) -> Array:
-        """Return the identity: the paper knows no metric."""
+        """Return the identity: the paper has no metric."""
         return np.eye(self.size)
 
     def _rate(self, t: float, q: Array, x: Array) -> Array:

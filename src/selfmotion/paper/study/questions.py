@@ -1,4 +1,4 @@
-"""What the paper leaves open, answered."""
+"""Open questions of the paper, answered."""
 
 from dataclasses import dataclass, replace
 
@@ -29,11 +29,12 @@ from selfmotion.problem.problem import Problem, sample_problem
 
 # The cause of the 'surging' of F against iterations: local minima or conditioning.
 
-# A surge: after the first two iterations, a drop more than this many times the one before, and
-# above this share of F.
-_FACTOR, _VISIBLE = 2.0, 1e-5
+# A surge: after the first two iterations, a drop of more than this many times the one before …
+_FACTOR = 2.0
+# … and above this share of F.
+_VISIBLE = 1e-5
 
-# Within this share of the final cost, the search is done for practical purposes.
+# Relative distance from the final cost at which the search is finished for practical purposes.
 _DONE = 1e-4
 
 
@@ -162,8 +163,6 @@ def _until_done(found: Minimum) -> int:
     return next(k for k, i in enumerate(found.history) if i.cost <= bound)
 
 
-# What the paper leaves open, answered.
-
 # A tolerance of the integrator, tight for its order.
 _TIGHT = 1e-6
 
@@ -240,9 +239,9 @@ def _nothing(context: Context, least: float) -> tuple[float, str, str]:
 def _differences(context: Context) -> _Answer:
     """Return the error of eq. 13 against the exact gradient, over δ, at x = 0 and away from it."""
     away = 0.5 * context.published().minimum.x
-    still = np.zeros_like(away)
+    zero = np.zeros_like(away)
     cases = {
-        "x = 0, ode23's default tolerance": (still, ODE23_TOLERANCE),
+        "x = 0, ode23's default tolerance": (zero, ODE23_TOLERANCE),
         "halfway to x*, default tolerance": (away, ODE23_TOLERANCE),
         f"halfway to x*, tolerance {_TIGHT:.0e}": (away, _TIGHT),
     }
@@ -303,7 +302,7 @@ def _accuracy(context: Context) -> _Answer:
         tuple(rows),
         "The motion found on a coarse grid, integrated finely, is nearly as good as any.",
     )
-    error = abs(run.minimum.history[0].cost / context.still.cost - 1.0)
+    error = abs(run.minimum.history[0].cost / context.minimum_norm.cost - 1.0)
     lost = truth / context.best.cost - 1.0
     return (
         table,
@@ -398,7 +397,7 @@ def _cyclic(context: Context) -> _Answer:
 
 
 def _minima(context: Context) -> _Answer:
-    """Start at random many times, and see where the searches end."""
+    """Start at random points, and compare the minima."""
     rng = np.random.default_rng(0)
     costs = []
     for _ in range(context.scale.starts):

@@ -1,4 +1,4 @@
-"""What the study finds, as plain values: all the report shows and all the JSON file holds."""
+"""Results of the study, as plain values: content of the report and of the JSON file."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 
 class Verdict(Enum):
-    """What became of a statement of the paper."""
+    """Verdict on a statement of the paper."""
 
     CONFIRMED = "confirmed"
     QUALIFIED = "qualified"
@@ -26,12 +26,12 @@ class Claim:
     key : str
         Short name, for the JSON file.
     statement : str
-        What the paper says.
+        Statement of the paper.
     verdict : Verdict
     number : str
         The figure that decides it.
     reason : str
-        How it was tested and what was found.
+        The test and its result.
     """
 
     key: str

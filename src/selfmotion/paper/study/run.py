@@ -31,7 +31,7 @@ def run(scale: Scale | None = None, progress: Callable[[str], None] | None = Non
     scale : Scale, optional
         ``Scale.full()`` by default: minutes.
     progress : callable, optional
-        Called with the name of each part (see `PARTS`) as it begins.
+        Called with the name of each part (see `PARTS`) at its start.
 
     Returns
     -------

@@ -7,9 +7,10 @@ from selfmotion.paper.study.context import Context, Result, finely, optimum
 from selfmotion.paper.study.results import Chapter, Claim, Plot, PlottedCurve, Table, Verdict
 from selfmotion.problem.costs import Cost, InverseManipulability, JointVelocity, Manipulability
 
+# Lengths of the links [m].
 _LINKS = np.array([2.0, 2.0, 1.0])
 
-# Without a velocity term the search need not end: the table shows how far it is after these.
+# Without a velocity term the search need not end: the table has the result after these iterations.
 _MOST_ITERATIONS = 60
 
 _COLUMNS = (
@@ -26,16 +27,17 @@ _COLUMNS = (
 
 def chapter(context: Context) -> Chapter:
     """Return figures 1 to 3, the arm on its path, the table, and the claims about μ."""
-    still, best, run = context.still, context.best, context.published()
-    ratio = np.abs(best.qd).max() / np.abs(still.qd).max()
+    minimum_norm, best, run = context.minimum_norm, context.best, context.published()
+    ratio = np.abs(best.qd).max() / np.abs(minimum_norm.qd).max()
     return Chapter(
         "sample",
         "The sample trajectory",
         (
             f"Links 2, 2, 1 m; the tool runs from (3, 2) through the origin to (-3, -2) in 1 s. "
-            f"Without self-motion F = {still.cost:.4f}, at the optimum of the paper's twelve "
-            f"coefficients {best.cost:.5f}; the peak joint speed falls to {100 * ratio:.0f} % "
-            f"({np.abs(still.qd).max():.2f} to {np.abs(best.qd).max():.2f} rad/s).",
+            f"Without self-motion F = {minimum_norm.cost:.4f}, at the optimum of the paper's "
+            f"twelve coefficients {best.cost:.5f}; the peak joint speed falls to "
+            f"{100 * ratio:.0f} % ({np.abs(minimum_norm.qd).max():.2f} to "
+            f"{np.abs(best.qd).max():.2f} rad/s).",
             f"The published scheme, started at x = 0, ends after {run.iterations} iterations and "
             f"{run.evaluations} evaluations of F at a motion of cost "
             f"{finely(context.problem, run.minimum.x).cost:.4f}; our default takes "
@@ -44,10 +46,10 @@ def chapter(context: Context) -> Chapter:
         ),
         tables=(_table(context),),
         plots=(
-            _speeds("figure1", "Figure 1: joint speeds at x = 0", still),
+            _speeds("figure1", "Figure 1: joint speeds at x = 0", minimum_norm),
             _speeds("figure2", "Figure 2: joint speeds at x*", best),
             *_figure3(context),
-            _arm("arm_still", "The arm at x = 0", still),
+            _arm("arm_still", "The arm at x = 0", minimum_norm),
             _arm("arm_best", "The arm at x*", best),
         ),
         claims=(_half_percent(context), _mu(context), _well_away(context)),
@@ -172,7 +174,7 @@ def _mu(context: Context) -> Claim:
 
 
 def _well_away(context: Context) -> Claim:
-    smallest = context.still.smallest_w
+    smallest = context.minimum_norm.smallest_w
     largest = _largest_w()
     share = smallest / largest
     return Claim(

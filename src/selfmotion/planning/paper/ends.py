@@ -1,4 +1,4 @@
-"""Conditions on the ends of the motion, eliminated: what is left to minimise is unconstrained.
+"""Conditions on the ends of the motion, eliminated: the remaining minimisation is unconstrained.
 
 With LᵀML = I, where xᵀMx = |z|² + ∫ |ε|² dt of a decision vector, and the right singular vectors of
 ∂c/∂x L at a reference x̂ split into U, those that the conditions c change along, and V, the others,
@@ -20,15 +20,21 @@ from selfmotion.basics import Array
 from selfmotion.planning.optimise import inverse_metric
 from selfmotion.planning.paper.objective import Objective
 
-# Conditions are met to this [rad, rad/s, rad/s²]; what rounding on a fine grid leaves is taken for
-# met, too.
-_CLOSED, _MET = 1e-11, 1e-9
-# Steps of Newton's method; how often one may be halved, and how often it goes on along others where
-# a motion is to be brought to the ends. After more steps than the last, the reference is far.
-_STEPS, _HALVINGS, _ROUNDS, _NEAR = 20, 10, 3, 4
-# Functions of the null motion are as good as dependent below this share of the largest.
+# Residual at which conditions are met [rad, rad/s, rad/s²] …
+_CLOSED = 1e-11
+# … and which counts as rounding on a fine grid.
+_MET = 1e-9
+# Largest number of Newton steps.
+_STEPS = 20
+# Halvings of a step where a motion is to be brought to the ends.
+_HALVINGS = 10
+# Restarts along other combinations there.
+_ROUNDS = 3
+# Steps above which the reference is far.
+_NEAR = 4
+# Relative size below which functions of the null motion are dependent.
 _FLAT = 1e-12
-# Combinations of conditions that change this much less than others follow from these.
+# Relative change below which combinations of conditions follow from others.
 _DEPENDENT = 1e-4
 
 
@@ -73,9 +79,9 @@ class Eliminated:
         rank = int(np.sum(singular > _DEPENDENT * singular.max(initial=0.0)))
         self._across, self._along = root @ right[:rank].T, root @ right[rank:].T
         self._inward = right[rank:] @ inward
-        # From conditions to what independent combinations say of them.
+        # Matrix from conditions to independent combinations.
         self._counted = sizes * (left[:, :rank] @ left[:, :rank].T) / sizes.T
-        # The last y, its x, how much that misses the ends, and the steps that it took.
+        # The last y, its x, residual, and number of steps.
         self._at: Array | None = None
         self._x, self._miss, self._taken = reference, np.inf, 0
 
@@ -98,7 +104,7 @@ class Eliminated:
         return self._x
 
     def is_met(self, y: Array) -> bool:
-        """Return whether Newton's method arrived."""
+        """Return whether Newton's method converged."""
         self.point(y)
         return self._miss < _MET
 
@@ -141,13 +147,13 @@ class Eliminated:
         return np.asarray(tangent @ inverse_hessian @ tangent.T)
 
     def newton(self, x: Array, halvings: int = 1) -> tuple[Array, float, int]:
-        """Return where Newton's method gets to along U, how much that misses the ends, and steps.
+        """Return the result of Newton's method along U, its residual, and the number of steps.
 
-        The miss is infinite where there is no motion.
+        The residual is infinite where there is no motion.
         """
         missed, taken = self._missed(x), 0
         while taken < _STEPS and _CLOSED <= _size(missed) < np.inf:
-            # A motion that hardly holds together has derivatives beyond all numbers.
+            # A motion near breakdown has derivatives that overflow.
             with np.errstate(over="ignore", invalid="ignore"):
                 table = self._rows(x) @ self._across
             if not np.all(np.isfinite(table)):
@@ -156,7 +162,7 @@ class Eliminated:
             for halving in range(halvings):
                 nearer = x + 0.5**halving * step
                 left = self._missed(nearer)
-                # What hardly comes nearer will not arrive.
+                # Slow convergence counts as failure.
                 if _size(left) < (1.0 - 0.5 ** (halving + 1)) * _size(missed):
                     break
             else:

@@ -6,20 +6,20 @@ import numpy as np
 
 from selfmotion.basics import Array, BreakdownError, Counts, ProblemError
 from selfmotion.model.motion import Evaluation, Grid, NullMotion, NullMotionTable, Trajectory
-from selfmotion.planning.paper.rollout import Rollout
-from selfmotion.planning.paper.still import (
+from selfmotion.planning.paper.minimum_norm import (
     FixedStart,
     FreeStart,
+    MinimumNormMotion,
     Start,
-    StillMotion,
     null_motion_table,
 )
+from selfmotion.planning.paper.rollout import Rollout
 from selfmotion.problem.constraints import BoundConstraint, NodeTangents, linearised, violated
 from selfmotion.problem.costs import ERROR, Cost, Samples
 from selfmotion.problem.problem import Problem
 
-# Samples whose tangents are weighed together.
-_LOT = 4096
+# Samples in one chunk, which bounds memory.
+_CHUNK = 4096
 
 
 class _CostIntegrals:
@@ -94,7 +94,7 @@ class _CostIntegrals:
         by_q, by_qd : (S, n, size)
             ∂q/∂x and ∂q̇/∂x at the stages.
         by_error : callable
-            Returns that of the pose error, (S, m, size); asked where a cost weighs it.
+            Returns that of the pose error, (S, m, size); called if a cost weighs it.
         """
         (stages, n, size), sampling = by_q.shape, self._grid.sampling
         curvatures = [cost.curvature(n) for cost in self._costs]
@@ -105,8 +105,8 @@ class _CostIntegrals:
         for curvature in curvatures:
             for order, weight in curvature.items():
                 table = by_error() if order == ERROR else by_q if order == 0 else by_qd
-                for first in range(0, stages, _LOT):
-                    lot = slice(first, first + _LOT)
+                for first in range(0, stages, _CHUNK):
+                    lot = slice(first, first + _CHUNK)
                     tangent = table[lot]
                     if order > 1:
                         operator = sampling.differentiation(order - 1)[lot]
@@ -118,14 +118,14 @@ class _CostIntegrals:
 def _weighted(tangent: Array, weight: Array, times: Array) -> Array:
     """Return Σ times tangentᵀ W tangent over samples, (size, size)."""
     flat = tangent.shape[0] * tangent.shape[1], tangent.shape[2]
-    # Near singular poses tangents may be beyond all numbers: see `inverse_metric`.
+    # Near singular poses tangents may overflow: see `inverse_metric`.
     with np.errstate(over="ignore", invalid="ignore"):
         weighted = times[:, None, None] * (weight @ tangent)
         return np.asarray(tangent.reshape(flat).T @ weighted.reshape(flat))
 
 
 class Objective:
-    """F = ∫ Σ G(q̇, q, t) dt along the motion of a decision vector, and what misses its ends.
+    """F = ∫ Σ G(q̇, q, t) dt along the motion of a decision vector, and residuals of its ends.
 
     The decision vector is [z | x]: where the start is on its self-motion manifold (nothing if it is
     given), and the null motion's coefficients.
@@ -168,7 +168,7 @@ class Objective:
         self.ends, self.counts = tuple(ends), counts
         self._costs = _CostIntegrals(costs, rollout.grid)
         self._at: Array | None = None
-        # ∂q/∂x and ∂q̇/∂x there, gradient and evaluation, once they were asked for.
+        # Cached ∂q/∂x and ∂q̇/∂x, gradient and evaluation.
         self._tangents: tuple[Array, Array] | None = None
         self._gradient: Array | None = None
         self._evaluation: Evaluation | None = None
@@ -185,7 +185,7 @@ class Objective:
     def of(
         cls,
         problem: Problem,
-        still: StillMotion,
+        minimum_norm: MinimumNormMotion,
         *,
         grid: Grid | None = None,
         free: bool = False,
@@ -200,28 +200,30 @@ class Objective:
         Parameters
         ----------
         problem : Problem
-        still : StillMotion
+        minimum_norm : MinimumNormMotion
             The motion at x = 0: its start, and the basis of the null motion, are those of x.
         grid : Grid, optional
-            By default that of `still`.
+            By default that of the minimum-norm motion.
         free : bool
             Whether the start may move along its self-motion.
         ends : sequence of BoundConstraint
-            What is asked of the ends.
+            Conditions on the ends.
         counts : Counts, optional
         null_motion : NullMotion, optional
             By default that of the problem.
         around : (S, n), optional
-            The null motion of x = 0; by default that of `still`.
+            The null motion of x = 0; by default that of the minimum-norm motion.
         rollout : Rollout, optional
-            That of `still`, on this grid, which nobody else uses any more; by default a new one.
+            That of the minimum-norm motion, on this grid, handed over; by default a new one.
         """
-        follows, grid = problem.follows, grid or still.grid
+        follows, grid = problem.follows, grid or minimum_norm.grid
         t = grid.stage_times
-        start: Start = FreeStart(follows, still.start) if free else FixedStart(still.start)
+        start: Start = (
+            FreeStart(follows, minimum_norm.start) if free else FixedStart(minimum_norm.start)
+        )
         found = cls(
             rollout or Rollout(follows, grid, damping=problem.damping_law),
-            null_motion_table(problem, t, still, null_motion or problem.null_motion, around),
+            null_motion_table(problem, t, minimum_norm, null_motion or problem.null_motion, around),
             problem.all_costs,
             start,
             ends,
@@ -245,7 +247,7 @@ class Objective:
 
     @property
     def evaluations(self) -> int:
-        """How often F was computed, by all that add to the same counts."""
+        """Number of evaluations of F, by all with the same counters."""
         return self.counts.evaluations
 
     def parts(self, x: Array) -> tuple[Array, Array]:
@@ -302,7 +304,7 @@ class Objective:
         return float(self.gradient(x) @ direction)
 
     def terms(self, x: Array) -> dict[str, float]:
-        """Return what each cost contributes to F at x."""
+        """Return the contribution of each cost to F at x."""
         self._run(x)
         return dict(self._terms)
 
@@ -312,7 +314,7 @@ class Objective:
         return self.rollout.samples()
 
     def at(self, x: Array) -> Evaluation:
-        """Return the motion of x with all that is known of it."""
+        """Return the motion of x with its costs."""
         self._run(x)
         if self._evaluation is None:
             before = self.rollout.jacobian_evaluations
@@ -343,7 +345,7 @@ class Objective:
         return np.concatenate(rows)
 
     def unmet(self, x: Array) -> tuple[str, ...]:
-        """Return what is wrong at x for each of the ends that it misses, beyond its tolerance."""
+        """Return the violated conditions on ends at x, in words."""
         return violated(self.ends, self.samples(x))
 
     def metric(self, x: Array) -> Array:
@@ -357,7 +359,7 @@ class Objective:
         return self._costs.curvature(by_q, by_qd, lambda: self._error_tangent(by_q))
 
     def node_tangents(self, x: Array) -> NodeTangents:
-        """Return how the motion at the nodes changes with the decision vector, at x."""
+        """Return the derivatives of the motion at the nodes by the decision vector, at x."""
         by_q, by_qd = self._sensitivities(x)
         sampling = self.grid.sampling
         return NodeTangents(by_q[sampling.nodes], by_qd[sampling.nodes], sampling)
@@ -374,7 +376,7 @@ class Objective:
         if self._at is not None and np.array_equal(self._at, x):
             return
         self.counts.evaluated()
-        # An interruption on the way must not leave half a motion as that of x.
+        # An interruption must not leave half a motion as that of x.
         self._at = self._tangents = self._gradient = self._evaluation = None
         self._terms = dict.fromkeys(self._costs.names, np.inf)
         before = self.rollout.jacobian_evaluations

@@ -10,20 +10,20 @@ from selfmotion.model.path import PathSamples
 from selfmotion.model.task import DampingLaw, feedback_rate
 from selfmotion.problem.costs import Samples, TipSamples
 
-# A tool this near to the path [m, rad] is on it; Newton's method needs few steps to that.
-_POLISHED, _POLISHING_STEPS = 1e-12, 4
+# Distance of a tool on the path [m, rad].
+_POLISHED = 1e-12
+# Newton steps to that; few are needed.
+_POLISHING_STEPS = 4
 
 
 class Rollout:
     """Integrates q̇ = J⁺(ẋ + K e) + (I - J⁺J) ε(t) over a grid, from a start configuration.
 
     Eq. 4 of the paper with pose feedback: e is the pose error (log on SO(3)), zero for the exact
-    solution, so that the feedback only takes out what the integration lets in. J⁺ is Jᵀ(JJᵀ)⁻¹,
-    near singular poses Jᵀ(JJᵀ + λ²I)⁻¹ where damping is asked for. Classical fourth-order
-    Runge-Kutta.
+    solution, so that the feedback corrects errors of the integration alone. J⁺ is Jᵀ(JJᵀ)⁻¹, near
+    singular poses Jᵀ(JJᵀ + λ²I)⁻¹ with damping. Classical fourth-order Runge-Kutta.
 
-    One object keeps its tables between runs; what `samples` and `pullback` return is that of the
-    last `run`.
+    One object reuses its tables between runs: `samples` and `pullback` are those of the last `run`.
 
     Parameters
     ----------
@@ -42,9 +42,9 @@ class Rollout:
         self._gain = feedback_rate(follows.duration)
         self._table, self._at, self._tips = self._new_table(len(grid.stage_times))
         self._space = np.zeros(kernels.space_size(*self._sizes[:2]))
-        # Of the last run, once they were asked for.
+        # Cached values of the last run.
         self._samples: Samples | None = None
-        # What `polished` works on: one stage, at a node.
+        # Work space of `polished`: one stage, at a node.
         self._node_table, self._node, self._node_tips = self._new_table(1)
         for f, item in enumerate(follows.items):
             self.aim(item.target(grid.stage_times), f)
@@ -187,7 +187,7 @@ class Rollout:
     def drift(self) -> Array:
         """Pose errors of the last run in the prescribed rows at the nodes, (N + 1, m) [m, rad].
 
-        What integration let in, and damping.
+        Errors of the integration, and of damping.
         """
         errors = [tip.error[self.grid.node_stages] for tip in self._tips]
         items = zip(self.follows.items, errors, strict=True)
@@ -218,7 +218,7 @@ class Rollout:
     def pullback(
         self, q_cotangent: Array, qd_cotangent: Array, error_cotangent: Array | None = None
     ) -> tuple[Array, Array]:
-        """Pull a gradient with respect to the last run's stages back to what drove it.
+        """Pull a gradient with respect to the last run's stages back to its inputs.
 
         The exact derivative of the discrete scheme: one backward sweep, no finite differences.
 

@@ -1,4 +1,4 @@
-"""The published method from one start: what it finds, on grids as fine as the cost asks for."""
+"""The published method from one start, on grids as fine as the cost needs."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -27,32 +27,36 @@ from selfmotion.planning.optimise import (
     Status,
 )
 from selfmotion.planning.paper.ends import Eliminated, closed
+from selfmotion.planning.paper.minimum_norm import MOST_HALVINGS, MinimumNormMotion
 from selfmotion.planning.paper.objective import Objective
-from selfmotion.planning.paper.still import MOST_HALVINGS, StillMotion
 from selfmotion.problem.constraints import BoundConstraint
 from selfmotion.problem.problem import Problem
 
-# Agreement of the cost on a grid and on the halved one.
+# Relative agreement of the cost on a grid and on the halved one.
 _AGREEMENT = 1e-4
-# A cost that rises this much on so many grids in turn has no limit: the path runs past the edge of
-# the workspace between nodes.
-_RISE, _RISES = 1.5, 2
-# Where the way to the optimum leads too far from what the unknowns are made for, others are, so
-# often at most, as long as the cost falls by this share with each.
-_CHARTS, _FALL = 200, 1e-6
-# What a search may end by for want of other unknowns; and after what there is none to go on from.
+# Factor of a rise of the cost from grid to grid …
+_RISE = 1.5
+# … which in so many grids in turn shows that it has no limit: the path leaves the workspace between
+# nodes.
+_RISES = 2
+# Changes of the unknowns' basis far from the reference …
+_CHARTS = 200
+# … while the cost falls by this share with each.
+_FALL = 1e-6
+# Statuses that a change of basis may mend …
 _STUCK = (Status.PRECISION, Status.GRADIENT)
+# … and those after which nothing goes on.
 _OVER = (Status.UNBOUNDED, Status.GRADIENT, Status.INFEASIBLE, Status.MAX_EVALUATIONS)
 
 
 @dataclass(frozen=True, eq=False)
 class Method:
-    """What all solutions from one start have in common; `solve` says what it is made of.
+    """Common data of all solutions from one start; see `solve`.
 
     Attributes
     ----------
     problem : Problem
-    still : StillMotion
+    minimum_norm : MinimumNormMotion
     free : bool
     ends : tuple of BoundConstraint
     optimizer : Optimizer
@@ -63,7 +67,7 @@ class Method:
     """
 
     problem: Problem
-    still: StillMotion
+    minimum_norm: MinimumNormMotion
     free: bool
     ends: tuple[BoundConstraint, ...]
     optimizer: Optimizer
@@ -74,7 +78,12 @@ class Method:
     def on(self, grid: Grid) -> Objective:
         """Return the objective on a grid."""
         return Objective.of(
-            self.problem, self.still, grid=grid, free=self.free, ends=self.ends, counts=self.counts
+            self.problem,
+            self.minimum_norm,
+            grid=grid,
+            free=self.free,
+            ends=self.ends,
+            counts=self.counts,
         )
 
     def minimum(
@@ -85,10 +94,10 @@ class Method:
         where: Callable[[Array], tuple[Array, bool]] = lambda x: (x, False),
         known: bool = False,
     ) -> tuple[Minimum, list[Iteration], bool]:
-        """Return a function's minimum, the way there in decision vectors, and whether it goes on.
+        """Return a function's minimum, the decision vectors on the way, and whether to go on.
 
-        `where` returns these, and whether other unknowns would be better from there; `known` says
-        that the callback was told the start.
+        `where` returns these, and whether another basis is better from there; `known` is whether
+        the callback has had the start.
         """
         way: list[Iteration] = []
         goes_on = False
@@ -137,7 +146,7 @@ class Solution:
     status : Status
         How the last optimisation ended; INFEASIBLE where the ends cannot be met from here.
     history : tuple of Iteration
-        On all grids so far.
+        On all grids.
     """
 
     method: Method
@@ -174,19 +183,19 @@ class Solution:
 
     @cached_property
     def unmet(self) -> tuple[str, ...]:
-        """What is wrong with each of the ends that is not met."""
+        """Violated conditions on ends, in words."""
         return self.objective.unmet(self.x)
 
     def evaluation(self) -> Evaluation:
         """Return the motion with its costs."""
         return self.objective.at(self.x)
 
-    def still_evaluation(self) -> Evaluation:
+    def minimum_norm_evaluation(self) -> Evaluation:
         """Return the motion at x = 0 on this grid."""
         return self.objective.at(np.zeros_like(self.x))
 
     def refined(self, where: Flags | None = None) -> Self:
-        """Return it with half the step length, everywhere or for some of the steps (N,).
+        """Return it with half the step length, for all or some of the steps (N,).
 
         With its ends met there, but not optimised anew.
 
@@ -198,7 +207,7 @@ class Solution:
         return self._on(self.method.on(self.objective.grid.halved(where)))
 
     def again(self) -> Self:
-        """Return the optimum on its grid, from here; interrupted, the best so far."""
+        """Return the optimum on its grid, from here; after an interruption, the best so far."""
         if self.unmet:
             return replace(self, status=Status.INFEASIBLE)
         found, size = self, None
@@ -206,7 +215,7 @@ class Solution:
             for _ in range(_CHARTS):
                 before = found
                 found, size = found._optimised(size)
-                # Where there is no step, that may be for want of motions that meet the ends.
+                # Without a step, other combinations may meet the ends.
                 if size is None or found.status not in _STUCK:
                     break
                 if not before.cost - found.cost > _FALL * abs(found.cost):
@@ -225,7 +234,7 @@ class Solution:
     def _optimised(self, before: int | None) -> tuple[Self, int | None]:
         """Return the optimum as far as the unknowns lead, and their number; None for x itself.
 
-        `before` is the number of those that led here: the callback knows the start then.
+        `before` is the number of earlier iterations: the callback has had the start then.
         """
         method, objective, inverse = self.method, self.objective, self.inverse_hessian
         size = None
@@ -233,7 +242,7 @@ class Solution:
             function = Eliminated(objective, self.x)
             size, y = function.size, np.zeros(function.size)
             if before not in (None, size):
-                # Conditions follow from each other here that do not elsewhere.
+                # Conditions are dependent here that are not elsewhere.
                 return self, None
             if not function.is_met(y):
                 return replace(self, status=Status.INFEASIBLE), None
@@ -251,7 +260,7 @@ class Solution:
         return better, size
 
     def _on(self, objective: Objective) -> Self:
-        """Return it by another objective of the same unknowns, with its ends met."""
+        """Return it with another objective of the same unknowns, with its ends met."""
         if not np.isfinite(objective.value(self.x)):
             objective.require_finite(self.x)
         x = closed(objective, self.x) if objective.ends and len(self.x) else self.x
@@ -263,7 +272,7 @@ _Solution = TypeVar("_Solution", bound=Solution)
 
 def solve(
     problem: Problem,
-    still: StillMotion,
+    minimum_norm: MinimumNormMotion,
     *,
     free: bool = False,
     ends: Sequence[BoundConstraint] = (),
@@ -280,8 +289,8 @@ def solve(
     Parameters
     ----------
     problem : Problem
-        Its null motion and its costs; of its constraints, only what `ends` says.
-    still : StillMotion
+        Its null motion and costs are used; of its constraints, only `ends`.
+    minimum_norm : MinimumNormMotion
         The motion at x = 0.
     free : bool
         Whether the start may move along its self-motion.
@@ -296,26 +305,26 @@ def solve(
     callback : callable, optional
         Called with each `Iteration`, of decision vectors; returning True stops.
     x0 : (size,), optional
-        Where to begin; by default, and where that is no motion, at 0.
+        Initial decision vector; by default, and if that is no motion, 0.
 
     Returns
     -------
     Solution
-        Also after an interruption from the keyboard, then the best so far.
+        After an interruption from the keyboard, the best so far.
 
     Raises
     ------
     BreakdownError
         The motion at x = 0 breaks down.
     ProblemError
-        A cost has no finite value on the motion that it begins with, one of the ends is no
-        equality, or an optimiser of one's own returns no decision vector.
+        A cost has no finite value on the initial motion, a condition on the ends is no equality, or
+        a user's optimiser returns no decision vector.
     """
     counts = Counts() if counts is None else counts
     limit = None if most is None else counts.evaluations + most
     own = QuasiNewton() if optimizer is None else optimizer
-    method = Method(problem, still, free, tuple(ends), own, counts, limit, callback)
-    objective = method.on(still.grid)
+    method = Method(problem, minimum_norm, free, tuple(ends), own, counts, limit, callback)
+    objective = method.on(minimum_norm.grid)
     x = np.zeros(objective.size)
     if x0 is not None and np.isfinite(objective.value(x0)):
         x = np.array(x0, dtype=np.float64)
@@ -324,7 +333,7 @@ def solve(
 
 def _settled(found: _Solution) -> _Solution:
     """Return the optimum on halved grids, once its cost agrees with that on the one before."""
-    rises, most = 0, found.method.still.grid.steps * 2**MOST_HALVINGS
+    rises, most = 0, found.method.minimum_norm.grid.steps * 2**MOST_HALVINGS
     try:
         while found.steps < most and not (found.status.is_cut_short or found.status in _OVER):
             finer = found.refined()
@@ -333,11 +342,11 @@ def _settled(found: _Solution) -> _Solution:
             if rises == _RISES:
                 return finer
             found = finer.again()
-            # The optimum agrees, too: what a coarse grid praises may be no motion on this one.
+            # The optimum has to agree, too: on a coarse grid it may be no motion.
             if max(changed, _change(before, found.cost)) <= _AGREEMENT:
                 break
     except BreakdownError:
-        # On a finer grid there is no such motion: the one that there is stands, to be judged.
+        # On a finer grid there is no such motion: the present one is judged.
         pass
     except KeyboardInterrupt:
         found = replace(found, status=Status.INTERRUPTED)
@@ -345,5 +354,5 @@ def _settled(found: _Solution) -> _Solution:
 
 
 def _change(before: float, after: float) -> float:
-    """Return the change of a cost as a share of what it was."""
+    """Return the relative change of a cost."""
     return abs(after - before) / max(abs(before), float(np.finfo(float).tiny))

@@ -28,9 +28,9 @@ from selfmotion.planning.paper import (
     MOST_HALVINGS,
     Guide,
     Method,
+    MinimumNormMotion,
     Objective,
-    StillMotion,
-    settled_still_motion,
+    converged_minimum_norm,
 )
 from selfmotion.planning.planner.effort import Effort
 from selfmotion.planning.planner.grids import first_nodes, is_on_nodes, is_published, most_nodes
@@ -155,7 +155,7 @@ class Candidate:
     ----------
     constraints : tuple of BoundConstraint
         Those that count, bound to the ends.
-    still : PublishedSolution
+    minimum_norm : PublishedSolution
         The minimum-norm motion: eq. 4 at x = 0.
     history : list of Iteration
     is_hopeless : bool
@@ -201,7 +201,7 @@ class Candidate:
         method = Method(problem, begun, free, ends, own, counts, None, None)
         # Without self-motion it is the only one; else nothing better was found.
         ended = Status.INFEASIBLE if problem.follows.redundancy > 0 else Status.CONVERGED
-        self.still = PublishedSolution(
+        self.minimum_norm = PublishedSolution(
             method, objective, np.zeros(objective.size), None, ended, (), self.constraints
         )
         self.history: list[Iteration] = []
@@ -214,7 +214,7 @@ class Candidate:
     @property
     def solution(self) -> Solution:
         """The best motion so far."""
-        return self._found or self.still
+        return self._found or self.minimum_norm
 
     @property
     def status(self) -> Status:
@@ -259,11 +259,11 @@ class Candidate:
         """Return the motion as it is now."""
         return self.solution.evaluation()
 
-    def still_evaluation(self) -> Evaluation:
+    def minimum_norm_evaluation(self) -> Evaluation:
         """Return the minimum-norm motion, on the grid of the best one where that has one."""
         found = self._found
-        known = found if isinstance(found, PublishedSolution) else self.still
-        return known.still_evaluation()
+        known = found if isinstance(found, PublishedSolution) else self.minimum_norm
+        return known.minimum_norm_evaluation()
 
     def score(self) -> tuple[bool, bool, float]:
         """Return what ranks it among others: the smaller, the better; see `score`."""
@@ -290,8 +290,8 @@ class Candidate:
         """
         if self._ended is not None or self.is_of_chain:
             return
-        if not np.isfinite(self.still.cost):
-            self.still.objective.require_finite(self.still.x)
+        if not np.isfinite(self.minimum_norm.cost):
+            self.minimum_norm.objective.require_finite(self.minimum_norm.x)
         if is_published(self.problem, self.effort):
             self._polish_as_published()
         elif is_on_nodes(self.problem, self.effort):
@@ -328,7 +328,7 @@ class Candidate:
     def refine(self, where: Flags | None = None) -> None:
         """Go on with half the step length, everywhere or for some of the steps (N,)."""
         if self._found is None:
-            self.still = self.still.refined(where)
+            self.minimum_norm = self.minimum_norm.refined(where)
         else:
             self._found = self._found.refined(where)
 
@@ -348,10 +348,10 @@ class Candidate:
         self.constraints = self.problem.bind_constraints(
             *self._ends, decomposed=self.effort.decomposed
         )
-        self.still = replace(self.still, constraints=self.constraints)
+        self.minimum_norm = replace(self.minimum_norm, constraints=self.constraints)
 
         def optimum(polisher: Polisher) -> NodeSolution | None:
-            first = self._known or self.still.evaluation().trajectory
+            first = self._known or self.minimum_norm.evaluation().trajectory
             return polisher.with_more(found) or polisher.near([first], found.motion.grid.t)
 
         self._by_nodes(optimum)
@@ -363,7 +363,7 @@ class Candidate:
         if isinstance(before, PublishedSolution):
             found = before.again()
         else:
-            begun, most = self.still, effort.max_evaluations
+            begun, most = self.minimum_norm, effort.max_evaluations
             limit = None if most is None else effort.counts.evaluations + most
             method = replace(begun.method, limit=limit, callback=effort.callback)
             found = replace(begun, method=method, x=self._first_coefficients()).settled()
@@ -375,14 +375,14 @@ class Candidate:
     def _first_coefficients(self) -> Array:
         """Return the decision vector that is nearest to a known plan, if no worse than x = 0."""
         plan, problem = self._warm, self.problem
-        objective, none = self.still.objective, self.still.x
+        objective, none = self.minimum_norm.objective, self.minimum_norm.x
         if plan is None:
             return none
         t, pace = objective.grid.stage_times, pace_of(plan, problem)
         near = coefficients_of(plan.trajectory, pace, problem, t, objective.null_motion)
         z, _ = objective.parts(none)
         x = np.concatenate([z, near])
-        return x if objective.value(x) <= self.still.cost else none
+        return x if objective.value(x) <= self.minimum_norm.cost else none
 
     def _polish_on_nodes(self, cost_to_beat: float) -> None:
         """Go to the optimum on nodes near the motion."""
@@ -401,12 +401,12 @@ class Candidate:
             self.keep_off_itself()
         if self.status is Status.GRADIENT:
             # A gradient that is not finite is named with its time.
-            self.still.objective.gradient(self.still.x)
+            self.minimum_norm.objective.gradient(self.minimum_norm.x)
 
     def _first_motions(self) -> tuple[list[Trajectory], Array]:
         """Return motions to begin near, and the times of the first nodes (N + 1,)."""
         problem, warm, t = self.problem, self._warm, first_nodes(self.problem)
-        motions = [self._known or self.still.evaluation().trajectory]
+        motions = [self._known or self.minimum_norm.evaluation().trajectory]
         if warm is not None and warm.trajectory.t[-1] == warm.path.duration:
             own = slower(warm.trajectory, pace_of(warm, problem))
             if not self.free:
@@ -439,19 +439,19 @@ class Candidate:
 
 def _begun(
     problem: Problem, start: Array, guide: Guide | None, grid: Grid | None
-) -> tuple[StillMotion, int]:
-    """Return the motion at x = 0, see `settled_still_motion`.
+) -> tuple[MinimumNormMotion, int]:
+    """Return the motion at x = 0, see `converged_minimum_norm`.
 
     It keeps out of tolerances in windows, so that it is one that may be followed. Where the path
     cannot be followed like that, it makes use of them, at any time: to begin with, that will do.
     """
     shut = problem.with_windows_shut
     try:
-        return settled_still_motion(shut, start, guide, grid)
+        return converged_minimum_norm(shut, start, guide, grid)
     except BreakdownError:
         if shut is problem:
             raise
-        return settled_still_motion(problem, start, guide, grid)
+        return converged_minimum_norm(problem, start, guide, grid)
 
 
 def _require_known(constraints: Sequence[BoundConstraint]) -> None:

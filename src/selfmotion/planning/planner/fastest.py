@@ -296,11 +296,11 @@ class _Rounds:
         costs = self._kept.values(planned)
         self._bounds = self._kept.bounds(costs)
         found = self._taken("costs", planned)
-        still = replace(planned, trajectory=planned.initial_trajectory)
-        still = replace(still, certificate=still.check())
-        if still.certificate.on_path:
+        minimum_norm = replace(planned, trajectory=planned.initial_trajectory)
+        minimum_norm = replace(minimum_norm, certificate=minimum_norm.check())
+        if minimum_norm.certificate.on_path:
             self._left(self.longest)
-            self._taken("x = 0", still)
+            self._taken("x = 0", minimum_norm)
         if planned.report.status.is_cut_short:
             raise KeyboardInterrupt
         use, weight = LimitUse(self._v, self._a, _POWER), 0.0
@@ -409,7 +409,7 @@ def _stand_in(original: Path, current: Path, found: Path) -> _Repaced:
         sigma = current.pace(sigma)
     sigma = np.maximum.accumulate(sigma)
     sigma[0], sigma[-1] = 0.0, original.duration
-    still: Any = [(1, 0.0), (2, 0.0)]
-    spline = make_interp_spline(t, sigma, _DEGREE, bc_type=(still, still))
+    minimum_norm: Any = [(1, 0.0), (2, 0.0)]
+    spline = make_interp_spline(t, sigma, _DEGREE, bc_type=(minimum_norm, minimum_norm))
     rate, bend = np.maximum(spline(t, 1), 0.0), spline(t, 2)
     return lambda path: Retimed(path, t, sigma, rate, bend)

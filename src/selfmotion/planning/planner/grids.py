@@ -45,12 +45,12 @@ def is_on_nodes(problem: Problem, effort: Effort) -> bool:
 
 def most_nodes(problem: Problem) -> int:
     """Return the largest number of nodes of a path, by its length."""
-    return int(_MOST_NODES * (len(problem.knots) + problem.way_in_reaches))
+    return int(_MOST_NODES * (len(problem.knots) + problem.length_in_reaches))
 
 
 def first_nodes(problem: Problem) -> Array:
     """Return the times of the first nodes, (N + 1,)."""
-    steps = int(np.ceil(_FIRST_INTERVALS * max(1.0, problem.way_in_reaches)))
+    steps = int(np.ceil(_FIRST_INTERVALS * max(1.0, problem.length_in_reaches)))
     t = _with_short_pieces(problem, Grid.aligned(problem.knots, steps).nodes, steps)
     return with_starts(problem, t, 1.0)
 

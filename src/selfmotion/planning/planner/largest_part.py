@@ -8,7 +8,7 @@ from selfmotion.basics import Array, BreakdownError, RedundancyError
 from selfmotion.model.motion import Evaluation, Grid, Sampling
 from selfmotion.model.path import Section, edges_of
 from selfmotion.planning.optimise import Status
-from selfmotion.planning.paper import Guide, StillMotion
+from selfmotion.planning.paper import Guide, MinimumNormMotion
 from selfmotion.planning.planner.candidate import Candidate
 from selfmotion.planning.planner.effort import Effort, Search
 from selfmotion.planning.planner.screening import ROUGH_MOTIONS
@@ -293,13 +293,13 @@ def _rank(problem: Problem, start: Array, guide: Guide | None) -> tuple[float, f
     """
     path = problem.path
     grid = Grid.aligned(path.knots, _FOLLOWED_STEPS)
-    still = StillMotion.on(problem.with_windows_shut, start, grid, guide)
-    trouble = still.off_path(_OFF_PATH)
+    minimum_norm = MinimumNormMotion.on(problem.with_windows_shut, start, grid, guide)
+    trouble = minimum_norm.off_path(_OFF_PATH)
     far = path.duration if trouble is None else trouble
-    kept = _kept_until(problem, still.grid.nodes, still.q, still.qd)
+    kept = _kept_until(problem, minimum_norm.grid.nodes, minimum_norm.q, minimum_norm.qd)
     # Beyond the place where it broke down, speeds may be anything.
-    weights = Sampling.trapezoidal(still.grid.nodes).weights
-    effort = float(weights @ np.sum(still.qd**2, axis=1)) if trouble is None else np.inf
+    weights = Sampling.trapezoidal(minimum_norm.grid.nodes).weights
+    effort = float(weights @ np.sum(minimum_norm.qd**2, axis=1)) if trouble is None else np.inf
     return -far, -min(kept, far), effort
 
 

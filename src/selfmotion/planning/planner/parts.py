@@ -42,10 +42,10 @@ from selfmotion.planning.transfer import FreeMotions
 from selfmotion.problem.costs import JointVelocity
 from selfmotion.problem.problem import (
     Problem,
-    asked_of_part,
     at_all_times,
     check_feeds_of,
     check_problem,
+    constraints_of_part,
     rest_orders,
     times_along,
 )
@@ -233,7 +233,7 @@ class _PartPlanner:
             whole,
             **whole.along(lambda _: path, times_along(path, ends)),
             start=whole.start if segment.first == 0 else None,
-            constraints=list(asked_of_part(whole, segment.first == 0, segment.last == last)),
+            constraints=list(constraints_of_part(whole, segment.first == 0, segment.last == last)),
             rest=True,
         )
 

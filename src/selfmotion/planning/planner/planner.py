@@ -43,7 +43,7 @@ class Judged:
     Attributes
     ----------
     part : Part
-    motion, still : Evaluation
+    motion, minimum_norm : Evaluation
         The motion, and the minimum-norm one on the same grid.
     certificate : Certificate
     rival_cost : float or None
@@ -52,7 +52,7 @@ class Judged:
 
     part: Part
     motion: Evaluation
-    still: Evaluation
+    minimum_norm: Evaluation
     certificate: Certificate
     rival_cost: float | None = None
 
@@ -169,7 +169,7 @@ def _same(problem: Problem, coarse: Trajectory, fine: Trajectory, tolerance: Tol
 def _check(problem: Problem, part: Part, tolerance: Tolerance) -> Judged:
     motion = _resolved(problem, part.candidate, tolerance)
     certificate = problem.certify(motion.trajectory, tolerance, part.ending)
-    return Judged(part, motion, part.candidate.still_evaluation(), certificate)
+    return Judged(part, motion, part.candidate.minimum_norm_evaluation(), certificate)
 
 
 @dataclass(eq=False)

@@ -47,7 +47,7 @@ from selfmotion.planning.search import (
     start_candidates,
 )
 from selfmotion.problem.constraints import BoundConstraint
-from selfmotion.problem.problem import Problem, asked_of_part
+from selfmotion.problem.problem import Problem, constraints_of_part
 
 # Length of a long path, in reaches of the arm: x = 0 starts to drift.
 LONG_PATH = 5.0
@@ -68,7 +68,7 @@ _DEARER_CHAIN = 1.005
 # Share of a joint at rest in the correction of a velocity, relative to the fastest joint's.
 _LEAST = 1e-2
 # Speed below which all joints rest [rad/s or m/s].
-_STILL = 1e-9
+_REST = 1e-9
 # Samples between two nodes for limits.
 _SAMPLES = 16
 
@@ -341,7 +341,7 @@ def _resting(motion: NodeMotion, near: Array) -> Array:
 
     The error from the path is left to the joints that move, so that others go on resting.
     """
-    share = np.abs(near) / np.maximum(np.abs(near).max(axis=1, keepdims=True), _STILL)
+    share = np.abs(near) / np.maximum(np.abs(near).max(axis=1, keepdims=True), _REST)
     rows = motion.grid.problem.follows.jacobians(motion.place.q)
     lack = np.einsum("kmn,kn->km", rows, motion.place.qd - near)
     shared = np.maximum(share, _LEAST)[:, :, None] * rows.transpose(0, 2, 1)
@@ -351,7 +351,7 @@ def _resting(motion: NodeMotion, near: Array) -> Array:
 def is_long(planner: Planner) -> bool:
     """Whether the path is many times the arm's reach, and the problem is solved on nodes."""
     problem = planner.problem
-    return problem.way_in_reaches > LONG_PATH and is_on_nodes(problem, planner.effort)
+    return problem.length_in_reaches > LONG_PATH and is_on_nodes(problem, planner.effort)
 
 
 def keep_to_posture(planner: Planner) -> None:
@@ -424,12 +424,12 @@ def _postures(planner: Planner) -> tuple[list[Array], Status | None]:
     And what ended the search for them, if the user did.
     """
     problem = planner.problem
-    middle, half = 0.5, 0.5 * _SEGMENT_LENGTH / problem.way_in_reaches
+    middle, half = 0.5, 0.5 * _SEGMENT_LENGTH / problem.length_in_reaches
     first, last = (problem.path.duration * share for share in (middle - half, middle + half))
     stretch = problem.changed(
         **problem.along(lambda path: Section(path, first, last)),
         start=None,
-        constraints=list(asked_of_part(problem, is_first=False, is_last=False)),
+        constraints=list(constraints_of_part(problem, is_first=False, is_last=False)),
         rest=False,
     )
     inner = replace(
@@ -457,7 +457,7 @@ def _near(polisher: Polisher, problem: Problem, start: Array, posture: Array) ->
     On the coarsest nodes on which it costs what it does; None where there is none.
     """
     # As long as it takes the tool to go as far as the arm reaches.
-    time = problem.path.duration / problem.way_in_reaches
+    time = problem.path.duration / problem.length_in_reaches
     grid, most = Grid.aligned(problem.knots, _FIRST_NODES), most_nodes(problem)
     while grid.steps <= most:
         motion = polisher.grid(grid.nodes).motion_towards(start, posture, time)

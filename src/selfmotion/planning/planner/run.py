@@ -46,7 +46,12 @@ def gathered(planner: Planner, deadline: Deadline) -> Plan:
     judged = planner.judged
     if judged is None:
         raise KeyboardInterrupt
-    part, motion, still, check = judged.part, judged.motion, judged.still, judged.certificate
+    part, motion, minimum_norm, check = (
+        judged.part,
+        judged.motion,
+        judged.minimum_norm,
+        judged.certificate,
+    )
     candidate = part.candidate
     if deadline.passed and candidate.status is Status.INTERRUPTED:
         candidate.end(Status.DEADLINE)
@@ -54,9 +59,9 @@ def gathered(planner: Planner, deadline: Deadline) -> Plan:
     status = status_of(candidate.status, check)
     report = Report(
         cost=motion.cost,
-        initial_cost=still.cost,
+        initial_cost=minimum_norm.cost,
         terms=motion.terms,
-        initial_terms=still.terms,
+        initial_terms=minimum_norm.terms,
         evaluations=counts.evaluations,
         gradient_evaluations=counts.gradients,
         jacobian_evaluations=counts.jacobians,
@@ -85,7 +90,7 @@ def gathered(planner: Planner, deadline: Deadline) -> Plan:
     return Plan(
         problem=planner.problem.asked,
         trajectory=planner.problem.own(motion.trajectory),
-        initial_trajectory=planner.problem.own(still.trajectory),
+        initial_trajectory=planner.problem.own(minimum_norm.trajectory),
         coefficients=read_only(solution.coefficients),
         report=report,
         certificate=report.explained(check),

@@ -349,11 +349,13 @@ class Ranking:
         self, q: Array, qd: Array | None = None, qdd: Array | None = None
     ) -> NodeMotion | None:
         """Return the motion nearest to one, with the conditions; by default without self-motion."""
-        problem, still = self._problem, np.zeros_like(q)
+        problem, minimum_norm = self._problem, np.zeros_like(q)
         bound = problem.bind_constraints(q[0], q[-1], apart=self._effort.apart)
         counts = self._effort.counts
         grid = NodeGrid(problem, self._t, bound, free=self._free, counts=counts, smoothed=True)
-        return grid.near(q, still if qd is None else qd, still if qdd is None else qdd)
+        return grid.near(
+            q, minimum_norm if qd is None else qd, minimum_norm if qdd is None else qdd
+        )
 
     def _clear(self, motion: NodeMotion) -> bool:
         return self._problem.keeps_off_itself(motion.place.q)
@@ -429,14 +431,14 @@ def _merit(problem: Problem, q: Array, twists: Array, sampling: Sampling) -> flo
 
     `twists` (N, m) are those of the path at the grid's nodes, which are the samples.
     """
-    still = Samples.along(problem.follows, sampling, q, np.zeros_like(q))
-    J = still.task_jacobian
+    minimum_norm = Samples.along(problem.follows, sampling, q, np.zeros_like(q))
+    J = minimum_norm.task_jacobian
     gram = J @ J.transpose(0, 2, 1)
     try:
         qd = np.einsum("smn,sm->sn", J, np.linalg.solve(gram, twists[..., None])[..., 0])
     except np.linalg.LinAlgError:
         return np.inf
-    samples = replace(still, qd=qd)
+    samples = replace(minimum_norm, qd=qd)
     bound = problem.bind_constraints(q[0], q[-1], apart=False)
     return penalised(problem_cost(problem, samples), bound, samples)
 

@@ -141,7 +141,7 @@ def _begin_at_plan(planner: Planner) -> bool:
 
 def _keep_to_posture(planner: Planner) -> bool:
     """Optimise from motions in the best postures of a segment, on a very long path."""
-    return planner.problem.way_in_reaches > VERY_LONG_PATH and _try_postures(planner)
+    return planner.problem.length_in_reaches > VERY_LONG_PATH and _try_postures(planner)
 
 
 def _begin_at_start(planner: Planner) -> bool:
@@ -168,7 +168,7 @@ def _draw_starts(planner: Planner) -> bool:
 
 def _compare_postures(planner: Planner) -> bool:
     """Do so on a path that is long, where it may lead to a better motion than other starts."""
-    return planner.problem.way_in_reaches <= VERY_LONG_PATH and _try_postures(planner)
+    return planner.problem.length_in_reaches <= VERY_LONG_PATH and _try_postures(planner)
 
 
 def _try_postures(planner: Planner) -> bool:

@@ -1,25 +1,13 @@
-"""What came of a problem: plans, how they were found, their files, and other paces."""
+"""Results: plans, reports, their files, and other paces."""
 
 from selfmotion.planning.result.archive import (
-    Made as Made,
+    ArmCache as ArmCache,
     files_of as files_of,
+    identity_of as identity_of,
     key_of as key_of,
     own_modules as own_modules,
     read_kept as read_kept,
-    told as told,
     write_kept as write_kept,
-)
-from selfmotion.planning.result.asked import (
-    Asked as Asked,
-    Piece as Piece,
-    another_tool as another_tool,
-    arm_digest as arm_digest,
-    described as described,
-    elsewhere as elsewhere,
-    gaps as gaps,
-    keeps_as_far as keeps_as_far,
-    moving_end as moving_end,
-    not_judged_by as not_judged_by,
 )
 from selfmotion.planning.result.comparison import Comparison as Comparison, compare as compare
 from selfmotion.planning.result.measured import (
@@ -55,6 +43,18 @@ from selfmotion.planning.result.retiming import (
     rate_limits as rate_limits,
     retime as retime,
     slowdown as slowdown,
+)
+from selfmotion.planning.result.specification import (
+    MotionSpecification as MotionSpecification,
+    Piece as Piece,
+    another_tool as another_tool,
+    arm_digest as arm_digest,
+    described as described,
+    elsewhere as elsewhere,
+    gaps as gaps,
+    keeps_as_far as keeps_as_far,
+    moving_end as moving_end,
+    not_judged_by as not_judged_by,
 )
 
 __all__ = [

@@ -1,4 +1,4 @@
-"""Plans as files, and what finished work is kept under."""
+"""Files of plans, and keys of finished work."""
 
 import dataclasses
 import hashlib
@@ -46,26 +46,23 @@ def in_order_of(robot: RobotModel, motion: Trajectory) -> Trajectory:
     return motion.of_joints(names)
 
 
-# The key of finished work: a digest of everything that decides its result.
-
-
 def key_of(asked: Any, files: Any) -> str:
-    """Return the digest of what was asked for, as JSON-safe values, and of the files it reads.
+    """Return the digest of a task, as JSON-safe values, and of the files it reads.
 
-    And of the package's version, and of the files of classes that are not of the package: what
-    another one made is made again.
+    It includes the package's version, and files of classes outside of the package: their changes
+    invalidate the work.
     """
     return digest_of(version(), asked, files, _code_of(asked))
 
 
 def write_kept(file: Path, values: Mapping[str, Any]) -> None:
-    """Write what is known of finished work, with its own name and a digest of it; atomically."""
+    """Write values of finished work, with its own name and a digest of it; atomically."""
     known = {"kept": file.stem, **values}
     write_text(file, json.dumps({**known, "whole": digest_of(known)}) + "\n")
 
 
 def read_kept(file: Path) -> dict[str, Any] | None:
-    """Return what `write_kept` wrote to this very file; None where it is anything else."""
+    """Return the values of `write_kept` to this very file; None for anything else."""
     try:
         found: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
         whole = found.pop("whole")
@@ -78,7 +75,7 @@ def read_kept(file: Path) -> dict[str, Any] | None:
 def own_modules(asked: Any) -> list[str]:
     """Return the modules, not of this package, of the classes that JSON-safe values name.
 
-    Of all that is made of others, and of what these are derived from.
+    Including those of values inside of others, and of base classes.
     """
     strangers = [(kind, cls) for kind, cls in _classes() if not _is_ours(cls)]
     if not strangers:
@@ -129,28 +126,28 @@ def _code_in(module: str) -> str:
     return digest_of_file(Path(file)) if file else ""
 
 
-def told(value: Any) -> Any:
-    """Return a setting as what tells it from others: what it holds, and the code of whose it is."""
+def identity_of(value: Any) -> Any:
+    """Return the identity of a setting: its values, and the source of its class."""
     if isinstance(value, Mapping):
-        return {name: told(item) for name, item in value.items()}
+        return {name: identity_of(item) for name, item in value.items()}
     if isinstance(value, list | tuple):
-        return [told(item) for item in value]
+        return [identity_of(item) for item in value]
     if isinstance(value, np.random.Generator):
-        return told(value.bit_generator.state)
+        return identity_of(value.bit_generator.state)
     if value is None or isinstance(value, bool | int | float | str | np.ndarray | np.generic):
         return value
     kind = value if hasattr(value, "__qualname__") else type(value)
     code = "" if _is_ours(kind) else _code_in(kind.__module__)
-    held = {} if kind is value else told(getattr(value, "__dict__", repr(value)))
+    held = {} if kind is value else identity_of(getattr(value, "__dict__", repr(value)))
     return [f"{kind.__module__}.{kind.__qualname__}", code, held]
 
 
 def files_of(
     robot: RobotModel, constraints: Sequence[Constraint], known: MutableMapping[str, Any]
 ) -> dict[str, str]:
-    """Return the SHA-256 of each mesh file that bodies are made of; "" for one that is missing.
+    """Return the SHA-256 of each mesh file of bodies; "" for one that is missing.
 
-    Those of an arm are read once, and put into what is `known`.
+    Those of an arm are read once, and stored in `known`.
     """
     # The same text names other files where its packages are elsewhere.
     own = f"meshes of {robot.urdf.sha256} in {robot.urdf.package_dirs}"
@@ -166,10 +163,10 @@ def _bodies(item: Constraint, robot: RobotModel) -> Iterator[Obstacle]:
     yield from item.obstacles if isinstance(item, Clearance) else item.requirement(robot).obstacles
 
 
-class Made(dict[str, Any]):
-    """Arms and bodies that this process made before, by their description; see `load_plan`.
+class ArmCache(dict[str, Any]):
+    """Cache of arms and bodies of this process, by their description; see `load_plan`.
 
-    Forgotten when there are many, or a file that they were made of is another.
+    Cleared when it is large, or when a file of its arms has changed.
     """
 
     _MANY = 64
@@ -178,8 +175,8 @@ class Made(dict[str, Any]):
         super().__init__()
         self._files: dict[str, str] = {}
 
-    def of(self, files: Mapping[str, str]) -> "Made":
-        """Return itself, for work whose bodies are made of files with these digests."""
+    def of(self, files: Mapping[str, str]) -> "ArmCache":
+        """Return itself, for work with bodies of files with these digests."""
         changed = any(self._files.get(name, digest) != digest for name, digest in files.items())
         if changed or len(self) > self._MANY:
             self.clear()
@@ -187,16 +184,14 @@ class Made(dict[str, Any]):
         return self
 
 
-# Plans as files: a description in JSON and arrays, in one ``.npz``.
-
-# Raised with every change that older versions cannot read.
+# Version of the format: raised with every change that older versions cannot read.
 FORMAT = 3
-# What files call `Finding.satisfied`.
+# Key of `Finding.satisfied` in files.
 _SATISFIED = "kept"
 
 
 class Archive(NamedTuple):
-    """What a plan's file holds, in the order of `Plan`."""
+    """Content of a plan's file, in the order of `Plan`."""
 
     problem: Problem
     trajectory: Trajectory
@@ -220,7 +215,7 @@ class Archive(NamedTuple):
             "certificate": _certificate_to_dict(self.certificate),
         }
         if self.altered:
-            # Another file does not make it what was planned.
+            # Writing an altered plan to a new file does not make it verified.
             description["altered"] = self.altered
         arrays = {
             **arrays_of(self.trajectory),
@@ -236,8 +231,8 @@ class Archive(NamedTuple):
     def read(cls, file: FilePath, known: MutableMapping[str, Any] | None = None) -> "Archive":
         """Read a file; FileFormatError where it is none, or of another version.
 
-        The certificate is the written one. Arms and constraints are taken from what is `known` by
-        their description, and put there: making their bodies takes a good part of a second.
+        The certificate is the written one. Arms and constraints are taken from the cache `known` by
+        their description: building their bodies takes a good part of a second.
         """
         description, arrays = read_archive(file)
         if "move" in description:
@@ -265,7 +260,7 @@ class Archive(NamedTuple):
 
 
 def _meshes(problem: Problem, known: MutableMapping[str, Any]) -> dict[str, str]:
-    """Return the digests of all mesh files that bodies are made of."""
+    """Return the digests of all mesh files of bodies."""
     return files_of(problem.robot, problem.all_constraints, known)
 
 
@@ -325,7 +320,7 @@ def _report_to_dict(report: Report) -> dict[str, Any]:
     return {
         **_without(report, "history"),
         "terms": dict(report.terms),
-        # What a function is called in this process says nothing to another one.
+        # Names of functions of this process mean nothing in another one.
         "costs": {
             name: "" if known.startswith(FUNCTION) else known
             for name, known in (report.costs or {}).items()
@@ -342,7 +337,7 @@ def _report_to_dict(report: Report) -> dict[str, Any]:
 def _certificate_to_dict(certificate: Certificate) -> dict[str, Any]:
     values = dataclasses.asdict(certificate)
     for item in values["findings"]:
-        # The key that it has had in files of plans from the first one on.
+        # Key of the first version of plan files.
         item[_SATISFIED] = item.pop("satisfied")
     return values
 
@@ -383,7 +378,7 @@ def _restore(
     report = dict(description["report"])
     report["status"] = Status(report["status"])
     report["gap"] = None if report["gap"] is None else Gap(**report["gap"])
-    # Plans of before it was noted have none.
+    # Plans of older versions have none.
     report["attempts"] = tuple(Attempt(**item) for item in report.get("attempts", ()))
     motion = report["null_motion"]
     report["null_motion"] = None if motion is None else restore(NullMotion, motion)

@@ -9,8 +9,11 @@ from selfmotion.basics import FileFormatError, ProblemError, as_several, shown
 from selfmotion.planning.result.plan import Plan
 from selfmotion.problem.costs import Cost, FunctionCost
 
-_TOTAL, _VERIFIED = "total cost", "verified"
-# Rows of a table, and the part of a certificate that each is the worst of.
+# Name of a row.
+_TOTAL = "total cost"
+# Name of a row.
+_VERIFIED = "verified"
+# Rows of a table, and the part of a certificate that has their value.
 _WORST = {
     "position error, m": "position_error",
     "rotation error, rad": "rotation_error",
@@ -29,15 +32,14 @@ class Comparison:
     Attributes
     ----------
     names : tuple of str
-        What the P plans are called.
+        Names of the P plans.
     costs : dict
-        What each cost contributes, and "total cost": (P,) each. None where a plan has no such cost,
-        and for the total of one that ends before its path does: nothing compares with it. Without a
-        total where plans were made for different costs; costs of one name that are not the same
-        are marked.
+        Contribution of each cost, and "total cost": (P,) each. None for a plan without such a cost,
+        and for the total of one that ends before its path does. Without a total if plans have
+        different costs; different costs of one name are marked.
     figures : dict
         Duration [s], joint path Σ|Δq| [rad or m], and the worst of the certificate, (P,) each; None
-        where it was not looked at.
+        if it was not checked.
     verdicts : tuple of str
     verified : tuple of bool
     ends : tuple of (float or None)
@@ -71,13 +73,13 @@ class Comparison:
 
     @property
     def remark(self) -> str:
-        """Why there is no total; "" where there is one."""
+        """Cause of a missing total; "" if there is one."""
         return (
             "" if _TOTAL in self.costs else "no total cost: the plans were made for different ones"
         )
 
     def __str__(self) -> str:
-        """Return the table, then why there is no total, and why plans are not verified."""
+        """Return the table, the cause of a missing total, and failures of plans."""
         rows = [["", *self.names], *self.cells()]
         widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
         lines = [
@@ -98,10 +100,10 @@ def compare(
     Parameters
     ----------
     plans : sequence of Plan, or dict
-        By name, or called "plan 1", "plan 2", …
+        By name, or numbered "plan 1", "plan 2", …
     costs : sequence of Cost, optional
-        What all are measured by, as `Plan.evaluate` does. By default each by the costs that it was
-        made for; totals of different costs compare with nothing, and are left out.
+        Costs for all, as `Plan.evaluate` does. By default each plan's own; totals of different
+        costs are left out.
 
     Returns
     -------
@@ -151,7 +153,7 @@ def compare(
 def _common_costs(
     plans: Sequence[Plan], costs: Sequence[Cost]
 ) -> dict[str, tuple[float | None, ...]]:
-    """Return what all plans cost by the same costs, and their sums."""
+    """Return the values of given costs for all plans, and their sums."""
     listed = as_several(costs, "costs", Cost)  # type: ignore[type-abstract]
     names = [cost.name for cost in listed]
     if not listed or len(set(names)) < len(names):
@@ -163,7 +165,7 @@ def _common_costs(
 
 
 def _own_costs(plans: Sequence[Plan]) -> dict[str, tuple[float | None, ...]]:
-    """Return what plans cost by what each was made for, and the sums where that is the same."""
+    """Return the values of each plan's own costs, and the sums if these are the same."""
     asked = [{cost.name: cost for cost in plan.problem.costs} for plan in plans]
     found: dict[str, tuple[float | None, ...]] = {}
     for term in dict.fromkeys(term for plan in plans for term in plan.report.terms):

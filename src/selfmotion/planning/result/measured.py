@@ -1,4 +1,4 @@
-"""What can be asked of a finished motion: limits that it uses, its null motion, reversals."""
+"""Measures of a finished motion: use of limits, null-space motion, reversals."""
 
 from __future__ import annotations
 
@@ -20,24 +20,25 @@ from selfmotion.problem.problem import Problem
 
 # Which limits a motion uses, and for how long: whether it could be faster.
 
-# A limit is used fully from this share of it on.
+# Share of a limit from which on it is fully used.
 FULLY = 0.95
-# Times that are looked at, so many per sample of the motion and at least.
-_PER_SAMPLE, _FEWEST = 3, 2000
+# Times per sample of the motion that are evaluated …
+_PER_SAMPLE = 3
+# … and their smallest number.
+_FEWEST = 2000
 _RATES = ("speed", "acceleration", "jerk")
 
 
 @dataclass(frozen=True)
 class LimitsUsed:
-    """For what share of a motion's time limits of its pace are used fully, by 95 % or more.
+    """Share of a motion's time in which limits of its pace are fully used, by 95 % or more.
 
     Attributes
     ----------
     busy : float
-        Some limit is: at 1 the motion is as fast as its joint path allows.
+        Share with any limit in use: at 1 the motion is as fast as its joint path allows.
     shares : tuple of (str, float)
-        Which limit is used most then, "acceleration of joint 'elbow'", and for what share of the
-        time; the longest first.
+        Shares by the limit used most, "acceleration of joint 'elbow'"; the longest first.
     """
 
     busy: float
@@ -58,7 +59,7 @@ def quantities_of_pace(requirements: Sequence[Requirement]) -> tuple[Quantity, .
 
 
 def limits_used(problem: Problem, motion: Trajectory) -> LimitsUsed:
-    """Return how long a motion uses which of the limits of its pace that a problem asks for."""
+    """Return the shares of time in which a motion fully uses limits of a problem."""
     envelope = problem.envelope
     quantities = quantities_of_pace(problem.requirements)
     limits = PaceLimits(envelope.speed, envelope.acceleration, envelope.jerk, quantities)
@@ -80,10 +81,8 @@ def _shares(which: Array, count: int) -> Array:
     return np.bincount(which, minlength=count).astype(np.float64)
 
 
-# What can be asked of a finished motion: its part in the null space, and its cost by any cost.
-
 # Gauss-Legendre points on each interval: squares of a quintic's derivatives are integrated exactly.
-_ROOTS, _SHARES = np.polynomial.legendre.leggauss(5)
+_ROOTS, _WEIGHTS = np.polynomial.legendre.leggauss(5)
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +105,7 @@ class NullSpaceVelocity:
     basis: Array
 
     def __repr__(self) -> str:
-        """Return what it is of, and how large it is at most."""
+        """Return its task and its largest value."""
         several = "" if self.joints.ndim == 1 else f"{len(self.joints)} times, "
         most = np.abs(self.joints).max(initial=0.0)
         return (
@@ -134,7 +133,7 @@ def null_space_velocity(
 
 
 def deviation_along(problem: Problem, motion: Trajectory, t: npt.ArrayLike) -> Array:
-    """Return how far the tool is off its path at times within the motion; see `Plan.deviation`."""
+    """Return the deviation of the tool from its path at times; see `Plan.deviation`."""
     _check_times(t)
     q, in_tool_axes = motion(t), any(item.in_tool_axes for item in problem.relaxations)
     times = np.atleast_1d(np.asarray(t, dtype=np.float64))
@@ -175,17 +174,19 @@ def _samples(follows: Follows, motion: Trajectory) -> Samples:
     """Return a motion at the Gauss points of each of its intervals."""
     steps = np.diff(motion.t)[:, None]
     t = (motion.t[:-1, None] + steps * 0.5 * (1.0 + _ROOTS)).ravel()
-    sampling = Sampling(t, (steps * 0.5 * _SHARES).ravel(), np.arange(len(t)))
+    sampling = Sampling(t, (steps * 0.5 * _WEIGHTS).ravel(), np.arange(len(t)))
     q, qd, qdd, qddd = (motion(t, order) for order in range(4))
     return PlacedLater(follows, sampling, q=q, qd=qd, qdd=qdd, qddd=qddd)
 
 
 # Where the joints of a motion change their direction.
 
-# A joint that goes back by less than this [rad or m] did not turn round.
+# Smallest backward motion of a joint that counts as a reversal [rad or m].
 LEAST = 1e-3
-# Times that are looked at for each sample of the motion, and halvings to find when one turns round.
-_BETWEEN, _HALVINGS = 4, 40
+# Times per sample of the motion that are evaluated.
+_BETWEEN = 4
+# Bisections of the time of a reversal.
+_HALVINGS = 40
 
 
 @dataclass(frozen=True, eq=False)
@@ -215,11 +216,11 @@ class Reversals:
 
     @property
     def count(self) -> int:
-        """How many there are, of all joints together."""
+        """Number of reversals, of all joints together."""
         return sum(map(len, self.times.values()))
 
     def __str__(self) -> str:
-        """Return how many times, and which joints do, those first that do most often."""
+        """Return the number of reversals, by joint, those with most first."""
         order = sorted(self.times, key=lambda name: -len(self.times[name]))
         turning = [f"{name} {len(self.times[name])}" for name in order if len(self.times[name])]
         return f"{self.count} ({', '.join(turning)})" if turning else "0"

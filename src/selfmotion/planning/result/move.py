@@ -36,7 +36,7 @@ from selfmotion.planning.result.archive import (
 from selfmotion.problem.constraints import Constraint
 from selfmotion.problem.problem import arm_and_constraints, describe_arm
 
-# Raised with every change that older versions cannot read.
+# Version of the format: raised with every change that older versions cannot read.
 _FORMAT = 1
 
 
@@ -49,11 +49,11 @@ class Move:
     robot : RobotModel
         The arm.
     constraints : tuple of Constraint
-        What it has to keep at all times.
+        Conditions at all times.
     trajectory : Trajectory or None
         None where none was found.
     reason : str
-        Why none was found, or what else speaks against it: a file that was changed.
+        Cause of its absence, or a further objection: a file that was changed.
     """
 
     robot: RobotModel
@@ -73,7 +73,7 @@ class Move:
 
     @cached_property
     def findings(self) -> tuple[Finding, ...]:
-        """What each requirement says of it; each judges all times. Found when it is asked for."""
+        """Finding of each requirement, at all times. Computed on first use."""
         if self.trajectory is None:
             return ()
         finished = FinishedMotion(self.robot, self.trajectory)
@@ -81,25 +81,25 @@ class Move:
 
     @property
     def trouble(self) -> str:
-        """What is wrong with it, or why none was found; "" where all is kept."""
+        """Its first violation, or the cause of its absence; "" for none."""
         broken = [item.text for item in self.findings if not item.satisfied]
         return "; ".join(filter(None, (self.reason, *broken)))
 
     @property
     def verified(self) -> bool:
-        """Whether there is one that keeps all that is required."""
+        """Whether there is a motion that satisfies all requirements."""
         return self.trajectory is not None and not self.trouble
 
     @property
     def verdict(self) -> str:
-        """One line: verified, with what was checked at all times, or what is wrong."""
+        """One line: verified, with the checks at all times, or the violation."""
         if not self.verified:
             return f"not verified: {self.trouble}"
         return f"verified at all times ({', '.join(covered_by(self.requirements))})"
 
     @property
     def requirements(self) -> tuple[Requirement, ...]:
-        """What it is judged by."""
+        """Requirements that it is judged by."""
         own = tuple(item.requirement(self.robot) for item in self.constraints)
         return (AtRest(True, True, (True, True)), *arm_limits(self.robot, own), *own)
 
@@ -143,7 +143,7 @@ class Move:
             "findings": [dataclasses.asdict(item) for item in self.findings],
         }
         if self.reason:
-            # Another file does not make it what was planned.
+            # Writing an altered move to a new file does not make it verified.
             description["reason"] = self.reason
         arrays = arrays_of(motion)
         description["digest"] = file_digest(description, arrays)
@@ -185,7 +185,7 @@ def load_move(file: str | FilePath, *, known: MutableMapping[str, Any] | None = 
         if altered:
             reason = f"{path.name} was changed after the move was written: its digest differs"
         move = Move(robot, constraints, motion, reason)
-        # Judged here, where a damaged file can be told from a fault of ours.
+        # Judged here, where an error is one of the file.
         _ = move.findings
     except SelfmotionError as error:
         raise FileFormatError(f"{path}: is a damaged move: {error}") from error

@@ -1,4 +1,4 @@
-"""What limits allow of the pace of a joint path, as rows of a linear programme."""
+"""Limits of the pace of a joint path, as rows of a linear programme."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -31,7 +31,7 @@ class Squares:
 
     @classmethod
     def constant(cls, knots: Array, value: float) -> "Squares":
-        """Return the same value everywhere."""
+        """Return a constant function."""
         return cls(knots, np.full(len(knots) + 1, value))
 
     @property
@@ -49,7 +49,7 @@ class Squares:
         return np.append(self.inside(0.0, order), self.inside(1.0, order)[-1])
 
     def on(self, knots: Array) -> "Squares":
-        """Return about the same over other knots of the same span."""
+        """Return about the same function over other knots of the same interval."""
         three = np.concatenate([[knots[0]] * 2, knots, [knots[-1]] * 2])
         places = 0.5 * (three[1:-2] + three[2:-1])
         old = np.clip(np.searchsorted(self.knots, places, side="right") - 1, 0, len(self.knots) - 2)
@@ -70,7 +70,7 @@ def basis(t: Array, share: float) -> Array:
 
 
 def _neighbours(t: Array, k: Ints) -> tuple[Array, Array, Array]:
-    """Return how long intervals k are, with the one before and with the one after."""
+    """Return the lengths of intervals k, each with those of both neighbours."""
     h = np.diff(t)
     around = np.concatenate([[0.0], h, [0.0]])
     return h[k], h[k] + around[k], h[k] + around[k + 2]
@@ -85,8 +85,6 @@ def _basis(h: Array, before: Array, after: Array, share: Array | float) -> Array
     return splines
 
 
-# What limits allow of the pace of a joint path, as rows of a linear programme.
-#
 # Along a motion q(τ) run through at another pace, with b(τ) the square of dτ/dt,
 #
 #     q̇² = q_τ² b,   q̈ = q_ττ b + ½ q_τ b',   q⃛ = √b (q_τττ b + 3/2 q_ττ b' + ½ q_τ b'')
@@ -100,30 +98,31 @@ def _basis(h: Array, before: Array, after: Array, share: Array | float) -> Array
 # counts as one more joint, which goes on at a share of its largest speed there, within the limits
 # that all joints have together.
 
-# The square of a rate is at least this share of what it was.
+# Smallest square of a rate, as a share of its earlier value.
 LEAST = 1e-6
-# Where in an interval limits are measured: its beginning and its end, from inside, and between.
+# Places in an interval at which limits are evaluated: from just inside its start to its end.
 PLACES = np.clip(0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, 9)), 1e-6, 1.0 - 1e-6)
+# Smaller values count as 0.
 _NOTHING = 1e-150
-# Where in an interval rows are: between, too, since near a rest b might rise and fall there unseen.
+# Places of rows in an interval: its middle, too, since b might oscillate near a rest.
 SHARES = np.array([0.0, 0.5, 1.0])
-# What is at a knot up to rounding is at it: this near, by the length of an interval.
+# Distance from a knot that counts as rounding, as a share of the interval.
 _BESIDE = 1e-6
-# Directions in which vectors are held from both sides: within a polygon inside of the circle of the
-# limit, of which it leaves half a percent at most. One around it, mended by tangents, chatters.
+# Directions in which vectors are limited on both sides: a polygon inside of the limit's circle,
+# which is at most half a percent smaller. A circumscribed one with tangents added would chatter.
 _SIDES = 16
-# Where the arm rests its length goes on at this share of its largest speed.
-_STILL = 0.01
+# Rate of the joint path's length at rests, as a share of its largest speed.
+_REST = 0.01
 
 
 @dataclass(frozen=True, eq=False)
 class PaceLimits:
-    """What depends on how fast a joint path is run through, and may not be passed.
+    """Limits that depend on the pace of a joint path.
 
     Attributes
     ----------
     speed, acceleration, jerk : (n,)
-        Of joints; inf where there is none.
+        Of joints; inf for none.
     quantities : sequence of Quantity
         Such as torques, and how fast the tool is.
     """
@@ -144,23 +143,23 @@ class PaceLimits:
         return bool(np.isfinite(self.jerk).any())
 
     def with_length(self) -> "PaceLimits":
-        """Return the same with the length of the joint path as one more joint."""
+        """Return the same with the length of the joint path as an additional joint."""
         speed, acceleration = (
             np.append(limit, np.linalg.norm(limit)) for limit in (self.speed, self.acceleration)
         )
         return PaceLimits(speed, acceleration, np.append(self.jerk, np.inf), self.quantities)
 
     def without_jerk(self) -> "PaceLimits":
-        """Return the same but for limits of the jerk."""
+        """Return the same without limits of the jerk."""
         free = np.full(len(self.jerk), np.inf)
         return PaceLimits(self.speed, self.acceleration, free, self.quantities)
 
     def shares(self, motion: Trajectory) -> tuple[list[Array], Array]:
-        """Return what of each limit is used in intervals, and of some limit at all their times.
+        """Return the use of each limit in intervals, and the least use of any limit at their times.
 
-        The most in each of all intervals, a table (I, n or m) for q̇, q̈, the jerk and the
-        quantities, in this order, 0 where there is no limit; and (I,) what some limit or other is
-        used by at least.
+        The largest in each interval, a table (I, n or m) for q̇, q̈, the jerk and the quantities,
+        in this order, 0 without a limit; and (I,) the smallest over time of the largest use of any
+        limit.
         """
         steps = np.diff(motion.t)
         at = np.minimum(motion.t[:-1, None] + steps[:, None] * PLACES, motion.t[-1]).ravel()
@@ -170,7 +169,7 @@ class PaceLimits:
         return most, some.reshape(len(steps), len(PLACES)).min(axis=1)
 
     def shares_at(self, motion: Trajectory, t: Array) -> list[Array]:
-        """Return what of each limit is used at times (K,), a table (K, n or m) for each."""
+        """Return the use of each limit at times (K,), a table (K, n or m) for each."""
         states = [motion(t, order) for order in range(4)]
         used = [np.abs(x) / limit for x, limit in zip(states[1:], self.of_orders, strict=True)]
         for item in self.quantities:
@@ -205,7 +204,7 @@ class States:
         at = np.clip(pace(knots) + motion.t[0], *motion.t[[0, -1]])
         sides, count = _inside(knots), len(knots) - 1
         inside = np.clip(pace(sides.ravel()) + motion.t[0], *motion.t[[0, -1]]).reshape(-1, count)
-        # What lies beside a knot is on that side of what the motion has there.
+        # Next to a knot, values are those of its side.
         beside = _BESIDE * np.diff(at)
         inside[0] = np.maximum(inside[0], at[:-1] + beside)
         inside[-1] = np.minimum(inside[-1], at[1:] - beside)
@@ -238,9 +237,9 @@ def _inside(t: Array) -> Array:
 
 
 def length_speed(qd: Array) -> Array:
-    """Return how fast the length of a joint path grows at velocities (…, n), (…)."""
+    """Return the rate of the joint path's length at velocities (…, n), (…)."""
     size: Array = np.linalg.norm(qd, axis=-1)
-    speed: Array = np.hypot(size, _STILL * max(float(size.max()), np.finfo(float).tiny))
+    speed: Array = np.hypot(size, _REST * max(float(size.max()), np.finfo(float).tiny))
     return speed
 
 
@@ -271,11 +270,11 @@ def rows_of(
     room : sequence of (K, n or m)
         Which share of each limit may be used, in the order of `PaceLimits.shares`.
     near : Squares
-        Around which what is not linear is replaced by its tangent.
+        Point of linearisation.
     """
     t = near.knots
     table, limits = _Table(len(t) - 1), limits.with_length()
-    # The length has all the room there is.
+    # The length has the largest room of all joints.
     room = [np.column_stack([own, own.max(axis=1)]) for own in room[:3]] + list(room[3:])
     for side, share in enumerate(SHARES.tolist()):
         value, slope, bend = (part[:, :, None] for part in basis(t, share))
@@ -320,8 +319,8 @@ def _add_quantity(
 ) -> None:
     """Add a quantity f(q, q̇, q̈), of first order around b, which is exact for torques.
 
-    A vector stays within its limit in some directions of the plane in which b and b' move it, that
-    of what it is among them.
+    A vector is limited in some directions of the plane in which b and b' move it, its own among
+    them.
     """
     some, limit = item.limited, item.bounds[item.limited]
     first, second = (states.at_knots(order)[:, :-1] for order in (1, 2))
@@ -342,7 +341,7 @@ def _add_quantity(
 def _parts(
     item: Quantity, q: Array, first: Array, second: Array, b: Array, change: Array
 ) -> list[Array]:
-    """Return a quantity where b and b' are so, and what these change of it, (K, m) or (K, m, c).
+    """Return a quantity at b and b', and its derivatives by these, (K, m) or (K, m, c).
 
     df = (½ f_q̇ q_τ / √b + f_q̈ q_ττ) db + ½ f_q̈ q_τ db'
     """
@@ -362,7 +361,7 @@ def _parts(
 def _directions(
     found: Array, by_value: Array, by_slope: Array
 ) -> Iterator[tuple[Array | None, float]]:
-    """Yield directions (K, m, c) in which vectors (K, m, c) are held, and by what share.
+    """Yield directions (K, m, c) in which vectors (K, m, c) are limited, and their shares.
 
     None for numbers (K, m).
     """
@@ -371,7 +370,7 @@ def _directions(
         return
     yield _unit(found), 1.0
     if not by_slope.any():
-        # What only b moves goes on as it points.
+        # A vector that depends on b alone keeps its direction.
         return
     across = _unit(by_slope)
     other = _unit(by_value - across * (by_value * across).sum(axis=2, keepdims=True))

@@ -17,24 +17,32 @@ from selfmotion.planning.result.pace_rows import (
     rows_of,
 )
 
-# Paces that the search for the fastest one begins with.
-
-# A pace of constant joint speed has so many knots at least and about so many at most.
-_FEWEST, _ENOUGH = 600, 3000
-# Its first and last intervals have so many parts.
+# Smallest number of knots of a pace of constant joint speed …
+_FEWEST = 600
+# … and about the largest.
+_ENOUGH = 3000
+# Parts of its first and last intervals.
 _GRADED = 12
-# A smooth pace has so many intervals at least; so many at most, or for each sample of the motion,
-# with this time between two [s], more with less: slow limits make a motion long, not more winding.
-_INTERVALS, _MANY, _PER_SAMPLE, _COARSE = 250, 4000, 4, 4e-3
-# Where jerks are limited it has this many, unless these are nearer than this [s]: from a pace that
-# is coarse around corners the programmes come to slower ones, from which no near one is faster.
-_FINE, _FINEST = 2000, 1e-3
-# It is as smooth as the mean, so often, over so many knots.
-_MEANS, _WINDOW = 4, 3
-# Accelerations build up over so many knots where the arm begins at rest and jerks are limited.
+# Smallest number of intervals of a smooth pace …
+_INTERVALS = 250
+# … and the largest …
+_MANY = 4000
+# … or per sample of the motion …
+_PER_SAMPLE = 4
+# … with this time between two [s], or more: slow limits make a motion long, not more winding.
+_COARSE = 4e-3
+# Number of intervals with limits of the jerk: programmes from a coarse pace end at slower ones …
+_FINE = 2000
+# … unless they become shorter than this [s].
+_FINEST = 1e-3
+# Moving means that smooth a pace: their number …
+_MEANS = 4
+# … and width in knots.
+_WINDOW = 3
+# Knots over which accelerations build up from rest, with limits of the jerk.
 _EASED = 8
-# Rates below this share of the largest are none.
-_STILL = 1e-9
+# Rates below this share of the largest are 0.
+_REST = 1e-9
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(8)
 
 
@@ -65,18 +73,19 @@ def of_constant_speed(motion: Trajectory) -> Pace:
     h = np.diff(knots)
     # The trapezoidal rule with its correction at the ends.
     parts = 0.5 * h * (speed[:-1] + speed[1:]) + h**2 / 12.0 * (gain[:-1] - gain[1:])
-    # Where accelerations are large for the steps, the correction is none.
+    # Without a correction where accelerations are large for the steps.
     parts = np.maximum(parts, 0.25 * h * (speed[:-1] + speed[1:]))
     length = np.append(0.0, np.cumsum(parts))
     return Pace(length, knots - knots[0], 1.0 / speed, -gain / speed**3)
 
 
 def smooth(pace: Pace, step: float, jerk: bool, samples: int) -> Pace:
-    """Return a pace all of whose derivatives are smooth, on knots about so far apart in time [s].
+    """Return a pace with smooth derivatives, on knots about `step` apart [s].
 
-    Farther where a motion of so many samples is that slow.
-    The mean over some knots, several times; beyond a rest it goes back, beyond others on. Where
-    jerks are limited, accelerations begin at 0.
+    Farther apart for slow motions of `samples` samples. The mean over some knots, several times; it
+    is reflected at rests, and extended at other ends. With limits of the jerk, accelerations start
+    at
+    0.
     """
     from scipy.interpolate import make_interp_spline
 
@@ -89,7 +98,7 @@ def smooth(pace: Pace, step: float, jerk: bool, samples: int) -> Pace:
     beyond = _WINDOW // 2 * _MEANS
     before, after = sigma[beyond:0:-1], sigma[-2 : -beyond - 2 : -1]
     rates = pace(t[[0, -1]], 1)
-    still = _STILL * float(pace.rate.max())
+    still = _REST * float(pace.rate.max())
     before = before if rates[0] <= still else 2.0 * sigma[0] - before
     after = after if rates[1] <= still else 2.0 * sigma[-1] - after
     mean = np.concatenate([before, sigma, after])
@@ -113,10 +122,10 @@ def smooth(pace: Pace, step: float, jerk: bool, samples: int) -> Pace:
 def _eased(
     duration: float, start: float, end: float, count: int
 ) -> tuple[Array, Array, Array, Array]:
-    """Return a time w that begins as τ^(3/2), its two derivatives, and τ, (count + 1,) each.
+    """Return a time w that starts as τ^(3/2), its two derivatives, and τ, (count + 1,) each.
 
-    What begins as w² begins as τ³, so that accelerations begin at 0. That takes times `start` and
-    `end` at the ends, where it takes some: there w' = √(1 - (1 - τ/start)⁴).
+    A function of w² then starts as τ³, so that accelerations start at 0. Over the times `start` and
+    `end` at the ends, if positive: there w' = √(1 - (1 - τ/start)⁴).
     """
     lost = start * (1.0 - _eased_way(np.ones(1))[0]), end * (1.0 - _eased_way(np.ones(1))[0])
     t = np.linspace(0.0, duration + sum(lost), count + 1)
@@ -143,52 +152,70 @@ def _eased_way(x: Array) -> Array:
 # The fastest pace of a joint path within limits of its rates.
 #
 # A pace is improved by linear programmes in b(τ), the square of how much faster it becomes at its
-# own time τ. Velocity, acceleration and torque limits are linear in b, so that one programme
-# finds their optimum (D. Verscheure et al., IEEE Trans. Automatic Control 54(10), 2009); limits
-# of the jerk and of the tool's acceleration are kept by tangents, anew in each programme. Where
-# the motion between two knots uses more than it may, a knot is put between them, or these two get
-# less room: the whole motion is not slowed for one of its samples.
+# own time τ. Velocity, acceleration and torque limits are linear in b, so that one programme finds
+# their optimum (D. Verscheure et al., IEEE Trans. Automatic Control 54(10), 2009); limits of the
+# jerk and of the tool's acceleration are linearised, anew in each programme. Where the motion
+# between two knots exceeds a limit, a knot is added between them, or these two get less room: the
+# whole motion is not slowed for one of its samples.
 
-# How much faster a pace may become in each of the first steps, and in the others: squared.
-_FIRST, _OTHERS = (50.0, 50.0, 9.0), 9.0
-# Nor more than by this, squared: at rest little else bounds it.
+# Largest growth of b in the first steps …
+_FIRST = (50.0, 50.0, 9.0)
+# … and in others.
+_OTHERS = 9.0
+# Largest b: little else bounds it at rest.
 _MOST = 500.0
-# With limits of the jerk tangents hold near a pace only: so many begin anew with the one before,
-# which becomes so much faster or slower at most, squared; and so much in the steps after them.
-_BASES, _BY_JERKS, _BY_JERKS_LATER = 3, 4.0, 2.0
-# Steps from there, until one gains less than this share; knots are added in the first ones.
-_MOST_STEPS, _ADDING, _GAIN = 12, 7, 5e-4
-# What of limits is aimed at, what is left as it is, and what is near enough.
-_AIM, _KEPT, _NEAR = 0.999, 0.9998, 1.0003
-# A step takes at most this share of the room that there is.
+# With limits of the jerk, linearisations are valid nearby: restarts at the pace before …
+_BASES = 3
+# … each with this largest change of b …
+_BY_JERKS = 4.0
+# … and this one in later steps.
+_BY_JERKS_LATER = 2.0
+# Largest number of steps from there …
+_MOST_STEPS = 12
+# … of which the first ones add knots …
+_ADDING = 7
+# … until the relative gain is below this.
+_GAIN = 5e-4
+# Target share of limits …
+_AIM = 0.999
+# … a share that is left as it is …
+_KEPT = 0.9998
+# … and one that is near enough.
+_NEAR = 1.0003
+# Smallest factor of the room between two knots in one step.
 _LEAST_ROOM = 0.8
-# A knot is added where a limit is passed by this share, unless knots are so near [s], or become so
-# many times as many: what is passed all along is no matter of knots.
-_ROUGH, _NEAREST, _MORE = 1.002, 2e-4, 4
-# So many programmes in turn that are not solved are the last ones: others would not be either.
+# Excess of a limit for which a knot is added …
+_ROUGH = 1.002
+# … unless knots are nearer than this [s] …
+_NEAREST = 2e-4
+# … or become this many times as many: an excess all along is not due to knots.
+_MORE = 4
+# Programmes without solution in turn that end the iteration.
 _UNSOLVED = 2
-# With limits of the jerk likewise where at some time no limit is used by this share: within an
-# interval the jerk cannot follow what the path asks for.
+# With limits of the jerk, a knot is also added where the use of all limits falls below this share:
+# within an interval the jerk cannot follow the path.
 _IDLE = 0.8
-# This share of what a step may do is all of it.
+# Share of the largest step that counts as all of it.
 _ALL = 0.9
-# A pace that passes limits manyfold is of a programme that was not solved: what is known stays.
+# Excess of a pace from a programme without solution: it is rejected.
 _WILD = 10.0
 # A jump of this share of a limit has a knot of its own.
 _JUMP = 0.02
-# Gaps of the linear programmes, as shares: while the pace is rough, and then.
-_ROUGH_GAP, _GAP = 1e-3, 1e-6
-# Times are this share longer than limits ask: third differences of samples round so much.
+# Relative duality gap of the programmes at a rough pace …
+_ROUGH_GAP = 1e-3
+# … and at a fine one.
+_GAP = 1e-6
+# Relative increase of times: rounding of third differences of samples.
 _ROUNDING = 1e-6
-# Derivatives below this share of the largest are none: they are looked at beside the ends.
+# Derivatives below this share of the largest are 0: then those next to the ends count.
 _NONE = 1e-5
-# Programmes begin with so much of what is known to keep the limits: there is room to all sides.
+# Initial point of programmes, as a share of a feasible one: there is room on all sides.
 _INSIDE = 0.9
 
 
 @dataclass(frozen=True)
 class Ends:
-    """How a motion begins and ends: whether its original rate is kept there, or it rests."""
+    """Rates at the start and end of a motion: the original ones, or rest."""
 
     start_kept: bool = False
     end_kept: bool = False
@@ -200,11 +227,11 @@ def fastest_pace(motion: Trajectory, limits: PaceLimits, ends: Ends, step: float
     Parameters
     ----------
     motion : Trajectory
-        Whose joint path is kept.
+        Its joint path is followed.
     limits : PaceLimits
     ends : Ends
     step : float
-        Time between two knots of the pace [s], about; more of a motion that is slow all along.
+        Approximate time between two knots of the pace [s]; more for slow motions.
 
     Raises
     ------
@@ -216,7 +243,7 @@ def fastest_pace(motion: Trajectory, limits: PaceLimits, ends: Ends, step: float
     for most in _FIRST:
         pace = _stepped(pace, motion, rough, ends, most)
     for _ in range(_BASES if limits.has_jerk else 0):
-        # Tangents hold near a pace, so that the next one begins anew from there.
+        # Linearisations are valid nearby: the next one starts there.
         pace = _scaled(smooth(pace, step, limits.has_jerk, len(motion.t)), motion, limits)
         pace = _stepped(pace, motion, limits, ends, _BY_JERKS)
     pace = _scaled(smooth(pace, step, limits.has_jerk, len(motion.t)), motion, limits)
@@ -249,7 +276,7 @@ def _settled(base: Pace, motion: Trajectory, limits: PaceLimits, ends: Ends) -> 
         used, least = limits.shares(along(pace, motion))
         kept = _scaled(pace, motion, limits, least=1.0)
         over = np.max([table.max(axis=1) for table in used], axis=0)
-        # A motion that passes what no slower pace surely keeps stands back.
+        # A motion that violates limits which no slower pace satisfies for sure is rejected.
         passed = max((float(table.max()) for table in used[3:]), default=0.0)
         rank = max(passed, _KEPT), float(kept.t[-1])
         if rank < best[0]:
@@ -265,13 +292,13 @@ def _settled(base: Pace, motion: Trajectory, limits: PaceLimits, ends: Ends) -> 
         if over.max() < _NEAR and passed <= _KEPT and abs(before / pace.t[-1] - 1.0) < _GAIN:
             break
         before = pace.t[-1]
-        # Where it became as fast as a step may make it, knots are not what holds it.
+        # Where the step was the limit, knots are not.
         held = near.inside(0.5) < _ALL * most * known.inside(0.5)
         idle = (least < _IDLE) & held & limits.has_jerk
         cut = _to_cut(over, idle, pace)
         if number >= _ADDING or len(near.knots) + np.count_nonzero(cut) > _MORE * count:
             cut[:] = False
-        # A limit that is passed where a knot is added is looked at again before there is less room.
+        # A limit exceeded where a knot is added is checked again before the room is reduced.
         room = [
             np.repeat(own * _less(table, cut), 1 + cut, axis=0)
             for own, table in zip(room, used, strict=True)
@@ -312,7 +339,7 @@ def _less(used: Array, cut: Flags) -> Array:
 
 
 def _to_cut(over: Array, idle: Flags, pace: Pace) -> Flags:
-    """Return which intervals are too long for what happens in them or beside them."""
+    """Return the mask of intervals that are too long for the motion in or next to them."""
     passed = np.concatenate([[False], (over > _ROUGH) | idle, [False]])
     near = passed[:-2] | passed[1:-1] | passed[2:]
     return np.asarray(near & (np.diff(pace.t) > _NEAREST))
@@ -330,7 +357,7 @@ def _scaled(pace: Pace, motion: Trajectory, limits: PaceLimits, least: float = 0
 
 
 def _stepped(pace: Pace, motion: Trajectory, limits: PaceLimits, ends: Ends, most: float) -> Pace:
-    """Return a pace after one rough step with all the room there is."""
+    """Return a pace after one rough step with full room."""
     near, room = Squares.constant(pace.t, 1.0), _all_room(len(pace.t) - 1, limits)
     return _changed(pace, _improved(pace, motion, limits, room, near, ends, most, _ROUGH_GAP)[0])
 
@@ -365,7 +392,7 @@ def _improved(
     gradient = weights * np.maximum(near.c, 1e-4) ** -1.5
     upper = np.minimum(most * near.c, _MOST) + 2.0 * LEAST
     upper = np.where(fixed, start, upper)
-    # Where a pace may not be much slower either, none can be within the room that is left.
+    # If a pace may not be much slower either, the remaining room has none.
     for lower in ([near.c / most] if limits.has_jerk else []) + [0.0 * near.c]:
         least = np.where(fixed, start, np.maximum(lower, LEAST))
         found, reached = banded_optimum(gradient, rows, start, least, upper, gap)
@@ -384,7 +411,7 @@ def _keep(start: Array, fixed: Flags, end: int, base: Pace, knots: Array) -> Non
 
 
 def _starts(states: States, end: int, jerk: bool) -> bool:
-    """Return whether the pace has to begin from rest at an end, since else the arm would not.
+    """Return whether the pace has to start from rest at an end, as the arm does.
 
     With limits of the jerk it rests where accelerations are 0 as well.
     """
@@ -402,7 +429,7 @@ def _changed(base: Pace, squares: Squares) -> Pace:
     with np.errstate(divide="ignore", invalid="ignore"):
         for node, weight in zip(roots, weights, strict=True):
             steps += weight * h / np.sqrt(squares.inside(float(node)))
-        # From rest b grows from 0: as a function of the root of the way the time is smooth.
+        # From rest b grows from 0: as a function of the root of the path length time is smooth.
         for end, shares in ((0, roots**2), (-1, 1.0 - roots**2)):
             if squares.c[end] == 0.0:
                 values = np.array([squares.inside(float(share))[end] for share in shares])

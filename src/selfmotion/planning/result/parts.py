@@ -1,4 +1,4 @@
-"""A plan in several parts, its file, and whether it is the motion that was asked for."""
+"""Plans in several parts, their files, and their agreement with the specification."""
 
 import hashlib
 import json
@@ -26,8 +26,10 @@ from selfmotion.model.motion import Trajectory, joined_motions
 from selfmotion.model.path import Path, Retimed
 from selfmotion.model.robot import RobotModel
 from selfmotion.planning.result.archive import OtherVersionError, check_version, file_digest
-from selfmotion.planning.result.asked import (
-    Asked,
+from selfmotion.planning.result.move import Move, load_move
+from selfmotion.planning.result.plan import Plan, load_plan, reached_text
+from selfmotion.planning.result.specification import (
+    MotionSpecification,
     Piece,
     another_tool,
     elsewhere,
@@ -36,21 +38,17 @@ from selfmotion.planning.result.asked import (
     looked_at,
     not_judged_by,
 )
-from selfmotion.planning.result.move import Move, load_move
-from selfmotion.planning.result.plan import Plan, load_plan, reached_text
 from selfmotion.problem.problem import (
-    START_MISS,
+    START_TOLERANCE,
     Problem,
-    asked_of_part,
     at_all_times,
+    constraints_of_part,
     problem_from_dict,
     problem_to_dict,
     times_along,
 )
 
-# Plans and moves as one file: a description in JSON, and their own files, in one archive.
-
-# Bundles beyond so many bytes are not read.
+# Largest size of a bundle that is read [bytes].
 _LARGEST = 2_000_000_000
 _NAME = "bundle.json"
 
@@ -62,23 +60,23 @@ def write_bundle(
     description: Mapping[str, Any],
     made: Sequence[Plan | Move],
 ) -> None:
-    """Write plans and moves, and what else is known, to one file; atomically.
+    """Write plans and moves, and further values, to one file; atomically.
 
     Parameters
     ----------
     file : FilePath
     kind : str
-        What it is, for who reads it: ``"program"``.
+        Its kind, for readers: ``"program"``.
     version : int
         Raised with every change that older versions cannot read.
     description : mapping
         JSON-safe.
     made : sequence of Plan or Move
-        Moves that were found.
+        Plans and moves.
     """
 
     def write(stream: Any) -> None:
-        # What is inside is compressed already.
+        # Its members are compressed already.
         with zipfile.ZipFile(stream, "w") as archive, tempfile.TemporaryDirectory() as folder:
             members = []
             for number, item in enumerate(made):
@@ -95,7 +93,7 @@ def write_bundle(
 def read_bundle(
     file: FilePath, kind: str, version: int
 ) -> tuple[dict[str, Any], list[Plan | Move], bool]:
-    """Return what `write_bundle` wrote, judged anew, and whether the file was changed since.
+    """Return the content of a bundle, judged anew, and whether the file was changed.
 
     Raises
     ------
@@ -140,7 +138,7 @@ def _member(number: int) -> str:
 
 # A plan in several parts, with changes of configuration in between.
 
-# Raised with every change that older versions cannot read.
+# Version of the format: raised with every change that older versions cannot read.
 _FORMAT = 1
 
 
@@ -151,20 +149,20 @@ class Parts:
     Attributes
     ----------
     problem : Problem
-        What was asked for, of the whole path.
+        The specification, for the whole path.
     plans : tuple of Plan
         One for each part of the path, in order, each with a problem of its own.
     moves : tuple of Move
         From the end of each part to the start of the next, and back to the first one's start where
         the path has to be closed and its motion is not.
     cuts : tuple of float
-        Where on the path each part but the last ends, and the next begins [s].
+        Times of the path at which each part but the last ends, and the next starts [s].
     endings : tuple of str
         Why each part but the last goes no further.
     altered : str
         Why the file that they were read from is not the one that was written; "" where it is.
     tolerance : Tolerance
-        What each of the plans may miss the path by.
+        Allowed error of each plan from the path.
     """
 
     problem: Problem
@@ -191,12 +189,12 @@ class Parts:
 
     @property
     def verified(self) -> bool:
-        """Whether the parts are what was asked for, and everything is kept at all times."""
+        """Whether the parts are as specified, and satisfy all conditions at all times."""
         return not self.failures
 
     @property
     def verdict(self) -> str:
-        """One line: verified, and how near to the path; or what is wrong with which of them."""
+        """One line: verified, with the path error; or the violations by part."""
         if self.verified:
             return (
                 f"verified at all times: {len(self.plans)} part{'s' * (len(self.plans) != 1)}, and "
@@ -206,12 +204,12 @@ class Parts:
 
     @property
     def summary(self) -> str:
-        """The verdict in short: of what is wrong the first."""
+        """The verdict in short, with the first violation."""
         return self.verdict if self.verified else first_of(self.failures)
 
     @cached_property
     def failures(self) -> tuple[str, ...]:
-        """What speaks against them; empty for verified ones."""
+        """Violations; empty for verified parts."""
         parts = [
             f"part {number}: {plan.certificate.verdict}"
             for number, plan in enumerate(self.plans, 1)
@@ -238,7 +236,7 @@ class Parts:
 
     @property
     def begins(self) -> tuple[float, ...]:
-        """When each part begins in `trajectory` [s].
+        """Start time of each part in `trajectory` [s].
 
         Raises
         ------
@@ -310,7 +308,7 @@ def load_parts(file: str | FilePath) -> Parts:
         problem = problem_from_dict(description["problem"])
         cuts = tuple(map(float, description["cuts"]))
         endings = tuple(map(str, description["endings"]))
-        # Files of before say none: then it is the usual one.
+        # Files of older versions have none: the default.
         tolerance = Tolerance(**description.get("tolerance", {}))
         altered = str(description.get("altered", ""))
     except (KeyError, TypeError, ValueError, SelfmotionError) as error:
@@ -322,9 +320,7 @@ def load_parts(file: str | FilePath) -> Parts:
     return Parts(problem, plans, moves, cuts, endings, altered, tolerance)
 
 
-# Whether parts are, together, the motion that was asked for.
-
-# A part is never quicker than the path is [share].
+# Largest pace of a part relative to the path's.
 _OWN_PACE = 1.0 + 1e-9
 
 
@@ -340,7 +336,7 @@ class PartsAsked:
         self._parts, self._problem = parts, parts.problem
 
     def failures(self) -> Iterator[str]:
-        """Yield what was asked for and is not so."""
+        """Yield the deviations from the specification."""
         parts = self._parts
         if not parts.plans:
             yield "there is no part"
@@ -370,13 +366,13 @@ class PartsAsked:
                 relaxed = moved["relaxations"]
             else:
                 relaxed = tuple(problem.relaxations)
-            constraints = tuple(asked_of_part(problem, is_first, is_last))
+            constraints = tuple(constraints_of_part(problem, is_first, is_last))
         else:
             path, relaxed = problem.path, tuple(problem.relaxations)
             constraints = tuple(problem.constraints)
         own = problem.own_collision
         kept = [item for item in constraints if item.applies(problem.robot)]
-        asked = Asked(
+        asked = MotionSpecification(
             problem.robot,
             path,
             problem.task,
@@ -389,9 +385,9 @@ class PartsAsked:
         yield from asked.failures(plan)
         start = problem.given_start
         if is_first and start is not None:
-            # What a start given near the path is put onto it by.
+            # The correction of a start given near the path.
             first = Piece("it", plan.trajectory)
-            yield from elsewhere(problem.robot, first, 0, start, START_MISS)
+            yield from elsewhere(problem.robot, first, 0, start, START_TOLERANCE)
 
     def _of_moves(self) -> Iterator[str]:
         parts, problem = self._parts, self._problem
@@ -417,7 +413,7 @@ class PartsAsked:
         if is_closed:
             pieces.append(Piece.of("part 1", plans[0]))
         found = [piece for piece in pieces if piece is not None]
-        # Where a move was not found, that is told already.
+        # A missing move has a message already.
         if len(found) == len(pieces):
             yield from gaps(problem.robot, found)
 
@@ -427,7 +423,7 @@ def _is_part(part: Path, whole: Path, ends: tuple[float, float]) -> bool:
     t = looked_at(part)
     first, last = ends
     passed = part.pace(t) if isinstance(part, Retimed) else t
-    # All of it: what is left out at either end is bridged by a move.
+    # A gap at either end is bridged by a move.
     reached = np.array([passed[0], passed[-1]])
     if not np.abs(reached - [0.0, last - first]).max() <= 1e-9 * whole.duration:
         return False

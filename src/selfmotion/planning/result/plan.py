@@ -1,4 +1,4 @@
-"""A finished plan: the motion, the problem it solves, how it was found, and what the check says."""
+"""Plan: a motion, its problem, the report of the planner, and the certificate."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ if TYPE_CHECKING:
 
 
 class Views(Protocol):
-    """What shows plans: made by the replay, which knows plans, not the other way round."""
+    """Views of plans, registered by the replay: it depends on plans."""
 
     def notebook_html(self, plan: Plan) -> str:
         """Return the replay as HTML for a notebook."""
@@ -101,7 +101,7 @@ class Plan:
     Attributes
     ----------
     problem : Problem
-        What was asked for.
+        The specification.
     trajectory : Trajectory
         The motion; shorter than the path where the arm cannot follow it to the end.
     initial_trajectory : Trajectory
@@ -111,8 +111,8 @@ class Plan:
     report : Report
         Of these motions: of one that was put in the place of another, costs are evaluated again.
     certificate : Certificate
-        Of this motion and this problem: one of any other is not kept, and the plan is then not
-        verified (``replace(plan, trajectory=…)``); `check` makes a new one.
+        Of this motion and this problem: that of any other is dropped, and the plan is then not
+        verified (``replace(plan, trajectory=…)``); `check` computes a new one.
     altered : str
         Why the file that it was read from is not the one that was written; "" where it is.
     """
@@ -128,7 +128,7 @@ class Plan:
     altered: str = ""
 
     def __post_init__(self) -> None:
-        # In the robot's order, whichever a file has: what is joined is joined by columns.
+        # In the robot's order, whichever a file has: motions are joined by columns.
         for name in ("trajectory", "initial_trajectory"):
             object.__setattr__(self, name, in_order_of(self.robot, getattr(self, name)))
         check, motion = self.certificate, self.trajectory
@@ -139,15 +139,15 @@ class Plan:
     def _own_report(self) -> Report:
         """Return the report of this motion and these costs: that of others is evaluated again.
 
-        Where it does not say what it is of, it is of what the certificate was of. What cannot be
-        evaluated, as functions that no file has, leaves a cost that is not a number.
+        If it does not name its motion, it is of the certificate's. Costs that cannot be evaluated,
+        as functions that no file has, are NaN.
         """
         motion, initial = self.trajectory.digest, self.initial_trajectory.digest
         costs, report = _digests(self.problem.costs), self.report
         if not report.motion and self.certificate.motion:
             return replace(report, motion=motion, initial_motion=initial, costs=costs)
         same_costs = _are_same(costs, report.costs)
-        # Files did not always say which minimum-norm motion it is: the one beside it.
+        # Files of older versions do not name the minimum-norm motion: the one in it.
         if not (same_costs and report.initial_motion in ("", initial)):
             total, terms = self._costs_of(self.initial_trajectory)
             report = replace(report, initial_cost=total, initial_terms=terms)
@@ -156,7 +156,7 @@ class Plan:
         return replace(report, motion=motion, initial_motion=initial, costs=costs)
 
     def _costs_of(self, motion: Trajectory) -> tuple[float, Mapping[str, float]]:
-        """Return what a motion costs, and by which costs; nan where one cannot be evaluated."""
+        """Return the cost of a motion, and the terms; NaN where one cannot be evaluated."""
         terms = {}
         for cost in self.problem.costs:
             with suppress(ProblemError):
@@ -166,7 +166,7 @@ class Plan:
         return (sum(terms.values()) if complete else math.nan), terms
 
     def __repr__(self) -> str:
-        """Return a few lines: what moves, at what cost, and the verdict."""
+        """Return a few lines: arm, cost, and the verdict."""
         report, verdict = self.report, self.certificate.verdict
         costs = f"{report.initial_cost:.6g} → {report.cost:.6g}"
         return (
@@ -192,12 +192,12 @@ class Plan:
 
     @property
     def tolerance(self) -> Tolerance:
-        """What the motion may miss the path by."""
+        """Allowed error of the motion from the path."""
         return self.certificate.tolerance
 
     @property
     def requirements(self) -> tuple[Requirement, ...]:
-        """What the certificate judged besides the path and the arm's own limits."""
+        """Requirements of the certificate besides the path and the arm's own limits."""
         return self.problem.requirements
 
     @property
@@ -207,32 +207,34 @@ class Plan:
 
     @cached_property
     def approaches(self) -> Mapping[str, Extreme]:
-        """How near each obstacle and carried body comes, and the arm to itself, at all times.
+        """Smallest distances of each obstacle and carried body, and of the arm from itself.
 
-        Name → the distance [m], when, and which two bodies; to a fiftieth of it or 0.1 mm. Found
-        when it is asked for.
+        Name → the distance [m], time, and the two bodies; to a fiftieth of it or 0.1 mm, at all
+        times. Computed on first use.
         """
         return approaches(self.requirements, FinishedMotion(self.robot, self.trajectory))
 
     @cached_property
     def limits_used(self) -> LimitsUsed:
-        """For what share of the time limits of speeds, accelerations, torques … are used fully.
+        """Shares of the time in which limits of speeds, accelerations, torques … are fully used.
 
-        By joint and limit: what keeps the motion from being faster. Found when it is asked for.
+        By joint and limit: they limit the pace of the motion. Computed on first use.
         """
         return limits_used(self.problem, self.trajectory)
 
     @cached_property
     def reversals(self) -> Reversals:
-        """When each joint turns round, by more than 1 mrad or 1 mm. Found when it is asked for."""
+        """Times of the joints' reversals, above 1 mrad or 1 mm. Computed on first use."""
         return Reversals.of(self.trajectory)
 
     def null_motion(self, t: npt.ArrayLike) -> NullSpaceVelocity:
-        """Return what of the joint velocities lies in the null space of the task at `t`.
+        """Return the null-space component of the joint velocities at `t`.
 
-        q̇ = J⁺ẋ + (I − J⁺J) q̇: the first part moves the tool, the second one only the joints. J are
-        the rows of all frames that follow a path, as they are prescribed; where tolerances
-        (`relaxations`) are used, ẋ = J q̇ is what the tool does, not what the path asks.
+        q̇ = J⁺ẋ + (I − J⁺J) q̇: the first part moves the tool, the second one only the joints. J
+        has
+        the prescribed rows of all task frames; where tolerances (`relaxations`) are used, ẋ = J q̇
+        is the
+        tool's twist, not the path's.
 
         Parameters
         ----------
@@ -253,7 +255,7 @@ class Plan:
         return null_space_velocity(self.problem.follows, self.trajectory, t)
 
     def deviation(self, t: npt.ArrayLike) -> Array:
-        """Return how far the tool is off its path at `t`, as the certificate sees it.
+        """Return the deviation of the tool from its path at `t`, as in the certificate.
 
         The six rows of a `Relaxation`. x, y, z [m] are the tool's position minus the path's: in
         world axes, or in those of the path's tool frame where a tolerance of positions is
@@ -295,7 +297,7 @@ class Plan:
 
     @property
     def metres(self) -> Mapping[str, float]:
-        """What a metre of each joint that slides counted against a radian of the others [rad].
+        """Weight of a metre of each prismatic joint relative to a radian of the others [rad].
 
         In the first cost of joint rates; empty for an arm of one kind of joints.
         """
@@ -310,8 +312,8 @@ class Plan:
     ) -> Certificate:
         """Return a new certificate of the motion.
 
-        By all that the problem asks for and by `requirements` besides; with another tolerance than
-        the plan's where one is given. `progress` is told how far it is, as in `certify`.
+        By all conditions of the problem and by further `requirements`; with another tolerance than
+        the plan's if one is given. `progress` is as in `certify`.
         """
         within = tolerance or self.tolerance
         found = self.problem.certify(
@@ -396,10 +398,10 @@ def load_plan(
 ) -> Plan:
     """Read a plan that `Plan.save` wrote, and measure its motion anew.
 
-    A file that was changed is never verified. Where the robot's own file has changed since, the
+    A file that was changed is never verified. If the robot's own file has changed since, the
     certificate's notes say so: the plan is checked against the arm it was made for. `progress` is
-    told how far it is, as in `certify`. Who reads many plans of one arm hands the same `known` to
-    each: arms and constraints are put there, and taken from there.
+    as in `certify`. For several plans of one arm pass the same `known` each time: it is a cache of
+    arms and constraints.
 
     Raises
     ------
@@ -407,7 +409,7 @@ def load_plan(
         The file is missing, is no plan, lacks something, or was written by a newer version.
     """
     archive = Archive.read(as_path(file), known)
-    # What the file says of itself is not believed.
+    # The certificate in the file is not trusted.
     plan = Plan(*archive[:-1])
     try:
         certificate = plan.check(progress=progress)

@@ -1,4 +1,4 @@
-"""How a plan was found, and how far it may be from the best."""
+"""Report of a plan: how it was found, and a bound of its distance from the best."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -8,13 +8,13 @@ from selfmotion.model.motion import NullMotion
 from selfmotion.planning.optimise import Iteration, Status
 from selfmotion.problem.constraints import ActiveConstraint
 
-# What digests of costs that are functions begin with; only the process that has them knows more.
+# Start of digests of costs that are functions, which are valid in one process.
 FUNCTION = "function "
 
 
 @dataclass(frozen=True)
 class Gap:
-    """How far a plan is from the global optimum, as far as the search over self-motions knows it.
+    """Distance of a plan from the global optimum, by the search over self-motions.
 
     No bound: the search sees samples of the self-motions, and joint path lengths. So there are two
     comparisons, with different strengths. The costs are alike (same cost, same constraints, same
@@ -36,7 +36,7 @@ class Gap:
     spacing : float
         Distance of the samples of the self-motions [rad or m], configuration norm.
     sequences : int
-        How many sequences, unlike each other, were refined.
+        Number of different sequences that were refined.
     """
 
     cost: float
@@ -61,7 +61,7 @@ class Gap:
 
 @dataclass(frozen=True)
 class Attempt:
-    """One thing that was tried for a plan, and what stood after it.
+    """One proposal for a plan, and the best motion after it.
 
     Attributes
     ----------
@@ -69,7 +69,7 @@ class Attempt:
         Such as "given start" or "global search"; the site's page "What is tried, in what order,
         and when it ends" has all of them.
     outcome : str
-        What stood after it, in words.
+        The best motion after it, in words.
     cost : float or None
         F of that; None where there was no motion.
     seconds : float
@@ -91,11 +91,11 @@ class Report:
     cost, initial_cost : float
         F of the plan, and of the minimum-norm motion (q̇ = J⁺ẋ).
     terms, initial_terms : dict
-        What each cost contributes to them.
+        Contribution of each cost to them.
     evaluations, gradient_evaluations : int
         How often F and ∇F were computed, on all grids.
     jacobian_evaluations : int
-        How often Pinocchio was asked for the frame Jacobian.
+        Number of evaluations of the frame Jacobian by Pinocchio.
     steps : int
         Runge-Kutta steps of the finest grid.
     iterations : int
@@ -104,11 +104,11 @@ class Report:
         One per iteration, each grid's first being its start.
     status : Status
     message : str
-        What the status means and what to do about it.
+        Meaning of the status, and a remedy.
     seconds : float
         Wall time of `plan`.
     gap : Gap or None
-        Distance from the global optimum, where a global search was made.
+        Distance from the global optimum, after a global search.
     ending : str
         Why the motion ends before its path does; "" where it does not.
     active : tuple of ActiveConstraint
@@ -116,20 +116,19 @@ class Report:
     null_motion : NullMotion or None
         The parameterisation that the plan's coefficients are of; None for other works' methods.
     remaining : float or None
-        An estimate of what any other null motion could still take off F, the constraints kept:
-        what the nodes' distance and another step leave. Without what it costs that an arm at rest
-        starts and stops smoothly, some 0.1 % of F, and what margins within limits do. None of the
-        published method, which knows no other null motion.
+        An estimate of the possible decrease of F by any other null motion, within the constraints:
+        by finer nodes and another step. Without the cost of smooth starts and stops of an arm at
+        rest, some 0.1 % of F, and that of margins within limits. None of the published method,
+        which has one kind of null motion.
     attempts : tuple of Attempt
         The strategies that were tried, in order; empty for other works' methods.
     motion : str
-        Digest of the motion that costs, active constraints and all else are of; "" until the plan
-        is made. Of a motion that was put in the place of another, `evaluated` is the report.
+        Digest of the motion of costs, active constraints and other values; "" before the plan is
+        made. `evaluated` is the report of another motion.
     initial_motion : str
         Digest of the minimum-norm motion that the initial costs are of.
     obstruction, remedy : str
-        Of a motion that is not verified: what no motion along the path passes, and what may help;
-        "" where nothing is known of that.
+        Of a motion that is not verified: the obstruction, and a remedy; "" if unknown.
     costs : dict
         The digest of each cost by its name; "" of one that is a function.
     """
@@ -160,7 +159,7 @@ class Report:
     remedy: str = ""
 
     def evaluated(self, cost: float, terms: Mapping[str, float]) -> "Report":
-        """Return the report of another motion or costs: what it costs, not how it was found."""
+        """Return the report of another motion or costs: without how it was found."""
         return replace(
             self,
             cost=cost,
@@ -174,7 +173,7 @@ class Report:
         )
 
     def explained(self, certificate: Certificate) -> Certificate:
-        """Return a certificate that begins with what stops the motion, if it is not verified."""
+        """Return a certificate with the obstruction first, if the motion is not verified."""
         if certificate.verified:
             return certificate
         first, last = ((text,) if text else () for text in (self.obstruction, self.remedy))
@@ -182,7 +181,7 @@ class Report:
         return replace(certificate, failures=failures, notes=notes)
 
     def with_found(self, before: "Report", active: Sequence[ActiveConstraint]) -> "Report":
-        """Return it with how the same motion was found at another pace or the other way round."""
+        """Return it with the history of the same motion at another pace or in reverse."""
         return replace(
             self,
             message=before.message,

@@ -23,7 +23,7 @@ from selfmotion.basics import (
     shown,
 )
 from selfmotion.model.motion import MOST_SAMPLES, Grid, Trajectory, slowdown_of
-from selfmotion.model.path import STILL, Pace, Path, Retimed, edges_of
+from selfmotion.model.path import REST_SPEED, Pace, Path, Retimed, edges_of
 from selfmotion.planning.result.measured import quantities_of_pace
 from selfmotion.planning.result.pace_rows import PaceLimits
 from selfmotion.planning.result.pacing import Ends, along, fastest_pace
@@ -35,21 +35,28 @@ from selfmotion.problem.constraints import (
 )
 from selfmotion.problem.problem import Problem
 
-# Time between two samples of the new motion [s]: the first that keeps the plan's tolerance.
+# Times between two samples of the new motion [s]: the first one within the plan's tolerance.
 _STEPS = (4e-3, 2e-3, 1e-3)
-# The tool waits where it stands still at so many times of its path, for this long in all [s].
-_LOOKS, _BRIEF = 2000, 0.05
-# A motion that passes limits by so little is slowed as a whole, and a bit beyond that.
-_BY_A_LITTLE, _BEYOND = 1.002, 1.0 + 1e-6
-# Samples at a rate are a whole number of periods, to rounding [periods]. A motion is made slower
-# for them in steps of this part of what limits are passed by, so often at most for all else.
-_WHOLE, _PART, _SLOWER = 1e-6, 0.1, 12
-# Accelerations that jump from one side to the other this often, over all joints, are reported.
+# Samples of a path in which waiting of the tool is noticed …
+_SAMPLES = 2000
+# … from this time on [s].
+_BRIEF = 0.05
+# A motion that exceeds limits by less than this is slowed as a whole …
+_BY_A_LITTLE = 1.002
+# … by slightly more than that.
+_BEYOND = 1.0 + 1e-6
+# Rounding of the number of sample periods [periods].
+_WHOLE = 1e-6
+# Slowing for samples at a rate, in steps of this share of the excess of limits …
+_PART = 0.1
+# … at most so often for all other requirements.
+_SLOWER = 12
+# Number of jumps of accelerations from which on a remark is made.
 _OFTEN = 12
 
 
 def slowdown(plan: Plan, acceleration: npt.ArrayLike | None = None) -> float:
-    """Return by what factor the plan's duration must grow to keep its limits (1: it does).
+    """Return the factor by which the plan's duration must grow to be within its limits (1: it is).
 
     At the same pace profile: velocities fall with the factor, accelerations with its square.
 
@@ -77,25 +84,25 @@ def retime(
 ) -> Plan:
     """Return the plan's joint path in the shortest time within the limits, from rest to rest.
 
-    Velocity, acceleration, jerk and torque limits and those of the tool are kept, all that the
-    plan was asked to keep, by linear programmes in the square of the pace (`result.pacing`). Where
-    the problem says how fast the arm begins or ends, it does so. The geometric path of joints and
-    tool stays; the tool motion becomes a `Retimed` one, the certificate is made anew. Costs are
-    evaluated again; the report has when constraints bind, which moves along, and remarks: where no
-    jerk is limited and accelerations often change at once, and where the tool waited on its way
-    (`Dwell`), which it does no longer than limits ask.
+    Velocity, acceleration, jerk and torque limits, those of the tool, and all other conditions of
+    the plan apply, by linear programmes in the square of the pace (`result.pacing`). Given rates at
+    the ends are kept. The geometric path of joints and tool is the same; the tool motion becomes a
+    `Retimed` one, and the certificate is computed anew. Costs are evaluated again; times of active
+    constraints in the report are transformed, and remarks made: of frequent jumps of acceleration
+    without limits of the jerk, and of waiting of the tool (`Dwell`), which is as short as limits
+    allow.
 
     Parameters
     ----------
     plan : Plan
     acceleration : (n,) or float, optional
-        Limits [rad/s² or m/s²]; by default those that the plan was asked to keep, or the maker's.
+        Limits [rad/s² or m/s²]; by default those of the plan, or the maker's.
     velocity : (n,) or float, optional
-        Limits [rad/s or m/s]; by default those that the plan was asked to keep, or the URDF's.
+        Limits [rad/s or m/s]; by default those of the plan, or the URDF's.
     rate : float, optional
-        Samples per second of the new motion, as a controller takes them; by default as many as the
-        pace needs. Accelerations that jump between two of these overshoot in the quintics through
-        them: the motion is as much slower as a whole as limits ask for.
+        Samples per second of the new motion, for a controller; by default as many as the pace
+        needs. Accelerations that jump between two of these overshoot in the quintics through them:
+        the motion is as much slower as a whole as limits ask for.
 
     Raises
     ------
@@ -110,7 +117,7 @@ def retime(
     check_no_feed(plan.problem)
     v, a = rate_limits(plan.problem, acceleration, velocity)
     wanted = [JointVelocityLimits(v), JointAccelerationLimits(a)]
-    # The problem's own limits stay: the tighter of both is kept.
+    # The problem's own limits apply as well: the tighter of both.
     robot = plan.robot
     kept = reduce(and_, (item.envelope(robot) for item in wanted), plan.problem.envelope)
     quantities = quantities_of_pace(plan.requirements)
@@ -121,7 +128,7 @@ def retime(
         result = _retimed(plan, wanted, pace)
         factor = max((item.factor for item in result.certificate.findings), default=1.0)
         if 1.0 < factor < _BY_A_LITTLE:
-            # What is seen of steps misses a per mille of peaks within them.
+            # Samples miss a per mille of peaks between them.
             result = _retimed(plan, wanted, pace.slower(factor * _BEYOND))
         if result.certificate.on_path:
             break
@@ -138,8 +145,8 @@ def is_retimed(plan: Plan) -> bool:
 def at_rate(plan: Plan, rate: float) -> Plan:
     """Return a retimed plan by samples at a rate, as much slower as they need to keep its limits.
 
-    It takes a whole number of periods. Where no slower motion is verified either, what is returned
-    is not: its certificate says why.
+    It takes a whole number of periods. If no slower motion is verified either, the result is not:
+    its certificate has the cause.
 
     Raises
     ------
@@ -173,7 +180,7 @@ def at_rate(plan: Plan, rate: float) -> Plan:
 
 
 def _even(motion: Trajectory, periods: int, rate: float) -> Pace:
-    """Return the pace by which a motion takes so many periods of a rate, slower as a whole."""
+    """Return the pace of a motion that takes `periods` of a rate, slower as a whole."""
     t = np.arange(periods + 1) / rate
     share = np.full(len(t), motion.duration / t[-1])
     sigma = np.linspace(0.0, motion.duration, len(t))
@@ -199,15 +206,15 @@ def _with_remarks(plan: Plan, original: Path, acceleration: Array, jerk: Array) 
 
 
 def _waited(path: Path) -> float:
-    """Return how long the tool stands still on a path [s], about."""
-    looks = Grid.aligned(edges_of(path.marks), _LOOKS).nodes
+    """Return the approximate time that the tool rests on a path [s]."""
+    looks = Grid.aligned(edges_of(path.marks), _SAMPLES).nodes
     middles = 0.5 * (looks[:-1] + looks[1:])
-    still = np.abs(path.samples(middles).twist).max(axis=1) <= STILL
+    still = np.abs(path.samples(middles).twist).max(axis=1) <= REST_SPEED
     return float(np.diff(looks)[still].sum())
 
 
 def _swings(motion: Trajectory, limit: Array) -> Ints:
-    """Return how often each joint's acceleration goes from half its limit to minus that, or back.
+    """Return the number of jumps of each joint's acceleration from half its limit to minus that.
 
     As seen at the samples.
     """
@@ -217,7 +224,7 @@ def _swings(motion: Trajectory, limit: Array) -> Ints:
 
 
 def _ends(plan: Plan) -> Ends:
-    """Return where the problem says how fast the arm is: its rate there stays."""
+    """Return the ends at which the problem gives the arm's rates: they are kept."""
     said = [item.sets_velocity for item in plan.problem.constraints]
     return Ends(any(start for start, _ in said), any(end for _, end in said))
 
@@ -228,7 +235,7 @@ def _check_plan(plan: Plan) -> None:
 
 
 def check_no_feed(problem: Problem) -> None:
-    """Raise ProblemError where a feed is asked for along the path: no other pace keeps that."""
+    """Raise ProblemError if the path has a feed: no other pace keeps it."""
     feeds = [feed for item in problem.follows.items for feed in item.path.feeds]
     if feeds:
         raise ProblemError(
@@ -239,7 +246,7 @@ def check_no_feed(problem: Problem) -> None:
 
 
 def _check_moves(plan: Plan) -> None:
-    if np.abs(plan.trajectory.extremes(1)[1]).max() <= STILL:
+    if np.abs(plan.trajectory.extremes(1)[1]).max() <= REST_SPEED:
         raise PlanError(
             f"{plan.robot.name}: the arm rests all the time, which nothing makes faster"
         )
@@ -250,7 +257,7 @@ def rate_limits(
 ) -> tuple[Array, Array]:
     """Return the limits of velocity and acceleration of a fastest motion, (n,) each.
 
-    Those that are given, or else those that the problem asks for.
+    The given ones, or else those of the problem.
 
     Raises
     ------
@@ -286,7 +293,7 @@ def _retimed(plan: Plan, wanted: Sequence[Constraint], pace: Pace) -> Plan:
         late = np.where(times >= pace.sigma[-1], pace.t[-1], inner)
         return np.where(times <= 0.0, 0.0, late)
 
-    # What asks for something of the end asks for it of the whole motion.
+    # A plan of a part has no conditions on the end.
     asked = (item.on_part() if plan.report.ending else item for item in old.constraints)
     problem = replace(
         old,

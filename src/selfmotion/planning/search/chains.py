@@ -277,7 +277,7 @@ def _refusals(samples: Array, bounds: Admissible, motion: SelfMotion) -> str:
         k = int(np.argmax(least))
         parts.append(
             f"{int(outside.sum())} of {len(samples)} are outside the joint limits, the nearest "
-            f"by {_amount(motion, k, least[k])} in {motion.robot.told(k)}"
+            f"by {_amount(motion, k, least[k])} in {motion.robot.label(k)}"
         )
     inside = samples[~outside]
     if len(inside) and bounds.bodies:
@@ -309,7 +309,7 @@ def _step(
     k = int(np.argmax(steps[a, b] / largest_step))
     moved, allowed = (_amount(motion, k, each) for each in (steps[a, b, k], largest_step[k]))
     return (
-        f"the step limit: {motion.robot.told(k)} would have to move by {moved} in one step, "
+        f"the step limit: {motion.robot.label(k)} would have to move by {moved} in one step, "
         f"allowed are {allowed}"
     )
 

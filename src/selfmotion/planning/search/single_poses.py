@@ -75,7 +75,7 @@ class SinglePoses:
 
     def __init__(self, problem: Problem, rng: np.random.Generator, *, clear: bool = True) -> None:
         problem = problem.augmented
-        asked = problem.asked_envelope
+        asked = problem.envelope_without_arm
         self.problem, self._rng, self._clear = problem, rng, clear
         self.robot: RobotModel = asked.arm(problem.robot)
         self.follows = problem.follows.for_robot(self.robot)

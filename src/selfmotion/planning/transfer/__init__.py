@@ -1,5 +1,5 @@
-"""Free motions through the air: from configuration to configuration, past what stands there."""
+"""Free motions: from configuration to configuration, around obstacles."""
 
 from selfmotion.planning.transfer.free_motion import FreeMotions as FreeMotions
 from selfmotion.planning.transfer.free_move import move as move
-from selfmotion.planning.transfer.ways import Room as Room, rounded as rounded
+from selfmotion.planning.transfer.rrt_connect import Room as Room, rounded as rounded

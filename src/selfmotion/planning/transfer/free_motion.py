@@ -1,4 +1,4 @@
-"""Joint motions from one configuration to another that nothing but limits and bodies tells."""
+"""Free joint motions between configurations, within limits and around bodies."""
 
 from __future__ import annotations
 
@@ -36,12 +36,12 @@ from selfmotion.planning.result import (
     quantities_of_pace,
 )
 from selfmotion.planning.search import start_candidates
-from selfmotion.planning.transfer.ways import (
+from selfmotion.planning.transfer.rrt_connect import (
     MOVE_MARGIN,
     PATH_SAMPLES,
     ROUNDING,
     Room,
-    find_way,
+    find_path,
     rounded,
     shortened,
     straight_way,
@@ -49,33 +49,36 @@ from selfmotion.planning.transfer.ways import (
 from selfmotion.problem.constraints import Constraint, Envelope
 from selfmotion.problem.problem import at_all_times, envelope_of
 
-# After so many seconds a move counts as not found.
+# Default deadline of a move [s].
 MOVE_DEADLINE = 10.0
-# Shares of the limits that are used; and the acceleration where nobody limits it: up to full speed
-# in so many seconds, which is this one where nobody limits it either [rad/s or m/s].
+# Share of the limits that is used.
 _USED = 0.95
+# Without a limit of acceleration: time to full speed [s] …
 _UP_TO_SPEED = 0.25
+# … which without a limit of speed is this [rad/s or m/s].
 _USUAL_SPEED = 1.0
-# Controllers want accelerations without jumps from arms of any make: where nobody limits the jerk,
-# they are reached in this time [s], and no move is briefer. Knots of a pace are so far apart [s].
+# Without a limit of jerk: time to full acceleration [s], and shortest duration of a move;
+# controllers need accelerations without jumps.
 _SOFT = 0.02
+# Interval between knots of a pace [s].
 _STEP_OF_PACE = 4e-3
-# Requirements that depend on the pace may be kept by a slower one, tried so often.
+# Factor by which a move is slowed for requirements that depend on the pace …
 _SLOWER_FACTOR = 1.2
+# … at most so often.
 _SLOWER_TRIES = 12
-# Where the certificate finds what looks have missed, bodies are kept so many times farther apart
-# and looked at as many times more often, and a way is looked for again, so often.
+# Factor of the margin and of the density of collision checks after a violation between them …
 _WIDER = 2.0
+# … in each of so many searches.
 _TRIES_OF_MOVE = 4
-# Where the straight leg is blocked, trees begin so far back along the tool's axis as well [m].
+# Retreats along the tool's axis from which trees start as well, if the straight leg is blocked [m].
 _RETREATS = (0.01, 0.03, 0.08)
-# A move that is shorter than this [rad or m] goes by one smooth law of time.
+# A move shorter than this [rad or m] has one smooth time law.
 _SHORTEST_PACED = 2e-3
-# Configurations for an end that is a pose of the tool, at most.
+# Largest number of configurations for an end that is a pose of the tool.
 _END_CONFIGURATIONS = 16
 
 
-# Roundings that a motion may add up to.
+# Accumulated rounding of a motion, in units of the last place.
 _ROUNDINGS = 16.0
 
 
@@ -86,7 +89,7 @@ class FreeMotions:
     ----------
     robot : RobotModel
     constraints : sequence of Constraint
-        What they must keep at all times; what is asked of ends only is left out.
+        Those at all times apply; those on ends are left out.
     rng : Generator
     progress : Progress
     """
@@ -129,14 +132,14 @@ class FreeMotions:
         seconds: float = MOVE_DEADLINE,
         known: Array | None = None,
     ) -> Move:
-        """Return the move from a configuration (n,) to another one, or why there is none.
+        """Return the move between configurations (n,), or the cause why there is none.
 
-        A way between them (m, n) may be `known`: it is taken where it is free and no straight leg.
+        A `known` polyline (m, n) between them is used if it is free and not straight.
         """
         return self.through([first[None], last[None]], seconds, known)
 
     def time_of(self, first: Array, last: Array) -> Array:
-        """Return what straight moves (K, n) → (K, n) would take by the limits, at least [s]."""
+        """Return lower bounds of the times of straight moves (K, n) → (K, n) by the limits [s]."""
         limits = self._limits
         far = np.abs(last - first)
         # From rest to rest: full acceleration, full speed, full brake.
@@ -148,22 +151,24 @@ class FreeMotions:
     def through(self, ends: Sequence[Array], seconds: float, known: Array | None = None) -> Move:
         """Return the move through one of several configurations (k, n) each, in this order.
 
-        A way from the first to the last one may be `known`; see `between`.
+        A polyline from the first to the last one may be `known`; see `between`.
         """
         self._progress("move", 1, 1)
         blocked = self._blocked(ends)
         if blocked:
             return self._missing(blocked)
-        # Of the processor, so that what else a machine does changes nothing.
+        # Processor time: the result is independent of other processes.
         began = time.thread_time()
         ends = [self._inside(several) for several in ends]
         worst, margin, finer = "", MOVE_MARGIN, 1.0
         for _ in range(_TRIES_OF_MOVE):
             room = Room(self.asked, self.robot, margin, finer)
-            way = self._known_way(room, ends, known) or self._way(room, ends, began + seconds)
-            if way is None:
+            polyline = self._known_polyline(room, ends, known) or self._polyline(
+                room, ends, began + seconds
+            )
+            if polyline is None:
                 break
-            path = rounded(room, *way)
+            path = rounded(room, *polyline)
             if path is not None:
                 try:
                     move = self.at_its_pace(path)
@@ -187,7 +192,7 @@ class FreeMotions:
         return Move(self.robot, self.constraints, None, trouble)
 
     def _blocked(self, ends: Sequence[Array]) -> str:
-        """Return what is wrong with an end already, "" for nothing."""
+        """Return the cause why an end is not allowed, "" for none."""
         room = Room(self.asked, self.robot, 0.0)
         for number, several in enumerate(ends):
             if room.free(several).any():
@@ -197,11 +202,11 @@ class FreeMotions:
         return ""
 
     def refusal(self, q: Array) -> str:
-        """Return why no motion begins or ends at a configuration (n,), "" where one may."""
+        """Return the cause why no motion starts or ends at a configuration (n,), "" for none."""
         return "" if Room(self.asked, self.robot, 0.0).free(q[None])[0] else self._wrong_with(q)
 
     def _wrong_with(self, q: Array) -> str:
-        """Return what forbids a configuration (n,), in words."""
+        """Return the violated condition of a configuration (n,), in words."""
         asked, beyond = self.asked, []
         for joint, name in enumerate(self.robot.joint_names):
             low, high = asked.lower[joint], asked.upper[joint]
@@ -224,10 +229,10 @@ class FreeMotions:
         names = ", ".join(item.name for item in asked.quantities)
         return f"it leaves what is asked of {names}"
 
-    def _known_way(
+    def _known_polyline(
         self, room: Room, ends: Sequence[Array], known: Array | None
     ) -> tuple[Array, list[int]] | None:
-        """Return a way that is known (m, n), where it is free and nothing is straight."""
+        """Return a known polyline (m, n), if it is free and not straight."""
         if known is None or straight_way(room, ends[0], ends[-1]) is not None:
             return None
         # On limits, the ends are put inside them.
@@ -236,8 +241,10 @@ class FreeMotions:
             return None
         return shortened(room, known, self._rng), []
 
-    def _way(self, room: Room, ends: Sequence[Array], end: float) -> tuple[Array, list[int]] | None:
-        """Return a way (m, n) through all ends, and where on it the inner ones are."""
+    def _polyline(
+        self, room: Room, ends: Sequence[Array], end: float
+    ) -> tuple[Array, list[int]] | None:
+        """Return a polyline (m, n) through all ends, and the indices of the inner ones."""
         legs: list[Array] = []
         starts = _allowed(room, ends[0])
         for goals in ends[1:]:
@@ -250,29 +257,31 @@ class FreeMotions:
         return np.concatenate([legs[0], *(leg[1:] for leg in legs[1:])]), passed
 
     def _leg(self, room: Room, starts: Array, goals: Array, end: float) -> Array | None:
-        """Return a way from one of starts (a, n) to one of goals (b, n), also after a retreat.
+        """Return a polyline from one of starts (a, n) to one of goals (b, n), also after a retreat.
 
-        Among what a tool works on the way out is narrow, and along the tool's axis.
+        In a workpiece the only way out is narrow, and along the tool's axis.
         """
         direct = straight_way(room, starts, goals)
         if direct is not None:
             return direct
         out = [self._retreats(room, several) for several in (starts, goals)]
         first, last = (np.concatenate([q, out[k][0]]) for k, q in enumerate((starts, goals)))
-        way = find_way(room, first, last, end, self._rng)
-        if way is None:
+        polyline = find_path(room, first, last, end, self._rng)
+        if polyline is None:
             return None
         before, after = (
             [origin for place, origin in zip(*each, strict=True) if np.array_equal(place, tip)]
-            for each, tip in zip(out, (way[0], way[-1]), strict=True)
+            for each, tip in zip(out, (polyline[0], polyline[-1]), strict=True)
         )
         if not (before or after):
-            return way
-        whole = np.concatenate([*(q[None] for q in before[:1]), way, *(q[None] for q in after[:1])])
+            return polyline
+        whole = np.concatenate(
+            [*(q[None] for q in before[:1]), polyline, *(q[None] for q in after[:1])]
+        )
         return shortened(room, whole, self._rng)
 
     def _retreats(self, room: Room, several: Array) -> tuple[Array, Array]:
-        """Return where the tool is back along its axis, and from where a free leg leads there."""
+        """Return configurations of retreats, and those from which a free leg leads there."""
         robot, found, origins = self.robot, list[Array](), list[Array]()
         for q in several:
             for length in _RETREATS:
@@ -302,7 +311,7 @@ class FreeMotions:
 
     @cached_property
     def _quantities(self) -> tuple[Quantity, ...]:
-        """What else a slower pace may keep."""
+        """Quantities that depend on the pace."""
         return quantities_of_pace([item.requirement(self.robot) for item in self.constraints])
 
     def _fast(self, path: Trajectory) -> Trajectory:
@@ -318,7 +327,7 @@ class FreeMotions:
         short = path.travelled(path.t[-1:]).max() < _SHORTEST_PACED
         motion = self._unhurried(path) if short else self._fast(path)
         q, qd = motion.q.copy(), motion.qd.copy()
-        # Exactly where it should begin and end.
+        # Exactly at the given ends.
         q[0], q[-1], qd[0], qd[-1] = path.q[0], path.q[-1], 0.0, 0.0
         faster = motion(motion.t, 2)
         for slower in _SLOWER_FACTOR ** np.arange(_SLOWER_TRIES):
@@ -354,7 +363,7 @@ def is_pose(end: npt.ArrayLike | SE3) -> bool:
 
 
 def _ulps(limit: Array) -> Array:
-    """Return what sums of a few numbers of this size may be off by."""
+    """Return the rounding of sums of a few numbers of this size."""
     finite = np.where(np.isfinite(limit), limit, 0.0)
     return np.asarray(_ROUNDINGS * np.spacing(1.0 + np.abs(finite)))
 

@@ -40,12 +40,11 @@ def move(
     rng: np.random.Generator | int = 0,
     progress: Progress = silent,
 ) -> Move:
-    """Move from one configuration to another, from rest to rest, past what is in the way.
+    """Move between configurations, from rest to rest, around obstacles.
 
-    Straight where that is free; else along the best of a few ways that two trees find
-    (RRT-Connect), shortened, with corners rounded as far as there is room. The pace is as fast as
-    the limits of joint velocity, acceleration and jerk allow. The motion is judged like a plan, at
-    all times.
+    Straight if that is free; else along the best of several paths of two trees (RRT-Connect),
+    shortened, with corners rounded as far as there is room. The pace is as fast as the limits of
+    joint velocity, acceleration and jerk allow. The motion is judged like a plan, at all times.
 
     Parameters
     ----------
@@ -54,20 +53,20 @@ def move(
         Configurations [rad or m], or a pose of the tool (an SE3 or a 4 × 4 matrix, in the frame of
         `RobotModel.pose`): then any configuration that puts the tool there.
     constraints : sequence of Constraint
-        What the motion must keep. By default limits of joint position and velocity, and those of
+        Conditions on the motion. By default limits of joint position and velocity, and those of
         acceleration and jerk that the arm's maker publishes.
     clearance : Clearance, optional
-        What keeps the arm apart from obstacles and from itself: by default its links must not
-        overlap. None to leave that out; the verdict then says so. A `Clearance` among the
-        constraints takes the place of the default.
+        Distance of the arm from obstacles and from itself: by default its links must not overlap.
+        None to leave that out; the verdict then says so. A `Clearance` among the constraints takes
+        the place of the default.
     via : sequence of (n,)
         Configurations that the motion passes exactly, in this order, without stopping where there
         is room for a curve.
     task : Task or str
         The rows of the pose that count where an end is one.
     deadline : float
-        After so many seconds of looking the move counts as not found; of the processor, so that
-        what else a machine does changes nothing.
+        Processor time after which the search fails [s]: the result is independent of other
+        processes.
     rng : Generator or int
         Shifts the samples; the same one gives the same move, unless the deadline ends it.
     progress : callable, optional
@@ -76,15 +75,15 @@ def move(
     Returns
     -------
     Move
-        Also where none was found: `Move.trouble` says after how many seconds, and `Move.require`
-        raises. That none is found does not prove that there is none.
+        Also without a motion: `Move.trouble` has the time of the search, and `Move.require` raises.
+        A failure does not prove that there is none.
 
     Raises
     ------
     InverseKinematicsError
         No configuration puts the tool at a pose.
     ProblemError
-        An argument is not what it should be.
+        An argument is invalid.
     """
     if not isinstance(robot, RobotModel):
         raise ProblemError(f"robot is {shown(robot)}, expected a RobotModel")

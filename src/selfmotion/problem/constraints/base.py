@@ -78,9 +78,9 @@ class Envelope:
 
     def admits(self, q: Array) -> npt.NDArray[np.bool_]:
         """Return the mask of configurations (K, n) that satisfy the quantities, (K,)."""
-        kept, still = np.ones(len(q), dtype=bool), np.zeros_like(q)
+        kept, at_rest = np.ones(len(q), dtype=bool), np.zeros_like(q)
         for item in self.quantities:
-            away = item.away(q, still, still)
+            away = item.away(q, at_rest, at_rest)
             sizes = np.linalg.norm(away, axis=2) if away.ndim == 3 else np.abs(away)
             kept &= (sizes <= item.bounds).all(axis=1)
         return kept

@@ -12,7 +12,7 @@ from typing_extensions import override
 from selfmotion.basics import Array, ProblemError, as_flag, as_numbers, per_joint, read_only
 from selfmotion.certificate import QUANTITIES, ClosedMotion, EndState
 from selfmotion.model.follow import Follows
-from selfmotion.model.path import STILL
+from selfmotion.model.path import REST_SPEED
 from selfmotion.model.robot import RobotModel
 from selfmotion.problem.constraints.base import Constraint
 from selfmotion.problem.constraints.conditions import NodeTangents, motion_of_order
@@ -203,7 +203,7 @@ class EndVelocity(_EndRate, order=1, at_start=False):
         if np.any(self.target(follows.robot)):
             return
         speed = float(np.abs(follows.twists(np.array([follows.duration]))).max())
-        if speed > STILL:
+        if speed > REST_SPEED:
             raise ProblemError(
                 f"the motion cannot end at rest: the path ends at {speed:.3g} m/s or rad/s; give "
                 f"the path a time law that ends at rest (time_law='minimum_jerk'), or ask for "

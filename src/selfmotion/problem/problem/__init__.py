@@ -2,9 +2,9 @@
 
 from selfmotion.problem.problem.along import (
     arm_rest_orders as arm_rest_orders,
-    asked_of_part as asked_of_part,
     at_all_times as at_all_times,
     check_all_times as check_all_times,
+    constraints_of_part as constraints_of_part,
     envelope_of as envelope_of,
     rest_orders as rest_orders,
     times_along as times_along,
@@ -18,7 +18,7 @@ from selfmotion.problem.problem.calibrated import (
 from selfmotion.problem.problem.fit import (
     KEPT as KEPT,
     NO_OVERLAP as NO_OVERLAP,
-    START_MISS as START_MISS,
+    START_TOLERANCE as START_TOLERANCE,
     check_feeds as check_feeds,
 )
 from selfmotion.problem.problem.of_arm import BodiesOfArm as BodiesOfArm

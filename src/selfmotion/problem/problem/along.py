@@ -10,7 +10,7 @@ import numpy as np
 from selfmotion.basics import Array, ProblemError, read_only
 from selfmotion.certificate import Requirement, arm_limits
 from selfmotion.model.follow import Follows
-from selfmotion.model.path import STILL, Path, Retimed, edges_of, spread_along
+from selfmotion.model.path import REST_SPEED, Path, Retimed, edges_of, spread_along
 from selfmotion.model.robot import RobotModel
 from selfmotion.model.task import Relaxation, Task
 from selfmotion.problem.constraints import Constraint, Envelope
@@ -83,7 +83,7 @@ def _speeds(path: Path, task: Task, t: np.ndarray) -> list[float]:
 
 def _order(speeds: list[float]) -> int:
     at, near, far = speeds
-    if at > STILL:
+    if at > REST_SPEED:
         return 0
     return 2 if far == 0.0 or near <= far * 0.5**_SMOOTH else 1
 
@@ -98,7 +98,7 @@ _MOST_SAMPLES = 100_000
 _GROWS = 1.05
 
 
-def way_of(path: Path) -> float:
+def length_of(path: Path) -> float:
     """Return the path length of the tool [m], by samples that are refined until it converges."""
     way, before, samples = 0.0, -1.0, _SAMPLES
     # Loops may be few or many: each refinement has no time in common with the one before.
@@ -112,10 +112,10 @@ def way_of(path: Path) -> float:
 def envelope_of(robot: RobotModel, constraints: Sequence[Constraint]) -> Envelope:
     """Return the envelope of constraints and of the arm's own limits."""
     requirements = [item.requirement(robot) for item in constraints]
-    return with_own_limits(robot, requirements, asked_envelope(robot, constraints))
+    return with_own_limits(robot, requirements, envelope_without_arm(robot, constraints))
 
 
-def asked_envelope(robot: RobotModel, constraints: Sequence[Constraint]) -> Envelope:
+def envelope_without_arm(robot: RobotModel, constraints: Sequence[Constraint]) -> Envelope:
     """Return the envelope of constraints, without the arm's own limits."""
     free = Envelope.unbounded(robot.dof)
     return reduce(and_, (item.envelope(robot) for item in constraints), free)
@@ -133,7 +133,7 @@ def with_own_limits(
 _SHORTEST_WINDOW = 1e-2
 
 
-def asked_of_part(problem: "Problem", is_first: bool, is_last: bool) -> Iterator[Constraint]:
+def constraints_of_part(problem: "Problem", is_first: bool, is_last: bool) -> Iterator[Constraint]:
     """Yield the constraints for a part that is the first or the last one, or neither."""
     for item in problem.constraints:
         kept: Constraint | None = None if item.closes else item

@@ -234,8 +234,8 @@ class AugmentedProblem(Problem):
 
     @cached_property
     @override
-    def asked_envelope(self) -> Envelope:
-        return self._envelope(self.asked.asked_envelope)
+    def envelope_without_arm(self) -> Envelope:
+        return self._envelope(self.asked.envelope_without_arm)
 
     @cached_property
     @override
@@ -288,8 +288,8 @@ class AugmentedProblem(Problem):
 
     @cached_property
     @override
-    def way_in_reaches(self) -> float:
-        return self.asked.way_in_reaches
+    def length_in_reaches(self) -> float:
+        return self.asked.length_in_reaches
 
 
 # `Problem.augmented` makes one; this file imports that one, so that the class is set here.

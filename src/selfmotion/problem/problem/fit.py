@@ -74,7 +74,7 @@ _EXAMPLES = {
 # A start nearer to the path than this is on it: far above rounding, far below any tolerance.
 _ON_PATH = 1e-7
 # Largest correction of a start towards the path [rad or m].
-START_MISS = 1e-5
+START_TOLERANCE = 1e-5
 # Largest error of a given end configuration [m, rad]: the certificate's tolerance for it.
 _NEAR_END = 1e-6
 
@@ -124,7 +124,7 @@ def _beyond(robot: RobotModel, start: Array) -> str:
 
 def check_start(follows: Follows, start: Array, relaxations: Sequence[Relaxation]) -> None:
     """Raise StartError where a start (n,) is off one of the paths, by more than is allowed."""
-    missed = _missed(follows, start, relaxations, at_end=False)
+    missed = _end_error(follows, start, relaxations, at_end=False)
     if missed is not None:
         position, rotation, text = missed
         raise StartError(
@@ -137,7 +137,7 @@ def check_start(follows: Follows, start: Array, relaxations: Sequence[Relaxation
 
 def check_end(follows: Follows, end: Array, relaxations: Sequence[Relaxation]) -> None:
     """Raise ProblemError where a given end (n,) is off one of the paths likewise."""
-    missed = _missed(follows, end, relaxations, at_end=True)
+    missed = _end_error(follows, end, relaxations, at_end=True)
     if missed is not None:
         raise ProblemError(
             f"{follows.robot.name}: the end configuration {missed[-1]}; take "
@@ -145,7 +145,7 @@ def check_end(follows: Follows, end: Array, relaxations: Sequence[Relaxation]) -
         )
 
 
-def _missed(
+def _end_error(
     follows: Follows, q: Array, relaxations: Sequence[Relaxation], *, at_end: bool
 ) -> tuple[float, float, str] | None:
     """Return the error of an end of a motion (n,) from its path [m, rad], in words; or None.

@@ -306,7 +306,7 @@ class RowWithinBand(BoundLimits):
         k = follows.robot.dof - len(follows.virtual.each) + number
         bound = np.array([item.band / scale])
         return cls(
-            name=f"relaxation {item.told}",
+            name=f"relaxation {item.label}",
             order=0,
             joints=np.array([k]),
             joint_names=(follows.robot.joint_names[k],),
@@ -315,7 +315,7 @@ class RowWithinBand(BoundLimits):
             upper=bound,
             scale=bound,
             margin=_margin(item),
-            labels=(f"deviation {item.told}",),
+            labels=(f"deviation {item.label}",),
             bands=np.array([item.band]),
         )
 
@@ -391,9 +391,9 @@ def _band(item: Relaxation, follows: AugmentedFollows) -> Quantity:
         found[:, :, first:] = by
         return (found[:, None] if several else found,)
 
-    label, unit = f"deviation {item.told}", "rad" if item.angular else "m"
+    label, unit = f"deviation {item.label}", "rad" if item.angular else "m"
     return Quantity(
-        f"relaxation {item.told}",
+        f"relaxation {item.label}",
         (Column(item.name, label, unit),),
         values,
         derivatives,

@@ -49,9 +49,9 @@ from selfmotion.problem.constraints import (
 from selfmotion.problem.costs import BeyondLimits, Cost, JointVelocity, OffPath
 from selfmotion.problem.problem.along import (
     arm_rest_orders,
-    asked_envelope,
+    envelope_without_arm,
+    length_of,
     smooth_knots,
-    way_of,
     with_own_limits,
 )
 from selfmotion.problem.problem.fit import (
@@ -59,7 +59,7 @@ from selfmotion.problem.problem.fit import (
     KEPT,
     NO_OVERLAP,
     SEQUENCES,
-    START_MISS,
+    START_TOLERANCE,
     USUAL_COSTS,
     check_costs,
     check_end,
@@ -423,14 +423,14 @@ class Problem:
         return (AtRest(start > 0, end > 0, (start > 1, end > 1)),)
 
     @cached_property
-    def asked_envelope(self) -> Envelope:
+    def envelope_without_arm(self) -> Envelope:
         """The envelope of the constraints, without the arm's own limits."""
-        return asked_envelope(self.robot, self.all_constraints)
+        return envelope_without_arm(self.robot, self.all_constraints)
 
     @cached_property
     def envelope(self) -> Envelope:
         """The same, with the arm's own limits where the certificate judges these."""
-        return with_own_limits(self.robot, self.requirements, self.asked_envelope)
+        return with_own_limits(self.robot, self.requirements, self.envelope_without_arm)
 
     @property
     def remarks(self) -> tuple[str, ...]:
@@ -487,13 +487,13 @@ class Problem:
         apart = np.abs(trajectory.of_joints(self.robot.joint_names).q[0] - self.given_start)
         worst = int(np.argmax(apart))
         # Written so that NaN is elsewhere.
-        if bool(apart[worst] <= START_MISS):
+        if bool(apart[worst] <= START_TOLERANCE):
             return ()
         joint = self.robot.joint_names[worst]
         return (
             f"it does not begin at the given start: joint '{joint}' is {apart[worst]:.3g} "
-            f"{self.robot.unit_of(joint)} away ({START_MISS:g} allowed); leave the start out, or "
-            f"plan from there",
+            f"{self.robot.unit_of(joint)} away ({START_TOLERANCE:g} allowed); leave the start out, "
+            f"or plan from there",
         )
 
     @cached_property
@@ -533,7 +533,7 @@ class Problem:
 
     def _mesh_digests(self) -> dict[str, str]:
         """Return digests of the mesh files of all collision bodies: names may stay the same."""
-        if not self.asked_envelope.bodies:
+        if not self.envelope_without_arm.bodies:
             return {}
         bodies = (body for item in self._asked for body in item.obstacles)
         files = {str(file): digest_of_file(file) for body in bodies for file in body.files}
@@ -553,9 +553,9 @@ class Problem:
         return smooth_knots(self.follows, self.relaxations)
 
     @cached_property
-    def way_in_reaches(self) -> float:
+    def length_in_reaches(self) -> float:
         """Path length of the tool, as a multiple of the arm's reach."""
-        return way_of(self.path) / self.robot.reach
+        return length_of(self.path) / self.robot.reach
 
 
 # Signature in help() of a field that is a descriptor.

@@ -61,8 +61,8 @@ def _depths(obstacle: Obstacle, places: Array) -> Array:
     request, point = coal.DistanceRequest(), coal.Sphere(1e-6)
     for k in np.flatnonzero(within):
         place = coal.Transform3s(np.eye(3), points[k])
-        still = coal.Transform3s.Identity()
-        away = coal.distance(point, place, solid.geometry, still, request, coal.DistanceResult())
+        identity = coal.Transform3s.Identity()
+        away = coal.distance(point, place, solid.geometry, identity, request, coal.DistanceResult())
         inside = solid.contains_any(points[k : k + 1]) if solid.is_mesh else away < 0.0
         found[k] = abs(away) if inside else 0.0
     return found

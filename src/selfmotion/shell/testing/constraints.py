@@ -18,7 +18,7 @@ from selfmotion.certificate import (
 )
 from selfmotion.model.motion import Grid, Trajectory
 from selfmotion.model.robot import RobotModel
-from selfmotion.planning.paper import Objective, StillMotion
+from selfmotion.planning.paper import MinimumNormMotion, Objective
 from selfmotion.planning.search import start_candidates
 from selfmotion.problem.constraints import BoundConstraint, Constraint, linearised
 from selfmotion.problem.problem import Problem
@@ -113,9 +113,9 @@ def check_constraint(constraint: Constraint, problem: Problem) -> None:
     if start is None:
         start = start_candidates(problem.follows, _STARTS, np.random.default_rng(0))[0]
     grid = Grid.aligned(problem.knots, _STEPS * max(1, problem.null_motion.fewest_steps // 4))
-    still = StillMotion.on(problem, start, grid)
-    bound = constraint.bind(problem.follows, still.start, still.end)
-    objective = Objective.of(problem, still, free=True)
+    minimum_norm = MinimumNormMotion.on(problem, start, grid)
+    bound = constraint.bind(problem.follows, minimum_norm.start, minimum_norm.end)
+    objective = Objective.of(problem, minimum_norm, free=True)
     requirement = constraint.requirement(robot)
     require(isinstance(requirement, Requirement), f"requirement() returned {requirement!r}")
     rng = np.random.default_rng(1)

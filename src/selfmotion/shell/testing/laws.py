@@ -13,7 +13,7 @@ from selfmotion.model.path import Line, Path
 from selfmotion.model.robot import RobotModel, load_robot
 from selfmotion.model.task import Task, exp3, log3
 from selfmotion.planning.optimise import Iteration, Minimum, Optimizer
-from selfmotion.planning.paper import Objective, StillMotion
+from selfmotion.planning.paper import MinimumNormMotion, Objective
 from selfmotion.problem.costs import Cost, Samples
 from selfmotion.problem.problem import Problem
 
@@ -300,4 +300,4 @@ def _objective(problem: Problem) -> Objective:
     if start is None:
         raise RuntimeError("these problems have a start")
     grid = Grid.aligned(problem.knots, _STEPS)
-    return Objective.of(problem, StillMotion.on(problem, start, grid))
+    return Objective.of(problem, MinimumNormMotion.on(problem, start, grid))

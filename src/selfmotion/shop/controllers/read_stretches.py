@@ -93,7 +93,7 @@ class Places:
         if self.planned is None or self.work is None:
             return None
         shift = self.work * self.planned.inverse()
-        still = np.abs(shift.homogeneous - np.eye(4)).max() < _STILL
+        still = np.abs(shift.homogeneous - np.eye(4)).max() < _REST
         return None if still else shift
 
     def frames(self, robot: RobotModel, axes: Sequence[Axis], file: object) -> ToolFrames:
@@ -136,7 +136,7 @@ class Places:
 
 
 # Digits of poses leave this [m, parts of a turn].
-_STILL = 2e-6
+_REST = 2e-6
 
 
 @dataclass

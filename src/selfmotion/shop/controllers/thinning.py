@@ -10,7 +10,7 @@ import numpy as np
 from selfmotion.basics import Array, Flags, PlanError, ProblemError
 from selfmotion.certificate import JointLimits, Requirement, Separation, Tolerance, arm_limits
 from selfmotion.model.motion import Trajectory
-from selfmotion.model.path import STILL as _STILL, FeedKept, Path
+from selfmotion.model.path import REST_SPEED as _REST, FeedKept, Path
 from selfmotion.model.robot import Chain
 from selfmotion.model.task import Task
 from selfmotion.planning.result import Move, Parts, Plan
@@ -119,7 +119,7 @@ def _of_plan(name: str, plan: Plan) -> Piece:
 def _rests_of(path: Path) -> tuple[float, ...]:
     """Return at which of its marks a path is at rest, but for its ends [s]."""
     marks = path.marks[1:-1]
-    still = np.linalg.norm(path.samples(marks).twist, axis=1) < _STILL if len(marks) else []
+    still = np.linalg.norm(path.samples(marks).twist, axis=1) < _REST if len(marks) else []
     return tuple(float(t) for t in marks[still])
 
 

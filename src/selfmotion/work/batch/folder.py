@@ -16,7 +16,7 @@ from selfmotion.basics import SelfmotionError, digest_of_file, write_bytes, writ
 from selfmotion.certificate import USUAL
 from selfmotion.model.path import Path as ToolPath, Retimed
 from selfmotion.planning.planner import PlanRequest
-from selfmotion.planning.result import Asked, Plan, load_plan, read_kept, write_kept
+from selfmotion.planning.result import MotionSpecification, Plan, load_plan, read_kept, write_kept
 from selfmotion.problem.problem import Problem
 from selfmotion.work.batch.items import Item, Row, measured
 from selfmotion.work.batch.maps import labels, maps
@@ -36,7 +36,7 @@ def is_made_for(plan: Plan, job: PlanRequest) -> bool:
     wanted = _at_its_own_pace(asked, asked)
     # The certificate belongs to another problem then; its requirements are reported all the same.
     alike = replace(plan, problem=_at_its_own_pace(made, asked))
-    held = Asked(
+    held = MotionSpecification(
         wanted.robot,
         wanted.path,
         wanted.task,

@@ -8,7 +8,7 @@ from typing import Any
 
 from selfmotion.basics import FileFormatError, ProblemError, SelfmotionError
 from selfmotion.planning.planner import PlanRequest
-from selfmotion.planning.result import Plan, files_of, key_of, load_plan, own_modules, told
+from selfmotion.planning.result import Plan, files_of, identity_of, key_of, load_plan, own_modules
 from selfmotion.problem.costs import FunctionCost
 from selfmotion.problem.problem import Problem, problem_to_dict
 
@@ -76,7 +76,7 @@ class Item:
             task = self.task
         except SelfmotionError as error:
             return f"error: {error}"
-        return key_of((task["problem"], told(task["options"])), task["files"])
+        return key_of((task["problem"], identity_of(task["options"])), task["files"])
 
 
 def unread_item(file: Path, error: SelfmotionError) -> Item:

@@ -28,7 +28,7 @@ from selfmotion.basics import (
     silent,
 )
 from selfmotion.planning.planner import PlanRequest
-from selfmotion.planning.result import Made
+from selfmotion.planning.result import ArmCache
 from selfmotion.problem.problem import Problem, problem_from_dict
 from selfmotion.work.batch.folder import Folder
 from selfmotion.work.batch.items import Item, Row, measured, problem_items
@@ -36,7 +36,7 @@ from selfmotion.work.batch.items import Item, Row, measured, problem_items
 # Work in another process: the description of a problem in, the file of a plan out.
 
 # Arms and bodies of problems planned before.
-_made = Made()
+_arms = ArmCache()
 # Short forms of errors.
 _REASONS = ((InverseKinematicsError, "out of reach"), (NoSequenceError, "no way through"))
 
@@ -55,7 +55,7 @@ def plan_task(task: Mapping[str, Any]) -> tuple[dict[str, Any], bytes]:
     try:
         for name in task["modules"]:
             importlib.import_module(name)
-        problem = problem_from_dict(task["problem"], _made.of(task["files"]))
+        problem = problem_from_dict(task["problem"], _arms.of(task["files"]))
         found = PlanRequest(problem, **task["options"]).plan()
         with tempfile.TemporaryDirectory() as folder:
             file = Path(folder, "plan.npz")
@@ -69,8 +69,8 @@ def plan_task(task: Mapping[str, Any]) -> tuple[dict[str, Any], bytes]:
     except Exception as error:
         what = f"{type(error).__name__}: {error}"
         return {"error": what, "fault": True, "seconds": time.perf_counter() - began}, b""
-    told = measured(found, task["options"]["goal"])
-    return {**told, "seconds": time.perf_counter() - began}, archive
+    identity_of = measured(found, task["options"]["goal"])
+    return {**identity_of, "seconds": time.perf_counter() - began}, archive
 
 
 def begin_process() -> None:

@@ -10,7 +10,7 @@ import numpy as np
 from selfmotion.basics import Array, ProblemError, as_flag, as_number, as_several, read_only, shown
 from selfmotion.model.collision import Obstacle
 from selfmotion.model.motion import NodeNullMotion, NullMotion, Trajectory, reversed_motion
-from selfmotion.model.path import STILL, Path, Reversed
+from selfmotion.model.path import REST_SPEED, Path, Reversed
 from selfmotion.model.task import Relaxation, Task
 from selfmotion.planning.result import Move, Plan, keeps_as_far
 from selfmotion.problem.constraints import Clearance, Constraint
@@ -215,7 +215,7 @@ class Seam:
         for time, said, order in zip(times, ("begins", "ends"), orders, strict=True):
             speed, turning = map(float, np.linalg.norm(self.path.twist(time).reshape(2, 3), axis=1))
             # Turning that the task leaves free is not asked of the arm.
-            if speed > STILL or order == 0:
+            if speed > REST_SPEED or order == 0:
                 raise ProblemError(
                     f"{what}: its path {said} at {speed:.3g} m/s and {turning:.3g} rad/s, expected "
                     f"rest: time_law='minimum_jerk', Feed(path, …), or section_at_rest(path)"

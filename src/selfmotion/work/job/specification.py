@@ -14,7 +14,14 @@ from selfmotion.model.collision import Obstacle, obstacle_from_dict
 from selfmotion.model.path import Path, Reversed
 from selfmotion.model.robot import RobotModel
 from selfmotion.model.task import Relaxation, Task
-from selfmotion.planning.result import Asked, Piece, Plan, arm_digest, elsewhere, not_judged_by
+from selfmotion.planning.result import (
+    MotionSpecification,
+    Piece,
+    Plan,
+    arm_digest,
+    elsewhere,
+    not_judged_by,
+)
 from selfmotion.problem.constraints import Clearance, Constraint
 from selfmotion.problem.costs import cost_from_dict
 from selfmotion.work.job.seam import JOB_END, JOB_START, Seam, Step, one_way, reversing
@@ -114,7 +121,7 @@ class Specification:
             yield f"seam '{seam.name}' is made from its end to its start"
         kept = [item for item in seam.constraints if item.applies(robot)]
         turned = (item.moved(reversing(seam.path.duration)) for item in seam.relaxations)
-        asked = Asked(
+        asked = MotionSpecification(
             robot,
             Reversed(seam.path) if step.turned else seam.path,
             Task.of(seam.task),

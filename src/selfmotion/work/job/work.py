@@ -29,7 +29,7 @@ from selfmotion.model.collision import Obstacle
 from selfmotion.model.motion import Trajectory
 from selfmotion.model.robot import RobotModel
 from selfmotion.planning.planner import branches, from_start, like_before, near_start
-from selfmotion.planning.result import Made, Move, Plan, load_move, load_plan
+from selfmotion.planning.result import ArmCache, Move, Plan, load_move, load_plan
 from selfmotion.planning.transfer import FreeMotions
 from selfmotion.problem.constraints import Clearance, Constraint
 from selfmotion.problem.costs import FunctionCost
@@ -365,12 +365,12 @@ def _move_asked(task: _Task) -> dict[str, Any]:
 
 
 # Arms and bodies of tasks done before in this process.
-_made = Made()
+_arms = ArmCache()
 
 
 def _plans_there(task: _Task) -> tuple[list[bytes], str]:
     """Do a task in another process: plans as the bytes of their files."""
-    known = _made.of(task["files"])
+    known = _arms.of(task["files"])
     problems = [name for name in ("problem", "allowed") if name in task]
     made: dict[str, Any] = {name: problem_from_dict(task[name], known) for name in problems}
     if "like" in task:
@@ -380,7 +380,7 @@ def _plans_there(task: _Task) -> tuple[list[bytes], str]:
 
 
 def _move_there(task: _Task) -> tuple[bytes, str]:
-    known = _made.of(task["files"])
+    known = _arms.of(task["files"])
     arm, ends = arm_and_constraints(task["arm"], known), np.array(task["ends"])
     move = _move_here({**task, "arm": arm, "ends": ends})
     return (b"" if move.trajectory is None else _packed(move)), move.trouble

@@ -1,4 +1,4 @@
-"""The start of a motion, and the minimum-norm motion: the optimiser's variables at 0."""
+"""Start of a motion, and the minimum-norm motion: x = 0, without self-motion."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -15,20 +15,24 @@ from selfmotion.model.task import SE3
 from selfmotion.planning.paper.rollout import Rollout
 from selfmotion.problem.problem import Problem
 
-# Newton's method onto the start of the path is quadratic: few steps, and the one after an error of
-# this is exact. Far moves fail and say so.
-_STEPS, _ARRIVED = 20, 1e-9
-# Steps to begin with; halved until the motion at x = 0 drifts off the path by less than this,
-# relative to the extent of the path. Costs are then right to about the same.
-_FEWEST_STEPS, _DRIFT = 32, 1e-3
-# Trouble that three grids in turn place within this share of the motion, and of which the last has
-# at least half as much as the first, is the motion's own.
-_SAME_PLACE, _SAME_AMOUNT = 1e-3, 0.5
-# A motion in which a joint goes so far [rad or m] has been thrown out of a singular pose.
+# Newton steps onto the start of the path; far starts fail with an error.
+_STEPS = 20
+# Error at which they end: the method is quadratic, and the next error its square.
+_ARRIVED = 1e-9
+# Steps of the first grid, which is halved until …
+_FEWEST_STEPS = 32
+# … the minimum-norm motion drifts off the path by less than this, relative to the path's extent.
+# Costs then have about the same accuracy.
+_DRIFT = 1e-3
+# A singularity that three grids in turn place within this share of the motion …
+_SAME_PLACE = 1e-3
+# … with at least this share of its amount on the first, is the motion's own.
+_SAME_AMOUNT = 0.5
+# Joint motion of a breakdown near a singular pose [rad or m].
 _WILD = 1e3
-# The finest grid has 2 to this power times the steps of the first.
+# Largest number of halvings of the first grid.
 MOST_HALVINGS = 8
-# A path shorter than this [m] is as good as a point.
+# Shorter paths [m] count as a point.
 _SHORTEST = 1e-3
 
 
@@ -129,7 +133,7 @@ Guide = Callable[[Array], Array]
 
 
 @dataclass(frozen=True, eq=False)
-class StillMotion:
+class MinimumNormMotion:
     """A motion at x = 0, integrated on a grid.
 
     Attributes
@@ -150,9 +154,9 @@ class StillMotion:
     damped : bool
         Whether the inverse was damped anywhere.
     jacobian_evaluations : int
-        What it took.
+        Number of evaluations.
     rollout : Rollout
-        What integrated it: for one objective on the same grid.
+        Its integrator: for one objective on the same grid.
     """
 
     problem: Problem
@@ -174,7 +178,7 @@ class StillMotion:
         configuration: Array,
         grid: Grid,
         guide: Guide | None = None,
-    ) -> "StillMotion":
+    ) -> "MinimumNormMotion":
         """Integrate from a start configuration (n,) on one grid."""
         rollout = Rollout(problem.follows, grid, damping=problem.damping_law)
         t = grid.stage_times
@@ -241,7 +245,11 @@ class StillMotion:
 
 
 def null_motion_table(
-    problem: Problem, t: Array, still: StillMotion, motion: NullMotion, around: Array | None
+    problem: Problem,
+    t: Array,
+    minimum_norm: MinimumNormMotion,
+    motion: NullMotion,
+    around: Array | None,
 ) -> NullMotionTable:
     """Return a null motion at times t (S,), in the basis of a motion at x = 0.
 
@@ -249,16 +257,16 @@ def null_motion_table(
     """
     n, redundancy = problem.robot.dof, problem.robot.dof - problem.follows.dimension
     if around is None:
-        guide = still.guide
+        guide = minimum_norm.guide
         around = np.zeros((len(t), n)) if guide is None else problem.brought_to_rest(t, guide(t))
     # Of an arm without redundancy no null motion acts.
     is_joint = motion.space == "joint" and redundancy > 0
-    frame, rows = (None, n) if is_joint else (partial(still.frame, t), redundancy)
+    frame, rows = (None, n) if is_joint else (partial(minimum_norm.frame, t), redundancy)
     return NullMotionTable(problem.null_functions(t, motion), frame, rows, around)
 
 
 def _extents(rollout: Rollout) -> Array:
-    """Return how far the paths go [m], for the rows of positions, and 1 for the others, (m,)."""
+    """Return the extents of the paths [m], for the rows of positions, and 1 for others, (m,)."""
     extents = [max(float(np.ptp(path, axis=0).max()), _SHORTEST) for path in rollout.targets]
     tasks = [item.task for item in rollout.follows.items]
     return np.concatenate(
@@ -266,12 +274,12 @@ def _extents(rollout: Rollout) -> Array:
     )
 
 
-def settled_still_motion(
+def converged_minimum_norm(
     problem: Problem,
     configuration: Array,
     guide: Guide | None = None,
     grid: Grid | None = None,
-) -> tuple[StillMotion, int]:
+) -> tuple[MinimumNormMotion, int]:
     """Return the motion at x = 0 on the coarsest grid on which it stays near the path.
 
     Damping takes it off the path: there, on the first grid that changes the error no more. The
@@ -279,7 +287,7 @@ def settled_still_motion(
 
     Returns
     -------
-    still : StillMotion
+    minimum_norm : MinimumNormMotion
     jacobian_evaluations : int
         On all grids tried.
 
@@ -294,17 +302,23 @@ def settled_still_motion(
     troubles: list[tuple[float, float]] = []
     evaluations = 0
     for _ in range(MOST_HALVINGS):
-        still = StillMotion.on(problem, configuration, grid, guide)
-        evaluations += still.jacobian_evaluations
-        settled = _settled(still, coarse)
-        if still.broken is None and settled:
-            return still, evaluations
-        coarse = still.drift
-        trouble = still.broken if still.broken is not None else still.off_path(_DRIFT)
+        minimum_norm = MinimumNormMotion.on(problem, configuration, grid, guide)
+        evaluations += minimum_norm.jacobian_evaluations
+        settled = _settled(minimum_norm, coarse)
+        if minimum_norm.broken is None and settled:
+            return minimum_norm, evaluations
+        coarse = minimum_norm.drift
+        trouble = (
+            minimum_norm.broken
+            if minimum_norm.broken is not None
+            else minimum_norm.off_path(_DRIFT)
+        )
         time = 0.0 if trouble is None else trouble
-        amount = np.inf if still.broken is not None else float(np.abs(still.drift).max())
+        amount = (
+            np.inf if minimum_norm.broken is not None else float(np.abs(minimum_norm.drift).max())
+        )
         troubles.append((time, amount))
-        if not still.damped and _stays(troubles, problem.path.duration):
+        if not minimum_norm.damped and _stays(troubles, problem.path.duration):
             break
         grid = grid.halved()
     raise BreakdownError(
@@ -315,14 +329,14 @@ def settled_still_motion(
     )
 
 
-def _settled(still: StillMotion, coarse: Array | None) -> bool:
-    if still.damped and coarse is not None:
-        return bool((np.abs(still.drift[::2] - coarse) <= _DRIFT).all())
-    return bool((np.abs(still.drift) <= _DRIFT).all())
+def _settled(minimum_norm: MinimumNormMotion, coarse: Array | None) -> bool:
+    if minimum_norm.damped and coarse is not None:
+        return bool((np.abs(minimum_norm.drift[::2] - coarse) <= _DRIFT).all())
+    return bool((np.abs(minimum_norm.drift) <= _DRIFT).all())
 
 
 def _stays(troubles: list[tuple[float, float]], duration: float) -> bool:
-    """Return whether trouble (when, how much) does not go away on finer grids."""
+    """Return whether a singularity (time, amount) is the same on finer grids."""
     if len(troubles) < 3:
         return False
     times, amounts = zip(*troubles[-3:], strict=True)

@@ -1,4 +1,4 @@
-"""What a motion is held against besides its own certificate, alone and where motions meet."""
+"""Specification of a motion, apart from its certificate, and continuity of motions."""
 
 import json
 from collections.abc import Iterator, Sequence
@@ -11,7 +11,7 @@ import numpy as np
 from selfmotion.basics import Array, Saved, description_of, digest_of
 from selfmotion.certificate import (
     ARRIVED,
-    STILL_ACCELERATION,
+    REST_ACCELERATION,
     USUAL,
     JointLimits,
     Requirement,
@@ -27,18 +27,18 @@ from selfmotion.planning.result.plan import Plan
 from selfmotion.problem.constraints import Clearance, Constraint
 from selfmotion.problem.problem import Problem, arm_rest_orders, rest_orders
 
-# What a motion along a path is held against, besides what its own certificate says.
-
-# Paths that are described otherwise are one where they are as near as this [m, and as a rotation
-# matrix] at their marks, and between each two of them at these shares, which no rhythm has; times
-# are the same up to rounding [s].
+# Paths with other descriptions are the same if they are nearer than _SAME at their marks, and at
+# these shares between each two of them, which are aperiodic.
 _SHARES = np.sort(np.modf(0.5 * (np.sqrt(5.0) - 1.0) * np.arange(1, 14))[0])
-_SAME, _ROUNDING = 1e-9, 1e-9
+# Distance of equal poses [m, and as a rotation matrix].
+_SAME = 1e-9
+# Rounding of times [s].
+_ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class Asked:
-    """What was asked of a motion along a path.
+class MotionSpecification:
+    """Specification of a motion along a path.
 
     Attributes
     ----------
@@ -48,13 +48,13 @@ class Asked:
     task : Task
     relaxations : sequence of Relaxation
     constraints : sequence of Constraint
-        What it has to be judged by, besides `clearance`.
+        Required constraints, besides `clearance`.
     clearance : Clearance or None
-        How far bodies have to be apart, or more.
+        Smallest distance of bodies.
     tolerance : Tolerance
-        What the path may be missed by, or less.
+        Largest error from the path.
     also : sequence of Follow
-        What else of the arm follows a path.
+        Further task frames.
     rest : bool
         Whether the arm has to rest where its paths do, unless `constraints` say how fast it is.
     """
@@ -70,7 +70,7 @@ class Asked:
     rest: bool = True
 
     def failures(self, plan: Plan) -> Iterator[str]:
-        """Yield, in words, what of it a plan was not judged by."""
+        """Yield, in words, the conditions that a plan was not judged by."""
         problem = plan.problem
         yield from another_tool(problem.robot, self.robot)
         if problem.task is not self.task:
@@ -91,7 +91,7 @@ class Asked:
             )
 
     def _restless(self, made: Problem) -> Iterator[str]:
-        """Yield that a problem does not ask for rest at an end where it was asked for."""
+        """Yield that a problem does not require rest at an end where it is required."""
         wanted = arm_rest_orders(made.follows, self.constraints) if self.rest else (0, 0)
         # A damped motion is not judged by its rest.
         judged = made.rest_orders if made.damping is None else (0, 0)
@@ -102,14 +102,14 @@ class Asked:
 
 
 def arm_digest(robot: RobotModel) -> str:
-    """Return what tells arms apart, with their tools, reference and limits; see `another_tool`."""
+    """Return the digest of an arm, with its tools, reference and limits; see `another_tool`."""
     limits = [getattr(robot, name) for name, _, _ in _LIMITS]
     told = (robot.urdf.sha256, robot.joint_names, robot.tools, robot.reference, robot.locked)
     return digest_of(told, sorted(robot.touching), limits, robot.effort_limit)
 
 
 def another_tool(made: RobotModel, asked: RobotModel) -> Iterator[str]:
-    """Yield in what an arm is not the one that was asked for."""
+    """Yield the differences of an arm from the required one."""
     if made.urdf.sha256 != asked.urdf.sha256 or made.joint_names != asked.joint_names:
         yield f"it is of another arm than {asked.name}: {made.name}"
     elif made.tools != asked.tools:
@@ -124,7 +124,7 @@ def another_tool(made: RobotModel, asked: RobotModel) -> Iterator[str]:
         yield from _other_limits(made, asked)
 
 
-# What constraints take from an arm where they say no more: attribute, in words, power of time.
+# Limits of an arm that constraints use by default: attribute, in words, power of time.
 _LIMITS = (
     ("lower", "lower limit", ""),
     ("upper", "upper limit", ""),
@@ -135,7 +135,7 @@ _LIMITS = (
 
 
 def _other_limits(made: RobotModel, asked: RobotModel) -> Iterator[str]:
-    """Yield a joint of an arm that has other limits than that of the same arm as it was asked."""
+    """Yield a joint of an arm with other limits than that of the required one."""
     for name, words, power in _LIMITS:
         found, wanted = getattr(made, name), getattr(asked, name)
         others = np.flatnonzero(found != wanted)
@@ -154,7 +154,7 @@ def _other_limits(made: RobotModel, asked: RobotModel) -> Iterator[str]:
 def not_judged_by(
     judged: Sequence[Constraint], asked: Sequence[Constraint], clearance: Clearance | None
 ) -> Iterator[str]:
-    """Yield what was asked for and is not among what a motion is judged by."""
+    """Yield required constraints by which a motion is not judged."""
     known = {described(item) for item in judged}
     for item in asked:
         if described(item) not in known:
@@ -164,7 +164,7 @@ def not_judged_by(
 
 
 def described(item: Saved) -> str:
-    """Return what tells values apart, as a text."""
+    """Return the identity of a value, as a text."""
     return json.dumps(description_of(item), sort_keys=True, default=repr)
 
 
@@ -194,7 +194,7 @@ def _looked_at(marks: Array) -> Array:
 
 
 def _apart(one: Path, t: Array, other: Path, times: Array) -> float:
-    """Return by how much poses differ at most [m, and as a rotation matrix]."""
+    """Return the largest difference of poses [m, and as a rotation matrix]."""
     here, there = one.samples(t), other.samples(times)
     places = np.abs(here.translation - there.translation).max()
     turns = np.abs(here.rotation - there.rotation).max()
@@ -245,11 +245,12 @@ def keeps_as_far(item: Constraint, apart: Clearance) -> bool:
     )
 
 
-# How motions that are judged one by one hang together: from rest to rest, without a jump.
-
-# Where one motion ends, the next begins, up to rounding [rad or m].
+# Largest gap between the end of one motion and the start of the next, from rounding [rad or m].
 _JOINED = 1e-9
-_START, _END = 0, -1
+# Index of the first and the last sample.
+_START = 0
+_END = -1
+# Order of derivative up to which rest is required.
 _SMOOTH = 2
 
 
@@ -293,9 +294,9 @@ def _accelerates(problem: Problem, requirements: Sequence[Requirement]) -> tuple
 def gaps(robot: RobotModel, pieces: Sequence[Piece], allowed: float = _JOINED) -> Iterator[str]:
     """Yield where from one piece to the next the arm jumps, moves or accelerates.
 
-    Configurations have to agree within what is allowed, by default 1e-9 rad or m; at both sides the
-    arm has to rest, within 1e-6 rad/s or m/s and 1e-3 rad/s² or m/s². All of them have to state
-    accelerations, or none: between the samples of the whole some would be other motions than were
+    Configurations have to agree within `allowed`, by default 1e-9 rad or m; at both sides the arm
+    has to rest, within 1e-6 rad/s or m/s and 1e-3 rad/s² or m/s². All of them have accelerations,
+    or none: otherwise some would be other motions between the samples of the whole than those
     judged.
     """
     yield from _mixed(pieces)
@@ -334,7 +335,7 @@ def _jump(
 def elsewhere(
     robot: RobotModel, piece: Piece, end: int, asked: Array, allowed: float = _JOINED
 ) -> Iterator[str]:
-    """Yield where a piece does not begin (0) or end (-1) at a configuration (n,)."""
+    """Yield the ends, start (0) or end (-1), of a motion that are not at a configuration (n,)."""
     apart = np.abs(piece.motion.q[end] - asked)
     worst = int(np.argmax(apart))
     if not apart[worst] <= allowed:
@@ -349,9 +350,9 @@ def elsewhere(
 def moving_end(robot: RobotModel, piece: Piece, end: int) -> Iterator[str]:
     """Yield where a piece does not rest at its start (0) or its end (-1)."""
     motion, verb = piece.motion, "end" if end else "begin"
-    rates = ((1, "moves", ARRIVED, ""), (2, "accelerates", STILL_ACCELERATION, "²"))
+    rates = ((1, "moves", ARRIVED, ""), (2, "accelerates", REST_ACCELERATION, "²"))
     for order, what, allowed, power in rates:
-        # What a file does not state is not judged: between its samples the controller accelerates.
+        # Without accelerations in a file, the controller interpolates, and rest cannot be judged.
         if order == _SMOOTH and (motion.qdd is None or piece.accelerates[end]):
             continue
         rate = np.abs(motion(motion.t[end], order))

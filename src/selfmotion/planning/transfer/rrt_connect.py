@@ -1,10 +1,10 @@
 """Ways of straight legs between configurations, and the smooth paths that round their corners.
 
 Two trees grow towards each other: RRT-Connect (J. Kuffner, S. LaValle, "RRT-Connect: an efficient
-approach to single-query path planning", ICRA 2000). The best of a few ways is shortened by straight
-shortcuts. A smooth path is a cubic B-spline whose control points lie on the legs: it stays within
-the hulls of four neighbours, so that it differs from the legs near corners only, the less the
-denser the points are.
+approach to single-query path planning", ICRA 2000). The best of several polylines is shortened by
+straight shortcuts. A smooth path is a cubic B-spline whose control points are on the legs: it is
+within the hulls of four neighbours, so that it differs from the legs near corners only, by less
+with denser points.
 """
 
 import math
@@ -20,42 +20,47 @@ from selfmotion.model.motion import Trajectory
 from selfmotion.model.robot import RobotModel
 from selfmotion.problem.constraints import Envelope
 
-# What is beyond a limit by no more than this is within it to rounding, as the certificate has it.
+# Excess of a limit that counts as rounding, as in the certificate.
 ROUNDING = 1e-12
-# Bodies are looked at a bit farther apart than asked for [m], since only at some times.
+# Additional clearance [m], since bodies are checked at samples.
 MOVE_MARGIN = 5e-4
-# Legs are looked at in steps in which no point of a body moves farther than this [m], finished
-# paths closely; and in steps of joints [rad] where there are no bodies.
+# Largest motion of a point of a body between two checks of a leg [m] …
 _LEG_STEP = 0.02
+# … and of a final path [m].
 _FINE_STEP = 0.005
+# The same of joints, without bodies [rad].
 _TURN_STEP = 0.05
-# Trees grow by legs of so many seconds at full speed; this share of the samples lies around the
-# middle, so far around, in shares of the distance; others are anywhere.
+# Length of the trees' legs at full speed [s].
 _LEG_RANGE = 1.0
+# Share of the samples around the middle; others are anywhere …
 _AROUND_MIDDLE = 0.2
+# … and their standard deviation, as a share of the distance.
 _SPREAD = 0.5
-# The best of so many ways is taken; so many shortcuts are tried on each at most, until so many in
-# turn are blocked.
-_WAYS = 4
+# Number of polylines of which the best is chosen.
+_CANDIDATES = 4
+# Largest number of shortcuts that are tried on each …
 _SHORTCUTS = 120
-_MISSED = 30
-# Control points of a path to begin with; and how near to each other they may come around corners,
-# as a share of the path. Samples of a path at least.
+# … until so many in turn are blocked.
+_BLOCKED_SHORTCUTS = 30
+# First number of control points of a path.
 _FIRST_POINTS = 12
+# Smallest distance of control points around corners, as a share of the path.
 _FINEST = 1e-3
+# Smallest number of samples of a path.
 PATH_SAMPLES = 64
 
 
-# Samples keep this share of the range from a limit.
+# Distance of samples from limits, as a share of the range.
 _INSIDE = 1e-6
-# Configurations this near are the same [rad or m].
+# Configurations nearer than this are the same [rad or m].
 _SAME = 1e-9
+# Degree of the splines.
 _DEGREE = 3
 
 
 @dataclass(frozen=True, eq=False)
 class Room:
-    """The configurations that are allowed, and how far they are apart.
+    """Allowed configurations, and their distances in time.
 
     Attributes
     ----------
@@ -63,9 +68,9 @@ class Room:
         Limits, bodies and quantities.
     robot : RobotModel
     margin : float
-        How much farther apart bodies are kept, since they are looked at at some times only [m].
+        Additional clearance, since bodies are checked at samples [m].
     finer : float
-        How many times more often legs are looked at.
+        Factor of the density of checks along legs.
     """
 
     asked: Envelope
@@ -74,7 +79,7 @@ class Room:
     finer: float = 1.0
 
     def free(self, q: Array) -> npt.NDArray[np.bool_]:
-        """Return which configurations (K, n) are allowed, (K,)."""
+        """Return the mask of allowed configurations (K, n), (K,)."""
         asked = self.asked
         inside = (q >= asked.lower - ROUNDING) & (q <= asked.upper + ROUNDING)
         allowed = np.asarray(inside.all(axis=1))
@@ -85,12 +90,12 @@ class Room:
             allowed[rows] = ~model.colliding(q[rows], far + self.margin)
         return allowed
 
-    def steps(self, way: Array, step: float = _LEG_STEP) -> Ints:
-        """Return in how many steps to look at legs from each of configurations (K, n) to the next.
+    def steps(self, polyline: Array, step: float = _LEG_STEP) -> Ints:
+        """Return the numbers of checks along legs from each of configurations (K, n) to the next.
 
         In each no point of a body moves farther than `step` [m].
         """
-        turned = np.abs(np.diff(way, axis=0))
+        turned = np.abs(np.diff(polyline, axis=0))
         count = (turned * self.robot.joint_weights).max(axis=1) / _TURN_STEP
         for model, _ in self.asked.bodies:
             count = np.maximum(count, (turned @ model.lever_arms.T).max(axis=1) / step)
@@ -100,7 +105,7 @@ class Room:
         """Return up to which share of it a straight leg is free, seen from its beginning."""
         count = int(self.steps(np.stack([first, last]))[0])
         shares = np.arange(1, count + 1) / count
-        for lot in _lots(count):
+        for lot in _chunks(count):
             some = shares[lot]
             blocked = np.flatnonzero(~self.free(first + some[:, None] * (last - first)))
             if blocked.size:
@@ -108,10 +113,10 @@ class Room:
         return 1.0
 
     def is_open(self, first: Array, last: Array, step: float = _LEG_STEP) -> bool:
-        """Whether all of a straight leg is free; what is in the way shows early."""
+        """Whether all of a straight leg is free; coarse checks come first."""
         count = int(self.steps(np.stack([first, last]), step)[0])
         order = _spread_out(count)
-        for lot in _lots(count):
+        for lot in _chunks(count):
             some = order[lot] / count
             if not self.free(first + some[:, None] * (last - first)).all():
                 return False
@@ -119,14 +124,14 @@ class Room:
 
     @property
     def rates(self) -> Array:
-        """What a unit of each joint takes at full speed, (n,) [s]; where that is endless, 1."""
+        """Time of each joint's unit at full speed, (n,) [s]; 1 without a limit."""
         return np.where(np.isfinite(self.asked.speed), 1.0 / self.asked.speed, 1.0)
 
 
-def find_way(
+def find_path(
     room: Room, starts: Array, goals: Array, end: float, rng: np.random.Generator
 ) -> Array | None:
-    """Return a way of straight legs that are free, (m, n), from one of starts to one of goals.
+    """Return a polyline of free legs, (m, n), from one of starts to one of goals.
 
     Parameters
     ----------
@@ -142,16 +147,16 @@ def find_way(
     (m, n) or None
         The quickest of a few; None where none was found in time.
     """
-    way = straight_way(room, starts, goals)
-    if way is not None:
-        return way
+    polyline = straight_way(room, starts, goals)
+    if polyline is not None:
+        return polyline
     found: list[Array] = []
-    while len(found) < _WAYS:
-        way = _connected(room, starts, goals, end, rng)
-        if way is None:
+    while len(found) < _CANDIDATES:
+        polyline = _connected(room, starts, goals, end, rng)
+        if polyline is None:
             break
-        found.append(shortened(room, way, rng))
-    return min(found, key=lambda way: _duration(way, room.rates), default=None)
+        found.append(shortened(room, polyline, rng))
+    return min(found, key=lambda polyline: _duration(polyline, room.rates), default=None)
 
 
 def straight_way(room: Room, starts: Array, goals: Array) -> Array | None:
@@ -164,40 +169,42 @@ def straight_way(room: Room, starts: Array, goals: Array) -> Array | None:
     return None
 
 
-def shortened(room: Room, way: Array, rng: np.random.Generator) -> Array:
-    """Return a way (m, n) with straight shortcuts between points of it, where these are free."""
+def shortened(room: Room, polyline: Array, rng: np.random.Generator) -> Array:
+    """Return a polyline (m, n) with free straight shortcuts between points of it."""
     missed = 0
     for _ in range(_SHORTCUTS):
-        if len(way) < 3 or missed >= _MISSED:
+        if len(polyline) < 3 or missed >= _BLOCKED_SHORTCUTS:
             break
-        lengths = (np.abs(np.diff(way, axis=0)) * room.rates).max(axis=1)
+        lengths = (np.abs(np.diff(polyline, axis=0)) * room.rates).max(axis=1)
         ends = np.concatenate([[0.0], np.cumsum(lengths)])
         places = np.sort(rng.uniform(0.0, ends[-1], 2))
         # Now and then whole legs: only these lose their ends.
         if rng.uniform() < 0.5:
             places = np.array([ends[np.argmin(np.abs(ends - place))] for place in places])
-        legs = np.minimum(np.searchsorted(ends, places, side="right") - 1, len(way) - 2)
+        legs = np.minimum(np.searchsorted(ends, places, side="right") - 1, len(polyline) - 2)
         shares = (places - ends[legs]) / np.maximum(lengths[legs], 1e-12)
-        between = way[legs] + shares[:, None] * (way[legs + 1] - way[legs])
+        between = polyline[legs] + shares[:, None] * (polyline[legs + 1] - polyline[legs])
         missed += 1
         if legs[1] > legs[0] and room.is_open(*between):
-            way = _apart(np.concatenate([way[: legs[0] + 1], between, way[legs[1] + 1 :]]))
+            polyline = _distinct(
+                np.concatenate([polyline[: legs[0] + 1], between, polyline[legs[1] + 1 :]])
+            )
             missed = 0
-    return way
+    return polyline
 
 
-def _apart(way: Array) -> Array:
-    """Return a way without configurations that repeat the one before; its ends stay."""
-    kept = np.append(True, np.abs(np.diff(way, axis=0)).max(axis=1) > _SAME)
-    if not kept[-1] and len(way) > 2:
+def _distinct(polyline: Array) -> Array:
+    """Return a polyline without repeated configurations, with the same ends."""
+    kept = np.append(True, np.abs(np.diff(polyline, axis=0)).max(axis=1) > _SAME)
+    if not kept[-1] and len(polyline) > 2:
         kept[-1] = True
         kept[np.flatnonzero(kept[:-1])[-1]] = len(np.flatnonzero(kept[:-1])) == 1
-    return np.asarray(way[kept])
+    return np.asarray(polyline[kept])
 
 
-def _duration(way: Array, rates: Array) -> float:
-    """Return what a way takes at full speed, more or less [s]; corners cost something as well."""
-    legs = np.abs(np.diff(way, axis=0)) * rates
+def _duration(polyline: Array, rates: Array) -> float:
+    """Return the approximate time of a polyline at full speed [s]; corners count as well."""
+    legs = np.abs(np.diff(polyline, axis=0)) * rates
     return float(legs.max(axis=1).sum() + 0.1 * np.linalg.norm(legs, axis=1).sum())
 
 
@@ -211,7 +218,7 @@ class _Tree:
         self._rates = rates
 
     def nearest(self, q: Array) -> int:
-        """Return which configuration is nearest to q (n,), in time."""
+        """Return the index of the configuration nearest to q (n,), in time."""
         reached = self._q[: len(self._before)]
         return int(np.argmin((((reached - q) * self._rates) ** 2).sum(axis=1)))
 
@@ -239,8 +246,8 @@ class _Tree:
         """Return a configuration, (n,)."""
         return np.asarray(self._q[k])
 
-    def way(self, k: int) -> Array:
-        """Return the way from a root to a configuration, (m, n)."""
+    def polyline(self, k: int) -> Array:
+        """Return the polyline from a root to a configuration, (m, n)."""
         found = []
         while k >= 0:
             found.append(self._q[k])
@@ -266,14 +273,18 @@ def _connected(
         k, _ = one.grow(room, np.clip(sample, lower, upper), _LEG_RANGE)
         j, met = other.grow(room, one.at(k), math.inf)
         if met:
-            halves = (one.way(k), other.way(j)) if forward else (other.way(j), one.way(k))
-            return _apart(np.concatenate([halves[0], halves[1][::-1]]))
+            halves = (
+                (one.polyline(k), other.polyline(j))
+                if forward
+                else (other.polyline(j), one.polyline(k))
+            )
+            return _distinct(np.concatenate([halves[0], halves[1][::-1]]))
         one, other, forward = other, one, not forward
     return None
 
 
-def _lots(count: int) -> Iterator[slice]:
-    """Yield slices of 0 to count - 1, small ones first: most of what is blocked shows early."""
+def _chunks(count: int) -> Iterator[slice]:
+    """Yield slices of 0 to count - 1, small ones first: collisions are often found early."""
     first, size = 0, 1
     while first < count:
         yield slice(first, first + size)
@@ -289,13 +300,13 @@ def _spread_out(count: int) -> Array:
     return order[(order > 0) & (order <= count)].astype(np.float64)
 
 
-def rounded(room: Room, way: Array, passed: Sequence[int] = ()) -> Trajectory | None:
-    """Return a way (m, n) as a smooth joint path over a time of its own from 0 to 1.
+def rounded(room: Room, polyline: Array, passed: Sequence[int] = ()) -> Trajectory | None:
+    """Return a polyline (m, n) as a smooth joint path over a time of its own from 0 to 1.
 
-    It begins and ends where the way does, and goes through those of its corners that are to be
-    `passed`. None where it is not free even when it hardly leaves the legs.
+    It has the same ends, and goes through the corners that are `passed`. None if it is not free
+    even close to the legs.
     """
-    lengths = (np.abs(np.diff(way, axis=0)) * room.rates).max(axis=1)
+    lengths = (np.abs(np.diff(polyline, axis=0)) * room.rates).max(axis=1)
     whole = max(float(lengths.sum()), np.finfo(float).tiny)
     spacing = np.full(len(lengths), whole / _FIRST_POINTS)
     # Near its ends a clamped spline goes through no other control point.
@@ -304,14 +315,14 @@ def rounded(room: Room, way: Array, passed: Sequence[int] = ()) -> Trajectory | 
         counts = np.maximum(fewest, np.ceil(lengths / spacing)).astype(np.int64)
         legs = np.repeat(np.arange(len(lengths)), counts)
         points = [
-            np.linspace(way[k], way[k + 1], count, endpoint=False)
+            np.linspace(polyline[k], polyline[k + 1], count, endpoint=False)
             for k, count in enumerate(counts.tolist())
         ]
-        path = _spline(_through(points, way, passed))
+        path = _spline(_through(points, polyline, passed))
         blocked = _blocked(room, path)
         if not blocked.size:
             return path
-        # Of the legs around what is blocked.
+        # Of the legs next to a collision.
         at = np.clip(blocked * len(legs), 0, len(legs) - 1).astype(np.int64)
         near = np.unique(np.clip(at[:, None] + np.arange(-2, 3), 0, len(legs) - 1))
         tight = np.unique(legs[near])
@@ -320,17 +331,17 @@ def rounded(room: Room, way: Array, passed: Sequence[int] = ()) -> Trajectory | 
         spacing[tight] *= 0.5
 
 
-def _through(points: Sequence[Array], way: Array, passed: Sequence[int]) -> Array:
+def _through(points: Sequence[Array], polyline: Array, passed: Sequence[int]) -> Array:
     """Return control points of legs as one list, with three in line around corners to pass.
 
     The spline goes through a control point that lies halfway between its neighbours.
     """
     legs = list(points)
     for corner in passed:
-        here, (one, other) = way[corner], (legs[corner - 1][-1], legs[corner][1])
+        here, (one, other) = polyline[corner], (legs[corner - 1][-1], legs[corner][1])
         step = 0.25 * (other - one)
         legs[corner] = np.concatenate([[here - step, here, here + step], legs[corner][1:]])
-    return np.concatenate([*legs, way[-1:]])
+    return np.concatenate([*legs, polyline[-1:]])
 
 
 def _spline(points: Array) -> Trajectory:
@@ -359,7 +370,7 @@ def _spline(points: Array) -> Trajectory:
 
 
 def _blocked(room: Room, path: Trajectory) -> Array:
-    """Return at which times a path is not free, looked at closely."""
+    """Return the times at which a path is not free, by fine checks."""
     counts = room.steps(path.q, _FINE_STEP)
     steps = [
         np.linspace(one, other, count, endpoint=False)
