@@ -92,7 +92,8 @@ def test_a_normal_is_the_tool_axis(poses: list[pin.SE3], tmp_path: Path) -> None
     path = sm.files.read_path(file)
     agree(path, poses, rotation=False)
     # The rest of the orientation is made up, which matters to tasks that prescribe it.
-    (note,) = path.notes
+    unit, note = path.notes
+    assert unit.startswith("columns say no unit and are taken so: x,y,z for metres")
     assert note.startswith("nx,ny,nz say where the tool's z axis points, not how")
     for task, told in (("pose", True), ("pointing", False), ("position", False)):
         remarks = sm.Problem(robot_named("panda"), path, task, start="free").remarks
@@ -449,10 +450,40 @@ def test_half_a_turn_with_few_digits_is_one(tmp_path: Path, half: str) -> None:
     assert sm.files.read_path(file, feed=0.02).duration > 0.0
 
 
+@pytest.mark.parametrize(
+    ("header", "said"),
+    [
+        ("x,y,z", "x,y,z for metres (else: x_mm, x_cm, x_in)"),
+        ("X [m],Y [m],Z [m]", ""),
+        ("x_mm,y_mm,z_mm,feed", "feed for m/s (else: feed_mm)"),
+        ("x_mm,y_mm,z_mm,feed_mm", ""),
+        ("x_m,y,z", None),
+        ("x [mm],y [mm],z [mm],roll,pitch,yaw", "roll,pitch,yaw for radians about fixed axes"),
+        ("x_mm,y_mm,z_mm,roll_deg,pitch_deg,yaw_deg", ""),
+    ],
+)
+def test_what_columns_without_a_unit_are_taken_for_is_noted(
+    header: str, said: str | None, tmp_path: Path
+) -> None:
+    count = header.count(",") + 1
+    lines = [",".join(["0.1", "0.2", str(0.01 * k), *["0.1"] * (count - 3)]) for k in range(1, 4)]
+    file = tmp_path / "seam.csv"
+    file.write_text("\n".join([header, *lines]) + "\n")
+    options = {} if "feed" in header else {"feed": 0.05}
+    if said is None:
+        with pytest.raises(sm.errors.FileFormatError, match="unknown column 'x_m'"):
+            sm.files.read_path(file, **options)
+        return
+    notes = [x for x in sm.files.read_path(file, **options).notes if "say no unit" in x]
+    assert bool(notes) == bool(said)
+    assert not said or said in notes[0]
+
+
 def test_what_was_noted_of_a_file_is_known_of_what_is_made_of_its_path(tmp_path: Path) -> None:
     file = turned(tmp_path / "seam.csv", "rx,ry,rz", "3,0,0", "3,0.1,0")
     path = sm.files.read_path(file, feed=0.02)
-    (note,) = path.notes
+    unit, note = path.notes
+    assert "rx,ry,rz for radians (else: rx_deg)" in unit
     assert "read as a rotation vector" in note
     assert "roll,pitch,yaw" in note
     for made in (
@@ -460,7 +491,7 @@ def test_what_was_noted_of_a_file_is_known_of_what_is_made_of_its_path(tmp_path:
         sm.paths.with_leads(path, 0.02, 1.0),
         sm.paths.Reversed(path),
     ):
-        assert made.notes == (note,)
+        assert made.notes == path.notes
     (tmp_path / "seams.csv").write_text(
         "seam," + file.read_text().replace("\n0", "\na,0", 1).replace("\n0.05", "\na,0.05", 1)
     )
@@ -471,9 +502,10 @@ def test_what_was_noted_of_a_file_is_known_of_what_is_made_of_its_path(tmp_path:
     )
     assert any(note in remark for remark in sm.files.read_seam_job(job).remarks)
     # Other orientations are what their titles say.
-    assert not sm.files.read_path(
+    others = sm.files.read_path(
         turned(tmp_path / "a.csv", "roll,pitch,yaw", "3,0,0", "3,0.1,0"), feed=0.02
     ).notes
+    assert not any("rotation vector" in said for said in others)
 
 
 @pytest.mark.parametrize(

@@ -34,7 +34,7 @@ def test_a_distance_that_is_only_a_bound_is_no_approach() -> None:
 class Bodies:
     """Pairs of bodies whose distances are given functions of q, with one lever on all joints."""
 
-    open_meshes = overlapping = disabled = obstacles = ()
+    open_meshes = overlapping = disabled = obstacles = held = ()
     checks_links, checks_obstacles, stuck = True, False, None
 
     def __init__(self, *distances: Callable[[Array], Array], lever: float = 1.0) -> None:

@@ -492,6 +492,67 @@ def test_curves_turn_on_their_way_and_a_lead_leans_the_tool(tmp_path: Path) -> N
         assert np.linalg.norm(places[-1] - [0, 0.2, 0]) < 1e-3
 
 
+@pytest.mark.parametrize(("name", "column", "sign"), [("x", 0, 1.0), ("-y", 1, -1.0)])
+def test_a_tilt_leans_the_tool_to_the_left_of_where_it_goes(
+    name: str, column: int, sign: float
+) -> None:
+    """Seen from above, where the holder is: left of +x is +y, and so round the square."""
+    square, tilt = CASES / "along_the_path" / "square.csv", 0.3
+    path = sm.files.read_path(square, feed=0.03, corners="stop", along=name, tilt=tilt)
+    _, twists, rotations = tool_along(path)
+    moving = np.linalg.norm(twists[:, :3], axis=1) > 0.02
+    ahead = twists[moving, :3] / np.linalg.norm(twists[moving, :3], axis=1)[:, None]
+    left = np.cross([0.0, 0.0, 1.0], ahead)
+    z, one = rotations[moving, :, 2], sign * rotations[moving, :, column]
+    np.testing.assert_allclose(z, np.sin(tilt) * left - [0, 0, np.cos(tilt)], atol=1e-6)
+    np.testing.assert_allclose(one, ahead, atol=1e-6)
+    np.testing.assert_allclose(np.linalg.det(rotations), 1.0, atol=ROUNDING)
+    # With a lead as well, it still leans that way by as much.
+    both = sm.files.read_path(square, feed=0.03, corners="stop", along=name, tilt=tilt, lead=-0.2)
+    z = tool_along(both)[2][moving, :, 2]
+    np.testing.assert_allclose(np.einsum("kc,kc->k", z, left), np.sin(tilt), atol=1e-6)
+    np.testing.assert_allclose(
+        np.einsum("kc,kc->k", z, ahead), -np.sin(0.2) * np.cos(tilt), atol=1e-6
+    )
+
+
+def test_a_tool_that_is_lifted_turns_in_the_air_and_comes_back(tmp_path: Path) -> None:
+    square = CASES / "along_the_path" / "square.csv"
+    asked = ("--along", "x", "--corners", "stop", "--feed", "0.03", "--lift", "0.02")
+    leans = ("--lead", "0.1", "--tilt", "-0.1", "--task", "pointing")
+    plan = planned(
+        tmp_path, "panda", "--path", square, *asked, *leans, "--frame", "0.45,0,0.3,0,0,0"
+    )
+    rotations, places = tips_of(plan, 4001)
+    places = 1e3 * (places - [0.45, 0.0, 0.3])
+    # What it does between its legs is above the corners, and no lower than it is lifted to.
+    for corner in ([100, 0], [100, 80]):
+        above = np.linalg.norm(places[:, :2] - corner, axis=1) < 0.01
+        assert places[above, 2].max() == pytest.approx(20.0, abs=0.01)
+    assert places[:, 2].min() > -0.01
+    path = sm.files.read_path(square, feed=0.03, corners="stop", along="x", lift=0.02)
+    places, _, rotations = tool_along(path)
+    turning = np.linalg.norm(np.diff(rotations[:, :, 0], axis=0), axis=1) > 1e-6
+    np.testing.assert_allclose(places[:-1][turning, 2], 0.02, atol=1e-9)
+    # Feeds are asked for on the legs alone, as without it.
+    plain = sm.files.read_path(square, feed=0.03, corners="stop", along="x")
+    assert [x.asked for x in path.feeds] == [x.asked for x in plain.feeds]
+    assert plain.samples([0.0]).translation[0, 2] == pytest.approx(0.0, abs=1e-12)
+
+
+def test_a_cut_is_lifted_at_its_corner_alone(tmp_path: Path) -> None:
+    """It comes down and leaves by rapids of its own, at neither of which it turns."""
+    text = "G21 G90\nG0 X0 Y0 Z20\nG0 Z5\nG1 Z0 F600\nX40 F1200\nY30\nG0 Z20\nM30\n"
+    (tmp_path / "knife.nc").write_text(text)
+    path = sm.files.read_path(tmp_path / "knife.nc", along="x", corners="stop", lift=0.005)
+    places, _, _ = tool_along(path)
+    for corner, is_lifted in (([0.0, 0.0], False), ([0.04, 0.0], True), ([0.04, 0.03], False)):
+        above = places[np.linalg.norm(places[:, :2] - corner, axis=1) < 1e-9, 2]
+        turns_back = np.count_nonzero(np.diff(np.sign(np.diff(above))))
+        assert bool(turns_back) == is_lifted
+        assert not is_lifted or above.max() == pytest.approx(0.005, abs=1e-6)
+
+
 def test_cuts_and_drawings_are_followed_along_too(tmp_path: Path) -> None:
     text = "G21 G90\nG0 X0 Y0 Z20\nG0 Z5\nG1 Z0 F600\nX40 F1200\nY30\nG0 Z20\nM30\n"
     (tmp_path / "knife.nc").write_text(text)
@@ -515,6 +576,11 @@ def test_cuts_and_drawings_are_followed_along_too(tmp_path: Path) -> None:
         ({"along": "x", "corners": "stop", "duration": 3.0, "feed": None}, "for paths at a feed"),
         ({"lead": 0.2}, "lead has no effect without along"),
         ({"along": "x", "corners": "stop", "lead": 30.0}, "lead is 30 rad, expected less than"),
+        ({"tilt": 0.2}, "tilt has no effect without along"),
+        ({"along": "x", "corners": "stop", "tilt": -2.0}, "tilt is -2 rad, expected less than"),
+        ({"lift": 0.01}, "lift has no effect without along"),
+        ({"along": "x", "corners": "round", "lift": 0.01}, "lift has no effect where corners are"),
+        ({"along": "x", "corners": "stop", "lift": -0.01}, "lift is -0.01"),
     ],
 )
 def test_what_along_cannot_be_is_said(options: dict[str, object], said: str) -> None:

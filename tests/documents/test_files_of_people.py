@@ -191,7 +191,7 @@ def test_normals_that_seem_to_point_out_are_told(
 
 
 def test_a_path_that_leaves_its_straight_lines_says_by_how_much(tmp_path: Path) -> None:
-    text = "x,y,z\n0.40,-0.10,0.4\n0.45,-0.10,0.4\n0.45,0.10,0.4\n"
+    text = "x [m],y [m],z [m]\n0.40,-0.10,0.4\n0.45,-0.10,0.4\n0.45,0.10,0.4\n"
     file = written(tmp_path, "three.csv", text)
     (note,) = sm.files.read_path(file, feed=0.05).notes
     assert "by up to 40.0 mm at line 3: corners round (--corners round) keeps 1 mm" in note
@@ -202,7 +202,10 @@ def test_a_path_that_leaves_its_straight_lines_says_by_how_much(tmp_path: Path) 
     arc = np.column_stack([0.4 + 0.1 * np.sin(angle), 0.1 * np.cos(angle), np.full(60, 0.4)])
     rows = "\n".join(",".join(map(repr, row)) for row in arc.tolist())
     assert (
-        sm.files.read_path(written(tmp_path, "arc.csv", f"x,y,z\n{rows}\n"), feed=0.05).notes == ()
+        sm.files.read_path(
+            written(tmp_path, "arc.csv", f"x (m),y (m),z (m)\n{rows}\n"), feed=0.05
+        ).notes
+        == ()
     )
     placed = tmp_path / "a.toml"
     placed.write_text(

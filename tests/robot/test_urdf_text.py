@@ -11,7 +11,7 @@ from selfmotion.model.robot import urdf_text
 from selfmotion.model.robot.urdf_text import Packages
 from selfmotion.shell.replay.links import bake
 from selfmotion.shell.replay.meshes import Payload
-from support.files_of_people import arm, described_package, with_arguments
+from support.files_of_people import arm, chain_elements, described_package, with_arguments
 from support.shell import complaint, invoke
 
 UP = [0.0, 0.0, 1.2]
@@ -118,6 +118,35 @@ def test_what_is_not_found_is_named_with_where_it_was_looked_for(tmp_path: Path)
         sm.errors.RobotError, match=r"link 'l4': no such mesh file, package 'hand' is in"
     ):
         sm.obstacles.CollisionModel(sm.load_robot(file))
+
+
+def test_a_urdf_that_is_xacro_is_expanded(tmp_path: Path) -> None:
+    """Its suffix says what it expands to; arguments are given as those of any xacro file."""
+    file = tmp_path / "arm.urdf"
+    file.write_text(
+        '<robot name="arm" xmlns:xacro="http://www.ros.org/wiki/xacro">'
+        '<xacro:arg name="up" default="0.3"/><xacro:property name="height" value="$(arg up)"/>'
+        f"{chain_elements('${height}')}</robot>"
+    )
+    assert sm.load_robot(file).pose([0.0] * 7).translation[2] == pytest.approx(0.3 + 6 * 0.15)
+    higher = sm.load_robot(file, arguments={"up": 0.5})
+    assert higher.pose([0.0] * 7).translation[2] == pytest.approx(0.5 + 6 * 0.15)
+    with pytest.raises(sm.errors.RobotError, match="has no argument 'upp'"):
+        sm.load_robot(file, arguments={"upp": 0.5})
+
+
+def test_the_root_of_a_xacro_has_the_defaults_that_the_file_declares_below(tmp_path: Path) -> None:
+    """Makers name the robot by an argument of the file, which xacro looks at too late."""
+    file = tmp_path / "arm.xacro"
+    file.write_text(
+        '<robot name="$(arg model)" xmlns:xacro="http://www.ros.org/wiki/xacro">'
+        f'<xacro:arg name="model" default="rx7"/>{chain_elements()}</robot>'
+    )
+    assert sm.load_robot(file).name == "rx7"
+    assert sm.load_robot(file, arguments={"model": "rx8"}).name == "rx8"
+    file.write_text(file.read_text().replace(' default="rx7"', ""))
+    with pytest.raises(sm.errors.RobotError, match=r"model \(no default\)"):
+        sm.load_robot(file)
 
 
 def test_arguments_of_a_xacro_are_given_in_the_shell(tmp_path: Path) -> None:

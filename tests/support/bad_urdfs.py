@@ -158,12 +158,6 @@ EDITS: list[tuple[str, str, str]] = [
     ("two root elements", _END, "</robot><robot/>"),
     ("an unescaped &", 'name="arm"', 'name="arm & hand"'),
     ("a xacro macro", _END, '<xacro:include filename="a"/></robot>'),
-    (
-        "a xacro property",
-        '<robot name="arm">',
-        '<robot name="arm" xmlns:xacro="http://www.ros.org/wiki/xacro">'
-        '<xacro:property name="a" value="1"/>',
-    ),
     ("a xacro expression left over", '"0 0 0.3"', '"0 0 ${height}"'),
     ("a xacro argument left over", 'name="arm"', 'name="$(arg name)"'),
     ("no joint", SOUND[SOUND.index("<joint") :], "</robot>"),

@@ -227,9 +227,9 @@ PER_JOINT = ("limit", "lock", "lower", "posture", "q", "qd", "qdd", "start", "up
 _BANDS = ("acceleration", "band", "center", "half", "speed", "target", "velocity")
 # Values above a turn are in degrees.
 _WITHIN_A_TURN = ("corner_angle", "rotation", "rotation_vector", "rpy", "turn_tolerance")
-_TURNS = (*_WITHIN_A_TURN, "lead", "margin", "turn_acceleration", "turn_rate", "within")
+_TURNS = (*_WITHIN_A_TURN, "lead", "tilt", "margin", "turn_acceleration", "turn_rate", "within")
 ANGLES = frozenset((*_BANDS, *_TURNS, *PER_JOINT))
-_SIZES = ("length", "radius", "rise", "rotary_center", "size", "standoff", "tolerance")
+_SIZES = ("length", "lift", "radius", "rise", "rotary_center", "size", "standoff", "tolerance")
 _WAYS = ("amplitude", "by", "distance", "feed", "jump", "pitch", "position", "positions", "retreat")
 LENGTHS = frozenset((*_BANDS, *_WAYS, *_SIZES))
 # Former name of `clearance`.

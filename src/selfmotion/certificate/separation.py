@@ -100,13 +100,21 @@ class Separation(Requirement):
     def remarks(self) -> tuple[str, ...]:
         """See `Requirement.remarks`: pairs that are left out and why, and open meshes."""
         left_out = [
-            f"{x.first} - {x.second} (in {100 * x.share:.0f} % of all configurations)"
+            f"{x.first} - {x.second} ({x.extent})"
             for x in self.model.overlapping
             if not x.is_checked
         ]
         said = []
         if left_out:
             said.append(f"links that overlap by design, not checked: {', '.join(left_out)}")
+        if self.model.held:
+            held = ", ".join(
+                f"{x.first} - {x.second} (by {-1e3 * x.value:.1f} mm)" for x in self.model.held
+            )
+            said.append(
+                f"links that overlap, which no joint of this motion moves against each other, not "
+                f"checked: {held}"
+            )
         if not self.model.pairs:
             said.append("no pair of bodies that can meet: nothing was measured")
         said += [item.hint for item in self.obstacles if item.hint]

@@ -29,7 +29,12 @@ def overlapping_by_design(
     shares: dict[tuple[str, str], float] = {}
     for pair, count in zip(model.pairs, model.overlap_counts()[0].tolist(), strict=True):
         shares[pair] = max(count / SAMPLES, shares.get(pair, 0.0))
-    found = {}
+    # What is left out anyway is listed where it is not so in all configurations.
+    found = {
+        (x.first, x.second): f"overlap {x.extent}"
+        for x in model.overlapping
+        if not x.is_checked and _ALWAYS <= x.share < 1.0
+    }
     for pair, share in shares.items():
         depth = deep.get(frozenset(pair))
         if share >= _ALWAYS or (depth is not None and share >= _OFTEN):

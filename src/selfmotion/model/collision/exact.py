@@ -23,12 +23,15 @@ from selfmotion.model.collision.pairs import (
     checked_pairs,
     count_overlaps,
     held_pairs,
+    held_together,
     links_of,
 )
 from selfmotion.model.robot import RobotModel
 
 # Overlap of bodies in contact that counts as rounding [m].
 _TOUCHING = 1e-6
+# Smallest overlap of links held together by joints that is reported [m].
+_WORTH_SAYING = 1e-4
 # Name of the links of an arm as a whole.
 ITSELF = "the arm itself"
 _NO_PAIR = Closest(math.inf, "", "")
@@ -64,8 +67,9 @@ class CollisionModel:
         Whether any pair is of links or attached bodies, and of an obstacle.
     overlapping : tuple of Overlap
         Pairs of links that overlap in half or more of 500 sampled configurations. Those that
-        overlap in each, or touch by design (`RobotModel.touching`), are not checked, but for parts
-        of a cell that were placed in each other.
+        overlap in each, or in 95 % by nearly the same depth, or touch by design
+        (`RobotModel.touching`), are not checked, but for parts of a cell that were placed in each
+        other.
     disabled : tuple of (str, str)
         Pairs of links that are disabled by the user alone.
 
@@ -152,6 +156,30 @@ class CollisionModel:
             return None
         worst = self.of_pairs(pairs).worst(np.zeros((1, self.robot.dof)))
         return worst if worst.value < -_TOUCHING else None
+
+    @cached_property
+    def held(self) -> tuple[Closest, ...]:
+        """The links that overlap where joints hold them which the motion does not move.
+
+        They are left out, as no motion parts them; the deepest come first.
+        """
+        put = set(held_pairs(self._bodies, self.robot.urdf, self.robot.locked, self._disabled))
+        asked = {frozenset(pair) for pair in self._disabled}
+        pairs = [
+            (i, j)
+            for i, j in held_together(self._bodies, self.robot.urdf)
+            if (i, j) not in put and {self.bodies[i], self.bodies[j]} not in asked
+        ]
+        if not pairs:
+            return ()
+        at = np.clip(np.zeros(self.robot.dof), self.robot.lower, self.robot.upper)
+        found = self.of_pairs(pairs).touching(at)
+        deepest = {frozenset((x.first, x.second)): x for x in reversed(found)}
+        return tuple(
+            x
+            for x in found
+            if deepest[frozenset((x.first, x.second))] is x and x.value < -_WORTH_SAYING
+        )
 
     @property
     def standing(self) -> frozenset[str]:

@@ -11,7 +11,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from selfmotion.basics import CollisionError, RobotError
+from selfmotion.basics import Array, CollisionError, RobotError
 from selfmotion.model.collision.bodies import Body, link_bodies
 from selfmotion.model.collision.distances import HullDistances, Ints
 from selfmotion.model.collision.pair_distances import MeshDistances
@@ -67,18 +67,21 @@ def held_pairs(
 ) -> list[tuple[int, int]]:
     """Return the index pairs of `bodies` that someone put where they are, and no joint moves.
 
-    By joints that are held elsewhere than at 0, or by placing parts of a cell. Links that such a
-    joint joins are left out, and parts of which one carries the other: they may touch.
+    By joints that are held elsewhere than where they rest, at 0 or the nearest limit, or by placing
+    parts of a cell. Links that such a joint joins are left out, and parts of which one carries the
+    other: they may touch.
     """
     up = {joint.child: joint for joint in urdf.joints.values()}
     placements = {joint.name for joint in urdf.joints.values() if is_placement(joint)}
+    rests = _rests(urdf)
 
     def put(link: str) -> frozenset[str]:
         """Return the joints from the root to a link that were put somewhere; "" for the world."""
         found = set()
         while link in up:
             joint = up[link]
-            if joint.name in placements or locked.get(joint.name, 0.0) != 0.0:
+            rest = rests.get(joint.name, 0.0)
+            if joint.name in placements or abs(locked.get(joint.name, rest) - rest) > _AT_REST:
                 found.add(joint.name)
             link = joint.parent
         return frozenset(found)
@@ -98,6 +101,46 @@ def held_pairs(
         (i, j)
         for i, j in itertools.combinations(range(len(bodies)), 2)
         if is_put(bodies[i], bodies[j])
+    ]
+
+
+# Distance from the rest of a joint below which a coordinate is at rest: rounding [rad or m].
+_AT_REST = 1e-9
+
+
+def _rests(urdf: Urdf) -> dict[str, float]:
+    """Return the coordinates of joints that nobody moves: 0, or the nearest limit."""
+    found: dict[str, float] = {}
+    for element in ElementTree.fromstring(urdf.text).findall("joint"):
+        limit = element.find("limit")
+        if limit is not None:
+            lower, upper = (float(limit.get(key, "0")) for key in ("lower", "upper"))
+            found[str(element.get("name"))] = min(max(0.0, lower), upper)
+    for name, joint in urdf.joints.items():
+        scale, offset = 1.0, 0.0
+        while joint.mimics is not None:
+            offset, scale = scale * joint.offset + offset, scale * joint.multiplier
+            joint = urdf.joints[joint.mimics]
+        found[name] = scale * found.get(joint.name, 0.0) + offset
+    return found
+
+
+def held_together(bodies: Sequence[Body], urdf: Urdf) -> list[tuple[int, int]]:
+    """Return the index pairs of links with a joint between them that the motion does not move.
+
+    The joint is held at 0, or at its nearest limit, and these pairs are not checked. The two links
+    of one joint, and links that are fixed to each other, are not among them: they may touch.
+    """
+    part = _rigid_parts(urdf)
+    joined = {frozenset((joint.parent, joint.child)) for joint in _movable(urdf)}
+    return [
+        (i, j)
+        for i, j in itertools.combinations(range(len(bodies)), 2)
+        if bodies[i].joint == bodies[j].joint
+        and bodies[i].link in part
+        and bodies[j].link in part
+        and part[bodies[i].link] != part[bodies[j].link]
+        and {bodies[i].link, bodies[j].link} not in joined
     ]
 
 
@@ -196,6 +239,12 @@ def disabled_links(
 
 # Number of configurations that are sampled.
 SAMPLES = 500
+# Share of configurations from which on an overlap may be by design …
+_NEARLY_ALWAYS = 0.95
+# … if this share of its depths is alike: what comes out of a tube overlaps ever less …
+_MOST = 0.75
+# … which means within this share of the median depth.
+_ALIKE_DEPTHS = 0.25
 
 
 @dataclass(frozen=True, eq=False)
@@ -209,10 +258,13 @@ class Links:
     counts : dict
         Index pair of bodies → number of configurations in which these overlap, and their hulls
         alone.
+    depths : dict
+        Index pair of bodies that overlap in nearly all → depths of their hulls, sorted (D,).
     """
 
     bodies: tuple[Body, ...]
     counts: dict[tuple[int, int], tuple[int, int]]
+    depths: dict[tuple[int, int], Array]
 
 
 # Cached: reading meshes and sampling pairs takes longer than many a plan.
@@ -229,8 +281,8 @@ def links_of(robot: RobotModel) -> Links:
     """
     if robot not in _known:
         bodies = link_bodies(robot)
-        pairs = candidate_pairs(bodies, robot.urdf)
-        _known[robot] = Links(tuple(bodies), counts_of(robot, bodies, pairs))
+        counts = counts_of(robot, bodies, candidate_pairs(bodies, robot.urdf))
+        _known[robot] = Links(tuple(bodies), counts, depths_of(robot, bodies, counts))
     return _known[robot]
 
 
@@ -245,6 +297,30 @@ def counts_of(
     meshes = MeshDistances([body.solid for body in bodies], [body.name for body in bodies], index)
     met, alone = count_overlaps(robot, hulls, meshes, np.arange(len(pairs)))
     return dict(zip(pairs, zip(met.tolist(), alone.tolist(), strict=True), strict=True))
+
+
+def depths_of(
+    robot: RobotModel, bodies: Sequence[Body], counts: Mapping[tuple[int, int], tuple[int, int]]
+) -> dict[tuple[int, int], Array]:
+    """Return `Links.depths` of the pairs of bodies that are counted."""
+    pairs = [pair for pair, (met, _) in counts.items() if met >= _NEARLY_ALWAYS * SAMPLES]
+    if not pairs:
+        return {}
+    hulls = HullDistances(robot, bodies, np.array(pairs, dtype=np.int64))
+    found: list[list[float]] = [[] for _ in pairs]
+    for _, pair, distance in _near(robot, hulls, np.arange(len(pairs))):
+        if distance <= 0.0:
+            found[pair].append(-distance)
+    return {pair: np.sort(depths) for pair, depths in zip(pairs, found, strict=True)}
+
+
+def _is_by_design(met: int, depths: Array | None) -> bool:
+    """Whether bodies overlap in all configurations, or in nearly all by nearly the same depth."""
+    if met == SAMPLES or depths is None:
+        return met == SAMPLES
+    usual = np.median(depths)
+    alike = np.abs(depths - usual) <= _ALIKE_DEPTHS * usual
+    return bool(alike.mean() >= _MOST)
 
 
 def count_overlaps(
@@ -320,14 +396,23 @@ class Overlap:
     share : float
         Share of the configurations.
     is_checked : bool
-        False for those that overlap in each, or touch by design: they are left out. Of links with
-        several bodies, others may still be checked.
+        False for those that overlap in each, or in nearly all by nearly the same depth, or touch by
+        design: they are left out. Of links with several bodies, others may still be checked.
+    depth : float or None
+        Median depth of the overlap of their hulls [m]; None if they do not overlap in nearly all.
     """
 
     first: str
     second: str
     share: float
     is_checked: bool
+    depth: float | None = None
+
+    @property
+    def extent(self) -> str:
+        """In how many configurations they overlap, and how deep."""
+        share = f"in {100 * self.share:.0f} % of all configurations"
+        return share if self.depth is None else f"{share}, by {1e3 * self.depth:.1f} mm"
 
     @property
     def remedy(self) -> str:
@@ -381,12 +466,15 @@ def checked_pairs(
     candidates = candidate_pairs(bodies, robot.urdf, disabled)
     known = links_of(robot).counts
     riding = [(i, j) for i, j in candidates if (i, j) not in known and not bodies[j].is_obstacle]
-    counts = {**known, **counts_of(robot, bodies, riding)}
-    # An overlap in each configuration that is not by placement is by design.
+    more = counts_of(robot, bodies, riding)
+    counts = {**known, **more}
+    depths = {**links_of(robot).depths, **depths_of(robot, bodies, more)}
+    # An overlap in (nearly) each configuration that is not by placement is by design.
     always = {
         (i, j)
         for (i, j), (met, _) in counts.items()
-        if met == SAMPLES and not are_separate_parts(bodies[i].link, bodies[j].link, robot.urdf)
+        if _is_by_design(met, depths.get((i, j)))
+        and not are_separate_parts(bodies[i].link, bodies[j].link, robot.urdf)
     }
     # Next to a joint, all bodies of two links of which some touch.
     by_design = {frozenset(pair) for pair in robot.touching} | {
@@ -395,7 +483,7 @@ def checked_pairs(
         if are_neighbours(bodies[i].link, bodies[j].link, robot.urdf)
     }
     pairs: list[tuple[int, int]] = []
-    often: dict[tuple[str, str, bool], int] = {}
+    often: dict[tuple[str, str, bool], tuple[int, float | None]] = {}
     for pair in candidates:
         met, _ = counts.get(pair, (0, 0))
         names = bodies[pair[0]].name, bodies[pair[1]].name
@@ -404,10 +492,11 @@ def checked_pairs(
             pairs.append(pair)
         if met >= _OFTEN * SAMPLES or (met and not is_checked):
             key = *names, is_checked
-            often[key] = max(met, often.get(key, 0))
+            if met > often.get(key, (0, None))[0]:
+                often[key] = met, float(np.median(depths[pair])) if pair in depths else None
     overlapping = tuple(
-        Overlap(first, second, met / SAMPLES, is_checked)
-        for (first, second, is_checked), met in often.items()
+        Overlap(first, second, met / SAMPLES, is_checked, depth)
+        for (first, second, is_checked), (met, depth) in often.items()
     )
     kept = {(bodies[i].name, bodies[j].name) for i, j in candidates}
     every = candidate_pairs(bodies, robot.urdf) if disabled else candidates

@@ -59,7 +59,11 @@ from selfmotion.model.robot.urdf import (
     UrdfJoint as UrdfJoint,
     UrdfPart as UrdfPart,
 )
-from selfmotion.model.robot.urdf_text import Packages as Packages, expand as expand
+from selfmotion.model.robot.urdf_text import (
+    Packages as Packages,
+    expand as expand,
+    is_xacro as is_xacro,
+)
 
 __all__ = [
     "Coordinate",

@@ -26,7 +26,7 @@ from selfmotion.model.robot.mounting import (
 from selfmotion.model.robot.named import NAMED_ARMS, NAMED_PARTS, published, read_named
 from selfmotion.model.robot.pinocchio_model import urdf_text_of
 from selfmotion.model.robot.urdf import Urdf, UrdfPart, read_urdf, urdf_of_file
-from selfmotion.model.robot.urdf_text import Packages, expand
+from selfmotion.model.robot.urdf_text import Packages, expand, is_xacro
 from selfmotion.model.task import as_pose
 
 # Name of a URDF's text in messages.
@@ -323,7 +323,8 @@ def _read_file(
 ) -> Urdf:
     if "://" in given:
         raise RobotError(f"{given}: is an address, expected a file: download it first")
-    if path.suffix == ".xacro":
+    # Some call a file of xacro by what it expands to.
+    if path.suffix == ".xacro" or (path.suffix == ".urdf" and is_xacro(path)):
         near = Packages(path, packages)
         return urdf_of_file(expand(path, arguments, near), near)
     _check_no_arguments(given, arguments)

@@ -230,6 +230,7 @@ def _inside(folder: Path) -> list[Path]:
 # Xacro keeps its state in its modules: one file at a time.
 _alone = threading.Lock()
 _FIND = re.compile(r"\$\(find\s+([^)\s]+)\s*\)")
+_ARGUMENT = re.compile(r"\$\(arg\s+([^)\s]+)\s*\)")
 # Largest depth of included files whose arguments are listed.
 _DEEPEST_INCLUDE = 10
 
@@ -272,6 +273,8 @@ def expand(
                 f"{path}: has no argument '{key}'{nearest(key, declared.defaults)}; {declared}"
             )
     mappings = {key: _text(value) for key, value in arguments.items()}
+    # What <robot> says is looked at before what it holds: its arguments would have no default yet.
+    mappings = {**declared.of_root(path), **mappings}
     try:
         with contextlib.redirect_stderr(io.StringIO()), _finding(packages):
             document = xacro.process_file(str(path), mappings=mappings)
@@ -288,6 +291,18 @@ def expand(
     if not of_others and document.getElementsByTagName("link").length == 0:
         _check_called(path)
     return text
+
+
+def is_xacro(file: Path) -> bool:
+    """Whether a file has elements of xacro, or values that xacro replaces."""
+    try:
+        root = ElementTree.parse(file).getroot()
+    except (OSError, ElementTree.ParseError):
+        return False
+    if any("xacro" in element.tag for element in root.iter() if isinstance(element.tag, str)):
+        return True
+    values = (value for element in root.iter() for value in element.attrib.values())
+    return any("${" in value or "$(" in value for value in values)
 
 
 def _check_called(path: Path) -> None:
@@ -373,8 +388,18 @@ class _Declared:
                 else:
                     self.read(place, depth + 1)
             for text in (*element.attrib.values(), element.text or ""):
-                for name in re.findall(r"\$\(arg\s+([^)\s]+)\s*\)", text):
+                for name in _ARGUMENT.findall(text):
                     self._used[name] = None
+
+    def of_root(self, file: Path) -> dict[str, str]:
+        """Return the plain defaults of those that the root element of a file uses."""
+        try:
+            used = " ".join(ElementTree.parse(file).getroot().attrib.values())
+        except (OSError, ElementTree.ParseError):
+            return {}
+        names = _ARGUMENT.findall(used)
+        known = {name: self._given.get(name) for name in names}
+        return {name: text for name, text in known.items() if text is not None and "$" not in text}
 
     def _place(self, name: str, file: Path) -> Path | None:
         found = _FIND.match(name)

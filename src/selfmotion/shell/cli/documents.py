@@ -50,6 +50,8 @@ class Shell:
     standoff: options.StandoffOption = None
     along: options.AlongOption = None
     lead: options.LeadOption = None
+    tilt: options.TiltOption = None
+    lift: options.LiftOption = None
     rotary: options.RotaryOption = None
     rotary_axes: options.RotaryAxesOption = None
     rotary_center: options.RotaryCenterOption = None
@@ -220,10 +222,12 @@ _ENTRY = re.compile(r"constraints\[\d+\]\.obstacles(\[\d+\])")
 OF_PATH = (
     *("feed", "duration", "jump", "seam", "columns", "flip_normals", "standoff", "rotary"),
     *("rotary_axes", "rotary_center", "unit", "frame", "ramp", "corners", "corner_tolerance"),
-    *("along", "lead"),
+    *("along", "lead", "tilt", "lift"),
 )
 
 
+# How the tool leans from the path, and leaves it to turn.
+_LEANS = ("lead", "tilt", "lift")
 # Starts that have a name, as in problem files.
 _STARTS = ("home", "dexterous", "free")
 # Those that a shape has as well.
@@ -233,7 +237,7 @@ _OF_SHAPE = ("feed", "duration")
 def path_table(file: Path, typed: Mapping[str, Any]) -> dict[str, Any]:
     """Return the table of a path of a file, by the options `OF_PATH` as typed."""
     names = ("seam", "feed", "duration", "jump", "ramp", "standoff", "rotary", "unit")
-    given = {name: typed[name] for name in (*names, "rotary_axes", "along", "lead")}
+    given = {name: typed[name] for name in (*names, "rotary_axes", "along", *_LEANS)}
     given["columns"] = None if typed["columns"] is None else typed["columns"].split(",")
     given["flip_normals"] = typed["flip_normals"] or None
     if typed["rotary_center"] is not None:

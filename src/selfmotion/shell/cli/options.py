@@ -94,6 +94,16 @@ LeadOption = Annotated[
     float | None,
     typer.Option(help="By how much the tool leans towards where it goes, with --along (rad)."),
 ]
+TiltOption = Annotated[
+    float | None,
+    typer.Option(help="By how much it leans to the left of where it goes, with --along (rad)."),
+]
+LiftOption = Annotated[
+    float | None,
+    typer.Option(
+        help="How far the tool leaves corners to turn, with --along and --corners stop (m)."
+    ),
+]
 RotaryOption = Annotated[
     Rotary | None,
     typer.Option(

@@ -129,7 +129,7 @@ _PATH_FILE: _Fields = {
     "flip_normals": (Flag, False),
     "standoff": (Number, None),
     "along": (Text, None),
-    "lead": (Number, None),
+    **dict.fromkeys(("lead", "tilt", "lift"), (Number, None)),
     "rotary": (Text, None),
     "rotary_axes": (Names, None),
     "rotary_center": (Numbers, None),

@@ -54,7 +54,7 @@ OF_PROBLEM = ("path", "task", "costs", "constraints", "relaxations")
 _PLACED = ("file", "frame", "weave", "leads")
 _PACED = (
     *("feed", "duration", "jump", "corners", "tolerance", "corner_angle", "ramp"),
-    *("flip_normals", "standoff", "along", "lead", *READING, *FEED_BOUNDS),
+    *("flip_normals", "standoff", "along", "lead", "tilt", "lift", *READING, *FEED_BOUNDS),
 )
 # What a feed is called that is looked for, how fast it is at most, and where it counts.
 HIGHEST, _OF_FEED = "highest", ("most_feed", "run_up")

@@ -65,6 +65,8 @@ class Pacing:
     standoff: float = 0.0
     along: str | None = None
     lead: float = 0.0
+    tilt: float = 0.0
+    lift: float = 0.0
 
     @property
     def bounds(self) -> dict[str, float]:
@@ -97,8 +99,11 @@ def path_of_rows(path: FilePath, rows: PoseRows, asked: Pacing) -> Path:
         _check_corners(asked)
         if asked.along is not None:
             made = _along(rows, rotations, asked)
-        elif asked.lead:
-            raise PathError("lead has no effect without along (x, -x, y, -y); drop it, or give it")
+        elif asked.lead or asked.tilt or asked.lift:
+            name = next(x for x in ("lead", "tilt", "lift") if getattr(asked, x))
+            raise PathError(
+                f"{name} has no effect without along (x, -x, y, -y); drop it, or give it"
+            )
         elif rows.straight:
             made = _of_cut(rows, turns, asked)
         else:
@@ -292,6 +297,11 @@ def _along(rows: PoseRows, rotations: Array, asked: Pacing) -> Path:
             f"along = '{along}' turns the tool in corners: say corners stop (on the spot, at "
             f"rest) or round (within the tolerance)"
         )
+    if asked.lift and asked.corners != "stop":
+        raise PathError(
+            f"lift has no effect where corners are '{asked.corners}', only where they are 'stop'; "
+            f"drop one"
+        )
     count = len(rows.positions)
     if rows.t is not None or asked.duration is not None:
         raise PathError(f"along = '{along}' is for paths at a feed, without times or a duration")
@@ -303,13 +313,15 @@ def _along(rows: PoseRows, rotations: Array, asked: Pacing) -> Path:
     axes = rotations[:, :, 2] if rows.orientation else np.tile([0.0, 0.0, -1.0], (count, 1))
     rapid = np.zeros(count, dtype=bool) if rows.rapid is None else rows.rapid
     bend = _BEND if asked.corner_angle is None else asked.corner_angle
-    found = stretches_along(rows.positions, axes, rapid, along, asked.lead, bend)
+    found = stretches_along(rows.positions, axes, rapid, along, (asked.lead, asked.tilt), bend)
     pieces: list[_Piece] = []
     for number, (first, last, turns) in enumerate(found):
         if number:
             before = turning(found[number - 1].rotations[-1], turns[0])
-            spot = np.repeat(rows.positions[first : first + 1], len(before), axis=0)
-            pieces.append(_Piece(spot, np.array(before), np.full(len(before), feeds[first]), True))
+            # Of two cuts: a rapid leaves the part by itself.
+            is_lifted = asked.lift > 0.0 and not rapid[found[number - 1].first] and not rapid[first]
+            away = -asked.lift * axes[first] if is_lifted else np.zeros(3)
+            pieces += _turned(rows.positions[first], np.array(before), float(feeds[first]), away)
         part = slice(first, last + 1)
         pieces.append(_Piece(rows.positions[part], turns, feeds[part], bool(rapid[first])))
     if asked.corners == "round":
@@ -324,6 +336,19 @@ def _along(rows: PoseRows, rotations: Array, asked: Pacing) -> Path:
                 steady = _steady(places, own, asked.tolerance)
                 paths.append(_at_feed(legs, legs.pose_times, steady, asked.bounds))
     return paths[0] if len(paths) == 1 else Joined(paths)
+
+
+def _turned(place: Array, turns: Array, feed: float, away: Array) -> list[_Piece]:
+    """Return the turn (K, 3, 3) at a corner: on the spot, or away (3,) from it and back."""
+    spot = _Piece(np.tile(place + away, (len(turns), 1)), turns, np.full(len(turns), feed), True)
+    if not away.any() or not _is_turned(turns):
+        return [spot]
+    ways = (([place, place + away], turns[0]), ([place + away, place], turns[-1]))
+    up, down = (
+        _Piece(np.array(ends), np.array([turn, turn]), np.full(2, feed), True)
+        for ends, turn in ways
+    )
+    return [up, spot, down]
 
 
 def _is_turned(turns: Array) -> bool:

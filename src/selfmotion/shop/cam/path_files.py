@@ -297,6 +297,8 @@ def read_path(
     standoff: float = 0.0,
     along: str | None = None,
     lead: float = 0.0,
+    tilt: float = 0.0,
+    lift: float = 0.0,
     columns: Sequence[str] | str | None = None,
     rotary: str | None = None,
     rotary_axes: Sequence[str] | str | None = None,
@@ -403,6 +405,12 @@ def read_path(
         way.
     lead : float
         By how much its z axis leans towards where it goes then [rad]; below 0 it lags.
+    tilt : float
+        By how much it leans to the left of where it goes, seen from the holder [rad]; below 0 to
+        the right.
+    lift : float
+        How far the tool leaves corners along its own z axis, before `lead` and `tilt`, to turn
+        there and come back [m], with corners "stop". It is lifted at no feed that is judged.
     columns : sequence of str, optional
         Names of the columns of a table or of an array, in place of a header or where there is none;
         "-" leaves one out.
@@ -447,6 +455,8 @@ def read_path(
             "standoff": standoff,
             "along": along,
             "lead": lead,
+            "tilt": tilt,
+            "lift": lift,
         },
     )
     reading = Reading.of(
@@ -487,9 +497,13 @@ def _pacing(path: FilePath, options: Mapping[str, Any]) -> Pacing:
     asked = Pacing(**options)
     as_number(asked.jump, f"{path}: jump", above=0.0, error=FileFormatError)
     as_number(asked.standoff, f"{path}: standoff", error=FileFormatError)
-    lean = as_number(asked.lead, f"{path}: lead", error=FileFormatError)
-    if not abs(lean) < 0.5 * np.pi:
-        raise FileFormatError(f"{path}: lead is {lean:g} rad, expected less than a quarter turn")
+    for name, angle in (("lead", asked.lead), ("tilt", asked.tilt)):
+        lean = as_number(angle, f"{path}: {name}", error=FileFormatError)
+        if not abs(lean) < 0.5 * np.pi:
+            raise FileFormatError(
+                f"{path}: {name} is {lean:g} rad, expected less than a quarter turn"
+            )
+    as_number(asked.lift, f"{path}: lift", least=0.0, error=FileFormatError)
     as_flag(asked.flip_normals, f"{path}: flip_normals", FileFormatError)
     for name, value in (("feed", asked.feed), ("duration", asked.duration)):
         if value is not None:

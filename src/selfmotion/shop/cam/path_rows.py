@@ -1,7 +1,7 @@
 """Rows of poses, as files of several kinds hold them."""
 
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path as FilePath
 from typing import Any
@@ -218,15 +218,25 @@ def no_such_seam(file: FilePath, seam: str, names: Sequence[str]) -> FileFormatE
 
 def read_tables(file: FilePath, reading: Reading | None = None) -> dict[str, PoseRows]:
     """Return the rows of a table by the names in its column ``seam``, "" where it has none."""
+    said = set[str]()
+
+    def called(title: str) -> str:
+        """Return what a title is called here, and remember those that say their unit."""
+        name = named(title)
+        if "[" in title or "(" in title:
+            said.add(name)
+        return name
+
     header, table, lines, texts = read_rows(
         file,
         (SEAM, EVENT),
         check=lambda names: [_meant(file, name) for name in _of_kuka(names)],
         columns=None if reading is None else reading.columns,
-        named=named,
+        named=called,
         usual=_HEADERS,
     )
-    whole = rows_of_table(file, header, table, [f"line {number}" for number in lines], texts)
+    places = [f"line {number}" for number in lines]
+    whole = rows_of_table(file, header, table, places, texts, said)
     if SEAM not in texts:
         return {"": whole}
     if not lines:
@@ -263,13 +273,18 @@ def rows_of_table(
     table: Array,
     places: Sequence[str],
     texts: Mapping[str, Sequence[str]],
+    said: Collection[str] = (),
 ) -> PoseRows:
-    """Return rows of poses of the columns of numbers of a table, and of its texts."""
+    """Return rows of poses of the columns of numbers of a table, and of its texts.
+
+    Of `said` columns the file says the unit, though their names do not.
+    """
     notes: tuple[str, ...] = ()
     if (titles := _of_kuka(header)) != list(header):
         _check_millimetres(file, header, table)
         header, notes = titles, (_KUKA_NOTE,)
     columns = _columns(file, header, table)
+    notes += _unsaid([title for title in header if title not in said])
     events = texts.get(EVENT, [""] * len(places))
     missing = [name for name in _POSITION if name not in columns]
     if missing:
@@ -307,6 +322,29 @@ def rows_of_table(
         tuple((k, event) for k, text in enumerate(events) for event in _several(text)),
         notes=notes,
     )
+
+
+# What columns are taken for that say no unit: words of it, and what says another one.
+_TAKEN = {
+    **dict.fromkeys(_POSITION, ("metres", "x_mm, x_cm, x_in")),
+    "feed": ("m/s", "feed_mm"),
+    **dict.fromkeys(("roll", "pitch", "yaw"), ("radians about fixed axes", "roll_deg")),
+    **dict.fromkeys(_TURN, ("radians", "rx_deg")),
+}
+
+
+def _unsaid(titles: Sequence[str]) -> tuple[str, ...]:
+    """Return a note of columns that say no unit, and of what they are taken for."""
+    bare: dict[tuple[str, str], list[str]] = {}
+    for title in titles:
+        if named(title) in _TAKEN:
+            bare.setdefault(_TAKEN[named(title)], []).append(named(title))
+    if not bare:
+        return ()
+    told = "; ".join(
+        f"{','.join(names)} for {taken} (else: {others})" for (taken, others), names in bare.items()
+    )
+    return (f"columns say no unit and are taken so: {told}",)
 
 
 def _of_kuka(titles: Sequence[str]) -> list[str]:

@@ -26,7 +26,7 @@ class Stretch(NamedTuple):
 
 
 def stretches_along(
-    positions: Array, axes: Array, rapid: Flags, along: str, lead: float, bend: float
+    positions: Array, axes: Array, rapid: Flags, along: str, lean: tuple[float, float], bend: float
 ) -> list[Stretch]:
     """Return the stretches of a path between corners, the tool's axis along it on each.
 
@@ -40,8 +40,8 @@ def stretches_along(
     rapid : (N,)
         Whether the tool goes on from each in a rapid.
     along : {"x", "-x", "y", "-y"}
-    lead : float
-        By how much the z axis leans towards where it goes [rad].
+    lean : (float, float)
+        By how much the z axis leans towards where it goes, and to the left of it [rad].
     bend : float
         Legs that bend by more make a corner [rad].
 
@@ -71,17 +71,20 @@ def stretches_along(
     for first, last in pairwise([0, *corners.tolist(), len(positions) - 1]):
         own = units[first:last]
         ahead = np.concatenate([own[:1], own[:-1] + own[1:], own[-1:]])
-        found.append(Stretch(first, last, _facing(ahead, axes[first : last + 1], along, lead)))
+        found.append(Stretch(first, last, _facing(ahead, axes[first : last + 1], along, lean)))
     return found
 
 
-def _facing(ahead: Array, axes: Array, along: str, lead: float) -> Array:
+def _facing(ahead: Array, axes: Array, along: str, lean: tuple[float, float]) -> Array:
     """Return rotations (K, 3, 3) with z axes, and another axis as far ahead as that allows."""
+    lead, tilt = lean
     column, sign = AXES[along]
     ahead = ahead - np.einsum("kc,kc->k", ahead, axes)[:, None] * axes
     ahead = ahead / np.linalg.norm(ahead, axis=1)[:, None]
     cosine, sine = np.cos(lead), np.sin(lead)
     z, forward = cosine * axes + sine * ahead, cosine * ahead - sine * axes
+    # Seen from the holder, which is where z comes from, forward × z is to the left.
+    z = np.cos(tilt) * z + np.sin(tilt) * np.cross(forward, z)
     one = sign * forward
     other = np.cross(z, one) if column == 0 else np.cross(one, z)
     both = (one, other) if column == 0 else (other, one)
