@@ -269,18 +269,18 @@ _LONGER = re.compile(r": give it ([0-9.e+-]+|inf) times the duration")
 
 
 def with_feeds(
-    told: Sequence[str], feeds: Sequence[FeedReached], findings: Sequence[Finding]
+    said: Sequence[str], feeds: Sequence[FeedReached], findings: Sequence[Finding]
 ) -> tuple[str, ...]:
     """Return findings of an arm that is too slow, of motions at feeds in terms of these.
 
     The first of it says which feed the arm can keep, where that is known.
     """
     if not feeds:
-        return tuple(told)
+        return tuple(said)
     possible = possible_feed(feeds, findings)
     if not possible:
-        return tuple(_LONGER.sub(r": run it \1 times slower", text) for text in told)
-    texts = [_LONGER.sub("", text) for text in told]
+        return tuple(_LONGER.sub(r": run it \1 times slower", text) for text in said)
+    texts = [_LONGER.sub("", text) for text in said]
     return (f"{texts[0]}: {possible}", *texts[1:])
 
 

@@ -113,8 +113,8 @@ class AugmentedFollows(Follows):
         items += [bound(item, item.chain.table, item.task) for item in others]
         alike = virtual.alike(n)
         if alike is not None:
-            still = Dwell(SE3.Identity(), follows.duration)
-            items.append(BoundFollow(TableChain("", alike, dof), still, cast(Task, _Alike())))
+            at_rest = Dwell(SE3.Identity(), follows.duration)
+            items.append(BoundFollow(TableChain("", alike, dof), at_rest, cast(Task, _Alike())))
         return cls(robot, tuple(items), virtual=virtual)
 
     @property

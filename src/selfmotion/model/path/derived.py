@@ -230,8 +230,8 @@ class Retimed(_Derived, kind="retimed"):
             # A time between two intervals belongs to both.
             at = np.isclose(t, pace.t[k], rtol=0.0, atol=_OWN * self.duration)
             # Between two rows with another piece in between nothing is known.
-            apart = replace(item, rows=item.rows + before[k])
-            own = apart.where(~others[k] | (at & ~others[np.maximum(k - 1, 0)]))
+            separate = replace(item, rows=item.rows + before[k])
+            own = separate.where(~others[k] | (at & ~others[np.maximum(k - 1, 0)]))
             found += [own.timed(self.when)] if own else []
         return tuple(found)
 

@@ -322,7 +322,7 @@ def _corrected(
 
 def _nearest_on_axis(frame: pin.SE3, wanted: pin.SE3) -> pin.SE3:
     """Return a frame moved along and turned about its z axis to be nearest to another one."""
-    apart = frame.inverse() * wanted
-    turn = np.arctan2(apart.rotation[1, 0], apart.rotation[0, 0])
-    along = _moved(0.0, 0.0, float(apart.translation[2]))
+    difference = frame.inverse() * wanted
+    turn = np.arctan2(difference.rotation[1, 0], difference.rotation[0, 0])
+    along = _moved(0.0, 0.0, float(difference.translation[2]))
     return frame * along * pin.SE3(pin.rpy.rpyToMatrix(0.0, 0.0, turn), np.zeros(3))

@@ -292,9 +292,9 @@ def _accuracy(context: Context) -> _Answer:
         _, found = optimum(context.problem, tolerance=1e-10, steps=steps)
         fine = finely(context.problem, found.x)
         rows.append(
-            (f"fourth order, {steps} steps", found.cost, fine.cost, _apart(context, fine.q))
+            (f"fourth order, {steps} steps", found.cost, fine.cost, _distances(context, fine.q))
         )
-    moved = _apart(context, finely(context.problem, run.minimum.x).q)
+    moved = _distances(context, finely(context.problem, run.minimum.x).q)
     rows.append(("as published (ode23, 1e-3)", run.minimum.cost, truth, moved))
     table = Table(
         "Sensitivity to integration and quadrature",
@@ -320,7 +320,7 @@ def _accuracy(context: Context) -> _Answer:
     )
 
 
-def _apart(context: Context, q: Array) -> float:
+def _distances(context: Context, q: Array) -> float:
     return float(np.abs(q - context.best.q).max())
 
 

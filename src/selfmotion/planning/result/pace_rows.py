@@ -333,9 +333,11 @@ def _add_quantity(
         value, slope, _ = (x[:, :, None] for x in basis(near.knots, share))
         for direction, most in _directions(*parts):
             found, by_value, by_slope = (_along(direction, x) / limit for x in parts)
-            still = found - by_value * b - by_slope * change
+            constant_part = found - by_value * b - by_slope * change
             own = most * room[:, some]
-            table.add(by_value * value + by_slope * slope, -own - still, own - still)
+            table.add(
+                by_value * value + by_slope * slope, -own - constant_part, own - constant_part
+            )
 
 
 def _parts(

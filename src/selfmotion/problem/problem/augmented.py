@@ -68,9 +68,9 @@ class AugmentedProblem(Problem):
             object.__setattr__(self, "start", read_only(start))
 
     @property
-    def _made(self) -> set[str]:
-        """See `Problem._made`: what is followed is given here."""
-        return super()._made - {"follows"}
+    def _derived(self) -> set[str]:
+        """See `Problem._derived`: what is followed is given here."""
+        return super()._derived - {"follows"}
 
     @property
     @override

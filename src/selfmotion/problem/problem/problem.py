@@ -210,7 +210,7 @@ class Problem:
     def __getstate__(self) -> tuple[dict[str, Any], bool, list[int]]:
         # Derived values are computed anew: placed bodies belong to a thread. The default clearance
         # and limits are identified by object identity.
-        kept = {name: item for name, item in self.__dict__.items() if name not in self._made}
+        kept = {name: item for name, item in self.__dict__.items() if name not in self._derived}
         usual = [
             next((k for k, each in enumerate(KEPT) if each is item), -1)
             for item in self.constraints
@@ -227,7 +227,7 @@ class Problem:
         object.__setattr__(self, "constraints", tuple(items))
 
     @property
-    def _made(self) -> set[str]:
+    def _derived(self) -> set[str]:
         """Names of cached derived values."""
         several = (vars(cls).items() for cls in type(self).__mro__)
         return {
