@@ -12,7 +12,7 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.basics import Array
-from selfmotion.planning.planner.largest_part import _start_guess_of, _Push, _until
+from selfmotion.planning.planner.largest_part import _Push, _start_guess_of, _until
 from support.arms import robot_named, short_line, start_of
 
 

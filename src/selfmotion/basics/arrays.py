@@ -12,8 +12,6 @@ import numpy.typing as npt
 
 from selfmotion.basics.errors import ProblemError
 
-# The array type of the package, arrays that cannot be written to, and numbers per joint.
-
 Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.intp]
 Flags = npt.NDArray[np.bool_]

@@ -1,4 +1,4 @@
-"""How the rows of several tips are stacked: a table for compiled kernels.
+"""Layout of the stacked rows of several tips: a table for compiled kernels.
 
 A layout (F, 9 + n) has, for each of F tips: the kind of its angular error, its first row among all,
 the number of its rows, these rows of [v, ω], and the joints in the order of its chain.

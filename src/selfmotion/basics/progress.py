@@ -21,7 +21,7 @@ to stop the work, as the keyboard does.
 
 
 class _Silent:
-    """Tells nothing; an object, so that signatures show it as `silent`."""
+    """Progress without output; an object, so that signatures show it as `silent`."""
 
     def __call__(self, *obeyed: object) -> None:
         pass

@@ -29,7 +29,7 @@ from selfmotion.certificate.requirement import (
     covered_by,
 )
 from selfmotion.certificate.verdict import Certificate
-from selfmotion.model.follow import BoundFollow, Follow, Follows
+from selfmotion.model.follow import BoundTaskFrame, Follow, Follows
 from selfmotion.model.motion import Trajectory
 from selfmotion.model.path import Path, check_oriented
 from selfmotion.model.robot import RobotModel
@@ -276,7 +276,11 @@ def _cut_short(
 
 
 def _ends_within(
-    item: BoundFollow, trajectory: Trajectory, excess: float, check: PathCheck, tolerance: Tolerance
+    item: BoundTaskFrame,
+    trajectory: Trajectory,
+    excess: float,
+    check: PathCheck,
+    tolerance: Tolerance,
 ) -> bool:
     """Whether the remainder of what lasts longer, path or tip, is within the tolerance."""
     if excess < 0.0:

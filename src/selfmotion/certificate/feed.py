@@ -13,7 +13,7 @@ from selfmotion.basics import Array, Flags, series
 from selfmotion.certificate.bounding import BoundedFunction, Bounds, MotionSegments, bounded
 from selfmotion.certificate.path_error import jacobians, smooth_between
 from selfmotion.certificate.requirement import Finding, FinishedMotion, Requirement
-from selfmotion.model.follow import BoundFollow
+from selfmotion.model.follow import BoundTaskFrame
 from selfmotion.model.path import FeedKept, FeedPossible, Path, path_series
 
 # Relative accuracy of the interpolation of speed margins.
@@ -37,12 +37,12 @@ class FeedReached(Requirement):
     ----------
     found : FeedKept
         The feed that the path itself keeps.
-    follow : BoundFollow
+    follow : BoundTaskFrame
         The tip on that path.
     """
 
     found: FeedKept
-    follow: BoundFollow
+    follow: BoundTaskFrame
     name: str = "feed"
 
     @property
@@ -224,7 +224,7 @@ class _Along(BoundedFunction):
     its majorant allows.
     """
 
-    def __init__(self, follow: BoundFollow, pace: _OwnPace) -> None:
+    def __init__(self, follow: BoundTaskFrame, pace: _OwnPace) -> None:
         self._follow, self._pace = follow, pace
         self.blocks = self.of = np.zeros(1, dtype=np.intp)
         self.allowed, self.wanted = np.ones(1), np.full(1, _FINE)

@@ -10,18 +10,16 @@ from typing_extensions import override
 from selfmotion.basics import Array, ProblemError, Progress, series, silent
 from selfmotion.certificate.bounding import BoundedFunction, MotionSegments, bounded
 from selfmotion.certificate.requirement import Extreme, Tolerance
-from selfmotion.model.follow import BoundFollow, Follows
+from selfmotion.model.follow import BoundTaskFrame, Follows
 from selfmotion.model.motion import Trajectory
 from selfmotion.model.path import Path, path_series
 from selfmotion.model.robot import WORLD, Chain, RobotModel
 from selfmotion.model.task import Relaxation, Task
 
-# Where a motion takes the tool, by forward kinematics; shares no code with the rollout.
-
 _AXES = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 
 
-def deviation_from(follow: BoundFollow, t: Array, q: Array, in_tool_axes: bool) -> Array:
+def deviation_from(follow: BoundTaskFrame, t: Array, q: Array, in_tool_axes: bool) -> Array:
     """Return the deviation of the tool from the path, (K, 6).
 
     Rows x, y, z [m] and rx, ry, rz [rad] as `Relaxation` has them; zero where the task leaves them
@@ -211,7 +209,7 @@ class PathCheck:
 
 def bound_errors(
     robot: RobotModel,
-    follow: BoundFollow,
+    follow: BoundTaskFrame,
     trajectory: Trajectory,
     tolerance: Tolerance,
     relaxations: Sequence[Relaxation],
@@ -236,14 +234,16 @@ def bound_errors(
 
 
 def errors_between(
-    follow: BoundFollow, trajectory: Trajectory, relaxations: Sequence[Relaxation]
+    follow: BoundTaskFrame, trajectory: Trajectory, relaxations: Sequence[Relaxation]
 ) -> Array:
     """Return the errors in the middle between samples, (N, 2) [m, rad]: for planners, no proof."""
     t = 0.5 * (trajectory.t[:-1] + trajectory.t[1:])
     return errors_at(follow, t, trajectory(t), relaxations)
 
 
-def errors_at(follow: BoundFollow, t: Array, q: Array, relaxations: Sequence[Relaxation]) -> Array:
+def errors_at(
+    follow: BoundTaskFrame, t: Array, q: Array, relaxations: Sequence[Relaxation]
+) -> Array:
     """Return the errors beyond relaxations at q (K, n), at times t (K,) [s], (K, 2) [m, rad]."""
     in_tool_axes = any(item.in_tool_axes for item in relaxations)
     deviation_rows = deviation_from(follow, t, q, in_tool_axes)
@@ -286,7 +286,7 @@ class _PathErrors(BoundedFunction):
     """
 
     def __init__(
-        self, follow: BoundFollow, tolerance: Tolerance, relaxations: Sequence[Relaxation]
+        self, follow: BoundTaskFrame, tolerance: Tolerance, relaxations: Sequence[Relaxation]
     ) -> None:
         self._chain, self._relaxations = follow.chain, relaxations
         self._path, self._task = follow.path, follow.task

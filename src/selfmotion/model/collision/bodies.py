@@ -234,7 +234,7 @@ class _Tree:
         return float(reach + _from_line(np.zeros((1, 3)), origin, axis))
 
     def _beyond(self, points: Array, down: list[int], origin: Array, axis: Array) -> float:
-        """Return the same where only the joints `down` are between the axis' frame and the body."""
+        """Return the same bound with the joints `down` alone between axis' frame and body."""
         if not down:
             return _from_line(points, origin, axis)
         reach = _farthest(points) + self._lengths(down[1:]) + self._far(down)

@@ -24,8 +24,6 @@ from selfmotion.model.path.feed_kept import FeedKept
 from selfmotion.model.path.pace import Pace, times_when
 from selfmotion.model.task import SE3
 
-# A tool motion given in a frame of its own, such as that of the workpiece.
-
 
 class Placed(_InStep, kind="placed"):
     """A path in a frame that stands somewhere in the world.

@@ -27,8 +27,6 @@ from selfmotion.model.path.feed_kept import FeedKept
 from selfmotion.model.path.feed_nodes import FeedNodes, twist_sizes
 from selfmotion.model.path.pace import Pace, times_when
 
-# A path at a constant feed.
-
 # Faster feeds [m/s] are errors of units.
 _FASTEST = 3.0
 

@@ -20,8 +20,8 @@ _SAME = 1e-3
 class FeedKept:
     """Errors of one of the feeds of a `Feed`, in its intervals.
 
-    Stretches count but for run-up and run-down, rounded corners, and turning on the spot; each has
-    to reach it.
+    Intervals count but for run-up, run-down, rounded corners, and turning on the spot; each has to
+    reach it.
 
     Attributes
     ----------

@@ -75,7 +75,7 @@ def with_leads(
     Parameters
     ----------
     path : Path
-        Begins and ends at rest.
+        Starts and ends at rest.
     length : float
         Of each lead [m].
     duration : float

@@ -31,9 +31,8 @@ if TYPE_CHECKING:
 # Poses that a polyline can do without: those that its legs pass within a tolerance.
 #
 # By the algorithm of Ramer (1972), Douglas and Peucker (1973): a leg from the first pose to the
-# last is divided at the pose that it misses by most, until it misses none by more than the
-# tolerance. A pose from which the tool goes back along the leg, or that is turned otherwise,
-# divides it as well.
+# last is divided at its farthest pose, until none is farther than the tolerance. A pose from which
+# the tool goes back along the leg, or that is turned otherwise, divides it as well.
 
 # Share of the tolerances by which legs may be off poses: rounding of files.
 _ROUNDING = 2e-3

@@ -24,8 +24,6 @@ from selfmotion.model.path.base import (
 )
 from selfmotion.model.task import SE3, log3
 
-# How fast a line or circle is run through.
-
 # Minimum jerk's coefficients of 1, τ, τ² …
 _JERK = (0.0, 0.0, 0.0, 10.0, -15.0, 6.0)
 

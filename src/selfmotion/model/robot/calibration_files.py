@@ -206,7 +206,7 @@ class _Lengths(NamedTuple):
 def maker_placements(
     joints: Sequence[UrdfAxis], tool: pin.SE3, calibration: CalibrationFile
 ) -> list[pin.SE3]:
-    """Return where a calibration puts the six joints of a URDF, each in its parent link.
+    """Return the placements of a URDF's six joints by a calibration, each in its parent link.
 
     Parameters
     ----------

@@ -24,8 +24,6 @@ from selfmotion.model.task import Task, as_pose
 if TYPE_CHECKING:
     from selfmotion.model.robot.model import RobotModel
 
-# Configurations as they are given: n numbers, or K rows of them.
-
 
 def as_configuration(robot: RobotModel, q: npt.ArrayLike) -> Array:
     """Return `q` as finite numbers (n,); see `RobotModel.configuration`."""

@@ -22,8 +22,6 @@ from selfmotion.problem.problem import Problem, check_problem
 if TYPE_CHECKING:
     from scipy.integrate import OdeSolution
 
-# Integrates joint velocity fields q̇(t, q) along a path, by error control instead of a grid.
-
 Rate = Callable[[float, Array], Array]
 
 # Tolerance of the integrator: far below a certificate's.

@@ -27,8 +27,6 @@ from selfmotion.planning.planner import plan
 from selfmotion.planning.result import Plan
 from selfmotion.problem.problem import Problem, sample_problem
 
-# The cause of the 'surging' of F against iterations: local minima or conditioning.
-
 # A surge: after the first two iterations, a drop of more than this many times the one before …
 _FACTOR = 2.0
 # … and above this share of F.

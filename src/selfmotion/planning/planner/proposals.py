@@ -419,7 +419,7 @@ def _optimise(planner: Planner, posture: Array, ended: Status | None) -> None:
 
 
 def _postures(planner: Planner) -> tuple[list[Array], Status | None]:
-    """Return mean configurations (n,) of the best motions along a stretch in the middle.
+    """Return mean configurations (n,) of the best motions along a segment in the middle.
 
     And what ended the search for them, if the user did.
     """
@@ -454,7 +454,7 @@ def _postures(planner: Planner) -> tuple[list[Array], Status | None]:
 def _near(polisher: Polisher, problem: Problem, start: Array, posture: Array) -> NodeMotion | None:
     """Return the motion from a start (n,) that goes to a posture (n,) by self-motion.
 
-    On the coarsest nodes on which it costs what it does; None where there is none.
+    On the coarsest nodes with about its cost; None without any.
     """
     # As long as it takes the tool to go as far as the arm reaches.
     time = problem.path.duration / problem.length_in_reaches

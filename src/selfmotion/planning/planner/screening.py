@@ -414,7 +414,7 @@ def most_promising(
         The motions from them, at few times t (N,) [s].
     arrived : (K,)
         Mask of those that follow the path to its end.
-    apart : callable
+    distance : callable
         Distance of motions.
     """
     merits = np.full(len(starts), np.inf)
@@ -429,7 +429,7 @@ def most_promising(
 
 
 def _merit(problem: Problem, q: Array, twists: Array, sampling: Sampling) -> float:
-    """Return what a motion q (N, n) along the path costs, and more where it violates something.
+    """Return the cost of a motion q (N, n) along the path, with a penalty of violations.
 
     `twists` (N, m) are those of the path at the grid's nodes, which are the samples.
     """

@@ -84,7 +84,7 @@ def _outcome(planner: Planner) -> tuple[str, float | None]:
 
 
 def _look_first(planner: Planner) -> bool:
-    """Look whether the arm can be at some single poses at all, where nothing is known yet."""
+    """Check whether the arm can reach some single poses, before anything is known."""
     if not planner.is_free or planner.has_motion:
         return False
     blocked = planner.blocked = _looked_at(planner.problem, planner.search)
@@ -372,7 +372,7 @@ def _passing(blocked: Obstruction) -> str:
 
 # Names as in reports; each function returns whether it was tried.
 STEPS: tuple[tuple[str, Callable[[Planner], bool]], ...] = (
-    # Look: a 'no' before anything is planned.
+    # Single poses first: a failure before anything is planned.
     ("look at single poses", _look_first),
     ("part before a pose out of reach", _plan_before_blocked_pose),
     # Propose and polish until one suffices.

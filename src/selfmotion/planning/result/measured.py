@@ -18,8 +18,6 @@ from selfmotion.planning.result.pace_rows import PaceLimits
 from selfmotion.problem.costs import Cost, PlacedLater, Samples
 from selfmotion.problem.problem import Problem
 
-# Which limits a motion uses, and for how long: whether it could be faster.
-
 # Share of a limit from which on it is fully used.
 FULLY = 0.95
 # Times per sample of the motion that are evaluated …

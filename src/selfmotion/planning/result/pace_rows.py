@@ -11,8 +11,6 @@ from selfmotion.model.motion import Trajectory
 from selfmotion.model.path import Pace
 from selfmotion.planning.optimise import BandedRows
 
-# Quadratic splines over a pace's own time, so that accelerations do not jump.
-
 
 @dataclass(frozen=True, eq=False)
 class Squares:
@@ -260,7 +258,7 @@ def rows_of(
     room: Sequence[Array],
     near: Squares,
 ) -> BandedRows:
-    """Return what limits allow of b, a spline over the same knots as one that it is near.
+    """Return the limits of b as rows, for a spline over the same knots as a near one.
 
     Parameters
     ----------

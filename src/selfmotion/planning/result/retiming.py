@@ -137,7 +137,7 @@ def retime(
 
 
 def is_retimed(plan: Plan) -> bool:
-    """Whether a plan's pace is that of `retime`: as fast as limits allow, and nobody's time."""
+    """Whether a plan's pace is that of `retime`: as fast as limits allow, not a given one."""
     pace = plan.path.pace if isinstance(plan.path, Retimed) else None
     return pace is not None and np.array_equal(pace.t, plan.trajectory.t)
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from selfmotion.basics import Array
 from selfmotion.model.collision import Closest, how_near
-from selfmotion.model.follow import AugmentedFollows
+from selfmotion.model.follow import AugmentedTaskFrames
 from selfmotion.model.path import edges_of, spread_along
 from selfmotion.model.task import POSITION_ROWS, ROW_NAMES, Relaxation
 from selfmotion.planning.search.single_poses import CLIMBERS, MOST_EVALUATED, Found, SinglePoses
@@ -106,7 +106,7 @@ def least_deviation(poses: SinglePoses, t: float, rows: tuple[str, ...]) -> Arra
         if not set(item.rows) <= set(rows)
     )
     wider, n = poses.of(replace(asked, relaxations=(*others, more))), asked.robot.dof
-    follows = cast(AugmentedFollows, wider.problem.follows)
+    follows = cast(AugmentedTaskFrames, wider.problem.follows)
     q = poses.some(t, CLIMBERS)[:, :n]
     q = np.hstack([q, np.zeros((len(q), follows.robot.dof - n))])
     best: Array | None = None

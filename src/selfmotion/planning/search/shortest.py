@@ -60,7 +60,7 @@ _FINE_SIDE = 4
 
 
 class Shortest:
-    """Looks for the shortest chains near others, on the same waypoints.
+    """Local search for the shortest chains near others, on the same waypoints.
 
     Parameters
     ----------

@@ -5,7 +5,7 @@ initial guess for Newton's method: a torch that leans does not become upright by
 table has to turn once round for that. Here a condition about to be violated is a row of the task
 while it binds,
 
-    q̇ = W⁻¹Aᵀ(A W⁻¹Aᵀ)⁻¹ [ẋ; ḣ],   A = [J; ∂h/∂q of what binds],
+    q̇ = W⁻¹Aᵀ(A W⁻¹Aᵀ)⁻¹ [ẋ; ḣ],   A = [J; ∂h/∂q of binding conditions],
 
 with a metric W by which some joints are heavy: of all distributions of a motion among the parts of
 a cell, the one in which these move least.

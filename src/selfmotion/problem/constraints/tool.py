@@ -13,8 +13,6 @@ from selfmotion.certificate import Column, MotionSegments, Quantity
 from selfmotion.model.robot import RobotModel, ToolRates
 from selfmotion.problem.constraints.base import Constraint, Envelope, check_changes
 
-# Limits of how fast the tool moves and accelerates.
-
 # Limited rates of the tool, as in [v, ω] and [dv/dt, dω/dt], and their units.
 TOOL_RATES = (
     ("speed", "m/s"),

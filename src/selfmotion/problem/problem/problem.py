@@ -81,7 +81,7 @@ class _TaskField:
     """A task that may be given by its name."""
 
     def __get__(self, problem: Any, owner: Any = None) -> Task:
-        # Asked of the class, it is the default.
+        # On the class, the descriptor gives the default.
         return Task.POSE if problem is None else problem.__dict__["_task"]
 
     def __set__(self, problem: Any, task: Task | str) -> None:
@@ -122,7 +122,7 @@ class Problem:
         default its links must not overlap, where its URDF has bodies and no constraint is a
         `Clearance`. None to leave that out; the verdict then says so.
     rest : bool
-        Whether the arm is at rest where the path begins or ends at rest, which a controller asks
+        Whether the arm is at rest where the path starts or ends at rest, which a controller needs,
         for, unless a constraint says how fast it is there: the null motion then vanishes, and its
         derivative too where the tool does not accelerate either. The paper's does not.
     also : sequence of Follow

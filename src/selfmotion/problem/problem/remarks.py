@@ -22,8 +22,6 @@ from selfmotion.problem.constraints import (
 )
 from selfmotion.problem.problem.fit import KEPT
 
-# A path that goes through obstacles, which nothing notices where the tool has no body.
-
 # Samples of a path.
 _SAMPLES = 101
 # Depth in a workpiece up to which no note is made [m].
