@@ -211,7 +211,7 @@ def test_a_part_before_a_window_has_none_of_its_joints(panda: sm.RobotModel) -> 
     # What was begun with on a longer part is cut to the joints that are left.
     whole = dataclasses.replace(problem, relaxations=[late]).augmented
     part, push = _until(whole, 2.0), _Push(np.ones(8))
-    failed: Any = SimpleNamespace(problem=whole, begin=(whole.given_start, push))
+    failed: Any = SimpleNamespace(problem=whole, start_guess=(whole.given_start, push))
     first, guide = _start_guess_of(part, failed)
     np.testing.assert_array_equal(first, start)
     assert guide is not None

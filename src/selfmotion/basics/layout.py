@@ -13,15 +13,21 @@ from selfmotion.basics.arrays import Ints
 
 Layout = npt.NDArray[np.int64]
 
-# Kinds of angular errors of a task.
+# Kind of a task without angular error.
 NO_ANGLE = 0
+# Kind of a task whose angular error is the logarithm on SO(3).
 LOGARITHM = 1
+# Kind of a task whose angular error is that of the z axis.
 POINTING = 2
-# Columns of a layout.
+# Column of the kind.
 KIND = 0
+# Column of the first row.
 FIRST = 1
+# Column of the number of rows.
 COUNT = 2
+# First column of the rows.
 ROWS = 3
+# First column of the joints.
 ORDER = 9
 
 

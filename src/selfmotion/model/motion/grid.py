@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from selfmotion.basics import Array, read_only
 
+# Nodes in a finite-difference stencil.
 _STENCIL = 5
 
 

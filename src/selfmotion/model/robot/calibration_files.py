@@ -180,6 +180,7 @@ JOINTS = (
 )
 # Difference of axes of a URDF from the maker's that counts as rounding [m, rad].
 _ALIKE = 1e-6
+# A quarter turn [rad].
 _QUARTER = 0.5 * np.pi
 # α of the maker's Denavit-Hartenberg parameters.
 _ALPHA = (_QUARTER, 0.0, 0.0, _QUARTER, -_QUARTER, 0.0)

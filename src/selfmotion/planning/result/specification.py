@@ -247,8 +247,9 @@ def keeps_as_far(item: Constraint, apart: Clearance) -> bool:
 
 # Largest gap between the end of one motion and the start of the next, from rounding [rad or m].
 _JOINED = 1e-9
-# Index of the first and the last sample.
+# Index of the first sample.
 _START = 0
+# Index of the last sample.
 _END = -1
 # Order of derivative up to which rest is required.
 _SMOOTH = 2
