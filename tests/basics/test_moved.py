@@ -4,7 +4,7 @@ from importlib import import_module
 
 import pytest
 
-from selfmotion.basics.moved import MOVED
+from selfmotion.basics.moved import MOVED, MOVED_MODULES
 
 
 @pytest.mark.parametrize("old", sorted(set(MOVED) - {"problem", "planning", "paper"}))
@@ -24,6 +24,14 @@ def test_modules_of_packages_that_have_moved_say_where_they_are() -> None:
         with pytest.raises(ModuleNotFoundError, match=f"is selfmotion.{now} now$"):
             import_module(f"selfmotion.{old}")
         import_module(f"selfmotion.{now}")
+
+
+@pytest.mark.parametrize("old", sorted(MOVED_MODULES))
+def test_a_module_that_has_another_name_says_which(old: str) -> None:
+    now = f"selfmotion.{MOVED_MODULES[old]}"
+    assert import_module(now)
+    with pytest.raises(ModuleNotFoundError, match=f"selfmotion.{old} is {now} now"):
+        import_module(f"selfmotion.{old}")
 
 
 def test_what_never_was_there_is_not_said_to_have_moved() -> None:

@@ -11,7 +11,7 @@ from selfmotion.certificate import MotionSegments
 from selfmotion.certificate.bounding import BoundedFunction, _measured
 from selfmotion.certificate.path_error import _PathErrors
 from selfmotion.certificate.quantity import Shares
-from selfmotion.model.follow import BoundFollow
+from selfmotion.model.follow import BoundTaskFrame
 from selfmotion.shell.testing.constraints import check_majorants
 from support.arms import robot_named
 from support.two_arms import baxter_with_both_arms
@@ -52,7 +52,7 @@ def kinds(robot: sm.RobotModel, motion: sm.Trajectory) -> dict[str, BoundedFunct
     path = sm.paths.Circle.around(pose, 0.1, float(motion.t[-1]), turns=0.05, turn_tool=True)
     free = (sm.Relaxation("rz", 0.1), sm.Relaxation(("x", "y"), 1e-2, axes="tool"))
     given, pointing = sm.Tolerance(), sm.Task.POINTING
-    follow = BoundFollow(robot.chain, path, sm.Task.POSE)
+    follow = BoundTaskFrame(robot.chain, path, sm.Task.POSE)
     if robot.reference is not None:
         limits = sm.constraints.ToolLimits(1.0, 1.0, 10.0, 10.0)
         return {
@@ -138,7 +138,7 @@ def test_majorants_follow_a_path_that_turns(axes: str, angular: bool) -> None:
     robot = robot_named("panda")
     motion, path = standing(robot)
     rows = [sm.Relaxation("x", 0.1, axes=axes)] + [sm.Relaxation("rz", 0.1)] * angular
-    follow = BoundFollow(robot.chain, path, sm.Task.POSE)
+    follow = BoundTaskFrame(robot.chain, path, sm.Task.POSE)
     segments = MotionSegments(robot, motion, np.stack([motion.t[:-1], motion.t[1:]], axis=1))
     check_majorants(_PathErrors(follow, sm.Tolerance(), rows), segments)
 

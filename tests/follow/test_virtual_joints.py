@@ -10,7 +10,7 @@ import pytest
 import selfmotion as sm
 from selfmotion.basics import Array
 from selfmotion.certificate.path_error import deviation_from
-from selfmotion.model.follow import AugmentedFollows, Follows
+from selfmotion.model.follow import AugmentedTaskFrames, Follows
 from selfmotion.model.motion import Sampling
 from selfmotion.problem.constraints import NodeTangents
 from selfmotion.problem.costs import Samples
@@ -55,7 +55,7 @@ def test_the_tool_deviates_in_what_is_relaxed_and_by_what_the_joints_say(
 ) -> None:
     robot, rng = robot_named(name), np.random.default_rng(1)
     real = Follows.of(robot, sm.paths.Dwell(pin.SE3.Identity(), 1.0), task)
-    follows = AugmentedFollows.with_tolerances(real, relaxations)
+    follows = AugmentedTaskFrames.with_tolerances(real, relaxations)
     virtual, n = follows.virtual, robot.dof
     lower, upper = robot.finite_limits()
     for _ in range(3):
@@ -90,7 +90,7 @@ def test_joints_stand_still_outside_of_windows() -> None:
     robot = robot_named("panda")
     path = sm.paths.Dwell(robot.pose(PANDA_HOME), 4.0)
     windows = [R("x", 0.1, during=(0.0, 2.0)), R(("rx", "ry"), 0.2, during=(1.0, 4.0)), R("z", 0.1)]
-    follows = AugmentedFollows.with_tolerances(Follows.of(robot, path, "pose"), windows)
+    follows = AugmentedTaskFrames.with_tolerances(Follows.of(robot, path, "pose"), windows)
     names = follows.robot.joint_names[7:]
     held = follows.held(np.array([0.0, 1.0, 1.5, 2.0, 4.0]))[:, 7:]
     told = [{name for name, still in zip(names, row, strict=True) if still} for row in held]
@@ -177,7 +177,7 @@ def test_what_is_said_of_a_band_is_the_deviation_in_its_unit(
     start = robot.dexterous_configuration(task)
     path = sm.paths.Dwell(robot.pose(start), 4.0)
     problem = sm.Problem(robot, path, task, relaxations=relaxations, clearance=None).augmented
-    follows = AugmentedFollows.with_tolerances(Follows.of(robot, path, task), relaxations)
+    follows = AugmentedTaskFrames.with_tolerances(Follows.of(robot, path, task), relaxations)
     virtual, n = follows.virtual, robot.dof
     sampling = Sampling.trapezoidal(np.linspace(0.0, 4.0, 5))
     said = 0
@@ -261,7 +261,7 @@ def test_what_is_brought_within_bands_deviates_by_no_more(relaxations: list[sm.R
     """Of tolerances of several rows; what is within them may stay where it is."""
     robot = robot_named("panda")
     real = Follows.of(robot, sm.paths.Dwell(pin.SE3.Identity(), 1.0), "pose")
-    follows = AugmentedFollows.with_tolerances(real, relaxations)
+    follows = AugmentedTaskFrames.with_tolerances(real, relaxations)
     count = len(follows.virtual.each)
     q = np.zeros((40, robot.dof + count))
     bands = [follows.virtual.widest([joint.row]) / joint.scale for joint in follows.virtual.each]

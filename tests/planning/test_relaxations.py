@@ -12,7 +12,7 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.basics import Array
-from selfmotion.planning.planner.largest_part import _begin_of, _Push, _until
+from selfmotion.planning.planner.largest_part import _Push, _start_guess_of, _until
 from support.arms import robot_named, short_line, start_of
 
 
@@ -211,8 +211,8 @@ def test_a_part_before_a_window_has_none_of_its_joints(panda: sm.RobotModel) -> 
     # What was begun with on a longer part is cut to the joints that are left.
     whole = dataclasses.replace(problem, relaxations=[late]).augmented
     part, push = _until(whole, 2.0), _Push(np.ones(8))
-    failed: Any = SimpleNamespace(problem=whole, begin=(whole.given_start, push))
-    first, guide = _begin_of(part, failed)
+    failed: Any = SimpleNamespace(problem=whole, start_guess=(whole.given_start, push))
+    first, guide = _start_guess_of(part, failed)
     np.testing.assert_array_equal(first, start)
     assert guide is not None
     np.testing.assert_array_equal(guide(np.zeros(2)), np.ones((2, 7)))

@@ -8,7 +8,7 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.model.task import SE3
-from selfmotion.planning.result import MotionSpecification, Piece, gaps
+from selfmotion.planning.result import CheckedMotion, MotionSpecification, gaps
 from selfmotion.planning.result.specification import same_path
 from support.arms import robot_named
 
@@ -223,13 +223,13 @@ def test_motions_are_in_the_robots_order_of_joints(plan: sm.Plan, tmp_path: Path
 
 def test_gaps_are_told_with_joint_amount_unit_and_what_is_allowed(plan: sm.Plan) -> None:
     robot, motion = plan.robot, plan.trajectory
-    whole = Piece("'one'", motion)
+    whole = CheckedMotion("'one'", motion)
 
-    def moved(**changes) -> Piece:
-        return Piece("'other'", replace(motion, **changes))
+    def moved(**changes) -> CheckedMotion:
+        return CheckedMotion("'other'", replace(motion, **changes))
 
     back = replace(motion, q=motion.q[::-1], qd=-motion.qd[::-1], qdd=np.array(motion.qdd)[::-1])
-    assert not list(gaps(robot, [whole, Piece("'back'", back)]))
+    assert not list(gaps(robot, [whole, CheckedMotion("'back'", back)]))
     rate = np.array(back.qd)
     rate[0, 1] = 2e-6
     push = np.array(back.qdd)
@@ -241,9 +241,9 @@ def test_gaps_are_told_with_joint_amount_unit_and_what_is_allowed(plan: sm.Plan)
     ):
         assert said in "; ".join(gaps(robot, [whole, piece]))
     # Between its samples a cubic among quintics would be another motion.
-    cubic = Piece("'other'", replace(back, qdd=None))
+    cubic = CheckedMotion("'other'", replace(back, qdd=None))
     assert "'other' states no accelerations" in "; ".join(gaps(robot, [whole, cubic]))
-    assert not list(gaps(robot, [cubic, Piece("'one'", replace(motion, qdd=None))]))
+    assert not list(gaps(robot, [cubic, CheckedMotion("'one'", replace(motion, qdd=None))]))
     # But where the tool's own motion accelerates.
     pushed = replace(motion, q=back.q, qd=back.qd, qdd=push)
-    assert not list(gaps(robot, [whole, Piece("'feed'", pushed, (True, True))]))
+    assert not list(gaps(robot, [whole, CheckedMotion("'feed'", pushed, (True, True))]))

@@ -83,7 +83,7 @@ def test_a_pose_out_of_reach_is_named_with_the_way_back(far: float) -> None:
     found = looked(sm.Problem(planar, beyond(far), "planar"))
     assert found is not None
     assert (found.time, found.is_met) == (5.0, False)
-    assert found.misses[0] == pytest.approx(far, rel=1e-3)
+    assert found.errors[0] == pytest.approx(far, rel=1e-3)
     assert f"misses it by {1e3 * far:.3g} mm" in found.reason
     assert "stretched" in found.reason
     shift = nearest_place(found.poses, found.times)

@@ -6,7 +6,7 @@ from scipy.optimize import minimize
 import selfmotion as sm
 from selfmotion.basics import Array
 from selfmotion.model.motion import Grid
-from selfmotion.planning.paper import Objective, MinimumNormMotion
+from selfmotion.planning.paper import MinimumNormMotion, Objective
 
 # Conditions that come this near to being broken by x = 0 are asked for.
 NEAR = -0.6
@@ -17,9 +17,9 @@ def best_spline(problem: sm.Problem, intervals: int = 16, steps: int = 64) -> fl
     problem = problem.changed(null_motion=sm.motion.BSplineNullMotion(intervals))
     start = problem.given_start
     assert start is not None
-    still = MinimumNormMotion.on(problem, start, Grid.aligned(problem.knots, steps))
-    objective = Objective.of(problem, still)
-    bound = problem.bind_constraints(still.start, still.end)
+    minimum_norm = MinimumNormMotion.on(problem, start, Grid.aligned(problem.knots, steps))
+    objective = Objective.of(problem, minimum_norm)
+    bound = problem.bind_constraints(minimum_norm.start, minimum_norm.end)
     x0 = np.zeros(objective.size)
     near = [np.flatnonzero(item.residual(objective.samples(x0)).ravel() > NEAR) for item in bound]
 

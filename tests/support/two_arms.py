@@ -6,7 +6,7 @@ import numpy as np
 
 import selfmotion as sm
 from selfmotion.basics import Array
-from selfmotion.model.follow import BoundFollow, Follows
+from selfmotion.model.follow import BoundTaskFrame, Follows
 
 LEFT, RIGHT = "left_gripper", "right_gripper"
 
@@ -25,5 +25,7 @@ def both_arms(left: str, right: str) -> tuple[Follows, Array]:
     items = []
     for tool, reference, task in ((LEFT, None, left), (RIGHT, LEFT, right)):
         chain = robot.chain_to(tool, reference)
-        items.append(BoundFollow(chain, sm.paths.Dwell(chain.place(start), 1.0), sm.Task.of(task)))
+        items.append(
+            BoundTaskFrame(chain, sm.paths.Dwell(chain.place(start), 1.0), sm.Task.of(task))
+        )
     return Follows(robot, tuple(items)), np.array(start)

@@ -12,8 +12,6 @@ import numpy.typing as npt
 
 from selfmotion.basics.errors import ProblemError
 
-# The array type of the package, arrays that cannot be written to, and numbers per joint.
-
 Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.intp]
 Flags = npt.NDArray[np.bool_]
@@ -146,7 +144,7 @@ def as_number(
     if not (above < number <= most and number >= least):
         asked = {f"> {above:g}": np.isfinite(above), f"≥ {least:g}": np.isfinite(least)}
         asked[f"≤ {most:g}"] = np.isfinite(number) and number > most
-        bounds = [bound for bound, told in asked.items() if told]
+        bounds = [bound for bound, said in asked.items() if said]
         kind = "number" if bounds and number != np.inf else "finite number"
         expected = " ".join(["a", kind, " and ".join(bounds)]).strip()
         raise error(f"{what} is {shown(value)}, expected {expected}")

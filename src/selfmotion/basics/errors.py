@@ -4,8 +4,6 @@ import re
 from collections.abc import Iterable
 from difflib import get_close_matches
 
-# Names that were probably meant.
-
 
 def nearest(name: str, names: Iterable[str], alike: float = 0.5) -> str:
     """Return "; nearest: 'a', 'b'" with the names that are like `name`, "" where none is."""
@@ -177,7 +175,7 @@ class NoSequenceError(SelfmotionError):
 
 
 class FileFormatError(SelfmotionError):
-    """A file that is not what it should be; the message names the file and the row or key."""
+    """An invalid file; the message names the file and the row or key."""
 
 
 class RenderError(SelfmotionError):
@@ -185,4 +183,4 @@ class RenderError(SelfmotionError):
 
 
 class PlanError(SelfmotionError):
-    """A plan without the quality asked for; raised by `Plan.require`."""
+    """A plan below the required quality; raised by `Plan.require`."""

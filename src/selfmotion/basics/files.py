@@ -21,8 +21,6 @@ import numpy as np
 from selfmotion.basics.arrays import Array, shown
 from selfmotion.basics.errors import FileFormatError
 
-# Archives and tables on disk: written atomically, read with errors that name the place.
-
 _DESCRIPTION = "description"
 # Suffixes of files with several plans.
 _OF_MANY = (".program", ".parts")

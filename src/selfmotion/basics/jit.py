@@ -79,7 +79,7 @@ _spent, _waited = _Spent(time.process_time), _Spent(time.monotonic)
 def seconds_of_kernels() -> float:
     """Return the processor time [s] of this process for compiling and loading kernels.
 
-    Who limits work by the processor's time leaves that out: it comes once.
+    Limits of processor time leave it out: it occurs once.
     """
     return _spent.seconds
 
@@ -112,7 +112,7 @@ class _Announcement(event.Listener):  # type: ignore[misc]  # numba ships no typ
             sys.stderr.flush()
             other = companion(FIRST_WORKS)
             if other is not None:
-                # Who ends is waited for, by nobody else.
+                # Nobody else waits for the process that ends.
                 threading.Thread(target=other.communicate, daemon=True).start()
 
     def on_end(self, event: Any) -> None:

@@ -1,4 +1,4 @@
-"""How the rows of several tips are stacked: a table for compiled kernels.
+"""Layout of the stacked rows of several tips: a table for compiled kernels.
 
 A layout (F, 9 + n) has, for each of F tips: the kind of its angular error, its first row among all,
 the number of its rows, these rows of [v, ω], and the joints in the order of its chain.
@@ -13,15 +13,21 @@ from selfmotion.basics.arrays import Ints
 
 Layout = npt.NDArray[np.int64]
 
-# Kinds of angular errors of a task.
+# Kind of a task without angular error.
 NO_ANGLE = 0
+# Kind of a task whose angular error is the logarithm on SO(3).
 LOGARITHM = 1
+# Kind of a task whose angular error is that of the z axis.
 POINTING = 2
-# Columns of a layout.
+# Column of the kind.
 KIND = 0
+# Column of the first row.
 FIRST = 1
+# Column of the number of rows.
 COUNT = 2
+# First column of the rows.
 ROWS = 3
+# First column of the joints.
 ORDER = 9
 
 

@@ -26,6 +26,14 @@ MOVED = {
     "transfer": "planning.transfer",
     "warm": "realtime.warm",
 }
+# The same of modules.
+MOVED_MODULES = {
+    "planning.paper.still": "planning.paper.minimum_norm",
+    "planning.result.asked": "planning.result.specification",
+    "planning.search.nodes": "planning.search.vertices",
+    "planning.search.stretches": "planning.search.segments",
+    "planning.transfer.ways": "planning.transfer.rrt_connect",
+}
 
 
 class MovedModules:
@@ -36,6 +44,8 @@ class MovedModules:
     ) -> ModuleSpec | None:
         """Raise ModuleNotFoundError with the new path of a moved module; else find nothing."""
         house, *parts = name.split(".")
+        if house == "selfmotion" and (module := MOVED_MODULES.get(".".join(parts))):
+            raise ModuleNotFoundError(f"{name} is {house}.{module} now", name=name)
         if house != "selfmotion" or not parts or parts[0] not in MOVED:
             return None
         now = f"{house}.{MOVED[parts[0]]}"

@@ -21,9 +21,9 @@ to stop the work, as the keyboard does.
 
 
 class _Silent:
-    """Tells nothing; an object, so that signatures show it as `silent`."""
+    """Progress without output; an object, so that signatures show it as `silent`."""
 
-    def __call__(self, *told: object) -> None:
+    def __call__(self, *obeyed: object) -> None:
         pass
 
     def __repr__(self) -> str:
@@ -127,11 +127,11 @@ def obeying(progress: Progress) -> Progress:
     """Return a progress that raises on Ctrl-C, too; ProblemError if not callable."""
     as_called(progress, "progress")
 
-    def told(stage: str, done: int, total: int) -> None:
+    def obeyed(stage: str, done: int, total: int) -> None:
         progress(stage, done, total)
         obey_interruption()
 
-    return told
+    return obeyed
 
 
 # Threads of linear algebra.

@@ -17,8 +17,9 @@ import numpy.typing as npt
 
 from selfmotion.basics.arrays import Array
 
-# Nodes of an interval: with two derivatives besides, a series has this many coefficients, at most.
+# Largest number of nodes of an interval.
 ORDER = 12
+# Number of coefficients of a series: also of two derivatives more.
 LENGTH = ORDER + 3
 
 

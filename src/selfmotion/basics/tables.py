@@ -15,8 +15,6 @@ from selfmotion.basics.arrays import TURN, Array, is_number
 from selfmotion.basics.errors import FileFormatError, nearest
 from selfmotion.basics.files import lines_of, text_of, write_text
 
-# Tables of numbers, as programs write them: with any of the usual separators and headers.
-
 # Marks of comment lines.
 _COMMENTS = ("#", "%", "//")
 _DECIMAL_COMMA = re.compile(r"[+-]?[0-9]*,[0-9]+([eE][+-]?[0-9]+)?")

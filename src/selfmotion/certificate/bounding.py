@@ -172,7 +172,7 @@ def bounded(
     values, times = np.zeros(len(function.of)), np.full(len(function.of), edges[0])
     undecided: list[tuple[float, float]] = []
     proved, samples = True, 0
-    for left, found in _settled(function, robot, trajectory, edges, progress):
+    for left, found in _decided(function, robot, trajectory, edges, progress):
         proved, samples = proved and found.proved, samples + found.samples
         for size in range(len(values)) if len(found.values) else ():
             # Written so that NaN is worse than any.
@@ -184,7 +184,7 @@ def bounded(
     return Bounds(values, times, tuple(undecided), proved, samples + 1)
 
 
-def _settled(
+def _decided(
     function: BoundedFunction,
     robot: RobotModel,
     trajectory: Trajectory,
@@ -204,15 +204,15 @@ def _settled(
             # Written so that NaN settles nothing and is no small error either.
             kept = np.asarray(found.values <= function.allowed).all(axis=1)
             broken = ~np.asarray(found.measured <= function.allowed).all(axis=1)
-            settled = kept | broken
-            left = np.flatnonzero(~settled)
+            decided = kept | broken
+            left = np.flatnonzero(~decided)
             last = depth == _DEPTH or len(left) > most
-            told = np.arange(len(pending)) if last else np.flatnonzero(settled)
+            said = np.arange(len(pending)) if last else np.flatnonzero(decided)
             # Without a bound, the samples: violated, or undecided.
             values = np.where(np.isfinite(found.values), found.values, found.measured)
             yield (
                 pending[left if last else left[:0]],
-                found._replace(values=values[told], times=found.times[told]),
+                found._replace(values=values[said], times=found.times[said]),
             )
             if last or not len(left):
                 break
@@ -244,14 +244,14 @@ def _measured(function: BoundedFunction, segments: MotionSegments) -> _Found:
 def _nodes(known: Array, function: BoundedFunction) -> tuple[Ints, Array]:
     """Return the number of nodes of each interval (I,), and interpolation errors (B, I)."""
     powers = np.arange(_FEWEST, series.ORDER + 1)
-    missed = known[:, powers] / 2.0 ** (powers - 1.0)[:, None]
-    good = (missed <= function.wanted[:, None, None]).all(axis=0)
+    errors = known[:, powers] / 2.0 ** (powers - 1.0)[:, None]
+    good = (errors <= function.wanted[:, None, None]).all(axis=0)
     limits = np.full(len(function.blocks), np.inf)
     np.minimum.at(limits, function.of, function.allowed)
-    usable = (missed[:, -1] <= 0.5 * limits[:, None]).all(axis=0)
+    usable = (errors[:, -1] <= 0.5 * limits[:, None]).all(axis=0)
     enough = good.any(axis=0)
     which = np.where(enough, np.argmax(good, axis=0), np.where(usable, len(powers) - 1, 0))
-    rest = np.take_along_axis(missed, which[None, None], axis=1)[:, 0]
+    rest = np.take_along_axis(errors, which[None, None], axis=1)[:, 0]
     return powers[which], np.where(enough | usable, rest, np.inf)
 
 

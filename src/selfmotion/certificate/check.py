@@ -29,7 +29,7 @@ from selfmotion.certificate.requirement import (
     covered_by,
 )
 from selfmotion.certificate.verdict import Certificate
-from selfmotion.model.follow import BoundFollow, Follow, Follows
+from selfmotion.model.follow import BoundTaskFrame, Follow, Follows
 from selfmotion.model.motion import Trajectory
 from selfmotion.model.path import Path, check_oriented
 from selfmotion.model.robot import RobotModel
@@ -261,29 +261,33 @@ def _cut_short(
     if ending:
         return (ending,)
     duration = follows.items[0].path.duration
-    apart = trajectory.duration - duration
-    if abs(apart) <= 1e-9 * duration:
+    excess = trajectory.duration - duration
+    if abs(excess) <= 1e-9 * duration:
         return ()
     pairs = zip(follows.items, checks, strict=True)
-    if abs(apart) <= min(_CLOCK, duration) and all(
-        _ends_within(item, trajectory, apart, found, tolerance) for item, found in pairs
+    if abs(excess) <= min(_CLOCK, duration) and all(
+        _ends_within(item, trajectory, excess, found, tolerance) for item, found in pairs
     ):
         return ()
     return (
         f"the motion lasts {trajectory.duration:.6g} s, the path {duration:.6g} s: "
-        f"{abs(apart):.2g} s too {'long' if apart > 0.0 else 'short'}",
+        f"{abs(excess):.2g} s too {'long' if excess > 0.0 else 'short'}",
     )
 
 
 def _ends_within(
-    item: BoundFollow, trajectory: Trajectory, apart: float, check: PathCheck, tolerance: Tolerance
+    item: BoundTaskFrame,
+    trajectory: Trajectory,
+    excess: float,
+    check: PathCheck,
+    tolerance: Tolerance,
 ) -> bool:
     """Whether the remainder of what lasts longer, path or tip, is within the tolerance."""
-    if apart < 0.0:
-        path = item.path.samples([item.path.duration + apart, item.path.duration])
+    if excess < 0.0:
+        path = item.path.samples([item.path.duration + excess, item.path.duration])
         rotation, translation = path.rotation, path.translation
     else:
-        _, rotation, translation = item.chain.along(trajectory(trajectory.t[-1] - [apart, 0.0]))
+        _, rotation, translation = item.chain.along(trajectory(trajectory.t[-1] - [excess, 0.0]))
     moved = float(np.linalg.norm(translation[1] - translation[0]))
     # ‖R₁ − R₀‖ = √8 sin(θ/2), accurate for small angles.
     angle = float(np.linalg.norm(rotation[1] - rotation[0])) / np.sqrt(8.0)

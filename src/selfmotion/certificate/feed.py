@@ -13,7 +13,7 @@ from selfmotion.basics import Array, Flags, series
 from selfmotion.certificate.bounding import BoundedFunction, Bounds, MotionSegments, bounded
 from selfmotion.certificate.path_error import jacobians, smooth_between
 from selfmotion.certificate.requirement import Finding, FinishedMotion, Requirement
-from selfmotion.model.follow import BoundFollow
+from selfmotion.model.follow import BoundTaskFrame
 from selfmotion.model.path import FeedKept, FeedPossible, Path, path_series
 
 # Relative accuracy of the interpolation of speed margins.
@@ -37,12 +37,12 @@ class FeedReached(Requirement):
     ----------
     found : FeedKept
         The feed that the path itself keeps.
-    follow : BoundFollow
+    follow : BoundTaskFrame
         The tip on that path.
     """
 
     found: FeedKept
-    follow: BoundFollow
+    follow: BoundTaskFrame
     name: str = "feed"
 
     @property
@@ -224,7 +224,7 @@ class _Along(BoundedFunction):
     its majorant allows.
     """
 
-    def __init__(self, follow: BoundFollow, pace: _OwnPace) -> None:
+    def __init__(self, follow: BoundTaskFrame, pace: _OwnPace) -> None:
         self._follow, self._pace = follow, pace
         self.blocks = self.of = np.zeros(1, dtype=np.intp)
         self.allowed, self.wanted = np.ones(1), np.full(1, _FINE)
@@ -269,18 +269,18 @@ _LONGER = re.compile(r": give it ([0-9.e+-]+|inf) times the duration")
 
 
 def with_feeds(
-    told: Sequence[str], feeds: Sequence[FeedReached], findings: Sequence[Finding]
+    said: Sequence[str], feeds: Sequence[FeedReached], findings: Sequence[Finding]
 ) -> tuple[str, ...]:
     """Return findings of an arm that is too slow, of motions at feeds in terms of these.
 
     The first of it says which feed the arm can keep, where that is known.
     """
     if not feeds:
-        return tuple(told)
+        return tuple(said)
     possible = possible_feed(feeds, findings)
     if not possible:
-        return tuple(_LONGER.sub(r": run it \1 times slower", text) for text in told)
-    texts = [_LONGER.sub("", text) for text in told]
+        return tuple(_LONGER.sub(r": run it \1 times slower", text) for text in said)
+    texts = [_LONGER.sub("", text) for text in said]
     return (f"{texts[0]}: {possible}", *texts[1:])
 
 

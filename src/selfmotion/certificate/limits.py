@@ -76,8 +76,8 @@ class JointLimits(Requirement):
     @override
     def remarks(self) -> tuple[str, ...]:
         count = int(np.sum(~(np.isfinite(self.upper) | np.isfinite(self.lower))))
-        told = f"{self.name}: {count} of {len(self.upper)} joints are not limited"
-        return (told,) if count else ()
+        said = f"{self.name}: {count} of {len(self.upper)} joints are not limited"
+        return (said,) if count else ()
 
     def judge(self, motion: FinishedMotion) -> Finding:
         """See `Requirement.judge`: a margin (order 0), or the share of the limit that is used."""
@@ -189,7 +189,7 @@ class EndState(Requirement):
         row = 0 if self.at_start else -1
         reached = motion.trajectory(motion.trajectory.t[row], self.order)
         words = "off the one asked for" if self.order else "away from where it should"
-        return _miss(self.name, motion, reached - self.target, self.order, words, row)
+        return _end_error(self.name, motion, reached - self.target, self.order, words, row)
 
 
 # Largest acceleration of an arm at rest [rad/s² or m/s²]; more is a step of acceleration.
@@ -258,16 +258,16 @@ class ClosedMotion(Requirement):
     def judge(self, motion: FinishedMotion) -> Finding:
         """See `Requirement.judge`: of the joint with the largest error."""
         q, qd = motion.trajectory.q, motion.trajectory.qd
-        apart = _miss(self.name, motion, q[-1] - q[0], 0, "away from the start")
-        if not (apart.satisfied and self.velocity):
-            return apart
-        return _miss(self.name, motion, qd[-1] - qd[0], 1, "off that of the start")
+        end_error = _end_error(self.name, motion, q[-1] - q[0], 0, "away from the start")
+        if not (end_error.satisfied and self.velocity):
+            return end_error
+        return _end_error(self.name, motion, qd[-1] - qd[0], 1, "off that of the start")
 
 
-def _miss(
-    name: str, motion: FinishedMotion, miss: Array, order: int, words: str, row: int = -1
+def _end_error(
+    name: str, motion: FinishedMotion, error: Array, order: int, words: str, row: int = -1
 ) -> Finding:
-    size = np.abs(miss)
+    size = np.abs(error)
     worst = int(np.argmax(size))
     joint, amount = motion.robot.joint_names[worst], float(size[worst])
     what = f" with {'an' if order == 2 else 'a'} {QUANTITIES[order]}" if order else ""

@@ -10,18 +10,16 @@ from typing_extensions import override
 from selfmotion.basics import Array, ProblemError, Progress, series, silent
 from selfmotion.certificate.bounding import BoundedFunction, MotionSegments, bounded
 from selfmotion.certificate.requirement import Extreme, Tolerance
-from selfmotion.model.follow import BoundFollow, Follows
+from selfmotion.model.follow import BoundTaskFrame, Follows
 from selfmotion.model.motion import Trajectory
 from selfmotion.model.path import Path, path_series
 from selfmotion.model.robot import WORLD, Chain, RobotModel
 from selfmotion.model.task import Relaxation, Task
 
-# Where a motion takes the tool, by forward kinematics; shares no code with the rollout.
-
 _AXES = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 
 
-def deviation_from(follow: BoundFollow, t: Array, q: Array, in_tool_axes: bool) -> Array:
+def deviation_from(follow: BoundTaskFrame, t: Array, q: Array, in_tool_axes: bool) -> Array:
     """Return the deviation of the tool from the path, (K, 6).
 
     Rows x, y, z [m] and rx, ry, rz [rad] as `Relaxation` has them; zero where the task leaves them
@@ -31,12 +29,12 @@ def deviation_from(follow: BoundFollow, t: Array, q: Array, in_tool_axes: bool) 
     rotation, translation = poses(follow.chain, q)
     target = follow.path.samples(t)
     linear = task.rows[task.rows < 3]
-    miss = np.zeros((len(t), 6))
-    miss[:, linear] = (translation - target.translation)[:, linear]
-    miss[:, 3:] = rotation_vectors(task, relative_turns(target.rotation, rotation))
+    deviation_rows = np.zeros((len(t), 6))
+    deviation_rows[:, linear] = (translation - target.translation)[:, linear]
+    deviation_rows[:, 3:] = rotation_vectors(task, relative_turns(target.rotation, rotation))
     if in_tool_axes:
-        miss[:, :3] = np.einsum("kji,kj->ki", target.rotation, miss[:, :3])
-    return miss
+        deviation_rows[:, :3] = np.einsum("kji,kj->ki", target.rotation, deviation_rows[:, :3])
+    return deviation_rows
 
 
 def smallest_singular_values(follows: Follows, q: Array) -> Array:
@@ -69,8 +67,8 @@ def jacobians(chain: Chain, q: Array) -> tuple[Array, Array]:
     if chain.base == WORLD:
         return world[0], turns[0]
     own, other = world
-    apart, turned = places[0] - places[1], turns[1].transpose(0, 2, 1)
-    moving = other[:, :3] + np.cross(other[:, 3:], apart[:, :, None], axis=1)
+    offset, turned = places[0] - places[1], turns[1].transpose(0, 2, 1)
+    moving = other[:, :3] + np.cross(other[:, 3:], offset[:, :, None], axis=1)
     jacobian = np.concatenate(
         [turned @ (own[:, :3] - moving), turned @ (own[:, 3:] - other[:, 3:])], 1
     )
@@ -211,7 +209,7 @@ class PathCheck:
 
 def bound_errors(
     robot: RobotModel,
-    follow: BoundFollow,
+    follow: BoundTaskFrame,
     trajectory: Trajectory,
     tolerance: Tolerance,
     relaxations: Sequence[Relaxation],
@@ -236,18 +234,20 @@ def bound_errors(
 
 
 def errors_between(
-    follow: BoundFollow, trajectory: Trajectory, relaxations: Sequence[Relaxation]
+    follow: BoundTaskFrame, trajectory: Trajectory, relaxations: Sequence[Relaxation]
 ) -> Array:
     """Return the errors in the middle between samples, (N, 2) [m, rad]: for planners, no proof."""
     t = 0.5 * (trajectory.t[:-1] + trajectory.t[1:])
     return errors_at(follow, t, trajectory(t), relaxations)
 
 
-def errors_at(follow: BoundFollow, t: Array, q: Array, relaxations: Sequence[Relaxation]) -> Array:
+def errors_at(
+    follow: BoundTaskFrame, t: Array, q: Array, relaxations: Sequence[Relaxation]
+) -> Array:
     """Return the errors beyond relaxations at q (K, n), at times t (K,) [s], (K, 2) [m, rad]."""
     in_tool_axes = any(item.in_tool_axes for item in relaxations)
-    miss = deviation_from(follow, t, q, in_tool_axes)
-    beyond = excess(relaxations, follow.path.duration, t, miss)
+    deviation_rows = deviation_from(follow, t, q, in_tool_axes)
+    beyond = excess(relaxations, follow.path.duration, t, deviation_rows)
     return np.stack([_length(beyond[:, :3]), _length(beyond[:, 3:])], axis=1)
 
 
@@ -286,7 +286,7 @@ class _PathErrors(BoundedFunction):
     """
 
     def __init__(
-        self, follow: BoundFollow, tolerance: Tolerance, relaxations: Sequence[Relaxation]
+        self, follow: BoundTaskFrame, tolerance: Tolerance, relaxations: Sequence[Relaxation]
     ) -> None:
         self._chain, self._relaxations = follow.chain, relaxations
         self._path, self._task = follow.path, follow.task
@@ -313,31 +313,31 @@ class _PathErrors(BoundedFunction):
         if path is None:
             return None
         place, turn = segments.chain().relative(self._chain)
-        apart = place + path.translation
+        offset = place + path.translation
         turned = series.product(path.rotation, turn)
         if self._in_tool_axes or self._as_vectors:
-            miss, relative = self._looked_at(segments, np.zeros(1))
-            apart[0] = _length(miss[:, 0]) + series.after_first(apart)
-            apart = series.product(path.rotation, apart)
+            deviation_rows, relative = self._samples_between(segments, np.zeros(1))
+            offset[0] = _length(deviation_rows[:, 0]) + series.after_first(offset)
+            offset = series.product(path.rotation, offset)
         if not self._task.angular:
-            return np.stack([apart, np.zeros_like(apart)])
+            return np.stack([offset, np.zeros_like(offset)])
         if self._as_vectors:
-            return np.stack([apart, _vector_series(turned, self._cosine(relative[:, 0]))])
+            return np.stack([offset, _vector_series(turned, self._cosine(relative[:, 0]))])
         share = 1.0 if self._task.tool_axes else _FROBENIUS / 2.0**0.5
-        return np.stack([apart, share * turned])
+        return np.stack([offset, share * turned])
 
     @override
     def values(self, segments: MotionSegments, u: Array) -> Array:
-        miss, relative = self._looked_at(segments, u)
+        deviation_rows, relative = self._samples_between(segments, u)
         if not self._task.angular:
-            turns = np.zeros((*miss.shape[:2], 1))
+            turns = np.zeros((*deviation_rows.shape[:2], 1))
         elif self._as_vectors:
             turns = rotation_vectors(self._task, relative)
         elif self._task.tool_axes:
             turns = relative[..., 2] - [0.0, 0.0, 1.0]
         else:
-            turns = (relative - np.eye(3)).reshape(*miss.shape[:2], 9) / 2.0**0.5
-        return np.concatenate([miss, turns], axis=2)
+            turns = (relative - np.eye(3)).reshape(*deviation_rows.shape[:2], 9) / 2.0**0.5
+        return np.concatenate([deviation_rows, turns], axis=2)
 
     @override
     def sizes(self, values: Array, segments: MotionSegments) -> Array:
@@ -357,18 +357,18 @@ class _PathErrors(BoundedFunction):
         sizes += [deviation_size(x, last, t, flat).reshape(shape) for x in self._relaxations]
         return np.stack(sizes, axis=2)
 
-    def _looked_at(self, segments: MotionSegments, u: Array) -> tuple[Array, Array]:
+    def _samples_between(self, segments: MotionSegments, u: Array) -> tuple[Array, Array]:
         """Return the position's deviation (I, P, 3) and R_dᵀR (I, P, 3, 3) at places u (P,)."""
         target = self._path.samples(segments.times(u).ravel())
         rotation, translation = poses(self._chain, segments.motion(u))
         rows = self._task.rows[self._task.rows < 3]
-        miss = np.zeros((len(translation), 3))
-        miss[:, rows] = (translation - target.translation)[:, rows]
+        deviation_rows = np.zeros((len(translation), 3))
+        deviation_rows[:, rows] = (translation - target.translation)[:, rows]
         if self._in_tool_axes:
-            miss = np.einsum("kji,kj->ki", target.rotation, miss)
+            deviation_rows = np.einsum("kji,kj->ki", target.rotation, deviation_rows)
         relative = relative_turns(target.rotation, rotation)
         shape = len(segments.middle), len(u)
-        return miss.reshape(*shape, 3), relative.reshape(*shape, 3, 3)
+        return deviation_rows.reshape(*shape, 3), relative.reshape(*shape, 3, 3)
 
     def _cosine(self, relative: Array) -> Array:
         """Return the cosine of the angle of turns (I, 3, 3), (I,)."""

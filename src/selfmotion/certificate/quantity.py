@@ -153,10 +153,10 @@ class Quantity:
         if middle:
             return f"{found}, expected {middle - limit:.4g} to {middle + limit:.4g}{unit}"
         share = abs(away) / limit
-        told = f"{found}, {share:.5g} times its limit of {limit:.4g}{unit}"
+        said_text = f"{found}, {share:.5g} times its limit of {limit:.4g}{unit}"
         if not one.slows:
-            return told
-        return f"{told}: give it {share ** (1.0 / one.slows):.5g} times the duration"
+            return said_text
+        return f"{said_text}: give it {share ** (1.0 / one.slows):.5g} times the duration"
 
 
 @dataclass(frozen=True, eq=False)

@@ -62,7 +62,7 @@ class Separation(Requirement):
             near = stuck.value
             return Finding(self.name, names, time, near, self.distance, False, text, unit="m")
         found = closest_at_all_times(self.model, motion.trajectory, self.distance)
-        text = self._told(found)
+        text = self._message(found)
         if found.open_until is not None:
             text = (
                 f"whether {found.names} keep {self.distance * 1e3:.2f} mm from t = "
@@ -132,15 +132,15 @@ class Separation(Requirement):
         Nor of links that overlap by design, or by placement: no other start helps.
         """
         start = self.model.distance(q)
-        made = [{pair.first, pair.second} for pair in self.model.overlapping]
-        is_made = self.model.stuck is not None or {start.first, start.second} in made
-        if start.value >= self.distance or is_made:
+        lengths = [{pair.first, pair.second} for pair in self.model.overlapping]
+        is_by_design = self.model.stuck is not None or {start.first, start.second} in lengths
+        if start.value >= self.distance or is_by_design:
             return ""
         pair = f"{start.first} - {start.second} {how_near(start.value)}"
         what = "too near already" if start.value > 0.0 else "in collision"
         return f"the given start is {what}: {pair}: choose another one"
 
-    def _told(self, found: "Approach") -> str:
+    def _message(self, found: "Approach") -> str:
         text = (
             f"{found.names} {how_near(found.closest.value)} at t = {found.time:.3f} s (wanted: "
             f"{self.distance * 1e3:.2f} mm)"
@@ -183,14 +183,16 @@ def closest_at_all_times(
     No pair comes nearer than `distance` [m] at any time unless the one returned does, or is
     undecided; and none nearer than it by more than a fiftieth or 0.1 mm.
     """
-    way, levers = trajectory.travelled, _levers(model, trajectory)
+    length_at, lever_arms = trajectory.travelled, _lever_arms(model, trajectory)
     edges = np.linspace(trajectory.t[0], trajectory.t[-1], _FIRST + 1)
     best = model.worst(trajectory(edges))
     approach = Approach(best, float(edges[best.index]))
     if not model.pairs:
         return approach
-    intervals, made = (np.stack([each[:-1], each[1:]], axis=1) for each in (edges, way(edges)))
-    budget = (made[:, 1] - made[:, 0]) @ levers.T
+    intervals, lengths = (
+        np.stack([each[:-1], each[1:]], axis=1) for each in (edges, length_at(edges))
+    )
+    budget = (lengths[:, 1] - lengths[:, 0]) @ lever_arms.T
     goal = _goal(best, distance)
     need = np.maximum(np.pad(budget, ((0, 1), (0, 0))), np.pad(budget, ((1, 0), (0, 0))))
     values = model.distances(trajectory(edges), goal + need, goal + _HULLS_DO * need)
@@ -198,32 +200,32 @@ def closest_at_all_times(
     for _ in range(_DEPTH):
         # Written so that NaN settles nothing.
         chunks = _chunks(len(sides))
-        settled = [_bounds(made[chunk], sides[chunk], levers) >= goal for chunk in chunks]
-        rows = np.flatnonzero(~np.concatenate([each.all(axis=1) for each in settled]))
+        decided = [_bounds(lengths[chunk], sides[chunk], lever_arms) >= goal for chunk in chunks]
+        rows = np.flatnonzero(~np.concatenate([each.all(axis=1) for each in decided]))
         if not rows.size or approach.closest.value < distance:
             return approach
         if len(rows) > _MOST:
             break
-        intervals, made, sides = intervals[rows], made[rows], sides[rows]
+        intervals, lengths, sides = intervals[rows], lengths[rows], sides[rows]
         # Decided pairs need no number.
-        known = np.concatenate(settled)[rows]
+        known = np.concatenate(decided)[rows]
         np.copyto(sides, np.inf, where=known[:, None])
         middle = intervals.mean(axis=1)
-        between, inner = way(middle), np.empty_like(sides[:, 0])
+        between, inner = length_at(middle), np.empty_like(sides[:, 0])
         for chunk in _chunks(len(rows)):
-            (before, after), here = made[chunk].swapaxes(0, 1), between[chunk]
-            need = np.maximum((here - before) @ levers.T, (after - here) @ levers.T)
+            (before, after), here = lengths[chunk].swapaxes(0, 1), between[chunk]
+            need = np.maximum((here - before) @ lever_arms.T, (after - here) @ lever_arms.T)
             exact_below = goal + _HULLS_DO * need
             asked = np.where(known[chunk], -np.inf, goal + need)
             found = model.distances(trajectory(middle[chunk]), asked, exact_below)
             inner[chunk] = np.where(known[chunk], np.inf, found)
             approach = _nearer(approach, model, middle[chunk], inner[chunk], exact_below)
-        intervals, made, sides = (
+        intervals, lengths, sides = (
             _halves(each, own)
-            for each, own in ((intervals, middle), (made, between), (sides, inner))
+            for each, own in ((intervals, middle), (lengths, between), (sides, inner))
         )
         goal = _goal(approach.closest, distance)
-    bounds = _bounds(made, sides, levers)
+    bounds = _bounds(lengths, sides, lever_arms)
     return _undecided(model, approach, intervals, sides[:, 0], bounds, distance)
 
 
@@ -238,15 +240,15 @@ def _halves(sides: Array, middle: Array) -> Array:
     return both.reshape(2 * len(sides), *sides.shape[1:])
 
 
-def _bounds(made: Array, sides: Array, levers: Array) -> Array:
+def _bounds(lengths: Array, sides: Array, lever_arms: Array) -> Array:
     """Return lower bounds (I, P) for path lengths (I, 2, n) and distances at both ends."""
     bounds: Array = sides[:, 0] + sides[:, 1]
-    bounds -= (made[:, 1] - made[:, 0]) @ levers.T
+    bounds -= (lengths[:, 1] - lengths[:, 0]) @ lever_arms.T
     bounds *= 0.5
     return bounds
 
 
-def _levers(model: CollisionModel, trajectory: Trajectory) -> Array:
+def _lever_arms(model: CollisionModel, trajectory: Trajectory) -> Array:
     """Return the pairs' lever arms (P, n), also beyond the URDF's joint limits."""
     return model.pair_levers_up_to(np.abs(trajectory.extremes(0)[1]).max(axis=0))
 

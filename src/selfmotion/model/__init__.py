@@ -1,1 +1,1 @@
-"""What there is: task, robot, path, what follows it, motions, bodies, and compiled algebra."""
+"""Models: task, robot, path, task frames, motions, bodies, and compiled algebra."""

@@ -1,4 +1,4 @@
-"""How a motion is found, and what comes out."""
+"""Planning of motions, and results."""
 
 from selfmotion.planning.planner import (
     GOALS as GOALS,

@@ -1,4 +1,4 @@
-"""What is wanted: costs, constraints, and the problem."""
+"""Problems: costs, constraints, and their combination with an arm and a path."""
 
 from selfmotion.problem.problem import (
     KEPT as KEPT,

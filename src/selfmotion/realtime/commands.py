@@ -24,8 +24,6 @@ from selfmotion.realtime import law
 from selfmotion.realtime.law import braking_distance, tightened
 from selfmotion.realtime.settings import ACCELERATION, ENDS, FARTHEST, GAIN, SPEED
 
-# Limits of the joints, as the loop keeps them.
-
 _USUAL = (JointPositionLimits, JointVelocityLimits, JointAccelerationLimits)
 
 

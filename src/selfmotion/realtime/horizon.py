@@ -208,7 +208,7 @@ class Horizon:
         self.forget()
 
     def forget(self) -> None:
-        """Begin anew: without self-motion, in a frame of the next configuration."""
+        """Restart: without self-motion, in a frame of the next configuration."""
         # None as long as it has no row.
         self._frames = np.zeros((0, self.rollout.robot.dof, self.redundancy))
         self._coefficients = np.zeros((self.redundancy, self._functions.shape[1]))

@@ -17,7 +17,7 @@ from selfmotion.model.kernels import (
 )
 from selfmotion.realtime.settings import FOLLOWED, PIVOT
 
-# Commands from which a stop within all limits stays possible, whatever is asked for.
+# Commands from which a stop within all limits is possible, for any reference.
 #
 # The commanded motion is a uniform cubic B-spline. Its control points c follow a double
 # integrator,

@@ -366,12 +366,12 @@ def warm_up(replanner: Replanner) -> None:
     pose = robot.pose(q)
     later = SE3(pose.rotation, pose.translation + np.array([0.0, 0.0, 0.01]))
     far = SE3(pose.rotation, pose.translation + 10.0 * robot.reach)
-    still = np.zeros(robot.dof)
+    zero = np.zeros(robot.dof)
     # On the path, then without a state, then towards an unreachable pose.
     for goal, measured in ((later, q), (later, np.full(robot.dof, np.nan)), (far, q)):
         replanner.reset()
         path = Line(pose, goal, 1.0)
-        replanner.step(0.0, q, still, path)
+        replanner.step(0.0, q, zero, path)
         for k in range(1, _STEPS):
-            replanner.step(k * replanner.period, measured, still, path)
+            replanner.step(k * replanner.period, measured, zero, path)
     replanner.reset()

@@ -17,8 +17,6 @@ from selfmotion.model.task import SE3, Jexp3, exp3
 from selfmotion.realtime import law
 from selfmotion.realtime.settings import OFFSET_STEP
 
-# A pose that goes on as it was seen to move.
-
 # Duration of moving poses [s]: replaced long before.
 LONG = 1e9
 

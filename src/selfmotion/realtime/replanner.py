@@ -131,7 +131,7 @@ class Replanner:
         self._commands = Commands(robot, limits, self.cycle, self._cycles, latency, settling)
         self._prepare()
         self._reference = Reference(follows, approach or Approach(), self._times)
-        self._begun = False
+        self._started = False
 
     def _prepare(self) -> None:
         """Make all tables of a step, for the cycles that follow the path."""
@@ -146,7 +146,7 @@ class Replanner:
 
     def reset(self) -> None:
         """Reset: the next step starts at its measured state."""
-        self._begun = False
+        self._started = False
 
     @property
     def deviation(self) -> Array:
@@ -231,7 +231,7 @@ class Replanner:
         reasons: list[str],
     ) -> Segment:
         dof = self.robot.dof
-        if not self._begun:
+        if not self._started:
             self._start(t, checked_state(q, "q", dof), checked_state(qd, "qd", dof))
         q, qd = measured_state(q, dof), measured_state(qd, dof)
         commands = self._commands
@@ -258,9 +258,9 @@ class Replanner:
     def _start(self, t: float, q: Array, qd: Array) -> None:
         self._commands.begin(t, q, qd)
         self._path = LastPath(self._patience)
-        self._without_state = self._without_way = 0.0
+        self._without_state = self._without_motion = 0.0
         self._horizon.forget()
-        self._follows = self._begun = True
+        self._follows = self._started = True
 
     def _held_up(self, passed: float) -> Array | None:
         """Return the twist that the reference had where limits stopped the tool.
@@ -309,9 +309,9 @@ class Replanner:
             flag = Flag.KEPT if np.any(kept) else Flag.TRACKING
         # Through a singular pose an arm may continue on its other side.
         soon = horizon.breakdown < SOON
-        self._without_way = self._without_way + max(passed, self.cycle) if soon else 0.0
+        self._without_motion = self._without_motion + max(passed, self.cycle) if soon else 0.0
         held_up = horizon.breakdown < AHEAD and not self._follows
-        if held_up or self._without_way > self._patience:
+        if held_up or self._without_motion > self._patience:
             flag = Flag.STOPPING
         self._table[:, n : 2 * n] = kept
         self._table[:, 2 * n :] = table[-self._cycles :]

@@ -58,9 +58,9 @@ def small_works() -> Iterator[tuple[str, Callable[[], object]]]:
         return lambda: sm.plan(problem, **options)
 
     # The slowest compilation first: another process starts with the earlier ones of a plan.
-    t, still = np.linspace(0.0, 4.0, 5), np.zeros((5, 7))
+    t, at_rest = np.linspace(0.0, 4.0, 5), np.zeros((5, 7))
     nodes = NodeGrid(alone, t, (), free=False, counts=Counts())
-    yield "nodes", lambda: nodes.near(np.tile(home, (5, 1)), still, still)
+    yield "nodes", lambda: nodes.near(np.tile(home, (5, 1)), at_rest, at_rest)
     yield "a given start", plan(alone)
     given = sm.Problem(arm, circle, "position", home)
     free = replace(given, start=None)
@@ -117,10 +117,10 @@ def _two_stops() -> Stops:
 def _carried() -> sm.Problem:
     """Return two arms that carry a bar along a line."""
     left, right = "left/panda_hand_tcp", "right/panda_hand_tcp"
-    apart = np.eye(4)
-    apart[1, 3] = -0.9
+    distant = np.eye(4)
+    distant[1, 3] = -0.9
     cell = sm.load_robot(
-        {"left": "panda", "right": "panda"}, base={"right": apart}, tool=(left, right)
+        {"left": "panda", "right": "panda"}, base={"right": distant}, tool=(left, right)
     )
     first, grasp = np.diag([1.0, -1.0, -1.0, 1.0]), np.eye(4)
     first[:3, 3], grasp[1, 3] = (0.45, -0.25, 0.3), 0.4

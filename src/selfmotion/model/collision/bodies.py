@@ -55,14 +55,16 @@ def link_bodies(robot: RobotModel) -> list[Body]:
         An element is no body, or Pinocchio has read none for it.
     """
     pieces = robot.geometry(pin.GeometryType.COLLISION).geometryObjects
-    links = [robot.link_of(piece.parentFrame) for piece in pieces]
+    links = [robot.link_of(geometry_object.parentFrame) for geometry_object in pieces]
     _check_count(robot.urdf, links)
     bodies = []
-    for link, piece in zip(links, pieces, strict=True):
-        file = f" ({piece.meshPath})" if piece.meshPath else ""
-        solid = Solid(piece.geometry, f"{robot.urdf.source}: link '{link}'{file}")
+    for link, geometry_object in zip(links, pieces, strict=True):
+        file = f" ({geometry_object.meshPath})" if geometry_object.meshPath else ""
+        solid = Solid(geometry_object.geometry, f"{robot.urdf.source}: link '{link}'{file}")
         carrier = robot.urdf.carrier(link)
-        bodies.append(Body(link, carrier, piece.parentJoint, piece.placement, solid))
+        bodies.append(
+            Body(link, carrier, geometry_object.parentJoint, geometry_object.placement, solid)
+        )
     return bodies
 
 
@@ -105,13 +107,13 @@ def place_of(obstacle: Obstacle, pose: pin.SE3, robot: RobotModel) -> tuple[int,
 
 
 def _check_count(urdf: Urdf, links: Sequence[str]) -> None:
-    root, made = ElementTree.fromstring(urdf.text), Counter(links)
+    root, built = ElementTree.fromstring(urdf.text), Counter(links)
     for link in root.findall("link"):
         name, wanted = link.get("name", ""), len(link.findall("collision"))
-        if made[name] != wanted:
+        if built[name] != wanted:
             raise CollisionError(
                 f"{urdf.source}: link '{name}' has {wanted} <collision> elements, but Pinocchio "
-                f"made {made[name]} bodies of them; look for a part that is no valid URDF"
+                f"made {built[name]} bodies of them; look for a part that is no valid URDF"
             )
 
 
@@ -211,28 +213,28 @@ class _Tree:
 
     def distance(self, points: Array, carrier: int, joint: int) -> float:
         """Return the largest distance of points (V, 3) of a body from a joint's axis [m]."""
-        way = self.supports(carrier)
-        if joint in way:
-            down = way[way.index(joint) + 1 :]
+        supports_of = self.supports(carrier)
+        if joint in supports_of:
+            down = supports_of[supports_of.index(joint) + 1 :]
             return self._beyond(points, down, np.zeros(3), self._axes[joint])
         origin, axis = self._places[joint], self._turns[joint] @ self._axes[joint]
         up = self.supports(self._parents[joint])
-        shared = sum(1 for a, b in zip(way, up, strict=False) if a == b)
-        up, down = up[shared:], way[shared:]
+        shared = sum(1 for a, b in zip(supports_of, up, strict=False) if a == b)
+        up, down = up[shared:], supports_of[shared:]
         if not up:
             return self._beyond(points, down, origin, axis)
         # From the axis to the origin of the frame it is in, and from there on.
         first = self._places[up[0]]
-        apart = (
+        offset = (
             _farthest(self._places[down[0]][None] - first) if down else _farthest(points - first)
         )
         rest = [*up[1:], *down[1:]]
-        reach = apart + self._lengths(rest) + self._far([*up, *down])
+        reach = offset + self._lengths(rest) + self._far([*up, *down])
         reach += _farthest(points) if down else 0.0
         return float(reach + _from_line(np.zeros((1, 3)), origin, axis))
 
     def _beyond(self, points: Array, down: list[int], origin: Array, axis: Array) -> float:
-        """Return the same where only the joints `down` are between the axis' frame and the body."""
+        """Return the same bound with the joints `down` alone between axis' frame and body."""
         if not down:
             return _from_line(points, origin, axis)
         reach = _farthest(points) + self._lengths(down[1:]) + self._far(down)

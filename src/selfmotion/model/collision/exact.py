@@ -120,7 +120,7 @@ class CollisionModel:
     def of_pairs(self, pairs: Sequence[tuple[int, int]]) -> CollisionModel:
         """Return the model of the same bodies in which these pairs are checked, by index."""
         other = copy(self)
-        for known in ("pair_levers", "_levers"):
+        for known in ("pair_levers", "_lever_arms"):
             other.__dict__.pop(known, None)
         other._take(pairs)
         return other
@@ -203,12 +203,12 @@ class CollisionModel:
         """
         names = {item.name for item in self.obstacles}
         met = [names & {self._bodies[i].name, self._bodies[j].name} for i, j in self._index]
-        apart = [
+        differing = [
             {b for b in pair if self._bodies[b].name in names or (links and before)}
             for pair, before in zip(self._index.tolist(), met, strict=True)
         ]
         bodies, first = list(self._bodies), dict[int, range]()
-        for b in sorted(set[int]().union(*apart)):
+        for b in sorted(set[int]().union(*differing)):
             pieces = self._bodies[b].solid.pieces
             if len(pieces) > 1:
                 first[b] = range(len(bodies), len(bodies) + len(pieces))
@@ -218,8 +218,8 @@ class CollisionModel:
         found = [
             (pair, k, m)
             for pair, (i, j) in enumerate(self._index.tolist())
-            for k in (first.get(i, [i]) if i in apart[pair] else [i])
-            for m in (first.get(j, [j]) if j in apart[pair] else [j])
+            for k in (first.get(i, [i]) if i in differing[pair] else [i])
+            for m in (first.get(j, [j]) if j in differing[pair] else [j])
         ]
         of, *index = np.array(found, dtype=np.int64).T
         return HullDistances(self.robot, bodies, np.stack(index, axis=1)), of
@@ -270,10 +270,10 @@ class CollisionModel:
         configurations the distance of disjoint bodies changes by Σ_j lever_pj |Δq_j| at most.
         Joints that move both bodies as one block have lever 0.
         """
-        return self.robot.coupling.bounds(self._levers)
+        return self.robot.coupling.bounds(self._lever_arms)
 
     @cached_property
-    def _levers(self) -> Array:
+    def _lever_arms(self) -> Array:
         """Those of all joints of the model, (P, N)."""
         return of_bodies.pair_levers(self._axis_distances, self._moved, self.hulls.pairs)
 
@@ -286,8 +286,8 @@ class CollisionModel:
         extra: Any = of_bodies.travel_beyond(self.robot, farthest)
         if displacement is not None:
             extra = extra + displacement[:, None]
-        counted = of_bodies.is_turned(self.robot) & (self._levers > 0.0)
-        return self.robot.coupling.bounds(self._levers + np.where(counted, extra, 0.0))
+        counted = of_bodies.is_turned(self.robot) & (self._lever_arms > 0.0)
+        return self.robot.coupling.bounds(self._lever_arms + np.where(counted, extra, 0.0))
 
     @cached_property
     def _axis_distances(self) -> Array:

@@ -14,8 +14,6 @@ from selfmotion.model.collision.distances import HullDistances, Ints
 from selfmotion.model.collision.solids import Solid
 from selfmotion.model.robot import RobotModel
 
-# Distances of meshes, where those of their convex hulls do not decide.
-
 # Allowance for rounding of distances of surfaces below those of the hulls [m].
 _ROUNDING = 1e-5
 

@@ -17,8 +17,6 @@ from selfmotion.model.collision.distances import HullDistances, Ints
 from selfmotion.model.collision.pair_distances import MeshDistances
 from selfmotion.model.robot import Packages, RobotModel, Urdf, UrdfJoint, expand, is_placement
 
-# Which pairs of bodies have to be checked.
-
 
 def candidate_pairs(
     bodies: Sequence[Body], urdf: Urdf, disabled: Iterable[tuple[str, str]] = ()

@@ -1,10 +1,10 @@
 """Task frames on their paths: chains, paths, and the prescribed rows of all."""
 
 from selfmotion.model.follow.augmented import (
-    AugmentedFollows as AugmentedFollows,
+    AugmentedTaskFrames as AugmentedTaskFrames,
 )
 from selfmotion.model.follow.follow import (
-    BoundFollow as BoundFollow,
+    BoundTaskFrame as BoundTaskFrame,
     Follow as Follow,
     Follows as Follows,
 )

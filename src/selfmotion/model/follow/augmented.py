@@ -8,7 +8,7 @@ import numpy as np
 from typing_extensions import override
 
 from selfmotion.basics import Array, Flags, read_only
-from selfmotion.model.follow.follow import BoundFollow, Follows
+from selfmotion.model.follow.follow import BoundTaskFrame, Follows
 from selfmotion.model.follow.table_chain import TableChain
 from selfmotion.model.follow.virtual_joints import VirtualJoints
 from selfmotion.model.path import Dwell
@@ -86,7 +86,7 @@ class AugmentedArm(RobotModel):
 
 
 @dataclass(frozen=True, eq=False)
-class AugmentedFollows(Follows):
+class AugmentedTaskFrames(Follows):
     """Task frames with virtual joints: their tip is on the path of the first tool.
 
     Attributes
@@ -99,33 +99,33 @@ class AugmentedFollows(Follows):
     @classmethod
     def with_tolerances(
         cls, follows: Follows, relaxations: Sequence[Relaxation]
-    ) -> "AugmentedFollows":
+    ) -> "AugmentedTaskFrames":
         """Return the task frames of an arm with rows of its first path relaxed."""
         arm, (first, *others) = follows.robot, follows.items
         virtual = VirtualJoints(first.task, relaxations, follows.duration, mean_lever(arm))
         robot = AugmentedArm.of(arm, virtual)
         n, dof = arm.dof, robot.dof
 
-        def bound(item: BoundFollow, table: Array, task: Task) -> BoundFollow:
-            return BoundFollow(TableChain(item.chain.tip_name, table, dof), item.path, task)
+        def bound(item: BoundTaskFrame, table: Array, task: Task) -> BoundTaskFrame:
+            return BoundTaskFrame(TableChain(item.chain.tip_name, table, dof), item.path, task)
 
         items = [bound(first, virtual.table(first.chain, n), virtual.task)]
         items += [bound(item, item.chain.table, item.task) for item in others]
         alike = virtual.alike(n)
         if alike is not None:
-            still = Dwell(SE3.Identity(), follows.duration)
-            items.append(BoundFollow(TableChain("", alike, dof), still, cast(Task, _Alike())))
+            at_rest = Dwell(SE3.Identity(), follows.duration)
+            items.append(BoundTaskFrame(TableChain("", alike, dof), at_rest, cast(Task, _Alike())))
         return cls(robot, tuple(items), virtual=virtual)
 
     @property
-    def with_windows_shut(self) -> "AugmentedFollows":
+    def with_windows_shut(self) -> "AugmentedTaskFrames":
         """The same with joints of windows held at 0 at all times, for integrated motions."""
         none = np.zeros(self.robot.dof - len(self.virtual.each), dtype=np.bool_)
         held = np.append(none, self.virtual.windowed)
 
-        def shut(item: BoundFollow) -> BoundFollow:
+        def shut(item: BoundTaskFrame) -> BoundTaskFrame:
             own = item.chain
-            return BoundFollow(
+            return BoundTaskFrame(
                 TableChain(own.tip_name, own.table, self.robot.dof, held), item.path, item.task
             )
 

@@ -53,7 +53,7 @@ class Follow:
             if not isinstance(given, str | None):
                 raise ProblemError(f"follow: {name} is {shown(given)}, expected the name of a link")
 
-    def on(self, robot: RobotModel, duration: float) -> BoundFollow:
+    def on(self, robot: RobotModel, duration: float) -> BoundTaskFrame:
         """Return the same bound to an arm, for a duration [s].
 
         Raises
@@ -75,7 +75,7 @@ class Follow:
         if reference is None and self.tool in (None, robot.tool):
             reference = robot.reference
         chain = robot.chain_to(self.tool or robot.tool, reference)
-        return BoundFollow(chain, path, Task.of(self.task))
+        return BoundTaskFrame(chain, path, Task.of(self.task))
 
     def along(self, path: Path) -> Follow:
         """Return the same with another path."""
@@ -83,7 +83,7 @@ class Follow:
 
 
 @dataclass(frozen=True, eq=False)
-class BoundFollow:
+class BoundTaskFrame:
     """The tip of a chain on a path, in the rows of a task.
 
     Poses, twists and errors are those of the tip in the chain's base frame, in its axes.
@@ -137,7 +137,7 @@ class BoundFollow:
 
 
 class TipKinematics:
-    """Asks for all tips at once, with data of their own.
+    """Kinematics of all tips in one call, with data of their own.
 
     Parameters
     ----------
@@ -175,19 +175,19 @@ class Follows:
     Attributes
     ----------
     robot : RobotModel
-    items : tuple of BoundFollow
+    items : tuple of BoundTaskFrame
         Each a tip on its path; their rows are stacked in this order. They last equally long.
     """
 
     robot: RobotModel
-    items: tuple[BoundFollow, ...]
+    items: tuple[BoundTaskFrame, ...]
 
     @classmethod
     def of(
         cls, robot: RobotModel, path: Path, task: Task | str, also: Sequence[Follow] = ()
     ) -> Self:
         """Return that an arm's tool follows a path, and other frames theirs."""
-        first = BoundFollow(robot.chain, path, Task.of(task))
+        first = BoundTaskFrame(robot.chain, path, Task.of(task))
         return cls(robot, (first, *(item.on(robot, path.duration) for item in also)))
 
     @property
@@ -201,7 +201,7 @@ class Follows:
         return self.items[0].path.duration
 
     @property
-    def only(self) -> BoundFollow:
+    def only(self) -> BoundTaskFrame:
         """The one tip that is followed.
 
         Raises

@@ -203,9 +203,9 @@ class VirtualJoints:
         near = _ROUNDING * self._duration
         for item in self.relaxations:
             first, last = item.window(self._duration)
-            begun = (t > first + near) | (first <= near)
+            started = (t > first + near) | (first <= near)
             lasts = (t < last - near) | (last >= self._duration - near)
-            found[:, item.indices] |= (begun & lasts)[:, None]
+            found[:, item.indices] |= (started & lasts)[:, None]
         return found
 
     def held(self, t: Array) -> Flags:

@@ -3,8 +3,7 @@
 Notation, per stage: J6 (6, n) a tip's Jacobian [v; ω] in the axes of its chain's base, S the
 selection of its task's rows, J = S J6 (m, n) the rows of all tips, one below the other, ε the null
 motion, u = S(ẋ_d + K e) the commanded rows with pose errors e, A = JJᵀ + λ²I = LLᵀ (λ = 0 except
-near singular poses, where damping is asked for), y = A⁻¹(u - Jε), and eq. 4 in the form that needs
-one solve:
+near singular poses, with damping), y = A⁻¹(u - Jε), and eq. 4 in the form that needs one solve:
 
     q̇ = Jᵀy + ε = J⁺u + (I - J⁺J) ε.
 

@@ -6,8 +6,6 @@ import numpy as np
 
 from selfmotion.basics import Array, called, inlined, kernel
 
-# Small dense algebra, compiled: vectors of three, Gram matrices, Cholesky, eigenvectors.
-
 Vector = tuple[float, float, float]
 
 # Pivot, relative to its diagonal, that counts as rounding: the matrix is singular.

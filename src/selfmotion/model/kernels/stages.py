@@ -34,8 +34,6 @@ from selfmotion.model.kernels.tool import (
     unselect,
 )
 
-# Damping near singular poses, compiled: forward and backward.
-
 # The threshold σ0 and the strength λ0 [m, rad].
 Law = tuple[float, float]
 

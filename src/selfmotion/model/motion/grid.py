@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from selfmotion.basics import Array, read_only
 
+# Nodes in a finite-difference stencil.
 _STENCIL = 5
 
 
@@ -122,11 +123,11 @@ class Grid:
     def aligned(cls, knots: Array, steps: int) -> "Grid":
         """Return about `steps` steps, none across a knot, as equal as the knots allow."""
         longest = (knots[-1] - knots[0]) / steps * (1.0 + 1e-9)
-        pieces = [
+        parts = [
             np.linspace(left, right, int(np.ceil((right - left) / longest)), endpoint=False)
             for left, right in pairwise(knots)
         ]
-        return cls(read_only(np.append(np.concatenate(pieces), knots[-1])))
+        return cls(read_only(np.append(np.concatenate(parts), knots[-1])))
 
     def halved(self, where: npt.NDArray[np.bool_] | None = None) -> "Grid":
         """Return the grid with every step cut in two, or those `where` (N,) says so."""

@@ -171,10 +171,10 @@ class BSplineNullMotion(NullMotion):
 
 @dataclass(frozen=True)
 class FreeNullMotion(NullMotion):
-    """Any ε(t): the motion is optimised at nodes, as many as its cost asks for.
+    """Any ε(t): the motion is optimised at nodes, as many as its cost needs.
 
-    Newton's method finds where each node lies on its self-motion; `Report.null_motion` tells which
-    nodes. An optimiser of one's own, or damping, uses the published method; there, it is a cubic.
+    Newton's method finds where each node is on its self-motion; `Report.null_motion` has the nodes.
+    An optimiser of one's own, or damping, uses the published method; there, it is a cubic.
     """
 
     @property
@@ -221,7 +221,7 @@ class NodeNullMotion(NullMotion):
         return self.resting(t, duration, (0, 0))
 
     def resting(self, t: Array, duration: float, orders: tuple[int, int]) -> Array:
-        """See `NullMotion.resting`: the end's own function is 0, the others begin without slope."""
+        """See `NullMotion.resting`: the end's own function is 0, the others start without slope."""
         from scipy.interpolate import CubicSpline
 
         values = np.eye(len(self.times))

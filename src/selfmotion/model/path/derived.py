@@ -24,8 +24,6 @@ from selfmotion.model.path.feed_kept import FeedKept
 from selfmotion.model.path.pace import Pace, times_when
 from selfmotion.model.task import SE3
 
-# A tool motion given in a frame of its own, such as that of the workpiece.
-
 
 class Placed(_InStep, kind="placed"):
     """A path in a frame that stands somewhere in the world.
@@ -230,8 +228,8 @@ class Retimed(_Derived, kind="retimed"):
             # A time between two intervals belongs to both.
             at = np.isclose(t, pace.t[k], rtol=0.0, atol=_OWN * self.duration)
             # Between two rows with another piece in between nothing is known.
-            apart = replace(item, rows=item.rows + before[k])
-            own = apart.where(~others[k] | (at & ~others[np.maximum(k - 1, 0)]))
+            separate = replace(item, rows=item.rows + before[k])
+            own = separate.where(~others[k] | (at & ~others[np.maximum(k - 1, 0)]))
             found += [own.timed(self.when)] if own else []
         return tuple(found)
 

@@ -27,8 +27,6 @@ from selfmotion.model.path.feed_kept import FeedKept
 from selfmotion.model.path.feed_nodes import FeedNodes, twist_sizes
 from selfmotion.model.path.pace import Pace, times_when
 
-# A path at a constant feed.
-
 # Faster feeds [m/s] are errors of units.
 _FASTEST = 3.0
 
@@ -154,12 +152,12 @@ class Feed(_Derived, kind="feed"):
         inner = [pace.t + start for start, _, pace in self._paces]
         # Length over time, and time over length, are splines.
         inner.append(self._moved(np.union1d(self._path.marks, self._nodes.sigma)))
-        return _apart(np.concatenate(inner), self.duration)
+        return _separate(np.concatenate(inner), self.duration)
 
     def _moved(self, wanted: Array) -> Array:
         """Return when times of the original are passed, from first to last, and rests."""
         passed = self.when(wanted)[1:-1]
-        return _apart(np.concatenate([passed, self.rest_times]), self.duration)
+        return _separate(np.concatenate([passed, self.rest_times]), self.duration)
 
     def when(self, wanted: Array) -> Array:
         """Return when times (K,) of the original are passed [s]."""
@@ -169,12 +167,12 @@ class Feed(_Derived, kind="feed"):
     def pace(self, t: Array) -> tuple[Array, Array]:
         """Return the original's time σ and dσ/dt at times `t` (K,)."""
         reached, rate = np.empty(len(t)), np.empty(len(t))
-        for here, own, pace in self._stretches(t):
+        for here, own, pace in self._sections(t):
             reached[here], rate[here] = pace(own), np.maximum(pace(own, 1), 0.0)
         sigma = np.clip(self._nodes.time_at(reached), 0.0, self._path.duration)
         return sigma, rate * np.maximum(self._nodes.time_at(reached, nu=1), 0.0)
 
-    def _stretches(self, t: Array) -> Iterator[tuple[Array, Array, Pace]]:
+    def _sections(self, t: Array) -> Iterator[tuple[Array, Array, Pace]]:
         """Yield for each section the mask of times (K,) in it, its own times, and its pace."""
         which = np.searchsorted([end for _, end, _ in self._paces[:-1]], t, side="right")
         for number, (start, end, pace) in enumerate(self._paces):
@@ -184,7 +182,7 @@ class Feed(_Derived, kind="feed"):
     def series(self, middle: Array, half: Array) -> PathSeries | None:
         """See `Path.series`: the original's time over the length, that over time."""
         reached, length = np.empty(len(middle)), np.empty((series.LENGTH, len(middle)))
-        for here, own, pace in self._stretches(middle):
+        for here, own, pace in self._sections(middle):
             reached[here], length[:, here] = pace(own), pace.series(own, half[here])
         reach = series.after_first(length)
         reach = np.where(reach > 0.0, reach, 1.0)
@@ -315,7 +313,7 @@ class Feed(_Derived, kind="feed"):
         return {"kind": self.kind, "path": self._path.to_dict(), **described}
 
 
-def _apart(times: Array, duration: float) -> Array:
+def _separate(times: Array, duration: float) -> Array:
     """Return times in order, but for those that differ by rounding."""
     unique = np.unique(np.clip(times, 0.0, duration))
     unique = unique[np.append(True, np.diff(unique) > 1e-9 * duration)]
@@ -440,16 +438,16 @@ class FeedPossible:
     @property
     def remedies(self) -> str:
         """Remedies, in words."""
-        told = [] if self.feed is None else [f"ask for {self.feed:g} m/s"]
+        said = [] if self.feed is None else [f"ask for {self.feed:g} m/s"]
         if self.limits:
             named = (
                 f"{name.replace('_', ' ')} of {value:g} {_UNITS[name]} ({name}={value:g})"
                 for name, value in self.limits.items()
             )
-            told.append(f"let the path have {'an ' * (len(self.limits) == 1)}{' and '.join(named)}")
+            said.append(f"let the path have {'an ' * (len(self.limits) == 1)}{' and '.join(named)}")
         if self.found.held_by.startswith("run-up"):
-            told.append("give it more way to run up (longer legs, rounder corners)")
-        return ", or ".join([*told, f"allow it more (within={self.within:g})"])
+            said.append("give it more way to run up (longer legs, rounder corners)")
+        return ", or ".join([*said, f"allow it more (within={self.within:g})"])
 
 
 def _leaves(found: FeedKept) -> bool:

@@ -20,8 +20,8 @@ _SAME = 1e-3
 class FeedKept:
     """Errors of one of the feeds of a `Feed`, in its intervals.
 
-    Stretches count but for run-up and run-down, rounded corners, and turning on the spot; each has
-    to reach it.
+    Intervals count but for run-up, run-down, rounded corners, and turning on the spot; each has to
+    reach it.
 
     Attributes
     ----------
@@ -109,7 +109,7 @@ class FeedKept:
         """Index of the slowest time where it counts; of an interval without any, the fastest."""
         chosen = []
         for own in range(len(self.during)):
-            here = self._stretch == own
+            here = self._interval == own
             if (self.counts & here).any():
                 chosen.append(int(np.argmin(np.where(self.counts & here, self.speeds, np.inf))))
             elif here.any():
@@ -118,7 +118,7 @@ class FeedKept:
         return min(chosen, key=lambda k: float(self.speeds[k]))
 
     @cached_property
-    def _stretch(self) -> Ints:
+    def _interval(self) -> Ints:
         """Number of each time's interval, (K,)."""
         return np.maximum(np.searchsorted(self.during[:, 0], self.t, side="right") - 1, 0)
 
@@ -155,10 +155,10 @@ class FeedKept:
         """
         if rows.all():
             return self
-        counted = np.unique(self._stretch[self.counts & rows])
+        counted = np.unique(self._interval[self.counts & rows])
         if not len(counted):
             return None
-        rows = rows & np.isin(self._stretch, counted)
+        rows = rows & np.isin(self._interval, counted)
         names = ("t", "speeds", "lasts", "counts", "own", "rows")
         chosen = {name: getattr(self, name)[rows] for name in names}
         causes = tuple(np.array(self.causes)[rows].tolist())

@@ -75,7 +75,7 @@ def with_leads(
     Parameters
     ----------
     path : Path
-        Begins and ends at rest.
+        Starts and ends at rest.
     length : float
         Of each lead [m].
     duration : float
@@ -278,37 +278,39 @@ def with_run_ups(path: Feed) -> Stroke:
     if not isinstance(path, Feed):
         raise PathError(f"run-ups: path is {shown(path)}, expected a Feed(path, feed)")
     original = path.original
-    ways = np.array([path.feed**2 / path.limits["acceleration"]] * 2)
+    run_ups = np.array([path.feed**2 / path.limits["acceleration"]] * 2)
     for _ in range(_TRIES):
-        longer, first, last = _lengthened(path, original, ways)
+        longer, first, last = _lengthened(path, original, run_ups)
         begin, end = longer.when(np.array([first, last])).tolist()
         counted = np.concatenate([found.own[found.counts] for found in longer.feeds])
         if not len(counted):
-            ways *= 2.0
+            run_ups *= 2.0
             continue
         missing = np.array([counted.min() - begin, end - counted.max()])
         if (missing <= 0.0).all():
-            return Stroke(longer, begin, end, *ways.tolist())
-        ways += path.feed * np.maximum(missing, 0.0) + _MORE * ways * (missing > 0.0)
+            return Stroke(longer, begin, end, *run_ups.tolist())
+        run_ups += path.feed * np.maximum(missing, 0.0) + _MORE * run_ups * (missing > 0.0)
         if len(path.feeds) == 1:
             # Both as long: the ends are symmetric in time.
-            ways[:] = ways.max()
+            run_ups[:] = run_ups.max()
     raise PathError(
         f"run-ups: the feed of {path.feed:g} m/s is not reached at the ends of the path with "
-        f"{ways[0]:.3g} m before it and {ways[1]:.3g} m after it; ask for a lower feed, or larger "
-        f"accelerations"
+        f"{run_ups[0]:.3g} m before it and {run_ups[1]:.3g} m after it; ask for a lower feed, or "
+        f"larger accelerations"
     )
 
 
-def _lengthened(path: Feed, original: Path, ways: Array) -> tuple[Feed, float, float]:
+def _lengthened(path: Feed, original: Path, run_ups: Array) -> tuple[Feed, float, float]:
     """Return the feed along the longer path, and when that is at the given one's ends [s]."""
-    before, after = (_way(original, time, way) for time, way in zip((0, -1), ways, strict=True))
+    before, after = (
+        _run_up(original, time, run) for time, run in zip((0, -1), run_ups, strict=True)
+    )
     whole = Joined([before, original, after])
     first = before.duration
     return path.along(whole, first), first, first + original.duration
 
 
-def _way(path: Path, end: int, length: float) -> Line:
+def _run_up(path: Path, end: int, length: float) -> Line:
     """Return the line on which the tool comes to the start of a path (0), or leaves its end.
 
     At the speed of the path, turning on as it turns.

@@ -69,14 +69,14 @@ class Pace:
         sigma = np.concatenate([self.sigma[:1], self.sigma, self.sigma[-1:]])
         rate = np.concatenate([[0.0], self.rate, [0.0]])
         spline = CubicHermiteSpline(t, sigma, rate)
-        way = spline.antiderivative()
+        integral = spline.antiderivative()
         new = np.union1d(self.t, self.t + window)
         new = new[np.unique(np.floor(new / (close * window)), return_index=True)[1]]
         # Neighbours on both sides of such a share are merged as well.
         new = new[np.append(True, np.diff(new) > _SAME * window)]
         new[-1] = self.t[-1] + window
         before = new - window
-        mean = np.clip((way(new) - way(before)) / window, self.sigma[0], self.sigma[-1])
+        mean = np.clip((integral(new) - integral(before)) / window, self.sigma[0], self.sigma[-1])
         mean[0], mean[-1] = self.sigma[0], self.sigma[-1]
         speed = np.maximum((spline(new) - spline(before)) / window, 0.0)
         return Pace(new, mean, speed, (spline(new, 1) - spline(before, 1)) / window)
@@ -106,17 +106,17 @@ class Pace:
         # Control points are below the curve: it is evaluated where they are negative.
         u = np.linspace(0.0, 1.0, _PLACES)
         rates = np.vander(u, degree + 1, increasing=True) @ local[:, late]
-        place, piece = np.unravel_index(int(np.argmin(rates)), rates.shape)
-        if rates[place, piece] >= -allowed:
+        place, segment = np.unravel_index(int(np.argmin(rates)), rates.shape)
+        if rates[place, segment] >= -allowed:
             return None
-        k = int(late[piece])
+        k = int(late[segment])
         return float(self.t[k] + u[place] * h[k])
 
     def series(self, middle: Array, half: Array) -> Array:
         """Return the majorants of σ on intervals between samples, (K + 1, I)."""
         spline = self._spline
-        pieces = series.of_pieces(spline.x, spline.c[::-1], middle, half)
-        return series.of_polynomial(pieces)
+        segments = series.of_pieces(spline.x, spline.c[::-1], middle, half)
+        return series.of_polynomial(segments)
 
     @cached_property
     def _spline(self) -> Any:

@@ -31,9 +31,8 @@ if TYPE_CHECKING:
 # Poses that a polyline can do without: those that its legs pass within a tolerance.
 #
 # By the algorithm of Ramer (1972), Douglas and Peucker (1973): a leg from the first pose to the
-# last is divided at the pose that it misses by most, until it misses none by more than the
-# tolerance. A pose from which the tool goes back along the leg, or that is turned otherwise,
-# divides it as well.
+# last is divided at its farthest pose, until none is farther than the tolerance. A pose from which
+# the tool goes back along the leg, or that is turned otherwise, divides it as well.
 
 # Share of the tolerances by which legs may be off poses: rounding of files.
 _ROUNDING = 2e-3
@@ -58,7 +57,7 @@ class Merged(NamedTuple):
 
     kept: Ints
     shares: Array
-    missed: Array
+    errors: Array
     turned: Array
 
 
@@ -105,7 +104,7 @@ class _Measure:
         """Return the leg from one pose to another, with its distances from those between them."""
         return _leg(self._points, self._turns, first, last)
 
-    def miss(self, leg: _Leg) -> Array:
+    def distance(self, leg: _Leg) -> Array:
         """Return its distance from each, as shares of the tolerances."""
         moved = np.maximum(leg.away, leg.back) / self._tolerance
         return np.asarray(np.maximum(moved, leg.turned / self._turn_tolerance))
@@ -120,11 +119,11 @@ class _Measure:
                 continue
             # Turns take ten times as long as places, which decide as a rule.
             moved = _leg(self._points, self._turns, first, last, turns_count=False)
-            missed = self.miss(moved)
-            if missed.max() <= most:
-                missed = self.miss(self.leg(first, last))
-            if missed.max() > most:
-                middle = first + 1 + int(missed.argmax())
+            errors = self.distance(moved)
+            if errors.max() <= most:
+                errors = self.distance(self.leg(first, last))
+            if errors.max() > most:
+                middle = first + 1 + int(errors.argmax())
                 waiting += [(middle, last), (first, middle)]
             else:
                 kept.append(last)
@@ -147,12 +146,12 @@ class _Measure:
             others = np.delete(lengths, min(k, 1))
             if own < self._tolerance and len(others) and own < _STUB * others.min():
                 ends = [each for each in (k, k + 1) if 0 < each < len(found) - 1]
-                missed = [
-                    self.miss(self.leg(found[each - 1], found[each + 1])).max(initial=0.0)
+                errors = [
+                    self.distance(self.leg(found[each - 1], found[each + 1])).max(initial=0.0)
                     for each in ends
                 ]
-                if min(missed) <= _CUT:
-                    del found[ends[int(np.argmin(missed))]]
+                if min(errors) <= _CUT:
+                    del found[ends[int(np.argmin(errors))]]
                     continue
             k += 1
         return found
@@ -347,9 +346,9 @@ class Polyline(Path, kind="polyline"):
     @cached_property
     def _lasts(self) -> Array:
         """Duration of each leg, (N - 1,)."""
-        way = np.linalg.norm(np.diff(self._points, axis=0), axis=1) / _SPEED
+        lengths_ = np.linalg.norm(np.diff(self._points, axis=0), axis=1) / _SPEED
         turning = np.linalg.norm(self._rotvecs, axis=1) / _TURN_RATE
-        return np.asarray(np.maximum(way, turning))
+        return np.asarray(np.maximum(lengths_, turning))
 
     @cached_property
     def _rotvecs(self) -> Array:
@@ -373,9 +372,9 @@ class Polyline(Path, kind="polyline"):
         turns = np.linalg.norm(rates[after] - rates[before], axis=1)
         tiny = np.finfo(float).tiny
         # The error of legs reduces the tolerance of the corners at their ends.
-        missed, turned = (np.maximum(off[before], off[after]) for off in self._merged[2:])
+        errors, turned = (np.maximum(off[before], off[after]) for off in self._merged[2:])
         half = np.minimum(
-            (self._tolerance - missed) / (_ROUNDED * np.maximum(jumps, tiny)),
+            (self._tolerance - errors) / (_ROUNDED * np.maximum(jumps, tiny)),
             (self._turn_tolerance - turned) / (_ROUNDED * np.maximum(turns, tiny)),
         )
         half = np.minimum(half, 0.5 * np.minimum(lasts[before], lasts[after]))
@@ -465,6 +464,6 @@ def _passed(x: Array, half: Array) -> tuple[Array, Array]:
     u = np.clip(x / np.where(half > 0.0, half, 1.0), -1.0, 1.0)
     # ∫ 15/16 (1 - u²)² du.
     share = 0.5 + 15.0 / 16.0 * (u - 2.0 / 3.0 * u**3 + u**5 / 5.0)
-    way = np.polynomial.polynomial.polyval(u, _CORNER)
+    lengths_ = np.polynomial.polynomial.polyval(u, _CORNER)
     inside = np.abs(x) < half
-    return np.where(inside, half * way, np.maximum(x, 0.0)), np.where(inside, share, x > 0.0)
+    return np.where(inside, half * lengths_, np.maximum(x, 0.0)), np.where(inside, share, x > 0.0)

@@ -26,8 +26,8 @@ def edges_of(times: Array) -> Array:
     """
     times, near = np.asarray(times), _SAME * float(times[-1])
     inner = times[(times > near) & (times < times[-1] - near)]
-    apart = np.append(True, np.diff(inner) > near)[: len(inner)]
-    return np.concatenate([[0.0], inner[apart], times[-1:]])
+    distinct = np.append(True, np.diff(inner) > near)[: len(inner)]
+    return np.concatenate([[0.0], inner[distinct], times[-1:]])
 
 
 def spread_along(path: Path, count: int) -> Array:

@@ -24,8 +24,6 @@ from selfmotion.model.path.base import (
 )
 from selfmotion.model.task import SE3, log3
 
-# How fast a line or circle is run through.
-
 # Minimum jerk's coefficients of 1, τ, τ² …
 _JERK = (0.0, 0.0, 0.0, 10.0, -15.0, 6.0)
 
@@ -106,7 +104,7 @@ class Round(Path):
             return turned @ self.start.rotation, omega
         return np.tile(self.start.rotation, (len(turned), 1, 1)), np.zeros_like(omega)
 
-    def _way(self, middle: Array, half: Array) -> Array:
+    def _length(self, middle: Array, half: Array) -> Array:
         """Return the series of how far along it is, from 0 to 1."""
         return TimeLaw.of(self.time_law).series(middle / self.duration, half / self.duration)
 
@@ -164,10 +162,10 @@ class Line(Path, kind="line"):
     @override
     def series(self, middle: Array, half: Array) -> PathSeries:
         law, last = TimeLaw.of(self.time_law), self.duration
-        way = law.series(middle / last, half / last)
+        share = law.series(middle / last, half / last)
         length = float(np.linalg.norm(self.end.translation - self.start.translation))
         angle = float(np.linalg.norm(log3(self.end.rotation @ self.start.rotation.T)))
-        return PathSeries(length * way, series.exponential(angle * way))
+        return PathSeries(length * share, series.exponential(angle * share))
 
 
 @dataclass(frozen=True, eq=False)
@@ -251,7 +249,7 @@ class Circle(Round, kind="circle"):
 
     @override
     def series(self, middle: Array, half: Array) -> PathSeries:
-        round_axis = series.exponential(2.0 * np.pi * abs(self.turns) * self._way(middle, half))
+        round_axis = series.exponential(2.0 * np.pi * abs(self.turns) * self._length(middle, half))
         return self._with_tool(self.radius * round_axis, round_axis)
 
 
@@ -306,8 +304,8 @@ class Spiral(Round, kind="spiral"):
             object.__setattr__(self, name, number)
         if max(self.start_radius, self.radius) < _ON_AXIS and abs(self.rise) < _ON_AXIS:
             raise PathError("spiral: it starts and ends on the axis and does not rise: no way")
-        still = abs(self.turns) < _ON_AXIS and abs(self.rise) < _ON_AXIS
-        if still and abs(self.radius - self.start_radius) < _ON_AXIS:
+        is_point = abs(self.turns) < _ON_AXIS and abs(self.rise) < _ON_AXIS
+        if is_point and abs(self.radius - self.start_radius) < _ON_AXIS:
             raise PathError(
                 "spiral: turns is 0, radius that of the start and rise 0: no way; say how far it "
                 "goes round, or Dwell to stay"
@@ -341,16 +339,16 @@ class Spiral(Round, kind="spiral"):
         arms = outward * (first + grown * s)[:, None]
         rises = self.normal * (self.rise * s)[:, None]
         foot = self.start.translation - self._away
-        per_way = angle * np.cross(self.normal, arms) + grown * outward + self.rise * self.normal
+        per_length = angle * np.cross(self.normal, arms) + grown * outward + self.rise * self.normal
         rate = (speed / self.duration)[:, None]
         rotation, omega = self._oriented(turned, angle * self.normal * rate)
-        return PathSamples(t, foot + arms + rises, rotation, np.hstack([per_way * rate, omega]))
+        return PathSamples(t, foot + arms + rises, rotation, np.hstack([per_length * rate, omega]))
 
     @override
     def series(self, middle: Array, half: Array) -> PathSeries:
-        way = self._way(middle, half)
-        round_axis = series.exponential(2.0 * np.pi * abs(self.turns) * way)
-        away = abs(self.radius - self.start_radius) * way
+        share = self._length(middle, half)
+        round_axis = series.exponential(2.0 * np.pi * abs(self.turns) * share)
+        away = abs(self.radius - self.start_radius) * share
         away[0] = max(self.radius, self.start_radius)
-        place = series.product(round_axis, away) + abs(self.rise) * way
+        place = series.product(round_axis, away) + abs(self.rise) * share
         return self._with_tool(place, round_axis)

@@ -27,7 +27,7 @@ _BESIDES = 16
 # … or as many of so many on the whole path as are in it …
 _IN_ALL = 2048
 # … and the largest difference, relative to the largest velocity.
-_MISSED = 1e-9
+_DIFFERENCE = 1e-9
 # Largest difference of two segments at their common end, likewise.
 _JUMP = 1e-9
 # Largest step of the orientation's integration, as a share of a segment.
@@ -112,8 +112,8 @@ class TwistPath(Path, kind="twist"):
         half = 0.5 * np.diff(self._breaks)
         integrals = np.array(
             [
-                chebyshev.chebint(piece[:, :3], lbnd=-1) * h
-                for piece, h in zip(self._coefficients, half, strict=True)
+                chebyshev.chebint(segment[:, :3], lbnd=-1) * h
+                for segment, h in zip(self._coefficients, half, strict=True)
             ]
         )
         lengths = np.array([chebyshev.chebval(1.0, integral) for integral in integrals])
@@ -188,13 +188,13 @@ class TwistPath(Path, kind="twist"):
         """See `Path.series`: with Ṙ = [ω]R, R is bounded by the exponential of ∫|ω|."""
         k, _ = self._local(middle)
         share = 2.0 * half / np.diff(self._breaks)[k]
-        pieces = self._coefficients[k].transpose(1, 0, 2)
+        segments = self._coefficients[k].transpose(1, 0, 2)
         step = half / np.arange(1.0, series.LENGTH)[:, None]
         found = []
-        for rates in (pieces[:, :, :3], pieces[:, :, 3:]):
-            way = np.zeros((series.LENGTH, len(middle)))
-            way[1:] = series.of_chebyshev(rates, share)[:-1] * step
-            found.append(way)
+        for rates in (segments[:, :, :3], segments[:, :, 3:]):
+            angle_series = np.zeros((series.LENGTH, len(middle)))
+            angle_series[1:] = series.of_chebyshev(rates, share)[:-1] * step
+            found.append(angle_series)
         return PathSeries(found[0], series.exponential(found[1]))
 
     def _rotation(self, t: Array) -> Array:
@@ -225,7 +225,7 @@ def _resolve(
 ) -> tuple[list[float], list[Array]]:
     """Return breaks and Chebyshev coefficients of pieces that resolve the velocity."""
     scale = max(float(np.abs(_sample(velocity, t)).max()) for t in np.linspace(0, duration, 9))
-    pending, breaks, pieces = [(0.0, duration)], [0.0], []
+    pending, breaks, segments = [(0.0, duration)], [0.0], []
     nodes = chebyshev.chebpts1(_DEGREE + 1)
     while pending:
         left, right = pending.pop()
@@ -235,7 +235,7 @@ def _resolve(
         scale = max(scale, float(np.abs(values).max()))
         resolved = np.abs(coefficients[-3:]).max() <= _TAIL * max(scale, 1e-300)
         if resolved and _fits(velocity, left, right, coefficients, duration, scale):
-            pieces.append(coefficients)
+            segments.append(coefficients)
             breaks.append(right)
         elif right - left < _SHORTEST * duration:
             raise PathError(
@@ -245,9 +245,9 @@ def _resolve(
         else:
             middle = 0.5 * (left + right)
             pending += [(middle, right), (left, middle)]
-    _check_jumps(breaks, pieces, scale)
-    _check_ends(velocity, duration, pieces, scale)
-    return breaks, pieces
+    _check_jumps(breaks, segments, scale)
+    _check_ends(velocity, duration, segments, scale)
+    return breaks, segments
 
 
 def _fits(
@@ -262,13 +262,13 @@ def _fits(
     count = max(_BESIDES, int(np.ceil(_IN_ALL * (right - left) / duration)))
     s = np.linspace(-1.0, 1.0, count + 1)[:-1] + 1.0 / count
     values = np.array([_sample(velocity, t) for t in 0.5 * (left + right + (right - left) * s)])
-    missed = np.abs(chebyshev.chebval(s, coefficients).T - values).max()
-    return bool(missed <= _MISSED * max(scale, 1e-300))
+    difference = np.abs(chebyshev.chebval(s, coefficients).T - values).max()
+    return bool(difference <= _DIFFERENCE * max(scale, 1e-300))
 
 
-def _check_jumps(breaks: list[float], pieces: list[Array], scale: float) -> None:
+def _check_jumps(breaks: list[float], segments: list[Array], scale: float) -> None:
     """Refuse a velocity that jumps from one piece to the next, which each by itself may not."""
-    for time, before, after in zip(breaks[1:-1], pieces[:-1], pieces[1:], strict=True):
+    for time, before, after in zip(breaks[1:-1], segments[:-1], segments[1:], strict=True):
         jump = chebyshev.chebval(-1.0, after) - chebyshev.chebval(1.0, before)
         size = float(np.abs(jump).max())
         if not size <= _JUMP * max(scale, 1e-300):
@@ -279,11 +279,11 @@ def _check_jumps(breaks: list[float], pieces: list[Array], scale: float) -> None
 
 
 def _check_ends(
-    velocity: Callable[[float], npt.ArrayLike], duration: float, pieces: list[Array], scale: float
+    velocity: Callable[[float], npt.ArrayLike], duration: float, segments: list[Array], scale: float
 ) -> None:
     """Refuse a velocity that jumps next to an end, beyond all samples."""
-    for time, place, piece in ((0.0, -1.0, pieces[0]), (duration, 1.0, pieces[-1])):
-        jump = float(np.abs(chebyshev.chebval(place, piece) - _sample(velocity, time)).max())
+    for time, place, segment in ((0.0, -1.0, segments[0]), (duration, 1.0, segments[-1])):
+        jump = float(np.abs(chebyshev.chebval(place, segment) - _sample(velocity, time)).max())
         if not jump <= _JUMP * max(scale, 1e-300):
             raise PathError(
                 f"twist path: the velocity jumps by {jump:.3g} m/s or rad/s next to t = "

@@ -291,7 +291,7 @@ class Waypoints(Path, kind="waypoints"):
         return np.flatnonzero(self._stops | (self._t == 0.0) | (self._t == self.duration))
 
     @cached_property
-    def _pieces(self) -> tuple[npt.NDArray[np.intp], list[tuple[Any, Turning]]]:
+    def _sections(self) -> tuple[npt.NDArray[np.intp], list[tuple[Any, Turning]]]:
         """First waypoint of each piece between corners, and its (position, rotation) splines."""
         from scipy.interpolate import CubicSpline
 
@@ -328,12 +328,12 @@ class Waypoints(Path, kind="waypoints"):
     @override
     def evaluate(self, t: Array) -> PathSamples:
         tau, slope = self._warp(t)
-        starts, splines = self._pieces
-        piece = np.searchsorted(self._t[starts], tau, side="right") - 1
+        starts, splines = self._sections
+        section = np.searchsorted(self._t[starts], tau, side="right") - 1
         position, rotation = np.empty((len(t), 3)), np.empty((len(t), 3, 3))
         twist = np.empty((len(t), 6))
         for index, (line, turned) in enumerate(splines):
-            here: Any = slice(None) if len(splines) == 1 else np.flatnonzero(piece == index)
+            here: Any = slice(None) if len(splines) == 1 else np.flatnonzero(section == index)
             own = tau[here]
             if len(own):
                 position[here], twist[here, :3] = line(own), line(own, 1)
@@ -351,11 +351,11 @@ class Waypoints(Path, kind="waypoints"):
         at, _ = self._warp(middle)
         # Of the range of τ; where it does not move, of any.
         reach = np.where(series.after_first(tau) > 0.0, series.after_first(tau), 1.0)
-        starts, splines = self._pieces
-        piece = np.searchsorted(self._t[starts], at, side="right") - 1
+        starts, splines = self._sections
+        section = np.searchsorted(self._t[starts], at, side="right") - 1
         found = PathSeries(np.empty_like(tau), np.empty_like(tau))
         for index, (line, turned) in enumerate(splines):
-            here = piece == index
+            here = section == index
             if not np.any(here):
                 continue
             for spline, whole in zip((line, turned), found, strict=True):

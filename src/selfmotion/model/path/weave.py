@@ -129,8 +129,8 @@ class Weave(_InStep, kind="weave"):
         found = np.concatenate([self._path.marks, pace.t, times_when(pace, breaks, *ends)])
         found = np.unique(found[(found >= 0.0) & (found <= self.duration)])
         # Of two equal times one is dropped; the last one is the end.
-        apart = np.append(np.diff(found) > 1e-12 * self.duration, True)
-        return read_only(np.append(0.0, found[apart & (found > 1e-12 * self.duration)]))
+        distinct = np.append(np.diff(found) > 1e-12 * self.duration, True)
+        return read_only(np.append(0.0, found[distinct & (found > 1e-12 * self.duration)]))
 
     @override
     def evaluate(self, t: Array) -> PathSamples:
@@ -161,11 +161,11 @@ class Weave(_InStep, kind="weave"):
         grown, grows = self._grown(count)
         inside = count - np.floor(count)
         if self._dwell:
-            breaks, pieces = self._cycle
+            breaks, segments = self._cycle
             k = np.clip(np.searchsorted(breaks, inside, side="right") - 1, 0, len(breaks) - 2)
-            x, piece = inside - breaks[k], pieces[:, k]
-            beside = _horner(piece, x)
-            slope = _horner(piece[1:] * np.arange(1.0, len(piece))[:, None], x)
+            x, segment = inside - breaks[k], segments[:, k]
+            beside = _horner(segment, x)
+            slope = _horner(segment[1:] * np.arange(1.0, len(segment))[:, None], x)
         else:
             angle = 2.0 * np.pi * inside
             beside, slope = np.sin(angle), 2.0 * np.pi * np.cos(angle)
@@ -189,8 +189,8 @@ class Weave(_InStep, kind="weave"):
         grown = series.of_polynomial(series.recentred(steps, near, reach))
         inside = count - np.floor(count)
         if self._dwell:
-            breaks, pieces = self._cycle
-            beside = series.of_polynomial(series.of_pieces(breaks, pieces, inside, reach))
+            breaks, segments = self._cycle
+            beside = series.of_polynomial(series.of_pieces(breaks, segments, inside, reach))
         else:
             powers = np.arange(float(series.LENGTH))[:, None]
             each = 2.0 * np.pi * reach / np.maximum(powers, 1.0)
@@ -211,8 +211,8 @@ class Weave(_InStep, kind="weave"):
         # Half of it has gone by when the seam is crossed.
         half = series.recentred(across, np.array([0.5 * step]), np.array([1.0]))
         held = np.eye(6)[:1].T
-        pieces = np.hstack([half, held, -across, -held, across])
-        return np.append(0.0, np.cumsum(lengths)), pieces
+        segments = np.hstack([half, held, -across, -held, across])
+        return np.append(0.0, np.cumsum(lengths)), segments
 
     @cached_property
     def _count(self) -> Pace:
@@ -228,10 +228,10 @@ class Weave(_InStep, kind="weave"):
     def _lengths(self) -> tuple[Array, Array]:
         """Return times and how long the seam is by then [m]."""
         marks = self._path.marks
-        pieces = np.ceil(np.diff(marks) / self.duration * _ABOUT).astype(int)
+        segments = np.ceil(np.diff(marks) / self.duration * _ABOUT).astype(int)
         parts = [
             np.linspace(first, last, count, endpoint=False)
-            for first, last, count in zip(marks[:-1], marks[1:], pieces, strict=True)
+            for first, last, count in zip(marks[:-1], marks[1:], segments, strict=True)
         ]
         t = np.append(np.concatenate(parts), self.duration)
         h = np.diff(t)

@@ -180,6 +180,7 @@ JOINTS = (
 )
 # Difference of axes of a URDF from the maker's that counts as rounding [m, rad].
 _ALIKE = 1e-6
+# A quarter turn [rad].
 _QUARTER = 0.5 * np.pi
 # α of the maker's Denavit-Hartenberg parameters.
 _ALPHA = (_QUARTER, 0.0, 0.0, _QUARTER, -_QUARTER, 0.0)
@@ -206,7 +207,7 @@ class _Lengths(NamedTuple):
 def maker_placements(
     joints: Sequence[UrdfAxis], tool: pin.SE3, calibration: CalibrationFile
 ) -> list[pin.SE3]:
-    """Return where a calibration puts the six joints of a URDF, each in its parent link.
+    """Return the placements of a URDF's six joints by a calibration, each in its parent link.
 
     Parameters
     ----------
@@ -322,7 +323,7 @@ def _corrected(
 
 def _nearest_on_axis(frame: pin.SE3, wanted: pin.SE3) -> pin.SE3:
     """Return a frame moved along and turned about its z axis to be nearest to another one."""
-    apart = frame.inverse() * wanted
-    turn = np.arctan2(apart.rotation[1, 0], apart.rotation[0, 0])
-    along = _moved(0.0, 0.0, float(apart.translation[2]))
+    difference = frame.inverse() * wanted
+    turn = np.arctan2(difference.rotation[1, 0], difference.rotation[0, 0])
+    along = _moved(0.0, 0.0, float(difference.translation[2]))
     return frame * along * pin.SE3(pin.rpy.rpyToMatrix(0.0, 0.0, turn), np.zeros(3))

@@ -27,7 +27,7 @@ _AXES = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 
 
 class Kinematics:
-    """Asks Pinocchio for a chain's Jacobian and pose, with data of its own.
+    """A chain's Jacobian and pose by Pinocchio, with data of its own.
 
     The one class with these calls: another library would be one class like it. Two of them may be
     used by two threads at once; one may not.

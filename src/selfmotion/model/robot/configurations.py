@@ -24,8 +24,6 @@ from selfmotion.model.task import Task, as_pose
 if TYPE_CHECKING:
     from selfmotion.model.robot.model import RobotModel
 
-# Configurations as they are given: n numbers, or K rows of them.
-
 
 def as_configuration(robot: RobotModel, q: npt.ArrayLike) -> Array:
     """Return `q` as finite numbers (n,); see `RobotModel.configuration`."""
@@ -88,8 +86,8 @@ def mean_lever(robot: RobotModel) -> float:
     """Return the mean motion of the tool [m] per radian of a revolute joint."""
     arrays = robot.chain.arrays
     beyond = np.cumsum(arrays.link_lengths[:0:-1])[::-1]
-    levers = beyond[arrays.tree.is_revolute]
-    return float(levers.mean()) if levers.size and levers.max() > 0.0 else 1.0
+    lever_arms = beyond[arrays.tree.is_revolute]
+    return float(lever_arms.mean()) if lever_arms.size and lever_arms.max() > 0.0 else 1.0
 
 
 def part_weights(robot: RobotModel, weights: Mapping[str, float]) -> Array:

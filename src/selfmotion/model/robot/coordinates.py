@@ -24,8 +24,6 @@ from selfmotion.basics import (
 from selfmotion.model.robot.chain_series import ChainSeries
 from selfmotion.model.robot.model import RobotModel
 
-# Whether joint coordinates are in radians.
-
 # Largest range of joints with limits [rad].
 _MOST_TURNS = 4.0 * np.pi
 

@@ -146,15 +146,17 @@ class Energy:
 
     def __init__(self, robot: RobotModel) -> None:
         _check_weighed(robot)
-        self._model, self._still = robot.model, robot.model.copy()
-        self._still.gravity.setZero()
+        self._model, self._without_gravity = robot.model, robot.model.copy()
+        self._without_gravity.gravity.setZero()
         self._coupling = robot.coupling
 
     def kinetic(self, q: Array, qd: Array) -> Array:
         """Return the energies of a motion (K, n) each, (K,) [J]."""
-        data, coupling = self._still.createData(), self._coupling
+        data, coupling = self._without_gravity.createData(), self._coupling
         rows = zip(coupling.spread(q), coupling.rates(qd), strict=True)
-        return np.array([pin.computeKineticEnergy(self._still, data, *row) for row in rows])
+        return np.array(
+            [pin.computeKineticEnergy(self._without_gravity, data, *row) for row in rows]
+        )
 
     def kinetic_slopes(self, q: Array, qd: Array) -> tuple[Array, Array]:
         """Return their derivatives ½ q̇ᵀ ∂(Mq̇)/∂q and Mq̇, (K, n) each.
@@ -162,18 +164,18 @@ class Energy:
         At rest and without gravity the inverse dynamics are τ = Mq̈, so that both come from its
         derivatives with q̇ in place of q̈.
         """
-        data, rest = self._still.createData(), np.zeros(self._still.nv)
+        data, rest = self._without_gravity.createData(), np.zeros(self._without_gravity.nv)
         q, qd = self._coupling.spread(q), self._coupling.rates(qd)
         by_q, by_qd = np.empty_like(q), np.empty_like(qd)
         for k in range(len(q)):
-            found = pin.computeRNEADerivatives(self._still, data, q[k], rest, qd[k])
+            found = pin.computeRNEADerivatives(self._without_gravity, data, q[k], rest, qd[k])
             by_q[k], by_qd[k] = 0.5 * (qd[k] @ found[0]), found[2] @ qd[k]
         return self._coupling.gathered(by_q), self._coupling.gathered(by_qd)
 
     def mass(self, q: Array) -> Array:
         """Return M at q (n,), (n, n)."""
         at = self._coupling.spread(q)
-        upper = np.triu(pin.crba(self._still, self._still.createData(), at))
+        upper = np.triu(pin.crba(self._without_gravity, self._without_gravity.createData(), at))
         return _reduced(self._coupling, np.asarray(upper + np.triu(upper, 1).T))
 
     def gravity(self, q: Array) -> Array:

@@ -22,8 +22,6 @@ from selfmotion.model.robot.urdf import Urdf
 from selfmotion.model.robot.urdf_elements import ARMATURE
 from selfmotion.model.robot.urdf_text import Packages
 
-# Joints that are held, in Pinocchio's terms.
-
 
 def locked_configuration(model: Any, locked: Mapping[str, float]) -> tuple[Array, list[int]]:
     """Return a full configuration with the locked joints set, and the indices of those joints."""

@@ -86,10 +86,9 @@ def load_robot(
     arguments : dict, optional
         Of a xacro file; of several robots a dict of these, by part.
     packages : path or sequence of path, optional
-        Folders in which packages that files name are looked up first (``package://``,
-        ``$(find …)``). Without, they are found in folders above the file and three levels below
-        these, and by ``AMENT_PREFIX_PATH`` and ``ROS_PACKAGE_PATH``. Text is as a file in the
-        working folder.
+        Folders that are searched first for packages (``package://``, ``$(find …)``). Without, they
+        are found in folders above the file and three levels below these, and by
+        ``AMENT_PREFIX_PATH`` and ``ROS_PACKAGE_PATH``. Text is as a file in the working folder.
     calibration : path, optional
         File that says where the joints of this very arm are: Universal Robots' kinematics
         (``.yaml``) or ``calibration.conf``; or a ``.yaml`` or ``.toml`` file with ``joints``, for

@@ -330,7 +330,7 @@ class RobotModel:
         Returns
         -------
         (n,)
-            Misses the pose by less than 1e-10 (m and rad).
+            The error from the pose is below 1e-10 (m and rad).
 
         Raises
         ------

@@ -258,7 +258,7 @@ def without_lacking(root: ElementTree.Element) -> ElementTree.Element:
     return root
 
 
-# Links of a URDF: each part is what it says, or refused by name.
+# Links of a URDF: invalid elements are errors with their names.
 #
 # Pinocchio drops what it cannot read, and what follows it in the link, with a line on the
 # terminal at most: a box with two sizes, numbers with commas, a capsule, a mass that is none.

@@ -8,8 +8,6 @@ import numpy as np
 
 from selfmotion.basics import Array, as_number
 
-# The singularity-robust inverse: how much damping, and where.
-
 
 @dataclass(frozen=True)
 class Damping:

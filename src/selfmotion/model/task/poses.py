@@ -16,14 +16,12 @@ from pinocchio import (
 
 from selfmotion.basics import Array, ProblemError, as_numbers, read_only
 
-# Poses as they are given: an SE3, or a homogeneous matrix.
-
 # Largest deviation of a given rotation matrix from orthonormal.
 _ROTATION_TOLERANCE = 1e-6
 
 
 class FixedPose(pin.SE3):  # type: ignore[misc]  # Pinocchio has no types
-    """A pose that nobody moves: paths and obstacles are values."""
+    """An immutable pose: paths and obstacles are values."""
 
     @property
     def translation(self) -> Array:

@@ -22,8 +22,6 @@ from selfmotion.problem.problem import Problem, check_problem
 if TYPE_CHECKING:
     from scipy.integrate import OdeSolution
 
-# Integrates joint velocity fields q̇(t, q) along a path, by error control instead of a grid.
-
 Rate = Callable[[float, Array], Array]
 
 # Tolerance of the integrator: far below a certificate's.
@@ -123,7 +121,7 @@ def integrate(problem: Problem, rate: Rate) -> Integrated:
     # Here, because importing it takes as long as the rest of the package.
     from scipy.integrate import solve_ivp
 
-    pieces: list[tuple[float, OdeSolution]] = []
+    intervals: list[tuple[float, OdeSolution]] = []
     rates = 0
     q = start_of(problem)
     guarded = _guarded(problem, rate)
@@ -144,15 +142,15 @@ def integrate(problem: Problem, rate: Rate) -> Integrated:
                 time=float(solution.t[-1]),
             )
         rates += solution.nfev
-        pieces.append((float(end), cast("OdeSolution", solution.sol)))
+        intervals.append((float(end), cast("OdeSolution", solution.sol)))
         q = solution.y[:, -1]
-    ends = np.array([end for end, _ in pieces])
+    ends = np.array([end for end, _ in intervals])
 
     def at(t: Array) -> tuple[Array, Array]:
         which = np.minimum(np.searchsorted(ends, t), len(ends) - 1)
         configurations = np.empty((len(t), len(q)))
-        for k, (_, piece) in enumerate(pieces):
-            configurations[which == k] = piece(t[which == k]).T
+        for k, (_, interval) in enumerate(intervals):
+            configurations[which == k] = interval(t[which == k]).T
         rows = zip(t, configurations, strict=True)
         return configurations, np.array([rate(float(time), row) for time, row in rows])
 

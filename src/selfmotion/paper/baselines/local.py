@@ -13,8 +13,6 @@ from selfmotion.paper.baselines.base import Motion, PoseFeedback, along_rate, co
 from selfmotion.problem.costs import Cost, Manipulability, Samples
 from selfmotion.problem.problem import Problem
 
-# Methods that decide from the present pose alone: pseudo-inverse, gradient projection, damping.
-
 # Steps of the quadrature that compares gains.
 _STEPS = 64
 # Cost evaluations of the search for the best gain.

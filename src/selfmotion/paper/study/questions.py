@@ -27,8 +27,6 @@ from selfmotion.planning.planner import plan
 from selfmotion.planning.result import Plan
 from selfmotion.problem.problem import Problem, sample_problem
 
-# The cause of the 'surging' of F against iterations: local minima or conditioning.
-
 # A surge: after the first two iterations, a drop of more than this many times the one before …
 _FACTOR = 2.0
 # … and above this share of F.
@@ -292,9 +290,9 @@ def _accuracy(context: Context) -> _Answer:
         _, found = optimum(context.problem, tolerance=1e-10, steps=steps)
         fine = finely(context.problem, found.x)
         rows.append(
-            (f"fourth order, {steps} steps", found.cost, fine.cost, _apart(context, fine.q))
+            (f"fourth order, {steps} steps", found.cost, fine.cost, _distances(context, fine.q))
         )
-    moved = _apart(context, finely(context.problem, run.minimum.x).q)
+    moved = _distances(context, finely(context.problem, run.minimum.x).q)
     rows.append(("as published (ode23, 1e-3)", run.minimum.cost, truth, moved))
     table = Table(
         "Sensitivity to integration and quadrature",
@@ -320,7 +318,7 @@ def _accuracy(context: Context) -> _Answer:
     )
 
 
-def _apart(context: Context, q: Array) -> float:
+def _distances(context: Context, q: Array) -> float:
     return float(np.abs(q - context.best.q).max())
 
 

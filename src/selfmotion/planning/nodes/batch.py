@@ -28,8 +28,9 @@ _ARMIJO = 1e-4
 _MAX_CHANGE = 0.5
 # Added to the diagonal, as a share of its median entry.
 _FLAT = 1e-11
-# Inertia correction: first, as a share of the largest entry, and its factor.
+# Inertia correction: its first value, as a share of the largest entry …
 _DELTA_FIRST = 1e-6
+# … and its factor from one attempt to the next.
 _KAPPA_PLUS = 8.0
 # Fields of `Place`.
 _PLACE = ("q", "qd", "qdd", "tangents", "table")

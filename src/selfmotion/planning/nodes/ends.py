@@ -8,8 +8,9 @@ import numpy as np
 from selfmotion.basics import Array, Ints
 from selfmotion.problem.constraints import BoundEnd
 
-# Index of the first and the last node.
+# Index of the first node.
 _FIRST = 0
+# Index of the last node.
 _LAST = 1
 # Derivatives that conditions know: q, q̇, q̈.
 _ORDERS = 3

@@ -84,7 +84,7 @@ def retract(
     jacobians = np.zeros((tips, 6, n))
     system, factor, b = np.empty((n, n)), np.empty((n, n)), np.empty(n)
     for k in range(count):
-        # Views: slices are counted references, which take as long as what is done with them.
+        # Views: slices are reference-counted, which takes as long as the computation.
         here, off = view(q[k], 0, (n,)), np.inf
         if carried > 0 and k % carried > 0:
             for j in range(n):
@@ -137,7 +137,7 @@ def retract(
             _centre(tangents[k], at.epsilon, b)
         for j in range(n):
             at.q[j] = q[k, j]
-        # The rows of B, and of the factor of BBᵀ, begin with those of J and of JJᵀ.
+        # The first rows of B, and of the factor of BBᵀ, are those of J and of JJᵀ.
         for i in range(m):
             for j in range(n):
                 at.task_jacobian[i, j] = system[i, j]

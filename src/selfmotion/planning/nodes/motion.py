@@ -368,7 +368,7 @@ class NodeMotion:
         return np.asarray(self.subdivisions() > 1)
 
     def forget(self) -> None:
-        """Let go of what can be computed anew."""
+        """Drop cached values."""
         for name in ("samples", "checked", "partials", "h", "curve_ends"):
             self.__dict__.pop(name, None)
 
@@ -383,6 +383,6 @@ class NodeMotion:
         """Return the motion on other nodes."""
         own = self.trajectory
         q, qd, qdd = (own(grid.t, order) for order in range(3))
-        # What is nearly a basis will do for charts to begin with, and turns as those around it do.
+        # Approximate bases suffice as a start, and rotate like the ones around.
         last = np.searchsorted(self.grid.t, grid.t, side="right") - 1
         return grid.around(Charts(grid.manifolds, q, self.charts.bases[last]), qd, qdd)

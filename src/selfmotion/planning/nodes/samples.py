@@ -31,26 +31,26 @@ class CurveSamples(PlacedLater):
     @cached_property
     def q(self) -> Array:
         """Joint coordinates, (S, n)."""
-        return self._made(0)
+        return self._cached(0)
 
     @cached_property
     def qd(self) -> Array:
         """Joint velocities, (S, n)."""
-        return self._made(1)
+        return self._cached(1)
 
     @cached_property
     def qdd(self) -> Array:
         """Joint accelerations, (S, n)."""
-        return self._made(2)
+        return self._cached(2)
 
     @cached_property
     def qddd(self) -> Array:
         """Joint jerks, (S, n)."""
-        return self._made(3)
+        return self._cached(3)
 
-    def _made(self, order: int) -> Array:
-        made: Array = self._of_order(order)
-        return read_only(made)
+    def _cached(self, order: int) -> Array:
+        values: Array = self._of_order(order)
+        return read_only(values)
 
     def forget(self) -> None:
         """Drop cached values."""

@@ -23,7 +23,9 @@ ORDERS = 4
 CONTROLS = (6, 5, 4, 3)
 # Gauss points on an interval: the square of a quintic's derivative is integrated exactly.
 _ROOTS, _WEIGHTS = np.polynomial.legendre.leggauss(5)
+# As shares of the interval.
 GAUSS = 0.5 * (1.0 + _ROOTS)
+# Weights of the quadrature, for an interval of length 1.
 WEIGHTS = 0.5 * _WEIGHTS
 # Shares of an interval at which constraints other than limits of joints apply, besides the last
 # node.

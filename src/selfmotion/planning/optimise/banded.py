@@ -17,6 +17,7 @@ from selfmotion.basics import Array, Flags, Ints, called, kernel
 
 # Feasibility tolerance of rows, relative to their limits or 1, whichever is larger.
 MET = 1e-7
+# Limit of iterations of the interior-point method.
 _MAX_ITERATIONS = 200
 # Smallest target of a product of slack and multiplier, as a share of the gap per row: the smaller
 # it is, the more rounding there is in multipliers of steep rows.

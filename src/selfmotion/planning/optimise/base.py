@@ -126,7 +126,7 @@ class Minimum:
 
 
 class Optimizer(Protocol):
-    """Whatever minimises a function of some variables; `QuasiNewton` is ours.
+    """Minimiser of a function of some variables; `QuasiNewton` is the default.
 
     One of your own is handed to `plan` as ``optimizer=``; `selfmotion.testing.check_optimizer`
     checks it.

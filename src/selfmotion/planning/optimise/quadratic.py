@@ -11,6 +11,7 @@ from selfmotion.basics import Array
 
 # Feasibility tolerance of rows, relative to their largest entry.
 _TOLERANCE = 1e-10
+# Limit of DAQP's iterations.
 _MAX_ITERATIONS = 2000
 # Bound that stands for none.
 _UNBOUNDED = 1e30

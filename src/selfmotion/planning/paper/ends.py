@@ -50,8 +50,8 @@ def closed(objective: Objective, x: Array) -> Array:
         Its cost is finite.
     """
     for _ in range(_ROUNDS):
-        x, miss, _ = Eliminated(objective, x).newton(x, _HALVINGS)
-        if miss < _MET:
+        x, residual_size, _ = Eliminated(objective, x).newton(x, _HALVINGS)
+        if residual_size < _MET:
             break
     return x
 
@@ -72,7 +72,7 @@ class Eliminated:
         self._objective, self._reference = objective, reference
         values, vectors = np.linalg.eigh(inverse_metric(_metric(objective), _FLAT))
         root, inward = vectors * np.sqrt(values), (vectors / np.sqrt(values)).T
-        rows = objective.miss_tangents(reference) @ root
+        rows = objective.residual_tangents(reference) @ root
         sizes = np.linalg.norm(rows, axis=1, keepdims=True)
         sizes[sizes == 0.0] = 1.0
         left, singular, right = np.linalg.svd(rows / sizes)
@@ -83,7 +83,7 @@ class Eliminated:
         self._counted = sizes * (left[:, :rank] @ left[:, :rank].T) / sizes.T
         # The last y, its x, residual, and number of steps.
         self._at: Array | None = None
-        self._x, self._miss, self._taken = reference, np.inf, 0
+        self._x, self._residual_size, self._taken = reference, np.inf, 0
 
     @property
     def size(self) -> int:
@@ -99,14 +99,16 @@ class Eliminated:
         """Return x at y, (size of x,), or the nearest to it that Newton's method came to."""
         if self._at is None or not np.array_equal(self._at, y):
             self._at = None
-            self._x, self._miss, self._taken = self.newton(self._reference + self._along @ y)
+            self._x, self._residual_size, self._taken = self.newton(
+                self._reference + self._along @ y
+            )
             self._at = y.copy()
         return self._x
 
     def is_met(self, y: Array) -> bool:
         """Return whether Newton's method converged."""
         self.point(y)
-        return self._miss < _MET
+        return self._residual_size < _MET
 
     def where(self, y: Array) -> tuple[Array, bool]:
         """Return x at y, and whether another reference would be better from there."""
@@ -151,33 +153,33 @@ class Eliminated:
 
         The residual is infinite where there is no motion.
         """
-        missed, taken = self._missed(x), 0
-        while taken < _STEPS and _CLOSED <= _size(missed) < np.inf:
+        residual, taken = self._residual(x), 0
+        while taken < _STEPS and _CLOSED <= _size(residual) < np.inf:
             # A motion near breakdown has derivatives that overflow.
             with np.errstate(over="ignore", invalid="ignore"):
                 table = self._rows(x) @ self._across
             if not np.all(np.isfinite(table)):
                 break
-            step = -self._across @ np.linalg.lstsq(table, missed)[0]
+            step = -self._across @ np.linalg.lstsq(table, residual)[0]
             for halving in range(halvings):
                 nearer = x + 0.5**halving * step
-                left = self._missed(nearer)
+                left = self._residual(nearer)
                 # Slow convergence counts as failure.
-                if _size(left) < (1.0 - 0.5 ** (halving + 1)) * _size(missed):
+                if _size(left) < (1.0 - 0.5 ** (halving + 1)) * _size(residual):
                     break
             else:
                 break
-            x, missed, taken = nearer, left, taken + 1
-        return x, _size(missed), taken
+            x, residual, taken = nearer, left, taken + 1
+        return x, _size(residual), taken
 
-    def _missed(self, x: Array) -> Array:
+    def _residual(self, x: Array) -> Array:
         count = len(self._counted)
         if not np.isfinite(self._objective.value(x)):
             return np.full(count, np.inf)
-        return np.asarray(self._counted @ self._objective.misses(x))
+        return np.asarray(self._counted @ self._objective.residuals(x))
 
     def _rows(self, x: Array) -> Array:
-        return np.asarray(self._counted @ self._objective.miss_tangents(x))
+        return np.asarray(self._counted @ self._objective.residual_tangents(x))
 
 
 def _metric(objective: Objective) -> Array:
@@ -189,5 +191,5 @@ def _metric(objective: Objective) -> Array:
     return metric
 
 
-def _size(missed: Array) -> float:
-    return float(np.max(np.abs(missed), initial=0.0))
+def _size(residual: Array) -> float:
+    return float(np.max(np.abs(residual), initial=0.0))

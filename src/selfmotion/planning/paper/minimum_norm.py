@@ -84,7 +84,7 @@ class FreeStart:
         """
         q = self._reference + self._null @ z
         for _ in range(_STEPS):
-            system, missed = self._missed(q, z, target)
+            system, missed = self._error(q, z, target)
             wrong = float(np.abs(missed).max())
             # NaN arrives nowhere.
             if not np.isfinite(wrong):
@@ -99,7 +99,7 @@ class FreeStart:
                 return q
         return None
 
-    def _missed(self, q: Array, z: Array, target: Array) -> tuple[Array, Array]:
+    def _error(self, q: Array, z: Array, target: Array) -> tuple[Array, Array]:
         """Return B = [J; N0ᵀ] (m + r, n) and b = [e; z - N0ᵀ(q - q_ref)] at q (n,)."""
         rows, errors = list[Array](), list[Array]()
         places = target.reshape(-1, 12)
@@ -304,8 +304,8 @@ def converged_minimum_norm(
     for _ in range(MOST_HALVINGS):
         minimum_norm = MinimumNormMotion.on(problem, configuration, grid, guide)
         evaluations += minimum_norm.jacobian_evaluations
-        settled = _settled(minimum_norm, coarse)
-        if minimum_norm.broken is None and settled:
+        converged = _converged_grid(minimum_norm, coarse)
+        if minimum_norm.broken is None and converged:
             return minimum_norm, evaluations
         coarse = minimum_norm.drift
         trouble = (
@@ -329,7 +329,7 @@ def converged_minimum_norm(
     )
 
 
-def _settled(minimum_norm: MinimumNormMotion, coarse: Array | None) -> bool:
+def _converged_grid(minimum_norm: MinimumNormMotion, coarse: Array | None) -> bool:
     if minimum_norm.damped and coarse is not None:
         return bool((np.abs(minimum_norm.drift[::2] - coarse) <= _DRIFT).all())
     return bool((np.abs(minimum_norm.drift) <= _DRIFT).all())

@@ -106,12 +106,12 @@ class _CostIntegrals:
             for order, weight in curvature.items():
                 table = by_error() if order == ERROR else by_q if order == 0 else by_qd
                 for first in range(0, stages, _CHUNK):
-                    lot = slice(first, first + _CHUNK)
-                    tangent = table[lot]
+                    chunk = slice(first, first + _CHUNK)
+                    tangent = table[chunk]
                     if order > 1:
-                        operator = sampling.differentiation(order - 1)[lot]
+                        operator = sampling.differentiation(order - 1)[chunk]
                         tangent = (operator @ nodes).reshape(tangent.shape)
-                    found += _weighted(tangent, weight, sampling.weights[lot])
+                    found += _weighted(tangent, weight, sampling.weights[chunk])
         return found
 
 
@@ -175,7 +175,7 @@ class Objective:
         self._terms: dict[str, float] = {}
         self._first = rollout.first_target
         # Which of the first and the last node neither move nor accelerate.
-        self._still_ends: list[int] = []
+        self._minimum_norm_ends: list[int] = []
         # Whether the rollout holds the motion of x = 0.
         self._is_rolled = False
         # When the last motion broke down [s].
@@ -231,7 +231,7 @@ class Objective:
         )
         if problem.damping is None:
             orders = zip((0, -1), problem.rest_orders, strict=True)
-            found._still_ends = [end for end, order in orders if order > 1]
+            found._minimum_norm_ends = [end for end, order in orders if order > 1]
         found._is_rolled = rollout is not None and not start.size
         return found
 
@@ -322,21 +322,21 @@ class Objective:
             names = self.rollout.robot.joint_names
             qdd = self.grid.derivative(qd)
             # Where the arm comes to rest smoothly that is so by construction; differences are not.
-            qdd[self._still_ends] = 0.0
+            qdd[self._minimum_norm_ends] = 0.0
             trajectory = Trajectory(t, q, qd, names, qdd)
             self.counts.jacobians += self.rollout.jacobian_evaluations - before
             terms = dict(self._terms)
             self._evaluation = Evaluation(x.copy(), terms, trajectory, self.rollout.damped)
         return self._evaluation
 
-    def misses(self, x: Array) -> Array:
+    def residuals(self, x: Array) -> Array:
         """Return c at x of E conditions on the ends, (E,): 0 where they are met."""
         samples = self.samples(x)
         return np.concatenate(
             [np.zeros(0), *(item.residual(samples).ravel() for item in self.ends)]
         )
 
-    def miss_tangents(self, x: Array) -> Array:
+    def residual_tangents(self, x: Array) -> Array:
         """Return ∂c/∂x at x, (E, size)."""
         motion, samples, rows = self.node_tangents(x), self.samples(x), [np.zeros((0, self.size))]
         for item in self.ends:

@@ -138,7 +138,7 @@ class Rollout:
     def _last_run(
         self,
     ) -> tuple[Array, Ints, float, kernels.Law | None, kernels.Every | None, Array]:
-        """What the kernels that differentiate the last run are given of it."""
+        """Arguments of the last run for kernels that differentiate it."""
         columns = self.follows.every_column(self._at.q)
         return self._table, self.follows.layout, self._gain, self._law, columns, self._space
 

@@ -99,16 +99,16 @@ class Method:
         `where` returns these, and whether another basis is better from there; `known` is whether
         the callback has had the start.
         """
-        way: list[Iteration] = []
+        iterates: list[Iteration] = []
         goes_on = False
 
         def note(iteration: Iteration) -> bool:
             nonlocal goes_on
             point, is_far = where(iteration.x)
-            way.append(replace(iteration, x=read_only(point)))
-            if known and len(way) == 1:
+            iterates.append(replace(iteration, x=read_only(point)))
+            if known and len(iterates) == 1:
                 return False
-            asked = self.callback is not None and bool(self.callback(way[-1]))
+            asked = self.callback is not None and bool(self.callback(iterates[-1]))
             goes_on = is_far and not asked
             return is_far or asked
 
@@ -127,7 +127,7 @@ class Method:
                 f"optimizer: {type(optimizer).__name__} returned {what}, expected a Minimum of "
                 f"{len(x)} finite numbers; selfmotion.testing.check_optimizer checks an optimiser"
             )
-        return found, way[known:], goes_on
+        return found, iterates[known:], goes_on
 
 
 @dataclass(frozen=True, eq=False)
@@ -227,7 +227,7 @@ class Solution:
     def settled(self) -> Self:
         """Return the optimum on its grid, and on halved ones until the cost agrees."""
         try:
-            return _settled(self._on(self.objective).again())
+            return _converged(self._on(self.objective).again())
         except KeyboardInterrupt:
             return replace(self, status=Status.INTERRUPTED)
 
@@ -247,15 +247,15 @@ class Solution:
             if not function.is_met(y):
                 return replace(self, status=Status.INFEASIBLE), None
             inverse = None if inverse is None else function.inward(inverse)
-            found, way, left = method.minimum(
+            found, iterates, left = method.minimum(
                 function, y, inverse, function.where, before is not None
             )
             x, inverse = function.point(found.x), function.outward(found.x, found.inverse_hessian)
         else:
-            found, way, left = method.minimum(objective, self.x, inverse)
+            found, iterates, left = method.minimum(objective, self.x, inverse)
             x, inverse = np.array(found.x), found.inverse_hessian
         status = Status.PRECISION if left else found.status
-        history = (*self.history, *way)
+        history = (*self.history, *iterates)
         better = replace(self, x=x, inverse_hessian=inverse, status=status, history=history)
         return better, size
 
@@ -331,7 +331,7 @@ def solve(
     return Solution(method, objective, x).settled()
 
 
-def _settled(found: _Solution) -> _Solution:
+def _converged(found: _Solution) -> _Solution:
     """Return the optimum on halved grids, once its cost agrees with that on the one before."""
     rises, most = 0, found.method.minimum_norm.grid.steps * 2**MOST_HALVINGS
     try:

@@ -60,20 +60,22 @@ def branches(
         if len(found) == count or failed == _BRANCH_TRIES or number > _BRANCH_TRIES * count:
             break
         progress("branch", number, _BRANCH_TRIES * count)
-        made, why = from_start(problem, start)
-        failed += made is None
+        planned, why = from_start(problem, start)
+        failed += planned is None
         reason = reason or why
-        if made is not None and all(_apart(made, other) > _SAME_ENDS for other in found):
-            found.append(made)
+        if planned is not None and all(
+            _end_distance(planned, other) > _SAME_ENDS for other in found
+        ):
+            found.append(planned)
     if found or allowed is not None:
         return found, "" if found else reason or _nowhere(allowed or problem)
     try:
-        made = _whole(lambda: plan(problem, search=Search(rng=rng), progress=progress))
+        planned = _whole(lambda: plan(problem, search=Search(rng=rng), progress=progress))
     except SelfmotionError as error:
         return [], str(error)
-    if made.certificate.verified:
-        return [made], ""
-    return [], reason or made.certificate.verdict
+    if planned.certificate.verified:
+        return [planned], ""
+    return [], reason or planned.certificate.verdict
 
 
 def like_before(problem: Problem, before: Plan) -> Plan | None:
@@ -92,21 +94,21 @@ def from_start(
     given = replace(problem, start=start)
     try:
         most = _BRANCH_EVALUATIONS
-        made = _whole(lambda: plan(given, warm_start=before, max_evaluations=most))
+        planned = _whole(lambda: plan(given, warm_start=before, max_evaluations=most))
     except SelfmotionError as error:
         return None, str(error)
-    if made.certificate.verified:
-        return made, ""
-    return None, made.certificate.verdict
+    if planned.certificate.verified:
+        return planned, ""
+    return None, planned.certificate.verdict
 
 
 def _whole(make: Callable[[], Plan]) -> Plan:
     """Make a plan; KeyboardInterrupt of an interrupted one is raised again, whatever it found."""
     pressed = presses()
-    made = make()
-    if presses() > pressed or made.report.status is Status.INTERRUPTED:
+    planned = make()
+    if presses() > pressed or planned.report.status is Status.INTERRUPTED:
         raise KeyboardInterrupt
-    return made
+    return planned
 
 
 def near_start(problem: Problem, q: Array) -> Array | None:
@@ -152,7 +154,7 @@ def _spread(problem: Problem, rng: np.random.Generator) -> list[Array]:
     return [starts[k] for k in order]
 
 
-def _apart(one: Plan, other: Plan) -> float:
+def _end_distance(one: Plan, other: Plan) -> float:
     """Return the larger distance of both ends of two plans."""
     ends = one.trajectory.q[[0, -1]] - other.trajectory.q[[0, -1]]
     return float(np.abs(ends).max(axis=1).max())

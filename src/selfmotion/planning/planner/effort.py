@@ -100,11 +100,11 @@ class Deadline(Counts):
         """Return a progress that checks the deadline as well; ProblemError for no function."""
         as_called(progress, "progress")
 
-        def told(stage: str, done: int, total: int) -> None:
+        def checked(stage: str, done: int, total: int) -> None:
             progress(stage, done, total)
             self.check()
 
-        return told
+        return checked
 
 
 @dataclass(frozen=True)

@@ -26,7 +26,7 @@ from selfmotion.model.motion import Grid
 from selfmotion.model.path import Pace, Path, Retimed, times_when
 from selfmotion.planning.optimise import Status
 from selfmotion.planning.planner.effort import Deadline, Search
-from selfmotion.planning.planner.run import plan, told_of
+from selfmotion.planning.planner.run import plan, with_ending
 from selfmotion.planning.result import Plan, check_no_feed, rate_limits, retime
 from selfmotion.problem.constraints import Constraint, JointVelocityLimits
 from selfmotion.problem.costs import Cost, LimitUse, Samples, Scaled
@@ -242,7 +242,7 @@ def fastest(
         when = f" in {deadline} s" if status is Status.DEADLINE else ""
         raise PlanError(f"no motion keeps all limits at any pace{when}: {rounds.verdict}")
     found = rounds.retimed
-    best = told_of(rounds.best, status) if status.is_cut_short else rounds.best
+    best = with_ending(rounds.best, status) if status.is_cut_short else rounds.best
     return Fastest(best, found["x = 0"], found["costs"], tuple(rounds.times), status)
 
 

@@ -51,7 +51,7 @@ def most_nodes(problem: Problem) -> int:
 def first_nodes(problem: Problem) -> Array:
     """Return the times of the first nodes, (N + 1,)."""
     steps = int(np.ceil(_FIRST_INTERVALS * max(1.0, problem.length_in_reaches)))
-    t = _with_short_pieces(problem, Grid.aligned(problem.knots, steps).nodes, steps)
+    t = _with_short_segments(problem, Grid.aligned(problem.knots, steps).nodes, steps)
     return with_starts(problem, t, 1.0)
 
 
@@ -73,20 +73,20 @@ def with_starts(problem: Problem, t: Array, quick: float) -> Array:
     return t
 
 
-def _with_short_pieces(problem: Problem, t: Array, steps: int) -> Array:
+def _with_short_segments(problem: Problem, t: Array, steps: int) -> Array:
     """Return times of nodes (N + 1,) with more where the tool moves far in little time.
 
     A motion next to a long wait gets nodes by its length, if these are many times those by its
     time. Lengths are those of translation, in reaches of the arm, and of rotation.
     """
     knots, follows = np.asarray(problem.knots), problem.follows
-    looks = Grid.aligned(knots, _LENGTH_SAMPLES).nodes
+    samples = Grid.aligned(knots, _LENGTH_SAMPLES).nodes
     reach = problem.robot.reach if np.isfinite(problem.robot.reach) else 1.0
     counts = np.where(follows.linear > 0.0, 1.0 / reach, 1.0)
-    speeds = np.linalg.norm(follows.twists(0.5 * (looks[:-1] + looks[1:])) * counts, axis=1)
-    way = np.append(0.0, np.cumsum(speeds * np.diff(looks)))
-    ways = np.diff(way[np.searchsorted(looks, knots)])
-    wanted = steps * ways / max(float(way[-1]), np.finfo(float).tiny)
+    speeds = np.linalg.norm(follows.twists(0.5 * (samples[:-1] + samples[1:])) * counts, axis=1)
+    length_at = np.append(0.0, np.cumsum(speeds * np.diff(samples)))
+    lengths = np.diff(length_at[np.searchsorted(samples, knots)])
+    wanted = steps * lengths / max(float(length_at[-1]), np.finfo(float).tiny)
     has = np.diff(np.searchsorted(t, knots))
     few = wanted > _SHORT_OF_NODES * has
     more = [

@@ -36,7 +36,7 @@ _PUSHES = (0.5, 2.0)
 _ROUGH = "beyond that it is off the path or past limits between its nodes"
 
 
-_Begin = tuple[Array, Guide | None]
+_StartGuess = tuple[Array, Guide | None]
 """A start, and a null motion in place of x = 0."""
 
 
@@ -66,7 +66,7 @@ class Part:
 class _Attempt:
     """Result of a start on a part: no candidate at a breakdown; the extent without violations."""
 
-    begin: _Begin
+    start_guess: _StartGuess
     problem: Problem
     candidate: Candidate | None
     kept_until: float
@@ -132,8 +132,8 @@ def _largest_part(problem: Problem, reach: Reach, effort: Effort) -> Part | None
     few = reach.starts if given else reach.starts[:: -(-len(reach.starts) // ROUGH_MOTIONS)]
     few = [_start_of(first, problem, q) for q in few]
     starts = _apart(first, few) if effort.apart else few
-    for begin in _beginnings(first, starts)[: Search().finalists if given else 1]:
-        attempts.append(_attempt(first, begin, effort))
+    for start_guess in _beginnings(first, starts)[: Search().finalists if given else 1]:
+        attempts.append(_attempt(first, start_guess, effort))
         if attempts[-1].cut_short:
             return _part(problem, attempts[-1], reach, "")
     arrived = [attempt for attempt in attempts if attempt.arrived]
@@ -164,7 +164,7 @@ def _bisect(problem: Problem, failed: _Attempt, reach: Reach, effort: Effort) ->
         if probe < _least(problem) or high - low < _END_AGREEMENT * high:
             break
         part = _until(problem, probe)
-        attempt = _attempt(part, _begin_of(part, failed), effort)
+        attempt = _attempt(part, _start_guess_of(part, failed), effort)
         if attempt.arrived or attempt.cut_short:
             arrived, low = attempt, probe
         else:
@@ -220,22 +220,22 @@ def _start_of(part: Problem, problem: Problem, q: Array) -> Array:
     return np.asarray(part.at(np.zeros(1), own)[0])
 
 
-def _begin_of(part: Problem, failed: _Attempt) -> _Begin:
+def _start_guess_of(part: Problem, failed: _Attempt) -> _StartGuess:
     """Return the start of another part as that of a part, which may have fewer joints."""
-    start, guide = failed.begin
+    start, guide = failed.start_guess
     if isinstance(guide, _Push):
         guide = guide.of(part.asked.robot.dof, part.robot.dof)
     return _start_of(part, failed.problem, start), guide
 
 
-def _attempt(problem: Problem, begin: _Begin, effort: Effort) -> _Attempt:
+def _attempt(problem: Problem, start_guess: _StartGuess, effort: Effort) -> _Attempt:
     try:
-        start, guide = begin
+        start, guide = start_guess
         free = problem.given_start is None
         candidate = Candidate(problem, effort, start, free=free, guide=guide)
     except BreakdownError as error:
         reason = f"it runs into a singular pose near t = {error.time:.6g} s"
-        return _Attempt(begin, problem, None, error.time, None, reason)
+        return _Attempt(start_guess, problem, None, error.time, None, reason)
     try:
         candidate.polish()
     except KeyboardInterrupt:
@@ -243,8 +243,10 @@ def _attempt(problem: Problem, begin: _Begin, effort: Effort) -> _Attempt:
     found = candidate.evaluation()
     motion = found.trajectory
     # Infeasible constraints may distort it: then x = 0 is a better guess.
-    until = max(_kept_until(problem, motion.t, motion.q, motion.qd), -_rank(problem, *begin)[1])
-    return _Attempt(begin, problem, candidate, until, found)
+    until = max(
+        _kept_until(problem, motion.t, motion.q, motion.qd), -_rank(problem, *start_guess)[1]
+    )
+    return _Attempt(start_guess, problem, candidate, until, found)
 
 
 def _apart(problem: Problem, starts: list[Array]) -> list[Array]:
@@ -252,13 +254,16 @@ def _apart(problem: Problem, starts: list[Array]) -> list[Array]:
     return [q for q in starts if problem.keeps_off_itself(q[None])] or starts
 
 
-def _beginnings(problem: Problem, starts: list[Array]) -> list[_Begin]:
+def _beginnings(problem: Problem, starts: list[Array]) -> list[_StartGuess]:
     """Return starts, and null motions in place of x = 0 where that breaks down; the best first."""
     ranked = sorted(((start, None) for start in starts), key=lambda each: _rank(problem, *each))
     furthest = ranked[0][0]
     if -_rank(problem, furthest, None)[0] >= problem.path.duration:
         return list(ranked)
-    pushed: list[_Begin] = [*ranked, *((furthest, push) for push in _pushes(problem, furthest))]
+    pushed: list[_StartGuess] = [
+        *ranked,
+        *((furthest, push) for push in _pushes(problem, furthest)),
+    ]
     return sorted(pushed, key=lambda each: _rank(problem, *each))
 
 

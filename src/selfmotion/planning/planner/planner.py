@@ -253,7 +253,7 @@ class Planner:
         return self.problem.given_start is None
 
     @property
-    def is_begun(self) -> bool:
+    def has_motion(self) -> bool:
         """Whether there is an initial motion."""
         return self.warm_start is not None or self.guide is not None
 
@@ -363,7 +363,7 @@ class Planner:
 
     def judge(self, best: Candidate) -> None:
         """Judge the best motion, on grids that are fine enough."""
-        rival_cost = _settle_both(best, self.rival, self.progress)
+        rival_cost = _refine_both(best, self.rival, self.progress)
         self.judged = self._judged(Part(self.problem, best), rival_cost)
         if self.judged.certificate.verified:
             return
@@ -409,7 +409,7 @@ class Planner:
         found = largest_part(self.problem, known, effort)
         if found is None:
             return False
-        _settle_both(found.candidate, None, self.progress)
+        _refine_both(found.candidate, None, self.progress)
         self.judged = self._judged(found)
         for _ in range(_SHORTER_PARTS):
             # Besides that it ends, nothing should be wrong with it.
@@ -418,7 +418,7 @@ class Planner:
             if (shorter := shorter_part(self.problem, found, effort)) is None:
                 break
             found = shorter
-            _settle_both(found.candidate, None, self.progress)
+            _refine_both(found.candidate, None, self.progress)
             judged = self._judged(found)
             if len(judged.certificate.failures) < 2:
                 self.judged = judged
@@ -443,7 +443,7 @@ class Planner:
         self.best.end(Status.INTERRUPTED)
 
 
-def _settle_both(best: Candidate, rival: Candidate | None, progress: Progress) -> float | None:
+def _refine_both(best: Candidate, rival: Candidate | None, progress: Progress) -> float | None:
     """Refine a motion, and the one it is compared with; return the latter's cost, if sufficient.
 
     An interruption ends both as they are.

@@ -33,7 +33,7 @@ from selfmotion.planning.planner.effort import Effort
 from selfmotion.planning.planner.grids import is_on_nodes, most_nodes, resolves, rough_grid
 from selfmotion.planning.planner.planner import Planner
 from selfmotion.planning.planner.polish import Polisher
-from selfmotion.planning.planner.screening import ONE_VALLEY, Ranking, apart_of, most_promising
+from selfmotion.planning.planner.screening import ONE_VALLEY, Ranking, distance_of, most_promising
 from selfmotion.planning.planner.solutions import NodeSolution
 from selfmotion.planning.search import (
     LAST_SMOOTHINGS,
@@ -90,13 +90,13 @@ def optimise_starts(planner: Planner, count: int, finalists: int) -> None:
             if planner.is_unmet and planner.best is not None and not planner.is_over:
                 before = [motion.trajectory for motion in ranked]
                 before.append(planner.best.evaluation().trajectory)
-                aside = ranking.left_aside(before, finalists)
-                _optimise_each(planner, _resumed(planner, aside), len(aside))
+                others = ranking.left_aside(before, finalists)
+                _optimise_each(planner, _resumed(planner, others), len(others))
             return
     elif len(starts) > finalists:
         starts = _best(planner.problem, starts)[:finalists]
-    begun = (planner.begin(start, free=True) for start in starts)
-    known = (candidate for candidate in begun if candidate is not None)
+    started = (planner.begin(start, free=True) for start in starts)
+    known = (candidate for candidate in started if candidate is not None)
     candidates = sorted(known, key=lambda candidate: candidate.solution.merit())
     _optimise_each(planner, candidates, len(candidates))
 
@@ -157,7 +157,7 @@ def optimise_stacked(planner: Planner, finalists: int) -> bool:
 def _stacked(planner: Planner, t: Array) -> Iterator[Array]:
     """Yield motions (K, N, n) through times t (N,) [s] that satisfy conditions at all of them."""
     problem, asked = planner.problem, planner.problem.envelope
-    drawn = _begun_at(planner, t)
+    drawn = _configurations_at(planner, t)
     for weights in metrics(problem.robot):
         task = Stacked(problem.follows, asked.quantities, asked.lower, asked.upper, weights)
         for place, starts in drawn.items():
@@ -168,7 +168,7 @@ def _stacked(planner: Planner, t: Array) -> Iterator[Array]:
             yield motions[arrived]
 
 
-def _begun_at(planner: Planner, t: Array) -> dict[int, Array]:
+def _configurations_at(planner: Planner, t: Array) -> dict[int, Array]:
     """Return initial configurations (K, n), by the number of their time among some (N,).
 
     The given start; or random ones at both ends, and at the largest violation of the best motion.
@@ -192,7 +192,7 @@ def _best(problem: Problem, starts: abc.Sequence[Array]) -> list[Array]:
     """Return starts, the best first, by their motions without self-motion."""
     t = rough_grid(problem).nodes
     motions, arrived = carried(problem.follows, np.array(starts), t)
-    order = most_promising(problem, starts, motions, arrived, t, apart_of(problem.robot))
+    order = most_promising(problem, starts, motions, arrived, t, distance_of(problem.robot))
     return [starts[k] for k in order]
 
 
@@ -247,23 +247,23 @@ def optimise_sequences(planner: Planner, *, chosen: bool) -> None:
     except NoSequenceError as error:
         planner.failure = error
         planner.notes.append(f"global search: {error}")
-    begun: list[Candidate] = []
+    started: list[Candidate] = []
     for number, guide in enumerate(planner.sequences, 1):
         planner.progress("refining sequence", number, len(planner.sequences))
         candidate = planner.begin(guide.start, free=True, guide=guide)
-        if candidate is None or (begun and _is_hopeless(planner, guide, candidate, begun[0])):
+        if candidate is None or (started and _is_hopeless(planner, guide, candidate, started[0])):
             continue
         found = along_chain(planner.problem, candidate.effort, guide, candidate.constraints)
         if found is not None:
             candidate.take(found)
-        if begun and begun[0].is_of_chain and not candidate.is_of_chain:
+        if started and started[0].is_of_chain and not candidate.is_of_chain:
             continue
         planner.polish(candidate, chosen=chosen)
         if planner.is_over:
             return
-        begun = sorted([*begun, candidate], key=Candidate.score)
-    if begun:
-        planner.rival = begun[0]
+        started = sorted([*started, candidate], key=Candidate.score)
+    if started:
+        planner.rival = started[0]
 
 
 def _is_hopeless(planner: Planner, guide: Sequence, candidate: Candidate, best: Candidate) -> bool:
@@ -320,8 +320,8 @@ def along_chain(
 def _beyond_limits(motion: NodeMotion) -> Flags:
     """Return on which intervals a joint passes a limit, also for a moment, (N,)."""
     asked, t = motion.grid.problem.envelope, motion.grid.t
-    looks = (t[:-1, None] + np.diff(t)[:, None] * np.arange(_SAMPLES) / _SAMPLES).ravel()
-    q, qd = motion.trajectory(looks), motion.trajectory(looks, 1)
+    samples = (t[:-1, None] + np.diff(t)[:, None] * np.arange(_SAMPLES) / _SAMPLES).ravel()
+    q, qd = motion.trajectory(samples), motion.trajectory(samples, 1)
     beyond = (q < asked.lower) | (q > asked.upper) | (np.abs(qd) > asked.speed)
     return np.asarray(beyond.reshape(len(t) - 1, -1).any(axis=1))
 
@@ -419,7 +419,7 @@ def _optimise(planner: Planner, posture: Array, ended: Status | None) -> None:
 
 
 def _postures(planner: Planner) -> tuple[list[Array], Status | None]:
-    """Return mean configurations (n,) of the best motions along a stretch in the middle.
+    """Return mean configurations (n,) of the best motions along a segment in the middle.
 
     And what ended the search for them, if the user did.
     """
@@ -454,7 +454,7 @@ def _postures(planner: Planner) -> tuple[list[Array], Status | None]:
 def _near(polisher: Polisher, problem: Problem, start: Array, posture: Array) -> NodeMotion | None:
     """Return the motion from a start (n,) that goes to a posture (n,) by self-motion.
 
-    On the coarsest nodes on which it costs what it does; None where there is none.
+    On the coarsest nodes with about its cost; None without any.
     """
     # As long as it takes the tool to go as far as the arm reaches.
     time = problem.path.duration / problem.length_in_reaches

@@ -17,7 +17,7 @@ from selfmotion.planning.planner.run import plan
 from selfmotion.planning.result import Parts, Plan, retime
 from selfmotion.problem.problem import Problem
 
-# What is looked for (see `PlanRequest.goal`), what has no effect on it, and what it is called.
+# Goals (see `PlanRequest.goal`), options without effect on them, and their names.
 _UNUSED = {
     "best": ("keep", "parts"),
     "retimed": ("keep", "parts"),
@@ -43,8 +43,8 @@ class PlanRequest:
     outputs : tuple of Path
         Files to write.
     goal : {"best", "retimed", "fastest", "parts"}
-        What `plan` looks for: the motion that is best by its costs, that at its fastest pace
-        (`retime`), or the `fastest` one. Of parts (`plan_in_parts`) it is `in_parts`.
+        Goal of `plan`: the best motion by its costs, that at its fastest pace (`retime`), or the
+        `fastest` one. Of parts (`plan_in_parts`) it is `in_parts`.
     parts : mapping, optional
         Of parts: ``retreat``, ``axis`` and ``ramp`` of `plan_in_parts`.
     keep : mapping, optional
@@ -66,7 +66,7 @@ class PlanRequest:
 
     @property
     def settings(self) -> dict[str, Any]:
-        """What `plan` is given besides the problem."""
+        """Options of `plan` besides the problem."""
         names = ("search", "optimizer", "tolerance", "max_evaluations")
         return {name: getattr(self, name) for name in names}
 
@@ -113,7 +113,7 @@ class PlanRequest:
         return plan_in_parts(self.problem, **given)
 
     def check_used(self, goal: str) -> None:
-        """Raise ProblemError for what is set and has no effect on a goal."""
+        """Raise ProblemError for options that have no effect on a goal."""
         for name in _UNUSED[goal]:
             if getattr(self, name) is not None:
                 said = {"optimizer": "optimiser"}.get(name, name)

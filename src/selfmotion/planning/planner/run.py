@@ -293,10 +293,10 @@ def _planned(planner: Planner, clock: Deadline) -> Plan:
     """Return the plan, with an interruption at its end in the report."""
     go_through(planner)
     found = gathered(planner, clock)
-    return told_of(found, Status.INTERRUPTED) if was_interrupted() else found
+    return with_ending(found, Status.INTERRUPTED) if was_interrupted() else found
 
 
-def told_of(plan: Plan, status: Status) -> Plan:
+def with_ending(plan: Plan, status: Status) -> Plan:
     """Return a plan whose report has the cause why another one was not completed."""
     message = f"{status.message}; before: {plan.report.message}"
     return replace(plan, report=replace(plan.report, status=status, message=message))

@@ -71,7 +71,7 @@ def wound_back(robot: RobotModel, motion: Array) -> Array:
     return np.asarray(motion + _TURN * shift)
 
 
-Apart = Callable[[Array, Array], Array]
+Distance = Callable[[Array, Array], Array]
 """How far a motion (N, n) is from each of others (K, N, n), (K,) [rad or m]."""
 
 
@@ -94,7 +94,7 @@ class Ranking:
         self._free = problem.given_start is None
         # Whole turns depend on the required limits, not on the arm's own.
         self._arm = problem.envelope.arm(problem.robot)
-        self._apart = apart_of(problem.robot)
+        self._distances = distance_of(problem.robot)
         self._t = rough_grid(problem).nodes
         self._found: Batch | None = None
         self._ranked: list[NodeMotion] = []
@@ -124,7 +124,7 @@ class Ranking:
         motions, arrived = carried(problem.follows, np.array(starts), self._t, at)
         if not arrived.any():
             return False
-        order = most_promising(problem, starts, motions, arrived, self._t, self._apart)
+        order = most_promising(problem, starts, motions, arrived, self._t, self._distances)
         self._carried = [motions[k] for k in order]
         free: list[NodeMotion] = []
         if self._is_pointwise():
@@ -134,8 +134,8 @@ class Ranking:
             free = optima
         if not self._ranked:
             # Unconstrained optima may be elsewhere than feasible motions.
-            begun = self._begun(max(ROUGH_MOTIONS, finalists))
-            self._ranked = self._with_conditions(free, begun, finalists)
+            started = self._feasible_starts(max(ROUGH_MOTIONS, finalists))
+            self._ranked = self._with_conditions(free, started, finalists)
         return bool(self._ranked)
 
     def left_aside(self, known: Sequence[Trajectory], finalists: int) -> list[NodeMotion]:
@@ -146,15 +146,15 @@ class Ranking:
         """
         near = (self._near(motion(self._t)) for motion in known)
         others = [motion for motion in near if motion is not None]
-        begun, found = self._begun(ROUGH_MOTIONS), list[NodeMotion]()
-        for number, motion in enumerate(begun, 1):
-            self._progress("start", number, len(begun))
+        started, found = self._feasible_starts(ROUGH_MOTIONS), list[NodeMotion]()
+        for number, motion in enumerate(started, 1):
+            self._progress("start", number, len(started))
             better = self._roughly(motion)
             if not _is_image(better, [*others, *found]):
                 found.append(better)
         return sorted(found, key=self._rank)[:finalists]
 
-    def _begun(self, count: int) -> list[NodeMotion]:
+    def _feasible_starts(self, count: int) -> list[NodeMotion]:
         """Return `count` motions at starts with constraints, none an image of another one."""
         found = list[NodeMotion]()
         for carried_on in self._carried:
@@ -180,7 +180,7 @@ class Ranking:
         each = [Samples.along(problem.follows, sampling, q(t), q(t, 1)) for q in curves]
         costs = np.array([problem_cost(problem, samples) for samples in each])
         cheapest = np.argsort(costs, kind="stable")
-        alone = unlike(motions, cheapest, self._apart, ONE_VALLEY)[0][:ROUGH_MOTIONS]
+        alone = unlike(motions, cheapest, self._distances, ONE_VALLEY)[0][:ROUGH_MOTIONS]
         merits = dict[int, float]()
         for k in alone:
             bound = problem.bind_constraints(*motions[k, [0, -1]], apart=False)
@@ -189,15 +189,17 @@ class Ranking:
         chosen = sorted(alone, key=lambda k: merits[k])[:_WITHIN]
         for number, k in enumerate(chosen, 1):
             self._progress("start", number, len(chosen))
-            begun = self._near(*(curves[k](self._t, order) for order in range(3)))
-            found += [] if begun is None else [self._roughly(begun)]
+            started = self._near(*(curves[k](self._t, order) for order in range(3)))
+            found += [] if started is None else [self._roughly(started)]
             self._ranked = self._different(sorted(found, key=self._rank))[:finalists]
         return bool(self._ranked)
 
-    def _roughly(self, begun: NodeMotion) -> NodeMotion:
+    def _roughly(self, started: NodeMotion) -> NodeMotion:
         """Return the rough optimum near a motion, or that itself where it keeps more."""
-        found = minimise(begun, lambda _: False, roughly=True, max_iterations=_ROUGH_ROUNDS).motion
-        return min(found, begun, key=self._rank)
+        found = minimise(
+            started, lambda _: False, roughly=True, max_iterations=_ROUGH_ROUNDS
+        ).motion
+        return min(found, started, key=self._rank)
 
     def _is_pointwise(self) -> bool:
         """Whether costs are pointwise, and there is no condition on ends.
@@ -224,7 +226,7 @@ class Ranking:
         soft = problem.softened(float(found.costs.min()))
         if soft is not problem:
             found = self._found = Batch.near(self._grid(soft), motions)
-        alone, near = unlike(found.q, _cheapest(found), self._apart, ONE_VALLEY)
+        alone, near = unlike(found.q, _cheapest(found), self._distances, ONE_VALLEY)
         which = [*alone, *near][: max(ROUGH_MOTIONS, finalists)]
         if not which:
             return None
@@ -234,7 +236,7 @@ class Ranking:
             if _hopeful(found).any():
                 found = self._found = found.advanced()
         self._ranked = self._decisive(found, finalists)
-        order = unlike(found.q, self._expected(found), self._apart, _SAME_OPTIMUM)[0]
+        order = unlike(found.q, self._expected(found), self._distances, _SAME_OPTIMUM)[0]
         each = [] if self._ranked else [self._motion(found, k) for k in order]
         return [motion for motion in each if motion is not None]
 
@@ -250,7 +252,7 @@ class Ranking:
         kept: list[NodeMotion] = []
         others: list[NodeMotion] = []
         dearest = np.inf
-        for k in unlike(found.q, self._expected(found), self._apart, _SAME_OPTIMUM)[0]:
+        for k in unlike(found.q, self._expected(found), self._distances, _SAME_OPTIMUM)[0]:
             if found.costs[k] > dearest or len(kept) + len(others) == finalists:
                 break
             motion = self._motion(found, k)
@@ -303,7 +305,7 @@ class Ranking:
     def _different(self, motions: Sequence[NodeMotion]) -> list[NodeMotion]:
         """Return motions without those that are near one before them."""
         q = np.array([motion.place.q for motion in motions])
-        alone, _ = unlike(q, np.arange(len(q)), self._apart, _SAME_OPTIMUM)
+        alone, _ = unlike(q, np.arange(len(q)), self._distances, _SAME_OPTIMUM)
         return [motions[k] for k in alone]
 
     def _rank(self, motion: NodeMotion) -> tuple[bool, float]:
@@ -396,7 +398,7 @@ def most_promising(
     motions: Array,
     arrived: Flags,
     t: Array,
-    apart: Apart,
+    apart: Distance,
 ) -> list[int]:
     """Return numbers of starts, the best first, and those last that are near a better one.
 
@@ -412,7 +414,7 @@ def most_promising(
         The motions from them, at few times t (N,) [s].
     arrived : (K,)
         Mask of those that follow the path to its end.
-    apart : callable
+    distance : callable
         Distance of motions.
     """
     merits = np.full(len(starts), np.inf)
@@ -427,7 +429,7 @@ def most_promising(
 
 
 def _merit(problem: Problem, q: Array, twists: Array, sampling: Sampling) -> float:
-    """Return what a motion q (N, n) along the path costs, and more where it violates something.
+    """Return the cost of a motion q (N, n) along the path, with a penalty of violations.
 
     `twists` (N, m) are those of the path at the grid's nodes, which are the samples.
     """
@@ -449,7 +451,7 @@ def problem_cost(problem: Problem, samples: Samples) -> float:
     return sum(float(weights @ cost.value(samples)) for cost in problem.all_costs)
 
 
-def apart_of(robot: RobotModel) -> Apart:
+def distance_of(robot: RobotModel) -> Distance:
     """Return the largest distance of an arm's motions, modulo whole turns, as a function."""
     turning, sizes = robot.is_revolute, robot.coordinate_sizes
 
@@ -462,7 +464,9 @@ def apart_of(robot: RobotModel) -> Apart:
     return apart
 
 
-def unlike(motions: Array, order: Ints, apart: Apart, least: float) -> tuple[list[int], list[int]]:
+def unlike(
+    motions: Array, order: Ints, apart: Distance, least: float
+) -> tuple[list[int], list[int]]:
     """Return those of motions (K, N, n) that are not near one earlier in an order, and the others.
 
     Numbers of motions, in that order; farther apart than `least` is not near.

@@ -83,9 +83,9 @@ def _outcome(planner: Planner) -> tuple[str, float | None]:
     return planner.blocked.reason if planner.blocked else "nothing is in the way", None
 
 
-def _look(planner: Planner) -> bool:
-    """Look whether the arm can be at some single poses at all, where nothing is known yet."""
-    if not planner.is_free or planner.is_begun:
+def _look_first(planner: Planner) -> bool:
+    """Check whether the arm can reach some single poses, before anything is known."""
+    if not planner.is_free or planner.has_motion:
         return False
     blocked = planner.blocked = _looked_at(planner.problem, planner.search)
     if blocked is not None:
@@ -106,7 +106,7 @@ def _plan_before_blocked_pose(planner: Planner) -> bool:
     except InverseKinematicsError:
         found = False
     if not found:
-        raise _no_way(planner.problem, blocked)
+        raise _obstruction_error(planner.problem, blocked)
     return True
 
 
@@ -121,7 +121,7 @@ def _follow_guide(planner: Planner) -> bool:
     return True
 
 
-def _begin_at_plan(planner: Planner) -> bool:
+def _warm_start_at_plan(planner: Planner) -> bool:
     """Optimise from a plan of this problem or of one like it, if it leads to a motion."""
     plan = planner.warm_start
     if plan is None or not planner.is_free:
@@ -144,7 +144,7 @@ def _keep_to_posture(planner: Planner) -> bool:
     return planner.problem.length_in_reaches > VERY_LONG_PATH and _try_postures(planner)
 
 
-def _begin_at_start(planner: Planner) -> bool:
+def _from_given_start(planner: Planner) -> bool:
     """Optimise from the start that is given."""
     start = planner.problem.given_start
     if start is None or not (planner.is_sought and planner.is_unmet):
@@ -172,7 +172,7 @@ def _compare_postures(planner: Planner) -> bool:
 
 
 def _try_postures(planner: Planner) -> bool:
-    wanted = planner.is_unmet or not planner.is_begun
+    wanted = planner.is_unmet or not planner.has_motion
     possible = is_long(planner) and (planner.takes_starts or not planner.is_free)
     if not (planner.is_sought and wanted and possible):
         return False
@@ -203,7 +203,7 @@ def _judge_on_meshes(planner: Planner) -> bool:
     return tried
 
 
-def _take_links_apart(planner: Planner) -> bool:
+def _decompose_links(planner: Planner) -> bool:
     """Optimise again with links in convex pieces, where only their hulls meet something."""
     search, effort = planner.search, planner.effort
     if effort.decomposed or not (planner.is_sought and planner.is_unmet):
@@ -335,7 +335,7 @@ def _draw_where_proof_fails(planner: Planner) -> bool:
     return True
 
 
-def _look_what_stops(planner: Planner) -> bool:
+def _find_obstruction(planner: Planner) -> bool:
     """Find the obstruction of a motion that is not verified: whether single poses are reachable."""
     judged, problem = planner.judged, planner.problem
     if judged is None or judged.certificate.verified or judged.part.candidate.cut_short:
@@ -372,19 +372,19 @@ def _passing(blocked: Obstruction) -> str:
 
 # Names as in reports; each function returns whether it was tried.
 STEPS: tuple[tuple[str, Callable[[Planner], bool]], ...] = (
-    # Look: a 'no' before anything is planned.
-    ("look at single poses", _look),
+    # Single poses first: a failure before anything is planned.
+    ("look at single poses", _look_first),
     ("part before a pose out of reach", _plan_before_blocked_pose),
     # Propose and polish until one suffices.
     ("motion that is known", _follow_guide),
-    ("warm start", _begin_at_plan),
+    ("warm start", _warm_start_at_plan),
     ("posture of a stretch", _keep_to_posture),
-    ("given start", _begin_at_start),
+    ("given start", _from_given_start),
     ("starts", _draw_starts),
     ("postures compared", _compare_postures),
     ("conditions as rows", _stack_rows),
     ("proof on meshes", _judge_on_meshes),
-    ("links in pieces", _take_links_apart),
+    ("links in pieces", _decompose_links),
     (_WHERE_IT_BREAKS, _draw_where_it_breaks),
     ("global search", _search_globally),
     # Judge.
@@ -392,7 +392,7 @@ STEPS: tuple[tuple[str, Callable[[Planner], bool]], ...] = (
     ("finer grids and proof", _judge),
     ("largest part instead", _plan_part_instead),
     ("starts where the proof fails", _draw_where_proof_fails),
-    ("what stops it", _look_what_stops),
+    ("what stops it", _find_obstruction),
 )
 
 
@@ -417,7 +417,7 @@ def _looked_at(problem: Problem, search: Search) -> Obstruction | None:
     if blocked.is_met and problem.own_collision is not None:
         return blocked
     if blocked.is_met or blocked.time == 0.0:
-        raise _no_way(problem, blocked)
+        raise _obstruction_error(problem, blocked)
     return blocked
 
 
@@ -433,12 +433,12 @@ def _is_in_own_reach(problem: Problem, pose: SE3) -> bool:
     return True
 
 
-def _no_way(problem: Problem, blocked: Obstruction) -> SelfmotionError:
+def _obstruction_error(problem: Problem, blocked: Obstruction) -> SelfmotionError:
     """Return the error with the obstruction and remedies."""
     robot, pose = problem.robot, problem.path.pose(blocked.time)
     task = problem.asked.task.value
     if not blocked.is_met and blocked.time == 0.0:
-        position, rotation = blocked.misses
+        position, rotation = blocked.errors
         remedy = "move the pose into the workspace"
         if _is_in_own_reach(problem, pose):
             remedy = "the arm's own limits let it be there: widen JointPositionLimits"

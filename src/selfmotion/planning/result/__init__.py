@@ -45,8 +45,8 @@ from selfmotion.planning.result.retiming import (
     slowdown as slowdown,
 )
 from selfmotion.planning.result.specification import (
+    CheckedMotion as CheckedMotion,
     MotionSpecification as MotionSpecification,
-    Piece as Piece,
     another_tool as another_tool,
     arm_digest as arm_digest,
     described as described,

@@ -35,8 +35,6 @@ from selfmotion.problem.constraints import ActiveConstraint, Clearance, Constrai
 from selfmotion.problem.problem.problem import Problem
 from selfmotion.problem.problem.saved_problem import problem_from_dict, problem_to_dict
 
-# Motions with their joints in the order of the robot.
-
 
 def in_order_of(robot: RobotModel, motion: Trajectory) -> Trajectory:
     """Return a motion in the robot's order of joints; one of other joints as it is."""

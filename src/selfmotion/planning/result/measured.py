@@ -18,8 +18,6 @@ from selfmotion.planning.result.pace_rows import PaceLimits
 from selfmotion.problem.costs import Cost, PlacedLater, Samples
 from selfmotion.problem.problem import Problem
 
-# Which limits a motion uses, and for how long: whether it could be faster.
-
 # Share of a limit from which on it is fully used.
 FULLY = 0.95
 # Times per sample of the motion that are evaluated …
@@ -46,10 +44,10 @@ class LimitsUsed:
 
     def __str__(self) -> str:
         """Return both in words."""
-        told = f"{self.busy:.1%} of the time"
+        said = f"{self.busy:.1%} of the time"
         if not self.shares:
-            return told
-        return f"{told}: " + ", ".join(f"{name} {share:.1%}" for name, share in self.shares)
+            return said
+        return f"{said}: " + ", ".join(f"{name} {share:.1%}" for name, share in self.shares)
 
 
 def quantities_of_pace(requirements: Sequence[Requirement]) -> tuple[Quantity, ...]:
@@ -239,13 +237,13 @@ def _turns(motion: Trajectory, number: int, t: Array, speed: Array) -> Array:
     # Of turns with less than LEAST in between both go, the nearest first.
     kept = list(range(len(places)))
     while len(kept) > 2:
-        ways = np.abs(np.diff(places[kept]))
-        least = int(np.argmin(ways))
-        if ways[least] > LEAST:
+        lengths = np.abs(np.diff(places[kept]))
+        least = int(np.argmin(lengths))
+        if lengths[least] > LEAST:
             break
         if least == 0:
             del kept[1]
-        elif least == len(ways) - 1:
+        elif least == len(lengths) - 1:
             del kept[-2]
         else:
             del kept[least : least + 2]

@@ -11,8 +11,6 @@ from selfmotion.model.motion import Trajectory
 from selfmotion.model.path import Pace
 from selfmotion.planning.optimise import BandedRows
 
-# Quadratic splines over a pace's own time, so that accelerations do not jump.
-
 
 @dataclass(frozen=True, eq=False)
 class Squares:
@@ -260,7 +258,7 @@ def rows_of(
     room: Sequence[Array],
     near: Squares,
 ) -> BandedRows:
-    """Return what limits allow of b, a spline over the same knots as one that it is near.
+    """Return the limits of b as rows, for a spline over the same knots as a near one.
 
     Parameters
     ----------
@@ -333,9 +331,11 @@ def _add_quantity(
         value, slope, _ = (x[:, :, None] for x in basis(near.knots, share))
         for direction, most in _directions(*parts):
             found, by_value, by_slope = (_along(direction, x) / limit for x in parts)
-            still = found - by_value * b - by_slope * change
+            constant_part = found - by_value * b - by_slope * change
             own = most * room[:, some]
-            table.add(by_value * value + by_slope * slope, -own - still, own - still)
+            table.add(
+                by_value * value + by_slope * slope, -own - constant_part, own - constant_part
+            )
 
 
 def _parts(

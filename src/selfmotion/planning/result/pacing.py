@@ -98,20 +98,20 @@ def smooth(pace: Pace, step: float, jerk: bool, samples: int) -> Pace:
     beyond = _WINDOW // 2 * _MEANS
     before, after = sigma[beyond:0:-1], sigma[-2 : -beyond - 2 : -1]
     rates = pace(t[[0, -1]], 1)
-    still = _REST * float(pace.rate.max())
-    before = before if rates[0] <= still else 2.0 * sigma[0] - before
-    after = after if rates[1] <= still else 2.0 * sigma[-1] - after
+    rest_rate = _REST * float(pace.rate.max())
+    before = before if rates[0] <= rest_rate else 2.0 * sigma[0] - before
+    after = after if rates[1] <= rest_rate else 2.0 * sigma[-1] - after
     mean = np.concatenate([before, sigma, after])
     for _ in range(_MEANS):
         mean = np.convolve(mean, np.full(_WINDOW, 1.0 / _WINDOW), mode="valid")
     # By as much as the ends have moved.
     mean = sigma[0] + (mean - mean[0]) * (sigma[-1] - sigma[0]) / (mean[-1] - mean[0])
     spline = make_interp_spline(t, mean, 5)
-    start, end = (_EASED * t[1] if jerk and rate <= still else 0.0 for rate in rates)
+    start, end = (_EASED * t[1] if jerk and rate <= rest_rate else 0.0 for rate in rates)
     w, dw, ddw, new = _eased(pace.t[-1], start, end, count)
     rate, bend = spline(w, 1), spline(w, 2)
     for at in (0, -1):
-        if rates[at] <= still:
+        if rates[at] <= rest_rate:
             rate[at] = 0.0
     rate = np.maximum(rate, 0.0)
     bend = bend * dw**2 + rate * ddw
@@ -127,22 +127,22 @@ def _eased(
     A function of w² then starts as τ³, so that accelerations start at 0. Over the times `start` and
     `end` at the ends, if positive: there w' = √(1 - (1 - τ/start)⁴).
     """
-    lost = start * (1.0 - _eased_way(np.ones(1))[0]), end * (1.0 - _eased_way(np.ones(1))[0])
+    lost = start * (1.0 - _eased_time(np.ones(1))[0]), end * (1.0 - _eased_time(np.ones(1))[0])
     t = np.linspace(0.0, duration + sum(lost), count + 1)
     w, dw, ddw = t - lost[0], np.ones(count + 1), np.zeros(count + 1)
-    for span, where, sign, origin in ((start, t, 1.0, 0.0), (end, t[-1] - t, -1.0, duration)):
-        if not span:
+    for ease, where, sign, origin in ((start, t, 1.0, 0.0), (end, t[-1] - t, -1.0, duration)):
+        if not ease:
             continue
-        inside = where < span
-        x = where[inside] / span
-        w[inside] = origin + sign * span * _eased_way(x)
+        inside = where < ease
+        x = where[inside] / ease
+        w[inside] = origin + sign * ease * _eased_time(x)
         dw[inside] = np.sqrt(1.0 - (1.0 - x) ** 4)
         # Where τ = 0 the rate that this multiplies is 0.
-        ddw[inside] = sign * 2.0 * (1.0 - x) ** 3 / np.where(x > 0.0, span * dw[inside], np.inf)
+        ddw[inside] = sign * 2.0 * (1.0 - x) ** 3 / np.where(x > 0.0, ease * dw[inside], np.inf)
     return w, dw, ddw, t
 
 
-def _eased_way(x: Array) -> Array:
+def _eased_time(x: Array) -> Array:
     """Return the integral of √(1 - (1 - x)⁴) from 0 to x (K,), smooth in the root of x."""
     roots = np.sqrt(x)[:, None] * 0.5 * (_NODES + 1.0)
     values = 2.0 * roots * np.sqrt(1.0 - (1.0 - roots**2) ** 4)
@@ -247,7 +247,7 @@ def fastest_pace(motion: Trajectory, limits: PaceLimits, ends: Ends, step: float
         pace = _scaled(smooth(pace, step, limits.has_jerk, len(motion.t)), motion, limits)
         pace = _stepped(pace, motion, limits, ends, _BY_JERKS)
     pace = _scaled(smooth(pace, step, limits.has_jerk, len(motion.t)), motion, limits)
-    return _settled(pace, motion, limits, ends)
+    return _converged(pace, motion, limits, ends)
 
 
 def along(pace: Pace, motion: Trajectory) -> Trajectory:
@@ -260,7 +260,7 @@ def along(pace: Pace, motion: Trajectory) -> Trajectory:
     )
 
 
-def _settled(base: Pace, motion: Trajectory, limits: PaceLimits, ends: Ends) -> Pace:
+def _converged(base: Pace, motion: Trajectory, limits: PaceLimits, ends: Ends) -> Pace:
     """Return a pace after steps until none gains any more, within limits between knots too."""
     best, before = ((np.inf, np.inf), base), base.t[-1]
     near = Squares.constant(_knots(base, motion, limits), 1.0)

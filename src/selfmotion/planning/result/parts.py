@@ -29,8 +29,8 @@ from selfmotion.planning.result.archive import OtherVersionError, check_version,
 from selfmotion.planning.result.move import Move, load_move
 from selfmotion.planning.result.plan import Plan, load_plan, reached_text
 from selfmotion.planning.result.specification import (
+    CheckedMotion,
     MotionSpecification,
-    Piece,
     another_tool,
     elsewhere,
     follows_at,
@@ -386,7 +386,7 @@ class PartsAsked:
         start = problem.given_start
         if is_first and start is not None:
             # The correction of a start given near the path.
-            first = Piece("it", plan.trajectory)
+            first = CheckedMotion("it", plan.trajectory)
             yield from elsewhere(problem.robot, first, 0, start, START_TOLERANCE)
 
     def _of_moves(self) -> Iterator[str]:
@@ -408,10 +408,12 @@ class PartsAsked:
                     yield f"move {number}: {text}"
         pieces = []
         for number, plan in enumerate(plans, 1):
-            pieces.append(Piece.of(f"part {number}", plan))
-            pieces += [Piece.of(f"move {number}", move) for move in moves[number - 1 : number]]
+            pieces.append(CheckedMotion.of(f"part {number}", plan))
+            pieces += [
+                CheckedMotion.of(f"move {number}", move) for move in moves[number - 1 : number]
+            ]
         if is_closed:
-            pieces.append(Piece.of("part 1", plans[0]))
+            pieces.append(CheckedMotion.of("part 1", plans[0]))
         found = [piece for piece in pieces if piece is not None]
         # A missing move has a message already.
         if len(found) == len(pieces):

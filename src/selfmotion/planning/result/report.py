@@ -84,7 +84,7 @@ class Attempt:
 
 @dataclass(frozen=True, eq=False)
 class Report:
-    """How a plan was found.
+    """History and quality of a plan.
 
     Attributes
     ----------

@@ -137,7 +137,7 @@ def retime(
 
 
 def is_retimed(plan: Plan) -> bool:
-    """Whether a plan's pace is that of `retime`: as fast as limits allow, and nobody's time."""
+    """Whether a plan's pace is that of `retime`: as fast as limits allow, not a given one."""
     pace = plan.path.pace if isinstance(plan.path, Retimed) else None
     return pace is not None and np.array_equal(pace.t, plan.trajectory.t)
 
@@ -189,28 +189,28 @@ def _even(motion: Trajectory, periods: int, rate: float) -> Pace:
 
 def _with_remarks(plan: Plan, original: Path, acceleration: Array, jerk: Array) -> Plan:
     """Return a plan whose report says so where accelerations jump to and fro, or waits are lost."""
-    told = [plan.report.message]
+    remarks = [plan.report.message]
     waited = _waited(original)
     if waited > _BRIEF:
-        told.append(
+        remarks.append(
             f"the {waited:.3g} s that the tool waits on its way take no longer than limits ask; "
             f"where it has to wait, retime the parts, as seams of a job (wait=)"
         )
     swings = _swings(plan.trajectory, acceleration)[~np.isfinite(jerk)].sum()
     if swings >= _OFTEN:
-        told.append(
+        remarks.append(
             f"without a limit of jerk, accelerations change {swings} times from one side to the "
             f"other at once; where that shakes the arm, ask for JointJerkLimits(…)"
         )
-    return replace(plan, report=replace(plan.report, message="; ".join(told)))
+    return replace(plan, report=replace(plan.report, message="; ".join(remarks)))
 
 
 def _waited(path: Path) -> float:
     """Return the approximate time that the tool rests on a path [s]."""
     looks = Grid.aligned(edges_of(path.marks), _SAMPLES).nodes
     middles = 0.5 * (looks[:-1] + looks[1:])
-    still = np.abs(path.samples(middles).twist).max(axis=1) <= REST_SPEED
-    return float(np.diff(looks)[still].sum())
+    rests = np.abs(path.samples(middles).twist).max(axis=1) <= REST_SPEED
+    return float(np.diff(looks)[rests].sum())
 
 
 def _swings(motion: Trajectory, limit: Array) -> Ints:

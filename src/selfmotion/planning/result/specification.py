@@ -104,24 +104,24 @@ class MotionSpecification:
 def arm_digest(robot: RobotModel) -> str:
     """Return the digest of an arm, with its tools, reference and limits; see `another_tool`."""
     limits = [getattr(robot, name) for name, _, _ in _LIMITS]
-    told = (robot.urdf.sha256, robot.joint_names, robot.tools, robot.reference, robot.locked)
-    return digest_of(told, sorted(robot.touching), limits, robot.effort_limit)
+    identity = (robot.urdf.sha256, robot.joint_names, robot.tools, robot.reference, robot.locked)
+    return digest_of(identity, sorted(robot.touching), limits, robot.effort_limit)
 
 
-def another_tool(made: RobotModel, asked: RobotModel) -> Iterator[str]:
+def another_tool(made: RobotModel, required: RobotModel) -> Iterator[str]:
     """Yield the differences of an arm from the required one."""
-    if made.urdf.sha256 != asked.urdf.sha256 or made.joint_names != asked.joint_names:
-        yield f"it is of another arm than {asked.name}: {made.name}"
-    elif made.tools != asked.tools:
-        yield f"its tool is '{', '.join(made.tools)}', not '{', '.join(asked.tools)}'"
-    elif made.reference != asked.reference:
-        yield f"its path is in the frame of '{made.reference}', not '{asked.reference}'"
-    elif dict(made.locked) != dict(asked.locked):
+    if made.urdf.sha256 != required.urdf.sha256 or made.joint_names != required.joint_names:
+        yield f"it is of another arm than {required.name}: {made.name}"
+    elif made.tools != required.tools:
+        yield f"its tool is '{', '.join(made.tools)}', not '{', '.join(required.tools)}'"
+    elif made.reference != required.reference:
+        yield f"its path is in the frame of '{made.reference}', not '{required.reference}'"
+    elif dict(made.locked) != dict(required.locked):
         yield "other joints are locked, or elsewhere"
-    elif set(made.touching) != set(asked.touching):
+    elif set(made.touching) != set(required.touching):
         yield "other links of it may touch"
     else:
-        yield from _other_limits(made, asked)
+        yield from _other_limits(made, required)
 
 
 # Limits of an arm that constraints use by default: attribute, in words, power of time.
@@ -134,29 +134,29 @@ _LIMITS = (
 )
 
 
-def _other_limits(made: RobotModel, asked: RobotModel) -> Iterator[str]:
+def _other_limits(made: RobotModel, required: RobotModel) -> Iterator[str]:
     """Yield a joint of an arm with other limits than that of the required one."""
     for name, words, power in _LIMITS:
-        found, wanted = getattr(made, name), getattr(asked, name)
+        found, wanted = getattr(made, name), getattr(required, name)
         others = np.flatnonzero(found != wanted)
         if others.size:
             k = int(others[0])
-            joint = asked.joint_names[k]
+            joint = required.joint_names[k]
             yield (
                 f"the {words} of its joint '{joint}' is {found[k]:g} "
-                f"{asked.unit_of(joint)}{power}, not {wanted[k]:g}"
+                f"{required.unit_of(joint)}{power}, not {wanted[k]:g}"
             )
             return
-    if not np.array_equal(made.effort_limit, asked.effort_limit):
+    if not np.array_equal(made.effort_limit, required.effort_limit):
         yield "its limits of torque are others"
 
 
 def not_judged_by(
-    judged: Sequence[Constraint], asked: Sequence[Constraint], clearance: Clearance | None
+    judged: Sequence[Constraint], required: Sequence[Constraint], clearance: Clearance | None
 ) -> Iterator[str]:
     """Yield required constraints by which a motion is not judged."""
     known = {described(item) for item in judged}
-    for item in asked:
+    for item in required:
         if described(item) not in known:
             yield f"it is not judged by {type(item).__name__}, which was asked for"
     if clearance is not None and not any(keeps_as_far(item, clearance) for item in judged):
@@ -168,14 +168,14 @@ def described(item: Saved) -> str:
     return json.dumps(description_of(item), sort_keys=True, default=repr)
 
 
-def same_path(made: Path, asked: Path) -> bool:
+def same_path(made: Path, required: Path) -> bool:
     """Whether two paths are the same motion."""
-    if made is asked or described(made) == described(asked):
+    if made is required or described(made) == described(required):
         return True
-    if not abs(made.duration - asked.duration) <= _ROUNDING:
+    if not abs(made.duration - required.duration) <= _ROUNDING:
         return False
-    t = _looked_at(np.minimum(np.union1d(made.marks, asked.marks), made.duration))
-    return _apart(made, t, asked, np.minimum(t, asked.duration)) <= _SAME
+    t = _looked_at(np.minimum(np.union1d(made.marks, required.marks), made.duration))
+    return _apart(made, t, required, np.minimum(t, required.duration)) <= _SAME
 
 
 def follows_at(part: Path, t: Array, whole: Path, times: Array) -> bool:
@@ -202,10 +202,10 @@ def _apart(one: Path, t: Array, other: Path, times: Array) -> float:
     return float(np.max([places, turns]))
 
 
-def _same_follows(made: Sequence[Follow], asked: Sequence[Follow]) -> bool:
-    if len(made) != len(asked):
+def _same_follows(made: Sequence[Follow], required: Sequence[Follow]) -> bool:
+    if len(made) != len(required):
         return False
-    for one, other in zip(made, asked, strict=True):
+    for one, other in zip(made, required, strict=True):
         if (one.task, one.tool, one.reference) != (other.task, other.tool, other.reference):
             return False
         if isinstance(one.path, Path) != isinstance(other.path, Path):
@@ -222,11 +222,11 @@ def _matrix(pose: object) -> Array:
     return np.asarray(getattr(pose, "homogeneous", pose), dtype=np.float64)
 
 
-def _same_bands(made: Sequence[Relaxation], asked: Sequence[Relaxation]) -> bool:
+def _same_bands(made: Sequence[Relaxation], required: Sequence[Relaxation]) -> bool:
     """Whether the same rows are relaxed, in the same windows up to rounding."""
-    if len(made) != len(asked):
+    if len(made) != len(required):
         return False
-    for one, other in zip(made, asked, strict=True):
+    for one, other in zip(made, required, strict=True):
         values, wanted = one.to_dict(), other.to_dict()
         during, window = values.pop("during"), wanted.pop("during")
         if values != wanted or (during is None) != (window is None):
@@ -247,14 +247,15 @@ def keeps_as_far(item: Constraint, apart: Clearance) -> bool:
 
 # Largest gap between the end of one motion and the start of the next, from rounding [rad or m].
 _JOINED = 1e-9
-# Index of the first and the last sample.
+# Index of the first sample.
 _START = 0
+# Index of the last sample.
 _END = -1
 # Order of derivative up to which rest is required.
 _SMOOTH = 2
 
 
-class Piece(NamedTuple):
+class CheckedMotion(NamedTuple):
     """One of several motions of an arm, each after the one before.
 
     Attributes
@@ -271,7 +272,7 @@ class Piece(NamedTuple):
     accelerates: tuple[bool, bool] = (False, False)
 
     @classmethod
-    def of(cls, name: str, made: Plan | Move) -> "Piece | None":
+    def of(cls, name: str, made: Plan | Move) -> "CheckedMotion | None":
         """Return a plan or a move as a piece; None for a move that was not found."""
         if isinstance(made, Plan):
             return cls(name, made.trajectory, _accelerates(made.problem, made.requirements))
@@ -291,7 +292,9 @@ def _accelerates(problem: Problem, requirements: Sequence[Requirement]) -> tuple
     return start, end
 
 
-def gaps(robot: RobotModel, pieces: Sequence[Piece], allowed: float = _JOINED) -> Iterator[str]:
+def gaps(
+    robot: RobotModel, motions: Sequence[CheckedMotion], allowed: float = _JOINED
+) -> Iterator[str]:
     """Yield where from one piece to the next the arm jumps, moves or accelerates.
 
     Configurations have to agree within `allowed`, by default 1e-9 rad or m; at both sides the arm
@@ -299,17 +302,17 @@ def gaps(robot: RobotModel, pieces: Sequence[Piece], allowed: float = _JOINED) -
     or none: otherwise some would be other motions between the samples of the whole than those
     judged.
     """
-    yield from _mixed(pieces)
-    for one, other in pairwise(pieces):
+    yield from _mixed(motions)
+    for one, other in pairwise(motions):
         last, first = one.motion.q[_END], other.motion.q[_START]
         yield from _jump(robot, one.name, other.name, last, first, allowed)
         yield from moving_end(robot, one, _END)
         yield from moving_end(robot, other, _START)
 
 
-def _mixed(pieces: Sequence[Piece]) -> Iterator[str]:
-    cubic = [piece.name for piece in pieces if piece.motion.qdd is None]
-    if cubic and len(cubic) < len(pieces):
+def _mixed(motions: Sequence[CheckedMotion]) -> Iterator[str]:
+    cubic = [motion_.name for motion_ in motions if motion_.motion.qdd is None]
+    if cubic and len(cubic) < len(motions):
         yield (
             f"{cubic[0]} states no accelerations, and others do, so that it is another motion "
             f"between its samples in the whole; give its accelerations (Trajectory(qdd=…)), and "
@@ -333,34 +336,34 @@ def _jump(
 
 
 def elsewhere(
-    robot: RobotModel, piece: Piece, end: int, asked: Array, allowed: float = _JOINED
+    robot: RobotModel, motion_: CheckedMotion, end: int, required: Array, allowed: float = _JOINED
 ) -> Iterator[str]:
     """Yield the ends, start (0) or end (-1), of a motion that are not at a configuration (n,)."""
-    apart = np.abs(piece.motion.q[end] - asked)
+    apart = np.abs(motion_.motion.q[end] - required)
     worst = int(np.argmax(apart))
     if not apart[worst] <= allowed:
         joint, verb = robot.joint_names[worst], "end" if end else "begin"
         yield (
-            f"{piece.name} does not {verb} where it was asked to: joint '{joint}' is "
+            f"{motion_.name} does not {verb} where it was asked to: joint '{joint}' is "
             f"{apart[worst]:.3g} {robot.unit_of(joint)} away ({allowed:g} allowed); plan it again, "
             f"{'to' if end else 'from'} there"
         )
 
 
-def moving_end(robot: RobotModel, piece: Piece, end: int) -> Iterator[str]:
+def moving_end(robot: RobotModel, motion_: CheckedMotion, end: int) -> Iterator[str]:
     """Yield where a piece does not rest at its start (0) or its end (-1)."""
-    motion, verb = piece.motion, "end" if end else "begin"
+    motion, verb = motion_.motion, "end" if end else "begin"
     rates = ((1, "moves", ARRIVED, ""), (2, "accelerates", REST_ACCELERATION, "²"))
     for order, what, allowed, power in rates:
         # Without accelerations in a file, the controller interpolates, and rest cannot be judged.
-        if order == _SMOOTH and (motion.qdd is None or piece.accelerates[end]):
+        if order == _SMOOTH and (motion.qdd is None or motion_.accelerates[end]):
             continue
         rate = np.abs(motion(motion.t[end], order))
         worst = int(np.argmax(rate))
         if not rate[worst] <= allowed:
             joint = robot.joint_names[worst]
             yield (
-                f"{piece.name} does not {verb} at rest: joint '{joint}' {what} at "
+                f"{motion_.name} does not {verb} at rest: joint '{joint}' {what} at "
                 f"{rate[worst]:.2g} {robot.unit_of(joint)}/s{power} ({allowed:g} allowed); plan it "
                 f"along a path that rests there, with rest=True"
             )

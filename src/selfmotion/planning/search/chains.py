@@ -165,7 +165,7 @@ def diverse_chains(
             (mirrored if images else chosen).append(chain)
             taken.append(q)
             for station, near in covered.items():
-                near |= _apart(layers[station], q[station], turning) <= UNLIKE
+                near |= _distance(layers[station], q[station], turning) <= UNLIKE
     return (chosen + mirrored)[:count]
 
 
@@ -201,7 +201,7 @@ def in_order(q: Array) -> Array:
 
 def unlike(q: Array, other: Array, turning: Flags) -> bool:
     """Whether two motions (W, n) differ by much for long."""
-    return bool(np.mean(_apart(q, other, turning) > UNLIKE) >= _UNLIKE_FOR)
+    return bool(np.mean(_distance(q, other, turning) > UNLIKE) >= _UNLIKE_FOR)
 
 
 def _mirrors(q: Array, other: Array, turning: Flags) -> bool:
@@ -213,7 +213,7 @@ def _mirrors(q: Array, other: Array, turning: Flags) -> bool:
     return bool(np.abs(moved - also).max() < UNLIKE)
 
 
-def _apart(q: Array, other: Array, turning: Flags) -> Array:
+def _distance(q: Array, other: Array, turning: Flags) -> Array:
     """Return the largest difference of any joint, (…,)."""
     return np.asarray(np.abs(unturned(q - other, turning)).max(axis=-1))
 

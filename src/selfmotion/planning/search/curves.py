@@ -29,9 +29,11 @@ _MOST_SAMPLES = 5000
 _CARRIED = 6
 
 
-# States of the continuation of a curve.
+# States of the continuation of a curve: it goes on …
 GOING = 0
+# … is back at its start …
 CLOSED = 1
+# … or ends.
 ENDED = 2
 
 

@@ -20,9 +20,10 @@ from selfmotion.problem.problem import Problem
 
 # Number of refined sequences: the best among the samples is not always that of the best motion.
 _REFINED = 3
-# Motion of the tool between two times of the search [m], [rad], whatever the path's own waypoints:
+# Translation of the tool between two times of the search [m], whatever the path's own waypoints:
 # more times take longer, and chains are smoothed anyway.
 _STRIDE = 0.02
+# The same of its rotation [rad].
 _TURN = 0.1
 # Smallest number of times with self-motion curves, which resolve more than samples of larger
 # spaces.
@@ -35,9 +36,10 @@ _MOST = 400
 _PATH_SAMPLES = 2000
 # Clearance of sequences in addition to the required one [m]: they are checked at waypoints only.
 _MARGIN = 2.5e-4
-# The best chain is made a motion at the smallest δ with this distance from limits [rad or m], and
-# at this share of the largest speeds: between waypoints it bulges.
+# The best chain is made a motion at the smallest δ with this distance from limits [rad or m]:
+# between waypoints it bulges.
 _CHAIN_EDGE = 5e-4
+# Share of the largest speeds there.
 _CHAIN_SPEED = 0.95
 # Shift of a time at which a vertex does not converge, towards the next one; not 0.5, since a halved
 # grid could then have equal times.

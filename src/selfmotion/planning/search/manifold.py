@@ -297,7 +297,7 @@ class Manifold:
         Returns
         -------
         q : (K, n)
-        misses : (K, 2)
+        errors : (K, 2)
             Remaining errors [m], [rad].
         """
         found, left = np.array(q), np.zeros((len(q), self.follows.dimension))

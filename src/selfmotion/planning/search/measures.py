@@ -257,17 +257,17 @@ class RunningCost:
         self, k: int, before: Array, after: Array, first: Ints, second: Ints, turning: Flags
     ) -> Array:
         """Return the costs of the steps between pairs of vertices, (P,)."""
-        span = float(self.t[k + 1] - self.t[k])
+        duration = float(self.t[k + 1] - self.t[k])
         here, there = self._at(k, before), self._at(k + 1, after)
-        price = 0.5 * span * (here.cost[first] + there.cost[second])
+        price = 0.5 * duration * (here.cost[first] + there.cost[second])
         if not self.moving or not len(first):
             return price
         difference = after[second] - before[first]
         turn = 2.0 * np.pi
         difference -= np.where(turning, turn * np.round(difference / turn), 0.0)
         moved = np.linalg.norm(self.weights * difference, axis=1)
-        lasting = np.maximum(span, moved / self.speed)
-        sampling = Sampling.trapezoidal(np.full(len(first), self.t[k] + 0.5 * span))
+        lasting = np.maximum(duration, moved / self.speed)
+        sampling = Sampling.trapezoidal(np.full(len(first), self.t[k] + 0.5 * duration))
         samples = replace(
             here.samples,
             sampling=sampling,
@@ -277,10 +277,10 @@ class RunningCost:
             tips=tuple(tip.at(first) for tip in here.samples.tips),
             task_jacobian=here.samples.task_jacobian[first],
         )
-        still = replace(samples, qd=np.zeros_like(difference))
-        moving = sum(cost.value(samples) - cost.value(still) for cost in self.moving)
-        resting = sum(cost.value(still) for cost in self.moving)
-        return np.asarray(price + lasting * moving + span * resting)
+        at_rest = replace(samples, qd=np.zeros_like(difference))
+        moving = sum(cost.value(samples) - cost.value(at_rest) for cost in self.moving)
+        resting = sum(cost.value(at_rest) for cost in self.moving)
+        return np.asarray(price + lasting * moving + duration * resting)
 
     def _at(self, k: int, q: Array) -> "_Places":
         known = self._places.get(id(q))

@@ -8,10 +8,10 @@ import numpy as np
 
 from selfmotion.basics import Array
 from selfmotion.model.collision import Closest, how_near
-from selfmotion.model.follow import AugmentedFollows
+from selfmotion.model.follow import AugmentedTaskFrames
 from selfmotion.model.path import edges_of, spread_along
 from selfmotion.model.task import POSITION_ROWS, ROW_NAMES, Relaxation
-from selfmotion.planning.search.single_poses import CLIMBERS, MOST_LOOKED_AT, Found, SinglePoses
+from selfmotion.planning.search.single_poses import CLIMBERS, MOST_EVALUATED, Found, SinglePoses
 from selfmotion.planning.search.starts import start_candidates
 from selfmotion.planning.search.vertices import AT_LIMIT
 from selfmotion.problem.problem import Problem
@@ -54,8 +54,8 @@ def remedies(poses: SinglePoses, t: float, times: Array) -> list[str]:
     if shift is not None:
         # Rounded away from the path: the remedy has to suffice.
         far = np.copysign(np.ceil(1e4 * np.abs(shift) - 1e-3) / 10.0, shift) + 0.0
-        told = ", ".join(f"{axis} {x:+.4g}" for axis, x in zip("xyz", far, strict=True) if x)
-        found.append(f"the path moved by {np.linalg.norm(far):.3g} mm ({told})")
+        said = ", ".join(f"{axis} {x:+.4g}" for axis, x in zip("xyz", far, strict=True) if x)
+        found.append(f"the path moved by {np.linalg.norm(far):.3g} mm ({said})")
     turn = least_deviation(poses, t, _ROTATION_ROWS)
     if turn is not None:
         found.append(f"the tool turned by {np.degrees(np.linalg.norm(turn)):.1f}° there")
@@ -106,7 +106,7 @@ def least_deviation(poses: SinglePoses, t: float, rows: tuple[str, ...]) -> Arra
         if not set(item.rows) <= set(rows)
     )
     wider, n = poses.of(replace(asked, relaxations=(*others, more))), asked.robot.dof
-    follows = cast(AugmentedFollows, wider.problem.follows)
+    follows = cast(AugmentedTaskFrames, wider.problem.follows)
     q = poses.some(t, CLIMBERS)[:, :n]
     q = np.hstack([q, np.zeros((len(q), follows.robot.dof - n))])
     best: Array | None = None
@@ -190,7 +190,7 @@ class Obstruction:
         return self.poses.nearest(self.time)
 
     @property
-    def misses(self) -> tuple[float, float]:
+    def errors(self) -> tuple[float, float]:
         """Error of the nearest configuration from the pose, (m, rad)."""
         position, rotation = self._nearest[1][0]
         return float(position), float(rotation)
@@ -206,7 +206,7 @@ class Obstruction:
                 f"tries, meets something: {_roomiest(poses, found.met)}"
             )
         q, _ = self._nearest
-        position, rotation = self.misses
+        position, rotation = self.errors
         turned = f" and {rotation:.2g} rad" if poses.problem.asked.task.angular else ""
         return (
             f"none was found that puts '{name}' there, from {found.tries} tries"
@@ -244,7 +244,7 @@ def _roomiest(poses: SinglePoses, met: Array) -> str:
 def _roomiest_pair(poses: SinglePoses, met: Array) -> tuple[Closest, float]:
     """Return the nearest bodies at the smallest overlap of all, and the required distance."""
     # The last ones were moved away from obstacles.
-    _, worst, asked = max((poses.room(q) for q in met[-MOST_LOOKED_AT:]), key=lambda each: each[0])
+    _, worst, asked = max((poses.room(q) for q in met[-MOST_EVALUATED:]), key=lambda each: each[0])
     return worst, asked
 
 
@@ -266,9 +266,9 @@ def obstruction(
         order = [suspect, *(t for t in order if t != suspect)]
     for t in order:
         near = min(known, key=lambda other: abs(other - t), default=None)
-        found = poses.look(t, np.empty((0, poses.robot.dof)) if near is None else known[near])
+        found = poses.solve(t, np.empty((0, poses.robot.dof)) if near is None else known[near])
         if not len(found.free):
-            found = poses.look_closely(t, found)
+            found = poses.search_closely(t, found)
         if not len(found.free):
             again = np.array([t, *(other for other in order if other != t)])
             return Obstruction(t, len(found.met) > 0, poses, found, again)
@@ -340,13 +340,13 @@ def reachable(
     times = np.union1d(spread_along(path, _POSES + 1), about)
     known, last = np.array(first), 0.0
     for t in times[1:]:
-        found = poses.look(t, known)
+        found = poses.solve(t, known)
         if not len(found.free):
             known, last = _edge(poses, (last, t), known)
             # From right before it, a pose that only seemed out of reach is found.
-            found = poses.look(t, known)
+            found = poses.solve(t, known)
         if not len(found.free):
-            found = poses.look_closely(t, found)
+            found = poses.search_closely(t, found)
         if not len(found.free):
             return Reach(last, first, _out_of_reach(poses, last, known[0], times[times > last]))
         known, last = found.free, float(t)
@@ -358,7 +358,7 @@ def _edge(poses: SinglePoses, interval: tuple[float, float], known: Array) -> tu
     last, beyond = interval
     for _ in range(_BISECTIONS):
         middle = 0.5 * (last + beyond)
-        found = poses.look(middle, known)
+        found = poses.solve(middle, known)
         if len(found.free):
             known, last = found.free, middle
         else:
@@ -375,9 +375,9 @@ def _out_of_reach(poses: SinglePoses, time: float, q: Array, beyond: Array) -> s
     if len(poses.problem.asked.follows.items) > 1:
         names = poses.follows.names
         return f"{begin}: no configuration was found that puts {names} on their paths"
-    looks = beyond[np.unique(np.linspace(0, len(beyond) - 1, _EXCESS_POSES).round().astype(int))]
-    misses = [(*poses.nearest(float(t))[1][0], float(t)) for t in looks]
-    position, rotation, when = max(misses, key=lambda miss: miss[0] + miss[1])
+    rounds = beyond[np.unique(np.linspace(0, len(beyond) - 1, _EXCESS_POSES).round().astype(int))]
+    errors = [(*poses.nearest(float(t))[1][0], float(t)) for t in rounds]
+    position, rotation, when = max(errors, key=lambda miss: miss[0] + miss[1])
     turned = f" and {rotation:.2g} rad" if poses.problem.asked.task.angular else ""
     return (
         f"{begin}: the nearest configuration found misses it by up to "

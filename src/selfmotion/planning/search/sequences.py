@@ -99,7 +99,7 @@ def curve_layers(
     rng : Generator or int
         Shifts the seeds of the inverse kinematics.
     progress : Progress
-        Told the waypoint that is worked on.
+        Called with the present waypoint.
     """
     motion, x = SelfMotion(follows, SPACING), follows.targets(t)
     bounds = Admissible(*limits, motion.revolute, bodies)
@@ -131,7 +131,7 @@ def best_sequences(
     given : Measure or None
         Their measure; by default their length.
     progress : Progress
-        Told the sequence that is worked on.
+        Called with the present sequence.
 
     Returns
     -------

@@ -52,6 +52,7 @@ _SHORTER = 0.4
 # Distances of the rings of samples around a chain [rad or m]. Chains along curves are up to 0.3 %
 # longer with 0.01 as the finest (`make bench NAME=suite`).
 _ROUGH_RINGS = (0.3, 0.1)
+# The same of fine rings.
 _FINE_RINGS = (0.03, 0.01, 0.003, 0.001)
 # Samples to each side in rough rings …
 _ROUGH_SIDE = 2
@@ -60,7 +61,7 @@ _FINE_SIDE = 4
 
 
 class Shortest:
-    """Looks for the shortest chains near others, on the same waypoints.
+    """Local search for the shortest chains near others, on the same waypoints.
 
     Parameters
     ----------

@@ -27,7 +27,7 @@ _APPROACHED = 48
 # … and before a pose is given up: near limits a third of them converges, of Newton's one in 300.
 _MORE_APPROACHED = 400
 # Configurations in collision that are evaluated.
-MOST_LOOKED_AT = 80
+MOST_EVALUATED = 80
 # Of these, the ones with the smallest overlap that are moved at random.
 CLIMBERS = 8
 # Random walks along the self-motions: number at a time …
@@ -129,7 +129,7 @@ class SinglePoses:
         """Return the first of some times [s] at whose poses a quick search finds nothing."""
         known = np.empty((0, self.robot.dof))
         for t in times.tolist():
-            found = self.look(t, known)
+            found = self.solve(t, known)
             if not len(found.free):
                 q = self._by_damped_steps(t, _APPROACHED)
                 found = replace(found, free=q[self.bounds.keep(q)])
@@ -138,7 +138,7 @@ class SinglePoses:
             known = found.free
         return None
 
-    def look(self, t: float, known: Array) -> Found:
+    def solve(self, t: float, known: Array) -> Found:
         """Return the solutions at t [s] from configurations nearby (K, n), and from anywhere."""
         near = self._reached(t, known[:_BRANCHES])
         free = near[self.bounds.keep(near)]
@@ -148,7 +148,7 @@ class SinglePoses:
         free = far[self.bounds.keep(far)]
         return Found(free, np.concatenate([near, far]), len(known[:_BRANCHES]) + len(self._seeds))
 
-    def look_closely(self, t: float, before: Found) -> Found:
+    def search_closely(self, t: float, before: Found) -> Found:
         """Return the solutions by all methods, after a search without a free one."""
         seeds = spread(self.robot, _MORE_SEEDS, self._rng)
         far = self._reached(t, seeds, far=True)
@@ -177,8 +177,8 @@ class SinglePoses:
 
     def _by_damped_steps(self, t: float, count: int) -> Array:
         """Return solutions of the damped method, which also reaches limits and edges, (K, n)."""
-        q, misses = self.nearest(t, count)
-        near = q[misses.sum(axis=1) < _NEARLY]
+        q, errors = self.nearest(t, count)
+        near = q[errors.sum(axis=1) < _NEARLY]
         within = (np.abs(near) <= self.follows.within_bands(near)).all(axis=1)
         pulled, arrived = self.project(near[~within], t)
         return np.concatenate([near[within], pulled[arrived]])
@@ -186,9 +186,9 @@ class SinglePoses:
     def nearest(self, t: float, count: int = _APPROACHED) -> tuple[Array, Array]:
         """Return configurations as near to a pose as limits allow (K, n), and errors [m, rad]."""
         seeds = spread(self.robot, count, self._rng)
-        q, misses = self._manifold.approach(seeds, self.target(t), self._held(t))
-        order = np.argsort(misses.sum(axis=1), kind="stable")
-        return q[order], misses[order]
+        q, errors = self._manifold.approach(seeds, self.target(t), self._held(t))
+        order = np.argsort(errors.sum(axis=1), kind="stable")
+        return q[order], errors[order]
 
     def some(self, t: float, count: int) -> Array:
         """Return seeds (K, n) from which something may be found near the pose at t [s]."""
@@ -232,7 +232,7 @@ class SinglePoses:
 
     def _climbed(self, t: float, met: Array) -> Array:
         """Return configurations that are less near to bodies than those that were found, (K, n)."""
-        some = met[:: -(-len(met) // MOST_LOOKED_AT)]
+        some = met[:: -(-len(met) // MOST_EVALUATED)]
         best = some[np.argsort([-self.room(q)[0] for q in some])[:CLIMBERS]]
         room = np.array([self.room(q)[0] for q in best])
         for size in _CLIMBS:

@@ -5,7 +5,7 @@ initial guess for Newton's method: a torch that leans does not become upright by
 table has to turn once round for that. Here a condition about to be violated is a row of the task
 while it binds,
 
-    q̇ = W⁻¹Aᵀ(A W⁻¹Aᵀ)⁻¹ [ẋ; ḣ],   A = [J; ∂h/∂q of what binds],
+    q̇ = W⁻¹Aᵀ(A W⁻¹Aᵀ)⁻¹ [ẋ; ḣ],   A = [J; ∂h/∂q of binding conditions],
 
 with a metric W by which some joints are heavy: of all distributions of a motion among the parts of
 a cell, the one in which these move least.
@@ -99,13 +99,13 @@ class Stacked:
     def _kept(self, q: Array, target: Array, held: Flags, rounds: int) -> tuple[Array, Flags]:
         """Return configurations near others that are on the path and keep everything, and which."""
         q, on_path = self._manifold.project(q, target, far=rounds == _FAR_ROUNDS, held=held)
-        still = np.zeros(self._follows.dimension)
+        zero = np.zeros(self._follows.dimension)
         for _ in range(rounds):
             broken = self._rows(q)[1].max(axis=1, initial=-np.inf) > _MET
             which = np.flatnonzero(broken & on_path)
             if not which.size:
                 break
-            step = self._step(q[which], still)
+            step = self._step(q[which], zero)
             size = np.abs(step).max(axis=1, keepdims=True)
             moved = q[which] + step * (_FARTHEST / np.maximum(size, _FARTHEST))
             q[which], on_path[which] = self._manifold.project(moved, target, held=held)
@@ -136,12 +136,12 @@ class Stacked:
         In shares of the limits.
         """
         count, n = q.shape
-        still, slopes, beyond = np.zeros_like(q), [], []
+        zero, slopes, beyond = np.zeros_like(q), [], []
         for item in self._quantities:
             some = item.limited
             limits = item.bounds[some]
-            away = item.away(q, still, still)[:, some]
-            by = item.derivatives(q, still, still)[0][:, some]
+            away = item.away(q, zero, zero)[:, some]
+            by = item.derivatives(q, zero, zero)[0][:, some]
             if away.ndim == 3:
                 sizes = np.linalg.norm(away, axis=2)
                 units = away / np.maximum(sizes, np.finfo(float).tiny)[:, :, None]

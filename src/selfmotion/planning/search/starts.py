@@ -142,8 +142,8 @@ def _approached(
     manifold = Manifold(follows, robot.lower, robot.upper)
     target, held, found = follows.targets(t)[0], follows.held(t)[0], list[Array]()
     seeds = spread(robot, _TRIES * count, rng)
-    near, misses = manifold.approach(seeds, target, held)
-    near = near[(misses <= _NEARLY).all(axis=1)]
+    near, errors = manifold.approach(seeds, target, held)
+    near = near[(errors <= _NEARLY).all(axis=1)]
     if not len(near):
         return found
     q, arrived = manifold.project(near, target, held=held)

@@ -44,7 +44,7 @@ from selfmotion.planning.transfer.rrt_connect import (
     find_path,
     rounded,
     shortened,
-    straight_way,
+    straight_legs,
 )
 from selfmotion.problem.constraints import Constraint, Envelope
 from selfmotion.problem.problem import at_all_times, envelope_of
@@ -233,7 +233,7 @@ class FreeMotions:
         self, room: Room, ends: Sequence[Array], known: Array | None
     ) -> tuple[Array, list[int]] | None:
         """Return a known polyline (m, n), if it is free and not straight."""
-        if known is None or straight_way(room, ends[0], ends[-1]) is not None:
+        if known is None or straight_legs(room, ends[0], ends[-1]) is not None:
             return None
         # On limits, the ends are put inside them.
         known = np.concatenate([ends[0], known[1:-1], ends[-1]])
@@ -261,7 +261,7 @@ class FreeMotions:
 
         In a workpiece the only way out is narrow, and along the tool's axis.
         """
-        direct = straight_way(room, starts, goals)
+        direct = straight_legs(room, starts, goals)
         if direct is not None:
             return direct
         out = [self._retreats(room, several) for several in (starts, goals)]

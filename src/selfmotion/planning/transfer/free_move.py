@@ -70,7 +70,7 @@ def move(
     rng : Generator or int
         Shifts the samples; the same one gives the same move, unless the deadline ends it.
     progress : callable, optional
-        Told the stage, as in `plan`.
+        Called with the stage, as in `plan`.
 
     Returns
     -------

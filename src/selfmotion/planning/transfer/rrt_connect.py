@@ -105,19 +105,19 @@ class Room:
         """Return up to which share of it a straight leg is free, seen from its beginning."""
         count = int(self.steps(np.stack([first, last]))[0])
         shares = np.arange(1, count + 1) / count
-        for lot in _chunks(count):
-            some = shares[lot]
+        for chunk in _chunks(count):
+            some = shares[chunk]
             blocked = np.flatnonzero(~self.free(first + some[:, None] * (last - first)))
             if blocked.size:
-                return float((lot.start + blocked[0]) / count)
+                return float((chunk.start + blocked[0]) / count)
         return 1.0
 
     def is_open(self, first: Array, last: Array, step: float = _LEG_STEP) -> bool:
         """Whether all of a straight leg is free; coarse checks come first."""
         count = int(self.steps(np.stack([first, last]), step)[0])
         order = _spread_out(count)
-        for lot in _chunks(count):
-            some = order[lot] / count
+        for chunk in _chunks(count):
+            some = order[chunk] / count
             if not self.free(first + some[:, None] * (last - first)).all():
                 return False
         return True
@@ -147,7 +147,7 @@ def find_path(
     (m, n) or None
         The quickest of a few; None where none was found in time.
     """
-    polyline = straight_way(room, starts, goals)
+    polyline = straight_legs(room, starts, goals)
     if polyline is not None:
         return polyline
     found: list[Array] = []
@@ -159,7 +159,7 @@ def find_path(
     return min(found, key=lambda polyline: _duration(polyline, room.rates), default=None)
 
 
-def straight_way(room: Room, starts: Array, goals: Array) -> Array | None:
+def straight_legs(room: Room, starts: Array, goals: Array) -> Array | None:
     """Return the quickest straight leg that is free from a start to a goal, (2, n); see above."""
     times = (np.abs(starts[:, None] - goals[None]) * room.rates).max(axis=2)
     for pair in np.argsort(times, axis=None)[: len(starts) + len(goals)].tolist():
@@ -171,9 +171,9 @@ def straight_way(room: Room, starts: Array, goals: Array) -> Array | None:
 
 def shortened(room: Room, polyline: Array, rng: np.random.Generator) -> Array:
     """Return a polyline (m, n) with free straight shortcuts between points of it."""
-    missed = 0
+    blocked_count = 0
     for _ in range(_SHORTCUTS):
-        if len(polyline) < 3 or missed >= _BLOCKED_SHORTCUTS:
+        if len(polyline) < 3 or blocked_count >= _BLOCKED_SHORTCUTS:
             break
         lengths = (np.abs(np.diff(polyline, axis=0)) * room.rates).max(axis=1)
         ends = np.concatenate([[0.0], np.cumsum(lengths)])
@@ -184,12 +184,12 @@ def shortened(room: Room, polyline: Array, rng: np.random.Generator) -> Array:
         legs = np.minimum(np.searchsorted(ends, places, side="right") - 1, len(polyline) - 2)
         shares = (places - ends[legs]) / np.maximum(lengths[legs], 1e-12)
         between = polyline[legs] + shares[:, None] * (polyline[legs + 1] - polyline[legs])
-        missed += 1
+        blocked_count += 1
         if legs[1] > legs[0] and room.is_open(*between):
             polyline = _distinct(
                 np.concatenate([polyline[: legs[0] + 1], between, polyline[legs[1] + 1 :]])
             )
-            missed = 0
+            blocked_count = 0
     return polyline
 
 

@@ -135,10 +135,10 @@ class Clearance(Constraint):
         }
 
     def _models(self, robot: RobotModel) -> _Models:
-        made = _made.setdefault(self, WeakKeyDictionary())
-        if robot not in made:
-            made[robot] = _Models(self, robot)
-        return made[robot]
+        by_robot = _models_of.setdefault(self, WeakKeyDictionary())
+        if robot not in by_robot:
+            by_robot[robot] = _Models(self, robot)
+        return by_robot[robot]
 
 
 def _pair(given: Any) -> tuple[str, str]:
@@ -176,7 +176,9 @@ class _Models:
 
 
 # Models take a good part of a second to make, and each start of a plan needs them.
-_made: WeakKeyDictionary[Clearance, WeakKeyDictionary[RobotModel, _Models]] = WeakKeyDictionary()
+_models_of: WeakKeyDictionary[Clearance, WeakKeyDictionary[RobotModel, _Models]] = (
+    WeakKeyDictionary()
+)
 
 
 @dataclass(frozen=True, eq=False)

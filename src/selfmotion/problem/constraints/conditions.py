@@ -385,7 +385,9 @@ def active_of(
     for (name, words), (saving, multiplier, at, times) in found.items():
         if saving >= least:
             active = (at if at.any() else multiplier) > _ACTIVE * multiplier.max()
-            spans = _spans(active if active.any() else multiplier == multiplier.max(), times, span)
+            spans = _intervals(
+                active if active.any() else multiplier == multiplier.max(), times, span
+            )
             kept.append((saving, ActiveConstraint(name, *_eased(words, saving, most), spans)))
     return tuple(item for _, item in sorted(kept, key=lambda item: -item[0]))
 
@@ -400,7 +402,7 @@ def _eased(words: str, saving: float, most: float) -> tuple[str, float]:
     return told + words[size.end() :], saving * float(told) / whole
 
 
-def _spans(active: Flags, times: Array, span: Array) -> tuple[tuple[float, float], ...]:
+def _intervals(active: Flags, times: Array, span: Array) -> tuple[tuple[float, float], ...]:
     """Return the intervals of active times, `span` for a single one; gaps of one are closed."""
     if len(active) == 1:
         return ((float(span[0]), float(span[-1])),)

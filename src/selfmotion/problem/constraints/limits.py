@@ -18,8 +18,6 @@ from selfmotion.problem.constraints.base import Constraint, Envelope
 from selfmotion.problem.constraints.conditions import NodeTangents, motion_of_order
 from selfmotion.problem.costs import Samples
 
-# Limits of joint position, velocity, acceleration and jerk.
-
 _QUANTITIES = ("position", "speed", "acceleration", "jerk")
 _POWERS = ("", "/s", "/s²", "/s³")
 _RATES = ("position", "velocity", "acceleration", "jerk")

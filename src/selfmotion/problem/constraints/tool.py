@@ -13,8 +13,6 @@ from selfmotion.certificate import Column, MotionSegments, Quantity
 from selfmotion.model.robot import RobotModel, ToolRates
 from selfmotion.problem.constraints.base import Constraint, Envelope, check_changes
 
-# Limits of how fast the tool moves and accelerates.
-
 # Limited rates of the tool, as in [v, ω] and [dv/dt, dω/dt], and their units.
 TOOL_RATES = (
     ("speed", "m/s"),
@@ -182,7 +180,7 @@ class Tilt(Constraint):
 
         found = _Angle(
             f"tilt of '{self.frame}'",
-            (Column(self.frame, f"the tilt of '{self.frame}' from {_told(towards)}", "rad"),),
+            (Column(self.frame, f"the tilt of '{self.frame}' from {_with_angle(towards)}", "rad"),),
             values,
             derivatives,
             limit=2.0 * np.sin(0.5 * self.within),
@@ -225,5 +223,5 @@ def _direction(given: npt.ArrayLike, what: str) -> Array:
     return np.asarray(vector / length)
 
 
-def _told(direction: Array) -> str:
+def _with_angle(direction: Array) -> str:
     return "[" + ", ".join(f"{number:.3g}" for number in np.round(direction, 6) + 0.0) + "]"

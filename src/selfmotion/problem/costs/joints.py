@@ -35,8 +35,6 @@ from selfmotion.problem.costs.base import (
 )
 from selfmotion.problem.costs.samples import Samples
 
-# Quadratic forms of the motion and its derivatives, and other costs of the joints alone.
-
 
 @dataclass(frozen=True, eq=False)
 class _Quadratic(Cost):

@@ -14,8 +14,6 @@ from selfmotion.model.follow import Follows
 from selfmotion.problem.costs.base import ERROR, Cost, Partials, check_name
 from selfmotion.problem.costs.samples import Samples
 
-# How much of their limits joints use: a smooth stand-in for the time that a motion needs.
-
 # G at rest: it keeps the root differentiable.
 _LEAST = 1e-3
 

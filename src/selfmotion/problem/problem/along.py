@@ -69,9 +69,9 @@ def rest_orders(path: Path, task: Task) -> tuple[int, int]:
     Of each end: 0 where the tool moves, 1 where it rests, 2 where it rests and does not accelerate
     either, so that a motion from standstill is smooth there.
     """
-    pieces, away = np.diff(edges_of(path.knots)), np.arange(3.0)
-    first = _speeds(path, task, _NEAR_END * pieces[0] * away)
-    last = _speeds(path, task, path.duration - _NEAR_END * pieces[-1] * away)
+    sections, away = np.diff(edges_of(path.knots)), np.arange(3.0)
+    first = _speeds(path, task, _NEAR_END * sections[0] * away)
+    last = _speeds(path, task, path.duration - _NEAR_END * sections[-1] * away)
     return _order(first), _order(last)
 
 
@@ -100,13 +100,13 @@ _GROWS = 1.05
 
 def length_of(path: Path) -> float:
     """Return the path length of the tool [m], by samples that are refined until it converges."""
-    way, before, samples = 0.0, -1.0, _SAMPLES
+    length, before, samples = 0.0, -1.0, _SAMPLES
     # Loops may be few or many: each refinement has no time in common with the one before.
-    while way > _GROWS * before and samples < _MOST_SAMPLES:
+    while length > _GROWS * before and samples < _MOST_SAMPLES:
         places = path.samples(spread_along(path, samples)).translation
-        before, way = way, float(np.linalg.norm(np.diff(places, axis=0), axis=1).sum())
+        before, length = length, float(np.linalg.norm(np.diff(places, axis=0), axis=1).sum())
         samples = 2 * samples + 1
-    return way
+    return length
 
 
 def envelope_of(robot: RobotModel, constraints: Sequence[Constraint]) -> Envelope:

@@ -12,7 +12,7 @@ from typing_extensions import override
 from selfmotion.basics import Array, Progress, read_only, silent
 from selfmotion.certificate import Certificate, Requirement, Tolerance
 from selfmotion.model.collision import CollisionModel
-from selfmotion.model.follow import AugmentedFollows
+from selfmotion.model.follow import AugmentedTaskFrames
 from selfmotion.model.motion import Trajectory
 from selfmotion.model.path import Path
 from selfmotion.model.task import DampingLaw
@@ -48,11 +48,11 @@ class AugmentedProblem(Problem):
         As it was asked; some of its rows are relaxed.
     """
 
-    follows: AugmentedFollows
+    follows: AugmentedTaskFrames
     _original: Problem
 
     def __init__(self, asked: Problem) -> None:
-        follows = AugmentedFollows.with_tolerances(asked.follows, asked.relaxations)
+        follows = AugmentedTaskFrames.with_tolerances(asked.follows, asked.relaxations)
         given = {one.name: getattr(asked, one.name) for one in fields(Problem)}
         dof = follows.robot.dof
         given["robot"], given["task"], given["relaxations"] = (
@@ -68,9 +68,9 @@ class AugmentedProblem(Problem):
             object.__setattr__(self, "start", read_only(start))
 
     @property
-    def _made(self) -> set[str]:
-        """See `Problem._made`: what is followed is given here."""
-        return super()._made - {"follows"}
+    def _derived(self) -> set[str]:
+        """See `Problem._derived`: what is followed is given here."""
+        return super()._derived - {"follows"}
 
     @property
     @override

@@ -94,10 +94,10 @@ def off_nominal(robot: RobotModel, motion: Trajectory) -> tuple[Extreme, Extreme
     t = np.append((own.t[:-1, None] + np.diff(own.t)[:, None] * shares).ravel(), own.t[-1])
     q = own(t)
     drawn = nominal_robot(robot).chain
-    misses = np.array([Task.POSE.miss(drawn.place(each), robot.chain.place(each)) for each in q])
-    worst = np.argmax(misses, axis=0)
+    errors = np.array([Task.POSE.miss(drawn.place(each), robot.chain.place(each)) for each in q])
+    worst = np.argmax(errors, axis=0)
     position, rotation = (
-        Extreme(float(misses[row, column]), float(t[row]), robot.tool)
+        Extreme(float(errors[row, column]), float(t[row]), robot.tool)
         for column, row in enumerate(worst.tolist())
     )
     return position, rotation

@@ -17,7 +17,7 @@ from selfmotion.basics import (
     shown,
 )
 from selfmotion.certificate import Requirement, errors_at
-from selfmotion.model.follow import AugmentedFollows, Follow, Follows, VirtualJoints
+from selfmotion.model.follow import AugmentedTaskFrames, Follow, Follows, VirtualJoints
 from selfmotion.model.motion import FreeNullMotion, NullMotion
 from selfmotion.model.path import FeedPossible, Path, check_oriented, spread_along
 from selfmotion.model.robot import Chain, RobotModel
@@ -124,9 +124,9 @@ def _beyond(robot: RobotModel, start: Array) -> str:
 
 def check_start(follows: Follows, start: Array, relaxations: Sequence[Relaxation]) -> None:
     """Raise StartError where a start (n,) is off one of the paths, by more than is allowed."""
-    missed = _end_error(follows, start, relaxations, at_end=False)
-    if missed is not None:
-        position, rotation, text = missed
+    end_error = _end_error(follows, start, relaxations, at_end=False)
+    if end_error is not None:
+        position, rotation, text = end_error
         raise StartError(
             f"{follows.robot.name}: the start configuration {_beyond(follows.robot, start)}{text}; "
             f"leave it out, or take robot.inverse_kinematics(path.pose(0.0), task, seed=start)",
@@ -137,10 +137,10 @@ def check_start(follows: Follows, start: Array, relaxations: Sequence[Relaxation
 
 def check_end(follows: Follows, end: Array, relaxations: Sequence[Relaxation]) -> None:
     """Raise ProblemError where a given end (n,) is off one of the paths likewise."""
-    missed = _end_error(follows, end, relaxations, at_end=True)
-    if missed is not None:
+    end_error = _end_error(follows, end, relaxations, at_end=True)
+    if end_error is not None:
         raise ProblemError(
-            f"{follows.robot.name}: the end configuration {missed[-1]}; take "
+            f"{follows.robot.name}: the end configuration {end_error[-1]}; take "
             f"robot.inverse_kinematics(path.pose(path.duration), task, seed=q)"
         )
 
@@ -387,7 +387,7 @@ def _can_with(follows: Follows, relaxations: Sequence[Relaxation]) -> bool:
     item = follows.items[0]
     if item.task is Task.PLANAR_POSE and not _moves_in_plane(follows.robot, item.chain):
         return False
-    whole = AugmentedFollows.with_tolerances(follows, relaxations)
+    whole = AugmentedTaskFrames.with_tolerances(follows, relaxations)
     return whole.robot.dof - whole.redundancy >= whole.dimension
 
 

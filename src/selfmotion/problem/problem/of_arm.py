@@ -11,7 +11,7 @@ from typing_extensions import override
 from selfmotion.basics import Array, Flags, Ints
 from selfmotion.certificate import Column, Quantity
 from selfmotion.model.collision import Closest, CollisionModel
-from selfmotion.model.follow import AugmentedFollows, Follows
+from selfmotion.model.follow import AugmentedTaskFrames, Follows
 from selfmotion.model.task import ROW_NAMES, Relaxation
 from selfmotion.problem.constraints import BoundConstraint, BoundLimits, NodeTangents, easing_of
 from selfmotion.problem.constraints.conditions import BoundQuantity, motion_of_order
@@ -252,7 +252,7 @@ class WithinBand(BoundQuantity):
         return found
 
     @classmethod
-    def of(cls, item: Relaxation, follows: AugmentedFollows) -> "WithinBand":
+    def of(cls, item: Relaxation, follows: AugmentedTaskFrames) -> "WithinBand":
         """Return that of a relaxation with a band, for an arm with virtual joints."""
         first, last = item.window(follows.duration)
         return cls(_band(item, follows), _margin(item), (first, last))
@@ -293,7 +293,7 @@ class RowWithinBand(BoundLimits):
     counts_at_once: ClassVar[bool] = True
 
     @classmethod
-    def of_row(cls, item: Relaxation, follows: AugmentedFollows) -> "RowWithinBand | None":
+    def of_row(cls, item: Relaxation, follows: AugmentedTaskFrames) -> "RowWithinBand | None":
         """Return that of a relaxation.
 
         None where no joint's coordinate is its deviation, or that has other bands in other windows.
@@ -320,7 +320,7 @@ class RowWithinBand(BoundLimits):
         )
 
     @classmethod
-    def of_each(cls, item: Relaxation, follows: AugmentedFollows) -> "RowWithinBand | None":
+    def of_each(cls, item: Relaxation, follows: AugmentedTaskFrames) -> "RowWithinBand | None":
         """Return limits of each of the joints of a relaxation's rows, which bands imply.
 
         None where a joint is its one row's deviation, or all rows are free at some time.
@@ -370,12 +370,12 @@ def _margin(item: Relaxation) -> float:
     return min(max(_MARGIN, _LEAST / item.band), _MOST)
 
 
-def widest_band(item: Relaxation, follows: AugmentedFollows) -> Quantity:
+def widest_band(item: Relaxation, follows: AugmentedTaskFrames) -> Quantity:
     """Return how far rows are off the path, within the widest band that they have at any time."""
     return replace(_band(item, follows), limit=follows.virtual.widest(item.indices))
 
 
-def _band(item: Relaxation, follows: AugmentedFollows) -> Quantity:
+def _band(item: Relaxation, follows: AugmentedTaskFrames) -> Quantity:
     """Return how far rows are off the path: one number, or the length of several."""
     virtual, dof = follows.virtual, follows.robot.dof
     first = dof - len(virtual.each)

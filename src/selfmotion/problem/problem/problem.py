@@ -81,7 +81,7 @@ class _TaskField:
     """A task that may be given by its name."""
 
     def __get__(self, problem: Any, owner: Any = None) -> Task:
-        # Asked of the class, it is the default.
+        # On the class, the descriptor gives the default.
         return Task.POSE if problem is None else problem.__dict__["_task"]
 
     def __set__(self, problem: Any, task: Task | str) -> None:
@@ -122,7 +122,7 @@ class Problem:
         default its links must not overlap, where its URDF has bodies and no constraint is a
         `Clearance`. None to leave that out; the verdict then says so.
     rest : bool
-        Whether the arm is at rest where the path begins or ends at rest, which a controller asks
+        Whether the arm is at rest where the path starts or ends at rest, which a controller needs,
         for, unless a constraint says how fast it is there: the null motion then vanishes, and its
         derivative too where the tool does not accelerate either. The paper's does not.
     also : sequence of Follow
@@ -210,7 +210,7 @@ class Problem:
     def __getstate__(self) -> tuple[dict[str, Any], bool, list[int]]:
         # Derived values are computed anew: placed bodies belong to a thread. The default clearance
         # and limits are identified by object identity.
-        kept = {name: item for name, item in self.__dict__.items() if name not in self._made}
+        kept = {name: item for name, item in self.__dict__.items() if name not in self._derived}
         usual = [
             next((k for k, each in enumerate(KEPT) if each is item), -1)
             for item in self.constraints
@@ -227,7 +227,7 @@ class Problem:
         object.__setattr__(self, "constraints", tuple(items))
 
     @property
-    def _made(self) -> set[str]:
+    def _derived(self) -> set[str]:
         """Names of cached derived values."""
         several = (vars(cls).items() for cls in type(self).__mro__)
         return {

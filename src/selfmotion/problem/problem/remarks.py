@@ -22,8 +22,6 @@ from selfmotion.problem.constraints import (
 )
 from selfmotion.problem.problem.fit import KEPT
 
-# A path that goes through obstacles, which nothing notices where the tool has no body.
-
 # Samples of a path.
 _SAMPLES = 101
 # Depth in a workpiece up to which no note is made [m].
@@ -109,8 +107,8 @@ def remarks_on(
             )
     for model, _ in envelope.bodies:
         yield from _body_remarks(robot, model.every_body)
-        if told := overlap_warning(robot, model):
-            yield told
+        if said := overlap_warning(robot, model):
+            yield said
     yield from _unit_remarks(robot, constraints)
     for item in constraints:
         # A default, or a limit that another constraint has, needs no note.
@@ -158,11 +156,11 @@ def _unit_remarks(robot: RobotModel, constraints: Sequence[Constraint]) -> Itera
         for k, name in enumerate(robot.joint_names):
             if robot.is_prismatic(name) or not np.isfinite(own[k]):
                 continue
-            told = ""
+            said = ""
             if not item.replace and own[k] > _FAR_ABOVE * published[k]:
-                told = f"has no effect, the arm's own limit is {published[k]:.4g} {unit}"
+                said = f"has no effect, the arm's own limit is {published[k]:.4g} {unit}"
             elif own[k] > most:
-                told = f"is more than arms do (above {most:g} {unit})"
-            if told:
-                yield f"{kind}: {own[k]:g} {unit} for '{name}' {told}; in degrees? limit_deg"
+                said = f"is more than arms do (above {most:g} {unit})"
+            if said:
+                yield f"{kind}: {own[k]:g} {unit} for '{name}' {said}; in degrees? limit_deg"
                 break

@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from selfmotion.basics import Array
-from selfmotion.model.follow import BoundFollow
+from selfmotion.model.follow import BoundTaskFrame
 from selfmotion.planning.result import Plan
 from selfmotion.shell.replay import links, scene, three
 from selfmotion.shell.replay.meshes import Json, Payload
@@ -47,7 +47,7 @@ _FRAME_LENGTH = 0.12
 class _Tip:
     """What follows a path, sampled: where it is and was to be, where the path is carried."""
 
-    def __init__(self, plan: Plan, follow: BoundFollow, whole: Whole | None) -> None:
+    def __init__(self, plan: Plan, follow: BoundTaskFrame, whole: Whole | None) -> None:
         self.carrier = follow.chain.carrier
         points = {} if whole is None else {"points": whole.points}
         self.shown = curves(plan, plan.trajectory, follow, **points)

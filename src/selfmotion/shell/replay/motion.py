@@ -9,7 +9,7 @@ from scipy.ndimage import maximum_filter1d
 
 from selfmotion.basics import Array
 from selfmotion.model.collision import CollisionModel
-from selfmotion.model.follow import BoundFollow
+from selfmotion.model.follow import BoundTaskFrame
 from selfmotion.model.motion import Trajectory
 from selfmotion.model.robot import RobotModel, null_space
 from selfmotion.model.task import SE3, Task
@@ -183,7 +183,7 @@ def torque_limits(plan: Plan) -> JointTorqueLimits | None:
 def curves(
     plan: Plan,
     trajectory: Trajectory,
-    follow: BoundFollow | None = None,
+    follow: BoundTaskFrame | None = None,
     points: int = _CURVE_POINTS,
 ) -> Curves:
     """Evaluate `trajectory` (the plan's, or its x = 0 motion) for the plots of what is followed."""

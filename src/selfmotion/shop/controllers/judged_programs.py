@@ -23,7 +23,7 @@ from selfmotion.model.motion import Trajectory
 from selfmotion.model.path import Placed
 from selfmotion.model.robot import RobotModel
 from selfmotion.model.task import log3
-from selfmotion.planning.result import Move, Parts, Piece, Plan, elsewhere, gaps
+from selfmotion.planning.result import CheckedMotion, Move, Parts, Plan, elsewhere, gaps
 from selfmotion.problem.constraints import Constraint
 from selfmotion.problem.problem import Problem
 from selfmotion.shop.controllers.controller_program import (
@@ -219,16 +219,16 @@ def parts_of(file: FilePath, program: ControllerProgram, job: Program) -> Progra
 
 def slow_steps(
     parts: ProgramParts, job: Program
-) -> tuple[tuple[JudgedStep, ...], Mapping[int, Sequence[Piece]]]:
+) -> tuple[tuple[JudgedStep, ...], Mapping[int, Sequence[CheckedMotion]]]:
     """Return what is found of slow motions, and these by the step that they are before.
 
     Each has to keep what the nearest free move has to.
     """
     moves = [(k, step.made) for k, step in enumerate(job.steps) if isinstance(step.made, Move)]
-    steps, pieces = list[JudgedStep](), dict[int, list[Piece]]()
+    steps, pieces = list[JudgedStep](), dict[int, list[CheckedMotion]]()
     for number, motions in parts.slow:
         name = f"slowly to '{job.steps[number].name}'"
-        pieces.setdefault(number, []).append(Piece(name, motions[0]))
+        pieces.setdefault(number, []).append(CheckedMotion(name, motions[0]))
         if not moves:
             steps.append(JudgedStep(name, False, "not verified: the job has no free moves"))
             continue
@@ -564,9 +564,9 @@ def _judged_steps(
     within: Tolerance | None,
     kept: Callable[[Sequence[Constraint]], tuple[Constraint, ...]],
     program: ControllerProgram | None = None,
-) -> tuple[tuple[JudgedStep, ...], list[Piece]]:
+) -> tuple[tuple[JudgedStep, ...], list[CheckedMotion]]:
     """Return what certificates say of the motions of a job's steps, by what of it is `kept`."""
-    found, pieces = list[JudgedStep](), list[Piece]()
+    found, pieces = list[JudgedStep](), list[CheckedMotion]()
     for step, ways in zip(job.steps, motions, strict=True):
         made = step.made
         if isinstance(made, Move):
@@ -583,13 +583,13 @@ def _judged_steps(
                 partial(lines.certify, tolerance=tolerance),
             )
             found.append(JudgedStep(step.name, certificate.verified, certificate.verdict))
-        pieces.append(Piece(f"'{step.name}'", ways[0]))
+        pieces.append(CheckedMotion(f"'{step.name}'", ways[0]))
     return tuple(found), pieces
 
 
 def _elsewhere(
     job: Program,
-    pieces: Sequence[Piece],
+    pieces: Sequence[CheckedMotion],
     digits: float = _DIGITS,
     program: ControllerProgram | None = None,
 ) -> Iterator[str]:

@@ -14,8 +14,8 @@ from selfmotion.model.collision import Obstacle
 from selfmotion.model.motion import Trajectory, joined_motions
 from selfmotion.model.robot import RobotModel
 from selfmotion.planning.result import (
+    CheckedMotion,
     Move,
-    Piece,
     Plan,
     another_tool,
     gaps,
@@ -196,7 +196,7 @@ class Program:
 
     def _gaps(self) -> Iterator[str]:
         """Yield where the arm would jump, or does not rest."""
-        named = ((step, Piece.of(f"'{step.name}'", step.made)) for step in self.steps)
+        named = ((step, CheckedMotion.of(f"'{step.name}'", step.made)) for step in self.steps)
         pieces = [piece for _, piece in named if piece is not None]
         for piece, end in [(each, 0) for each in pieces[:1]] + [(each, -1) for each in pieces[-1:]]:
             yield from moving_end(self.robot, piece, end)

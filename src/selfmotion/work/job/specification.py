@@ -15,8 +15,8 @@ from selfmotion.model.path import Path, Reversed
 from selfmotion.model.robot import RobotModel
 from selfmotion.model.task import Relaxation, Task
 from selfmotion.planning.result import (
+    CheckedMotion,
     MotionSpecification,
-    Piece,
     Plan,
     arm_digest,
     elsewhere,
@@ -110,7 +110,7 @@ class Specification:
     def _ends(self, robot: RobotModel, steps: Sequence[Step]) -> Iterator[str]:
         """Yield faults of the start and the end, without those of moves that were not found."""
         for q, at in ((self.start, 0), (self.end, -1)):
-            piece = Piece.of("it", steps[at].made) if steps and q is not None else None
+            piece = CheckedMotion.of("it", steps[at].made) if steps and q is not None else None
             if piece is not None and q is not None:
                 yield from elsewhere(robot, piece, at, q)
 

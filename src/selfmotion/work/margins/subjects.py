@@ -8,7 +8,7 @@ import numpy as np
 from selfmotion.basics import Array, ProblemError, nearest
 from selfmotion.certificate import Separation
 from selfmotion.model.collision import CollisionModel
-from selfmotion.model.follow import BoundFollow
+from selfmotion.model.follow import BoundTaskFrame
 from selfmotion.model.path import spread_along
 from selfmotion.model.robot import BASE_JOINT, root_place
 from selfmotion.planning.result import Plan
@@ -244,7 +244,7 @@ def _middle_of_path(plan: Plan) -> Array:
     return np.asarray(chain.base_placement.act(middle))
 
 
-def _lever(plan: Plan, item: BoundFollow, center: Array) -> float:
+def _lever(plan: Plan, item: BoundTaskFrame, center: Array) -> float:
     """Return how far a tip is from a centre at most, at any time [m].
 
     Between two samples it moves by no more than the ways of the joints times the arm's reach.

@@ -21,7 +21,7 @@ from selfmotion.basics import (
     seconds_of_kernels,
 )
 from selfmotion.model.collision import Obstacle
-from selfmotion.model.follow import BoundFollow
+from selfmotion.model.follow import BoundTaskFrame
 from selfmotion.model.path import Path, Placed, spread_along
 from selfmotion.model.robot import root_place, with_moved_base
 from selfmotion.model.task import SE3
@@ -312,11 +312,11 @@ def _quickly(problem: Problem, known: Plan | None, search: Search | None, patien
     return _uninterrupted(found) if presses() > pressed or not given_up else found
 
 
-def _stands(item: BoundFollow) -> bool:
+def _stands(item: BoundTaskFrame) -> bool:
     return item.chain.carrier < 0
 
 
-def _placed(item: BoundFollow, by: SE3) -> Path:
+def _placed(item: BoundTaskFrame, by: SE3) -> Path:
     """Return a path moved by a rigid motion in world axes."""
     frame = item.chain.base_placement
     return Placed(item.path, frame.inverse() * by * frame)
