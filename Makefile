@@ -191,7 +191,8 @@ fuzz-realtime: $(READY)  ## 1,000 scenarios of pushes, late steps, jumps and fau
 fuzz-files: $(READY)  ## 20,000 spoiled files of all kinds: read, or refused in one line
 	$(BIN)/python benchmarks/fuzz_files.py
 
-arms: $(READY)  ## docs/chains.md: a line with every chain of example-robot-data, or why not
+arms: $(READY)  ## docs/chains.md: what loads, plans and is verified of robot descriptions; needs a network
+	$(BIN)/pip install --quiet --constraint constraints.txt -e '.[arms]'
 	$(BIN)/python benchmarks/arms.py
 
 mutants: $(READY)  ## faults put into the parts that all else stands on, and how many tests catch
