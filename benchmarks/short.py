@@ -24,7 +24,14 @@ PATIENCE = 180.0
 # File → arguments of its short form.
 SHORT: dict[str, list[str]] = {
     "acceptance.py": ["--count", "2"],
-    "arms.py": ["--list", "example-robot-data", "--only", "panda_description", "--out", "out/short/chains.md"],
+    "arms.py": [
+        "--list",
+        "example-robot-data",
+        "--only",
+        "panda_description",
+        "--out",
+        "out/short/chains.md",
+    ],
     "batch.py": ["--count", "12", "--same", "2"],
     "binding.py": ["--kind", "jerk"],
     "bought_margins.py": ["--count", "1", "--displacements", "2"],
