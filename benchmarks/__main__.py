@@ -231,8 +231,12 @@ BENCHMARKS = {
         Run("fuzz_files.py", short="--count 60"),
     ),
     "arms": Benchmark(
-        "docs/chains.md: a line with every chain of example-robot-data, or why not",
-        Run("arms.py", short="--only panda_description --out out/short/chains.md"),
+        "docs/chains.md: how many robot descriptions load, plan and are verified; needs a network",
+        Run(
+            "arms.py",
+            short="--list example-robot-data --only panda_description --out out/short/chains.md",
+        ),
+        needs=(".[arms]",),
     ),
     "mutants": Benchmark(
         "faults put into the parts that all else stands on, and how many tests catch",

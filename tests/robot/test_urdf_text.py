@@ -120,6 +120,18 @@ def test_what_is_not_found_is_named_with_where_it_was_looked_for(tmp_path: Path)
         sm.obstacles.CollisionModel(sm.load_robot(file))
 
 
+def test_what_a_simulator_is_told_is_no_part_of_the_robot(tmp_path: Path) -> None:
+    """Contact sensors of Gazebo name their bodies by elements that are called as URDF's are."""
+    sensor = "<sensor><contact><collision>l3_collision</collision></contact></sensor>"
+    file = tmp_path / "arm.urdf"
+    plain = arm()
+    file.write_text(plain.replace("</robot>", f'<gazebo reference="l3">{sensor}</gazebo></robot>'))
+    assert sm.load_robot(file).dof == 7
+    file.write_text(plain.replace("</robot>", "<collision/></robot>"))
+    with pytest.raises(sm.errors.RobotError, match="a <collision> is outside of the links"):
+        sm.load_robot(file)
+
+
 def test_a_urdf_that_is_xacro_is_expanded(tmp_path: Path) -> None:
     """Its suffix says what it expands to; arguments are given as those of any xacro file."""
     file = tmp_path / "arm.urdf"

@@ -319,6 +319,9 @@ def parse_urdf(
     """Validate URDF text; see `read_urdf`. `packages` are searched for meshes."""
     root = root_of(text, source)
     check_expanded(root, source)
+    # What a simulator is told is no part of the robot, though it may be called as if.
+    for told in root.findall("gazebo"):
+        root.remove(told)
     notes = [*split_planar(root, source), *mend_cosmetics(root, check_shape)]
     unsaid = without_limits(root)
     for key, what in (("velocity", "speeds are"), ("effort", "torques are")):
