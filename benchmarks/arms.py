@@ -471,8 +471,8 @@ _HEAD = """# Arms that people have
 
 Written by `make bench NAME=arms`, which fetches the repositories of `benchmarks/makers.csv` and of
 the package robot_descriptions ({list_version}) when it first needs them: that takes a network, and
-rows without a file say *not fetched*. Of example-robot-data ({chains_version}) it is each chain of two
-joints or more, arms, legs and fingers; of other files the longest one.
+rows without a file say *not fetched*. Of example-robot-data ({chains_version}) it is each chain
+of two joints or more, arms, legs and fingers; of other files the longest one.
 
 Each file of the first two goes through two commands as they stand: `selfmotion init FILE --tool
 TOOL --packages FOLDER` writes a problem, a circle in the task with the most rows that leaves
