@@ -9,22 +9,19 @@ What a first script needs is here. The rest is in namespaces: `costs`, `constrai
 works' methods).
 """
 
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
+from warnings import warn
 
 from selfmotion import (
-    baselines as baselines,
     certificate as certificate,
     constraints as constraints,
     costs as costs,
     errors as errors,
-    files as files,
-    job as job,
-    margins as margins,
     motion as motion,
     obstacles as obstacles,
     optimise as optimise,
     paths as paths,
-    placement as placement,
     result as result,
     robot as robot,
 )
@@ -46,7 +43,6 @@ from selfmotion.model.robot import (
     load_robot as load_robot,
 )
 from selfmotion.model.task import Damping as Damping, Relaxation as Relaxation, Task as Task
-from selfmotion.paper.baselines import plan_by as plan_by
 from selfmotion.planning.optimise import QuasiNewton as QuasiNewton
 from selfmotion.planning.planner import (
     Fastest as Fastest,
@@ -72,30 +68,59 @@ from selfmotion.problem.problem import (
     off_nominal as off_nominal,
     sample_problem as sample_problem,
 )
-from selfmotion.shell.documents import read_problem as read_problem
-from selfmotion.work.batch import Batch as Batch, plan_many as plan_many
-from selfmotion.work.job import (
-    Program as Program,
-    Seam as Seam,
-    load_program as load_program,
-    plan_job as plan_job,
-)
-from selfmotion.work.margins import Margin as Margin, margin as margin
-from selfmotion.work.placement import (
-    correction as correction,
-    place as place,
-    plan_with_margin as plan_with_margin,
-)
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from matplotlib.figure import Figure
 
+    from selfmotion import (
+        baselines as baselines,
+        files as files,
+        job as job,
+        margins as margins,
+        placement as placement,
+        realtime as realtime,
+        replay as replay,
+        testing as testing,
+    )
+    from selfmotion.paper.baselines import plan_by as plan_by
     from selfmotion.realtime import Replanner as Replanner, warm_up as warm_up
+    from selfmotion.shell.documents import read_problem as read_problem
+    from selfmotion.work.batch import Batch as Batch, plan_many as plan_many
+    from selfmotion.work.job import (
+        Program as Program,
+        Seam as Seam,
+        load_program as load_program,
+        plan_job as plan_job,
+    )
+    from selfmotion.work.margins import Margin as Margin, margin as margin
+    from selfmotion.work.placement import (
+        correction as correction,
+        place as place,
+        plan_with_margin as plan_with_margin,
+    )
 
-_LATER = ("Replanner", "warm_up")
-_LATER_NAMESPACES = ("realtime", "replay", "testing")
+# Names that a plan does not need → the module that has them, imported when they are first used.
+_LATER = {
+    **dict.fromkeys(("Batch", "plan_many"), "work.batch"),
+    **dict.fromkeys(("Program", "Seam", "load_program", "plan_job"), "work.job"),
+    **dict.fromkeys(("Margin", "margin"), "work.margins"),
+    **dict.fromkeys(("correction", "place", "plan_with_margin"), "work.placement"),
+    **dict.fromkeys(("Replanner", "warm_up"), "realtime"),
+    "plan_by": "paper.baselines",
+    "read_problem": "shell.documents",
+}
+_LATER_NAMESPACES = (
+    "baselines",
+    "files",
+    "job",
+    "margins",
+    "placement",
+    "realtime",
+    "replay",
+    "testing",
+)
 # Names that were at the top level once, and have another one since.
 _RENAMED = {"Binding": "ActiveConstraint", "BoughtMargin": "PlanWithMargin"}
 _NAMESPACES = (
@@ -190,21 +215,18 @@ def __getattr__(name: str) -> Any:
     if name == "__version__":
         return _version()
     if name in _LATER_NAMESPACES:
-        from importlib import import_module
-
         return import_module(f"selfmotion.{name}")
     if name in _LATER:
-        from selfmotion import realtime
-
-        return getattr(realtime, name)
+        found = getattr(import_module(f"selfmotion.{_LATER[name]}"), name)
+        globals()[name] = found
+        return found
     now = _RENAMED.get(name, name)
     for space in _NAMESPACES:
-        if now in globals()[space].__all__:
-            from warnings import warn
-
+        offered = import_module(f"selfmotion.{space}")
+        if now in offered.__all__:
             moved = f"sm.{name} is sm.{space}.{now} now; the old name goes with the next version"
             warn(moved, DeprecationWarning, stacklevel=2)
-            return getattr(globals()[space], now)
+            return getattr(offered, now)
     raise AttributeError(f"module 'selfmotion' has no attribute '{name}'")
 
 
