@@ -99,3 +99,7 @@ from selfmotion.basics.tables import (
     read_values as read_values,
     write_document as write_document,
 )
+from selfmotion.basics.units import (
+    in_angle as in_angle,
+    in_length as in_length,
+)

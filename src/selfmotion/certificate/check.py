@@ -12,6 +12,8 @@ from selfmotion.basics import (
     Progress,
     as_called,
     as_several,
+    in_angle,
+    in_length,
     shown,
     silent,
     version,
@@ -306,13 +308,13 @@ def _off_path(
     # Written so that NaN fails.
     if not position.value <= tolerance.position:
         failures.append(
-            f"'{position.name}' is {position.value:.2e} m {off} at t = {position.time:.3f} "
-            f"s (allowed: {tolerance.position:.3g} m){_damping_cause(position.time, damped)}"
+            f"'{position.name}' is {in_length(position.value, 3)} {off} at t = {position.time:.3f} "
+            f"s (allowed: {in_length(tolerance.position, 3)}){_damping_cause(position.time, damped)}"
         )
     if not rotation.value <= tolerance.rotation:
         failures.append(
-            f"'{rotation.name}' is {rotation.value:.2e} rad {off} at t = "
-            f"{rotation.time:.3f} s (allowed: {tolerance.rotation:.3g} rad)"
+            f"'{rotation.name}' is {in_angle(rotation.value, 3)} {off} at t = "
+            f"{rotation.time:.3f} s (allowed: {in_angle(tolerance.rotation, 3)})"
             f"{_damping_cause(rotation.time, damped)}"
         )
     return tuple(failures)

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from selfmotion.basics import in_angle, in_length
 from selfmotion.certificate.limits import LIMIT_NAMES
 from selfmotion.certificate.requirement import (
     USUAL,
@@ -27,7 +28,8 @@ def allowed_text(tolerance: Tolerance) -> str:
     """Return the clause of a verdict for a larger tolerance than usual, "" for the usual one."""
     if tolerance.position <= USUAL.position and tolerance.rotation <= USUAL.rotation:
         return ""
-    return f" ({tolerance.position:.2g} m and {tolerance.rotation:.2g} rad are allowed)"
+    position, rotation = in_length(tolerance.position), in_angle(tolerance.rotation)
+    return f" ({position} and {rotation} are allowed)"
 
 
 def relaxed_text(relaxed: bool) -> str:
@@ -162,8 +164,8 @@ class Certificate:
         if self.verified:
             return (
                 f"verified at all times ({', '.join(self.covers)}): at most "
-                f"{self.position_error.value:.1e} m and {self.rotation_error.value:.1e} rad off "
-                f"the path{relaxed_text(bool(self.deviations))}{allowed_text(self.tolerance)}"
+                f"{in_length(self.position_error.value)} and {in_angle(self.rotation_error.value)} "
+                f"off the path{relaxed_text(bool(self.deviations))}{allowed_text(self.tolerance)}"
                 f"{self._others_text}"
                 f"{self._besides}"
             )
@@ -180,7 +182,8 @@ class Certificate:
         position = max(one.value for one, _ in self._errors)
         rotation = max(one.value for _, one in self._errors)
         return (
-            f"verified at all times: at most {position:.1e} m and {rotation:.1e} rad off the path"
+            f"verified at all times: at most {in_length(position)} and {in_angle(rotation)} off the "
+            f"path"
             f"{relaxed_text(bool(self.deviations))}{allowed_text(self.tolerance)}"
             f"{self._besides}"
         )
@@ -198,7 +201,8 @@ class Certificate:
     @property
     def _others_text(self) -> str:
         return "".join(
-            f", '{position.name}' {position.value:.1e} m and {rotation.value:.1e} rad off its path"
+            f", '{position.name}' {in_length(position.value)} and {in_angle(rotation.value)} off "
+            f"its path"
             for position, rotation in self.others
         )
 

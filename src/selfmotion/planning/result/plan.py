@@ -24,6 +24,8 @@ from selfmotion.basics import (
     as_path,
     description_of,
     digest_of,
+    in_angle,
+    in_length,
     silent,
 )
 from selfmotion.certificate import (
@@ -385,7 +387,7 @@ def reached_text(plans: Sequence[Plan], tolerance: Tolerance) -> str:
     rotation = max(other.value for _, other in found)
     relaxed = any(plan.certificate.deviations for plan in plans)
     return (
-        f"at most {position:.1e} m and {rotation:.1e} rad off the path"
+        f"at most {in_length(position)} and {in_angle(rotation)} off the path"
         f"{relaxed_text(relaxed)}{allowed_text(tolerance)}"
     )
 
