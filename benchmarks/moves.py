@@ -50,8 +50,8 @@ def transfer(
         boxes.append(sm.obstacles.Box(f"box {k}", place, rng.uniform(0.08, 0.3, 3)))
     clearance = sm.constraints.Clearance(boxes, APART)
     free = FreeMotions(robot, [*KEPT, clearance], rng)
-    room = Room(free.asked, robot, 2e-3)
-    lower, upper = free.asked.arm(robot).finite_limits()
+    room = Room(free.envelope, robot, 2e-3)
+    lower, upper = free.envelope.arm(robot).finite_limits()
     starts = 0.8 * rng.uniform(lower, upper, (200, robot.dof))
     starts = starts[room.free(starts)]
     if not len(starts):
@@ -92,8 +92,8 @@ def peer_best(free: FreeMotions, first: np.ndarray, last: np.ndarray, tries: int
     from ompl import base, geometric, util
 
     util.setLogLevel(util.LogLevel.LOG_NONE)
-    room, n = Room(free.asked, free.robot), len(first)
-    lower, upper = free.asked.arm(free.robot).finite_limits()
+    room, n = Room(free.envelope, free.robot), len(first)
+    lower, upper = free.envelope.arm(free.robot).finite_limits()
     space = base.RealVectorStateSpace(n)
     bounds = base.RealVectorBounds(n)
     for k in range(n):

@@ -78,9 +78,9 @@ def read_rows(
         The file cannot be read, has no header, no rows, a name twice, or a row that is short, long
         or not numeric; the line is named.
     """
-    comments, kept = _lines(file)
-    titles, rows, line = _header(file, comments, kept, columns, usual or {}, check, named)
-    mark = _mark(kept[0][1])
+    comments, remaining = _lines(file)
+    titles, rows, line = _header(file, comments, remaining, columns, usual or {}, check, named)
+    mark = _mark(remaining[0][1])
     if rows and len(_cells(rows[0][1], mark)) != len(titles):
         own = _mark(rows[0][1])
         mark = own if len(_cells(rows[0][1], own)) == len(titles) else mark
@@ -114,21 +114,21 @@ def read_rows(
 def _header(
     file: Path,
     comments: Sequence[tuple[int, str]],
-    kept: Sequence[tuple[int, str]],
+    remaining: Sequence[tuple[int, str]],
     columns: Sequence[str] | None,
     usual: Mapping[int, str],
     check: Callable[[Sequence[str]], object] | None,
     named: Callable[[str], str],
 ) -> tuple[list[str], Sequence[tuple[int, str]], int]:
     """Return the titles of the columns, the lines of the rows, and on which line titles stand."""
-    line, first = kept[0]
+    line, first = remaining[0]
     cells = _cells(first, _mark(first))
     is_row = all(_as_float(cell, _mark(first)) is not None for cell in cells)
     if columns is not None:
-        return list(columns), kept if is_row else kept[1:], line
+        return list(columns), remaining if is_row else remaining[1:], line
     if not is_row:
         titles = _titles(first)
-        return titles, kept[1:], line
+        return titles, remaining[1:], line
     before = [each for each in comments if each[0] < line]
     if before and check is not None:
         titles = _titles(before[-1][1].lstrip("#%/ "))
@@ -138,7 +138,7 @@ def _header(
             except FileFormatError:
                 pass
             else:
-                return titles, kept, before[-1][0]
+                return titles, remaining, before[-1][0]
     known = usual.get(len(cells))
     add = f"add {known} (or say --columns {known})" if known else "add one that names its columns"
     raise FileFormatError(f"{file}: line {line}: has no header, only numbers; {add}")
@@ -192,10 +192,10 @@ def _lines(file: Path) -> tuple[list[tuple[int, str]], list[tuple[int, str]]]:
             f"most"
         )
     all_lines = [(k, line.strip(" ")) for k, line in enumerate(lines, 1) if line.strip()]
-    kept = [each for each in all_lines if not each[1].startswith(_COMMENTS)]
-    if not kept:
+    remaining = [each for each in all_lines if not each[1].startswith(_COMMENTS)]
+    if not remaining:
         raise FileFormatError(f"{file}: is empty, expected a header line and rows of numbers")
-    return [each for each in all_lines if each[1].startswith(_COMMENTS)], kept
+    return [each for each in all_lines if each[1].startswith(_COMMENTS)], remaining
 
 
 def _as_float(cell: str, mark: str) -> float | None:

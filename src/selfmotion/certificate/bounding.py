@@ -202,9 +202,9 @@ def _decided(
         for depth in range(_DEPTH + 1):
             found = _measured(function, MotionSegments(robot, trajectory, pending))
             # Written so that NaN settles nothing and is no small error either.
-            kept = np.asarray(found.values <= function.allowed).all(axis=1)
+            satisfied = np.asarray(found.values <= function.allowed).all(axis=1)
             broken = ~np.asarray(found.measured <= function.allowed).all(axis=1)
-            decided = kept | broken
+            decided = satisfied | broken
             left = np.flatnonzero(~decided)
             last = depth == _DEPTH or len(left) > most
             said = np.arange(len(pending)) if last else np.flatnonzero(decided)

@@ -150,8 +150,8 @@ def _runs(intervals: Array, counts: Flags) -> Iterator[tuple[int, int, bool]]:
     """Yield the first and last of intervals (I, 2) in a row that count, or do not."""
     if not len(intervals):
         return
-    apart = intervals[1:, 0] != intervals[:-1, 1]
-    cuts = np.flatnonzero(apart | (counts[1:] != counts[:-1])) + 1
+    offset = intervals[1:, 0] != intervals[:-1, 1]
+    cuts = np.flatnonzero(offset | (counts[1:] != counts[:-1])) + 1
     for first, after in pairwise([0, *cuts.tolist(), len(intervals)]):
         yield first, after - 1, bool(counts[first])
 
@@ -247,8 +247,8 @@ class _Along(BoundedFunction):
             return None
         place, _ = segments.chain().relative(self._follow.chain)
         speed = series.derivative(path.translation, segments.half)
-        apart = series.derivative(place, segments.half) + speed
-        return np.asarray(series.product(apart, speed)[None] / self._room(segments))
+        offset = series.derivative(place, segments.half) + speed
+        return np.asarray(series.product(offset, speed)[None] / self._room(segments))
 
     @override
     def values(self, segments: MotionSegments, u: Array) -> Array:

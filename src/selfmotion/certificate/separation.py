@@ -69,10 +69,10 @@ class Separation(Requirement):
                 f"{found.time:.6g} to {found.open_until:.6g} s is not decided: they come to "
                 f"{found.closest.value * 1e3:.4f} mm"
             )
-        kept = found.open_until is None and bool(found.closest.value >= self.distance)
+        selected = found.open_until is None and bool(found.closest.value >= self.distance)
         near = found.closest.value
         return Finding(
-            self.name, found.names, found.time, near, self.distance, kept, text, unit="m"
+            self.name, found.names, found.time, near, self.distance, selected, text, unit="m"
         )
 
     def approaches(self, motion: FinishedMotion) -> dict[str, Extreme]:
@@ -216,8 +216,8 @@ def closest_at_all_times(
             (before, after), here = lengths[chunk].swapaxes(0, 1), between[chunk]
             need = np.maximum((here - before) @ lever_arms.T, (after - here) @ lever_arms.T)
             exact_below = goal + _HULLS_DO * need
-            asked = np.where(known[chunk], -np.inf, goal + need)
-            found = model.distances(trajectory(middle[chunk]), asked, exact_below)
+            bounds_wanted = np.where(known[chunk], -np.inf, goal + need)
+            found = model.distances(trajectory(middle[chunk]), bounds_wanted, exact_below)
             inner[chunk] = np.where(known[chunk], np.inf, found)
             approach = _nearer(approach, model, middle[chunk], inner[chunk], exact_below)
         intervals, lengths, sides = (

@@ -153,10 +153,10 @@ def saturate(
         for i in range(m):
             moving[i, worst] = 0.0
     for i in range(m):
-        miss = wanted[i]
+        residual = wanted[i]
         for k in range(n):
-            miss -= jacobian[i, k] * rates[k]
-        if not abs(miss) <= FOLLOWED:
+            residual -= jacobian[i, k] * rates[k]
+        if not abs(residual) <= FOLLOWED:
             return False
     return True
 

@@ -54,11 +54,11 @@ def link_bodies(robot: RobotModel) -> list[Body]:
     CollisionError
         An element is no body, or Pinocchio has read none for it.
     """
-    pieces = robot.geometry(pin.GeometryType.COLLISION).geometryObjects
-    links = [robot.link_of(geometry_object.parentFrame) for geometry_object in pieces]
+    geometries = robot.geometry(pin.GeometryType.COLLISION).geometryObjects
+    links = [robot.link_of(geometry_object.parentFrame) for geometry_object in geometries]
     _check_count(robot.urdf, links)
     bodies = []
-    for link, geometry_object in zip(links, pieces, strict=True):
+    for link, geometry_object in zip(links, geometries, strict=True):
         file = f" ({geometry_object.meshPath})" if geometry_object.meshPath else ""
         solid = Solid(geometry_object.geometry, f"{robot.urdf.source}: link '{link}'{file}")
         carrier = robot.urdf.carrier(link)

@@ -114,9 +114,9 @@ class ClearanceModel:
     ) -> None:
         self.robot, self._exact, self._near, self._width = exact.robot, exact, near, width
         self._hulls, self._of = exact.decomposed(links=decompose_links)
-        self._kept = self._useful()
-        self.pairs = tuple(exact.pairs[i] for i in self._of[self._kept])
-        first, second = exact.hulls.pairs[self._of[self._kept]].T
+        self._selected = self._useful()
+        self.pairs = tuple(exact.pairs[i] for i in self._of[self._selected])
+        first, second = exact.hulls.pairs[self._of[self._selected]].T
         moved = exact.moved.astype(np.float64)
         # Which joints move the first body, less those that move the second.
         self._sides = moved[first] - moved[second]
@@ -131,9 +131,9 @@ class ClearanceModel:
         """
         q = self._exact.samples(q_samples)
         hulls, reach = self._hulls, self._near + self._width
-        values = hulls.lower_bounds(q, reach)[:, self._kept]
+        values = hulls.lower_bounds(q, reach)[:, self._selected]
         rows, columns = np.nonzero(values < reach)
-        contacts = hulls.contacts(q, rows, self._kept[columns], values[rows, columns])
+        contacts = hulls.contacts(q, rows, self._selected[columns], values[rows, columns])
         values[rows, columns] = contacts.values
         slopes = contacts.slopes * self._sides[columns]
         beyond = np.clip(values - self._near, 0.0, self._width)
@@ -154,8 +154,8 @@ class ClearanceModel:
         """
         q = self._exact.samples(q_samples)
         bounds = np.full((len(q), len(self._of)), np.inf)
-        kept = self._kept
-        bounds[:, kept] = self._hulls.lower_bounds(q, margin)[:, kept]
+        selected = self._selected
+        bounds[:, selected] = self._hulls.lower_bounds(q, margin)[:, selected]
         return self._hulls.closer(q, bounds, margin, np.ones(len(self._of), dtype=bool).tolist())[0]
 
     def move(self, obstacle: str, pose: SE3) -> None:
@@ -168,13 +168,13 @@ class ClearanceModel:
 
     def is_exact(self, column: int) -> bool:
         """Whether the bodies of a pair are their own convex hulls."""
-        return self._exact.is_convex(int(self._of[self._kept[column]]))
+        return self._exact.is_convex(int(self._of[self._selected[column]]))
 
     @property
     def left_out(self) -> tuple[tuple[str, str], ...]:
         """Pairs of bodies without any piece here: the exact model alone checks them."""
-        kept = set(self._of[self._kept].tolist())
-        return tuple(pair for k, pair in enumerate(self._exact.pairs) if k not in kept)
+        selected = set(self._of[self._selected].tolist())
+        return tuple(pair for k, pair in enumerate(self._exact.pairs) if k not in selected)
 
     def _useful(self) -> Ints:
         """Return the indices of pairs whose hulls overlap hardly more often than the bodies."""
@@ -182,10 +182,10 @@ class ClearanceModel:
         met, alone = exact.overlap_counts()
         allowed = np.where(met > 0, _FALSE_ALARMS * SAMPLES, 0.0)
         allowed = np.where(exact.to_world, SAMPLES - 1.0, allowed)
-        kept = (alone <= allowed)[self._of]
+        selected = (alone <= allowed)[self._of]
         # Pieces of a body overlap less often than its hull.
         parted = np.bincount(self._of, minlength=len(exact.pairs)) > 1
-        open_ = np.flatnonzero(~kept & parted[self._of])
+        open_ = np.flatnonzero(~selected & parted[self._of])
         often = hull_overlaps(self.robot, self._hulls, open_)
-        kept[open_] = often <= (met * ~exact.to_world + allowed)[self._of[open_]]
-        return np.flatnonzero(kept)
+        selected[open_] = often <= (met * ~exact.to_world + allowed)[self._of[open_]]
+        return np.flatnonzero(selected)

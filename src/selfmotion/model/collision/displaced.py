@@ -179,18 +179,18 @@ class DisplacedBodies:
         self._is_displaced = [
             body.joint == joint and body.name in chosen for body in model.every_body
         ]
-        kept = [
+        selected = [
             (i, j)
             for i, j in model.index.tolist()
             if self._is_displaced[i] != self._is_displaced[j]
         ]
-        self.model, self._joint, self._center = model.of_pairs(kept), joint, center
+        self.model, self._joint, self._center = model.of_pairs(selected), joint, center
         # Of each pair the displaced body, and the other.
-        ordered = [(i, j) if self._is_displaced[i] else (j, i) for i, j in kept]
+        ordered = [(i, j) if self._is_displaced[i] else (j, i) for i, j in selected]
         self._sides = np.array(ordered, dtype=np.int64).reshape(-1, 2)
         self._others, self._other_of = np.unique(self._sides[:, 1], return_inverse=True)
         self._hulls, of = self.model.decomposed()
-        self._pieces = [np.flatnonzero(of == pair) for pair in range(len(kept))]
+        self._pieces = [np.flatnonzero(of == pair) for pair in range(len(selected))]
 
     @property
     def pairs(self) -> tuple[tuple[str, str], ...]:
@@ -260,9 +260,9 @@ class DisplacedBodies:
             parts.append(SeparatingPlane(one, other, (normal if swapped else -normal) / length))
         distance = float(contacts.values.min())
         if not self.model.is_convex(pair):
-            asked = np.full((1, len(self.pairs)), -np.inf)
-            asked[0, pair] = np.inf
-            distance = float(self.model.distances(q[None], asked)[0, pair])
+            wanted = np.full((1, len(self.pairs)), -np.inf)
+            wanted[0, pair] = np.inf
+            distance = float(self.model.distances(q[None], wanted)[0, pair])
         lever = min(float(self.lever_arms[pair]), farthest)
         return Separation(distance, lever, tuple(parts))
 

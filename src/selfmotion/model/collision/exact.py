@@ -366,8 +366,8 @@ class CollisionModel:
             A row is not a configuration of the arm.
         """
         q = self.samples(q_samples)
-        asked = np.broadcast_to(np.asarray(within, dtype=np.float64), (len(q), len(self.pairs)))
-        return self._near.distances(q, asked, np.minimum(asked, exact_below))
+        wanted = np.broadcast_to(np.asarray(within, dtype=np.float64), (len(q), len(self.pairs)))
+        return self._near.distances(q, wanted, np.minimum(wanted, exact_below))
 
     def collides(self, q: Array, margin: float = 0.0) -> bool:
         """Whether some pair is closer than `margin` [m] at `q` (n,); fast for many calls.

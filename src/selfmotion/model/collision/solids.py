@@ -154,7 +154,7 @@ class Solid:
         size = float(np.ptp(self._corners, axis=0).max())
         pieces = list(convex_pieces(self._corners, self._welded))
         try:
-            hulls = [_hull_of(_thickened(piece, self._label)[1], self._label) for piece in pieces]
+            hulls = [_hull_of(_thickened(part, self._label)[1], self._label) for part in pieces]
             outside, nearest = _outside([planes for _, planes in hulls], points)
             missing = outside > _INSIDE * size
             # Slivers may be lost by rounding: the next piece takes their corners.

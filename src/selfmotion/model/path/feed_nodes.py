@@ -131,8 +131,8 @@ class FeedNodes:
         if len(self.asked) == 1:
             return sigma
         changes = np.append(self.asked[:, 0], self.path.duration)
-        apart = np.abs(sigma[:, None] - changes).min(axis=1)
-        inner = sigma[apart > _CLOSE * np.diff(changes).min()]
+        separate = np.abs(sigma[:, None] - changes).min(axis=1)
+        inner = sigma[separate > _CLOSE * np.diff(changes).min()]
         empty = np.diff(np.searchsorted(inner, changes)) == 0
         between = 0.5 * (changes[:-1] + changes[1:])[empty]
         return np.union1d(changes, np.append(inner, between))

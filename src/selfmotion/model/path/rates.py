@@ -61,9 +61,9 @@ def twist_rates(path: Path, t: Array) -> Array:
     return rates
 
 
-def _rates_within(path: Path, edges: Array, piece: Ints, t: Array) -> Array:
+def _rates_within(path: Path, edges: Array, interval: Ints, t: Array) -> Array:
     """Return the rates at times t (K,) as they are within pieces (K,), (K, 6)."""
-    first, last = edges[piece], edges[piece + 1]
+    first, last = edges[interval], edges[interval + 1]
     step = np.maximum(_STEP * (last - first), _LEAST_STEP * path.duration)
     step = np.minimum(step, (last - first) / _ROOM)
     # Half a step off the edges: an edge belongs to one interval only.
@@ -84,6 +84,6 @@ def _slopes(x: Array) -> Array:
         others = np.delete(_OFFSETS, k)
         scale = np.prod(own - others)
         for left in range(len(others)):
-            kept = np.delete(others, left)
-            found[:, k] += np.prod(x[:, None] - kept, axis=1) / scale
+            selected = np.delete(others, left)
+            found[:, k] += np.prod(x[:, None] - selected, axis=1) / scale
     return found

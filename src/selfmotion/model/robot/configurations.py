@@ -182,10 +182,10 @@ def solved(
     start = 0.5 * (lower + upper) if seed is None else robot.configuration(seed)
     best = (np.inf, np.inf)
     for _ in range(attempts):
-        q, miss = _levenberg_marquardt(robot, pose, task, start)
-        if max(miss) < _IK_TOLERANCE:
+        q, residual = _levenberg_marquardt(robot, pose, task, start)
+        if max(residual) < _IK_TOLERANCE:
             return q
-        best = min(best, miss, key=sum)
+        best = min(best, residual, key=sum)
         start = rng.uniform(lower, upper)
     raise InverseKinematicsError(
         f"{robot.name}: no configuration within the limits puts '{robot.tool}' at "

@@ -276,13 +276,13 @@ def _row(label: str, found: Plan) -> tuple[str | float | int, ...]:
 def _agreement(context: Context) -> Claim:
     ours = plan(sample_problem(null_motion=PolynomialNullMotion(15)))
     theirs = context.lagrangian.report.cost
-    apart = ours.report.cost / theirs - 1.0
+    distance = ours.report.cost / theirs - 1.0
     return Claim(
         "two_optima",
         "The Lagrangian technique gives a globally optimal solution.",
-        Verdict.CONFIRMED if abs(apart) < _AGREEMENT else Verdict.QUALIFIED,
+        Verdict.CONFIRMED if abs(distance) < _AGREEMENT else Verdict.QUALIFIED,
         f"boundary-value problem {theirs:.5f}, our degree 15 {ours.report.cost:.5f}",
-        f"The two optima differ by {abs(apart):.0e}, found by methods that share only the arm's "
+        f"The two optima differ by {abs(distance):.0e}, found by methods that share only the arm's "
         f"kinematics. The boundary-value problem finds any stationary motion, though: it is as "
         f"local as ours.",
     )

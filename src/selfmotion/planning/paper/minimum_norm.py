@@ -84,14 +84,14 @@ class FreeStart:
         """
         q = self._reference + self._null @ z
         for _ in range(_STEPS):
-            system, missed = self._error(q, z, target)
-            wrong = float(np.abs(missed).max())
+            system, residual = self._error(q, z, target)
+            wrong = float(np.abs(residual).max())
             # NaN arrives nowhere.
             if not np.isfinite(wrong):
                 return None
             try:
                 # B⁻¹ = Bᵀ(BBᵀ)⁻¹: errors of the product are taken out by the next step.
-                q = q + system.T @ np.linalg.solve(system @ system.T, missed)
+                q = q + system.T @ np.linalg.solve(system @ system.T, residual)
             except np.linalg.LinAlgError:
                 return None
             if wrong < _ARRIVED:
@@ -110,8 +110,8 @@ class FreeStart:
             errors.append(item.task.select(error[:, None], rotation)[:, 0])
             rows.append(item.task.select(jacobian, rotation))
         along = self._null.T
-        missed = np.concatenate([*errors, z - along @ (q - self._reference)])
-        return np.vstack([*rows, along]), missed
+        residual = np.concatenate([*errors, z - along @ (q - self._reference)])
+        return np.vstack([*rows, along]), residual
 
     def tangent(self) -> Array:
         """Return ∂q(0)/∂z at the last q(0), [J; N0ᵀ]⁻¹ [0; I], (n, size)."""

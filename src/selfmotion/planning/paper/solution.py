@@ -108,9 +108,9 @@ class Method:
             iterates.append(replace(iteration, x=read_only(point)))
             if known and len(iterates) == 1:
                 return False
-            asked = self.callback is not None and bool(self.callback(iterates[-1]))
-            goes_on = is_far and not asked
-            return is_far or asked
+            stops = self.callback is not None and bool(self.callback(iterates[-1]))
+            goes_on = is_far and not stops
+            return is_far or stops
 
         # Of no unknowns any point is the minimum.
         optimizer = self.optimizer if len(x) else QuasiNewton()

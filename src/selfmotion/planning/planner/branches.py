@@ -144,11 +144,11 @@ def _spread(problem: Problem, rng: np.random.Generator) -> list[Array]:
     motions, arrived = carried(follows, starts, rough_grid(problem).nodes)
     back = np.array([wound_back(robot, motion)[0] for motion in motions])
     starts = np.where((arrived & room.free(back))[:, None], back, starts)
-    apart = np.abs(starts[:, None] - starts) @ robot.joint_weights
+    distances = np.abs(starts[:, None] - starts) @ robot.joint_weights
     lower, upper = robot.finite_limits()
     order = [int(np.argmin(np.abs(starts - 0.5 * (lower + upper)) @ robot.joint_weights))]
     while len(order) < len(starts):
-        nearest = apart[order].min(axis=0)
+        nearest = distances[order].min(axis=0)
         nearest[order] = -1.0
         order.append(int(np.argmax(nearest)))
     return [starts[k] for k in order]

@@ -68,8 +68,8 @@ def with_starts(problem: Problem, t: Array, quick: float) -> Array:
         away = least * _FARTHER**farther
         near = np.asarray(times)[:, None] + np.concatenate([-away[::-1], away])
         inside = near[(near > 0.0) & (near < duration)]
-        apart = np.abs(inside[:, None] - t).min(axis=1, initial=np.inf) > 0.5 * least
-        t = np.sort(np.concatenate([t, inside[apart]]))
+        spacing = np.abs(inside[:, None] - t).min(axis=1, initial=np.inf) > 0.5 * least
+        t = np.sort(np.concatenate([t, inside[spacing]]))
     return t
 
 

@@ -207,11 +207,11 @@ def _until(problem: Problem, time: float) -> Problem:
     if time >= problem.path.duration:
         return problem
     asked = (item.on_part() for item in problem.constraints)
-    kept = [item for item in asked if item is not None]
+    remaining = [item for item in asked if item is not None]
     shorter = problem.along(
         lambda path: Section(path, 0.0, time, crowding=True), lambda t: np.minimum(t, time)
     )
-    return problem.changed(**shorter, constraints=kept)
+    return problem.changed(**shorter, constraints=remaining)
 
 
 def _start_of(part: Problem, problem: Problem, q: Array) -> Array:
@@ -301,14 +301,14 @@ def _rank(problem: Problem, start: Array, guide: Guide | None) -> tuple[float, f
     minimum_norm = MinimumNormMotion.on(problem.with_windows_shut, start, grid, guide)
     trouble = minimum_norm.off_path(_OFF_PATH)
     far = path.duration if trouble is None else trouble
-    kept = _kept_until(problem, minimum_norm.grid.nodes, minimum_norm.q, minimum_norm.qd)
+    remaining = _kept_until(problem, minimum_norm.grid.nodes, minimum_norm.q, minimum_norm.qd)
     # Beyond the place where it broke down, speeds may be anything.
     weights = Sampling.trapezoidal(minimum_norm.grid.nodes).weights
     effort = float(weights @ np.sum(minimum_norm.qd**2, axis=1)) if trouble is None else np.inf
-    return -far, -min(kept, far), effort
+    return -far, -min(remaining, far), effort
 
 
 def _kept_until(problem: Problem, t: Array, q: Array, qd: Array) -> float:
     """Return the first of the times t (N,) at which a joint is beyond its limits, or the last."""
-    kept = problem.envelope.keeps(q, qd)
-    return float(t[-1] if kept.all() else t[int(np.argmin(kept))])
+    remaining = problem.envelope.keeps(q, qd)
+    return float(t[-1] if remaining.all() else t[int(np.argmin(remaining))])

@@ -314,16 +314,16 @@ def _parts(
 ) -> Parts:
     # Samples of curves prove that parts are needed; those of larger spaces may miss chains, and all
     # are on the path itself.
-    missed = _MISSED_CUTS if problem.relaxations or not has_curves(problem) else 0
+    allowed_cuts = _MISSED_CUTS if problem.relaxations or not has_curves(problem) else 0
     refused, chains = None, []
     try:
         segments = ChainSegments.of(problem, rng, progress)
         chains = segments.fewest(set())
     except NoSequenceError as error:
-        if not missed:
+        if not allowed_cuts:
             raise
         refused = error
-    if len(chains) <= 1 + missed:
+    if len(chains) <= 1 + allowed_cuts:
         whole = _whole(problem, rng, tolerance, progress)
         if whole is not None:
             return Parts(problem, (whole,), tolerance=tolerance)

@@ -129,26 +129,26 @@ def _resolved(problem: Problem, candidate: Candidate, tolerance: Tolerance) -> E
 
 def _meets_itself(problem: Problem, certificate: Certificate) -> bool:
     """Whether self-collision, under the default clearance, is the only violation."""
-    asked = problem.own_collision is not None and len(certificate.failures) == 1
-    return asked and not certificate.findings[-1].satisfied
+    is_default = problem.own_collision is not None and len(certificate.failures) == 1
+    return is_default and not certificate.findings[-1].satisfied
 
 
 def _rough(problem: Problem, judged: Judged, candidate: Candidate) -> bool:
     """Whether a required condition holds at the nodes, but not between them."""
     if candidate.violations or not judged.certificate.on_path:
         return False
-    asked = {item.name for item in problem.requirements}
+    is_default = {item.name for item in problem.requirements}
     # The arm's own limits always apply.
-    asked |= set(LIMIT_NAMES[:2])
+    is_default |= set(LIMIT_NAMES[:2])
     if problem.own_collision is not None:
         # The default clearance need not have been a constraint of the nodes.
-        asked.discard(problem.requirements[-1].name)
+        is_default.discard(problem.requirements[-1].name)
     nodes = judged.motion.trajectory.t
     # Rates are judged on both sides of a node; anything else that is wrong there stays so.
     return any(
         item.requirement in LIMIT_NAMES or item.time not in nodes
         for item in judged.certificate.findings
-        if not item.satisfied and item.requirement in asked
+        if not item.satisfied and item.requirement in is_default
     )
 
 

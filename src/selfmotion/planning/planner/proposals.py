@@ -162,8 +162,8 @@ def _stacked(planner: Planner, t: Array) -> Iterator[Array]:
         task = Stacked(problem.follows, asked.quantities, asked.lower, asked.upper, weights)
         for place, starts in drawn.items():
             if planner.is_free:
-                q, kept = task.placed(starts, float(t[place]))
-                starts = q[kept]
+                q, feasible = task.placed(starts, float(t[place]))
+                starts = q[feasible]
             motions, arrived = task.carried(starts, t, place)
             yield motions[arrived]
 

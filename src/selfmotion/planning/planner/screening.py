@@ -108,8 +108,8 @@ class Ranking:
             # After an interruption, the cheapest feasible one.
             near = (self._motion(self._found, k) for k in _cheapest(self._found))
             motions = [motion for motion in near if motion is not None]
-            kept = (one for one in motions if one.violation <= 0.0)
-            best = next((one for one in kept if self._clear(one)), next(iter(motions), None))
+            feasible = (one for one in motions if one.violation <= 0.0)
+            best = next((one for one in feasible if self._clear(one)), next(iter(motions), None))
             return [] if best is None else [best]
         return self._ranked
 
@@ -249,15 +249,15 @@ class Ranking:
 
         None is the cheapest for sure where it is not at its optimum yet, or the nodes are too few.
         """
-        kept: list[NodeMotion] = []
+        feasible: list[NodeMotion] = []
         others: list[NodeMotion] = []
         dearest = np.inf
         for k in unlike(found.q, self._expected(found), self._distances, _SAME_OPTIMUM)[0]:
-            if found.costs[k] > dearest or len(kept) + len(others) == finalists:
+            if found.costs[k] > dearest or len(feasible) + len(others) == finalists:
                 break
             motion = self._motion(found, k)
             # Equal costs to the last digits are mirror images.
-            if motion is None or any(_same(motion.cost, one.cost) for one in kept):
+            if motion is None or any(_same(motion.cost, one.cost) for one in feasible):
                 continue
             if found.going[k] or not resolves(motion):
                 return []
@@ -266,13 +266,13 @@ class Ranking:
             if stuck or motion.breaks_hard():
                 others.append(motion)
             elif self._clear(motion):
-                kept.append(motion)
+                feasible.append(motion)
             else:
                 # An optimum that takes the arm into itself goes on doing that.
                 continue
             cost = float(found.costs[k])
             dearest = min(dearest, cost + ABOUT_AS_GOOD * abs(cost))
-        return [*kept, *others] if kept and not _hopeful(found).any() else []
+        return [*feasible, *others] if feasible and not _hopeful(found).any() else []
 
     def _with_conditions(
         self, free: Sequence[NodeMotion], others: Sequence[NodeMotion], finalists: int

@@ -44,13 +44,13 @@ def in_order_of(robot: RobotModel, motion: Trajectory) -> Trajectory:
     return motion.of_joints(names)
 
 
-def key_of(asked: Any, files: Any) -> str:
+def key_of(task: Any, files: Any) -> str:
     """Return the digest of a task, as JSON-safe values, and of the files it reads.
 
     It includes the package's version, and files of classes outside of the package: their changes
     invalidate the work.
     """
-    return digest_of(version(), asked, files, _code_of(asked))
+    return digest_of(version(), task, files, _code_of(task))
 
 
 def write_kept(file: Path, values: Mapping[str, Any]) -> None:
@@ -70,7 +70,7 @@ def read_kept(file: Path) -> dict[str, Any] | None:
     return found if own else None
 
 
-def own_modules(asked: Any) -> list[str]:
+def own_modules(task: Any) -> list[str]:
     """Return the modules, not of this package, of the classes that JSON-safe values name.
 
     Including those of values inside of others, and of base classes.
@@ -78,7 +78,7 @@ def own_modules(asked: Any) -> list[str]:
     strangers = [(kind, cls) for kind, cls in _classes() if not _is_ours(cls)]
     if not strangers:
         return []
-    names = set(_named(asked))
+    names = set(_named(task))
     found = {base for kind, cls in strangers if kind in names for base in cls.__mro__}
     return sorted({cls.__module__ for _, cls in strangers if cls in found})
 
@@ -114,9 +114,9 @@ def _named(value: Any) -> Iterator[str]:
             yield from _named(item)
 
 
-def _code_of(asked: Any) -> dict[str, str]:
+def _code_of(task: Any) -> dict[str, str]:
     """Return the digests of the files in which the user's own classes are that values name."""
-    return {name: _code_in(name) for name in own_modules(asked)}
+    return {name: _code_in(name) for name in own_modules(task)}
 
 
 def _code_in(module: str) -> str:

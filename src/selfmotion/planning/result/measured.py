@@ -52,8 +52,8 @@ class LimitsUsed:
 
 def quantities_of_pace(requirements: Sequence[Requirement]) -> tuple[Quantity, ...]:
     """Return the quantities within limits that a slower pace may keep."""
-    kept = (item.quantity for item in requirements if isinstance(item, QuantityWithinLimits))
-    return tuple(item for item in kept if item.of_pace and len(item.limited))
+    selected = (item.quantity for item in requirements if isinstance(item, QuantityWithinLimits))
+    return tuple(item for item in selected if item.of_pace and len(item.limited))
 
 
 def limits_used(problem: Problem, motion: Trajectory) -> LimitsUsed:
@@ -235,16 +235,16 @@ def _turns(motion: Trajectory, number: int, t: Array, speed: Array) -> Array:
         early, late = np.where(before, middle, early), np.where(before, late, middle)
     places = motion(np.concatenate([t[:1], late, t[-1:]]))[:, number]
     # Of turns with less than LEAST in between both go, the nearest first.
-    kept = list(range(len(places)))
-    while len(kept) > 2:
-        lengths = np.abs(np.diff(places[kept]))
+    selected = list(range(len(places)))
+    while len(selected) > 2:
+        lengths = np.abs(np.diff(places[selected]))
         least = int(np.argmin(lengths))
         if lengths[least] > LEAST:
             break
         if least == 0:
-            del kept[1]
+            del selected[1]
         elif least == len(lengths) - 1:
-            del kept[-2]
+            del selected[-2]
         else:
-            del kept[least : least + 2]
-    return np.asarray(late[np.array(kept[1:-1], dtype=int) - 1])
+            del selected[least : least + 2]
+    return np.asarray(late[np.array(selected[1:-1], dtype=int) - 1])

@@ -274,13 +274,13 @@ def _converged(base: Pace, motion: Trajectory, limits: PaceLimits, ends: Ends) -
             break
         pace = _changed(base, near)
         used, least = limits.shares(along(pace, motion))
-        kept = _scaled(pace, motion, limits, least=1.0)
+        selected = _scaled(pace, motion, limits, least=1.0)
         over = np.max([table.max(axis=1) for table in used], axis=0)
         # A motion that violates limits which no slower pace satisfies for sure is rejected.
         passed = max((float(table.max()) for table in used[3:]), default=0.0)
-        rank = max(passed, _KEPT), float(kept.t[-1])
+        rank = max(passed, _KEPT), float(selected.t[-1])
         if rank < best[0]:
-            best = rank, kept
+            best = rank, selected
         if unsolved == _UNSOLVED:
             break
         if over.max() > _WILD and np.isfinite(best[0][1]):
@@ -380,8 +380,8 @@ def _improved(
     knots = near.knots
     states = States.of(motion, base, knots)
     start, fixed = _INSIDE * near.c, np.zeros(len(near.c), dtype=bool)
-    for kept, end in ((ends.start_kept, 0), (ends.end_kept, -1)):
-        if kept:
+    for selected, end in ((ends.start_kept, 0), (ends.end_kept, -1)):
+        if selected:
             _keep(start, fixed, end, base, knots)
         elif _starts(states, end, limits.has_jerk):
             start[end], fixed[end] = 0.0, True

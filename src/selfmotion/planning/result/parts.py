@@ -58,7 +58,7 @@ def write_bundle(
     kind: str,
     version: int,
     description: Mapping[str, Any],
-    made: Sequence[Plan | Move],
+    items: Sequence[Plan | Move],
 ) -> None:
     """Write plans and moves, and further values, to one file; atomically.
 
@@ -79,7 +79,7 @@ def write_bundle(
         # Its members are compressed already.
         with zipfile.ZipFile(stream, "w") as archive, tempfile.TemporaryDirectory() as folder:
             members = []
-            for number, item in enumerate(made):
+            for number, item in enumerate(items):
                 member = FilePath(folder, _member(number))
                 item.save(member)
                 members.append({"plan": isinstance(item, Plan), "digest": digest_of_file(member)})
@@ -109,14 +109,14 @@ def read_bundle(
                 raise ValueError(f"it is a {description['kind']}, expected a {kind}")
             check_version(file, kind, description["version"], version)
             changed = description.pop("digest", None) != file_digest(description, {})
-            made, known = list[Plan | Move](), dict[str, Any]()
+            items, known = list[Plan | Move](), dict[str, Any]()
             for number, item in enumerate(description["members"]):
                 data = archive.read(_member(number))
                 changed |= hashlib.sha256(data).hexdigest() != item["digest"]
                 member = FilePath(folder, _member(number))
                 member.write_bytes(data)
                 load = load_plan if item["plan"] else load_move
-                made.append(load(member, known=known))
+                items.append(load(member, known=known))
     except FileNotFoundError:
         raise FileFormatError(f"{file}: no such file") from None
     except OSError as error:
@@ -127,9 +127,9 @@ def read_bundle(
     except Exception as error:
         reason = " ".join(str(error).split()) or type(error).__name__
         raise FileFormatError(f"{file}: is no {kind}, or a damaged one: {reason}") from error
-    if not made:
+    if not items:
         raise FileFormatError(f"{file}: is no {kind}, or a damaged one: it holds no motion")
-    return description, made, changed
+    return description, items, changed
 
 
 def _member(number: int) -> str:
@@ -303,7 +303,7 @@ def load_parts(file: str | FilePath) -> Parts:
         The file is missing, holds no parts, lacks something, or was written by another version.
     """
     path = as_path(file)
-    description, made, changed = read_bundle(path, "parts", _FORMAT)
+    description, items, changed = read_bundle(path, "parts", _FORMAT)
     try:
         problem = problem_from_dict(description["problem"])
         cuts = tuple(map(float, description["cuts"]))
@@ -313,8 +313,8 @@ def load_parts(file: str | FilePath) -> Parts:
         altered = str(description.get("altered", ""))
     except (KeyError, TypeError, ValueError, SelfmotionError) as error:
         raise FileFormatError(f"{path}: are damaged parts: {error!r}") from error
-    plans = tuple(item for item in made if isinstance(item, Plan))
-    moves = tuple(item for item in made if isinstance(item, Move))
+    plans = tuple(item for item in items if isinstance(item, Plan))
+    moves = tuple(item for item in items if isinstance(item, Move))
     if changed:
         altered = f"{path.name} was changed after the parts were written"
     return Parts(problem, plans, moves, cuts, endings, altered, tolerance)
@@ -354,9 +354,9 @@ class PartsAsked:
         yield from self._of_moves()
 
     def _of_part(self, plan: Plan, ends: tuple[float, float], number: int) -> Iterator[str]:
-        problem, made = self._problem, plan.problem
+        problem, items = self._problem, plan.problem
         is_first, is_last = number == 1, number == len(self._parts.plans)
-        path = made.path
+        path = items.path
         if not (is_first and is_last):
             if not _is_part(path, problem.path, ends):
                 yield f"it is not the path from {ends[0]:.6g} to {ends[1]:.6g} s"
@@ -414,7 +414,7 @@ class PartsAsked:
             ]
         if is_closed:
             pieces.append(CheckedMotion.of("part 1", plans[0]))
-        found = [piece for piece in pieces if piece is not None]
+        found = [motion_ for motion_ in pieces if motion_ is not None]
         # A missing move has a message already.
         if len(found) == len(pieces):
             yield from gaps(problem.robot, found)

@@ -90,11 +90,11 @@ class MotionSpecification:
                 f"expected {wanted.position:.2g} m and {wanted.rotation:.2g} rad"
             )
 
-    def _restless(self, made: Problem) -> Iterator[str]:
+    def _restless(self, judged_by: Problem) -> Iterator[str]:
         """Yield that a problem does not require rest at an end where it is required."""
-        wanted = arm_rest_orders(made.follows, self.constraints) if self.rest else (0, 0)
+        wanted = arm_rest_orders(judged_by.follows, self.constraints) if self.rest else (0, 0)
         # A damped motion is not judged by its rest.
-        judged = made.rest_orders if made.damping is None else (0, 0)
+        judged = judged_by.rest_orders if judged_by.damping is None else (0, 0)
         for end, order, found in zip(("start", "end"), wanted, judged, strict=True):
             if found < order:
                 what = " without acceleration" if found else ""
@@ -108,20 +108,23 @@ def arm_digest(robot: RobotModel) -> str:
     return digest_of(identity, sorted(robot.touching), limits, robot.effort_limit)
 
 
-def another_tool(made: RobotModel, required: RobotModel) -> Iterator[str]:
+def another_tool(judged_by: RobotModel, required: RobotModel) -> Iterator[str]:
     """Yield the differences of an arm from the required one."""
-    if made.urdf.sha256 != required.urdf.sha256 or made.joint_names != required.joint_names:
-        yield f"it is of another arm than {required.name}: {made.name}"
-    elif made.tools != required.tools:
-        yield f"its tool is '{', '.join(made.tools)}', not '{', '.join(required.tools)}'"
-    elif made.reference != required.reference:
-        yield f"its path is in the frame of '{made.reference}', not '{required.reference}'"
-    elif dict(made.locked) != dict(required.locked):
+    if (
+        judged_by.urdf.sha256 != required.urdf.sha256
+        or judged_by.joint_names != required.joint_names
+    ):
+        yield f"it is of another arm than {required.name}: {judged_by.name}"
+    elif judged_by.tools != required.tools:
+        yield f"its tool is '{', '.join(judged_by.tools)}', not '{', '.join(required.tools)}'"
+    elif judged_by.reference != required.reference:
+        yield f"its path is in the frame of '{judged_by.reference}', not '{required.reference}'"
+    elif dict(judged_by.locked) != dict(required.locked):
         yield "other joints are locked, or elsewhere"
-    elif set(made.touching) != set(required.touching):
+    elif set(judged_by.touching) != set(required.touching):
         yield "other links of it may touch"
     else:
-        yield from _other_limits(made, required)
+        yield from _other_limits(judged_by, required)
 
 
 # Limits of an arm that constraints use by default: attribute, in words, power of time.
@@ -134,10 +137,10 @@ _LIMITS = (
 )
 
 
-def _other_limits(made: RobotModel, required: RobotModel) -> Iterator[str]:
+def _other_limits(judged_by: RobotModel, required: RobotModel) -> Iterator[str]:
     """Yield a joint of an arm with other limits than that of the required one."""
     for name, words, power in _LIMITS:
-        found, wanted = getattr(made, name), getattr(required, name)
+        found, wanted = getattr(judged_by, name), getattr(required, name)
         others = np.flatnonzero(found != wanted)
         if others.size:
             k = int(others[0])
@@ -147,7 +150,7 @@ def _other_limits(made: RobotModel, required: RobotModel) -> Iterator[str]:
                 f"{required.unit_of(joint)}{power}, not {wanted[k]:g}"
             )
             return
-    if not np.array_equal(made.effort_limit, required.effort_limit):
+    if not np.array_equal(judged_by.effort_limit, required.effort_limit):
         yield "its limits of torque are others"
 
 
@@ -168,14 +171,14 @@ def described(item: Saved) -> str:
     return json.dumps(description_of(item), sort_keys=True, default=repr)
 
 
-def same_path(made: Path, required: Path) -> bool:
+def same_path(judged_by: Path, required: Path) -> bool:
     """Whether two paths are the same motion."""
-    if made is required or described(made) == described(required):
+    if judged_by is required or described(judged_by) == described(required):
         return True
-    if not abs(made.duration - required.duration) <= _ROUNDING:
+    if not abs(judged_by.duration - required.duration) <= _ROUNDING:
         return False
-    t = _looked_at(np.minimum(np.union1d(made.marks, required.marks), made.duration))
-    return _apart(made, t, required, np.minimum(t, required.duration)) <= _SAME
+    t = _looked_at(np.minimum(np.union1d(judged_by.marks, required.marks), judged_by.duration))
+    return _apart(judged_by, t, required, np.minimum(t, required.duration)) <= _SAME
 
 
 def follows_at(part: Path, t: Array, whole: Path, times: Array) -> bool:
@@ -202,10 +205,10 @@ def _apart(one: Path, t: Array, other: Path, times: Array) -> float:
     return float(np.max([places, turns]))
 
 
-def _same_follows(made: Sequence[Follow], required: Sequence[Follow]) -> bool:
-    if len(made) != len(required):
+def _same_follows(judged_by: Sequence[Follow], required: Sequence[Follow]) -> bool:
+    if len(judged_by) != len(required):
         return False
-    for one, other in zip(made, required, strict=True):
+    for one, other in zip(judged_by, required, strict=True):
         if (one.task, one.tool, one.reference) != (other.task, other.tool, other.reference):
             return False
         if isinstance(one.path, Path) != isinstance(other.path, Path):
@@ -222,11 +225,11 @@ def _matrix(pose: object) -> Array:
     return np.asarray(getattr(pose, "homogeneous", pose), dtype=np.float64)
 
 
-def _same_bands(made: Sequence[Relaxation], required: Sequence[Relaxation]) -> bool:
+def _same_bands(judged_by: Sequence[Relaxation], required: Sequence[Relaxation]) -> bool:
     """Whether the same rows are relaxed, in the same windows up to rounding."""
-    if len(made) != len(required):
+    if len(judged_by) != len(required):
         return False
-    for one, other in zip(made, required, strict=True):
+    for one, other in zip(judged_by, required, strict=True):
         values, wanted = one.to_dict(), other.to_dict()
         during, window = values.pop("during"), wanted.pop("during")
         if values != wanted or (during is None) != (window is None):
@@ -272,11 +275,13 @@ class CheckedMotion(NamedTuple):
     accelerates: tuple[bool, bool] = (False, False)
 
     @classmethod
-    def of(cls, name: str, made: Plan | Move) -> "CheckedMotion | None":
+    def of(cls, name: str, judged_by: Plan | Move) -> "CheckedMotion | None":
         """Return a plan or a move as a piece; None for a move that was not found."""
-        if isinstance(made, Plan):
-            return cls(name, made.trajectory, _accelerates(made.problem, made.requirements))
-        return None if made.trajectory is None else cls(name, made.trajectory)
+        if isinstance(judged_by, Plan):
+            return cls(
+                name, judged_by.trajectory, _accelerates(judged_by.problem, judged_by.requirements)
+            )
+        return None if judged_by.trajectory is None else cls(name, judged_by.trajectory)
 
 
 def _accelerates(problem: Problem, requirements: Sequence[Requirement]) -> tuple[bool, bool]:

@@ -182,11 +182,11 @@ def ranked(
     """Return the sequences, the best first, without those that became like a better one."""
     length = Length(weights)
     sequences = [Sequence(times, q, length.of(q), measure.of(q)) for q in motions]
-    kept: list[Sequence] = []
+    selected: list[Sequence] = []
     for sequence in sorted(sequences, key=lambda sequence: sequence.cost):
-        if all(unlike(sequence.q, other.q, turning) for other in kept):
-            kept.append(sequence)
-    return kept
+        if all(unlike(sequence.q, other.q, turning) for other in selected):
+            selected.append(sequence)
+    return selected
 
 
 def stations_of(count: int) -> list[int]:

@@ -343,11 +343,11 @@ class Manifold:
             locked = np.zeros((1, len(q)), dtype=np.bool_)
             found, arrived = self._within(q[None], target[None], locked, _NEAR_STEPS)
             for item, pose in zip(items, poses, strict=True):
-                miss = max(item.miss(pose, found[0]))
-                if not (arrived[0] and miss < _AGREE):
+                distance = max(item.miss(pose, found[0]))
+                if not (arrived[0] and distance < _AGREE):
                     raise RobotError(
                         f"{self.robot.name}: compiled kinematics put '{item.chain.tip_name}' "
-                        f"{miss:.3g} off where Pinocchio does; this is an error of selfmotion's"
+                        f"{distance:.3g} off where Pinocchio does; this is an error of selfmotion's"
                     )
 
 

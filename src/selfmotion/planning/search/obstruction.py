@@ -335,8 +335,8 @@ def reachable(
     path, given = problem.path, poses.problem.given_start
     first = [given] if given is not None else start_candidates(poses.follows, starts, rng)
     knots = edges_of(path.knots)
-    piece = np.diff(knots)[min(int(np.searchsorted(knots, suspect, "right")), len(knots) - 1) - 1]
-    about = np.clip(suspect + piece * np.array(_ABOUT), 0.0, path.duration)
+    section = np.diff(knots)[min(int(np.searchsorted(knots, suspect, "right")), len(knots) - 1) - 1]
+    about = np.clip(suspect + section * np.array(_ABOUT), 0.0, path.duration)
     times = np.union1d(spread_along(path, _POSES + 1), about)
     known, last = np.array(first), 0.0
     for t in times[1:]:
@@ -377,7 +377,7 @@ def _out_of_reach(poses: SinglePoses, time: float, q: Array, beyond: Array) -> s
         return f"{begin}: no configuration was found that puts {names} on their paths"
     rounds = beyond[np.unique(np.linspace(0, len(beyond) - 1, _EXCESS_POSES).round().astype(int))]
     errors = [(*poses.nearest(float(t))[1][0], float(t)) for t in rounds]
-    position, rotation, when = max(errors, key=lambda miss: miss[0] + miss[1])
+    position, rotation, when = max(errors, key=lambda pair: pair[0] + pair[1])
     turned = f" and {rotation:.2g} rad" if poses.problem.asked.task.angular else ""
     return (
         f"{begin}: the nearest configuration found misses it by up to "

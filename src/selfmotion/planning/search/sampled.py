@@ -65,7 +65,7 @@ def sampled_layers(
     generator = np.random.default_rng(rng)
     samples = _layers(waypoints, bounds, steps, weights, generator, progress)
 
-    def why(i: int, alive: Array, layer: Array, kept: Admissible) -> str:
+    def why(i: int, alive: Array, layer: Array, selected: Admissible) -> str:
         if not len(samples[i]):
             return (
                 "no sample there is within the limits and free; what may help: a smaller "
@@ -161,23 +161,23 @@ def spread_out(q: Array, distances: Array, most: int) -> Ints:
     First those farther from all kept ones in some coordinate than apart[0], then apart[1], ….
     """
     n, many = q.shape[1], len(q)
-    kept, count = np.empty(min(most, many), dtype=np.intp), 0
+    selected, count = np.empty(min(most, many), dtype=np.intp), 0
     taken = np.zeros(many, dtype=np.bool_)
     for distance in distances:
         for k in range(many):
-            if taken[k] or count == len(kept):
+            if taken[k] or count == len(selected):
                 continue
             alone = True
             for other in range(count):
                 far = False
                 for i in range(n):
-                    if abs(q[k, i] - q[kept[other], i]) > distance:
+                    if abs(q[k, i] - q[selected[other], i]) > distance:
                         far = True
                         break
                 if not far:
                     alone = False
                     break
             if alone:
-                taken[k], kept[count] = True, k
+                taken[k], selected[count] = True, k
                 count += 1
-    return kept[:count]
+    return selected[:count]

@@ -268,16 +268,16 @@ def improved_by(
     Where something else than length counts, Newton's method goes on from there, and chains only
     have to be near enough.
     """
-    asked = waypoints, bounds, largest_step, measure
+    arguments = waypoints, bounds, largest_step, measure
     if not isinstance(measure, Length):
-        return lambda q, _: _cheaper(*asked, q, _ROUGH_RINGS, _ROUGH_SIDE)
+        return lambda q, _: _cheaper(*arguments, q, _ROUGH_RINGS, _ROUGH_SIDE)
     shortest = Shortest(waypoints, bounds, largest_step, measure.weights)
 
     def shorter(q: Array, roughly: bool) -> Array:
         q = shortest.near(q, SMOOTHINGS[:1] if roughly else SMOOTHINGS)
         # Along curves samples are few: they pass obstacles that the quadratics do not.
         is_last = roughly or waypoints.redundancy > 1
-        return q if is_last else _cheaper(*asked, q, _FINE_RINGS, _FINE_SIDE)
+        return q if is_last else _cheaper(*arguments, q, _FINE_RINGS, _FINE_SIDE)
 
     return shorter
 

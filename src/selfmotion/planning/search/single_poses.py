@@ -75,13 +75,13 @@ class SinglePoses:
 
     def __init__(self, problem: Problem, rng: np.random.Generator, *, clear: bool = True) -> None:
         problem = problem.augmented
-        asked = problem.envelope_without_arm
+        required = problem.envelope_without_arm
         self.problem, self._rng, self._clear = problem, rng, clear
-        self.robot: RobotModel = asked.arm(problem.robot)
+        self.robot: RobotModel = required.arm(problem.robot)
         self.follows = problem.follows.for_robot(self.robot)
-        self._manifold = Manifold(self.follows, asked.lower, asked.upper)
+        self._manifold = Manifold(self.follows, required.lower, required.upper)
         self.bounds = Admissible(
-            asked.lower, asked.upper, self.robot.is_revolute, asked.bodies if clear else ()
+            required.lower, required.upper, self.robot.is_revolute, required.bodies if clear else ()
         )
         self._seeds = spread(self.robot, _SEEDS, rng)
         self._shift = np.zeros(3)
@@ -248,6 +248,6 @@ class SinglePoses:
 
     def room(self, q: Array) -> tuple[float, Closest, float]:
         """Return the excess clearance at q (n,) [m], the worst pair, and the required distance."""
-        each = [(model.distance(q), asked) for model, asked in self.bounds.bodies]
-        rooms = ((closest.value - asked, closest, asked) for closest, asked in each)
+        each = [(model.distance(q), required) for model, required in self.bounds.bodies]
+        rooms = ((closest.value - required, closest, required) for closest, required in each)
         return min(rooms, key=lambda found: found[0])

@@ -74,7 +74,7 @@ class Stacked:
         """
         t = np.array([time])
         target, held = self._follows.targets(t)[0], self._follows.held(t)[0]
-        return self._kept(q, target, held, _FAR_ROUNDS)
+        return self._satisfied(q, target, held, _FAR_ROUNDS)
 
     def carried(self, starts: Array, t: Array, at: int = 0) -> tuple[Array, Flags]:
         """Return the motions through configurations (K, n), (K, N, n), and which are complete.
@@ -92,11 +92,11 @@ class Stacked:
                 seconds = t[k] - t[k - step]
                 twist = follows.twists(np.array([0.5 * (t[k] + t[k - step])]))[0]
                 ahead = before + self._step(before, seconds * twist)
-                motions[:, k], arrived = self._kept(ahead, targets[k], helds[k], _NEAR_ROUNDS)
+                motions[:, k], arrived = self._satisfied(ahead, targets[k], helds[k], _NEAR_ROUNDS)
                 going &= arrived
         return motions, going
 
-    def _kept(self, q: Array, target: Array, held: Flags, rounds: int) -> tuple[Array, Flags]:
+    def _satisfied(self, q: Array, target: Array, held: Flags, rounds: int) -> tuple[Array, Flags]:
         """Return configurations near others that are on the path and keep everything, and which."""
         q, on_path = self._manifold.project(q, target, far=rounds == _FAR_ROUNDS, held=held)
         zero = np.zeros(self._follows.dimension)

@@ -110,9 +110,9 @@ class Admissible:
 
     def keep(self, q: Array) -> npt.NDArray[np.bool_]:
         """Whether each of q (K, n) is inside the limits as it is, and clear of collisions."""
-        kept = np.asarray(np.all((q <= self.upper) & (q >= self.lower), axis=1))
-        kept[kept] = self._clear(q[kept])
-        return kept
+        selected = np.asarray(np.all((q <= self.upper) & (q >= self.lower), axis=1))
+        selected[selected] = self._clear(q[selected])
+        return selected
 
     def _clear(self, q: Array) -> npt.NDArray[np.bool_]:
         """Whether bodies keep their distances at each of q (K, n)."""
@@ -184,11 +184,11 @@ class _Sampler:
         for k, curve in enumerate(self.curves.curves):
             here = np.flatnonzero(on == k)
             here = here[np.argsort(places[here], kind="stable")]
-            kept = here[_thinned(places[here], _MERGED * self.spacing)]
-            gaps = _between(places[kept].tolist(), curve.length, self.spacing)
-            arcs += [places[kept], gaps]
-            rows += [kept, np.full(len(gaps), -1)]
-            numbers.append(np.full(len(kept) + len(gaps), k))
+            selected = here[_thinned(places[here], _MERGED * self.spacing)]
+            gaps = _between(places[selected].tolist(), curve.length, self.spacing)
+            arcs += [places[selected], gaps]
+            rows += [selected, np.full(len(gaps), -1)]
+            numbers.append(np.full(len(selected) + len(gaps), k))
         number, row = np.concatenate(numbers), np.concatenate(rows)
         arc = np.concatenate(arcs)
         fresh = row < 0
@@ -228,23 +228,26 @@ def _changes(number: Ints, arc: Array, free: Flags, curves: CurveSet) -> tuple[I
     for k, curve in enumerate(curves.curves):
         here = np.flatnonzero(number == k)
         here = here[np.argsort(arc[here], kind="stable")]
-        arcs, kept = arc[here], free[here]
+        arcs, selected = arc[here], free[here]
         if curve.closed and len(here):
-            arcs, kept = np.append(arcs, arcs[0] + curve.length), np.append(kept, kept[0])
-        i = np.flatnonzero(kept[1:] != kept[:-1])
+            arcs, selected = (
+                np.append(arcs, arcs[0] + curve.length),
+                np.append(selected, selected[0]),
+            )
+        i = np.flatnonzero(selected[1:] != selected[:-1])
         on.append(np.full(len(i), k))
-        inside.append(np.where(kept[i], arcs[i], arcs[i + 1]))
-        outside.append(np.where(kept[i], arcs[i + 1], arcs[i]))
+        inside.append(np.where(selected[i], arcs[i], arcs[i + 1]))
+        outside.append(np.where(selected[i], arcs[i + 1], arcs[i]))
     return np.concatenate(on), np.concatenate(inside), np.concatenate(outside)
 
 
 def _thinned(arcs: Array, spacing: float) -> list[int]:
     """Return the sorted arc lengths (K,) to keep: each farther than `spacing` from the last."""
-    kept: list[int] = []
+    selected: list[int] = []
     for k, arc in enumerate(arcs.tolist()):
-        if not kept or arc - arcs[kept[-1]] > spacing:
-            kept.append(k)
-    return kept
+        if not selected or arc - arcs[selected[-1]] > spacing:
+            selected.append(k)
+    return selected
 
 
 def _between(arcs: Sequence[float], length: float, spacing: float) -> Array:
@@ -254,6 +257,6 @@ def _between(arcs: Sequence[float], length: float, spacing: float) -> Array:
         fill.append(0.0)
     stops = [0.0, *arcs, length]
     for first, last in itertools.pairwise(stops):
-        pieces = int(np.ceil((last - first) / spacing))
-        fill += [first + (last - first) * k / pieces for k in range(1, pieces)]
+        parts = int(np.ceil((last - first) / spacing))
+        fill += [first + (last - first) * k / parts for k in range(1, parts)]
     return np.array(fill)

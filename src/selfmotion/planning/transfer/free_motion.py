@@ -101,18 +101,21 @@ class FreeMotions:
         rng: np.random.Generator,
         progress: Progress = silent,
     ) -> None:
-        kept = at_all_times(constraints)
-        self.robot, self.constraints = robot, tuple(item for item in kept if item.applies(robot))
+        retained = at_all_times(constraints)
+        self.robot, self.constraints = (
+            robot,
+            tuple(item for item in retained if item.applies(robot)),
+        )
         self._rng, self._progress = rng, progress
-        self.asked: Envelope = envelope_of(robot, self.constraints)
+        self.envelope: Envelope = envelope_of(robot, self.constraints)
 
     def configurations(self, end: npt.ArrayLike | SE3, task: Task) -> Array:
         """Return the configurations (k, n) that an end stands for; see `move`."""
         if not is_pose(end):
             return self.robot.configuration(end)[None]
-        arm = self.asked.arm(self.robot)
+        arm = self.envelope.arm(self.robot)
         follows = Follows.of(arm, Dwell(end, 1.0), task)
-        room = Room(self.asked, self.robot)
+        room = Room(self.envelope, self.robot)
         found = np.array(start_candidates(follows, _END_CONFIGURATIONS, self._rng, room.free))
         free = found[room.free(found)]
         if not len(free):
@@ -162,7 +165,7 @@ class FreeMotions:
         ends = [self._inside(several) for several in ends]
         worst, margin, finer = "", MOVE_MARGIN, 1.0
         for _ in range(_TRIES_OF_MOVE):
-            room = Room(self.asked, self.robot, margin, finer)
+            room = Room(self.envelope, self.robot, margin, finer)
             polyline = self._known_polyline(room, ends, known) or self._polyline(
                 room, ends, began + seconds
             )
@@ -185,7 +188,7 @@ class FreeMotions:
 
     def _inside(self, q: Array) -> Array:
         """Return configurations on a limit as far inside it as rounding may lead beyond."""
-        lower, upper = self.asked.lower, self.asked.upper
+        lower, upper = self.envelope.lower, self.envelope.upper
         return np.clip(q, lower + _ulps(lower), upper - _ulps(upper))
 
     def _missing(self, trouble: str) -> Move:
@@ -193,7 +196,7 @@ class FreeMotions:
 
     def _blocked(self, ends: Sequence[Array]) -> str:
         """Return the cause why an end is not allowed, "" for none."""
-        room = Room(self.asked, self.robot, 0.0)
+        room = Room(self.envelope, self.robot, 0.0)
         for number, several in enumerate(ends):
             if room.free(several).any():
                 continue
@@ -203,13 +206,13 @@ class FreeMotions:
 
     def refusal(self, q: Array) -> str:
         """Return the cause why no motion starts or ends at a configuration (n,), "" for none."""
-        return "" if Room(self.asked, self.robot, 0.0).free(q[None])[0] else self._wrong_with(q)
+        return "" if Room(self.envelope, self.robot, 0.0).free(q[None])[0] else self._wrong_with(q)
 
     def _wrong_with(self, q: Array) -> str:
         """Return the violated condition of a configuration (n,), in words."""
-        asked, beyond = self.asked, []
+        envelope, beyond = self.envelope, []
         for joint, name in enumerate(self.robot.joint_names):
-            low, high = asked.lower[joint], asked.upper[joint]
+            low, high = envelope.lower[joint], envelope.upper[joint]
             if max(low - q[joint], q[joint] - high) > ROUNDING:
                 beyond.append(
                     f"joint '{name}' is at {q[joint]:.5g} {self.robot.unit_of(name)} "
@@ -221,12 +224,12 @@ class FreeMotions:
             in_degrees = bool(turns) and np.abs(q[turns]).max() > TURN
             asked_for = "; are these degrees? Angles are in rad" if in_degrees else ""
             return f"{'; '.join(beyond)}; give one within the limits{asked_for}"
-        for model, far in asked.bodies:
+        for model, far in envelope.bodies:
             near = model.distance(q)
             if near.value < far:
                 apart = f"{how_near(near.value)} (wanted: {far * 1e3:.2f} mm)"
                 return f"{near.first} and {near.second} {apart}"
-        names = ", ".join(item.name for item in asked.quantities)
+        names = ", ".join(item.name for item in envelope.quantities)
         return f"it leaves what is asked of {names}"
 
     def _known_polyline(
@@ -298,15 +301,15 @@ class FreeMotions:
     @property
     def _limits(self) -> Envelope:
         """The limits of the pace: all of speed and acceleration are finite."""
-        asked = self.asked
-        speed = np.where(np.isfinite(asked.speed), asked.speed, _USUAL_SPEED)
+        envelope = self.envelope
+        speed = np.where(np.isfinite(envelope.speed), envelope.speed, _USUAL_SPEED)
         usual = speed / _UP_TO_SPEED
-        faster = np.where(np.isfinite(asked.acceleration), asked.acceleration, usual)
+        faster = np.where(np.isfinite(envelope.acceleration), envelope.acceleration, usual)
         return replace(
-            asked,
+            envelope,
             speed=read_only(_USED * speed),
             acceleration=read_only(_USED * faster),
-            jerk=read_only(_USED * asked.jerk),
+            jerk=read_only(_USED * envelope.jerk),
         )
 
     @cached_property
@@ -318,8 +321,8 @@ class FreeMotions:
         """Return a joint path at the fastest pace that the limits allow, from rest to rest."""
         limits = self._limits
         jerk = np.where(np.isfinite(limits.jerk), limits.jerk, limits.acceleration / _SOFT)
-        kept = PaceLimits(limits.speed, limits.acceleration, jerk, self._quantities)
-        return along(fastest_pace(path, kept, Ends(), _STEP_OF_PACE), path)
+        retained = PaceLimits(limits.speed, limits.acceleration, jerk, self._quantities)
+        return along(fastest_pace(path, retained, Ends(), _STEP_OF_PACE), path)
 
     def at_its_pace(self, path: Trajectory) -> Move:
         """Return the move along a joint path, as fast as it may be."""

@@ -87,14 +87,14 @@ def move(
     """
     if not isinstance(robot, RobotModel):
         raise ProblemError(f"robot is {shown(robot)}, expected a RobotModel")
-    asked = list(as_several(constraints, "constraints", Constraint))
-    check_all_times(asked, "the ends of a move are first and last; leave it out")
+    conditions = list(as_several(constraints, "constraints", Constraint))
+    check_all_times(conditions, "the ends of a move are first and last; leave it out")
     if clearance is not None and not isinstance(clearance, Clearance):
         raise ProblemError(f"clearance is {shown(clearance)}, expected a Clearance, or None")
-    apart = any(item.envelope(robot).bodies for item in asked)
+    apart = any(item.envelope(robot).bodies for item in conditions)
     default = clearance is NO_OVERLAP and (apart or not robot.urdf.has_collisions)
     if clearance is not None and not default:
-        asked.append(clearance)
+        conditions.append(clearance)
     if not isinstance(via, list | tuple | np.ndarray):
         raise ProblemError(f"via is {shown(via)}, expected a list of configurations")
     given = (first, *via, last)
@@ -104,7 +104,7 @@ def move(
             f"configurations"
         )
     seconds, generator = as_number(deadline, "deadline", above=0.0), random_numbers(rng)
-    motions = FreeMotions(robot, asked, generator, obeying(progress))
+    motions = FreeMotions(robot, conditions, generator, obeying(progress))
     with one_blas_thread(), held_interruption():
         ends = [motions.configurations(end, Task.of(task)) for end in given]
         return motions.through(ends, seconds)

@@ -73,19 +73,19 @@ class Room:
         Factor of the density of checks along legs.
     """
 
-    asked: Envelope
+    envelope: Envelope
     robot: RobotModel
     margin: float = MOVE_MARGIN
     finer: float = 1.0
 
     def free(self, q: Array) -> npt.NDArray[np.bool_]:
         """Return the mask of allowed configurations (K, n), (K,)."""
-        asked = self.asked
-        inside = (q >= asked.lower - ROUNDING) & (q <= asked.upper + ROUNDING)
+        envelope = self.envelope
+        inside = (q >= envelope.lower - ROUNDING) & (q <= envelope.upper + ROUNDING)
         allowed = np.asarray(inside.all(axis=1))
-        if asked.quantities:
-            allowed &= asked.admits(q)
-        for model, far in asked.bodies:
+        if envelope.quantities:
+            allowed &= envelope.admits(q)
+        for model, far in envelope.bodies:
             rows = np.flatnonzero(allowed)
             allowed[rows] = ~model.colliding(q[rows], far + self.margin)
         return allowed
@@ -97,7 +97,7 @@ class Room:
         """
         turned = np.abs(np.diff(polyline, axis=0))
         count = (turned * self.robot.joint_weights).max(axis=1) / _TURN_STEP
-        for model, _ in self.asked.bodies:
+        for model, _ in self.envelope.bodies:
             count = np.maximum(count, (turned @ model.lever_arms.T).max(axis=1) / step)
         return np.asarray(np.maximum(1, np.ceil(self.finer * count)), dtype=np.int64)
 
@@ -125,7 +125,7 @@ class Room:
     @property
     def rates(self) -> Array:
         """Time of each joint's unit at full speed, (n,) [s]; 1 without a limit."""
-        return np.where(np.isfinite(self.asked.speed), 1.0 / self.asked.speed, 1.0)
+        return np.where(np.isfinite(self.envelope.speed), 1.0 / self.envelope.speed, 1.0)
 
 
 def find_path(
@@ -195,11 +195,11 @@ def shortened(room: Room, polyline: Array, rng: np.random.Generator) -> Array:
 
 def _distinct(polyline: Array) -> Array:
     """Return a polyline without repeated configurations, with the same ends."""
-    kept = np.append(True, np.abs(np.diff(polyline, axis=0)).max(axis=1) > _SAME)
-    if not kept[-1] and len(polyline) > 2:
-        kept[-1] = True
-        kept[np.flatnonzero(kept[:-1])[-1]] = len(np.flatnonzero(kept[:-1])) == 1
-    return np.asarray(polyline[kept])
+    retained = np.append(True, np.abs(np.diff(polyline, axis=0)).max(axis=1) > _SAME)
+    if not retained[-1] and len(polyline) > 2:
+        retained[-1] = True
+        retained[np.flatnonzero(retained[:-1])[-1]] = len(np.flatnonzero(retained[:-1])) == 1
+    return np.asarray(polyline[retained])
 
 
 def _duration(polyline: Array, rates: Array) -> float:
@@ -260,7 +260,7 @@ def _connected(
 ) -> Array | None:
     """Return a way by two trees, None where the time is over before."""
     rates = room.rates
-    lower, upper = room.asked.arm(room.robot).finite_limits()
+    lower, upper = room.envelope.arm(room.robot).finite_limits()
     # Not on the limits themselves, which rounding would lead beyond.
     inside = _INSIDE * (upper - lower)
     lower, upper = lower + inside, upper - inside

@@ -381,15 +381,15 @@ def active_of(
                 *(saving + amount * float(own.sum()), np.maximum(multiplier, own)),
                 *(at, times),
             )
-    kept = []
+    selected = []
     for (name, words), (saving, multiplier, at, times) in found.items():
         if saving >= least:
             active = (at if at.any() else multiplier) > _ACTIVE * multiplier.max()
             spans = _intervals(
                 active if active.any() else multiplier == multiplier.max(), times, span
             )
-            kept.append((saving, ActiveConstraint(name, *_eased(words, saving, most), spans)))
-    return tuple(item for _, item in sorted(kept, key=lambda item: -item[0]))
+            selected.append((saving, ActiveConstraint(name, *_eased(words, saving, most), spans)))
+    return tuple(item for _, item in sorted(selected, key=lambda item: -item[0]))
 
 
 def _eased(words: str, saving: float, most: float) -> tuple[str, float]:
@@ -398,8 +398,8 @@ def _eased(words: str, saving: float, most: float) -> tuple[str, float]:
     if size is None or saving <= most:
         return words, saving
     whole = float(size[0])
-    told = f"{whole * most / saving:.2g}"
-    return told + words[size.end() :], saving * float(told) / whole
+    reported = f"{whole * most / saving:.2g}"
+    return reported + words[size.end() :], saving * float(reported) / whole
 
 
 def _intervals(active: Flags, times: Array, span: Array) -> tuple[tuple[float, float], ...]:

@@ -70,8 +70,8 @@ class BoundEnd:
         if not self.is_whole:
             return 0.0
         away = last - first if self.target is None else (last if self.row else first) - self.target
-        far, told = (float(np.linalg.norm(x)) for x in (away, self.null.T @ away))
-        return far if far > _FARTHER * told + _ELSEWHERE else 0.0
+        far, said = (float(np.linalg.norm(x)) for x in (away, self.null.T @ away))
+        return far if far > _FARTHER * said + _ELSEWHERE else 0.0
 
     def describe(self, samples: Samples, row: int, column: int) -> str:
         """See `BoundConstraint.describe`."""

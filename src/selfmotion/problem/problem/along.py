@@ -136,13 +136,13 @@ _SHORTEST_WINDOW = 1e-2
 def constraints_of_part(problem: "Problem", is_first: bool, is_last: bool) -> Iterator[Constraint]:
     """Yield the constraints for a part that is the first or the last one, or neither."""
     for item in problem.constraints:
-        kept: Constraint | None = None if item.closes else item
-        if kept is not None and not is_last:
-            kept = kept.on_part()
-        if kept is not None and not is_first:
-            kept = kept.on_last_part()
-        if kept is not None:
-            yield kept
+        selected: Constraint | None = None if item.closes else item
+        if selected is not None and not is_last:
+            selected = selected.on_part()
+        if selected is not None and not is_first:
+            selected = selected.on_last_part()
+        if selected is not None:
+            yield selected
 
 
 def at_all_times(constraints: Sequence[Constraint]) -> list[Constraint]:
