@@ -16,7 +16,9 @@ def test_what_is_written_is_the_value_to_its_digits(write: object, digits: int) 
     rng = np.random.default_rng(0)
     for value in [0.0, *(10.0 ** rng.uniform(-12, 2, 300)), *(-(10.0 ** rng.uniform(-9, 2, 50)))]:
         number, unit = write(float(value), digits).split()  # type: ignore[operator]
-        assert float(number) * SCALES[unit] == pytest.approx(value, rel=0.5 * 10.0 ** (1 - digits))
+        assert float(number) * SCALES[unit] == pytest.approx(
+            value, rel=0.5 * 10.0 ** (1 - digits), abs=1e-12
+        )
 
 
 @pytest.mark.parametrize(

@@ -87,7 +87,7 @@ def test_a_verdict_names_each_fault_and_what_was_looked_at() -> None:
     assert bad.position_error.value == pytest.approx(5e-6, rel=1e-3)
     assert bad.rotation_error.value == pytest.approx(2e-6, rel=1e-3)
     assert len(bad.failures) == 3
-    for words in ("5.00e-06 m off", "2.00e-06 rad off", "lasts 1 s, the path 2 s"):
+    for words in ("5 µm off", "2 µrad off", "lasts 1 s, the path 2 s"):
         assert words in bad.verdict
     for tolerance, kept in ((sm.Tolerance(6e-6, 1e-6), False), (sm.Tolerance(6e-6, 3e-6), True)):
         assert sm.certify(robot, beside, "pose", motion, tolerance).on_path is kept

@@ -63,7 +63,7 @@ def test_notes_and_failures_are_told_in_this_order() -> None:
 def test_other_tips_and_damping_are_told() -> None:
     pair = Extreme(2e-7, 0.5, "left"), Extreme(3e-7, 0.5, "left")
     told = replace(still(), others=(pair,))
-    assert ", 'left' 2.0e-07 m and 3.0e-07 rad off its path" in told.verdict
+    assert ", 'left' 0.2 µm and 0.3 µrad off its path" in told.verdict
     damped = replace(still(), damped=(DampedStretch(0.1, 0.2, 1e-3, 2e-2),) * 2)
     assert damped.verdict.count("0.100 to 0.200 s (smallest singular value 0.001") == 2
     assert "; damped 0.100" in damped.verdict

@@ -109,7 +109,7 @@ def test_a_straight_seam_is_one_motion_at_its_feed(
     code, text = invoke("check", file, "--robot", cell)
     assert code == 0, text
     assert "how the controller runs up and down, and so when it is where, is its own" in text
-    assert "(0.0001 m and 0.001 rad are allowed)" in text
+    assert "(0.1 mm and 1 mrad are allowed)" in text
     code, text = invoke("check", file, "--robot", cell, "--json")
     assert "how the controller runs up and down" in json.loads(text)["not_judged"]
 

@@ -170,7 +170,7 @@ def test_a_program_is_of_the_tool_the_reference_and_the_tolerance_that_were_aske
     finer = replace(program, specification=replace(asked, tolerance=sm.Tolerance(1e-9, 1e-9)))
     assert "it is judged within 1e-06 m" in finer.verdict
     looser = replace(program, specification=replace(asked, tolerance=sm.Tolerance(1e-3, 1e-3)))
-    assert "(0.001 m and 0.001 rad are allowed)" in looser.verdict
+    assert "(1 mm and 1 mrad are allowed)" in looser.verdict
     assert "rad off the path" in program.verdict
 
 

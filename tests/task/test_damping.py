@@ -190,7 +190,7 @@ def test_a_damped_plan_within_the_tolerance_is_verified(
 ) -> None:
     plan = sm.plan(touching(planar, 5.002), tolerance=sm.Tolerance(position=0.02))
     assert plan.certificate.verified
-    said = "m and 0.0e+00 rad off the path (0.02 m and 1e-06 rad are allowed); damped"
+    said = "m and 0 µrad off the path (20 mm and 1 µrad are allowed); damped"
     assert said in plan.certificate.verdict
     plan.save(tmp_path / "plan.npz")
     loaded = sm.load_plan(tmp_path / "plan.npz")

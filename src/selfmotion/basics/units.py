@@ -2,6 +2,8 @@
 
 import math
 
+# Sizes below this are written as 0 [m, rad].
+_ROUNDING = 1e-12
 # Unit → the largest size that is written in it [m, rad].
 _LENGTHS = (("µm", 1e-6, 1e-4), ("mm", 1e-3, 1.0), ("m", 1.0, math.inf))
 _ANGLES = (("µrad", 1e-6, 1e-4), ("mrad", 1e-3, 0.1), ("rad", 1.0, math.inf))
@@ -18,6 +20,8 @@ def in_angle(radians: float, digits: int = 2) -> str:
 
 
 def _in_units(value: float, digits: int, units: tuple[tuple[str, float, float], ...]) -> str:
+    # Less than a picometre, or a picoradian, is rounding.
+    value = 0.0 if abs(value) < _ROUNDING else value
     # NaN is below no size: it is written in the last unit.
     unit, scale, _ = next((each for each in units if abs(value) < each[2]), units[-1])
     text = f"{value / scale:.{digits}g}"

@@ -308,8 +308,9 @@ def _off_path(
     # Written so that NaN fails.
     if not position.value <= tolerance.position:
         failures.append(
-            f"'{position.name}' is {in_length(position.value, 3)} {off} at t = {position.time:.3f} "
-            f"s (allowed: {in_length(tolerance.position, 3)}){_damping_cause(position.time, damped)}"
+            f"'{position.name}' is {in_length(position.value, 3)} {off} at t = "
+            f"{position.time:.3f} s (allowed: {in_length(tolerance.position, 3)})"
+            f"{_damping_cause(position.time, damped)}"
         )
     if not rotation.value <= tolerance.rotation:
         failures.append(

@@ -182,9 +182,8 @@ class Certificate:
         position = max(one.value for one, _ in self._errors)
         rotation = max(one.value for _, one in self._errors)
         return (
-            f"verified at all times: at most {in_length(position)} and {in_angle(rotation)} off the "
-            f"path"
-            f"{relaxed_text(bool(self.deviations))}{allowed_text(self.tolerance)}"
+            f"verified at all times: at most {in_length(position)} and {in_angle(rotation)} "
+            f"off the path{relaxed_text(bool(self.deviations))}{allowed_text(self.tolerance)}"
             f"{self._besides}"
         )
 
