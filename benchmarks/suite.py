@@ -101,7 +101,7 @@ def load(folder: Path) -> PathProblem:
         sm.paths.Waypoints.from_csv(folder / "path.csv"),
         "pose" if free_axis is None else "pointing",
         tuple(sm.obstacles.Box(f"box{k}", pose, size) for k, (size, pose) in enumerate(boxes)),
-        (*disabled, *judge.neighbours),
+        tuple((a, b) for a, b in (*disabled, *judge.neighbours) if a != b),
         criteria,
         tuple(description.get(f"reference_path_length_{unit}") for unit in ("rad", "m")),
         judge,

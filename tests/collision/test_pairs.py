@@ -156,3 +156,12 @@ def test_what_held_joints_keep_in_each_other_is_told_and_what_is_put_there_stays
 def test_depths_are_told_as_such() -> None:
     assert how_near(0.01788) == "are 17.88 mm apart"
     assert how_near(-0.01788) == "overlap by 17.88 mm"
+
+
+def test_a_link_with_itself_in_an_srdf_is_passed_over(tmp_path: Path) -> None:
+    """Other programs pass over it, too."""
+    file = tmp_path / "arm.srdf"
+    pair = '<disable_collisions link1="{}" link2="{}" reason="Default"/>'
+    pairs = pair.format("a", "a") + pair.format("a", "b")
+    file.write_text(f'<robot name="arm">{pairs}</robot>')
+    assert disabled_links(file) == (("a", "b"),)

@@ -230,7 +230,8 @@ def disabled_links(
             f"{srdf}: has no <disable_collisions>, the only thing that is read of an SRDF: leave "
             f"it out, or give the file that has them"
         )
-    return tuple(pairs)
+    # A link with itself is no pair; some files have it, and other programs pass over it.
+    return tuple((first, second) for first, second in pairs if first != second)
 
 
 # How often bodies overlap in sampled configurations, and how often their convex hulls alone do.
