@@ -365,6 +365,9 @@ def asks_elbow(found: Known) -> Asked:
     values = np.unwrap(angle(found.robot, found.states[0])[0])
     center, half = 0.5 * (values.max() + values.min()), 0.5 * np.ptp(values)
     half = (1.0 + SPARE) * half + SPARE_PLACE
+    if half >= np.pi:
+        # A band is less than half a turn to each side; this motion uses more.
+        return Asked(_usual())
     center = (center + np.pi) % (2.0 * np.pi) - np.pi
     return Asked([*_usual(), sm.constraints.Band(angle, float(center), float(half))])
 
