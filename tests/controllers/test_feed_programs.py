@@ -14,7 +14,7 @@ import pytest
 import selfmotion as sm
 from selfmotion.model.task import SE3, Quaternion, exp3
 from selfmotion.shop.controllers import judged_program, program_miss, read_program
-from selfmotion.shop.controllers.feed_stretches import ZONE, FeedStretch, Ramps, times_at
+from selfmotion.shop.controllers.feed_segments import ZONE, FeedSegment, Ramps, times_at
 from selfmotion.shop.controllers.program_settings import axes_of
 from selfmotion.shop.controllers.steps import arc_through
 from support.arms import robot_named
@@ -84,7 +84,7 @@ def test_a_straight_seam_is_one_motion_at_its_feed(
     sm.files.write_motion(line, file, settings=settings(name))
     count, stated, found = program_miss(line, file)
     assert count == 1
-    (stretch,) = read_poses(file, SLIDES).stretches
+    (stretch,) = read_poses(file, SLIDES).segments
     np.testing.assert_allclose(stretch.speeds, [FEED], rtol=1e-6)
     # The tool is where it should be, its axis is, and all else is off by what is stated.
     far = measured(line, file)
@@ -317,9 +317,7 @@ def test_strokes_switch_where_their_feed_begins(
     file, job = tmp_path / name, tmp_path / "paint.program"
     sm.files.write_motion(program, file, settings=settings(name))
     strokes = [
-        stretch
-        for stretch in read_program(file, ur10).stretches
-        if isinstance(stretch, FeedStretch)
+        stretch for stretch in read_program(file, ur10).segments if isinstance(stretch, FeedSegment)
     ]
     assert [len(stretch.speeds) for stretch in strokes] == [3, 3]
     found = judged_program(file, program)
@@ -347,7 +345,7 @@ def test_leads_take_their_time_with_ramps(abb: sm.RobotModel, tmp_path: Path) ->
     plan = sm.plan(sm.Problem(abb, seam, "pointing", constraints=(), clearance=None)).require()
     file = tmp_path / "weld.mod"
     sm.files.write_motion(plan, file, settings=settings("weld.mod"))
-    stretches = read_poses(file, SLIDES).stretches
+    stretches = read_poses(file, SLIDES).segments
     speeds = [float(stretch.speeds[0]) for stretch in stretches]
     np.testing.assert_allclose(speeds, [0.05 / 0.75, FEED, 0.05 / 0.75], rtol=1e-4)
     far = measured(plan, file)
@@ -482,7 +480,7 @@ def test_feeds_that_change_are_a_motion_each(abb: sm.RobotModel, tmp_path: Path,
     plan = sm.plan(sm.Problem(abb, seam, "pointing", start, clearance=None)).require()
     file = tmp_path / name
     sm.files.write_motion(plan, file, settings=settings(name))
-    (stretch,) = read_poses(file, SLIDES).stretches
+    (stretch,) = read_poses(file, SLIDES).segments
     np.testing.assert_allclose(stretch.speeds, [2.0 * FEED, FEED, 2.0 * FEED], rtol=1e-6)
     assert measured(plan, file).position <= program_miss(plan, file)[1].path.position + ROUNDED
     read_program(file, abb).motions(seam)[0]
@@ -501,9 +499,9 @@ def test_feeds_that_change_are_a_motion_each(abb: sm.RobotModel, tmp_path: Path,
         alone.along(seam, 0.0)
 
 
-def stretch_of(file: Path, robot: sm.RobotModel) -> FeedStretch:
-    (stretch,) = read_program(file, robot).stretches
-    assert isinstance(stretch, FeedStretch)
+def stretch_of(file: Path, robot: sm.RobotModel) -> FeedSegment:
+    (stretch,) = read_program(file, robot).segments
+    assert isinstance(stretch, FeedSegment)
     return stretch
 
 

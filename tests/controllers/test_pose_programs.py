@@ -14,7 +14,7 @@ import selfmotion as sm
 from selfmotion.model.task import SE3, Quaternion, exp3
 from selfmotion.shop.controllers import judged_program, judged_programs, program_miss, read_program
 from selfmotion.shop.controllers.program_settings import axes_of
-from selfmotion.shop.controllers.stretches import Miss, Misses, miss_between
+from selfmotion.shop.controllers.segments import Miss, Misses, miss_between
 from selfmotion.shop.controllers.tool_frames import (
     ROUNDINGS,
     ToolFrames,
@@ -513,7 +513,7 @@ def test_the_frame_of_the_path_may_be_the_work_object(name: str, tmp_path: Path)
     plan = sm.plan(sm.Problem(ur5, path, "pointing", clearance=None)).require()
     file = tmp_path / name
     sm.files.write_motion(plan, file, settings=settings(name, work_object="path"))
-    (stretch,) = read_program(file, ur5).stretches
+    (stretch,) = read_program(file, ur5).segments
     np.testing.assert_allclose(stretch.places[0], begin.translation, atol=2e-7)
     np.testing.assert_allclose(stretch.places[-1], end.translation, atol=2e-7)
     # And it is where the table lies, by a chain that the program knows nothing of.

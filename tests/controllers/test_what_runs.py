@@ -122,7 +122,7 @@ def off_by_straight_lines(plan: sm.Plan, file: Path) -> float:
     names = [axis.joint for axis in program.axes]
     order = [names.index(name) for name in plan.robot.joint_names]
     worst, begin = 0.0, 0.0
-    for stretch in program.stretches:
+    for stretch in program.segments:
         for at in np.linspace(0.0, stretch.duration, LOOKS):
             q = np.array([np.interp(at, stretch.t, column) for column in stretch.q.T])[order]
             time = min(begin + at, plan.path.duration)
@@ -158,7 +158,7 @@ def test_all_that_a_controller_may_make_of_targets_is_judged(plan: sm.Plan, tmp_
     file = tmp_path / "seam.mod"
     sm.files.write_motion(plan, file, settings=settings("joints"))
     program = read_program(file, plan.robot)
-    (stretch,) = program.stretches
+    (stretch,) = program.segments
     smooth, lines, cut = (motion.q for motion in program.motions())
     t = np.linspace(0.0, stretch.duration, LOOKS)
     # Velocities change within a thousandth of a step at corners [of a step's length].

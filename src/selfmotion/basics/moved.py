@@ -33,6 +33,9 @@ MOVED_MODULES = {
     "planning.search.nodes": "planning.search.vertices",
     "planning.search.stretches": "planning.search.segments",
     "planning.transfer.ways": "planning.transfer.rrt_connect",
+    "shop.controllers.feed_stretches": "shop.controllers.feed_segments",
+    "shop.controllers.read_stretches": "shop.controllers.read_segments",
+    "shop.controllers.stretches": "shop.controllers.segments",
 }
 
 

@@ -191,8 +191,8 @@ def of_problem(
         problem = controllers.by_targets(problem)
         begin = motions[0].of_joints(problem.robot.joint_names).q[0]
         problem = controllers.as_shifted(problem, program, begin)
-        if controllers.shift_told(program):
-            stages.print(f"note: {controllers.shift_told(program)}", markup=False, soft_wrap=True)
+        if controllers.shift_note(program):
+            stages.print(f"note: {controllers.shift_note(program)}", markup=False, soft_wrap=True)
     if calibration is not None:
         problem = on_calibrated(problem, calibration)
         tell_difference(problem.robot, motions[0])
@@ -207,7 +207,7 @@ def of_problem(
     def certify_lines(motion: sm.Trajectory) -> sm.Certificate:
         return lines.certify(motion, allowed, ending, besides, progress)
 
-    certificate, motion = controllers.judged_ways(motions, certify, certify_lines)
+    certificate, motion = controllers.judged_interpolations(motions, certify, certify_lines)
     certificate = with_failures(certificate, against)
     close = near(robot, motion, (*problem.requirements, *besides))
     return certificate, close, robot, program

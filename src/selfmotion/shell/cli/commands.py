@@ -234,7 +234,9 @@ def check(
                     arm, followed, task or "pose", motion, stated, asked, progress=display.stage
                 )
 
-            certificate, motion = controllers.judged_ways(found.ways(followed, arm), certify)
+            certificate, motion = controllers.judged_interpolations(
+                found.ways(followed, arm), certify
+            )
             certificate = checks.with_failures(certificate, found.besides(arm, ()))
             near = checks.near(arm, motion, asked)
     if as_json:

@@ -14,7 +14,7 @@ from selfmotion.shop.controllers.controller_program import ControllerProgram, Sw
 from selfmotion.shop.controllers.program_facts import Load, ProgramFacts
 from selfmotion.shop.controllers.program_settings import Axis
 from selfmotion.shop.controllers.program_texts import BECAUSE, KEPT, PLANNED, TIMED, of_word
-from selfmotion.shop.controllers.read_stretches import (
+from selfmotion.shop.controllers.read_segments import (
     Follower,
     Places,
     Pose,
@@ -23,14 +23,17 @@ from selfmotion.shop.controllers.read_stretches import (
     SlowRow,
     pose_of_values,
 )
-from selfmotion.shop.controllers.stretches import Miss, Misses
+from selfmotion.shop.controllers.segments import Miss, Misses
 
-# A file of a controller has less than so many bytes, lines less than so many characters, numbers
-# less than that.
-_BYTES, _LINE, _LARGEST = 50_000_000, 2000, 1e7
-# What ends lines in other programs is in none.
+# Largest size of a controller's file [bytes].
+_BYTES = 50_000_000
+# Longest line of such a file [characters].
+_LINE = 2000
+# Largest number in it, in any unit.
+_LARGEST = 1e7
+# Characters that end lines in other programs; a controller's file has none.
 _STRANGE = re.compile("[\v\f\x1c-\x1e\x85\u2028\u2029]")
-# What comments of events begin with.
+# Beginning of comments that name events.
 _EVENT = "event: "
 _NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)(E[+-]?[0-9]{1,3})?", re.IGNORECASE)
 
@@ -112,7 +115,7 @@ class Lines:
         return steps[-1] if steps else ""
 
     def _after(self, begin: str) -> list[str]:
-        """Return what comments say that begin so."""
+        """Return the texts behind a beginning of comments."""
         return [note.removeprefix(begin) for note in self.notes if note.startswith(begin)]
 
     def planned(self) -> float | None:
@@ -127,7 +130,7 @@ class Lines:
         return None
 
     def joints(self) -> dict[str, tuple[str, bool]]:
-        """Return what comments say of axes: axis → its joint, and whether that slides."""
+        """Return the axes stated in comments: axis → its joint, and whether that slides."""
         said = next((note for note in self.notes if note.startswith("axes: ")), "axes: ")
         joints: dict[str, tuple[str, bool]] = {}
         for item in said.removeprefix("axes: ").split(", "):
@@ -140,7 +143,7 @@ class Lines:
         return joints
 
     def facts(self) -> ProgramFacts | None:
-        """Return what the comments so far state that targets rest on; None where they do not."""
+        """Return the facts stated in the comments so far; None if there are none."""
         return ProgramFacts.stated(self.notes)
 
     def miss(self) -> Misses:
@@ -159,7 +162,7 @@ class Lines:
         return None
 
     def within(self) -> Tolerance | None:
-        """Return what seams at speeds keep of what is prescribed, by the comments."""
+        """Return the tolerance of seams at speeds stated in the comments."""
         for note in self.notes:
             found = re.fullmatch(rf"{KEPT}([\d.]+) mm, ([\d.]+) rad", note[:200])
             if found:
@@ -168,7 +171,7 @@ class Lines:
         return None
 
     def places(self, tool: SE3 | None, work: SE3 | None) -> Places:
-        """Return what comments say of the frames of poses, with what the program has of them."""
+        """Return the frames of poses by the comments and by the program's own declarations."""
         found = Places(tool=tool, work=work)
         for note in self.notes:
             said = re.fullmatch(r"poses: work object (\S+) of (\S+), flange (\S+)", note[:400])
@@ -218,13 +221,13 @@ class Lines:
         follower = Follower(self._file, axes, frames)
         for row in rows:
             follower.take(_with_axes(row, kept))
-        if not follower.stretches:
+        if not follower.segments:
             raise FileFormatError(f"{self._file}: has no targets with times")
         remark = next((note for note in self.notes if note.startswith(BECAUSE)), BECAUSE)
         return ControllerProgram(
             name,
             axes,
-            tuple(follower.stretches),
+            tuple(follower.segments),
             self.miss(),
             tuple(switches),
             None if places is None else places.shift,

@@ -16,8 +16,8 @@ from selfmotion.model.robot import RobotModel
 from selfmotion.model.task import SE3
 from selfmotion.planning.result import Move, Parts, Plan
 from selfmotion.problem.constraints import Constraint
-from selfmotion.shop.controllers.feed_stretches import FeedStretch
-from selfmotion.shop.controllers.feed_thinning import FeedSpan
+from selfmotion.shop.controllers.feed_segments import FeedSegment
+from selfmotion.shop.controllers.feed_thinning import FeedSection
 from selfmotion.shop.controllers.program_facts import Load, ProgramFacts, check_load, with_checksum
 from selfmotion.shop.controllers.program_settings import (
     OF_PATH,
@@ -39,17 +39,22 @@ from selfmotion.shop.controllers.program_texts import (
     rounded_up,
     stated,
 )
-from selfmotion.shop.controllers.stretches import (
+from selfmotion.shop.controllers.segments import (
     NO_MISS,
     Knots,
     Misses,
-    PoseStretch,
-    Stretch,
-    by_each_way,
+    PoseSegment,
+    Segment,
+    by_interpolation,
     miss_of,
 )
-from selfmotion.shop.controllers.targets import NotByPosesError, PosedSpans, PoseSpan, stretches_of
-from selfmotion.shop.controllers.thinning import TIME_DIGITS, Piece, Span, pieces_of
+from selfmotion.shop.controllers.targets import (
+    NotByPosesError,
+    PosedSections,
+    PoseSection,
+    segments_of,
+)
+from selfmotion.shop.controllers.thinning import TIME_DIGITS, Piece, Section, pieces_of
 from selfmotion.shop.controllers.tool_frames import (
     ROUNDINGS,
     WORLD,
@@ -61,7 +66,7 @@ from selfmotion.work.job import Program, are_opposite
 
 
 class Switch(NamedTuple):
-    """What a program does besides moving.
+    """An output or event that a program switches.
 
     Attributes
     ----------
@@ -80,7 +85,7 @@ class Switch(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class ControllerProgram:
-    """What a program file says of a motion.
+    """A motion by a controller's program file.
 
     Attributes
     ----------
@@ -88,7 +93,7 @@ class ControllerProgram:
         Of the module.
     axes : tuple of Axis
         In the order of the file: A1 … A6, E1 … E6.
-    stretches : tuple of Stretch
+    segments : tuple of Segment
         From rest to rest, coordinates in the order of the axes.
     miss : Misses
         How far targets are off the motion, as the file states it.
@@ -116,7 +121,7 @@ class ControllerProgram:
 
     name: str
     axes: tuple[Axis, ...]
-    stretches: tuple[Stretch, ...]
+    segments: tuple[Segment, ...]
     miss: Misses
     switches: tuple[Switch, ...] = ()
     shift: SE3 | None = None
@@ -131,11 +136,11 @@ class ControllerProgram:
     @property
     def targets(self) -> int:
         """How many targets it has."""
-        return sum(len(stretch.t) - 1 for stretch in self.stretches if not stretch.is_rest)
+        return sum(len(segment.t) - 1 for segment in self.segments if not segment.is_rest)
 
     @property
     def begins_elsewhere(self) -> str:
-        """What speaks against the axis target that it begins with, in words; empty for nothing.
+        """Reason why the axis target at its begin does not fit its first pose; empty for none.
 
         Of a shifted work object the way to the shifted begin is to be expected.
         """
@@ -148,7 +153,7 @@ class ControllerProgram:
 
     @property
     def trajectory(self) -> Trajectory:
-        """The motion as the cubic spline through the targets of each stretch, at rest in between.
+        """The motion as the cubic spline through the targets of each segment, at rest in between.
 
         Raises
         ------
@@ -158,7 +163,7 @@ class ControllerProgram:
         return self._motion([next(own) for own in self._joined(None)])
 
     def motions(self, path: Path | None = None) -> list[Trajectory]:
-        """Return what a controller may make of it, by each way in which it may join targets.
+        """Return the motions of a controller, one for each interpolation between targets.
 
         The cubic spline comes first. With a path, seams at speeds are at its pace: ramps are those
         of the plan.
@@ -168,19 +173,19 @@ class ControllerProgram:
         FileFormatError
             There is none, or a speed is another one than the path has.
         """
-        return [self._motion(parts) for parts in by_each_way(self._joined(path))]
+        return [self._motion(parts) for parts in by_interpolation(self._joined(path))]
 
     def _joined(self, path: Path | None) -> Iterator[Iterator[Knots]]:
-        """Yield of each stretch the ways in which a controller may join its targets."""
+        """Yield of each segment the ways in which a controller may join its targets."""
         begin = 0.0
-        for stretch in self.stretches:
-            if path is not None and isinstance(stretch, FeedStretch):
-                yield stretch.along(path, begin)
-            elif stretch.is_rest:
-                yield iter([Knots(stretch.t, stretch.q, 0.0 * stretch.q)])
+        for segment in self.segments:
+            if path is not None and isinstance(segment, FeedSegment):
+                yield segment.along(path, begin)
+            elif segment.is_rest:
+                yield iter([Knots(segment.t, segment.q, 0.0 * segment.q)])
             else:
-                yield stretch.joined()
-            begin += stretch.duration
+                yield segment.joined()
+            begin += segment.duration
 
     def _motion(self, parts: Sequence[Knots]) -> Trajectory:
         t, q, qd = [np.zeros(1)], [parts[0].q[:1]], [0.0 * parts[0].q[:1]]
@@ -197,7 +202,7 @@ class ControllerProgram:
         Raises
         ------
         FileFormatError
-            It has other joints, or other stretches.
+            It has other joints, or other segments.
         """
         pieces = pieces_of(plan)
         names = [axis.joint for axis in self.axes]
@@ -206,19 +211,19 @@ class ControllerProgram:
             raise FileFormatError(f"has joints {', '.join(names)}, expected {', '.join(known)}")
         order = [names.index(name) for name in known]
         worst, at, k = Misses(NO_MISS, NO_MISS), 0.0, 0
-        for number, stretch in enumerate(self.stretches):
-            if stretch.is_slow and self.shift is None:
-                after = self.stretches[min(number + 1, len(self.stretches) - 1)].name
+        for number, segment in enumerate(self.segments):
+            if segment.is_slow and self.shift is None:
+                after = self.segments[min(number + 1, len(self.segments) - 1)].name
                 raise FileFormatError(
                     f"the arm is not where '{after}' begins, by the poses before: it is singular "
                     f"there"
                 )
-            same = stretch.in_order(order)
+            same = segment.in_order(order)
             piece = pieces[min(k, len(pieces) - 1)]
             found = miss_of(same, piece.motion, piece.chains, piece.motion.t[0] + at)
             both = Misses(NO_MISS, found) if piece.is_move else Misses(found, NO_MISS)
             worst = worst.worse(both)
-            at += stretch.duration
+            at += segment.duration
             if at >= piece.motion.duration - _MOMENT:
                 at, k = 0.0, k + 1
         if k > len(pieces):
@@ -247,12 +252,12 @@ class Draft:
     frames: ToolFrames | None = None
 
     def signal(self, event: str) -> Signal | None:
-        """Return what an event switches."""
+        """Return the outputs that an event switches."""
         return self.settings.signal(event)
 
 
 class Joints(NamedTuple):
-    """What has joint targets where poses are asked for: free moves only, or all; and why."""
+    """Joint targets instead of poses: of free moves only, or of all; with the reason."""
 
     moves_only: bool
     why: str
@@ -296,21 +301,21 @@ def drafted(
             why = why or otherwise.why
     if frames is not None and not why:
         try:
-            spans = PoseSpan if settings.targets == "timed-poses" else FeedSpan
-            posed: PosedSpans = partial(spans.by, frames, ROUNDINGS[form])
+            spans = PoseSection if settings.targets == "timed-poses" else FeedSection
+            posed: PosedSections = partial(spans.by, frames, ROUNDINGS[form])
             if otherwise is not None:
                 posed = partial(_but_of_moves, posed, otherwise.why)
-            stretches, miss = stretches_of(*given, posed)
+            segments, miss = segments_of(*given, posed)
         except NotByPosesError as error:
             why = str(error)
     if frames is None or why:
         frames = None
-        stretches, miss = stretches_of(*given)
+        segments, miss = segments_of(*given)
     order = in_order(axes)
-    sorted_ones = tuple(item.in_order(order) for item in stretches)
+    sorted_ones = tuple(item.in_order(order) for item in segments)
     ordered = tuple(axes[k] for k in order)
     stated = Misses(miss.path.stated, miss.moves.stated)
-    at_speeds = any(isinstance(item, FeedStretch) for item in sorted_ones)
+    at_speeds = any(isinstance(item, FeedSegment) for item in sorted_ones)
     within = settings.deviation if at_speeds else None
     program = ControllerProgram(
         name, ordered, sorted_ones, stated, remark=plain(why), within=within
@@ -349,8 +354,8 @@ def _paths_of(plan: Plan | Parts | Move | Program) -> list[Path]:
 
 
 def _but_of_moves(
-    posed: PosedSpans, why: str, piece: Piece, slides: Flags, first: float, last: float
-) -> Span:
+    posed: PosedSections, why: str, piece: Piece, slides: Flags, first: float, last: float
+) -> Section:
     """Return a span of poses of a seam; NotByPosesError of a free move."""
     if piece.is_move:
         raise NotByPosesError(why)
@@ -399,23 +404,23 @@ def check_signals(seams: Mapping[str, str], settings: ProgramSettings) -> None:
             )
 
 
-# What programs say around their motion: their heads, and the comments before a stretch.
+# Texts around the motion: the head of a program, and the comments before a segment.
 
 
-def with_begins(stretches: Sequence[Stretch]) -> Iterator[tuple[Stretch, Stretch | None]]:
-    """Yield each stretch, and one to whose begin the arm has to go slowly before; else None.
+def with_begins(segments: Sequence[Segment]) -> Iterator[tuple[Segment, Segment | None]]:
+    """Yield each segment, and one to whose begin the arm has to go slowly before; else None.
 
     That is where targets of the other kind follow, poses after joints or joints after poses, rests
     in between included: where the work object was shifted, the arm is elsewhere by the other ones.
     A program begins by joints.
     """
     by_poses = False
-    for k, stretch in enumerate(stretches):
-        moving = next((item for item in stretches[k:] if not item.is_rest), None)
+    for k, segment in enumerate(segments):
+        moving = next((item for item in segments[k:] if not item.is_rest), None)
         begun = None
-        if moving is not None and by_poses != isinstance(moving, PoseStretch):
+        if moving is not None and by_poses != isinstance(moving, PoseSegment):
             by_poses, begun = not by_poses, moving
-        yield stretch, begun
+        yield segment, begun
 
 
 def head(draft: Draft) -> list[str]:
@@ -447,27 +452,27 @@ def head(draft: Draft) -> list[str]:
 
 def speeds_of(program: ControllerProgram) -> list[float]:
     """Return the speeds of its seams, each once [m/s]."""
-    at_speeds = (item for item in program.stretches if isinstance(item, FeedStretch))
+    at_speeds = (item for item in program.segments if isinstance(item, FeedSegment))
     return sorted({float(speed) for item in at_speeds for speed in item.speeds})
 
 
 def goes_round(program: ControllerProgram) -> bool:
     """Whether it has circular motions."""
-    at_speeds = (item for item in program.stretches if isinstance(item, FeedStretch))
+    at_speeds = (item for item in program.segments if isinstance(item, FeedSegment))
     return any(bool(np.isfinite(item.vias).any()) for item in at_speeds)
 
 
-def before(stretch: Stretch) -> list[str]:
-    """Return the comments before a stretch, without what marks them as such."""
-    planned = isinstance(stretch, FeedStretch)
+def before(segment: Segment) -> list[str]:
+    """Return the comments before a segment, without what marks them as such."""
+    planned = isinstance(segment, FeedSegment)
     return [
-        *([plain(stretch.remark)] if stretch.remark else []),
-        *([f"{PLANNED}{stretch.duration:.{TIME_DIGITS}f} s"] if planned else []),
+        *([plain(segment.remark)] if segment.remark else []),
+        *([f"{PLANNED}{segment.duration:.{TIME_DIGITS}f} s"] if planned else []),
     ]
 
 
 def _of_speeds(program: ControllerProgram) -> list[str]:
-    """Return what the head says of seams at speeds."""
+    """Return the lines of the head about seams at speeds."""
     within = program.within
     if within is None:
         return []
@@ -484,7 +489,7 @@ def _lines(draft: Draft) -> str:
 
 
 def _of_poses(draft: Draft) -> list[str]:
-    """Return what the head says of the frames of poses; the reader takes it from there."""
+    """Return the lines of the head about the frames of poses, from which the reader takes them."""
     frames = draft.frames
     if frames is None:
         return []

@@ -15,8 +15,17 @@ import numpy as np
 from selfmotion.basics import Array, Flags
 from selfmotion.certificate import Tolerance
 from selfmotion.model.motion import Trajectory
-from selfmotion.shop.controllers.feed_stretches import FeedStretch, PassedLength, times_at
+from selfmotion.shop.controllers.feed_segments import FeedSegment, PassedLength, times_at
 from selfmotion.shop.controllers.program_texts import TIMED
+from selfmotion.shop.controllers.segments import (
+    SURE,
+    Event,
+    Knots,
+    Miss,
+    Segment,
+    by_interpolation,
+    on_one_side,
+)
 from selfmotion.shop.controllers.steps import (
     Allowed,
     Places,
@@ -25,39 +34,39 @@ from selfmotion.shop.controllers.steps import (
     arc_through,
     step_lengths,
 )
-from selfmotion.shop.controllers.stretches import (
-    SURE,
-    Event,
-    Knots,
-    Miss,
-    Stretch,
-    by_each_way,
-    on_one_side,
-)
-from selfmotion.shop.controllers.targets import NotByPosesError, PoseSpan, largest
+from selfmotion.shop.controllers.targets import NotByPosesError, PoseSection, largest
 from selfmotion.shop.controllers.thinning import Piece, events_within, rests
 from selfmotion.shop.controllers.tool_frames import Rounding, ToolFrames, carrier_in_reference
 
-# What turning and self-motion may be off, from the most that is tried on [rad or m], the last as
-# all else is; and how much of what is allowed of places: where corners are cut the feed suffers.
-_FREE, _OF_PLACES = (0.2, 0.02, 0.0), (1.0, 0.3)
-# Places along a stretch that are looked at, at least and at most.
-_FEWEST, _MOST = 400, 2000
-# Stretches shorter than this have no feed [m]; steps at least [m]; tries to halve those that take
-# more than they may.
-_SHORT, _STEP, _TRIES = 1e-3, 1e-5, 12
-# Speeds have so many digits [m/s]. Leads have no feed: each ramp takes this share of their time.
-_SPEED_DIGITS, _RAMP = 8, 0.25
-# What joints are off may change by this share of what they may be off, from look to look, and by
-# so much at corners in any case [rad or m].
-_SWING, _LEAST_SWING = 0.1, 3e-4
-# Events have to be as near to their times [s].
+# Tolerances of turning and self-motion, tried in turn [rad or m]; 0: that of all other joints.
+_FREE = (0.2, 0.02, 0.0)
+# Shares of the tolerance of positions, tried in turn: corners that are cut cost feed.
+_OF_PLACES = (1.0, 0.3)
+# Smallest number of places along a segment at which it is evaluated.
+_FEWEST = 400
+# Largest number of these places.
+_MOST = 2000
+# Length below which a segment has no feed [m].
+_SHORT = 1e-3
+# Shortest step [m].
+_STEP = 1e-5
+# Largest number of rounds that halve steps which exceed their tolerance.
+_TRIES = 12
+# Decimals of speeds [m/s].
+_SPEED_DIGITS = 8
+# Share of the time of a lead that each of its ramps takes: leads have no feed.
+_RAMP = 0.25
+# Change of the joints' deviation from place to place, as a share of its tolerance.
+_SWING = 0.1
+# Change that is allowed in any case, as at corners [rad or m].
+_LEAST_SWING = 3e-4
+# Tolerance of the times of events [s].
 _PROMPT = 5e-4
 
 
 @dataclass(frozen=True, eq=False)
-class FeedSpan(PoseSpan):
-    """What of a seam at a feed lies between two rests, to be written as poses with speeds."""
+class FeedSection(PoseSection):
+    """Part of a seam at a feed between two rests, to be written as poses with speeds."""
 
     @classmethod
     def by(
@@ -68,21 +77,21 @@ class FeedSpan(PoseSpan):
         slides: Flags,
         first: float,
         last: float,
-    ) -> PoseSpan:
+    ) -> PoseSection:
         """Return that of a piece with a feed; of others, what is written with times."""
         given = frames, rounding, piece, slides, first, last
         has_feed = len(piece.feeds) == 1 and bool(piece.feeds[0])
         if not has_feed or piece.keeps is None or not _rides_along(frames):
-            return PoseSpan.by(*given)
+            return PoseSection.by(*given)
         return super().by(*given)
 
-    def stretches(self, allowed: Tolerance) -> list[tuple[Stretch, Miss]]:
-        """See `Span.stretches`: one from rest to rest of the tool, the arm's self-motion aside.
+    def segments(self, allowed: Tolerance) -> list[tuple[Segment, Miss]]:
+        """See `Section.segments`: one from rest to rest of the tool, the arm's self-motion aside.
 
-        With times where speeds do not do, and the stretch says why.
+        With times where speeds do not do, and the segment says why.
         """
         if rests(self.piece.motion, self.first, self.last):
-            return super().stretches(allowed)
+            return super().segments(allowed)
         self.check_regular(allowed)
         parts = [self._part(*ends) for ends in pairwise(self._stops)]
         gone = [part._gone for part in parts]
@@ -95,10 +104,10 @@ class FeedSpan(PoseSpan):
             made = [
                 part._fewest(each, nearer, turning) for part, each in zip(parts, gone, strict=True)
             ]
-            found = [stretch for stretch in made if isinstance(stretch, FeedStretch)]
+            found = [segment for segment in made if isinstance(segment, FeedSegment)]
             if len(found) < len(parts):
                 # Where it is with the most that may be off.
-                stuck = stuck or next(at for at in made if not isinstance(at, FeedStretch))
+                stuck = stuck or next(at for at in made if not isinstance(at, FeedSegment))
                 why = self._lost(stuck, allowed)
                 continue
             why = (
@@ -109,8 +118,8 @@ class FeedSpan(PoseSpan):
                 why = "an event is where the tool is slower than its feed, or it is at no feed"
             elif self._keeps(found, gone, allowed):
                 pairs = zip(parts, found, strict=True)
-                return [(stretch, part._miss(stretch)) for part, stretch in pairs]
-        ((timed, miss),) = super().stretches(allowed)
+                return [(segment, part._miss(segment)) for part, segment in pairs]
+        ((timed, miss),) = super().segments(allowed)
         return [(replace(timed, remark=f"{TIMED}{why}"), miss)]
 
     def _lost(self, at: float, allowed: Tolerance) -> str:
@@ -132,7 +141,7 @@ class FeedSpan(PoseSpan):
         inside = at[(at > self.first + _PROMPT) & (at < self.last - _PROMPT)]
         return [self.first, *inside.tolist(), self.last]
 
-    def _part(self, first: float, last: float) -> "FeedSpan":
+    def _part(self, first: float, last: float) -> "FeedSection":
         events = events_within(self.piece, first, last)
         return replace(self, first=first, last=last, events=events)
 
@@ -141,14 +150,14 @@ class FeedSpan(PoseSpan):
         return PassedLength.of_motion(self.frames, self.piece.motion, self.first, self.last)
 
     def _keeps(
-        self, stretches: Sequence[FeedStretch], gone: Sequence[PassedLength], allowed: Tolerance
+        self, segments: Sequence[FeedSegment], gone: Sequence[PassedLength], allowed: Tolerance
     ) -> bool:
-        """Whether the seam keeps all that it has to with stretches in place of its motion.
+        """Whether the seam keeps all that it has to with segments in place of its motion.
 
         By each way in which a controller may join their targets.
         """
-        ways = (stretch.at_pace(each) for stretch, each in zip(stretches, gone, strict=True))
-        return all(self._keeps_by(parts, allowed) for parts in by_each_way(ways))
+        ways = (segment.at_pace(each) for segment, each in zip(segments, gone, strict=True))
+        return all(self._keeps_by(parts, allowed) for parts in by_interpolation(ways))
 
     def _keeps_by(self, parts: Sequence[Knots], allowed: Tolerance) -> bool:
         motion, begin = self.piece.motion, self.first
@@ -168,17 +177,17 @@ class FeedSpan(PoseSpan):
         judged = Trajectory(whole[0], whole[1], whole[2], motion.joint_names)
         return self.piece.keeps is not None and self.piece.keeps(judged, allowed)
 
-    def _is_prompt(self, stretch: FeedStretch) -> bool:
+    def _is_prompt(self, segment: FeedSegment) -> bool:
         """Whether there is time to run up, and events are on time, ramps being even."""
-        if not stretch.ramps.each > 0.0:
+        if not segment.ramps.each > 0.0:
             return False
-        own = stretch.ramps.times(stretch.t)
+        own = segment.ramps.times(segment.t)
         return all(
             abs(own[event.target] - (at - self.first)) < _PROMPT
-            for event, (at, _) in zip(stretch.events, self.events, strict=True)
+            for event, (at, _) in zip(segment.events, self.events, strict=True)
         )
 
-    def _fewest(self, gone: PassedLength, allowed: Tolerance, free: float) -> FeedStretch | float:
+    def _fewest(self, gone: PassedLength, allowed: Tolerance, free: float) -> FeedSegment | float:
         """Return the fewest targets; where none keep what is allowed, near when that is [s]."""
         fixed = self._fixed(gone)
         along = self._along(gone, fixed)
@@ -188,13 +197,13 @@ class FeedSpan(PoseSpan):
         if not isinstance(steps, Steps):
             return self._when(gone, along.gone[steps])
         for _ in range(_TRIES):
-            stretch = self._stretch(gone, along, steps)
-            taken = self._off(stretch, limits)
+            segment = self._segment(gone, along, steps)
+            taken = self._off(segment, limits)
             if not isinstance(taken, np.ndarray):
                 return taken
             far = taken > 1.0
             if not far.any():
-                return stretch
+                return segment
             worst = steps.ends[int(taken.argmax())]
             finer = steps.halved(far)
             if len(finer.ends) == len(steps.ends):
@@ -234,7 +243,7 @@ class FeedSpan(PoseSpan):
         """Return the motion where the tool has gone so far, (K, n)."""
         return self.piece.motion(np.minimum(gone.when(far), self.last))
 
-    def _stretch(self, gone: PassedLength, along: Places, steps: Steps) -> FeedStretch:
+    def _segment(self, gone: PassedLength, along: Places, steps: Steps) -> FeedSegment:
         """Return targets, as the file has them."""
         motion, ends = self.piece.motion, steps.ends
         q = self._in_digits(along.q[ends])
@@ -263,7 +272,7 @@ class FeedSpan(PoseSpan):
             Event(int(np.abs(along.gone[ends] - gone.at(np.array([at]))).argmin()), name)
             for at, name in self.events
         ]
-        return FeedStretch(
+        return FeedSegment(
             self.piece.name,
             times,
             found,
@@ -287,16 +296,16 @@ class FeedSpan(PoseSpan):
                 found[(middles >= begin) & (middles <= end)] = item.asked
         return np.round(found, _SPEED_DIGITS)
 
-    def _off(self, stretch: FeedStretch, allowed: Allowed) -> Array | float:
+    def _off(self, segment: FeedSegment, allowed: Allowed) -> Array | float:
         """Return how much of what is allowed each step takes, corners included, (K,).
 
         Where joints swing between two looks, as they do near a singular pose, near when [s].
         """
-        times, count = stretch.looked_at(), len(stretch.t) - 1
-        exact = stretch.matched(self.piece.motion, self.first)
+        times, count = segment.looked_at(), len(segment.t) - 1
+        exact = segment.matched(self.piece.motion, self.first)
         at, facing = self.frames.places(exact)
         worst = np.zeros(count)
-        for line in stretch.ways(times):
+        for line in segment.ways(times):
             off = line - exact
             swing = np.abs(np.diff(off, axis=0)).max(axis=1)
             # Written so that NaN does.

@@ -40,7 +40,7 @@ from selfmotion.shop.controllers.program_lines import ProgramReader
 from selfmotion.shop.controllers.program_settings import ProgramSettings
 from selfmotion.shop.controllers.program_texts import plain
 from selfmotion.shop.controllers.rapid import RapidReader, write_rapid
-from selfmotion.shop.controllers.stretches import Misses, PoseStretch, Stretch
+from selfmotion.shop.controllers.segments import Misses, PoseSegment, Segment
 from selfmotion.shop.controllers.thinning import what_lines_keep, what_targets_keep
 from selfmotion.shop.controllers.tool_frames import WORLD, carrier_in_reference
 from selfmotion.shop.controllers.urscript import UrscriptReader, write_urscript
@@ -122,7 +122,7 @@ def read_program(file: FilePath, robot: RobotModel | None = None) -> ControllerP
 def program_miss(
     plan: Plan | Parts | Move | Program, file: FilePath, read: ControllerProgram | None = None
 ) -> tuple[int, Misses, Misses]:
-    """Return what a program file holds: targets, the deviations it states, and what it is.
+    """Return the contents of a program file: targets, the deviations it states, and its kind.
 
     The file is read unless it was `read` before.
 
@@ -142,7 +142,7 @@ def program_miss(
 
 
 class JudgedStep(NamedTuple):
-    """What a certificate says of the targets of a seam or move.
+    """The certificate of the targets of a seam or move.
 
     Attributes
     ----------
@@ -157,7 +157,7 @@ class JudgedStep(NamedTuple):
 
 
 class ProgramParts(NamedTuple):
-    """What of a program each step of its job is.
+    """The part of a program that each step of its job is.
 
     Attributes
     ----------
@@ -176,7 +176,7 @@ class ProgramParts(NamedTuple):
 
 
 def parts_of(file: FilePath, program: ControllerProgram, job: Program) -> ProgramParts:
-    """Return what of a program each step of its job is.
+    """Return the part of a program that each step of its job is.
 
     Raises
     ------
@@ -187,10 +187,10 @@ def parts_of(file: FilePath, program: ControllerProgram, job: Program) -> Progra
     known = [axis.joint for axis in program.axes]
     if sorted(known) != sorted(names):
         raise FileFormatError(f"{file}: has joints {', '.join(known)}, expected {', '.join(names)}")
-    left, found = list(program.stretches), ProgramParts([], slow := [], [])
+    left, found = list(program.segments), ProgramParts([], slow := [], [])
 
-    def part(stretches: Sequence[Stretch]) -> ControllerProgram:
-        return replace(program, stretches=tuple(stretches))
+    def part(segments: Sequence[Segment]) -> ControllerProgram:
+        return replace(program, segments=tuple(segments))
 
     for number, step in enumerate(job.steps):
         taken, seconds = [], 0.0
@@ -210,7 +210,7 @@ def parts_of(file: FilePath, program: ControllerProgram, job: Program) -> Progra
         found.motions.append([motion.of_joints(names) for motion in own.motions(path)])
         # Where the arm rests, it is where the poses around have it.
         moving = [item for item in taken if not item.is_rest]
-        posed = not moving or any(isinstance(item, PoseStretch) for item in moving)
+        posed = not moving or any(isinstance(item, PoseSegment) for item in moving)
         found.by_poses.append(posed)
     if left:
         raise FileFormatError(f"{file}: goes on with '{left[0].name}' when the job has ended")
@@ -220,7 +220,7 @@ def parts_of(file: FilePath, program: ControllerProgram, job: Program) -> Progra
 def slow_steps(
     parts: ProgramParts, job: Program
 ) -> tuple[tuple[JudgedStep, ...], Mapping[int, Sequence[CheckedMotion]]]:
-    """Return what is found of slow motions, and these by the step that they are before.
+    """Return failures of slow motions, and these motions by the step that they are before.
 
     Each has to keep what the nearest free move has to.
     """
@@ -239,14 +239,19 @@ def slow_steps(
 
 # Programs of controllers, judged by what they were made from.
 
-# Files have so many digits of time [s], and of angles [rad].
-_MOMENT, _LEAST = 1e-4, 1e-6
-# Where a program begins and ends is written to so many digits [rad or m], by poses to fewer; what
-# it switches is switched at a target, as near to its time [s].
-_DIGITS, _OF_POSES, _PROMPT = 1e-6, 1e-5, 1e-3
-# A slow motion of a shifted program ends as near as this to where the shift takes it [m].
+# Rounding of times in files [s].
+_MOMENT = 1e-4
+# Rounding of angles in files [rad].
+_LEAST = 1e-6
+# Rounding of the ends of a program in joints [rad or m].
+_DIGITS = 1e-6
+# Rounding of its ends in poses, as joints [rad or m].
+_OF_POSES = 1e-5
+# Tolerance of the times of outputs, which are switched at targets [s].
+_PROMPT = 1e-3
+# Distance of a slow motion's end from the end by the program's shift [m].
 _EXPLAINED = 1e-3
-# Times as near as this are one [s].
+# Difference of times that are the same [s].
 _INSTANT = 1e-9
 
 
@@ -316,7 +321,7 @@ def _judged_move(
     motions: Sequence[Trajectory],
     kept: Callable[[Sequence[Constraint]], tuple[Constraint, ...]],
 ) -> JudgedStep:
-    """Return what is found of a move by each way in which it may be made: the first that fails."""
+    """Return the verdict on a move by each interpolation: the first that fails."""
     asked, lines = kept(made.constraints), what_lines_keep(kept(made.constraints))
     ways = [Move(made.robot, lines if k else asked, motion) for k, motion in enumerate(motions)]
     worst = next((move for move in ways if not move.verified), ways[0])
@@ -324,7 +329,7 @@ def _judged_move(
     return JudgedStep(name, worst.verified, f"{worst.verdict}{way}")
 
 
-def judged_ways(
+def judged_interpolations(
     motions: Sequence[Trajectory],
     judge: Callable[[Trajectory], Certificate],
     judge_lines: Callable[[Trajectory], Certificate] | None = None,
@@ -374,7 +379,7 @@ def judged_program(file: FilePath, job: Program, within: Tolerance | None = None
     slow, between = slow_steps(parts, job)
     pieces = [piece for k, own in enumerate(pieces) for piece in (*between.get(k, ()), own)]
     # From axis targets to poses there are digits of both, which the arm's kinematics may magnify.
-    digits = _OF_POSES if any(isinstance(s, PoseStretch) for s in program.stretches) else _DIGITS
+    digits = _OF_POSES if any(isinstance(s, PoseSegment) for s in program.segments) else _DIGITS
     failures = (
         *(f"the job itself: {text}" for text in job.failures),
         *gaps(job.robot, pieces, digits),
@@ -385,7 +390,7 @@ def judged_program(file: FilePath, job: Program, within: Tolerance | None = None
         *unlike(program, job.robot, constraints_of(job)),
     )
     left = of_the_controller(program)
-    return JudgedProgram((*steps, *slow), failures, allowed, shift_told(program), left)
+    return JudgedProgram((*steps, *slow), failures, allowed, shift_note(program), left)
 
 
 def _shifted_moves(program: ControllerProgram, job: Program, parts: ProgramParts) -> Iterator[str]:
@@ -461,7 +466,7 @@ def unlike(
 
 
 def of_the_controller(program: ControllerProgram) -> str:
-    """Return what of a program is the controller's own, and not judged, in words."""
+    """Return the parts of a program that the controller decides, and that are not judged."""
     if program.within is None:
         return "accelerations are the controller's, and not judged"
     return (
@@ -470,7 +475,7 @@ def of_the_controller(program: ControllerProgram) -> str:
     )
 
 
-def shift_told(program: ControllerProgram) -> str:
+def shift_note(program: ControllerProgram) -> str:
     """Return by how much the work object is elsewhere than planned, in words; empty for not."""
     if program.shift is None:
         return ""
@@ -512,7 +517,7 @@ def as_shifted(problem: Problem, program: ControllerProgram, begin: Array) -> Pr
 
 
 def misswitched(program: ControllerProgram, made: object) -> tuple[str, ...]:
-    """Return what a controller's program switches otherwise than its job's events, or besides them.
+    """Return the differences between the outputs of a controller's program and its job's events.
 
     A plan, parts or a move have no events.
     """
@@ -550,7 +555,7 @@ def judged_motion(motion: Trajectory, job: Program) -> JudgedProgram:
 
 
 def part_of(motion: Trajectory, first: float, last: float) -> Trajectory:
-    """Return what a motion is from one of its times to another [s], from t = 0 on."""
+    """Return the part of a motion from one of its times to another [s], from t = 0 on."""
     first, last = motion.t[0] + first, min(motion.t[0] + last, motion.t[-1])
     inside = motion.t[(motion.t > first + _INSTANT) & (motion.t < last - _INSTANT)]
     t = np.concatenate([[first], inside, [last]])
@@ -565,7 +570,7 @@ def _judged_steps(
     kept: Callable[[Sequence[Constraint]], tuple[Constraint, ...]],
     program: ControllerProgram | None = None,
 ) -> tuple[tuple[JudgedStep, ...], list[CheckedMotion]]:
-    """Return what certificates say of the motions of a job's steps, by what of it is `kept`."""
+    """Return the certificates of the motions of a job's steps, by the limits that are `kept`."""
     found, pieces = list[JudgedStep](), list[CheckedMotion]()
     for step, ways in zip(job.steps, motions, strict=True):
         made = step.made
@@ -577,7 +582,7 @@ def _judged_steps(
                 problem = as_shifted(problem, program, ways[0].q[0])
             lines = replace(problem, constraints=what_lines_keep(problem.constraints))
             tolerance = within or made.tolerance
-            certificate, _ = judged_ways(
+            certificate, _ = judged_interpolations(
                 ways,
                 partial(problem.certify, tolerance=tolerance),
                 partial(lines.certify, tolerance=tolerance),
@@ -599,8 +604,8 @@ def _elsewhere(
     """
     for end in (0, -1) if pieces else ():
         if program is not None and program.shift is not None:
-            moving = [item for item in program.stretches if not item.is_rest]
-            if not moving or isinstance(moving[end], PoseStretch):
+            moving = [item for item in program.segments if not item.is_rest]
+            if not moving or isinstance(moving[end], PoseSegment):
                 continue
         asked = job.steps[end].motion.q[end]
         yield from elsewhere(job.robot, pieces[end], end, asked, digits)

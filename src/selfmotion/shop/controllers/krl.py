@@ -17,14 +17,14 @@ from selfmotion.shop.controllers.controller_program import (
     speeds_of,
     with_begins,
 )
-from selfmotion.shop.controllers.feed_stretches import FeedStretch
+from selfmotion.shop.controllers.feed_segments import FeedSegment
 from selfmotion.shop.controllers.program_lines import ProgramReader, switched
 from selfmotion.shop.controllers.program_settings import AXES, written
 from selfmotion.shop.controllers.program_texts import module_name, plain
-from selfmotion.shop.controllers.read_stretches import Pose, pose_of_values, times_of
-from selfmotion.shop.controllers.stretches import (
-    PoseStretch,
-    Stretch,
+from selfmotion.shop.controllers.read_segments import Pose, pose_of_values, times_of
+from selfmotion.shop.controllers.segments import (
+    PoseSegment,
+    Segment,
     fastest_between,
     on_one_side,
     straight,
@@ -47,7 +47,7 @@ from selfmotion.shop.controllers.tool_frames import krl_numbers, krl_pose, statu
 # at a feed has ``$VEL.CP`` in place of times, and ``SCIRC`` where it goes round, whose
 # orientation turns evenly in ``$BASE`` (``$ORI_TYPE = #VAR``, ``$CIRC_TYPE = #BASE``).
 
-# What no module may be called.
+# Names that no module may have.
 # fmt: off
 _WORDS = (
     "AND", "ANIN", "ANOUT", "AXIS", "B_AND", "B_EXOR", "B_NOT", "B_OR", "BOOL", "BRAKE", "CASE",
@@ -64,13 +64,24 @@ _WORDS = (
 # fmt: on
 # Characters in a name.
 NAME = 24
-# The fastest approach [m/s, °/s], and speeds above all that times ask for.
-_FASTEST, _TURNING, _UNBOUND, UNBOUND_TURNING = 0.5, 100.0, 2.0, 400.0
-# What axes may have of their speeds [%]; the most that $VEL.CP may be [m/s]; what is set is above
-# what times ask for by this share.
-_WHOLE, _MOST, _ABOVE_ASKED = 100.0, 3.0, 1.02
-# Ways shorter than this have no direction [m]; digits leave poses of a line this far off it.
-_SHORT, _ON_LINE = 1e-3, 4e-7
+# Largest speed of the approach [m/s].
+_FASTEST = 0.5
+# Largest rate of turning of the approach [°/s].
+_TURNING = 100.0
+# Speed above all that the times of targets need [m/s].
+_UNBOUND = 2.0
+# Rate of turning above all that the times of targets need [°/s].
+UNBOUND_TURNING = 400.0
+# Largest share of the speeds of axes [%].
+_WHOLE = 100.0
+# Largest $VEL.CP [m/s].
+_MOST = 3.0
+# Ratio of the speed that is set to the speed that times need.
+_ABOVE_ASKED = 1.02
+# Length of path below which it has no direction [m].
+_SHORT = 1e-3
+# Distance of poses from their line by rounding [m].
+_ON_LINE = 4e-7
 
 
 def write_krl(file: FilePath, draft: Draft) -> None:
@@ -78,7 +89,7 @@ def write_krl(file: FilePath, draft: Draft) -> None:
     program = draft.program
     name = module_name(file, NAME, _WORDS)
     percent = f"{100.0 * draft.settings.approach:g}"
-    first = program.stretches[0]
+    first = program.segments[0]
     lines = [
         "&ACCESS RVP",
         "&REL 1",
@@ -97,76 +108,76 @@ def write_krl(file: FilePath, draft: Draft) -> None:
         "  BAS(#ACC_PTP, 100)",
     ]
     begins = True
-    for stretch, begun in with_begins(program.stretches):
-        lines += ["", f"  ; step: {plain(stretch.name)}"]
-        lines += [f"  ; {line}" for line in before(stretch)]
+    for segment, begun in with_begins(program.segments):
+        lines += ["", f"  ; step: {plain(segment.name)}"]
+        lines += [f"  ; {line}" for line in before(segment)]
         if begun is not None:
             lines += _slowly(draft, begun, percent, begins=begins)
             begins = False
-        lines += _block(draft, stretch)
+        lines += _block(draft, segment)
     write_text(file, "\n".join([*lines, "END", ""]))
 
 
-def _block(draft: Draft, stretch: Stretch) -> list[str]:
+def _block(draft: Draft, segment: Segment) -> list[str]:
     """Return the lines of a motion from rest to rest, or of a rest."""
-    at_begin = [_event(draft, item.name) for item in stretch.events if item.target == 0]
+    at_begin = [_event(draft, item.name) for item in segment.events if item.target == 0]
     lines = [f"  {line}" for line in at_begin]
-    if stretch.is_rest:
-        t = stretch.t
+    if segment.is_rest:
+        t = segment.t
         for k in range(1, len(t)):
             lines.append(f"  WAIT SEC {_seconds(t[k] - t[k - 1])}")
             lines += [
-                f"  {_event(draft, item.name)}" for item in stretch.events if item.target == k
+                f"  {_event(draft, item.name)}" for item in segment.events if item.target == k
             ]
         return lines
-    if isinstance(stretch, FeedStretch):
-        return [*lines, *_at_speed(draft, stretch)]
-    block, segment = "PTP_SPLINE", "SPTP"
-    if isinstance(stretch, PoseStretch):
-        block, segment = "SPLINE", "SLIN" if _is_straight(stretch) else "SPL"
-        speed = _unbound(stretch)
+    if isinstance(segment, FeedSegment):
+        return [*lines, *_at_speed(draft, segment)]
+    block, command = "PTP_SPLINE", "SPTP"
+    if isinstance(segment, PoseSegment):
+        block, command = "SPLINE", "SLIN" if _is_straight(segment) else "SPL"
+        speed = _unbound(segment)
         # After a seam at its feed, or where times ask for more.
         if speeds_of(draft.program) or speed > _UNBOUND:
             lines.append(f"  $VEL.CP = {speed:g}")
     lines += [f"  {block}", "    TIME_BLOCK START"]
-    for k in range(1, len(stretch.t)):
-        lines += _triggers(draft, stretch, k)
-        lines.append(f"    {segment} {_target(stretch, k, draft.program)}")
-        lines.append(f"    TIME_BLOCK PART = {_seconds(stretch.t[k] - stretch.t[k - 1])}")
-    lines += [f"    TIME_BLOCK END = {_seconds(stretch.t[-1])}", "  ENDSPLINE"]
+    for k in range(1, len(segment.t)):
+        lines += _triggers(draft, segment, k)
+        lines.append(f"    {command} {_target(segment, k, draft.program)}")
+        lines.append(f"    TIME_BLOCK PART = {_seconds(segment.t[k] - segment.t[k - 1])}")
+    lines += [f"    TIME_BLOCK END = {_seconds(segment.t[-1])}", "  ENDSPLINE"]
     return lines
 
 
-def _unbound(stretch: PoseStretch) -> float:
-    """Return a speed above what the times of a stretch ask for, if $VEL.CP can be it [m/s]."""
-    fast, _ = fastest_between(stretch.t, stretch.places, stretch.turns)
+def _unbound(segment: PoseSegment) -> float:
+    """Return a speed above what the times of a segment ask for, if $VEL.CP can be it [m/s]."""
+    fast, _ = fastest_between(segment.t, segment.places, segment.turns)
     return float(min(max(_UNBOUND, np.ceil(1e3 * _ABOVE_ASKED * fast) / 1e3), _MOST))
 
 
-def _at_speed(draft: Draft, stretch: FeedStretch) -> list[str]:
+def _at_speed(draft: Draft, segment: FeedSegment) -> list[str]:
     """Return the lines of a seam at its feed: one segment, or a block of them."""
-    speeds, count = stretch.speeds, len(stretch.speeds)
+    speeds, count = segment.speeds, len(segment.speeds)
     # Steps that bend, none of them round, are passed smoothly.
-    bends = not (np.isfinite(stretch.vias).any() or _is_straight(stretch))
+    bends = not (np.isfinite(segment.vias).any() or _is_straight(segment))
     straight_one = "SPL" if bends and count > 1 else "SLIN"
-    lines, segments = [f"  $VEL.CP = {speeds[0]:.7g}"], []
+    lines, commands = [f"  $VEL.CP = {speeds[0]:.7g}"], []
     for k in range(1, count + 1):
-        segments += _triggers(draft, stretch, k)
-        segment = f"{straight_one} {_target(stretch, k, draft.program)}"
-        if stretch.goes_round(k):
-            via = _target(stretch.middles, k - 1, draft.program)
-            segment = f"SCIRC {via}, {_target(stretch, k, draft.program)}"
+        commands += _triggers(draft, segment, k)
+        command = f"{straight_one} {_target(segment, k, draft.program)}"
+        if segment.goes_round(k):
+            via = _target(segment.middles, k - 1, draft.program)
+            command = f"SCIRC {via}, {_target(segment, k, draft.program)}"
         own = f" WITH $VEL.CP = {speeds[k - 1]:.7g}" if speeds[k - 1] != speeds[0] else ""
-        segments.append(f"    {segment}{own}")
-    if count == 1 and len(segments) == 1:
-        return [*lines, segments[0][2:]]
-    return [*lines, "  SPLINE", *segments, "  ENDSPLINE"]
+        commands.append(f"    {command}{own}")
+    if count == 1 and len(commands) == 1:
+        return [*lines, commands[0][2:]]
+    return [*lines, "  SPLINE", *commands, "  ENDSPLINE"]
 
 
-def _triggers(draft: Draft, stretch: Stretch, k: int) -> list[str]:
-    """Return what switches what is to be at a target."""
+def _triggers(draft: Draft, segment: Segment, k: int) -> list[str]:
+    """Return the lines that switch outputs at a target."""
     lines = []
-    for item in stretch.events:
+    for item in segment.events:
         if item.target == k:
             said = _event(draft, item.name)
             # Without ONSTART it is at the end of the motion that follows.
@@ -177,14 +188,14 @@ def _triggers(draft: Draft, stretch: Stretch, k: int) -> list[str]:
     return lines
 
 
-def _slowly(draft: Draft, stretch: Stretch, percent: str, *, begins: bool) -> list[str]:
-    """Return the slow motion to where a stretch begins, of another kind than the one before."""
-    if not isinstance(stretch, PoseStretch):
+def _slowly(draft: Draft, segment: Segment, percent: str, *, begins: bool) -> list[str]:
+    """Return the slow motion to where a segment begins, of another kind than the one before."""
+    if not isinstance(segment, PoseSegment):
         slow, fast = ([f"  BAS(#VEL_PTP, {x})", f"  BAS(#ACC_PTP, {x})"] for x in (percent, "100"))
-        return [*slow, f"  PTP {_aggregate(stretch, 0, draft.program)}", *fast]
+        return [*slow, f"  PTP {_aggregate(segment, 0, draft.program)}", *fast]
     configuration = ""
     if begins:
-        status, turn = status_and_turn(stretch.frames, stretch.q[0, np.argsort(stretch.order)])
+        status, turn = status_and_turn(segment.frames, segment.q[0, np.argsort(segment.order)])
         configuration = f", T {turn}" if status is None else f", S {status}, T {turn}"
     slow, fast = _slow_and_fast(draft)
     unknown = [
@@ -194,9 +205,9 @@ def _slowly(draft: Draft, stretch: Stretch, percent: str, *, begins: bool) -> li
     return [
         *(unknown if begins and "S" not in configuration else []),
         *slow,
-        f"  LIN {_target(stretch, 0, draft.program, configuration)}",
+        f"  LIN {_target(segment, 0, draft.program, configuration)}",
         # A seam at its feed says it itself.
-        *(fast[1:] if isinstance(stretch, FeedStretch) else fast),
+        *(fast[1:] if isinstance(segment, FeedSegment) else fast),
     ]
 
 
@@ -213,9 +224,9 @@ def _slow_and_fast(draft: Draft) -> tuple[list[str], list[str]]:
     return slow, fast
 
 
-def _is_straight(stretch: PoseStretch) -> bool:
+def _is_straight(segment: PoseSegment) -> bool:
     """Whether all poses are on one line that turns about one axis, one after the other."""
-    rows = np.hstack([stretch.places, stretch.turns])
+    rows = np.hstack([segment.places, segment.turns])
     way = np.linalg.norm(rows[:, :3] - rows[0, :3], axis=1)
     if way[-1] < _SHORT or (np.diff(way) <= 0.0).any():
         return False
@@ -223,7 +234,7 @@ def _is_straight(stretch: PoseStretch) -> bool:
 
 
 def _base(draft: Draft) -> str:
-    """Return what poses are counted in: in the world, or on an external kinematic system."""
+    """Return the frame of poses: the world, or an external kinematic system."""
     frames = draft.frames
     if frames is None:
         return "{X 0, Y 0, Z 0, A 0, B 0, C 0}"
@@ -240,13 +251,13 @@ def _base(draft: Draft) -> str:
     return f"EK({machine}.ROOT, {machine}.MECH_TYPE, {_frame(frames.work)})"
 
 
-def _target(stretch: Stretch, k: int, program: ControllerProgram, configuration: str = "") -> str:
+def _target(segment: Segment, k: int, program: ControllerProgram, configuration: str = "") -> str:
     """Return a target: axes, or a pose and the external axes."""
-    if not isinstance(stretch, PoseStretch):
-        return _aggregate(stretch, k, program)
-    numbers = krl_numbers(stretch.places[k], stretch.turns[k])
+    if not isinstance(segment, PoseSegment):
+        return _aggregate(segment, k, program)
+    numbers = krl_numbers(segment.places[k], segment.turns[k])
     pose = [f"{name} {value:.5f}" for name, value in zip("XYZABC", numbers, strict=True)]
-    values = zip(program.axes, written(stretch.q[k], program.axes), strict=True)
+    values = zip(program.axes, written(segment.q[k], program.axes), strict=True)
     outer = [f"{axis.name} {value}" for axis, value in values if axis.name.startswith("E")]
     return "{" + ", ".join(pose) + configuration + "".join(f", {text}" for text in outer) + "}"
 
@@ -263,8 +274,8 @@ def _event(draft: Draft, event: str) -> str:
     return f"$OUT[{output}] = {str(value).upper()}"
 
 
-def _aggregate(stretch: Stretch, k: int, program: ControllerProgram) -> str:
-    values = written(stretch.q[k], program.axes)
+def _aggregate(segment: Segment, k: int, program: ControllerProgram) -> str:
+    values = written(segment.q[k], program.axes)
     named = zip(program.axes, values, strict=True)
     return "{" + ", ".join(f"{axis.name} {value}" for axis, value in named) + "}"
 
@@ -293,7 +304,7 @@ def _seconds(value: float) -> str:
 
 # Parts whose sum is as near to their block's time as this [s] are seconds.
 _ABOVE = 1e-4
-# How the tool turns in circular segments is said by so many variables.
+# Variables that set how the tool turns in circular segments.
 _KINDS = 2
 
 
@@ -407,12 +418,12 @@ class KrlReader(ProgramReader):
         """Take what is said of how the tool turns."""
         self._turns.add(given[0].upper())
 
-    def segment(self, given: Sequence[str]) -> None:
+    def command(self, given: Sequence[str]) -> None:
         """Take a straight or smooth segment at a speed, in a block or alone."""
         kind, pose, speed = given
         self._at_speed(self._pose(pose), None, speed, is_smooth=kind.upper() == "SPL")
 
-    def round_segment(self, given: Sequence[str]) -> None:
+    def circular_command(self, given: Sequence[str]) -> None:
         """Take a circular segment at a speed, in a block or alone."""
         via, pose, speed = given
         if len(self._turns) < _KINDS:
@@ -623,8 +634,8 @@ KrlReader.grammar = (
     (("block",), r"TIME_BLOCK START", KrlReader.start),
     (("time",), rf"SPTP {_TARGET}", KrlReader.target),
     (("time",), rf"(?:SPL|SLIN) {_POSE}", KrlReader.pose),
-    (("block", "body"), rf"(SPL|SLIN) {_POSE}{_WITH}", KrlReader.segment),
-    (("block", "body"), rf"SCIRC {_POSE} ?, ?{_POSE}{_WITH}", KrlReader.round_segment),
+    (("block", "body"), rf"(SPL|SLIN) {_POSE}{_WITH}", KrlReader.command),
+    (("block", "body"), rf"SCIRC {_POSE} ?, ?{_POSE}{_WITH}", KrlReader.circular_command),
     (("time",), r"TIME_BLOCK PART ?= ?(\S+)", KrlReader.part),
     (
         ("time", "block"),

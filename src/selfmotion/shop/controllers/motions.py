@@ -320,7 +320,7 @@ def _write_stream(
 
 # How tables of what happens when are called.
 _TIMETABLE = ".timetable.csv"
-# What is written as messages of ROS, in texts.
+# Messages of ROS, as texts.
 MESSAGES = ("ros", "moveit")
 # Samples per second of a stream to an arm of Universal Robots.
 STREAM = 125.0

@@ -1,4 +1,4 @@
-"""What a program rests on besides its targets: held joints, outputs, and the load."""
+"""Facts that a program depends on besides its targets: held joints, outputs, and the load."""
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
@@ -20,11 +20,15 @@ from selfmotion.shop.controllers.program_settings import (
 )
 from selfmotion.shop.controllers.program_texts import KEPT, plain
 
-# What comments begin with that state these facts.
-_HELD, _OUTPUTS, _UNIT, _FLANGE = "held joints: ", "outputs: ", "positioner: ", "flange: "
-_LOAD, _APPROACH = "load: ", "approach: "
+# Beginnings of comments that state these facts.
+_HELD = "held joints: "
+_OUTPUTS = "outputs: "
+_UNIT = "positioner: "
+_FLANGE = "flange: "
+_LOAD = "load: "
+_APPROACH = "approach: "
 _FACTS = (_FLANGE, _HELD, _OUTPUTS, _UNIT, _LOAD, _APPROACH)
-# What else a head states and a reader believes, and what guards all of it.
+# Other statements of a head that readers use; the checksum guards all of them.
 _BELIEVED = (
     *("axes: ", "deviation: ", "deviation of moves: ", KEPT, "poses: ", "planned work object: "),
     *_FACTS,
@@ -32,13 +36,16 @@ _BELIEVED = (
 _CHECKSUM = "checksum of what is stated: "
 # Held joints stand where the file says within its digits [rad or m].
 _DIGITS = 1e-6
-# A load is the same within this share, but at least within 1 g, and its centre within 1 mm: what a
-# scale and a drawing give.
-_SHARE, _GRAM, _MILLIMETRE = 1e-3, 1e-3, 1e-3
+# Relative difference of masses that are the same: that of a scale.
+_SHARE = 1e-3
+# Difference of masses that are the same in any case [kg].
+_GRAM = 1e-3
+# Difference of centres of mass that are the same: that of a drawing [m].
+_MILLIMETRE = 1e-3
 
 
 class Load(NamedTuple):
-    """What the flange carries.
+    """The load at the flange.
 
     Attributes
     ----------
@@ -66,7 +73,7 @@ class Load(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class ProgramFacts:
-    """What the head of a program states that its targets rest on.
+    """Facts in the head of a program that its targets depend on.
 
     Attributes
     ----------
@@ -136,7 +143,7 @@ class ProgramFacts:
 
     @property
     def notes(self) -> list[str]:
-        """What the head says of them, without what marks comments as such."""
+        """Their lines in the head, without the marks of comments."""
         parts = [f"{_FLANGE}{json.dumps(self.flange)}"]
         parts += [f"{_HELD}{json.dumps(dict(self.held))}"] if self.held else []
         parts += [f"{_OUTPUTS}{json.dumps(dict(self.outputs))}"] if self.outputs else []
@@ -197,11 +204,11 @@ def _slides(robot: RobotModel, joint: str) -> bool:
     return robot.urdf.joints[joint].kind == "prismatic"
 
 
-# What torques were verified with, and what a program says that the flange carries.
+# The load that torques were verified with, and the load that a program states.
 
 
 def verified_loads(robot: RobotModel, constraints: Sequence[Constraint], flange: str) -> list[Load]:
-    """Return what the flange carries in each constraint of torques, by payload and URDF."""
+    """Return the load at the flange in each constraint of torques, by payload and URDF."""
     limits = [item for item in constraints if isinstance(item, JointTorqueLimits)]
     if not limits:
         return []

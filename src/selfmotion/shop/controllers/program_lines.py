@@ -11,10 +11,10 @@ from selfmotion.model.robot import RobotModel
 from selfmotion.model.task import SE3
 from selfmotion.shop.controllers.commented_lines import Lines
 from selfmotion.shop.controllers.controller_program import ControllerProgram, Switch
-from selfmotion.shop.controllers.feed_stretches import Ramps, times_at
+from selfmotion.shop.controllers.feed_segments import Ramps, times_at
 from selfmotion.shop.controllers.program_facts import Load
 from selfmotion.shop.controllers.program_texts import PLANNED
-from selfmotion.shop.controllers.read_stretches import (
+from selfmotion.shop.controllers.read_segments import (
     Pose,
     PoseRow,
     Row,
@@ -26,7 +26,7 @@ _ROUNDED = 1e-2
 
 
 def switched(at: float, given: Sequence[str]) -> Switch:
-    """Return what an output and its value, or the name of an event, are at a time [s]."""
+    """Return the output and its value, or the name of the event, at a time [s]."""
     if len(given) == 1:
         return Switch(at, given[0].strip())
     output, value = given
@@ -62,7 +62,7 @@ class ProgramReader:
         # Whether an axis carries the work object, where a program says it.
         self.is_carried: bool | None = None
         self.switches: list[Switch] = []
-        # What the flange carries, and the mechanical unit of the work object, where it says that.
+        # The load at the flange, and the mechanical unit of the work object, if it is stated.
         self.load: Load | None = None
         self.unit = ""
 
@@ -115,7 +115,7 @@ class ProgramReader:
         self.switches.append(switched(self.clock, given))
 
     def load_is(self, mass: str, center: Sequence[str], metres: float) -> None:
-        """Take what the flange carries: its mass [kg] and centre, in so many metres."""
+        """Set the load at the flange: its mass [kg] and centre, in units of `metres` [m]."""
         at = [metres * self.lines.coordinate(text) for text in center]
         self.load = Load(self.lines.number_of(mass), np.array(at))
 
@@ -151,7 +151,7 @@ class ProgramReader:
         is_spline: bool = False,
         acceleration: float = np.inf,
     ) -> None:
-        """Take a stretch of poses at speeds [m/s], and what is switched at which of them.
+        """Take a segment of poses at speeds [m/s], and what is switched at which of them.
 
         With the `acceleration` [m/s²] that a program gives the tool has to come to its speed:
         ramps are the controller's, but the seam between them is judged at its feed.
@@ -193,14 +193,14 @@ class ProgramReader:
         self.at, self.pose_at = None, poses[-1]
 
     def follow(self, poses: list[Pose], seconds: list[float]) -> None:
-        """Take a stretch of poses."""
+        """Take a segment of poses."""
         if self.pose_at is None:
             raise self.lines.fault("a pose after axis targets, expected a slow motion there first")
         self.rows.append(PoseRow(self.lines.step(), [self.pose_at, *poses], seconds))
         self.at, self.pose_at = None, poses[-1]
 
     def join(self, targets: list[list[float]], seconds: list[float]) -> None:
-        """Take a stretch of axis targets."""
+        """Take a segment of axis targets."""
         if self.at is None:
             raise self.lines.fault("axis targets after a pose, expected a slow motion there first")
         self.rows.append(Row(self.lines.step(), [self.at, *targets], seconds))

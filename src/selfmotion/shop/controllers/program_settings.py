@@ -1,4 +1,4 @@
-"""What a controller's program says besides the motion, and which of its axes each joint is."""
+"""Settings of a controller's program besides the motion, and the axis of each joint."""
 
 import dataclasses
 from collections.abc import Mapping, Sequence
@@ -26,26 +26,27 @@ from selfmotion.model.path import pose_of
 from selfmotion.model.robot import RobotModel
 from selfmotion.model.task import SE3, as_pose
 
-# What a controller's program says besides the motion.
-
 # Where an output of a signal is, and what it becomes.
 Signal = tuple[str | int, bool]
 _DEVIATION = Tolerance(1e-4, 1e-3)
-# No arm carries more [kg], nor holds it farther from its flange [m].
-_HEAVIEST, _FARTHEST = 3000.0, 5.0
-# A work object stands no farther from the arm's base [m]; the word for the frame of the path.
+# Largest mass at a flange [kg].
+_HEAVIEST = 3000.0
+# Largest distance of its centre from the flange [m].
+_FARTHEST = 5.0
+# Largest distance of a work object from the arm's base [m].
 _FARTHEST_WORK = 50.0
+# Word for the frame of the path.
 OF_PATH = "path"
 # Mechanical units that a KUKA controller has at most.
 _UNITS = 16
-# What targets may be.
+# Kinds of targets.
 TARGETS = ("joints", "poses", "timed-poses")
 AXES = tuple(f"{kind}{number}" for kind in "AE" for number in range(1, 7))
 
 
 @dataclass(frozen=True)
 class ProgramSettings:
-    """What a program for a controller says besides the motion.
+    """Settings of a program for a controller besides the motion.
 
     Parameters
     ----------
@@ -182,11 +183,11 @@ class ProgramSettings:
 
     @property
     def streamed(self) -> "ProgramSettings":
-        """What is of URScript, which has all joints in their order at each of its periods."""
+        """Settings of URScript only, which has all joints in their order at each period."""
         return dataclasses.replace(self, deviation=_DEVIATION, move_deviation=None, axes=None)
 
     def signal(self, event: str) -> Signal | None:
-        """Return what an event switches, None for nothing; KeyError where nothing is said of it."""
+        """Return the output of an event, None for none; KeyError if the table has no such event."""
         return (self.signals or {})[event]
 
     def knows(self, event: str) -> bool:

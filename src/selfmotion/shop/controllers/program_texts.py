@@ -8,19 +8,19 @@ from urllib.parse import quote, unquote
 
 from selfmotion.basics import FileFormatError
 from selfmotion.model.task import SE3, Quaternion
-from selfmotion.shop.controllers.stretches import Miss
+from selfmotion.shop.controllers.segments import Miss
 
 # Marks in names that stand in comments as they are, besides letters, digits and _ . - ~.
 _MARKS = "/:+#@()[]{}<>|$&=*;!?^"
 # Characters in a line of comments.
 _WIDTH = 100
-# What a comment begins with that says why targets are joints.
+# Beginning of the comment that says why targets are joints.
 BECAUSE = "targets are joints, as poses do not keep the motion: "
-# What a comment begins with that says why a seam with a feed has times all the same.
+# Beginning of the comment that says why a seam with a feed has times all the same.
 TIMED = "with times: "
-# What a comment begins with that says what seams at speeds keep.
+# Beginning of the comment that says which tolerance seams at speeds keep.
 KEPT = "kept of what is prescribed: "
-# What a comment begins with that says how long a stretch at speeds was planned to take.
+# Beginning of the comment with the planned duration of a segment at speeds.
 PLANNED = "planned time: "
 
 

@@ -17,12 +17,12 @@ from selfmotion.shop.controllers.controller_program import (
     speeds_of,
     with_begins,
 )
-from selfmotion.shop.controllers.feed_stretches import ZONE, FeedStretch
+from selfmotion.shop.controllers.feed_segments import ZONE, FeedSegment
 from selfmotion.shop.controllers.program_lines import StopReader
 from selfmotion.shop.controllers.program_settings import AXES, written
 from selfmotion.shop.controllers.program_texts import module_name, plain
-from selfmotion.shop.controllers.read_stretches import Pose, pose_of_values
-from selfmotion.shop.controllers.stretches import PoseStretch, Stretch
+from selfmotion.shop.controllers.read_segments import Pose, pose_of_values
+from selfmotion.shop.controllers.segments import PoseSegment, Segment
 from selfmotion.shop.controllers.thinning import TIME_DIGITS
 from selfmotion.shop.controllers.tool_frames import confdata, rapid_numbers, rapid_pose
 
@@ -42,7 +42,7 @@ from selfmotion.shop.controllers.tool_frames import confdata, rapid_numbers, rap
 
 # Characters in a name, those of the procedure included.
 NAME = 32
-# What no module may be called.
+# Names that no module may have.
 # fmt: off
 _WORDS = (
     "ALIAS", "AND", "BACKWARD", "BOOL", "CASE", "CONNECT", "CONST", "DEFAULT", "DIV", "DO",
@@ -55,12 +55,14 @@ _WORDS = (
 )
 # fmt: on
 _PROCEDURE = "_run"
-# What stands for an axis that is not there.
+# Value of an axis that is not there.
 _ABSENT = "9E9"
 # How a time takes the place of a speed.
 _TIME = "\\T:="
-# The fastest approach [mm/s, °/s].
-_FASTEST, _TURNING = 500.0, 100.0
+# Largest speed of the approach [mm/s].
+_FASTEST = 500.0
+# Largest rate of turning of the approach [°/s].
+_TURNING = 100.0
 
 
 def write_rapid(file: FilePath, draft: Draft) -> None:
@@ -82,15 +84,15 @@ def write_rapid(file: FilePath, draft: Draft) -> None:
         f"  PROC {name}{_PROCEDURE}()",
         *([] if draft.frames is None else ["    ConfL \\Off;"]),
         *(["    CirPathMode \\ObjectFrame;"] if goes_round(program) else []),
-        _slowly(draft, program.stretches[0], name, by_axes=True),
+        _slowly(draft, program.segments[0], name, by_axes=True),
     ]
-    for stretch, begun in with_begins(program.stretches):
-        lines += ["", f"    ! step: {plain(stretch.name)}"]
-        lines += [f"    ! {line}" for line in before(stretch)]
+    for segment, begun in with_begins(program.segments):
+        lines += ["", f"    ! step: {plain(segment.name)}"]
+        lines += [f"    ! {line}" for line in before(segment)]
         if begun is not None:
-            by_axes = not isinstance(begun, PoseStretch)
+            by_axes = not isinstance(begun, PoseSegment)
             lines.append(_slowly(draft, begun, name, by_axes=by_axes))
-        lines += _moves(draft, stretch, name)
+        lines += _moves(draft, segment, name)
     write_text(file, "\n".join([*lines, "  ENDPROC", "ENDMODULE", ""]))
 
 
@@ -99,32 +101,32 @@ def _check_robot_axes(draft: Draft) -> None:
         raise ProblemError(f"{draft.robot.name}: axes: none is A1 to A6, which a robot has")
 
 
-def _moves(draft: Draft, stretch: Stretch, name: str) -> list[str]:
-    last = len(stretch.t) - 1
+def _moves(draft: Draft, segment: Segment, name: str) -> list[str]:
+    last = len(segment.t) - 1
     lines = []
     for k in range(last + 1):
-        if k and stretch.is_rest:
-            lines.append(f"    WaitTime {_seconds(stretch.t[k] - stretch.t[k - 1])};")
+        if k and segment.is_rest:
+            lines.append(f"    WaitTime {_seconds(segment.t[k] - segment.t[k - 1])};")
         elif k:
             zone = "fine" if k == last else "z1"
-            seconds = _seconds(stretch.t[k] - stretch.t[k - 1])
+            seconds = _seconds(segment.t[k] - segment.t[k - 1])
             speed = f"v100{_TIME}{seconds}"
-            if isinstance(stretch, FeedStretch):
-                speed = f"{name}_f{speeds_of(draft.program).index(stretch.speeds[k - 1]) + 1}"
+            if isinstance(segment, FeedSegment):
+                speed = f"{name}_f{speeds_of(draft.program).index(segment.speeds[k - 1]) + 1}"
                 zone = "fine" if k == last else "z0"
-            lines.append(f"    {_motion(draft, stretch, k, name, f'{speed}, {zone}')}")
-        lines += [f"    {_event(draft, item.name)}" for item in stretch.events if item.target == k]
+            lines.append(f"    {_motion(draft, segment, k, name, f'{speed}, {zone}')}")
+        lines += [f"    {_event(draft, item.name)}" for item in segment.events if item.target == k]
     return lines
 
 
-def _motion(draft: Draft, stretch: Stretch, k: int, name: str, speed_and_zone: str) -> str:
-    """Return the motion to a target of a stretch: linear to a pose, by the axes to joints."""
-    if isinstance(stretch, PoseStretch):
-        target, rest = _robtarget(draft, stretch, k), f"{speed_and_zone}, {name}_t\\WObj:={name}_w;"
-        if isinstance(stretch, FeedStretch) and k and stretch.goes_round(k):
-            return f"MoveC {_robtarget(draft, stretch.middles, k - 1)}, {target}, {rest}"
+def _motion(draft: Draft, segment: Segment, k: int, name: str, speed_and_zone: str) -> str:
+    """Return the motion to a target of a segment: linear to a pose, by the axes to joints."""
+    if isinstance(segment, PoseSegment):
+        target, rest = _robtarget(draft, segment, k), f"{speed_and_zone}, {name}_t\\WObj:={name}_w;"
+        if isinstance(segment, FeedSegment) and k and segment.goes_round(k):
+            return f"MoveC {_robtarget(draft, segment.middles, k - 1)}, {target}, {rest}"
         return f"MoveL {target}, {rest}"
-    target = _target(stretch, k, draft.program)
+    target = _target(segment, k, draft.program)
     return f"MoveAbsJ {target}\\NoEOffs, {speed_and_zone}, {name}_t;"
 
 
@@ -136,17 +138,17 @@ def _speeds(draft: Draft, name: str) -> list[str]:
     ]
 
 
-def _slowly(draft: Draft, stretch: Stretch, name: str, *, by_axes: bool) -> str:
-    """Return the slow motion to where a stretch begins."""
-    way = Stretch(stretch.name, stretch.t, stretch.q) if by_axes else stretch
+def _slowly(draft: Draft, segment: Segment, name: str, *, by_axes: bool) -> str:
+    """Return the slow motion to where a segment begins."""
+    way = Segment(segment.name, segment.t, segment.q) if by_axes else segment
     return f"    {_motion(draft, way, 0, name, f'{name}_v, fine')}"
 
 
-def _robtarget(draft: Draft, stretch: PoseStretch, k: int) -> str:
-    x, y, z, *turn = rapid_numbers(stretch.places[k], stretch.turns[k])
-    own = stretch.q[k, np.argsort(stretch.order)]
-    *quarters, cfx = confdata(stretch.frames, own)
-    values = written(stretch.q[k], draft.program.axes)
+def _robtarget(draft: Draft, segment: PoseSegment, k: int) -> str:
+    x, y, z, *turn = rapid_numbers(segment.places[k], segment.turns[k])
+    own = segment.q[k, np.argsort(segment.order)]
+    *quarters, cfx = confdata(segment.frames, own)
+    values = written(segment.q[k], draft.program.axes)
     known = {axis.name: value for axis, value in zip(draft.program.axes, values, strict=True)}
     parts = (
         ", ".join(f"{value:.4f}" for value in (x, y, z)),
@@ -158,8 +160,8 @@ def _robtarget(draft: Draft, stretch: PoseStretch, k: int) -> str:
 
 
 def _unknown(draft: Draft) -> list[str]:
-    """Return what is not known of configurations, in words."""
-    first = next((item for item in draft.program.stretches if isinstance(item, PoseStretch)), None)
+    """Return the comment on configurations that are not known."""
+    first = next((item for item in draft.program.segments if isinstance(item, PoseSegment)), None)
     if first is None or confdata(first.frames, first.q[0, np.argsort(first.order)])[3] is not None:
         return []
     return [
@@ -175,7 +177,7 @@ def _work(draft: Draft, name: str) -> list[str]:
         return []
     nowhere, place = "[[0, 0, 0], [1, 0, 0, 0]]", _pose(frames.work)
     if not frames.is_carried:
-        told = f'TRUE, "", {place}, {nowhere}'
+        rows = f'TRUE, "", {place}, {nowhere}'
     else:
         unit = draft.settings.positioner
         if not isinstance(unit, str):
@@ -184,8 +186,8 @@ def _work(draft: Draft, name: str) -> list[str]:
                 f'names its mechanical unit; say positioner = "STN1", or what it is called, in the '
                 f"file of --settings (ProgramSettings(positioner=…))"
             )
-        told = f'FALSE, "{unit}", {nowhere}, {place}'
-    return [f"  TASK PERS wobjdata {name}_w := [FALSE, {told}];"]
+        rows = f'FALSE, "{unit}", {nowhere}, {place}'
+    return [f"  TASK PERS wobjdata {name}_w := [FALSE, {rows}];"]
 
 
 def _event(draft: Draft, event: str) -> str:
@@ -201,8 +203,8 @@ def _event(draft: Draft, event: str) -> str:
     return f"SetDO {output}, {int(value)};"
 
 
-def _target(stretch: Stretch, k: int, program: ControllerProgram) -> str:
-    values = written(stretch.q[k], program.axes)
+def _target(segment: Segment, k: int, program: ControllerProgram) -> str:
+    values = written(segment.q[k], program.axes)
     known = {axis.name: value for axis, value in zip(program.axes, values, strict=True)}
     # A robot of fewer than six axes has 0 in their place.
     own = ", ".join(known.get(name, "0") for name in AXES[:6])
@@ -212,7 +214,7 @@ def _target(stretch: Stretch, k: int, program: ControllerProgram) -> str:
 
 def _tool(draft: Draft) -> str:
     frame, (x, y, z) = _pose(draft.tool), (1e3 * value for value in draft.settings.center)
-    # What is drafted has one.
+    # A draft has one.
     mass = draft.settings.mass or 0.0
     return f"[TRUE, {frame}, [{mass:.4f}, [{x:.4f}, {y:.4f}, {z:.4f}], [1, 0, 0, 0], 0, 0, 0]]"
 
@@ -230,7 +232,7 @@ def _seconds(value: float) -> str:
 
 # ABB RAPID, read line by line: what `selfmotion.shop.controllers.rapid` writes.
 
-# What the speed of slow motions is called by at its end.
+# End of the name of the speed of slow motions.
 SLOW = "_v"
 # Zones of seams at speeds, in which corners are rounded by as much as is judged.
 _ZONES = ("fine", "z0")
@@ -249,7 +251,7 @@ class RapidReader(StopReader):
         super().__init__(file, robot)
         # Speeds by the names of their speeddata: of the tool [mm/s], and of what turns.
         self._known: dict[str, list[float]] = {}
-        # What tool and work object of the module are called, and whether arcs turn as is judged.
+        # Names of tool and work object of the module, and whether arcs turn as they are judged.
         self._tool_name, self._work_name, self._turns_evenly = "", "", False
         # Whether configurations of poses are not asked for.
         self._goes_on = False

@@ -182,7 +182,10 @@ def _values(point: Mapping[str, Any], key: str) -> list[float]:
 # The container: https://mcap.dev/spec. The messages: https://github.com/ros2/common_interfaces
 # (sensor_msgs/msg/JointState) and https://github.com/ros2/geometry2 (tf2_msgs/msg/TFMessage).
 
-STATES, FRAMES = "/joint_states", "/tf"
+# Topic of joint states.
+STATES = "/joint_states"
+# Topic of transforms.
+FRAMES = "/tf"
 
 _LINE = "=" * 80
 _HEADER = f"""{_LINE}
@@ -312,7 +315,7 @@ def motion_of_bag(file: Path) -> Trajectory:
         from zstandard import ZstdError
     except ModuleNotFoundError:
         raise ProblemError("bags need mcap-ros2-support: pip install 'selfmotion[bags]'") from None
-    # What spoilt bytes lead to is as various as the fields that they are in.
+    # Damaged bytes raise as many kinds of errors as there are fields.
     spoilt = (McapError, ZstdError, *_SPOILT)
     try:
         with file.open("rb") as stream:
@@ -324,8 +327,8 @@ def motion_of_bag(file: Path) -> Trajectory:
         raise FileFormatError(f"{file}: is no bag of ROS 2 messages: {error}") from error
     names = {tuple(state.name) for state in found}
     if len(names) != 1:
-        told = "no" if not names else "several sets of"
-        raise FileFormatError(f"{file}: has {told} joint names on {STATES}, expected one")
+        count = "no" if not names else "several sets of"
+        raise FileFormatError(f"{file}: has {count} joint names on {STATES}, expected one")
     stamps = [_NANO * s.header.stamp.sec + s.header.stamp.nanosec for s in found]
     t = np.array([at - stamps[0] for at in stamps]) / _NANO
     q, qd = (np.array([getattr(s, each) for s in found]) for each in ("position", "velocity"))

@@ -13,18 +13,18 @@ from selfmotion.planning.result import Move, Parts, Plan, at_rate, is_retimed
 from selfmotion.problem.constraints import ClosedPath, EndVelocity, StartVelocity
 from selfmotion.work.job import Program
 
-# A joint motion at the times that a file has it.
-
-# Messages count whole nanoseconds.
+# Decimals of times in messages [s]: whole nanoseconds.
 _DIGITS = 9
-# A motion has so many samples at least.
+# Smallest number of samples of a motion.
 _FEWEST = 4
-# Where between two samples straight lines are compared with the motion.
+# Shares of an interval at which straight lines are compared with the motion.
 _BETWEEN = (0.25, 0.5, 0.75)
-# A rate that does not keep the tolerance is raised at least so far for the next trial.
+# Smallest factor between rates that are tried in turn.
 _FASTER = 1.01
-# Cubics this near to a motion [rad or m] are as good as it; intervals are halved so often for that.
-_AS_GOOD_AS, _MOST_HALVINGS = 1e-8, 12
+# Deviation of cubics that counts as none [rad or m].
+_AS_GOOD_AS = 1e-8
+# Largest number of halvings of an interval until its cubic is as near.
+_MOST_HALVINGS = 12
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,8 +92,8 @@ class LinearMiss(NamedTuple):
         Of the tool in its reference, or of another frame that follows a path, where it is farthest
         off [m, rad].
     rate : float or None
-        Samples per second at which it would stay within the plan's tolerance; None where files
-        have no so many samples.
+        Samples per second at which it would stay within the plan's tolerance; None if files
+        cannot hold that many.
     """
 
     position: float
@@ -102,7 +102,7 @@ class LinearMiss(NamedTuple):
 
 
 def linear_miss(plan: Plan, rate: float | None = None) -> LinearMiss:
-    """Return what linear interpolation between the samples of a file costs; see `write_motion`.
+    """Return the error of linear interpolation between the samples of a file; see `write_motion`.
 
     Raises
     ------
@@ -197,7 +197,7 @@ def within_limits_at(plan: Plan, rate: float | None) -> Plan:
 
 
 def for_cubics(motion: Trajectory) -> Trajectory:
-    """Return a motion with so many samples that cubics through q and q̇ are it.
+    """Return a motion with enough samples for cubics through q and q̇.
 
     For files without accelerations: each interval is halved until its cubic is near enough.
     """
@@ -218,7 +218,7 @@ def for_cubics(motion: Trajectory) -> Trajectory:
 
 # Motions that begin or end while the arm moves: no controller takes one unasked.
 
-# What is slower than this rests [rad/s or m/s], as certificates judge it.
+# Speed below which a joint rests, as certificates judge it [rad/s or m/s].
 _REST = 1e-6
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from selfmotion.basics import Array, Flags
 from selfmotion.model.task import Task
-from selfmotion.shop.controllers.stretches import straight
+from selfmotion.shop.controllers.segments import straight
 from selfmotion.shop.controllers.tool_frames import ToolFrames
 
 # Circular steps between tool poses, as ``SCIRC``, ``MoveC`` and ``movec`` make them.
@@ -21,11 +21,14 @@ from selfmotion.shop.controllers.tool_frames import ToolFrames
 # (Universal Robots). A via pose is in the middle of its step in all of that, so that a controller
 # that heeds its orientation does the same.
 
-# Circles are flatter than this [m of height over the chord's length] where they are lines.
+# Ratio of height to chord below which a circle is a line.
 _FLAT = 1e-6
-# No step goes farther round than this [rad], as ABB's are below 240°, nor less, as controllers ask
-# for points that are apart: ABB by 0.1 mm and 1°.
-MOST_TURN, LEAST_TURN, LEAST_LENGTH = np.radians(200.0), np.radians(3.0), 1e-3
+# Largest angle of a circular step [rad]: ABB's are below 240°.
+MOST_TURN = np.radians(200.0)
+# Smallest angle of a circular step [rad]: ABB requires points that are 1° apart.
+LEAST_TURN = np.radians(3.0)
+# Shortest circular step [m]: ABB requires points that are 0.1 mm apart.
+LEAST_LENGTH = 1e-3
 
 
 class Arc(NamedTuple):
@@ -137,7 +140,7 @@ class Steps(NamedTuple):
 
 
 class Places(NamedTuple):
-    """A motion at places along a stretch.
+    """A motion at places along a segment.
 
     Attributes
     ----------
@@ -156,13 +159,13 @@ class Places(NamedTuple):
     at: Callable[[Array], Array]
 
     def middle(self, first: int, last: int) -> Array:
-        """Return where the tool is halfway from one place to another, (3,)."""
+        """Return the position of the tool halfway between two places, (3,)."""
         found: Array = self.at(0.5 * (self.gone[[first]] + self.gone[[last]]))[0]
         return found
 
 
 class Allowed(NamedTuple):
-    """What steps may be off: of places [m], of turning as prescribed, and of all else [rad or m].
+    """Tolerances of steps: positions [m], prescribed turning, and all else [rad or m].
 
     Attributes
     ----------

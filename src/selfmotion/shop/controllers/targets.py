@@ -1,4 +1,4 @@
-"""A motion cut into stretches, each of as few tool poses or joint targets as can be."""
+"""A motion cut into segments, each of as few tool poses or joint targets as can be."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -10,18 +10,18 @@ from typing_extensions import override
 from selfmotion.basics import Array, Flags, ProblemError, Progress, silent
 from selfmotion.certificate import Tolerance
 from selfmotion.model.motion import Trajectory
-from selfmotion.shop.controllers.stretches import (
+from selfmotion.shop.controllers.segments import (
     NO_MISS,
     SURE,
     Event,
     Miss,
     Misses,
-    PoseStretch,
-    Stretch,
+    PoseSegment,
+    Segment,
     finer,
     on_one_side,
 )
-from selfmotion.shop.controllers.thinning import TIME_DIGITS, Piece, Span, events_within, rests
+from selfmotion.shop.controllers.thinning import TIME_DIGITS, Piece, Section, events_within, rests
 from selfmotion.shop.controllers.tool_frames import Rounding, ToolFrames
 
 # As few tool poses as keep a controller near a motion.
@@ -31,16 +31,22 @@ from selfmotion.shop.controllers.tool_frames import Rounding, ToolFrames
 # joint targets are (`controllers/thinning.py`), and doubled where they are still too far apart
 # by inverse kinematics of what is in between.
 
-# Targets are at least so dense [of where they are densest]; how often they are doubled; and times
-# between them that no controller interpolates in [s].
-_SPARSE, _TRIES, _SHORTEST = 0.02, 16, 4e-3
-# So often all are made denser, where none is off by more than this share of what is allowed.
-_EVENLY, _MUCH = 5, 9.0
-# Times at which the motion is looked at between two of its samples; from how far the acceleration
-# is taken [s]; and how far poses may take joints that inverse kinematics finds anew [rad].
-_FINER, _AROUND = 4, 2e-3
-# What numbers of poses, and controllers that count with them, may be off [m, rad], in any language:
-# where that alone takes joints as far as is allowed, the arm is singular.
+# Smallest density of targets, as a share of the largest one.
+_SPARSE = 0.02
+# Largest number of refinements of the targets.
+_TRIES = 16
+# Shortest time between two targets: controllers do not interpolate in less [s].
+_SHORTEST = 4e-3
+# Number of refinements that add targets everywhere …
+_EVENLY = 5
+# … if no error exceeds this multiple of its tolerance.
+_MUCH = 9.0
+# Times at which the motion is evaluated, per interval between two samples.
+_FINER = 4
+# Step of the central differences for accelerations [s].
+_AROUND = 2e-3
+# Rounding of poses in programs and controllers, in any language [m, rad]: where that alone takes
+# joints as far as is allowed, the arm is singular.
 _OF_POSES = 1e-6
 
 
@@ -49,8 +55,8 @@ class NotByPosesError(ProblemError):
 
 
 @dataclass(frozen=True, eq=False)
-class PoseSpan(Span):
-    """What of a piece lies between two rests, to be written as tool poses.
+class PoseSection(Section):
+    """Part of a piece between two rests, to be written as tool poses.
 
     Attributes
     ----------
@@ -71,12 +77,12 @@ class PoseSpan(Span):
         slides: Flags,
         first: float,
         last: float,
-    ) -> "PoseSpan":
+    ) -> "PoseSection":
         """Return that of a piece, with the events that are in it."""
         return cls(piece, slides, first, last, events_within(piece, first, last), frames, rounding)
 
-    def stretches(self, allowed: Tolerance) -> list[tuple[Stretch, Miss]]:
-        """See `Span.stretches`.
+    def segments(self, allowed: Tolerance) -> list[tuple[Segment, Miss]]:
+        """See `Section.segments`.
 
         Raises
         ------
@@ -84,7 +90,7 @@ class PoseSpan(Span):
             The arm is singular somewhere, as at an end: its joints do not follow from poses.
         """
         self.check_regular(allowed)
-        return super().stretches(allowed)
+        return super().segments(allowed)
 
     def check_regular(self, allowed: Tolerance) -> None:
         """Raise NotByPosesError where the arm is singular within what is allowed."""
@@ -99,22 +105,22 @@ class PoseSpan(Span):
             at = float(t[int(far.argmax())] - motion.t[0])
             raise NotByPosesError(f"'{self.piece.name}': the arm is singular at t = {at:.4g} s")
 
-    def thinned(self, allowed: Tolerance) -> tuple[Stretch, Miss]:
-        """See `Span.thinned`.
+    def thinned(self, allowed: Tolerance) -> tuple[Segment, Miss]:
+        """See `Section.thinned`.
 
         Raises
         ------
         NotByPosesError
             There are no such poses.
         """
-        stretch, miss = super().thinned(allowed)
+        segment, miss = super().thinned(allowed)
         # More targets are looked at elsewhere: near a singular pose joints swing in between.
-        if isinstance(stretch, PoseStretch) and miss.share(allowed) > 1.0:
+        if isinstance(segment, PoseSegment) and miss.share(allowed) > 1.0:
             raise self._singular(self.first, allowed)
-        return stretch, miss
+        return segment, miss
 
     def _within(self, allowed: Tolerance, fixed: Array) -> Array:
-        """See `Span._within`.
+        """See `Section._within`.
 
         Raises
         ------
@@ -149,24 +155,24 @@ class PoseSpan(Span):
         """Digits of poses are finer than those of joints."""
 
     @override
-    def _passing(self, t: Array, *, at_rest: bool = False) -> Stretch:
-        stretch = super()._passing(t, at_rest=at_rest)
+    def _passing(self, t: Array, *, at_rest: bool = False) -> Segment:
+        segment = super()._passing(t, at_rest=at_rest)
         if at_rest:
-            return stretch
+            return segment
         motion = self.piece.motion
-        exact = motion(np.minimum(self.first + stretch.t, self.last))
+        exact = motion(np.minimum(self.first + segment.t, self.last))
         places, turns = self.rounding(*self.frames.places(exact))
         # External axes in their digits, the arm's joints as they follow.
-        q, arrived = self.frames.solved(places, turns, self._mixed(exact, stretch.q))
+        q, arrived = self.frames.solved(places, turns, self._mixed(exact, segment.q))
         if not arrived.all():
             at = float(t[int(np.argmin(arrived))])
             raise NotByPosesError(
                 f"'{self.piece.name}': the arm is singular at t = {at - motion.t[0]:.4g} s"
             )
-        events: tuple[Event, ...] = stretch.events
-        return PoseStretch(
-            stretch.name,
-            stretch.t,
+        events: tuple[Event, ...] = segment.events
+        return PoseSegment(
+            segment.name,
+            segment.t,
             q,
             events,
             places=places,
@@ -181,13 +187,13 @@ class PoseSpan(Span):
         q[:, others] = digits[:, others]
         return q
 
-    def _shares(self, stretch: Stretch, allowed: Tolerance) -> Array:
+    def _shares(self, segment: Segment, allowed: Tolerance) -> Array:
         """Return how much of what is allowed each step between two targets takes, (K,)."""
-        times, count = stretch.looked_at(), len(stretch.t) - 1
+        times, count = segment.looked_at(), len(segment.t) - 1
         motion = self.piece.motion
         exact = motion(np.clip(self.first + times, motion.t[0], motion.t[-1]))
         worst = np.zeros(count)
-        lines = stretch.ways(times)
+        lines = segment.ways(times)
         for line in lines:
             joints = np.abs(line - exact).max(axis=1) / allowed.rotation
             worst = np.maximum(worst, largest(joints, count))
@@ -257,28 +263,32 @@ def largest(values: Array, count: int) -> Array:
     return np.where(np.isnan(found), np.inf, found)
 
 
-# A motion cut into stretches from rest to rest, as controllers pass it.
+# A motion cut into segments from rest to rest, as controllers pass it.
 #
 # A motion is cut where the arm rests, be it for an instant: controllers stop there, and what
 # happens there happens on time. Which targets there are in between says
 # `selfmotion.shop.controllers.thinning`.
 
 # Makes a span of tool poses of a piece, which joints slide, and when it begins and ends.
-PosedSpans = Callable[[Piece, Flags, float, float], Span]
-# The arm rests where it is as slow as this [rad or m/s] for at least so long [s].
-_REST, _WHILE = 1e-7, 0.02
-# Programs go from rest to rest: this is rest [rad or m/s], and so is such a share of the fastest.
-_SLOW, _SHARE = 1e-4, 1e-3
+PosedSections = Callable[[Piece, Flags, float, float], Section]
+# Speed below which the arm rests [rad/s or m/s] …
+_REST = 1e-7
+# … if it lasts for at least this time [s].
+_WHILE = 0.02
+# Speed that counts as rest at the ends of a program [rad/s or m/s] …
+_SLOW = 1e-4
+# … and as a share of the largest one.
+_SHARE = 1e-3
 
 
-def stretches_of(
+def segments_of(
     pieces: Sequence[Piece],
     slides: Flags,
     allowed: Tolerance,
     of_moves: Tolerance | None = None,
     progress: Progress = silent,
-    posed: PosedSpans | None = None,
-) -> tuple[list[Stretch], Misses]:
+    posed: PosedSections | None = None,
+) -> tuple[list[Segment], Misses]:
     """Return the targets of a motion, as its file has them, and how far they are off it.
 
     Moves through the air may be off by `of_moves`; by default as far as they keep apart. With
@@ -291,7 +301,7 @@ def stretches_of(
     ProblemError
         It does not begin and end at rest, or takes more targets than any controller has.
     """
-    found: list[Stretch] = []
+    found: list[Segment] = []
     worst = Misses(NO_MISS, NO_MISS)
     for k, piece in enumerate(pieces):
         progress("targets", k + 1, len(pieces))
@@ -306,10 +316,10 @@ def stretches_of(
                 )
         within = _allowed(piece, allowed, of_moves)
         for first, last in _moving(motion, [motion.t[0] + at for at, _ in piece.events]):
-            for stretch, miss in _thinned(piece, slides, first, last, within, posed):
+            for segment, miss in _thinned(piece, slides, first, last, within, posed):
                 both = Misses(NO_MISS, miss) if piece.is_move else Misses(miss, NO_MISS)
                 worst = worst.worse(both)
-                found.append(stretch)
+                found.append(segment)
     return found, worst
 
 
@@ -319,16 +329,16 @@ def _thinned(
     first: float,
     last: float,
     within: Tolerance,
-    posed: PosedSpans | None,
-) -> list[tuple[Stretch, Miss]]:
+    posed: PosedSections | None,
+) -> list[tuple[Segment, Miss]]:
     if posed is not None:
         try:
-            return posed(piece, slides, first, last).stretches(within)
+            return posed(piece, slides, first, last).segments(within)
         except NotByPosesError:
             # A free move goes through singular configurations where it likes.
             if not piece.is_move:
                 raise
-    return Span.of(piece, slides, first, last).stretches(within)
+    return Section.of(piece, slides, first, last).segments(within)
 
 
 def _allowed(piece: Piece, allowed: Tolerance, of_moves: Tolerance | None) -> Tolerance:

@@ -1,4 +1,4 @@
-"""What a motion is made of, and as few joint targets as keep a controller near it."""
+"""Seams and moves of a motion, and the fewest joint targets that keep a controller near it."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -22,19 +22,19 @@ from selfmotion.problem.constraints import (
     ToolLimits,
 )
 from selfmotion.problem.problem import Problem
-from selfmotion.shop.controllers.stretches import (
+from selfmotion.shop.controllers.segments import (
     NO_MISS,
     Event,
     Miss,
-    Stretch,
+    Segment,
     miss_between,
     miss_of,
 )
 from selfmotion.work.job import Program
 
-# What a motion is made of: seams, and moves through the air with room around them.
+# Parts of a motion: seams, and moves through the air with room around them.
 
-# What a move through the air may be off at most, however much room there is [m, rad].
+# Largest deviation of a move through the air, however much room there is [m, rad].
 _ROOMY = Tolerance(5e-3, 5e-3)
 # How much of the room that is left between bodies is used: distances are found to a fiftieth.
 _SURE = 0.9
@@ -64,7 +64,7 @@ class Piece(NamedTuple):
 
 
 def pieces_of(plan: Plan | Parts | Move | Program) -> list[Piece]:
-    """Return what a plan, parts, a move or a program is made of, in order.
+    """Return the seams and moves of a plan, parts, a move or a program, in order.
 
     Raises
     ------
@@ -124,18 +124,18 @@ def _rests_of(path: Path) -> tuple[float, ...]:
 
 
 def by_targets(problem: Problem) -> Problem:
-    """Return what targets can keep of a problem."""
+    """Return a problem with the constraints that targets can keep."""
     return replace(problem, constraints=what_targets_keep(problem.constraints))
 
 
 def what_targets_keep(constraints: Sequence[Constraint]) -> tuple[Constraint, ...]:
-    """Return what targets can keep: how a controller accelerates between them is its own."""
+    """Return the constraints that targets can keep: accelerations are the controller's own."""
     own = (JointAccelerationLimits, JointJerkLimits)
     return tuple(item for item in constraints if not isinstance(item, own))
 
 
 def what_lines_keep(constraints: Sequence[Constraint]) -> tuple[Constraint, ...]:
-    """Return what straight lines between targets can keep: at corners they have no acceleration.
+    """Return the constraints that straight lines can keep: corners have no acceleration.
 
     Nor torques, then, which are judged along the smooth way.
     """
@@ -193,25 +193,35 @@ def _farthest(move: Move) -> Array:
 # Steps in which the spline through the targets misses a feed, or passes a limit of speed, are
 # halved.
 
-# Programs count times [s], angles [°] and lengths [mm] in so many digits behind the point.
-TIME_DIGITS, ANGLE_DIGITS, LENGTH_DIGITS = 5, 5, 4
-# Targets are at least so dense [of where they are densest].
+# Decimals of times in programs [s].
+TIME_DIGITS = 5
+# Decimals of angles in programs [°].
+ANGLE_DIGITS = 5
+# Decimals of lengths in programs [mm].
+LENGTH_DIGITS = 4
+# Smallest density of targets, as a share of the largest one.
 _SPARSE = 0.1
-# Share of what a feed leaves that may be taken where it is looked at: the worst is in between.
+# Share of a feed's tolerance that targets may use at the times that are evaluated: it is larger in
+# between.
 _OF_FEED = 0.8
-# Steps are not made shorter than this [s]: no controller has shorter cycles, and the digits of
-# angles would be jumps of speed.
+# Shortest step [s]: no controller has shorter cycles, and the digits of angles would be jumps of
+# speed.
 _SHORTEST = 2e-3
-# Share of a limit of speed that the spline may use where the motion uses no more.
+# Share of a limit of speed that the spline may use if the motion uses no more.
 _OF_SPEED = 0.9995
-# Times at which the motion's curvature is looked at, for each of its samples; targets at least
-# between two events or rests, tries, and more targets than this no controller takes.
-_FINER, _FEWEST, _TRIES, _MOST = 4, 4, 20, 100_000
+# Times at which the motion's curvature is evaluated, per interval between two samples.
+_FINER = 4
+# Smallest number of targets between two events or rests.
+_FEWEST = 4
+# Largest number of refinements of the targets.
+_TRIES = 20
+# Largest number of targets that a controller takes.
+_MOST = 100_000
 
 
 @dataclass(frozen=True, eq=False)
-class Span:
-    """What of a piece lies between two rests.
+class Section:
+    """Part of a piece between two rests.
 
     Attributes
     ----------
@@ -231,12 +241,12 @@ class Span:
     events: Sequence[tuple[float, str]]
 
     @classmethod
-    def of(cls, piece: Piece, slides: Flags, first: float, last: float) -> "Span":
+    def of(cls, piece: Piece, slides: Flags, first: float, last: float) -> "Section":
         """Return that of a piece, with the events that are in it."""
         return cls(piece, slides, first, last, events_within(piece, first, last))
 
-    def stretches(self, allowed: Tolerance) -> list[tuple[Stretch, Miss]]:
-        """Return what it is written as: one stretch, or several where the tool rests in between.
+    def segments(self, allowed: Tolerance) -> list[tuple[Segment, Miss]]:
+        """Return its segments: one, or several if the tool rests in between.
 
         Raises
         ------
@@ -245,8 +255,8 @@ class Span:
         """
         return [self.thinned(allowed)]
 
-    def thinned(self, allowed: Tolerance) -> tuple[Stretch, Miss]:
-        """Return its targets, and how far they are off.
+    def thinned(self, allowed: Tolerance) -> tuple[Segment, Miss]:
+        """Return the segment of its targets, and their deviation.
 
         Raises
         ------
@@ -259,8 +269,8 @@ class Span:
         self._check_digits(allowed)
         t = self._within(allowed, fixed)
         for _ in range(_TRIES):
-            stretch = self._passing(t)
-            missed = self._missed(stretch)
+            segment = self._passing(t)
+            missed = self._missed(segment)
             if not missed.any():
                 break
             # With their neighbours, so that steps do not differ much.
@@ -269,7 +279,7 @@ class Span:
             if not near.any():
                 break
             t = np.sort(np.append(t, 0.5 * (t[1:] + t[:-1])[near]))
-        return stretch, self._miss(stretch)
+        return segment, self._miss(segment)
 
     def _within(self, allowed: Tolerance, fixed: Array) -> Array:
         """Return times of targets that keep the tool and the joints near the motion."""
@@ -286,7 +296,7 @@ class Span:
             f"than {_in_words(self.piece, allowed)}"
         )
 
-    def _passing(self, t: Array, *, at_rest: bool = False) -> Stretch:
+    def _passing(self, t: Array, *, at_rest: bool = False) -> Segment:
         """Return targets at times, as the file has them."""
         if len(t) > _MOST:
             raise ProblemError(
@@ -298,10 +308,10 @@ class Span:
         if at_rest:
             q[:] = q[0]
         events = (Event(int(np.abs(t - at).argmin()), name) for at, name in self.events)
-        return Stretch(self.piece.name, offset, q, tuple(events))
+        return Segment(self.piece.name, offset, q, tuple(events))
 
-    def _miss(self, stretch: Stretch) -> Miss:
-        return miss_of(stretch, self.piece.motion, self.piece.chains, self.first)
+    def _miss(self, segment: Segment) -> Miss:
+        return miss_of(segment, self.piece.motion, self.piece.chains, self.first)
 
     def _in_digits(self, q: Array) -> Array:
         """Return coordinates [rad or m] as they are when their digits in a file are read again."""
@@ -319,15 +329,15 @@ class Span:
                 f"tool; allow more than {_in_words(self.piece, allowed)}"
             )
 
-    def _missed(self, stretch: Stretch) -> Flags:
+    def _missed(self, segment: Segment) -> Flags:
         """Whether a feed is missed, or a limit of speed passed, between two targets (K,).
 
         Where the motion itself does not; on the spline through the targets and straight between
         them. Cut corners are slower than that.
         """
-        far = np.zeros(len(stretch.t) - 1)
-        for times, q, qd in islice(stretch.joined(), 2):
-            step = np.clip(np.searchsorted(stretch.t, times, side="right") - 1, 0, len(far) - 1)
+        far = np.zeros(len(segment.t) - 1)
+        for times, q, qd in islice(segment.joined(), 2):
+            step = np.clip(np.searchsorted(segment.t, times, side="right") - 1, 0, len(far) - 1)
             np.maximum.at(far, step, self._taken(times, q, qd))
         return np.asarray(far > 1.0)
 
@@ -355,7 +365,7 @@ class Span:
 
 
 def events_within(piece: Piece, first: float, last: float) -> list[tuple[float, str]]:
-    """Return what happens in a part of a piece, at times of its motion [s]."""
+    """Return the events in a part of a piece, at times of its motion [s]."""
     start, end = float(piece.motion.t[0]), float(piece.motion.t[-1])
     return [
         (start + at, name)
@@ -365,7 +375,7 @@ def events_within(piece: Piece, first: float, last: float) -> list[tuple[float, 
 
 
 def _in_words(piece: Piece, allowed: Tolerance) -> str:
-    """Return what is allowed as the file of settings says it."""
+    """Return the tolerance as the file of settings has it."""
     key = "move_deviation" if piece.is_move else "deviation"
     return (
         f"{key} = {{ position_mm = {1e3 * allowed.position:.3g}, "

@@ -19,9 +19,10 @@ from selfmotion.shop.controllers.program_settings import (
     tool_from_flange,
 )
 
-# A frame is turned by more than rounding [rad]; frames that differ by less [m, parts of a turn] are
-# one.
-_TURNED, _SAME = 1e-6, 1e-9
+# Angle of a frame above rounding [rad].
+_TURNED = 1e-6
+# Difference of frames that are the same [m, parts of quaternions].
+_SAME = 1e-9
 
 # Tool poses in the numbers that each language has for them.
 #
@@ -31,9 +32,15 @@ _TURNED, _SAME = 1e-6, 1e-9
 
 # Positions (K, 3) [m] and quaternions (K, 4) as they are when a file is read again.
 Rounding = Callable[[Array, Array], tuple[Array, Array]]
-# Digits behind the point: of mm, degrees, parts of quaternions, and of m and rad.
-_MM, _DEGREES, _PARTS, _SI = 4, 5, 8, 9
-# A work object farther away than so many times the arm's reach is in another unit.
+# Decimals of lengths in mm.
+_MM = 4
+# Decimals of angles in degrees.
+_DEGREES = 5
+# Decimals of parts of quaternions.
+_PARTS = 8
+# Decimals of lengths in m and angles in rad.
+_SI = 9
+# Distance of a work object that must be in another unit, as a multiple of the arm's reach.
 _FAR_IN_REACHES = 20.0
 
 
@@ -113,18 +120,23 @@ def _rounded(values: Array | list[float], digits: int) -> list[float]:
 # six joints of the arm that are near to known ones; they are found by Newton's method, Δq = J⁻¹
 # [Δp; log(R_wanted Rᵀ)], J the six columns of the arm's joints.
 
-# What the frame is called that does not move and is no link.
+# Name of the fixed frame, which is no link.
 WORLD = "world"
 _JOINTS = 6
-# Newton: steps at most, how far one goes [rad], when it has arrived [m, rad], and what keeps steps
-# finite in singular configurations.
-_STEPS, _FARTHEST, _THERE, _DAMPED = 20, 0.3, 1e-10, 1e-14
-# As near as digits of files are, it counts as arrived [m, rad].
+# Largest number of Newton steps.
+_STEPS = 20
+# Largest change of a joint in one step [rad or m].
+_FARTHEST = 0.3
+# Error at which the steps end [m, rad].
+_THERE = 1e-10
+# Damping, added to the diagonal: steps stay finite in singular configurations.
+_DAMPED = 1e-14
+# Error that counts as solved: digits of files [m, rad].
 _NEAR = 1e-8
 
 
 def carrier_in_reference(robot: RobotModel, carrier: str) -> SE3 | None:
-    """Return where a work object's carrier stands in the frame of the paths; None if it moves."""
+    """Return the pose of a work object's carrier in the frame of paths; None if it moves."""
     link = robot.urdf.root if carrier == WORLD else carrier
     between = robot.chain_to(link, robot.reference)
     return None if len(between.joints) else between.place(np.zeros(robot.dof))
@@ -279,7 +291,7 @@ class ToolFrames:
         return q, np.asarray(np.abs(off).max(axis=1) < _NEAR)
 
     def joint_rates(self, q: Array, rates: Array) -> Array:
-        """Return what rates of the tool in the work object (K, 6) take of the arm's, (K, 6)."""
+        """Return rates of the tool in the work object (K, 6) as rates of the arm's joints."""
         turn = np.asarray(self.work.rotation)
         turned = np.hstack([rates[:, :3] @ turn.T, rates[:, 3:] @ turn.T])
         return self._rates(self._tool_along(q)[0], turned)
@@ -312,7 +324,7 @@ class ToolFrames:
         return np.asarray(np.einsum("kji,kj->ki", own, solved))
 
     def rounded(self, rounding: Rounding) -> "ToolFrames":
-        """Return the same with work object and tool as they are when a file is read again."""
+        """Return the frames with work object and tool rounded as in files."""
         poses = (self.work, self.tool)
         turns = np.array([Quaternion(pose.rotation).coeffs() for pose in poses])
         places, turned = rounding(np.array([pose.translation for pose in poses]), turns)
@@ -452,9 +464,13 @@ def _turned(rotations: Array, wanted: Array) -> Array:
 # whose zero is that of the maker: the wrist is in front, the arm bent (ABB) or stretched (KUKA).
 # Of others, such as those of Universal Robots, they are not known.
 
-# Axes meet within this [m], are parallel within this sine, and a wrist is in front by this [m].
-_MEET, _PARALLEL, _IN_FRONT = 1e-4, 1e-3, 0.05
-# An arm is bent at zero, as ABB's are, above this sine; KUKA's are stretched but for an offset.
+# Distance of axes that meet [m].
+_MEET = 1e-4
+# Sine of the angle between axes that are parallel.
+_PARALLEL = 1e-3
+# Distance by which a wrist is in front [m].
+_IN_FRONT = 0.05
+# Sine above which an arm is bent at zero, as ABB's are; KUKA's are stretched but for an offset.
 _BENT = 0.5
 
 

@@ -9,13 +9,13 @@ from selfmotion.basics import Array, ProblemError, write_text
 from selfmotion.model.robot import RobotModel
 from selfmotion.model.task import SE3, log3
 from selfmotion.shop.controllers.controller_program import Draft, before, head, with_begins
-from selfmotion.shop.controllers.feed_stretches import ZONE, FeedStretch
+from selfmotion.shop.controllers.feed_segments import ZONE, FeedSegment
 from selfmotion.shop.controllers.program_facts import held_in_words
 from selfmotion.shop.controllers.program_lines import StopReader
 from selfmotion.shop.controllers.program_settings import AXES, ProgramSettings, tool_from_flange
 from selfmotion.shop.controllers.program_texts import as_word, pin_values, plain
-from selfmotion.shop.controllers.read_stretches import Pose, pose_of_values
-from selfmotion.shop.controllers.stretches import PoseStretch, Stretch
+from selfmotion.shop.controllers.read_segments import Pose, pose_of_values
+from selfmotion.shop.controllers.segments import PoseSegment, Segment
 from selfmotion.shop.controllers.thinning import TIME_DIGITS
 from selfmotion.shop.controllers.tool_frames import urscript_numbers, urscript_pose
 
@@ -32,9 +32,10 @@ _LAST_OUTPUT = 7
 # It follows with this gain: the default of the manual.
 _GAIN = 300
 _JOINTS = 6
-# What `approach` is a share of: joints of these arms turn by π rad/s at least; movej's own default
-# acceleration [rad/s²].
-_FASTEST_JOINT, _JOINT_ACCELERATION = 3.14, 1.4
+# Speed that `approach` is a share of [rad/s]: joints of these arms turn by π rad/s at least.
+_FASTEST_JOINT = 3.14
+# Acceleration of the approach: movej's default [rad/s²].
+_JOINT_ACCELERATION = 1.4
 
 
 def script(
@@ -115,7 +116,7 @@ def slow_joints(q: Array, settings: ProgramSettings) -> str:
 
 
 def _tool(robot: RobotModel, joints: Sequence[str], settings: ProgramSettings) -> list[str]:
-    """Return where the tool is; of one of a cell's arms nothing, as its tool may be another's."""
+    """Return the line of the tool; none for one arm of a cell, whose tool may be another's."""
     if len(joints) < robot.dof:
         return []
     tool = tool_from_flange(robot, settings)
@@ -124,7 +125,7 @@ def _tool(robot: RobotModel, joints: Sequence[str], settings: ProgramSettings) -
 
 
 def event_line(event: str, settings: ProgramSettings) -> str:
-    """Return what an event switches, or the comment that it is."""
+    """Return the lines that switch an event's output, or its comment."""
     signal = settings.signal(event)
     if signal is None:
         return f"# event: {' '.join(event.split())}"
@@ -150,12 +151,17 @@ def _vector(values: Array) -> str:
 # has its speed v [m/s] in place of times, and ``movec`` through a via pose where it goes round,
 # whose orientation turns evenly to that of its end (mode 0).
 
-# The fastest approach [m/s], its acceleration [m/s²]; blends reach so far [m], and at most so much
-# of the way to the next target, as two of them may not overlap.
-_FASTEST, _ACCELERATION, _BLEND, _SHARE = 0.5, 1.2, 1e-3, 0.45
-# Speeds are written in four digits.
+# Largest speed of the approach [m/s].
+_FASTEST = 0.5
+# Acceleration of the approach [m/s²].
+_ACCELERATION = 1.2
+# Largest radius of a blend [m].
+_BLEND = 1e-3
+# Largest share of the distance to the next target that a blend takes: two may not overlap.
+_SHARE = 0.45
+# Factor of speeds, which are written in four digits.
 _UP = 1.001
-# Where the tool turns in place, the arm goes on as well [m].
+# Length of path at which the arm goes on where the tool turns in place [m].
 _LEAST = 1e-5
 
 
@@ -163,7 +169,7 @@ def write_urscript(file: FilePath, draft: Draft) -> None:
     """Write a program of linear motions, and of joint ones where poses do not keep a free move."""
     joints = [axis.joint for axis in draft.program.axes]
     check_joints(draft.robot, joints)
-    settings, first = draft.settings, draft.program.stretches[0]
+    settings, first = draft.settings, draft.program.segments[0]
     center = ", ".join(f"{value:.6g}" for value in settings.center)
     lines = [
         *(f"# {line}" for line in head(draft)),
@@ -173,74 +179,74 @@ def write_urscript(file: FilePath, draft: Draft) -> None:
         *([] if draft.frames is None else [f"  feature = {_pose(draft.frames.work)}"]),
         _slowly(draft, first, by_axes=True),
     ]
-    for stretch, begun in with_begins(draft.program.stretches):
-        lines.append(f"  # step: {plain(stretch.name)}")
-        lines += [f"  # {line}" for line in before(stretch)]
+    for segment, begun in with_begins(draft.program.segments):
+        lines.append(f"  # step: {plain(segment.name)}")
+        lines += [f"  # {line}" for line in before(segment)]
         if begun is not None:
-            lines.append(_slowly(draft, begun, by_axes=not isinstance(begun, PoseStretch)))
-        lines += _moves(draft, stretch)
+            lines.append(_slowly(draft, begun, by_axes=not isinstance(begun, PoseSegment)))
+        lines += _moves(draft, segment)
     write_text(file, "\n".join([*lines, "end", ""]))
 
 
-def _slowly(draft: Draft, stretch: Stretch, *, by_axes: bool) -> str:
+def _slowly(draft: Draft, segment: Segment, *, by_axes: bool) -> str:
     if by_axes:
-        return slow_joints(stretch.q[0], draft.settings)
+        return slow_joints(segment.q[0], draft.settings)
     share = draft.settings.approach
     return (
-        f"  movel({_target(stretch, 0)}, a={share * _ACCELERATION:.4g}, v={share * _FASTEST:.4g})"
+        f"  movel({_target(segment, 0)}, a={share * _ACCELERATION:.4g}, v={share * _FASTEST:.4g})"
     )
 
 
-def _moves(draft: Draft, stretch: Stretch) -> list[str]:
-    happens: dict[int, list[str]] = {k: [] for k in range(len(stretch.t))}
-    for item in stretch.events:
+def _moves(draft: Draft, segment: Segment) -> list[str]:
+    happens: dict[int, list[str]] = {k: [] for k in range(len(segment.t))}
+    for item in segment.events:
         happens[item.target].append(item.name)
     lines = [f"  {event_line(name, draft.settings)}" for name in happens[0]]
-    radii = _radii(draft, stretch)
-    for k in range(1, len(stretch.t)):
-        seconds = f"{stretch.t[k] - stretch.t[k - 1]:.{TIME_DIGITS}f}"
-        word = "movel" if isinstance(stretch, PoseStretch) else "movej"
-        if isinstance(stretch, FeedStretch):
-            lines.append(f"  {_at_speed(stretch, k)}, r={radii[k]:.6f}{_mode(stretch, k)})")
-        elif stretch.is_rest:
+    radii = _radii(draft, segment)
+    for k in range(1, len(segment.t)):
+        seconds = f"{segment.t[k] - segment.t[k - 1]:.{TIME_DIGITS}f}"
+        word = "movel" if isinstance(segment, PoseSegment) else "movej"
+        if isinstance(segment, FeedSegment):
+            lines.append(f"  {_at_speed(segment, k)}, r={radii[k]:.6f}{_mode(segment, k)})")
+        elif segment.is_rest:
             lines.append(f"  sleep({seconds})")
         else:
-            lines.append(f"  {word}({_target(stretch, k)}, t={seconds}, r={radii[k]:.6f})")
+            lines.append(f"  {word}({_target(segment, k)}, t={seconds}, r={radii[k]:.6f})")
         lines += [f"  {event_line(name, draft.settings)}" for name in happens[k]]
     return lines
 
 
-def _at_speed(stretch: FeedStretch, k: int) -> str:
+def _at_speed(segment: FeedSegment, k: int) -> str:
     """Return a motion at a speed, but for its blend; the acceleration is that of the ramps."""
-    pace = f"a={stretch.speeds.max() / stretch.ramps.each:.4g}, v={stretch.speeds[k - 1]:.7g}"
-    if not stretch.goes_round(k):
-        return f"movel({_target(stretch, k)}, {pace}"
-    return f"movec({_target(stretch.middles, k - 1)}, {_target(stretch, k)}, {pace}"
+    pace = f"a={segment.speeds.max() / segment.ramps.each:.4g}, v={segment.speeds[k - 1]:.7g}"
+    if not segment.goes_round(k):
+        return f"movel({_target(segment, k)}, {pace}"
+    return f"movec({_target(segment.middles, k - 1)}, {_target(segment, k)}, {pace}"
 
 
-def _mode(stretch: FeedStretch, k: int) -> str:
+def _mode(segment: FeedSegment, k: int) -> str:
     """Return how the orientation of a circular motion turns: evenly to that of its end."""
-    return ", mode=0" if stretch.goes_round(k) else ""
+    return ", mode=0" if segment.goes_round(k) else ""
 
 
-def _radii(draft: Draft, stretch: Stretch) -> Array:
+def _radii(draft: Draft, segment: Segment) -> Array:
     """Return the radius of the blend at each target [m]; without one the arm stops there."""
-    if isinstance(stretch, PoseStretch):
-        places = stretch.places
+    if isinstance(segment, PoseSegment):
+        places = segment.places
     else:
         order = [draft.robot.joint_names.index(axis.joint) for axis in draft.program.axes]
-        places = draft.robot.chain.along(stretch.q[:, np.argsort(order)])[2]
+        places = draft.robot.chain.along(segment.q[:, np.argsort(order)])[2]
     ways = np.linalg.norm(np.diff(places, axis=0), axis=1)
-    radii = np.zeros(len(stretch.t))
-    most = ZONE if isinstance(stretch, FeedStretch) else _BLEND
+    radii = np.zeros(len(segment.t))
+    most = ZONE if isinstance(segment, FeedSegment) else _BLEND
     radii[1:-1] = np.clip(_SHARE * np.minimum(ways[:-1], ways[1:]), _LEAST, most)
     return radii
 
 
-def _target(stretch: Stretch, k: int) -> str:
-    if not isinstance(stretch, PoseStretch):
-        return f"[{', '.join(f'{value:.9f}' for value in stretch.q[k].tolist())}]"
-    numbers = urscript_numbers(stretch.places[k], stretch.turns[k])
+def _target(segment: Segment, k: int) -> str:
+    if not isinstance(segment, PoseSegment):
+        return f"[{', '.join(f'{value:.9f}' for value in segment.q[k].tolist())}]"
+    numbers = urscript_numbers(segment.places[k], segment.turns[k])
     return f"pose_trans(feature, p[{', '.join(f'{value:.9f}' for value in numbers)}])"
 
 
@@ -325,7 +331,7 @@ class UrscriptReader(StopReader):
         self.take_pose(pose, taken, stops=radius == 0.0)
 
     def _places(self, targets: Sequence[list[float] | None]) -> Array | None:
-        """Return where the tool is at joint targets [deg], (K, 3); None where no arm is known."""
+        """Return positions of the tool at joint targets [deg], (K, 3); None if no arm is known."""
         joints = self.lines.joints()
         named = [joints[axis][0] for axis in self.present if axis in joints]
         if self.robot is None or None in targets or sorted(named) != sorted(self.robot.joint_names):
@@ -415,7 +421,8 @@ class UrscriptReader(StopReader):
 _LIST = r"\[([^\[\]]*)\]"
 _TARGET = rf"pose_trans\(feature, ?p{_LIST}\)"
 _SPEED = r"a=([\d.e-]+), ?v=([\d.e-]+)"
-_RAMPED, _PACED = r"a=([\d.e-]+)", r"v=([\d.e-]+), ?r=([\d.e-]+)"
+_RAMPED = r"a=([\d.e-]+)"
+_PACED = r"v=([\d.e-]+), ?r=([\d.e-]+)"
 _TIMED = r"t=([\d.e-]+), ?r=([\d.e-]+)"
 UrscriptReader.grammar = (
     (("before",), r"def selfmotion\(\):", UrscriptReader.begin),

@@ -1,4 +1,4 @@
-"""Rows of targets as a file has them, made into stretches; poses by inverse kinematics."""
+"""Rows of targets as a file has them, made into segments; poses by inverse kinematics."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -8,27 +8,31 @@ import numpy as np
 from selfmotion.basics import Array, FileFormatError, Flags, RobotError
 from selfmotion.model.robot import RobotModel
 from selfmotion.model.task import SE3, Quaternion
-from selfmotion.shop.controllers.feed_stretches import FeedStretch, times_at
+from selfmotion.shop.controllers.feed_segments import FeedSegment, times_at
 from selfmotion.shop.controllers.program_settings import Axis, ProgramSettings, tool_from_flange
+from selfmotion.shop.controllers.segments import PoseSegment, Segment, finer, on_one_side, straight
 from selfmotion.shop.controllers.steps import put_on_arcs
-from selfmotion.shop.controllers.stretches import PoseStretch, Stretch, finer, on_one_side, straight
 from selfmotion.shop.controllers.tool_frames import ToolFrames
 
-# What slow motions to where a shifted program goes on are called in messages.
+# Name in messages of slow motions to where a shifted program goes on.
 _SLOWLY = "a slow motion"
-# A slow motion to where the arm is already takes no time: digits differ by this [rad or m].
+# Length below which a slow motion takes no time: rounding of digits [rad or m].
 _THERE = 1e-5
-# How fast slow motions are, where the file was shifted: what is read of them is their way [m/s,
-# rad/s]; how often the joints are followed between two poses, from which step on one by one, and
-# steps that are none [rad].
-_SLOW, _BETWEEN, _STEP, _JUMP = 0.05, 16, 0.2, 0.5
-# So many times as often where steps are at speeds.
+# Speed of slow motions in shifted files: only their path is read [m/s, rad/s].
+_SLOW = 0.05
+# Number of poses between two targets at which inverse kinematics is solved.
+_BETWEEN = 16
+# Step of a joint above which poses are solved one after another [rad].
+_STEP = 0.2
+# Step of a joint that is a jump to another branch [rad].
+_JUMP = 0.5
+# Factor of that number for steps at speeds.
 _FINER = 8
 
 
 @dataclass
 class Row:
-    """A stretch while it is read: where it begins, its targets [deg or mm], times between [s].
+    """A segment while it is read: where it begins, its targets [deg or mm], times between [s].
 
     A row that is nowhere rests where the arm is.
     """
@@ -50,7 +54,7 @@ class Pose:
 
 @dataclass
 class PoseRow:
-    """A stretch of poses while it is read: where it begins, its targets, times between [s].
+    """A segment of poses while it is read: where it begins, its targets, times between [s].
 
     Of one at speeds the time that was planned for all of it, the speed of each step [m/s], through
     where it goes round, and whether it goes smoothly through its targets.
@@ -66,7 +70,7 @@ class PoseRow:
 
 @dataclass
 class SlowRow:
-    """A slow motion to where the next stretch begins: an axis target, or a pose."""
+    """A slow motion to where the next segment begins: an axis target, or a pose."""
 
     target: list[float] | Pose
     seconds: list[float] = field(default_factory=list)
@@ -74,7 +78,7 @@ class SlowRow:
 
 @dataclass
 class Places:
-    """What a file says of its frames: the tool in the flange, the work object in its carrier.
+    """The frames of a file: the tool in the flange, the work object in its carrier.
 
     And whether it says that an axis carries the work object; None where it does not say.
     """
@@ -141,7 +145,7 @@ _REST = 2e-6
 
 @dataclass
 class Follower:
-    """Makes stretches of rows, one after the other, from where the arm is.
+    """Makes segments of rows, one after the other, from where the arm is.
 
     Parameters
     ----------
@@ -150,7 +154,7 @@ class Follower:
         In the order of the file.
     frames : ToolFrames or None
         None where there are no poses.
-    stretches : list of Stretch
+    segments : list of Segment
         What is made so far.
     at : (n,) or None
         Where the arm is.
@@ -161,7 +165,7 @@ class Follower:
     file: object
     axes: tuple[Axis, ...]
     frames: ToolFrames | None
-    stretches: list[Stretch] = field(default_factory=list)
+    segments: list[Segment] = field(default_factory=list)
     at: Array | None = None
     approach: float = 0.0
 
@@ -186,7 +190,7 @@ class Follower:
                 q = np.array([at] * len(t))
             else:
                 raise FileFormatError(f"{self.file}: rests before it has a target")
-            self.stretches.append(Stretch(row.name, t, q))
+            self.segments.append(Segment(row.name, t, q))
             self.at = q[-1]
 
     def in_si(self, values: Array, kept: Sequence[int] | None = None) -> Array:
@@ -201,7 +205,7 @@ class Follower:
             if before is not None and np.abs(self.at - before).max() > _THERE:
                 seconds = float(np.abs(self.at - before).max()) / _SLOW
                 both = np.array([before, self.at])
-                self.stretches.append(Stretch(_SLOWLY, times_of([seconds]), both, is_slow=True))
+                self.segments.append(Segment(_SLOWLY, times_of([seconds]), both, is_slow=True))
             return
         frames, _ = self._known()
         if before is None:
@@ -211,23 +215,23 @@ class Follower:
         angle = float(np.linalg.norm(frames.turned(turn, row.target.turn[None])))
         # Slowly from where the arm is, however far that is.
         seconds = max(far / _SLOW, angle / _SLOW, 0.1)
-        moves = bool(self.stretches) and max(far, angle) > _THERE
+        moves = bool(self.segments) and max(far, angle) > _THERE
         here = Pose(place[0], turn[0], self._others(before), row.target.line)
-        found = self._stretch(PoseRow(_SLOWLY, [here, row.target], [seconds]))
-        stretch = replace(found, is_slow=True)
-        if not self.stretches:
-            self.approach = float(np.abs(stretch.q[-1] - before).max())
+        found = self._segment(PoseRow(_SLOWLY, [here, row.target], [seconds]))
+        segment = replace(found, is_slow=True)
+        if not self.segments:
+            self.approach = float(np.abs(segment.q[-1] - before).max())
         if moves:
-            self.stretches.append(stretch)
-        self.at = stretch.q[-1]
+            self.segments.append(segment)
+        self.at = segment.q[-1]
 
     def _poses(self, row: PoseRow) -> None:
-        stretch = self._stretch(row)
-        self.stretches.append(stretch)
-        self.at = stretch.q[-1]
+        segment = self._segment(row)
+        self.segments.append(segment)
+        self.at = segment.q[-1]
 
-    def _stretch(self, row: PoseRow) -> PoseStretch:
-        """Return the stretch of poses, its joints followed from where the arm is."""
+    def _segment(self, row: PoseRow) -> PoseSegment:
+        """Return the segment of poses, its joints followed from where the arm is."""
         frames, order = self._known()
         places = np.array([pose.place for pose in row.poses])
         at_speeds = bool(row.speeds)
@@ -241,7 +245,7 @@ class Follower:
         in_file = {self.axes[k].joint: c for c, k in enumerate(outer)}
         columns = [in_file[frames.axes[k].joint] for k in frames.external.tolist()]
         others = others[:, columns]
-        # Steps at speeds may be as long as the stretch.
+        # Steps at speeds may be as long as the segment.
         count = _BETWEEN * (_FINER if at_speeds else 1)
         times = finer(t, np.linspace(0.0, 1.0, count, endpoint=False))
         rows = straight(times, t, np.hstack([places, turns, others]))
@@ -254,7 +258,7 @@ class Follower:
         def near(asked: Array) -> Array:
             return np.stack([np.interp(asked, times, column) for column in q.T], axis=1)
 
-        stretch = PoseStretch(
+        segment = PoseSegment(
             row.name,
             t,
             every,
@@ -266,14 +270,14 @@ class Follower:
         )
         if at_speeds:
             speeds, seconds = np.array(row.speeds), sum(row.seconds)
-            stretch = FeedStretch(
-                **vars(stretch),
+            segment = FeedSegment(
+                **vars(segment),
                 speeds=speeds,
                 vias=row.vias,
                 seconds=seconds,
                 is_spline=row.is_spline,
             )
-        return stretch.in_order(order)
+        return segment.in_order(order)
 
     def _followed(
         self, frames: ToolFrames, rows: Array, first: Array, row: PoseRow, count: int

@@ -1,4 +1,4 @@
-"""Stretches of a motion from rest to rest, as targets of joints or as tool poses."""
+"""Segments of a motion from rest to rest, as targets of joints or as tool poses."""
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -13,18 +13,16 @@ from selfmotion.model.motion import Trajectory
 from selfmotion.model.robot import Chain
 from selfmotion.shop.controllers.tool_frames import ToolFrames
 
-# Joint targets of a motion from rest to rest, and how far off it they take a controller.
-
-# The worst is no more than so many times what is found at times that are so near to each other.
+# Ratio of the largest deviation to the largest one at the times that are evaluated.
 SURE = 1.02
-# At a corner the velocity changes within this share of the shorter of its two sides.
+# Share of the shorter side of a corner within which the velocity changes.
 _CORNER = 1e-3
-# Where between two targets, and how near to each, the error is looked at.
+# Shares of the interval between two targets at which the error is evaluated.
 _BETWEEN = np.array([0.0, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875])
 
 
 class Event(NamedTuple):
-    """What happens when a target is reached: its number in the stretch, and what."""
+    """An event at a target: the target's number in the segment, and the event's name."""
 
     target: int
     name: str
@@ -47,7 +45,7 @@ class Knots(NamedTuple):
 
     @classmethod
     def cornered(cls, t: Array, q: Array, each: int) -> "Knots":
-        """Return a motion (K, n) that is smooth but for a corner at each so many-th of its times.
+        """Return a motion (K, n) that is smooth but for a corner at every `each`-th of its times.
 
         There the velocity changes within a short time, as it does at both ends.
         """
@@ -76,7 +74,7 @@ class Knots(NamedTuple):
         return cls(np.concatenate(times), np.concatenate(places), np.concatenate(rates))
 
 
-def by_each_way(parts: Iterable[Iterable[Knots]]) -> list[list[Knots]]:
+def by_interpolation(parts: Iterable[Iterable[Knots]]) -> list[list[Knots]]:
     """Return the parts of a motion by each way in which a controller may make it.
 
     Where a part has fewer ways, its last one stands for the others.
@@ -87,7 +85,7 @@ def by_each_way(parts: Iterable[Iterable[Knots]]) -> list[list[Knots]]:
 
 
 @dataclass(frozen=True, eq=False)
-class Stretch:
+class Segment:
     """A motion from rest to rest by its targets, or a rest.
 
     Attributes
@@ -122,8 +120,8 @@ class Stretch:
         """Whether the arm rests all the while."""
         return bool((self.q == self.q[0]).all())
 
-    def in_order(self, order: Sequence[int]) -> "Stretch":
-        """Return the same with coordinates in another order."""
+    def in_order(self, order: Sequence[int]) -> "Segment":
+        """Return the segment with coordinates in another order."""
         return replace(self, q=self.q[:, order])
 
     def looked_at(self) -> Array:
@@ -135,7 +133,7 @@ class Stretch:
         return ways(self.t, self.q, times)
 
     def matched(self, motion: Trajectory, first: float) -> Array:
-        """Return what is to be where it is looked at: a motion (K, n), begun at `first`."""
+        """Return a motion begun at `first`, at the times that are evaluated, (K, n)."""
         return motion(np.clip(first + self.looked_at(), motion.t[0], motion.t[-1]))
 
     def smooth(self) -> tuple[Array, Array, Array]:
@@ -209,18 +207,18 @@ NO_MISS = Miss(0.0, 0.0, 0.0)
 
 
 def miss_of(
-    stretch: Stretch, motion: Trajectory, chains: Sequence[Chain], first: float = 0.0
+    segment: Segment, motion: Trajectory, chains: Sequence[Chain], first: float = 0.0
 ) -> Miss:
     """Return how far a controller is off a motion at most, whichever way it joins the targets.
 
     In between it may go straight in joint space, past each corner on the line between the middles
     of the two sides, which is the largest corner that controllers round, or along the cubic spline
     through all targets that begins and ends at rest; at the times of the motion, which holds it to
-    its speeds as well. Stretches at a speed are held to where it goes alone.
+    its speeds as well. Segments at a speed are held to where it goes alone.
     """
-    times, exact = stretch.looked_at(), stretch.matched(motion, first)
+    times, exact = segment.looked_at(), segment.matched(motion, first)
     worst = NO_MISS
-    for line in stretch.ways(times):
+    for line in segment.ways(times):
         worst = Miss(*map(max, worst, miss_between(line, exact, chains)))
     return worst
 
@@ -290,12 +288,12 @@ def _straight(times: Array, t: Array, q: Array) -> Array:
 # ``MoveL``, ``LIN`` and ``movel`` are documented to do. ``SPLINE`` goes smoothly through all
 # poses.
 
-# How often it is looked at what is between two targets: their inverse kinematics bends.
+# Shares of the interval between two poses at which joints are evaluated, which bend in between.
 _BETWEEN_POSES = np.linspace(0.0, 1.0, 16, endpoint=False)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class PoseStretch(Stretch):
+class PoseSegment(Segment):
     """A motion from rest to rest by tool poses.
 
     Attributes
@@ -317,7 +315,7 @@ class PoseStretch(Stretch):
     order: Ints
 
     @override
-    def in_order(self, order: Sequence[int]) -> "PoseStretch":
+    def in_order(self, order: Sequence[int]) -> "PoseSegment":
         return replace(self, q=self.q[:, order], order=self.order[list(order)])
 
     @override
@@ -325,7 +323,7 @@ class PoseStretch(Stretch):
         return finer(self.t, _BETWEEN_POSES)
 
     def ways(self, times: Array) -> list[Array]:
-        """See `Stretch.ways`: straight lines, rounded corners, a smooth curve; in tool poses.
+        """See `Segment.ways`: straight lines, rounded corners, a smooth curve; in tool poses.
 
         Where no joints are known they are not numbers.
         """
@@ -346,7 +344,7 @@ class PoseStretch(Stretch):
         return times, q, CubicSpline(times, q, bc_type="clamped")(times, 1)
 
     def joined(self) -> Iterator[Knots]:
-        """See `Stretch.joined`; where no joints are known they are not numbers."""
+        """See `Segment.joined`; where no joints are known they are not numbers."""
         yield _at_rest(*self.smooth())
         for knots, rows in polygons(self.t, self._rows(), straight):
             times = finer(knots, _BETWEEN_POSES)
@@ -400,7 +398,7 @@ def straight(times: Array, t: Array, rows: Array) -> Array:
     return found
 
 
-# Below this sine of the angle slerp and a straight line are the same.
+# Sine of the angle below which slerp is a straight line.
 _SMALL = 1e-9
 
 

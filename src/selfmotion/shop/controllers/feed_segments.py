@@ -13,14 +13,16 @@ from typing_extensions import override
 from selfmotion.basics import Array, FileFormatError
 from selfmotion.model.motion import Trajectory
 from selfmotion.model.path import Path, times_when
+from selfmotion.shop.controllers.segments import Knots, PoseSegment, finer, straight
 from selfmotion.shop.controllers.steps import put_on_arcs, step_lengths
-from selfmotion.shop.controllers.stretches import Knots, PoseStretch, finer, straight
 from selfmotion.shop.controllers.tool_frames import ToolFrames
 
 # How far a tool has gone along its path, as a function of time, and back.
 
-# Speeds are looked at so often between two samples, and so often in all at least.
-_BETWEEN, _FEWEST = 4, 1600
+# Times at which speeds are evaluated, per interval between two samples.
+_BETWEEN = 4
+# Smallest number of such times in all.
+_FEWEST = 1600
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,16 +108,22 @@ class PassedLength:
 # Tool poses with the speed between them in place of times: what a shop touches up.
 #
 # A controller goes along each straight or circular step at its speed, rounds corners within its
-# zone, and runs up and down by its own acceleration. So a stretch is compared with a motion where
+# zone, and runs up and down by its own acceleration. So a segment is compared with a motion where
 # the tool has gone as far, not at equal times. Where times are needed, ramps that are even and as
 # long as the planned time leaves stand for those of the controller.
 
 # Corners are rounded within this of a target at most [m]: ABB's z0, and as much in the others.
 ZONE = 3e-4
-# Times of a ramp that are looked at; of a whole stretch at least, and of a step.
-_OF_RAMP, _LOOKS, _OF_STEP = 24, 3200, 16
-# A path that goes less is at rest [m]; speeds are the same up to this share, which digits take.
-_LEAST, _SAME = 1e-6, 1e-4
+# Times at which each ramp is evaluated.
+_OF_RAMP = 24
+# Smallest number of times at which a whole segment is evaluated.
+_LOOKS = 3200
+# Smallest number of times at which a step between two targets is evaluated.
+_OF_STEP = 16
+# Length of path below which the tool rests [m].
+_LEAST = 1e-6
+# Relative difference of speeds that counts as rounding of digits.
+_SAME = 1e-4
 
 
 class Ramps(NamedTuple):
@@ -156,7 +164,7 @@ class Ramps(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class FeedStretch(PoseStretch):
+class FeedSegment(PoseSegment):
     """A motion from rest to rest by tool poses and speeds.
 
     `t` is when targets would be reached without ramps.
@@ -189,13 +197,13 @@ class FeedStretch(PoseStretch):
         return Ramps(float(self.t[-1]), self.seconds)
 
     @cached_property
-    def middles(self) -> PoseStretch:
+    def middles(self) -> PoseSegment:
         """The middles of its steps as targets: via poses of those that go round, (K,)."""
         t = 0.5 * (self.t[1:] + self.t[:-1])
         rows = self._stepped(t)
         q = self._joints(rows, t)[:, self.order]
         places = np.where(np.isfinite(self.vias), self.vias, rows[:, :3])
-        return PoseStretch(
+        return PoseSegment(
             self.name,
             t,
             q,
@@ -216,12 +224,12 @@ class FeedStretch(PoseStretch):
         return np.append(0.0, np.cumsum(step_lengths(self.places, self.vias)))
 
     def looked_at(self) -> Array:
-        """See `Stretch.looked_at`: steps may be as long as the stretch."""
+        """See `Segment.looked_at`: steps may be as long as the segment."""
         count = max(_OF_STEP, ceil(_LOOKS / (len(self.t) - 1)))
         return finer(self.t, np.linspace(0.0, 1.0, count, endpoint=False))
 
     def ways(self, times: Array) -> list[Array]:
-        """See `Stretch.ways`: its steps, with corners rounded in their zones, a smooth curve."""
+        """See `Segment.ways`: its steps, with corners rounded in their zones, a smooth curve."""
         return [self._joints(way(times), times)[:, self.order] for way in self._ways]
 
     @property
@@ -235,7 +243,7 @@ class FeedStretch(PoseStretch):
         return found[::-1] if self.is_spline else found
 
     def smooth(self) -> tuple[Array, Array, Array]:
-        """See `Stretch.smooth`: with its ramps."""
+        """See `Segment.smooth`: with its ramps."""
         times = self.ramps.times(self.looked_at())
         ends = np.linspace(0.0, self.ramps.each, _OF_RAMP)
         times = np.unique(np.concatenate([times, ends, self.seconds - ends]))
@@ -244,22 +252,22 @@ class FeedStretch(PoseStretch):
         return next(self._driven(times, self.ramps.passed(times)))
 
     def joined(self) -> Iterator[Knots]:
-        """See `Stretch.joined`: with its ramps."""
+        """See `Segment.joined`: with its ramps."""
         times = self.smooth()[0]
         return self._driven(times, self.ramps.passed(times))
 
     def matched(self, motion: Trajectory, first: float) -> Array:
-        """See `Stretch.matched`: where the tool has gone as far."""
+        """See `Segment.matched`: where the tool has gone as far."""
         gone = PassedLength.of_motion(self.frames, motion, first, first + self.seconds)
         return motion(np.clip(gone.when(self._shares * gone.whole), motion.t[0], motion.t[-1]))
 
     def at_pace(self, gone: PassedLength) -> Iterator[Knots]:
-        """Return what `joined` does, at the pace at which something else has gone as far."""
+        """Return the motions of `joined`, at the pace at which something else has gone as far."""
         own = np.interp(gone.at(gone.t) * (self.lengths[-1] / gone.whole), self.lengths, self.t)
         return self._driven(gone.t - gone.t[0], own)
 
     def along(self, path: Path, first: float) -> Iterator[Knots]:
-        """Return what `joined` does, at the pace of a path that it begins at `first` [s].
+        """Return the motions of `joined`, at the pace of a path that it begins at `first` [s].
 
         Raises
         ------
