@@ -1,4 +1,4 @@
-"""Distances of bodies after any small rigid displacement of one of them.
+"""Separating planes, and distances of bodies after any small displacement of one of them.
 
 A displacement is x → c + d + R (x - c), with |d| and the angle θ of R given, their directions
 unknown. Two bounds of the distance that is left hold for all of them at once:

@@ -133,7 +133,7 @@ class BoundTaskFrame:
         return self.task.miss(pose, self.chain.place(q))
 
 
-# All that an arm follows at once: rows of several tips, stacked.
+# Stacked kinematics, targets and rows of all tips.
 
 
 class TipKinematics:

@@ -20,8 +20,8 @@ _SAME = 1e-3
 class FeedKept:
     """Errors of one of the feeds of a `Feed`, in its intervals.
 
-    Intervals count but for run-up, run-down, rounded corners, and turning on the spot; each has to
-    reach it.
+    The feed counts everywhere but in run-up, run-down, rounded corners and turns on the spot; each
+    interval has to reach it.
 
     Attributes
     ----------
@@ -36,7 +36,7 @@ class FeedKept:
     lasts : (K,)
         Duration that each time represents [s].
     counts : (K,)
-        When the feed counts.
+        Whether the feed counts at each time.
     causes : (K,)
         Limiting cause at each time, in words.
     path : Feed

@@ -28,7 +28,7 @@ from selfmotion.model.task import SE3, Quaternion
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
 
-# Poses that a polyline can do without: those that its legs pass within a tolerance.
+# Simplification: poses that the legs of a polyline pass within a tolerance are left out.
 #
 # By the algorithm of Ramer (1972), Douglas and Peucker (1973): a leg from the first pose to the
 # last is divided at its farthest pose, until none is farther than the tolerance. A pose from which
@@ -51,7 +51,7 @@ class Merged(NamedTuple):
         Their numbers; first and last are among them.
     shares : (N,)
         Where each pose is passed: the leg's number, and as its fraction the share of the leg.
-    missed, turned : (M - 1,)
+    errors, turned : (M - 1,)
         Largest distance of each leg from its poses [m, rad].
     """
 
@@ -64,8 +64,8 @@ class Merged(NamedTuple):
 def merged(points: Array, turns: Array, tolerance: float, turn_tolerance: float) -> Merged:
     """Return the numbers of poses (N, 3), (N, 4) at which legs have to end.
 
-    Legs are off poses by next to nothing, so that curves of short chords are unchanged. Where a leg
-    shorter than the tolerance is between legs that are far longer, these are off one of its ends,
+    Legs miss poses by rounding only, so that curves of short chords are unchanged. A leg shorter
+    than the tolerance between far longer ones (a stub) is left out, where these then miss its end
     by half of the tolerances [m, rad] at most.
     """
     measure = _Measure(points, turns, tolerance, turn_tolerance)
@@ -83,7 +83,7 @@ def merged(points: Array, turns: Array, tolerance: float, turn_tolerance: float)
 
 
 class _Leg(NamedTuple):
-    """Of the poses between a leg's ends: where it passes them, how far off, turned, and back."""
+    """Distances of a leg from the poses between its ends: share passed, offset, turn, reversal."""
 
     shares: Array
     away: Array

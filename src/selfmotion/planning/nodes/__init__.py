@@ -1,4 +1,4 @@
-"""Motions given by nodes on their self-motion manifolds, optimised by Newton's method."""
+"""Motions given by nodes on their self-motion manifolds, by an interior-point method."""
 
 from selfmotion.planning.nodes.batch import Batch as Batch
 from selfmotion.planning.nodes.motion import NodeGrid as NodeGrid, NodeMotion as NodeMotion

@@ -1,4 +1,4 @@
-"""Compiled: nodes are put onto their self-motion manifolds, and eq. 4 and its rate evaluated.
+"""Compiled: retraction of nodes onto their self-motion manifolds; eq. 4 and its rate there.
 
 Each node's chart is around a reference on the manifold, with an orthonormal basis N0 of the null
 space there: z are the coordinates N0ᵀ(q - q_ref) of q on the manifold {q : F(q) = x}, and ε = N0 ν

@@ -1,4 +1,4 @@
-"""Solutions, of the published method or on nodes, as values."""
+"""Solutions of a planning problem: by the published method, or on nodes."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

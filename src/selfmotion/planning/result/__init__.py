@@ -1,4 +1,4 @@
-"""Results: plans, reports, their files, and other paces."""
+"""Results: plans, reports, their files, and time scaling."""
 
 from selfmotion.planning.result.archive import (
     ArmCache as ArmCache,

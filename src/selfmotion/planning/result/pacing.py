@@ -1,4 +1,4 @@
-"""The fastest pace of a joint path within limits of its rates."""
+"""Optimal time scaling: the fastest pace of a joint path within limits of its rates."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""The same joint path in the time that velocity and acceleration limits allow."""
+"""Time scaling: the same joint path in the time that velocity and acceleration limits allow."""
 
 from __future__ import annotations
 

@@ -72,7 +72,8 @@ class Sequence:
 class Chains:
     """The cheapest chains to every vertex, or from every vertex when made backwards.
 
-    Attributes Least cost from the first waypoint; inf where no chain arrives.
+    Attributes
+    ----------
     cost : tuple of (N_i,)
         The least from the first waypoint; inf where no chain arrives.
     parent : tuple of (N_i,)

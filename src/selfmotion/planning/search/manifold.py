@@ -292,7 +292,7 @@ class Manifold:
         """Return configurations (K, n) moved as near to a target (12 F,) as limits allow.
 
         Slower than `project`, it arrives at stretched poses and with joints at their limits, too;
-        joints that are `locked` (n,) stand at 0.
+        joints that are `held` (n,) stand at 0.
 
         Returns
         -------

@@ -107,7 +107,7 @@ def problem_items(problems: list[Problem | PlanRequest], options: Mapping[str, A
     return items
 
 
-# The result of one problem of a batch.
+# Rows: results, as a table of the batch has them.
 
 
 @dataclass(frozen=True)

@@ -9,13 +9,13 @@ from selfmotion.basics import Array, Ints, obey_interruption
 from selfmotion.work.job.kernels import Tables, swept
 from selfmotion.work.job.stops import NO_ROUND, Round, Stops, along, feasible_order
 
-# Many stops in a good order.
+# Local search for many stops: 2-opt and or-opt.
 #
 # They are put one after the other by what is nearest, then stretches of the order are moved and
 # turned round where that pays (2-opt and or-opt), each try with the best states by dynamic
 # programming along what it changes: what the stops before cost and those after it, by state,
 # stays. What cannot be done costs more than any round there, so that these steps lead out of it;
-# where they do not, `feasible` looks for an order without costs.
+# where they do not, `feasible_order` looks for an order without costs.
 
 # Rounds of tries, at most.
 _ROUNDS = 12
@@ -138,11 +138,11 @@ def _padded(rows: Sequence[Sequence[int]]) -> Ints:
     return table
 
 
-# In which order, and how each: the shortest round of stops that can be made in several ways.
+# The shortest round: exact for few stops.
 #
 # Up to a dozen stops are ordered exactly, by dynamic programming over the sets of stops made (M.
 # Held, R. Karp, "A dynamic programming approach to sequencing problems", 1962), with the states
-# of the last one beside the set; more of them as `exchange` says.
+# of the last one beside the set; more of them by `improved`.
 
 # Stops that are ordered exactly, at most: the sets of more fit neither into time nor memory.
 EXACT = 12

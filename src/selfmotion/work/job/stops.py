@@ -9,7 +9,7 @@ import numpy as np
 
 from selfmotion.basics import Array, Flags, Ints
 
-# Stops that can be made in several ways, what leads from one to another, and what has to wait.
+# Stops, their states, costs of transitions, and precedences.
 #
 # Knows only numbers. A stop (a seam) has states (a direction and a branch of configurations);
 # what leads from one state to another one costs something.
@@ -145,7 +145,7 @@ def along(stops: Stops, order: Sequence[int]) -> tuple[tuple[int, ...], float]:
     return tuple(found), float(ends[at])
 
 
-# An order of stops in which each can be reached from the one before, whatever it costs.
+# Depth-first search for a feasible order, whatever it costs.
 
 # So many stops are looked at as the next one, at most: some seconds.
 _LOOKS = 300_000

@@ -201,7 +201,7 @@ def _standing(plan: Plan) -> tuple[str, ...]:
 
 
 class _Corners:
-    """Plans at corners."""
+    """Search for the largest size at which motions are verified in all directions."""
 
     def __init__(self, places: Places, plan: Plan, progress: Progress) -> None:
         self._places, self._plan, self._progress, self._done = places, plan, progress, 0

@@ -74,7 +74,7 @@ class Tried:
 
 @dataclass(frozen=True, eq=False)
 class Places:
-    """Problems, and what of them is moved.
+    """Problems whose part or base can be displaced.
 
     Attributes
     ----------
