@@ -203,7 +203,7 @@ def _not_at_feed(path: sm.paths.Path, read: Read) -> list[str]:
     asked = path.feeds[0].asked
     return [
         f"at {speed:.6g} m/s, the feed is {asked:.6g}"
-        for stretch in read.segments
+        for stretch in read.stretches
         for speed in stretch.speeds
         if abs(speed - asked) > 1e-5 * asked
     ]

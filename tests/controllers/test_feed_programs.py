@@ -84,7 +84,7 @@ def test_a_straight_seam_is_one_motion_at_its_feed(
     sm.files.write_motion(line, file, settings=settings(name))
     count, stated, found = program_miss(line, file)
     assert count == 1
-    (stretch,) = read_poses(file, SLIDES).segments
+    (stretch,) = read_poses(file, SLIDES).stretches
     np.testing.assert_allclose(stretch.speeds, [FEED], rtol=1e-6)
     # The tool is where it should be, its axis is, and all else is off by what is stated.
     far = measured(line, file)
@@ -345,7 +345,7 @@ def test_leads_take_their_time_with_ramps(abb: sm.RobotModel, tmp_path: Path) ->
     plan = sm.plan(sm.Problem(abb, seam, "pointing", constraints=(), clearance=None)).require()
     file = tmp_path / "weld.mod"
     sm.files.write_motion(plan, file, settings=settings("weld.mod"))
-    stretches = read_poses(file, SLIDES).segments
+    stretches = read_poses(file, SLIDES).stretches
     speeds = [float(stretch.speeds[0]) for stretch in stretches]
     np.testing.assert_allclose(speeds, [0.05 / 0.75, FEED, 0.05 / 0.75], rtol=1e-4)
     far = measured(plan, file)
@@ -480,7 +480,7 @@ def test_feeds_that_change_are_a_motion_each(abb: sm.RobotModel, tmp_path: Path,
     plan = sm.plan(sm.Problem(abb, seam, "pointing", start, clearance=None)).require()
     file = tmp_path / name
     sm.files.write_motion(plan, file, settings=settings(name))
-    (stretch,) = read_poses(file, SLIDES).segments
+    (stretch,) = read_poses(file, SLIDES).stretches
     np.testing.assert_allclose(stretch.speeds, [2.0 * FEED, FEED, 2.0 * FEED], rtol=1e-6)
     assert measured(plan, file).position <= program_miss(plan, file)[1].path.position + ROUNDED
     read_program(file, abb).motions(seam)[0]
