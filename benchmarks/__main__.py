@@ -274,14 +274,12 @@ def environment() -> dict[str, str]:
     return {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
 
 
-def install(benchmark: Benchmark) -> None:
-    """Install the packages that a benchmark needs, by the pinned versions."""
-    if benchmark.needs:
+def install(needs: tuple[str, ...]) -> None:
+    """Install packages, or extras of ours, by the pinned versions."""
+    if needs:
         pip = [sys.executable, "-m", "pip", "install", "--quiet", "--constraint", "constraints.txt"]
-        editable = [["-e", x] if x.startswith(".") else [x] for x in benchmark.needs]
-        subprocess.run(
-            [*pip, *(part for parts in editable for part in parts)], cwd=ROOT, check=True
-        )
+        names = [part for name in needs for part in (["-e", name] if name[0] == "." else [name])]
+        subprocess.run([*pip, *names], cwd=ROOT, check=True)
 
 
 def run_whole(name: str) -> int:
