@@ -819,3 +819,10 @@ def test_words_that_may_move_poses_are_refused_and_others_told(where: str, tmp_p
             reads(key, value)
     assert not any("passed over" in note for note in reads("name", "seam").notes)
     assert any("passed over: 'gripper'" in note for note in reads("gripper", "open").notes)
+
+
+@pytest.mark.parametrize(("feed", "is_noted"), [("600", True), ("MMPM,600", False)])
+def test_a_feed_without_a_unit_is_noted(feed: str, is_noted: bool, tmp_path: Path) -> None:
+    text = f"UNITS/MM\nRAPID\nGOTO/0,0,5\nFEDRAT/{feed}\nGOTO/0,0,0\nGOTO/40,0,0\n"
+    rows = read_cldata(written(tmp_path, "part.cls", text))["cut 1"]
+    assert any("FEDRAT says neither MMPM nor IPM" in note for note in rows.notes) is is_noted

@@ -115,6 +115,7 @@ class _Reader:
         # The word of the file that says its unit, and the one of its feeds.
         self._unit_said: float | None = None
         self._feed_said: float | None = None
+        self._feed_is_bare = False
         # Where its coordinates are: the axes of the frame in columns, and its origin.
         self._axes: Array = np.eye(3)
         self._origin: Array = np.zeros(3)
@@ -135,6 +136,10 @@ class _Reader:
         """Return the cuts by names."""
         if self._given is None and self._unit_said is None:
             self.machine.notes.append("no statement says UNITS: lengths are taken for mm")
+        if self._feed_is_bare:
+            self.machine.notes.append(
+                "FEDRAT says neither MMPM nor IPM: feeds are taken per minute, in the unit of lengths"
+            )
         return self.machine.seams()
 
     def take(self, text: str) -> bool:
@@ -473,6 +478,8 @@ class _Reader:
         if scale is not None:
             self._feed_said = scale
             self._agrees()
+        elif self._feed_said is None:
+            self._feed_is_bare = True
         feed = self._number(numbers[0]) * (scale or self._unit) / 60.0
         if not 0.0 < feed < 1e3:
             raise self.machine.fault(f"FEDRAT/{numbers[0]}: expected a feed above 0")
