@@ -138,7 +138,7 @@ class _Reader:
             self.machine.notes.append("no statement says UNITS: lengths are taken for mm")
         if self._feed_is_bare:
             self.machine.notes.append(
-                "FEDRAT says neither MMPM nor IPM: feeds are taken per minute, in the unit of lengths"
+                "FEDRAT says neither MMPM nor IPM: feeds are per minute, in the unit of lengths"
             )
         return self.machine.seams()
 
