@@ -170,3 +170,51 @@ def test_a_processor_that_the_user_chose_stays(
     monkeypatch.setattr(numba.config, "CPU_NAME", "x86-64-v2")
     assert not jit.use_built_kernels(file)
     assert numba.config.CPU_NAME == "x86-64-v2"
+
+
+RUN = """
+import sys
+from numba.core import event
+class Counted(event.Listener):
+    count = 0
+    def on_start(self, event): self.count += 1
+    def on_end(self, event): pass
+counted = Counted()
+with event.install_listener("numba:compile", counted):
+    from kernels_of_a_test.outer import outer
+    print(outer(1.0), counted.count)
+"""
+
+
+def test_a_change_of_what_a_kernel_calls_in_another_file_compiles_it_anew(tmp_path: Path) -> None:
+    """Also of a number that it takes from there, and nothing else does."""
+    folder = tmp_path / "kernels_of_a_test"
+    folder.mkdir()
+    (folder / "__init__.py").write_text("")
+    (folder / "other.py").write_text("UNUSED = 1.0\n")
+    (folder / "numbers_of_a_test.py").write_text("SHIFT = 10.0\n")
+    head = "from selfmotion.basics.jit import inlined, kernel\n"
+    inner = folder / "inner.py"
+    inner.write_text(f"{head}\n@inlined\ndef inner(x):\n    return 2.0 * x\n")
+    (folder / "outer.py").write_text(
+        f"{head}from kernels_of_a_test.inner import inner\n"
+        "from kernels_of_a_test.numbers_of_a_test import SHIFT\n"
+        "from kernels_of_a_test.other import UNUSED\n"
+        "\n@kernel\ndef outer(x):\n    return inner(x) + SHIFT\n"
+    )
+
+    def value_and_count() -> tuple[float, bool]:
+        ended = subprocess.run(
+            [sys.executable, "-c", RUN], cwd=tmp_path, capture_output=True, text=True, check=True
+        )
+        value, count = ended.stdout.split()
+        return float(value), int(count) > 0
+
+    assert value_and_count() == (12.0, True)
+    assert value_and_count() == (12.0, False)
+    inner.write_text(inner.read_text().replace("2.0", "3.0"))
+    assert value_and_count() == (13.0, True)
+    (folder / "numbers_of_a_test.py").write_text("SHIFT = 20.0\n")
+    assert value_and_count() == (23.0, True)
+    (folder / "other.py").write_text("UNUSED = 2.0\n")
+    assert value_and_count() == (23.0, False)

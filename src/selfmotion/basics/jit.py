@@ -6,6 +6,7 @@ work.
 """
 
 import contextlib
+import hashlib
 import json
 import os
 import subprocess
@@ -13,7 +14,9 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
+from functools import cache as cached
 from pathlib import Path
+from types import CodeType, FunctionType, ModuleType
 from typing import Any, TypeVar
 
 import numba
@@ -145,6 +148,15 @@ def _forgive(compiled: Any) -> None:
     cache = compiled._cache
     load, save = cache.load_overload, cache.save_overload
     turn = contextlib.ExitStack()
+    # Functions that it calls may be defined later in its module.
+    is_stamped = False
+
+    def stamp() -> None:
+        nonlocal is_stamped
+        if not is_stamped:
+            is_stamped = True
+            kept = cache._cache_file
+            kept._source_stamp = kept._source_stamp, source_stamp(compiled.py_func)
 
     def load_if_possible(*given: Any) -> Any:
         # A damaged file raises any exception of unpickling.
@@ -157,6 +169,7 @@ def _forgive(compiled: Any) -> None:
 
     def load_or_compile(*given: Any) -> Any:
         with _spent, _waited:
+            stamp()
             return load_in_turn(*given)
 
     def load_in_turn(*given: Any) -> Any:
@@ -175,6 +188,55 @@ def _forgive(compiled: Any) -> None:
             save(*given)
 
     cache.load_overload, cache.save_overload = load_or_compile, save_if_possible
+
+
+def source_stamp(function: Callable[..., Any]) -> str:
+    """Return a digest of all that a kernel is compiled of: its file, and those that it calls into.
+
+    Numba's own stamp is of the kernel's file alone: after a change of a function or a number that
+    it takes from another file, in an upgrade too, the old code would run on.
+    """
+    files, constants, seen = set[str](), list[str](), set[object]()
+    _collect(function, files, constants, seen)
+    parts = sorted(map(_digest_of_source, files)) + sorted(constants)
+    return hashlib.sha256("\n".join(parts).encode()).hexdigest()
+
+
+def _collect(function: Any, files: set[str], constants: list[str], seen: set[object]) -> None:
+    """Collect source files and constants of a function and of all functions of ours it calls."""
+    function = getattr(function, "py_func", function)
+    if not isinstance(function, FunctionType) or function in seen:
+        return
+    seen.add(function)
+    files.add(function.__code__.co_filename)
+    package, names = function.__module__.partition(".")[0], _names(function.__code__)
+    # In modules that it names, what it names as well.
+    found = {name: function.__globals__[name] for name in names & function.__globals__.keys()}
+    for module in [x for x in found.values() if isinstance(x, ModuleType)]:
+        if module.__name__.partition(".")[0] == package:
+            found |= {
+                f"{module.__name__}.{n}": vars(module)[n] for n in names & vars(module).keys()
+            }
+    for name, value in found.items():
+        if isinstance(value, int | float | str | tuple):
+            constants.append(f"{name} = {value!r}")
+        elif str(getattr(value, "__module__", "")).partition(".")[0] == package:
+            _collect(value, files, constants, seen)
+
+
+def _names(code: CodeType) -> set[str]:
+    """Return the names that code uses, with the code within it."""
+    inner = [x for x in code.co_consts if isinstance(x, CodeType)]
+    return set(code.co_names).union(*map(_names, inner))
+
+
+@cached
+def _digest_of_source(file: str) -> str:
+    """Return the digest of a file; "" of one within an archive, which numba's own stamp covers."""
+    try:
+        return hashlib.sha256(Path(file).read_bytes()).hexdigest()
+    except OSError:
+        return ""
 
 
 _meanwhile: list[Callable[[], object]] = []
