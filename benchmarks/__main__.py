@@ -195,7 +195,7 @@ BENCHMARKS = {
         Run(
             "suite.py",
             "--folder out/made --out out/suite-made",
-            whole="the run above is its short form",
+            whole="it has the short form of 'suite'",
         ),
     ),
     "fuzz-paths": Benchmark(

@@ -28,7 +28,7 @@ _EXCESS = 2e-3
 _JOINED = 5e-4
 # Planes tried for each cut …
 _TRIED = 6
-# … among those of so many of the largest faces.
+# … among the planes of this number of the largest faces.
 _LARGEST = 100
 # Parts of more triangles try a single plane, since cuts take long.
 _FINE = 3000
@@ -40,7 +40,7 @@ _SAME_PLACE = 0.01
 _CUTS = 2e-3
 # Meshes of more triangles are not cut, which would take above half a minute.
 _MOST_TRIANGLES = 100_000
-# Pairs of pieces that are candidates for joining: each with so many nearest ones.
+# Nearest pieces of each piece that are candidates for joining it.
 _NEIGHBOURS = 10
 # Factor by which a cut with two small remainders is preferred to one with a large one.
 _PREFERENCE = 0.75

@@ -15,6 +15,7 @@ without damping, or with a fixed path, do not wait for these.
 from selfmotion.model.kernels.algebra import (
     carried as carried,
     cholesky as cholesky,
+    clear_held as clear_held,
     factor_damped as factor_damped,
     finite as finite,
     gram as gram,

@@ -4,7 +4,7 @@ from math import isfinite, sqrt
 
 import numpy as np
 
-from selfmotion.basics import Array, called, inlined, kernel
+from selfmotion.basics import Array, Flags, called, inlined, kernel
 
 Vector = tuple[float, float, float]
 
@@ -14,6 +14,16 @@ _SINGULAR = 1e-13
 _SWEEPS = 30
 # Squared size of the remaining off-diagonal, relative, that counts as rounding.
 _ROTATED = 1e-32
+
+
+@inlined
+def clear_held(held: Flags, jacobians: Array) -> None:
+    """Clear the columns of joints that are held, (n,), in Jacobians (F, 6, n)."""
+    for j in range(len(held)):
+        if held[j]:
+            for f in range(jacobians.shape[0]):
+                for i in range(6):
+                    jacobians[f, i, j] = 0.0
 
 
 @inlined

@@ -20,6 +20,7 @@ from selfmotion.model.kernels import (
     Tip,
     approach,
     cholesky,
+    clear_held,
     errors_and_rows,
     finite,
     gram,
@@ -96,7 +97,7 @@ def retract(
                 here[j] += bases[k, j, x] * coordinates[k, x]
         for _ in range(_STEPS):
             place_tips(here, chains, turns, places, rotations, positions, jacobians)
-            _hold(held[k], jacobians)
+            clear_held(held[k], jacobians)
             off = approach(
                 here,
                 jacobians,
@@ -151,16 +152,6 @@ def retract(
         if not finite(at.qd):
             failed = k if failed < 0 else failed
     return failed
-
-
-@inlined
-def _hold(held: Flags, jacobians: Array) -> None:
-    """Clear the columns of joints that are held, (n,), in Jacobians (F, 6, n)."""
-    for j in range(len(held)):
-        if held[j]:
-            for f in range(jacobians.shape[0]):
-                for i in range(6):
-                    jacobians[f, i, j] = 0.0
 
 
 @inlined
@@ -395,7 +386,7 @@ def follow(
                 here[j] = 0.0
         for i in range(_STEPS):
             place_tips(here, chains, turns, places, rotations, positions, jacobians)
-            _hold(held[k], jacobians)
+            clear_held(held[k], jacobians)
             errors_and_rows(layout, targets[k], jacobians, rotations, positions, b, rows)
             off = 0.0
             for x in range(m):

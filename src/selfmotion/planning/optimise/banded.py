@@ -24,9 +24,9 @@ _MAX_ITERATIONS = 200
 _MU_FLOOR = 0.1
 # Rounding ends the iteration where the dual residual is below this share of g·c …
 _STALL_RESIDUAL = 1e-2
-# … and in so many iterations …
+# … and this number of iterations in turn …
 _STALL_ITERATIONS = 3
-# … has each time been above this share of the one before.
+# … each left more than this share of it.
 _STALL_FACTOR = 0.7
 # Fraction to the boundary of a step.
 _TAU = 0.99
@@ -34,7 +34,7 @@ _TAU = 0.99
 _NEIGHBOURHOOD = 1e-3
 # … for which steps are shortened by this factor …
 _SHORTENING = 0.7
-# … at most so often.
+# … at most this number of times.
 _SHORTENINGS = 12
 # A shorter step than this runs along the boundary: it is replaced by a centring step …
 _SHORT_STEP = 0.1

@@ -34,10 +34,9 @@ from selfmotion.problem.problem import Problem
 
 # Relative agreement of the cost on a grid and on the halved one.
 _AGREEMENT = 1e-4
-# Factor of a rise of the cost from grid to grid …
+# Factor of a rise of the cost from grid to grid.
 _RISE = 1.5
-# … which in so many grids in turn shows that it has no limit: the path leaves the workspace between
-# nodes.
+# Such grids in turn that show a cost without limit: the path leaves the workspace between nodes.
 _RISES = 2
 # Changes of the unknowns' basis far from the reference …
 _CHARTS = 200

@@ -55,7 +55,7 @@ _TOWARDS_MIDDLE = (1.0 / 16.0, 1.0 / 64.0, 1.0 / 4.0)
 _SIDEWAYS = (0.4, -0.4, 0.8, -0.8)
 # … after this share of the duration …
 _SIDEWAYS_AFTER = 1.0 / 4.0
-# … at most so many of them.
+# … of which this number is tried at most.
 _MOST_SIDEWAYS = 4
 
 # Statuses of an optimum.

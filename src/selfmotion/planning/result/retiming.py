@@ -49,7 +49,7 @@ _BEYOND = 1.0 + 1e-6
 _WHOLE = 1e-6
 # Slowing for samples at a rate, in steps of this share of the excess of limits …
 _PART = 0.1
-# … at most so often for all other requirements.
+# … at most this number of times for all other requirements.
 _SLOWER = 12
 # Number of jumps of accelerations from which on a remark is made.
 _OFTEN = 12

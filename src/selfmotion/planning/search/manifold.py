@@ -8,6 +8,7 @@ from selfmotion.model.follow import Follows
 from selfmotion.model.kernels import (
     carried,
     cholesky,
+    clear_held,
     errors_and_rows,
     gram,
     rows_of,
@@ -23,7 +24,7 @@ _NEAR_STEPS = 10
 _FAR_STEPS = 60
 # The damped method ends when its relative gain is below this …
 _LITTLE_GAIN = 1e-3
-# … in so many steps in turn.
+# … in this number of steps in turn.
 _LITTLE_GAINS = 5
 
 
@@ -88,16 +89,6 @@ def stopped(q: Array, lower: Array, upper: Array, held: Flags) -> bool:
             q[j] = min(max(q[j], lower[j]), upper[j])
             held[j], inside = True, False
     return inside
-
-
-@called
-def clear_held(held: Flags, jacobians: Array) -> None:
-    """Clear the columns of joints (n,) that are held in Jacobians (F, 6, n)."""
-    for j in range(len(held)):
-        if held[j]:
-            for f in range(jacobians.shape[0]):
-                for i in range(6):
-                    jacobians[f, i, j] = 0.0
 
 
 @kernel

@@ -64,11 +64,11 @@ _SOFT = 0.02
 _STEP_OF_PACE = 4e-3
 # Factor by which a move is slowed for requirements that depend on the pace …
 _SLOWER_FACTOR = 1.2
-# … at most so often.
+# … at most this number of times.
 _SLOWER_TRIES = 12
-# Factor of the margin and of the density of collision checks after a violation between them …
+# Factor of the margin and of the density of collision checks after a violation between them.
 _WIDER = 2.0
-# … in each of so many searches.
+# Searches with ever denser checks.
 _TRIES_OF_MOVE = 4
 # Retreats along the tool's axis from which trees start as well, if the straight leg is blocked [m].
 _RETREATS = (0.01, 0.03, 0.08)

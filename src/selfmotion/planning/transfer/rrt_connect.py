@@ -40,7 +40,7 @@ _SPREAD = 0.5
 _CANDIDATES = 4
 # Largest number of shortcuts that are tried on each …
 _SHORTCUTS = 120
-# … until so many in turn are blocked.
+# … until this number in turn is blocked.
 _BLOCKED_SHORTCUTS = 30
 # First number of control points of a path.
 _FIRST_POINTS = 12
