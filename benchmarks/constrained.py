@@ -27,6 +27,7 @@ from rich.table import Table
 
 import selfmotion as sm
 from selfmotion.basics import Array
+from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.optimise import inverse_metric
 from selfmotion.planning.paper import MinimumNormMotion, Objective, converged_minimum_norm
 from selfmotion.problem.problem import problem_from_dict, problem_to_dict
@@ -90,7 +91,7 @@ def _made(robot: sm.RobotModel, task: str, kind: str, seed: int, number: int) ->
     for _ in range(STARTS):
         free = _without(robot, task, kind, rng)
         try:
-            minimum_norm, _ = converged_minimum_norm(free, free.given_start)
+            minimum_norm, _ = converged_minimum_norm(Formulation.of(free), free.given_start)
         except sm.SelfmotionError:
             continue
         constraints = _constraints(kind, free, minimum_norm, rng)
@@ -218,7 +219,7 @@ def _calmer(
     problem: sm.Problem, minimum_norm: MinimumNormMotion, order: int, rng: np.random.Generator
 ) -> tuple[_Motion, _Motion] | None:
     """Return the motion at x = 0 and one whose busiest joints move less, by random search."""
-    objective = Objective.of(problem, minimum_norm)
+    objective = Objective.of(Formulation.of(problem), minimum_norm)
     first = _motion(objective, np.zeros(objective.size))
     if first is None:
         return None
@@ -244,7 +245,7 @@ def _sphere(
     problem: sm.Problem, minimum_norm: MinimumNormMotion, rng: np.random.Generator
 ) -> tuple[sm.obstacles.Sphere] | None:
     """Return a sphere that the motion at x = 0 runs into, and another one does not."""
-    robot, objective = problem.robot, Objective.of(problem, minimum_norm)
+    robot, objective = problem.robot, Objective.of(Formulation.of(problem), minimum_norm)
     data = robot.model.createData()
     pin.forwardKinematics(robot.model, data, minimum_norm.q[len(minimum_norm.q) // 2])
     others = [_motion(objective, _random(objective, rng)[1]) for _ in range(4)]

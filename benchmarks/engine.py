@@ -9,6 +9,7 @@ import pinocchio as pin
 
 import selfmotion as sm
 from selfmotion.model.motion import Grid
+from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.paper import MinimumNormMotion, Objective
 
 
@@ -17,8 +18,9 @@ def objective_on(problem: sm.Problem, steps: int) -> Objective:
     start = problem.given_start
     if start is None:
         start = problem.robot.inverse_kinematics(problem.path.pose(0.0), problem.task)
-    minimum_norm = MinimumNormMotion.on(problem, start, Grid.aligned(problem.path.knots, steps))
-    return Objective.of(problem, minimum_norm)
+    formulation, grid = Formulation.of(problem), Grid.aligned(problem.path.knots, steps)
+    minimum_norm = MinimumNormMotion.on(formulation, start, grid)
+    return Objective.of(formulation, minimum_norm)
 
 
 class Measured:

@@ -145,8 +145,9 @@ PARTS = (
         "virtual joints",
         (
             "model/follow/virtual_joints.py",
-            "model/follow/augmented.py",
-            "problem/problem/of_arm.py",
+            "model/follow/relaxed.py",
+            "model/follow/coordinates.py",
+            "planning/formulation/tolerances.py",
         ),
         ("follow/test_virtual_joints.py", "planning/test_relaxations.py"),
     ),

@@ -22,6 +22,7 @@ from selfmotion.certificate.path_error import (
     rotation_vectors,
 )
 from selfmotion.model.follow import Follows
+from selfmotion.planning.formulation import Formulation
 from support.arms import robot_named
 from support.two_arms import baxter_with_both_arms
 
@@ -200,7 +201,7 @@ def test_errors_between_samples_are_those_of_the_poses(row: int) -> None:
     path = sm.paths.Waypoints.from_poses([0.0, 1.0, 2.0], [pose, pose, beside])
     problem = sm.Problem(robot, path, start=q)
     still = sm.Trajectory([0.0, 0.5, 2.0], [q] * 3, np.zeros((3, 7)), robot.joint_names)
-    errors = problem.errors_between(still)
+    errors = Formulation.of(problem).errors_between(still)
     middles = [path.pose(0.25), path.pose(1.25)]
     expected = [problem.task.miss(target, pose) for target in middles]
     np.testing.assert_allclose(errors, expected, atol=1e-9)
@@ -208,7 +209,9 @@ def test_errors_between_samples_are_those_of_the_poses(row: int) -> None:
     name = ("x", "y", "z", "rx", "ry", "rz")[row]
     band = sm.Relaxation(name, 2.0 * offset, axes="tool")
     relaxed = dataclasses.replace(problem, relaxations=[band])
-    np.testing.assert_allclose(relaxed.errors_between(still), 0.0, atol=1e-5 * offset)
+    np.testing.assert_allclose(
+        Formulation.of(relaxed).errors_between(still), 0.0, atol=1e-5 * offset
+    )
 
 
 # The deviation of a pose from its target, row by row.

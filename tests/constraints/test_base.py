@@ -12,6 +12,7 @@ from selfmotion.basics import Array
 from selfmotion.certificate import EndState, JointLimits
 from selfmotion.model.motion.grid import Grid
 from selfmotion.model.motion.null_motion import PolynomialNullMotion
+from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.paper import MinimumNormMotion, Objective
 from selfmotion.problem.constraints import NodeTangents, linearised
 from selfmotion.shell.cli.tables import show
@@ -56,9 +57,12 @@ def objective_with(
     grid = Grid.aligned(path.knots, 12)
     motion = PolynomialNullMotion(1, "joint")
     problem = sm.Problem(robot, path, rows, start, motion, constraints=(), rest=False)
-    minimum_norm = MinimumNormMotion.on(problem, start, grid)
-    bound = constraint.bind(standing(robot, rows), start, start)
-    return Objective.of(problem, minimum_norm, free=True), bound
+    formulation = Formulation.of(problem)
+    minimum_norm = MinimumNormMotion.on(formulation, start, grid)
+    # At the start all ends have the same null space.
+    at_rest = dataclasses.replace(formulation, follows=standing(robot, rows))
+    (bound,) = at_rest.bound(constraint.conditions(robot), start, start).every
+    return Objective.of(formulation, minimum_norm, free=True), bound
 
 
 def rows_of(objective: Objective, bound: sm.constraints.BoundConstraint, x: Array) -> Array:

@@ -13,6 +13,10 @@ from selfmotion.model.motion.grid import Grid
 from selfmotion.model.task import Task
 from selfmotion.planning.paper import Rollout
 from selfmotion.problem.constraints import (
+    BoundConstraint,
+    BoundLimits,
+    Conditions,
+    Linear,
     Multipliers,
     NodeTangents,
     active_of,
@@ -28,7 +32,7 @@ DURATION = 1.5
 
 
 @dataclass(frozen=True, eq=False)
-class Given:
+class Given(BoundConstraint):
     """A bound constraint of given numbers."""
 
     name: str
@@ -83,12 +87,12 @@ def test_the_penalty_is_the_square_over_the_motion(
         looked = SimpleNamespace(sampling=nodes.sampling)
         item = Given("it", np.resize(h, (len(nodes.nodes), 2)), equality)
         expected = 10.0 * min(1.0, DURATION * beyond**2 / 2e-3)
-        assert penalty([item], looked) == pytest.approx(expected)
-        assert penalty([item, item], looked) == pytest.approx(2.0 * expected)
+        assert penalty([(item, looked)]) == pytest.approx(expected)
+        assert penalty([(item, looked), (item, looked)]) == pytest.approx(2.0 * expected)
     end = Given("end", np.array([[size]]), equality)
     expected = 10.0 * min(1.0, beyond**2 / 2e-3)
-    assert penalty([], samples) == 0.0
-    assert penalty([end], samples) == pytest.approx(expected)
+    assert penalty([]) == 0.0
+    assert penalty([(end, samples)]) == pytest.approx(expected)
 
 
 def test_what_binds_is_priced_where_it_binds(grid: Grid) -> None:
@@ -149,12 +153,12 @@ def test_the_worst_place_is_told_of_what_is_not_kept(
     h[3, 1], h[5, 0] = 2.0, -3.0
     item = Given("it", h, equality)
     place = "row 5, column 0" if equality else "row 3, column 1"
-    assert violated([item], samples) == (f"it: {place}",)
+    assert violated([(item, samples)]) == (f"it: {place}",)
     kept = Given("kept", np.full((2, 2), 1e-3), equality)
-    assert violated([kept], samples) == ()
+    assert violated([(kept, samples)]) == ()
     beyond = Given("beyond", np.full((2, 2), 1.001e-3), equality)
     broken = Given("broken", np.array([[0.0, np.nan]]), equality)
-    told = violated([kept, beyond, broken], samples)
+    told = violated((item, samples) for item in (kept, beyond, broken))
     assert told == ("beyond: row 0, column 0", "broken: row 0, column 1")
 
 
@@ -180,14 +184,21 @@ def test_derivatives_of_another_shape_are_refused_by_name(
 def test_a_constraint_that_is_wrong_on_demand_does_not_pass() -> None:
     """Its tangents are right, but not what programmes are solved with."""
 
+    class Turned:
+        def __init__(self, own: Linear) -> None:
+            self.own = own
+
+        def picked(self, motion: NodeTangents, rows: Array, columns: Array) -> Array:
+            return -self.own.picked(motion, rows, columns)
+
+    class Bound(BoundLimits):
+        def linearised_at(self, samples: Samples):
+            shape, known = super().linearised_at(samples)
+            return shape, Turned(known)
+
     class Mine(sm.constraints.JointVelocityLimits):
-        def bind(self, follows, start, end):
-            own = super().bind(follows, start, end)
-            known = SimpleNamespace(picked=lambda *given: -own.picked(*given))
-            asked = ("name", "equality", "tolerance", "residual", "tangents", "describe")
-            bound = SimpleNamespace(**{name: getattr(own, name) for name in asked})
-            bound.linearised_at = lambda samples: (own.linearised_at(samples)[0], known)
-            return bound
+        def conditions(self, robot: sm.RobotModel) -> Conditions:
+            return Conditions(points=(Bound.of(robot, self.requirement(robot), self.margin),))
 
     robot = robot_named("panda")
     start = start_of(robot, "pose")

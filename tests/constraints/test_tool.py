@@ -176,13 +176,14 @@ def test_what_is_no_tilt_is_refused(
 
 def test_what_is_eased_is_what_h_falls_by(panda: sm.RobotModel, free: sm.Plan) -> None:
     """2 % of a limit: of a vector, whose h is a square, twice as much."""
-    own, start = free.problem.follows, free.trajectory.q[0]
+    own = free.problem.follows
     t = np.linspace(0.0, 3.0, 301)
     motion = [free.trajectory(t, order) for order in range(3)]
     samples = Samples.along(own, Sampling.trapezoidal(t), *motion[:2])
     speed = np.linalg.norm(ToolRates(panda.chain)(*motion)[0][:, :3], axis=1).max()
     bound, eased = (
-        sm.constraints.ToolLimits(share * speed).bind(own, start, start) for share in (1.0, 1.02)
+        sm.constraints.ToolLimits(share * speed).conditions(panda).points[0]
+        for share in (1.0, 1.02)
     )
     fallen = bound.residual(samples).max() - eased.residual(samples).max()
     assert bound.easing(0)[0] == pytest.approx(fallen, rel=0.05)

@@ -8,13 +8,21 @@ import pinocchio as pin
 import pytest
 
 import selfmotion as sm
-from selfmotion.basics import Array
+from selfmotion.basics import Array, Counts
 from selfmotion.certificate.path_error import deviation_from
-from selfmotion.model.follow import AugmentedTaskFrames, Follows
+from selfmotion.model.follow import Follows, RelaxedFrames
 from selfmotion.model.motion import Sampling
-from selfmotion.problem.constraints import NodeTangents
+from selfmotion.planning.formulation import (
+    BoundConditions,
+    CurveSamples,
+    Formulation,
+    SampledMotion,
+)
+from selfmotion.planning.formulation.tolerances import RowWithinBand, WithinBand
+from selfmotion.planning.nodes import NodeGrid
+from selfmotion.planning.nodes.spline import AT_GAUSS
+from selfmotion.problem.constraints import DependsOn, NodeTangents
 from selfmotion.problem.costs import Samples
-from selfmotion.problem.problem.of_arm import RowWithinBand, WithinBand, springs
 from support.arms import PANDA_HOME, robot_named
 from support.nodes import around_of, centred, moved, nodes_of, random_step
 
@@ -55,7 +63,7 @@ def test_the_tool_deviates_in_what_is_relaxed_and_by_what_the_joints_say(
 ) -> None:
     robot, rng = robot_named(name), np.random.default_rng(1)
     real = Follows.of(robot, sm.paths.Dwell(pin.SE3.Identity(), 1.0), task)
-    follows = AugmentedTaskFrames.with_tolerances(real, relaxations)
+    follows = RelaxedFrames.with_tolerances(real, relaxations)
     virtual, n = follows.virtual, robot.dof
     lower, upper = robot.finite_limits()
     for _ in range(3):
@@ -90,8 +98,8 @@ def test_joints_stand_still_outside_of_windows() -> None:
     robot = robot_named("panda")
     path = sm.paths.Dwell(robot.pose(PANDA_HOME), 4.0)
     windows = [R("x", 0.1, during=(0.0, 2.0)), R(("rx", "ry"), 0.2, during=(1.0, 4.0)), R("z", 0.1)]
-    follows = AugmentedTaskFrames.with_tolerances(Follows.of(robot, path, "pose"), windows)
-    names = follows.robot.joint_names[7:]
+    follows = RelaxedFrames.with_tolerances(Follows.of(robot, path, "pose"), windows)
+    names = follows.coordinates.names[7:]
     held = follows.held(np.array([0.0, 1.0, 1.5, 2.0, 4.0]))[:, 7:]
     told = [{name for name, still in zip(names, row, strict=True) if still} for row in held]
     tilt = {"tilt rx", "tilt ry"}
@@ -130,38 +138,45 @@ def test_a_problem_with_tolerances_keeps_what_its_costs_and_limits_say_of_the_ar
         ],
         relaxations=[R(("rx", "ry"), 0.2), R("z", 0.01, axes="tool")],
     )
-    problem, rng = asked.augmented, np.random.default_rng(0)
+    formulation, rng = Formulation.of(asked), np.random.default_rng(0)
     t = np.linspace(0.0, 3.0, 9)
-    more = problem.robot.dof - robot.dof
+    more = formulation.follows.dof - robot.dof
     q = np.hstack([PANDA_HOME + 0.1 * rng.normal(size=(9, 7)), 0.3 * rng.normal(size=(9, more))])
     qd = rng.normal(size=q.shape)
     sampling = Sampling.trapezoidal(t)
-    whole = Samples.along(problem.follows, sampling, q, qd)
+    whole = formulation.sampled_along(sampling, q, qd)
     own = Samples.along(asked.follows, sampling, q[:, :7], qd[:, :7])
-    for one, other in zip(problem.all_costs, asked.all_costs, strict=True):
-        np.testing.assert_allclose(one.value(whole), other.value(own), rtol=1e-12)
+    for cost in formulation.costs:
+        np.testing.assert_allclose(cost.value(whole.arm), cost.value(own), rtol=1e-12)
         for name in ("q", "qd", "qdd"):
-            part, wanted = (getattr(x, name) for x in (one.gradient(whole), other.gradient(own)))
+            part, wanted = (getattr(cost.gradient(x), name) for x in (whole.arm, own))
             assert (part is None) == (wanted is None)
             if part is not None:
-                np.testing.assert_allclose(part[:, :7], wanted, rtol=1e-12)
-                assert not part[:, 7:].any()
-    bound = problem.bind_constraints(q[0], q[-1], apart=False)
-    before = asked.bind_constraints(q[0, :7], q[-1, :7], apart=False)
-    bands = bound[len(before) :]
+                np.testing.assert_allclose(part, wanted, rtol=1e-12)
+    bound = formulation.conditions(q[0], q[-1], apart=False)
+    before = Formulation.on_path(asked).conditions(q[0, :7], q[-1, :7], apart=False)
+    bands = [item for item in bound.inequalities if item.depends_on is DependsOn.TOLERANCES]
     # Of rows that share a band, each is within it by itself, too.
-    assert [type(item) for item in bands] == [WithinBand, RowWithinBand, RowWithinBand]
-    for one, other in zip(bound, before, strict=False):
-        np.testing.assert_allclose(one.residual(whole), other.residual(own), atol=1e-12)
-    ones = np.eye(q.shape[1])
-    motion = NodeTangents(np.tile(ones, (9, 1, 1)), np.zeros((9, *ones.shape)), sampling)
-    for item in bound:
-        exact = differences(
-            lambda x, item=item: item.residual(Samples.along(problem.follows, sampling, x, qd)), q
+    assert [type(item) for item in bands] == [RowWithinBand, RowWithinBand, WithinBand]
+    kept = [item for item in bound.every if item not in bands]
+    for one, other in zip(kept, before.every, strict=True):
+        np.testing.assert_allclose(
+            one.residual(whole.seen_by(one)), other.residual(own), atol=1e-12
         )
-        if "velocity" in item.name:
-            continue
-        np.testing.assert_allclose(item.tangents(whole, motion), exact, atol=1e-6)
+    for item in bound.inequalities:
+        columns = slice(7, None) if item in bands else slice(0, 7)
+        ones = np.eye(q.shape[1])[columns, columns]
+        motion = NodeTangents(np.tile(ones, (9, 1, 1)), np.zeros((9, *ones.shape)), sampling)
+
+        def residual(x: Array, item=item, columns=columns) -> Array:
+            there = q.copy()
+            there[:, columns] = x
+            return item.residual(formulation.sampled_along(sampling, there, qd).seen_by(item))
+
+        if "velocity" not in item.name:
+            exact = differences(residual, q[:, columns])
+            tangents = item.tangents(whole.seen_by(item), motion)
+            np.testing.assert_allclose(tangents, exact, atol=1e-6)
 
 
 # Poses with one row off at a time, of which a virtual joint's coordinate is in proportion.
@@ -176,8 +191,9 @@ def test_what_is_said_of_a_band_is_the_deviation_in_its_unit(
     robot = robot_named(name)
     start = robot.dexterous_configuration(task)
     path = sm.paths.Dwell(robot.pose(start), 4.0)
-    problem = sm.Problem(robot, path, task, relaxations=relaxations, clearance=None).augmented
-    follows = AugmentedTaskFrames.with_tolerances(Follows.of(robot, path, task), relaxations)
+    problem = sm.Problem(robot, path, task, relaxations=relaxations, clearance=None)
+    formulation = Formulation.of(problem)
+    follows = RelaxedFrames.with_tolerances(Follows.of(robot, path, task), relaxations)
     virtual, n = follows.virtual, robot.dof
     sampling = Sampling.trapezoidal(np.linspace(0.0, 4.0, 5))
     said = 0
@@ -190,10 +206,11 @@ def test_what_is_said_of_a_band_is_the_deviation_in_its_unit(
             if virtual.swing is not None and k == virtual.swing[0]:
                 s[virtual.swing[1]] = off
             q = np.tile(np.append(start, s), (5, 1))
-            samples = Samples.along(problem.follows, sampling, q, np.zeros_like(q))
-            for item in problem.bind_constraints(q[0], q[1], apart=False):
+            whole = formulation.sampled_along(sampling, q, np.zeros_like(q))
+            for item in formulation.conditions(q[0], q[1], apart=False).every:
                 if not item.name.startswith("relaxation"):
                     continue
+                samples = whole.seen_by(item)
                 h = item.residual(samples)
                 text = item.describe(samples, 0, int(h[0].argmax()))
                 assert "tilt" not in text
@@ -209,9 +226,9 @@ def test_what_is_said_of_a_band_is_the_deviation_in_its_unit(
                 said += 1
     bands = [item for item in relaxations if np.isfinite(item.band)]
     assert said >= len(bands)
-    told = [follows.robot.label(n + k) for k in range(len(virtual.each))]
+    told = [follows.coordinates.label(n + k) for k in range(len(virtual.each))]
     assert not any("tilt" in words or "relaxed" in words for words in told)
-    assert follows.robot.label(0) == f"joint '{robot.joint_names[0]}'"
+    assert follows.coordinates.label(0) == f"joint '{robot.joint_names[0]}'"
 
 
 @pytest.mark.parametrize("relaxations", [item[2] for item in TOLERANCES[:4]])
@@ -225,7 +242,7 @@ def test_gradients_along_nodes_equal_central_differences(
     asked = sm.Problem(
         robot, circle, start=PANDA_HOME, relaxations=items, rest=False, clearance=None
     )
-    motion = nodes_of(asked.augmented)
+    motion = nodes_of(asked)
     held = motion.grid.manifolds.held
     assert held.any() == (window is not None)
     step = random_step(motion, 3, 0.02)
@@ -244,16 +261,46 @@ def test_gradients_along_nodes_equal_central_differences(
     assert abs(float((gradient * direction).sum()) - exact) < COST * np.abs(gradient).sum()
 
 
-def test_springs_have_exact_slopes() -> None:
-    follows = Follows.of(robot_named("panda"), sm.paths.Dwell(pin.SE3.Identity(), 1.0), "pose")
-    q, cost = np.random.default_rng(0).normal(size=(3, 7)), springs(np.linspace(0.0, 2.0, 7))
+def test_springs_have_exact_slopes_and_curvatures() -> None:
+    """Deviations cost ½ Σ w δ² where their bands do not bound them."""
+    robot = robot_named("panda")
+    circle = sm.paths.Circle.around(robot.pose(PANDA_HOME), 0.1, 2.0)
+    asked = sm.Problem(
+        *(robot, circle), start=PANDA_HOME, relaxations=[R("z", 0.02)], rest=False, clearance=None
+    )
+    soft = Formulation.of(asked).with_springs(3.0)
+    assert soft.springs is not None
+    t = np.linspace(0.0, 2.0, 7)
+    grid = NodeGrid(soft, t, BoundConditions(), free=False, counts=Counts())
+    cost, spline = grid.cost, grid.spline
+    rng = np.random.default_rng(0)
+    ends = np.concatenate([np.tile(PANDA_HOME, (6, 6, 1)), rng.normal(size=(6, 6, 1))], axis=2)
 
-    def along(x: Array) -> Samples:
-        return Samples.along(follows, Sampling.trapezoidal(np.arange(3.0)), x, np.zeros_like(x))
+    def value(ends: Array) -> float:
+        every = CurveSamples(
+            soft.follows, spline.sampling, lambda o: spline.at(AT_GAUSS, o, ends).reshape(-1, 8)
+        )
+        motion = soft.sampled(every)
+        return float(spline.sampling.weights @ (cost.integrand(motion) - hard(motion)))
 
-    exact = differences(lambda x: cost.value(along(x)), q)
-    np.testing.assert_allclose(cost.gradient(along(q)).q, exact, atol=GRADIENT)
-    np.testing.assert_allclose(np.diag(cost.curvature(7)[0]) * q, exact, atol=GRADIENT)
+    def hard(motion: SampledMotion) -> Array:
+        return np.sum([item.value(motion.arm) for item in soft.costs], axis=0)
+
+    # Being at a band all the time doubles a cost of 3.
+    edge = np.zeros((6, 6, 8))
+    edge[:, [0, 3], 7] = soft.coordinates.upper[7]
+    assert value(edge) == pytest.approx(3.0, rel=1e-9)
+    samples = soft.sampled(CurveSamples(soft.follows, spline.sampling, lambda o: np.zeros((30, 8))))
+    none = cost.partials(samples.arm)
+    slopes = cost.slopes(samples.arm, ends, none)[:, :, 7:]
+    direction = np.zeros_like(ends)
+    direction[:, :, 7] = rng.normal(size=(6, 6))
+    exact = (value(ends + 1e-4 * direction) - value(ends - 1e-4 * direction)) / 2e-4
+    assert float((slopes * direction[:, :, 7:]).sum()) == pytest.approx(exact, rel=1e-6)
+    both = np.swapaxes(direction, 1, 2)[:, :, :, None]
+    bends = cost.curvature(samples.arm, none, both).sum()
+    sides = value(ends + direction) + value(ends - direction) - 2.0 * value(ends)
+    assert float(bends) == pytest.approx(sides, rel=1e-6)
 
 
 @pytest.mark.parametrize("relaxations", [item[2] for item in TOLERANCES[1:5]])
@@ -261,7 +308,7 @@ def test_what_is_brought_within_bands_deviates_by_no_more(relaxations: list[sm.R
     """Of tolerances of several rows; what is within them may stay where it is."""
     robot = robot_named("panda")
     real = Follows.of(robot, sm.paths.Dwell(pin.SE3.Identity(), 1.0), "pose")
-    follows = AugmentedTaskFrames.with_tolerances(real, relaxations)
+    follows = RelaxedFrames.with_tolerances(real, relaxations)
     count = len(follows.virtual.each)
     q = np.zeros((40, robot.dof + count))
     bands = [follows.virtual.widest([joint.row]) / joint.scale for joint in follows.virtual.each]

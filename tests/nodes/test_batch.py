@@ -5,6 +5,7 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.basics import Array, Counts
+from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.nodes import Batch, NodeGrid, Step, minimise
 from support.arms import PANDA_HOME, Case
 from support.nodes import problem_of
@@ -19,8 +20,9 @@ INTERVALS, ROUNDS = 8, 6
 def grid_of(problem: sm.Problem) -> NodeGrid:
     start = np.array(problem.given_start)
     t = np.linspace(0.0, problem.path.duration, INTERVALS + 1)
-    bound = problem.bind_constraints(start, start)
-    return NodeGrid(problem, t, bound, free=True, counts=Counts())
+    formulation = Formulation.of(problem)
+    bound = formulation.conditions(start, start)
+    return NodeGrid(formulation, t, bound, free=True, counts=Counts())
 
 
 def motions_of(problem: sm.Problem, count: int = 4, size: float = 0.15) -> Array:

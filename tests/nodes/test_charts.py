@@ -20,7 +20,7 @@ def test_nodes_are_on_the_path_wherever_they_go(case: Case) -> None:
         step = random_step(motion, seed, 0.05)
         place = moved(motion, step).place
         for k, t in enumerate(motion.grid.t):
-            item = motion.grid.problem.follows.items[0]
+            item = motion.grid.formulation.follows.items[0]
             assert np.abs(item.error(t, place.q[k])).max() < ON_PATH
         r = motion.nu.shape[1]
         away = place.q - motion.charts.q
@@ -47,7 +47,7 @@ def test_accelerations_are_those_of_the_path(case: Case) -> None:
     motion = centred(moved(motion, random_step(motion, 5, 0.05)))
     # Also at both ends of the path, where it is known to one side alone.
     signs = np.where(motion.grid.t < 0.5 * motion.grid.t[-1], 1.0, -1.0)
-    place, item = motion.place, motion.grid.problem.follows.items[0]
+    place, item = motion.place, motion.grid.formulation.follows.items[0]
     errors = []
     for size in np.array([2e-2, 1e-2]) / max(1.0, np.abs(place.qd).max()):
         step = size * signs[:, None]
@@ -110,7 +110,7 @@ def test_charts_around_nodes_are_of_the_same_motion(case: Case) -> None:
         np.testing.assert_allclose(one.qd, there.place.qd, atol=1e-9)
         np.testing.assert_allclose(one.qdd, there.place.qdd, atol=1e-8)
         np.testing.assert_allclose(one.tangents, charts.bases, atol=1e-9)
-    jacobians = np.array([motion.grid.problem.follows.jacobian(q) for q in place.q])
+    jacobians = np.array([motion.grid.formulation.follows.jacobian(q) for q in place.q])
     np.testing.assert_allclose(jacobians @ charts.bases, 0.0, atol=1e-9)
     unit = np.swapaxes(charts.bases, 1, 2) @ charts.bases
     np.testing.assert_allclose(unit, np.broadcast_to(np.eye(unit.shape[1]), unit.shape), atol=1e-12)
@@ -136,7 +136,7 @@ def test_from_rest_to_rest_where_no_time_is_given() -> None:
     start = start_of(robot, "planar")
     still = sm.paths.Dwell(robot.pose(start), 2.0)
     grid = nodes_of(problem_of((robot, sm.Task.PLANAR, start, still)), 40).grid
-    wanted = start + 0.01 * grid.problem.follows.null_basis(start)[:, 0]
+    wanted = start + 0.01 * grid.formulation.follows.null_basis(start)[:, 0]
     motion = grid.motion_towards(start, wanted)
     assert motion is not None
     u = grid.t / grid.t[-1]

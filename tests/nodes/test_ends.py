@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
+from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.nodes import Step, minimise
 from selfmotion.planning.nodes.ends import NodeEnds
 from selfmotion.planning.optimise import Status
@@ -191,7 +192,8 @@ def test_another_configuration_on_the_same_plane_is_none(planar: sm.RobotModel) 
     curve = self_motion(planar, start, 5e-3)
     dwell = sm.paths.Dwell(planar.pose(start), 3.0)
     problem = sm.Problem(planar, dwell, "planar", start)
-    end = sm.constraints.EndConfiguration(curve[0]).bind(problem.follows, start, start)
+    asked = sm.constraints.EndConfiguration(curve[0]).conditions(problem.robot)
+    (end,) = Formulation.of(problem).bound(asked, start, start).ends
     away = (curve - curve[0]) @ end.null[:, 0]
     (others,) = np.nonzero(np.diff(np.sign(away[100:-100])))
     assert len(others)
@@ -225,7 +227,8 @@ def test_an_end_at_another_configuration_is_told(panda: sm.RobotModel) -> None:
     """By how far it is from what is asked for, where its own coordinates do not tell."""
     problem = circle(panda)
     end = np.array(PANDA_HOME)
-    asked = sm.constraints.EndConfiguration(end).bind(problem.follows, end, end)
+    own = sm.constraints.EndConfiguration(end).conditions(problem.robot)
+    (asked,) = Formulation.of(problem).bound(own, end, end).ends
     away = 0.3 * problem.follows.jacobian(end)[0] / np.linalg.norm(problem.follows.jacobian(end)[0])
     nodes = np.tile(end, (4, 3, 1))
     assert NodeEnds([asked]).elsewhere(nodes) == {}

@@ -4,6 +4,7 @@ import numpy as np
 
 import selfmotion as sm
 from selfmotion.basics import Counts
+from selfmotion.planning.formulation import BoundConditions, Formulation
 from selfmotion.planning.nodes import NodeGrid
 from selfmotion.planning.nodes.objective import LocalModel
 from selfmotion.planning.nodes.spline import AT_CONTROLS
@@ -27,7 +28,7 @@ def test_what_is_forgotten_is_the_same_again(case: Case) -> None:
     def known() -> list[np.ndarray]:
         return [
             motion.h,
-            motion.checked.qdd,
+            motion.checked.arm.qdd,
             motion.samples.qddd,
             motion.curve_ends,
             np.array([motion.cost, motion.objective, motion.violation]),
@@ -46,13 +47,14 @@ def test_beside_a_singular_pose_rounding_of_the_path_does_not_accelerate_the_arm
     t = np.linspace(0.0, DURATION, 65)
     # At the pose itself nothing may come onto the path.
     t[32] += 0.3 * (t[33] - t[32])
-    grid = NodeGrid(problem, t, (), free=True, counts=Counts())
+    formulation = Formulation.of(problem)
+    grid = NodeGrid(formulation, t, BoundConditions(), free=True, counts=Counts())
     q = stretching(t)
 
     motion = grid.near(q, np.gradient(q, t, axis=0))
     assert motion is not None
     assert np.abs(motion.trajectory.qdd).max() < CALM
-    assert problem.errors_between(motion.trajectory).max() < 1e-6
+    assert formulation.errors_between(motion.trajectory).max() < 1e-6
 
 
 def in_span(vectors: np.ndarray, values: np.ndarray) -> np.ndarray:
@@ -86,7 +88,7 @@ def linear_and_real_jerks(panda: sm.RobotModel, count: int) -> tuple[np.ndarray,
     found = motion.along(step, changes), motion.stepped(step)
     assert found[0] is not None
     assert found[1] is not None
-    assert grid.problem.errors_between(found[0].trajectory).max() < ON_PATH
+    assert grid.formulation.errors_between(found[0].trajectory).max() < ON_PATH
     return jerks(place.nodes + moved), *(jerks(one.place.nodes) for one in found)
 
 

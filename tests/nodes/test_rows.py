@@ -7,7 +7,7 @@ import selfmotion as sm
 from selfmotion.basics import Array
 from selfmotion.model.motion import Trajectory
 from selfmotion.model.robot import ToolRates
-from selfmotion.planning.nodes.rows import NodeRows, accelerates_of
+from selfmotion.planning.nodes.limit_rows import ControlPointRows
 from selfmotion.planning.nodes.spline import AT_CONTROLS, ORDERS, Quintic, unit_bases
 from support.arms import PANDA_HOME
 from support.circles import small_circle
@@ -172,9 +172,8 @@ def test_what_is_of_accelerations_looks_twice_as_often(panda: sm.RobotModel, nam
     each = (len(spline.points.t) - 1) / spline.count
     assert each == {"tool": 4.0}.get(name, 2.0)
     # Of speeds of the tool alone nothing is of accelerations.
-    follows = small_circle(panda).follows
-    speed = sm.constraints.ToolLimits(speed=1.0).bind(follows, PANDA_HOME, PANDA_HOME)
-    assert not accelerates_of(speed, panda.dof)
+    (speed,) = sm.constraints.ToolLimits(speed=1.0).conditions(panda).points
+    assert not speed.uses_accelerations(panda.dof)
 
 
 def test_rows_of_a_vector_bend_as_squares_do(panda: sm.RobotModel) -> None:
@@ -185,15 +184,16 @@ def test_rows_of_a_vector_bend_as_squares_do(panda: sm.RobotModel) -> None:
         *(panda, path, "position", PANDA_HOME), constraints=[tilt], rest=False, clearance=None
     )
     motion = nodes_of(problem, 6)
-    bound = next(item for item in motion.grid.constraints if item.name.startswith("tilt"))
-    slopes = bound.squares(motion.checked)
-    assert slopes.shape == (len(motion.checked.q), 3, 7)
+    bound = next(item for item in motion.grid.conditions.points if item.name.startswith("tilt"))
+    checked = motion.checked.arm
+    slopes = bound.squares(checked)
+    assert slopes.shape == (len(checked.q), 3, 7)
     way = np.random.default_rng(0).normal(size=7)
 
     def h(share: float) -> Array:
-        q = motion.checked.q + share * way
+        q = checked.q + share * way
         away = bound.quantity.away(q, 0.0 * q, 0.0 * q)[:, 0]
-        linear = bound.quantity.away(motion.checked.q, 0.0 * q, 0.0 * q)[:, 0]
+        linear = bound.quantity.away(checked.q, 0.0 * q, 0.0 * q)[:, 0]
         turned = linear + share * slopes @ way * bound.quantity.bounds[0] / np.sqrt(2.0)
         assert np.abs(away - turned).max() <= 10.0 * share**2
         return np.asarray((turned**2).sum(axis=1)) / bound.quantity.bounds[0] ** 2
@@ -201,8 +201,8 @@ def test_rows_of_a_vector_bend_as_squares_do(panda: sm.RobotModel) -> None:
     bends = (h(1e-3) + h(-1e-3) - 2.0 * h(0.0)) / 1e-6
     np.testing.assert_allclose(bends, ((slopes @ way) ** 2).sum(axis=1), rtol=1e-6)
     # Of numbers there is nothing of that.
-    limits = sm.constraints.Band.of_elbow("up").bind(problem.follows, PANDA_HOME, PANDA_HOME)
-    assert limits.squares is None
+    (limits,) = sm.constraints.Band.of_elbow("up").conditions(panda).points
+    assert limits.squares(checked) is None
 
 
 def test_limits_are_told_as_used_where_the_curve_uses_them(panda: sm.RobotModel) -> None:
@@ -215,10 +215,9 @@ def test_limits_are_told_as_used_where_the_curve_uses_them(panda: sm.RobotModel)
     highest = float(q(once)[:, 3].max())
     upper[3] = highest + 1e-4
     limits = sm.constraints.JointPositionLimits(lower, upper)
-    bound = limits.bind(motion.grid.problem.follows, q.q[0], q.q[-1])
-    rows = NodeRows(motion.grid.spline, [bound], 7)
-    ones = np.ones(rows.spline.count * 6 * 2 * len(bound.joints))
-    (found,) = rows.multipliers_of(ones, motion.curve_ends)
+    (bound,) = limits.conditions(panda).limits
+    rows = ControlPointRows(motion.grid.spline, bound, 0)
+    found = rows.multipliers_of(np.ones(rows.shape), motion.curve_ends)
     used = found.used.reshape(len(found.times), 2, -1)
     joint = list(bound.joints).index(3)
     expected = q(found.times)[:, 3] - upper[3] > -0.005

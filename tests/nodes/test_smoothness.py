@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
+from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.nodes.smoothness import quickness, smoothing_of
 from selfmotion.planning.nodes.spline import Quintic
 from support.arms import Case, robot_named, short_line, start_of
@@ -60,7 +61,7 @@ def test_a_wait_after_a_line_costs_nothing() -> None:
 
 def test_what_starts_too_slowly_for_its_cost_is_quicker(case: Case) -> None:
     motion = nodes_of(problem_of(case, rest=True))
-    problem, samples, cost = motion.grid.problem, motion.samples, motion.cost
+    problem, samples, cost = motion.grid.formulation, motion.samples, motion.cost
     assert quickness(problem, samples, 1e3 * cost, 1.0) == 1.0
     much = quickness(problem, samples, 1e-3 * cost, 1.0)
     more = quickness(problem, samples, 1e-4 * cost, 1.0)
@@ -72,7 +73,7 @@ def test_what_is_held_for_a_while_begins_and_ends_without_a_jump() -> None:
     robot, _, start, path = case_of("panda", "pose")
     window = (0.4 * path.duration, 0.7 * path.duration)
     held = sm.Relaxation("rz", 0.1, during=window)
-    problem = problem_of((robot, "pose", start, path), relaxations=[held]).augmented
+    problem = Formulation.of(problem_of((robot, "pose", start, path), relaxations=[held]))
     t = np.linspace(0.0, path.duration, 201)
     spline = Quintic(t)
     found = smoothing_of(problem, spline, smoothed=False)

@@ -1,5 +1,7 @@
 """Given ends are eliminated: exact gradients, the optimum of other solvers, ends to rounding."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.optimize import minimize
@@ -7,6 +9,7 @@ from scipy.optimize import minimize
 import selfmotion as sm
 from selfmotion.basics import Array
 from selfmotion.model.motion import PolynomialNullMotion
+from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.optimise import inverse_metric
 from selfmotion.planning.paper import (
     Eliminated,
@@ -55,9 +58,11 @@ def solved(
     name: str, asked: list[sm.constraints.Constraint], *, free: bool = False, **options
 ) -> Solution:
     problem = problem_of(name)
-    minimum_norm, _ = converged_minimum_norm(problem, np.array(problem.given_start))
-    ends = [item.bind(problem.follows, minimum_norm.start, minimum_norm.end) for item in asked]
-    return solve(problem, minimum_norm, ends=ends, free=free, **options)
+    formulation = Formulation.of(problem)
+    minimum_norm, _ = converged_minimum_norm(formulation, np.array(problem.given_start))
+    own = sm.constraints.Conditions.joined(item.conditions(problem.robot) for item in asked)
+    ends = formulation.bound(own, minimum_norm.start, minimum_norm.end).ends
+    return solve(formulation, minimum_norm, ends=ends, free=free, **options)
 
 
 def eliminated(found: Solution) -> Eliminated:
@@ -230,5 +235,8 @@ def test_an_end_that_is_missed_is_named_on_either_side() -> None:
 
 
 def test_limits_are_refused() -> None:
+    found = solved("pose", [])
+    limits = sm.constraints.JointVelocityLimits().conditions(found.objective.rollout.robot).limits
+    method = replace(found.method, ends=limits)
     with pytest.raises(sm.errors.ProblemError, match="'joint velocity limits' is none on the ends"):
-        solved("pose", [sm.constraints.JointVelocityLimits()])
+        method.on(found.objective.grid)

@@ -10,6 +10,7 @@ from selfmotion.basics import Array
 from selfmotion.model.follow import Follows
 from selfmotion.model.motion import NullMotionTable, PolynomialNullMotion
 from selfmotion.model.motion.grid import Grid
+from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.paper import MinimumNormMotion, Objective
 from selfmotion.planning.paper.minimum_norm import FixedStart
 from selfmotion.planning.paper.rollout import Rollout
@@ -35,8 +36,9 @@ def test_the_metric_is_the_differenced_gauss_newton_matrix(
     path = short_line(panda, PANDA_HOME)
     motion = PolynomialNullMotion(3, "joint")
     problem = sm.Problem(panda, path, "pose", PANDA_HOME, motion, costs=[cost], constraints=())
+    formulation = Formulation.of(problem)
     objective = Objective.of(
-        problem, MinimumNormMotion.on(problem, PANDA_HOME, Grid.aligned(path.knots, 12))
+        formulation, MinimumNormMotion.on(formulation, PANDA_HOME, Grid.aligned(path.knots, 12))
     )
     x = 0.05 * np.random.default_rng(0).normal(size=objective.size)
     sampling = objective.grid.sampling
@@ -157,9 +159,10 @@ def test_a_free_start_is_a_variable_and_a_guide_stands_for_no_null_motion() -> N
     robot = robot_named("panda")
     start = start_of(robot, "pose")
     problem = sm.Problem(robot, short_line(robot, start), "pose", start, rest=False)
-    steps = Grid.aligned(problem.knots, 12)
-    minimum_norm = MinimumNormMotion.on(problem, start, steps)
-    given, free = (Objective.of(problem, minimum_norm, free=free) for free in (False, True))
+    formulation = Formulation.of(problem)
+    steps = Grid.aligned(formulation.knots, 12)
+    minimum_norm = MinimumNormMotion.on(formulation, start, steps)
+    given, free = (Objective.of(formulation, minimum_norm, free=free) for free in (False, True))
     assert free.size == given.size + 1
     zero = np.zeros(given.size)
     assert_same(given.samples(zero).q[steps.node_stages], minimum_norm.q)
@@ -167,11 +170,11 @@ def test_a_free_start_is_a_variable_and_a_guide_stands_for_no_null_motion() -> N
     def guide(t: Array) -> Array:
         return np.tile(0.3 * np.eye(7)[0], (len(t), 1))
 
-    guided = MinimumNormMotion.on(problem, start, steps, guide)
+    guided = MinimumNormMotion.on(formulation, start, steps, guide)
     assert np.abs(guided.q[-1] - minimum_norm.q[-1]).max() > 1e-3
-    along = Objective.of(problem, guided)
+    along = Objective.of(formulation, guided)
     assert_same(along.samples(zero).q[steps.node_stages], guided.q)
     # What is given in its place counts instead.
     around = np.zeros((len(steps.stage_times), 7))
-    back = Objective.of(problem, guided, around=around)
+    back = Objective.of(formulation, guided, around=around)
     assert_same(back.samples(zero).q[steps.node_stages], minimum_norm.q)

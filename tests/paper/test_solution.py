@@ -10,8 +10,10 @@ from scipy.optimize import minimize
 import selfmotion as sm
 from selfmotion.basics import Array, Counts
 from selfmotion.model.motion import BSplineNullMotion, Grid, NullMotion, PolynomialNullMotion
+from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.optimise import Function, Iteration, Minimum, Status
 from selfmotion.planning.paper import MinimumNormMotion, Solution, converged_minimum_norm, solve
+from selfmotion.problem.constraints import BoundEnd
 from support.arms import PANDA_HOME, robot_named, short_line, start_of
 
 # The notes' costs are of a fine integration, and of optima that steps of 1e-8 of it end at: here
@@ -22,11 +24,11 @@ PUBLISHED = PolynomialNullMotion(3, "joint", "monomial")
 
 
 def still_of(problem: sm.Problem) -> MinimumNormMotion:
-    return converged_minimum_norm(problem, np.array(problem.given_start))[0]
+    return converged_minimum_norm(Formulation.of(problem), np.array(problem.given_start))[0]
 
 
 def solved(problem: sm.Problem, **options) -> Solution:
-    return solve(problem, still_of(problem), **options)
+    return solve(Formulation.of(problem), still_of(problem), **options)
 
 
 def closed_circle(**options) -> Solution:
@@ -35,8 +37,20 @@ def closed_circle(**options) -> Solution:
     cubic = PolynomialNullMotion()
     problem = sm.Problem(robot, circle, "pose", PANDA_HOME, cubic, constraints=(), rest=False)
     minimum_norm = still_of(problem)
-    end = sm.constraints.ClosedPath().bind(problem.follows, minimum_norm.start, minimum_norm.end)
-    return solve(problem, minimum_norm, ends=[end], **options)
+    return solve(
+        Formulation.of(problem),
+        minimum_norm,
+        ends=ends_of(minimum_norm, [sm.constraints.ClosedPath()]),
+        **options,
+    )
+
+
+def ends_of(
+    minimum_norm: MinimumNormMotion, asked: list[sm.constraints.Constraint]
+) -> tuple[BoundEnd, ...]:
+    robot = minimum_norm.formulation.robot
+    own = sm.constraints.Conditions.joined(item.conditions(robot) for item in asked)
+    return minimum_norm.formulation.bound(own, minimum_norm.start, minimum_norm.end).ends
 
 
 @pytest.mark.parametrize(
@@ -155,7 +169,7 @@ def test_a_callback_stops() -> None:
     found = closed_circle(callback=lambda iteration: iteration.cost < 1.92)
     assert found.status is Status.STOPPED
     assert found.cost < 1.92
-    assert found.steps == still_of(found.method.problem).grid.steps
+    assert found.steps == still_of(found.method.formulation.problem).grid.steps
 
 
 class Interruption:
@@ -240,8 +254,8 @@ def test_without_coefficients_there_is_nothing_to_optimise(
     motion = NoNullMotion(space)
     problem = sm.Problem(robot, short_line(robot, start), "pose", start, motion, constraints=())
     minimum_norm = still_of(problem)
-    ends = [item.bind(problem.follows, minimum_norm.start, minimum_norm.end) for item in asked]
-    found = solve(problem, minimum_norm, ends=ends, optimizer=Scipy())
+    ends = ends_of(minimum_norm, asked)
+    found = solve(Formulation.of(problem), minimum_norm, ends=ends, optimizer=Scipy())
     # The path does not end at rest by itself in all joints.
     assert found.status is (Status.INFEASIBLE if found.unmet else Status.CONVERGED)
     assert found.coefficients.shape == (0,)
@@ -277,12 +291,13 @@ def test_a_motion_that_breaks_down_is_refused_with_the_time() -> None:
     end.translation = 1.1 * end.translation
     line, cubic = sm.paths.Line(robot.pose(start), end, 1.0), PolynomialNullMotion()
     problem = sm.Problem(robot, line, "planar", start, cubic, constraints=())
-    broken = MinimumNormMotion.on(problem, start, Grid.aligned(problem.knots, 32))
+    formulation = Formulation.of(problem)
+    broken = MinimumNormMotion.on(formulation, start, Grid.aligned(formulation.knots, 32))
     assert broken.broken == 0.0
     with pytest.raises(
         sm.errors.BreakdownError, match=r"eq\. 4 breaks down near t = 0 s"
     ) as caught:
-        solve(problem, broken)
+        solve(formulation, broken)
     assert caught.value.time == 0.0
 
 

@@ -11,6 +11,7 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.basics import BreakdownError, Counts
+from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.planner import planner
 from selfmotion.planning.planner.candidate import Candidate
 from selfmotion.planning.planner.effort import Effort
@@ -94,7 +95,7 @@ def test_what_costs_more_freely_is_not_optimised_with_limits(
     problem = dataclasses.replace(panda_circle("position"), constraints=limits)
     effort = Effort(None, None, None, Counts())
     assert problem.given_start is not None
-    candidate = Candidate(problem, effort, problem.given_start, free=False)
+    candidate = Candidate(Formulation.of(problem), effort, problem.given_start, free=False)
     candidate.polish(cost_to_beat=free.report.cost * (0.5 if dearer else 2.0))
     assert candidate.is_hopeless == dearer
     assert dearer or not candidate.violations
@@ -107,11 +108,12 @@ def test_what_conditions_did_not_count_for_is_none_that_keeps_them(panda_circle:
     limits = [sm.constraints.JointVelocityLimits(0.9 * fastest)]
     problem = dataclasses.replace(panda_circle("position"), constraints=limits)
     start = np.array(problem.given_start)
-    bound = problem.bind_constraints(start, start)
+    formulation = Formulation.of(problem)
+    bound = formulation.conditions(start, start)
     effort = Effort(None, lambda iteration: True, None, Counts())
-    polisher = Polisher(problem, effort, bound, free=False)
+    polisher = Polisher(formulation, effort, bound, free=False)
     found = polisher.near(
-        [free.trajectory], first_nodes(problem), cost_to_beat=10.0 * free.report.cost
+        [free.trajectory], first_nodes(formulation), cost_to_beat=10.0 * free.report.cost
     )
     assert polisher.history
     assert found is not None
@@ -121,9 +123,10 @@ def test_what_conditions_did_not_count_for_is_none_that_keeps_them(panda_circle:
     easy = dataclasses.replace(
         problem, constraints=[sm.constraints.JointVelocityLimits(2.0 * fastest)]
     )
-    bound = easy.bind_constraints(start, start)
-    polisher = Polisher(easy, effort, bound, free=False)
-    polisher.near([free.trajectory], first_nodes(easy))
+    formulation = Formulation.of(easy)
+    bound = formulation.conditions(start, start)
+    polisher = Polisher(formulation, effort, bound, free=False)
+    polisher.near([free.trajectory], first_nodes(formulation))
     assert polisher.latest is not None
 
 
@@ -138,7 +141,7 @@ def test_an_optimum_that_takes_the_arm_into_itself_goes_on_at_once(panda: sm.Rob
         panda, sm.paths.Waypoints.from_poses(np.linspace(0, 4, 4), poses), start=start
     )
     careless = sm.plan(dataclasses.replace(problem, clearance=None))
-    assert not problem.keeps_off_itself(careless.trajectory.q)
+    assert not Formulation.of(problem).keeps_off_itself(careless.trajectory.q)
     plan = sm.plan(problem)
     assert plan.certificate.verified, plan.certificate.verdict
     assert names_of(plan) == ["given start", "finer grids and proof"]

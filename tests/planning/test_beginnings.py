@@ -69,7 +69,7 @@ def test_what_keeps_everything_is_not_given_up_for_what_costs_less(
 
     monkeypatch.setattr(polish, "minimise", astray)
     effort = Effort(None, None, None, Counts())
-    polisher = polish.Polisher(problem, effort, kept.grid.constraints, free=False)
+    polisher = polish.Polisher(kept.grid.formulation, effort, kept.grid.conditions, free=False)
     assert astray(kept, lambda _: False).motion.violation > 0.0
     found = polisher.best_near(kept)
     assert found is not None

@@ -22,15 +22,15 @@ class Corridor(sm.constraints.Constraint):
 
     motion: sm.Trajectory
 
-    def bind(self, follows: sm.Follows, start: Array, end: Array) -> "Nodes":
-        return Nodes(self.motion)
+    def conditions(self, robot: sm.RobotModel) -> sm.constraints.Conditions:
+        return sm.constraints.Conditions(points=(Nodes(self.motion),))
 
     def requirement(self, robot: sm.RobotModel) -> sm.certificate.Requirement:
         return Judge(self.motion)
 
 
 @dataclass(frozen=True, eq=False)
-class Nodes:
+class Nodes(sm.constraints.BoundConstraint):
     motion: sm.Trajectory
     name: str = "corridor"
     equality: bool = False

@@ -12,6 +12,7 @@ import selfmotion as sm
 from selfmotion.basics import Counts
 from selfmotion.model.follow import Follows
 from selfmotion.model.motion.grid import Grid
+from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.paper import Rollout, converged_minimum_norm
 from selfmotion.planning.planner.candidate import Candidate
 from selfmotion.planning.planner.effort import Effort
@@ -173,7 +174,7 @@ def test_another_null_motion_where_x_0_breaks_down(planar: sm.RobotModel) -> Non
     line = sm.paths.Line(inner, outer, 4.0)
     problem = sm.Problem(planar, line, "planar", start)
     with pytest.raises(sm.errors.BreakdownError):
-        converged_minimum_norm(problem, start)
+        converged_minimum_norm(Formulation.of(problem), start)
     plan = sm.plan(problem)
     assert plan.certificate.verified
     assert plan.trajectory.t[-1] == line.duration
@@ -333,7 +334,7 @@ def test_a_long_wait_after_it_takes_nothing_from_a_part(planar: sm.RobotModel) -
 
 def test_an_end_always_has_a_reason(planar: sm.RobotModel) -> None:
     """Also where a longer motion was found, which no finer grid would keep."""
-    problem = sm.Problem(planar, outward(planar, 1.01), "planar", [0.0, 0.5, 0.5])
+    problem = Formulation.of(sm.Problem(planar, outward(planar, 1.01), "planar", [0.0, 0.5, 0.5]))
     effort = Effort(None, None, 20, Counts())
     candidate = Candidate(problem, effort, np.array([0.0, 0.5, 0.5]), free=False)
     shorter = shorter_part(problem, Part(problem, candidate), effort)

@@ -7,6 +7,7 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.basics import Counts, silent
+from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.planner.effort import Effort
 from selfmotion.planning.planner.grids import first_nodes
 from selfmotion.planning.planner.planner import Planner
@@ -42,7 +43,7 @@ def loops(planar: sm.RobotModel, count: int, start: bool = False) -> sm.Problem:
 
 def planner_of(problem: sm.Problem) -> Planner:
     effort = Effort(None, None, None, Counts())
-    return Planner(problem, effort, sm.Search(), sm.Tolerance(), silent)
+    return Planner(Formulation.of(problem), effort, sm.Search(), sm.Tolerance(), silent)
 
 
 @pytest.fixture(scope="module")
@@ -57,13 +58,13 @@ def test_the_way_is_measured_however_many_loops_there_are(
 ) -> None:
     problem = loops(planar, count)
     way = 2.0 * np.pi * RADIUS * count / planar.reach
-    assert problem.length_in_reaches == pytest.approx(way, rel=0.03)
+    assert Formulation.of(problem).length_in_reaches == pytest.approx(way, rel=0.03)
 
 
 def test_a_loop_costs_the_same_however_many_there_are(planar: sm.RobotModel, free: sm.Plan) -> None:
     plans = {LOOPS: free, 2 * LOOPS: sm.plan(loops(planar, 2 * LOOPS)).require()}
     for plan in plans.values():
-        assert plan.problem.length_in_reaches > VERY_LONG_PATH
+        assert Formulation.of(plan.problem).length_in_reaches > VERY_LONG_PATH
         assert plan.report.attempts[1].name == NAME
         assert plan.report.attempts[1].outcome == "all constraints are met"
     each = [plan.report.cost / count for count, plan in plans.items()]
@@ -209,10 +210,10 @@ def test_a_motion_beside_a_long_wait_has_as_many_nodes_as_its_way_is_long(
     ]
     path = sm.paths.Dwell(a, 2500.0) + line + sm.paths.Dwell(b, 2500.0)
     problem = sm.Problem(planar, path, "planar", start, constraints=limits, clearance=None)
-    times = first_nodes(problem)
+    times = first_nodes(Formulation.of(problem))
     assert np.sum((times >= 2500.0) & (times <= 2500.5)) > 16
     plan = sm.plan(problem)
     assert plan.certificate.verified, plan.certificate.verdict
     assert plan.report.cost < alone.report.cost
     # Where nothing waits, there are no more than there were.
-    assert len(first_nodes(alone.problem)) == 21
+    assert len(first_nodes(Formulation.of(alone.problem))) == 21

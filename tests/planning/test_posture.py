@@ -5,8 +5,10 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.basics import Counts, silent
+from selfmotion.model.follow import Coordinates
+from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.planner.effort import Effort
-from selfmotion.planning.planner.screening import Ranking, far_from_usual, usual_posture, wound_back
+from selfmotion.planning.planner.screening import Ranking, far_from_usual, wound_back
 from selfmotion.planning.search import Stacked, start_candidates
 from support.arms import robot_named
 from support.cones import downhand
@@ -22,7 +24,8 @@ def test_joints_are_wound_back_within_their_limits_and_the_tool_stays(name: str)
         begin = robot.generic_configurations()[0]
         motion = begin + np.linspace(0.0, 1.0, 7)[:, None] * rng.uniform(-0.2, 0.2, robot.dof)
         wound = motion + WHOLE * rng.integers(-2, 3, robot.dof) * robot.is_revolute
-        back = wound_back(robot, wound)
+        own = Coordinates.of(robot)
+        back = wound_back(own, wound)
         for q, other in zip(wound, back, strict=True):
             np.testing.assert_allclose(
                 robot.pose(other).homogeneous, robot.pose(q).homogeneous, atol=1e-12
@@ -32,14 +35,14 @@ def test_joints_are_wound_back_within_their_limits_and_the_tool_stays(name: str)
         for joint in range(robot.dof):
             lower, upper = robot.lower[joint], robot.upper[joint]
             fits = [
-                abs(np.mean(wound[:, joint] + turn) - usual_posture(robot)[joint])
+                abs(np.mean(wound[:, joint] + turn) - own.usual()[joint])
                 for turn in (turns if robot.is_revolute[joint] else [0.0])
                 if lower <= (wound[:, joint] + turn).min()
                 and (wound[:, joint] + turn).max() <= upper
             ]
             if fits:
                 middle = 0.5 * (back[:, joint].min() + back[:, joint].max())
-                away = abs(middle - usual_posture(robot)[joint])
+                away = abs(middle - own.usual()[joint])
                 assert away <= min(fits) + 0.5 * np.ptp(wound[:, joint]) + 1e-9
 
 
@@ -53,8 +56,9 @@ def test_the_nearest_of_mirror_images_is_taken() -> None:
     q = plan.trajectory.q
     assert np.abs(q[:, 3:] - arm.home[3:]).max() < np.pi
     # None of its joints could be a turn nearer.
-    np.testing.assert_array_equal(wound_back(arm, q), q)
-    assert far_from_usual(arm, q[None])[0] <= far_from_usual(arm, q[None] + WHOLE)[0]
+    own = Coordinates.of(arm)
+    np.testing.assert_array_equal(wound_back(own, q), q)
+    assert far_from_usual(own, q[None])[0] <= far_from_usual(own, q[None] + WHOLE)[0]
 
 
 def test_whole_turns_are_told_by_the_limits_that_are_asked_for() -> None:
@@ -64,10 +68,10 @@ def test_whole_turns_are_told_by_the_limits_that_are_asked_for() -> None:
     lower, upper = cell.robot.lower.copy(), cell.robot.upper.copy()
     lower[turn], upper[turn] = 2.0, 12.0
     limits = sm.constraints.JointPositionLimits(lower, upper)
-    problem = cell.changed(constraints=(limits, *cell.constraints[1:])).augmented
+    problem = Formulation.of(cell.changed(constraints=(limits, *cell.constraints[1:])))
     t, envelope = np.linspace(0.0, problem.path.duration, 49), problem.envelope
     task = Stacked(problem.follows, envelope.quantities, lower, upper, np.ones(8))
-    arm = problem.follows.for_robot(envelope.arm(problem.robot))
+    arm = problem.follows.within(envelope.lower, envelope.upper)
     starts, kept = task.placed(
         np.array(start_candidates(arm, 24, np.random.default_rng(0))), float(t[0])
     )

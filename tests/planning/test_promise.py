@@ -5,6 +5,7 @@ import numpy as np
 import selfmotion as sm
 from selfmotion.basics import Array
 from selfmotion.model.motion import Grid
+from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.planner.screening import ONE_VALLEY, most_promising
 from selfmotion.planning.search import carried, start_candidates
 from support.arms import robot_named
@@ -21,10 +22,11 @@ def apart(motion: Array, others: Array) -> Array:
 def test_carried_motions_follow_the_path_and_unlike_ones_come_first() -> None:
     robot = robot_named("panda")
     problem = sm.Problem(robot, line_of(robot, "pose"))
-    grid = Grid.aligned(problem.knots, 12)
+    formulation = Formulation.of(problem)
+    grid = Grid.aligned(formulation.knots, 12)
     starts = start_candidates(problem.follows, 24, np.random.default_rng(0))
     motions, arrived = carried(problem.follows, np.array(starts), grid.nodes)
-    order = most_promising(problem, starts, motions, arrived, grid.nodes, apart)
+    order = most_promising(formulation, starts, motions, arrived, grid.nodes, apart)
     assert sorted(order) == list(range(len(starts)))
     motions, arrived = motions[order], arrived[order]
     assert arrived.any()

@@ -12,6 +12,7 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.basics import Array
+from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.planner.largest_part import _Push, _start_guess_of, _until
 from support.arms import robot_named, short_line, start_of
 
@@ -209,9 +210,9 @@ def test_a_part_before_a_window_has_none_of_its_joints(panda: sm.RobotModel) -> 
     assert all(plan.report.ending for plan in ends)
     assert ends[1].trajectory.duration == pytest.approx(ends[0].trajectory.duration, rel=0.02)
     # What was begun with on a longer part is cut to the joints that are left.
-    whole = dataclasses.replace(problem, relaxations=[late]).augmented
+    whole = Formulation.of(dataclasses.replace(problem, relaxations=[late]))
     part, push = _until(whole, 2.0), _Push(np.ones(8))
-    failed: Any = SimpleNamespace(problem=whole, start_guess=(whole.given_start, push))
+    failed: Any = SimpleNamespace(formulation=whole, start_guess=(whole.given_start, push))
     first, guide = _start_guess_of(part, failed)
     np.testing.assert_array_equal(first, start)
     assert guide is not None

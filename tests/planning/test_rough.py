@@ -7,6 +7,7 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.basics import Array, Counts
+from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.planner import screening as rough_motions
 from selfmotion.planning.planner.effort import Effort
 from selfmotion.planning.planner.screening import Ranking
@@ -42,7 +43,7 @@ def test_ranked_motions_are_on_the_path_and_about_as_dear_as_their_optima(
 ) -> None:
     problem = problem_of(arm, task)
     starts = starts_of(problem)
-    ranking = Ranking(problem, effort(), told)
+    ranking = Ranking(Formulation.of(problem), effort(), told)
     assert ranking.ranked == []
     assert ranking.run(starts, 3)
     costs = [motion.cost for motion in ranking.ranked]
@@ -68,7 +69,9 @@ def test_costs_of_accelerations_and_conditions_on_ends_are_ranked_one_by_one() -
         replace(problem, path=circle, constraints=[sm.constraints.ClosedPath()]),
     ):
         told_of: list[str] = []
-        ranking = Ranking(other, effort(), lambda stage, done, total, to=told_of: to.append(stage))
+        ranking = Ranking(
+            Formulation.of(other), effort(), lambda stage, done, total, to=told_of: to.append(stage)
+        )
         assert ranking.run(starts_of(other), 3)
         assert set(told_of) == {"start"}
         assert 1 <= len(ranking.ranked) <= 3
@@ -78,7 +81,7 @@ def test_where_the_cheapest_break_conditions_those_come_first_that_keep_them() -
     """They may become better or worse than what keeps them: a few steps with conditions tell."""
     problem = problem_of("xarm7", "pose")
     starts = starts_of(problem)
-    free = Ranking(problem, effort(), told)
+    free = Ranking(Formulation.of(problem), effort(), told)
     free.run(starts, 3)
     speeds = np.abs(free.ranked[0].trajectory.qd).max(axis=0)
     limits = np.where(np.arange(7) == 3, 0.9 * speeds, np.inf)
@@ -89,7 +92,7 @@ def test_where_the_cheapest_break_conditions_those_come_first_that_keep_them() -
             sm.constraints.JointVelocityLimits(limits),
         ],
     )
-    other = Ranking(slow, effort(), told)
+    other = Ranking(Formulation.of(slow), effort(), told)
     assert other.run(starts, 3)
     kept = [motion.violation <= 0.0 for motion in other.ranked]
     assert kept == sorted(kept, reverse=True)
@@ -100,7 +103,7 @@ def test_where_the_cheapest_break_conditions_those_come_first_that_keep_them() -
     place = tuple(problem.robot.pose(middle.q[len(middle.q) // 2]).translation)
     for center, is_best in ((place, False), ((2.0, 2.0, 2.0), True)):
         ball = sm.constraints.Clearance([sm.obstacles.Sphere("ball", center, 0.1)])
-        among = Ranking(replace(problem, constraints=[ball]), effort(), told)
+        among = Ranking(Formulation.of(replace(problem, constraints=[ball])), effort(), told)
         assert among.run(starts, 3)
         same = among.ranked[0].cost == pytest.approx(free.ranked[0].cost, rel=1e-6)
         assert same is is_best
@@ -114,7 +117,7 @@ def test_whoever_interrupts_gets_the_cheapest() -> None:
         if stage == "start":
             raise KeyboardInterrupt
 
-    ranking = Ranking(replace(problem, constraints=speeds), effort(), interrupt)
+    ranking = Ranking(Formulation.of(replace(problem, constraints=speeds)), effort(), interrupt)
     with pytest.raises(KeyboardInterrupt):
         ranking.run(starts_of(problem), 3)
     assert len(ranking.ranked) == 1
@@ -129,7 +132,7 @@ def test_starts_of_which_none_follows_the_path_at_x_0_are_all_optimised(
         return np.tile(starts[:, None], (1, len(t), 1)), np.zeros(len(starts), dtype=bool)
 
     monkeypatch.setattr(rough_motions, "carried", nowhere)
-    ranking = Ranking(problem, effort(), told)
+    ranking = Ranking(Formulation.of(problem), effort(), told)
     assert not ranking.run(starts_of(problem), 3)
     assert ranking.ranked == []
     found = sm.plan(problem, search=sm.Search(starts=12))

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
+from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.planner.solutions import score
 from support.arms import robot_named
 
@@ -81,7 +82,7 @@ def test_a_motion_that_takes_the_arm_into_itself_is_passed_over_for_another() ->
     ur5 = robot_named("ur5")
     problem = sm.Problem(ur5, sm.paths.Circle(start, center, normal, 4.0), "pointing")
     careless = sm.plan(dataclasses.replace(problem, clearance=None))
-    assert not problem.keeps_off_itself(careless.trajectory.q)
+    assert not Formulation.of(problem).keeps_off_itself(careless.trajectory.q)
     plan = sm.plan(problem)
     assert plan.certificate.verified, plan.certificate.verdict
     assert plan.report.cost > careless.report.cost

@@ -42,10 +42,10 @@ def test_problems_and_plans_are_the_same_afterwards(way: str) -> None:
     plain, much = problem(), with_much()
     plan = sm.plan(plain)
     # Also when all that follows from a problem is there already.
-    assert much.augmented is not None
-    for one in (plain, much, much.augmented):
+    assert much.envelope.bodies
+    for one in (plain, much):
         again = WAYS[way](one)
-        assert again.asked.digest == one.asked.digest
+        assert again.digest == one.digest
         assert (again.clearance is NO_OVERLAP) == (one.clearance is NO_OVERLAP)
         for item, other in zip(again.constraints, one.constraints, strict=True):
             assert any(item is usual for usual in KEPT) == any(other is usual for usual in KEPT)

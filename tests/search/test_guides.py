@@ -5,6 +5,7 @@ import pinocchio as pin
 import pytest
 
 import selfmotion as sm
+from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.search import carried, shortest_along
 from selfmotion.planning.search.guides import search_times
 from support.arms import PANDA_HOME
@@ -40,7 +41,7 @@ def test_the_search_looks_as_the_tool_moves_on() -> None:
 
 def test_a_chain_passes_beside_a_pose_that_rounding_puts_out_of_reach() -> None:
     t = np.linspace(0.0, DURATION, 33)
-    problem = rounded_problem(costs=[sm.costs.PathLength()])
+    problem = Formulation.of(rounded_problem(costs=[sm.costs.PathLength()]))
     found = shortest_along(problem, t, stretching(t), t, (1.0, 0.3))
     assert found is not None
     where, q = found
@@ -60,11 +61,12 @@ def test_chains_beside_bodies_are_shortened_with_virtual_joints(panda: sm.RobotM
     ball = sm.constraints.Clearance([sm.obstacles.Sphere("ball", (0.2, 0.25, 0.6), 0.05)], 0.01)
     problem = sm.Problem(
         panda, path, constraints=[ball], relaxations=[sm.Relaxation("rz", 0.3, during=(1.0, 2.0))]
-    ).augmented
+    )
+    formulation = Formulation.of(problem)
     t = np.linspace(0.0, 4.0, 9)
-    motions, arrived = carried(problem.follows, problem.at(t[:1], start[None]), t)
+    motions, arrived = carried(formulation.follows, formulation.completed(t[:1], start[None]), t)
     assert arrived.all()
-    found = shortest_along(problem, t, motions[0], t, (1.0, 0.3))
+    found = shortest_along(formulation, t, motions[0], t, (1.0, 0.3))
     assert found is not None
     assert found[1].shape == motions[0].shape
 

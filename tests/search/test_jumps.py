@@ -7,6 +7,7 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.basics import Array
+from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.search import ChainSegment, ChainSegments
 from selfmotion.planning.search.segments import jumps_of
 from support.arms import robot_named
@@ -47,13 +48,14 @@ def turned_over(problem: sm.Problem, time: float, q: Array) -> Array:
 @pytest.mark.parametrize(("name", "task"), ARMS)
 def test_steps_of_a_motion_are_no_jumps_and_changes_of_branch_are(name: str, task: str) -> None:
     problem, t, q = motion(name, task)
-    assert not jumps_of(problem, t[:-1], t[1:], q[:-1], q[1:]).any()
+    formulation = Formulation.of(problem)
+    assert not jumps_of(formulation, t[:-1], t[1:], q[:-1], q[1:]).any()
     # However fine or coarse the motion is looked at.
-    assert not jumps_of(problem, t[:-3], t[3:], q[:-3], q[3:]).any()
+    assert not jumps_of(formulation, t[:-3], t[3:], q[:-3], q[3:]).any()
     other = turned_over(problem, t[10], q[10])
     broken = np.array([*q[:10], other, *q[11:]])
-    assert jumps_of(problem, t[:0], t[:0], q[:0], q[:0]).shape == (0,)
-    found = jumps_of(problem, t[:-1], t[1:], broken[:-1], broken[1:])
+    assert jumps_of(formulation, t[:0], t[:0], q[:0], q[:0]).shape == (0,)
+    found = jumps_of(formulation, t[:-1], t[1:], broken[:-1], broken[1:])
     assert found[[9, 10]].any()
     assert not np.delete(found, [9, 10]).any()
 
@@ -70,11 +72,11 @@ def wound() -> sm.Problem:
 
 def test_chains_do_without_jumps(monkeypatch: pytest.MonkeyPatch) -> None:
     # So far apart in time as on a path five times as long.
-    def few(problem: sm.Problem) -> np.ndarray:
-        return np.linspace(0.0, problem.path.duration, WAYPOINTS)
+    def few(formulation: Formulation) -> np.ndarray:
+        return np.linspace(0.0, formulation.path.duration, WAYPOINTS)
 
     monkeypatch.setattr(sys.modules["selfmotion.planning.search.guides"], "waypoint_times", few)
-    segments = ChainSegments.of(wound())
+    segments = ChainSegments.of(Formulation.of(wound()))
     # What the samples alone would do.
     assert any(_jumps(segments, item) for item in segments._found(set()))
     found = segments.fewest(set())
@@ -85,4 +87,4 @@ def test_chains_do_without_jumps(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def _jumps(segments: ChainSegments, item: ChainSegment) -> bool:
     times, q = item.t, item.q
-    return bool(jumps_of(segments.problem, times[:-1], times[1:], q[:-1], q[1:]).any())
+    return bool(jumps_of(segments.formulation, times[:-1], times[1:], q[:-1], q[1:]).any())

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.model.follow import Follows
+from selfmotion.model.follow import Coordinates, Follows
 from selfmotion.model.kernels import carried
 from selfmotion.model.robot import null_space
 from selfmotion.planning.search import spread
@@ -35,7 +35,7 @@ def test_projection_is_onto_the_path_and_within_the_limits(name: str, task: str)
     robot, rows = robot_named(name), sm.Task.of(task)
     path = line_of(robot, task)
     manifold = Manifold(standing(robot, rows), robot.lower, robot.upper)
-    seeds = np.array(list(spread(robot, 100, np.random.default_rng(0))))
+    seeds = np.array(list(spread(Coordinates.of(robot), 100, np.random.default_rng(0))))
     q, arrived = manifold.project(
         seeds, Follows.of(robot, path, "pose").targets(np.zeros(1))[0], far=True
     )

@@ -12,7 +12,7 @@ from selfmotion.planning.search.chains import best_chains
 from selfmotion.planning.search.measures import Length, RunningCost, measure_of
 from selfmotion.problem.costs import Samples
 from support.arms import robot_named
-from support.followed import standing
+from support.followed import charging, standing
 
 COSTS = (
     sm.costs.JointVelocity(2.0),
@@ -39,7 +39,7 @@ def test_a_chain_costs_what_its_motion_does() -> None:
     integral = sum(float(samples.weights @ cost.value(samples)) for cost in COSTS)
     errors = []
     for stride in (20, 10):
-        coarse = RunningCost.by(standing(robot, task), COSTS, t[::stride])
+        coarse = RunningCost.by(charging(robot, task, COSTS), t[::stride])
         errors.append(abs(coarse.of(q[::stride]) / integral - 1.0))
     # The energy takes the inertia at the beginning of each step: first order.
     assert errors[1] < 0.6 * errors[0]
@@ -51,7 +51,7 @@ def test_faster_steps_count_as_spread_over_the_time_that_they_take() -> None:
     t = np.array([0.0, 0.1, 0.2])
     q = np.array(sm.NAMED_ARMS["panda"].home)
     jump = np.array([q, q + 0.5, q + 0.5])
-    measure = RunningCost.by(standing(robot, task), [sm.costs.JointVelocity()], t)
+    measure = RunningCost.by(charging(robot, task, [sm.costs.JointVelocity()]), t)
     moved = 0.5 * np.sqrt(7.0)
     assert measure.of(jump) == pytest.approx(0.5 * moved**2 / 0.1)
     # At twice the mean speed v: ½v² over |Δq| / v.
@@ -66,7 +66,7 @@ def test_the_cheapest_chain_is_that_of_brute_force_and_so_backwards() -> None:
     layers = [here + 0.1 * rng.normal(size=(4, 7)) for here in q]
     layers = [layer[np.argsort(layer[:, 0])] for layer in layers]
     step = np.full(7, 0.6)
-    measure = RunningCost.by(standing(robot, task), COSTS, t).at_pace_of(q)
+    measure = RunningCost.by(charging(robot, task, COSTS), t).at_pace_of(q)
     costs = []
     for chain in itertools.product(range(4), repeat=len(layers)):
         motion = np.array([layer[k] for layer, k in zip(layers, chain, strict=True)])
@@ -86,12 +86,12 @@ def test_the_cheapest_chain_is_that_of_brute_force_and_so_backwards() -> None:
 def test_lengths_are_measured_as_such_and_accelerations_left_out() -> None:
     robot, task, t = robot_named("panda"), sm.Task.POSE, np.linspace(0.0, 1.0, 5)
     ones = np.ones(7)
-    assert isinstance(measure_of(standing(robot, task), [sm.costs.PathLength()], t, ones), Length)
+    assert isinstance(measure_of(charging(robot, task, [sm.costs.PathLength()]), t, ones), Length)
     assert isinstance(
-        measure_of(standing(robot, task), [sm.costs.JointAcceleration()], t, ones), Length
+        measure_of(charging(robot, task, [sm.costs.JointAcceleration()]), t, ones), Length
     )
     both = measure_of(
-        standing(robot, task), [sm.costs.JointVelocity(), sm.costs.JointJerk()], t, ones
+        charging(robot, task, [sm.costs.JointVelocity(), sm.costs.JointJerk()]), t, ones
     )
     assert isinstance(both, RunningCost)
     assert [cost.name for cost in (*both.placed, *both.moving)] == ["joint velocity"]

@@ -8,6 +8,7 @@ from scipy.interpolate import make_interp_spline
 
 import selfmotion as sm
 from selfmotion.basics import Array
+from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.search.curves import SPACING
 from selfmotion.planning.search.obstruction import (
     Obstruction,
@@ -26,7 +27,7 @@ AT_POSE = 1e-9
 
 
 def looked(problem: sm.Problem) -> Obstruction | None:
-    return obstruction(problem, np.random.default_rng(0))
+    return obstruction(Formulation.of(problem), np.random.default_rng(0))
 
 
 def known_motion(robot: sm.RobotModel, seed: int) -> tuple[Array, Array]:
@@ -146,7 +147,9 @@ def test_self_motions_of_a_pose_in_a_window_make_use_of_it() -> None:
     pose = robot.pose(robot.dexterous_configuration("pose"))
     window = sm.Relaxation("rz", during=(1.0, 3.0))
     problem = sm.Problem(robot, sm.paths.Dwell(pose, 4.0), "pose", relaxations=[window])
-    curves = SinglePoses(problem, np.random.default_rng(0))._along_curves(2.0, np.empty((0, 7)))
+    curves = SinglePoses(Formulation.of(problem), np.random.default_rng(0))._along_curves(
+        2.0, np.empty((0, 7))
+    )
     tools = [robot.pose(q[: robot.dof]) for q in curves]
     away = [np.linalg.norm(tool.translation - pose.translation) for tool in tools]
     tilts = [np.linalg.norm(tool.rotation[:, 2] - pose.rotation[:, 2]) for tool in tools]

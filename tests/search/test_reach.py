@@ -5,6 +5,7 @@ import pytest
 from scipy.interpolate import make_interp_spline
 
 import selfmotion as sm
+from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.search import reachable
 from support.arms import robot_named
 
@@ -31,4 +32,5 @@ def test_what_a_motion_within_the_limits_draws_is_in_reach(name: str, task: str)
         path = sm.paths.Waypoints.from_poses(t, [robot.pose(x) for x in q])
         for start in (None, q[0]):
             problem = sm.Problem(robot, path, task, start, rest=False, clearance=None)
-            assert reachable(problem, 48, np.random.default_rng(0)).reason == ""
+            whole = Formulation.of(problem)
+            assert reachable(whole, 48, np.random.default_rng(0)).reason == ""

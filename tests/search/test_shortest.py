@@ -8,6 +8,7 @@ import pytest
 import selfmotion as sm
 from selfmotion.basics import Array
 from selfmotion.model.follow import Follows
+from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.search.manifold import OnPath
 from selfmotion.planning.search.measures import Length, RunningCost
 from selfmotion.planning.search.shortest import Shortest, improved_by
@@ -114,7 +115,8 @@ def test_along_curves_samples_lead_on_from_what_moving_aside_finds(name: str, ta
 def test_what_costs_more_than_its_length_becomes_cheaper() -> None:
     chain = Chain("panda", "pose")
     costs = [sm.costs.JointVelocity(), sm.costs.InverseManipulability(1e-3)]
-    measure = RunningCost.by(Follows.of(chain.robot, chain.path, "pose"), costs, chain.t)
+    problem = sm.Problem(chain.robot, chain.path, costs=costs, clearance=None)
+    measure = RunningCost.by(Formulation.of(problem), chain.t)
     found = best_of(chain, measure)(chain.q, False)
     assert measure.of(found) < 0.9 * measure.of(chain.q)
     assert chain.kept().keep(found).all()

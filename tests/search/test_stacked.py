@@ -8,6 +8,8 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.basics import Array
+from selfmotion.model.follow import Coordinates
+from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.search import Stacked, metrics, start_candidates
 from support.arms import robot_named
 from support.cones import UPRIGHT, downhand
@@ -22,18 +24,18 @@ ON_PATH = 1e-9
 
 def carried(problem: sm.Problem, weights: Array, places: int = 49) -> tuple[Array, Array]:
     """Return times (N,) and motions (K, N, n) from drawn starts that went all the way."""
-    problem = problem.augmented
-    t, envelope = np.linspace(0.0, problem.path.duration, places), problem.envelope
+    formulation = Formulation.of(problem)
+    t, envelope = np.linspace(0.0, problem.path.duration, places), formulation.envelope
     limits = envelope.lower, envelope.upper
-    task = Stacked(problem.follows, envelope.quantities, *limits, weights)
-    starts = start_candidates(problem.follows, 16, np.random.default_rng(0))
+    task = Stacked(formulation.follows, envelope.quantities, *limits, weights)
+    starts = start_candidates(formulation.follows, 16, np.random.default_rng(0))
     q, kept = task.placed(np.array(starts), 0.0)
     motions, arrived = task.carried(q[kept], t)
     return t, motions[arrived]
 
 
 def misses(problem: sm.Problem, t: Array, q: Array) -> float:
-    items = problem.augmented.follows.items
+    items = Formulation.of(problem).follows.items
     pairs = zip(t, q, strict=True)
     return max(max(item.miss(item.path.pose(s), x)) for item in items for s, x in pairs)
 
@@ -76,7 +78,7 @@ def test_what_is_heavy_moves_less() -> None:
     first = pin.SE3(np.diag([1.0, -1.0, -1.0]), np.array([0.1, 0.0, 0.03]))
     ring = sm.paths.Circle.around(first, radius=0.1, duration=12.0, normal=(0, 0, 1))
     problem = sm.Problem(cell, ring, task="pointing", clearance=None)
-    usual, arm, table, *alone = metrics(cell)
+    usual, arm, table, *alone = metrics(Coordinates.of(cell))
     assert [np.flatnonzero(weights > usual).tolist() for weights in (arm, table, *alone)] == [
         [0, 1, 2, 3, 4, 5, 6],
         [7, 8],
@@ -92,10 +94,10 @@ def test_what_is_heavy_moves_less() -> None:
 
 
 def test_an_arm_without_parts_has_one_metric() -> None:
-    assert len(metrics(robot_named("panda"))) == 1
+    assert len(metrics(Coordinates.of(robot_named("panda")))) == 1
     # Of one on a lift, the lift and the arm are parts.
     lift = robot_named("tiago")
-    assert len(metrics(lift)) == 3
+    assert len(metrics(Coordinates.of(lift))) == 3
 
 
 def test_a_joint_stops_at_its_limit() -> None:

@@ -1,7 +1,5 @@
 """Starts: on the path at any time, and carried from there to both of its ends."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -54,10 +52,10 @@ def test_within_narrow_limits_there_are_some_as_well(number: int) -> None:
     follows, start = both_arms("pose", "pose")
     rng = np.random.default_rng(number)
     below, above = rng.uniform(0.0, 0.5, (2, len(start)))
-    arm = replace(follows.robot, lower=start - below, upper=start + above)
-    starts = start_candidates(follows.for_robot(arm), 8, np.random.default_rng(0))
+    lower, upper = start - below, start + above
+    starts = start_candidates(follows.within(lower, upper), 8, np.random.default_rng(0))
     assert starts
     for q in starts:
-        assert ((q >= arm.lower) & (q <= arm.upper)).all()
+        assert ((q >= lower) & (q <= upper)).all()
         for item in follows.items:
             assert max(item.miss(item.path.pose(0.0), q)) <= ON_PATH

@@ -5,6 +5,7 @@ import numpy as np
 import selfmotion as sm
 from selfmotion.basics import Array, Counts
 from selfmotion.model.motion import Trajectory
+from selfmotion.planning.formulation import BoundConditions, Formulation
 from selfmotion.planning.nodes import NodeGrid, NodeMotion
 from selfmotion.planning.nodes.objective import LocalModel
 from selfmotion.planning.paper import converged_minimum_norm
@@ -22,17 +23,24 @@ def problem_of(case: Case, **options) -> sm.Problem:
 def nodes_of(problem: sm.Problem, count: int = 12, *, free: bool = False) -> NodeMotion:
     """Return the nodes at x = 0."""
     start = np.array(problem.given_start)
-    minimum_norm, _ = converged_minimum_norm(problem, start)
+    formulation = Formulation.of(problem)
+    minimum_norm, _ = converged_minimum_norm(formulation, _all_of(formulation, start))
     trajectory = Trajectory(
-        minimum_norm.grid.nodes, minimum_norm.q, minimum_norm.qd, problem.robot.joint_names
+        minimum_norm.grid.nodes, minimum_norm.q, minimum_norm.qd, formulation.coordinates.names
     )
     # Where nothing is asked, these laws are those of motions without any limits.
-    constraints = problem.bind_constraints(start, minimum_norm.end) if problem.constraints else ()
+    ends = minimum_norm.start, minimum_norm.end
+    whole = problem.constraints or problem.relaxations
+    conditions = formulation.conditions(*ends) if whole else BoundConditions()
     t = np.linspace(0.0, problem.path.duration, count + 1)
-    grid = NodeGrid(problem, t, constraints, free=free, counts=Counts())
+    grid = NodeGrid(formulation, t, conditions, free=free, counts=Counts())
     motion = grid.near(trajectory(t), trajectory(t, 1))
     assert motion is not None
     return motion
+
+
+def _all_of(formulation: Formulation, q: Array) -> Array:
+    return np.asarray(formulation.completed(np.zeros(1), q[None])[0])
 
 
 def moved(motion: NodeMotion, step: Array) -> NodeMotion:

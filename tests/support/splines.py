@@ -6,6 +6,7 @@ from scipy.optimize import minimize
 import selfmotion as sm
 from selfmotion.basics import Array
 from selfmotion.model.motion import Grid
+from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.paper import MinimumNormMotion, Objective
 
 # Conditions that come this near to being broken by x = 0 are asked for.
@@ -15,11 +16,12 @@ NEAR = -0.6
 def best_spline(problem: sm.Problem, intervals: int = 16, steps: int = 64) -> float:
     """Return F of the best null motion of so many intervals that keeps its limits at all nodes."""
     problem = problem.changed(null_motion=sm.motion.BSplineNullMotion(intervals))
+    formulation = Formulation.of(problem)
     start = problem.given_start
     assert start is not None
-    minimum_norm = MinimumNormMotion.on(problem, start, Grid.aligned(problem.knots, steps))
-    objective = Objective.of(problem, minimum_norm)
-    bound = problem.bind_constraints(minimum_norm.start, minimum_norm.end)
+    minimum_norm = MinimumNormMotion.on(formulation, start, Grid.aligned(formulation.knots, steps))
+    objective = Objective.of(formulation, minimum_norm)
+    bound = formulation.conditions(minimum_norm.start, minimum_norm.end).every
     x0 = np.zeros(objective.size)
     near = [np.flatnonzero(item.residual(objective.samples(x0)).ravel() > NEAR) for item in bound]
 

@@ -11,7 +11,6 @@ from typer.testing import CliRunner
 
 import selfmotion as sm
 from selfmotion.basics import Array, restore
-from selfmotion.model.follow import Follows
 from selfmotion.model.motion import NullMotion
 from selfmotion.shell import testing
 from selfmotion.shell.cli import app
@@ -26,15 +25,15 @@ class SlowElbow(sm.constraints.Constraint):
 
     limit: float
 
-    def bind(self, follows: Follows, start: Array, end: Array) -> "SlowNodes":
-        return SlowNodes(self.limit)
+    def conditions(self, robot: sm.RobotModel) -> sm.constraints.Conditions:
+        return sm.constraints.Conditions(points=(SlowNodes(self.limit),))
 
     def requirement(self, robot: sm.RobotModel) -> sm.certificate.Requirement:
         return SlowJudge(self.limit)
 
 
 @dataclass(frozen=True)
-class SlowNodes:
+class SlowNodes(sm.constraints.BoundConstraint):
     limit: float
     name: str = "slow elbow"
     equality: bool = False
@@ -121,8 +120,8 @@ def problem() -> sm.Problem:
 class Careless(SlowElbow):
     """Asks the optimiser for nothing, so that only its requirement can tell."""
 
-    def bind(self, follows: Follows, start: Array, end: Array) -> SlowNodes:
-        return SlowNodes(1e3)
+    def conditions(self, robot: sm.RobotModel) -> sm.constraints.Conditions:
+        return sm.constraints.Conditions(points=(SlowNodes(1e3),))
 
 
 @pytest.fixture(scope="module")
@@ -214,8 +213,8 @@ def test_a_function_as_cost_is_missed_when_it_is_needed(tmp_path: Path) -> None:
 
 
 class NoRequirement:
-    def bind(self, follows: Follows, start: Array, end: Array) -> SlowNodes:
-        return SlowNodes(1.0)
+    def conditions(self, robot: sm.RobotModel) -> sm.constraints.Conditions:
+        return sm.constraints.Conditions(points=(SlowNodes(1.0),))
 
 
 @dataclass(frozen=True)
@@ -227,7 +226,7 @@ class EmptyRequirement(SlowElbow, kind="empty"):
 def test_a_constraint_that_nothing_judges_is_refused(problem: sm.Problem) -> None:
     with pytest.raises(sm.errors.ProblemError, match=r"is no Constraint; derive a class"):
         dataclasses.replace(problem, constraints=[NoRequirement()])
-    half = type("Half", (sm.constraints.Constraint,), {"bind": NoRequirement.bind})()
+    half = type("Half", (sm.constraints.Constraint,), {"conditions": NoRequirement.conditions})()
     with pytest.raises(
         sm.errors.ProblemError, match=r"Half does not say what it asks for: give it quant"
     ):
@@ -343,8 +342,9 @@ class OneNumber(SlowNodes):
 class AsOne(SlowElbow, kind="as one"):
     equality: bool = False
 
-    def bind(self, follows: Follows, start: Array, end: Array) -> OneNumber:
-        return OneNumber(self.limit, equality=self.equality)
+    def conditions(self, robot: sm.RobotModel) -> sm.constraints.Conditions:
+        mine = OneNumber(self.limit, equality=self.equality)
+        return sm.constraints.Conditions(points=(mine,))
 
 
 @pytest.mark.parametrize(

@@ -28,11 +28,15 @@ MOVED = {
 }
 # The same of modules.
 MOVED_MODULES = {
+    "model.follow.augmented": "model.follow.relaxed",
+    "planning.nodes.samples": "planning.formulation.sampled",
     "planning.paper.still": "planning.paper.minimum_norm",
     "planning.result.asked": "planning.result.specification",
     "planning.search.nodes": "planning.search.vertices",
     "planning.search.stretches": "planning.search.segments",
     "planning.transfer.ways": "planning.transfer.rrt_connect",
+    "problem.problem.augmented": "planning.formulation.formulation",
+    "problem.problem.of_arm": "planning.formulation.tolerances",
     "shop.controllers.feed_stretches": "shop.controllers.feed_segments",
     "shop.controllers.read_stretches": "shop.controllers.read_segments",
     "shop.controllers.stretches": "shop.controllers.segments",

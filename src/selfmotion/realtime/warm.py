@@ -13,6 +13,7 @@ import selfmotion as sm
 from selfmotion.basics import FIRST_WORKS, Counts, compile_alone, read_only
 from selfmotion.model.collision.kernels import winding_number
 from selfmotion.model.task import SE3
+from selfmotion.planning.formulation import BoundConditions, Formulation
 from selfmotion.planning.nodes import NodeGrid
 from selfmotion.realtime.loop import warm_up
 from selfmotion.realtime.replanner import Replanner
@@ -59,7 +60,8 @@ def small_works() -> Iterator[tuple[str, Callable[[], object]]]:
 
     # The slowest compilation first: another process starts with the earlier ones of a plan.
     t, at_rest = np.linspace(0.0, 4.0, 5), np.zeros((5, 7))
-    nodes = NodeGrid(alone, t, (), free=False, counts=Counts())
+    formulation = Formulation.of(alone)
+    nodes = NodeGrid(formulation, t, BoundConditions(), free=False, counts=Counts())
     yield "nodes", lambda: nodes.near(np.tile(home, (5, 1)), at_rest, at_rest)
     yield "a given start", plan(alone)
     given = sm.Problem(arm, circle, "position", home)

@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from selfmotion.basics import Array, Flags, Ints, ProblemError, shown
 from selfmotion.basics.layout import Layout, layout_of
+from selfmotion.model.follow.coordinates import Coordinates
 from selfmotion.model.path import Dwell, Path, PathSamples
 from selfmotion.model.robot import Chain, RobotModel, null_space
 from selfmotion.model.robot.tree_arrays import JOINT
@@ -175,6 +176,7 @@ class Follows:
     Attributes
     ----------
     robot : RobotModel
+        The arm.
     items : tuple of BoundTaskFrame
         Each a tip on its path; their rows are stacked in this order. They last equally long.
     """
@@ -189,6 +191,16 @@ class Follows:
         """Return that an arm's tool follows a path, and other frames theirs."""
         first = BoundTaskFrame(robot.chain, path, Task.of(task))
         return cls(robot, (first, *(item.on(robot, path.duration) for item in also)))
+
+    @cached_property
+    def coordinates(self) -> Coordinates:
+        """Coordinates of motions."""
+        return Coordinates.of(self.robot)
+
+    @property
+    def dof(self) -> int:
+        """Number n of coordinates."""
+        return self.coordinates.dof
 
     @property
     def dimension(self) -> int:
@@ -229,8 +241,8 @@ class Follows:
     @cached_property
     def redundancy(self) -> int:
         """Number n - m of directions of self-motion at generic configurations."""
-        jacobians = [self.jacobian(q) for q in self.robot.generic_configurations()]
-        return self.robot.dof - max(map(_rank, jacobians))
+        jacobians = [self.jacobian(q) for q in self.coordinates.generic()]
+        return self.dof - max(map(_rank, jacobians))
 
     @cached_property
     def linear(self) -> Array:
@@ -253,7 +265,7 @@ class Follows:
     def layout(self) -> Layout:
         """Layout of the rows for compiled kernels."""
         return layout_of(
-            [(f.task.rows, f.task.tool_axes, f.chain.joints) for f in self.items], self.robot.dof
+            [(f.task.rows, f.task.tool_axes, f.chain.joints) for f in self.items], self.dof
         )
 
     @cached_property
@@ -326,7 +338,7 @@ class Follows:
 
     def held(self, t: Array) -> Flags:
         """Return the mask of coordinates that are held at 0 at times t (K,), (K, n)."""
-        return np.zeros((len(t), self.robot.dof), dtype=np.bool_)
+        return np.zeros((len(t), self.dof), dtype=np.bool_)
 
     def within_bands(self, q: Array) -> Array:
         """Return limits of |q| like q (K, n), within which joints that share a band keep it.
@@ -341,13 +353,22 @@ class Follows:
         return False
 
     @property
+    def with_windows_shut(self) -> Follows:
+        """The same with those coordinates held at 0 at all times, for integrated motions."""
+        return self
+
+    @property
     def edges(self) -> tuple[float, ...]:
         """Times at which coordinates start or end to be held [s]."""
         return ()
 
-    def for_robot(self, robot: RobotModel) -> Follows:
-        """Return the same for an arm of the same joints with other limits."""
-        return replace(self, robot=robot)
+    def within(self, lower: Array, upper: Array) -> Follows:
+        """Return the same for an arm with other limits, (n,) each [rad or m]."""
+        return replace(self, robot=replace(self.robot, lower=lower, upper=upper))
+
+    def completed(self, t: Array, q: Array) -> Array:
+        """Return all coordinates (K, n) for the arm's own at times t (K,) [s] of the path."""
+        return q
 
 
 def _rank(jacobian: Array) -> int:

@@ -75,7 +75,7 @@ class Batch:
         # This also checks the deadline.
         grid.counts.evaluated()
         grid.counts.evaluations += int(going.sum()) - 1
-        each = np.sum([cost.value(samples) for cost in grid.problem.all_costs], axis=0)
+        each = grid.cost.integrand(motion.sampled)
         # In gaps, a cost may be infinite.
         shares, counts = np.zeros_like(each), samples.weights > 0.0
         shares[counts] = samples.weights[counts] * each[counts]

@@ -206,7 +206,7 @@ class Manifolds:
         self.is_whole, copies = copies is None, copies or 1
         self.follows, self.t, self.copies = follows, np.tile(t, copies), copies
         self.chains, self.layout = follows.chains, follows.layout
-        self._sizes = follows.robot.dof, follows.dimension, len(follows.items)
+        self._sizes = follows.dof, follows.dimension, len(follows.items)
         self._paths, accelerations = [], []
         for item in follows.items:
             own = item.target(t)
@@ -245,7 +245,7 @@ class Manifolds:
 
     def rates(self, table: Array) -> tuple[Array, Array]:
         """Return q̇ and ε of a table, (N + 1, n) each, as views of it."""
-        return kernels.rates_of(table, self.follows.robot.dof)
+        return kernels.rates_of(table, self.follows.dof)
 
     def accelerated(self, place: Place, a: Array, bases: Array | None) -> Bases:
         """Set q̈ of a place for a null acceleration a (N + 1, n).

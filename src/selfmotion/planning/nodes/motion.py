@@ -1,6 +1,5 @@
 """A motion on its path, given by its nodes."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
@@ -8,17 +7,20 @@ import numpy as np
 
 from selfmotion.basics import Array, Counts, Flags, Ints, read_only
 from selfmotion.model.motion import Trajectory
+from selfmotion.planning.formulation import (
+    BoundConditions,
+    CurveSamples,
+    Formulation,
+    SampledMotion,
+)
 from selfmotion.planning.nodes.charts import Centred, Charts, Manifolds, Place
 from selfmotion.planning.nodes.ends import NodeEnds
 from selfmotion.planning.nodes.kernels import follow
 from selfmotion.planning.nodes.objective import NodeCost
-from selfmotion.planning.nodes.rows import NodeRows, accelerates_of, counts_at_once, sampled_curve
-from selfmotion.planning.nodes.samples import CurveSamples
+from selfmotion.planning.nodes.rows import NodeRows, is_tolerance, sampled_curve
 from selfmotion.planning.nodes.smoothness import can_be_smoothed, quickness, smoothing_of
 from selfmotion.planning.nodes.spline import AT_GAUSS, FINE_POINTS, POINTS, Quintic
-from selfmotion.problem.constraints import BoundConstraint, BoundEnd
-from selfmotion.problem.costs import Partials
-from selfmotion.problem.problem import Problem
+from selfmotion.problem.costs import Partials, Samples
 
 
 class NodeGrid:
@@ -26,11 +28,11 @@ class NodeGrid:
 
     Parameters
     ----------
-    problem : Problem
+    formulation : Formulation
     t : (N + 1,)
         Times of the nodes [s].
-    constraints : sequence of BoundConstraint
-        Conditions along the motion, h ≤ 0, and at the ends, c = 0.
+    conditions : BoundConditions
+        Along the motion, h ≤ 0, and at the ends, c = 0.
     free : bool
         Whether the start may move along its self-motion.
     counts : Counts
@@ -44,7 +46,7 @@ class NodeGrid:
 
     Attributes
     ----------
-    constraints : tuple of BoundConstraint
+    conditions : BoundConditions
     spline : Quintic
     manifolds : Manifolds
     cost : NodeCost
@@ -58,9 +60,9 @@ class NodeGrid:
 
     def __init__(
         self,
-        problem: Problem,
+        formulation: Formulation,
         t: Array,
-        constraints: Sequence[BoundConstraint],
+        conditions: BoundConditions,
         *,
         free: bool,
         counts: Counts,
@@ -68,28 +70,26 @@ class NodeGrid:
         quick: float = 1.0,
         copies: int | None = None,
     ) -> None:
-        self.problem, self.free, self.counts = problem, free, counts
-        self.smoothed, self.quick = smoothed, quick
-        follows = problem.follows
+        self.formulation, self.free, self.counts = formulation, free, counts
+        self.smoothed, self.quick, self.conditions = smoothed, quick, conditions
+        follows, n = formulation.follows, formulation.robot.dof
         self.manifolds = Manifolds(follows, t, copies)
         copies = self.manifolds.copies
-        accelerates = any(accelerates_of(item, follows.robot.dof) for item in constraints)
+        accelerates = any(item.uses_accelerations(n) for item in conditions.points)
         self.spline = Quintic(t, copies, FINE_POINTS if accelerates else POINTS)
-        smoothing = smoothing_of(problem, self.spline, smoothed=smoothed, quick=quick)
-        self.cost = NodeCost(follows, self.spline, problem.all_costs, smoothing)
-        self.ends = NodeEnds([item for item in constraints if isinstance(item, BoundEnd)])
-        others = [item for item in constraints if not item.equality]
-        self.rows = NodeRows(self.spline, others, follows.robot.dof)
-        self.constraints = tuple(constraints)
+        smoothing = smoothing_of(formulation, self.spline, smoothed=smoothed, quick=quick)
+        self.cost = NodeCost(formulation, self.spline, smoothing)
+        self.ends = NodeEnds(conditions.ends)
+        self.rows = NodeRows.of(formulation, self.spline, conditions.limits, conditions.points)
         self._times = t
-        r = follows.robot.dof - follows.dimension
+        r = follows.dof - follows.dimension
         usual = float(np.median(np.diff(t)))
         self.scale = np.repeat([1.0, 1.0 / usual, 1.0 / usual**2], r)
         # Nodes at which q̇ and q̈ are given, by order.
         first = len(t) * np.arange(copies)
         self._resting: list[Ints] = []
         for order in (1, 2):
-            asked = [rest >= order for rest in problem.rest_orders]
+            asked = [rest >= order for rest in formulation.rest_orders]
             ends = np.array([0, len(t) - 1])[np.array(asked)]
             self._resting.append((ends + first[:, None]).ravel())
         held: list[Ints] = [] if free else [np.arange(r)]
@@ -113,13 +113,14 @@ class NodeGrid:
 
     def without_rows(self) -> "NodeGrid":
         """Return the grid with conditions on its ends and rows of tolerances alone."""
-        return self.with_constraints(
-            [item for item in self.constraints if item.equality or counts_at_once(item)]
-        )
+        own = self.conditions
+        limits = tuple(item for item in own.limits if is_tolerance(item))
+        points = tuple(item for item in own.points if is_tolerance(item))
+        return self.with_conditions(BoundConditions(limits, points, own.ends))
 
-    def with_constraints(self, constraints: Sequence[BoundConstraint]) -> "NodeGrid":
-        """Return the grid with other constraints."""
-        return self._other(self._times, constraints)
+    def with_conditions(self, conditions: BoundConditions) -> "NodeGrid":
+        """Return the grid with other conditions."""
+        return self._other(self._times, conditions)
 
     def copied(self, copies: int) -> "NodeGrid":
         """Return the grid of `copies` motions, one after the other, for `Batch`.
@@ -131,16 +132,16 @@ class NodeGrid:
     def _other(
         self,
         t: Array,
-        constraints: Sequence[BoundConstraint] | None = None,
+        conditions: BoundConditions | None = None,
         *,
         smoothed: bool = False,
         quick: float | None = None,
         copies: int | None = None,
     ) -> "NodeGrid":
         return NodeGrid(
-            self.problem,
+            self.formulation,
             t,
-            self.constraints if constraints is None else constraints,
+            self.conditions if conditions is None else conditions,
             free=self.free,
             counts=self.counts,
             smoothed=smoothed or self.smoothed,
@@ -247,17 +248,24 @@ class NodeMotion:
         return self.grid.spline.at(AT_GAUSS, order, self.curve_ends).reshape(-1, n)
 
     @cached_property
-    def samples(self) -> CurveSamples:
-        """The motion as costs see it."""
+    def sampled(self) -> SampledMotion:
+        """The motion at the Gauss points."""
         grid = self.grid
-        return CurveSamples(grid.manifolds.follows, grid.spline.sampling, self._at_gauss)
+        every = CurveSamples(grid.manifolds.follows, grid.spline.sampling, self._at_gauss)
+        return grid.formulation.sampled(every)
+
+    @property
+    def samples(self) -> Samples:
+        """The arm's motion at the Gauss points, as costs see it."""
+        return self.sampled.arm
 
     @cached_property
-    def checked(self) -> CurveSamples:
-        """The motion as constraints see it that are no limits of joints."""
+    def checked(self) -> SampledMotion:
+        """The motion at the collocation points, as constraints see it that are no limits."""
         grid = self.grid
         at = partial(grid.spline.at_points, ends=self.curve_ends)
-        return CurveSamples(grid.manifolds.follows, grid.spline.points, at)
+        every = CurveSamples(grid.manifolds.follows, grid.spline.points, at)
+        return grid.formulation.sampled(every)
 
     @cached_property
     def terms(self) -> dict[str, float]:
@@ -304,19 +312,20 @@ class NodeMotion:
         """Whether a row that is none of a tolerance is violated by more than `most`."""
         rows = self.grid.rows
         beyond = rows.split(self.h - rows.granted)
-        pairs = zip(rows.constraints, beyond, strict=True)
         return any(
-            not np.max(own, initial=0.0) <= most for item, own in pairs if not counts_at_once(item)
+            not np.max(own, initial=0.0) <= most
+            for each, own in zip(rows.families, beyond, strict=True)
+            if not is_tolerance(each.item)
         )
 
     def can_be_smoothed(self) -> bool:
         """Whether q̈ may be penalised everywhere, see `smoothing_of`."""
-        return can_be_smoothed(self.grid.problem, self.samples, self.cost)
+        return can_be_smoothed(self.grid.formulation, self.samples, self.cost)
 
     @cached_property
     def quickness(self) -> float:
         """Share of the usual time in which it should start and stop, see `quickness`."""
-        return quickness(self.grid.problem, self.samples, self.cost, self.grid.quick)
+        return quickness(self.grid.formulation, self.samples, self.cost, self.grid.quick)
 
     @property
     def epsilon(self) -> Array:
@@ -358,9 +367,7 @@ class NodeMotion:
     def subdivisions(self) -> Ints:
         """Return into how many parts intervals have to be divided, (N,); see `NodeRows`."""
         grid = self.grid
-        if not grid.rows.has_point_rows:
-            return np.ones(grid.spline.count, dtype=np.int64)
-        curve = sampled_curve(grid.spline, grid.manifolds.follows, self.curve_ends)
+        curve = sampled_curve(grid.formulation, grid.spline, self.curve_ends)
         return grid.rows.subdivisions(curve)
 
     def broken_intervals(self) -> Flags:
@@ -369,13 +376,13 @@ class NodeMotion:
 
     def forget(self) -> None:
         """Drop cached values."""
-        for name in ("samples", "checked", "partials", "h", "curve_ends"):
+        for name in ("sampled", "checked", "partials", "h", "curve_ends"):
             self.__dict__.pop(name, None)
 
     @cached_property
     def trajectory(self) -> Trajectory:
         """The motion itself: the quintic through the nodes."""
-        place, names = self.place, self.grid.problem.robot.joint_names
+        place, names = self.place, self.grid.formulation.coordinates.names
         q, qd, qdd = (read_only(x) for x in (place.q, place.qd, place.qdd))
         return Trajectory(self.grid.t, q, qd, names, qdd)
 

@@ -19,13 +19,12 @@ from functools import cached_property
 import numpy as np
 
 from selfmotion.basics import Array
-from selfmotion.model.follow import Follows
 from selfmotion.model.motion import Sampling
+from selfmotion.planning.formulation import Formulation, SampledMotion
 from selfmotion.planning.nodes.charts import Bases, Charts, Place, orthonormal
-from selfmotion.planning.nodes.samples import CurveSamples
 from selfmotion.planning.nodes.smoothness import Smoothing
 from selfmotion.planning.nodes.spline import AT_GAUSS, GAUSS, WEIGHTS, Quintic
-from selfmotion.problem.costs import Cost, Partials, PlacedLater, Samples
+from selfmotion.problem.costs import Partials, PlacedLater, Samples
 
 # Step of central differences along a manifold [rad or m]: first derivatives are right to 1e-8,
 # second ones to 1e-6.
@@ -43,27 +42,29 @@ _TOGETHER = 4096
 
 
 class NodeCost:
-    """F = ∫ Σ G dt along the quintic pieces between the nodes.
+    """F = ∫ Σ G dt along the quintic segments between the nodes.
+
+    Costs are functions of the arm's joints, which are the first of all coordinates: their
+    derivatives by the others, 0, are filled in here.
 
     Parameters
     ----------
-    follows : Follows
+    formulation : Formulation
     spline : Quintic
-    costs : sequence of Cost
     smoothing : Smoothing, optional
         Minimised besides, and no part of the costs.
     """
 
     def __init__(
         self,
-        follows: Follows,
+        formulation: Formulation,
         spline: Quintic,
-        costs: Sequence[Cost],
         smoothing: Smoothing | None = None,
     ) -> None:
-        self._spline, self._costs = spline, tuple(costs)
-        self._bent = tuple(cost for cost in costs if not cost.is_quadratic)
-        self._dof = follows.robot.dof
+        self._spline, self._costs = spline, formulation.costs
+        self._springs = formulation.springs
+        self._bent = tuple(cost for cost in self._costs if not cost.is_quadratic)
+        self._dof, self._follows = formulation.robot.dof, formulation.problem.follows
         self._smoothing: tuple[Array, Array] | None = None
         if smoothing is not None:
             each = [self._stiffness(order, b) for order, b in smoothing.shares.items()]
@@ -71,7 +72,7 @@ class NodeCost:
 
     @cached_property
     def _forms(self) -> list[tuple[Array, Array]]:
-        """K and W of all that is quadratic, see `_stiffness`."""
+        """K and W of all that is quadratic in the arm's joints, see `_stiffness`."""
         found = [] if self._smoothing is None else [self._smoothing]
         for cost in (cost for cost in self._costs if cost.is_quadratic):
             for order, weight in cost.curvature(self._dof).items():
@@ -87,8 +88,15 @@ class NodeCost:
         weighted = (WEIGHTS * shares)[:, :, None] * table
         return np.asarray(scale[:, None, None] * (table.T @ weighted))
 
+    def integrand(self, motion: SampledMotion) -> Array:
+        """Return Σ G at the samples, (S,)."""
+        found = np.sum([cost.value(motion.arm) for cost in self._costs], axis=0)
+        if self._springs is not None:
+            found = found + 0.5 * motion.tolerances.q**2 @ self._springs
+        return np.asarray(found)
+
     def terms(self, samples: Samples) -> dict[str, float]:
-        """Return the contribution of each cost to F."""
+        """Return the contribution of each cost to F, for the motion of the arm."""
         return {cost.name: float(samples.weights @ cost.value(samples)) for cost in self._costs}
 
     def roughness(self, ends: Array) -> float:
@@ -96,10 +104,11 @@ class NodeCost:
         if self._smoothing is None:
             return 0.0
         stiffness, weight = self._smoothing
-        return 0.5 * float(np.sum((stiffness @ ends) * (ends @ weight)))
+        own = ends[:, :, : self._dof]
+        return 0.5 * float(np.sum((stiffness @ own) * (own @ weight)))
 
     def partials(self, samples: Samples) -> tuple[Partials, ...]:
-        """Return the derivatives of the integrand of each cost at the samples."""
+        """Return the derivatives of the integrand of each cost, for the motion of the arm."""
         return tuple(cost.gradient(samples) for cost in self._costs)
 
     def slopes(self, samples: Samples, ends: Array, partials: Sequence[Partials]) -> Array:
@@ -107,14 +116,19 @@ class NodeCost:
         together, spline = _summed(partials), self._spline
         weights = samples.weights.reshape(spline.count, -1, 1)
         found = np.zeros_like(ends)
+        own = found[:, :, : self._dof]
         for order, name in enumerate(_NAMES):
             part = getattr(together, name)
             if part is not None:
                 each = weights * spline.rates(order)[:, None, None]
-                found += AT_GAUSS[order].T @ (each * part.reshape(*weights.shape[:2], -1))
+                own += AT_GAUSS[order].T @ (each * part.reshape(*weights.shape[:2], -1))
         if self._smoothing is not None:
             stiffness, weight = self._smoothing
-            found += stiffness @ (ends @ weight)
+            own += stiffness @ (ends[:, :, : self._dof] @ weight)
+        if self._springs is not None:
+            found[:, :, self._dof :] += self._stiffness(0) @ (
+                ends[:, :, self._dof :] * self._springs
+            )
         return found
 
     def _of_bent(self, partials: Sequence[Partials]) -> Partials:
@@ -122,49 +136,51 @@ class NodeCost:
         both = zip(self._costs, partials, strict=True)
         return _summed([own for cost, own in both if not cost.is_quadratic])
 
-    def curvature(self, samples: CurveSamples, partials: Sequence[Partials], both: Array) -> Array:
+    def curvature(self, samples: Samples, partials: Sequence[Partials], both: Array) -> Array:
         """Return Γᵀ (∂²F) Γ on each interval, by w of its left, then its right node, (N, d, d).
 
         `both` (N, n, 6, d) are the changes of y.
         """
-        count, n, _, size = both.shape
+        count, _, _, size = both.shape
         found = np.zeros((count, size, size))
         for first in range(0, count, _CHUNK):
             part = slice(first, first + _CHUNK)
-            own = both[part]
-            turned = _bent_by(self._forms, part, own)
-            flat = own.reshape(len(own), 6 * n, size)
-            found[part] = np.swapaxes(flat, 1, 2) @ turned.reshape(len(own), 6 * n, size)
+            found[part] = _form(self._forms, part, both[part, : self._dof])
+            if self._springs is not None:
+                springs = [(self._stiffness(0), np.diag(self._springs))]
+                found[part] += _form(springs, part, both[part, self._dof :])
         if self._bent:
             found += self._bending(samples, self._of_bent(partials), both)
         return found
 
-    def _bending(self, samples: CurveSamples, here: Partials, both: Array) -> Array:
+    def _bending(self, samples: Samples, here: Partials, both: Array) -> Array:
         """Return the contribution of costs that are not quadratic forms, with derivatives `here`.
 
         By differences along the self-motion, and by one joint's rate after the other.
         """
-        spline, (count, n, _, size) = self._spline, both.shape
-        r, each = size // 6, len(GAUSS)
+        spline, (count, dof, _, size) = self._spline, both.shape
+        r, each, n = size // 6, len(GAUSS), self._dof
         by = [
-            np.moveaxis(table @ both, 1, 2).reshape(-1, n, size)
+            np.moveaxis(table @ both[:, :n], 1, 2).reshape(-1, n, size)
             * np.repeat(spline.rates(order), each)[:, None, None]
             for order, table in enumerate(AT_GAUSS)
         ]
+        places = np.moveaxis(AT_GAUSS[0] @ both, 1, 2).reshape(-1, dof, size)
         # Self-motion directions at the samples: interpolated between the nodes.
         left, right = both[:, None, :, 0, :r], both[:, None, :, 3, 3 * r : 4 * r].copy()
         right[spline.gaps] = left[spline.gaps]
         share = GAUSS[:, None, None]
-        along = (left + share * (right - left)).reshape(-1, n, r)
-        along[np.repeat(np.isin(np.arange(count), spline.gaps), each)] = np.eye(n)[:, :r]
+        along = (left + share * (right - left)).reshape(-1, dof, r)
+        along[np.repeat(np.isin(np.arange(count), spline.gaps), each)] = np.eye(dof)[:, :r]
         along = orthonormal(along)
-        turned = np.swapaxes(along, 1, 2)
-        moved, weights = turned @ by[0], samples.weights[:, None, None]
-        directions = [("q", along[:, :, x]) for x in range(r)]
+        moved, weights = np.swapaxes(along, 1, 2) @ places, samples.weights[:, None, None]
+        own = along[:, :n]
+        directions = [("q", own[:, :, x]) for x in range(r)]
         changed = self._changes(samples, here, directions)
         found = np.zeros((count, size, size))
         if "q" in changed:
-            found += _squared(count, moved, weights * (turned @ changed["q"]) @ moved)
+            turned = np.swapaxes(own, 1, 2) @ changed["q"]
+            found += _squared(count, moved, weights * turned @ moved)
         for order, name in enumerate(_NAMES[1:], 1):
             if name in changed:
                 found += 2.0 * _squared(count, by[order], weights * changed[name] @ moved)
@@ -179,7 +195,7 @@ class NodeCost:
         return np.asarray(0.5 * (found + np.swapaxes(found, 1, 2)))
 
     def _changes(
-        self, samples: CurveSamples, here: Partials, directions: Sequence[tuple[str, Array]]
+        self, samples: Samples, here: Partials, directions: Sequence[tuple[str, Array]]
     ) -> dict[str, Array]:
         """Return changes of non-quadratic costs' derivatives `here` in directions, (S, n, D) each.
 
@@ -196,7 +212,7 @@ class NodeCost:
         return {name: np.concatenate(parts, axis=2) for name, parts in found.items()}
 
     def _changed(
-        self, samples: CurveSamples, here: Partials, directions: Sequence[tuple[str, Array]]
+        self, samples: Samples, here: Partials, directions: Sequence[tuple[str, Array]]
     ) -> dict[str, Array]:
         """Return the result of `_changes`, all directions in one pass."""
         count, copies = len(samples.t), len(directions)
@@ -205,7 +221,7 @@ class NodeCost:
             flat[name][k * count : (k + 1) * count] += _NEAR * direction
         t, weights = (np.tile(values, copies) for values in (samples.t, samples.weights))
         sampling = Sampling(t, weights, np.arange(len(t)))
-        shifted = PlacedLater(samples.follows, sampling, **flat)
+        shifted = PlacedLater(self._follows, sampling, **flat)
         there = _summed([cost.gradient(shifted) for cost in self._bent])
         parts = {}
         for name in _NAMES:
@@ -221,6 +237,14 @@ def _squared(count: int, left: Array, right: Array) -> Array:
     size = left.shape[2]
     flat = left.reshape(count, -1, size)
     return np.asarray(np.swapaxes(flat, 1, 2) @ right.reshape(count, -1, size))
+
+
+def _form(forms: Sequence[tuple[Array, Array]], part: slice, both: Array) -> Array:
+    """Return Γᵀ ∂²F Γ of quadratic forms on some intervals, (N, d, d), for changes of y."""
+    count, n, _, size = both.shape
+    flat = both.reshape(count, 6 * n, size)
+    turned = _bent_by(forms, part, both).reshape(count, 6 * n, size)
+    return np.asarray(np.swapaxes(flat, 1, 2) @ turned)
 
 
 def _bent_by(forms: Sequence[tuple[Array, Array]], part: slice, both: Array) -> Array:

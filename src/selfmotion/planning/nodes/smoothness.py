@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from selfmotion.basics import Array
+from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.nodes.spline import Quintic
 from selfmotion.problem.costs import JointVelocity, Samples
-from selfmotion.problem.problem import Problem
 
 # Time in which the self-motion of a resting arm starts and stops, as a share of the duration.
 _STARTING = 0.02
@@ -47,7 +47,7 @@ class Smoothing:
 
 
 def smoothing_of(
-    problem: Problem, spline: Quintic, *, smoothed: bool, quick: float = 1.0
+    formulation: Formulation, spline: Quintic, *, smoothed: bool, quick: float = 1.0
 ) -> Smoothing | None:
     """Return the penalty that makes the self-motion start and stop smoothly where the arm rests.
 
@@ -55,65 +55,67 @@ def smoothing_of(
     stopping takes the share `quick` of the usual time. None without any of that, or where the costs
     penalise q̈ themselves.
     """
-    if _is_smooth(problem):
+    if _is_smooth(formulation):
         return None
     t = spline.sampling.t.reshape(spline.count, -1)
-    shares, of_jerks = _of_held(problem, t)
-    shares = np.maximum(shares, _of_rest(problem, t, quick))
+    shares, of_jerks = _of_held(formulation, t)
+    shares = np.maximum(shares, _of_rest(formulation, t, quick))
     if smoothed:
         # No more than at the ends, which it would slow down.
-        little = min(_EVERYWHERE, quick * _STARTING) * problem.path.duration
+        little = min(_EVERYWHERE, quick * _STARTING) * formulation.path.duration
         shares = np.maximum(shares, little**2)
     if not shares.any():
         return None
     each = {order: b for order, b in ((2, shares), (3, of_jerks)) if b.any()}
-    return Smoothing(each, np.diag(_weights(problem)))
+    return Smoothing(each, np.diag(_weights(formulation)))
 
 
-def rest_times(problem: Problem) -> Array:
+def rest_times(formulation: Formulation) -> Array:
     """Return the ends at which the arm rests, (k,) [s]."""
-    both = zip(problem.rests, (0.0, problem.path.duration), strict=True)
+    both = zip(formulation.rests, (0.0, formulation.path.duration), strict=True)
     return np.array([end for rest, end in both if rest])
 
 
-def quickness(problem: Problem, samples: Samples, cost: float, quick: float) -> float:
+def quickness(formulation: Formulation, samples: Samples, cost: float, quick: float) -> float:
     """Return the share of the usual time in which a motion of this cost should start and stop.
 
     The present share `quick`, unless its penalty is too large.
     """
-    if _is_smooth(problem):
+    if _is_smooth(formulation):
         return quick
-    shares = _of_rest(problem, samples.sampling.t, quick)
-    squares = shares * (samples.qdd**2 @ _weights(problem))
+    shares = _of_rest(formulation, samples.sampling.t, quick)
+    squares = shares * (samples.qdd**2 @ _weights(formulation))
     added = 0.5 * float(np.sum(samples.weights * squares))
     if added <= _TOO_MUCH * abs(cost):
         return quick
     return max(quick * _STARTS_COST * abs(cost) / added, _QUICKEST)
 
 
-def _is_smooth(problem: Problem) -> bool:
+def _is_smooth(formulation: Formulation) -> bool:
     """Whether the costs penalise q̈ or the jerk themselves."""
-    orders = [order for cost in problem.all_costs for order in cost.curvature(problem.robot.dof)]
+    orders = [
+        order for cost in formulation.costs for order in cost.curvature(formulation.robot.dof)
+    ]
     return max(orders, default=0) > 1
 
 
-def _of_rest(problem: Problem, t: Array, quick: float) -> Array:
+def _of_rest(formulation: Formulation, t: Array, quick: float) -> Array:
     """Return b of q̈ at times, of the shape of t, of starting and stopping."""
-    starting = quick * _STARTING * problem.path.duration
+    starting = quick * _STARTING * formulation.path.duration
     found = np.zeros_like(t)
-    for end in rest_times(problem):
+    for end in rest_times(formulation):
         found = np.maximum(found, starting**2 * _faded(t - end, starting))
     return found
 
 
-def _of_held(problem: Problem, t: Array) -> tuple[Array, Array]:
+def _of_held(formulation: Formulation, t: Array) -> tuple[Array, Array]:
     """Return b of q̈ and of the jerk at times where joints start or end to be held.
 
     Accelerations do not jump there, as at rests.
     """
-    starting = _STARTING * problem.path.duration
+    starting = _STARTING * formulation.path.duration
     faded = np.zeros_like(t)
-    for edge in problem.follows.edges:
+    for edge in formulation.follows.edges:
         faded = np.maximum(faded, _faded(t - edge, starting))
     return starting**2 * faded, starting**4 * faded
 
@@ -123,22 +125,22 @@ def _faded(away: Array, starting: float) -> Array:
     return np.asarray(np.maximum(1.0 - (away / (_NEAR_REST * starting)) ** 2, 0.0) ** 3)
 
 
-def can_be_smoothed(problem: Problem, samples: Samples, cost: float) -> bool:
+def can_be_smoothed(formulation: Formulation, samples: Samples, cost: float) -> bool:
     """Return whether q̈ may be penalised everywhere at this cost, see `smoothing_of`."""
-    squares = samples.qdd**2 @ _weights(problem)
-    share = (_EVERYWHERE * problem.path.duration) ** 2
+    squares = samples.qdd**2 @ _weights(formulation)
+    share = (_EVERYWHERE * formulation.path.duration) ** 2
     return bool(0.5 * share * float(samples.weights @ squares) <= _LITTLE * abs(cost))
 
 
-def _weights(problem: Problem) -> Array:
-    """Return the weights of squared rates, (n,): 0 of virtual joints, as in costs.
+def _weights(formulation: Formulation) -> Array:
+    """Return the weights of squared rates of the arm's joints, (n,).
 
     The usual weights of joint speed, scaled to those of the costs: the optimum is independent of
     the unit of the cost.
     """
-    arm, dof = problem.asked.robot, problem.robot.dof
-    found = np.zeros(dof)
-    found[: arm.dof] = np.asarray(JointVelocity.usual(arm).weight)
-    own = [cost.curvature(dof).get(1) for cost in problem.all_costs]
+    arm = formulation.robot
+    found = np.zeros(arm.dof)
+    found[:] = np.asarray(JointVelocity.usual(arm).weight)
+    own = [cost.curvature(arm.dof).get(1) for cost in formulation.costs]
     total = sum(float(np.trace(each)) for each in own if each is not None)
     return found * (total / float(found.sum())) if total > 0.0 else found

@@ -12,8 +12,8 @@ from selfmotion.model.kernels import carried
 from selfmotion.model.motion import Grid, NullMotion, NullMotionTable
 from selfmotion.model.robot import null_space
 from selfmotion.model.task import SE3
+from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.paper.rollout import Rollout
-from selfmotion.problem.problem import Problem
 
 # Newton steps onto the start of the path; far starts fail with an error.
 _STEPS = 20
@@ -138,7 +138,7 @@ class MinimumNormMotion:
 
     Attributes
     ----------
-    problem : Problem
+    formulation : Formulation
     grid : Grid
     guide : Guide or None
         The null motion that stands for x = 0; None for none.
@@ -159,7 +159,7 @@ class MinimumNormMotion:
         Its integrator: for one objective on the same grid.
     """
 
-    problem: Problem
+    formulation: Formulation
     grid: Grid
     guide: Guide | None
     q: Array
@@ -174,16 +174,16 @@ class MinimumNormMotion:
     @classmethod
     def on(
         cls,
-        problem: Problem,
+        formulation: Formulation,
         configuration: Array,
         grid: Grid,
         guide: Guide | None = None,
     ) -> "MinimumNormMotion":
         """Integrate from a start configuration (n,) on one grid."""
-        rollout = Rollout(problem.follows, grid, damping=problem.damping_law)
+        rollout = Rollout(formulation.follows, grid, damping=formulation.damping_law)
         t = grid.stage_times
-        idle = np.zeros((len(t), problem.robot.dof))
-        own = idle if guide is None else problem.brought_to_rest(t, guide(t))
+        idle = np.zeros((len(t), formulation.follows.dof))
+        own = idle if guide is None else formulation.brought_to_rest(t, guide(t))
         broken = rollout.run(configuration, own)
         samples, drift = rollout.samples(), rollout.drift / _extents(rollout)
         if broken is not None:
@@ -193,7 +193,7 @@ class MinimumNormMotion:
         if broken is None and wild.any():
             broken = float(grid.nodes[int(np.argmax(wild))])
         return cls(
-            problem,
+            formulation,
             grid,
             guide,
             samples.q[nodes],
@@ -232,8 +232,8 @@ class MinimumNormMotion:
         At the nodes carried along, so that it does not turn inside the null space; between them the
         entries follow a cubic spline.
         """
-        n = self.problem.robot.dof
-        none = n == self.problem.follows.dimension
+        n = self.formulation.follows.dof
+        none = n == self.formulation.follows.dimension
         return np.zeros((len(t), n, 0)) if none else np.asarray(self._frame(t))
 
     @cached_property
@@ -245,7 +245,7 @@ class MinimumNormMotion:
 
 
 def null_motion_table(
-    problem: Problem,
+    formulation: Formulation,
     t: Array,
     minimum_norm: MinimumNormMotion,
     motion: NullMotion,
@@ -255,14 +255,17 @@ def null_motion_table(
 
     Around (S, n) is the null motion of x = 0, by default the guide's.
     """
-    n, redundancy = problem.robot.dof, problem.robot.dof - problem.follows.dimension
+    n = formulation.follows.dof
+    redundancy = n - formulation.follows.dimension
     if around is None:
         guide = minimum_norm.guide
-        around = np.zeros((len(t), n)) if guide is None else problem.brought_to_rest(t, guide(t))
+        around = (
+            np.zeros((len(t), n)) if guide is None else formulation.brought_to_rest(t, guide(t))
+        )
     # Of an arm without redundancy no null motion acts.
     is_joint = motion.space == "joint" and redundancy > 0
     frame, rows = (None, n) if is_joint else (partial(minimum_norm.frame, t), redundancy)
-    return NullMotionTable(problem.null_functions(t, motion), frame, rows, around)
+    return NullMotionTable(formulation.null_functions(t, motion), frame, rows, around)
 
 
 def _extents(rollout: Rollout) -> Array:
@@ -275,7 +278,7 @@ def _extents(rollout: Rollout) -> Array:
 
 
 def converged_minimum_norm(
-    problem: Problem,
+    formulation: Formulation,
     configuration: Array,
     guide: Guide | None = None,
     grid: Grid | None = None,
@@ -296,13 +299,13 @@ def converged_minimum_norm(
     BreakdownError
         It runs into a singular pose.
     """
-    steps = max(_FEWEST_STEPS, problem.null_motion.fewest_steps)
-    grid = grid or Grid.aligned(problem.knots, steps)
+    steps = max(_FEWEST_STEPS, formulation.null_motion.fewest_steps)
+    grid = grid or Grid.aligned(formulation.knots, steps)
     coarse: Array | None = None
     troubles: list[tuple[float, float]] = []
     evaluations = 0
     for _ in range(MOST_HALVINGS):
-        minimum_norm = MinimumNormMotion.on(problem, configuration, grid, guide)
+        minimum_norm = MinimumNormMotion.on(formulation, configuration, grid, guide)
         evaluations += minimum_norm.jacobian_evaluations
         converged = _converged_grid(minimum_norm, coarse)
         if minimum_norm.broken is None and converged:
@@ -318,11 +321,11 @@ def converged_minimum_norm(
             np.inf if minimum_norm.broken is not None else float(np.abs(minimum_norm.drift).max())
         )
         troubles.append((time, amount))
-        if not minimum_norm.damped and _stays(troubles, problem.path.duration):
+        if not minimum_norm.damped and _stays(troubles, formulation.path.duration):
             break
         grid = grid.halved()
     raise BreakdownError(
-        f"{problem.robot.name}: without self-motion the tool reaches a singular pose near "
+        f"{formulation.robot.name}: without self-motion the tool reaches a singular pose near "
         f"t = {time:.4g} s; start elsewhere (start=), or keep the path away from the edge "
         f"of the workspace",
         time=time,

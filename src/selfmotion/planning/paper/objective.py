@@ -6,6 +6,11 @@ import numpy as np
 
 from selfmotion.basics import Array, BreakdownError, Counts, ProblemError
 from selfmotion.model.motion import Evaluation, Grid, NullMotion, NullMotionTable, Trajectory
+from selfmotion.planning.formulation import (
+    Formulation,
+    require_finite,
+    require_finite_values,
+)
 from selfmotion.planning.paper.minimum_norm import (
     FixedStart,
     FreeStart,
@@ -16,7 +21,6 @@ from selfmotion.planning.paper.minimum_norm import (
 from selfmotion.planning.paper.rollout import Rollout
 from selfmotion.problem.constraints import BoundConstraint, NodeTangents, linearised, violated
 from selfmotion.problem.costs import ERROR, Cost, Samples
-from selfmotion.problem.problem import Problem
 
 # Samples in one chunk, which bounds memory.
 _CHUNK = 4096
@@ -60,28 +64,13 @@ class _CostIntegrals:
                 (by_error, partials.error),
             ):
                 if part is not None:
-                    self._require_finite(cost, "gradient", part)
+                    require_finite(cost, "gradient", part, samples.t)
                     total += weights * part
             for order, part in ((1, partials.qdd), (2, partials.qddd)):
                 if part is not None:
-                    self._require_finite(cost, "gradient", part)
+                    require_finite(cost, "gradient", part, samples.t)
                     by_qd[nodes] += sampling.differentiation(order).T @ (weights * part)
         return by_q, by_qd, by_error
-
-    def require_finite(self, samples: Samples) -> None:
-        """Raise ProblemError where a cost has no finite value; says when."""
-        for cost in self._costs:
-            self._require_finite(cost, "value", np.asarray(cost.value(samples)))
-
-    def _require_finite(self, cost: Cost, which: str, table: Array) -> None:
-        bad = ~np.isfinite(table)
-        if bad.any():
-            row = int(np.argmax(bad.reshape(len(bad), -1).any(axis=1)))
-            raise ProblemError(
-                f"cost '{cost.name}': its {which} is {table[row]} at "
-                f"t = {self._grid.stage_times[row]:.6g} s, expected finite numbers; "
-                f"selfmotion.testing.check_cost checks a cost"
-            )
 
     def curvature(self, by_q: Array, by_qd: Array, by_error: Callable[[], Array]) -> Array:
         """Return ∫ Σ_k (∂q^(k)/∂x)ᵀ W_k (∂q^(k)/∂x) dt, (size, size).
@@ -166,7 +155,7 @@ class Objective:
                 )
         self.rollout, self.null_motion, self.start = rollout, null_motion, start
         self.ends, self.counts = tuple(ends), counts
-        self._costs = _CostIntegrals(costs, rollout.grid)
+        self._all_costs, self._costs = tuple(costs), _CostIntegrals(costs, rollout.grid)
         self._at: Array | None = None
         # Cached ∂q/∂x and ∂q̇/∂x, gradient and evaluation.
         self._tangents: tuple[Array, Array] | None = None
@@ -184,7 +173,7 @@ class Objective:
     @classmethod
     def of(
         cls,
-        problem: Problem,
+        formulation: Formulation,
         minimum_norm: MinimumNormMotion,
         *,
         grid: Grid | None = None,
@@ -199,7 +188,7 @@ class Objective:
 
         Parameters
         ----------
-        problem : Problem
+        formulation : Formulation
         minimum_norm : MinimumNormMotion
             The motion at x = 0: its start, and the basis of the null motion, are those of x.
         grid : Grid, optional
@@ -210,27 +199,29 @@ class Objective:
             Conditions on the ends.
         counts : Counts, optional
         null_motion : NullMotion, optional
-            By default that of the problem.
+            By default that of the formulation.
         around : (S, n), optional
             The null motion of x = 0; by default that of the minimum-norm motion.
         rollout : Rollout, optional
             That of the minimum-norm motion, on this grid, handed over; by default a new one.
         """
-        follows, grid = problem.follows, grid or minimum_norm.grid
+        follows, grid = formulation.follows, grid or minimum_norm.grid
         t = grid.stage_times
         start: Start = (
             FreeStart(follows, minimum_norm.start) if free else FixedStart(minimum_norm.start)
         )
         found = cls(
-            rollout or Rollout(follows, grid, damping=problem.damping_law),
-            null_motion_table(problem, t, minimum_norm, null_motion or problem.null_motion, around),
-            problem.all_costs,
+            rollout or Rollout(follows, grid, damping=formulation.damping_law),
+            null_motion_table(
+                formulation, t, minimum_norm, null_motion or formulation.null_motion, around
+            ),
+            formulation.costs,
             start,
             ends,
             Counts() if counts is None else counts,
         )
-        if problem.damping is None:
-            orders = zip((0, -1), problem.rest_orders, strict=True)
+        if formulation.damping_law is None:
+            orders = zip((0, -1), formulation.rest_orders, strict=True)
             found._minimum_norm_ends = [end for end, order in orders if order > 1]
         found._is_rolled = rollout is not None and not start.size
         return found
@@ -297,7 +288,7 @@ class Objective:
                 f"where the tool reaches a singular pose",
                 time=self._broken,
             )
-        self._costs.require_finite(samples)
+        require_finite_values(self._all_costs, samples)
 
     def slope(self, x: Array, direction: Array) -> float:
         """Return the derivative of `value` at x along `direction`."""
@@ -319,7 +310,7 @@ class Objective:
         if self._evaluation is None:
             before = self.rollout.jacobian_evaluations
             t, q, qd = self.rollout.polished()
-            names = self.rollout.robot.joint_names
+            names = self.rollout.follows.coordinates.names
             qdd = self.grid.derivative(qd)
             # Where the arm comes to rest smoothly that is so by construction; differences are not.
             qdd[self._minimum_norm_ends] = 0.0
@@ -346,7 +337,8 @@ class Objective:
 
     def unmet(self, x: Array) -> tuple[str, ...]:
         """Return the violated conditions on ends at x, in words."""
-        return violated(self.ends, self.samples(x))
+        samples = self.samples(x)
+        return violated((item, samples) for item in self.ends)
 
     def metric(self, x: Array) -> Array:
         """Return the Gauss-Newton matrix of quadratic costs, (size, size).

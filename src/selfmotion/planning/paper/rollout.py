@@ -52,7 +52,7 @@ class Rollout:
 
     @property
     def _sizes(self) -> tuple[int, int, int]:
-        return self.robot.dof, self.follows.dimension, len(self.follows.items)
+        return self.follows.dof, self.follows.dimension, len(self.follows.items)
 
     def _new_table(self, stages: int) -> tuple[Array, kernels.Stage, list[kernels.Tip]]:
         n, m, count = self._sizes

@@ -17,6 +17,7 @@ from selfmotion.basics import (
     shown,
 )
 from selfmotion.model.motion import Evaluation, Grid, NullMotion
+from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.optimise import (
     Callback,
     Function,
@@ -30,7 +31,6 @@ from selfmotion.planning.paper.ends import Eliminated, closed
 from selfmotion.planning.paper.minimum_norm import MOST_HALVINGS, MinimumNormMotion
 from selfmotion.planning.paper.objective import Objective
 from selfmotion.problem.constraints import BoundConstraint
-from selfmotion.problem.problem import Problem
 
 # Relative agreement of the cost on a grid and on the halved one.
 _AGREEMENT = 1e-4
@@ -54,7 +54,7 @@ class Method:
 
     Attributes
     ----------
-    problem : Problem
+    formulation : Formulation
     minimum_norm : MinimumNormMotion
     free : bool
     ends : tuple of BoundConstraint
@@ -65,7 +65,7 @@ class Method:
     callback : callable or None
     """
 
-    problem: Problem
+    formulation: Formulation
     minimum_norm: MinimumNormMotion
     free: bool
     ends: tuple[BoundConstraint, ...]
@@ -77,7 +77,7 @@ class Method:
     def on(self, grid: Grid) -> Objective:
         """Return the objective on a grid."""
         return Objective.of(
-            self.problem,
+            self.formulation,
             self.minimum_norm,
             grid=grid,
             free=self.free,
@@ -158,7 +158,7 @@ class Solution:
     @property
     def null_motion(self) -> NullMotion:
         """The parameterisation of the null motion."""
-        return self.method.problem.null_motion
+        return self.method.formulation.null_motion
 
     @property
     def coefficients(self) -> Array:
@@ -270,7 +270,7 @@ _Solution = TypeVar("_Solution", bound=Solution)
 
 
 def solve(
-    problem: Problem,
+    formulation: Formulation,
     minimum_norm: MinimumNormMotion,
     *,
     free: bool = False,
@@ -287,7 +287,7 @@ def solve(
 
     Parameters
     ----------
-    problem : Problem
+    formulation : Formulation
         Its null motion and costs are used; of its constraints, only `ends`.
     minimum_norm : MinimumNormMotion
         The motion at x = 0.
@@ -322,7 +322,7 @@ def solve(
     counts = Counts() if counts is None else counts
     limit = None if most is None else counts.evaluations + most
     own = QuasiNewton() if optimizer is None else optimizer
-    method = Method(problem, minimum_norm, free, tuple(ends), own, counts, limit, callback)
+    method = Method(formulation, minimum_norm, free, tuple(ends), own, counts, limit, callback)
     objective = method.on(minimum_norm.grid)
     x = np.zeros(objective.size)
     if x0 is not None and np.isfinite(objective.value(x0)):

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from selfmotion.basics import Array, Progress, SelfmotionError, presses, silent
+from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.optimise import Status
 from selfmotion.planning.planner.effort import Search
 from selfmotion.planning.planner.grids import rough_grid
@@ -130,9 +131,9 @@ def _room(problem: Problem) -> Room:
 
 def _spread(problem: Problem, rng: np.random.Generator) -> list[Array]:
     """Return allowed starts, each as far as any from those before, the first in the middle."""
-    robot = problem.envelope.arm(problem.robot)
-    follows = problem.follows.for_robot(robot)
-    room = _room(problem)
+    allowed = problem.envelope
+    follows = problem.follows.within(allowed.lower, allowed.upper)
+    own, room = follows.coordinates, _room(problem)
     try:
         starts = np.array(start_candidates(follows, Search().starts, rng, room.free))
     except SelfmotionError:
@@ -141,12 +142,12 @@ def _spread(problem: Problem, rng: np.random.Generator) -> list[Array]:
     if not len(starts):
         return []
     # Wrists start near their usual angle, not a turn away.
-    motions, arrived = carried(follows, starts, rough_grid(problem).nodes)
-    back = np.array([wound_back(robot, motion)[0] for motion in motions])
+    motions, arrived = carried(follows, starts, rough_grid(Formulation.on_path(problem)).nodes)
+    back = np.array([wound_back(own, motion)[0] for motion in motions])
     starts = np.where((arrived & room.free(back))[:, None], back, starts)
-    distances = np.abs(starts[:, None] - starts) @ robot.joint_weights
-    lower, upper = robot.finite_limits()
-    order = [int(np.argmin(np.abs(starts - 0.5 * (lower + upper)) @ robot.joint_weights))]
+    distances = np.abs(starts[:, None] - starts) @ own.weights
+    lower, upper = own.finite_limits()
+    order = [int(np.argmin(np.abs(starts - 0.5 * (lower + upper)) @ own.weights))]
     while len(order) < len(starts):
         nearest = distances[order].min(axis=0)
         nearest[order] = -1.0
@@ -162,12 +163,12 @@ def _end_distance(one: Plan, other: Plan) -> float:
 
 def _nowhere(problem: Problem) -> str:
     """Return the cause why a path has no start."""
-    asked, follows = problem.envelope, problem.follows.for_robot(problem.robot)
+    allowed, follows = problem.envelope, problem.follows
     try:
         starts = np.array(start_candidates(follows, _BRANCH_TRIES, np.random.default_rng(0)))
     except SelfmotionError as error:
         return str(error)
-    for model, far in asked.bodies:
+    for model, far in allowed.bodies:
         near = model.worst(starts)
         if near.value < far:
             return (

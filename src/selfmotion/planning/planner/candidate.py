@@ -23,6 +23,7 @@ from selfmotion.model.motion import (
     Trajectory,
 )
 from selfmotion.model.robot import RobotModel, null_space
+from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.optimise import Iteration, QuasiNewton, Status
 from selfmotion.planning.paper import (
     MOST_HALVINGS,
@@ -35,10 +36,15 @@ from selfmotion.planning.paper import (
 from selfmotion.planning.planner.effort import Effort
 from selfmotion.planning.planner.grids import first_nodes, is_on_nodes, is_published, most_nodes
 from selfmotion.planning.planner.polish import Polisher
-from selfmotion.planning.planner.solutions import NodeSolution, PublishedSolution, Solution, score
+from selfmotion.planning.planner.solutions import (
+    MinimumNormSolution,
+    NodeSolution,
+    PublishedSolution,
+    Solution,
+    score,
+)
 from selfmotion.planning.result import Plan
 from selfmotion.planning.search import Manifold
-from selfmotion.problem.constraints import BoundConstraint, BoundEnd
 from selfmotion.problem.problem import Problem
 
 
@@ -58,7 +64,7 @@ def check_joints(theirs: RobotModel, ours: RobotModel) -> None:
         )
 
 
-def on_start(problem: Problem, seed: Array) -> Array:
+def on_start(formulation: Formulation, seed: Array) -> Array:
     """Return the configuration (n,) near another one that is on the start of all paths.
 
     Raises
@@ -66,9 +72,10 @@ def on_start(problem: Problem, seed: Array) -> Array:
     InverseKinematicsError
         There is none.
     """
-    follows, robot = problem.follows, problem.robot
+    follows, robot = formulation.follows, formulation.robot
+    own = follows.coordinates
     if not follows.is_plain:
-        manifold = Manifold(follows, robot.lower, robot.upper)
+        manifold = Manifold(follows, own.lower, own.upper)
         held = follows.held(np.zeros(1))
         q, arrived = manifold.project(seed[None], follows.targets(np.zeros(1)), far=True, held=held)
         if not arrived[0]:
@@ -81,12 +88,13 @@ def on_start(problem: Problem, seed: Array) -> Array:
                 rotation_miss=float(rotation),
             )
         return np.asarray(q[0])
-    return problem.robot.inverse_kinematics(problem.path.pose(0.0), problem.task, seed)
+    first, task = formulation.path.pose(0.0), formulation.problem.task
+    return formulation.robot.inverse_kinematics(first, task, seed)
 
 
-def pace_of(plan: Plan, problem: Problem) -> float:
+def pace_of(plan: Plan, formulation: Formulation) -> float:
     """Return the duration of a plan's path over that of the problem's."""
-    return plan.path.duration / problem.path.duration
+    return plan.path.duration / formulation.path.duration
 
 
 def slower(trajectory: Trajectory, pace: float) -> Trajectory:
@@ -103,7 +111,7 @@ def moved_to(trajectory: Trajectory, start: Array) -> Trajectory:
 
 
 def coefficients_of(
-    trajectory: Trajectory, pace: float, problem: Problem, t: Array, table: NullMotionTable
+    trajectory: Trajectory, pace: float, formulation: Formulation, t: Array, table: NullMotionTable
 ) -> Array:
     """Return the coefficients x whose null motion is nearest to that of another motion, (size,).
 
@@ -116,7 +124,7 @@ def coefficients_of(
     trajectory : Trajectory
     pace : float
         The duration of its path over that of the problem's.
-    problem : Problem
+    formulation : Formulation
     t : (S,)
         Times on its path [s].
     table : NullMotionTable
@@ -125,7 +133,7 @@ def coefficients_of(
     # A plan of a part of its path ends earlier.
     theirs = np.minimum(t * pace, trajectory.t[-1])
     q, qd = trajectory(theirs), pace * trajectory(theirs, 1)
-    null = np.swapaxes(null_space(problem.follows.jacobians(q)), 1, 2)
+    null = np.swapaxes(null_space(formulation.follows.jacobians(q)), 1, 2)
     acting = null @ table.matrix()
     wanted = np.einsum("srn,sn->sr", null, qd)
     if not wanted.size:
@@ -140,7 +148,7 @@ class Candidate:
 
     Parameters
     ----------
-    problem : Problem
+    formulation : Formulation
     effort : Effort
     start : (n,)
     free : bool
@@ -153,9 +161,9 @@ class Candidate:
 
     Attributes
     ----------
-    constraints : tuple of BoundConstraint
+    conditions : BoundConditions
         Those that count, bound to the ends.
-    minimum_norm : PublishedSolution
+    minimum_norm : MinimumNormSolution
         The minimum-norm motion: eq. 4 at x = 0.
     history : list of Iteration
     is_hopeless : bool
@@ -171,7 +179,7 @@ class Candidate:
 
     def __init__(
         self,
-        problem: Problem,
+        formulation: Formulation,
         effort: Effort,
         start: Array,
         *,
@@ -179,31 +187,16 @@ class Candidate:
         guide: Guide | None = None,
         grid: Grid | None = None,
     ) -> None:
-        begun, jacobians = _begun(problem, start, guide, grid)
+        begun, jacobians = _begun(formulation, start, guide, grid)
         effort.counts.jacobians += jacobians
-        self.problem, self.effort, self.free = problem, effort, free
-        self.constraints = problem.bind_constraints(
+        self.formulation, self.effort, self.free = formulation, effort, free
+        self.conditions = formulation.conditions(
             start, begun.end, apart=effort.apart, decomposed=effort.decomposed
         )
-        _require_known(self.constraints)
         self._ends = begun.start, begun.end
-        problem = begun.problem
         # Beyond so many steps a grid is not refined any more.
         self.most_steps = int(begun.grid.steps * 2**MOST_HALVINGS)
-        if isinstance(problem.null_motion, FreeNullMotion) and is_published(problem, effort):
-            problem = problem.changed(null_motion=PolynomialNullMotion())
-        ends = tuple(item for item in self.constraints if item.equality)
-        own = QuasiNewton() if effort.optimizer is None else effort.optimizer
-        counts = effort.counts
-        objective = Objective.of(
-            problem, begun, free=free, ends=ends, counts=counts, rollout=begun.rollout
-        )
-        method = Method(problem, begun, free, ends, own, counts, None, None)
-        # Without self-motion it is the only one; else nothing better was found.
-        ended = Status.INFEASIBLE if problem.follows.redundancy > 0 else Status.CONVERGED
-        self.minimum_norm = PublishedSolution(
-            method, objective, np.zeros(objective.size), None, ended, (), self.constraints
-        )
+        self.minimum_norm = MinimumNormSolution(formulation, begun, self.conditions, effort.counts)
         self.history: list[Iteration] = []
         self.is_hopeless = False
         self._found: Solution | None = None
@@ -262,8 +255,9 @@ class Candidate:
     def minimum_norm_evaluation(self) -> Evaluation:
         """Return the minimum-norm motion, on the grid of the best one where that has one."""
         found = self._found
-        known = found if isinstance(found, PublishedSolution) else self.minimum_norm
-        return known.minimum_norm_evaluation()
+        if isinstance(found, PublishedSolution):
+            return found.minimum_norm_evaluation()
+        return self.minimum_norm.evaluation()
 
     def score(self) -> tuple[bool, bool, float]:
         """Return what ranks it among others: the smaller, the better; see `score`."""
@@ -291,10 +285,10 @@ class Candidate:
         if self._ended is not None or self.is_of_chain:
             return
         if not np.isfinite(self.minimum_norm.cost):
-            self.minimum_norm.objective.require_finite(self.minimum_norm.x)
-        if is_published(self.problem, self.effort):
+            self.minimum_norm.require_finite()
+        if is_published(self.formulation, self.effort):
             self._polish_as_published()
-        elif is_on_nodes(self.problem, self.effort):
+        elif is_on_nodes(self.formulation, self.effort):
             self._polish_on_nodes(cost_to_beat)
 
     def settle(self) -> None:
@@ -311,12 +305,12 @@ class Candidate:
 
     def as_adopted(self) -> "Candidate | None":
         """Return it with the motion of the plan that it began with; None where there is none."""
-        if self._warm is None or not is_on_nodes(self.problem, self.effort):
+        if self._warm is None or not is_on_nodes(self.formulation, self.effort):
             return None
         motions, t = self._first_motions()
         if len(motions) < 2:
             return None
-        polisher = Polisher(self.problem, self.effort, self.constraints, free=self.free)
+        polisher = Polisher(self.formulation, self.effort, self.conditions, free=self.free)
         motion = polisher.grid(t).near(*(motions[0](t, order) for order in range(3)))
         if motion is None:
             return None
@@ -341,14 +335,14 @@ class Candidate:
         if not isinstance(found, NodeSolution) or found.violations:
             return False
         # Of a given start in which it meets itself, nothing else begins.
-        can = self.free or self.problem.keeps_off_itself(found.motion.place.q[:1])
+        can = self.free or self.formulation.keeps_off_itself(found.motion.place.q[:1])
         if self._ended is not None or self.effort.apart or found.is_chain or not can:
             return False
         self.effort = replace(self.effort, apart=True)
-        self.constraints = self.problem.bind_constraints(
+        self.conditions = self.formulation.conditions(
             *self._ends, decomposed=self.effort.decomposed
         )
-        self.minimum_norm = replace(self.minimum_norm, constraints=self.constraints)
+        self.minimum_norm = replace(self.minimum_norm, conditions=self.conditions)
 
         def optimum(polisher: Polisher) -> NodeSolution | None:
             first = self._known or self.minimum_norm.evaluation().trajectory
@@ -359,30 +353,49 @@ class Candidate:
 
     def _polish_as_published(self) -> None:
         """Go to the optimum of the published method."""
-        effort, before = self.effort, self._found
+        before = self._found
         if isinstance(before, PublishedSolution):
             found = before.again()
         else:
-            begun, most = self.minimum_norm, effort.max_evaluations
-            limit = None if most is None else effort.counts.evaluations + most
-            method = replace(begun.method, limit=limit, callback=effort.callback)
-            found = replace(begun, method=method, x=self._first_coefficients()).settled()
+            begun = self._as_published()
+            found = replace(begun, x=self._first_coefficients(begun)).settled()
         self._found = found
         self.history = list(found.history)
         if found.status is Status.INTERRUPTED:
             self.end(Status.INTERRUPTED)
 
-    def _first_coefficients(self) -> Array:
+    def _as_published(self) -> PublishedSolution:
+        """Return the minimum-norm motion as the start of the published method."""
+        effort, formulation, begun = self.effort, self.formulation, self.minimum_norm.motion
+        if isinstance(formulation.null_motion, FreeNullMotion):
+            formulation = formulation.changed(null_motion=PolynomialNullMotion())
+        ends, most = self.conditions.ends, effort.max_evaluations
+        limit = None if most is None else effort.counts.evaluations + most
+        own = QuasiNewton() if effort.optimizer is None else effort.optimizer
+        method = Method(
+            formulation, begun, self.free, ends, own, effort.counts, limit, effort.callback
+        )
+        objective = Objective.of(
+            formulation,
+            begun,
+            free=self.free,
+            ends=ends,
+            counts=effort.counts,
+            rollout=begun.rollout,
+        )
+        none = np.zeros(objective.size)
+        return PublishedSolution(method, objective, none, conditions=self.conditions)
+
+    def _first_coefficients(self, begun: PublishedSolution) -> Array:
         """Return the decision vector that is nearest to a known plan, if no worse than x = 0."""
-        plan, problem = self._warm, self.problem
-        objective, none = self.minimum_norm.objective, self.minimum_norm.x
+        plan, formulation, objective = self._warm, self.formulation, begun.objective
         if plan is None:
-            return none
-        t, pace = objective.grid.stage_times, pace_of(plan, problem)
-        near = coefficients_of(plan.trajectory, pace, problem, t, objective.null_motion)
-        z, _ = objective.parts(none)
+            return begun.x
+        t, pace = objective.grid.stage_times, pace_of(plan, formulation)
+        near = coefficients_of(plan.trajectory, pace, formulation, t, objective.null_motion)
+        z, _ = objective.parts(begun.x)
         x = np.concatenate([z, near])
-        return x if objective.value(x) <= self.minimum_norm.cost else none
+        return x if objective.value(x) <= self.minimum_norm.cost else begun.x
 
     def _polish_on_nodes(self, cost_to_beat: float) -> None:
         """Go to the optimum on nodes near the motion."""
@@ -401,25 +414,25 @@ class Candidate:
             self.keep_off_itself()
         if self.status is Status.GRADIENT:
             # A gradient that is not finite is named with its time.
-            self.minimum_norm.objective.gradient(self.minimum_norm.x)
+            self.minimum_norm.require_finite_gradients()
 
     def _first_motions(self) -> tuple[list[Trajectory], Array]:
         """Return motions to begin near, and the times of the first nodes (N + 1,)."""
-        problem, warm, t = self.problem, self._warm, first_nodes(self.problem)
+        formulation, warm, t = self.formulation, self._warm, first_nodes(self.formulation)
         motions = [self._known or self.minimum_norm.evaluation().trajectory]
         if warm is not None and warm.trajectory.t[-1] == warm.path.duration:
-            own = slower(warm.trajectory, pace_of(warm, problem))
+            own = slower(warm.trajectory, pace_of(warm, formulation))
             if not self.free:
                 own = moved_to(own, self._ends[0])
             motions = [own, *motions]
-            if len(own.t) <= most_nodes(problem):
+            if len(own.t) <= most_nodes(formulation):
                 # Its nodes are where such a motion needs them.
-                t = np.unique(np.append(own.t, problem.knots))
+                t = np.unique(np.append(own.t, formulation.knots))
         return motions, t
 
     def _by_nodes(self, search: Callable[[Polisher], NodeSolution | None]) -> None:
         """Let what is found on nodes be the best motion, if something is."""
-        polisher = Polisher(self.problem, self.effort, self.constraints, free=self.free)
+        polisher = Polisher(self.formulation, self.effort, self.conditions, free=self.free)
         try:
             found = search(polisher)
         except KeyboardInterrupt:
@@ -438,28 +451,17 @@ class Candidate:
 
 
 def _begun(
-    problem: Problem, start: Array, guide: Guide | None, grid: Grid | None
+    formulation: Formulation, start: Array, guide: Guide | None, grid: Grid | None
 ) -> tuple[MinimumNormMotion, int]:
     """Return the motion at x = 0, see `converged_minimum_norm`.
 
     It keeps out of tolerances in windows, so that it is one that may be followed. Where the path
     cannot be followed like that, it makes use of them, at any time: to begin with, that will do.
     """
-    shut = problem.with_windows_shut
+    shut = formulation.with_windows_shut
     try:
         return converged_minimum_norm(shut, start, guide, grid)
     except BreakdownError:
-        if shut is problem:
+        if shut is formulation:
             raise
-        return converged_minimum_norm(problem, start, guide, grid)
-
-
-def _require_known(constraints: Sequence[BoundConstraint]) -> None:
-    """Raise ProblemError for equalities that are none on the ends."""
-    for item in constraints:
-        if item.equality and not isinstance(item, BoundEnd):
-            raise ProblemError(
-                f"constraint '{item.name}': it is an equality, expected h ≤ 0 at all nodes; "
-                f"equalities are asked of the ends alone (ClosedPath, EndConfiguration, …), and "
-                f"others are two-sided bands"
-            )
+        return converged_minimum_norm(formulation, start, guide, grid)

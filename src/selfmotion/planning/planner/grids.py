@@ -1,12 +1,12 @@
-"""Nodes of a problem: their times, and their largest number."""
+"""Nodes of a formulation: their times, and their largest number."""
 
 import numpy as np
 
 from selfmotion.basics import Array
 from selfmotion.model.motion import FreeNullMotion, Grid
+from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.nodes import NodeMotion, rest_times
 from selfmotion.planning.planner.effort import Effort
-from selfmotion.problem.problem import Problem
 
 # Intervals of the first nodes for each reach of the arm that the tool moves, and at least.
 _FIRST_INTERVALS = 16
@@ -30,39 +30,39 @@ NOTHING = 1e-4
 UNKEPT = 10.0
 
 
-def is_published(problem: Problem, effort: Effort) -> bool:
+def is_published(formulation: Formulation, effort: Effort) -> bool:
     """Whether the published method is requested: by a null motion, an optimiser, or damping."""
-    own = isinstance(problem.null_motion, FreeNullMotion) and effort.optimizer is None
-    return not own or problem.damping is not None
+    own = isinstance(formulation.null_motion, FreeNullMotion) and effort.optimizer is None
+    return not own or formulation.damping_law is not None
 
 
-def is_on_nodes(problem: Problem, effort: Effort) -> bool:
-    """Whether a problem is optimised on nodes: by default, if it has a self-motion."""
-    follows = problem.follows
-    free = follows.redundancy == problem.robot.dof - follows.dimension > 0
-    return free and not is_published(problem, effort)
+def is_on_nodes(formulation: Formulation, effort: Effort) -> bool:
+    """Whether a formulation is optimised on nodes: by default, if it has a self-motion."""
+    follows = formulation.follows
+    free = follows.redundancy == follows.dof - follows.dimension > 0
+    return free and not is_published(formulation, effort)
 
 
-def most_nodes(problem: Problem) -> int:
+def most_nodes(formulation: Formulation) -> int:
     """Return the largest number of nodes of a path, by its length."""
-    return int(_MOST_NODES * (len(problem.knots) + problem.length_in_reaches))
+    return int(_MOST_NODES * (len(formulation.knots) + formulation.length_in_reaches))
 
 
-def first_nodes(problem: Problem) -> Array:
+def first_nodes(formulation: Formulation) -> Array:
     """Return the times of the first nodes, (N + 1,)."""
-    steps = int(np.ceil(_FIRST_INTERVALS * max(1.0, problem.length_in_reaches)))
-    t = _with_short_segments(problem, Grid.aligned(problem.knots, steps).nodes, steps)
-    return with_starts(problem, t, 1.0)
+    steps = int(np.ceil(_FIRST_INTERVALS * max(1.0, formulation.length_in_reaches)))
+    t = _with_short_segments(formulation, Grid.aligned(formulation.knots, steps).nodes, steps)
+    return with_starts(formulation, t, 1.0)
 
 
-def with_starts(problem: Problem, t: Array, quick: float) -> Array:
+def with_starts(formulation: Formulation, t: Array, quick: float) -> Array:
     """Return times of nodes with more of them where self-motions start and stop.
 
     In the share `quick` of the usual time where the arm rests, and in the usual one where a joint
     starts or ends to be held.
     """
-    duration = problem.path.duration
-    for times, share in ((rest_times(problem), quick), (problem.follows.edges, 1.0)):
+    duration = formulation.path.duration
+    for times, share in ((rest_times(formulation), quick), (formulation.follows.edges, 1.0)):
         least = share * _STARTING * duration
         farther = np.arange(2 + int(np.ceil(np.log(1.0 / share) / np.log(_FARTHER))))
         away = least * _FARTHER**farther
@@ -73,15 +73,15 @@ def with_starts(problem: Problem, t: Array, quick: float) -> Array:
     return t
 
 
-def _with_short_segments(problem: Problem, t: Array, steps: int) -> Array:
+def _with_short_segments(formulation: Formulation, t: Array, steps: int) -> Array:
     """Return times of nodes (N + 1,) with more where the tool moves far in little time.
 
     A motion next to a long wait gets nodes by its length, if these are many times those by its
     time. Lengths are those of translation, in reaches of the arm, and of rotation.
     """
-    knots, follows = np.asarray(problem.knots), problem.follows
+    knots, follows = np.asarray(formulation.knots), formulation.follows
     samples = Grid.aligned(knots, _LENGTH_SAMPLES).nodes
-    reach = problem.robot.reach if np.isfinite(problem.robot.reach) else 1.0
+    reach = formulation.robot.reach if np.isfinite(formulation.robot.reach) else 1.0
     counts = np.where(follows.linear > 0.0, 1.0 / reach, 1.0)
     speeds = np.linalg.norm(follows.twists(0.5 * (samples[:-1] + samples[1:])) * counts, axis=1)
     length_at = np.append(0.0, np.cumsum(speeds * np.diff(samples)))
@@ -98,10 +98,12 @@ def _with_short_segments(problem: Problem, t: Array, steps: int) -> Array:
     return np.union1d(t, np.concatenate(more))
 
 
-def rough_grid(problem: Problem) -> Grid:
+def rough_grid(formulation: Formulation) -> Grid:
     """Return the grid of rough motions."""
     # Paths of many waypoints are crossed in strides: a rough motion need not stop at each.
-    knots = problem.knots if len(problem.knots) <= _ROUGH_STEPS else problem.knots[[0, -1]]
+    knots = (
+        formulation.knots if len(formulation.knots) <= _ROUGH_STEPS else formulation.knots[[0, -1]]
+    )
     return Grid.aligned(knots, _ROUGH_STEPS)
 
 

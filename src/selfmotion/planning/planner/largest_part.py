@@ -7,13 +7,13 @@ import numpy as np
 from selfmotion.basics import Array, BreakdownError, RedundancyError
 from selfmotion.model.motion import Evaluation, Grid, Sampling
 from selfmotion.model.path import Section, edges_of
+from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.optimise import Status
 from selfmotion.planning.paper import Guide, MinimumNormMotion
 from selfmotion.planning.planner.candidate import Candidate
 from selfmotion.planning.planner.effort import Effort, Search
 from selfmotion.planning.planner.screening import ROUGH_MOTIONS
 from selfmotion.planning.search import Reach
-from selfmotion.problem.problem import Problem
 
 # Share of the time to the edge of the workspace that is left out: joint speeds grow without bound
 # there.
@@ -46,7 +46,7 @@ class Part:
 
     Attributes
     ----------
-    problem : Problem
+    formulation : Formulation
         That of the part.
     candidate : Candidate
         Optimised.
@@ -56,7 +56,7 @@ class Part:
         The reasons alone.
     """
 
-    problem: Problem
+    formulation: Formulation
     candidate: Candidate
     ending: str = ""
     why: str = ""
@@ -67,7 +67,7 @@ class _Attempt:
     """Result of a start on a part: no candidate at a breakdown; the extent without violations."""
 
     start_guess: _StartGuess
-    problem: Problem
+    formulation: Formulation
     candidate: Candidate | None
     kept_until: float
     found: Evaluation | None
@@ -94,7 +94,7 @@ class _Attempt:
         return self.candidate is not None and self.candidate.cut_short
 
 
-def largest_part(problem: Problem, reach: Reach, effort: Effort) -> Part | None:
+def largest_part(formulation: Formulation, reach: Reach, effort: Effort) -> Part | None:
     """Return an optimised motion along the largest part [0, t] of the path that can be found.
 
     Motions up to where single poses are in reach, by the same optimiser as any; where none
@@ -103,7 +103,7 @@ def largest_part(problem: Problem, reach: Reach, effort: Effort) -> Part | None:
 
     Parameters
     ----------
-    problem : Problem
+    formulation : Formulation
         Of the whole path.
     reach : Reach
         Extent to which single poses are reachable.
@@ -116,43 +116,45 @@ def largest_part(problem: Problem, reach: Reach, effort: Effort) -> Part | None:
         None where nothing worth the name is left.
     """
     try:
-        return _largest_part(problem, reach, effort)
+        return _largest_part(formulation, reach, effort)
     except RedundancyError:
         # Before a tolerance's window, a part may have no self-motion.
         return None
 
 
-def _largest_part(problem: Problem, reach: Reach, effort: Effort) -> Part | None:
+def _largest_part(formulation: Formulation, reach: Reach, effort: Effort) -> Part | None:
     goal = reach.time * (1.0 - _EDGE_MARGIN) if reach.reason else reach.time
-    if goal < _least(problem):
+    if goal < _least(formulation):
         return None
-    first = _until(problem, goal)
+    first = _until(formulation, goal)
     attempts = []
-    given = problem.given_start is not None
+    given = formulation.given_start is not None
     few = reach.starts if given else reach.starts[:: -(-len(reach.starts) // ROUGH_MOTIONS)]
-    few = [_start_of(first, problem, q) for q in few]
+    few = [_start_of(first, formulation, q) for q in few]
     starts = _apart(first, few) if effort.apart else few
     for start_guess in _beginnings(first, starts)[: Search().finalists if given else 1]:
         attempts.append(_attempt(first, start_guess, effort))
         if attempts[-1].cut_short:
-            return _part(problem, attempts[-1], reach, "")
+            return _part(formulation, attempts[-1], reach, "")
     arrived = [attempt for attempt in attempts if attempt.arrived]
     if arrived:
-        return _part(problem, min(arrived, key=lambda attempt: attempt.cost), reach, "")
+        return _part(formulation, min(arrived, key=lambda attempt: attempt.cost), reach, "")
     furthest = max(attempts, key=lambda attempt: attempt.kept_until)
-    return _bisect(problem, furthest, reach, effort)
+    return _bisect(formulation, furthest, reach, effort)
 
 
-def _least(problem: Problem) -> float:
+def _least(formulation: Formulation) -> float:
     """Return the smallest duration of a part of a path [s]."""
-    first = float(edges_of(problem.path.knots)[1])
-    return _LEAST_PART * min(first, problem.path.duration)
+    first = float(edges_of(formulation.path.knots)[1])
+    return _LEAST_PART * min(first, formulation.path.duration)
 
 
-def _bisect(problem: Problem, failed: _Attempt, reach: Reach, effort: Effort) -> Part | None:
+def _bisect(
+    formulation: Formulation, failed: _Attempt, reach: Reach, effort: Effort
+) -> Part | None:
     """Return the motion of a start on the largest part on which it arrives."""
     arrived: _Attempt | None = None
-    low, high = 0.0, failed.problem.path.duration
+    low, high = 0.0, failed.formulation.path.duration
     back = _END_AGREEMENT
     for _ in range(_PROBES):
         if arrived is None:
@@ -161,9 +163,9 @@ def _bisect(problem: Problem, failed: _Attempt, reach: Reach, effort: Effort) ->
             back *= 2.0
         else:
             probe = 0.5 * (low + high)
-        if probe < _least(problem) or high - low < _END_AGREEMENT * high:
+        if probe < _least(formulation) or high - low < _END_AGREEMENT * high:
             break
-        part = _until(problem, probe)
+        part = _until(formulation, probe)
         attempt = _attempt(part, _start_guess_of(part, failed), effort)
         if attempt.arrived or attempt.cut_short:
             arrived, low = attempt, probe
@@ -171,71 +173,71 @@ def _bisect(problem: Problem, failed: _Attempt, reach: Reach, effort: Effort) ->
             failed, high = attempt, probe
         if attempt.cut_short:
             break
-    return None if arrived is None else _part(problem, arrived, reach, failed.reason)
+    return None if arrived is None else _part(formulation, arrived, reach, failed.reason)
 
 
-def _part(problem: Problem, found: _Attempt, reach: Reach, further: str) -> Part:
+def _part(formulation: Formulation, found: _Attempt, reach: Reach, further: str) -> Part:
     """Return the part, with the reason why nothing goes `further` in words."""
     if found.candidate is None:
         raise RuntimeError("a part is made of a motion that was found")
     reasons = [reach.reason] if reach.reason else []
     reasons += [f"the next longer motion fails: {further}"] if further else []
-    return _ending_at(problem, found.problem, found.candidate, "; ".join(reasons))
+    return _ending_at(formulation, found.formulation, found.candidate, "; ".join(reasons))
 
 
-def shorter_part(problem: Problem, part: Part, effort: Effort) -> Part | None:
+def shorter_part(formulation: Formulation, part: Part, effort: Effort) -> Part | None:
     """Return a motion on a part that ends a little earlier; None where none is found.
 
     For one whose last bit is too rough: near a singular pose rates grow between its nodes.
     """
-    first = _until(problem, part.problem.path.duration * (1.0 - _PART_BACK))
-    start = _start_of(first, part.problem, part.candidate.evaluation().trajectory.q[0])
+    first = _until(formulation, part.formulation.path.duration * (1.0 - _PART_BACK))
+    start = _start_of(first, part.formulation, part.candidate.evaluation().trajectory.q[0])
     attempt = _attempt(first, (start, None), effort)
     if attempt.candidate is None or not attempt.arrived:
         return None
-    return _ending_at(problem, first, attempt.candidate, part.why or _ROUGH)
+    return _ending_at(formulation, first, attempt.candidate, part.why or _ROUGH)
 
 
-def _ending_at(problem: Problem, part: Problem, candidate: Candidate, why: str) -> Part:
-    end, whole = part.path.duration, problem.path.duration
+def _ending_at(formulation: Formulation, part: Formulation, candidate: Candidate, why: str) -> Part:
+    end, whole = part.path.duration, formulation.path.duration
     ending = f"the motion ends at t = {end:.6g} s of {whole:.6g} s: {why}"
     return Part(part, candidate, ending if end < whole else "", why)
 
 
-def _until(problem: Problem, time: float) -> Problem:
+def _until(formulation: Formulation, time: float) -> Formulation:
     """Return the problem on [0, time], without conditions on the end."""
-    if time >= problem.path.duration:
-        return problem
-    asked = (item.on_part() for item in problem.constraints)
+    if time >= formulation.path.duration:
+        return formulation
+    asked = (item.on_part() for item in formulation.problem.constraints)
     remaining = [item for item in asked if item is not None]
-    shorter = problem.along(
+    shorter = formulation.along(
         lambda path: Section(path, 0.0, time, crowding=True), lambda t: np.minimum(t, time)
     )
-    return problem.changed(**shorter, constraints=remaining)
+    return formulation.changed(**shorter, constraints=remaining)
 
 
-def _start_of(part: Problem, problem: Problem, q: Array) -> Array:
+def _start_of(part: Formulation, formulation: Formulation, q: Array) -> Array:
     """Return a start (n,) of a problem as one of its part, which may have fewer joints."""
-    own = q[None, : problem.asked.robot.dof]
-    return np.asarray(part.at(np.zeros(1), own)[0])
+    own = q[None, : formulation.robot.dof]
+    return np.asarray(part.completed(np.zeros(1), own)[0])
 
 
-def _start_guess_of(part: Problem, failed: _Attempt) -> _StartGuess:
+def _start_guess_of(part: Formulation, failed: _Attempt) -> _StartGuess:
     """Return the start of another part as that of a part, which may have fewer joints."""
     start, guide = failed.start_guess
     if isinstance(guide, _Push):
-        guide = guide.of(part.asked.robot.dof, part.robot.dof)
-    return _start_of(part, failed.problem, start), guide
+        guide = guide.of(part.robot.dof, part.follows.dof)
+    return _start_of(part, failed.formulation, start), guide
 
 
-def _attempt(problem: Problem, start_guess: _StartGuess, effort: Effort) -> _Attempt:
+def _attempt(formulation: Formulation, start_guess: _StartGuess, effort: Effort) -> _Attempt:
     try:
         start, guide = start_guess
-        free = problem.given_start is None
-        candidate = Candidate(problem, effort, start, free=free, guide=guide)
+        free = formulation.given_start is None
+        candidate = Candidate(formulation, effort, start, free=free, guide=guide)
     except BreakdownError as error:
         reason = f"it runs into a singular pose near t = {error.time:.6g} s"
-        return _Attempt(start_guess, problem, None, error.time, None, reason)
+        return _Attempt(start_guess, formulation, None, error.time, None, reason)
     try:
         candidate.polish()
     except KeyboardInterrupt:
@@ -244,27 +246,28 @@ def _attempt(problem: Problem, start_guess: _StartGuess, effort: Effort) -> _Att
     motion = found.trajectory
     # Infeasible constraints may distort it: then x = 0 is a better guess.
     until = max(
-        _kept_until(problem, motion.t, motion.q, motion.qd), -_rank(problem, *start_guess)[1]
+        _kept_until(formulation, motion.t, motion.q, motion.qd),
+        -_rank(formulation, *start_guess)[1],
     )
-    return _Attempt(start_guess, problem, candidate, until, found)
+    return _Attempt(start_guess, formulation, candidate, until, found)
 
 
-def _apart(problem: Problem, starts: list[Array]) -> list[Array]:
+def _apart(formulation: Formulation, starts: list[Array]) -> list[Array]:
     """Return the starts at which the arm does not meet itself; all where it always does."""
-    return [q for q in starts if problem.keeps_off_itself(q[None])] or starts
+    return [q for q in starts if formulation.keeps_off_itself(q[None])] or starts
 
 
-def _beginnings(problem: Problem, starts: list[Array]) -> list[_StartGuess]:
+def _beginnings(formulation: Formulation, starts: list[Array]) -> list[_StartGuess]:
     """Return starts, and null motions in place of x = 0 where that breaks down; the best first."""
-    ranked = sorted(((start, None) for start in starts), key=lambda each: _rank(problem, *each))
+    ranked = sorted(((start, None) for start in starts), key=lambda each: _rank(formulation, *each))
     furthest = ranked[0][0]
-    if -_rank(problem, furthest, None)[0] >= problem.path.duration:
+    if -_rank(formulation, furthest, None)[0] >= formulation.path.duration:
         return list(ranked)
     pushed: list[_StartGuess] = [
         *ranked,
-        *((furthest, push) for push in _pushes(problem, furthest)),
+        *((furthest, push) for push in _pushes(formulation, furthest)),
     ]
-    return sorted(pushed, key=lambda each: _rank(problem, *each))
+    return sorted(pushed, key=lambda each: _rank(formulation, *each))
 
 
 class _Push:
@@ -284,31 +287,33 @@ class _Push:
         return np.tile(self._rate, (len(t), 1))
 
 
-def _pushes(problem: Problem, start: Array) -> list[Guide]:
+def _pushes(formulation: Formulation, start: Array) -> list[Guide]:
     """Return null motions to either side: x = 0 may stay in a plane without a continuation."""
-    basis = problem.follows.null_basis(start) / problem.path.duration
+    basis = formulation.follows.null_basis(start) / formulation.path.duration
     angles = [sign * angle for angle in _PUSHES for sign in (1.0, -1.0)]
     return [_Push(angle * direction) for direction in basis.T for angle in angles]
 
 
-def _rank(problem: Problem, start: Array, guide: Guide | None) -> tuple[float, float, float]:
+def _rank(
+    formulation: Formulation, start: Array, guide: Guide | None
+) -> tuple[float, float, float]:
     """Return the negative times of path and limits without violation [s], and the effort.
 
     That without self-motion, from a start; the smaller, the better.
     """
-    path = problem.path
+    path = formulation.path
     grid = Grid.aligned(path.knots, _FOLLOWED_STEPS)
-    minimum_norm = MinimumNormMotion.on(problem.with_windows_shut, start, grid, guide)
+    minimum_norm = MinimumNormMotion.on(formulation.with_windows_shut, start, grid, guide)
     trouble = minimum_norm.off_path(_OFF_PATH)
     far = path.duration if trouble is None else trouble
-    remaining = _kept_until(problem, minimum_norm.grid.nodes, minimum_norm.q, minimum_norm.qd)
+    remaining = _kept_until(formulation, minimum_norm.grid.nodes, minimum_norm.q, minimum_norm.qd)
     # Beyond the place where it broke down, speeds may be anything.
     weights = Sampling.trapezoidal(minimum_norm.grid.nodes).weights
     effort = float(weights @ np.sum(minimum_norm.qd**2, axis=1)) if trouble is None else np.inf
     return -far, -min(remaining, far), effort
 
 
-def _kept_until(problem: Problem, t: Array, q: Array, qd: Array) -> float:
+def _kept_until(formulation: Formulation, t: Array, q: Array, qd: Array) -> float:
     """Return the first of the times t (N,) at which a joint is beyond its limits, or the last."""
-    remaining = problem.envelope.keeps(q, qd)
+    remaining = formulation.envelope.keeps(q, qd)
     return float(t[-1] if remaining.all() else t[int(np.argmin(remaining))])

@@ -28,6 +28,7 @@ from selfmotion.certificate import Tolerance
 from selfmotion.model.motion import Trajectory, joined_motions, reversed_motion
 from selfmotion.model.path import Line, Retimed, Section, section_at_rest
 from selfmotion.model.task import SE3
+from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.planner.effort import Search
 from selfmotion.planning.planner.run import plan, plan_along
 from selfmotion.planning.result import Move, Parts, Plan
@@ -314,10 +315,12 @@ def _parts(
 ) -> Parts:
     # Samples of curves prove that parts are needed; those of larger spaces may miss chains, and all
     # are on the path itself.
-    allowed_cuts = _MISSED_CUTS if problem.relaxations or not has_curves(problem) else 0
+    formulation = Formulation.on_path(problem)
+    proves = has_curves(formulation) and not problem.relaxations
+    allowed_cuts = 0 if proves else _MISSED_CUTS
     refused, chains = None, []
     try:
-        segments = ChainSegments.of(problem, rng, progress)
+        segments = ChainSegments.of(formulation, rng, progress)
         chains = segments.fewest(set())
     except NoSequenceError as error:
         if not allowed_cuts:

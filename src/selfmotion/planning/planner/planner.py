@@ -9,6 +9,7 @@ import numpy as np
 from selfmotion.basics import Array, BreakdownError, Progress, SelfmotionError
 from selfmotion.certificate import LIMIT_NAMES, Certificate, Tolerance
 from selfmotion.model.motion import Evaluation, Grid, Trajectory
+from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.optimise import Status
 from selfmotion.planning.paper import MOST_HALVINGS, Guide
 from selfmotion.planning.planner.candidate import Candidate
@@ -18,7 +19,6 @@ from selfmotion.planning.planner.largest_part import Part, largest_part, shorter
 from selfmotion.planning.planner.screening import Ranking
 from selfmotion.planning.result import Attempt, Plan
 from selfmotion.planning.search import Obstruction, Reach, Sequence, reachable
-from selfmotion.problem.problem import Problem
 
 # Path error between nodes, as a share of the tolerance, up to which a grid is fine enough …
 _RESOLVED = 0.3
@@ -66,7 +66,7 @@ class Judged:
         return failed[0] if failed else None
 
 
-def judge(problem: Problem, part: Part, tolerance: Tolerance, progress: Progress) -> Judged:
+def judge(formulation: Formulation, part: Part, tolerance: Tolerance, progress: Progress) -> Judged:
     """Return the motion on the first grid on which it is within the tolerance, with its check."""
     candidate = part.candidate
     judged: Judged | None = None
@@ -76,11 +76,11 @@ def judge(problem: Problem, part: Part, tolerance: Tolerance, progress: Progress
     for _ in range(MOST_HALVINGS):
         try:
             progress("checking", 1, 1)
-            judged = _check(problem, part, tolerance)
-            if _meets_itself(problem, judged.certificate) and candidate.keep_off_itself():
+            judged = _check(formulation, part, tolerance)
+            if _meets_itself(formulation, judged.certificate) and candidate.keep_off_itself():
                 candidate.settle()
                 continue
-            rough = _rough(problem, judged, candidate)
+            rough = _rough(formulation, judged, candidate)
             roughs += rough
             # Where no evaluations are left, finer grids change nothing.
             out = candidate.status is Status.MAX_EVALUATIONS
@@ -90,7 +90,7 @@ def judge(problem: Problem, part: Part, tolerance: Tolerance, progress: Progress
             trajectory = judged.motion.trajectory
             # The path error of damping is the same on any grid: the grid is fine when the tool's
             # motion is.
-            if coarse is not None and _same(problem, coarse, trajectory, tolerance):
+            if coarse is not None and _same(formulation, coarse, trajectory, tolerance):
                 break
             coarse = trajectory if judged.motion.damped else None
             # Poses out of reach are so on any grid.
@@ -107,15 +107,15 @@ def judge(problem: Problem, part: Part, tolerance: Tolerance, progress: Progress
             candidate.end(Status.INTERRUPTED)
             break
     # No plan goes without a certificate, interrupted or not.
-    return judged or _check(problem, part, tolerance)
+    return judged or _check(formulation, part, tolerance)
 
 
-def _resolved(problem: Problem, candidate: Candidate, tolerance: Tolerance) -> Evaluation:
+def _resolved(formulation: Formulation, candidate: Candidate, tolerance: Tolerance) -> Evaluation:
     """Return the motion, steps halved between whose nodes the tool was off the path."""
     allowed, before = np.array([tolerance.position, tolerance.rotation]), np.inf
     motion = candidate.evaluation()
     for _ in range(MOST_HALVINGS):
-        errors = problem.errors_between(motion.trajectory) / allowed
+        errors = formulation.errors_between(motion.trajectory) / allowed
         worst = float(errors.max())
         # Written so that NaN is no progress. Damping's error is not that of the steps.
         stuck = not worst < _FALLS * before or len(errors) > candidate.most_steps
@@ -127,22 +127,22 @@ def _resolved(problem: Problem, candidate: Candidate, tolerance: Tolerance) -> E
     return motion
 
 
-def _meets_itself(problem: Problem, certificate: Certificate) -> bool:
+def _meets_itself(formulation: Formulation, certificate: Certificate) -> bool:
     """Whether self-collision, under the default clearance, is the only violation."""
-    is_default = problem.own_collision is not None and len(certificate.failures) == 1
+    is_default = formulation.problem.own_collision is not None and len(certificate.failures) == 1
     return is_default and not certificate.findings[-1].satisfied
 
 
-def _rough(problem: Problem, judged: Judged, candidate: Candidate) -> bool:
+def _rough(formulation: Formulation, judged: Judged, candidate: Candidate) -> bool:
     """Whether a required condition holds at the nodes, but not between them."""
     if candidate.violations or not judged.certificate.on_path:
         return False
-    is_default = {item.name for item in problem.requirements}
+    is_default = {item.name for item in formulation.problem.requirements}
     # The arm's own limits always apply.
     is_default |= set(LIMIT_NAMES[:2])
-    if problem.own_collision is not None:
+    if formulation.problem.own_collision is not None:
         # The default clearance need not have been a constraint of the nodes.
-        is_default.discard(problem.requirements[-1].name)
+        is_default.discard(formulation.problem.requirements[-1].name)
     nodes = judged.motion.trajectory.t
     # Rates are judged on both sides of a node; anything else that is wrong there stays so.
     return any(
@@ -152,13 +152,15 @@ def _rough(problem: Problem, judged: Judged, candidate: Candidate) -> bool:
     )
 
 
-def _same(problem: Problem, coarse: Trajectory, fine: Trajectory, tolerance: Tolerance) -> bool:
+def _same(
+    formulation: Formulation, coarse: Trajectory, fine: Trajectory, tolerance: Tolerance
+) -> bool:
     """Whether two motions put all that is followed in the same place in the prescribed rows."""
     pairs = list(zip(coarse(fine.t), fine.q, strict=True))
     misses = np.array(
         [
             item.miss(item.chain.place(first), second)
-            for item in problem.follows.items
+            for item in formulation.follows.items
             for first, second in pairs
         ]
     )
@@ -166,9 +168,9 @@ def _same(problem: Problem, coarse: Trajectory, fine: Trajectory, tolerance: Tol
     return bool(position <= tolerance.position and rotation <= tolerance.rotation)
 
 
-def _check(problem: Problem, part: Part, tolerance: Tolerance) -> Judged:
-    motion = _resolved(problem, part.candidate, tolerance)
-    certificate = problem.certify(motion.trajectory, tolerance, part.ending)
+def _check(formulation: Formulation, part: Part, tolerance: Tolerance) -> Judged:
+    motion = _resolved(formulation, part.candidate, tolerance)
+    certificate = formulation.certify(motion.trajectory, tolerance, part.ending)
     return Judged(part, motion, part.candidate.minimum_norm_evaluation(), certificate)
 
 
@@ -178,8 +180,8 @@ class Planner:
 
     Attributes
     ----------
-    problem : Problem
-        With its tolerances as virtual joints, see `Problem.augmented`.
+    formulation : Formulation
+        The problem, with its tolerances as virtual joints.
     effort : Effort
         Options of all candidates.
     search : Search
@@ -220,7 +222,7 @@ class Planner:
         The judged content of the plan.
     """
 
-    problem: Problem
+    formulation: Formulation
     effort: Effort
     search: Search
     tolerance: Tolerance
@@ -250,7 +252,7 @@ class Planner:
     @property
     def is_free(self) -> bool:
         """Whether the start is free."""
-        return self.problem.given_start is None
+        return self.formulation.given_start is None
 
     @property
     def has_motion(self) -> bool:
@@ -260,7 +262,7 @@ class Planner:
     @property
     def is_searchable(self) -> bool:
         """Whether there is a self-motion to search."""
-        return self.problem.follows.redundancy > 0
+        return self.formulation.follows.redundancy > 0
 
     @property
     def chooses_globally(self) -> bool:
@@ -291,7 +293,7 @@ class Planner:
     @property
     def is_published(self) -> bool:
         """Whether the published method is requested: its constraints are given ends alone."""
-        return is_published(self.problem, self.effort)
+        return is_published(self.formulation, self.effort)
 
     @property
     def cost_to_beat(self) -> float:
@@ -304,7 +306,9 @@ class Planner:
     ) -> Candidate | None:
         """Return the candidate of a start; None where it breaks down at once, which is noted."""
         try:
-            return Candidate(self.problem, self.effort, start, free=free, guide=guide, grid=grid)
+            return Candidate(
+                self.formulation, self.effort, start, free=free, guide=guide, grid=grid
+            )
         except BreakdownError as error:
             self.failure = error
             return None
@@ -351,7 +355,7 @@ class Planner:
         if suspect not in self._reaches:
             self.progress("checking reach", 1, 1)
             rng = np.random.default_rng(self.search.rng)
-            self._reaches[suspect] = reachable(self.problem, self.search.starts, rng, suspect)
+            self._reaches[suspect] = reachable(self.formulation, self.search.starts, rng, suspect)
         return self._reaches[suspect]
 
     def is_out_of_reach(self) -> bool:
@@ -364,7 +368,7 @@ class Planner:
     def judge(self, best: Candidate) -> None:
         """Judge the best motion, on grids that are fine enough."""
         rival_cost = _refine_both(best, self.rival, self.progress)
-        self.judged = self._judged(Part(self.problem, best), rival_cost)
+        self.judged = self._judged(Part(self.formulation, best), rival_cost)
         if self.judged.certificate.verified:
             return
         known = [best.as_adopted()]
@@ -383,17 +387,18 @@ class Planner:
         The best first; apart by the required distance, or `just` apart. Without any motion that
         satisfies all, one whose hulls overlap slightly may be the only one whose meshes do not.
         """
-        bodies = self.problem.envelope.bodies
+        bodies = self.formulation.envelope.bodies
         if not self.is_unmet or all(model.is_all_convex for model, _ in bodies):
             return
         for candidate in sorted(self.broken, key=Candidate.score):
             q = candidate.evaluation().trajectory.q
-            if all(model.worst(q).value >= (0.0 if just else far) for model, far in bodies):
+            own = q[:, : self.formulation.robot.dof]
+            if all(model.worst(own).value >= (0.0 if just else far) for model, far in bodies):
                 yield candidate
 
     def judge_as_it_is(self, best: Candidate) -> bool:
         """Let a motion be it if it is verified; return whether it is."""
-        judged = self._judged(Part(self.problem, best))
+        judged = self._judged(Part(self.formulation, best))
         if judged.certificate.verified:
             self.judged = judged
         return judged.certificate.verified
@@ -406,7 +411,7 @@ class Planner:
             effort = replace(effort, max_evaluations=most)
         known = self.reach(suspect)
         self.progress("longest part that can be followed", 1, 1)
-        found = largest_part(self.problem, known, effort)
+        found = largest_part(self.formulation, known, effort)
         if found is None:
             return False
         _refine_both(found.candidate, None, self.progress)
@@ -415,7 +420,7 @@ class Planner:
             # Besides that it ends, nothing should be wrong with it.
             if len(self.judged.certificate.failures) < 2 or found.candidate.cut_short:
                 break
-            if (shorter := shorter_part(self.problem, found, effort)) is None:
+            if (shorter := shorter_part(self.formulation, found, effort)) is None:
                 break
             found = shorter
             _refine_both(found.candidate, None, self.progress)
@@ -426,7 +431,7 @@ class Planner:
 
     def _judged(self, part: Part, rival_cost: float | None = None) -> Judged:
         """Return a motion on the first grid that holds the tolerance, with its check."""
-        found = judge(self.problem, part, self.tolerance, self.progress)
+        found = judge(self.formulation, part, self.tolerance, self.progress)
         return replace(found, rival_cost=rival_cost)
 
     def interrupted(self) -> None:

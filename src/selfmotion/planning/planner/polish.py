@@ -9,15 +9,14 @@ import numpy as np
 
 from selfmotion.basics import Array, Ints
 from selfmotion.model.motion import Grid, Trajectory
+from selfmotion.planning.formulation import BoundConditions, Formulation
 from selfmotion.planning.nodes import NodeGrid, NodeMotion, Optimum, Step, minimise
 from selfmotion.planning.optimise import Iteration, Status
 from selfmotion.planning.planner.effort import Effort
 from selfmotion.planning.planner.grids import NOTHING, UNKEPT, most_nodes, with_starts
 from selfmotion.planning.planner.solutions import ENDS_MET, NodeSolution
 from selfmotion.planning.search import BESIDE
-from selfmotion.problem.constraints import BoundClearance, BoundConstraint, BoundLimits
 from selfmotion.problem.costs import Cost, JointAcceleration, JointJerk
-from selfmotion.problem.problem import Problem
 
 # Largest path error between nodes [m, rad] …
 _NEAR_PATH = 2e-7
@@ -67,9 +66,9 @@ class Polisher:
 
     Parameters
     ----------
-    problem : Problem
+    formulation : Formulation
     effort : Effort
-    constraints : sequence of BoundConstraint
+    conditions : BoundConditions
     free : bool
         Whether the start may move along its self-motion.
 
@@ -84,14 +83,14 @@ class Polisher:
 
     def __init__(
         self,
-        problem: Problem,
+        formulation: Formulation,
         effort: Effort,
-        constraints: Sequence[BoundConstraint],
+        conditions: BoundConditions,
         *,
         free: bool,
     ) -> None:
-        self._problem, self._effort = problem, effort
-        self._constraints, self._free = constraints, free
+        self._formulation, self._effort = formulation, effort
+        self._conditions, self._free = conditions, free
         self._first = effort.counts.evaluations
         self.history: list[Iteration] = []
         self.latest: NodeSolution | None = None
@@ -110,7 +109,7 @@ class Polisher:
     def grid(self, t: Array) -> NodeGrid:
         """Return nodes at some times."""
         return NodeGrid(
-            self._problem, t, self._constraints, free=self._free, counts=self._effort.counts
+            self._formulation, t, self._conditions, free=self._free, counts=self._effort.counts
         )
 
     def near(
@@ -225,12 +224,11 @@ class Polisher:
         costs = self._costs_of_limits(begun)
         if not costs:
             return
-        problem, motion = self._problem.changed(costs=costs), begun
+        formulation, motion = self._formulation.with_costs(costs), begun
         for number in range(_SMOOTHING_ROUNDS):
-            kept = [item for item in motion.grid.constraints if item.equality]
-            grid = NodeGrid(
-                problem, motion.grid.t, kept, free=self._free, counts=self._effort.counts
-            )
+            ends = BoundConditions(ends=motion.grid.conditions.ends)
+            counts = self._effort.counts
+            grid = NodeGrid(formulation, motion.grid.t, ends, free=self._free, counts=counts)
             found = minimise(
                 grid.at(motion.centred), self._noted, roughly=True, max_iterations=_FEWER
             )
@@ -245,14 +243,15 @@ class Polisher:
 
     def _costs_of_limits(self, begun: NodeMotion) -> tuple[Cost, ...]:
         """Return what uses of the limits of q̈ and jerk that a motion breaks cost; none for none."""
-        grid, problem = begun.grid, self._problem
-        found, most = list[Cost](), _SMOOTHING * abs(begun.objective) / problem.path.duration
-        for item, h in zip(grid.rows.constraints, grid.rows.split(begun.h), strict=True):
-            if isinstance(item, BoundLimits) and item.order in _SMOOTHING_COSTS and (h > 0.0).any():
-                weight = np.zeros(problem.robot.dof)
+        grid, formulation = begun.grid, self._formulation
+        found, most = list[Cost](), _SMOOTHING * abs(begun.objective) / formulation.path.duration
+        residuals = grid.rows.by_kind(begun.h)[0]
+        for item, h in zip(grid.conditions.limits, residuals, strict=True):
+            if item.order in _SMOOTHING_COSTS and (h > 0.0).any():
+                weight = np.zeros(formulation.robot.dof)
                 weight[item.joints] = most / (0.5 * (item.upper - item.lower)) ** 2
                 found.append(_SMOOTHING_COSTS[item.order](weight, name=item.name))
-        return (*problem.costs, *found) if found else ()
+        return (*formulation.costs, *found) if found else ()
 
     def _beginnings(self, begun: NodeMotion) -> Iterator[NodeMotion | None]:
         """Yield motions that go to where they have to end, and towards the middle of the limits."""
@@ -261,12 +260,12 @@ class Polisher:
             yield grid.motion_towards(start, grid.ends.last)
         if self._free:
             return
-        robot = self._problem.robot
-        limited = np.isfinite(robot.lower) & np.isfinite(robot.upper)
+        own = self._formulation.coordinates
+        limited = np.isfinite(own.lower) & np.isfinite(own.upper)
         middle = start.copy()
-        middle[limited] = 0.5 * (robot.lower[limited] + robot.upper[limited])
+        middle[limited] = 0.5 * (own.lower[limited] + own.upper[limited])
         for share in _TOWARDS_MIDDLE:
-            yield grid.motion_towards(start, middle, share * self._problem.path.duration)
+            yield grid.motion_towards(start, middle, share * self._formulation.path.duration)
 
     def _aside(self, begun: NodeMotion) -> Iterator[NodeMotion]:
         """Yield motions that go to either side along their self-motion, what breaks least first.
@@ -276,7 +275,7 @@ class Polisher:
         if self._free:
             return
         grid, start = begun.grid, begun.place.q[0]
-        time = _SIDEWAYS_AFTER * self._problem.path.duration
+        time = _SIDEWAYS_AFTER * self._formulation.path.duration
         goals = [start + far * way for way in begun.charts.bases[0].T for far in _SIDEWAYS]
         found = [grid.motion_towards(start, goal, time) for goal in goals]
         rank = partial(_rank_of, begun=begun)
@@ -286,7 +285,7 @@ class Polisher:
         """Return the optimum on twice as many nodes, more beside rest, or what there is."""
         t = optimum.motion.grid.t
         ends = t[0] + (t[1] - t[0]) * _BESIDE_REST, t[-1] - (t[-1] - t[-2]) * _BESIDE_REST
-        beside = [own for rest, own in zip(self._problem.rests, ends, strict=True) if rest]
+        beside = [own for rest, own in zip(self._formulation.rests, ends, strict=True) if rest]
         finer = np.unique(np.concatenate([Grid(t).halved().nodes, *beside]))
         motion = optimum.motion.on(optimum.motion.grid.on(finer))
         return optimum if motion is None else self._minimise(motion)
@@ -307,7 +306,7 @@ class Polisher:
 
     def _resolved(self, known: NodeSolution) -> NodeSolution:
         """Return the optimum on nodes so near to each other that more change nothing, if it may."""
-        before, most, is_rough = np.inf, most_nodes(self._problem), True
+        before, most, is_rough = np.inf, most_nodes(self._formulation), True
         for _ in range(_NODE_ROUNDS):
             if self._ended is not None:
                 break
@@ -332,7 +331,7 @@ class Polisher:
                 if again is not None and again.has_arrived:
                     return again
                 # Between few nodes it may be off the path: there, what is on the way will do.
-                errors = self._problem.errors_between(known.motion.trajectory)
+                errors = self._formulation.errors_between(known.motion.trajectory)
                 off = not polishes and again is None and errors.max() > _NEAR_PATH
                 return found if off else known
             known, is_rough = found.after(known.cost), not polishes
@@ -345,17 +344,14 @@ class Polisher:
         apart at the points.
         """
         grid = known.motion.grid
-        has_bodies = any(isinstance(item, BoundClearance) for item in grid.constraints)
+        own = grid.conditions
+        has_bodies = any(item.stricter(0.0) is not None for item in own.points)
         if self._ended is not None or not (has_bodies and known.motion.broken_intervals().any()):
             return None
         for far in _EXTRA_CLEARANCE:
-            asked = [
-                replace(item, distance=item.distance + far, _last=[])
-                if isinstance(item, BoundClearance)
-                else item
-                for item in grid.constraints
-            ]
-            optimum = self._minimise(grid.with_constraints(asked).at(known.motion.centred))
+            points = tuple(item.stricter(far) or item for item in own.points)
+            stricter = grid.with_conditions(own._replace(points=points))
+            optimum = self._minimise(stricter.at(known.motion.centred))
             found = replace(optimum, motion=grid.at(optimum.motion.centred))
             if _is_kept(found.motion) and not found.motion.broken_intervals().any():
                 return self._solution(found)
@@ -365,7 +361,7 @@ class Polisher:
         """Return times of nodes near enough to each other, or None where these are."""
         motion = known.motion
         grid, spline = motion.grid, motion.grid.spline
-        errors = self._problem.errors_between(motion.trajectory).max(axis=1)
+        errors = self._formulation.errors_between(motion.trajectory).max(axis=1)
         # Where one is too far apart, so is what is nearly so: on the next nodes it would be.
         wanted = _WANTED_NEAR_PATH if errors.max() > _NEAR_PATH else _NEAR_PATH
         parts = np.ceil((errors / wanted) ** _FINER_POWER - 1e-9)
@@ -377,7 +373,7 @@ class Polisher:
         parts = np.maximum(parts, motion.subdivisions())
         t = spline.t if (parts == 1).all() else _divided(spline.t, parts)
         if motion.quickness < grid.quick:
-            t = with_starts(self._problem, t, motion.quickness)
+            t = with_starts(self._formulation, t, motion.quickness)
         return t if len(t) > len(spline.t) else None
 
     def _minimise(

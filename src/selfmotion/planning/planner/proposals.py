@@ -26,6 +26,7 @@ from selfmotion.basics import (
 )
 from selfmotion.model.motion import Grid, Sampling
 from selfmotion.model.path import Section
+from selfmotion.planning.formulation import BoundConditions, Formulation
 from selfmotion.planning.nodes import NodeGrid, NodeMotion
 from selfmotion.planning.optimise import Status
 from selfmotion.planning.planner.candidate import Candidate, on_start
@@ -46,8 +47,7 @@ from selfmotion.planning.search import (
     shortest_along,
     start_candidates,
 )
-from selfmotion.problem.constraints import BoundConstraint
-from selfmotion.problem.problem import Problem, constraints_of_part
+from selfmotion.problem.problem import constraints_of_part
 
 # Length of a long path, in reaches of the arm: x = 0 starts to drift.
 LONG_PATH = 5.0
@@ -82,8 +82,8 @@ def optimise_starts(planner: Planner, count: int, finalists: int) -> None:
         None reaches the start of the path.
     """
     starts = _starts(planner, count)
-    if len(starts) > finalists and is_on_nodes(planner.problem, planner.effort):
-        ranking = planner.ranking = Ranking(planner.problem, planner.effort, planner.progress)
+    if len(starts) > finalists and is_on_nodes(planner.formulation, planner.effort):
+        ranking = planner.ranking = Ranking(planner.formulation, planner.effort, planner.progress)
         if ranking.run(starts, finalists):
             ranked = ranking.ranked
             _optimise_each(planner, _resumed(planner, ranked), len(ranked))
@@ -94,7 +94,7 @@ def optimise_starts(planner: Planner, count: int, finalists: int) -> None:
                 _optimise_each(planner, _resumed(planner, others), len(others))
             return
     elif len(starts) > finalists:
-        starts = _best(planner.problem, starts)[:finalists]
+        starts = _best(planner.formulation, starts)[:finalists]
     started = (planner.begin(start, free=True) for start in starts)
     known = (candidate for candidate in started if candidate is not None)
     candidates = sorted(known, key=lambda candidate: candidate.solution.merit())
@@ -109,13 +109,13 @@ def optimise_where_it_breaks(
     The fewest configurations are feasible there, as a rule: motions through one of these, which are
     carried to both ends of the path from there, start feasible.
     """
-    problem, t = planner.problem, rough_grid(planner.problem).nodes
+    formulation, t = planner.formulation, rough_grid(planner.formulation).nodes
     at = int(np.argmin(np.abs(t - breaks_at)))
     try:
-        starts = _drawn(problem, planner, count, float(t[at]))
+        starts = _drawn(formulation, planner, count, float(t[at]))
     except InverseKinematicsError:
         return
-    ranking = planner.ranking = Ranking(problem, planner.effort, planner.progress)
+    ranking = planner.ranking = Ranking(formulation, planner.effort, planner.progress)
     if ranking.run(starts, finalists, at):
         ranked = ranking.ranked
         _optimise_each(planner, _resumed(planner, ranked), len(ranked))
@@ -123,8 +123,8 @@ def optimise_where_it_breaks(
 
 def may_stack(planner: Planner) -> bool:
     """Whether a quantity of q is violated, or several parts share the motion."""
-    problem, best = planner.problem, planner.best
-    names = [item.name for item in problem.envelope.quantities]
+    formulation, best = planner.formulation, planner.best
+    names = [item.name for item in formulation.envelope.quantities]
     broken = (
         names
         if best is None
@@ -132,7 +132,7 @@ def may_stack(planner: Planner) -> bool:
             name for name in names if any(text.startswith(f"{name}: ") for text in best.violations)
         ]
     )
-    return bool(broken) or len(metrics(problem.robot)) > 1
+    return bool(broken) or len(metrics(formulation.coordinates)) > 1
 
 
 def optimise_stacked(planner: Planner, finalists: int) -> bool:
@@ -141,13 +141,13 @@ def optimise_stacked(planner: Planner, finalists: int) -> bool:
     In several metrics, each part of a cell heavy in turn; from both ends of the path, and from
     where the best motion breaks something. Return whether there was any.
     """
-    problem = planner.problem
+    formulation = planner.formulation
     # Between two nodes of a rough motion a part of a cell may turn by half a radian.
-    t = rough_grid(problem).halved().halved().nodes
+    t = rough_grid(formulation).halved().halved().nodes
     motions = [*_stacked(planner, t)]
     found = np.concatenate(motions) if motions else np.zeros((0, 0, 0))
     if len(found):
-        ranking = planner.ranking = Ranking(problem, planner.effort, planner.progress)
+        ranking = planner.ranking = Ranking(formulation, planner.effort, planner.progress)
         ranking.run_along(found, t, finalists)
         ranked = ranking.ranked
         _optimise_each(planner, _resumed(planner, ranked), len(ranked))
@@ -156,10 +156,10 @@ def optimise_stacked(planner: Planner, finalists: int) -> bool:
 
 def _stacked(planner: Planner, t: Array) -> Iterator[Array]:
     """Yield motions (K, N, n) through times t (N,) [s] that satisfy conditions at all of them."""
-    problem, asked = planner.problem, planner.problem.envelope
+    formulation, asked = planner.formulation, planner.formulation.envelope
     drawn = _configurations_at(planner, t)
-    for weights in metrics(problem.robot):
-        task = Stacked(problem.follows, asked.quantities, asked.lower, asked.upper, weights)
+    for weights in metrics(formulation.coordinates):
+        task = Stacked(formulation.follows, asked.quantities, asked.lower, asked.upper, weights)
         for place, starts in drawn.items():
             if planner.is_free:
                 q, feasible = task.placed(starts, float(t[place]))
@@ -173,13 +173,14 @@ def _configurations_at(planner: Planner, t: Array) -> dict[int, Array]:
 
     The given start; or random ones at both ends, and at the largest violation of the best motion.
     """
-    problem, best = planner.problem, planner.best
-    if problem.given_start is not None:
-        return {0: problem.given_start[None]}
+    formulation, best = planner.formulation, planner.best
+    if formulation.given_start is not None:
+        return {0: formulation.given_start[None]}
     breaks = best.breaks_at if best is not None else None
     places = {0, len(t) - 1, *([] if breaks is None else [int(np.argmin(np.abs(t - breaks)))])}
     found = dict[int, Array]()
-    arm = problem.follows.for_robot(problem.envelope.arm(problem.robot))
+    allowed = formulation.envelope
+    arm = formulation.follows.within(allowed.lower, allowed.upper)
     for place in sorted(places):
         with contextlib.suppress(InverseKinematicsError):
             # Few random ones satisfy all conditions: they are moved there.
@@ -188,31 +189,36 @@ def _configurations_at(planner: Planner, t: Array) -> dict[int, Array]:
     return found
 
 
-def _best(problem: Problem, starts: abc.Sequence[Array]) -> list[Array]:
+def _best(formulation: Formulation, starts: abc.Sequence[Array]) -> list[Array]:
     """Return starts, the best first, by their motions without self-motion."""
-    t = rough_grid(problem).nodes
-    motions, arrived = carried(problem.follows, np.array(starts), t)
-    order = most_promising(problem, starts, motions, arrived, t, distance_of(problem.robot))
+    t = rough_grid(formulation).nodes
+    motions, arrived = carried(formulation.follows, np.array(starts), t)
+    order = most_promising(
+        formulation, starts, motions, arrived, t, distance_of(formulation.coordinates)
+    )
     return [starts[k] for k in order]
 
 
 def _starts(planner: Planner, count: int) -> list[Array]:
     """Return `count` starts: on the path itself, or as near to it as tolerances allow."""
-    problem = planner.problem
+    formulation = planner.formulation
     try:
-        found = _drawn(problem.asked, planner, count)
+        found = _drawn(formulation.without_tolerances, planner, count)
     except InverseKinematicsError:
-        if problem.asked is problem:
+        if not formulation.problem.relaxations:
             raise
-        return _drawn(problem, planner, count)
-    return list(problem.at(np.zeros(len(found)), np.array(found)))
+        return _drawn(formulation, planner, count)
+    return list(formulation.completed(np.zeros(len(found)), np.array(found)))
 
 
-def _drawn(problem: Problem, planner: Planner, count: int, time: float = 0.0) -> list[Array]:
+def _drawn(
+    formulation: Formulation, planner: Planner, count: int, time: float = 0.0
+) -> list[Array]:
     """Return `count` configurations on the path at a time [s]."""
-    arm, asked = problem.envelope.arm(problem.robot), problem.envelope
-    admits = asked.admits if asked.quantities else None
-    return start_candidates(problem.follows.for_robot(arm), count, planner.rng, admits, time)
+    allowed = formulation.envelope
+    follows = formulation.follows.within(allowed.lower, allowed.upper)
+    admits = allowed.admits if allowed.quantities else None
+    return start_candidates(follows, count, planner.rng, admits, time)
 
 
 def _optimise_each(planner: Planner, candidates: Iterable[Candidate], count: int) -> None:
@@ -243,7 +249,7 @@ def optimise_sequences(planner: Planner, *, chosen: bool) -> None:
     They are compared with the present motion, and `chosen` only if allowed.
     """
     try:
-        planner.sequences = guides(planner.problem, planner.search.rng, planner.progress)
+        planner.sequences = guides(planner.formulation, planner.search.rng, planner.progress)
     except NoSequenceError as error:
         planner.failure = error
         planner.notes.append(f"global search: {error}")
@@ -253,7 +259,7 @@ def optimise_sequences(planner: Planner, *, chosen: bool) -> None:
         candidate = planner.begin(guide.start, free=True, guide=guide)
         if candidate is None or (started and _is_hopeless(planner, guide, candidate, started[0])):
             continue
-        found = along_chain(planner.problem, candidate.effort, guide, candidate.constraints)
+        found = along_chain(planner.formulation, candidate.effort, guide, candidate.conditions)
         if found is not None:
             candidate.take(found)
         if started and started[0].is_of_chain and not candidate.is_of_chain:
@@ -280,10 +286,10 @@ def _is_hopeless(planner: Planner, guide: Sequence, candidate: Candidate, best: 
 
 
 def along_chain(
-    problem: Problem,
+    formulation: Formulation,
     effort: Effort,
     guide: Sequence,
-    constraints: abc.Sequence[BoundConstraint],
+    conditions: BoundConditions,
 ) -> NodeSolution | None:
     """Return the motion through the shortest chain near a sequence; None where it will not do.
 
@@ -291,21 +297,21 @@ def along_chain(
     nodes cannot, and second derivatives at kinks are useless for Newton's method. The chain is at
     its optimum already, so that only velocities are missing.
     """
-    if not is_on_nodes(problem, effort) or not asks_length(problem):
+    if not is_on_nodes(formulation, effort) or not asks_length(formulation):
         return None
-    if any(item.equality for item in constraints):
+    if conditions.ends:
         # The search's sequences know nothing of given ends.
         return None
     t, q = guide.t, guide.q
-    finer = Grid.aligned(problem.knots, _FINER_CHAIN * len(t))
+    finer = Grid.aligned(formulation.knots, _FINER_CHAIN * len(t))
     for number in range(_CHAIN_ROUNDS):
         # A few nodes more change little.
         stages = LAST_SMOOTHINGS[2:] if number else LAST_SMOOTHINGS
-        found = shortest_along(problem, t, q, finer.nodes, stages)
+        found = shortest_along(formulation, t, q, finer.nodes, stages)
         if found is None:
             return None
         t, q = found
-        grid = NodeGrid(problem, t, constraints, free=True, counts=effort.counts)
+        grid = NodeGrid(formulation, t, conditions, free=True, counts=effort.counts)
         motion = _through(grid, q)
         if motion is None:
             return None
@@ -319,7 +325,7 @@ def along_chain(
 
 def _beyond_limits(motion: NodeMotion) -> Flags:
     """Return on which intervals a joint passes a limit, also for a moment, (N,)."""
-    asked, t = motion.grid.problem.envelope, motion.grid.t
+    asked, t = motion.grid.formulation.envelope, motion.grid.t
     samples = (t[:-1, None] + np.diff(t)[:, None] * np.arange(_SAMPLES) / _SAMPLES).ravel()
     q, qd = motion.trajectory(samples), motion.trajectory(samples, 1)
     beyond = (q < asked.lower) | (q > asked.upper) | (np.abs(qd) > asked.speed)
@@ -342,16 +348,16 @@ def _resting(motion: NodeMotion, near: Array) -> Array:
     The error from the path is left to the joints that move, so that others go on resting.
     """
     share = np.abs(near) / np.maximum(np.abs(near).max(axis=1, keepdims=True), _REST)
-    rows = motion.grid.problem.follows.jacobians(motion.place.q)
+    rows = motion.grid.formulation.follows.jacobians(motion.place.q)
     lack = np.einsum("kmn,kn->km", rows, motion.place.qd - near)
     shared = np.maximum(share, _LEAST)[:, :, None] * rows.transpose(0, 2, 1)
     return np.asarray(near + (shared @ np.linalg.solve(rows @ shared, lack[:, :, None]))[:, :, 0])
 
 
 def is_long(planner: Planner) -> bool:
-    """Whether the path is many times the arm's reach, and the problem is solved on nodes."""
-    problem = planner.problem
-    return problem.length_in_reaches > LONG_PATH and is_on_nodes(problem, planner.effort)
+    """Whether the path is many times the arm's reach, and the formulation is solved on nodes."""
+    formulation = planner.formulation
+    return formulation.length_in_reaches > LONG_PATH and is_on_nodes(formulation, planner.effort)
 
 
 def keep_to_posture(planner: Planner) -> None:
@@ -382,17 +388,17 @@ def _optimise(planner: Planner, posture: Array, ended: Status | None) -> None:
 
     Where the user wants no more, it has to do where there is no other.
     """
-    problem, start = planner.problem, planner.problem.given_start
+    formulation, start = planner.formulation, planner.formulation.given_start
     if start is None:
         try:
-            start = on_start(problem, posture)
+            start = on_start(formulation, posture)
         except SelfmotionError:
             return
-    constraints = problem.bind_constraints(start, start, apart=planner.effort.apart)
-    polisher = Polisher(problem, planner.effort, constraints, free=planner.is_free)
+    conditions = formulation.conditions(start, start, apart=planner.effort.apart)
+    polisher = Polisher(formulation, planner.effort, conditions, free=planner.is_free)
     if ended is not None:
         polisher.end(ended)
-    motion = _near(polisher, problem, start, posture)
+    motion = _near(polisher, formulation, start, posture)
     if motion is None:
         return
     try:
@@ -423,17 +429,17 @@ def _postures(planner: Planner) -> tuple[list[Array], Status | None]:
 
     And what ended the search for them, if the user did.
     """
-    problem = planner.problem
-    middle, half = 0.5, 0.5 * _SEGMENT_LENGTH / problem.length_in_reaches
-    first, last = (problem.path.duration * share for share in (middle - half, middle + half))
-    stretch = problem.changed(
-        **problem.along(lambda path: Section(path, first, last)),
+    formulation = planner.formulation
+    middle, half = 0.5, 0.5 * _SEGMENT_LENGTH / formulation.length_in_reaches
+    first, last = (formulation.path.duration * share for share in (middle - half, middle + half))
+    section = formulation.changed(
+        **formulation.along(lambda path: Section(path, first, last)),
         start=None,
-        constraints=list(constraints_of_part(problem, is_first=False, is_last=False)),
+        constraints=list(constraints_of_part(formulation.problem, is_first=False, is_last=False)),
         rest=False,
     )
     inner = replace(
-        planner, problem=stretch, best=None, failure=None, waiting=(), ranking=None, attempts=[]
+        planner, formulation=section, best=None, failure=None, waiting=(), ranking=None, attempts=[]
     )
     try:
         optimise_starts(inner, planner.search.starts, planner.search.finalists)
@@ -451,14 +457,16 @@ def _postures(planner: Planner) -> tuple[list[Array], Status | None]:
     return found, inner.best.status if inner.is_over and inner.best is not None else None
 
 
-def _near(polisher: Polisher, problem: Problem, start: Array, posture: Array) -> NodeMotion | None:
+def _near(
+    polisher: Polisher, formulation: Formulation, start: Array, posture: Array
+) -> NodeMotion | None:
     """Return the motion from a start (n,) that goes to a posture (n,) by self-motion.
 
     On the coarsest nodes with about its cost; None without any.
     """
     # As long as it takes the tool to go as far as the arm reaches.
-    time = problem.path.duration / problem.length_in_reaches
-    grid, most = Grid.aligned(problem.knots, _FIRST_NODES), most_nodes(problem)
+    time = formulation.path.duration / formulation.length_in_reaches
+    grid, most = Grid.aligned(formulation.knots, _FIRST_NODES), most_nodes(formulation)
     while grid.steps <= most:
         motion = polisher.grid(grid.nodes).motion_towards(start, posture, time)
         if motion is not None and resolves(motion):

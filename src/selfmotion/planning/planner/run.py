@@ -21,6 +21,7 @@ from selfmotion.basics import (
     was_interrupted,
 )
 from selfmotion.certificate import Certificate, Tolerance
+from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.optimise import Callback, Optimizer, Status
 from selfmotion.planning.planner.candidate import check_warm_start
 from selfmotion.planning.planner.effort import Deadline, Effort, Search
@@ -88,9 +89,9 @@ def gathered(planner: Planner, deadline: Deadline) -> Plan:
         remedy=planner.advice,
     )
     return Plan(
-        problem=planner.problem.asked,
-        trajectory=planner.problem.own(motion.trajectory),
-        initial_trajectory=planner.problem.own(minimum_norm.trajectory),
+        problem=planner.formulation.problem,
+        trajectory=planner.formulation.of_arm(motion.trajectory),
+        initial_trajectory=planner.formulation.of_arm(minimum_norm.trajectory),
         coefficients=read_only(solution.coefficients),
         report=report,
         certificate=report.explained(check),
@@ -103,7 +104,7 @@ def _gap(planner: Planner, judged: Judged) -> Gap | None:
         return None
     motion, rival, rival_cost = judged.motion, planner.rival, judged.rival_cost
     shortest = min(planner.sequences, key=lambda each: each.length)
-    weights = planner.problem.robot.joint_weights
+    weights = planner.formulation.coordinates.weights
     if rival is not None and rival is planner.best and not rival.violations:
         rival_cost = motion.cost
     return Gap(
@@ -249,19 +250,19 @@ def plan(
     if problem.damping is not None and max_evaluations is None:
         max_evaluations = _DAMPED_EVALUATIONS
     effort = Effort(optimizer, callback, max_evaluations, clock)
-    if problem.relaxations and is_published(problem, effort):
+    formulation = Formulation.of(problem)
+    if problem.relaxations and is_published(formulation, effort):
         raise ProblemError(
             "relaxations: the published method keeps nothing but given ends, so that the tool "
             "would leave its tolerances; leave null_motion out, optimizer and damping too"
         )
-    search, problem = search or Search(), problem.augmented
     if warm_start is not None:
-        known = problem.with_own(warm_start.trajectory, warm_start.path)
+        known = formulation.of_all(warm_start.trajectory, warm_start.path)
         warm_start = replace(warm_start, trajectory=known)
     planner = Planner(
-        problem,
+        formulation,
         effort,
-        search,
+        search or Search(),
         Tolerance.of(tolerance),
         clock.checked_by(progress),
         warm_start=warm_start,
@@ -282,9 +283,9 @@ def plan_along(problem: Problem, guide: Sequence, tolerance: Tolerance, progress
     """Plan as `plan` does, but try a motion first that is known, near which there should be one."""
     clock = Deadline()
     effort = Effort(None, None, None, clock)
-    problem = problem.augmented
-    guide = replace(guide, q=problem.at(guide.t, guide.q))
-    planner = Planner(problem, effort, Search(), tolerance, progress, guide=guide)
+    formulation = Formulation.of(problem)
+    guide = replace(guide, q=formulation.completed(guide.t, guide.q))
+    planner = Planner(formulation, effort, Search(), tolerance, progress, guide=guide)
     with one_blas_thread(), held_interruption():
         return _planned(planner, clock)
 

@@ -5,16 +5,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from selfmotion.basics import Array, Flags, Ints, Progress, RobotError
+from selfmotion.basics import Array, Flags, Ints, Progress
+from selfmotion.model.follow import Coordinates
 from selfmotion.model.motion import Sampling, Trajectory
-from selfmotion.model.robot import RobotModel
+from selfmotion.planning.formulation import BoundConditions, Formulation
 from selfmotion.planning.nodes import Batch, NodeGrid, NodeMotion, minimise
 from selfmotion.planning.planner.effort import Effort
 from selfmotion.planning.planner.grids import ABOUT_AS_GOOD, NOTHING, UNKEPT, resolves, rough_grid
 from selfmotion.planning.search import carried
 from selfmotion.problem.constraints import penalised
 from selfmotion.problem.costs import Samples
-from selfmotion.problem.problem import Problem
 
 # Newton iterations of rough motions.
 _ROUGH_ROUNDS = 30
@@ -36,30 +36,22 @@ _SAME_OPTIMUM = 0.1
 _TURN = 2.0 * np.pi
 
 
-def usual_posture(robot: RobotModel) -> Array:
-    """Return home (n,) where it is known, else the middle of the joints' limits [rad or m]."""
-    try:
-        return robot.home
-    except RobotError:
-        return np.asarray(0.5 * np.add(*robot.finite_limits()))
-
-
-def far_from_usual(robot: RobotModel, motions: Array) -> Array:
+def far_from_usual(coordinates: Coordinates, motions: Array) -> Array:
     """Return the mean distances of motions (K, N, n) from the usual posture, (K,) [rad]."""
-    away = np.abs(motions - usual_posture(robot)) @ robot.joint_weights
+    away = np.abs(motions - coordinates.usual()) @ coordinates.weights
     return np.asarray(away.mean(axis=1))
 
 
-def wound_back(robot: RobotModel, motion: Array) -> Array:
+def wound_back(coordinates: Coordinates, motion: Array) -> Array:
     """Return a motion (N, n) with joints turned by whole turns, as near to usual as limits allow.
 
     The tool's motion is the same. Joints outside of their limits at any turn are put in the middle.
     """
     lowest, highest = motion.min(axis=0), motion.max(axis=0)
-    middle, shift = 0.5 * (lowest + highest), np.zeros(robot.dof)
-    usual = usual_posture(robot)
-    for joint in np.flatnonzero(robot.is_revolute):
-        lower, upper = robot.lower[joint], robot.upper[joint]
+    middle, shift = 0.5 * (lowest + highest), np.zeros(coordinates.dof)
+    usual = coordinates.usual()
+    for joint in np.flatnonzero(coordinates.is_revolute):
+        lower, upper = coordinates.lower[joint], coordinates.upper[joint]
         wanted = round((usual[joint] - middle[joint]) / _TURN)
         # Rounding must not take a joint that stands on its limit round to the other side.
         least = np.ceil((lower - lowest[joint]) / _TURN - _SAME_TO_DIGITS)
@@ -84,18 +76,19 @@ class Ranking:
 
     Parameters
     ----------
-    problem : Problem
+    formulation : Formulation
     effort : Effort
     progress : Progress
     """
 
-    def __init__(self, problem: Problem, effort: Effort, progress: Progress) -> None:
-        self._problem, self._effort, self._progress = problem, effort, progress
-        self._free = problem.given_start is None
+    def __init__(self, formulation: Formulation, effort: Effort, progress: Progress) -> None:
+        self._formulation, self._effort, self._progress = formulation, effort, progress
+        self._free = formulation.given_start is None
         # Whole turns depend on the required limits, not on the arm's own.
-        self._arm = problem.envelope.arm(problem.robot)
-        self._distances = distance_of(problem.robot)
-        self._t = rough_grid(problem).nodes
+        allowed = formulation.envelope
+        self._coordinates = formulation.coordinates.within(allowed.lower, allowed.upper)
+        self._distances = distance_of(formulation.coordinates)
+        self._t = rough_grid(formulation).nodes
         self._found: Batch | None = None
         self._ranked: list[NodeMotion] = []
         # Motions at the starts, of which the ranked ones came.
@@ -120,11 +113,11 @@ class Ranking:
 
         Returns whether the ranking is complete.
         """
-        problem = self._problem
-        motions, arrived = carried(problem.follows, np.array(starts), self._t, at)
+        formulation = self._formulation
+        motions, arrived = carried(formulation.follows, np.array(starts), self._t, at)
         if not arrived.any():
             return False
-        order = most_promising(problem, starts, motions, arrived, self._t, self._distances)
+        order = most_promising(formulation, starts, motions, arrived, self._t, self._distances)
         self._carried = [motions[k] for k in order]
         free: list[NodeMotion] = []
         if self._is_pointwise():
@@ -173,18 +166,18 @@ class Ranking:
         """
         from scipy.interpolate import CubicSpline
 
-        problem, sampling = self._problem, Sampling.trapezoidal(t)
+        formulation, sampling = self._formulation, Sampling.trapezoidal(t)
         if self._free:
-            motions = np.array([wound_back(self._arm, motion) for motion in motions])
+            motions = np.array([wound_back(self._coordinates, motion) for motion in motions])
         curves = [CubicSpline(t, motion) for motion in motions]
-        each = [Samples.along(problem.follows, sampling, q(t), q(t, 1)) for q in curves]
-        costs = np.array([problem_cost(problem, samples) for samples in each])
+        each = [formulation.sampled_along(sampling, q(t), q(t, 1)) for q in curves]
+        costs = np.array([formulation.cost_of(motion) for motion in each])
         cheapest = np.argsort(costs, kind="stable")
         alone = unlike(motions, cheapest, self._distances, ONE_VALLEY)[0][:ROUGH_MOTIONS]
         merits = dict[int, float]()
         for k in alone:
-            bound = problem.bind_constraints(*motions[k, [0, -1]], apart=False)
-            merits[k] = penalised(float(costs[k]), bound, each[k])
+            own = formulation.conditions(*motions[k, [0, -1]], apart=False)
+            merits[k] = penalised(float(costs[k]), each[k].with_conditions(own.every))
         found = list[NodeMotion]()
         chosen = sorted(alone, key=lambda k: merits[k])[:_WITHIN]
         for number, k in enumerate(chosen, 1):
@@ -206,25 +199,25 @@ class Ranking:
 
         Not where accelerations cost: few nodes say little of them.
         """
-        problem, dof = self._problem, self._problem.robot.dof
-        costs = problem.all_costs
+        formulation, dof = self._formulation, self._formulation.robot.dof
+        costs = formulation.costs
         if not all(cost.is_pointwise and max(cost.curvature(dof), default=0) < 2 for cost in costs):
             return False
-        q = problem.robot.generic_configurations()[0]
-        return not any(item.equality for item in problem.bind_constraints(q, q, apart=False))
+        q = formulation.coordinates.generic()[0]
+        return not formulation.conditions(q, q, apart=False).ends
 
     def _freely(self, motions: Array, finalists: int) -> list[NodeMotion] | None:
         """Return the rough optima near motions (K, N + 1, n), the cheapest first.
 
         Those that are the best for sure are ranked. None if none can be evaluated.
         """
-        problem = self._problem
-        nodes = self._grid(problem)
+        formulation = self._formulation
+        nodes = self._grid(formulation)
         total = 1 + _ROUGH_ROUNDS
         self._progress("screening start", 1, total)
         found = self._found = Batch.near(nodes, motions)
-        soft = problem.softened(float(found.costs.min()))
-        if soft is not problem:
+        soft = formulation.with_springs(float(found.costs.min()))
+        if soft is not formulation:
             found = self._found = Batch.near(self._grid(soft), motions)
         alone, near = unlike(found.q, _cheapest(found), self._distances, ONE_VALLEY)
         which = [*alone, *near][: max(ROUGH_MOTIONS, finalists)]
@@ -240,9 +233,10 @@ class Ranking:
         each = [] if self._ranked else [self._motion(found, k) for k in order]
         return [motion for motion in each if motion is not None]
 
-    def _grid(self, problem: Problem) -> NodeGrid:
+    def _grid(self, formulation: Formulation) -> NodeGrid:
         counts = self._effort.counts
-        return NodeGrid(problem, self._t, (), free=self._free, counts=counts, smoothed=True)
+        none = BoundConditions()
+        return NodeGrid(formulation, self._t, none, free=self._free, counts=counts, smoothed=True)
 
     def _decisive(self, found: Batch, finalists: int) -> list[NodeMotion]:
         """Return the cheapest motion that keeps all, then others about as cheap; or none.
@@ -320,7 +314,7 @@ class Ranking:
         gone far beyond them, and the tool's motion is the same.
         """
         q = found.q[k]
-        motion = self._near(wound_back(self._arm, q), found.qd[k], found.qdd[k])
+        motion = self._near(wound_back(self._coordinates, q), found.qd[k], found.qdd[k])
         # Costs may depend on whole turns.
         if motion is not None and motion.cost <= (1.0 + _SAME_TO_DIGITS) * found.costs[k]:
             return motion
@@ -331,36 +325,36 @@ class Ranking:
         order = _cheapest(found)
         if not order.size:
             return order
-        robot, costs = self._arm, found.costs[order]
+        own, costs = self._coordinates, found.costs[order]
         # Each motion belongs to the cheapest one of about the same cost.
         group, first = np.zeros(len(order), dtype=np.int64), 0
         for k in range(1, len(order)):
             if costs[k] - costs[first] > NOTHING * abs(costs[first]):
                 first = k
             group[k] = first
-        far = far_from_usual(robot, np.array([wound_back(robot, found.q[k]) for k in order]))
+        far = far_from_usual(own, np.array([wound_back(own, found.q[k]) for k in order]))
         return np.asarray(order[np.lexsort((far, group))])
 
     def _turned_inside(self, q: Array) -> Array:
         """Return a motion (N + 1, n) with joints beyond their limits turned back by whole turns."""
-        robot = self._arm
-        beyond = ((q > robot.upper) | (q < robot.lower)).any(axis=0)
-        return np.where(beyond, wound_back(robot, q), q)
+        own = self._coordinates
+        beyond = ((q > own.upper) | (q < own.lower)).any(axis=0)
+        return np.where(beyond, wound_back(own, q), q)
 
     def _near(
         self, q: Array, qd: Array | None = None, qdd: Array | None = None
     ) -> NodeMotion | None:
         """Return the motion nearest to one, with the conditions; by default without self-motion."""
-        problem, minimum_norm = self._problem, np.zeros_like(q)
-        bound = problem.bind_constraints(q[0], q[-1], apart=self._effort.apart)
+        formulation, minimum_norm = self._formulation, np.zeros_like(q)
+        bound = formulation.conditions(q[0], q[-1], apart=self._effort.apart)
         counts = self._effort.counts
-        grid = NodeGrid(problem, self._t, bound, free=self._free, counts=counts, smoothed=True)
+        grid = NodeGrid(formulation, self._t, bound, free=self._free, counts=counts, smoothed=True)
         return grid.near(
             q, minimum_norm if qd is None else qd, minimum_norm if qdd is None else qdd
         )
 
     def _clear(self, motion: NodeMotion) -> bool:
-        return self._problem.keeps_off_itself(motion.place.q)
+        return self._formulation.keeps_off_itself(motion.place.q)
 
 
 def _cheapest(found: Batch) -> Ints:
@@ -393,7 +387,7 @@ def _same(a: float, b: float | None) -> bool:
 
 
 def most_promising(
-    problem: Problem,
+    formulation: Formulation,
     starts: Sequence[Array],
     motions: Array,
     arrived: Flags,
@@ -408,7 +402,7 @@ def most_promising(
 
     Parameters
     ----------
-    problem : Problem
+    formulation : Formulation
     starts : sequence of (n,)
     motions : (K, N, n)
         The motions from them, at few times t (N,) [s].
@@ -418,22 +412,22 @@ def most_promising(
         Distance of motions.
     """
     merits = np.full(len(starts), np.inf)
-    twists = problem.follows.twists(t)
+    twists = formulation.follows.twists(t)
     sampling = Sampling.trapezoidal(t)
     for k in np.flatnonzero(arrived):
-        merits[k] = _merit(problem, motions[k], twists, sampling)
+        merits[k] = _merit(formulation, motions[k], twists, sampling)
     order = np.argsort(merits, kind="stable")
     followed = order[arrived[order]]
     valleys, slopes = unlike(motions, followed, apart, ONE_VALLEY)
     return [*valleys, *slopes, *order[~arrived[order]].tolist()]
 
 
-def _merit(problem: Problem, q: Array, twists: Array, sampling: Sampling) -> float:
+def _merit(formulation: Formulation, q: Array, twists: Array, sampling: Sampling) -> float:
     """Return the cost of a motion q (N, n) along the path, with a penalty of violations.
 
     `twists` (N, m) are those of the path at the grid's nodes, which are the samples.
     """
-    minimum_norm = Samples.along(problem.follows, sampling, q, np.zeros_like(q))
+    minimum_norm = Samples.along(formulation.follows, sampling, q, np.zeros_like(q))
     J = minimum_norm.task_jacobian
     gram = J @ J.transpose(0, 2, 1)
     try:
@@ -441,19 +435,13 @@ def _merit(problem: Problem, q: Array, twists: Array, sampling: Sampling) -> flo
     except np.linalg.LinAlgError:
         return np.inf
     samples = replace(minimum_norm, qd=qd)
-    bound = problem.bind_constraints(q[0], q[-1], apart=False)
-    return penalised(problem_cost(problem, samples), bound, samples)
+    own, motion = formulation.conditions(q[0], q[-1], apart=False), formulation.sampled(samples)
+    return penalised(formulation.cost_of(motion), motion.with_conditions(own.every))
 
 
-def problem_cost(problem: Problem, samples: Samples) -> float:
-    """Return the cost of a motion."""
-    weights = samples.sampling.weights
-    return sum(float(weights @ cost.value(samples)) for cost in problem.all_costs)
-
-
-def distance_of(robot: RobotModel) -> Distance:
-    """Return the largest distance of an arm's motions, modulo whole turns, as a function."""
-    turning, sizes = robot.is_revolute, robot.coordinate_sizes
+def distance_of(coordinates: Coordinates) -> Distance:
+    """Return the largest distance of motions, modulo whole turns, as a function."""
+    turning, sizes = coordinates.is_revolute, coordinates.sizes
 
     def apart(motion: Array, others: Array) -> Array:
         difference = others - motion

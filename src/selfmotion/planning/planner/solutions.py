@@ -1,17 +1,25 @@
-"""Solutions of a planning problem: by the published method, or on nodes."""
+"""Solutions of a planning formulation: by the published method, or on nodes."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Self
 
 import numpy as np
 
-from selfmotion.basics import Array, BreakdownError, Flags
-from selfmotion.model.motion import Evaluation, Grid, NodeNullMotion, NullMotion
+from selfmotion.basics import Array, BreakdownError, Counts, Flags
+from selfmotion.model.motion import Evaluation, Grid, NodeNullMotion, NullMotion, Trajectory
 from selfmotion.planning import paper
+from selfmotion.planning.formulation import (
+    BoundConditions,
+    Formulation,
+    SampledMotion,
+    require_finite_gradients,
+    require_finite_values,
+)
 from selfmotion.planning.nodes import NodeMotion, Optimum
 from selfmotion.planning.optimise import Status
+from selfmotion.planning.paper import MinimumNormMotion
 from selfmotion.planning.search import BESIDE
 from selfmotion.problem.constraints import (
     ActiveConstraint,
@@ -33,21 +41,78 @@ _MOST_SAVING = 1e-2
 
 
 @dataclass(frozen=True, eq=False)
-class PublishedSolution(paper.Solution):
-    """A motion of the published method: at x = 0, the minimum-norm motion, or optimised.
+class MinimumNormSolution:
+    """The minimum-norm motion, eq. 4 at ε = 0: an initial guess, and what others are held against.
 
     Attributes
     ----------
-    constraints : sequence of BoundConstraint
+    formulation : Formulation
+    motion : MinimumNormMotion
+    conditions : BoundConditions
         Judged, not required.
+    counts : Counts
+        Where work is added up.
     """
 
-    constraints: Sequence[BoundConstraint] = ()
+    formulation: Formulation
+    motion: MinimumNormMotion
+    conditions: BoundConditions
+    counts: Counts
+
+    @property
+    def status(self) -> Status:
+        """Without self-motion it is the only motion; else nothing better was found."""
+        redundant = self.formulation.follows.redundancy > 0
+        return Status.INFEASIBLE if redundant else Status.CONVERGED
+
+    @property
+    def steps(self) -> int:
+        """Of its grid."""
+        return self.motion.grid.steps
+
+    @property
+    def null_motion(self) -> NullMotion:
+        """The parameterisation of the null motion."""
+        return self.formulation.null_motion
+
+    @property
+    def coefficients(self) -> Array:
+        """The null motion's coefficients: none."""
+        return np.zeros(0)
+
+    @cached_property
+    def _sampled(self) -> SampledMotion:
+        return self.formulation.sampled(self.motion.rollout.samples())
+
+    @cached_property
+    def terms(self) -> dict[str, float]:
+        """Contribution of each cost."""
+        self.counts.evaluated()
+        arm, costs = self._sampled.arm, self.formulation.costs
+        return {cost.name: float(arm.weights @ cost.value(arm)) for cost in costs}
+
+    @property
+    def cost(self) -> float:
+        """F; inf where it is not finite."""
+        total = sum(self.terms.values())
+        return total if np.isfinite(total) else np.inf
+
+    def require_finite(self) -> None:
+        """Raise ProblemError where a cost has no finite value."""
+        require_finite_values(self.formulation.costs, self._sampled.arm)
+
+    def require_finite_gradients(self) -> None:
+        """Raise ProblemError where a derivative of a cost is not finite."""
+        require_finite_gradients(self.formulation.costs, self._sampled.arm)
+
+    @property
+    def _evaluated(self) -> Iterator[tuple[BoundConstraint, Samples]]:
+        return self._sampled.with_conditions(self.conditions.every)
 
     @cached_property
     def violations(self) -> tuple[str, ...]:
         """Violations, one for each constraint."""
-        return violated(self.constraints, self._samples)
+        return violated(self._evaluated)
 
     @property
     def active(self) -> tuple[ActiveConstraint, ...]:
@@ -61,17 +126,81 @@ class PublishedSolution(paper.Solution):
     @cached_property
     def keeps_off_itself(self) -> bool:
         """Whether the default clearance from itself holds, at the nodes and by meshes."""
-        return self.method.problem.keeps_off_itself(self.nodes)
-
-    @property
-    def _samples(self) -> Samples:
-        return self.objective.samples(self.x)
+        return self.formulation.keeps_off_itself(self.motion.q)
 
     def merit(self) -> float:
         """Return the cost, much larger where constraints are violated: for ranking."""
-        if not np.isfinite(self.cost):
-            return np.inf
-        return penalised(self.cost, self.constraints, self._samples)
+        return penalised(self.cost, self._evaluated) if np.isfinite(self.cost) else np.inf
+
+    @cached_property
+    def _evaluation(self) -> Evaluation:
+        own, rollout = self.motion, self.motion.rollout
+        before = rollout.jacobian_evaluations
+        t, q, qd = rollout.polished()
+        qdd = own.grid.derivative(qd)
+        if self.formulation.damping_law is None:
+            # Where the arm comes to rest smoothly that is so by construction; differences are not.
+            orders = zip((0, -1), self.formulation.rest_orders, strict=True)
+            qdd[[end for end, order in orders if order > 1]] = 0.0
+        self.counts.jacobians += rollout.jacobian_evaluations - before
+        trajectory = Trajectory(t, q, qd, self.formulation.coordinates.names, qdd)
+        return Evaluation(self.coefficients, self.terms, trajectory, rollout.damped)
+
+    def evaluation(self) -> Evaluation:
+        """Return the motion with its costs."""
+        return self._evaluation
+
+    def refined(self, where: Flags | None = None) -> "MinimumNormSolution":
+        """Return it with half the step length, for all or some of the steps (N,).
+
+        As it is where it breaks down on that grid.
+        """
+        own = self.motion
+        grid = own.grid.halved(where)
+        finer = MinimumNormMotion.on(own.formulation, own.start, grid, own.guide)
+        self.counts.jacobians += finer.jacobian_evaluations
+        return self if finer.broken is not None else replace(self, motion=finer)
+
+
+@dataclass(frozen=True, eq=False)
+class PublishedSolution(paper.Solution):
+    """A motion of the published method, optimised.
+
+    Attributes
+    ----------
+    conditions : BoundConditions
+        Judged, not required.
+    """
+
+    conditions: BoundConditions = field(default_factory=BoundConditions)
+
+    @property
+    def _evaluated(self) -> Iterator[tuple[BoundConstraint, Samples]]:
+        motion = self.method.formulation.sampled(self.objective.samples(self.x))
+        return motion.with_conditions(self.conditions.every)
+
+    @cached_property
+    def violations(self) -> tuple[str, ...]:
+        """Violations, one for each constraint."""
+        return violated(self._evaluated)
+
+    @property
+    def active(self) -> tuple[ActiveConstraint, ...]:
+        """No constraint: they are judged, not required."""
+        return ()
+
+    @property
+    def remaining(self) -> None:
+        """Not known."""
+
+    @cached_property
+    def keeps_off_itself(self) -> bool:
+        """Whether the default clearance from itself holds, at the nodes and by meshes."""
+        return self.method.formulation.keeps_off_itself(self.nodes)
+
+    def merit(self) -> float:
+        """Return the cost, much larger where constraints are violated: for ranking."""
+        return penalised(self.cost, self._evaluated) if np.isfinite(self.cost) else np.inf
 
     def refined(self, where: Flags | None = None) -> Self:
         """Return it with half the step length, for all or some of the steps (N,).
@@ -155,7 +284,7 @@ class NodeSolution:
     @cached_property
     def keeps_off_itself(self) -> bool:
         """Whether the default clearance from itself holds, at the nodes and by meshes."""
-        return self.motion.grid.problem.keeps_off_itself(self.motion.place.q)
+        return self.motion.grid.formulation.keeps_off_itself(self.motion.place.q)
 
     @cached_property
     def violations(self) -> tuple[str, ...]:
@@ -166,7 +295,7 @@ class NodeSolution:
         if motion.violation <= 0.0 and ends <= ENDS_MET and not motion.elsewhere:
             return ()
         # The curve may satisfy limits that control points exceed.
-        broken = violated(motion.grid.constraints, motion.checked)
+        broken = violated(motion.checked.with_conditions(motion.grid.conditions.every))
         return broken + tuple(
             f"{name}: the motion ends {far:.3g} rad or m away from it, in another configuration "
             f"that puts the tool there"
@@ -176,14 +305,15 @@ class NodeSolution:
     @property
     def breaks_at(self) -> float | None:
         """Time [s] of the largest violation; None where conditions at all times hold."""
-        return worst_time(self.motion.grid.constraints, self.motion.checked)
+        motion = self.motion
+        return worst_time(motion.checked.with_conditions(motion.grid.conditions.inequalities))
 
     def merit(self) -> float:
         """Return the cost, much larger where constraints are violated: for ranking."""
         motion = self.motion
         if motion.violation <= 0.0 and not motion.elsewhere:
             return self.cost
-        found = penalised(self.cost, motion.grid.constraints, motion.checked)
+        found = penalised(self.cost, motion.checked.with_conditions(motion.grid.conditions.every))
         return found + len(motion.elsewhere) * 10.0 * max(abs(self.cost), 1e-3)
 
     def evaluation(self) -> Evaluation:
@@ -219,7 +349,7 @@ class NodeSolution:
         return self.on(Grid(self.motion.grid.t).halved(where).nodes) or self
 
 
-Solution = PublishedSolution | NodeSolution
+Solution = MinimumNormSolution | PublishedSolution | NodeSolution
 """A motion, however it was found."""
 
 
@@ -240,14 +370,10 @@ def _active(optimum: Optimum) -> tuple[ActiveConstraint, ...]:
     if not (optimum.multipliers.any() or optimum.end_multipliers.size):
         return ()
     motion, grid = optimum.motion, optimum.motion.grid
-    inner = iter(grid.rows.multipliers_of(optimum.multipliers, motion.curve_ends))
+    each = grid.rows.multipliers_of(optimum.multipliers, motion.curve_ends)
     ends = grid.ends.by_item(optimum.end_multipliers)
-    each = []
-    for item in grid.constraints:
-        if item.equality:
-            own = ends[id(item)][None]
-            each.append(Multipliers(item, own, np.zeros(1), np.ones(own.shape, dtype=np.bool_)))
-        else:
-            each.append(next(inner))
+    for item in grid.conditions.ends:
+        own = ends[id(item)][None]
+        each.append(Multipliers(item, own, np.zeros(1), np.ones(own.shape, dtype=np.bool_)))
     least, most = (share * abs(motion.cost) for share in (_LEAST_SAVING, _MOST_SAVING))
     return active_of(each, grid.t[[0, -1]], least, most)

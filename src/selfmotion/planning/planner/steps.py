@@ -19,6 +19,7 @@ from selfmotion.basics import (
     SelfmotionError,
 )
 from selfmotion.model.task import SE3
+from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.planner.candidate import Candidate, on_start
 from selfmotion.planning.planner.effort import Search
 from selfmotion.planning.planner.grids import is_on_nodes
@@ -36,7 +37,6 @@ from selfmotion.planning.planner.proposals import (
 from selfmotion.planning.result import Attempt
 from selfmotion.planning.search import Obstruction, obstruction
 from selfmotion.problem.constraints import JointPositionLimits
-from selfmotion.problem.problem import Problem
 
 _WHERE_IT_BREAKS = "starts where it breaks"
 
@@ -87,7 +87,7 @@ def _look_first(planner: Planner) -> bool:
     """Check whether the arm can reach some single poses, before anything is known."""
     if not planner.is_free or planner.has_motion:
         return False
-    blocked = planner.blocked = _looked_at(planner.problem, planner.search)
+    blocked = planner.blocked = _looked_at(planner.formulation, planner.search)
     if blocked is not None:
         # Planning the rest takes many times as long as this message.
         planner.progress(f"no motion passes t = {blocked.time:.6g} s: {blocked.reason}", 0, 0)
@@ -106,7 +106,7 @@ def _plan_before_blocked_pose(planner: Planner) -> bool:
     except InverseKinematicsError:
         found = False
     if not found:
-        raise _obstruction_error(planner.problem, blocked)
+        raise _obstruction_error(planner.formulation, blocked)
     return True
 
 
@@ -127,7 +127,7 @@ def _warm_start_at_plan(planner: Planner) -> bool:
     if plan is None or not planner.is_free:
         return False
     try:
-        start = on_start(planner.problem, plan.trajectory.q[0])
+        start = on_start(planner.formulation, plan.trajectory.q[0])
     except InverseKinematicsError as error:
         planner.failure = error
         return True
@@ -141,12 +141,12 @@ def _warm_start_at_plan(planner: Planner) -> bool:
 
 def _keep_to_posture(planner: Planner) -> bool:
     """Optimise from motions in the best postures of a segment, on a very long path."""
-    return planner.problem.length_in_reaches > VERY_LONG_PATH and _try_postures(planner)
+    return planner.formulation.length_in_reaches > VERY_LONG_PATH and _try_postures(planner)
 
 
 def _from_given_start(planner: Planner) -> bool:
     """Optimise from the start that is given."""
-    start = planner.problem.given_start
+    start = planner.formulation.given_start
     if start is None or not (planner.is_sought and planner.is_unmet):
         return False
     candidate = planner.begin(start, free=False)
@@ -168,7 +168,7 @@ def _draw_starts(planner: Planner) -> bool:
 
 def _compare_postures(planner: Planner) -> bool:
     """Do so on a path that is long, where it may lead to a better motion than other starts."""
-    return planner.problem.length_in_reaches <= VERY_LONG_PATH and _try_postures(planner)
+    return planner.formulation.length_in_reaches <= VERY_LONG_PATH and _try_postures(planner)
 
 
 def _try_postures(planner: Planner) -> bool:
@@ -184,7 +184,7 @@ def _stack_rows(planner: Planner) -> bool:
     """Optimise from motions that keep limits and quantities as rows of their task."""
     wanted = planner.is_sought and planner.is_unmet
     begins = planner.takes_starts or not planner.is_free
-    can = is_on_nodes(planner.problem, planner.effort) and may_stack(planner)
+    can = is_on_nodes(planner.formulation, planner.effort) and may_stack(planner)
     if not (wanted and begins and can) or planner.is_out_of_reach():
         return False
     return optimise_stacked(planner, planner.search.finalists)
@@ -226,7 +226,10 @@ def _draw_where_it_breaks(planner: Planner) -> bool:
     """Draw configurations where the best motion breaks something most, or where none goes on."""
     best, failure, search = planner.best, planner.failure, planner.search
     wanted = planner.is_sought and planner.takes_starts and planner.is_unmet
-    if not (wanted and is_on_nodes(planner.problem, planner.effort)) or planner.is_out_of_reach():
+    if (
+        not (wanted and is_on_nodes(planner.formulation, planner.effort))
+        or planner.is_out_of_reach()
+    ):
         return False
     if best is None and not isinstance(failure, BreakdownError):
         return False
@@ -253,7 +256,8 @@ def _plan_largest_part(planner: Planner) -> bool:
     """
     best, failure = planner.best, planner.failure
     if best is not None:
-        short = planner.is_sought and _may_meet_more(best) and planner.problem.damping is None
+        is_damped = planner.formulation.damping_law is not None
+        short = planner.is_sought and _may_meet_more(best) and not is_damped
         if short and planner.reach().reason:
             planner.judge_part()
             return True
@@ -272,7 +276,7 @@ def _plan_largest_part(planner: Planner) -> bool:
         reason = planner.reach(failure.time).reason
         if isinstance(failure, BreakdownError) and reason:
             raise BreakdownError(
-                f"{planner.problem.asked.robot.name}: {reason}; and of the path before that no "
+                f"{planner.formulation.robot.name}: {reason}; and of the path before that no "
                 f"part was found that can be followed; start elsewhere (start=), or move the path",
                 time=failure.time,
             ) from failure
@@ -299,7 +303,7 @@ def _plan_part_instead(planner: Planner) -> bool:
         return False
     check = judged.certificate
     # With damping the motion goes on off the path, as requested.
-    if best.is_spent or planner.problem.damping is not None:
+    if best.is_spent or planner.formulation.damping_law is not None:
         return False
     out_of_limits = bool(best.violations) and check.limit_margin.value < 0.0
     suspect = check.position_error.time
@@ -318,7 +322,7 @@ def _draw_where_proof_fails(planner: Planner) -> bool:
     fails_at, known = judged.fails_at, {item.name for item in planner.attempts}
     if fails_at is None or _WHERE_IT_BREAKS in known or not planner.takes_starts:
         return False
-    if not is_on_nodes(planner.problem, planner.effort) or planner.is_out_of_reach():
+    if not is_on_nodes(planner.formulation, planner.effort) or planner.is_out_of_reach():
         return False
     planner.best = planner.judged = None
     try:
@@ -337,19 +341,19 @@ def _draw_where_proof_fails(planner: Planner) -> bool:
 
 def _find_obstruction(planner: Planner) -> bool:
     """Find the obstruction of a motion that is not verified: whether single poses are reachable."""
-    judged, problem = planner.judged, planner.problem
+    judged, formulation = planner.judged, planner.formulation
     if judged is None or judged.certificate.verified or judged.part.candidate.cut_short:
         return False
-    if planner.is_published or problem.damping is not None:
+    if planner.is_published or formulation.damping_law is not None:
         return False
     if judged.part.ending or judged.fails_at is None:
         return False
     failure = planner.failure
     if isinstance(failure, NoSequenceError):
-        planner.stops = str(failure).removeprefix(f"{problem.asked.robot.name}: ")
+        planner.stops = str(failure).removeprefix(f"{formulation.robot.name}: ")
         return True
     rng = np.random.default_rng(planner.search.rng)
-    blocked = obstruction(problem, rng, judged.fails_at)
+    blocked = obstruction(formulation, rng, judged.fails_at)
     if blocked is not None:
         planner.stops = _passing(blocked)
     elif planner.is_free:
@@ -396,7 +400,7 @@ STEPS: tuple[tuple[str, Callable[[Planner], bool]], ...] = (
 )
 
 
-def _looked_at(problem: Problem, search: Search) -> Obstruction | None:
+def _looked_at(formulation: Formulation, search: Search) -> Obstruction | None:
     """Return an unreachable pose; None if all sampled ones are reachable.
 
     Also None where the motion can go on: damped motions leave their path, and self-collision under
@@ -409,22 +413,22 @@ def _looked_at(problem: Problem, search: Search) -> Obstruction | None:
     NoSequenceError
         Bodies with a required clearance are met there.
     """
-    if problem.damping is not None:
+    if formulation.damping_law is not None:
         return None
-    blocked = obstruction(problem, np.random.default_rng(search.rng))
+    blocked = obstruction(formulation, np.random.default_rng(search.rng))
     if blocked is None:
         return None
-    if blocked.is_met and problem.own_collision is not None:
+    if blocked.is_met and formulation.problem.own_collision is not None:
         return blocked
     if blocked.is_met or blocked.time == 0.0:
-        raise _obstruction_error(problem, blocked)
+        raise _obstruction_error(formulation, blocked)
     return blocked
 
 
-def _is_in_own_reach(problem: Problem, pose: SE3) -> bool:
+def _is_in_own_reach(formulation: Formulation, pose: SE3) -> bool:
     """Whether required limits, and not the arm's own, exclude a pose."""
-    asked = problem.asked
-    if not any(isinstance(item, JointPositionLimits) for item in problem.constraints):
+    asked = formulation.problem
+    if not any(isinstance(item, JointPositionLimits) for item in formulation.problem.constraints):
         return False
     try:
         asked.robot.inverse_kinematics(pose, asked.task)
@@ -433,14 +437,14 @@ def _is_in_own_reach(problem: Problem, pose: SE3) -> bool:
     return True
 
 
-def _obstruction_error(problem: Problem, blocked: Obstruction) -> SelfmotionError:
+def _obstruction_error(formulation: Formulation, blocked: Obstruction) -> SelfmotionError:
     """Return the error with the obstruction and remedies."""
-    robot, pose = problem.robot, problem.path.pose(blocked.time)
-    task = problem.asked.task.value
+    robot, pose = formulation.robot, formulation.path.pose(blocked.time)
+    task = formulation.problem.task.value
     if not blocked.is_met and blocked.time == 0.0:
         position, rotation = blocked.errors
         remedy = "move the pose into the workspace"
-        if _is_in_own_reach(problem, pose):
+        if _is_in_own_reach(formulation, pose):
             remedy = "the arm's own limits let it be there: widen JointPositionLimits"
         return InverseKinematicsError(
             f"{robot.name}: no configuration within the limits puts '{robot.tool}' at "

@@ -278,7 +278,7 @@ def _refusals(samples: Array, bounds: Admissible, motion: SelfMotion) -> str:
         k = int(np.argmax(least))
         parts.append(
             f"{int(outside.sum())} of {len(samples)} are outside the joint limits, the nearest "
-            f"by {_amount(motion, k, least[k])} in {motion.robot.label(k)}"
+            f"by {_amount(motion, k, least[k])} in {motion.coordinates.label(k)}"
         )
     inside = samples[~outside]
     if len(inside) and bounds.bodies:
@@ -297,7 +297,8 @@ def _refusals(samples: Array, bounds: Admissible, motion: SelfMotion) -> str:
 
 def _roomiest(model: CollisionModel, configurations: Array) -> Closest:
     """Return the closest pair of the configuration (of K, n) with the largest distance."""
-    return max((model.distance(q) for q in configurations), key=lambda closest: closest.value)
+    own = configurations[:, : model.robot.dof]
+    return max((model.distance(q) for q in own), key=lambda closest: closest.value)
 
 
 def _step(
@@ -310,13 +311,13 @@ def _step(
     k = int(np.argmax(steps[a, b] / largest_step))
     moved, allowed = (_amount(motion, k, each) for each in (steps[a, b, k], largest_step[k]))
     return (
-        f"the step limit: {motion.robot.label(k)} would have to move by {moved} in one step, "
+        f"the step limit: {motion.coordinates.label(k)} would have to move by {moved} in one step, "
         f"allowed are {allowed}"
     )
 
 
 def _amount(motion: SelfMotion, k: int, change: float) -> str:
     """Return in words the motion of a joint for a change of its coordinate."""
-    robot = motion.robot
-    far = change * robot.coordinate_sizes[k]
-    return f"{far:.3g} {robot.unit_of(robot.joint_names[k])}"
+    own = motion.coordinates
+    far = change * own.sizes[k]
+    return f"{far:.3g} {own.unit(k)}"

@@ -309,14 +309,13 @@ class SelfMotion:
     """
 
     def __init__(self, follows: Follows, spacing: float) -> None:
-        robot = follows.robot
-        self.robot, self.spacing = robot, spacing
-        self.revolute = robot.is_revolute
+        self.robot, self.coordinates, self.spacing = follows.robot, follows.coordinates, spacing
+        self.revolute = follows.coordinates.is_revolute
         self._tips = follows.kinematics()
-        everywhere = np.full(robot.dof, np.inf)
+        everywhere = np.full(follows.dof, np.inf)
         self._manifold = Manifold(follows, -everywhere, everywhere)
         # Any direction that is not a row of the Jacobian gives the tangent by projection.
-        self._direction = np.random.default_rng(0).normal(size=robot.dof)
+        self._direction = np.random.default_rng(0).normal(size=follows.dof)
 
     def project_all(
         self, q: Array, target: Array, *, far: bool = False
@@ -361,7 +360,7 @@ class SelfMotion:
     ) -> bool:
         """Add to `found` the curves it lacks; return whether there was one."""
         before = len(found.curves)
-        given = np.array(list(seeds)).reshape(-1, self.robot.dof)
+        given = np.array(list(seeds)).reshape(-1, self.coordinates.dof)
         projected, arrived = self.project_all(given, target, far=far)
         left = projected[arrived]
         left = left[found.locate(left)[0] < 0]
@@ -375,7 +374,7 @@ class SelfMotion:
 
     def _walk(self, start: Array, tangent: Array, target: Array) -> tuple[Array, bool]:
         """Return the samples (K, n) from `start` on, and whether they lead back to it."""
-        samples, on = np.empty((_MOST_SAMPLES, self.robot.dof)), self._manifold
+        samples, on = np.empty((_MOST_SAMPLES, self.coordinates.dof)), self._manifold
         count, closed = walk(
             start, tangent, target, on.chains, on.revolute, on.layout, self.spacing, samples
         )

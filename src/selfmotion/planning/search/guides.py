@@ -8,6 +8,7 @@ import numpy as np
 from selfmotion.basics import Array, Progress
 from selfmotion.model.path import Path, spread_along
 from selfmotion.model.task import log3
+from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.search.chains import Sequence
 from selfmotion.planning.search.manifold import OnPath
 from selfmotion.planning.search.measures import Length, measure_of
@@ -16,7 +17,6 @@ from selfmotion.planning.search.sequences import Layers, best_sequences, curve_l
 from selfmotion.planning.search.shortest import Shortest
 from selfmotion.planning.search.vertices import Admissible
 from selfmotion.problem.costs import PathLength
-from selfmotion.problem.problem import Problem
 
 # Number of refined sequences: the best among the samples is not always that of the best motion.
 _REFINED = 3
@@ -48,7 +48,9 @@ BESIDE = 0.3
 LAST_SMOOTHINGS = (3.0, 1.0, 0.3, 0.1, 0.03)
 
 
-def guides(problem: Problem, rng: np.random.Generator | int, progress: Progress) -> list[Sequence]:
+def guides(
+    formulation: Formulation, rng: np.random.Generator | int, progress: Progress
+) -> list[Sequence]:
     """Return guides from the best sequences over the self-motions, by the problem's own costs.
 
     Raises
@@ -56,37 +58,37 @@ def guides(problem: Problem, rng: np.random.Generator | int, progress: Progress)
     NoSequenceError
         No chain of configurations follows the path; says where it ends and why.
     """
-    weights = _weights(problem)
-    layers = layers_of(problem, weights, rng, progress)
-    measure = measure_of(problem.follows, problem.costs, layers.t, weights)
+    weights = _weights(formulation)
+    layers = layers_of(formulation, weights, rng, progress)
+    measure = measure_of(formulation, layers.t, weights)
     return best_sequences(layers, _REFINED, measure, progress)
 
 
 def layers_of(
-    problem: Problem, weights: Array, rng: np.random.Generator | int, progress: Progress
+    formulation: Formulation, weights: Array, rng: np.random.Generator | int, progress: Progress
 ) -> Layers:
-    """Return the vertices of a problem: samples of all self-motions, free and within limits.
+    """Return the vertices of a formulation: samples of all self-motions, free and within limits.
 
     Parameters
     ----------
-    problem : Problem
+    formulation : Formulation
     weights : (n,)
         Weight of a unit of each joint.
     rng : Generator or int
     progress : Progress
     """
-    asked, t = problem.envelope, waypoint_times(problem)
+    asked, t = formulation.envelope, waypoint_times(formulation)
     steps = np.minimum(asked.speed * np.diff(t)[:, None], np.pi)
     bodies = tuple((model, distance + _MARGIN) for model, distance in asked.bodies)
     limits = asked.lower, asked.upper
-    if has_curves(problem):
-        return curve_layers(problem.follows, t, steps, limits, bodies, rng, progress)
-    waypoints = OnPath(problem.follows, t, *limits)
+    if has_curves(formulation):
+        return curve_layers(formulation.follows, t, steps, limits, bodies, rng, progress)
+    waypoints = OnPath(formulation.follows, t, *limits)
     return sampled_layers(waypoints, t, steps, limits, bodies, weights, rng, progress)
 
 
 def shortest_along(
-    problem: Problem, t: Array, q: Array, where: Array, smoothings: abc.Sequence[float]
+    formulation: Formulation, t: Array, q: Array, where: Array, smoothings: abc.Sequence[float]
 ) -> tuple[Array, Array] | None:
     """Return the shortest configurations near those q (W, n) at t, at times `where`, (K,), (K, n).
 
@@ -94,21 +96,21 @@ def shortest_along(
     a little later instead: at a singular pose rounding may put it beyond reach, by next to nothing.
     None where that does not help, or one meets something.
     """
-    weights, asked = _weights(problem), problem.envelope
+    weights, asked = _weights(formulation), formulation.envelope
     edge = np.minimum(_CHAIN_EDGE, 1e-2 * (asked.upper - asked.lower))
     limits = asked.lower + edge, asked.upper - edge
-    waypoints = OnPath(problem.follows, where, *limits)
+    waypoints = OnPath(formulation.follows, where, *limits)
     here, arrived = waypoints.project_each(_between(t, q, where), np.arange(len(where)))
     if not arrived[[0, -1]].all():
         return None
     if not arrived.all():
         where = np.where(arrived, where, where + BESIDE * np.diff(where, append=where[-1]))
-        waypoints = OnPath(problem.follows, where, *limits)
+        waypoints = OnPath(formulation.follows, where, *limits)
         here, arrived = waypoints.project_each(_between(t, q, where), np.arange(len(where)))
         if not arrived.all():
             return None
     bodies = tuple((model, distance + _MARGIN) for model, distance in asked.bodies)
-    bounds = Admissible(*limits, problem.robot.is_revolute, bodies)
+    bounds = Admissible(*limits, formulation.coordinates.is_revolute, bodies)
     largest = np.minimum(_CHAIN_SPEED * asked.speed * np.diff(where)[:, None], np.pi)
     here = Shortest(waypoints, bounds, largest, weights).near(here, smoothings)
     return (where, here) if bounds.keep(here).all() else None
@@ -119,20 +121,20 @@ def _between(t: Array, q: Array, where: Array) -> Array:
     return np.column_stack([np.interp(where, t, joint) for joint in q.T])
 
 
-def asks_length(problem: Problem) -> bool:
+def asks_length(formulation: Formulation) -> bool:
     """Whether sequences are chosen by their length."""
-    t, weights = np.array([0.0, problem.path.duration]), _weights(problem)
-    return isinstance(measure_of(problem.follows, problem.costs, t, weights), Length)
+    t, weights = np.array([0.0, formulation.path.duration]), _weights(formulation)
+    return isinstance(measure_of(formulation, t, weights), Length)
 
 
-def has_curves(problem: Problem) -> bool:
+def has_curves(formulation: Formulation) -> bool:
     """Whether the self-motions of a problem are curves, at all times."""
-    return problem.follows.redundancy == 1 and not problem.follows.holds
+    return formulation.follows.redundancy == 1 and not formulation.follows.holds
 
 
-def waypoint_times(problem: Problem) -> Array:
+def waypoint_times(formulation: Formulation) -> Array:
     """Return times (W,) [s] at which to search for a problem's configurations."""
-    return search_times(problem.path, _FEWEST_OF_CURVES if has_curves(problem) else _FEWEST)
+    return search_times(formulation.path, _FEWEST_OF_CURVES if has_curves(formulation) else _FEWEST)
 
 
 def search_times(path: Path, fewest: int) -> Array:
@@ -150,9 +152,10 @@ def search_times(path: Path, fewest: int) -> Array:
     return np.asarray(times)
 
 
-def _weights(problem: Problem) -> Array:
+def _weights(formulation: Formulation) -> Array:
     """Return the weight of each joint's unit, (n,): that of the path's length, if it is a cost."""
-    for cost in problem.costs:
+    virtual = formulation.coordinates.weights[formulation.robot.dof :]
+    for cost in formulation.costs:
         if isinstance(cost, PathLength) and cost.joint_weights is not None:
-            return np.asarray(cost.joint_weights, dtype=np.float64)
-    return problem.robot.joint_weights
+            return np.append(np.asarray(cost.joint_weights, dtype=np.float64), virtual)
+    return formulation.coordinates.weights

@@ -236,12 +236,12 @@ class Manifold:
     """
 
     def __init__(self, follows: Follows, lower: Array, upper: Array) -> None:
-        self.follows, self.robot = follows, follows.robot
+        self.follows = follows
         # Copies: kernels would be compiled again for read-only arrays.
         self._limits = np.array(lower), np.array(upper)
         self._limited = np.isfinite(upper)
         self.chains = follows.chains
-        self.revolute: Flags = follows.robot.is_revolute
+        self.revolute: Flags = follows.coordinates.is_revolute
         self.layout = follows.layout
         self._check()
 
@@ -323,9 +323,9 @@ class Manifold:
 
     def _check(self) -> None:
         """Compare with Pinocchio: where it puts the tool, nothing is left to correct."""
-        ends = zip(self._limits, self.robot.finite_limits(), strict=True)
+        ends = zip(self._limits, self.follows.coordinates.finite_limits(), strict=True)
         lower, upper = (np.where(np.isfinite(own), own, finite) for own, finite in ends)
-        for q in np.random.default_rng(0).uniform(lower, upper, (3, self.robot.dof)):
+        for q in np.random.default_rng(0).uniform(lower, upper, (3, self.follows.dof)):
             items = self.follows.items
             poses = [item.chain.place(q) for item in items]
             target = np.concatenate(
@@ -336,8 +336,9 @@ class Manifold:
             for item, pose in zip(items, poses, strict=True):
                 distance = max(item.miss(pose, found[0]))
                 if not (arrived[0] and distance < _AGREE):
+                    name = self.follows.robot.name
                     raise RobotError(
-                        f"{self.robot.name}: compiled kinematics put '{item.chain.tip_name}' "
+                        f"{name}: compiled kinematics put '{item.chain.tip_name}' "
                         f"{distance:.3g} off where Pinocchio does; this is an error of selfmotion's"
                     )
 
@@ -356,7 +357,8 @@ class OnPath:
 
     def __init__(self, follows: Follows, t: Array, lower: Array, upper: Array) -> None:
         self._follows, self._manifold = follows, Manifold(follows, lower, upper)
-        self._targets, self.robot, self.count = follows.targets(t), follows.robot, len(t)
+        self._targets, self.count = follows.targets(t), len(t)
+        self.robot, self.coordinates = follows.robot, follows.coordinates
         self._held, self.redundancy = follows.held(t), follows.redundancy
 
     def project(self, q: Array, i: int, *, far: bool = False) -> tuple[Array, Flags]:

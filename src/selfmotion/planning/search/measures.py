@@ -1,14 +1,13 @@
 """Measures of chains of configurations: their length, or the problem's costs."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Self
 
 import numpy as np
 
 from selfmotion.basics import Array, Flags, Ints, kernel
-from selfmotion.model.follow import Follows
 from selfmotion.model.motion import Sampling
+from selfmotion.planning.formulation import Formulation
 from selfmotion.problem.costs import Cost, PathLength, Samples
 
 # Steps faster than this many times the mean speed of the shortest chain are sampling noise, which
@@ -170,7 +169,7 @@ class RunningCost:
 
     Attributes
     ----------
-    follows : Follows
+    formulation : Formulation
     t : (W,)
         Times of the waypoints [s].
     placed : tuple of Cost
@@ -185,7 +184,7 @@ class RunningCost:
         Whether chains go from the last waypoint to the first.
     """
 
-    follows: Follows
+    formulation: Formulation
     t: Array
     placed: tuple[Cost, ...]
     moving: tuple[Cost, ...]
@@ -196,22 +195,23 @@ class RunningCost:
     _steps: dict[tuple[int, int], "_Steps"] = field(default_factory=dict, repr=False)
 
     @classmethod
-    def by(cls, follows: Follows, costs: Sequence[Cost], t: Array) -> "RunningCost":
-        """Return that of costs over waypoints at times t (W,)."""
-        robot = follows.robot
+    def by(cls, formulation: Formulation, t: Array) -> "RunningCost":
+        """Return that of the costs over waypoints at times t (W,)."""
+        robot = formulation.robot
         lower, upper = robot.finite_limits()
         # Several times, since costs may take differences over them.
         q = lower + (upper - lower) * np.random.default_rng(0).uniform(0.3, 0.7, (8, robot.dof))
         sampling = Sampling.trapezoidal(np.linspace(t[0], t[-1], len(q)))
-        probe = Samples.along(follows, sampling, q, 0.1 * q)
+        probe = Samples.along(formulation.problem.follows, sampling, q, 0.1 * q)
         placed: list[Cost] = []
         moving: list[Cost] = []
-        for cost in costs:
+        for cost in formulation.costs:
             partials = cost.gradient(probe)
             if partials.qdd is not None or partials.qddd is not None:
                 continue
             (placed if partials.qd is None else moving).append(cost)
-        return cls(follows, t, tuple(placed), tuple(moving), robot.joint_weights)
+        weights = formulation.coordinates.weights
+        return cls(formulation, t, tuple(placed), tuple(moving), weights)
 
     def extended(
         self, k: int, before: Array, cost: Array, after: Array, step: Array, turning: Flags
@@ -268,16 +268,17 @@ class RunningCost:
         moved = np.linalg.norm(self.weights * difference, axis=1)
         lasting = np.maximum(duration, moved / self.speed)
         sampling = Sampling.trapezoidal(np.full(len(first), self.t[k] + 0.5 * duration))
+        own = difference[:, : self.formulation.robot.dof]
         samples = replace(
             here.samples,
             sampling=sampling,
-            q=before[first] + 0.5 * difference,
-            qd=difference / lasting[:, None],
+            q=here.samples.q[first] + 0.5 * own,
+            qd=own / lasting[:, None],
             # The kinematics hardly change within a step.
             tips=tuple(tip.at(first) for tip in here.samples.tips),
             task_jacobian=here.samples.task_jacobian[first],
         )
-        at_rest = replace(samples, qd=np.zeros_like(difference))
+        at_rest = replace(samples, qd=np.zeros_like(own))
         moving = sum(cost.value(samples) - cost.value(at_rest) for cost in self.moving)
         resting = sum(cost.value(at_rest) for cost in self.moving)
         return np.asarray(price + lasting * moving + duration * resting)
@@ -286,7 +287,10 @@ class RunningCost:
         known = self._places.get(id(q))
         if known is None or known.q is not q:
             sampling = Sampling.trapezoidal(np.full(len(q), self.t[k]))
-            samples = Samples.along(self.follows, sampling, q, np.zeros_like(q))
+            # Costs are functions of the arm's joints, which come first.
+            own = q[:, : self.formulation.robot.dof]
+            follows = self.formulation.problem.follows
+            samples = Samples.along(follows, sampling, own, np.zeros_like(own))
             cost = sum((cost.value(samples) for cost in self.placed), np.zeros(len(q)))
             known = _Places(q, samples, cost)
             _note(self._places, id(q), known, _LAYERS_KEPT * len(self.t))
@@ -333,12 +337,14 @@ Measure = Length | RunningCost
 """Adds up along chains of configurations, from one waypoint to the next."""
 
 
-def measure_of(follows: Follows, costs: Sequence[Cost], t: Array, weights: Array) -> Measure:
+def measure_of(formulation: Formulation, t: Array, weights: Array) -> Measure:
     """Return the measure of chains over waypoints at times t (W,).
 
     The costs, or the length with `weights` (n,) where it is all that they ask for.
     """
-    own = RunningCost.by(follows, costs, t)
-    if all(isinstance(cost, PathLength) for cost in costs) or not (own.placed or own.moving):
+    own = RunningCost.by(formulation, t)
+    has_length = all(isinstance(cost, PathLength) for cost in formulation.costs)
+    # Virtual joints have no length.
+    if (has_length and formulation.coordinates.virtual is None) or not (own.placed or own.moving):
         return Length(weights)
     return own

@@ -8,13 +8,13 @@ import numpy as np
 
 from selfmotion.basics import Array
 from selfmotion.model.collision import Closest, how_near
-from selfmotion.model.follow import AugmentedTaskFrames
+from selfmotion.model.follow import RelaxedFrames
 from selfmotion.model.path import edges_of, spread_along
 from selfmotion.model.task import POSITION_ROWS, ROW_NAMES, Relaxation
+from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.search.single_poses import CLIMBERS, MOST_EVALUATED, Found, SinglePoses
 from selfmotion.planning.search.starts import start_candidates
 from selfmotion.planning.search.vertices import AT_LIMIT
-from selfmotion.problem.problem import Problem
 
 # Poses along the path that are tried.
 _POSES = 64
@@ -62,7 +62,7 @@ def remedies(poses: SinglePoses, t: float, times: Array) -> list[str]:
     joint = least_excess(poses, t)
     if joint is not None:
         name, excess = joint
-        unit = poses.problem.asked.robot.unit_of(name)
+        unit = poses.problem.robot.unit_of(name)
         found.append(f"joint '{name}' going {excess:.3g} {unit} beyond its limit")
     return found
 
@@ -94,7 +94,7 @@ def least_deviation(poses: SinglePoses, t: float, rows: tuple[str, ...]) -> Arra
     By sampling: the least of many, which is then reduced. None if nothing is found, or the task
     does not prescribe these rows.
     """
-    asked = poses.problem.asked
+    asked = poses.problem
     prescribed = [ROW_NAMES[k] for k in asked.task.rows]
     rows = tuple(row for row in rows if row in prescribed)
     if not rows:
@@ -106,9 +106,9 @@ def least_deviation(poses: SinglePoses, t: float, rows: tuple[str, ...]) -> Arra
         if not set(item.rows) <= set(rows)
     )
     wider, n = poses.of(replace(asked, relaxations=(*others, more))), asked.robot.dof
-    follows = cast(AugmentedTaskFrames, wider.problem.follows)
+    follows = cast(RelaxedFrames, wider.formulation.follows)
     q = poses.some(t, CLIMBERS)[:, :n]
-    q = np.hstack([q, np.zeros((len(q), follows.robot.dof - n))])
+    q = np.hstack([q, np.zeros((len(q), follows.dof - n))])
     best: Array | None = None
     for _ in range(_SHRINKS):
         q, arrived = wider.project(q, t, far=True)
@@ -142,7 +142,7 @@ def least_excess(poses: SinglePoses, t: float) -> tuple[str, float] | None:
     lower, upper = poses.bounds.lower, poses.bounds.upper
     seeds = poses.some(t, CLIMBERS)
     found: list[tuple[float, str]] = []
-    for k, name in enumerate(poses.problem.asked.robot.joint_names):
+    for k, name in enumerate(poses.problem.robot.joint_names):
         if not (np.isfinite(lower[k]) or np.isfinite(upper[k])):
             continue
         wide = poses.with_limits(
@@ -199,7 +199,7 @@ class Obstruction:
     def reason(self) -> str:
         """The cause at that pose, and the extent of the search."""
         poses, found = self.poses, self.found
-        name = poses.robot.tool
+        name = poses.problem.robot.tool
         if self.is_met:
             return (
                 f"each configuration that was found to put '{name}' there, from {found.tries} "
@@ -207,7 +207,7 @@ class Obstruction:
             )
         q, _ = self._nearest
         position, rotation = self.errors
-        turned = f" and {rotation:.2g} rad" if poses.problem.asked.task.angular else ""
+        turned = f" and {rotation:.2g} rad" if poses.problem.task.angular else ""
         return (
             f"none was found that puts '{name}' there, from {found.tries} tries"
             f"{cause(poses, q[0])}: the nearest misses it by {1e3 * position:.3g} mm{turned}"
@@ -249,7 +249,7 @@ def _roomiest_pair(poses: SinglePoses, met: Array) -> tuple[Closest, float]:
 
 
 def obstruction(
-    problem: Problem, rng: np.random.Generator, suspect: float | None = None
+    formulation: Formulation, rng: np.random.Generator, suspect: float | None = None
 ) -> Obstruction | None:
     """Return a pose of the path without any configuration; None if all have one.
 
@@ -258,15 +258,17 @@ def obstruction(
     over the limits, and within the bands of tolerances; where self-motions are curves, all of
     these; and the configurations with the smallest overlaps, moved away.
     """
-    poses = SinglePoses(problem, rng)
-    times = spread_along(problem.path, _COARSE_POSES)
+    poses = SinglePoses(formulation, rng)
+    times = spread_along(formulation.path, _COARSE_POSES)
     known: dict[float, Array] = {}
-    order = _worst_first(problem, times)
+    order = _worst_first(formulation, times)
     if suspect is not None:
         order = [suspect, *(t for t in order if t != suspect)]
     for t in order:
         near = min(known, key=lambda other: abs(other - t), default=None)
-        found = poses.solve(t, np.empty((0, poses.robot.dof)) if near is None else known[near])
+        found = poses.solve(
+            t, np.empty((0, poses.coordinates.dof)) if near is None else known[near]
+        )
         if not len(found.free):
             found = poses.search_closely(t, found)
         if not len(found.free):
@@ -276,12 +278,12 @@ def obstruction(
     return None
 
 
-def _worst_first(problem: Problem, times: Array) -> list[float]:
+def _worst_first(formulation: Formulation, times: Array) -> list[float]:
     """Return times [s], after the first of the poses farthest from the middle of all.
 
     Without a solution at the start, no part can be planned; otherwise causes are mostly at an end.
     """
-    places = problem.path.samples(times).translation
+    places = formulation.path.samples(times).translation
     away = np.linalg.norm(places - places.mean(axis=0), axis=1)
     away[0] = np.inf
     return [float(t) for t in times[np.argsort(-away, kind="stable")]]
@@ -289,12 +291,12 @@ def _worst_first(problem: Problem, times: Array) -> list[float]:
 
 def cause(poses: SinglePoses, q: Array) -> str:
     """Return the cause why the arm reaches no further at q (n,); "" for none found."""
-    robot, follows, causes = poses.robot, poses.follows, []
-    near = np.minimum(q - robot.lower, robot.upper - q)[: poses.problem.asked.robot.dof] < AT_LIMIT
+    own, follows, causes = poses.coordinates, poses.follows, []
+    near = np.minimum(q - own.lower, own.upper - q)[: poses.problem.robot.dof] < AT_LIMIT
     if np.any(near):
-        names = ", ".join(f"'{robot.joint_names[k]}'" for k in np.flatnonzero(near))
+        names = ", ".join(f"'{own.names[k]}'" for k in np.flatnonzero(near))
         causes.append(f"at its limit: joint {names}")
-    best = robot.dexterous_configuration(poses.problem.asked.task)
+    best = own.dexterous(poses.problem.task)
     here, there = (
         float(np.linalg.svd(follows.jacobian(x), compute_uv=False)[-1]) for x in (q, best)
     )
@@ -323,7 +325,7 @@ class Reach:
 
 
 def reachable(
-    problem: Problem, starts: int, rng: np.random.Generator, suspect: float = 0.0
+    formulation: Formulation, starts: int, rng: np.random.Generator, suspect: float = 0.0
 ) -> Reach:
     """Return the extent to which single poses of the path are reachable, within joint limits.
 
@@ -331,8 +333,8 @@ def reachable(
     seeds where these end: a pose that no seed leads to is out of reach. Poses all along the path,
     and more about the time `suspect` [s], where a motion has failed.
     """
-    poses = SinglePoses(problem, rng, clear=False)
-    path, given = problem.path, poses.problem.given_start
+    poses = SinglePoses(formulation, rng, clear=False)
+    path, given = formulation.path, poses.formulation.given_start
     first = [given] if given is not None else start_candidates(poses.follows, starts, rng)
     knots = edges_of(path.knots)
     section = np.diff(knots)[min(int(np.searchsorted(knots, suspect, "right")), len(knots) - 1) - 1]
@@ -372,13 +374,13 @@ def _out_of_reach(poses: SinglePoses, time: float, q: Array, beyond: Array) -> s
     q (n,) is its configuration at `time`, the last one; `beyond` are later times.
     """
     begin = f"from t = {time:.6g} s on the pose is out of reach{cause(poses, q)}"
-    if len(poses.problem.asked.follows.items) > 1:
+    if len(poses.problem.follows.items) > 1:
         names = poses.follows.names
         return f"{begin}: no configuration was found that puts {names} on their paths"
     rounds = beyond[np.unique(np.linspace(0, len(beyond) - 1, _EXCESS_POSES).round().astype(int))]
     errors = [(*poses.nearest(float(t))[1][0], float(t)) for t in rounds]
     position, rotation, when = max(errors, key=lambda pair: pair[0] + pair[1])
-    turned = f" and {rotation:.2g} rad" if poses.problem.asked.task.angular else ""
+    turned = f" and {rotation:.2g} rad" if poses.problem.task.angular else ""
     return (
         f"{begin}: the nearest configuration found misses it by up to "
         f"{1e3 * position:.3g} mm{turned}, at t = {when:.4g} s"

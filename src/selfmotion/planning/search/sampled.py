@@ -61,7 +61,7 @@ def sampled_layers(
     rng : Generator or int
     progress : Progress
     """
-    bounds = Admissible(*limits, waypoints.robot.is_revolute, bodies)
+    bounds = Admissible(*limits, waypoints.coordinates.is_revolute, bodies)
     generator = np.random.default_rng(rng)
     samples = _layers(waypoints, bounds, steps, weights, generator, progress)
 
@@ -120,7 +120,7 @@ def _smooth_motions(
     waypoints: OnPath, bounds: Admissible, rng: np.random.Generator, progress: Progress
 ) -> list[Array]:
     """Return at all waypoints where motions with constant null motions are, each (K, n)."""
-    dof, last = waypoints.robot.dof, waypoints.count - 1
+    dof, last = waypoints.coordinates.dof, waypoints.count - 1
     vertices = [[np.empty((0, dof))] for _ in range(waypoints.count)]
     stations = stations_of(waypoints.count)
     for number, station in enumerate(stations, 1):
@@ -147,7 +147,7 @@ def _spread_out(q: Array, cost: Array, count: int) -> Array:
 
 def _starts(waypoints: OnPath, bounds: Admissible, station: int, rng: np.random.Generator) -> Array:
     """Return configurations within the limits, free where there are such, (K, n)."""
-    seeds = spread(waypoints.robot, _START_SEEDS, rng)
+    seeds = spread(waypoints.coordinates, _START_SEEDS, rng)
     q, arrived = waypoints.project(seeds, station, far=True)
     q = q[arrived]
     free = bounds.keep(q)

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from selfmotion.basics import Array, Flags, Ints, NoSequenceError, Progress, silent
+from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.search.chains import best_chains, connected, unturned
 from selfmotion.planning.search.guides import layers_of
 from selfmotion.planning.search.manifold import OnPath
 from selfmotion.planning.search.measures import Length, cheapest, near_pairs
 from selfmotion.planning.search.sequences import Layers
 from selfmotion.planning.search.vertices import Admissible
-from selfmotion.problem.problem import Problem
 
 # Cost of a change to another configuration: above that of any motion in between.
 _BREAK = 1e6
@@ -32,15 +32,15 @@ class _Jumps:
 
     Parameters
     ----------
-    problem : Problem
+    formulation : Formulation
     t : (W,)
         Times of the waypoints [s].
     steps : (W - 1, n)
         Largest change of each joint from one waypoint to the next [rad or m].
     """
 
-    def __init__(self, problem: Problem, t: Array, steps: Array) -> None:
-        self._problem, self._t, self._steps = problem, t, steps
+    def __init__(self, formulation: Formulation, t: Array, steps: Array) -> None:
+        self._formulation, self._t, self._steps = formulation, t, steps
         # The largest share of these that is no jump, as far as is known.
         self._most = 1.0
         # Waypoints at which steps were checked, and the results.
@@ -55,7 +55,7 @@ class _Jumps:
             steps = self._steps[first : first + len(q) - 1]
             share = (np.abs(np.diff(q, axis=0)) / steps).max(axis=1)
             t = self._t[first : first + len(q)]
-            (jumps,) = np.nonzero(jumps_of(self._problem, t[:-1], t[1:], q[:-1], q[1:]))
+            (jumps,) = np.nonzero(jumps_of(self._formulation, t[:-1], t[1:], q[:-1], q[1:]))
             jumping += share[jumps].tolist()
             others = max(others, float(np.delete(share, jumps).max(initial=0.0)))
             self._at |= {first + k for k in jumps.tolist()}
@@ -86,12 +86,14 @@ class _Jumps:
             here = before[first]
             there = here + unturned(after[second] - here, turning)
             early, late = (np.full(len(first), time) for time in self._t[k : k + 2])
-            jump = jumps_of(self._problem, early, late, here, there)
+            jump = jumps_of(self._formulation, early, late, here, there)
             self._known[key] = first[~jump], second[~jump]
         return self._known[key]
 
 
-def jumps_of(problem: Problem, early: Array, late: Array, here: Array, there: Array) -> Flags:
+def jumps_of(
+    formulation: Formulation, early: Array, late: Array, here: Array, there: Array
+) -> Flags:
     """Return the mask of steps from q (K, n) at times (K,) to others that no motion follows.
 
     A step is projected onto the path at a few points between its ends, within limits. Where arms
@@ -101,7 +103,9 @@ def jumps_of(problem: Problem, early: Array, late: Array, here: Array, there: Ar
     share = np.arange(1, _STEP_POINTS) / _STEP_POINTS
     times = (early[:, None] + (late - early)[:, None] * share).ravel()
     straight = here[:, None] + (there - here)[:, None] * share[:, None]
-    where = OnPath(problem.follows, times, problem.envelope.lower, problem.envelope.upper)
+    where = OnPath(
+        formulation.follows, times, formulation.envelope.lower, formulation.envelope.upper
+    )
     n = here.shape[1]
     found, arrived = where.project_each(straight.reshape(-1, n), np.arange(len(times)))
     between = found.reshape(len(here), len(share), n)
@@ -139,7 +143,7 @@ class ChainSegment:
 class ChainSegments:
     """Vertices along a path, and the fewest chains over them; made by `ChainSegments.of`."""
 
-    problem: Problem
+    formulation: Formulation
     _layers: Layers
     _jumps: _Jumps
 
@@ -150,7 +154,10 @@ class ChainSegments:
 
     @classmethod
     def of(
-        cls, problem: Problem, rng: np.random.Generator | int = 0, progress: Progress = silent
+        cls,
+        formulation: Formulation,
+        rng: np.random.Generator | int = 0,
+        progress: Progress = silent,
     ) -> "ChainSegments":
         """Return the vertices of a problem: samples of all self-motions, free and within limits.
 
@@ -159,8 +166,8 @@ class ChainSegments:
         NoSequenceError
             A pose of the path has no vertex at all; with the time and cause.
         """
-        layers = layers_of(problem, problem.robot.joint_weights, rng, progress)
-        found = cls(problem, layers, _Jumps(problem, layers.t, layers.steps))
+        layers = layers_of(formulation, formulation.coordinates.weights, rng, progress)
+        found = cls(formulation, layers, _Jumps(formulation, layers.t, layers.steps))
         found._pin_ends()
         found._check()
         return found
@@ -217,11 +224,11 @@ class ChainSegments:
 
     def _pin_ends(self) -> None:
         """Let nothing but a given start, and a given end, be a vertex there."""
-        start, samples = self.problem.given_start, self._layers.samples
+        start, samples = self.formulation.given_start, self._layers.samples
         if start is not None:
             samples[0] = start[None]
-        for item in self.problem.constraints:
-            end = item.fixed_end(self.problem.robot)
+        for item in self.formulation.problem.constraints:
+            end = item.fixed_end(self.formulation.robot)
             if end is not None:
                 samples[-1] = end[None]
                 self._keep_given(-1, "end configuration asked for")
@@ -232,7 +239,7 @@ class ChainSegments:
         q = self._layers.samples[i]
         if np.any(self._layers.bounds.beyond(q)):
             k = int(np.argmax(self._layers.bounds.beyond(q)))
-            joint = self.problem.robot.joint_names[k]
+            joint = self.formulation.robot.joint_names[k]
             raise self._refused(
                 i, f"the {name} has joint '{joint}' at {q[0, k]:.4g}, outside its limits"
             )
@@ -250,7 +257,7 @@ class ChainSegments:
         self, layers: list[Array], bounds: Admissible, forbidden: set[int]
     ) -> list[tuple[int, list[int]]]:
         """Return the first waypoint of each chain, and its vertices, first to last."""
-        length, turning = Length(self.problem.robot.joint_weights), bounds.turning
+        length, turning = Length(self.formulation.coordinates.weights), bounds.turning
         anywhere = np.full(len(turning), np.inf)
         cost = np.zeros(len(layers[0]))
         parents: list[Ints] = [np.arange(len(cost))]

@@ -103,7 +103,7 @@ def curve_layers(
     """
     motion, x = SelfMotion(follows, SPACING), follows.targets(t)
     bounds = Admissible(*limits, motion.revolute, bodies)
-    seeds = spread(follows.robot, TRACING_SEEDS, np.random.default_rng(rng))
+    seeds = spread(follows.coordinates, TRACING_SEEDS, np.random.default_rng(rng))
     curves = curves_along(motion, x, seeds, _RESTART_EVERY, progress)
     samples = _free_samples(motion, x, curves, bounds, progress)
 
@@ -157,7 +157,7 @@ def best_sequences(
         for number, q in enumerate(rough):
             progress(stage, number + 1, len(rough))
             rough[number] = better(q, roughly)
-        best = ranked(layers.t, rough, turning, layers.waypoints.robot.joint_weights, measure)
+        best = ranked(layers.t, rough, turning, layers.waypoints.coordinates.weights, measure)
         best = best[:count]
         rough = [np.array(sequence.q) for sequence in best]
     return best
@@ -170,7 +170,7 @@ def _rough_motions(vertices: Layers, given: Measure | None) -> tuple[list[Array]
     as a whole; if it does not fit, the search is repeated with all turns of these joints.
     """
     bounds = vertices.bounds
-    length = given if isinstance(given, Length) else Length(vertices.waypoints.robot.joint_weights)
+    length = given if isinstance(given, Length) else Length(vertices.waypoints.coordinates.weights)
     any_turn = bounds.without_turns()
     while True:
         layers, turning = [any_turn.layer(q) for q in vertices.samples], any_turn.turning
@@ -197,7 +197,7 @@ def _free_samples(
 ) -> list[Array]:
     """Return the free samples of the curves at every waypoint, without turns."""
     found: list[Array] = []
-    before = np.empty((0, motion.robot.dof))
+    before = np.empty((0, motion.coordinates.dof))
     for number, (target, here) in enumerate(zip(x, curves, strict=True), 1):
         progress("search: sampling waypoint", number, len(x))
         carried, arrived = motion.project_all(before, target)

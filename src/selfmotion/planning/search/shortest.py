@@ -19,7 +19,6 @@ from selfmotion.planning.search.chains import best_chains, connected, in_order
 from selfmotion.planning.search.manifold import LONGEST_CORRECTION, OnPath
 from selfmotion.planning.search.measures import Length, Measure
 from selfmotion.planning.search.vertices import AT_LIMIT, Admissible
-from selfmotion.problem.problem import BodiesOfArm
 
 # δ of the stages, as multiples of the chain's mean step.
 SMOOTHINGS = (10.0, 3.0, 1.0, 0.3, 0.1)
@@ -160,7 +159,7 @@ class Shortest:
         watched = np.flatnonzero(self._watched)
         found = [(watched[:0], np.empty(0), np.empty((0, q.shape[1])))]
         for model, wanted in self._smooth_models() if len(watched) else ():
-            # Virtual joints come after the arm's own, and move no bodies.
+            # Virtual joints come after the arm's, and move no bodies.
             own = model.robot.dof
             now = model.clearances(np.ascontiguousarray(q[watched, :own]))
             lack = wanted - now.values[now.rows, now.columns]
@@ -253,11 +252,10 @@ def _least(bases: Array, slope: Array, own: Array, between: Array, state: _State
     return np.asarray(np.einsum("wnd,wd->wn", bases, moves.reshape(count, size)))
 
 
-def _smooth(model: CollisionModel | BodiesOfArm, distance: float) -> tuple[ClearanceModel, float]:
+def _smooth(model: CollisionModel, distance: float) -> tuple[ClearanceModel, float]:
     """Return differentiable distances, and the required one [m]."""
     wanted = distance + _NEAR_BODIES
-    own = model.own if isinstance(model, BodiesOfArm) else model
-    return ClearanceModel(own, wanted, width=_SATURATED), wanted
+    return ClearanceModel(model, wanted, width=_SATURATED), wanted
 
 
 def improved_by(

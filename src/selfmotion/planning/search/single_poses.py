@@ -7,7 +7,7 @@ import numpy as np
 
 from selfmotion.basics import Array, Flags
 from selfmotion.model.collision import Closest
-from selfmotion.model.robot import RobotModel
+from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.search.curves import SPACING, SelfMotion
 from selfmotion.planning.search.manifold import Manifold
 from selfmotion.planning.search.starts import TRACING_SEEDS, spread
@@ -66,31 +66,40 @@ class SinglePoses:
 
     Parameters
     ----------
-    problem : Problem
+    formulation : Formulation
     rng : Generator
         Shifts the seeds.
     clear : bool
         Whether bodies have to keep their distances.
     """
 
-    def __init__(self, problem: Problem, rng: np.random.Generator, *, clear: bool = True) -> None:
-        problem = problem.augmented
-        required = problem.envelope_without_arm
-        self.problem, self._rng, self._clear = problem, rng, clear
-        self.robot: RobotModel = required.arm(problem.robot)
-        self.follows = problem.follows.for_robot(self.robot)
+    def __init__(
+        self, formulation: Formulation, rng: np.random.Generator, *, clear: bool = True
+    ) -> None:
+        required = formulation.envelope_without_arm
+        self.formulation, self._rng, self._clear = formulation, rng, clear
+        self.follows = formulation.follows.within(required.lower, required.upper)
+        self.coordinates = self.follows.coordinates
         self._manifold = Manifold(self.follows, required.lower, required.upper)
         self.bounds = Admissible(
-            required.lower, required.upper, self.robot.is_revolute, required.bodies if clear else ()
+            required.lower,
+            required.upper,
+            self.coordinates.is_revolute,
+            required.bodies if clear else (),
         )
-        self._seeds = spread(self.robot, _SEEDS, rng)
+        self._seeds = spread(self.coordinates, _SEEDS, rng)
         self._shift = np.zeros(3)
         # Cached: a path takes a millisecond to evaluate.
         self._targets: dict[float, Array] = {}
 
+    @property
+    def problem(self) -> Problem:
+        """The user's problem."""
+        return self.formulation.problem
+
     def of(self, problem: Problem) -> "SinglePoses":
         """Return that of another problem, its path moved as far as this one's."""
-        other = SinglePoses(problem, self._rng, clear=self._clear)
+        other = SinglePoses(Formulation.of(problem), self._rng, clear=self._clear)
         other._shift = self._shift
         return other
 
@@ -127,7 +136,7 @@ class SinglePoses:
 
     def first_blocked(self, times: Array) -> float | None:
         """Return the first of some times [s] at whose poses a quick search finds nothing."""
-        known = np.empty((0, self.robot.dof))
+        known = np.empty((0, self.coordinates.dof))
         for t in times.tolist():
             found = self.solve(t, known)
             if not len(found.free):
@@ -150,7 +159,7 @@ class SinglePoses:
 
     def search_closely(self, t: float, before: Found) -> Found:
         """Return the solutions by all methods, after a search without a free one."""
-        seeds = spread(self.robot, _MORE_SEEDS, self._rng)
+        seeds = spread(self.coordinates, _MORE_SEEDS, self._rng)
         far = self._reached(t, seeds, far=True)
         tries = before.tries + len(seeds)
         free = far[self.bounds.keep(far)]
@@ -185,7 +194,7 @@ class SinglePoses:
 
     def nearest(self, t: float, count: int = _APPROACHED) -> tuple[Array, Array]:
         """Return configurations as near to a pose as limits allow (K, n), and errors [m, rad]."""
-        seeds = spread(self.robot, count, self._rng)
+        seeds = spread(self.coordinates, count, self._rng)
         q, errors = self._manifold.approach(seeds, self.target(t), self._held(t))
         order = np.argsort(errors.sum(axis=1), kind="stable")
         return q[order], errors[order]
@@ -195,7 +204,7 @@ class SinglePoses:
         q, _ = self.nearest(t)
         near = np.repeat(q[:count], len(_CLOSE), axis=0)
         noise = self._rng.normal(size=near.shape) * np.tile(_CLOSE, count)[: len(near), None]
-        return np.concatenate([near + noise / self.robot.joint_weights, self._seeds])
+        return np.concatenate([near + noise / self.coordinates.weights, self._seeds])
 
     def _along_curves(self, t: float, met: Array) -> Array:
         """Return samples of all self-motions of a pose, where these are curves, (K, n).
@@ -203,12 +212,12 @@ class SinglePoses:
         Those within the limits: the curves go on beyond them.
         """
         if self.follows.redundancy != 1 or self._held(t).any():
-            return np.empty((0, self.robot.dof))
+            return np.empty((0, self.coordinates.dof))
         motion = SelfMotion(self.follows, SPACING)
         target = self.target(t)
-        seeds = spread(self.robot, TRACING_SEEDS, self._rng)
+        seeds = spread(self.coordinates, TRACING_SEEDS, self._rng)
         samples = [curve.q for curve in motion.curves(target, seeds).curves]
-        every = np.concatenate([np.empty((0, self.robot.dof)), *samples])
+        every = np.concatenate([np.empty((0, self.coordinates.dof)), *samples])
         q = self.bounds.representative(every)
         most = self.follows.within_bands(q)
         lower, upper = np.maximum(self.bounds.lower, -most), np.minimum(self.bounds.upper, most)
@@ -223,7 +232,7 @@ class SinglePoses:
         for _ in range(_WALKS):
             here = known[self._rng.integers(len(known), size=_WALKERS)]
             size = self._rng.choice(_WALK_STEPS, size=(_WALKERS, 1))
-            away = self._rng.normal(size=here.shape) * size / self.robot.joint_weights
+            away = self._rng.normal(size=here.shape) * size / self.coordinates.weights
             found, arrived = self.project(here + away, t)
             known = np.concatenate([known, found[arrived]])
             if self.bounds.keep(found[arrived]).any():
@@ -236,7 +245,7 @@ class SinglePoses:
         best = some[np.argsort([-self.room(q)[0] for q in some])[:CLIMBERS]]
         room = np.array([self.room(q)[0] for q in best])
         for size in _CLIMBS:
-            away = self._rng.normal(scale=size, size=best.shape) / self.robot.joint_weights
+            away = self._rng.normal(scale=size, size=best.shape) / self.coordinates.weights
             found, arrived = self.project(best + away, t)
             for k in np.flatnonzero(arrived):
                 here = self.room(found[k])[0]
@@ -248,6 +257,9 @@ class SinglePoses:
 
     def room(self, q: Array) -> tuple[float, Closest, float]:
         """Return the excess clearance at q (n,) [m], the worst pair, and the required distance."""
-        each = [(model.distance(q), required) for model, required in self.bounds.bodies]
+        each = [
+            (model.distance(q[: model.robot.dof]), required)
+            for model, required in self.bounds.bodies
+        ]
         rooms = ((closest.value - required, closest, required) for closest, required in each)
         return min(rooms, key=lambda found: found[0])

@@ -17,8 +17,7 @@ import numpy as np
 
 from selfmotion.basics import Array, Flags
 from selfmotion.certificate import Quantity
-from selfmotion.model.follow import Follows
-from selfmotion.model.robot import RobotModel
+from selfmotion.model.follow import Coordinates, Follows
 from selfmotion.planning.search.manifold import Manifold
 
 # Share of its limit from which on a row binds …
@@ -61,10 +60,10 @@ class Stacked:
         upper: Array,
         weights: Array,
     ) -> None:
-        free = np.full(follows.robot.dof, np.inf)
+        free = np.full(follows.dof, np.inf)
         self._follows, self._quantities = follows, quantities
         self._manifold, self._light = Manifold(follows, -free, free), 1.0 / weights
-        turns = follows.robot.is_revolute & (upper - lower >= _WHOLE_TURN)
+        turns = follows.coordinates.is_revolute & (upper - lower >= _WHOLE_TURN)
         self._lower, self._upper = np.where(turns, -np.inf, lower), np.where(turns, np.inf, upper)
 
     def placed(self, q: Array, time: float) -> tuple[Array, Flags]:
@@ -158,19 +157,19 @@ class Stacked:
         return np.concatenate(slopes, axis=1), np.concatenate(beyond, axis=1)
 
 
-def metrics(robot: RobotModel) -> list[Array]:
+def metrics(coordinates: Coordinates) -> list[Array]:
     """Return weights of the joints (n,): the usual ones first, then each part heavy in turn.
 
     Parts are those of a cell, and joints that slide where others turn; of a part of few joints each
     joint is heavy by itself as well. One for an arm that has no parts.
     """
-    usual = np.asarray(robot.joint_weights) ** 2
-    groups = _groups(robot)
+    usual = np.asarray(coordinates.weights) ** 2
+    groups = _groups(coordinates)
     if len(groups) < 2:
         return [usual]
     largest = max(groups, key=lambda group: int(group.sum()))
     alone = [
-        np.arange(robot.dof) == joint
+        np.arange(coordinates.dof) == joint
         for group in groups
         if group is not largest and group.sum() > 1
         for joint in np.flatnonzero(group)
@@ -178,12 +177,12 @@ def metrics(robot: RobotModel) -> list[Array]:
     return [usual, *(np.where(heavy, _HEAVY, 1.0) * usual for heavy in [*groups, *alone])]
 
 
-def _groups(robot: RobotModel) -> list[Flags]:
+def _groups(coordinates: Coordinates) -> list[Flags]:
     """Return the joints of each part of a cell, (n,) each; or those that slide, and that turn."""
-    names = robot.joint_names
-    prefixes = [f"{part.name}/" for part in robot.urdf.parts]
+    names = coordinates.names
+    prefixes = [f"{part.name}/" for part in coordinates.robot.urdf.parts]
     found = [np.array([name.startswith(prefix) for name in names]) for prefix in prefixes]
     if len(found) < 2:
-        slides = np.array([robot.is_prismatic(name) for name in names])
+        slides = np.array([coordinates.unit(k) == "m" for k in range(len(names))])
         found = [~slides, slides]
     return [group for group in found if group.any()]

@@ -6,8 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from selfmotion.basics import Array, InverseKinematicsError
-from selfmotion.model.follow import Follows
-from selfmotion.model.robot import RobotModel
+from selfmotion.model.follow import Coordinates, Follows
 from selfmotion.planning.search.chains import UNLIKE
 from selfmotion.planning.search.curves import SPACING, SelfMotion
 from selfmotion.planning.search.manifold import Manifold
@@ -96,17 +95,17 @@ def _along_curves(
     follows: Follows, count: int, rng: np.random.Generator, admits: Admits, time: float
 ) -> list[Array]:
     """Return up to `count` configurations within the limits, evenly over all curves."""
-    robot, motion = follows.robot, SelfMotion(follows, SPACING)
-    bounds = Admissible(robot.lower, robot.upper, motion.revolute, ())
+    own, motion = follows.coordinates, SelfMotion(follows, SPACING)
+    bounds = Admissible(own.lower, own.upper, motion.revolute, ())
     curves = motion.curves(
-        follows.targets(np.array([time]))[0], spread(robot, TRACING_SEEDS, rng)
+        follows.targets(np.array([time]))[0], spread(own, TRACING_SEEDS, rng)
     ).curves
     # The last sample of a closed curve equals its first one.
     samples = [curve.q[: len(curve.q) - curve.closed] for curve in curves]
     inside = [q[bounds.free(q) & admits(q)] for q in samples]
     total = sum(map(len, inside))
     stride = max(1, -(-total // count))
-    every = np.concatenate([np.empty((0, robot.dof)), *inside])[::stride]
+    every = np.concatenate([np.empty((0, own.dof)), *inside])[::stride]
     return [bounds.turned_inside(q[None])[0] for q in bounds.representative(every)]
 
 
@@ -114,12 +113,12 @@ def _scattered(
     follows: Follows, count: int, rng: np.random.Generator, admits: Admits, time: float
 ) -> list[Array]:
     """Return up to `count` configurations that Newton's method finds, none near another."""
-    robot = follows.robot
-    manifold = Manifold(follows, robot.lower, robot.upper)
+    own = follows.coordinates
+    manifold = Manifold(follows, own.lower, own.upper)
     target, found = follows.targets(np.array([time]))[0], list[Array]()
     held = follows.held(np.array([time]))[0]
     for _ in range(_START_ROUNDS):
-        seeds = spread(robot, _TRIES * count, rng)
+        seeds = spread(own, _TRIES * count, rng)
         q, arrived = manifold.project(seeds, target, far=True, held=held)
         # Near ones lead to the same plan once the start may move.
         for one in q[arrived][admits(q[arrived])]:
@@ -138,10 +137,10 @@ def _approached(
 
     It lets go of limits again: where these are narrow, Newton's method stops at some of them.
     """
-    robot, t = follows.robot, np.array([time])
-    manifold = Manifold(follows, robot.lower, robot.upper)
+    own, t = follows.coordinates, np.array([time])
+    manifold = Manifold(follows, own.lower, own.upper)
     target, held, found = follows.targets(t)[0], follows.held(t)[0], list[Array]()
-    seeds = spread(robot, _TRIES * count, rng)
+    seeds = spread(own, _TRIES * count, rng)
     near, errors = manifold.approach(seeds, target, held)
     near = near[(errors <= _NEARLY).all(axis=1)]
     if not len(near):
@@ -162,7 +161,7 @@ def carried(
     regarded, and likewise back from the one of number `at`, where the configurations are; and of
     which that is possible, (K,).
     """
-    free = np.full(follows.robot.dof, np.inf)
+    free = np.full(follows.dof, np.inf)
     manifold = Manifold(follows, -free, free)
     targets, helds = follows.targets(t), follows.held(t)
     motions, going = (
@@ -179,18 +178,18 @@ def carried(
     return motions, going
 
 
-def spread(robot: RobotModel, count: int, rng: np.random.Generator) -> Array:
+def spread(coordinates: Coordinates, count: int, rng: np.random.Generator) -> Array:
     """Return configurations that fill the limits evenly, (count, n).
 
     The additive recurrence with the generalised golden ratio: fractions of k g^-1 … k g^-n, where
     g > 1 solves g^(n+1) = g + 1 (M. Roberts, "The unreasonable effectiveness of quasirandom
     sequences", 2018).
     """
-    lower, upper = robot.finite_limits()
+    lower, upper = coordinates.finite_limits()
     ratio = 2.0
     for _ in range(60):
-        ratio = (1.0 + ratio) ** (1.0 / (robot.dof + 1.0))
-    steps = ratio ** -np.arange(1.0, robot.dof + 1.0)
-    shift = rng.uniform(size=robot.dof)
+        ratio = (1.0 + ratio) ** (1.0 / (coordinates.dof + 1.0))
+    steps = ratio ** -np.arange(1.0, coordinates.dof + 1.0)
+    shift = rng.uniform(size=coordinates.dof)
     shares = (shift + np.arange(1, count + 1)[:, None] * steps) % 1.0
     return np.asarray(lower + (upper - lower) * shares)

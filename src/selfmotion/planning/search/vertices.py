@@ -118,7 +118,7 @@ class Admissible:
         """Whether bodies keep their distances at each of q (K, n)."""
         clear = np.ones(len(q), dtype=bool)
         for model, distance in self.bodies:
-            clear[clear] = ~model.colliding(q[clear], distance)
+            clear[clear] = ~model.colliding(q[clear, : model.robot.dof], distance)
         return clear
 
     def all_turns(self, q: Array) -> Array:
@@ -160,7 +160,7 @@ def place_vertices(
         Largest gap in the configuration norm.
     """
     if not curves.curves:
-        return np.empty((0, motion.robot.dof))
+        return np.empty((0, motion.coordinates.dof))
     sampler = _Sampler(motion, target, curves, bounds, spacing)
     return np.vstack(sampler.vertices(carried))
 
@@ -192,7 +192,7 @@ class _Sampler:
         number, row = np.concatenate(numbers), np.concatenate(rows)
         arc = np.concatenate(arcs)
         fresh = row < 0
-        q = np.empty((len(row), self.motion.robot.dof))
+        q = np.empty((len(row), self.motion.coordinates.dof))
         q[~fresh], q[fresh] = carried[row[~fresh]], self.curves.at(number[fresh], arc[fresh])
         # Samples farther outside of the limits would stay outside after projection onto their
         # curve.

@@ -1,26 +1,36 @@
 """Constraints on a motion: limits, end conditions, closed paths, clearance."""
 
+from selfmotion.problem.constraints.active import (
+    ActiveConstraint as ActiveConstraint,
+    Multipliers as Multipliers,
+    active_of as active_of,
+)
 from selfmotion.problem.constraints.band import Band as Band
 from selfmotion.problem.constraints.base import Constraint as Constraint, Envelope as Envelope
+from selfmotion.problem.constraints.bound import Conditions as Conditions
+from selfmotion.problem.constraints.bound_ends import (
+    BoundEnd as BoundEnd,
+    EndCondition as EndCondition,
+)
+from selfmotion.problem.constraints.bound_limits import BoundLimits as BoundLimits
 from selfmotion.problem.constraints.clearance import (
     BoundClearance as BoundClearance,
     Clearance as Clearance,
 )
 from selfmotion.problem.constraints.conditions import (
-    ActiveConstraint as ActiveConstraint,
     BoundConstraint as BoundConstraint,
-    Multipliers as Multipliers,
+    BoundQuantity as BoundQuantity,
+    DependsOn as DependsOn,
+    Linear as Linear,
     NodeTangents as NodeTangents,
-    active_of as active_of,
-    easing_of as easing_of,
     linearised as linearised,
+    motion_of_order as motion_of_order,
     penalised as penalised,
     penalty as penalty,
     violated as violated,
     worst_time as worst_time,
 )
 from selfmotion.problem.constraints.ends import (
-    BoundEnd as BoundEnd,
     ClosedPath as ClosedPath,
     EndAcceleration as EndAcceleration,
     EndConfiguration as EndConfiguration,
@@ -29,7 +39,6 @@ from selfmotion.problem.constraints.ends import (
     StartVelocity as StartVelocity,
 )
 from selfmotion.problem.constraints.limits import (
-    BoundLimits as BoundLimits,
     JointAccelerationLimits as JointAccelerationLimits,
     JointJerkLimits as JointJerkLimits,
     JointPositionLimits as JointPositionLimits,
@@ -44,8 +53,10 @@ __all__ = [
     "BoundConstraint",
     "Clearance",
     "ClosedPath",
+    "Conditions",
     "Constraint",
     "EndAcceleration",
+    "EndCondition",
     "EndConfiguration",
     "EndVelocity",
     "Envelope",

@@ -14,7 +14,8 @@ from selfmotion.certificate import JointLimits, Quantity, QuantityWithinLimits, 
 from selfmotion.model.collision import CollisionModel
 from selfmotion.model.follow import Follows
 from selfmotion.model.robot import RobotModel
-from selfmotion.problem.constraints.conditions import BoundConstraint, BoundQuantity
+from selfmotion.problem.constraints.bound import Conditions
+from selfmotion.problem.constraints.conditions import BoundQuantity
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,8 +105,8 @@ class Constraint(Saved, ABC, family="constraint"):
     """Something that a motion must keep, not yet bound to an arm.
 
     A user's own class gives the `quantity` that it limits. From that follow the conditions of the
-    optimiser (`bind`), and the independent judgement of the finished motion by the certificate
-    (`requirement`). A constraint that is no limited quantity gives these two instead.
+    optimiser (`conditions`), and the independent judgement of the finished motion by the
+    certificate (`requirement`). A constraint that is no limited quantity gives these two instead.
     `selfmotion.testing.check_constraint` checks either.
 
     Attributes
@@ -140,15 +141,16 @@ class Constraint(Saved, ABC, family="constraint"):
         """Return the quantity and its limits; ProblemError if it does not fit the arm."""
         raise ProblemError(
             f"constraint {type(self).__name__} does not say what it asks for: give it "
-            f"quantity(robot), or bind(…) and requirement(robot)"
+            f"quantity(robot), or conditions(robot) and requirement(robot)"
         )
 
-    def bind(self, follows: Follows, start: Array, end: Array) -> BoundConstraint:
-        """Return the conditions on the motion of an arm; ProblemError where it misfits.
+    def conditions(self, robot: RobotModel) -> Conditions:
+        """Return the conditions on the motion of an arm; ProblemError if it does not fit."""
+        return Conditions(points=(BoundQuantity(self.quantity(robot), self.margin),))
 
-        `start` and `end` (n,) are those of the initial motion of the optimisation.
-        """
-        return BoundQuantity(self.quantity(follows.robot), self.margin)
+    def decomposed_conditions(self, robot: RobotModel) -> Conditions:
+        """Return the same with links as convex pieces instead of hulls, if it is on bodies."""
+        return self.conditions(robot)
 
     def requirement(self, robot: RobotModel) -> Requirement:
         """Return the requirement for the certificate; ProblemError if it does not fit the arm."""

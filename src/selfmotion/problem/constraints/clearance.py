@@ -23,10 +23,15 @@ from selfmotion.model.collision import (
     how_near,
     obstacle_from_dict,
 )
-from selfmotion.model.follow import Follows
 from selfmotion.model.robot import RobotModel
 from selfmotion.problem.constraints.base import Constraint, Envelope
-from selfmotion.problem.constraints.conditions import NodeTangents, motion_of_order
+from selfmotion.problem.constraints.bound import Conditions
+from selfmotion.problem.constraints.conditions import (
+    BoundConstraint,
+    Linear,
+    NodeTangents,
+    motion_of_order,
+)
 from selfmotion.problem.costs import Samples
 
 # Largest distance that is accepted [m].
@@ -104,12 +109,12 @@ class Clearance(Constraint):
         return self._models(robot).exact
 
     @override
-    def bind(self, follows: Follows, start: Array, end: Array) -> BoundClearance:
-        return BoundClearance(self._models(follows.robot).smooth, self.distance)
+    def conditions(self, robot: RobotModel) -> Conditions:
+        return Conditions(points=(BoundClearance(self._models(robot).smooth, self.distance),))
 
-    def bind_decomposed(self, follows: Follows) -> BoundClearance:
-        """Return `bind` with links decomposed into convex pieces before obstacles."""
-        return BoundClearance(self._models(follows.robot).decomposed, self.distance)
+    @override
+    def decomposed_conditions(self, robot: RobotModel) -> Conditions:
+        return Conditions(points=(BoundClearance(self._models(robot).decomposed, self.distance),))
 
     @override
     def requirement(self, robot: RobotModel) -> Separation:
@@ -182,68 +187,63 @@ _models_of: WeakKeyDictionary[Clearance, WeakKeyDictionary[RobotModel, _Models]]
 
 
 @dataclass(frozen=True, eq=False)
-class BoundClearance:
+class BoundClearance(BoundConstraint):
     """h = (d_min + margin - d) / 0.1 m for each pair of bodies."""
 
     model: ClearanceModel
     distance: float
     name: str = "clearance"
-    equality = False
     margin: float = 1e-4
-    _last: list[Any] = field(default_factory=list, repr=False)
+    tolerance: float = field(init=False)
+    _last: list[Any] = field(default_factory=list, init=False, repr=False)
 
-    @property
-    def tolerance(self) -> float:
-        """See `BoundConstraint.tolerance`: half the margin."""
-        return 0.5 * self.margin / _METRE
+    def __post_init__(self) -> None:
+        # Half the margin is left.
+        object.__setattr__(self, "tolerance", 0.5 * self.margin / _METRE)
 
+    @override
     def residual(self, samples: Samples) -> Array:
-        """See `BoundConstraint.residual`."""
         return (self.distance + self.margin - self._clearances(samples).values) / _METRE
 
-    def above(self, samples: Samples, level: float) -> Flags:
-        """Return at which nodes some h is more than a level that is hardly below 0, (N + 1,).
-
-        Where the distances are not known yet, this takes much less time than these.
-        """
+    @override
+    def exceeds(self, samples: Samples, level: float) -> Flags:
+        # Where the distances are not known yet, this takes much less time than these.
         least = self.distance + self.margin - level * _METRE
-        q = self._of_arm(samples)
+        q = motion_of_order(samples, 0)
         if self._knows(q):
             return np.asarray((self._last[1].values < least).any(axis=1))
         return self.model.closer(q, least)
 
+    @override
+    def stricter(self, by: float) -> BoundClearance:
+        return replace(self, distance=self.distance + by)
+
+    @override
     def tangents(self, samples: Samples, motion: NodeTangents) -> Array:
-        """See `BoundConstraint.tangents`."""
         return _Pull(self._clearances(samples)).all(motion)
 
-    def linearised_at(self, samples: Samples) -> tuple[tuple[int, int], _Pull]:
-        """See `linearised`."""
+    @override
+    def linearised_at(self, samples: Samples) -> tuple[tuple[int, int], Linear]:
         now = self._clearances(samples)
         return (len(now.values), now.values.shape[1]), _Pull(now)
 
     def _clearances(self, samples: Samples) -> Clearances:
         """Return the distances at the nodes; those of the last motion are cached."""
-        q = self._of_arm(samples)
+        q = motion_of_order(samples, 0)
         if not self._knows(q):
             self._last[:] = [q, self.model.clearances(q)]
         return cast(Clearances, self._last[1])
 
-    def _of_arm(self, samples: Samples) -> Array:
-        """Return q at the nodes of the joints that move bodies, which come first, (N + 1, n)."""
-        q = motion_of_order(samples, 0)
-        dof = self.model.robot.dof
-        return q if q.shape[1] == dof else np.ascontiguousarray(q[:, :dof])
-
     def _knows(self, q: Array) -> bool:
         return bool(self._last) and np.array_equal(self._last[0], q)
 
+    @override
     def easing(self, column: int) -> tuple[float, str]:
-        """See `easing_of`: a millimetre."""
         first, second = self.model.pairs[column]
         return 1e-3 / _METRE, f"1 mm less between '{first}' and '{second}'"
 
+    @override
     def describe(self, samples: Samples, row: int, column: int) -> str:
-        """See `BoundConstraint.describe`."""
         first, second = self.model.pairs[column]
         value = self.distance + self.margin - self.residual(samples)[row, column] * _METRE
         of_hulls = "" if self.model.is_exact(column) else "the convex hulls of "
@@ -261,15 +261,12 @@ class _Pull:
 
     def all(self, motion: NodeTangents) -> Array:
         """Return the entries of all rows and columns."""
-        return self.clearances.along(-self._moved(motion) / _METRE)
+        return self.clearances.along(-motion.q / _METRE)
 
     def picked(self, motion: NodeTangents, rows: Ints, columns: Ints) -> Array:
         """See `Linear.picked`."""
         slopes = self.clearances.slopes_at(rows, columns)
-        return np.asarray(np.einsum("kn,knd->kd", slopes, self._moved(motion)[rows])) / -_METRE
-
-    def _moved(self, motion: NodeTangents) -> Array:
-        return motion.q[:, : self.clearances.slopes.shape[1]]
+        return np.asarray(np.einsum("kn,knd->kd", slopes, motion.q[rows])) / -_METRE
 
 
 # Distances saturate this far beyond the required one [m]: well outside of the optimiser's active

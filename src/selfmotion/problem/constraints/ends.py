@@ -15,86 +15,8 @@ from selfmotion.model.follow import Follows
 from selfmotion.model.path import REST_SPEED
 from selfmotion.model.robot import RobotModel
 from selfmotion.problem.constraints.base import Constraint
-from selfmotion.problem.constraints.conditions import NodeTangents, motion_of_order
-from selfmotion.problem.costs import Samples
-
-# Distance from the target at which the optimiser's end counts as near [rad, rad/s]: Newton's method
-# closes the rest.
-_NEAR = 1e-4
-# A configuration is another solution of the same pose if its distance from the target is above this
-# factor of that of its null coordinates …
-_FARTHER = 2.0
-# … and above this distance [rad or m].
-_ELSEWHERE = 1e-3
-
-
-@dataclass(frozen=True, eq=False)
-class BoundEnd:
-    """Nᵀ(x - target) = 0 at an end (`row`), or Nᵀ(x(T) - x(0)) = 0 without a target.
-
-    x is q, q̇ or both. Where that is all that is left to ask for of q, `is_whole`, it is to be the
-    target: other configurations on the same pose may be on the plane Nᵀ(q - target) = 0 as well.
-    """
-
-    name: str
-    orders: tuple[int, ...]
-    target: Array | None
-    null: Array
-    row: int = -1
-    is_whole: bool = False
-    equality = True
-    tolerance = _NEAR
-
-    def residual(self, samples: Samples) -> Array:
-        """See `BoundConstraint.residual`."""
-        parts = []
-        for order in self.orders:
-            x = motion_of_order(samples, order)
-            reached, wanted = (x[-1], x[0]) if self.target is None else (x[self.row], self.target)
-            parts.append(self.null.T @ (reached - wanted))
-        return np.concatenate(parts)[None, :]
-
-    def tangents(self, samples: Samples, motion: NodeTangents) -> Array:
-        """See `BoundConstraint.tangents`."""
-        parts = []
-        for order in self.orders:
-            x = motion.of_order(order)
-            parts.append(self.null.T @ (x[-1] - x[0] if self.target is None else x[self.row]))
-        return np.concatenate(parts)[None]
-
-    def elsewhere(self, first: Array, last: Array) -> float:
-        """Return the distance of q from the target if it is another solution of the pose, else 0.
-
-        For q at the first and the last node, (n,) each [rad or m].
-        """
-        if not self.is_whole:
-            return 0.0
-        away = last - first if self.target is None else (last if self.row else first) - self.target
-        far, said = (float(np.linalg.norm(x)) for x in (away, self.null.T @ away))
-        return far if far > _FARTHER * said + _ELSEWHERE else 0.0
-
-    def describe(self, samples: Samples, row: int, column: int) -> str:
-        """See `BoundConstraint.describe`."""
-        order = self.orders[column // self.null.shape[1]]
-        quantity = QUANTITIES[order]
-        goal = "that of the start" if self.target is None else "the one asked for"
-        miss = np.abs(self.residual(samples)).max()
-        where = "end" if self.row else "start"
-        unit = ("rad or m", "rad/s or m/s", "rad/s² or m/s²")[order]
-        return (
-            f"the {quantity} at the {where} is {miss:.3g} {unit} away from {goal} "
-            f"({self.tolerance:g} allowed)"
-        )
-
-
-# Conditions on the end of the motion: a configuration, rest, repetition.
-#
-# The tool's rows of q(T) and q̇(T) are given by the path. The remaining conditions are the r
-# coordinates along the self-motion: h = Nᵀ(x(T) - target), with N an orthonormal null-space basis
-# at the target configuration, at the start for closed paths, or at the end of the initial motion.
-# Two configurations on the same pose with equal coordinates are equal, near the reference, and so
-# are two velocities with the same tool velocity; the residual is free of the path error of the
-# integration.
+from selfmotion.problem.constraints.bound import Conditions
+from selfmotion.problem.constraints.bound_ends import EndCondition
 
 # Largest difference of a start velocity from that of the path [m/s, rad/s].
 _NEAR_TWIST = 1e-6
@@ -119,10 +41,9 @@ class EndConfiguration(Constraint):
     q: npt.ArrayLike
 
     @override
-    def bind(self, follows: Follows, start: Array, end: Array) -> BoundEnd:
-        target = read_only(follows.robot.configuration(self.q))
-        null = follows.null_basis(target)
-        return BoundEnd("end configuration", (0,), target, null, is_whole=True)
+    def conditions(self, robot: RobotModel) -> Conditions:
+        target = read_only(robot.configuration(self.q))
+        return Conditions(ends=(EndCondition("end configuration", (0,), target, is_whole=True),))
 
     @override
     def requirement(self, robot: RobotModel) -> EndState:
@@ -161,10 +82,9 @@ class _EndRate(Constraint):
         return f"{'start' if self.at_start else 'end'} {QUANTITIES[self.order]}"
 
     @override
-    def bind(self, follows: Follows, start: Array, end: Array) -> BoundEnd:
-        null = follows.null_basis(start if self.at_start else end)
-        row = 0 if self.at_start else -1
-        return BoundEnd(self._name, (self.order,), self.target(follows.robot), null, row)
+    def conditions(self, robot: RobotModel) -> Conditions:
+        target = self.target(robot)
+        return Conditions(ends=(EndCondition(self._name, (self.order,), target, self.at_start),))
 
     @override
     def requirement(self, robot: RobotModel) -> EndState:
@@ -294,9 +214,9 @@ class ClosedPath(Constraint):
         as_flag(self.velocity, "closed path: velocity")
 
     @override
-    def bind(self, follows: Follows, start: Array, end: Array) -> BoundEnd:
+    def conditions(self, robot: RobotModel) -> Conditions:
         orders = (0, 1) if self.velocity else (0,)
-        return BoundEnd("closed path", orders, None, follows.null_basis(start), is_whole=True)
+        return Conditions(ends=(EndCondition("closed path", orders, None, is_whole=True),))
 
     @override
     def requirement(self, robot: RobotModel) -> ClosedMotion:

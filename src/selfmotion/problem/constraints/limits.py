@@ -3,23 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
 import numpy.typing as npt
 from typing_extensions import override
 
-from selfmotion.basics import Array, Ints, ProblemError, as_flag, as_number, per_joint, read_only
+from selfmotion.basics import Array, ProblemError, as_flag, as_number, per_joint, read_only
 from selfmotion.certificate import LIMIT_NAMES, Column, JointLimits, Quantity
-from selfmotion.model.follow import Follows
 from selfmotion.model.robot import Dynamics, RobotModel, check_radians
 from selfmotion.problem.constraints.base import Constraint, Envelope
-from selfmotion.problem.constraints.conditions import NodeTangents, motion_of_order
-from selfmotion.problem.costs import Samples
+from selfmotion.problem.constraints.bound import Conditions
+from selfmotion.problem.constraints.bound_limits import BoundLimits
 
-_QUANTITIES = ("position", "speed", "acceleration", "jerk")
-_POWERS = ("", "/s", "/s²", "/s³")
 _RATES = ("position", "velocity", "acceleration", "jerk")
 
 
@@ -49,9 +45,9 @@ class JointPositionLimits(Constraint):
         as_flag(self.replace, f"{type(self).__name__}: replace")
 
     @override
-    def bind(self, follows: Follows, start: Array, end: Array) -> BoundLimits:
-        robot = follows.robot
-        return BoundLimits.of(robot, self.requirement(robot), self.margin)
+    def conditions(self, robot: RobotModel) -> Conditions:
+        limits = BoundLimits.of(robot, self.requirement(robot), self.margin)
+        return Conditions(limits=(limits,))
 
     @override
     def requirement(self, robot: RobotModel) -> JointLimits:
@@ -123,8 +119,9 @@ class _RateLimits(Constraint):
         return bool(np.isfinite(self.of(robot)).any())
 
     @override
-    def bind(self, follows: Follows, start: Array, end: Array) -> BoundLimits:
-        return BoundLimits.of(follows.robot, self.requirement(follows.robot), self.margin)
+    def conditions(self, robot: RobotModel) -> Conditions:
+        limits = BoundLimits.of(robot, self.requirement(robot), self.margin)
+        return Conditions(limits=(limits,))
 
     @override
     def requirement(self, robot: RobotModel) -> JointLimits:
@@ -203,92 +200,6 @@ class JointJerkLimits(_RateLimits):
 
 def _check_margin(margin: float) -> None:
     as_number(margin, "limits: margin", above=0.0, most=1.0)
-
-
-@dataclass(frozen=True, eq=False)
-class BoundLimits:
-    """lower ≤ x ≤ upper for x = q, q̇, q̈ or the jerk of the joints that have finite limits.
-
-    h = (x - upper) / s + margin and (lower - x) / s + margin, with s = 1 for positions and the
-    limit itself for its derivatives.
-    """
-
-    name: str
-    order: int
-    joints: npt.NDArray[np.intp]
-    joint_names: tuple[str, ...]
-    units: tuple[str, ...]
-    lower: Array
-    upper: Array
-    scale: Array
-    margin: float
-    equality = False
-
-    @classmethod
-    def of(cls, robot: RobotModel, limits: JointLimits, margin: float) -> BoundLimits:
-        """Return the judged limits, for the joints with a finite limit on either side."""
-        lower, upper, order = limits.lower, limits.upper, limits.order
-        joints = np.flatnonzero(np.isfinite(lower) | np.isfinite(upper))
-        scale = np.ones(len(joints)) if order == 0 else upper[joints]
-        names = tuple(robot.joint_names[k] for k in joints)
-        units = tuple("rad" if turns else "m" for turns in robot.is_revolute[joints].tolist())
-        sides = lower[joints], upper[joints]
-        return cls(limits.name, order, joints, names, units, *sides, scale, margin)
-
-    @property
-    def tolerance(self) -> float:
-        """See `BoundConstraint.tolerance`: half the margin."""
-        return 0.5 * self.margin
-
-    def residual(self, samples: Samples) -> Array:
-        """See `BoundConstraint.residual`."""
-        x = motion_of_order(samples, self.order)
-        x = x if len(self.joints) == x.shape[1] else x[:, self.joints]
-        h = np.empty((len(x), 2 * len(self.joints)))
-        np.subtract(x, self.upper, out=h[:, : len(self.joints)])
-        np.subtract(self.lower, x, out=h[:, len(self.joints) :])
-        h /= self._both_scales
-        h += self.margin
-        return h
-
-    @cached_property
-    def _both_scales(self) -> Array:
-        return np.concatenate([self.scale, self.scale])
-
-    def tangents(self, samples: Samples, motion: NodeTangents) -> Array:
-        """See `BoundConstraint.tangents`."""
-        above = motion.of_order(self.order)[:, self.joints] / self.scale[:, None]
-        return np.concatenate([above, -above], axis=1)
-
-    def linearised_at(self, samples: Samples) -> tuple[tuple[int, int], BoundLimits]:
-        """See `linearised`."""
-        return (len(samples.nodes), 2 * len(self.joints)), self
-
-    def picked(self, motion: NodeTangents, rows: Ints, columns: Ints) -> Array:
-        """See `Linear.picked`."""
-        joints = columns % len(self.joints)
-        signed = np.where(columns < len(self.joints), 1.0, -1.0) / self.scale[joints]
-        return motion.picked(self.order, rows, self.joints[joints]) * signed[:, None]
-
-    def easing(self, column: int) -> tuple[float, str]:
-        """See `easing_of`: 2 % of a rate, on both sides; 0.01 rad or m of a position."""
-        number = column % len(self.joints)
-        joint = f"joint '{self.joint_names[number]}'"
-        if self.order > 0:
-            return 0.02, f"2 % more {_QUANTITIES[self.order]} for {joint}"
-        side = "upper" if column < len(self.joints) else "lower"
-        return 0.01, f"0.01 {self.units[number]} more at the {side} limit of {joint}"
-
-    def describe(self, samples: Samples, row: int, column: int) -> str:
-        """See `BoundConstraint.describe`."""
-        joint = column % len(self.joints)
-        value = motion_of_order(samples, self.order)[row, self.joints[joint]]
-        limit = self.upper[joint] if column < len(self.joints) else self.lower[joint]
-        unit = self.units[joint] + _POWERS[self.order]
-        return (
-            f"{_QUANTITIES[self.order]} of joint '{self.joint_names[joint]}' is {value:.4g} {unit} "
-            f"at t = {samples.sampling.node_times[row]:.3f} s, limit {limit:.4g} {unit}"
-        )
 
 
 # Clause of a message about joints that mimic others.

@@ -138,18 +138,6 @@ class Samples:
         """Joint jerks, (S, n)."""
         return np.asarray(self.sampling.differentiation(2) @ self.qd[self.nodes])
 
-    def of(self, follows: Follows) -> Samples:
-        """Return the motion of the arm alone, without the virtual joints after its own.
-
-        The result is cached.
-        """
-        if self.follows is follows:
-            return self
-        known = self.__dict__.get("_of_arm")
-        if known is None or known.follows is not follows:
-            known = self.__dict__["_of_arm"] = _OfArm(self, follows)
-        return known
-
     @cached_property
     def gram(self) -> Array:
         """JJᵀ of the task Jacobian, (S, m, m)."""
@@ -206,27 +194,6 @@ class PlacedLater(Samples):
     @override
     def task_jacobian(self) -> Array:
         return self._placed.task_jacobian
-
-
-class _OfArm(PlacedLater):
-    """A motion of an arm's own joints, which come before all others; see `Samples.of`."""
-
-    _whole: Samples
-
-    def __init__(self, whole: Samples, follows: Follows) -> None:
-        n = follows.robot.dof
-        object.__setattr__(self, "_whole", whole)
-        super().__init__(follows, whole.sampling, q=whole.q[:, :n], qd=whole.qd[:, :n])
-
-    @cached_property
-    @override
-    def qdd(self) -> Array:
-        return self._whole.qdd[:, : self.follows.robot.dof]
-
-    @cached_property
-    @override
-    def qddd(self) -> Array:
-        return self._whole.qddd[:, : self.follows.robot.dof]
 
 
 def _show(owner: Samples | TipSamples, names: Sequence[str]) -> None:

@@ -6,10 +6,11 @@ from selfmotion.problem.problem.along import (
     check_all_times as check_all_times,
     constraints_of_part as constraints_of_part,
     envelope_of as envelope_of,
+    length_of as length_of,
     rest_orders as rest_orders,
+    smooth_knots as smooth_knots,
     times_along as times_along,
 )
-from selfmotion.problem.problem.augmented import AugmentedProblem as AugmentedProblem
 from selfmotion.problem.problem.calibrated import (
     calibrated as calibrated,
     off_nominal as off_nominal,
@@ -21,7 +22,6 @@ from selfmotion.problem.problem.fit import (
     START_TOLERANCE as START_TOLERANCE,
     check_feeds as check_feeds,
 )
-from selfmotion.problem.problem.of_arm import BodiesOfArm as BodiesOfArm
 from selfmotion.problem.problem.paper_problem import sample_problem as sample_problem
 from selfmotion.problem.problem.problem import (
     Problem as Problem,

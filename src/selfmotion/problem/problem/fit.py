@@ -17,7 +17,7 @@ from selfmotion.basics import (
     shown,
 )
 from selfmotion.certificate import Requirement, errors_at
-from selfmotion.model.follow import AugmentedTaskFrames, Follow, Follows, VirtualJoints
+from selfmotion.model.follow import Follow, Follows, RelaxedFrames, VirtualJoints
 from selfmotion.model.motion import FreeNullMotion, NullMotion
 from selfmotion.model.path import FeedPossible, Path, check_oriented, spread_along
 from selfmotion.model.robot import Chain, RobotModel
@@ -387,8 +387,8 @@ def _can_with(follows: Follows, relaxations: Sequence[Relaxation]) -> bool:
     item = follows.items[0]
     if item.task is Task.PLANAR_POSE and not _moves_in_plane(follows.robot, item.chain):
         return False
-    whole = AugmentedTaskFrames.with_tolerances(follows, relaxations)
-    return whole.robot.dof - whole.redundancy >= whole.dimension
+    whole = RelaxedFrames.with_tolerances(follows, relaxations)
+    return whole.dof - whole.redundancy >= whole.dimension
 
 
 def _check_several(follows: Follows, relaxations: Sequence[Relaxation]) -> None:

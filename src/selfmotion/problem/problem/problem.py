@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
-from typing import Any, ClassVar, Self
+from typing import Any, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -29,29 +29,22 @@ from selfmotion.certificate import (
     Requirement,
     Separation,
     Tolerance,
-    arm_limits,
     certify,
-    errors_between,
 )
 from selfmotion.model.follow import Follow, Follows
-from selfmotion.model.motion import NullMotion, Trajectory, fading_window
+from selfmotion.model.motion import NullMotion, Trajectory
 from selfmotion.model.path import Path
 from selfmotion.model.robot import RobotModel, mesh_digests
 from selfmotion.model.task import Damping, DampingLaw, Relaxation, Task, feedback_rate
 from selfmotion.problem.constraints import (
-    BoundConstraint,
     Clearance,
     Constraint,
     Envelope,
-    JointPositionLimits,
-    JointVelocityLimits,
 )
 from selfmotion.problem.costs import BeyondLimits, Cost, JointVelocity, OffPath
 from selfmotion.problem.problem.along import (
     arm_rest_orders,
     envelope_without_arm,
-    length_of,
-    smooth_knots,
     with_own_limits,
 )
 from selfmotion.problem.problem.fit import (
@@ -149,9 +142,6 @@ class Problem:
     Attributes other than its parameters and `certify` are for planners, and may change with them.
     """
 
-    # Class of the problem that planners see; set by `augmented`, which derives from this one.
-    _augmentation: ClassVar[type]
-
     robot: RobotModel
     path: Path
     task: _TaskField = _TaskField()  # a descriptor, meant to be shared
@@ -191,7 +181,7 @@ class Problem:
             if end is not None:
                 check_end(self.follows, end, self.relaxations)
         # Now, not when the motion is finished: without a requirement nothing judges it.
-        check_judged(self.all_constraints, self._asked)
+        check_judged(self.all_constraints, self._judging)
         if self.start is not None:
             start = read_only(self.robot.configuration(self.start))
             object.__setattr__(self, "start", start)
@@ -238,43 +228,6 @@ class Problem:
     def follows(self) -> Follows:
         """Task frames of the arm: the input of planners."""
         return Follows.of(self.robot, self.path, self.task, self.also)
-
-    @cached_property
-    def augmented(self) -> Problem:
-        """The problem as planners see it: its tolerances are virtual joints."""
-        if not self.relaxations:
-            return self
-        found: Problem = self._augmentation(self)
-        return found
-
-    @property
-    def asked(self) -> Problem:
-        """The original problem, where this is `augmented`."""
-        return self
-
-    def own(self, trajectory: Trajectory) -> Trajectory:
-        """Return the arm's own joints of a motion of all."""
-        return trajectory
-
-    def at(self, t: Array, q: Array) -> Array:
-        """Return all coordinates for the arm's own, (K, n), at times t (K,) [s] of the path."""
-        return q
-
-    def with_own(self, trajectory: Trajectory, path: Path) -> Trajectory:
-        """Return the motion of all joints for one of the arm's own along a path like this one's."""
-        return trajectory
-
-    def softened(self, cost: float) -> Problem:
-        """Return the problem with a cost of deviations in place of limits of their bands.
-
-        At `cost`, the cost of a motion, being at a band all the time doubles it.
-        """
-        return self
-
-    @property
-    def with_windows_shut(self) -> Problem:
-        """The same where motions without self-motion make no use of tolerances in windows."""
-        return self
 
     def changed(self, **changes: Any) -> Problem:
         """Return the problem with other parameters."""
@@ -329,55 +282,16 @@ class Problem:
             return None
         return self.clearance
 
-    def keeps_off_itself(self, q: Array) -> bool:
-        """Whether the arm's meshes in configurations (K, n) are free of self-collision.
-
-        Only for the default clearance: constraints are the optimisation's.
-        """
-        if self.own_collision is None:
-            return True
-        return all(model.worst(q).value >= far for model, far in self.envelope.bodies)
-
     @property
     def all_constraints(self) -> tuple[Constraint, ...]:
         """The constraints that apply, with `own_collision` last if there is one."""
         own = self.own_collision
-        return (*self._asking, *([] if own is None else [own]))
+        return (*self.applying, *([] if own is None else [own]))
 
     @property
-    def _asking(self) -> tuple[Constraint, ...]:
+    def applying(self) -> tuple[Constraint, ...]:
+        """The given constraints that apply to the arm."""
         return tuple(item for item in self.constraints if item.applies(self.robot))
-
-    def bind_constraints(
-        self, start: Array, end: Array, *, apart: bool = True, decomposed: bool = False
-    ) -> tuple[BoundConstraint, ...]:
-        """Return the constraints for this arm, given first and last configuration, (n,) each.
-
-        Those of the initial motion. Without `own_collision` unless `apart`; with links `decomposed`
-        where their hulls are too large. With the arm's own limits where constraints have none: no
-        motion beyond these is verified.
-        """
-        asked = [*self._own_limits, *(self.all_constraints if apart else self._asking)]
-        if all(self.rests):
-            asked = [item.at_rest() for item in asked]
-        return tuple(
-            item.bind_decomposed(self.follows)
-            if decomposed and isinstance(item, Clearance)
-            else item.bind(self.follows, start, end)
-            for item in asked
-        )
-
-    @property
-    def _own_limits(self) -> tuple[Constraint, ...]:
-        """The arm's own limits of position and velocity, where constraints say nothing of them."""
-        said = {type(item) for item in self.constraints}
-        judged = {item.order for item in arm_limits(self.robot, self._asked)}
-        own = enumerate((JointPositionLimits(), JointVelocityLimits()))
-        return tuple(
-            item
-            for order, item in own
-            if order in judged and type(item) not in said and item.applies(self.robot)
-        )
 
     @cached_property
     def rest_orders(self) -> tuple[int, int]:
@@ -390,14 +304,6 @@ class Problem:
         start, end = self.rest_orders
         return start > 0, end > 0
 
-    def null_functions(self, t: Array, motion: NullMotion) -> Array:
-        """Return φ of a null motion at times `t` (S,), at rest where the arm has to be, (S, K)."""
-        return motion.resting(t, self.path.duration, self.rest_orders)
-
-    def brought_to_rest(self, t: Array, epsilon: Array) -> Array:
-        """Return a null motion (S, n) that fades to nothing where the arm has to be at rest."""
-        return epsilon * fading_window(t, self.path.duration, self.rests)[:, None]
-
     @cached_property
     def damping_law(self) -> DampingLaw | None:
         """The damping in numbers [m, rad] for this arm and task."""
@@ -409,10 +315,10 @@ class Problem:
     @cached_property
     def requirements(self) -> tuple[Requirement, ...]:
         """Requirements of the certificate besides the path: rest, and one for each constraint."""
-        return (*self._rest(*self.rest_orders), *self._asked)
+        return (*self._rest(*self.rest_orders), *self._judging)
 
     @cached_property
-    def _asked(self) -> tuple[Requirement, ...]:
+    def _judging(self) -> tuple[Requirement, ...]:
         return tuple(item.requirement(self.robot) for item in self.all_constraints)
 
     def _rest(self, start: int, end: int) -> tuple[Requirement, ...]:
@@ -461,7 +367,7 @@ class Problem:
             self.task,
             trajectory,
             tolerance,
-            (*rests, *self._asked, *besides),
+            (*rests, *self._judging, *besides),
             also=self.also,
             relaxations=self.relaxations,
             damping=self.damping_law,
@@ -476,7 +382,7 @@ class Problem:
     def _too_near(self, certificate: Certificate) -> tuple[str, ...]:
         """Return that bodies are too near at the given start already, in words."""
         wrong = {found.requirement for found in certificate.findings if not found.satisfied}
-        apart = [item for item in self._asked if isinstance(item, Separation)]
+        apart = [item for item in self._judging if isinstance(item, Separation)]
         start = self.given_start
         if start is None or not any(item.name in wrong for item in apart):
             return ()
@@ -535,27 +441,9 @@ class Problem:
         """Return digests of the mesh files of all collision bodies: names may stay the same."""
         if not self.envelope_without_arm.bodies:
             return {}
-        bodies = (body for item in self._asked for body in item.obstacles)
+        bodies = (body for item in self._judging for body in item.obstacles)
         files = {str(file): digest_of_file(file) for body in bodies for file in body.files}
         return {**mesh_digests(self.robot.urdf, "collision"), **files}
-
-    def errors_between(self, trajectory: Trajectory) -> Array:
-        """Return the errors of a motion in the middle between samples, (N, 2) [m, rad]."""
-        found = [
-            errors_between(item, trajectory, () if k else self.relaxations)
-            for k, item in enumerate(self.follows.items)
-        ]
-        return np.asarray(np.max(found, axis=0))
-
-    @cached_property
-    def knots(self) -> Array:
-        """Times [s] between which paths and deviations are smooth; see `Path.knots`."""
-        return smooth_knots(self.follows, self.relaxations)
-
-    @cached_property
-    def length_in_reaches(self) -> float:
-        """Path length of the tool, as a multiple of the arm's reach."""
-        return length_of(self.path) / self.robot.reach
 
 
 # Signature in help() of a field that is a descriptor.

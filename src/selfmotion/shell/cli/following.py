@@ -18,6 +18,7 @@ import selfmotion as sm
 from selfmotion import realtime
 from selfmotion.basics import Array
 from selfmotion.model.task import SE3
+from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.search import reachable
 from selfmotion.problem.problem import KEPT, NO_OVERLAP
 
@@ -247,7 +248,8 @@ def out_of_reach(problem: sm.Problem) -> str:
 
     PlanError where it begins there.
     """
-    return reachable(problem, sm.Search().starts, np.random.default_rng(0)).reason
+    formulation = Formulation.of(problem)
+    return reachable(formulation, sm.Search().starts, np.random.default_rng(0)).reason
 
 
 def show_link(link: Link, console: Console) -> None:

@@ -18,6 +18,7 @@ from selfmotion.certificate import (
 )
 from selfmotion.model.motion import Grid, Trajectory
 from selfmotion.model.robot import RobotModel
+from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.paper import MinimumNormMotion, Objective
 from selfmotion.planning.search import start_candidates
 from selfmotion.problem.constraints import BoundConstraint, Constraint, linearised
@@ -112,12 +113,22 @@ def check_constraint(constraint: Constraint, problem: Problem) -> None:
     start = problem.given_start
     if start is None:
         start = start_candidates(problem.follows, _STARTS, np.random.default_rng(0))[0]
-    grid = Grid.aligned(problem.knots, _STEPS * max(1, problem.null_motion.fewest_steps // 4))
-    minimum_norm = MinimumNormMotion.on(problem, start, grid)
-    bound = constraint.bind(problem.follows, minimum_norm.start, minimum_norm.end)
-    objective = Objective.of(problem, minimum_norm, free=True)
+    formulation = Formulation.on_path(problem)
+    grid = Grid.aligned(formulation.knots, _STEPS * max(1, problem.null_motion.fewest_steps // 4))
+    minimum_norm = MinimumNormMotion.on(formulation, start, grid)
+    own = constraint.conditions(robot)
+    ends = minimum_norm.start, minimum_norm.end
+    objective = Objective.of(formulation, minimum_norm, free=True)
     requirement = constraint.requirement(robot)
     require(isinstance(requirement, Requirement), f"requirement() returned {requirement!r}")
+    for bound in formulation.bound(own, *ends).every:
+        _check_derivatives(objective, bound)
+        _judges_alike(objective, bound, requirement, robot, np.random.default_rng(2))
+    saved(constraint, Constraint)
+
+
+def _check_derivatives(objective: Objective, bound: BoundConstraint) -> None:
+    """Require that derivatives of a condition are those of its residual."""
     rng = np.random.default_rng(1)
     x = 0.02 * rng.normal(size=objective.size)
     weights = rng.normal(size=bound.residual(objective.samples(x)).shape)
@@ -132,8 +143,6 @@ def check_constraint(constraint: Constraint, problem: Problem) -> None:
     exact = np.tensordot(weights, tangents, weights.ndim)
     require_gradient(weighed, lambda _: exact, x, f"constraint '{bound.name}'")
     _known_on_demand(objective, bound, tangents.reshape(-1, objective.size), x)
-    _judges_alike(objective, bound, requirement, robot, rng)
-    saved(constraint, Constraint)
 
 
 def _known_on_demand(objective: Objective, bound: BoundConstraint, table: Array, x: Array) -> None:

@@ -1,0 +1,200 @@
+"""Rows of constraints at collocation points of the intervals between nodes."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from typing_extensions import override
+
+from selfmotion.basics import Array, Flags, Ints, ProblemError
+from selfmotion.planning.formulation import SampledMotion
+from selfmotion.planning.nodes.spline import ORDERS, Quintic
+from selfmotion.problem.constraints import (
+    BoundConstraint,
+    Multipliers,
+    NodeTangents,
+    linearised,
+)
+
+# Rows become active where h is above this [units of h]: distances level off there.
+_NEAR = -0.19
+# Share of the unused tolerance that a violation between points may use once intervals are
+# subdivided.
+_ROOM = 0.5
+# Largest number of parts of an interval at once.
+_MOST_PARTS = 4
+
+
+class UnitTangents(NodeTangents):
+    """Tangents by q, q̇, q̈ and the jerk of each point themselves: d = 4 n.
+
+    Parameters
+    ----------
+    spline : Quintic
+    dof : int
+    """
+
+    _tables: tuple[Array, ...]
+
+    def __init__(self, spline: Quintic, dof: int) -> None:
+        ones = np.eye(ORDERS * dof).reshape(ORDERS, dof, ORDERS * dof)
+        shape = (len(spline.points.t), dof, ORDERS * dof)
+        tables = tuple(np.broadcast_to(one, shape) for one in ones)
+        object.__setattr__(self, "_tables", tables)
+        super().__init__(tables[0], tables[1], spline.points)
+
+    @override
+    def of_order(self, order: int) -> Array:
+        return self._tables[order]
+
+    @override
+    def picked(self, order: int, nodes: Ints, joints: Ints) -> Array:
+        return np.asarray(self._tables[order][nodes, joints])
+
+
+@dataclass(frozen=True, eq=False)
+class PointRows:
+    """Rows of points by y of their intervals.
+
+    Attributes
+    ----------
+    intervals : (R,)
+    by_ends : (R, 6, n)
+        ∂h/∂y, y the ends of the interval.
+    """
+
+    intervals: Ints
+    by_ends: Array
+
+    def along(self, changes: Array) -> Array:
+        """Return ∂h along changes of y (N, 6, n), (R,)."""
+        return np.asarray(np.sum(self.by_ends * changes[self.intervals], axis=(1, 2)))
+
+    def pulled(self, multipliers: Array, count: int) -> Array:
+        """Return Σ multipliers ∂h/∂y, (count, 6, n)."""
+        found = np.zeros((count, *self.by_ends.shape[1:]))
+        np.add.at(found, self.intervals, multipliers[:, None, None] * self.by_ends)
+        return found
+
+    def squared(self, weights: Array, both: Array) -> Array:
+        """Return Σ weights ∂h ∂hᵀ by w of both ends of each interval, (N, d, d)."""
+        count, _, _, size = both.shape
+        found = np.zeros((count, size, size))
+        flat = both.reshape(count, -1, size)
+        turned = np.swapaxes(self.by_ends, 1, 2).reshape(len(self.intervals), -1)
+        order = np.argsort(self.intervals, kind="stable")
+        starts = np.searchsorted(self.intervals[order], np.arange(count + 1))
+        for k in np.flatnonzero(np.diff(starts)):
+            own = order[starts[k] : starts[k + 1]]
+            rows = turned[own] @ flat[k]
+            found[k] = rows.T @ (weights[own, None] * rows)
+        return found
+
+
+class CollocationRows:
+    """Rows of one constraint at the points of a spline, (2 N + 1, C): by point and column.
+
+    Parameters
+    ----------
+    spline : Quintic
+    item : BoundConstraint
+    columns : slice
+        The coordinates that it is a function of, among all.
+    dof : int
+        Number of all coordinates.
+
+    Attributes
+    ----------
+    count : int
+        C, once it was evaluated on any nodes.
+    """
+
+    def __init__(self, spline: Quintic, item: BoundConstraint, columns: slice, dof: int) -> None:
+        self._spline, self.item = spline, item
+        self._columns, self._dof = columns, dof
+        self.count = 0
+
+    def on(self, spline: Quintic) -> "CollocationRows":
+        """Return the rows on other nodes."""
+        found = CollocationRows(spline, self.item, self._columns, self._dof)
+        found.count = self.count
+        return found
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Number of points and of columns."""
+        return len(self._spline.points.t), self.count
+
+    def residuals(self, motion: SampledMotion) -> Array:
+        """Return h, minus the part of the tolerance that is used."""
+        h = self.item.residual(motion.seen_by(self.item))
+        if len(h) != len(self._spline.points.t):
+            raise ProblemError(
+                f"constraint '{self.item.name}': its residual has shape {h.shape}, expected a "
+                f"row for each of {len(self._spline.points.t)} nodes; what is asked of the "
+                f"whole motion is asked at each of them"
+            )
+        self.count = h.shape[1]
+        return h - self.item.granted
+
+    def near(self, h: Array) -> Flags:
+        """Return the mask of nearly violated rows."""
+        return np.asarray(h > _NEAR)
+
+    @cached_property
+    def _units(self) -> UnitTangents:
+        return UnitTangents(self._spline, len(range(self._dof)[self._columns]))
+
+    def linearised(self, motion: SampledMotion, active: Flags) -> PointRows:
+        """Return the derivatives of the active rows."""
+        which = np.flatnonzero(active)
+        intervals, shares = self._spline.point_shares(which // self.count if which.size else which)
+        found = np.zeros((len(which), 6, self._dof))
+        if which.size:
+            samples = motion.seen_by(self.item)
+            rows = linearised(self.item, samples, self._units).picked(self._units, which)
+            by = rows.reshape(len(which), ORDERS, -1)
+            found[:, :, self._columns] = np.swapaxes(shares, 1, 2) @ by
+        return PointRows(intervals, found)
+
+    def bending(self, motion: SampledMotion, multipliers: Array, both: Array) -> Array | None:
+        """Return Σ multipliers · ∂²h/∂w² of rows that are sums of squares, (N, d, d), or None."""
+        slopes = self.item.squares(motion.seen_by(self.item))
+        if slopes is None:
+            return None
+        slopes = np.sqrt(np.abs(multipliers))[:, :1, None] * slopes
+        points, which = np.nonzero(slopes.any(axis=2))
+        intervals, shares = self._spline.point_shares(points)
+        by = np.zeros((len(points), 6, self._dof))
+        by[:, :, self._columns] = shares[:, 0, :, None] * slopes[points, which][:, None, :]
+        return PointRows(intervals, by).squared(np.ones(len(points)), both)
+
+    def multipliers_of(self, multipliers: Array) -> Multipliers:
+        """Return the multipliers in the order of time."""
+        used = np.ones(multipliers.shape, dtype=np.bool_)
+        return Multipliers(self.item, multipliers, self._spline.points.t, used)
+
+    def subdivisions(self, curve: SampledMotion) -> Ints:
+        """Return the number of parts of each interval that the rows need, (N,)."""
+        item, count = self.item, self._spline.count
+        samples, found = curve.seen_by(item), np.ones(count, dtype=np.int64)
+        beyond = item.exceeds(samples, item.tolerance)
+        if beyond is not None:
+            found[beyond.reshape(count, -1).any(axis=1)] = 2
+            return found
+        # A quantity without limits has no rows.
+        h = np.asarray(item.residual(samples)).reshape(count, -1).max(axis=1, initial=-np.inf)
+        if (h <= item.tolerance).all():
+            return found
+        used = item.granted
+        need = np.sqrt(np.maximum(h - used, 0.0) / (_ROOM * (item.tolerance - used)))
+        # Written so that NaN is divided.
+        need = np.where(h > -np.inf, need, _MOST_PARTS)
+        return np.clip(np.ceil(need), 1, _MOST_PARTS).astype(np.int64)
+
+    def carried(self, before: "CollocationRows", multipliers: Array) -> Array:
+        """Return the multipliers of these rows by those of the nearest rows before."""
+        t, known = self._spline.points.t, before._spline.points.t
+        right = np.clip(np.searchsorted(known, t), 1, len(known) - 1)
+        right -= t - known[right - 1] < known[right] - t
+        return np.asarray(multipliers[right] * (len(known) / len(t)))
