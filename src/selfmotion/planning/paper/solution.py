@@ -185,12 +185,14 @@ class Solution:
         """Violated conditions on ends, in words."""
         return self.objective.unmet(self.x)
 
+    @property
     def evaluation(self) -> Evaluation:
-        """Return the motion with its costs."""
+        """The motion with its costs."""
         return self.objective.at(self.x)
 
+    @property
     def minimum_norm_evaluation(self) -> Evaluation:
-        """Return the motion at x = 0 on this grid."""
+        """The motion at x = 0 on this grid."""
         return self.objective.at(np.zeros_like(self.x))
 
     def refined(self, where: Flags | None = None) -> Self:

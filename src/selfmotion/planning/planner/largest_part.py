@@ -10,9 +10,11 @@ from selfmotion.model.path import Section, edges_of
 from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.optimise import Status
 from selfmotion.planning.paper import Guide, MinimumNormMotion
-from selfmotion.planning.planner.candidate import Candidate
 from selfmotion.planning.planner.effort import Effort, Search
+from selfmotion.planning.planner.guess import Guess
 from selfmotion.planning.planner.screening import ROUGH_MOTIONS
+from selfmotion.planning.planner.solution import Solution
+from selfmotion.planning.planner.solve import solve
 from selfmotion.planning.search import Reach
 
 # Share of the time to the edge of the workspace that is left out: joint speeds grow without bound
@@ -48,7 +50,7 @@ class Part:
     ----------
     formulation : Formulation
         That of the part.
-    candidate : Candidate
+    solution : Solution
         Optimised.
     ending : str
         Why it goes no further; "" where the part is the whole.
@@ -57,25 +59,25 @@ class Part:
     """
 
     formulation: Formulation
-    candidate: Candidate
+    solution: Solution
     ending: str = ""
     why: str = ""
 
 
 @dataclass(frozen=True, eq=False)
 class _Attempt:
-    """Result of a start on a part: no candidate at a breakdown; the extent without violations."""
+    """Result of a start on a part: no solution at a breakdown; the extent without violations."""
 
     start_guess: _StartGuess
     formulation: Formulation
-    candidate: Candidate | None
+    solution: Solution | None
     kept_until: float
     found: Evaluation | None
     trouble: str = ""
 
     @property
     def arrived(self) -> bool:
-        return self.candidate is not None and not self.candidate.violations
+        return self.solution is not None and not self.solution.violations
 
     @property
     def cost(self) -> float:
@@ -84,14 +86,14 @@ class _Attempt:
     @property
     def reason(self) -> str:
         """Cause of its failure."""
-        if self.candidate is None:
+        if self.solution is None:
             return self.trouble
-        return "; ".join(self.candidate.violations)
+        return "; ".join(self.solution.violations)
 
     @property
     def cut_short(self) -> bool:
         """Whether the user ended the optimisation."""
-        return self.candidate is not None and self.candidate.cut_short
+        return self.solution is not None and self.solution.cut_short
 
 
 def largest_part(formulation: Formulation, reach: Reach, effort: Effort) -> Part | None:
@@ -108,7 +110,7 @@ def largest_part(formulation: Formulation, reach: Reach, effort: Effort) -> Part
     reach : Reach
         Extent to which single poses are reachable.
     effort : Effort
-        Options of the candidates.
+        Options of the solutions.
 
     Returns
     -------
@@ -178,11 +180,11 @@ def _bisect(
 
 def _part(formulation: Formulation, found: _Attempt, reach: Reach, further: str) -> Part:
     """Return the part, with the reason why nothing goes `further` in words."""
-    if found.candidate is None:
+    if found.solution is None:
         raise RuntimeError("a part is made of a motion that was found")
     reasons = [reach.reason] if reach.reason else []
     reasons += [f"the next longer motion fails: {further}"] if further else []
-    return _ending_at(formulation, found.formulation, found.candidate, "; ".join(reasons))
+    return _ending_at(formulation, found.formulation, found.solution, "; ".join(reasons))
 
 
 def shorter_part(formulation: Formulation, part: Part, effort: Effort) -> Part | None:
@@ -191,17 +193,17 @@ def shorter_part(formulation: Formulation, part: Part, effort: Effort) -> Part |
     For one whose last bit is too rough: near a singular pose rates grow between its nodes.
     """
     first = _until(formulation, part.formulation.path.duration * (1.0 - _PART_BACK))
-    start = _start_of(first, part.formulation, part.candidate.evaluation().trajectory.q[0])
+    start = _start_of(first, part.formulation, part.solution.evaluation.trajectory.q[0])
     attempt = _attempt(first, (start, None), effort)
-    if attempt.candidate is None or not attempt.arrived:
+    if attempt.solution is None or not attempt.arrived:
         return None
-    return _ending_at(formulation, first, attempt.candidate, part.why or _ROUGH)
+    return _ending_at(formulation, first, attempt.solution, part.why or _ROUGH)
 
 
-def _ending_at(formulation: Formulation, part: Formulation, candidate: Candidate, why: str) -> Part:
+def _ending_at(formulation: Formulation, part: Formulation, solution: Solution, why: str) -> Part:
     end, whole = part.path.duration, formulation.path.duration
     ending = f"the motion ends at t = {end:.6g} s of {whole:.6g} s: {why}"
-    return Part(part, candidate, ending if end < whole else "", why)
+    return Part(part, solution, ending if end < whole else "", why)
 
 
 def _until(formulation: Formulation, time: float) -> Formulation:
@@ -234,22 +236,22 @@ def _attempt(formulation: Formulation, start_guess: _StartGuess, effort: Effort)
     try:
         start, guide = start_guess
         free = formulation.given_start is None
-        candidate = Candidate(formulation, effort, start, free=free, guide=guide)
+        guess = Guess.of(formulation, effort, start, free=free, guide=guide)
     except BreakdownError as error:
         reason = f"it runs into a singular pose near t = {error.time:.6g} s"
         return _Attempt(start_guess, formulation, None, error.time, None, reason)
     try:
-        candidate.polish()
+        solution = solve(guess)
     except KeyboardInterrupt:
-        candidate.end(Status.INTERRUPTED)
-    found = candidate.evaluation()
+        solution = Solution.of(guess).ended_by(Status.INTERRUPTED)
+    found = solution.evaluation
     motion = found.trajectory
     # Infeasible constraints may distort it: then x = 0 is a better guess.
     until = max(
         _kept_until(formulation, motion.t, motion.q, motion.qd),
         -_rank(formulation, *start_guess)[1],
     )
-    return _Attempt(start_guess, formulation, candidate, until, found)
+    return _Attempt(start_guess, formulation, solution, until, found)
 
 
 def _apart(formulation: Formulation, starts: list[Array]) -> list[Array]:

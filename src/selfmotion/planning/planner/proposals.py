@@ -26,16 +26,16 @@ from selfmotion.basics import (
 )
 from selfmotion.model.motion import Grid, Sampling
 from selfmotion.model.path import Section
-from selfmotion.planning.formulation import BoundConditions, Formulation
+from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.nodes import NodeGrid, NodeMotion
 from selfmotion.planning.optimise import Status
-from selfmotion.planning.planner.candidate import Candidate, on_start
-from selfmotion.planning.planner.effort import Effort
 from selfmotion.planning.planner.grids import is_on_nodes, most_nodes, resolves, rough_grid
+from selfmotion.planning.planner.guess import Guess, on_start
+from selfmotion.planning.planner.local_search import LocalSearch
+from selfmotion.planning.planner.outcomes import NodeOutcome
 from selfmotion.planning.planner.planner import Planner
-from selfmotion.planning.planner.polish import Polisher
 from selfmotion.planning.planner.screening import ONE_VALLEY, Ranking, distance_of, most_promising
-from selfmotion.planning.planner.solutions import NodeSolution
+from selfmotion.planning.planner.solution import Solution, is_chain
 from selfmotion.planning.search import (
     LAST_SMOOTHINGS,
     Sequence,
@@ -83,22 +83,29 @@ def optimise_starts(planner: Planner, count: int, finalists: int) -> None:
     """
     starts = _starts(planner, count)
     if len(starts) > finalists and is_on_nodes(planner.formulation, planner.effort):
-        ranking = planner.ranking = Ranking(planner.formulation, planner.effort, planner.progress)
+        ranking = _ranking(planner)
         if ranking.run(starts, finalists):
             ranked = ranking.ranked
             _optimise_each(planner, _resumed(planner, ranked), len(ranked))
-            if planner.is_unmet and planner.best is not None and not planner.is_over:
+            if planner.is_unmet and planner.incumbent is not None and not planner.is_over:
                 before = [motion.trajectory for motion in ranked]
-                before.append(planner.best.evaluation().trajectory)
+                before.append(planner.incumbent.evaluation.trajectory)
                 others = ranking.left_aside(before, finalists)
                 _optimise_each(planner, _resumed(planner, others), len(others))
             return
     elif len(starts) > finalists:
         starts = _best(planner.formulation, starts)[:finalists]
-    started = (planner.begin(start, free=True) for start in starts)
-    known = (candidate for candidate in started if candidate is not None)
-    candidates = sorted(known, key=lambda candidate: candidate.solution.merit())
-    _optimise_each(planner, candidates, len(candidates))
+    started = (planner.guess(start, free=True) for start in starts)
+    known = (guess for guess in started if guess is not None)
+    guesses = sorted(known, key=lambda guess: guess.minimum_norm.merit())
+    _optimise_each(planner, guesses, len(guesses))
+
+
+def _ranking(planner: Planner) -> Ranking:
+    """Return a new ranking of starts, which an interruption finds."""
+    found = Ranking(planner.formulation, planner.effort, planner.setup.progress)
+    planner.ranking = found
+    return found
 
 
 def optimise_where_it_breaks(
@@ -115,7 +122,7 @@ def optimise_where_it_breaks(
         starts = _drawn(formulation, planner, count, float(t[at]))
     except InverseKinematicsError:
         return
-    ranking = planner.ranking = Ranking(formulation, planner.effort, planner.progress)
+    ranking = _ranking(planner)
     if ranking.run(starts, finalists, at):
         ranked = ranking.ranked
         _optimise_each(planner, _resumed(planner, ranked), len(ranked))
@@ -123,7 +130,7 @@ def optimise_where_it_breaks(
 
 def may_stack(planner: Planner) -> bool:
     """Whether a quantity of q is violated, or several parts share the motion."""
-    formulation, best = planner.formulation, planner.best
+    formulation, best = planner.formulation, planner.incumbent
     names = [item.name for item in formulation.envelope.quantities]
     broken = (
         names
@@ -147,7 +154,7 @@ def optimise_stacked(planner: Planner, finalists: int) -> bool:
     motions = [*_stacked(planner, t)]
     found = np.concatenate(motions) if motions else np.zeros((0, 0, 0))
     if len(found):
-        ranking = planner.ranking = Ranking(formulation, planner.effort, planner.progress)
+        ranking = _ranking(planner)
         ranking.run_along(found, t, finalists)
         ranked = ranking.ranked
         _optimise_each(planner, _resumed(planner, ranked), len(ranked))
@@ -161,7 +168,7 @@ def _stacked(planner: Planner, t: Array) -> Iterator[Array]:
     for weights in metrics(formulation.coordinates):
         task = Stacked(formulation.follows, asked.quantities, asked.lower, asked.upper, weights)
         for place, starts in drawn.items():
-            if planner.is_free:
+            if planner.setup.is_free:
                 q, feasible = task.placed(starts, float(t[place]))
                 starts = q[feasible]
             motions, arrived = task.carried(starts, t, place)
@@ -173,10 +180,10 @@ def _configurations_at(planner: Planner, t: Array) -> dict[int, Array]:
 
     The given start; or random ones at both ends, and at the largest violation of the best motion.
     """
-    formulation, best = planner.formulation, planner.best
+    formulation, best = planner.formulation, planner.incumbent
     if formulation.given_start is not None:
         return {0: formulation.given_start[None]}
-    breaks = best.breaks_at if best is not None else None
+    breaks = best.outcome.breaks_at if best is not None else None
     places = {0, len(t) - 1, *([] if breaks is None else [int(np.argmin(np.abs(t - breaks)))])}
     found = dict[int, Array]()
     allowed = formulation.envelope
@@ -184,7 +191,9 @@ def _configurations_at(planner: Planner, t: Array) -> dict[int, Array]:
     for place in sorted(places):
         with contextlib.suppress(InverseKinematicsError):
             # Few random ones satisfy all conditions: they are moved there.
-            drawn = start_candidates(arm, planner.search.starts, planner.rng, time=float(t[place]))
+            drawn = start_candidates(
+                arm, planner.setup.search.starts, planner.rng, time=float(t[place])
+            )
             found[place] = np.array(drawn)
     return found
 
@@ -221,26 +230,29 @@ def _drawn(
     return start_candidates(follows, count, planner.rng, admits, time)
 
 
-def _optimise_each(planner: Planner, candidates: Iterable[Candidate], count: int) -> None:
+def _optimise_each(planner: Planner, guesses: Iterable[Guess], count: int) -> None:
     planner.waiting = ()
-    for number, candidate in enumerate(candidates, 1):
+    for number, guess in enumerate(guesses, 1):
         if planner.is_over:
             break
-        planner.waiting = (*planner.waiting, candidate)
-        planner.progress("optimising start", number, count)
-        planner.polish(candidate)
+        planner.waiting = (*planner.waiting, guess)
+        planner.setup.progress("optimising start", number, count)
+        planner.take(guess)
         # A pose out of reach is so for any start.
         if planner.is_out_of_reach():
             break
     planner.waiting = ()
 
 
-def _resumed(planner: Planner, rough: abc.Sequence[NodeMotion]) -> Iterator[Candidate]:
-    """Yield candidates with rough motions as warm starts, lazily."""
+def _resumed(planner: Planner, rough: abc.Sequence[NodeMotion]) -> Iterator[Guess]:
+    """Yield guesses near rough motions, lazily."""
     for motion in rough:
-        candidate = None if planner.is_over else planner.taken_up(motion.trajectory)
-        if candidate is not None:
-            yield candidate
+        if planner.is_over:
+            continue
+        known = motion.trajectory
+        guess = planner.guess(known.q[0], free=planner.setup.is_free, motion=known)
+        if guess is not None:
+            yield guess
 
 
 def optimise_sequences(planner: Planner, *, chosen: bool) -> None:
@@ -249,30 +261,31 @@ def optimise_sequences(planner: Planner, *, chosen: bool) -> None:
     They are compared with the present motion, and `chosen` only if allowed.
     """
     try:
-        planner.sequences = guides(planner.formulation, planner.search.rng, planner.progress)
+        planner.sequences = guides(
+            planner.formulation, planner.setup.search.rng, planner.setup.progress
+        )
     except NoSequenceError as error:
         planner.failure = error
         planner.notes.append(f"global search: {error}")
-    started: list[Candidate] = []
+    started: list[Solution] = []
     for number, guide in enumerate(planner.sequences, 1):
-        planner.progress("refining sequence", number, len(planner.sequences))
-        candidate = planner.begin(guide.start, free=True, guide=guide)
-        if candidate is None or (started and _is_hopeless(planner, guide, candidate, started[0])):
+        planner.setup.progress("refining sequence", number, len(planner.sequences))
+        guess = planner.guess(guide.start, free=True, guide=guide)
+        if guess is None or (started and _is_hopeless(planner, guide, guess, started[0])):
             continue
-        found = along_chain(planner.formulation, candidate.effort, guide, candidate.conditions)
-        if found is not None:
-            candidate.take(found)
-        if started and started[0].is_of_chain and not candidate.is_of_chain:
+        found = along_chain(guess, guide)
+        if started and is_chain(started[0]) and found is None:
             continue
-        planner.polish(candidate, chosen=chosen)
+        given = guess if found is None else Solution(guess, found)
+        solution = planner.take(given, chosen=chosen)
         if planner.is_over:
             return
-        started = sorted([*started, candidate], key=Candidate.score)
+        started = sorted([*started, solution], key=Solution.score)
     if started:
         planner.rival = started[0]
 
 
-def _is_hopeless(planner: Planner, guide: Sequence, candidate: Candidate, best: Candidate) -> bool:
+def _is_hopeless(planner: Planner, guide: Sequence, guess: Guess, best: Solution) -> bool:
     """Whether a sequence is much dearer than the best one, and costs more than the present motion.
 
     Optimising gains some percent on a sequence.
@@ -280,23 +293,19 @@ def _is_hopeless(planner: Planner, guide: Sequence, candidate: Candidate, best: 
     if best.violations:
         return False
     least = planner.sequences[0].cost
-    share = _DEARER_CHAIN if best.is_of_chain else _DEARER
+    share = _DEARER_CHAIN if is_chain(best) else _DEARER
     dearer = guide.cost > least + (share - 1.0) * abs(least)
-    return dearer and candidate.solution.merit() > best.score()[-1]
+    return dearer and guess.minimum_norm.merit() > best.score()[-1]
 
 
-def along_chain(
-    formulation: Formulation,
-    effort: Effort,
-    guide: Sequence,
-    conditions: BoundConditions,
-) -> NodeSolution | None:
+def along_chain(guess: Guess, guide: Sequence) -> NodeOutcome | None:
     """Return the motion through the shortest chain near a sequence; None where it will not do.
 
     Where length is the only cost, joints rest and start again all over the path: a motion of few
     nodes cannot, and second derivatives at kinks are useless for Newton's method. The chain is at
     its optimum already, so that only velocities are missing.
     """
+    formulation, effort, conditions = guess.formulation, guess.effort, guess.conditions
     if not is_on_nodes(formulation, effort) or not asks_length(formulation):
         return None
     if conditions.ends:
@@ -318,7 +327,7 @@ def along_chain(
         broken = motion.broken_intervals() | _beyond_limits(motion)
         if not broken.any():
             none = np.zeros(len(motion.h))
-            return NodeSolution(motion, Status.PRECISION, none, is_chain=True)
+            return NodeOutcome(motion, Status.PRECISION, none, is_chain=True)
         finer = Grid(t).halved(np.convolve(broken, np.ones(3), "same") > 0.0)
     return None
 
@@ -367,7 +376,7 @@ def keep_to_posture(planner: Planner) -> None:
     """
     postures, ended = _postures(planner)
     for number, posture in enumerate(postures, 1):
-        planner.progress("posture", number, len(postures))
+        planner.setup.progress("posture", number, len(postures))
         _optimise(planner, posture, ended)
         if planner.is_over:
             break
@@ -377,8 +386,8 @@ def keep_to_posture(planner: Planner) -> None:
 
 def _end(planner: Planner, ended: Status) -> None:
     """Keep the present motion after an interruption; KeyboardInterrupt if there is none."""
-    if planner.best is not None:
-        planner.best.end(ended)
+    if planner.incumbent is not None:
+        planner.end(ended)
     elif ended is Status.INTERRUPTED:
         raise KeyboardInterrupt
 
@@ -395,33 +404,32 @@ def _optimise(planner: Planner, posture: Array, ended: Status | None) -> None:
         except SelfmotionError:
             return
     conditions = formulation.conditions(start, start, apart=planner.effort.apart)
-    polisher = Polisher(formulation, planner.effort, conditions, free=planner.is_free)
-    if ended is not None:
-        polisher.end(ended)
-    motion = _near(polisher, formulation, start, posture)
+    search = LocalSearch(formulation, planner.effort, conditions, free=planner.setup.is_free)
+    search.recorder.ended = ended
+    motion = _near(search, start, posture)
     if motion is None:
         return
+    best = planner.incumbent
+    least = best.outcome.cost if best is not None and best.will_do else np.inf
     try:
-        found = polisher.best_near(motion, planner.cost_to_beat)
+        found = search.best_near(motion, least)
     except KeyboardInterrupt:
-        found, ended = polisher.latest, Status.INTERRUPTED
+        found, ended = search.recorder.latest, Status.INTERRUPTED
         if found is None:
             raise
-    if polisher.is_stopped:
+    if search.recorder.ended is Status.STOPPED:
         ended = Status.STOPPED
-    will_do = found is not None and not found.violations and found.cost < planner.cost_to_beat
-    if found is None or not (will_do or (ended is not None and planner.best is None)):
+    will_do = found is not None and not found.violations and found.cost < least
+    if found is None or not (will_do or (ended is not None and planner.incumbent is None)):
         if ended is not None:
             _end(planner, ended)
         return
     # Of its velocities eq. 4 keeps the self-motion.
     rates, grid = partial(motion.trajectory, order=1), Grid(motion.grid.t)
-    candidate = planner.begin(start, free=planner.is_free, guide=rates, grid=grid)
-    if candidate is not None:
-        candidate.take(found, polisher.history)
-        if ended is not None:
-            candidate.end(ended)
-        planner.consider(candidate)
+    guess = planner.guess(start, free=planner.setup.is_free, guide=rates, grid=grid)
+    if guess is not None:
+        history = tuple(search.recorder.history)
+        planner.consider(Solution(guess, found, history, ended))
 
 
 def _postures(planner: Planner) -> tuple[list[Array], Status | None]:
@@ -438,14 +446,21 @@ def _postures(planner: Planner) -> tuple[list[Array], Status | None]:
         constraints=list(constraints_of_part(formulation.problem, is_first=False, is_last=False)),
         rest=False,
     )
+    own = replace(planner.setup, formulation=section)
     inner = replace(
-        planner, formulation=section, best=None, failure=None, waiting=(), ranking=None, attempts=[]
+        planner,
+        setup=own,
+        incumbent=None,
+        failure=None,
+        waiting=(),
+        ranking=None,
+        attempts=[],
     )
     try:
-        optimise_starts(inner, planner.search.starts, planner.search.finalists)
+        optimise_starts(inner, planner.setup.search.starts, planner.setup.search.finalists)
     except SelfmotionError:
         return [], None
-    motions = [] if inner.best is None else [inner.best.evaluation().trajectory]
+    motions = [] if inner.incumbent is None else [inner.incumbent.evaluation.trajectory]
     ranked = [] if inner.ranking is None else inner.ranking.ranked
     motions += [motion.trajectory for motion in ranked]
     found: list[Array] = []
@@ -454,21 +469,20 @@ def _postures(planner: Planner) -> tuple[list[Array], Status | None]:
         posture = np.asarray(weights @ motion.q / weights.sum())
         if all(np.abs(posture - other).max() > ONE_VALLEY for other in found):
             found.append(posture)
-    return found, inner.best.status if inner.is_over and inner.best is not None else None
+    return found, inner.incumbent.status if inner.is_over and inner.incumbent is not None else None
 
 
-def _near(
-    polisher: Polisher, formulation: Formulation, start: Array, posture: Array
-) -> NodeMotion | None:
+def _near(search: LocalSearch, start: Array, posture: Array) -> NodeMotion | None:
     """Return the motion from a start (n,) that goes to a posture (n,) by self-motion.
 
     On the coarsest nodes with about its cost; None without any.
     """
+    formulation = search.formulation
     # As long as it takes the tool to go as far as the arm reaches.
     time = formulation.path.duration / formulation.length_in_reaches
     grid, most = Grid.aligned(formulation.knots, _FIRST_NODES), most_nodes(formulation)
     while grid.steps <= most:
-        motion = polisher.grid(grid.nodes).motion_towards(start, posture, time)
+        motion = search.grid(grid.nodes).motion_towards(start, posture, time)
         if motion is not None and resolves(motion):
             return motion
         grid = grid.halved()

@@ -23,10 +23,13 @@ from selfmotion.basics import (
 from selfmotion.certificate import Certificate, Tolerance
 from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.optimise import Callback, Optimizer, Status
-from selfmotion.planning.planner.candidate import check_warm_start
 from selfmotion.planning.planner.effort import Deadline, Effort, Search
 from selfmotion.planning.planner.grids import is_published
-from selfmotion.planning.planner.planner import Judged, Planner
+from selfmotion.planning.planner.guess import check_warm_start
+from selfmotion.planning.planner.judging import Judged
+from selfmotion.planning.planner.planner import Planner
+from selfmotion.planning.planner.setup import Setup
+from selfmotion.planning.planner.solution import have_one_start
 from selfmotion.planning.planner.steps import go_through
 from selfmotion.planning.result import Gap, Plan, Report
 from selfmotion.planning.search import SPACING, Sequence
@@ -53,11 +56,11 @@ def gathered(planner: Planner, deadline: Deadline) -> Plan:
         judged.minimum_norm,
         judged.certificate,
     )
-    candidate = part.candidate
-    if deadline.passed and candidate.status is Status.INTERRUPTED:
-        candidate.end(Status.DEADLINE)
-    counts, solution = candidate.effort.counts, candidate.solution
-    status = status_of(candidate.status, check)
+    solution = part.solution
+    if deadline.passed and solution.status is Status.INTERRUPTED:
+        solution = solution.ended_by(Status.DEADLINE)
+    counts, facts = solution.guess.effort.counts, solution.outcome.facts()
+    status = status_of(solution.status, check)
     report = Report(
         cost=motion.cost,
         initial_cost=minimum_norm.cost,
@@ -67,23 +70,23 @@ def gathered(planner: Planner, deadline: Deadline) -> Plan:
         gradient_evaluations=counts.gradients,
         jacobian_evaluations=counts.jacobians,
         steps=len(motion.trajectory.t) - 1,
-        iterations=sum(iteration.step > 0.0 for iteration in candidate.history),
-        history=tuple(candidate.history),
+        iterations=sum(iteration.step > 0.0 for iteration in solution.history),
+        history=solution.history,
         status=status,
         message=message_of(
             status,
-            candidate.violations,
+            solution.violations,
             check,
             ending=part.ending,
             notes=planner.notes,
-            published=planner.is_published,
+            published=is_published(planner.formulation, planner.effort),
         ),
         seconds=time.perf_counter() - planner.began,
         gap=_gap(planner, judged),
         ending=part.ending,
-        active=solution.active,
-        null_motion=solution.null_motion,
-        remaining=solution.remaining,
+        active=facts.active,
+        null_motion=facts.null_motion,
+        remaining=facts.remaining,
         attempts=tuple(planner.attempts),
         obstruction=planner.stops,
         remedy=planner.advice,
@@ -92,7 +95,7 @@ def gathered(planner: Planner, deadline: Deadline) -> Plan:
         problem=planner.formulation.problem,
         trajectory=planner.formulation.of_arm(motion.trajectory),
         initial_trajectory=planner.formulation.of_arm(minimum_norm.trajectory),
-        coefficients=read_only(solution.coefficients),
+        coefficients=read_only(facts.coefficients),
         report=report,
         certificate=report.explained(check),
     )
@@ -100,12 +103,13 @@ def gathered(planner: Planner, deadline: Deadline) -> Plan:
 
 def _gap(planner: Planner, judged: Judged) -> Gap | None:
     """Compare a plan with the global search; None without one."""
-    if not planner.sequences or judged.part.candidate is not planner.best:
+    if not planner.sequences or judged.part.solution is not planner.incumbent:
         return None
     motion, rival, rival_cost = judged.motion, planner.rival, judged.rival_cost
     shortest = min(planner.sequences, key=lambda each: each.length)
     weights = planner.formulation.coordinates.weights
-    if rival is not None and rival is planner.best and not rival.violations:
+    best = planner.incumbent
+    if rival is not None and have_one_start(rival, best) and not rival.violations:
         rival_cost = motion.cost
     return Gap(
         cost=motion.cost,
@@ -259,14 +263,14 @@ def plan(
     if warm_start is not None:
         known = formulation.of_all(warm_start.trajectory, warm_start.path)
         warm_start = replace(warm_start, trajectory=known)
-    planner = Planner(
+    setup = Setup(
         formulation,
-        effort,
         search or Search(),
         Tolerance.of(tolerance),
         clock.checked_by(progress),
         warm_start=warm_start,
     )
+    planner = Planner(setup, effort)
     try:
         with one_blas_thread(), held_interruption():
             return _planned(planner, clock)
@@ -285,7 +289,7 @@ def plan_along(problem: Problem, guide: Sequence, tolerance: Tolerance, progress
     effort = Effort(None, None, None, clock)
     formulation = Formulation.of(problem)
     guide = replace(guide, q=formulation.completed(guide.t, guide.q))
-    planner = Planner(formulation, effort, Search(), tolerance, progress, guide=guide)
+    planner = Planner(Setup(formulation, Search(), tolerance, progress, guide=guide), effort)
     with one_blas_thread(), held_interruption():
         return _planned(planner, clock)
 

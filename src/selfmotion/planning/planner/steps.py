@@ -20,9 +20,9 @@ from selfmotion.basics import (
 )
 from selfmotion.model.task import SE3
 from selfmotion.planning.formulation import Formulation
-from selfmotion.planning.planner.candidate import Candidate, on_start
 from selfmotion.planning.planner.effort import Search
-from selfmotion.planning.planner.grids import is_on_nodes
+from selfmotion.planning.planner.grids import is_on_nodes, is_published
+from selfmotion.planning.planner.guess import on_start
 from selfmotion.planning.planner.planner import Planner
 from selfmotion.planning.planner.proposals import (
     VERY_LONG_PATH,
@@ -33,6 +33,13 @@ from selfmotion.planning.planner.proposals import (
     optimise_stacked,
     optimise_starts,
     optimise_where_it_breaks,
+)
+from selfmotion.planning.planner.solution import Solution
+from selfmotion.planning.planner.verdicts import (
+    free_by_meshes,
+    judge_as_it_is,
+    judge_incumbent,
+    judge_part,
 )
 from selfmotion.planning.result import Attempt
 from selfmotion.planning.search import Obstruction, obstruction
@@ -68,16 +75,16 @@ def go_through(planner: Planner) -> None:
 
 def _outcome(planner: Planner) -> tuple[str, float | None]:
     """Return the best motion in words, and its cost."""
-    judged, best = planner.judged, planner.best
+    judged, best = planner.judged, planner.incumbent
     if judged is not None:
         parts = (judged.part.ending, judged.certificate.verdict)
         return "; ".join(text for text in parts if text), judged.motion.cost
     if best is not None:
         wrong = "; ".join(best.violations)
         if wrong:
-            return f"not all constraints are met: {wrong}", best.solution.cost
-        itself = "" if best.solution.keeps_off_itself else ", but the arm meets itself"
-        return f"all constraints are met{itself}", best.solution.cost
+            return f"not all constraints are met: {wrong}", best.outcome.cost
+        itself = "" if best.outcome.keeps_off_itself else ", but the arm meets itself"
+        return f"all constraints are met{itself}", best.outcome.cost
     if planner.failure is not None:
         return str(planner.failure), None
     return planner.blocked.reason if planner.blocked else "nothing is in the way", None
@@ -85,12 +92,12 @@ def _outcome(planner: Planner) -> tuple[str, float | None]:
 
 def _look_first(planner: Planner) -> bool:
     """Check whether the arm can reach some single poses, before anything is known."""
-    if not planner.is_free or planner.has_motion:
+    if not planner.setup.is_free or planner.setup.has_motion:
         return False
-    blocked = planner.blocked = _looked_at(planner.formulation, planner.search)
+    blocked = planner.blocked = _looked_at(planner.formulation, planner.setup.search)
     if blocked is not None:
         # Planning the rest takes many times as long as this message.
-        planner.progress(f"no motion passes t = {blocked.time:.6g} s: {blocked.reason}", 0, 0)
+        planner.setup.progress(f"no motion passes t = {blocked.time:.6g} s: {blocked.reason}", 0, 0)
     return True
 
 
@@ -102,7 +109,7 @@ def _plan_before_blocked_pose(planner: Planner) -> bool:
     told = blocked.help.removeprefix("; ")
     planner.notes += [told] if told else []
     try:
-        found = planner.judge_part(blocked.time)
+        found = judge_part(planner, blocked.time)
     except InverseKinematicsError:
         found = False
     if not found:
@@ -112,30 +119,29 @@ def _plan_before_blocked_pose(planner: Planner) -> bool:
 
 def _follow_guide(planner: Planner) -> bool:
     """Optimise from a motion that is known."""
-    guide = planner.guide
+    guide = planner.setup.guide
     if guide is None:
         return False
-    candidate = planner.begin(guide.start, free=planner.is_free, guide=guide)
-    if candidate is not None:
-        planner.polish(candidate)
+    guess = planner.guess(guide.start, free=planner.setup.is_free, guide=guide)
+    if guess is not None:
+        planner.take(guess)
     return True
 
 
 def _warm_start_at_plan(planner: Planner) -> bool:
     """Optimise from a plan of this problem or of one like it, if it leads to a motion."""
-    plan = planner.warm_start
-    if plan is None or not planner.is_free:
+    plan = planner.setup.warm_start
+    if plan is None or not planner.setup.is_free:
         return False
     try:
         start = on_start(planner.formulation, plan.trajectory.q[0])
     except InverseKinematicsError as error:
         planner.failure = error
         return True
-    candidate = planner.begin(start, free=True)
-    if candidate is not None:
-        candidate.adopt(plan)
-        planner.progress("warm start", 1, 1)
-        planner.polish(candidate)
+    guess = planner.guess(start, free=True)
+    if guess is not None:
+        planner.setup.progress("warm start", 1, 1)
+        planner.take(guess.with_plan(plan))
     return True
 
 
@@ -149,18 +155,16 @@ def _from_given_start(planner: Planner) -> bool:
     start = planner.formulation.given_start
     if start is None or not (planner.is_sought and planner.is_unmet):
         return False
-    candidate = planner.begin(start, free=False)
-    if candidate is not None:
-        if planner.warm_start is not None:
-            candidate.adopt(planner.warm_start)
-        planner.polish(candidate)
+    guess, plan = planner.guess(start, free=False), planner.setup.warm_start
+    if guess is not None:
+        planner.take(guess if plan is None else guess.with_plan(plan))
     return True
 
 
 def _draw_starts(planner: Planner) -> bool:
     """Optimise from the best of starts that are drawn."""
-    search = planner.search
-    if not (planner.is_sought and planner.takes_starts and (planner.is_unmet or search.compare)):
+    search, draws = planner.setup.search, planner.setup.takes_starts
+    if not (planner.is_sought and draws and (planner.is_unmet or search.compare)):
         return False
     optimise_starts(planner, search.starts, search.finalists)
     return True
@@ -172,8 +176,8 @@ def _compare_postures(planner: Planner) -> bool:
 
 
 def _try_postures(planner: Planner) -> bool:
-    wanted = planner.is_unmet or not planner.has_motion
-    possible = is_long(planner) and (planner.takes_starts or not planner.is_free)
+    wanted = planner.is_unmet or not planner.setup.has_motion
+    possible = is_long(planner) and (planner.setup.takes_starts or not planner.setup.is_free)
     if not (planner.is_sought and wanted and possible):
         return False
     keep_to_posture(planner)
@@ -183,49 +187,48 @@ def _try_postures(planner: Planner) -> bool:
 def _stack_rows(planner: Planner) -> bool:
     """Optimise from motions that keep limits and quantities as rows of their task."""
     wanted = planner.is_sought and planner.is_unmet
-    begins = planner.takes_starts or not planner.is_free
+    begins = planner.setup.takes_starts or not planner.setup.is_free
     can = is_on_nodes(planner.formulation, planner.effort) and may_stack(planner)
     if not (wanted and begins and can) or planner.is_out_of_reach():
         return False
-    return optimise_stacked(planner, planner.search.finalists)
+    return optimise_stacked(planner, planner.setup.search.finalists)
 
 
 def _judge_on_meshes(planner: Planner) -> bool:
     """Take a motion that bodies' hulls forbid where their meshes do not."""
-    if planner.best is None or not planner.is_sought:
+    if planner.incumbent is None or not planner.is_sought:
         return False
     tried = False
-    for candidate in planner.free_by_meshes():
+    for solution in free_by_meshes(planner):
         tried = True
-        if planner.judge_as_it_is(candidate):
-            planner.best = candidate
+        if judge_as_it_is(planner, solution) and planner.judged is not None:
+            planner.incumbent = planner.judged.part.solution
             break
     return tried
 
 
 def _decompose_links(planner: Planner) -> bool:
     """Optimise again with links in convex pieces, where only their hulls meet something."""
-    search, effort = planner.search, planner.effort
+    search, effort = planner.setup.search, planner.effort
     if effort.decomposed or not (planner.is_sought and planner.is_unmet):
         return False
-    best = next(planner.free_by_meshes(just=True), None)
+    best = next(free_by_meshes(planner, just=True), None)
     if best is None:
         return False
     planner.effort = replace(effort, decomposed=True)
-    known = best.evaluation().trajectory
-    candidate = planner.begin(known.q[0], free=best.free)
-    if candidate is not None:
-        candidate.resume(known)
-        planner.polish(candidate)
-    if planner.is_unmet and planner.takes_starts and not planner.is_over:
+    known = best.evaluation.trajectory
+    guess = planner.guess(known.q[0], free=best.guess.free, motion=known)
+    if guess is not None:
+        planner.take(guess)
+    if planner.is_unmet and planner.setup.takes_starts and not planner.is_over:
         optimise_starts(planner, search.starts, search.finalists)
     return True
 
 
 def _draw_where_it_breaks(planner: Planner) -> bool:
     """Draw configurations where the best motion breaks something most, or where none goes on."""
-    best, failure, search = planner.best, planner.failure, planner.search
-    wanted = planner.is_sought and planner.takes_starts and planner.is_unmet
+    best, failure, search = planner.incumbent, planner.failure, planner.setup.search
+    wanted = planner.is_sought and planner.setup.takes_starts and planner.is_unmet
     if (
         not (wanted and is_on_nodes(planner.formulation, planner.effort))
         or planner.is_out_of_reach()
@@ -234,18 +237,18 @@ def _draw_where_it_breaks(planner: Planner) -> bool:
     if best is None and not isinstance(failure, BreakdownError):
         return False
     # Conditions on ends and self-collision have no time: others do.
-    at = best.breaks_at if best is not None else cast(BreakdownError, failure).time
+    at = best.outcome.breaks_at if best is not None else cast(BreakdownError, failure).time
     optimise_where_it_breaks(planner, at or 0.0, search.starts, search.finalists)
     return True
 
 
 def _search_globally(planner: Planner) -> bool:
     """Optimise from the best chains of configurations over all self-motions."""
-    wanted = planner.search.compare or (planner.chooses_globally and planner.is_unmet)
-    can = planner.is_searchable and (planner.is_free or planner.best)
+    wanted = planner.setup.search.compare or (planner.setup.chooses_globally and planner.is_unmet)
+    can = planner.setup.is_searchable and (planner.setup.is_free or planner.incumbent)
     if not (planner.is_sought and wanted and can) or planner.is_out_of_reach():
         return False
-    optimise_sequences(planner, chosen=planner.chooses_globally)
+    optimise_sequences(planner, chosen=planner.setup.chooses_globally)
     return True
 
 
@@ -254,12 +257,12 @@ def _plan_largest_part(planner: Planner) -> bool:
 
     No other motion on finer grids would be better then.
     """
-    best, failure = planner.best, planner.failure
+    best, failure = planner.incumbent, planner.failure
     if best is not None:
         is_damped = planner.formulation.damping_law is not None
         short = planner.is_sought and _may_meet_more(best) and not is_damped
         if short and planner.reach().reason:
-            planner.judge_part()
+            judge_part(planner)
             return True
         return False
     if planner.judged is not None:
@@ -272,7 +275,7 @@ def _plan_largest_part(planner: Planner) -> bool:
     blocked = isinstance(failure, NoSequenceError) and not planner.reach(failure.time).reason
     if blocked:
         raise failure
-    if not planner.judge_part(failure.time):
+    if not judge_part(planner, failure.time):
         reason = planner.reach(failure.time).reason
         if isinstance(failure, BreakdownError) and reason:
             raise BreakdownError(
@@ -284,22 +287,22 @@ def _plan_largest_part(planner: Planner) -> bool:
     return True
 
 
-def _may_meet_more(best: Candidate) -> bool:
+def _may_meet_more(best: Solution) -> bool:
     return bool(best.violations) and not best.is_spent
 
 
 def _judge(planner: Planner) -> bool:
     """Go on to finer grids, until the certificate finds nothing wrong."""
-    if planner.best is None or planner.judged is not None:
+    if planner.incumbent is None or planner.judged is not None:
         return False
-    planner.judge(planner.best)
+    judge_incumbent(planner, planner.incumbent)
     return True
 
 
 def _plan_part_instead(planner: Planner) -> bool:
     """Plan the largest part where a motion along all of the path is off it, or past limits."""
-    best, judged = planner.best, planner.judged
-    if best is None or judged is None or best is not judged.part.candidate:
+    best, judged = planner.incumbent, planner.judged
+    if best is None or judged is None or best is not judged.part.solution:
         return False
     check = judged.certificate
     # With damping the motion goes on off the path, as requested.
@@ -310,41 +313,41 @@ def _plan_part_instead(planner: Planner) -> bool:
     # Where single poses are in reach, constraints that are not met say more than a part.
     if (check.on_path and not out_of_limits) or not planner.reach(suspect).reason:
         return False
-    planner.judge_part(suspect)
+    judge_part(planner, suspect)
     return True
 
 
 def _draw_where_proof_fails(planner: Planner) -> bool:
     """Draw configurations where the proof fails, if nothing was known to break there before."""
-    best, judged, search = planner.best, planner.judged, planner.search
-    if best is None or judged is None or best is not judged.part.candidate or best.is_spent:
+    best, judged, search = planner.incumbent, planner.judged, planner.setup.search
+    if best is None or judged is None or best is not judged.part.solution or best.is_spent:
         return False
     fails_at, known = judged.fails_at, {item.name for item in planner.attempts}
-    if fails_at is None or _WHERE_IT_BREAKS in known or not planner.takes_starts:
+    if fails_at is None or _WHERE_IT_BREAKS in known or not planner.setup.takes_starts:
         return False
     if not is_on_nodes(planner.formulation, planner.effort) or planner.is_out_of_reach():
         return False
-    planner.best = planner.judged = None
+    planner.incumbent = planner.judged = None
     try:
         optimise_where_it_breaks(planner, fails_at, search.starts, search.finalists)
-        found = planner.best
+        found = planner.incumbent
         if found is not None and found.will_do:
-            planner.judge(found)
+            judge_incumbent(planner, found)
     finally:
-        found = planner.best
+        found = planner.incumbent
         if planner.judged is None or not planner.judged.certificate.verified:
-            planner.best, planner.judged = best, judged
+            planner.incumbent, planner.judged = best, judged
             if found is not None and found.cut_short:
-                best.end(found.status)
+                planner.end(found.status)
     return True
 
 
 def _find_obstruction(planner: Planner) -> bool:
     """Find the obstruction of a motion that is not verified: whether single poses are reachable."""
     judged, formulation = planner.judged, planner.formulation
-    if judged is None or judged.certificate.verified or judged.part.candidate.cut_short:
+    if judged is None or judged.certificate.verified or judged.part.solution.cut_short:
         return False
-    if planner.is_published or formulation.damping_law is not None:
+    if is_published(formulation, planner.effort) or formulation.damping_law is not None:
         return False
     if judged.part.ending or judged.fails_at is None:
         return False
@@ -352,11 +355,11 @@ def _find_obstruction(planner: Planner) -> bool:
     if isinstance(failure, NoSequenceError):
         planner.stops = str(failure).removeprefix(f"{formulation.robot.name}: ")
         return True
-    rng = np.random.default_rng(planner.search.rng)
+    rng = np.random.default_rng(planner.setup.search.rng)
     blocked = obstruction(formulation, rng, judged.fails_at)
     if blocked is not None:
         planner.stops = _passing(blocked)
-    elif planner.is_free:
+    elif planner.setup.is_free:
         planner.advice = (
             "the arm can be at each pose that was looked at, but no motion was found that joins "
             "them: plan it in parts (plan_in_parts, parts = true in files)"

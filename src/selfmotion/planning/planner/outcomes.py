@@ -1,9 +1,9 @@
-"""Solutions of a planning formulation: by the published method, or on nodes."""
+"""Motions that are found: the minimum-norm one, the published method's, and those on nodes."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Self
+from typing import ClassVar, NamedTuple, Self
 
 import numpy as np
 
@@ -14,12 +14,11 @@ from selfmotion.planning.formulation import (
     BoundConditions,
     Formulation,
     SampledMotion,
-    require_finite_gradients,
-    require_finite_values,
 )
 from selfmotion.planning.nodes import NodeMotion, Optimum
 from selfmotion.planning.optimise import Status
 from selfmotion.planning.paper import MinimumNormMotion
+from selfmotion.planning.planner.grids import UNKEPT
 from selfmotion.planning.search import BESIDE
 from selfmotion.problem.constraints import (
     ActiveConstraint,
@@ -34,14 +33,37 @@ from selfmotion.problem.costs import Samples
 
 # Residual of conditions at the ends [rad, rad/s].
 ENDS_MET = 1e-8
+# Statuses of an optimum.
+ARRIVED = (Status.CONVERGED, Status.PRECISION)
 # Relative saving below which a constraint does not bind.
 _LEAST_SAVING = 1e-6
 # Largest relative saving in reports: multipliers are first derivatives, which are valid nearby.
 _MOST_SAVING = 1e-2
 
 
+class OutcomeFacts(NamedTuple):
+    """What a report says of a motion that was found.
+
+    Attributes
+    ----------
+    null_motion : NullMotion
+        Its parameterisation.
+    coefficients : (size,)
+        Of the null motion.
+    active : tuple of ActiveConstraint
+        Constraints that limit the optimum; none before convergence, without multipliers.
+    remaining : float or None
+        Possible decrease of the cost by more nodes and another step; None if unknown.
+    """
+
+    null_motion: NullMotion
+    coefficients: Array
+    active: tuple[ActiveConstraint, ...] = ()
+    remaining: float | None = None
+
+
 @dataclass(frozen=True, eq=False)
-class MinimumNormSolution:
+class MinimumNormOutcome:
     """The minimum-norm motion, eq. 4 at ε = 0: an initial guess, and what others are held against.
 
     Attributes
@@ -58,6 +80,7 @@ class MinimumNormSolution:
     motion: MinimumNormMotion
     conditions: BoundConditions
     counts: Counts
+    breaks_at: ClassVar[float | None] = None
 
     @property
     def status(self) -> Status:
@@ -70,25 +93,16 @@ class MinimumNormSolution:
         """Of its grid."""
         return self.motion.grid.steps
 
-    @property
-    def null_motion(self) -> NullMotion:
-        """The parameterisation of the null motion."""
-        return self.formulation.null_motion
-
-    @property
-    def coefficients(self) -> Array:
-        """The null motion's coefficients: none."""
-        return np.zeros(0)
-
     @cached_property
-    def _sampled(self) -> SampledMotion:
+    def sampled(self) -> SampledMotion:
+        """The motion at the stages of its integration."""
         return self.formulation.sampled(self.motion.rollout.samples())
 
     @cached_property
     def terms(self) -> dict[str, float]:
         """Contribution of each cost."""
         self.counts.evaluated()
-        arm, costs = self._sampled.arm, self.formulation.costs
+        arm, costs = self.sampled.arm, self.formulation.costs
         return {cost.name: float(arm.weights @ cost.value(arm)) for cost in costs}
 
     @property
@@ -97,31 +111,10 @@ class MinimumNormSolution:
         total = sum(self.terms.values())
         return total if np.isfinite(total) else np.inf
 
-    def require_finite(self) -> None:
-        """Raise ProblemError where a cost has no finite value."""
-        require_finite_values(self.formulation.costs, self._sampled.arm)
-
-    def require_finite_gradients(self) -> None:
-        """Raise ProblemError where a derivative of a cost is not finite."""
-        require_finite_gradients(self.formulation.costs, self._sampled.arm)
-
-    @property
-    def _evaluated(self) -> Iterator[tuple[BoundConstraint, Samples]]:
-        return self._sampled.with_conditions(self.conditions.every)
-
     @cached_property
     def violations(self) -> tuple[str, ...]:
         """Violations, one for each constraint."""
-        return violated(self._evaluated)
-
-    @property
-    def active(self) -> tuple[ActiveConstraint, ...]:
-        """No constraint: they are judged, not required."""
-        return ()
-
-    @property
-    def remaining(self) -> None:
-        """Not known."""
+        return violated(self.sampled.with_conditions(self.conditions.every))
 
     @cached_property
     def keeps_off_itself(self) -> bool:
@@ -130,10 +123,17 @@ class MinimumNormSolution:
 
     def merit(self) -> float:
         """Return the cost, much larger where constraints are violated: for ranking."""
-        return penalised(self.cost, self._evaluated) if np.isfinite(self.cost) else np.inf
+        if not np.isfinite(self.cost):
+            return np.inf
+        return penalised(self.cost, self.sampled.with_conditions(self.conditions.every))
+
+    def facts(self) -> OutcomeFacts:
+        """Return what a report says of it: there is no null motion."""
+        return OutcomeFacts(self.formulation.null_motion, np.zeros(0))
 
     @cached_property
-    def _evaluation(self) -> Evaluation:
+    def evaluation(self) -> Evaluation:
+        """The motion with its costs."""
         own, rollout = self.motion, self.motion.rollout
         before = rollout.jacobian_evaluations
         t, q, qd = rollout.polished()
@@ -144,13 +144,9 @@ class MinimumNormSolution:
             qdd[[end for end, order in orders if order > 1]] = 0.0
         self.counts.jacobians += rollout.jacobian_evaluations - before
         trajectory = Trajectory(t, q, qd, self.formulation.coordinates.names, qdd)
-        return Evaluation(self.coefficients, self.terms, trajectory, rollout.damped)
+        return Evaluation(np.zeros(0), self.terms, trajectory, rollout.damped)
 
-    def evaluation(self) -> Evaluation:
-        """Return the motion with its costs."""
-        return self._evaluation
-
-    def refined(self, where: Flags | None = None) -> "MinimumNormSolution":
+    def refined(self, where: Flags | None = None) -> "MinimumNormOutcome":
         """Return it with half the step length, for all or some of the steps (N,).
 
         As it is where it breaks down on that grid.
@@ -163,7 +159,7 @@ class MinimumNormSolution:
 
 
 @dataclass(frozen=True, eq=False)
-class PublishedSolution(paper.Solution):
+class PublishedOutcome(paper.Solution):
     """A motion of the published method, optimised.
 
     Attributes
@@ -173,6 +169,7 @@ class PublishedSolution(paper.Solution):
     """
 
     conditions: BoundConditions = field(default_factory=BoundConditions)
+    breaks_at: ClassVar[float | None] = None
 
     @property
     def _evaluated(self) -> Iterator[tuple[BoundConstraint, Samples]]:
@@ -184,15 +181,6 @@ class PublishedSolution(paper.Solution):
         """Violations, one for each constraint."""
         return violated(self._evaluated)
 
-    @property
-    def active(self) -> tuple[ActiveConstraint, ...]:
-        """No constraint: they are judged, not required."""
-        return ()
-
-    @property
-    def remaining(self) -> None:
-        """Not known."""
-
     @cached_property
     def keeps_off_itself(self) -> bool:
         """Whether the default clearance from itself holds, at the nodes and by meshes."""
@@ -201,6 +189,10 @@ class PublishedSolution(paper.Solution):
     def merit(self) -> float:
         """Return the cost, much larger where constraints are violated: for ranking."""
         return penalised(self.cost, self._evaluated) if np.isfinite(self.cost) else np.inf
+
+    def facts(self) -> OutcomeFacts:
+        """Return what a report says of it: constraints are judged, not required."""
+        return OutcomeFacts(self.null_motion, self.coefficients)
 
     def refined(self, where: Flags | None = None) -> Self:
         """Return it with half the step length, for all or some of the steps (N,).
@@ -214,7 +206,7 @@ class PublishedSolution(paper.Solution):
 
 
 @dataclass(frozen=True, eq=False)
-class NodeSolution:
+class NodeOutcome:
     """A motion on nodes: the best that was found near a start.
 
     Attributes
@@ -239,42 +231,22 @@ class NodeSolution:
     is_chain: bool = False
 
     @classmethod
-    def of(cls, optimum: Optimum, status: Status) -> "NodeSolution":
+    def of(cls, optimum: Optimum, status: Status) -> "NodeOutcome":
         """Return the one at an optimum."""
         motion: NodeMotion = optimum.motion
         promised = optimum.promised if np.isfinite(optimum.promised) else 0.0
         away = motion.grid.rows.conservatism(optimum.multipliers, motion.curve_ends)
         return cls(motion, status, optimum.multipliers, promised + float(away.sum()), optimum)
 
-    @classmethod
-    def on_the_way(cls, motion: NodeMotion) -> "NodeSolution":
-        """Return the one of a motion that keeps the conditions and has to do as it is."""
-        return cls(motion, Status.STOPPED, np.zeros(len(motion.h)))
-
-    @cached_property
-    def active(self) -> tuple[ActiveConstraint, ...]:
-        """Constraints that limit the optimum; none before convergence, without multipliers."""
-        return _active(self.optimum) if self.optimum is not None and self.has_arrived else ()
-
     @property
     def has_arrived(self) -> bool:
         """Whether it is an optimum."""
-        return self.optimum is None or self.optimum.status in (Status.CONVERGED, Status.PRECISION)
+        return self.optimum is None or self.optimum.status in ARRIVED
 
     @property
     def steps(self) -> int:
         """Intervals between the nodes."""
         return len(self.motion.grid.t) - 1
-
-    @property
-    def null_motion(self) -> NullMotion:
-        """The null motion's functions: of its values at the nodes, for each joint."""
-        return NodeNullMotion(tuple(self.motion.grid.t / self.motion.grid.t[-1]))
-
-    @property
-    def coefficients(self) -> Array:
-        """The null motion at the nodes, joint by joint."""
-        return self.motion.epsilon.T.ravel()
 
     @property
     def cost(self) -> float:
@@ -316,19 +288,22 @@ class NodeSolution:
         found = penalised(self.cost, motion.checked.with_conditions(motion.grid.conditions.every))
         return found + len(motion.elsewhere) * 10.0 * max(abs(self.cost), 1e-3)
 
+    def facts(self) -> OutcomeFacts:
+        """Return what a report says of it: the null motion at the nodes, joint by joint."""
+        times = self.motion.grid.t
+        functions = NodeNullMotion(tuple(times / times[-1]))
+        active = _active(self.optimum) if self.optimum is not None and self.has_arrived else ()
+        return OutcomeFacts(functions, _coefficients(self.motion), active, self.remaining)
+
+    @property
     def evaluation(self) -> Evaluation:
-        """Return the motion with its costs."""
+        """The motion with its costs."""
         motion = self.motion
-        found = Evaluation(self.coefficients, motion.terms, motion.trajectory, damped=False)
+        found = Evaluation(_coefficients(motion), motion.terms, motion.trajectory, damped=False)
         motion.forget()
         return found
 
-    def after(self, before: float) -> "NodeSolution":
-        """Return it as the refinement of a motion on fewer nodes that cost `before`."""
-        remaining = (self.remaining or 0.0) + max(before - self.cost, 0.0)
-        return replace(self, remaining=remaining)
-
-    def on(self, t: Array) -> "NodeSolution | None":
+    def on(self, t: Array) -> "NodeOutcome | None":
         """Return it on other nodes (N + 1,); None if one of them is out of reach.
 
         Beside a singular pose the path may be so, by next to nothing: a little later it is not.
@@ -344,25 +319,23 @@ class NodeSolution:
                 return replace(self, motion=motion, multipliers=multipliers)
         return None
 
-    def refined(self, where: Flags | None = None) -> "NodeSolution":
+    def refined(self, where: Flags | None = None) -> "NodeOutcome":
         """Return it with all intervals halved, or some (N,); unchanged where that fails."""
         return self.on(Grid(self.motion.grid.t).halved(where).nodes) or self
 
 
-Solution = MinimumNormSolution | PublishedSolution | NodeSolution
+def on_the_way(motion: NodeMotion, status: Status = Status.STOPPED) -> NodeOutcome:
+    """Return the outcome of a motion that satisfies the conditions and has to do as it is."""
+    return NodeOutcome(motion, status, np.zeros(len(motion.h)))
+
+
+def _coefficients(motion: NodeMotion) -> Array:
+    """Return the null motion at the nodes, joint by joint."""
+    return np.asarray(motion.epsilon.T.ravel())
+
+
+Outcome = MinimumNormOutcome | PublishedOutcome | NodeOutcome
 """A motion, however it was found."""
-
-
-def score(solution: Solution) -> tuple[bool, bool, float]:
-    """Return the sort key of motions, the smaller, the better.
-
-    Whether constraints are violated, whether the arm meets itself, which would be refused in the
-    end, and the cost. Of two that violate constraints, the one that does so less is nearer to a
-    motion.
-    """
-    if solution.violations:
-        return True, False, solution.merit()
-    return False, not solution.keeps_off_itself, solution.cost
 
 
 def _active(optimum: Optimum) -> tuple[ActiveConstraint, ...]:
@@ -377,3 +350,29 @@ def _active(optimum: Optimum) -> tuple[ActiveConstraint, ...]:
         each.append(Multipliers(item, own, np.zeros(1), np.ones(own.shape, dtype=np.bool_)))
     least, most = (share * abs(motion.cost) for share in (_LEAST_SAVING, _MOST_SAVING))
     return active_of(each, grid.t[[0, -1]], least, most)
+
+
+def is_kept(motion: NodeMotion) -> bool:
+    """Whether a motion satisfies all conditions."""
+    # Written so that NaN is not.
+    ends = np.abs(motion.c).max(initial=0.0) <= ENDS_MET and not motion.elsewhere
+    return bool(motion.violation <= 0.0 and ends)
+
+
+def rank_of(motion: NodeMotion, begun: NodeMotion) -> tuple[bool, bool, float]:
+    """Return the sort key of motions, the smaller the better.
+
+    A unit of violation, or all of it where the motion that all `begun` with has less, has a penalty
+    in multiples of the cost of that one: where no condition can be satisfied, not at any price.
+    """
+    most = UNKEPT * abs(begun.objective)
+    if is_kept(motion):
+        return False, False, motion.objective
+    of_all = min(1.0, _unmet(begun)) or 1.0
+    return True, motion.objective > most, motion.objective + most * _unmet(motion) / of_all
+
+
+def _unmet(motion: NodeMotion) -> float:
+    """Return by how much conditions are broken."""
+    far = max(motion.elsewhere.values(), default=0.0)
+    return motion.violation + float(np.abs(motion.c).max(initial=0.0)) + far

@@ -1,0 +1,191 @@
+"""Judge a motion on finer grids, until its certificate finds nothing wrong."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from selfmotion.basics import Progress
+from selfmotion.certificate import LIMIT_NAMES, Certificate, Tolerance
+from selfmotion.model.motion import Evaluation, Trajectory
+from selfmotion.planning.formulation import Formulation
+from selfmotion.planning.optimise import Status
+from selfmotion.planning.paper import MOST_HALVINGS
+from selfmotion.planning.planner.largest_part import Part
+from selfmotion.planning.planner.solution import Solution, have_one_start
+from selfmotion.planning.planner.solve import kept_off_itself, settle, solve_again
+
+# Path error between nodes, as a share of the tolerance, up to which a grid is fine enough …
+_RESOLVED = 0.3
+# … and as a share of that on the grid before.
+_FALLS = 0.7
+# Number of grids on which limits are exceeded between nodes before they count as infeasible.
+_ROUGH_GRIDS = 3
+# Grids with more steps than this multiple of the first are not optimised again.
+_FINER = 4
+
+
+@dataclass(frozen=True, eq=False)
+class Judged:
+    """Content of a plan: a motion along all of the path or a part of it, and its certificate.
+
+    Attributes
+    ----------
+    part : Part
+    motion, minimum_norm : Evaluation
+        The motion, and the minimum-norm one on the same grid.
+    certificate : Certificate
+    rival_cost : float or None
+        That of the best motion from the chains of the search, where it keeps the constraints.
+    """
+
+    part: Part
+    motion: Evaluation
+    minimum_norm: Evaluation
+    certificate: Certificate
+    rival_cost: float | None = None
+
+    @property
+    def fails_at(self) -> float | None:
+        """When [s] the certificate finds something wrong; None where it finds nothing."""
+        check = self.certificate
+        failed = [item.time for item in check.findings if not item.satisfied]
+        if not check.on_path:
+            failed.append(check.position_error.time)
+        return failed[0] if failed else None
+
+
+def judge(formulation: Formulation, part: Part, tolerance: Tolerance, progress: Progress) -> Judged:
+    """Return the motion on the first grid on which it is within the tolerance, with its check."""
+    judged: Judged | None = None
+    coarse: Trajectory | None = None
+    misses: list[float] = []
+    roughs, first = 0, part.solution.outcome.steps
+    for _ in range(MOST_HALVINGS):
+        try:
+            progress("checking", 1, 1)
+            judged = _check(formulation, part, tolerance)
+            part = judged.part
+            if _meets_itself(formulation, judged.certificate):
+                apart = kept_off_itself(part.solution)
+                if apart is not None and apart.outcome is not part.solution.outcome:
+                    part = replace(part, solution=settle(apart))
+                    continue
+            rough = _rough(formulation, judged)
+            roughs += rough
+            solution = part.solution
+            # Where no evaluations are left, finer grids change nothing.
+            out = solution.status is Status.MAX_EVALUATIONS
+            spent = out or roughs > _ROUGH_GRIDS or solution.outcome.steps > _FINER * first
+            if judged.certificate.on_path and (spent or not rough):
+                break
+            trajectory = judged.motion.trajectory
+            # The path error of damping is the same on any grid: the grid is fine when the tool's
+            # motion is.
+            if coarse is not None and _same(formulation, coarse, trajectory, tolerance):
+                break
+            coarse = trajectory if judged.motion.damped else None
+            # Poses out of reach are so on any grid.
+            check = judged.certificate
+            misses.append(check.position_error.value + check.rotation_error.value)
+            if coarse is None and len(misses) > 2 and misses[-1] > 0.5 * misses[-3]:
+                break
+            if solution.outcome.steps >= solution.most_steps:
+                break
+            solution = solution.refined()
+            if rough and not solution.cut_short:
+                solution = solve_again(solution)
+            part = replace(part, solution=solution)
+        except KeyboardInterrupt:
+            part = replace(part, solution=part.solution.ended_by(Status.INTERRUPTED))
+            if judged is not None:
+                judged = replace(judged, part=part)
+            break
+    # No plan goes without a certificate, interrupted or not.
+    return judged or _check(formulation, part, tolerance)
+
+
+def _resolved(
+    formulation: Formulation, solution: Solution, tolerance: Tolerance
+) -> tuple[Solution, Evaluation]:
+    """Return the motion, steps halved between whose nodes the tool was off the path."""
+    allowed, before = np.array([tolerance.position, tolerance.rotation]), np.inf
+    motion = solution.evaluation
+    for _ in range(MOST_HALVINGS):
+        errors = formulation.errors_between(motion.trajectory) / allowed
+        worst = float(errors.max())
+        # Written so that NaN is no progress. Damping's error is not that of the steps.
+        stuck = not worst < _FALLS * before or len(errors) > solution.most_steps
+        if motion.damped or worst <= _RESOLVED or stuck:
+            break
+        before = worst
+        solution = solution.refined((errors > _RESOLVED).any(axis=1))
+        motion = solution.evaluation
+    return solution, motion
+
+
+def _meets_itself(formulation: Formulation, certificate: Certificate) -> bool:
+    """Whether self-collision, under the default clearance, is the only violation."""
+    is_default = formulation.problem.own_collision is not None and len(certificate.failures) == 1
+    return is_default and not certificate.findings[-1].satisfied
+
+
+def _rough(formulation: Formulation, judged: Judged) -> bool:
+    """Whether a required condition holds at the nodes, but not between them."""
+    if judged.part.solution.violations or not judged.certificate.on_path:
+        return False
+    is_default = {item.name for item in formulation.problem.requirements}
+    # The arm's own limits always apply.
+    is_default |= set(LIMIT_NAMES[:2])
+    if formulation.problem.own_collision is not None:
+        # The default clearance need not have been a constraint of the nodes.
+        is_default.discard(formulation.problem.requirements[-1].name)
+    nodes = judged.motion.trajectory.t
+    # Rates are judged on both sides of a node; anything else that is wrong there stays so.
+    return any(
+        item.requirement in LIMIT_NAMES or item.time not in nodes
+        for item in judged.certificate.findings
+        if not item.satisfied and item.requirement in is_default
+    )
+
+
+def _same(
+    formulation: Formulation, coarse: Trajectory, fine: Trajectory, tolerance: Tolerance
+) -> bool:
+    """Whether two motions put all that is followed in the same place in the prescribed rows."""
+    pairs = list(zip(coarse(fine.t), fine.q, strict=True))
+    misses = np.array(
+        [
+            item.miss(item.chain.place(first), second)
+            for item in formulation.follows.items
+            for first, second in pairs
+        ]
+    )
+    position, rotation = misses.max(axis=0)
+    return bool(position <= tolerance.position and rotation <= tolerance.rotation)
+
+
+def _check(formulation: Formulation, part: Part, tolerance: Tolerance) -> Judged:
+    solution, motion = _resolved(formulation, part.solution, tolerance)
+    certificate = formulation.certify(motion.trajectory, tolerance, part.ending)
+    resolved = replace(part, solution=solution)
+    return Judged(resolved, motion, solution.minimum_norm_evaluation, certificate)
+
+
+def refined_both(
+    solution: Solution, rival: Solution | None, progress: Progress
+) -> tuple[Solution, float | None]:
+    """Return a motion refined, and the cost of the one it is compared with, if that is sufficient.
+
+    An interruption ends both as they are.
+    """
+    try:
+        progress("refining", 1, 1)
+        solution = settle(solution)
+        if rival is not None and not solution.cut_short and not have_one_start(solution, rival):
+            rival = settle(rival)
+            if rival.cut_short:
+                solution = solution.ended_by(rival.status)
+            return solution, None if rival.violations else rival.outcome.cost
+    except KeyboardInterrupt:
+        solution = solution.ended_by(Status.INTERRUPTED)
+    return solution, None

@@ -1,0 +1,98 @@
+"""The published method from an initial guess; the only place where the planner calls it."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from selfmotion.basics import Array
+from selfmotion.model.motion import (
+    FreeNullMotion,
+    NullMotionTable,
+    PolynomialNullMotion,
+    Trajectory,
+)
+from selfmotion.model.robot import null_space
+from selfmotion.planning.formulation import Formulation
+from selfmotion.planning.optimise import QuasiNewton, Status
+from selfmotion.planning.paper import Method, Objective
+from selfmotion.planning.planner.guess import Guess, pace_of
+from selfmotion.planning.planner.outcomes import PublishedOutcome
+from selfmotion.planning.planner.solution import Solution
+
+
+def solve_as_published(solution: Solution) -> Solution:
+    """Return the optimum of the published method, on its grids, or on that of the solution."""
+    before = solution.outcome
+    if isinstance(before, PublishedOutcome):
+        found = before.again()
+    else:
+        begun = _first(solution.guess)
+        found = replace(begun, x=_first_coefficients(begun, solution.guess)).settled()
+    ended = Status.INTERRUPTED if found.status is Status.INTERRUPTED else solution.ended
+    return replace(solution, outcome=found, history=tuple(found.history), ended=ended)
+
+
+def _first(guess: Guess) -> PublishedOutcome:
+    """Return the minimum-norm motion as the start of the published method."""
+    effort, formulation, begun = guess.effort, guess.formulation, guess.minimum_norm.motion
+    if isinstance(formulation.null_motion, FreeNullMotion):
+        formulation = formulation.changed(null_motion=PolynomialNullMotion())
+    ends, most = guess.conditions.ends, effort.max_evaluations
+    limit = None if most is None else effort.counts.evaluations + most
+    own = QuasiNewton() if effort.optimizer is None else effort.optimizer
+    method = Method(
+        formulation, begun, guess.free, ends, own, effort.counts, limit, effort.callback
+    )
+    objective = Objective.of(
+        formulation,
+        begun,
+        free=guess.free,
+        ends=ends,
+        counts=effort.counts,
+        rollout=begun.rollout,
+    )
+    none = np.zeros(objective.size)
+    return PublishedOutcome(method, objective, none, conditions=guess.conditions)
+
+
+def _first_coefficients(begun: PublishedOutcome, guess: Guess) -> Array:
+    """Return the decision vector that is nearest to a known plan, if no worse than x = 0."""
+    plan, formulation, objective = guess.plan, guess.formulation, begun.objective
+    if plan is None:
+        return begun.x
+    t, pace = objective.grid.stage_times, pace_of(plan, formulation)
+    near = coefficients_of(plan.trajectory, pace, formulation, t, objective.null_motion)
+    z, _ = objective.parts(begun.x)
+    x = np.concatenate([z, near])
+    return x if objective.value(x) <= guess.minimum_norm.cost else begun.x
+
+
+def coefficients_of(
+    trajectory: Trajectory, pace: float, formulation: Formulation, t: Array, table: NullMotionTable
+) -> Array:
+    """Return the coefficients x whose null motion is nearest to that of another motion, (size,).
+
+    By least squares over the times. Of a null motion only Nᵀε acts, with N (n, r) a basis of the
+    null space of the task: it is fitted to Nᵀq̇, with N and q̇ those of the other motion at the same
+    share of its path.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+    pace : float
+        The duration of its path over that of the problem's.
+    formulation : Formulation
+    t : (S,)
+        Times on its path [s].
+    table : NullMotionTable
+        Its null motion at these times.
+    """
+    # A plan of a part of its path ends earlier.
+    theirs = np.minimum(t * pace, trajectory.t[-1])
+    q, qd = trajectory(theirs), pace * trajectory(theirs, 1)
+    null = np.swapaxes(null_space(formulation.follows.jacobians(q)), 1, 2)
+    acting = null @ table.matrix()
+    wanted = np.einsum("srn,sn->sr", null, qd)
+    if not wanted.size:
+        return np.zeros(table.size)
+    return np.asarray(np.linalg.lstsq(acting.reshape(-1, table.size), wanted.ravel())[0])
