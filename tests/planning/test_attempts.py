@@ -12,11 +12,13 @@ import pytest
 import selfmotion as sm
 from selfmotion.basics import BreakdownError, Counts
 from selfmotion.planning.formulation import Formulation
-from selfmotion.planning.planner import planner
-from selfmotion.planning.planner.candidate import Candidate
+from selfmotion.planning.planner import planner, verdicts
 from selfmotion.planning.planner.effort import Effort
 from selfmotion.planning.planner.grids import first_nodes
-from selfmotion.planning.planner.polish import Polisher
+from selfmotion.planning.planner.guess import Guess
+from selfmotion.planning.planner.judging import Judged
+from selfmotion.planning.planner.local_search import LocalSearch
+from selfmotion.planning.planner.solve import solve
 from selfmotion.planning.planner.steps import STEPS
 
 Circle = Callable[..., sm.Problem]
@@ -95,10 +97,10 @@ def test_what_costs_more_freely_is_not_optimised_with_limits(
     problem = dataclasses.replace(panda_circle("position"), constraints=limits)
     effort = Effort(None, None, None, Counts())
     assert problem.given_start is not None
-    candidate = Candidate(Formulation.of(problem), effort, problem.given_start, free=False)
-    candidate.polish(cost_to_beat=free.report.cost * (0.5 if dearer else 2.0))
-    assert candidate.is_hopeless == dearer
-    assert dearer or not candidate.violations
+    guess = Guess.of(Formulation.of(problem), effort, problem.given_start, free=False)
+    solution = solve(guess, cost_to_beat=free.report.cost * (0.5 if dearer else 2.0))
+    assert solution.is_hopeless == dearer
+    assert dearer or not solution.violations
 
 
 def test_what_conditions_did_not_count_for_is_none_that_keeps_them(panda_circle: Circle) -> None:
@@ -111,23 +113,23 @@ def test_what_conditions_did_not_count_for_is_none_that_keeps_them(panda_circle:
     formulation = Formulation.of(problem)
     bound = formulation.conditions(start, start)
     effort = Effort(None, lambda iteration: True, None, Counts())
-    polisher = Polisher(formulation, effort, bound, free=False)
-    found = polisher.near(
+    search = LocalSearch(formulation, effort, bound, free=False)
+    found = search.near(
         [free.trajectory], first_nodes(formulation), cost_to_beat=10.0 * free.report.cost
     )
-    assert polisher.history
+    assert search.recorder.history
     assert found is not None
     assert found.violations
-    assert polisher.latest is None
+    assert search.recorder.latest is None
     # One that does is kept.
     easy = dataclasses.replace(
         problem, constraints=[sm.constraints.JointVelocityLimits(2.0 * fastest)]
     )
     formulation = Formulation.of(easy)
     bound = formulation.conditions(start, start)
-    polisher = Polisher(formulation, effort, bound, free=False)
-    polisher.near([free.trajectory], first_nodes(formulation))
-    assert polisher.latest is not None
+    search = LocalSearch(formulation, effort, bound, free=False)
+    search.near([free.trajectory], first_nodes(formulation))
+    assert search.recorder.latest is not None
 
 
 def test_an_optimum_that_takes_the_arm_into_itself_goes_on_at_once(panda: sm.RobotModel) -> None:
@@ -154,10 +156,10 @@ def test_where_a_proof_fails_starts_are_drawn(
 ) -> None:
     """What is verified then is the plan; where nothing is, the first motion stays."""
     problem = dataclasses.replace(panda_circle(), start=None)
-    judged = planner.judge
+    judged = verdicts.judge
     costs: list[float] = []
 
-    def failing(*given) -> planner.Judged:
+    def failing(*given) -> Judged:
         found = judged(*given)
         costs.append(found.motion.cost)
         if len(costs) > 1 and not again:
@@ -169,7 +171,7 @@ def test_where_a_proof_fails_starts_are_drawn(
         )
         return dataclasses.replace(found, certificate=refused)
 
-    monkeypatch.setattr(planner, "judge", failing)
+    monkeypatch.setattr(verdicts, "judge", failing)
     plan = sm.plan(problem, search=sm.Search(mode="local", starts=6, finalists=2))
     # A motion that is not verified is looked at once more.
     expected = ["starts where the proof fails", *(["what stops it"] if again else [])]
@@ -183,7 +185,7 @@ def test_where_no_motion_goes_on_others_begin(
     panda_circle: Circle, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """All that begin at the start of the path break down on the way."""
-    begin = planner.Planner.begin
+    begin = planner.Planner.guess
 
     def failing(self: planner.Planner, start, **given):
         if any(item.name == "starts" for item in self.attempts):
@@ -191,7 +193,7 @@ def test_where_no_motion_goes_on_others_begin(
         self.failure = BreakdownError("by order", time=2.0)
         return None
 
-    monkeypatch.setattr(planner.Planner, "begin", failing)
+    monkeypatch.setattr(planner.Planner, "guess", failing)
     problem = dataclasses.replace(panda_circle(), start=None)
     plan = sm.plan(problem, search=sm.Search(mode="local", starts=6, finalists=2))
     assert "starts where it breaks" in names_of(plan)

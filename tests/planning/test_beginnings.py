@@ -9,9 +9,9 @@ import pytest
 import selfmotion as sm
 from selfmotion.basics import Counts
 from selfmotion.planning.nodes import NodeMotion, Optimum, Step, minimise
-from selfmotion.planning.planner import polish
+from selfmotion.planning.planner import local_search
 from selfmotion.planning.planner.effort import Effort
-from selfmotion.planning.planner.solutions import NodeSolution
+from selfmotion.planning.planner.outcomes import on_the_way
 from support.arms import PANDA_HOME
 from support.nodes import nodes_of, problem_of
 from support.places import DATA
@@ -67,11 +67,12 @@ def test_what_keeps_everything_is_not_given_up_for_what_costs_less(
         gone = begin.grid.at(alone.motion.centred)
         return replace(alone, motion=gone, multipliers=np.zeros(len(gone.h)))
 
-    monkeypatch.setattr(polish, "minimise", astray)
+    monkeypatch.setattr(local_search, "minimise", astray)
     effort = Effort(None, None, None, Counts())
-    polisher = polish.Polisher(kept.grid.formulation, effort, kept.grid.conditions, free=False)
+    conditions = kept.grid.conditions
+    search = local_search.LocalSearch(kept.grid.formulation, effort, conditions, free=False)
     assert astray(kept, lambda _: False).motion.violation > 0.0
-    found = polisher.best_near(kept)
+    found = search.best_near(kept)
     assert found is not None
     assert found.violations == ()
     assert found.cost == kept.cost
@@ -81,9 +82,9 @@ def test_where_a_motion_breaks_most_is_told(panda: sm.RobotModel) -> None:
     problem = limited_circle(panda)
     begin = nodes_of(replace(problem, constraints=()))
     (limits,) = problem.constraints
-    broken = NodeSolution.on_the_way(nodes_of(problem).grid.at(begin.centred))
+    broken = on_the_way(nodes_of(problem).grid.at(begin.centred))
     beyond = (begin.place.q - limits.upper).max(axis=1)
     assert beyond.max() > 0.0
     assert broken.breaks_at == begin.grid.t[np.argmax(beyond)]
-    kept = NodeSolution.on_the_way(minimise(nodes_of(problem), lambda _: False).motion)
+    kept = on_the_way(minimise(nodes_of(problem), lambda _: False).motion)
     assert kept.breaks_at is None

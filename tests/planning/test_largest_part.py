@@ -14,9 +14,10 @@ from selfmotion.model.follow import Follows
 from selfmotion.model.motion.grid import Grid
 from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.paper import Rollout, converged_minimum_norm
-from selfmotion.planning.planner.candidate import Candidate
 from selfmotion.planning.planner.effort import Effort
+from selfmotion.planning.planner.guess import Guess
 from selfmotion.planning.planner.largest_part import Part, shorter_part
+from selfmotion.planning.planner.solution import Solution
 from selfmotion.shell.replay import write_replay
 from support.arms import PANDA_HOME, robot_named
 
@@ -336,7 +337,7 @@ def test_an_end_always_has_a_reason(planar: sm.RobotModel) -> None:
     """Also where a longer motion was found, which no finer grid would keep."""
     problem = Formulation.of(sm.Problem(planar, outward(planar, 1.01), "planar", [0.0, 0.5, 0.5]))
     effort = Effort(None, None, 20, Counts())
-    candidate = Candidate(problem, effort, np.array([0.0, 0.5, 0.5]), free=False)
-    shorter = shorter_part(problem, Part(problem, candidate), effort)
+    guess = Guess.of(problem, effort, np.array([0.0, 0.5, 0.5]), free=False)
+    shorter = shorter_part(problem, Part(problem, Solution.of(guess)), effort)
     assert shorter is not None
     assert re.search(r"the motion ends at t = 9.8 s of 10 s: \w", shorter.ending)

@@ -12,6 +12,7 @@ from selfmotion.planning.planner.effort import Effort
 from selfmotion.planning.planner.grids import first_nodes
 from selfmotion.planning.planner.planner import Planner
 from selfmotion.planning.planner.proposals import VERY_LONG_PATH, is_long
+from selfmotion.planning.planner.setup import Setup
 from support.arms import PANDA_HOME, robot_named
 
 NAME = "posture of a stretch"
@@ -43,7 +44,8 @@ def loops(planar: sm.RobotModel, count: int, start: bool = False) -> sm.Problem:
 
 def planner_of(problem: sm.Problem) -> Planner:
     effort = Effort(None, None, None, Counts())
-    return Planner(Formulation.of(problem), effort, sm.Search(), sm.Tolerance(), silent)
+    setup = Setup(Formulation.of(problem), sm.Search(), sm.Tolerance(), silent)
+    return Planner(setup, effort)
 
 
 @pytest.fixture(scope="module")

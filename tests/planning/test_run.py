@@ -12,7 +12,7 @@ import yourdfpy
 import selfmotion as sm
 from selfmotion.certificate import Certificate, Extreme
 from selfmotion.planning.optimise import Status
-from selfmotion.planning.planner.polish import Polisher
+from selfmotion.planning.planner.local_search import LocalSearch
 from selfmotion.planning.planner.run import message_of, status_of
 from support.arms import robot_named
 
@@ -210,7 +210,7 @@ def test_what_is_verified_is_not_said_to_contradict(
     panda_circle: Callable[[str], sm.Problem], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Where nodes lead nowhere the motion at x = 0 stands, and may keep all."""
-    monkeypatch.setattr(Polisher, "near", lambda *_: None)
+    monkeypatch.setattr(LocalSearch, "near", lambda *_: None)
     report = sm.plan(panda_circle("position")).require().report
     assert report.status is Status.PRECISION
     assert report.message == Status.PRECISION.message

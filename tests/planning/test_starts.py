@@ -2,13 +2,14 @@
 
 import dataclasses
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
 
 import selfmotion as sm
 from selfmotion.planning.formulation import Formulation
-from selfmotion.planning.planner.solutions import score
+from selfmotion.planning.planner.solution import Solution
 from support.arms import robot_named
 
 Circle = Callable[..., sm.Problem]
@@ -43,7 +44,10 @@ def test_of_two_that_violate_constraints_the_nearer_is_kept() -> None:
     """A cheap motion through a body is no better start than a dearer one that touches it."""
     through, touching, free = Found(1.0, 50.0), Found(2.0, 0.1), Found(9.0, 0.0)
     itself = Found(0.5, 0.0, keeps_off_itself=False)
-    assert sorted((through, touching, free, itself), key=score) == [free, itself, touching, through]
+    guess: Any = None
+    ranked = [Solution(guess, outcome) for outcome in (through, touching, free, itself)]
+    best_first = [solution.outcome for solution in sorted(ranked, key=Solution.score)]
+    assert best_first == [free, itself, touching, through]
 
 
 BANDS = {
