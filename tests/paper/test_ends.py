@@ -212,7 +212,7 @@ def test_a_given_end_is_reached(z: float) -> None:
     found = solved("pose", [sm.constraints.EndConfiguration(end)])
     assert found.status is sm.optimise.Status.CONVERGED
     # What the integration leaves of the path error, put onto the path.
-    np.testing.assert_allclose(found.evaluation().trajectory.q[-1], end, atol=1e-9)
+    np.testing.assert_allclose(found.evaluation.trajectory.q[-1], end, atol=1e-9)
 
 
 def test_ends_that_contradict_each_other_are_named() -> None:

@@ -69,7 +69,7 @@ def test_the_sample_problem_costs_what_an_independent_integration_says(
     assert found.null_motion == null_motion
     assert found.coefficients.shape == (size,)
     assert found.cost == pytest.approx(cost, rel=AGREEMENT)
-    minimum_norm = found.minimum_norm_evaluation()
+    minimum_norm = found.minimum_norm_evaluation
     assert minimum_norm.cost == pytest.approx(15.500547, rel=AGREEMENT)
     assert minimum_norm.terms["inverse manipulability"] == pytest.approx(0.085116, rel=1e-3)
     np.testing.assert_allclose(
@@ -83,7 +83,7 @@ def test_its_variants_lead_to_optima(mu: float, duration: float, null_motion: Nu
     """No coefficient changes the cost to first order, relative to what it may be changed by."""
     found = solved(sm.sample_problem(mu, duration, null_motion))
     assert found.status is Status.CONVERGED
-    assert found.cost < 0.95 * found.minimum_norm_evaluation().cost
+    assert found.cost < 0.95 * found.minimum_norm_evaluation.cost
     gradient = found.objective.gradient(found.x)
     step = np.linalg.pinv(found.objective.metric(found.x), rcond=1e-4) @ gradient
     assert gradient @ step < 1e-5 * found.cost
@@ -102,7 +102,7 @@ def test_the_cost_agrees_with_that_on_a_finer_grid() -> None:
 
 def test_a_solution_knows_its_motion() -> None:
     found = closed_circle(free=True)
-    evaluation, minimum_norm = found.evaluation(), found.minimum_norm_evaluation()
+    evaluation, minimum_norm = found.evaluation, found.minimum_norm_evaluation
     assert found.nodes.shape == (found.steps + 1, 7)
     assert evaluation.cost == pytest.approx(found.cost, rel=1e-12)
     np.testing.assert_allclose(evaluation.trajectory.q, found.nodes, atol=1e-5)
@@ -162,7 +162,7 @@ def test_evaluations_are_counted_and_limited() -> None:
     assert found.status is Status.MAX_EVALUATIONS
     # The limit is looked at between steps.
     assert 110 <= counts.evaluations <= 113
-    assert found.cost < found.minimum_norm_evaluation().cost
+    assert found.cost < found.minimum_norm_evaluation.cost
 
 
 def test_a_callback_stops() -> None:
@@ -215,7 +215,7 @@ def test_interrupted_at_any_evaluation_there_is_a_motion(number: int) -> None:
     assert found.status is Status.INTERRUPTED
     assert found.cost == found.objective.value(found.x)
     assert len(found.history) <= len(whole.history)
-    assert np.isfinite(found.evaluation().trajectory.q).all()
+    assert np.isfinite(found.evaluation.trajectory.q).all()
 
 
 def test_it_begins_where_it_is_told() -> None:
@@ -259,7 +259,7 @@ def test_without_coefficients_there_is_nothing_to_optimise(
     # The path does not end at rest by itself in all joints.
     assert found.status is (Status.INFEASIBLE if found.unmet else Status.CONVERGED)
     assert found.coefficients.shape == (0,)
-    assert found.evaluation().cost == found.cost
+    assert found.evaluation.cost == found.cost
     assert found.refined().again().status is found.status
 
 
@@ -279,9 +279,9 @@ def test_a_damped_motion_leaves_the_path() -> None:
         still_of(edge(5.2, None))
     found = solved(edge(5.2, sm.Damping()))
     assert found.status is Status.CONVERGED
-    assert found.evaluation().damped
-    assert found.cost < found.minimum_norm_evaluation().cost
-    assert not solved(edge(4.0, sm.Damping())).evaluation().damped
+    assert found.evaluation.damped
+    assert found.cost < found.minimum_norm_evaluation.cost
+    assert not solved(edge(4.0, sm.Damping())).evaluation.damped
 
 
 def test_a_motion_that_breaks_down_is_refused_with_the_time() -> None:

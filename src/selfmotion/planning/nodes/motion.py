@@ -89,8 +89,8 @@ class NodeGrid:
         first = len(t) * np.arange(copies)
         self._resting: list[Ints] = []
         for order in (1, 2):
-            asked = [rest >= order for rest in formulation.rest_orders]
-            ends = np.array([0, len(t) - 1])[np.array(asked)]
+            resting = [rest >= order for rest in formulation.rest_orders]
+            ends = np.array([0, len(t) - 1])[np.array(resting)]
             self._resting.append((ends + first[:, None]).ravel())
         held: list[Ints] = [] if free else [np.arange(r)]
         for order, nodes in enumerate(self._resting, 1):

@@ -309,9 +309,9 @@ class _Rounds:
             self._progress("fastest", number, ROUNDS)
             before = self._duration
             weighted = self._kept.weighted(costs, weight * self._duration) if weight else ()
-            asked = replace(self._free, costs=(use, *weighted))
+            wanted = replace(self._free, costs=(use, *weighted))
             try:
-                paced = _at_pace(asked, pace)
+                paced = _at_pace(wanted, pace)
             except PathError:
                 # No pace as smooth as the path is near the one found: that one is the result.
                 return

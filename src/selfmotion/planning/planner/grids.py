@@ -30,7 +30,7 @@ NOTHING = 1e-4
 UNKEPT = 10.0
 
 
-def is_published(formulation: Formulation, effort: Effort) -> bool:
+def uses_published_method(formulation: Formulation, effort: Effort) -> bool:
     """Whether the published method is requested: by a null motion, an optimiser, or damping."""
     own = isinstance(formulation.null_motion, FreeNullMotion) and effort.optimizer is None
     return not own or formulation.damping_law is not None
@@ -40,7 +40,7 @@ def is_on_nodes(formulation: Formulation, effort: Effort) -> bool:
     """Whether a formulation is optimised on nodes: by default, if it has a self-motion."""
     follows = formulation.follows
     free = follows.redundancy == follows.dof - follows.dimension > 0
-    return free and not is_published(formulation, effort)
+    return free and not uses_published_method(formulation, effort)
 
 
 def most_nodes(formulation: Formulation) -> int:

@@ -210,8 +210,8 @@ def _until(formulation: Formulation, time: float) -> Formulation:
     """Return the problem on [0, time], without conditions on the end."""
     if time >= formulation.path.duration:
         return formulation
-    asked = (item.on_part() for item in formulation.problem.constraints)
-    remaining = [item for item in asked if item is not None]
+    parts = (item.on_part() for item in formulation.problem.constraints)
+    remaining = [item for item in parts if item is not None]
     shorter = formulation.along(
         lambda path: Section(path, 0.0, time, crowding=True), lambda t: np.minimum(t, time)
     )

@@ -147,14 +147,14 @@ class LocalSearch:
         return self.outcome(best)
 
     def with_more(self, known: NodeOutcome) -> NodeOutcome | None:
-        """Return the best motion near one of which less was asked, the rest after that; or None."""
+        """Return the best motion near one with fewer conditions, or None."""
         motion = self.grid(known.motion.grid.t).at(known.motion.centred)
         more = len(motion.h) - len(known.multipliers)
         found = self.best_near(motion, multipliers=np.append(known.multipliers, np.zeros(more)))
         return None if found is None or found.violations else found
 
     def _freely(self, motion: NodeMotion) -> Optimum:
-        """Return the optimum near a motion of which nothing is asked but ends and tolerances."""
+        """Return the optimum near a motion without conditions but those on ends and tolerances."""
         alone = motion.grid.without_rows().at(motion.centred)
         # Whether these keep the conditions is not known.
         return minimise(alone, self.recorder.note, roughly=True)

@@ -163,10 +163,12 @@ def optimise_stacked(planner: Planner, finalists: int) -> bool:
 
 def _stacked(planner: Planner, t: Array) -> Iterator[Array]:
     """Yield motions (K, N, n) through times t (N,) [s] that satisfy conditions at all of them."""
-    formulation, asked = planner.formulation, planner.formulation.envelope
+    formulation, allowed = planner.formulation, planner.formulation.envelope
     drawn = _configurations_at(planner, t)
     for weights in metrics(formulation.coordinates):
-        task = Stacked(formulation.follows, asked.quantities, asked.lower, asked.upper, weights)
+        task = Stacked(
+            formulation.follows, allowed.quantities, allowed.lower, allowed.upper, weights
+        )
         for place, starts in drawn.items():
             if planner.setup.is_free:
                 q, feasible = task.placed(starts, float(t[place]))
@@ -334,10 +336,10 @@ def along_chain(guess: Guess, guide: Sequence) -> NodeOutcome | None:
 
 def _beyond_limits(motion: NodeMotion) -> Flags:
     """Return on which intervals a joint passes a limit, also for a moment, (N,)."""
-    asked, t = motion.grid.formulation.envelope, motion.grid.t
+    allowed, t = motion.grid.formulation.envelope, motion.grid.t
     samples = (t[:-1, None] + np.diff(t)[:, None] * np.arange(_SAMPLES) / _SAMPLES).ravel()
     q, qd = motion.trajectory(samples), motion.trajectory(samples, 1)
-    beyond = (q < asked.lower) | (q > asked.upper) | (np.abs(qd) > asked.speed)
+    beyond = (q < allowed.lower) | (q > allowed.upper) | (np.abs(qd) > allowed.speed)
     return np.asarray(beyond.reshape(len(t) - 1, -1).any(axis=1))
 
 

@@ -53,9 +53,9 @@ class Recorder:
             evaluations=effort.counts.evaluations,
         )
         self.history.append(iteration)
-        # Who has asked to stop is asked no more.
-        asked = effort.callback if self.ended is None else None
-        if asked is not None and asked(iteration):
+        # The callback that has stopped it is not called again.
+        callback = effort.callback if self.ended is None else None
+        if callback is not None and callback(iteration):
             self.ended = Status.STOPPED
         most = effort.max_evaluations
         if most is not None and effort.counts.evaluations >= self._first + most:

@@ -30,7 +30,7 @@ def settled(search: LocalSearch, known: NodeOutcome) -> NodeOutcome:
     """Return the optimum on nodes so near to each other that more change nothing.
 
     The curve is on its path between them, control points give hardly anything away, and what
-    is asked at points holds between them.
+    holds at points holds between them.
     """
     found = _resolved(search, known)
     return _farther_apart(search, found) or found

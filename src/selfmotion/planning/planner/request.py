@@ -97,8 +97,8 @@ class PlanRequest:
             Something that is set has no effect on it: an optimiser, parts.
         """
         self.check_used("fastest")
-        asked = {"keep": self.keep, "search": self.search, "tolerance": self.tolerance, **options}
-        return fastest(self.problem, **asked)
+        given = {"keep": self.keep, "search": self.search, "tolerance": self.tolerance, **options}
+        return fastest(self.problem, **given)
 
     def in_parts(self, **options: Any) -> Parts:
         """Return its motion in the fewest parts; `options` are further ones of `plan_in_parts`.

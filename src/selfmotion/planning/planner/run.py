@@ -24,7 +24,7 @@ from selfmotion.certificate import Certificate, Tolerance
 from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.optimise import Callback, Optimizer, Status
 from selfmotion.planning.planner.effort import Deadline, Effort, Search
-from selfmotion.planning.planner.grids import is_published
+from selfmotion.planning.planner.grids import uses_published_method
 from selfmotion.planning.planner.guess import check_warm_start
 from selfmotion.planning.planner.judging import Judged
 from selfmotion.planning.planner.planner import Planner
@@ -79,7 +79,7 @@ def gathered(planner: Planner, deadline: Deadline) -> Plan:
             check,
             ending=part.ending,
             notes=planner.notes,
-            published=is_published(planner.formulation, planner.effort),
+            published=uses_published_method(planner.formulation, planner.effort),
         ),
         seconds=time.perf_counter() - planner.began,
         gap=_gap(planner, judged),
@@ -255,7 +255,7 @@ def plan(
         max_evaluations = _DAMPED_EVALUATIONS
     effort = Effort(optimizer, callback, max_evaluations, clock)
     formulation = Formulation.of(problem)
-    if problem.relaxations and is_published(formulation, effort):
+    if problem.relaxations and uses_published_method(formulation, effort):
         raise ProblemError(
             "relaxations: the published method keeps nothing but given ends, so that the tool "
             "would leave its tolerances; leave null_motion out, optimizer and damping too"

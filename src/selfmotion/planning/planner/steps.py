@@ -21,7 +21,7 @@ from selfmotion.basics import (
 from selfmotion.model.task import SE3
 from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.planner.effort import Search
-from selfmotion.planning.planner.grids import is_on_nodes, is_published
+from selfmotion.planning.planner.grids import is_on_nodes, uses_published_method
 from selfmotion.planning.planner.guess import on_start
 from selfmotion.planning.planner.planner import Planner
 from selfmotion.planning.planner.proposals import (
@@ -347,7 +347,7 @@ def _find_obstruction(planner: Planner) -> bool:
     judged, formulation = planner.judged, planner.formulation
     if judged is None or judged.certificate.verified or judged.part.solution.cut_short:
         return False
-    if is_published(formulation, planner.effort) or formulation.damping_law is not None:
+    if uses_published_method(formulation, planner.effort) or formulation.damping_law is not None:
         return False
     if judged.part.ending or judged.fails_at is None:
         return False
@@ -430,11 +430,11 @@ def _looked_at(formulation: Formulation, search: Search) -> Obstruction | None:
 
 def _is_in_own_reach(formulation: Formulation, pose: SE3) -> bool:
     """Whether required limits, and not the arm's own, exclude a pose."""
-    asked = formulation.problem
+    problem = formulation.problem
     if not any(isinstance(item, JointPositionLimits) for item in formulation.problem.constraints):
         return False
     try:
-        asked.robot.inverse_kinematics(pose, asked.task)
+        problem.robot.inverse_kinematics(pose, problem.task)
     except InverseKinematicsError:
         return False
     return True

@@ -284,7 +284,7 @@ def _refusals(samples: Array, bounds: Admissible, motion: SelfMotion) -> str:
     if len(inside) and bounds.bodies:
         configurations = bounds.representative(inside)
         distance, best = min(
-            ((asked, _roomiest(model, configurations)) for model, asked in bounds.bodies),
+            ((required, _roomiest(model, configurations)) for model, required in bounds.bodies),
             key=lambda found: found[1].value - found[0],
         )
         parts.append(

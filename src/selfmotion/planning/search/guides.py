@@ -77,10 +77,10 @@ def layers_of(
     rng : Generator or int
     progress : Progress
     """
-    asked, t = formulation.envelope, waypoint_times(formulation)
-    steps = np.minimum(asked.speed * np.diff(t)[:, None], np.pi)
-    bodies = tuple((model, distance + _MARGIN) for model, distance in asked.bodies)
-    limits = asked.lower, asked.upper
+    allowed, t = formulation.envelope, waypoint_times(formulation)
+    steps = np.minimum(allowed.speed * np.diff(t)[:, None], np.pi)
+    bodies = tuple((model, distance + _MARGIN) for model, distance in allowed.bodies)
+    limits = allowed.lower, allowed.upper
     if has_curves(formulation):
         return curve_layers(formulation.follows, t, steps, limits, bodies, rng, progress)
     waypoints = OnPath(formulation.follows, t, *limits)
@@ -96,9 +96,9 @@ def shortest_along(
     a little later instead: at a singular pose rounding may put it beyond reach, by next to nothing.
     None where that does not help, or one meets something.
     """
-    weights, asked = _weights(formulation), formulation.envelope
-    edge = np.minimum(_CHAIN_EDGE, 1e-2 * (asked.upper - asked.lower))
-    limits = asked.lower + edge, asked.upper - edge
+    weights, allowed = _weights(formulation), formulation.envelope
+    edge = np.minimum(_CHAIN_EDGE, 1e-2 * (allowed.upper - allowed.lower))
+    limits = allowed.lower + edge, allowed.upper - edge
     waypoints = OnPath(formulation.follows, where, *limits)
     here, arrived = waypoints.project_each(_between(t, q, where), np.arange(len(where)))
     if not arrived[[0, -1]].all():
@@ -109,9 +109,9 @@ def shortest_along(
         here, arrived = waypoints.project_each(_between(t, q, where), np.arange(len(where)))
         if not arrived.all():
             return None
-    bodies = tuple((model, distance + _MARGIN) for model, distance in asked.bodies)
+    bodies = tuple((model, distance + _MARGIN) for model, distance in allowed.bodies)
     bounds = Admissible(*limits, formulation.coordinates.is_revolute, bodies)
-    largest = np.minimum(_CHAIN_SPEED * asked.speed * np.diff(where)[:, None], np.pi)
+    largest = np.minimum(_CHAIN_SPEED * allowed.speed * np.diff(where)[:, None], np.pi)
     here = Shortest(waypoints, bounds, largest, weights).near(here, smoothings)
     return (where, here) if bounds.keep(here).all() else None
 

@@ -94,18 +94,18 @@ def least_deviation(poses: SinglePoses, t: float, rows: tuple[str, ...]) -> Arra
     By sampling: the least of many, which is then reduced. None if nothing is found, or the task
     does not prescribe these rows.
     """
-    asked = poses.problem
-    prescribed = [ROW_NAMES[k] for k in asked.task.rows]
+    problem = poses.problem
+    prescribed = [ROW_NAMES[k] for k in problem.task.rows]
     rows = tuple(row for row in rows if row in prescribed)
     if not rows:
         return None
     more = Relaxation(rows, _FARTHEST if rows[0] in POSITION_ROWS else np.pi)
     others = (
         replace(item, rows=tuple(row for row in item.rows if row not in rows))
-        for item in asked.relaxations
+        for item in problem.relaxations
         if not set(item.rows) <= set(rows)
     )
-    wider, n = poses.of(replace(asked, relaxations=(*others, more))), asked.robot.dof
+    wider, n = poses.of(replace(problem, relaxations=(*others, more))), problem.robot.dof
     follows = cast(RelaxedFrames, wider.formulation.follows)
     q = poses.some(t, CLIMBERS)[:, :n]
     q = np.hstack([q, np.zeros((len(q), follows.dof - n))])
@@ -218,10 +218,10 @@ class Obstruction:
         """Largest distance of bodies at the pose, if it is below the required one [m]."""
         if not self.is_met:
             return 0.0
-        worst, asked = _roomiest_pair(self.poses, self.found.met)
+        worst, required = _roomiest_pair(self.poses, self.found.met)
         # Rounded down: the remedy has to suffice.
         known = np.floor(1e4 * worst.value) / 1e4
-        return float(known) if 0.0 < worst.value < asked else 0.0
+        return float(known) if 0.0 < worst.value < required else 0.0
 
     @cached_property
     def help(self) -> str:
@@ -234,18 +234,20 @@ class Obstruction:
 
 def _roomiest(poses: SinglePoses, met: Array) -> str:
     """Return the collision of the configuration (of K, n) with the smallest overlap."""
-    worst, asked = _roomiest_pair(poses, met)
+    worst, required = _roomiest_pair(poses, met)
     return (
         f"at best '{worst.first}' and '{worst.second}' {how_near(worst.value)} (wanted: "
-        f"{1e3 * asked:.3g} mm)"
+        f"{1e3 * required:.3g} mm)"
     )
 
 
 def _roomiest_pair(poses: SinglePoses, met: Array) -> tuple[Closest, float]:
     """Return the nearest bodies at the smallest overlap of all, and the required distance."""
     # The last ones were moved away from obstacles.
-    _, worst, asked = max((poses.room(q) for q in met[-MOST_EVALUATED:]), key=lambda each: each[0])
-    return worst, asked
+    _, worst, required = max(
+        (poses.room(q) for q in met[-MOST_EVALUATED:]), key=lambda each: each[0]
+    )
+    return worst, required
 
 
 def obstruction(

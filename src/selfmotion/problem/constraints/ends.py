@@ -72,7 +72,7 @@ class _EndRate(Constraint):
         super().__init_subclass__(**options)
 
     @property
-    def asked(self) -> npt.ArrayLike:
+    def given(self) -> npt.ArrayLike:
         """The prescribed value, (n,) or one number."""
         given: npt.ArrayLike = getattr(self, "q" + "d" * self.order)
         return given
@@ -93,7 +93,7 @@ class _EndRate(Constraint):
     def target(self, robot: RobotModel) -> Array:
         """Return the prescribed value for an arm, (n,) [rad or m, per s^order]."""
         what = f"{robot.name}: {self._name}"
-        return as_numbers(per_joint(self.asked, robot.dof, what), what)
+        return as_numbers(per_joint(self.given, robot.dof, what), what)
 
     def on_part(self) -> Constraint | None:
         """See `Constraint.on_part`: a first part has the same start, but another end."""
@@ -150,13 +150,13 @@ class StartVelocity(_EndRate, order=1, at_start=True):
         robot = follows.robot
         if start is None:
             raise ProblemError("a start velocity needs a given start (start=)")
-        asked = follows.jacobian(start) @ self.target(robot)
+        moved = follows.jacobian(start) @ self.target(robot)
         twist = follows.twists(np.zeros(1))[0]
-        row = int(np.argmax(np.abs(asked - twist)))
-        if abs(asked[row] - twist[row]) > _NEAR_TWIST:
+        row = int(np.argmax(np.abs(moved - twist)))
+        if abs(moved[row] - twist[row]) > _NEAR_TWIST:
             begins = round(float(twist[row]), 9) + 0.0
             raise ProblemError(
-                f"the start velocity moves '{robot.tool}' at {asked[row]:.6g} m/s or rad/s in row "
+                f"the start velocity moves '{robot.tool}' at {moved[row]:.6g} m/s or rad/s in row "
                 f"'{follows.row_names[row]}', but the path begins at {begins:g}; give "
                 f"the path that speed, or the arm another one"
             )

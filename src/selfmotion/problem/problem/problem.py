@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Self
 
@@ -16,9 +16,6 @@ from selfmotion.basics import (
     Progress,
     as_flag,
     as_several,
-    description_of,
-    digest_of,
-    digest_of_file,
     read_only,
     shown,
     silent,
@@ -27,14 +24,13 @@ from selfmotion.certificate import (
     AtRest,
     Certificate,
     Requirement,
-    Separation,
     Tolerance,
     certify,
 )
 from selfmotion.model.follow import Follow, Follows
 from selfmotion.model.motion import NullMotion, Trajectory
 from selfmotion.model.path import Path
-from selfmotion.model.robot import RobotModel, mesh_digests
+from selfmotion.model.robot import RobotModel
 from selfmotion.model.task import Damping, DampingLaw, Relaxation, Task, feedback_rate
 from selfmotion.problem.constraints import (
     Clearance,
@@ -47,12 +43,12 @@ from selfmotion.problem.problem.along import (
     envelope_without_arm,
     with_own_limits,
 )
+from selfmotion.problem.problem.digest import conditions_digest
 from selfmotion.problem.problem.fit import (
     ANY_NULL_MOTION,
     KEPT,
     NO_OVERLAP,
     SEQUENCES,
-    START_TOLERANCE,
     USUAL_COSTS,
     check_costs,
     check_end,
@@ -63,6 +59,7 @@ from selfmotion.problem.problem.fit import (
     check_start,
     first_tool,
 )
+from selfmotion.problem.problem.of_start import misses_of_start, too_near_at
 from selfmotion.problem.problem.remarks import remarks_on
 
 # Stiffness of springs that hold joints of a damped motion within limits, in shares of a limit of
@@ -374,76 +371,17 @@ class Problem:
             ending=ending,
             progress=progress,
         )
-        elsewhere = () if self.given_start is None else self._elsewhere(trajectory)
-        failures = (*elsewhere, *certificate.failures)
-        notes = (*certificate.notes, *self._too_near(certificate))
-        return replace(certificate, problem=self.digest, failures=failures, notes=notes)
-
-    def _too_near(self, certificate: Certificate) -> tuple[str, ...]:
-        """Return that bodies are too near at the given start already, in words."""
-        wrong = {found.requirement for found in certificate.findings if not found.satisfied}
-        apart = [item for item in self._judging if isinstance(item, Separation)]
-        start = self.given_start
-        if start is None or not any(item.name in wrong for item in apart):
-            return ()
-        return tuple(filter(None, (item.of_given_start(start) for item in apart)))
-
-    def _elsewhere(self, trajectory: Trajectory) -> tuple[str, ...]:
-        """Return in words that a motion does not start at the given start."""
-        apart = np.abs(trajectory.of_joints(self.robot.joint_names).q[0] - self.given_start)
-        worst = int(np.argmax(apart))
-        # Written so that NaN is elsewhere.
-        if bool(apart[worst] <= START_TOLERANCE):
-            return ()
-        joint = self.robot.joint_names[worst]
-        return (
-            f"it does not begin at the given start: joint '{joint}' is {apart[worst]:.3g} "
-            f"{self.robot.unit_of(joint)} away ({START_TOLERANCE:g} allowed); leave the start out, "
-            f"or plan from there",
-        )
+        given = self.given_start
+        if given is not None:
+            failures = (*misses_of_start(self.robot, given, trajectory), *certificate.failures)
+            notes = (*certificate.notes, *too_near_at(given, certificate, self._judging))
+            certificate = replace(certificate, failures=failures, notes=notes)
+        return replace(certificate, problem=self.digest)
 
     @cached_property
     def digest(self) -> str:
-        """Identifier of the certificate's conditions.
-
-        A digest of the arm, task frames, tolerances, start and constraints; costs and the null
-        motion are left out, since no certificate judges them.
-        """
-        robot = self.robot
-        arm = (robot.urdf.sha256, robot.joint_names, robot.tools, robot.reference)
-        own = sorted(robot.urdf.continuous()), robot.locked, robot.touching
-        damping = None if self.damping is None else asdict(self.damping)
-        followed = [
-            (item.path.duration, item.task.value, item.chain.tip_name, item.chain.base)
-            for item in self.follows.items
-        ]
-        asked = (*(item.path for item in self.follows.items), *self.all_constraints)
-        return digest_of(
-            arm,
-            own,
-            robot.lower,
-            robot.upper,
-            robot.velocity_limit,
-            # Limits of the arm that constraints use by default.
-            robot.acceleration_limit,
-            robot.jerk_limit,
-            robot.effort_limit,
-            damping,
-            followed,
-            [item.to_dict() for item in self.relaxations],
-            [description_of(item) for item in asked],
-            self.given_start,
-            self._mesh_digests(),
-            self.rest,
-        )
-
-    def _mesh_digests(self) -> dict[str, str]:
-        """Return digests of the mesh files of all collision bodies: names may stay the same."""
-        if not self.envelope_without_arm.bodies:
-            return {}
-        bodies = (body for item in self._judging for body in item.obstacles)
-        files = {str(file): digest_of_file(file) for body in bodies for file in body.files}
-        return {**mesh_digests(self.robot.urdf, "collision"), **files}
+        """Identifier of the certificate's conditions; see `conditions_digest`."""
+        return conditions_digest(self)
 
 
 # Signature in help() of a field that is a descriptor.
