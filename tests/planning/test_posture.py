@@ -8,7 +8,8 @@ from selfmotion.basics import Counts, silent
 from selfmotion.model.follow import Coordinates
 from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.planner.effort import Effort
-from selfmotion.planning.planner.screening import Ranking, far_from_usual, wound_back
+from selfmotion.planning.planner.rough import far_from_usual, wound_back
+from selfmotion.planning.planner.screening import Ranking
 from selfmotion.planning.search import Stacked, start_candidates
 from support.arms import robot_named
 from support.cones import downhand

@@ -10,8 +10,8 @@ from selfmotion.planning.formulation import Formulation
 from selfmotion.planning.optimise import Status
 from selfmotion.planning.planner.effort import Search
 from selfmotion.planning.planner.grids import rough_grid
+from selfmotion.planning.planner.rough import wound_back
 from selfmotion.planning.planner.run import plan
-from selfmotion.planning.planner.screening import wound_back
 from selfmotion.planning.result import Plan
 from selfmotion.planning.search import carried, start_candidates
 from selfmotion.planning.transfer import Room

@@ -34,7 +34,8 @@ from selfmotion.planning.planner.guess import Guess, on_start
 from selfmotion.planning.planner.local_search import LocalSearch
 from selfmotion.planning.planner.outcomes import NodeOutcome
 from selfmotion.planning.planner.planner import Planner
-from selfmotion.planning.planner.screening import ONE_VALLEY, Ranking, distance_of, most_promising
+from selfmotion.planning.planner.rough import distance_of
+from selfmotion.planning.planner.screening import ONE_VALLEY, Ranking, most_promising
 from selfmotion.planning.planner.solution import Solution, is_chain
 from selfmotion.planning.search import (
     LAST_SMOOTHINGS,
