@@ -122,6 +122,11 @@ def certify(
     off = tuple(text for check in checks for text in _off_path(check, tolerance, damped))
     # A time that differs by digits is not worth a message where the tool is off its path.
     by_digits = not ending and abs(trajectory.duration - path.duration) <= _CLOCK
+    failures = (
+        *((off or cut) if by_digits else cut + off),
+        *(text for check in checks for text in _undecided(check)),
+        *with_feeds(tuple(_violations(findings)), feeds, findings),
+    )
     return Certificate(
         path_check.position,
         path_check.rotation,
@@ -130,11 +135,7 @@ def certify(
         samples=sum(check.samples for check in checks),
         tolerance=tolerance,
         findings=findings,
-        failures=(
-            *((off or cut) if by_digits else cut + off),
-            *(text for check in checks for text in _undecided(check)),
-            *with_feeds(tuple(_violations(findings)), feeds, findings),
-        ),
+        failures=failures,
         covers=("path", *covered_by(wanted)),
         remarks=tuple(remark for item in wanted for remark in item.remarks),
         deviations=path_check.deviations,

@@ -248,32 +248,8 @@ def _parts(
     calibration: Any,
 ) -> _Source:
     """Return several robots as one."""
-    for name in robots:
-        if not (isinstance(name, str) and name.isidentifier()):
-            raise RobotError(
-                f"robot: a part is called {shown(name)}, expected a name of letters, digits and _"
-            )
-        if not isinstance(robots[name], str | Path | pin.Model):
-            raise RobotError(
-                f"robot: part '{name}' is {shown(robots[name])}, expected a name, the path of a "
-                f"file, the text of a URDF or a pinocchio.Model"
-            )
-    if not robots:
-        raise RobotError("robot: there is no part, expected names with robots")
-    if not isinstance(base, Mapping | None):
-        raise RobotError(f"base is {shown(base)}, expected a dict, since there are several robots")
-    for name, given in arguments.items():
-        if name not in robots or not isinstance(given, Mapping):
-            raise RobotError(
-                f"arguments: '{name}' is {shown(given)}, expected a dict for each part that is a "
-                f".xacro file{nearest(name, robots)}; parts: {', '.join(robots)}"
-            )
+    _check_parts(robots, base, arguments, calibration)
     measured = {} if calibration is None else calibration
-    if not isinstance(measured, Mapping) or not set(measured) <= set(robots):
-        raise RobotError(
-            f"calibration is {shown(calibration)}, expected a dict of files by part: "
-            f"{', '.join(robots)}"
-        )
     own_arguments = {name: dict(arguments.get(name, {})) for name in robots}
     sources = {name: _read(robot, own_arguments[name], packages) for name, robot in robots.items()}
     for name, file in measured.items():
@@ -315,6 +291,41 @@ def _parts(
         (f"{name}/{a}", f"{name}/{b}") for name, part in sources.items() for a, b in part.touching
     )
     return _Source(urdf, None if own is None else f"{first}/{own}", touching, limits)
+
+
+def _check_parts(
+    robots: Mapping[str, str | Path | pin.Model],
+    base: Any,
+    arguments: Mapping[str, Any],
+    calibration: Any,
+) -> None:
+    """Raise RobotError where what is given for parts does not fit them."""
+    for name in robots:
+        if not (isinstance(name, str) and name.isidentifier()):
+            raise RobotError(
+                f"robot: a part is called {shown(name)}, expected a name of letters, digits and _"
+            )
+        if not isinstance(robots[name], str | Path | pin.Model):
+            raise RobotError(
+                f"robot: part '{name}' is {shown(robots[name])}, expected a name, the path of a "
+                f"file, the text of a URDF or a pinocchio.Model"
+            )
+    if not robots:
+        raise RobotError("robot: there is no part, expected names with robots")
+    if not isinstance(base, Mapping | None):
+        raise RobotError(f"base is {shown(base)}, expected a dict, since there are several robots")
+    for name, given in arguments.items():
+        if name not in robots or not isinstance(given, Mapping):
+            raise RobotError(
+                f"arguments: '{name}' is {shown(given)}, expected a dict for each part that is a "
+                f".xacro file{nearest(name, robots)}; parts: {', '.join(robots)}"
+            )
+    measured = {} if calibration is None else calibration
+    if not isinstance(measured, Mapping) or not set(measured) <= set(robots):
+        raise RobotError(
+            f"calibration is {shown(calibration)}, expected a dict of files by part: "
+            f"{', '.join(robots)}"
+        )
 
 
 def _read_file(

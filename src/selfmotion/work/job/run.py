@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor
 from contextlib import nullcontext
 from dataclasses import replace
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 
@@ -290,7 +291,7 @@ def plan_job(
     held = nullcontext() if executor is not None else held_interruption()
     with held:
         shelf = Shelf(None if folder is None else as_path(folder), Tolerance(), {})
-        asked_for = Specification(
+        specification = Specification(
             listed,
             not is_free,
             ends[0],
@@ -299,28 +300,45 @@ def plan_job(
             asked.clearance,
             arm=arm_digest(robot),
         )
-        earlier, changed, why = None, dict[str, str](), ""
-        if warm_start is not None:
-            check_earlier(warm_start, robot)
-            earlier = Earlier(warm_start)
-            work = Work(asked, shelf, executor, told, earlier)
-            as_before = earlier.order_of(listed) if is_free else None
-            ordering = Ordering(as_before or listed, work, ends, price, is_free and not as_before)
-            changed = ordering.changed
-            for program in _kept_first(ordering, work, ends, is_free):
-                program = replace(program, specification=asked_for)
-                if program.verified:
-                    return replace(program, kept=earlier.kept_in(program, changed, why))
-                why = why or program.summary
-        work = Work(asked, shelf, executor, told)
-        ordering = Ordering(listed, work, ends, price, is_free)
-        if not ordering.states:
-            reasons = "".join(f"\n  '{name}': {why}" for name, why in ordering.missing.items())
-            raise PlanError(f"{robot.name}: no seam has a motion:{reasons}")
-        program = replace(Builder(ordering, work, ends).program(), specification=asked_for)
-        if earlier is None:
-            return program
-        return replace(program, kept=earlier.kept_in(program, changed, why))
+        make = partial(Work, asked, shelf, executor, told)
+        return _program(specification, make, ends, price, warm_start)
+
+
+def _program(
+    specification: Specification,
+    make: Callable[..., Work],
+    ends: tuple[Array | None, ...],
+    price: float,
+    warm_start: Program | None,
+) -> Program:
+    """Return the program of a job: of what is kept of an earlier one first, where there is one.
+
+    `make` makes what plans seams and moves, with what is known of an earlier program.
+    """
+    listed, is_free = specification.seams, not specification.in_order
+    earlier, changed, why = None, dict[str, str](), ""
+    work = make()
+    robot = work.asked.robot
+    if warm_start is not None:
+        check_earlier(warm_start, robot)
+        earlier = Earlier(warm_start)
+        again = make(earlier)
+        as_before = earlier.order_of(listed) if is_free else None
+        ordering = Ordering(as_before or listed, again, ends, price, is_free and not as_before)
+        changed = ordering.changed
+        for program in _kept_first(ordering, again, ends, is_free):
+            program = replace(program, specification=specification)
+            if program.verified:
+                return replace(program, kept=earlier.kept_in(program, changed, why))
+            why = why or program.summary
+    ordering = Ordering(listed, work, ends, price, is_free)
+    if not ordering.states:
+        reasons = "".join(f"\n  '{name}': {why}" for name, why in ordering.missing.items())
+        raise PlanError(f"{robot.name}: no seam has a motion:{reasons}")
+    program = replace(Builder(ordering, work, ends).program(), specification=specification)
+    if earlier is None:
+        return program
+    return replace(program, kept=earlier.kept_in(program, changed, why))
 
 
 def _kept_first(

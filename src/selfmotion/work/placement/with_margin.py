@@ -7,8 +7,9 @@ kept farther apart than it has to be.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -157,58 +158,22 @@ def plan_with_margin(
         raise ProblemError(f"plan_with_margin: of is {shown(of)}, expected {', '.join(_SUBJECTS)}")
     as_number(clearance, "plan_with_margin: clearance", least=0.0)
     about = None if center is None else as_numbers(center, "center", "(3,) [m]", (3,))
-    asked: dict[str, Any] = {"part": part, "tool": tool, "center": about, "clearance": clearance}
+    given: dict[str, Any] = {"part": part, "tool": tool, "center": about, "clearance": clearance}
     first = plan(problem, **options).require()
     # The given warm start is for the first plan only.
     options.pop("warm_start", None)
-    found = shortfalls(first, margin, named, **asked)
-    narrow = problem.changed(relaxations=_narrowed(problem, margin, found.lever))
-    now = _Made(first, found, {})
-    best, refused, without = None, "", first.report.cost
-    if not found.items and not problem.relaxations:
-        best = now
-    rounds = 0 if best else _ROUNDS
-    if _is_interrupted(first):
-        rounds, refused = 0, _INTERRUPTED
-    for number in range(rounds):
-        progress("margin", number + 1, _ROUNDS)
-        apart = _adjusted(now.apart, now.found, clearance)
-        raised = narrow.changed(constraints=(*narrow.constraints, *_kept(problem, apart)))
-        again = plan(raised, warm_start=now.plan, **options)
-        if not number and not _is_interrupted(again):
-            # Past bodies there are several ways, and the one of before may have become the longer.
-            again = min(again, plan(raised, **options), key=_rank)
-        certificate = problem.certify(again.trajectory, first.tolerance)
-        plan_now = replace(again, problem=problem, certificate=certificate)
-        if certificate.verified:
-            # A motion that keeps pairs farther apart is one without a margin, too.
-            without = min(without, again.report.cost)
-        if not again.certificate.verified:
-            refused = again.certificate.verdict.removeprefix("not verified: ")
-            # The attempt may be nearer to it all the same.
-            if certificate.verified:
-                more = shortfalls(plan_now, margin, named, **asked)
-                if more.least > now.found.least:
-                    now = _Made(plan_now, more, apart)
-            break
-        now = _Made(plan_now, shortfalls(plan_now, margin, named, **asked), apart)
-        if not now.found.items and (best is None or again.report.cost < best.plan.report.cost):
-            best = now
-        if _is_interrupted(again):
-            refused = _INTERRUPTED
-            break
-        if not now.found.items and (not apart or now.found.least <= 1.0 + _ENOUGH):
-            break
-    told, refused = best or now, "" if best else refused
+    search = _MarginSearch(problem, first, partial(shortfalls, wanted=margin, of=named, **given))
+    search.run(margin, clearance, options, progress)
+    told = search.best or search.now
     return PlanWithMargin(
         told.plan,
         margin,
         named,
         told.found.items,
         told.plan.report.cost,
-        without,
+        search.without,
         told.apart,
-        refused,
+        "" if search.best else search.refused,
     )
 
 
@@ -218,6 +183,83 @@ class _Made(NamedTuple):
     plan: Plan
     found: Shortfalls
     apart: dict[tuple[str, str], float]
+
+
+class _MarginSearch:
+    """Rounds in which pairs of bodies are kept farther apart, until a margin is there.
+
+    Parameters
+    ----------
+    problem : Problem
+    first : Plan
+        Verified, without a margin.
+    lacks : callable
+        Plan → what it lacks of the margin.
+
+    Attributes
+    ----------
+    now : _Made
+        The last plan.
+    best : _Made or None
+        The cheapest one with the margin.
+    without : float
+        Least cost that is known of a motion without a margin.
+    refused : str
+        Why no round came after the last one.
+    """
+
+    def __init__(self, problem: Problem, first: Plan, lacks: Callable[[Plan], Shortfalls]) -> None:
+        self._problem, self._first, self._lacks = problem, first, lacks
+        self.now = _Made(first, lacks(first), {})
+        self.best: _Made | None = None
+        self.without, self.refused = first.report.cost, ""
+
+    def run(
+        self, margin: Margin, clearance: float, options: dict[str, Any], progress: Progress
+    ) -> None:
+        """Go through the rounds."""
+        problem, first = self._problem, self._first
+        narrow = problem.changed(relaxations=_narrowed(problem, margin, self.now.found.lever))
+        if not self.now.found.items and not problem.relaxations:
+            self.best = self.now
+            return
+        if _is_interrupted(first):
+            self.refused = _INTERRUPTED
+            return
+        for number in range(_ROUNDS):
+            progress("margin", number + 1, _ROUNDS)
+            apart = _adjusted(self.now.apart, self.now.found, clearance)
+            raised = narrow.changed(constraints=(*narrow.constraints, *_kept(problem, apart)))
+            again = plan(raised, warm_start=self.now.plan, **options)
+            if not number and not _is_interrupted(again):
+                # Past bodies there are several ways, and the one of before may have become longer.
+                again = min(again, plan(raised, **options), key=_rank)
+            if self._is_done(again, apart):
+                break
+
+    def _is_done(self, again: Plan, apart: dict[tuple[str, str], float]) -> bool:
+        """Take a round's plan; return whether it was the last one."""
+        certificate = self._problem.certify(again.trajectory, self._first.tolerance)
+        plan_now = replace(again, problem=self._problem, certificate=certificate)
+        if certificate.verified:
+            # A motion that keeps pairs farther apart is one without a margin, too.
+            self.without = min(self.without, again.report.cost)
+        if not again.certificate.verified:
+            self.refused = again.certificate.verdict.removeprefix("not verified: ")
+            # The attempt may be nearer to it all the same.
+            if certificate.verified:
+                more = self._lacks(plan_now)
+                if more.least > self.now.found.least:
+                    self.now = _Made(plan_now, more, apart)
+            return True
+        now = self.now = _Made(plan_now, self._lacks(plan_now), apart)
+        has_it = not now.found.items
+        if has_it and (self.best is None or again.report.cost < self.best.plan.report.cost):
+            self.best = now
+        if _is_interrupted(again):
+            self.refused = _INTERRUPTED
+            return True
+        return has_it and (not apart or now.found.least <= 1.0 + _ENOUGH)
 
 
 def _is_interrupted(found: Plan) -> bool:
