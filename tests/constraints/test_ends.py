@@ -122,8 +122,8 @@ def test_what_is_asked_of_rates_sets_them_at_its_end_alone() -> None:
         asked.EndAcceleration: ((False, False), (False, True)),
     }
     for kind, (velocity, acceleration) in rates.items():
-        assert kind.sets_velocity == velocity
-        assert kind.sets_acceleration == acceleration
+        assert kind.ends.velocity == velocity
+        assert kind.ends.acceleration == acceleration
 
 
 @pytest.mark.parametrize("off", [1e-7, 1e-4])

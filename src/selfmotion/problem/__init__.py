@@ -16,6 +16,7 @@ from selfmotion.problem.problem import (
     constraints_of_part as constraints_of_part,
     describe_arm as describe_arm,
     envelope_of as envelope_of,
+    given_end as given_end,
     length_of as length_of,
     off_nominal as off_nominal,
     problem_from_dict as problem_from_dict,

@@ -30,7 +30,7 @@ from selfmotion.problem.constraints import (
     JointVelocityLimits,
 )
 from selfmotion.problem.costs import Cost, Samples
-from selfmotion.problem.problem import Problem, length_of, smooth_knots
+from selfmotion.problem.problem import Problem, given_end, length_of, smooth_knots
 
 
 class BoundConditions(NamedTuple):
@@ -250,10 +250,8 @@ class Formulation:
             return bound
         ends = list(bound.ends)
         bands = band_conditions(self.follows, problem.relaxations)
-        pinned = any(item.pins[1] for item in problem.constraints)
-        if pinned and not any(
-            item.fixed_end(self.robot) is not None for item in problem.constraints
-        ):
+        pinned = any(item.ends.pins[1] for item in problem.constraints)
+        if pinned and given_end(self.robot, problem.constraints) is None:
             ends.append(_on_path_at_end(self.follows))
         limits, points = (*own.limits, *bands.limits), (*own.points, *bands.points)
         return BoundConditions(limits, points, tuple(ends))

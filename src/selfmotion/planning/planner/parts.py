@@ -150,7 +150,7 @@ class _PartPlanner:
     ) -> None:
         self._problem, self._stretches, self._ramp = problem, segments, ramp
         self._tolerance, self._progress = tolerance, progress
-        self._closed = any(item.closes for item in problem.constraints)
+        self._closed = any(item.ends.closes for item in problem.constraints)
         generator = np.random.default_rng(rng)
         self._mover = _Mover(between_parts(problem), retreat, generator, progress)
         self.failure: SelfmotionError = PlanError("no part was planned")

@@ -392,7 +392,7 @@ class PartsAsked:
     def _of_moves(self) -> Iterator[str]:
         parts, problem = self._parts, self._problem
         plans, moves = parts.plans, parts.moves
-        is_closed = any(item.closes for item in problem.constraints) and len(plans) > 1
+        is_closed = any(item.ends.closes for item in problem.constraints) and len(plans) > 1
         wanted = len(plans) if is_closed else len(plans) - 1
         if len(moves) != wanted:
             yield f"{len(plans)} parts have {len(moves)} moves in between, expected {wanted}"

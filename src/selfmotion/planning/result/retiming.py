@@ -225,7 +225,7 @@ def _swings(motion: Trajectory, limit: Array) -> Ints:
 
 def _ends(plan: Plan) -> Ends:
     """Return the ends at which the problem gives the arm's rates: they are kept."""
-    said = [item.sets_velocity for item in plan.problem.constraints]
+    said = [item.ends.velocity for item in plan.problem.constraints]
     return Ends(any(start for start, _ in said), any(end for _, end in said))
 
 

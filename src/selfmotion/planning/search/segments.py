@@ -14,6 +14,7 @@ from selfmotion.planning.search.manifold import OnPath
 from selfmotion.planning.search.measures import Length, cheapest, near_pairs
 from selfmotion.planning.search.sequences import Layers
 from selfmotion.planning.search.vertices import Admissible
+from selfmotion.problem.problem import given_end
 
 # Cost of a change to another configuration: above that of any motion in between.
 _BREAK = 1e6
@@ -227,11 +228,11 @@ class ChainSegments:
         start, samples = self.formulation.given_start, self._layers.samples
         if start is not None:
             samples[0] = start[None]
-        for item in self.formulation.problem.constraints:
-            end = item.fixed_end(self.formulation.robot)
-            if end is not None:
-                samples[-1] = end[None]
-                self._keep_given(-1, "end configuration asked for")
+        problem = self.formulation.problem
+        end = given_end(problem.robot, problem.constraints)
+        if end is not None:
+            samples[-1] = end[None]
+            self._keep_given(-1, "end configuration asked for")
         if start is not None:
             self._keep_given(0, "given start")
 

@@ -6,7 +6,11 @@ from selfmotion.problem.constraints.active import (
     active_of as active_of,
 )
 from selfmotion.problem.constraints.band import Band as Band
-from selfmotion.problem.constraints.base import Constraint as Constraint, Envelope as Envelope
+from selfmotion.problem.constraints.base import (
+    Constraint as Constraint,
+    Ends as Ends,
+    Envelope as Envelope,
+)
 from selfmotion.problem.constraints.bound import Conditions as Conditions
 from selfmotion.problem.constraints.bound_ends import (
     BoundEnd as BoundEnd,

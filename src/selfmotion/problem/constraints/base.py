@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -101,6 +101,28 @@ class Envelope:
         return np.asarray(inside.all(axis=1))
 
 
+class Ends(NamedTuple):
+    """What a constraint says of the first and the last state of a motion.
+
+    Attributes
+    ----------
+    closes : bool
+        Whether the motion has to end as it starts, so that no part of it can.
+    pins : (bool, bool)
+        Whether the tool has to be on the path itself, in spite of relaxations, at the start and at
+        the end.
+    velocity : (bool, bool)
+        Whether it says how fast the arm is there, which else is at rest where the tool is.
+    acceleration : (bool, bool)
+        Likewise whether it says how the arm accelerates there.
+    """
+
+    closes: bool = False
+    pins: tuple[bool, bool] = (False, False)
+    velocity: tuple[bool, bool] = (False, False)
+    acceleration: tuple[bool, bool] = (False, False)
+
+
 class Constraint(Saved, ABC, family="constraint"):
     """Something that a motion must keep, not yet bound to an arm.
 
@@ -115,27 +137,16 @@ class Constraint(Saved, ABC, family="constraint"):
         Share of a quantity's limits that is aimed to be left unused; at least half of it is.
     of_pace : bool
         Whether it limits the pace of a motion rather than its path in joint space.
-    closes : bool
-        Whether it requires that the motion ends as it starts, so that no part of it can.
     kept_moving : bool
         Whether its envelope is the whole constraint, so that it can be kept while the arm moves.
-    pins : (bool, bool)
-        Whether the tool has to be on the path itself, in spite of relaxations, at the start and at
-        the end of the motion.
-    sets_velocity : (bool, bool)
-        Whether it says how fast the arm is at the start and at the end of the motion, which else
-        is at rest where the tool is.
-    sets_acceleration : (bool, bool)
-        Likewise whether it says how the arm accelerates there.
+    ends : Ends
+        What it says of the first and the last state.
     """
 
     margin: float = 1e-3
     of_pace: ClassVar[bool] = False
-    closes: ClassVar[bool] = False
     kept_moving: ClassVar[bool] = False
-    pins: ClassVar[tuple[bool, bool]] = (False, False)
-    sets_velocity: ClassVar[tuple[bool, bool]] = (False, False)
-    sets_acceleration: ClassVar[tuple[bool, bool]] = (False, False)
+    ends: ClassVar[Ends] = Ends()
 
     def quantity(self, robot: RobotModel) -> Quantity:
         """Return the quantity and its limits; ProblemError if it does not fit the arm."""
@@ -169,10 +180,6 @@ class Constraint(Saved, ABC, family="constraint"):
     def envelope(self, robot: RobotModel) -> Envelope:
         """Return its envelope for single configurations and velocities; by default an empty one."""
         return Envelope.unbounded(robot.dof)
-
-    def fixed_end(self, robot: RobotModel) -> Array | None:
-        """Return the configuration (n,) that the motion has to end in, where it says one."""
-        return None
 
     def at_rest(self) -> Constraint:
         """Return the remainder for a motion that rests at both ends by itself."""

@@ -14,7 +14,7 @@ from selfmotion.certificate import QUANTITIES, ClosedMotion, EndState
 from selfmotion.model.follow import Follows
 from selfmotion.model.path import REST_SPEED
 from selfmotion.model.robot import RobotModel
-from selfmotion.problem.constraints.base import Constraint
+from selfmotion.problem.constraints.base import Constraint, Ends
 from selfmotion.problem.constraints.bound import Conditions
 from selfmotion.problem.constraints.bound_ends import EndCondition
 
@@ -36,7 +36,7 @@ class EndConfiguration(Constraint):
         q(T) [rad or m].
     """
 
-    pins: ClassVar[tuple[bool, bool]] = (False, True)
+    ends: ClassVar[Ends] = Ends(pins=(False, True))
 
     q: npt.ArrayLike
 
@@ -48,10 +48,6 @@ class EndConfiguration(Constraint):
     @override
     def requirement(self, robot: RobotModel) -> EndState:
         return EndState(0, read_only(robot.configuration(self.q)))
-
-    @override
-    def fixed_end(self, robot: RobotModel) -> Array:
-        return robot.configuration(self.q)
 
     def on_part(self) -> None:
         """See `Constraint.on_part`: the part ends elsewhere."""
@@ -66,9 +62,9 @@ class _EndRate(Constraint):
     def __init_subclass__(cls, *, order: int, at_start: bool, **options: Any) -> None:
         cls.order, cls.at_start = order, at_start
         here = (at_start, not at_start)
-        cls.pins = here
-        cls.sets_velocity = here if order == 1 else (False, False)
-        cls.sets_acceleration = here if order == 2 else (False, False)
+        none = (False, False)
+        velocity, acceleration = (here, none) if order == 1 else (none, here)
+        cls.ends = Ends(pins=here, velocity=velocity, acceleration=acceleration)
         super().__init_subclass__(**options)
 
     @property
@@ -206,7 +202,7 @@ class ClosedPath(Constraint):
         Also q̇(T) = q̇(0), for repetition without a jump in speed.
     """
 
-    closes: ClassVar[bool] = True
+    ends: ClassVar[Ends] = Ends(closes=True)
 
     velocity: bool = True
 

@@ -6,6 +6,7 @@ from selfmotion.problem.problem.along import (
     check_all_times as check_all_times,
     constraints_of_part as constraints_of_part,
     envelope_of as envelope_of,
+    given_end as given_end,
     length_of as length_of,
     rest_orders as rest_orders,
     smooth_knots as smooth_knots,

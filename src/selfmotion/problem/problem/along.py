@@ -57,9 +57,9 @@ def arm_rest_orders(follows: Follows, constraints: Sequence[Constraint]) -> tupl
 
 
 def _allowed(order: int, constraints: Sequence[Constraint], end: int) -> int:
-    if any(item.sets_velocity[end] for item in constraints):
+    if any(item.ends.velocity[end] for item in constraints):
         return 0
-    accelerates = any(item.sets_acceleration[end] for item in constraints)
+    accelerates = any(item.ends.acceleration[end] for item in constraints)
     return min(order, 1) if accelerates else order
 
 
@@ -129,6 +129,16 @@ def with_own_limits(
     return reduce(and_, own, asked)
 
 
+def given_end(robot: RobotModel, constraints: Sequence[Constraint]) -> Array | None:
+    """Return the configuration (n,) that motions have to end in; None where none is given."""
+    for item in constraints:
+        if item.ends.pins[1] and item.applies(robot):
+            for end in item.conditions(robot).ends:
+                if end.orders == (0,) and not end.at_start:
+                    return end.target
+    return None
+
+
 # Shortest window on a part, as a share of the part and of the window: shorter ones are dropped.
 _SHORTEST_WINDOW = 1e-2
 
@@ -136,7 +146,7 @@ _SHORTEST_WINDOW = 1e-2
 def constraints_of_part(problem: "Problem", is_first: bool, is_last: bool) -> Iterator[Constraint]:
     """Yield the constraints for a part that is the first or the last one, or neither."""
     for item in problem.constraints:
-        selected: Constraint | None = None if item.closes else item
+        selected: Constraint | None = None if item.ends.closes else item
         if selected is not None and not is_last:
             selected = selected.on_part()
         if selected is not None and not is_first:

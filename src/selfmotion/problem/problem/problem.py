@@ -41,6 +41,7 @@ from selfmotion.problem.costs import BeyondLimits, Cost, JointVelocity, OffPath
 from selfmotion.problem.problem.along import (
     arm_rest_orders,
     envelope_without_arm,
+    given_end,
     with_own_limits,
 )
 from selfmotion.problem.problem.digest import conditions_digest
@@ -174,7 +175,7 @@ class Problem:
         check_costs(self.follows, self.costs, self.all_costs)
         for item in self.constraints:
             item.check(self.follows)
-            end = item.fixed_end(self.robot)
+            end = given_end(self.robot, [item])
             if end is not None:
                 check_end(self.follows, end, self.relaxations)
         # Now, not when the motion is finished: without a requirement nothing judges it.
