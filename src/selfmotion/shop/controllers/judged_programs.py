@@ -53,7 +53,7 @@ _WRITERS: Mapping[str, Callable[[FilePath, Draft], None]] = {
     "rapid": write_rapid,
     "urscript": write_urscript,
 }
-_READERS: Mapping[str, type[ProgramReader]] = {
+_READERS: Mapping[str, type[KrlReader] | type[ProgramReader]] = {
     ".src": KrlReader,
     ".mod": RapidReader,
     ".script": UrscriptReader,

@@ -1,0 +1,312 @@
+"""Programs of controllers, read line by line by the table of their language."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path as FilePath
+from typing import Any, ClassVar
+
+import numpy as np
+
+from selfmotion.model.robot import RobotModel
+from selfmotion.model.task import SE3
+from selfmotion.shop.controllers.commented_lines import Lines
+from selfmotion.shop.controllers.controller_program import ControllerProgram, Switch
+from selfmotion.shop.controllers.feed_segments import Ramps, times_at
+from selfmotion.shop.controllers.program_facts import Load
+from selfmotion.shop.controllers.program_texts import PLANNED
+from selfmotion.shop.controllers.read_segments import Pose, PoseRow, Row, SlowRow
+from selfmotion.shop.controllers.statements import Language
+
+# Relative error of accelerations by their few digits.
+_ROUNDED = 1e-2
+
+
+@dataclass
+class Target:
+    """A target of a motion while it is read.
+
+    Attributes
+    ----------
+    at : list of float or Pose
+        Axes [deg or mm], or a tool pose.
+    seconds : float
+        Time from the target before [s]; 0 where it has a speed.
+    speed : float
+        Speed of the tool from the target before [m/s]; 0 where it has a time.
+    via : Pose or None
+        Point of a circular step to it.
+    acceleration : float
+        Of the tool [m/s²]; infinite where the program does not state it.
+    """
+
+    at: list[float] | Pose
+    seconds: float = 0.0
+    speed: float = 0.0
+    via: Pose | None = None
+    acceleration: float = np.inf
+
+    def is_like(self, other: "Target") -> bool:
+        """Whether both are axes or both poses, and both have times or both speeds."""
+        same_kind = isinstance(self.at, Pose) == isinstance(other.at, Pose)
+        return same_kind and (self.speed > 0.0) == (other.speed > 0.0)
+
+
+class ProgramReader:
+    """Reader of a language: a state machine over the kinds of its statements.
+
+    Targets gather in `run` until the arm stops at one of them.
+
+    Attributes
+    ----------
+    language : Language
+    moving : str
+        What says in the language that the arm does not stop at a target.
+    metres : float
+        Unit of lengths [m].
+    """
+
+    language: ClassVar[Language]
+    moving: ClassVar[str] = ""
+    metres: ClassVar[float] = 1e-3
+
+    def __init__(self, file: FilePath, robot: RobotModel | None = None) -> None:
+        self.lines = Lines(file, self.language.comment)
+        self.robot = robot
+        self.name, self.state = "", "before"
+        # Axes of targets, by their names.
+        self.axes: list[str] = []
+        self.rows: list[Row | PoseRow | SlowRow] = []
+        # Time of the motion up to the last stop [s].
+        self.clock = 0.0
+        # Target at which the arm stopped last; None before the first one.
+        self.here: list[float] | Pose | None = None
+        # Targets since then, and what is switched at which of them.
+        self.run: list[Target] = []
+        self.happens: list[tuple[int, Switch]] = []
+        self.switches: list[Switch] = []
+        # What statements have set: of each value the last one, by its name.
+        self.settings: dict[str, Any] = {}
+
+    def actions(self) -> Mapping[str, Callable[..., None]]:
+        """Return the action of each kind of statement: it takes the statement's values."""
+        return {
+            "begin": self.begin,
+            "comment": self.no_action,
+            "set": self.settings.update,
+            "wait": self.wait,
+            "output": self.switch_output,
+            "event": self.pass_event,
+            "end": self.no_action,
+        }
+
+    def program(self) -> ControllerProgram:
+        """Read the whole program.
+
+        Raises
+        ------
+        FileFormatError
+            A line is none of those that are read, or something is missing.
+        """
+        actions = self.actions()
+        for line in self.lines:
+            text = " ".join(line.split())
+            found = self.language.find(text, self.state)
+            if found is None:
+                raise self.lines.fault(self._unread(text))
+            statement, texts = found
+            self.check(statement.kind)
+            values: dict[str, Any] = {
+                name: self.language.fields[field].read(self, texts[name])
+                for name, field in statement.values.items()
+            }
+            actions[statement.kind](**values)
+            self.state = statement.then or self.state
+        if self.state != "after":
+            raise self.lines.fault(f"is the last one, expected {self.language.last}")
+        places = self.lines.places(self.settings.get("tool"), self.work)
+        places.is_carried = self.is_carried
+        facts, unit = self.lines.facts(), self.settings.get("unit", "")
+        if facts is not None and unit and facts.positioner not in ("", unit):
+            raise self.lines.fault(
+                f"its work object is carried by mechanical unit '{unit}', it was written for "
+                f"'{facts.positioner}'"
+            )
+        given = self.name, self.axes, self.rows, self.switches, places, self.robot, self.load
+        return self.lines.program(*given)
+
+    @property
+    def work(self) -> SE3 | None:
+        """Work object, in the world or in what carries it; None where it is not stated."""
+        work: SE3 | None = self.settings.get("work")
+        return work
+
+    @property
+    def is_carried(self) -> bool | None:
+        """Whether an axis carries the work object; None where the program does not say it."""
+        return None
+
+    @property
+    def load(self) -> Load | None:
+        """Load at the flange; None where it is not stated."""
+        if "mass" not in self.settings:
+            return None
+        center = [self.metres * self.settings[name] for name in "xyz"]
+        return Load(self.settings["mass"], np.array(center))
+
+    def _unread(self, text: str) -> str:
+        is_own = any(note.startswith("selfmotion: ") for note in self.lines.notes)
+        other = (
+            "selfmotion did not write this program, and only the statements that it writes "
+            "are read; of another one judge the recorded motion, a table of t and a column "
+            "per joint (.csv, .npz, .json, .yaml of ROS, .mcap); "
+        )
+        return (
+            f"'{text[:60]}' is not read: {'' if is_own else other}page 'Files' of the docs "
+            f"lists what is (read_motion)"
+        )
+
+    def check(self, kind: str) -> None:
+        """Refuse a kind of statement where it may not stand, before its values are read."""
+
+    def no_action(self, **_: object) -> None:
+        """Go on: the statement changes the state alone."""
+
+    def begin(self, name: str) -> None:
+        """Begin a program of a name."""
+        self.name = name
+
+    def wait(self, seconds: float) -> None:
+        """Take a rest [s]."""
+        self.check_stopped("the arm is to rest")
+        self.rows.append(Row(self.lines.step(), [], [seconds]))
+        self.clock += seconds
+
+    def switch_output(self, output: str, value: bool) -> None:
+        """Take an output that is switched at the last target."""
+        self.happen(Switch(0.0, output, value))
+
+    def pass_event(self, event: str) -> None:
+        """Take an event that is a comment at the last target."""
+        self.happen(Switch(0.0, event.strip()))
+
+    def happen(self, switch: Switch, ahead: int = 0) -> None:
+        """Take what is switched at the last target, or at one that is `ahead`."""
+        if self.run or ahead:
+            self.happens.append((len(self.run) + ahead, switch))
+        else:
+            self.switches.append(switch._replace(at=self.clock))
+
+    def approach(self, target: list[float] | Pose) -> None:
+        """Take where the arm begins, or goes slowly before targets of the other kind."""
+        self.check_stopped("a slow motion")
+        self.rows.append(SlowRow(target))
+        self.here = target
+
+    def take(self, target: Target, *, stops: bool) -> None:
+        """Take a target, and end the motion where the arm `stops` there.
+
+        Raises
+        ------
+        FileFormatError
+            Targets before, at which it does not stop, are of another kind.
+        """
+        if self.run and not self.run[0].is_like(target):
+            raise self.lines.fault(f"a target of another kind than the one before: {self.moving}")
+        self.run.append(target)
+        if stops:
+            self.stop()
+
+    def stop(self, *, is_spline: bool = False) -> None:
+        """End a motion at its last target, at which the arm stops."""
+        run, happens, self.run, self.happens = self.run, self.happens, [], []
+        times = self._paced(run, is_spline=is_spline) if run[0].speed else self._timed(run)
+        for number, switch in happens:
+            self.switches.append(switch._replace(at=self.clock + times[number]))
+        self.clock += sum(self.rows[-1].seconds)
+        self.here = run[-1].at
+
+    def _timed(self, run: list[Target]) -> list[float]:
+        """Add a motion at times; return when its targets are reached [s]."""
+        seconds = [target.seconds for target in run]
+        poses = self._poses([self.here, *(target.at for target in run)])
+        if poses:
+            self.rows.append(PoseRow(self.lines.step(), poses, seconds))
+        else:
+            axes = [at for at in (self.here, *(x.at for x in run)) if isinstance(at, list)]
+            self.rows.append(Row(self.lines.step(), axes, seconds))
+        return [sum(seconds[:k]) for k in range(len(run) + 1)]
+
+    def _poses(self, targets: list[list[float] | Pose | None]) -> list[Pose]:
+        """Return targets that are poses; none for axes.
+
+        Raises
+        ------
+        FileFormatError
+            The arm begins at a target of the other kind.
+        """
+        poses = [at for at in targets if isinstance(at, Pose)]
+        if poses and len(poses) < len(targets):
+            given, before = "a pose", "axis targets"
+            if isinstance(targets[0], Pose):
+                given, before = before, given
+            raise self.lines.fault(f"{given} after {before}, expected a slow motion there first")
+        return poses
+
+    def _paced(self, run: list[Target], *, is_spline: bool) -> list[float]:
+        """Add a motion at speeds; return when its targets are reached, by even ramps [s].
+
+        Ramps are the controller's, but the seam between them is judged at its feed.
+        """
+        planned = self.lines.planned()
+        every = self._poses([self.here, *(target.at for target in run)])
+        if planned is None:
+            raise self.lines.fault(
+                f"a motion at a speed needs the comment '{PLANNED}… s' before it, which says how "
+                f"long all up to the next stop was planned to take"
+            )
+        speeds = [target.speed for target in run]
+        vias = np.array([[np.nan] * 3 if x.via is None else x.via.place for x in run])
+        own = times_at(np.array([pose.place for pose in every]), vias, speeds)
+        if not (np.diff(own) > 0.0).all():
+            k = int(np.argmin(np.diff(own)))
+            raise self.lines.fault(
+                f"target {k + 1} of a seam at its speed is where the one before is, expected a way "
+                f"to go: at a speed a step of no length takes no time"
+            )
+        if not 0.0 < own[-1] < planned:
+            raise self.lines.fault(
+                f"at these speeds it takes {own[-1]:.6g} s without ramps, planned are "
+                f"{planned:.6g} s; after a change of speeds plan anew, with the feed that is wanted"
+            )
+        # Half of the length to come to the slowest of its speeds, half to stop.
+        least = min(speeds) ** 2 / float(np.diff(own) @ np.array(speeds))
+        acceleration = min(target.acceleration for target in run)
+        if not acceleration >= (1.0 - _ROUNDED) * least:
+            raise self.lines.fault(
+                f"its acceleration is {acceleration:g} m/s², expected {least:.4g} or more: with "
+                f"less the tool never is at its speed"
+            )
+        self.rows.append(PoseRow(self.lines.step(), every, [planned], speeds, vias, is_spline))
+        times: list[float] = Ramps(float(own[-1]), planned).times(own).tolist()
+        return times
+
+    def check_stopped(self, what: str) -> None:
+        """Refuse `what` where the arm does not stop."""
+        if self.run:
+            raise self.lines.fault(f"{what} where it does not stop: {self.moving}")
+
+    def external_axes(self, values: Mapping[str, float]) -> list[float]:
+        """Return the external axes of a pose, which are those of the axis target before."""
+        known = [name for name in self.axes if name.startswith("E")]
+        if sorted(values) != sorted(known):
+            raise self.lines.fault(
+                f"has external axes {', '.join(values) or 'none'}, expected "
+                f"{', '.join(known) or 'none'}"
+            )
+        return [values[name] for name in known]
+
+    def check_axes(self, names: list[str]) -> None:
+        """Refuse a target with other axes than those before."""
+        self.axes = self.axes or names
+        if names != self.axes:
+            raise self.lines.fault(f"has axes {', '.join(names)}, expected {', '.join(self.axes)}")

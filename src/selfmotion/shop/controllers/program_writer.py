@@ -1,0 +1,157 @@
+"""Programs of controllers, written segment by segment by the table of their language."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path as FilePath
+from typing import Any, ClassVar, NamedTuple
+
+from selfmotion.basics import Array, ProblemError, write_text
+from selfmotion.shop.controllers.controller_program import Draft, before, head
+from selfmotion.shop.controllers.program_settings import written
+from selfmotion.shop.controllers.program_texts import plain
+from selfmotion.shop.controllers.segments import PoseSegment, Segment
+from selfmotion.shop.controllers.statements import Language
+
+
+class WrittenPose(NamedTuple):
+    """A tool pose for a file.
+
+    Attributes
+    ----------
+    place, turn : (3,), (4,)
+        Position [m], and quaternion x, y, z, w.
+    axes : mapping
+        Axis → its coordinate, as text.
+    configuration : str
+        Of the arm, in the language.
+    """
+
+    place: Array
+    turn: Array
+    axes: Mapping[str, str]
+    configuration: str = ""
+
+
+class ProgramWriter:
+    """Writer of a language.
+
+    Attributes
+    ----------
+    language : Language
+    indent : str
+        Before each statement of the program.
+    outputs : str
+        What outputs may be, in words.
+    """
+
+    language: ClassVar[Language]
+    indent: ClassVar[str] = "  "
+    outputs: ClassVar[str]
+
+    def __init__(self, draft: Draft, name: str) -> None:
+        self.draft, self.program, self.name = draft, draft.program, name
+
+    def write(self, file: FilePath) -> None:
+        """Write the program."""
+        lines = self.opening()
+        for segment, begun in with_begins(self.program.segments):
+            lines += self.before_step()
+            notes = [f"step: {plain(segment.name)}", *before(segment)]
+            lines += [self.comment(note) for note in notes]
+            if begun is not None:
+                lines += self.approach(begun)
+            lines += self.motion(segment)
+        write_text(file, "\n".join([*lines, *self.closing(), ""]))
+
+    def opening(self) -> list[str]:
+        """Return the lines up to where the motion begins."""
+        raise NotImplementedError
+
+    def closing(self) -> list[str]:
+        """Return the lines after the motion."""
+        raise NotImplementedError
+
+    def before_step(self) -> list[str]:
+        """Return the lines before the comments of a step."""
+        return []
+
+    def approach(self, segment: Segment) -> list[str]:
+        """Return the slow motion to where a segment begins, of another kind than the one before."""
+        raise NotImplementedError
+
+    def motion(self, segment: Segment) -> list[str]:
+        """Return the lines of a motion from rest to rest, or of a rest."""
+        raise NotImplementedError
+
+    def has_output(self, output: str | int) -> bool:
+        """Whether the controller has such an output."""
+        raise NotImplementedError
+
+    def line(self, kind: str, **values: Any) -> str:
+        """Return the line of a statement."""
+        return f"{self.indent}{self.language.text(kind, **values)}"
+
+    def comment(self, text: str) -> str:
+        """Return the line of a comment."""
+        return f"{self.indent}{self.language.comment} {text}"
+
+    def head(self) -> list[str]:
+        """Return the comments at the head."""
+        return [self.comment(note) for note in head(self.draft)]
+
+    def events(self, segment: Segment, target: int) -> list[str]:
+        """Return the lines of what happens at a target of a segment."""
+        names = (item.name for item in segment.events if item.target == target)
+        return [self.event(name) for name in names]
+
+    def event(self, event: str) -> str:
+        """Return the line that switches the output of an event, or names it."""
+        signal = self.draft.signal(event)
+        if signal is None:
+            return self.line("event", event=plain(event))
+        output, value = signal
+        if not self.has_output(output):
+            raise ProblemError(f"signals: '{event}' switches {output!r}; {self.outputs}")
+        return self.line("output", output=output, value=value)
+
+    def axes(self, segment: Segment, k: int) -> dict[str, str]:
+        """Return the coordinates of the axes at a target, as texts."""
+        values = written(segment.q[k], self.program.axes)
+        return {axis.name: text for axis, text in zip(self.program.axes, values, strict=True)}
+
+    def pose(self, segment: PoseSegment, k: int, configuration: str = "") -> WrittenPose:
+        """Return the pose of a target."""
+        axes = self.axes(segment, k)
+        return WrittenPose(segment.places[k], segment.turns[k], axes, configuration)
+
+    def positioner(self, kind: type[int] | type[str], said: str) -> Any:
+        """Return the mechanical unit that carries the work object.
+
+        Raises
+        ------
+        ProblemError
+            Settings name none of that kind.
+        """
+        unit, frames = self.draft.settings.positioner, self.draft.frames
+        if frames is None or not isinstance(unit, kind):
+            name = "" if frames is None else frames.name
+            raise ProblemError(
+                f"{self.draft.robot.name}: an axis carries work object '{name}', and {said}, in "
+                f"the file of --settings (ProgramSettings(positioner=…))"
+            )
+        return unit
+
+
+def with_begins(segments: Sequence[Segment]) -> Iterator[tuple[Segment, Segment | None]]:
+    """Yield each segment, and one to whose begin the arm has to go slowly before; else None.
+
+    That is where targets of the other kind follow, poses after joints or joints after poses, rests
+    in between included: where the work object was shifted, the arm is elsewhere by the other ones.
+    A program begins by joints.
+    """
+    by_poses = False
+    for k, segment in enumerate(segments):
+        moving = next((item for item in segments[k:] if not item.is_rest), None)
+        begun = None
+        if moving is not None and by_poses != isinstance(moving, PoseSegment):
+            by_poses, begun = not by_poses, moving
+        yield segment, begun
