@@ -196,8 +196,9 @@ PARTS = (
         "programs read",
         (
             "shop/controllers/read_*.py",
-            "shop/controllers/program_lines.py",
+            "shop/controllers/program_reader.py",
             "shop/controllers/commented_lines.py",
+            "shop/controllers/statements.py",
         ),
         (
             "controllers/test_programs.py",

@@ -43,7 +43,6 @@ from selfmotion.shop.controllers.segments import (
     NO_MISS,
     Knots,
     Misses,
-    PoseSegment,
     Segment,
     by_interpolation,
     miss_of,
@@ -405,22 +404,6 @@ def check_signals(seams: Mapping[str, str], settings: ProgramSettings) -> None:
 
 
 # Texts around the motion: the head of a program, and the comments before a segment.
-
-
-def with_begins(segments: Sequence[Segment]) -> Iterator[tuple[Segment, Segment | None]]:
-    """Yield each segment, and one to whose begin the arm has to go slowly before; else None.
-
-    That is where targets of the other kind follow, poses after joints or joints after poses, rests
-    in between included: where the work object was shifted, the arm is elsewhere by the other ones.
-    A program begins by joints.
-    """
-    by_poses = False
-    for k, segment in enumerate(segments):
-        moving = next((item for item in segments[k:] if not item.is_rest), None)
-        begun = None
-        if moving is not None and by_poses != isinstance(moving, PoseSegment):
-            by_poses, begun = not by_poses, moving
-        yield segment, begun
 
 
 def head(draft: Draft) -> list[str]:

@@ -36,7 +36,7 @@ from selfmotion.shop.controllers.controller_program import (
 )
 from selfmotion.shop.controllers.krl import KrlReader, write_krl
 from selfmotion.shop.controllers.program_facts import check_load
-from selfmotion.shop.controllers.program_lines import ProgramReader
+from selfmotion.shop.controllers.program_reader import ProgramReader
 from selfmotion.shop.controllers.program_settings import ProgramSettings
 from selfmotion.shop.controllers.program_texts import plain
 from selfmotion.shop.controllers.rapid import RapidReader, write_rapid
@@ -53,7 +53,7 @@ _WRITERS: Mapping[str, Callable[[FilePath, Draft], None]] = {
     "rapid": write_rapid,
     "urscript": write_urscript,
 }
-_READERS: Mapping[str, type[KrlReader] | type[ProgramReader]] = {
+_READERS: Mapping[str, type[ProgramReader]] = {
     ".src": KrlReader,
     ".mod": RapidReader,
     ".script": UrscriptReader,

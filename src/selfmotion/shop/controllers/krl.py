@@ -180,6 +180,8 @@ _TRIGGER = "TRIGGER WHEN PATH = 0 DELAY = 0 DO $OUT[<output>] = <value>"
 KRL = Language(
     comment=";",
     last="END",
+    outputs="KUKA's outputs are numbers from 1 on",
+    has_output=lambda output: isinstance(output, int) and output >= 1,
     fields={
         "header": word(r"(?:ACCESS|REL|PARAM|COMMENT)\b.*"),
         "name": word(rf"[A-Z]\w{{0,{NAME - 1}}}"),
@@ -252,7 +254,6 @@ class KrlWriter(ProgramWriter):
     """Writer of a module that a KR C4 or C5 selects."""
 
     language = KRL
-    outputs = "KUKA's outputs are numbers from 1 on"
 
     @override
     def opening(self) -> list[str]:
@@ -278,10 +279,6 @@ class KrlWriter(ProgramWriter):
     @override
     def before_step(self) -> list[str]:
         return [""]
-
-    @override
-    def has_output(self, output: str | int) -> bool:
-        return isinstance(output, int) and output >= 1
 
     @override
     def approach(self, segment: Segment) -> list[str]:

@@ -49,7 +49,8 @@ from selfmotion.shop.controllers.samples import (
     for_cubics,
     within_limits_at,
 )
-from selfmotion.shop.controllers.urscript import check_joints, script
+from selfmotion.shop.controllers.urscript import check_joints
+from selfmotion.shop.controllers.urscript_stream import script
 from selfmotion.work.job import Program
 
 

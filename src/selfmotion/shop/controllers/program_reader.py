@@ -123,7 +123,7 @@ class ProgramReader:
             self.state = statement.then or self.state
         if self.state != "after":
             raise self.lines.fault(f"is the last one, expected {self.language.last}")
-        places = self.lines.places(self.settings.get("tool"), self.work)
+        places = self.lines.places(self.tool, self.work)
         places.is_carried = self.is_carried
         facts, unit = self.lines.facts(), self.settings.get("unit", "")
         if facts is not None and unit and facts.positioner not in ("", unit):
@@ -133,6 +133,12 @@ class ProgramReader:
             )
         given = self.name, self.axes, self.rows, self.switches, places, self.robot, self.load
         return self.lines.program(*given)
+
+    @property
+    def tool(self) -> SE3 | None:
+        """Tool in the flange; None where it is not stated."""
+        tool: SE3 | None = self.settings.get("tool")
+        return tool
 
     @property
     def work(self) -> SE3 | None:

@@ -6,7 +6,7 @@ from typing import Any, ClassVar, NamedTuple
 
 from selfmotion.basics import Array, ProblemError, write_text
 from selfmotion.shop.controllers.controller_program import Draft, before, head
-from selfmotion.shop.controllers.program_settings import written
+from selfmotion.shop.controllers.program_settings import Signal, written
 from selfmotion.shop.controllers.program_texts import plain
 from selfmotion.shop.controllers.segments import PoseSegment, Segment
 from selfmotion.shop.controllers.statements import Language
@@ -38,17 +38,14 @@ class ProgramWriter:
     ----------
     language : Language
     indent : str
-        Before each statement of the program.
-    outputs : str
-        What outputs may be, in words.
+        Spaces before each statement.
     """
 
     language: ClassVar[Language]
-    indent: ClassVar[str] = "  "
-    outputs: ClassVar[str]
 
     def __init__(self, draft: Draft, name: str) -> None:
         self.draft, self.program, self.name = draft, draft.program, name
+        self.indent = "  "
 
     def write(self, file: FilePath) -> None:
         """Write the program."""
@@ -82,10 +79,6 @@ class ProgramWriter:
         """Return the lines of a motion from rest to rest, or of a rest."""
         raise NotImplementedError
 
-    def has_output(self, output: str | int) -> bool:
-        """Whether the controller has such an output."""
-        raise NotImplementedError
-
     def line(self, kind: str, **values: Any) -> str:
         """Return the line of a statement."""
         return f"{self.indent}{self.language.text(kind, **values)}"
@@ -105,13 +98,7 @@ class ProgramWriter:
 
     def event(self, event: str) -> str:
         """Return the line that switches the output of an event, or names it."""
-        signal = self.draft.signal(event)
-        if signal is None:
-            return self.line("event", event=plain(event))
-        output, value = signal
-        if not self.has_output(output):
-            raise ProblemError(f"signals: '{event}' switches {output!r}; {self.outputs}")
-        return self.line("output", output=output, value=value)
+        return f"{self.indent}{event_text(self.language, event, self.draft.signal(event))}"
 
     def axes(self, segment: Segment, k: int) -> dict[str, str]:
         """Return the coordinates of the axes at a target, as texts."""
@@ -139,6 +126,22 @@ class ProgramWriter:
                 f"the file of --settings (ProgramSettings(positioner=…))"
             )
         return unit
+
+
+def event_text(language: Language, event: str, signal: Signal | None) -> str:
+    """Return the statement that switches the output of an event, or the comment that names it.
+
+    Raises
+    ------
+    ProblemError
+        The controller has no such output.
+    """
+    if signal is None:
+        return language.text("event", event=plain(event))
+    output, value = signal
+    if not language.has_output(output):
+        raise ProblemError(f"signals: '{event}' switches {output!r}; {language.outputs}")
+    return language.text("output", output=output, value=value)
 
 
 def with_begins(segments: Sequence[Segment]) -> Iterator[tuple[Segment, Segment | None]]:

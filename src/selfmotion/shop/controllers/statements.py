@@ -73,6 +73,10 @@ class Language:
         Beginning of a comment.
     last : str
         The last statement of a program.
+    outputs : str
+        What outputs may be, in words.
+    has_output : callable
+        Whether the controller has an output.
     fields : mapping
         Types of values, by name.
     statements : sequence of Statement
@@ -80,6 +84,8 @@ class Language:
 
     comment: str
     last: str
+    outputs: str
+    has_output: Callable[[str | int], bool]
     fields: Mapping[str, Field]
     statements: Sequence[Statement]
 
@@ -106,7 +112,9 @@ class Language:
 
     @cached_property
     def _by_values(self) -> dict[tuple[str, frozenset[str]], Statement]:
-        return {(item.kind, frozenset(item.values)): item for item in self.statements}
+        # Of statements with the same values the first is the one that is written.
+        every = reversed(self.statements)
+        return {(item.kind, frozenset(item.values)): item for item in every}
 
     @cached_property
     def _patterns(self) -> list[tuple[Statement, re.Pattern[str]]]:
