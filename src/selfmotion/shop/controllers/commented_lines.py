@@ -17,10 +17,7 @@ from selfmotion.shop.controllers.program_texts import BECAUSE, KEPT, PLANNED, TI
 from selfmotion.shop.controllers.read_segments import (
     Follower,
     Places,
-    Pose,
-    PoseRow,
     Row,
-    SlowRow,
     pose_of_values,
 )
 from selfmotion.shop.controllers.segments import Miss, Misses
@@ -188,7 +185,7 @@ class Lines:
         self,
         name: str,
         present: Sequence[str],
-        rows: Sequence[Row | PoseRow | SlowRow],
+        rows: Sequence[Row],
         switches: Sequence[Switch] = (),
         places: Places | None = None,
         robot: RobotModel | None = None,
@@ -211,7 +208,7 @@ class Lines:
             raise FileFormatError(f"{self._file}: has no axes of those that its comments name")
         self._check_unnamed(present, kept, rows)
         frames = None
-        if any(_has_poses(row) for row in rows):
+        if any(row.poses for row in rows):
             if robot is None or places is None:
                 raise FileFormatError(
                     f"{self._file}: has tool poses, whose joint positions need the robot: give it "
@@ -220,7 +217,7 @@ class Lines:
             frames = places.frames(robot, axes, self._file)
         follower = Follower(self._file, axes, frames)
         for row in rows:
-            follower.take(_with_axes(row, kept))
+            follower.take(row.with_axes(kept))
         if not follower.segments:
             raise FileFormatError(f"{self._file}: has no targets with times")
         remark = next((note for note in self.notes if note.startswith(BECAUSE)), BECAUSE)
@@ -241,7 +238,7 @@ class Lines:
         )
 
     def _check_unnamed(
-        self, present: Sequence[str], kept: Sequence[int], rows: Sequence[Row | PoseRow | SlowRow]
+        self, present: Sequence[str], kept: Sequence[int], rows: Sequence[Row]
     ) -> None:
         """Refuse axes that move, and that no comment gives a joint: nothing judges them.
 
@@ -250,29 +247,8 @@ class Lines:
         for k, axis in enumerate(present):
             if k in kept:
                 continue
-            if axis.startswith("E") or any(q[k] != 0.0 for q in _axis_targets(rows)):
+            if axis.startswith("E") or any(q[k] != 0.0 for row in rows for q in row.axes):
                 raise FileFormatError(
                     f"{self._file}: axis {axis} has targets, and the comment 'axes: …' names no "
                     f"joint that it is: nothing has judged its motion"
                 )
-
-
-def _axis_targets(rows: Sequence[Row | PoseRow | SlowRow]) -> Iterator[list[float]]:
-    for row in rows:
-        if isinstance(row, Row):
-            yield from row.q
-        elif isinstance(row, SlowRow) and not isinstance(row.target, Pose):
-            yield row.target
-
-
-def _has_poses(row: Row | PoseRow | SlowRow) -> bool:
-    return isinstance(row, PoseRow) or (isinstance(row, SlowRow) and isinstance(row.target, Pose))
-
-
-def _with_axes(row: Row | PoseRow | SlowRow, kept: Sequence[int]) -> Row | PoseRow | SlowRow:
-    """Return a row with those of its axes that the robot has."""
-    if isinstance(row, Row):
-        return Row(row.name, [[q[k] for k in kept] for q in row.q], row.seconds)
-    if isinstance(row, SlowRow) and not isinstance(row.target, Pose):
-        return SlowRow([row.target[k] for k in kept])
-    return row

@@ -14,7 +14,7 @@ from selfmotion.shop.controllers.controller_program import ControllerProgram, Sw
 from selfmotion.shop.controllers.feed_segments import Ramps, times_at
 from selfmotion.shop.controllers.program_facts import Load
 from selfmotion.shop.controllers.program_texts import PLANNED
-from selfmotion.shop.controllers.read_segments import Pose, PoseRow, Row, SlowRow
+from selfmotion.shop.controllers.read_segments import Pose, Row
 from selfmotion.shop.controllers.statements import Language
 
 # Relative error of accelerations by their few digits.
@@ -75,7 +75,7 @@ class ProgramReader:
         self.name, self.state = "", "before"
         # Axes of targets, by their names.
         self.axes: list[str] = []
-        self.rows: list[Row | PoseRow | SlowRow] = []
+        self.rows: list[Row] = []
         # Time of the motion up to the last stop [s].
         self.clock = 0.0
         # Target at which the arm stopped last; None before the first one.
@@ -205,7 +205,7 @@ class ProgramReader:
     def approach(self, target: list[float] | Pose) -> None:
         """Take where the arm begins, or goes slowly before targets of the other kind."""
         self.check_stopped("a slow motion")
-        self.rows.append(SlowRow(target))
+        self.rows.append(Row("", [target], [], is_slow=True))
         self.here = target
 
     def take(self, target: Target, *, stops: bool) -> None:
@@ -234,29 +234,23 @@ class ProgramReader:
     def _timed(self, run: list[Target]) -> list[float]:
         """Add a motion at times; return when its targets are reached [s]."""
         seconds = [target.seconds for target in run]
-        poses = self._poses([self.here, *(target.at for target in run)])
-        if poses:
-            self.rows.append(PoseRow(self.lines.step(), poses, seconds))
-        else:
-            axes = [at for at in (self.here, *(x.at for x in run)) if isinstance(at, list)]
-            self.rows.append(Row(self.lines.step(), axes, seconds))
+        self.rows.append(Row(self.lines.step(), self._every(run), seconds))
         return [sum(seconds[:k]) for k in range(len(run) + 1)]
 
-    def _poses(self, targets: list[list[float] | Pose | None]) -> list[Pose]:
-        """Return targets that are poses; none for axes.
+    def _every(self, run: list[Target]) -> list[list[float] | Pose]:
+        """Return where a motion begins, and its targets.
 
         Raises
         ------
         FileFormatError
-            The arm begins at a target of the other kind.
+            It begins at a target of the other kind.
         """
-        poses = [at for at in targets if isinstance(at, Pose)]
-        if poses and len(poses) < len(targets):
-            given, before = "a pose", "axis targets"
-            if isinstance(targets[0], Pose):
-                given, before = before, given
+        begins_by_pose, by_poses = isinstance(self.here, Pose), isinstance(run[0].at, Pose)
+        if self.here is None or begins_by_pose != by_poses:
+            kinds = ("a pose", "axis targets")
+            given, before = kinds if by_poses else kinds[::-1]
             raise self.lines.fault(f"{given} after {before}, expected a slow motion there first")
-        return poses
+        return [self.here, *(target.at for target in run)]
 
     def _paced(self, run: list[Target], *, is_spline: bool) -> list[float]:
         """Add a motion at speeds; return when its targets are reached, by even ramps [s].
@@ -264,7 +258,7 @@ class ProgramReader:
         Ramps are the controller's, but the seam between them is judged at its feed.
         """
         planned = self.lines.planned()
-        every = self._poses([self.here, *(target.at for target in run)])
+        every = self._every(run)
         if planned is None:
             raise self.lines.fault(
                 f"a motion at a speed needs the comment '{PLANNED}… s' before it, which says how "
@@ -272,7 +266,7 @@ class ProgramReader:
             )
         speeds = [target.speed for target in run]
         vias = np.array([[np.nan] * 3 if x.via is None else x.via.place for x in run])
-        own = times_at(np.array([pose.place for pose in every]), vias, speeds)
+        own = times_at(np.array([x.place for x in every if isinstance(x, Pose)]), vias, speeds)
         if not (np.diff(own) > 0.0).all():
             k = int(np.argmin(np.diff(own)))
             raise self.lines.fault(
@@ -292,7 +286,7 @@ class ProgramReader:
                 f"its acceleration is {acceleration:g} m/s², expected {least:.4g} or more: with "
                 f"less the tool never is at its speed"
             )
-        self.rows.append(PoseRow(self.lines.step(), every, [planned], speeds, vias, is_spline))
+        self.rows.append(Row(self.lines.step(), every, [planned], speeds, vias, is_spline))
         times: list[float] = Ramps(float(own[-1]), planned).times(own).tolist()
         return times
 
