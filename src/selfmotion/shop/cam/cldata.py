@@ -11,9 +11,13 @@ from selfmotion.basics import Array, lines_of
 from selfmotion.shop.cam.cuts import Machine, Pecks, arc_points, drill, unit_axis
 from selfmotion.shop.cam.path_rows import LENGTH_UNITS, PoseRows
 
-_INCH, _MM = 25.4e-3, 1e-3
+# Inch [m].
+_INCH = 25.4e-3
+# Millimetre [m].
+_MM = 1e-3
 _STATEMENT = re.compile(r"([A-Z][A-Z0-9]{0,7})\s*(?:/(.*))?")
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:E[+-]?[0-9]{1,2})?")
+# Longest statement [characters].
 _LONGEST = 10_000
 _UNITS = {"MM": _MM, "INCH": _INCH, "INCHES": _INCH}
 # Feeds by the minute: all others are by turn or time.
@@ -63,10 +67,12 @@ _OF_HOLES = (
     *("FEDTO", "DEPTH", "RAPTO", "CLEAR", "RTRCTO", "DWELL", "MMPM", "IPM", "1STPECK"),
     *_STEPS,
 )
-# Axes nearer than this are the same; those of a frame are square up to this: rounding of files.
-_TURNED, _SQUARE = 1e-6, 1e-4
+# Difference of axes that are the same.
+_TURNED = 1e-6
+# Cosine of the angle between axes of a frame that counts as none: rounding of files.
+_SQUARE = 1e-4
 _UP = np.array([0.0, 0.0, 1.0])
-# A helix goes round so many times at most.
+# Largest number of turns of a helix.
 _TURNS = 1000
 
 

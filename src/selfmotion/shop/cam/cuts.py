@@ -1,4 +1,4 @@
-"""What programs of machine tools do: cuts at a feed, rapids in between, arcs and holes."""
+"""Cuts of machine tools' programs at a feed, rapids in between, arcs and holes."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -11,13 +11,17 @@ from selfmotion.basics import Array, FileFormatError, text_of
 from selfmotion.model.path import from_normal
 from selfmotion.shop.cam.path_rows import PoseRows
 
-# What programs of machine tools do: cuts at a feed, and rapids in between.
-
-# A file of a machine tool has less than so many bytes, a cut less than so many poses; nothing is
-# farther away than this [m].
-_BYTES, _POSES, _FAR = 200_000_000, 1_000_000, 1e3
-# What stops something: after a cut it belongs to that.
-RETRACT, PRIME = "retract", "prime"
+# Largest size of a file [bytes].
+_BYTES = 200_000_000
+# Largest number of poses of a cut.
+_POSES = 1_000_000
+# Largest distance of a place from zero [m].
+_FAR = 1e3
+# Event where a printer draws filament back.
+RETRACT = "retract"
+# Event where a printer pushes it forward again.
+PRIME = "prime"
+# Events that stop something: after a cut they belong to that.
 STOPS = ("M5", "M9", "SPINDL/OFF", "COOLNT/OFF", "ARCOFF", RETRACT)
 # The suffix of programs of Siemens' controls.
 _SIEMENS = ".mpf"
@@ -28,14 +32,15 @@ _FREE = (
     "let CAM write retracts and approaches along the axis"
 )
 _UP = np.array([0.0, 0.0, 1.0])
-# Poses nearer than this [m, and of their axes] are the same.
+# Difference of positions and axes of poses that are the same [m].
 _SAME = 1e-9
-# How fast the tool goes where a file says rapid and the motion is part of a cut, at most [m/s].
+# Largest speed of a rapid that is part of a cut [m/s].
 RAPID = 0.1
-# A rapid goes along the tool's axis where it goes aside by no more than this [m] and this share of
-# its length: rounding of files.
-_ASIDE, _SKEW = 2e-5, 1e-3
-# Axes apart from their opposite by less than this have no shortest way.
+# Largest distance from the tool's axis of a rapid along it, by rounding of files [m].
+_ASIDE = 2e-5
+# The same as a share of its length.
+_SKEW = 1e-3
+# Difference from -1 of the cosine between axes of which no rotation is the shortest.
 _OPPOSITE = 1e-9
 
 
@@ -367,13 +372,15 @@ def unit_axis(values: Sequence[float], machine: Machine) -> Array:
 
 # Arcs of machines as points: circles about an axis, and helices along it.
 
-# Chords of arcs are off by this at most [m].
+# Largest deviation of chords from their arc [m].
 _CHORD = 1e-5
-# Both ends of an arc are as far from its centre, and no farther apart than its circle is wide, but
-# for this [m].
+# Difference of the distances of an arc's ends from its centre, and by which ends may be farther
+# apart than the circle is wide [m].
 _ROUND = 2e-4
-# Arcs of a larger radius [m] are a fault of what wrote them, and so are more chords.
-_LARGEST, _POINTS = 1e5, 100_000
+# Largest radius of an arc that is no fault of what wrote it [m].
+_LARGEST = 1e5
+# Largest number of chords of an arc.
+_POINTS = 100_000
 
 
 def arc_points(

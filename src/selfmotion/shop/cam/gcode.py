@@ -32,10 +32,13 @@ from selfmotion.shop.cam.gcode_words import (
 from selfmotion.shop.cam.path_rows import PoseRows, Reading
 from selfmotion.shop.cam.rotary import HEAD, Rotary
 
-_INCH, _MM = 25.4e-3, 1e-3
-# Nearer than this [m] is the same place.
+# Inch [m].
+_INCH = 25.4e-3
+# Millimetre [m].
+_MM = 1e-3
+# Distance of places that are the same [m].
 _SAME = 1e-9
-# A helix goes round so many times at most.
+# Largest number of turns of a helix.
 _TURNS = 1000
 # What changes nothing here: cutter compensation off, tool length (programs say where the tip is),
 # no polar words, mirror or turn, how corners are smoothed.

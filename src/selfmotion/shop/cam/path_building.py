@@ -24,24 +24,27 @@ from selfmotion.shop.cam.cuts import RAPID
 from selfmotion.shop.cam.path_rows import DRAWING, PoseRows, some_rows
 from selfmotion.shop.cam.tangents import AXES, stretches_along, turning
 
-# A coordinate beyond this [m] can only be meant in millimetres.
+# Largest coordinate in metres [m]; one beyond can only be meant in millimetres.
 _FAR = 50.0
-# Poses farther from their predecessor than this [m] are a jump, unless another length is given.
+# Distance of a pose from the one before that is a jump, unless another one is given [m].
 JUMP = 0.5
-# Rotations by more than this [rad] are a jump, too: their direction would be a guess.
+# Rotation between poses that is a jump as well [rad]: its direction would be a guess.
 _FLIP = 2.6
-# Times this near [s] are the same.
+# Difference of times that are the same [s].
 _MOMENT = 1e-9
-# Legs that bend by more than this [rad] make a corner, unless another angle is given.
+# Angle between legs from which on they make a corner, unless another one is given [rad].
 _BEND = np.pi / 6
-# Poses nearer than this [m] are repeated ones; a stub is shorter than this share of the steps
-# beside it, and turns the tool by no more than this [rad].
-_REPEATED, _STUB, _TURN_TOLERANCE = 1e-9, 0.05, 1e-2
-# A path of a duration is run up in so long [s] at most.
+# Distance of repeated poses [m].
+_REPEATED = 1e-9
+# Largest length of a stub, as a share of the steps beside it.
+_STUB = 0.05
+# Largest rotation of the tool along a stub [rad].
+_TURN_TOLERANCE = 1e-2
+# Longest run-up of a path with a duration [s].
 _RAMP = 0.5
-# A curve is looked at in so many places between two poses.
+# Number of places between two poses at which a curve is evaluated.
 _LOOKS = 9
-# Legs that go back by less than this of the way they came turn round.
+# Difference from -1 of the cosine between legs of which the second goes back along the first.
 _BACK = 1e-3
 
 
@@ -70,7 +73,7 @@ class Pacing:
 
     @property
     def bounds(self) -> dict[str, float]:
-        """What bounds a feed, where it is given."""
+        """Bounds of a feed that are given."""
         names = ("turn_rate", "acceleration", "turn_acceleration", "smoothing", "within")
         given = {name: getattr(self, name) for name in names}
         return {name: value for name, value in given.items() if value is not None}
@@ -514,7 +517,7 @@ def _remedy(jump: float, units: str) -> str:
 
 
 def _units(file: FilePath, rows: PoseRows) -> str:
-    """Return what to do where lengths are in another unit than they are taken for."""
+    """Return the remedy, in words, where lengths are in another unit than they are taken for."""
     if file.suffix.lower() == DRAWING:
         return "say in which unit it is drawn if $INSUNITS is wrong (unit = 'mm')"
     if rows.straight:

@@ -67,8 +67,10 @@ _TURNS = re.compile(r"(?:[a-z]+[._])*(?:orientation|quaternion|quat|q)[._]([wxyz
 # The first word of a program.
 _CODE = re.compile(r"[gmn][0-9]+|%")
 _TITLE = re.compile(r"([^\[(]*?)[\s_]*[\[(]([^\])]*)[\])]")
-# Columns of texts: which seam a row is of, and what happens at it.
-SEAM, EVENT = "seam", "event"
+# Column with the name of a row's seam.
+SEAM = "seam"
+# Column with the events at a row.
+EVENT = "event"
 _KNOWN = {"t", "feed", *_POSITION, *(name for names in _COLUMNS for name in names)}
 
 
@@ -80,12 +82,13 @@ _MAKERS = {
 }
 
 
-# A frame of KUKA's: what its columns are called here. No arm reaches so many metres.
+# Columns of a frame of KUKA's → their names here.
 _KUKA = {"a": "yaw_deg", "b": "pitch_deg", "c": "roll_deg", "x": "x_mm", "y": "y_mm", "z": "z_mm"}
 _KUKA_NOTE = (
     "columns A,B,C are read as KUKA's: angles about z, y and x in turn in degrees, x,y,z in mm "
     "where they say no unit"
 )
+# Coordinate above which lengths are no metres: no arm reaches so far [m].
 _METRES = 10.0
 
 
@@ -154,7 +157,7 @@ CLDATA = (".apt", ".aptsource", ".cls", ".clsf", ".cl", ".ncl")
 
 @dataclass(frozen=True)
 class Reading:
-    """What a file does not say itself; see `read_path`.
+    """Options of reading a file, which it does not state itself; see `read_path`.
 
     Attributes
     ----------
@@ -172,7 +175,7 @@ class Reading:
 
     @classmethod
     def of(cls, file: FilePath, options: Mapping[str, Any]) -> "Reading":
-        """Return what options say; others are passed over.
+        """Return the reading that options ask for; others are passed over.
 
         Raises
         ------
@@ -203,7 +206,7 @@ class Reading:
         return cls(tuple(name.strip() for name in columns))
 
 
-# So many names of seams are listed.
+# Largest number of seams that a message names.
 _LISTED = 5
 
 
@@ -221,7 +224,7 @@ def read_tables(file: FilePath, reading: Reading | None = None) -> dict[str, Pos
     said = set[str]()
 
     def called(title: str) -> str:
-        """Return what a title is called here, and remember those that say their unit."""
+        """Return the name of a title here, and remember those that state their unit."""
         name = named(title)
         if "[" in title or "(" in title:
             said.add(name)

@@ -16,9 +16,12 @@ from selfmotion.basics import Array, FileFormatError, is_number, lines_of, shown
 from selfmotion.shop.cam.cuts import Machine, arc_points
 from selfmotion.shop.cam.path_rows import PoseRows
 
+# Millimetre [m].
 _MM = 1e-3
-# A file with more bytes is none of these; titles stand within so many.
-_BYTES, _HEAD = 50_000_000, 10_000
+# Largest size of such a file [bytes].
+_BYTES = 50_000_000
+# Size of its beginning that has the titles [bytes].
+_HEAD = 10_000
 
 
 def peer_table(file: FilePath) -> Mapping[str, PoseRows] | None:
@@ -47,7 +50,7 @@ def peer_table(file: FilePath) -> Mapping[str, PoseRows] | None:
 def _reader_of(
     first: str, titles: Sequence[str]
 ) -> Callable[[FilePath, str, Sequence[str]], PoseRows] | None:
-    """Return what reads a table with this first line, None where it is of no other program."""
+    """Return the reader of a table with this first line, None where no other program has it."""
     if set(_IRBCAM) <= set(titles):
         return _of_irbcam
     if _IGUS.fullmatch(first.strip()):
