@@ -17,7 +17,7 @@ from selfmotion.model.task import SE3
 from selfmotion.planning.result import Move, Parts, Plan
 from selfmotion.problem.constraints import Constraint
 from selfmotion.shop.controllers.feed_segments import FeedSegment
-from selfmotion.shop.controllers.feed_thinning import FeedSection
+from selfmotion.shop.controllers.feed_thinning import paced_section
 from selfmotion.shop.controllers.program_facts import Load, ProgramFacts, check_load, with_checksum
 from selfmotion.shop.controllers.program_settings import (
     OF_PATH,
@@ -183,7 +183,7 @@ class ControllerProgram:
             elif segment.is_rest:
                 yield iter([Knots(segment.t, segment.q, 0.0 * segment.q)])
             else:
-                yield segment.joined()
+                yield segment.motions()
             begin += segment.duration
 
     def _motion(self, parts: Sequence[Knots]) -> Trajectory:
@@ -300,8 +300,8 @@ def drafted(
             why = why or otherwise.why
     if frames is not None and not why:
         try:
-            spans = PoseSection if settings.targets == "timed-poses" else FeedSection
-            posed: PosedSections = partial(spans.by, frames, ROUNDINGS[form])
+            made = PoseSection if settings.targets == "timed-poses" else paced_section
+            posed: PosedSections = partial(made, frames=frames, rounding=ROUNDINGS[form])
             if otherwise is not None:
                 posed = partial(_but_of_moves, posed, otherwise.why)
             segments, miss = segments_of(*given, posed)

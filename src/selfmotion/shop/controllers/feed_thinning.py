@@ -35,7 +35,7 @@ from selfmotion.shop.controllers.steps import (
     step_lengths,
 )
 from selfmotion.shop.controllers.targets import NotByPosesError, PoseSection, largest
-from selfmotion.shop.controllers.thinning import Piece, events_within, rests
+from selfmotion.shop.controllers.thinning import Piece, rests
 from selfmotion.shop.controllers.tool_frames import Rounding, ToolFrames, carrier_in_reference
 
 # Tolerances of turning and self-motion, tried in turn [rad or m]; 0: that of all other joints.
@@ -68,23 +68,6 @@ _PROMPT = 5e-4
 class FeedSection(PoseSection):
     """Part of a seam at a feed between two rests, to be written as poses with speeds."""
 
-    @classmethod
-    def by(
-        cls,
-        frames: ToolFrames,
-        rounding: Rounding,
-        piece: Piece,
-        slides: Flags,
-        first: float,
-        last: float,
-    ) -> PoseSection:
-        """Return that of a piece with a feed; of others, what is written with times."""
-        given = frames, rounding, piece, slides, first, last
-        has_feed = len(piece.feeds) == 1 and bool(piece.feeds[0])
-        if not has_feed or piece.keeps is None or not _rides_along(frames):
-            return PoseSection.by(*given)
-        return super().by(*given)
-
     def segments(self, allowed: Tolerance) -> list[tuple[Segment, Miss]]:
         """See `Section.segments`: one from rest to rest of the tool, the arm's self-motion aside.
 
@@ -93,7 +76,7 @@ class FeedSection(PoseSection):
         if rests(self.piece.motion, self.first, self.last):
             return super().segments(allowed)
         self.check_regular(allowed)
-        parts = [self._part(*ends) for ends in pairwise(self._stops)]
+        parts = [replace(self, first=a, last=b) for a, b in pairwise(self._stops)]
         gone = [part._gone for part in parts]
         why, stuck = "there is no feed where the tool hardly moves", None
         for free, share in product(_FREE, _OF_PLACES):
@@ -140,10 +123,6 @@ class FeedSection(PoseSection):
         at = self.piece.motion.t[0] + np.array(self.piece.tool_rests)
         inside = at[(at > self.first + _PROMPT) & (at < self.last - _PROMPT)]
         return [self.first, *inside.tolist(), self.last]
-
-    def _part(self, first: float, last: float) -> "FeedSection":
-        events = events_within(self.piece, first, last)
-        return replace(self, first=first, last=last, events=events)
 
     @property
     def _gone(self) -> PassedLength:
@@ -301,11 +280,11 @@ class FeedSection(PoseSection):
 
         Where joints swing between two looks, as they do near a singular pose, near when [s].
         """
-        times, count = segment.looked_at(), len(segment.t) - 1
-        exact = segment.matched(self.piece.motion, self.first)
+        times, count = segment.evaluation_times(), len(segment.t) - 1
+        exact = segment.reference(self.piece.motion, self.first)
         at, facing = self.frames.places(exact)
         worst = np.zeros(count)
-        for line in segment.ways(times):
+        for line in segment.interpolated(times):
             off = line - exact
             swing = np.abs(np.diff(off, axis=0)).max(axis=1)
             # Written so that NaN does.
@@ -318,6 +297,16 @@ class FeedSection(PoseSection):
             turned = allowed.turned(self.frames, self.piece.turns, turns, facing)
             worst = np.maximum(worst, largest(np.maximum(taken, turned), count))
         return SURE * worst
+
+
+def paced_section(
+    piece: Piece, slides: Flags, first: float, last: float, frames: ToolFrames, rounding: Rounding
+) -> PoseSection:
+    """Return the section of a seam at a feed; of other parts of a motion, one with times."""
+    has_feed = len(piece.feeds) == 1 and bool(piece.feeds[0])
+    is_paced = has_feed and piece.keeps is not None and _rides_along(frames)
+    kind = FeedSection if is_paced else PoseSection
+    return kind(piece, slides, first, last, frames, rounding)
 
 
 def _rides_along(frames: ToolFrames) -> bool:

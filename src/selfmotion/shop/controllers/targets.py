@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import ClassVar
 
 import numpy as np
 from typing_extensions import override
@@ -21,7 +22,7 @@ from selfmotion.shop.controllers.segments import (
     finer,
     on_one_side,
 )
-from selfmotion.shop.controllers.thinning import TIME_DIGITS, Piece, Section, events_within, rests
+from selfmotion.shop.controllers.thinning import Piece, Section, rests
 from selfmotion.shop.controllers.tool_frames import Rounding, ToolFrames
 
 # As few tool poses as keep a controller near a motion.
@@ -31,8 +32,6 @@ from selfmotion.shop.controllers.tool_frames import Rounding, ToolFrames
 # joint targets are (`controllers/thinning.py`), and doubled where they are still too far apart
 # by inverse kinematics of what is in between.
 
-# Smallest density of targets, as a share of the largest one.
-_SPARSE = 0.02
 # Largest number of refinements of the targets.
 _TRIES = 16
 # Shortest time between two targets: controllers do not interpolate in less [s].
@@ -41,7 +40,7 @@ _SHORTEST = 4e-3
 _EVENLY = 5
 # … if no error exceeds this multiple of its tolerance.
 _MUCH = 9.0
-# Times at which the motion is evaluated, per interval between two samples.
+# Times at which the arm's regularity is evaluated, per interval between two samples.
 _FINER = 4
 # Step of the central differences for accelerations [s].
 _AROUND = 2e-3
@@ -68,18 +67,8 @@ class PoseSection(Section):
     frames: ToolFrames
     rounding: Rounding
 
-    @classmethod
-    def by(
-        cls,
-        frames: ToolFrames,
-        rounding: Rounding,
-        piece: Piece,
-        slides: Flags,
-        first: float,
-        last: float,
-    ) -> "PoseSection":
-        """Return that of a piece, with the events that are in it."""
-        return cls(piece, slides, first, last, events_within(piece, first, last), frames, rounding)
+    sparse: ClassVar[float] = 0.02
+    fewest: ClassVar[int] = 2
 
     def segments(self, allowed: Tolerance) -> list[tuple[Segment, Miss]]:
         """See `Section.segments`.
@@ -127,7 +116,7 @@ class PoseSection(Section):
         NotByPosesError
             There are no such poses.
         """
-        t, more = self._evenly(fixed, allowed, 1.0), 1.0
+        t, more = self.spread(fixed, allowed, 1.0), 1.0
         for tries in range(_TRIES):
             shares = self._shares(self._passing(t), allowed)
             far, worst = shares > 1.0, float(shares.max())
@@ -135,7 +124,7 @@ class PoseSection(Section):
                 return t
             if tries < _EVENLY and worst < _MUCH:
                 more *= max(1.05, 1.02 * float(np.sqrt(worst)))
-                t = self._evenly(fixed, allowed, more)
+                t = self.spread(fixed, allowed, more)
                 continue
             if np.diff(t)[far].min() < _SHORTEST:
                 break
@@ -189,11 +178,11 @@ class PoseSection(Section):
 
     def _shares(self, segment: Segment, allowed: Tolerance) -> Array:
         """Return how much of what is allowed each step between two targets takes, (K,)."""
-        times, count = segment.looked_at(), len(segment.t) - 1
+        times, count = segment.evaluation_times(), len(segment.t) - 1
         motion = self.piece.motion
         exact = motion(np.clip(self.first + times, motion.t[0], motion.t[-1]))
         worst = np.zeros(count)
-        lines = segment.ways(times)
+        lines = segment.interpolated(times)
         for line in lines:
             joints = np.abs(line - exact).max(axis=1) / allowed.rotation
             worst = np.maximum(worst, largest(joints, count))
@@ -209,27 +198,8 @@ class PoseSection(Section):
                 worst = np.maximum(worst, largest(off, count))
         return np.where(np.isfinite(worst), SURE * worst, np.inf)
 
-    def _evenly(self, fixed: Array, allowed: Tolerance, more: float) -> Array:
-        found = [self._spread(*ends, allowed, more) for ends in pairwise(fixed)]
-        return np.concatenate([fixed[:1], *found])
-
-    def _spread(self, begin: float, end: float, allowed: Tolerance, more: float) -> Array:
-        """Return times from one to another, even in the root of how much the poses bend."""
-        motion = self.piece.motion
-        inside = motion.t[(motion.t > begin) & (motion.t < end)]
-        marks = np.concatenate([[begin], inside, [end]])
-        count = _FINER * (len(marks) - 1) + 1
-        t = np.interp(np.linspace(0, len(marks) - 1, count), np.arange(len(marks)), marks)
-        rate = np.sqrt(self._bend(t, allowed) / 8.0)
-        rate = np.maximum(rate, _SPARSE * float(rate.max())) + 1e-3 / max(end - begin, 1e-6)
-        way = np.append(0.0, np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(t)))
-        most = max(1, int((end - begin) * 10**TIME_DIGITS / 2))
-        targets = min(max(2, int(np.ceil(more * way[-1]))), most)
-        found: Array = np.interp(np.linspace(0.0, way[-1], targets + 1)[1:], way, t)
-        found[-1] = end
-        return found
-
-    def _bend(self, t: Array, allowed: Tolerance) -> Array:
+    @override
+    def bend(self, t: Array, allowed: Tolerance) -> Array:
         """Return accelerations of poses and joints as shares of what is allowed, (K,) [1/s²]."""
         motion = self.piece.motion
         middle = np.clip(t, motion.t[0] + _AROUND, motion.t[-1] - _AROUND)
@@ -338,7 +308,7 @@ def _thinned(
             # A free move goes through singular configurations where it likes.
             if not piece.is_move:
                 raise
-    return Section.of(piece, slides, first, last).segments(within)
+    return Section(piece, slides, first, last).segments(within)
 
 
 def _allowed(piece: Piece, allowed: Tolerance, of_moves: Tolerance | None) -> Tolerance:

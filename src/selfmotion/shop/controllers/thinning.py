@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice, pairwise
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
@@ -199,8 +199,6 @@ TIME_DIGITS = 5
 ANGLE_DIGITS = 5
 # Decimals of lengths in programs [mm].
 LENGTH_DIGITS = 4
-# Smallest density of targets, as a share of the largest one.
-_SPARSE = 0.1
 # Share of a feed's tolerance that targets may use at the times that are evaluated: it is larger in
 # between.
 _OF_FEED = 0.8
@@ -211,8 +209,6 @@ _SHORTEST = 2e-3
 _OF_SPEED = 0.9995
 # Times at which the motion's curvature is evaluated, per interval between two samples.
 _FINER = 4
-# Smallest number of targets between two events or rests.
-_FEWEST = 4
 # Largest number of refinements of the targets.
 _TRIES = 20
 # Largest number of targets that a controller takes.
@@ -230,20 +226,27 @@ class Section:
         Which joints slide.
     first, last : float
         From when to when [s].
-    events : sequence of (float, str)
-        What happens when [s].
     """
 
     piece: Piece
     slides: Flags
     first: float
     last: float
-    events: Sequence[tuple[float, str]]
+    # Smallest density of targets, as a share of the largest one.
+    sparse: ClassVar[float] = 0.1
+    # Smallest number of targets between two events or rests.
+    fewest: ClassVar[int] = 4
 
-    @classmethod
-    def of(cls, piece: Piece, slides: Flags, first: float, last: float) -> "Section":
-        """Return that of a piece, with the events that are in it."""
-        return cls(piece, slides, first, last, events_within(piece, first, last))
+    @property
+    def events(self) -> list[tuple[float, str]]:
+        """Times of its events [s], and their names."""
+        start, end = float(self.piece.motion.t[0]), float(self.piece.motion.t[-1])
+        return [
+            (start + at, name)
+            for at, name in self.piece.events
+            if (self.first == start or self.first < start + at)
+            and (self.last == end or start + at <= self.last)
+        ]
 
     def segments(self, allowed: Tolerance) -> list[tuple[Segment, Miss]]:
         """Return its segments: one, or several if the tool rests in between.
@@ -285,7 +288,7 @@ class Section:
         """Return times of targets that keep the tool and the joints near the motion."""
         more = 1.0
         for _ in range(_TRIES):
-            t = _spread(self.piece, fixed, allowed, more)
+            t = self.spread(fixed, allowed, more)
             miss = self._miss(self._passing(t))
             if miss.share(allowed) <= 1.0:
                 return t
@@ -295,6 +298,36 @@ class Section:
             f"{np.degrees(max(miss.rotation, miss.joint)):.3g}° with {len(t)} targets; allow more "
             f"than {_in_words(self.piece, allowed)}"
         )
+
+    def spread(self, fixed: Array, allowed: Tolerance, more: float) -> Array:
+        """Return times between fixed ones, even in the root of how much the motion bends."""
+        found, motion = [fixed[:1]], self.piece.motion
+        for begin, end in pairwise(fixed):
+            inside = motion.t[(motion.t > begin) & (motion.t < end)]
+            marks = np.concatenate([[begin], inside, [end]])
+            count = _FINER * (len(marks) - 1) + 1
+            t = np.interp(np.linspace(0, len(marks) - 1, count), np.arange(len(marks)), marks)
+            rate = np.sqrt(self.bend(t, allowed) / 8.0)
+            # A spline swings where long and short steps meet, and it bends nowhere.
+            rate = np.maximum(rate, self.sparse * float(rate.max())) + 1e-3 / max(end - begin, 1e-6)
+            total = np.append(0.0, np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(t)))
+            targets = max(self.fewest, int(np.ceil(more * total[-1])))
+            # Programs count whole digits of time: targets may not fall on each other.
+            targets = min(targets, max(1, int((end - begin) * 10**TIME_DIGITS / 2)))
+            found.append(np.interp(np.linspace(0.0, total[-1], targets + 1)[1:], total, t))
+            found[-1][-1] = end
+        return np.concatenate(found)
+
+    def bend(self, t: Array, allowed: Tolerance) -> Array:
+        """Return the accelerations of tool and joints as shares of what is allowed, (K,) [1/s²]."""
+        motion = self.piece.motion
+        q, qdd = motion(t), motion(t, 2)
+        found: Array = np.abs(qdd).max(axis=1) / allowed.rotation
+        for chain in self.piece.chains:
+            rates = np.einsum("kij,kj->ki", chain.along(q)[0], qdd)
+            for rows, limit in ((slice(0, 3), allowed.position), (slice(3, 6), allowed.rotation)):
+                found = np.maximum(found, np.linalg.norm(rates[:, rows], axis=1) / limit)
+        return found
 
     def _passing(self, t: Array, *, at_rest: bool = False) -> Segment:
         """Return targets at times, as the file has them."""
@@ -336,7 +369,7 @@ class Section:
         them. Cut corners are slower than that.
         """
         far = np.zeros(len(segment.t) - 1)
-        for times, q, qd in islice(segment.joined(), 2):
+        for times, q, qd in islice(segment.motions(), 2):
             step = np.clip(np.searchsorted(segment.t, times, side="right") - 1, 0, len(far) - 1)
             np.maximum.at(far, step, self._taken(times, q, qd))
         return np.asarray(far > 1.0)
@@ -364,16 +397,6 @@ class Section:
         return taken
 
 
-def events_within(piece: Piece, first: float, last: float) -> list[tuple[float, str]]:
-    """Return the events in a part of a piece, at times of its motion [s]."""
-    start, end = float(piece.motion.t[0]), float(piece.motion.t[-1])
-    return [
-        (start + at, name)
-        for at, name in piece.events
-        if (first == start or first < start + at) and (last == end or start + at <= last)
-    ]
-
-
 def _in_words(piece: Piece, allowed: Tolerance) -> str:
     """Return the tolerance as the file of settings has it."""
     key = "move_deviation" if piece.is_move else "deviation"
@@ -396,37 +419,3 @@ def rests(motion: Trajectory, first: float, last: float) -> bool:
     """Whether nothing moves from one time to another."""
     times = np.linspace(first, last, 33)
     return bool(np.abs(motion(times) - motion(first)).max() < 1e-9)
-
-
-def _spread(piece: Piece, fixed: Array, allowed: Tolerance, more: float) -> Array:
-    """Return times between fixed ones, even in the root of how much the motion bends."""
-    found = [fixed[:1]]
-    motion = piece.motion
-    for begin, end in pairwise(fixed):
-        inside = motion.t[(motion.t > begin) & (motion.t < end)]
-        marks = np.concatenate([[begin], inside, [end]])
-        count = _FINER * (len(marks) - 1) + 1
-        t = np.interp(np.linspace(0, len(marks) - 1, count), np.arange(len(marks)), marks)
-        bend = _bend(piece, t, allowed)
-        rate = np.sqrt(bend / 8.0)
-        # A spline swings where long and short steps meet, and it bends nowhere.
-        rate = np.maximum(rate, _SPARSE * float(rate.max())) + 1e-3 / max(end - begin, 1e-6)
-        way = np.append(0.0, np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(t)))
-        targets = max(_FEWEST, int(np.ceil(more * way[-1])))
-        # Programs count whole digits of time: targets may not fall on each other.
-        targets = min(targets, max(1, int((end - begin) * 10**TIME_DIGITS / 2)))
-        found.append(np.interp(np.linspace(0.0, way[-1], targets + 1)[1:], way, t))
-        found[-1][-1] = end
-    return np.concatenate(found)
-
-
-def _bend(piece: Piece, t: Array, allowed: Tolerance) -> Array:
-    """Return the accelerations of tool and joints as shares of what is allowed, (K,) [1/s²]."""
-    motion = piece.motion
-    q, qdd = motion(t), motion(t, 2)
-    found: Array = np.abs(qdd).max(axis=1) / allowed.rotation
-    for chain in piece.chains:
-        rates = np.einsum("kij,kj->ki", chain.along(q)[0], qdd)
-        for rows, limit in ((slice(0, 3), allowed.position), (slice(3, 6), allowed.rotation)):
-            found = np.maximum(found, np.linalg.norm(rates[:, rows], axis=1) / limit)
-    return found
