@@ -128,7 +128,7 @@ class _Reader:
         self._msys: tuple[Array, Array] | None = None
         # What the first statement of a kind said that a file has one of.
         self._first: dict[str, str] = {}
-        # What the next places are told beforehand: an arc, a direction, the tool's axis.
+        # Stated for the next places beforehand: an arc, a direction, the tool's axis.
         self._arc: _Arc | None = None
         self._ahead: Array | None = None
         self._axis: Array | None = None
@@ -359,21 +359,21 @@ class _Reader:
         self._cycle = found
 
     def _drill(self, top: Array, axis: Array) -> None:
-        """Drill a hole of the cycle, whose top is told."""
-        asked, unit = self._cycle, self._unit
-        height = unit * asked.get("RAPTO", asked.get("CLEAR", 0.0))
+        """Drill a hole of the cycle, whose top is given."""
+        cycle, unit = self._cycle, self._unit
+        height = unit * cycle.get("RAPTO", cycle.get("CLEAR", 0.0))
         # NX says depths by what is below 0, others by how deep.
-        depth = unit * abs(asked.get("FEDTO", asked.get("DEPTH", 0.0)))
+        depth = unit * abs(cycle.get("FEDTO", cycle.get("DEPTH", 0.0)))
         pecks = None
-        if "DEEP" in asked or "BRKC" in asked:
-            others = next((asked[word] for word in _STEPS if word in asked), 0.0)
-            first = asked.get("1STPECK", others)
-            pecks = Pecks(unit * first, unit * others, is_out="DEEP" in asked)
-        waits = asked.get("DWELL", 0.0) > 0.0
+        if "DEEP" in cycle or "BRKC" in cycle:
+            others = next((cycle[word] for word in _STEPS if word in cycle), 0.0)
+            first = cycle.get("1STPECK", others)
+            pecks = Pecks(unit * first, unit * others, is_out="DEEP" in cycle)
+        waits = cycle.get("DWELL", 0.0) > 0.0
         # Between holes it is as high as it says, or as it was before them.
-        level = max(height, unit * asked.get("RTRCTO", 0.0))
+        level = max(height, unit * cycle.get("RTRCTO", 0.0))
         before = float((self._level - top) @ axis)
-        if "AUTO" in asked and np.isfinite(before):
+        if "AUTO" in cycle and np.isfinite(before):
             level = max(level, before)
         over = top + level * axis
         if level > height:
@@ -384,14 +384,14 @@ class _Reader:
             top - depth * axis,
             axis,
             pecks=pecks,
-            dwell=f"DELAY/{asked['DWELL']:g}" if waits else "",
+            dwell=f"DELAY/{cycle['DWELL']:g}" if waits else "",
         )
         if level > height:
             self.machine.rapid(over, axis)
         self._arc, self._ahead, self._axis, self._rapid = None, None, None, False
 
     def _to(self, position: Array, axis: Array, *, travels: bool) -> None:
-        """Go somewhere, along the arc that was told before if there is one."""
+        """Go somewhere, along the arc that was stated before, if there is one."""
         machine, arc = self.machine, self._arc
         self._arc, self._ahead, self._axis, self._rapid = None, None, None, False
         if travels:

@@ -255,9 +255,9 @@ class Machine:
 
     def _is_along(self, position: Array, axis: Array) -> bool:
         """Return whether a place is above or below the tool along its axis."""
-        way = position - self.position
-        length = float(np.linalg.norm(way))
-        aside = float(np.linalg.norm(way - (way @ axis) * axis))
+        step = position - self.position
+        length = float(np.linalg.norm(step))
+        aside = float(np.linalg.norm(step - (step @ axis) * axis))
         is_turned = np.abs(axis - self.axis).max() > _SKEW
         return not is_turned and aside <= _ASIDE + _SKEW * length
 
@@ -268,9 +268,9 @@ class Machine:
         if left is None:
             return
         if not np.isnan(position).any():
-            way = position - left.positions[-1]
-            away = float(way @ left.axes[-1])
-            self._slanted = abs(away) > _ASIDE + _SKEW * float(np.linalg.norm(way))
+            step = position - left.positions[-1]
+            away = float(step @ left.axes[-1])
+            self._slanted = abs(away) > _ASIDE + _SKEW * float(np.linalg.norm(step))
         if not left.cuts:
             # It went nowhere, but what happened there did.
             self.cuts = [cut for cut in self.cuts if cut is not left]

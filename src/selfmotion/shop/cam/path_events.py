@@ -72,11 +72,11 @@ def _poses_passed(path: Path) -> Array | None:
             return None if times is None else np.clip(path.when(times), 0.0, path.duration)
         case Joined():
             found, start = [np.zeros(1)], 0.0
-            for piece in path.pieces:
-                times = _poses_passed(piece)
+            for part in path.pieces:
+                times = _poses_passed(part)
                 if times is None:
                     return None
                 found.append(start + times[1:])
-                start += piece.duration
+                start += part.duration
             return np.concatenate(found)
     return None

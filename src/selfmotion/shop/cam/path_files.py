@@ -227,7 +227,7 @@ def read_path(
         A drawing, and the package that reads them is not installed.
     """
     path = as_path(file)
-    asked = _pacing(
+    pacing = _pacing(
         path,
         {
             "feed": feed,
@@ -260,7 +260,7 @@ def read_path(
             "unit": unit,
         },
     )
-    return path_of_rows(path, one_seam(path, seam, reading), asked)
+    return path_of_rows(path, one_seam(path, seam, reading), pacing)
 
 
 def read_seams(file: FilePath, options: Mapping[str, Any]) -> dict[str, tuple[Path, PoseRows]]:
@@ -280,26 +280,26 @@ def read_seams(file: FilePath, options: Mapping[str, Any]) -> dict[str, tuple[Pa
         raise FileFormatError(
             f"{file}: has no column 'seam', expected one that names the seam of each row"
         )
-    asked = _pacing(file, options)
-    return {name: (path_of_rows(file, rows, asked), rows) for name, rows in seams.items()}
+    pacing = _pacing(file, options)
+    return {name: (path_of_rows(file, rows, pacing), rows) for name, rows in seams.items()}
 
 
 def _pacing(path: FilePath, options: Mapping[str, Any]) -> Pacing:
-    asked = Pacing(**options)
-    as_number(asked.jump, f"{path}: jump", above=0.0, error=FileFormatError)
-    as_number(asked.standoff, f"{path}: standoff", error=FileFormatError)
-    for name, angle in (("lead", asked.lead), ("tilt", asked.tilt)):
+    pacing = Pacing(**options)
+    as_number(pacing.jump, f"{path}: jump", above=0.0, error=FileFormatError)
+    as_number(pacing.standoff, f"{path}: standoff", error=FileFormatError)
+    for name, angle in (("lead", pacing.lead), ("tilt", pacing.tilt)):
         lean = as_number(angle, f"{path}: {name}", error=FileFormatError)
         if not abs(lean) < 0.5 * np.pi:
             raise FileFormatError(
                 f"{path}: {name} is {lean:g} rad, expected less than a quarter turn"
             )
-    as_number(asked.lift, f"{path}: lift", least=0.0, error=FileFormatError)
-    as_flag(asked.flip_normals, f"{path}: flip_normals", FileFormatError)
-    for name, value in (("feed", asked.feed), ("duration", asked.duration)):
+    as_number(pacing.lift, f"{path}: lift", least=0.0, error=FileFormatError)
+    as_flag(pacing.flip_normals, f"{path}: flip_normals", FileFormatError)
+    for name, value in (("feed", pacing.feed), ("duration", pacing.duration)):
         if value is not None:
             as_number(value, f"{path}: {name}", above=0.0, error=FileFormatError)
-    return asked
+    return pacing
 
 
 def _read(path: FilePath, seam: str | None, reading: Reading) -> Mapping[str, PoseRows]:

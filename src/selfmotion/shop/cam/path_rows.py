@@ -344,10 +344,10 @@ def _unsaid(titles: Sequence[str]) -> tuple[str, ...]:
             bare.setdefault(_TAKEN[named(title)], []).append(named(title))
     if not bare:
         return ()
-    told = "; ".join(
+    columns = "; ".join(
         f"{','.join(names)} for {taken} (else: {others})" for (taken, others), names in bare.items()
     )
-    return (f"columns say no unit and are taken so: {told}",)
+    return (f"columns say no unit and are taken so: {columns}",)
 
 
 def _of_kuka(titles: Sequence[str]) -> list[str]:
@@ -370,7 +370,7 @@ def _check_millimetres(file: FilePath, titles: Sequence[str], table: Array) -> N
 def _check_turns(file: FilePath, turns: Array, places: Sequence[str], angles: str) -> None:
     """Refuse rotation vectors (K, 3) [rad] of more than half a turn, which angles look like."""
     sizes = np.linalg.norm(turns, axis=1)
-    # Degrees that are taken for radians are told as such later on.
+    # Degrees that are taken for radians are reported as such later on.
     over = (sizes > (1.0 + _HALF_TURN) * np.pi) & (np.abs(turns).max(axis=1) <= TURN)
     if over.any():
         k = int(np.argmax(over))
@@ -467,9 +467,9 @@ def _read_array(file: FilePath, reading: Reading) -> PoseRows:
             f"{file}: has shape {array.shape} and {named} are named, expected (N, 4, 4) poses, "
             f"(N, 3) x,y,z, (N, 4) t,x,y,z, or a name in columns for each"
         )
-    kept = [k for k, name in enumerate(columns) if name != LEFT_OUT]
-    numbers = array[:, kept] * 1.0
-    return rows_of_table(file, [columns[k] for k in kept], numbers, places, {})
+    chosen = [k for k, name in enumerate(columns) if name != LEFT_OUT]
+    numbers = array[:, chosen] * 1.0
+    return rows_of_table(file, [columns[k] for k in chosen], numbers, places, {})
 
 
 # What a list of messages may be called.

@@ -202,11 +202,11 @@ class Lines:
             raise FileFormatError(f"{self._file}: has no beginning of a program")
         said = self.joints()
         # Robots of fewer axes have numbers in the places of those they lack.
-        kept = [k for k, axis in enumerate(present) if axis in said or not said]
-        axes = tuple(Axis(present[k], *said.get(present[k], (present[k], False))) for k in kept)
+        columns = [k for k, axis in enumerate(present) if axis in said or not said]
+        axes = tuple(Axis(present[k], *said.get(present[k], (present[k], False))) for k in columns)
         if not axes:
             raise FileFormatError(f"{self._file}: has no axes of those that its comments name")
-        self._check_unnamed(present, kept, rows)
+        self._check_unnamed(present, columns, rows)
         frames = None
         if any(row.poses for row in rows):
             if robot is None or places is None:
@@ -217,7 +217,7 @@ class Lines:
             frames = places.frames(robot, axes, self._file)
         follower = Follower(self._file, axes, frames)
         for row in rows:
-            follower.take(row.with_axes(kept))
+            follower.take(row.with_axes(columns))
         if not follower.segments:
             raise FileFormatError(f"{self._file}: has no targets with times")
         remark = next((note for note in self.notes if note.startswith(BECAUSE)), BECAUSE)
@@ -238,14 +238,14 @@ class Lines:
         )
 
     def _check_unnamed(
-        self, present: Sequence[str], kept: Sequence[int], rows: Sequence[Row]
+        self, present: Sequence[str], columns: Sequence[int], rows: Sequence[Row]
     ) -> None:
         """Refuse axes that move, and that no comment gives a joint: nothing judges them.
 
         Robots of fewer than six axes have 0 in the places of those they lack.
         """
         for k, axis in enumerate(present):
-            if k in kept:
+            if k in columns:
                 continue
             if axis.startswith("E") or any(q[k] != 0.0 for row in rows for q in row.axes):
                 raise FileFormatError(

@@ -53,7 +53,7 @@ from selfmotion.shop.controllers.targets import (
     PoseSection,
     segments_of,
 )
-from selfmotion.shop.controllers.thinning import TIME_DIGITS, Piece, Section, pieces_of
+from selfmotion.shop.controllers.thinning import TIME_DIGITS, Operation, Section, operations_of
 from selfmotion.shop.controllers.tool_frames import (
     ROUNDINGS,
     WORLD,
@@ -104,7 +104,7 @@ class ControllerProgram:
     carrier : str
         The link that the work object is fixed to, or ``"world"``.
     remark : str
-        Why targets are joints though poses were asked for.
+        Reason why targets are joints in place of poses.
     within : Tolerance or None
         Within what seams at speeds keep what is prescribed, by their certificates; None where none
         is at a speed.
@@ -141,7 +141,7 @@ class ControllerProgram:
     def begins_elsewhere(self) -> str:
         """Reason why the axis target at its begin does not fit its first pose; empty for none.
 
-        Of a shifted work object the way to the shifted begin is to be expected.
+        Of a shifted work object the motion to the shifted begin is to be expected.
         """
         if self.shift is not None or self.approach <= _TAUGHT:
             return ""
@@ -175,7 +175,7 @@ class ControllerProgram:
         return [self._motion(parts) for parts in by_interpolation(self._joined(path))]
 
     def _joined(self, path: Path | None) -> Iterator[Iterator[Knots]]:
-        """Yield of each segment the ways in which a controller may join its targets."""
+        """Yield the motions of each segment, one for each interpolation."""
         begin = 0.0
         for segment in self.segments:
             if path is not None and isinstance(segment, FeedSegment):
@@ -203,7 +203,7 @@ class ControllerProgram:
         FileFormatError
             It has other joints, or other segments.
         """
-        pieces = pieces_of(plan)
+        operations = operations_of(plan)
         names = [axis.joint for axis in self.axes]
         known = plan.robot.joint_names
         if sorted(names) != sorted(known):
@@ -218,23 +218,25 @@ class ControllerProgram:
                     f"there"
                 )
             same = segment.in_order(order)
-            piece = pieces[min(k, len(pieces) - 1)]
-            found = miss_of(same, piece.motion, piece.chains, piece.motion.t[0] + at)
-            both = Misses(NO_MISS, found) if piece.is_move else Misses(found, NO_MISS)
+            operation = operations[min(k, len(operations) - 1)]
+            found = miss_of(same, operation.motion, operation.chains, operation.motion.t[0] + at)
+            both = Misses(NO_MISS, found) if operation.is_move else Misses(found, NO_MISS)
             worst = worst.worse(both)
             at += segment.duration
-            if at >= piece.motion.duration - _MOMENT:
+            if at >= operation.motion.duration - _MOMENT:
                 at, k = 0.0, k + 1
-        if k > len(pieces):
+        if k > len(operations):
             raise FileFormatError("goes on when the motion has ended")
-        if k < len(pieces):
-            raise FileFormatError(f"ends {len(pieces) - k} seams or moves before the motion does")
+        if k < len(operations):
+            raise FileFormatError(
+                f"ends {len(operations) - k} seams or moves before the motion does"
+            )
         return worst
 
 
-# A first pose that was taught anew is as near to the axis target before it [rad or m].
+# Largest distance of a first pose that was taught anew from the axis target before [rad or m].
 _TAUGHT = 0.02
-# A piece is over where less of it is left than this [s].
+# Rest of an operation that counts as none [s].
 _MOMENT = 1e-4
 
 
@@ -273,7 +275,7 @@ def drafted(
 ) -> Draft:
     """Return the program of a motion, named as its file is.
 
-    Where poses are asked for, `otherwise` says what has joint targets all the same.
+    With settings for poses, `otherwise` says which operations have joint targets all the same.
 
     Raises
     ------
@@ -284,12 +286,12 @@ def drafted(
         A move was not found.
     """
     check_controller(plan.robot, form, settings)
-    robot, pieces = plan.robot, pieces_of(plan)
+    robot, operations = plan.robot, operations_of(plan)
     axes = axes_of(robot, settings)
-    happens = {event: item.name for item in pieces for _, event in item.events}
+    happens = {event: item.name for item in operations for _, event in item.events}
     check_signals(happens, settings)
     slides = np.array([axis.slides for axis in axes])
-    given = pieces, slides, settings.deviation, settings.move_deviation, progress
+    given = operations, slides, settings.deviation, settings.move_deviation, progress
     frames, why = None, ""
     if settings.by_poses:
         of_path = settings.work_object == OF_PATH
@@ -353,12 +355,12 @@ def _paths_of(plan: Plan | Parts | Move | Program) -> list[Path]:
 
 
 def _but_of_moves(
-    posed: PosedSections, why: str, piece: Piece, slides: Flags, first: float, last: float
+    posed: PosedSections, why: str, operation: Operation, slides: Flags, first: float, last: float
 ) -> Section:
-    """Return a span of poses of a seam; NotByPosesError of a free move."""
-    if piece.is_move:
+    """Return the section of poses of a seam; NotByPosesError of a free move."""
+    if operation.is_move:
         raise NotByPosesError(why)
-    return posed(piece, slides, first, last)
+    return posed(operation, slides, first, last)
 
 
 def check_controller(robot: RobotModel, form: str, settings: ProgramSettings) -> None:

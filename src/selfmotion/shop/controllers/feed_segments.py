@@ -157,8 +157,8 @@ class Ramps(NamedTuple):
     def times(self, passed: Array) -> Array:
         """Return when times without ramps (K,) are reached with ramps [s]."""
         ramp, top = self.each, self.whole / (self.seconds - self.each)
-        ways = passed, self.whole - passed
-        up, down = (np.sqrt(2.0 * ramp * np.maximum(x, 0.0) / top) for x in ways)
+        sides = passed, self.whole - passed
+        up, down = (np.sqrt(2.0 * ramp * np.maximum(x, 0.0) / top) for x in sides)
         found = np.where(up < ramp, up, passed / top + 0.5 * ramp)
         return np.asarray(np.where(down < ramp, self.seconds - down, found))
 
@@ -292,13 +292,13 @@ class FeedSegment(PoseSegment):
         at = 0.5 * sum(during)
         # Where less of a step than this is at another feed, its zone is.
         least = min(ZONE, 0.4 * float(np.ptp(gone.at(np.array(during)))))
-        asked = [
+        feeds = [
             (feed, *np.clip(window, *during))
             for feed in path.feeds
             for window in feed.during
             if np.ptp(gone.at(np.clip(window, *during))) > least
         ]
-        for feed, first, last in asked:
+        for feed, first, last in feeds:
             fastest, slowest = feed.asked, (1.0 - feed.within) * feed.asked
             if not slowest <= speed <= (1.0 + _SAME) * fastest:
                 at = 0.5 * (first + last)
@@ -334,7 +334,7 @@ class FeedSegment(PoseSegment):
         return rows
 
     def _gone(self, times: Array) -> Array:
-        """Return how far the tool has gone at times [m]: its way is the same at all speeds."""
+        """Return how far the tool has gone at times [m]: its path is the same at all speeds."""
         return np.interp(times, self.t, self.lengths)
 
     @override

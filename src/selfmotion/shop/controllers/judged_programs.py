@@ -162,7 +162,7 @@ class ProgramParts(NamedTuple):
     Attributes
     ----------
     motions : list of list of Trajectory
-        Of each step, by each way in which a controller may join its targets; of a seam at the pace
+        Of each step, by each interpolation that a controller may use; of a seam at the pace
         of its path.
     slow : sequence of (int, list of Trajectory)
         Slow motions to where a shifted program goes on: before which step, and what.
@@ -225,16 +225,16 @@ def slow_steps(
     Each has to keep what the nearest free move has to.
     """
     moves = [(k, step.made) for k, step in enumerate(job.steps) if isinstance(step.made, Move)]
-    steps, pieces = list[JudgedStep](), dict[int, list[CheckedMotion]]()
+    steps, checked = list[JudgedStep](), dict[int, list[CheckedMotion]]()
     for number, motions in parts.slow:
         name = f"slowly to '{job.steps[number].name}'"
-        pieces.setdefault(number, []).append(CheckedMotion(name, motions[0]))
+        checked.setdefault(number, []).append(CheckedMotion(name, motions[0]))
         if not moves:
             steps.append(JudgedStep(name, False, "not verified: the job has no free moves"))
             continue
         _, near = min(moves, key=lambda move: abs(move[0] - number))
         steps.append(_judged_move(name, near, motions, what_targets_keep))
-    return tuple(steps), pieces
+    return tuple(steps), checked
 
 
 # Programs of controllers, judged by what they were made from.
@@ -265,7 +265,7 @@ def stated_deviation(program: ControllerProgram) -> Tolerance | None:
 
 
 class JudgedProgram(NamedTuple):
-    """What is known of a controller's program, by the job that it is of.
+    """Verdict on a controller's program, by the job that it is of.
 
     Attributes
     ----------
@@ -296,13 +296,13 @@ class JudgedProgram(NamedTuple):
         """One line: verified, or how many steps are not, and what speaks against the whole."""
         if self.verified:
             own = f"; {self.unjudged}" if self.unjudged else ""
-            return f"verified: each step, and the whole{self._allowed}{self._told}{own}"
+            return f"verified: each step, and the whole{self._allowed}{self._shift_note}{own}"
         count = sum(not step.verified for step in self.steps)
-        told = [*([f"{count} of {len(self.steps)} steps"] if count else []), *self.failures]
-        return f"not verified: {'; '.join(told)}{self._told}"
+        reasons = [*([f"{count} of {len(self.steps)} steps"] if count else []), *self.failures]
+        return f"not verified: {'; '.join(reasons)}{self._shift_note}"
 
     @property
-    def _told(self) -> str:
+    def _shift_note(self) -> str:
         return f"; {self.shifted}" if self.shifted else ""
 
     @property
@@ -319,14 +319,14 @@ def _judged_move(
     name: str,
     made: Move,
     motions: Sequence[Trajectory],
-    kept: Callable[[Sequence[Constraint]], tuple[Constraint, ...]],
+    judged: Callable[[Sequence[Constraint]], tuple[Constraint, ...]],
 ) -> JudgedStep:
     """Return the verdict on a move by each interpolation: the first that fails."""
-    asked, lines = kept(made.constraints), what_lines_keep(kept(made.constraints))
-    ways = [Move(made.robot, lines if k else asked, motion) for k, motion in enumerate(motions)]
-    worst = next((move for move in ways if not move.verified), ways[0])
-    way = "" if worst is ways[0] else _STRAIGHT
-    return JudgedStep(name, worst.verified, f"{worst.verdict}{way}")
+    smooth, lines = judged(made.constraints), what_lines_keep(judged(made.constraints))
+    moves = [Move(made.robot, lines if k else smooth, motion) for k, motion in enumerate(motions)]
+    worst = next((move for move in moves if not move.verified), moves[0])
+    interpolation = "" if worst is moves[0] else _STRAIGHT
+    return JudgedStep(name, worst.verified, f"{worst.verdict}{interpolation}")
 
 
 def judged_interpolations(
@@ -375,15 +375,15 @@ def judged_program(file: FilePath, job: Program, within: Tolerance | None = None
     program = read_program(file, job.robot)
     allowed = within or stated_deviation(program)
     parts = parts_of(file, program, job)
-    steps, pieces = _judged_steps(job, parts.motions, allowed, what_targets_keep, program)
+    steps, checked = _judged_steps(job, parts.motions, allowed, what_targets_keep, program)
     slow, between = slow_steps(parts, job)
-    pieces = [piece for k, own in enumerate(pieces) for piece in (*between.get(k, ()), own)]
+    checked = [item for k, own in enumerate(checked) for item in (*between.get(k, ()), own)]
     # From axis targets to poses there are digits of both, which the arm's kinematics may magnify.
     digits = _OF_POSES if any(isinstance(s, PoseSegment) for s in program.segments) else _DIGITS
     failures = (
         *(f"the job itself: {text}" for text in job.failures),
-        *gaps(job.robot, pieces, digits),
-        *_elsewhere(job, pieces, digits, program),
+        *gaps(job.robot, checked, digits),
+        *_elsewhere(job, checked, digits, program),
         *([program.begins_elsewhere] if program.begins_elsewhere else []),
         *misswitched(program, job),
         *_off_moves(file, program, job, parts),
@@ -400,13 +400,13 @@ def _shifted_moves(program: ControllerProgram, job: Program, parts: ProgramParts
     where a joint target is to where the shifted pose of it is, or back.
     """
     stated = program.miss.moves.joint
-    for step, ways, is_shifted in zip(job.steps, parts.motions, parts.by_poses, strict=True):
+    for step, motions, is_shifted in zip(job.steps, parts.motions, parts.by_poses, strict=True):
         if isinstance(step.made, Plan) or is_shifted:
             continue
         t = np.union1d(step.motion.t, step.motion.t[:-1] + 0.5 * np.diff(step.motion.t))
         here = step.motion(t)
-        for way in ways:
-            off = np.abs(way(np.minimum(t - t[0], way.t[-1])) - here).max()
+        for motion in motions:
+            off = np.abs(motion(np.minimum(t - t[0], motion.t[-1])) - here).max()
             if off > stated + _DIGITS:
                 yield (
                     f"'{step.name}' has joints {off:.4g} rad or m off the move of the job, the "
@@ -417,8 +417,8 @@ def _shifted_moves(program: ControllerProgram, job: Program, parts: ProgramParts
     frame = carrier_in_reference(job.robot, program.carrier)
     if shift is None or frame is None:
         return
-    for number, ways in parts.slow:
-        ends = [job.robot.chain.place(q) for q in ways[0].q[[0, -1]]]
+    for number, motions in parts.slow:
+        ends = [job.robot.chain.place(q) for q in motions[0].q[[0, -1]]]
         first, last = (np.asarray(frame.actInv(end.translation)) for end in ends)
         explained = min(
             np.linalg.norm(np.asarray(shift.act(first)) - last),
@@ -479,11 +479,11 @@ def shift_note(program: ControllerProgram) -> str:
     """Return by how much the work object is elsewhere than planned, in words; empty for not."""
     if program.shift is None:
         return ""
-    way = 1e3 * float(np.linalg.norm(program.shift.translation))
+    distance = 1e3 * float(np.linalg.norm(program.shift.translation))
     turn = float(np.degrees(np.linalg.norm(log3(program.shift.rotation))))
     return (
-        f"the work object is {way:.4g} mm and {turn:.3g}° from where it was planned: judged along "
-        f"the path shifted with it"
+        f"the work object is {distance:.4g} mm and {turn:.3g}° from where it was planned: judged "
+        f"along the path shifted with it"
     )
 
 
@@ -541,15 +541,15 @@ def judged_motion(motion: Trajectory, job: Program) -> JudgedProgram:
     """
     whole = motion.of_joints(job.robot.joint_names)
     if abs(whole.duration - job.duration) > _MOMENT:
-        told = f"it lasts {whole.duration:.6g} s, the job {job.duration:.6g} s"
-        return JudgedProgram((), (told,))
+        failure = f"it lasts {whole.duration:.6g} s, the job {job.duration:.6g} s"
+        return JudgedProgram((), (failure,))
     ends = [*job.begins, job.duration]
     motions = [[part_of(whole, first, last)] for first, last in pairwise(ends)]
-    steps, pieces = _judged_steps(job, motions, None, tuple)
+    steps, checked = _judged_steps(job, motions, None, tuple)
     failures = (
         *(f"the job itself: {text}" for text in job.failures),
-        *gaps(job.robot, pieces),
-        *_elsewhere(job, pieces),
+        *gaps(job.robot, checked),
+        *_elsewhere(job, checked),
     )
     return JudgedProgram(steps, failures)
 
@@ -567,34 +567,34 @@ def _judged_steps(
     job: Program,
     motions: Sequence[Sequence[Trajectory]],
     within: Tolerance | None,
-    kept: Callable[[Sequence[Constraint]], tuple[Constraint, ...]],
+    judged: Callable[[Sequence[Constraint]], tuple[Constraint, ...]],
     program: ControllerProgram | None = None,
 ) -> tuple[tuple[JudgedStep, ...], list[CheckedMotion]]:
-    """Return the certificates of the motions of a job's steps, by the limits that are `kept`."""
-    found, pieces = list[JudgedStep](), list[CheckedMotion]()
-    for step, ways in zip(job.steps, motions, strict=True):
+    """Return the certificates of the motions of a job's steps, by the limits that are `judged`."""
+    found, checked = list[JudgedStep](), list[CheckedMotion]()
+    for step, own in zip(job.steps, motions, strict=True):
         made = step.made
         if isinstance(made, Move):
-            found.append(_judged_move(step.name, made, ways, kept))
+            found.append(_judged_move(step.name, made, own, judged))
         else:
-            problem = replace(made.problem, constraints=kept(made.problem.constraints))
+            problem = replace(made.problem, constraints=judged(made.problem.constraints))
             if program is not None:
-                problem = as_shifted(problem, program, ways[0].q[0])
+                problem = as_shifted(problem, program, own[0].q[0])
             lines = replace(problem, constraints=what_lines_keep(problem.constraints))
             tolerance = within or made.tolerance
             certificate, _ = judged_interpolations(
-                ways,
+                own,
                 partial(problem.certify, tolerance=tolerance),
                 partial(lines.certify, tolerance=tolerance),
             )
             found.append(JudgedStep(step.name, certificate.verified, certificate.verdict))
-        pieces.append(CheckedMotion(f"'{step.name}'", ways[0]))
-    return tuple(found), pieces
+        checked.append(CheckedMotion(f"'{step.name}'", own[0]))
+    return tuple(found), checked
 
 
 def _elsewhere(
     job: Program,
-    pieces: Sequence[CheckedMotion],
+    checked: Sequence[CheckedMotion],
     digits: float = _DIGITS,
     program: ControllerProgram | None = None,
 ) -> Iterator[str]:
@@ -602,27 +602,27 @@ def _elsewhere(
 
     Poses of a shifted work object are elsewhere, joint targets are not.
     """
-    for end in (0, -1) if pieces else ():
+    for end in (0, -1) if checked else ():
         if program is not None and program.shift is not None:
             moving = [item for item in program.segments if not item.is_rest]
             if not moving or isinstance(moving[end], PoseSegment):
                 continue
-        asked = job.steps[end].motion.q[end]
-        yield from elsewhere(job.robot, pieces[end], end, asked, digits)
+        wanted = job.steps[end].motion.q[end]
+        yield from elsewhere(job.robot, checked[end], end, wanted, digits)
 
 
 def _otherwise_switched(job: Program, program: ControllerProgram) -> Iterator[str]:
     """Yield what of a job's events a program does not switch, or switches otherwise."""
-    asked = sorted(job.events, key=lambda event: event[0])
+    events = sorted(job.events, key=lambda event: event[0])
     made = sorted(program.switches, key=lambda switch: switch.at)
     stated = None if program.facts is None else program.facts.outputs
-    if asked and stated is None:
+    if events and stated is None:
         yield "its head does not say which output each event switches: write the program again"
-    if len(asked) != len(made):
-        yield f"it switches {len(made)} times, the job {len(asked)} times"
+    if len(events) != len(made):
+        yield f"it switches {len(made)} times, the job {len(events)} times"
         return
     known: dict[str, Switch] = {}
-    for (at, seam, event), switch in zip(asked, made, strict=True):
+    for (at, seam, event), switch in zip(events, made, strict=True):
         if abs(at - switch.at) > _PROMPT:
             yield (
                 f"event '{event}' of '{seam}' is at {at:.4f} s, but '{switch.output}' is switched "

@@ -303,8 +303,8 @@ class KrlWriter(ProgramWriter):
     def motion(self, segment: Segment) -> list[str]:
         lines = self.events(segment, 0)
         if segment.is_rest:
-            for k, span in enumerate(np.diff(segment.t), 1):
-                lines += [self.line("wait", seconds=span), *self.events(segment, k)]
+            for k, interval in enumerate(np.diff(segment.t), 1):
+                lines += [self.line("wait", seconds=interval), *self.events(segment, k)]
             return lines
         if isinstance(segment, FeedSegment):
             return [*lines, *self._at_speed(segment)]
@@ -316,13 +316,13 @@ class KrlWriter(ProgramWriter):
             if speeds_of(self.program) or speed > _UNBOUND:
                 lines.append(self.line("set", speed=speed))
         lines += [self.line(block), self._inner("times")]
-        for k, span in enumerate(np.diff(segment.t), 1):
+        for k, interval in enumerate(np.diff(segment.t), 1):
             lines += self._triggers(segment, k)
             if isinstance(segment, PoseSegment):
                 lines.append(self._inner(kind, pose=self.pose(segment, k)))
             else:
                 lines.append(self._inner("joint", axes=self.axes(segment, k)))
-            lines.append(self._inner("part", seconds=span))
+            lines.append(self._inner("part", seconds=interval))
         return [*lines, self._inner("whole", seconds=segment.t[-1]), self.line("close")]
 
     def _at_speed(self, segment: FeedSegment) -> list[str]:

@@ -61,10 +61,10 @@ def without_followers(motion: Trajectory, robot: RobotModel) -> Trajectory:
                 f"'{following[name]}', which it mimics, puts it at t = {motion.t[worst]:.4g} s; "
                 f"leave it out, or mend <mimic> in the URDF"
             )
-    kept = [k for k, name in enumerate(own) if name not in following]
-    faster = None if motion.qdd is None else motion.qdd[:, kept]
-    names = tuple(own[k] for k in kept)
-    return Trajectory(motion.t, motion.q[:, kept], motion.qd[:, kept], names, faster)
+    columns = [k for k, name in enumerate(own) if name not in following]
+    faster = None if motion.qdd is None else motion.qdd[:, columns]
+    names = tuple(own[k] for k in columns)
+    return Trajectory(motion.t, motion.q[:, columns], motion.qd[:, columns], names, faster)
 
 
 # Joint motions as tables: columns, arrays or lists by name.

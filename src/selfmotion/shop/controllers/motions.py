@@ -130,13 +130,13 @@ def write_motion(
         write_program(plan, path, name, settings or ProgramSettings(), progress)
         return
     if name == "urscript":
-        asked = settings or ProgramSettings()
-        if asked != asked.streamed:
+        given = settings or ProgramSettings()
+        if given != given.streamed:
             raise ProblemError(
                 f"{path}: settings: deviation, move_deviation and axes have no effect on URScript, "
                 f"which has all joints in their order at each period; leave them out"
             )
-        _write_stream(path, plan, STREAM if rate is None else rate, asked)
+        _write_stream(path, plan, STREAM if rate is None else rate, given)
         return
     if settings is not None:
         raise ProblemError(f"{path}: settings have no effect: they are of controllers' programs")

@@ -50,12 +50,12 @@ class ProgramWriter:
     def write(self, file: FilePath) -> None:
         """Write the program."""
         lines = self.opening()
-        for segment, begun in with_begins(self.program.segments):
+        for segment, approached in with_approaches(self.program.segments):
             lines += self.before_step()
             notes = [f"step: {plain(segment.name)}", *before(segment)]
             lines += [self.comment(note) for note in notes]
-            if begun is not None:
-                lines += self.approach(begun)
+            if approached is not None:
+                lines += self.approach(approached)
             lines += self.motion(segment)
         write_text(file, "\n".join([*lines, *self.closing(), ""]))
 
@@ -144,8 +144,8 @@ def event_text(language: Language, event: str, signal: Signal | None) -> str:
     return language.text("output", output=output, value=value)
 
 
-def with_begins(segments: Sequence[Segment]) -> Iterator[tuple[Segment, Segment | None]]:
-    """Yield each segment, and one to whose begin the arm has to go slowly before; else None.
+def with_approaches(segments: Sequence[Segment]) -> Iterator[tuple[Segment, Segment | None]]:
+    """Yield each segment, and the one to whose begin the arm goes slowly before it; else None.
 
     That is where targets of the other kind follow, poses after joints or joints after poses, rests
     in between included: where the work object was shifted, the arm is elsewhere by the other ones.
@@ -154,7 +154,7 @@ def with_begins(segments: Sequence[Segment]) -> Iterator[tuple[Segment, Segment 
     by_poses = False
     for k, segment in enumerate(segments):
         moving = next((item for item in segments[k:] if not item.is_rest), None)
-        begun = None
+        approached = None
         if moving is not None and by_poses != isinstance(moving, PoseSegment):
-            by_poses, begun = not by_poses, moving
-        yield segment, begun
+            by_poses, approached = not by_poses, moving
+        yield segment, approached

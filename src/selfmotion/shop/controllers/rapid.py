@@ -298,13 +298,17 @@ class RapidWriter(ProgramWriter):
     @override
     def motion(self, segment: Segment) -> list[str]:
         lines, last = self.events(segment, 0), len(segment.t) - 1
-        for k, span in enumerate(np.diff(segment.t), 1):
+        for k, interval in enumerate(np.diff(segment.t), 1):
             if segment.is_rest:
-                lines.append(self.line("wait", seconds=span))
+                lines.append(self.line("wait", seconds=interval))
             elif isinstance(segment, FeedSegment):
                 lines.append(self._at_speed(segment, k, "fine" if k == last else "z0"))
             else:
-                values = {"speed": "v100", "seconds": span, "zone": "fine" if k == last else "z1"}
+                values = {
+                    "speed": "v100",
+                    "seconds": interval,
+                    "zone": "fine" if k == last else "z1",
+                }
                 lines.append(self._timed(segment, k, values))
             lines += self.events(segment, k)
         return lines

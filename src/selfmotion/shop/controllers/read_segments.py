@@ -111,8 +111,8 @@ class Places:
         if self.planned is None or self.work is None:
             return None
         shift = self.work * self.planned.inverse()
-        still = np.abs(shift.homogeneous - np.eye(4)).max() < _REST
-        return None if still else shift
+        is_same = np.abs(shift.homogeneous - np.eye(4)).max() < _REST
+        return None if is_same else shift
 
     def frames(self, robot: RobotModel, axes: Sequence[Axis], file: object) -> ToolFrames:
         """Return the frames for a robot whose joints the axes are.
@@ -206,9 +206,9 @@ class Follower:
         self.segments.append(segment)
         self.at = segment.q[-1]
 
-    def in_si(self, values: Array, kept: Sequence[int] | None = None) -> Array:
+    def in_si(self, values: Array, columns: Sequence[int] | None = None) -> Array:
         """Return coordinates in rad or m."""
-        axes = self.axes if kept is None else [self.axes[k] for k in kept]
+        axes = self.axes if columns is None else [self.axes[k] for k in columns]
         return np.asarray(values * [1e-3 if axis.slides else np.pi / 180.0 for axis in axes])
 
     def _slowly(self, row: Row) -> None:
@@ -263,8 +263,8 @@ class Follower:
         q = self._followed(frames, rows, self._by_robot(self.at[None])[0], row, count)
         every = q[np.arange(0, len(times), count)]
 
-        def near(asked: Array) -> Array:
-            return np.stack([np.interp(asked, times, column) for column in q.T], axis=1)
+        def near(wanted: Array) -> Array:
+            return np.stack([np.interp(wanted, times, column) for column in q.T], axis=1)
 
         segment = PoseSegment(
             row.name,

@@ -154,7 +154,7 @@ class Segment:
 
     @property
     def rows(self) -> Array:
-        """What is interpolated at its targets: joints, (K + 1, n)."""
+        """Rows that are interpolated, one a target: joints, (K + 1, n)."""
         return self.q
 
     def between(self, times: Array, t: Array, rows: Array) -> Array:

@@ -168,7 +168,7 @@ def _is_true(_: Any, text: str) -> bool:
 
 
 def seconds(digits: int) -> Field:
-    """Return the field of times [s] with so many decimals."""
+    """Return the field of times [s] with a number of decimals."""
     return Field(NUMBER, _seconds, lambda value: f"{value:.{digits}f}")
 
 

@@ -22,14 +22,14 @@ from selfmotion.shop.controllers.segments import (
     finer,
     on_one_side,
 )
-from selfmotion.shop.controllers.thinning import Piece, Section, rests
+from selfmotion.shop.controllers.thinning import Operation, Section, rests
 from selfmotion.shop.controllers.tool_frames import Rounding, ToolFrames
 
 # As few tool poses as keep a controller near a motion.
 #
 # A straight line over a time h is off a motion by h²|a|/8, with a the acceleration of the tool in
 # the work object; the joints then by |J⁻¹a| h²/8. Poses are spread evenly in the root of that, as
-# joint targets are (`controllers/thinning.py`), and doubled where they are still too far apart
+# joint targets are (`controllers/thinning.py`), and doubled where they are too far apart
 # by inverse kinematics of what is in between.
 
 # Largest number of refinements of the targets.
@@ -55,7 +55,7 @@ class NotByPosesError(ProblemError):
 
 @dataclass(frozen=True, eq=False)
 class PoseSection(Section):
-    """Part of a piece between two rests, to be written as tool poses.
+    """Section of an operation between two rests, to be written as tool poses.
 
     Attributes
     ----------
@@ -83,7 +83,7 @@ class PoseSection(Section):
 
     def check_regular(self, allowed: Tolerance) -> None:
         """Raise NotByPosesError where the arm is singular within what is allowed."""
-        motion = self.piece.motion
+        motion = self.operation.motion
         if rests(motion, self.first, self.last):
             return
         inside = motion.t[(motion.t > self.first) & (motion.t < self.last)]
@@ -92,7 +92,7 @@ class PoseSection(Section):
         far = _OF_POSES / np.maximum(self.frames.regularity(motion(t)), 1e-12)
         if far.max() > allowed.rotation:
             at = float(t[int(far.argmax())] - motion.t[0])
-            raise NotByPosesError(f"'{self.piece.name}': the arm is singular at t = {at:.4g} s")
+            raise NotByPosesError(f"'{self.operation.name}': the arm is singular at t = {at:.4g} s")
 
     def thinned(self, allowed: Tolerance) -> tuple[Segment, Miss]:
         """See `Section.thinned`.
@@ -134,8 +134,9 @@ class PoseSection(Section):
         raise self._singular(float(t[:-1][far][0]), allowed)
 
     def _singular(self, at: float, allowed: Tolerance) -> NotByPosesError:
+        time = at - self.operation.motion.t[0]
         return NotByPosesError(
-            f"'{self.piece.name}': near t = {at - self.piece.motion.t[0]:.4g} s the joints do not "
+            f"'{self.operation.name}': near t = {time:.4g} s the joints do not "
             f"follow from poses within {1e3 * allowed.position:.3g} mm and "
             f"{np.degrees(allowed.rotation):.3g}°: it is singular there, or turns too fast"
         )
@@ -148,7 +149,7 @@ class PoseSection(Section):
         segment = super()._passing(t, at_rest=at_rest)
         if at_rest:
             return segment
-        motion = self.piece.motion
+        motion = self.operation.motion
         exact = motion(np.minimum(self.first + segment.t, self.last))
         places, turns = self.rounding(*self.frames.places(exact))
         # External axes in their digits, the arm's joints as they follow.
@@ -156,7 +157,7 @@ class PoseSection(Section):
         if not arrived.all():
             at = float(t[int(np.argmin(arrived))])
             raise NotByPosesError(
-                f"'{self.piece.name}': the arm is singular at t = {at - motion.t[0]:.4g} s"
+                f"'{self.operation.name}': the arm is singular at t = {at - motion.t[0]:.4g} s"
             )
         events: tuple[Event, ...] = segment.events
         return PoseSegment(
@@ -179,7 +180,7 @@ class PoseSection(Section):
     def _shares(self, segment: Segment, allowed: Tolerance) -> Array:
         """Return how much of what is allowed each step between two targets takes, (K,)."""
         times, count = segment.evaluation_times(), len(segment.t) - 1
-        motion = self.piece.motion
+        motion = self.operation.motion
         exact = motion(np.clip(self.first + times, motion.t[0], motion.t[-1]))
         worst = np.zeros(count)
         lines = segment.interpolated(times)
@@ -188,7 +189,7 @@ class PoseSection(Section):
             worst = np.maximum(worst, largest(joints, count))
         # Where joints are near, the tool is nearly so: only these are placed.
         for line in lines if worst.max() <= _JOINTS_FAR else []:
-            for chain in self.piece.chains:
+            for chain in self.operation.chains:
                 _, turned, here = chain.along(line)
                 _, facing, there = chain.along(exact)
                 off = np.linalg.norm(here - there, axis=1) / allowed.position
@@ -201,7 +202,7 @@ class PoseSection(Section):
     @override
     def bend(self, t: Array, allowed: Tolerance) -> Array:
         """Return accelerations of poses and joints as shares of what is allowed, (K,) [1/s²]."""
-        motion = self.piece.motion
+        motion = self.operation.motion
         middle = np.clip(t, motion.t[0] + _AROUND, motion.t[-1] - _AROUND)
         q = [motion(middle + side * _AROUND) for side in (-1.0, 0.0, 1.0)]
         poses = [self.frames.places(each) for each in q]
@@ -239,8 +240,8 @@ def largest(values: Array, count: int) -> Array:
 # happens there happens on time. Which targets there are in between says
 # `selfmotion.shop.controllers.thinning`.
 
-# Makes a span of tool poses of a piece, which joints slide, and when it begins and ends.
-PosedSections = Callable[[Piece, Flags, float, float], Section]
+# Operation, joints that slide, begin and end [s] → the section of tool poses.
+PosedSections = Callable[[Operation, Flags, float, float], Section]
 # Speed below which the arm rests [rad/s or m/s] …
 _REST = 1e-7
 # … if it lasts for at least this time [s].
@@ -252,7 +253,7 @@ _SHARE = 1e-3
 
 
 def segments_of(
-    pieces: Sequence[Piece],
+    operations: Sequence[Operation],
     slides: Flags,
     allowed: Tolerance,
     of_moves: Tolerance | None = None,
@@ -273,28 +274,28 @@ def segments_of(
     """
     found: list[Segment] = []
     worst = Misses(NO_MISS, NO_MISS)
-    for k, piece in enumerate(pieces):
-        progress("targets", k + 1, len(pieces))
-        motion = piece.motion
+    for k, operation in enumerate(operations):
+        progress("targets", k + 1, len(operations))
+        motion = operation.motion
         for when in motion.t[[0, -1]]:
             speed = np.abs(motion(when, 1))
             if speed.max() > _SLOW:
                 raise ProblemError(
-                    f"'{piece.name}' has joint '{motion.joint_names[int(speed.argmax())]}' at "
+                    f"'{operation.name}' has joint '{motion.joint_names[int(speed.argmax())]}' at "
                     f"{speed.max():.3g} rad/s or m/s at t = {when:.6g} s; programs of controllers "
                     f"go from rest to rest: plan it with a ramp, or rest=True"
                 )
-        within = _allowed(piece, allowed, of_moves)
-        for first, last in _moving(motion, [motion.t[0] + at for at, _ in piece.events]):
-            for segment, miss in _thinned(piece, slides, first, last, within, posed):
-                both = Misses(NO_MISS, miss) if piece.is_move else Misses(miss, NO_MISS)
+        within = _allowed(operation, allowed, of_moves)
+        for first, last in _moving(motion, [motion.t[0] + at for at, _ in operation.events]):
+            for segment, miss in _thinned(operation, slides, first, last, within, posed):
+                both = Misses(NO_MISS, miss) if operation.is_move else Misses(miss, NO_MISS)
                 worst = worst.worse(both)
                 found.append(segment)
     return found, worst
 
 
 def _thinned(
-    piece: Piece,
+    operation: Operation,
     slides: Flags,
     first: float,
     last: float,
@@ -303,29 +304,29 @@ def _thinned(
 ) -> list[tuple[Segment, Miss]]:
     if posed is not None:
         try:
-            return posed(piece, slides, first, last).segments(within)
+            return posed(operation, slides, first, last).segments(within)
         except NotByPosesError:
             # A free move goes through singular configurations where it likes.
-            if not piece.is_move:
+            if not operation.is_move:
                 raise
-    return Section(piece, slides, first, last).segments(within)
+    return Section(operation, slides, first, last).segments(within)
 
 
-def _allowed(piece: Piece, allowed: Tolerance, of_moves: Tolerance | None) -> Tolerance:
-    """Return how far a controller may be off a piece."""
-    if not piece.is_move:
+def _allowed(operation: Operation, allowed: Tolerance, of_moves: Tolerance | None) -> Tolerance:
+    """Return how far a controller may be off an operation."""
+    if not operation.is_move:
         return allowed
-    if of_moves is not None or piece.room is None:
+    if of_moves is not None or operation.room is None:
         return of_moves or allowed
-    room = piece.room
+    room = operation.room
     return Tolerance(max(allowed.position, room.position), max(allowed.rotation, room.rotation))
 
 
 def _moving(motion: Trajectory, events: Sequence[float]) -> list[tuple[float, float]]:
     """Return when motions from rest to rest, and rests, begin and end, in turn [s]."""
-    still = np.abs(motion.qd).max(axis=1) < _REST
-    still[:-1] &= np.abs(np.diff(motion.q, axis=0)).max(axis=1) < 1e-9
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], still[:-1], [False]]).astype(int)))
+    at_rest = np.abs(motion.qd).max(axis=1) < _REST
+    at_rest[:-1] &= np.abs(np.diff(motion.q, axis=0)).max(axis=1) < 1e-9
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], at_rest[:-1], [False]]).astype(int)))
     marks = [float(motion.t[0])]
     for begin, end in edges.reshape(-1, 2):
         if motion.t[end] - motion.t[begin] >= _WHILE:

@@ -32,16 +32,16 @@ from selfmotion.shop.controllers.segments import (
 )
 from selfmotion.work.job import Program
 
-# Parts of a motion: seams, and moves through the air with room around them.
+# Operations of a motion: seams, and moves through the air with room around them.
 
 # Largest deviation of a move through the air, however much room there is [m, rad].
 _ROOMY = Tolerance(5e-3, 5e-3)
-# How much of the room that is left between bodies is used: distances are found to a fiftieth.
+# Share of the room between bodies that is used: distances are found to a fiftieth.
 _SURE = 0.9
 
 
-class Piece(NamedTuple):
-    """A part of a motion with a name, events at times from its start, and the tools' chains.
+class Operation(NamedTuple):
+    """A seam or a move of a motion: its name, events at times from its start, the tools' chains.
 
     Of a move through the air also how far a controller may be off it, where there is room; of a
     seam the feeds that its tools keep, one list for each chain. `speeds` (n,) are what joints may
@@ -63,7 +63,7 @@ class Piece(NamedTuple):
     tool_rests: tuple[float, ...] = ()
 
 
-def pieces_of(plan: Plan | Parts | Move | Program) -> list[Piece]:
+def operations_of(plan: Plan | Parts | Move | Program) -> list[Operation]:
     """Return the seams and moves of a plan, parts, a move or a program, in order.
 
     Raises
@@ -85,14 +85,16 @@ def pieces_of(plan: Plan | Parts | Move | Program) -> list[Piece]:
     found = []
     for step in plan.steps:
         made = step.made
-        piece = _of_plan(step.name, made) if isinstance(made, Plan) else _of_move(step.name, made)
-        found.append(piece._replace(events=tuple((at, name) for name, at in step.happenings)))
+        operation = (
+            _of_plan(step.name, made) if isinstance(made, Plan) else _of_move(step.name, made)
+        )
+        found.append(operation._replace(events=tuple((at, name) for name, at in step.happenings)))
     if not found:
         raise PlanError(f"{plan.robot.name}: {plan.verdict}")
     return found
 
 
-def _of_plan(name: str, plan: Plan) -> Piece:
+def _of_plan(name: str, plan: Plan) -> Operation:
     items = plan.problem.follows.items
     chains = tuple(item.chain for item in items)
     feeds = tuple(tuple(feed for feed in item.path.feeds if feed.kept) for item in items)
@@ -103,7 +105,7 @@ def _of_plan(name: str, plan: Plan) -> Piece:
 
     relaxed = {row for item in plan.problem.relaxations for row in item.rows}
     turns = Task.POSITION if relaxed & {"rx", "ry", "rz"} else plan.problem.task
-    return Piece(
+    return Operation(
         name,
         plan.trajectory,
         (),
@@ -119,8 +121,8 @@ def _of_plan(name: str, plan: Plan) -> Piece:
 def _rests_of(path: Path) -> tuple[float, ...]:
     """Return at which of its marks a path is at rest, but for its ends [s]."""
     marks = path.marks[1:-1]
-    still = np.linalg.norm(path.samples(marks).twist, axis=1) < _REST if len(marks) else []
-    return tuple(float(t) for t in marks[still])
+    at_rest = np.linalg.norm(path.samples(marks).twist, axis=1) < _REST if len(marks) else []
+    return tuple(float(t) for t in marks[at_rest])
 
 
 def by_targets(problem: Problem) -> Problem:
@@ -137,7 +139,7 @@ def what_targets_keep(constraints: Sequence[Constraint]) -> tuple[Constraint, ..
 def what_lines_keep(constraints: Sequence[Constraint]) -> tuple[Constraint, ...]:
     """Return the constraints that straight lines can keep: corners have no acceleration.
 
-    Nor torques, then, which are judged along the smooth way.
+    Nor torques, then, which are judged along the smooth curve.
     """
     return tuple(
         replace(item, acceleration=np.inf, turn_acceleration=np.inf)
@@ -148,9 +150,9 @@ def what_lines_keep(constraints: Sequence[Constraint]) -> tuple[Constraint, ...]
     )
 
 
-def _of_move(name: str, move: Move) -> Piece:
+def _of_move(name: str, move: Move) -> Operation:
     room = safe_deviation(move)
-    return Piece(
+    return Operation(
         name,
         move.motion,
         (),
@@ -161,9 +163,11 @@ def _of_move(name: str, move: Move) -> Piece:
     )
 
 
-def _speeds(asked: Sequence[Requirement]) -> Array | None:
+def _speeds(requirements: Sequence[Requirement]) -> Array | None:
     """Return the limits of joint speed (n,) among requirements; None for none."""
-    limits = [item.upper for item in asked if isinstance(item, JointLimits) and item.order == 1]
+    limits = [
+        item.upper for item in requirements if isinstance(item, JointLimits) and item.order == 1
+    ]
     return np.minimum.reduce(limits) if limits else None
 
 
@@ -171,7 +175,7 @@ def safe_deviation(move: Move) -> Tolerance | None:
     """Return how far a controller may be off a move so that it keeps apart; None for not at all.
 
     The distance of a pair of bodies changes by Σ_j l_j |Δq_j| at most, with l its levers: so joints
-    may be off by the room that is left over what is asked, divided by the largest Σ_j l_j.
+    may be off by the room that is left over the required distance, divided by the largest Σ_j l_j.
     """
     joint = _ROOMY.rotation
     for item, finding in zip(move.requirements, move.findings, strict=True):
@@ -217,18 +221,18 @@ _MOST = 100_000
 
 @dataclass(frozen=True, eq=False)
 class Section:
-    """Part of a piece between two rests.
+    """Section of an operation between two rests.
 
     Attributes
     ----------
-    piece : Piece
+    operation : Operation
     slides : (n,)
         Which joints slide.
     first, last : float
         From when to when [s].
     """
 
-    piece: Piece
+    operation: Operation
     slides: Flags
     first: float
     last: float
@@ -240,10 +244,10 @@ class Section:
     @property
     def events(self) -> list[tuple[float, str]]:
         """Times of its events [s], and their names."""
-        start, end = float(self.piece.motion.t[0]), float(self.piece.motion.t[-1])
+        start, end = float(self.operation.motion.t[0]), float(self.operation.motion.t[-1])
         return [
             (start + at, name)
-            for at, name in self.piece.events
+            for at, name in self.operation.events
             if (self.first == start or self.first < start + at)
             and (self.last == end or start + at <= self.last)
         ]
@@ -267,7 +271,7 @@ class Section:
             Digits are too few for what is allowed, or targets too many.
         """
         fixed = _apart(self.first, self.last, [at for at, _ in self.events])
-        if rests(self.piece.motion, self.first, self.last):
+        if rests(self.operation.motion, self.first, self.last):
             return self._passing(fixed, at_rest=True), NO_MISS
         self._check_digits(allowed)
         t = self._within(allowed, fixed)
@@ -294,14 +298,14 @@ class Section:
                 return t
             more *= max(1.05, 1.02 * float(np.sqrt(miss.share(allowed))))
         raise ProblemError(
-            f"'{self.piece.name}' is off by {1e3 * miss.position:.3g} mm and "
+            f"'{self.operation.name}' is off by {1e3 * miss.position:.3g} mm and "
             f"{np.degrees(max(miss.rotation, miss.joint)):.3g}° with {len(t)} targets; allow more "
-            f"than {_in_words(self.piece, allowed)}"
+            f"than {_in_words(self.operation, allowed)}"
         )
 
     def spread(self, fixed: Array, allowed: Tolerance, more: float) -> Array:
         """Return times between fixed ones, even in the root of how much the motion bends."""
-        found, motion = [fixed[:1]], self.piece.motion
+        found, motion = [fixed[:1]], self.operation.motion
         for begin, end in pairwise(fixed):
             inside = motion.t[(motion.t > begin) & (motion.t < end)]
             marks = np.concatenate([[begin], inside, [end]])
@@ -320,10 +324,10 @@ class Section:
 
     def bend(self, t: Array, allowed: Tolerance) -> Array:
         """Return the accelerations of tool and joints as shares of what is allowed, (K,) [1/s²]."""
-        motion = self.piece.motion
+        motion = self.operation.motion
         q, qdd = motion(t), motion(t, 2)
         found: Array = np.abs(qdd).max(axis=1) / allowed.rotation
-        for chain in self.piece.chains:
+        for chain in self.operation.chains:
             rates = np.einsum("kij,kj->ki", chain.along(q)[0], qdd)
             for rows, limit in ((slice(0, 3), allowed.position), (slice(3, 6), allowed.rotation)):
                 found = np.maximum(found, np.linalg.norm(rates[:, rows], axis=1) / limit)
@@ -333,18 +337,18 @@ class Section:
         """Return targets at times, as the file has them."""
         if len(t) > _MOST:
             raise ProblemError(
-                f"'{self.piece.name}' takes more than {_MOST} targets; allow a larger deviation"
+                f"'{self.operation.name}' takes more than {_MOST} targets; allow a larger deviation"
             )
         offset = np.round(t - self.first, TIME_DIGITS)
         # Where the arm is at the times that the file has.
-        q = self._in_digits(self.piece.motion(np.minimum(self.first + offset, self.last)))
+        q = self._in_digits(self.operation.motion(np.minimum(self.first + offset, self.last)))
         if at_rest:
             q[:] = q[0]
         events = (Event(int(np.abs(t - at).argmin()), name) for at, name in self.events)
-        return Segment(self.piece.name, offset, q, tuple(events))
+        return Segment(self.operation.name, offset, q, tuple(events))
 
     def _miss(self, segment: Segment) -> Miss:
-        return miss_of(segment, self.piece.motion, self.piece.chains, self.first)
+        return miss_of(segment, self.operation.motion, self.operation.chains, self.first)
 
     def _in_digits(self, q: Array) -> Array:
         """Return coordinates [rad or m] as they are when their digits in a file are read again."""
@@ -353,13 +357,14 @@ class Section:
 
     def _check_digits(self, allowed: Tolerance) -> None:
         """Refuse what no number of targets keeps, as they have few digits."""
-        q = self.piece.motion.q
-        miss = miss_between(self._in_digits(q), q, self.piece.chains)
+        q = self.operation.motion.q
+        miss = miss_between(self._in_digits(q), q, self.operation.chains)
         if miss.share(allowed) > 1.0:
             raise ProblemError(
-                f"'{self.piece.name}': programs count angles in {10.0**-ANGLE_DIGITS:g}°, which is "
-                f"up to {1e3 * miss.position:.2g} mm and {np.degrees(miss.rotation):.2g}° of the "
-                f"tool; allow more than {_in_words(self.piece, allowed)}"
+                f"'{self.operation.name}': programs count angles in {10.0**-ANGLE_DIGITS:g}°, "
+                f"which is up to {1e3 * miss.position:.2g} mm and "
+                f"{np.degrees(miss.rotation):.2g}° of the tool; allow more than "
+                f"{_in_words(self.operation, allowed)}"
             )
 
     def _missed(self, segment: Segment) -> Flags:
@@ -376,14 +381,16 @@ class Section:
 
     def _taken(self, times: Array, q: Array, qd: Array) -> Array:
         """Return how much is taken of what feeds and limits of speed leave, at times (K,)."""
-        motion = self.piece.motion
+        motion = self.operation.motion
         t = np.clip(self.first + times, self.first, motion.t[-1])
         exact, rates = motion(t), motion(t, 1)
         taken = np.zeros(len(t))
-        if self.piece.speeds is not None:
-            within = np.abs(rates) <= _OF_SPEED * self.piece.speeds
-            taken = np.where(within, np.abs(qd) / (_OF_SPEED * self.piece.speeds), 0.0).max(axis=1)
-        for chain, feeds in zip(self.piece.chains, self.piece.feeds, strict=False):
+        if self.operation.speeds is not None:
+            within = np.abs(rates) <= _OF_SPEED * self.operation.speeds
+            taken = np.where(within, np.abs(qd) / (_OF_SPEED * self.operation.speeds), 0.0).max(
+                axis=1
+            )
+        for chain, feeds in zip(self.operation.chains, self.operation.feeds, strict=False):
             moved, wanted = (
                 np.einsum("kcn,kn->kc", chain.along(at)[0][:, :3], speeds)
                 for at, speeds in ((q, qd), (exact, rates))
@@ -392,14 +399,14 @@ class Section:
             for feed in feeds:
                 room = _OF_FEED * feed.slowest * feed.left_over
                 for begin, end in feed.during + motion.t[0]:
-                    asked = (t > begin) & (t < end)
-                    taken = np.maximum(taken, np.where(asked, off / max(room, 1e-12), 0.0))
+                    during = (t > begin) & (t < end)
+                    taken = np.maximum(taken, np.where(during, off / max(room, 1e-12), 0.0))
         return taken
 
 
-def _in_words(piece: Piece, allowed: Tolerance) -> str:
+def _in_words(operation: Operation, allowed: Tolerance) -> str:
     """Return the tolerance as the file of settings has it."""
-    key = "move_deviation" if piece.is_move else "deviation"
+    key = "move_deviation" if operation.is_move else "deviation"
     return (
         f"{key} = {{ position_mm = {1e3 * allowed.position:.3g}, "
         f"rotation_deg = {np.degrees(allowed.rotation):.3g} }}"

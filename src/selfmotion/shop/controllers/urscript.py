@@ -221,12 +221,12 @@ class UrscriptWriter(ProgramWriter):
     @override
     def motion(self, segment: Segment) -> list[str]:
         lines, radii = self.events(segment, 0), self._radii(segment)
-        for k, span in enumerate(np.diff(segment.t), 1):
-            values = {"seconds": span, "radius": radii[k]}
+        for k, interval in enumerate(np.diff(segment.t), 1):
+            values = {"seconds": interval, "radius": radii[k]}
             if isinstance(segment, FeedSegment):
                 lines.append(self._at_speed(segment, k, radii[k]))
             elif segment.is_rest:
-                lines.append(self.line("wait", seconds=span))
+                lines.append(self.line("wait", seconds=interval))
             elif isinstance(segment, PoseSegment):
                 lines.append(self.line("linear", pose=self.pose(segment, k), **values))
             else:
