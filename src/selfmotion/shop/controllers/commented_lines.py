@@ -14,12 +14,7 @@ from selfmotion.shop.controllers.controller_program import ControllerProgram, Sw
 from selfmotion.shop.controllers.program_facts import Load, ProgramFacts
 from selfmotion.shop.controllers.program_settings import Axis
 from selfmotion.shop.controllers.program_texts import BECAUSE, KEPT, PLANNED, TIMED, of_word
-from selfmotion.shop.controllers.read_segments import (
-    Follower,
-    Places,
-    Row,
-    pose_of_values,
-)
+from selfmotion.shop.controllers.read_segments import Follower, Places, Row, pose_of_values
 from selfmotion.shop.controllers.segments import Miss, Misses
 
 # Largest size of a controller's file [bytes].

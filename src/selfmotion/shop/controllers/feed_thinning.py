@@ -15,6 +15,7 @@ from selfmotion.basics import Array, Flags
 from selfmotion.certificate import Tolerance
 from selfmotion.model.motion import Trajectory
 from selfmotion.shop.controllers.feed_segments import FeedSegment, PassedLength, times_at
+from selfmotion.shop.controllers.pose_numbers import Rounding
 from selfmotion.shop.controllers.program_texts import TIMED
 from selfmotion.shop.controllers.segments import (
     SURE,
@@ -35,7 +36,7 @@ from selfmotion.shop.controllers.steps import (
 )
 from selfmotion.shop.controllers.targets import NotByPosesError, PoseSection, largest
 from selfmotion.shop.controllers.thinning import Operation, rests
-from selfmotion.shop.controllers.tool_frames import Rounding, ToolFrames, carrier_in_reference
+from selfmotion.shop.controllers.tool_frames import ToolFrames, carrier_in_reference
 
 # Tolerances of turning and self-motion, tried in turn [rad or m]; 0: that of all other joints.
 _FREE = (0.2, 0.02, 0.0)

@@ -1,144 +1,48 @@
-"""Programs of controllers as files, cut into the steps of their job, and judged."""
+"""Programs of controllers, judged by the jobs that they are of."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import combinations, pairwise
 from pathlib import Path as FilePath
-from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
 import numpy as np
 
-from selfmotion.basics import (
-    Array,
-    FileFormatError,
-    ProblemError,
-    Progress,
-    RobotError,
-    silent,
-)
+from selfmotion.basics import Array, FileFormatError, ProblemError, RobotError
 from selfmotion.certificate import Certificate, Tolerance
 from selfmotion.model.motion import Trajectory
 from selfmotion.model.path import Placed
 from selfmotion.model.robot import RobotModel
 from selfmotion.model.task import log3
-from selfmotion.planning.result import CheckedMotion, Move, Parts, Plan, elsewhere, gaps
+from selfmotion.planning.result import CheckedMotion, Move, Plan, elsewhere, gaps
 from selfmotion.problem.constraints import Constraint
 from selfmotion.problem.problem import Problem
-from selfmotion.shop.controllers.controller_program import (
-    ControllerProgram,
-    Draft,
-    Joints,
-    Switch,
-    constraints_of,
-    drafted,
-)
-from selfmotion.shop.controllers.krl import KrlReader, write_krl
+from selfmotion.shop.controllers.controller_program import ControllerProgram, Switch
+from selfmotion.shop.controllers.program_draft import constraints_of
 from selfmotion.shop.controllers.program_facts import check_load
-from selfmotion.shop.controllers.program_reader import ProgramReader
-from selfmotion.shop.controllers.program_settings import ProgramSettings
+from selfmotion.shop.controllers.program_files import program_miss, read_program
+from selfmotion.shop.controllers.program_steps import ProgramParts, parts_of
 from selfmotion.shop.controllers.program_texts import plain
-from selfmotion.shop.controllers.rapid import RapidReader, write_rapid
-from selfmotion.shop.controllers.segments import Misses, PoseSegment, Segment
+from selfmotion.shop.controllers.segments import PoseSegment
 from selfmotion.shop.controllers.thinning import what_lines_keep, what_targets_keep
 from selfmotion.shop.controllers.tool_frames import WORLD, carrier_in_reference
-from selfmotion.shop.controllers.urscript import UrscriptReader, write_urscript
 from selfmotion.work.job import Program, are_opposite
 
-# Programs of controllers as files: which suffix is which language.
-
-_WRITERS: Mapping[str, Callable[[FilePath, Draft], None]] = {
-    "krl": write_krl,
-    "rapid": write_rapid,
-    "urscript": write_urscript,
-}
-_READERS: Mapping[str, type[ProgramReader]] = {
-    ".src": KrlReader,
-    ".mod": RapidReader,
-    ".script": UrscriptReader,
-}
-# Suffixes of programs of targets; those that are read as such, which linear URScript is as well.
-PROGRAMS = {".src": "krl", ".mod": "rapid"}
-READ_PROGRAMS = tuple(_READERS)
-
-
-def write_program(
-    plan: Plan | Parts | Move | Program,
-    file: FilePath,
-    form: str,
-    settings: ProgramSettings,
-    progress: Progress = silent,
-) -> None:
-    """Write a motion as a program of a controller; see `write_motion`.
-
-    Poses are written where the file, read again, keeps what it states: else joint targets, of free
-    moves first.
-    """
-    verdict = plan.certificate.verdict if isinstance(plan, Plan) else plan.verdict
-    given = plan, file.stem, form, settings, verdict, progress
-    draft = drafted(*given)
-    for moves_only in (True, False):
-        if draft.frames is None:
-            break
-        why = _lost(plan, file, form, draft)
-        if not why:
-            break
-        draft = drafted(*given, Joints(moves_only, why))
-    _WRITERS[form](file, draft)
-
-
-def _lost(plan: Plan | Parts | Move | Program, file: FilePath, form: str, draft: Draft) -> str:
-    """Return why a program of poses, read again, is not the motion, in words; empty where it is."""
-    with TemporaryDirectory() as folder:
-        trial = FilePath(folder) / file.name
-        _WRITERS[form](trial, draft)
-        try:
-            _, stated, found = program_miss(plan, trial)
-        except FileFormatError as error:
-            return f"read again, {str(error).removeprefix(f'{trial}: ')}"
-    if keeps_stated(found, stated):
-        return ""
-    return "read again, poses leave the motion: the arm is singular, or nearly so"
-
-
-def keeps_stated(found: Misses, stated: Misses) -> bool:
-    """Whether a program is no farther off its motion than it states, in the digits of files."""
-    pairs = zip((*found.path, *found.moves), (*stated.path, *stated.moves), strict=True)
-    return all(one <= other + 1e-9 for one, other in pairs)
-
-
-def read_program(file: FilePath, robot: RobotModel | None = None) -> ControllerProgram:
-    """Read a program of a controller, by its suffix; tool poses by the robot that moves to them.
-
-    Raises
-    ------
-    FileFormatError
-        The file cannot be read, or says what is not read; the line is named.
-    """
-    return _READERS[file.suffix.lower()](file, robot).program()
-
-
-def program_miss(
-    plan: Plan | Parts | Move | Program, file: FilePath, read: ControllerProgram | None = None
-) -> tuple[int, Misses, Misses]:
-    """Return the contents of a program file: targets, the deviations it states, and its kind.
-
-    The file is read unless it was `read` before.
-
-    Raises
-    ------
-    FileFormatError
-        The file cannot be read, or is of another motion.
-    """
-    found = read or read_program(file, plan.robot)
-    try:
-        return found.targets, found.miss, found.miss_of(plan)
-    except FileFormatError as error:
-        raise FileFormatError(f"{file}: {error}") from error
-
-
-# A controller's program cut into the steps of its job, and slow motions in between judged.
+# Rounding of times in files [s].
+_MOMENT = 1e-4
+# Rounding of angles in files [rad].
+_LEAST = 1e-6
+# Rounding of the ends of a program in joints [rad or m].
+_DIGITS = 1e-6
+# Rounding of its ends in poses, as joints [rad or m].
+_OF_POSES = 1e-5
+# Tolerance of the times of outputs, which are switched at targets [s].
+_PROMPT = 1e-3
+# Distance of a slow motion's end from the end by the program's shift [m].
+_EXPLAINED = 1e-3
+# Difference of times that are the same [s].
+_INSTANT = 1e-9
 
 
 class JudgedStep(NamedTuple):
@@ -154,67 +58,6 @@ class JudgedStep(NamedTuple):
     name: str
     verified: bool
     verdict: str
-
-
-class ProgramParts(NamedTuple):
-    """The part of a program that each step of its job is.
-
-    Attributes
-    ----------
-    motions : list of list of Trajectory
-        Of each step, by each interpolation that a controller may use; of a seam at the pace
-        of its path.
-    slow : sequence of (int, list of Trajectory)
-        Slow motions to where a shifted program goes on: before which step, and what.
-    by_poses : list of bool
-        Whether a step has targets that are poses, or rests.
-    """
-
-    motions: list[list[Trajectory]]
-    slow: Sequence[tuple[int, list[Trajectory]]]
-    by_poses: list[bool]
-
-
-def parts_of(file: FilePath, program: ControllerProgram, job: Program) -> ProgramParts:
-    """Return the part of a program that each step of its job is.
-
-    Raises
-    ------
-    FileFormatError
-        It is of another job.
-    """
-    names = job.robot.joint_names
-    known = [axis.joint for axis in program.axes]
-    if sorted(known) != sorted(names):
-        raise FileFormatError(f"{file}: has joints {', '.join(known)}, expected {', '.join(names)}")
-    left, found = list(program.segments), ProgramParts([], slow := [], [])
-
-    def part(segments: Sequence[Segment]) -> ControllerProgram:
-        return replace(program, segments=tuple(segments))
-
-    for number, step in enumerate(job.steps):
-        taken, seconds = [], 0.0
-        while left and left[0].is_slow:
-            own = part([left.pop(0)])
-            slow.append((number, [motion.of_joints(names) for motion in own.motions()]))
-        while left and seconds < step.motion.duration - _MOMENT:
-            taken.append(left.pop(0))
-            seconds += taken[-1].duration
-        if abs(seconds - step.motion.duration) > _MOMENT:
-            raise FileFormatError(
-                f"{file}: its targets of '{step.name}' take {seconds:.6g} s, the job's "
-                f"{step.motion.duration:.6g} s: it is of another one"
-            )
-        own, made = part(taken), step.made
-        path = None if isinstance(made, Move) else made.problem.path
-        found.motions.append([motion.of_joints(names) for motion in own.motions(path)])
-        # Where the arm rests, it is where the poses around have it.
-        moving = [item for item in taken if not item.is_rest]
-        posed = not moving or any(isinstance(item, PoseSegment) for item in moving)
-        found.by_poses.append(posed)
-    if left:
-        raise FileFormatError(f"{file}: goes on with '{left[0].name}' when the job has ended")
-    return found
 
 
 def slow_steps(
@@ -235,24 +78,6 @@ def slow_steps(
         _, near = min(moves, key=lambda move: abs(move[0] - number))
         steps.append(_judged_move(name, near, motions, what_targets_keep))
     return tuple(steps), checked
-
-
-# Programs of controllers, judged by what they were made from.
-
-# Rounding of times in files [s].
-_MOMENT = 1e-4
-# Rounding of angles in files [rad].
-_LEAST = 1e-6
-# Rounding of the ends of a program in joints [rad or m].
-_DIGITS = 1e-6
-# Rounding of its ends in poses, as joints [rad or m].
-_OF_POSES = 1e-5
-# Tolerance of the times of outputs, which are switched at targets [s].
-_PROMPT = 1e-3
-# Distance of a slow motion's end from the end by the program's shift [m].
-_EXPLAINED = 1e-3
-# Difference of times that are the same [s].
-_INSTANT = 1e-9
 
 
 def stated_deviation(program: ControllerProgram) -> Tolerance | None:

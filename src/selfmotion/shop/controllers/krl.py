@@ -9,12 +9,20 @@ from typing_extensions import override
 from selfmotion.basics import Array
 from selfmotion.model.robot import RobotModel
 from selfmotion.model.task import SE3, Quaternion
-from selfmotion.shop.controllers.controller_program import Draft, Switch, goes_round, speeds_of
+from selfmotion.shop.controllers.configurations import status_and_turn
+from selfmotion.shop.controllers.controller_program import Switch
 from selfmotion.shop.controllers.feed_segments import FeedSegment
+from selfmotion.shop.controllers.pose_numbers import krl_numbers, krl_pose
+from selfmotion.shop.controllers.program_draft import Draft
 from selfmotion.shop.controllers.program_reader import ProgramReader, Target
 from selfmotion.shop.controllers.program_settings import AXES
 from selfmotion.shop.controllers.program_texts import module_name
-from selfmotion.shop.controllers.program_writer import ProgramWriter, WrittenPose
+from selfmotion.shop.controllers.program_writer import (
+    ProgramWriter,
+    WrittenPose,
+    goes_round,
+    speeds_of,
+)
 from selfmotion.shop.controllers.read_segments import Pose, pose_of_values, times_of
 from selfmotion.shop.controllers.segments import (
     PoseSegment,
@@ -34,7 +42,6 @@ from selfmotion.shop.controllers.statements import (
     word,
 )
 from selfmotion.shop.controllers.thinning import TIME_DIGITS
-from selfmotion.shop.controllers.tool_frames import krl_numbers, krl_pose, status_and_turn
 
 # After KUKA System Software 8.3, Operating and Programming Instructions for System Integrators
 # (KSS 8.3 SI V4): E6AXIS aggregates, ``PTP_SPLINE`` with ``SPTP`` segments and a ``TIME_BLOCK``,

@@ -25,13 +25,7 @@ from selfmotion.model.motion import Trajectory
 from selfmotion.model.robot import RobotModel
 from selfmotion.planning.result import Move, Parts, Plan
 from selfmotion.shop.controllers import ros
-from selfmotion.shop.controllers.controller_program import ControllerProgram, check_signals
-from selfmotion.shop.controllers.judged_programs import (
-    PROGRAMS,
-    READ_PROGRAMS,
-    read_program,
-    write_program,
-)
+from selfmotion.shop.controllers.controller_program import ControllerProgram
 from selfmotion.shop.controllers.motion_tables import (
     keyframes,
     of_tables,
@@ -39,6 +33,13 @@ from selfmotion.shop.controllers.motion_tables import (
     write_arrays,
     write_columns,
     write_lists,
+)
+from selfmotion.shop.controllers.program_draft import check_signals
+from selfmotion.shop.controllers.program_files import (
+    PROGRAMS,
+    READ_PROGRAMS,
+    read_program,
+    write_program,
 )
 from selfmotion.shop.controllers.program_settings import ProgramSettings
 from selfmotion.shop.controllers.ros import bag, motion_of_bag

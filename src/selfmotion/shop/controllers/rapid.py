@@ -11,12 +11,19 @@ from typing_extensions import override
 from selfmotion.basics import Array, ProblemError
 from selfmotion.model.robot import RobotModel
 from selfmotion.model.task import SE3, Quaternion
-from selfmotion.shop.controllers.controller_program import Draft, goes_round, speeds_of
+from selfmotion.shop.controllers.configurations import confdata
 from selfmotion.shop.controllers.feed_segments import ZONE, FeedSegment
+from selfmotion.shop.controllers.pose_numbers import rapid_numbers, rapid_pose
+from selfmotion.shop.controllers.program_draft import Draft
 from selfmotion.shop.controllers.program_reader import ProgramReader, Target
 from selfmotion.shop.controllers.program_settings import AXES
 from selfmotion.shop.controllers.program_texts import module_name
-from selfmotion.shop.controllers.program_writer import ProgramWriter, WrittenPose
+from selfmotion.shop.controllers.program_writer import (
+    ProgramWriter,
+    WrittenPose,
+    goes_round,
+    speeds_of,
+)
 from selfmotion.shop.controllers.read_segments import Pose, pose_of_values
 from selfmotion.shop.controllers.segments import PoseSegment, Segment
 from selfmotion.shop.controllers.statements import (
@@ -29,7 +36,6 @@ from selfmotion.shop.controllers.statements import (
     word,
 )
 from selfmotion.shop.controllers.thinning import TIME_DIGITS
-from selfmotion.shop.controllers.tool_frames import confdata, rapid_numbers, rapid_pose
 
 # After ABB's Technical reference manual, RAPID Instructions, Functions and Data types (RobotWare
 # 6, 3HAC050917-001): ``MoveAbsJ`` of a ``jointtarget``, whose external axes are 9E9 where there

@@ -11,6 +11,7 @@ from typing_extensions import override
 from selfmotion.basics import Array, Flags, ProblemError, Progress, silent
 from selfmotion.certificate import Tolerance
 from selfmotion.model.motion import Trajectory
+from selfmotion.shop.controllers.pose_numbers import Rounding
 from selfmotion.shop.controllers.segments import (
     NO_MISS,
     SURE,
@@ -23,7 +24,7 @@ from selfmotion.shop.controllers.segments import (
     on_one_side,
 )
 from selfmotion.shop.controllers.thinning import Operation, Section, rests
-from selfmotion.shop.controllers.tool_frames import Rounding, ToolFrames
+from selfmotion.shop.controllers.tool_frames import ToolFrames
 
 # As few tool poses as keep a controller near a motion.
 #
