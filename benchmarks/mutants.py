@@ -197,7 +197,8 @@ PARTS = (
         (
             "shop/controllers/read_*.py",
             "shop/controllers/program_reader.py",
-            "shop/controllers/commented_lines.py",
+            "shop/controllers/program_comments.py",
+            "shop/controllers/program_lines.py",
             "shop/controllers/statements.py",
         ),
         (

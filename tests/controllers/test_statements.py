@@ -9,11 +9,13 @@ import pytest
 
 from selfmotion.model.task import SE3, exp3
 from selfmotion.shop.controllers.krl import KRL, KrlReader
+from selfmotion.shop.controllers.program_comments import COMMENTS, Comments
+from selfmotion.shop.controllers.program_lines import Lines
 from selfmotion.shop.controllers.program_reader import ProgramReader
 from selfmotion.shop.controllers.program_writer import WrittenPose
 from selfmotion.shop.controllers.rapid import RAPID, RapidReader
 from selfmotion.shop.controllers.read_segments import Pose
-from selfmotion.shop.controllers.statements import Language, Statement, number, word
+from selfmotion.shop.controllers.statements import Statement, Table, number, word
 from selfmotion.shop.controllers.urscript import URSCRIPT, UrscriptReader
 
 READERS: dict[str, type[ProgramReader]] = {
@@ -125,7 +127,7 @@ def test_a_line_of_the_table_is_all_that_a_statement_takes() -> None:
     """A table of one line, whose value is there twice: both have to be the same."""
     line = Statement("mass", "LOAD <mass> OF <name>, <name>", ("body",))
     fields = {"mass": number(".2f"), "name": word(r"\w+")}
-    table = Language("#", "END", "none", lambda _: False, fields, [line])
+    table = Table(fields=fields, statements=[line])
     assert table.text("mass", mass=1.5, name="tool") == "LOAD 1.50 OF tool, tool"
     found = table.find("load 2 of tool ,tool", "body")
     assert found is not None
@@ -134,3 +136,20 @@ def test_a_line_of_the_table_is_all_that_a_statement_takes() -> None:
         assert table.find(other, "body") is None
     with pytest.raises(KeyError):
         table.text("mass", mass=1.5)
+
+
+@pytest.mark.parametrize("statement", COMMENTS.statements, ids=lambda x: str(x.kind))
+def test_a_comment_is_read_as_it_is_written_alone(statement: Statement, tmp_path: Path) -> None:
+    """In other letters or spaces its checksum would not guard it."""
+    known = {"text": "arc, left", "link": "table/plate 1", "pose": [0.1, 0.2, -0.3, 0, 0, 0.6, 0.8]}
+    values = {name: known.get(field, 0.25) for name, field in statement.values.items()}
+    text = COMMENTS.text(statement.kind, **values)
+    found = COMMENTS.find(text, "head")
+    assert found is not None
+    (tmp_path / "a.src").write_text("")
+    comments = Comments(Lines(tmp_path / "a.src", ";"))
+    for name, field in statement.values.items():
+        assert same(COMMENTS.fields[field].read(comments, found[1][name]), values[name])
+    begin = text.partition(":")[0]
+    for other in (text.replace(begin, begin.upper()), text.replace(":", " :", 1)):
+        assert COMMENTS.find(other, "head") is None

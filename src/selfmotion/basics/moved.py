@@ -34,7 +34,7 @@ MOVED_MODULES = {
     "planning.search.stretches": "planning.search.segments",
     "planning.transfer.ways": "planning.transfer.rrt_connect",
     "shop.controllers.feed_stretches": "shop.controllers.feed_segments",
-    "shop.controllers.program_lines": "shop.controllers.program_reader",
+    "shop.controllers.commented_lines": "shop.controllers.program_lines",
     "shop.controllers.read_stretches": "shop.controllers.read_segments",
     "shop.controllers.stretches": "shop.controllers.segments",
 }

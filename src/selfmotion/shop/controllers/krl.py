@@ -497,7 +497,7 @@ class KrlReader(ProgramReader):
 
     def _joint_approach(self, axes: list[float]) -> None:
         """Take where the motion begins, or where it slowly goes on by axis targets."""
-        facts = self.lines.facts()
+        facts = self.comments.facts()
         most = _WHOLE if facts is None else _WHOLE * facts.approach
         share = {name: self.settings.get(name, 0.0) for name in ("VEL", "ACC")}
         fast = [name for name, value in share.items() if not 0.0 < value <= most + _SAME_TIME]

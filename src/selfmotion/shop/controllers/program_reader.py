@@ -1,21 +1,25 @@
 """Programs of controllers, read line by line by the table of their language."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path as FilePath
 from typing import Any, ClassVar
 
 import numpy as np
 
+from selfmotion.basics import FileFormatError
 from selfmotion.model.robot import RobotModel
 from selfmotion.model.task import SE3
-from selfmotion.shop.controllers.commented_lines import Lines
 from selfmotion.shop.controllers.controller_program import ControllerProgram, Switch
 from selfmotion.shop.controllers.feed_segments import Ramps, times_at
+from selfmotion.shop.controllers.program_comments import Comments
 from selfmotion.shop.controllers.program_facts import Load
+from selfmotion.shop.controllers.program_lines import Lines
+from selfmotion.shop.controllers.program_settings import Axis
 from selfmotion.shop.controllers.program_texts import PLANNED
-from selfmotion.shop.controllers.read_segments import Pose, Row
+from selfmotion.shop.controllers.read_segments import Follower, Places, Pose, Row
 from selfmotion.shop.controllers.statements import Language
+from selfmotion.shop.controllers.tool_frames import WORLD
 
 # Relative error of accelerations by their few digits.
 _ROUNDED = 1e-2
@@ -71,6 +75,7 @@ class ProgramReader:
 
     def __init__(self, file: FilePath, robot: RobotModel | None = None) -> None:
         self.lines = Lines(file, self.language.comment)
+        self.comments = Comments(self.lines)
         self.robot = robot
         self.name, self.state = "", "before"
         # Axes of targets, by their names.
@@ -123,16 +128,73 @@ class ProgramReader:
             self.state = statement.then or self.state
         if self.state != "after":
             raise self.lines.fault(f"is the last one, expected {self.language.last}")
-        places = self.lines.places(self.tool, self.work)
+        places = self.comments.places(self.tool, self.work)
         places.is_carried = self.is_carried
-        facts, unit = self.lines.facts(), self.settings.get("unit", "")
+        facts, unit = self.comments.facts(), self.settings.get("unit", "")
         if facts is not None and unit and facts.positioner not in ("", unit):
             raise self.lines.fault(
                 f"its work object is carried by mechanical unit '{unit}', it was written for "
                 f"'{facts.positioner}'"
             )
-        given = self.name, self.axes, self.rows, self.switches, places, self.robot, self.load
-        return self.lines.program(*given)
+        return self._program(places)
+
+    def _program(self, places: Places) -> ControllerProgram:
+        """Return the program of the rows of targets, and of what is switched.
+
+        Raises
+        ------
+        FileFormatError
+            Something is missing, or the arm cannot follow.
+        """
+        said, present, file = self.comments.joints(), self.axes, self.lines.file
+        # Robots of fewer axes have numbers in the places of those they lack.
+        columns = [k for k, axis in enumerate(present) if axis in said or not said]
+        axes = tuple(Axis(present[k], *said.get(present[k], (present[k], False))) for k in columns)
+        if not axes:
+            raise FileFormatError(f"{file}: has no axes of those that its comments name")
+        self._check_unnamed(columns)
+        frames = None
+        if any(row.poses for row in self.rows):
+            if self.robot is None:
+                raise FileFormatError(
+                    f"{file}: has tool poses, whose joint positions need the robot: give it "
+                    f"(read_motion(file, robot=…), check --robot)"
+                )
+            frames = places.frames(self.robot, axes, file)
+        follower = Follower(file, axes, frames)
+        for row in self.rows:
+            follower.take(row.with_axes(columns))
+        if not follower.segments:
+            raise FileFormatError(f"{file}: has no targets with times")
+        return ControllerProgram(
+            self.name,
+            axes,
+            tuple(follower.segments),
+            self.comments.miss(),
+            tuple(self.switches),
+            places.shift,
+            WORLD if frames is None else places.carrier,
+            next(iter(self.comments.texts("joint targets")), ""),
+            self.comments.tolerance(),
+            tuple(dict.fromkeys(self.comments.texts("times"))),
+            follower.approach,
+            self.comments.facts(),
+            self.load,
+        )
+
+    def _check_unnamed(self, columns: Sequence[int]) -> None:
+        """Refuse axes that move, and that no comment gives a joint: nothing judges them.
+
+        Robots of fewer than six axes have 0 in the places of those they lack.
+        """
+        for k, axis in enumerate(self.axes):
+            if k in columns:
+                continue
+            if axis.startswith("E") or any(q[k] for row in self.rows for q in row.axes):
+                raise FileFormatError(
+                    f"{self.lines.file}: axis {axis} has targets, and the comment 'axes: …' names "
+                    f"no joint that it is: nothing has judged its motion"
+                )
 
     @property
     def tool(self) -> SE3 | None:
@@ -184,7 +246,7 @@ class ProgramReader:
     def wait(self, seconds: float) -> None:
         """Take a rest [s]."""
         self.check_stopped("the arm is to rest")
-        self.rows.append(Row(self.lines.step(), [], [seconds]))
+        self.rows.append(Row(self.comments.step(), [], [seconds]))
         self.clock += seconds
 
     def switch_output(self, output: str, value: bool) -> None:
@@ -234,7 +296,7 @@ class ProgramReader:
     def _timed(self, run: list[Target]) -> list[float]:
         """Add a motion at times; return when its targets are reached [s]."""
         seconds = [target.seconds for target in run]
-        self.rows.append(Row(self.lines.step(), self._every(run), seconds))
+        self.rows.append(Row(self.comments.step(), self._every(run), seconds))
         return [sum(seconds[:k]) for k in range(len(run) + 1)]
 
     def _every(self, run: list[Target]) -> list[list[float] | Pose]:
@@ -257,7 +319,7 @@ class ProgramReader:
 
         Ramps are the controller's, but the seam between them is judged at its feed.
         """
-        planned = self.lines.planned()
+        planned = self.comments.planned()
         every = self._every(run)
         if planned is None:
             raise self.lines.fault(
@@ -286,7 +348,7 @@ class ProgramReader:
                 f"its acceleration is {acceleration:g} m/s², expected {least:.4g} or more: with "
                 f"less the tool never is at its speed"
             )
-        self.rows.append(Row(self.lines.step(), every, [planned], speeds, vias, is_spline))
+        self.rows.append(Row(self.comments.step(), every, [planned], speeds, vias, is_spline))
         times: list[float] = Ramps(float(own[-1]), planned).times(own).tolist()
         return times
 

@@ -9,23 +9,14 @@ import numpy as np
 from selfmotion.basics import Array, ProblemError, write_text
 from selfmotion.shop.controllers.controller_program import ControllerProgram
 from selfmotion.shop.controllers.feed_segments import FeedSegment
+from selfmotion.shop.controllers.program_comments import before, head
 from selfmotion.shop.controllers.program_draft import Draft
-from selfmotion.shop.controllers.program_facts import with_checksum
 from selfmotion.shop.controllers.program_settings import Signal, written
 from selfmotion.shop.controllers.program_texts import (
-    BECAUSE,
-    KEPT,
-    PLANNED,
-    as_word,
-    folded,
-    pin_values,
     plain,
-    rounded_up,
-    stated,
 )
-from selfmotion.shop.controllers.segments import NO_MISS, PoseSegment, Segment
+from selfmotion.shop.controllers.segments import PoseSegment, Segment
 from selfmotion.shop.controllers.statements import Language
-from selfmotion.shop.controllers.thinning import TIME_DIGITS
 
 
 class WrittenPose(NamedTuple):
@@ -176,33 +167,6 @@ def with_approaches(segments: Sequence[Segment]) -> Iterator[tuple[Segment, Segm
         yield segment, approached
 
 
-def head(draft: Draft) -> list[str]:
-    """Return the comments at the head of a program, without what marks them as such."""
-    program = draft.program
-    axes = ", ".join(
-        f"{axis.name} = {as_word(axis.joint)} [{'mm' if axis.slides else 'deg'}]"
-        for axis in program.axes
-    )
-    moves = program.miss.moves
-    targets = "target" if program.targets == 1 else "targets"
-    notes = [
-        plain(f"selfmotion: {draft.robot.name}, {program.targets} {targets}"),
-        plain(draft.verdict),
-        plain(f"axes: {axes}"),
-        *draft.facts.notes,
-        *_of_speeds(program),
-        f"deviation: {stated(program.miss.path)}",
-        *([] if moves == NO_MISS else [f"deviation of moves: {stated(moves)}"]),
-        f"(of the tool from the plan, straight {_lines(draft)}, rounded corners or a spline",
-        "through the targets, at the times of the plan; of seams at speeds where the tool has gone",
-        "as far)",
-        *([f"{BECAUSE}{program.remark}"] if program.remark else []),
-        *_of_poses(draft),
-        "Angles are those of the URDF: compare zeros and signs with the controller's.",
-    ]
-    return [line for note in with_checksum(notes) for line in folded(note)]
-
-
 def speeds_of(program: ControllerProgram) -> list[float]:
     """Return the speeds of its seams, each once [m/s]."""
     at_speeds = (item for item in program.segments if isinstance(item, FeedSegment))
@@ -213,45 +177,3 @@ def goes_round(program: ControllerProgram) -> bool:
     """Whether it has circular motions."""
     at_speeds = (item for item in program.segments if isinstance(item, FeedSegment))
     return any(bool(np.isfinite(item.vias).any()) for item in at_speeds)
-
-
-def before(segment: Segment) -> list[str]:
-    """Return the comments before a segment, without what marks them as such."""
-    planned = isinstance(segment, FeedSegment)
-    return [
-        *([plain(segment.remark)] if segment.remark else []),
-        *([f"{PLANNED}{segment.duration:.{TIME_DIGITS}f} s"] if planned else []),
-    ]
-
-
-def _of_speeds(program: ControllerProgram) -> list[str]:
-    """Return the lines of the head about seams at speeds."""
-    within = program.within
-    if within is None:
-        return []
-    return [
-        f"{KEPT}{rounded_up(1e3 * within.position, 6)} mm, {rounded_up(within.rotation, 9)} rad",
-        "(seams are at their feeds, and keep that of what is prescribed; where the tool may turn,",
-        "and the arm's self-motion, are off the plan by what follows. Run-up and run-down, and so",
-        "when the tool is where, are the controller's)",
-    ]
-
-
-def _lines(draft: Draft) -> str:
-    return "joint lines" if draft.frames is None else "lines of the tool"
-
-
-def _of_poses(draft: Draft) -> list[str]:
-    """Return the lines of the head about the frames of poses, from which the reader takes them."""
-    frames = draft.frames
-    if frames is None:
-        return []
-    place = ", ".join(f"{value:.9f}" for value in pin_values(frames.work))
-    names = (frames.name, frames.carrier, draft.settings.flange or "-")
-    work, carrier, flange = map(as_word, names)
-    return [
-        f"poses: work object {work} of {carrier}, flange {flange}",
-        f"planned work object: {place}",
-        "(m, and quaternion x, y, z, w, in that frame; shift the work object to shift the motion)",
-        "Poses are reached in the arm's configuration at the begin, by axes.",
-    ]

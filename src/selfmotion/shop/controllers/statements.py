@@ -63,31 +63,22 @@ class Statement:
         return {part["name"]: part["field"] or part["name"] for part in parts}
 
 
-@dataclass(frozen=True, eq=False)
-class Language:
-    """The statements of a language.
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Table:
+    """Statements that are written and read.
 
     Attributes
     ----------
-    comment : str
-        Beginning of a comment.
-    last : str
-        The last statement of a program.
-    outputs : str
-        What outputs may be, in words.
-    has_output : callable
-        Whether the controller has an output.
     fields : mapping
         Types of values, by name.
     statements : sequence of Statement
+    is_exact : bool
+        Whether all spaces and capitals matter, as in comments that a checksum guards.
     """
 
-    comment: str
-    last: str
-    outputs: str
-    has_output: Callable[[str | int], bool]
     fields: Mapping[str, Field]
     statements: Sequence[Statement]
+    is_exact: bool = False
 
     def text(self, kind: str, **values: Any) -> str:
         """Return the statement of a kind that has these values."""
@@ -102,7 +93,8 @@ class Language:
     def find(self, text: str, state: str) -> tuple[Statement, dict[str, str]] | None:
         """Return the statement that a line is in a state, and the texts of its values.
 
-        Single spaces may be left out beside marks, and capitals do not matter.
+        Single spaces may be left out beside marks, and capitals do not matter, unless the table is
+        exact.
         """
         for statement, pattern in self._patterns:
             found = pattern.fullmatch(text) if state in statement.states else None
@@ -118,7 +110,8 @@ class Language:
 
     @cached_property
     def _patterns(self) -> list[tuple[Statement, re.Pattern[str]]]:
-        return [(item, re.compile(self._pattern(item), re.IGNORECASE)) for item in self.statements]
+        flags = re.NOFLAG if self.is_exact else re.IGNORECASE
+        return [(item, re.compile(self._pattern(item), flags)) for item in self.statements]
 
     def _pattern(self, statement: Statement) -> str:
         """Return the regular expression of a statement: spaces count between words alone."""
@@ -126,12 +119,11 @@ class Language:
         for part in _PARTS.finditer(statement.template):
             if part["space"]:
                 spaced = True
+                pattern += part[0] if self.is_exact else ""
                 continue
             is_mark = bool(part["mark"])
-            if pattern and (is_mark or after_mark):
-                pattern += " ?"
-            elif spaced:
-                pattern += " "
+            if not self.is_exact:
+                pattern += " ?" if pattern and (is_mark or after_mark) else " " * spaced
             after_mark, spaced = is_mark, False
             known = bool(part["name"]) and f"(?P<{part['name']}>" in pattern
             pattern += f"(?P={part['name']})" if known else self._part(statement, part)
@@ -141,7 +133,30 @@ class Language:
         if part["name"]:
             return f"(?P<{part['name']}>{self.fields[statement.values[part['name']]].pattern})"
         # A whole number may have decimals that are zero.
-        return rf"{part[0]}(?:\.0*)?" if part["number"] else re.escape(part[0])
+        is_number = part["number"] and not self.is_exact
+        return rf"{part[0]}(?:\.0*)?" if is_number else re.escape(part[0])
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Language(Table):
+    """The statements of a controller's language.
+
+    Attributes
+    ----------
+    comment : str
+        Beginning of a comment.
+    last : str
+        The last statement of a program.
+    outputs : str
+        What outputs may be, in words.
+    has_output : callable
+        Whether the controller has an output.
+    """
+
+    comment: str
+    last: str
+    outputs: str
+    has_output: Callable[[str | int], bool]
 
 
 @cache

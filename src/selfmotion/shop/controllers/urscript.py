@@ -363,7 +363,7 @@ class UrscriptReader(ProgramReader):
         axes = [at for at in targets if isinstance(at, list)]
         if len(poses) == len(targets):
             return np.array(poses)
-        joints = self.lines.joints()
+        joints = self.comments.joints()
         named = [joints[axis][0] for axis in self.axes if axis in joints]
         known = self.robot is not None and sorted(named) == sorted(self.robot.joint_names)
         if self.robot is None or not known or len(axes) < len(targets):
