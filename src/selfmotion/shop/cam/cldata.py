@@ -22,7 +22,7 @@ _LONGEST = 10_000
 _UNITS = {"MM": _MM, "INCH": _INCH, "INCHES": _INCH}
 # Feeds by the minute: all others are by turn or time.
 _FEEDS = {"MMPM": _MM, "IPM": _INCH, "PERMIN": None}
-# What moves nothing: names, the cutter's shape, tolerances of what is done already.
+# Words that move nothing: names, the cutter's shape, tolerances of what is done already.
 _NOTHING = (
     *("MACHIN", "CUTTER", "INTOL", "OUTTOL", "TOLER", "TLDATA", "SELECTL", "TOOLNO", "MULTAX"),
     *("PAINT", "SEQNO", "SELECT", "AUTOPS", "CLPRNT", "NOPOST", "REWIND"),
@@ -51,7 +51,7 @@ _AS_IT_IS = "INSERT"
 # Lines of texts, planes that the tip is on anyway, and what systems write of their own.
 _TEXTS = ("PARTNO", "PPRINT", "TPRINT", "REMARK", "DISPLY", "LETTER", "PSIS")
 _OWN = ("TOOL PATH", "END-OF-PATH", "CSI_")
-# What happens to other things than the arm: the events of a cut.
+# Words that are the events of a cut: they concern other things than the arm.
 _EVENTS = ("SPINDL", "COOLNT", "AUXFUN", "ARCON", "ARCOFF", "STOP", "OPSTOP", "DELAY")
 _ENDS = ("FINI", "END")
 # An arc of NX says tolerances and its cutter as well, and turns left-handed about its axis; all

@@ -25,7 +25,7 @@ PRIME = "prime"
 STOPS = ("M5", "M9", "SPINDL/OFF", "COOLNT/OFF", "ARCOFF", RETRACT)
 # The suffix of programs of Siemens' controls.
 _SIEMENS = ".mpf"
-# What is not known of a program of a machine tool.
+# Remark on what no program of a machine tool states.
 UNJUDGED = "stock and engagement are not judged"
 _FREE = (
     "only rapids along the tool's axis are made as the file has them, all others are free motions; "
@@ -470,7 +470,7 @@ def center_by_radius(
 
 # Holes that cycles of machines drill: down at the feed, and straight out again.
 
-# How far the tool stays off the bottom of a hole that is there already, or comes back to break
+# Distance of the tool from the bottom of a hole that is there already, or comes back to break
 # chips [m].
 _OFF = 5e-4
 _PECKS = 10_000

@@ -7,7 +7,7 @@ from selfmotion.basics import lines_of
 from selfmotion.shop.cam.cuts import Machine
 
 _WORD = re.compile(r"([A-Z])\s*=?\s*([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+))\s*")
-# What only a control's own language says.
+# Words of the languages of controls alone.
 _MACRO = re.compile(r"#|\[|^\s*N?[0-9]*\s*O\s*<|\b(SUB|CALL|REPEAT|WHILE|IF|ENDSUB|GOTO)\b")
 _HEIDENHAIN = re.compile(r"[0-9]*\s*BEGIN PGM")
 # Words of a printer that extrude, and that extrude while it moves.

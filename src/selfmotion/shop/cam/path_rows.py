@@ -46,7 +46,7 @@ _TURN_NOTE = "rx,ry,rz are read as a rotation vector: the axis of a turn, as lon
 _HALF_TURN = 2e-4
 
 
-# What a table without a header may be, by the number of its columns.
+# Columns of a table without a header, by their number.
 _HEADERS = {
     3: "x,y,z",
     4: "t,x,y,z",
@@ -54,14 +54,14 @@ _HEADERS = {
     7: "x,y,z,qw,qx,qy,qz",
     8: "t,x,y,z,qw,qx,qy,qz",
 }
-# What the columns of an array are where nothing else is said.
+# Columns of an array, by their number, unless options name them.
 _ARRAYS = {3: ("x", "y", "z"), 4: ("t", "x", "y", "z")}
 # Units in brackets behind a title → what its name ends in; other names of columns.
 _BRACKETS = {"mm": "_mm", "mm/s": "_mm", "deg": "_deg", "°": "_deg", "degrees": "_deg"}
 _BRACKETS |= {"cm": "_cm", "cm/s": "_cm", "in": "_in", "inch": "_in", "in/s": "_in"}
 _BRACKETS |= dict.fromkeys(("m", "rad", "s", "m/s", "sec", "-", "1"), "")
 _ALSO = {"time": "t", "timestamp": "t"}
-# What other programs call x or qx: pose.position.x, pos_x, px, tx; orientation.x, quat_x.
+# Names of x or qx in other programs: pose.position.x, pos_x, px, tx; orientation.x, quat_x.
 _PLACES = re.compile(r"(?:[a-z]+[._])*(?:position|pos|translation)[._]([xyz])|[pt]([xyz])")
 _TURNS = re.compile(r"(?:[a-z]+[._])*(?:orientation|quaternion|quat|q)[._]([wxyz])")
 # The first word of a program.
@@ -74,7 +74,7 @@ EVENT = "event"
 _KNOWN = {"t", "feed", *_POSITION, *(name for names in _COLUMNS for name in names)}
 
 
-# What makers of controllers call orientations → what they are here.
+# Names of orientations of makers of controllers → their names here.
 _MAKERS = {
     **dict.fromkeys("abc", "A,B,C of KUKA are yaw_deg,pitch_deg,roll_deg here"),
     **dict.fromkeys(("w", "p", "r"), "W,P,R of Fanuc are roll_deg,pitch_deg,yaw_deg here"),
@@ -327,7 +327,7 @@ def rows_of_table(
     )
 
 
-# What columns are taken for that say no unit: words of it, and what says another one.
+# Columns without a unit → the unit that is taken, and the ending for another one.
 _TAKEN = {
     **dict.fromkeys(_POSITION, ("metres", "x_mm, x_cm, x_in")),
     "feed": ("m/s", "feed_mm"),
@@ -472,7 +472,7 @@ def _read_array(file: FilePath, reading: Reading) -> PoseRows:
     return rows_of_table(file, [columns[k] for k in chosen], numbers, places, {})
 
 
-# What a list of messages may be called.
+# Names of a list of messages.
 _LISTS = ("paths", "rasters", "pose_arrays")
 
 

@@ -17,7 +17,7 @@ from selfmotion.shop.controllers.segments import Curve, Knots, PoseSegment, fine
 from selfmotion.shop.controllers.steps import put_on_arcs, step_lengths
 from selfmotion.shop.controllers.tool_frames import ToolFrames
 
-# How far a tool has gone along its path, as a function of time, and back.
+# Length of path that a tool has passed, as a function of time, and its inverse.
 
 # Times at which speeds are evaluated, per interval between two samples.
 _BETWEEN = 4

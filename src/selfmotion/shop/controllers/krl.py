@@ -308,27 +308,21 @@ class KrlWriter(ProgramWriter):
 
     @override
     def motion(self, segment: Segment) -> list[str]:
-        lines = self.events(segment, 0)
         if segment.is_rest:
-            for k, interval in enumerate(np.diff(segment.t), 1):
-                lines += [self.line("wait", seconds=interval), *self.events(segment, k)]
-            return lines
+            return super().motion(segment)
+        lines, kind = self.events(segment, 0), "joint"
         if isinstance(segment, FeedSegment):
             return [*lines, *self._at_speed(segment)]
-        block = "axis block"
         if isinstance(segment, PoseSegment):
-            block, kind = "pose block", "linear" if _is_straight(segment) else "spline"
+            kind = "linear" if _is_straight(segment) else "spline"
             speed = _unbound(segment)
             # After a seam at its feed, or where times ask for more.
             if speeds_of(self.program) or speed > _UNBOUND:
                 lines.append(self.line("set", speed=speed))
+        block = "axis block" if kind == "joint" else "pose block"
         lines += [self.line(block), self._inner("times")]
         for k, interval in enumerate(np.diff(segment.t), 1):
-            lines += self._triggers(segment, k)
-            if isinstance(segment, PoseSegment):
-                lines.append(self._inner(kind, pose=self.pose(segment, k)))
-            else:
-                lines.append(self._inner("joint", axes=self.axes(segment, k)))
+            lines += [*self._triggers(segment, k), f"  {self.step(segment, k, kind)}"]
             lines.append(self._inner("part", seconds=interval))
         return [*lines, self._inner("whole", seconds=segment.t[-1]), self.line("close")]
 
@@ -341,11 +335,8 @@ class KrlWriter(ProgramWriter):
         lines, commands = [self.line("set", speed=speeds[0])], list[str]()
         for k, speed in enumerate(speeds, 1):
             commands += self._triggers(segment, k)
-            values = {"pose": self.pose(segment, k)}
-            if segment.goes_round(k):
-                values["via"] = self.pose(segment.middles, k - 1)
             own = {"speed": speed} if speed != speeds[0] else {}
-            commands.append(self._inner("circular" if "via" in values else kind, **values, **own))
+            commands.append(f"  {self.step(segment, k, kind, **own)}")
         if count == 1 and len(commands) == 1:
             return [*lines, commands[0][2:]]
         return [*lines, self.line("pose block"), *commands, self.line("close")]
@@ -416,7 +407,7 @@ _UNKNOWN_STATUS = [
     "S is not stated: the wrist axes of this arm do not meet in a point, or its zero is",
     "not that of KUKA's arms. The configuration is that of the begin.",
 ]
-# What a trigger at the next target begins with.
+# Beginning of a trigger at the next target.
 _AT_TARGET = _TRIGGER.partition("$OUT")[0]
 
 
@@ -578,7 +569,7 @@ class KrlReader(ProgramReader):
         self.run[-1].seconds = seconds
 
     def _take_trigger(self, output: str = "", value: bool | None = None, event: str = "") -> None:
-        """Take what is switched at the target that follows."""
+        """Take an output or event at the target that follows."""
         self.happen(Switch(0.0, output or event.strip(), value), ahead=1)
 
     def _end_times(self, seconds: float) -> None:

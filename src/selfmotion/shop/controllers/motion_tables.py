@@ -26,7 +26,7 @@ from selfmotion.shop.controllers.samples import MotionSamples
 
 # Joints that mimic others, in files of motions: they follow, and are no coordinates of an arm.
 
-# How far a joint may be off what it mimics [rad or m]: rounding of a file, and what encoders see.
+# Largest deviation of a joint from the one that it mimics, by rounding and encoders [rad or m].
 _OFF = 1e-4
 
 

@@ -320,7 +320,7 @@ def _write_stream(
     write_text(file, script(plan.robot, joints, q, rate, settings, events))
 
 
-# How tables of what happens when are called.
+# End of the names of timetables.
 _TIMETABLE = ".timetable.csv"
 # Messages of ROS, as texts.
 MESSAGES = ("ros", "moveit")

@@ -258,7 +258,7 @@ class ProgramReader:
         self.happen(Switch(0.0, event.strip()))
 
     def happen(self, switch: Switch, ahead: int = 0) -> None:
-        """Take what is switched at the last target, or at one that is `ahead`."""
+        """Take an output or event at the last target, or at one that is `ahead`."""
         if self.run or ahead:
             self.happens.append((len(self.run) + ahead, switch))
         else:

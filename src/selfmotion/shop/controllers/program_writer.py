@@ -84,7 +84,31 @@ class ProgramWriter:
 
     def motion(self, segment: Segment) -> list[str]:
         """Return the lines of a motion from rest to rest, or of a rest."""
+        lines = self.events(segment, 0)
+        for k, interval in enumerate(np.diff(segment.t), 1):
+            if segment.is_rest:
+                lines.append(self.line("wait", seconds=interval))
+            else:
+                lines.append(self.step(segment, k, **self.pace(segment, k)))
+            lines += self.events(segment, k)
+        return lines
+
+    def pace(self, segment: Segment, k: int) -> dict[str, Any]:
+        """Return the values of the statement of a step besides its target."""
         raise NotImplementedError
+
+    def step(self, segment: Segment, k: int, linear: str = "linear", **values: Any) -> str:
+        """Return the line of a step to a target: by joints, circular, or `linear`."""
+        if not isinstance(segment, PoseSegment):
+            return self.line("joint", axes=self.joint_target(segment, k), **values)
+        pose = self.pose(segment, k)
+        if not (isinstance(segment, FeedSegment) and segment.goes_round(k)):
+            return self.line(linear, pose=pose, **values)
+        return self.line("circular", via=self.pose(segment.middles, k - 1), pose=pose, **values)
+
+    def joint_target(self, segment: Segment, k: int) -> Any:
+        """Return a target of joints, as its field is written."""
+        return self.axes(segment, k)
 
     def line(self, kind: str, **values: Any) -> str:
         """Return the line of a statement."""

@@ -4,6 +4,7 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path as FilePath
+from typing import Any
 
 import numpy as np
 from typing_extensions import override
@@ -295,51 +296,34 @@ class RapidWriter(ProgramWriter):
         if not isinstance(segment, PoseSegment):
             return self._joint_approach(segment)
         values = {**self._frames, "speed": f"{self.name}{SLOW}", "zone": "fine"}
-        return [self.line("linear", pose=self._pose(segment, 0), **values)]
+        return [self.line("linear", pose=self.pose(segment, 0), **values)]
 
     def _joint_approach(self, segment: Segment) -> list[str]:
         values = {"speed": f"{self.name}{SLOW}", "tool": f"{self.name}_t"}
         return [self.line("joint approach", axes=self.axes(segment, 0), **values)]
 
     @override
-    def motion(self, segment: Segment) -> list[str]:
-        lines, last = self.events(segment, 0), len(segment.t) - 1
-        for k, interval in enumerate(np.diff(segment.t), 1):
-            if segment.is_rest:
-                lines.append(self.line("wait", seconds=interval))
-            elif isinstance(segment, FeedSegment):
-                lines.append(self._at_speed(segment, k, "fine" if k == last else "z0"))
-            else:
-                values = {
-                    "speed": "v100",
-                    "seconds": interval,
-                    "zone": "fine" if k == last else "z1",
-                }
-                lines.append(self._timed(segment, k, values))
-            lines += self.events(segment, k)
-        return lines
-
-    def _timed(self, segment: Segment, k: int, values: Mapping[str, object]) -> str:
-        if isinstance(segment, PoseSegment):
-            return self.line("linear", pose=self._pose(segment, k), **self._frames, **values)
-        return self.line("joint", axes=self.axes(segment, k), tool=f"{self.name}_t", **values)
-
-    def _at_speed(self, segment: FeedSegment, k: int, zone: str) -> str:
-        number = speeds_of(self.program).index(segment.speeds[k - 1]) + 1
-        values = {**self._frames, "speed": f"{self.name}_f{number}", "zone": zone}
-        pose = self._pose(segment, k)
-        if not segment.goes_round(k):
-            return self.line("linear", pose=pose, **values)
-        return self.line("circular", via=self._pose(segment.middles, k - 1), pose=pose, **values)
+    def pace(self, segment: Segment, k: int) -> dict[str, Any]:
+        stops = k == len(segment.t) - 1
+        if isinstance(segment, FeedSegment):
+            number = speeds_of(self.program).index(segment.speeds[k - 1]) + 1
+            speed = f"{self.name}_f{number}"
+            return {**self._frames, "speed": speed, "zone": "fine" if stops else "z0"}
+        frames = self._frames if isinstance(segment, PoseSegment) else {"tool": f"{self.name}_t"}
+        interval = segment.t[k] - segment.t[k - 1]
+        zone = "fine" if stops else "z1"
+        return {**frames, "speed": "v100", "seconds": interval, "zone": zone}
 
     @property
     def _frames(self) -> dict[str, str]:
         """Names of tool and work object."""
         return {"tool": f"{self.name}_t", "work": f"{self.name}_w"}
 
-    def _pose(self, segment: PoseSegment, k: int) -> WrittenPose:
+    @override
+    def pose(self, segment: PoseSegment, k: int, configuration: str = "") -> WrittenPose:
         *quarters, cfx = confdata(segment.frames, segment.q[k, np.argsort(segment.order)])
-        return self.pose(segment, k, ", ".join(str(value) for value in (*quarters, cfx or 0)))
+        numbers = ", ".join(str(value) for value in (*quarters, cfx or 0))
+        return super().pose(segment, k, configuration or numbers)
 
     def _unknown(self) -> list[str]:
         """Return the comment on configurations that are not known."""

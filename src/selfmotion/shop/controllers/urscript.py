@@ -4,6 +4,7 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path as FilePath
+from typing import Any
 
 import numpy as np
 from typing_extensions import override
@@ -193,6 +194,11 @@ class UrscriptWriter(ProgramWriter):
 
     language = URSCRIPT
 
+    def __init__(self, draft: Draft, name: str) -> None:
+        super().__init__(draft, name)
+        # Of the segment that is written [m].
+        self._radii = np.zeros(0)
+
     @override
     def opening(self) -> list[str]:
         draft, frames = self.draft, self.draft.frames
@@ -220,30 +226,24 @@ class UrscriptWriter(ProgramWriter):
 
     @override
     def motion(self, segment: Segment) -> list[str]:
-        lines, radii = self.events(segment, 0), self._radii(segment)
-        for k, interval in enumerate(np.diff(segment.t), 1):
-            values = {"seconds": interval, "radius": radii[k]}
-            if isinstance(segment, FeedSegment):
-                lines.append(self._at_speed(segment, k, radii[k]))
-            elif segment.is_rest:
-                lines.append(self.line("wait", seconds=interval))
-            elif isinstance(segment, PoseSegment):
-                lines.append(self.line("linear", pose=self.pose(segment, k), **values))
-            else:
-                lines.append(self.line("joint", axes=segment.q[k].tolist(), **values))
-            lines += self.events(segment, k)
-        return lines
+        self._radii = self._blends(segment)
+        return super().motion(segment)
 
-    def _at_speed(self, segment: FeedSegment, k: int, radius: float) -> str:
-        """Return a motion at a speed; the acceleration is that of the ramps."""
+    @override
+    def pace(self, segment: Segment, k: int) -> dict[str, Any]:
+        if not isinstance(segment, FeedSegment):
+            return {"seconds": segment.t[k] - segment.t[k - 1], "radius": self._radii[k]}
+        # The acceleration is that of the ramps.
         ramp = segment.speeds.max() / segment.ramps.each
-        values = {"acceleration": ramp, "speed": segment.speeds[k - 1], "radius": radius}
-        pose = self.pose(segment, k)
-        if not segment.goes_round(k):
-            return self.line("linear", pose=pose, **values)
-        return self.line("circular", via=self.pose(segment.middles, k - 1), pose=pose, **values)
+        speed = segment.speeds[k - 1]
+        return {"acceleration": ramp, "speed": speed, "radius": self._radii[k]}
 
-    def _radii(self, segment: Segment) -> Array:
+    @override
+    def joint_target(self, segment: Segment, k: int) -> list[float]:
+        q: list[float] = segment.q[k].tolist()
+        return q
+
+    def _blends(self, segment: Segment) -> Array:
         """Return the radius of the blend at each target [m]; without one the arm stops there."""
         if isinstance(segment, PoseSegment):
             places = segment.places
