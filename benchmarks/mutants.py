@@ -197,8 +197,10 @@ PARTS = (
         "programs read",
         (
             "shop/controllers/read_*.py",
+            "shop/controllers/program_reader.py",
+            "shop/controllers/program_comments.py",
             "shop/controllers/program_lines.py",
-            "shop/controllers/commented_lines.py",
+            "shop/controllers/statements.py",
         ),
         (
             "controllers/test_programs.py",

@@ -12,17 +12,12 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.model.task import SE3, Quaternion, exp3
-from selfmotion.shop.controllers import judged_program, judged_programs, program_miss, read_program
+from selfmotion.shop.controllers import judged_program, program_files, program_miss, read_program
+from selfmotion.shop.controllers.configurations import confdata, status_and_turn
+from selfmotion.shop.controllers.pose_numbers import ROUNDINGS
 from selfmotion.shop.controllers.program_settings import axes_of
 from selfmotion.shop.controllers.segments import Miss, Misses, miss_between
-from selfmotion.shop.controllers.tool_frames import (
-    ROUNDINGS,
-    ToolFrames,
-    confdata,
-    frame_of_paths,
-    status_and_turn,
-    turned_base,
-)
+from selfmotion.shop.controllers.tool_frames import ToolFrames, frame_of_paths, turned_base
 from support.arms import PANDA_HOME, robot_named
 from support.industrial import industrial_arm, two_seams
 from support.own_kinematics import Arm
@@ -479,7 +474,7 @@ def test_what_is_not_read_as_it_is_written_is_written_by_joints(
     alone: sm.Plan, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Where poses are off when a file is read again, whatever for, no such file is left."""
-    read = judged_programs.program_miss
+    read = program_files.program_miss
     off = Misses(Miss(1.0, 0.0, 0.0), Miss(0.0, 0.0, 0.0))
     asked = settings("a.mod")
 
@@ -487,7 +482,7 @@ def test_what_is_not_read_as_it_is_written_is_written_by_joints(
         count, stated, found = read(plan, file)
         return count, stated, off if "MoveL" in file.read_text() else found
 
-    monkeypatch.setattr(judged_programs, "program_miss", spoilt)
+    monkeypatch.setattr(program_files, "program_miss", spoilt)
     sm.files.write_motion(alone, tmp_path / "a.mod", settings=asked)
     text = (tmp_path / "a.mod").read_text()
     assert "MoveL" not in text

@@ -14,10 +14,10 @@ from selfmotion.certificate import Separation
 from selfmotion.shell.cli import reread
 from selfmotion.shop import controllers
 from selfmotion.shop.controllers import judged_program, program_miss
-from selfmotion.shop.controllers.judged_programs import read_program
+from selfmotion.shop.controllers.program_files import read_program
 from selfmotion.shop.controllers.program_settings import axes_of, tool_from_flange
-from selfmotion.shop.controllers.segments import NO_MISS, ways
-from selfmotion.shop.controllers.thinning import Piece, Section
+from selfmotion.shop.controllers.segments import NO_MISS
+from selfmotion.shop.controllers.thinning import Operation, Section
 from selfmotion.work.job import Step
 from support.arms import PANDA_HOME, robot_named
 from support.industrial import two_seams
@@ -265,7 +265,7 @@ def test_free_moves_are_as_far_off_as_bodies_keep_apart(
     (apart,) = (item for item in past.requirements if isinstance(item, Separation))
     (stretch,) = read_program(file).segments
     times = np.linspace(0.0, stretch.t[-1], 400)
-    for way in ways(stretch.t, stretch.q, times):
+    for way in stretch.interpolated(times):
         assert min(apart.model.distance(q).value for q in way) >= apart.distance
     # Where nothing else is said, and not for less.
     narrow = replace(settings(name, 1e-4), move_deviation=sm.Tolerance(1e-4, 1e-3))
@@ -734,7 +734,7 @@ def test_targets_are_not_nearer_than_a_controller_s_cycle() -> None:
     q[:, 0] += np.concatenate([[0.0], np.cumsum(0.5 * (qd[1:, 0] + qd[:-1, 0]) * np.diff(t))])
     motion = sm.Trajectory(t, q, qd, ur5.joint_names, qdd)
     speeds = np.abs(motion(np.linspace(0.0, 2.0, 4001), 1)).max(axis=0) / FULL
-    piece = Piece("seam", motion, (), (ur5.chain,), speeds=np.maximum(speeds, 1e-9))
+    operation = Operation("seam", motion, (), (ur5.chain,), speeds=np.maximum(speeds, 1e-9))
     slides = np.zeros(ur5.dof, dtype=bool)
-    stretch, _ = Section.of(piece, slides, 0.0, 2.0).thinned(sm.Tolerance(1e-4, 1e-3))
+    stretch, _ = Section(operation, slides, 0.0, 2.0).thinned(sm.Tolerance(1e-4, 1e-3))
     assert np.diff(stretch.t).min() >= CYCLE

@@ -164,7 +164,7 @@ def test_all_that_a_controller_may_make_of_targets_is_judged(plan: sm.Plan, tmp_
     # Velocities change within a thousandth of a step at corners [of a step's length].
     near = 1e-3 * np.abs(np.diff(stretch.q, axis=0)).max()
     for k, motion in enumerate(program.motions()):
-        for way in stretch.ways(t)[0:2][k - 1 : k]:
+        for way in stretch.interpolated(t)[0:2][k - 1 : k]:
             np.testing.assert_allclose(motion(t), way, atol=near)
         np.testing.assert_allclose(motion(t[[0, -1]], 1), 0.0, atol=AT_REST)
     assert len(lines) > len(smooth)

@@ -38,6 +38,7 @@ MOVED_MODULES = {
     "problem.problem.augmented": "planning.formulation.formulation",
     "problem.problem.of_arm": "planning.formulation.tolerances",
     "shop.controllers.feed_stretches": "shop.controllers.feed_segments",
+    "shop.controllers.commented_lines": "shop.controllers.program_lines",
     "shop.controllers.read_stretches": "shop.controllers.read_segments",
     "shop.controllers.stretches": "shop.controllers.segments",
 }

@@ -11,14 +11,18 @@ from selfmotion.basics import Array, lines_of
 from selfmotion.shop.cam.cuts import Machine, Pecks, arc_points, drill, unit_axis
 from selfmotion.shop.cam.path_rows import LENGTH_UNITS, PoseRows
 
-_INCH, _MM = 25.4e-3, 1e-3
+# Inch [m].
+_INCH = 25.4e-3
+# Millimetre [m].
+_MM = 1e-3
 _STATEMENT = re.compile(r"([A-Z][A-Z0-9]{0,7})\s*(?:/(.*))?")
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:E[+-]?[0-9]{1,2})?")
+# Longest statement [characters].
 _LONGEST = 10_000
 _UNITS = {"MM": _MM, "INCH": _INCH, "INCHES": _INCH}
 # Feeds by the minute: all others are by turn or time.
 _FEEDS = {"MMPM": _MM, "IPM": _INCH, "PERMIN": None}
-# What moves nothing: names, the cutter's shape, tolerances of what is done already.
+# Words that move nothing: names, the cutter's shape, tolerances of what is done already.
 _NOTHING = (
     *("MACHIN", "CUTTER", "INTOL", "OUTTOL", "TOLER", "TLDATA", "SELECTL", "TOOLNO", "MULTAX"),
     *("PAINT", "SEQNO", "SELECT", "AUTOPS", "CLPRNT", "NOPOST", "REWIND"),
@@ -47,7 +51,7 @@ _AS_IT_IS = "INSERT"
 # Lines of texts, planes that the tip is on anyway, and what systems write of their own.
 _TEXTS = ("PARTNO", "PPRINT", "TPRINT", "REMARK", "DISPLY", "LETTER", "PSIS")
 _OWN = ("TOOL PATH", "END-OF-PATH", "CSI_")
-# What happens to other things than the arm: the events of a cut.
+# Words that are the events of a cut: they concern other things than the arm.
 _EVENTS = ("SPINDL", "COOLNT", "AUXFUN", "ARCON", "ARCOFF", "STOP", "OPSTOP", "DELAY")
 _ENDS = ("FINI", "END")
 # An arc of NX says tolerances and its cutter as well, and turns left-handed about its axis; all
@@ -63,10 +67,12 @@ _OF_HOLES = (
     *("FEDTO", "DEPTH", "RAPTO", "CLEAR", "RTRCTO", "DWELL", "MMPM", "IPM", "1STPECK"),
     *_STEPS,
 )
-# Axes nearer than this are the same; those of a frame are square up to this: rounding of files.
-_TURNED, _SQUARE = 1e-6, 1e-4
+# Difference of axes that are the same.
+_TURNED = 1e-6
+# Cosine of the angle between axes of a frame that counts as none: rounding of files.
+_SQUARE = 1e-4
 _UP = np.array([0.0, 0.0, 1.0])
-# A helix goes round so many times at most.
+# Largest number of turns of a helix.
 _TURNS = 1000
 
 
@@ -122,7 +128,7 @@ class _Reader:
         self._msys: tuple[Array, Array] | None = None
         # What the first statement of a kind said that a file has one of.
         self._first: dict[str, str] = {}
-        # What the next places are told beforehand: an arc, a direction, the tool's axis.
+        # Stated for the next places beforehand: an arc, a direction, the tool's axis.
         self._arc: _Arc | None = None
         self._ahead: Array | None = None
         self._axis: Array | None = None
@@ -353,21 +359,21 @@ class _Reader:
         self._cycle = found
 
     def _drill(self, top: Array, axis: Array) -> None:
-        """Drill a hole of the cycle, whose top is told."""
-        asked, unit = self._cycle, self._unit
-        height = unit * asked.get("RAPTO", asked.get("CLEAR", 0.0))
+        """Drill a hole of the cycle, whose top is given."""
+        cycle, unit = self._cycle, self._unit
+        height = unit * cycle.get("RAPTO", cycle.get("CLEAR", 0.0))
         # NX says depths by what is below 0, others by how deep.
-        depth = unit * abs(asked.get("FEDTO", asked.get("DEPTH", 0.0)))
+        depth = unit * abs(cycle.get("FEDTO", cycle.get("DEPTH", 0.0)))
         pecks = None
-        if "DEEP" in asked or "BRKC" in asked:
-            others = next((asked[word] for word in _STEPS if word in asked), 0.0)
-            first = asked.get("1STPECK", others)
-            pecks = Pecks(unit * first, unit * others, is_out="DEEP" in asked)
-        waits = asked.get("DWELL", 0.0) > 0.0
+        if "DEEP" in cycle or "BRKC" in cycle:
+            others = next((cycle[word] for word in _STEPS if word in cycle), 0.0)
+            first = cycle.get("1STPECK", others)
+            pecks = Pecks(unit * first, unit * others, is_out="DEEP" in cycle)
+        waits = cycle.get("DWELL", 0.0) > 0.0
         # Between holes it is as high as it says, or as it was before them.
-        level = max(height, unit * asked.get("RTRCTO", 0.0))
+        level = max(height, unit * cycle.get("RTRCTO", 0.0))
         before = float((self._level - top) @ axis)
-        if "AUTO" in asked and np.isfinite(before):
+        if "AUTO" in cycle and np.isfinite(before):
             level = max(level, before)
         over = top + level * axis
         if level > height:
@@ -378,14 +384,14 @@ class _Reader:
             top - depth * axis,
             axis,
             pecks=pecks,
-            dwell=f"DELAY/{asked['DWELL']:g}" if waits else "",
+            dwell=f"DELAY/{cycle['DWELL']:g}" if waits else "",
         )
         if level > height:
             self.machine.rapid(over, axis)
         self._arc, self._ahead, self._axis, self._rapid = None, None, None, False
 
     def _to(self, position: Array, axis: Array, *, travels: bool) -> None:
-        """Go somewhere, along the arc that was told before if there is one."""
+        """Go somewhere, along the arc that was stated before, if there is one."""
         machine, arc = self.machine, self._arc
         self._arc, self._ahead, self._axis, self._rapid = None, None, None, False
         if travels:

@@ -1,4 +1,4 @@
-"""What programs of machine tools do: cuts at a feed, rapids in between, arcs and holes."""
+"""Cuts of machine tools' programs at a feed, rapids in between, arcs and holes."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -11,31 +11,36 @@ from selfmotion.basics import Array, FileFormatError, text_of
 from selfmotion.model.path import from_normal
 from selfmotion.shop.cam.path_rows import PoseRows
 
-# What programs of machine tools do: cuts at a feed, and rapids in between.
-
-# A file of a machine tool has less than so many bytes, a cut less than so many poses; nothing is
-# farther away than this [m].
-_BYTES, _POSES, _FAR = 200_000_000, 1_000_000, 1e3
-# What stops something: after a cut it belongs to that.
-RETRACT, PRIME = "retract", "prime"
+# Largest size of a file [bytes].
+_BYTES = 200_000_000
+# Largest number of poses of a cut.
+_POSES = 1_000_000
+# Largest distance of a place from zero [m].
+_FAR = 1e3
+# Event where a printer draws filament back.
+RETRACT = "retract"
+# Event where a printer pushes it forward again.
+PRIME = "prime"
+# Events that stop something: after a cut they belong to that.
 STOPS = ("M5", "M9", "SPINDL/OFF", "COOLNT/OFF", "ARCOFF", RETRACT)
 # The suffix of programs of Siemens' controls.
 _SIEMENS = ".mpf"
-# What is not known of a program of a machine tool.
+# Remark on what no program of a machine tool states.
 UNJUDGED = "stock and engagement are not judged"
 _FREE = (
     "only rapids along the tool's axis are made as the file has them, all others are free motions; "
     "let CAM write retracts and approaches along the axis"
 )
 _UP = np.array([0.0, 0.0, 1.0])
-# Poses nearer than this [m, and of their axes] are the same.
+# Difference of positions and axes of poses that are the same [m].
 _SAME = 1e-9
-# How fast the tool goes where a file says rapid and the motion is part of a cut, at most [m/s].
+# Largest speed of a rapid that is part of a cut [m/s].
 RAPID = 0.1
-# A rapid goes along the tool's axis where it goes aside by no more than this [m] and this share of
-# its length: rounding of files.
-_ASIDE, _SKEW = 2e-5, 1e-3
-# Axes apart from their opposite by less than this have no shortest way.
+# Largest distance from the tool's axis of a rapid along it, by rounding of files [m].
+_ASIDE = 2e-5
+# The same as a share of its length.
+_SKEW = 1e-3
+# Difference from -1 of the cosine between axes of which no rotation is the shortest.
 _OPPOSITE = 1e-9
 
 
@@ -250,9 +255,9 @@ class Machine:
 
     def _is_along(self, position: Array, axis: Array) -> bool:
         """Return whether a place is above or below the tool along its axis."""
-        way = position - self.position
-        length = float(np.linalg.norm(way))
-        aside = float(np.linalg.norm(way - (way @ axis) * axis))
+        step = position - self.position
+        length = float(np.linalg.norm(step))
+        aside = float(np.linalg.norm(step - (step @ axis) * axis))
         is_turned = np.abs(axis - self.axis).max() > _SKEW
         return not is_turned and aside <= _ASIDE + _SKEW * length
 
@@ -263,9 +268,9 @@ class Machine:
         if left is None:
             return
         if not np.isnan(position).any():
-            way = position - left.positions[-1]
-            away = float(way @ left.axes[-1])
-            self._slanted = abs(away) > _ASIDE + _SKEW * float(np.linalg.norm(way))
+            step = position - left.positions[-1]
+            away = float(step @ left.axes[-1])
+            self._slanted = abs(away) > _ASIDE + _SKEW * float(np.linalg.norm(step))
         if not left.cuts:
             # It went nowhere, but what happened there did.
             self.cuts = [cut for cut in self.cuts if cut is not left]
@@ -367,13 +372,15 @@ def unit_axis(values: Sequence[float], machine: Machine) -> Array:
 
 # Arcs of machines as points: circles about an axis, and helices along it.
 
-# Chords of arcs are off by this at most [m].
+# Largest deviation of chords from their arc [m].
 _CHORD = 1e-5
-# Both ends of an arc are as far from its centre, and no farther apart than its circle is wide, but
-# for this [m].
+# Difference of the distances of an arc's ends from its centre, and by which ends may be farther
+# apart than the circle is wide [m].
 _ROUND = 2e-4
-# Arcs of a larger radius [m] are a fault of what wrote them, and so are more chords.
-_LARGEST, _POINTS = 1e5, 100_000
+# Largest radius of an arc that is no fault of what wrote it [m].
+_LARGEST = 1e5
+# Largest number of chords of an arc.
+_POINTS = 100_000
 
 
 def arc_points(
@@ -463,7 +470,7 @@ def center_by_radius(
 
 # Holes that cycles of machines drill: down at the feed, and straight out again.
 
-# How far the tool stays off the bottom of a hole that is there already, or comes back to break
+# Distance of the tool from the bottom of a hole that is there already, or comes back to break
 # chips [m].
 _OFF = 5e-4
 _PECKS = 10_000

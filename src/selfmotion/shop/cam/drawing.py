@@ -3,7 +3,7 @@
 import logging
 import re
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path as FilePath
 from typing import Any, NamedTuple
@@ -12,136 +12,34 @@ import numpy as np
 
 from selfmotion.basics import Array, FileFormatError, Ints, ProblemError
 from selfmotion.shop.cam.cuts import Cut
+from selfmotion.shop.cam.drawn_curves import DRAWN
 from selfmotion.shop.cam.path_rows import LENGTH_UNITS, PoseRows, no_such_seam
 
-# Entities of DXF drawings as points (N, 3) along them, in units of the drawing.
+# Codes of a drawing: https://ezdxf.mozman.at/docs/.
 
-# A curve has less than so many points.
-_POINTS = 200_000
-# What is farther away than this, in units of the drawing, is a fault of what wrote it.
-_LARGEST = 1e100
-# A cubic is off its chord by at most this many times what it is off at thirds of its parameter.
-_BETWEEN_THIRDS = 1.31
-# Arcs of a larger radius, in deviations of a chord, are a fault of what wrote them.
-_FLATTEST = 1e11
-# A chord is halved so many times at most.
-_HALVINGS = 30
-# Pieces of a span between knots, and of an ellipse, to begin with.
-_PIECES = 4
-# Of polylines: fitted by a curve, by a spline, meshes.
-_NOT_AS_DRAWN = 2 | 4 | 16 | 64
-
-
-def _line_drawn(entity: Any, deviation: float) -> Array:
-    return np.array([entity.dxf.start, entity.dxf.end])
-
-
-def _arc_drawn(entity: Any, deviation: float) -> Array:
-    radius = abs(entity.dxf.radius)
-    if not 0.0 < radius < _FLATTEST * deviation:
-        raise ValueError(f"its radius is {radius:.6g}")
-    return np.array(list(entity.flattening(min(deviation, 0.5 * radius))))
-
-
-def _ellipse_drawn(entity: Any, deviation: float) -> Array:
-    ellipse = entity.construction_tool()
-    ends = np.linspace(0.0, ellipse.param_span, 2 * _PIECES + 1)
-    return _chords(lambda t: ellipse.vertices(ellipse.start_param + t), ends, deviation)
-
-
-def _spline_drawn(entity: Any, deviation: float) -> Array:
-    spline = entity.construction_tool()
-    first, last = spline.knots()[spline.order - 1], spline.knots()[spline.count]
-    knots = np.unique([first, *(each for each in spline.knots() if first < each < last), last])
-    ends = np.interp(np.arange(_PIECES * (len(knots) - 1) + 1) / _PIECES, range(len(knots)), knots)
-    return _chords(spline.points, ends, deviation)
-
-
-def _polyline_drawn(entity: Any, deviation: float) -> Array:
-    """Return the corners of a polyline, and points of the arcs between them."""
-    if entity.dxf.flags & _NOT_AS_DRAWN and entity.dxftype() == "POLYLINE":
-        raise ValueError("is a mesh, or fitted by a curve; explode it")
-    if entity.dxftype() == "POLYLINE" and entity.is_3d_polyline:
-        corners = [vertex.dxf.location for vertex in entity.vertices]
-        return np.array(corners + corners[:1] if entity.is_closed else corners)
-    found = np.zeros((0, 3))
-    for part in entity.virtual_entities():
-        points = DRAWN[part.dxftype()](part, deviation)
-        # Arcs go round to the left, also where the polyline goes to the right.
-        last = found[-1] if len(found) else np.array(_first_corner(entity))
-        away = np.linalg.norm(points[[0, -1]] - last, axis=1)
-        found = np.concatenate([found, points[::-1] if away[1] < away[0] else points])
-    return found
-
-
-def _first_corner(entity: Any) -> Any:
-    if entity.dxftype() == "POLYLINE":
-        return next(iter(entity.points_in_wcs()))
-    return next(iter(entity.vertices_in_wcs()))
-
-
-def _chords(curve: Callable[[Array], Any], ends: Array, deviation: float) -> Array:
-    """Return points of a curve whose chords are nowhere off it by more than a deviation.
-
-    Between two parameters it is taken for a cubic, which is what is between two knots of a spline
-    of degree three, and soon what is left of any other curve.
-    """
-    t = ends
-    for _ in range(_HALVINGS):
-        points = np.array([tuple(each) for each in curve(t)])
-        if not np.isfinite(points).all():
-            raise ValueError("is not finite")
-        if not np.abs(points).max() < _LARGEST:
-            raise ValueError(f"is farther away than {_LARGEST:g}")
-        chords, steps = np.diff(points, axis=0), np.diff(t)
-        far = np.zeros(len(chords), dtype=bool)
-        lengths = np.maximum((chords * chords).sum(axis=1), np.finfo(np.float64).tiny)
-        for share in (1.0 / 3.0, 2.0 / 3.0):
-            here = np.array([tuple(each) for each in curve(t[:-1] + share * steps)]) - points[:-1]
-            here = np.clip(here, -_LARGEST, _LARGEST)
-            along = np.clip((here * chords).sum(axis=1) / lengths, 0.0, 1.0)
-            away = np.linalg.norm(here - along[:, None] * chords, axis=1)
-            far |= ~(_BETWEEN_THIRDS * away <= deviation)
-        if not far.any():
-            return points
-        if len(t) + far.sum() > _POINTS:
-            break
-        t = np.sort(np.concatenate([t, t[:-1][far] + 0.5 * steps[far]]))
-    raise ValueError(f"needs more than {_POINTS} chords to be near enough")
-
-
-DRAWN: Mapping[str, Callable[[Any, float], Array]] = {
-    "LINE": _line_drawn,
-    "ARC": _arc_drawn,
-    "CIRCLE": _arc_drawn,
-    "ELLIPSE": _ellipse_drawn,
-    "SPLINE": _spline_drawn,
-    "LWPOLYLINE": _polyline_drawn,
-    "POLYLINE": _polyline_drawn,
-}
-
-
-# DXF drawings: what is drawn on a layer, joined end to end, as strokes of a tool.
-#
-# What the codes of a drawing mean: https://ezdxf.mozman.at/docs/.
-
-# What is written or marked in a drawing, and no stroke.
+# Entities that are texts or marks, and no strokes.
 _SAID = frozenset(
     ("TEXT", "MTEXT", "DIMENSION", "LEADER", "MULTILEADER", "MLEADER", "TOLERANCE", "ATTDEF")
 ) | frozenset(("ATTRIB", "ACAD_TABLE", "HATCH", "POINT", "VIEWPORT", "IMAGE", "WIPEOUT", "XLINE"))
-# What ezdxf remarks, such as handles that two entities share, is not told beside our own errors.
+# Remarks of ezdxf, such as on handles that two entities share, do not stand beside our errors.
 logging.getLogger("ezdxf").addHandler(logging.NullHandler())
-# A drawing has less than so many bytes; nothing is farther away than this [m].
-_BYTES, _FAR = 50_000_000, 1e3
-# Blocks have so many entities together, and are in so many others.
-_PARTS, _DEEPEST = 100_000, 20
+# Largest size of a drawing [bytes].
+_BYTES = 50_000_000
+# Largest distance from zero [m].
+_FAR = 1e3
+# Largest number of entities in all blocks.
+_PARTS = 100_000
+# Largest depth of blocks in blocks.
+_DEEPEST = 20
 _NO_DRAWING = "{}: is no DXF drawing: {}; save it as DXF in CAD again (2000 or later)"
 _DWG = re.compile(rb"AC10[0-9]{2}")
-# What $INSUNITS means.
+# Units of $INSUNITS.
 _UNITS = {1: "in", 2: "ft", 4: "mm", 5: "cm", 6: "m", 14: "dm"}
-# What chords may be off a curve, and ends off each other that meet [m].
-_DEVIATION = _MEET = 1e-5
-# What spoilt drawings lead to is as various as the entities that they are in.
+# Largest deviation of chords from their curve [m].
+_DEVIATION = 1e-5
+# Largest distance of ends that meet [m].
+_MEET = 1e-5
+# Errors of spoilt drawings, which are as various as the entities that they are in.
 _SPOILT = (
     ArithmeticError,
     AttributeError,
@@ -156,8 +54,8 @@ _SPOILT = (
 )
 
 
-class _Piece(NamedTuple):
-    """An entity as it is drawn: where it stands in the file, and points along it (N, 3) [m]."""
+class _Drawn(NamedTuple):
+    """An entity as it is drawn: its place in the file, and points along it (N, 3) [m]."""
 
     place: str
     points: Array
@@ -214,10 +112,10 @@ def read_drawing(
     except spoilt as error:
         raise FileFormatError(_NO_DRAWING.format(file, _line(error))) from error
     present = list(dict.fromkeys(layer for layer, _, _ in drawn if layer is not None))
-    asked = [layer for layer in present if seam is None or _may_have(layer, seam)]
-    if seam is not None and present and not asked:
+    chosen = [layer for layer in present if seam is None or _may_have(layer, seam)]
+    if seam is not None and present and not chosen:
         raise no_such_seam(file, seam, present)
-    layers: dict[str, list[_Piece]] = {layer: [] for layer in asked}
+    layers: dict[str, list[_Drawn]] = {layer: [] for layer in chosen}
     beside: Counter[str] = Counter()
     hidden = sorted({str(entity.dxf.layer) for layer, _, entity in drawn if layer is None})
     for layer, place, entity in drawn:
@@ -226,8 +124,8 @@ def read_drawing(
         if entity.dxftype() in _SAID:
             beside[entity.dxftype()] += 1
         else:
-            layers[layer].extend(_piece(file, layer, place, entity, LENGTH_UNITS[unit]))
-    strokes = {layer: _strokes(pieces) for layer, pieces in layers.items()}
+            layers[layer].extend(_points_of(file, layer, place, entity, LENGTH_UNITS[unit]))
+    strokes = {layer: _strokes(entities) for layer, entities in layers.items()}
     found = _named(file, strokes, hidden, beside)
     kinds = ", ".join(f"{count} {kind}" for kind, count in sorted(beside.items()))
     layers_off = ", ".join(f"'{name}'" for name in hidden)
@@ -299,7 +197,7 @@ def _may_have(layer: str, seam: str) -> bool:
 
 
 def _line(error: BaseException) -> str:
-    """Return what an error of ezdxf says, in one line."""
+    """Return the text of an error of ezdxf, in one line."""
     text = " ".join(str(error).split())[:200].rstrip(".")
     return type(error).__name__ if text in ("", "None") else text
 
@@ -313,7 +211,9 @@ def _visible_layer(drawing: Any, entity: Any) -> str | None:
     return None if layer.is_off() or layer.is_frozen() else str(layer.dxf.name)
 
 
-def _piece(file: FilePath, layer: str, place: str, entity: Any, unit: float) -> Iterator[_Piece]:
+def _points_of(
+    file: FilePath, layer: str, place: str, entity: Any, unit: float
+) -> Iterator[_Drawn]:
     """Yield an entity as points, unless it is shorter than what counts as a gap."""
     from ezdxf.lldxf.const import DXFError
 
@@ -337,32 +237,32 @@ def _piece(file: FilePath, layer: str, place: str, entity: Any, unit: float) -> 
             f"another unit than $INSUNITS says? (unit = 'mm')"
         )
     if len(points) and np.ptp(points, axis=0).max() > _MEET:
-        yield _Piece(place, points)
+        yield _Drawn(place, points)
 
 
-def _strokes(pieces: Sequence[_Piece]) -> list[PoseRows]:
-    """Return pieces joined end to end, each stroke in the direction of its first piece.
+def _strokes(entities: Sequence[_Drawn]) -> list[PoseRows]:
+    """Return entities joined end to end, each stroke in the direction of its first one.
 
-    Where more than two ends meet it is not said which goes on: strokes end there.
+    Where more than two ends meet, strokes end: which entity goes on is not known.
     """
-    # End 2 k is where piece k begins, and 2 k + 1 where it ends.
-    mates = _mates(np.array([piece.points[end] for piece in pieces for end in (0, -1)]))
+    # End 2 k is where entity k begins, and 2 k + 1 where it ends.
+    mates = _mates(np.array([item.points[end] for item in entities for end in (0, -1)]))
     found, taken = list[PoseRows](), set[int]()
-    for first in range(len(pieces)):
+    for first in range(len(entities)):
         if first in taken:
             continue
         here = 2 * first
         while (mate := int(mates[here])) >= 0:
             if mate // 2 == first:
-                # It closes: its first piece is where it begins.
+                # It closes: it begins with its first entity.
                 here = 2 * first
                 break
             here = mate ^ 1
         cut = Cut()
         while here >= 0 and here // 2 not in taken:
-            piece = pieces[here // 2]
+            item = entities[here // 2]
             taken.add(here // 2)
-            _add(cut, piece, piece.points[::-1] if here % 2 else piece.points)
+            _add(cut, item, item.points[::-1] if here % 2 else item.points)
             here = int(mates[here ^ 1])
         found.append(cut.rows())
     return found
@@ -386,12 +286,12 @@ def _mates(ends: Array) -> Ints:
     return mates
 
 
-def _add(cut: Cut, piece: _Piece, points: Array) -> None:
+def _add(cut: Cut, item: _Drawn, points: Array) -> None:
     up = np.array([0.0, 0.0, 1.0])
     for k, point in enumerate(points):
         meets = k == 0 and cut.positions and np.abs(point - cut.positions[-1]).max() <= _MEET
         if not meets:
-            cut.add(piece.place, point, up, 0.0)
+            cut.add(item.place, point, up, 0.0)
 
 
 def _named(

@@ -32,16 +32,19 @@ from selfmotion.shop.cam.gcode_words import (
 from selfmotion.shop.cam.path_rows import PoseRows, Reading
 from selfmotion.shop.cam.rotary import HEAD, Rotary
 
-_INCH, _MM = 25.4e-3, 1e-3
-# Nearer than this [m] is the same place.
+# Inch [m].
+_INCH = 25.4e-3
+# Millimetre [m].
+_MM = 1e-3
+# Distance of places that are the same [m].
 _SAME = 1e-9
-# A helix goes round so many times at most.
+# Largest number of turns of a helix.
 _TURNS = 1000
-# What changes nothing here: cutter compensation off, tool length (programs say where the tip is),
-# no polar words, mirror or turn, how corners are smoothed.
+# Words that change nothing here: cutter compensation off, tool length (programs say where the tip
+# is), no polar words, mirror or turn, how corners are smoothed.
 _NOTHING = {"G40", "G43", "G69", "G64", "G61", "G61.1", "G5.1", "G8", "G9"}
 _NOTHING |= {"G15", "G50.1", "G67"}
-# What is not read for a reason that says what to do.
+# Words that are not read → the reason, with what to do.
 _REASONS = {
     **dict.fromkeys(("G41", "G42"), "the cutter's radius is not added: let CAM do so"),
     "G95": "feeds by turns of a spindle are not read: let CAM write them by the minute (G94)",
@@ -57,7 +60,7 @@ _REASONS = {
 }
 # A wait, a retraction of its own, a look at a bed.
 _STANDING = {"G4", "G10", "G11", "G29"}
-# What has words P and Q, besides cycles, arcs and M words: how corners are smoothed.
+# Words that have P and Q, besides cycles, arcs and M words: how corners are smoothed.
 _WITH_P = {"G61", "G61.1", "G64", "G5.1", "G8"}
 # Calls of other programs.
 _CALLS = {"M96", "M97", "M98", "M99", "M198"}
@@ -70,7 +73,7 @@ _PLANES = {"G17": (0, 1, 2), "G18": (2, 0, 1), "G19": (1, 2, 0)}
 _DRILLS = {"G73", "G81", "G82", "G83", "G85", "G89"}
 _CYCLES = {"G74", "G76", "G84", "G86", "G87", "G88"}
 _HOME = {"G28", "G30", "G53"}
-# What of a printer's lines is read; all others are commands of its own.
+# Words of printers that are read; all others are commands of its own.
 _MOVES = re.compile(r"[GTXYZEF]\s*[0-9+.-]")
 _NUMBERED = re.compile(r"N\s*[0-9]+\s*")
 _MOTIONS = {"G0": 0, "G1": 1, "G2": 2, "G3": 3}

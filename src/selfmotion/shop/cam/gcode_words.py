@@ -7,10 +7,10 @@ from selfmotion.basics import lines_of
 from selfmotion.shop.cam.cuts import Machine
 
 _WORD = re.compile(r"([A-Z])\s*=?\s*([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+))\s*")
-# What only a control's own language says.
+# Words of the languages of controls alone.
 _MACRO = re.compile(r"#|\[|^\s*N?[0-9]*\s*O\s*<|\b(SUB|CALL|REPEAT|WHILE|IF|ENDSUB|GOTO)\b")
 _HEIDENHAIN = re.compile(r"[0-9]*\s*BEGIN PGM")
-# What a printer extrudes, and what it extrudes on its way.
+# Words of a printer that extrude, and that extrude while it moves.
 _EXTRUDES = re.compile(r"G0*[0-3](?![0-9.]).*E[+-]?[0-9.]")
 _ON_ITS_WAY = re.compile(r"[XYZ].*E[+-]?[0-9.]|E[+-]?[0-9.].*[XYZ]")
 # A word Z.
@@ -25,7 +25,7 @@ _LETTERS = "XYZABCIJKRFE" + "NSTHDOPQL"
 
 
 def extrudes(text: str) -> tuple[bool, bool]:
-    """Return whether a program is a printer's, and whether that extrudes on its way."""
+    """Return whether a program is a printer's, and whether that extrudes while it moves."""
     lines = (re.sub(r"[;(].*", "", line.upper()) for line in lines_of(text) if len(line) < _LINE)
     found = [line for line in lines if "E" in line and _EXTRUDES.search(line)]
     return bool(found), any(map(_ON_ITS_WAY.search, found))

@@ -22,26 +22,29 @@ from selfmotion.model.path import (
 )
 from selfmotion.shop.cam.cuts import RAPID
 from selfmotion.shop.cam.path_rows import DRAWING, PoseRows, some_rows
-from selfmotion.shop.cam.tangents import AXES, stretches_along, turning
+from selfmotion.shop.cam.tangents import AXES, sections_along, turning
 
-# A coordinate beyond this [m] can only be meant in millimetres.
+# Largest coordinate in metres [m]; one beyond can only be meant in millimetres.
 _FAR = 50.0
-# Poses farther from their predecessor than this [m] are a jump, unless another length is given.
+# Distance of a pose from the one before that is a jump, unless another one is given [m].
 JUMP = 0.5
-# Rotations by more than this [rad] are a jump, too: their direction would be a guess.
+# Rotation between poses that is a jump as well [rad]: its direction would be a guess.
 _FLIP = 2.6
-# Times this near [s] are the same.
+# Difference of times that are the same [s].
 _MOMENT = 1e-9
-# Legs that bend by more than this [rad] make a corner, unless another angle is given.
+# Angle between legs from which on they make a corner, unless another one is given [rad].
 _BEND = np.pi / 6
-# Poses nearer than this [m] are repeated ones; a stub is shorter than this share of the steps
-# beside it, and turns the tool by no more than this [rad].
-_REPEATED, _STUB, _TURN_TOLERANCE = 1e-9, 0.05, 1e-2
-# A path of a duration is run up in so long [s] at most.
+# Distance of repeated poses [m].
+_REPEATED = 1e-9
+# Largest length of a stub, as a share of the steps beside it.
+_STUB = 0.05
+# Largest rotation of the tool along a stub [rad].
+_TURN_TOLERANCE = 1e-2
+# Longest run-up of a path with a duration [s].
 _RAMP = 0.5
-# A curve is looked at in so many places between two poses.
+# Number of places between two poses at which a curve is evaluated.
 _LOOKS = 9
-# Legs that go back by less than this of the way they came turn round.
+# Difference from -1 of the cosine between legs of which the second goes back along the first.
 _BACK = 1e-3
 
 
@@ -70,13 +73,13 @@ class Pacing:
 
     @property
     def bounds(self) -> dict[str, float]:
-        """What bounds a feed, where it is given."""
+        """Bounds of a feed that are given."""
         names = ("turn_rate", "acceleration", "turn_acceleration", "smoothing", "within")
         given = {name: getattr(self, name) for name in names}
         return {name: value for name, value in given.items() if value is not None}
 
 
-def path_of_rows(path: FilePath, rows: PoseRows, asked: Pacing) -> Path:
+def path_of_rows(path: FilePath, rows: PoseRows, pacing: Pacing) -> Path:
     """Return the tool motion of rows of poses of a file; see `read_path`.
 
     Raises
@@ -87,29 +90,29 @@ def path_of_rows(path: FilePath, rows: PoseRows, asked: Pacing) -> Path:
     if len(rows.positions) < 2:
         raise FileFormatError(f"{path}: has {len(rows.positions)} poses, expected at least two")
     _check_rows(path, rows)
-    if asked.flip_normals:
+    if pacing.flip_normals:
         rows = _flipped(path, rows)
     rotations = _rotations(path, rows)
-    _check_jumps(path, rows, rotations, asked.jump)
-    rows, rotations = _without_stubs(rows, rotations, asked)
-    if asked.standoff:
-        rows = _stood_off(path, rows, rotations, asked.standoff)
+    _check_jumps(path, rows, rotations, pacing.jump)
+    rows, rotations = _without_stubs(rows, rotations, pacing)
+    if pacing.standoff:
+        rows = _stood_off(path, rows, rotations, pacing.standoff)
     turns = _quaternions(rotations) if rows.orientation else None
     try:
-        _check_corners(asked)
-        if asked.along is not None:
-            made = _along(rows, rotations, asked)
-        elif asked.lead or asked.tilt or asked.lift:
-            name = next(x for x in ("lead", "tilt", "lift") if getattr(asked, x))
+        _check_corners(pacing)
+        if pacing.along is not None:
+            made = _along(rows, rotations, pacing)
+        elif pacing.lead or pacing.tilt or pacing.lift:
+            name = next(x for x in ("lead", "tilt", "lift") if getattr(pacing, x))
             raise PathError(
                 f"{name} has no effect without along (x, -x, y, -y); drop it, or give it"
             )
         elif rows.straight:
-            made = _of_cut(rows, turns, asked)
+            made = _of_cut(rows, turns, pacing)
         else:
-            made = _of_table(path, rows, turns, asked)
-        is_ramped = asked.ramp is not None and asked.duration is None
-        found = section_at_rest(made, ramp=asked.ramp or 0.0) if is_ramped else made
+            made = _of_table(path, rows, turns, pacing)
+        is_ramped = pacing.ramp is not None and pacing.duration is None
+        found = section_at_rest(made, ramp=pacing.ramp or 0.0) if is_ramped else made
     # Splines refuse times that differ, but by less than they can divide by.
     except (PathError, ValueError) as error:
         raise FileFormatError(f"{path}: {error}") from error
@@ -117,63 +120,63 @@ def path_of_rows(path: FilePath, rows: PoseRows, asked: Pacing) -> Path:
     return found.noted((*rows.notes, *made.notes, *turned))
 
 
-def _check_corners(asked: Pacing) -> None:
+def _check_corners(pacing: Pacing) -> None:
     """Refuse what corners are not, and what has no effect on them."""
-    as_choice(asked.corners, "corners", ("blend", "stop", "round"), PathError)
-    stops = asked.corners == "stop"
-    if asked.corner_angle is not None and not stops:
+    as_choice(pacing.corners, "corners", ("blend", "stop", "round"), PathError)
+    stops = pacing.corners == "stop"
+    if pacing.corner_angle is not None and not stops:
         raise PathError(
-            f"corner_angle has no effect where corners are '{asked.corners}', only where they are "
+            f"corner_angle has no effect where corners are '{pacing.corners}', only where they are "
             f"'stop'; drop one"
         )
-    if asked.ramp is not None and asked.duration is not None and stops:
+    if pacing.ramp is not None and pacing.duration is not None and stops:
         raise PathError(
             "ramp has no effect on a duration where corners are 'stop', whose stretches rest at "
             "their ends; drop one"
         )
 
 
-def _of_table(file: FilePath, rows: PoseRows, turns: Array | None, asked: Pacing) -> Path:
+def _of_table(file: FilePath, rows: PoseRows, turns: Array | None, pacing: Pacing) -> Path:
     """Return the tool motion of a table."""
-    feed, duration, bounds = asked.feed, asked.duration, asked.bounds
+    feed, duration, bounds = pacing.feed, pacing.duration, pacing.bounds
     # The ramps are part of the duration, and go half as far as they last.
-    moving = None if duration is None else _moving(file, duration, asked)
-    in_place = asked.corners == "round" and moving is None
+    moving = None if duration is None else _moving(file, duration, pacing)
+    in_place = pacing.corners == "round" and moving is None
     t = _times(file, rows, feed, moving, turns_in_place=in_place)
     feeds = rows.feed if feed is None else np.full(len(rows.positions), feed)
     if bounds and feeds is None:
         raise PathError(f"{next(iter(bounds))} has no effect without a feed")
-    if asked.corners == "round":
+    if pacing.corners == "round":
         if feeds is None:
             raise PathError("corners are 'round', which needs a feed [m/s]; give it")
-        legs = Polyline(rows.positions, turns, tolerance=asked.tolerance)
-        steady = _steady(rows.positions, feeds, asked.tolerance)
+        legs = Polyline(rows.positions, turns, tolerance=pacing.tolerance)
+        steady = _steady(rows.positions, feeds, pacing.tolerance)
         return _at_feed(legs, legs.pose_times, steady, bounds)
-    return _noted(_through(t, rows, turns, feeds, asked), t, rows, asked)
+    return _noted(_through(t, rows, turns, feeds, pacing), t, rows, pacing)
 
 
 def _through(
-    t: Array, rows: PoseRows, turns: Array | None, feeds: Array | None, asked: Pacing
+    t: Array, rows: PoseRows, turns: Array | None, feeds: Array | None, pacing: Pacing
 ) -> Path:
     """Return a smooth path through poses."""
-    bend = _BEND if asked.corner_angle is None else asked.corner_angle
-    through = Waypoints(t, rows.positions, turns, corners=asked.corners, corner_angle=bend)
+    bend = _BEND if pacing.corner_angle is None else pacing.corner_angle
+    through = Waypoints(t, rows.positions, turns, corners=pacing.corners, corner_angle=bend)
     through.samples([0.0])
     if feeds is None:
-        return through if asked.duration is None else _at_rest(through, asked)
-    pieces: list[Path] = []
+        return through if pacing.duration is None else _at_rest(through, pacing)
+    sections: list[Path] = []
     passed = t - t[0]
-    for piece in through.between_corners():
+    for section in through.between_corners():
         # From one rest to the next.
-        here = (passed >= -_MOMENT) & (passed <= piece.duration + _MOMENT)
-        pieces.append(_at_feed(piece, passed[here], feeds[here], asked.bounds))
-        passed = passed - piece.duration
-    return pieces[0] if len(pieces) == 1 else Joined(pieces)
+        here = (passed >= -_MOMENT) & (passed <= section.duration + _MOMENT)
+        sections.append(_at_feed(section, passed[here], feeds[here], pacing.bounds))
+        passed = passed - section.duration
+    return sections[0] if len(sections) == 1 else Joined(sections)
 
 
-def _moving(file: FilePath, duration: float, asked: Pacing) -> float:
+def _moving(file: FilePath, duration: float, pacing: Pacing) -> float:
     """Return how long a path that is run up and down takes at its own speed [s]."""
-    ramp = 0.0 if asked.corners == "stop" else _ramp(asked)
+    ramp = 0.0 if pacing.corners == "stop" else _ramp(pacing)
     if not 0.0 <= 2.0 * ramp <= duration:
         raise FileFormatError(
             f"{file}: ramp is {ramp:g} s, expected at most half of the duration, {duration:g} s"
@@ -181,19 +184,19 @@ def _moving(file: FilePath, duration: float, asked: Pacing) -> float:
     return duration - ramp
 
 
-def _at_rest(path: Path, asked: Pacing) -> Path:
+def _at_rest(path: Path, pacing: Pacing) -> Path:
     """Return a path of a duration run up from rest, and down again, unless it rests anyway."""
-    return path if asked.corners == "stop" else section_at_rest(path, ramp=_ramp(asked))
+    return path if pacing.corners == "stop" else section_at_rest(path, ramp=_ramp(pacing))
 
 
-def _ramp(asked: Pacing) -> float:
+def _ramp(pacing: Pacing) -> float:
     """Return how long a path of a duration takes to run up [s]."""
-    return min(_RAMP, 0.25 * (asked.duration or 0.0)) if asked.ramp is None else asked.ramp
+    return min(_RAMP, 0.25 * (pacing.duration or 0.0)) if pacing.ramp is None else pacing.ramp
 
 
-def _noted(path: Path, t: Array, rows: PoseRows, asked: Pacing) -> Path:
+def _noted(path: Path, t: Array, rows: PoseRows, pacing: Pacing) -> Path:
     """Give a path a note where it leaves the straight lines between its poses."""
-    if asked.corners != "blend" or rows.t is not None:
+    if pacing.corners != "blend" or rows.t is not None:
         return path
     legs = np.diff(rows.positions, axis=0)
     lengths = np.linalg.norm(legs, axis=1)
@@ -211,10 +214,10 @@ def _noted(path: Path, t: Array, rows: PoseRows, asked: Pacing) -> Path:
     along = np.clip(np.einsum("klc,kc->kl", places, legs) / squares[:, None], 0.0, 1.0)
     away = np.linalg.norm(places - along[:, :, None] * legs[:, None], axis=2).max(axis=1)
     worst = int(away.argmax())
-    if away[worst] > asked.tolerance:
-        has_feed = rows.feed is not None or asked.feed is not None
+    if away[worst] > pacing.tolerance:
+        has_feed = rows.feed is not None or pacing.feed is not None
         remedy = (
-            f"corners round (--corners round) keeps {1e3 * asked.tolerance:g} mm"
+            f"corners round (--corners round) keeps {1e3 * pacing.tolerance:g} mm"
             if has_feed
             else "give more poses, or corners stop (--corners stop)"
         )
@@ -247,41 +250,44 @@ def _stood_off(file: FilePath, rows: PoseRows, rotations: Array, standoff: float
     return replace(rows, positions=rows.positions - standoff * rotations[:, :, 2])
 
 
-def _of_cut(rows: PoseRows, turns: Array | None, asked: Pacing) -> Path:
+def _of_cut(rows: PoseRows, turns: Array | None, pacing: Pacing) -> Path:
     """Return the straight legs of a cut or stroke, which rests where it goes back on itself."""
-    if asked.duration is not None:
+    if pacing.duration is not None:
         raise PathError("straight legs go at a feed, so that duration has no effect; drop it")
-    feeds = rows.feed if asked.feed is None else np.full(len(rows.positions), asked.feed)
+    feeds = rows.feed if pacing.feed is None else np.full(len(rows.positions), pacing.feed)
     if feeds is None:
         raise PathError("it says no feed (programs: F, FEDRAT); give a feed [m/s]")
-    still = np.tile([1.0, 0.0, 0.0, 0.0], (len(rows.positions), 1)) if turns is None else turns
+    unturned = np.tile([1.0, 0.0, 0.0, 0.0], (len(rows.positions), 1))
+    orientations = unturned if turns is None else turns
     rapid = np.zeros(len(feeds), dtype=bool) if rows.rapid is None else rows.rapid
     changes = 1 + np.flatnonzero(np.diff(rapid[:-1]))
-    pieces: list[Path] = []
+    sections: list[Path] = []
     for first, last in pairwise([0, *changes.tolist(), len(rows.positions) - 1]):
         is_rapid = bool(rapid[first])
         part = slice(first, last + 1)
         own = (
-            feeds[part] if is_rapid else _steady(rows.positions[part], feeds[part], asked.tolerance)
+            feeds[part]
+            if is_rapid
+            else _steady(rows.positions[part], feeds[part], pacing.tolerance)
         )
-        ends = first + _rests(rows.positions[part], still[part], asked)
+        ends = first + _rests(rows.positions[part], orientations[part], pacing)
         for begin, end in pairwise(ends.tolist()):
             leg = slice(begin, end + 1)
-            piece = Polyline(
+            section = Polyline(
                 rows.positions[leg],
                 None if turns is None else turns[leg],
-                tolerance=asked.tolerance,
+                tolerance=pacing.tolerance,
             )
             at = own[begin - first : end + 1 - first]
             if is_rapid:
-                pieces.append(Feed(piece, RAPID, required=False, **asked.bounds))
+                sections.append(Feed(section, RAPID, required=False, **pacing.bounds))
             else:
-                pieces.append(_at_feed(piece, piece.pose_times, at, asked.bounds))
-    return pieces[0] if len(pieces) == 1 else Joined(pieces)
+                sections.append(_at_feed(section, section.pose_times, at, pacing.bounds))
+    return sections[0] if len(sections) == 1 else Joined(sections)
 
 
-class _Piece(NamedTuple):
-    """Places (K, 3), rotations there, feeds from each on, and whether no feed is asked for."""
+class _CutSection(NamedTuple):
+    """Places (K, 3), rotations there, feeds from each on, and whether no feed is pacing for."""
 
     places: Array
     turns: Array
@@ -289,64 +295,66 @@ class _Piece(NamedTuple):
     is_free: bool
 
 
-def _along(rows: PoseRows, rotations: Array, asked: Pacing) -> Path:
+def _along(rows: PoseRows, rotations: Array, pacing: Pacing) -> Path:
     """Return straight legs along which an axis of the tool points where it goes."""
-    along = as_choice(asked.along, "along", tuple(AXES), PathError)
-    if asked.corners == "blend":
+    along = as_choice(pacing.along, "along", tuple(AXES), PathError)
+    if pacing.corners == "blend":
         raise PathError(
             f"along = '{along}' turns the tool in corners: say corners stop (on the spot, at "
             f"rest) or round (within the tolerance)"
         )
-    if asked.lift and asked.corners != "stop":
+    if pacing.lift and pacing.corners != "stop":
         raise PathError(
-            f"lift has no effect where corners are '{asked.corners}', only where they are 'stop'; "
+            f"lift has no effect where corners are '{pacing.corners}', only where they are 'stop'; "
             f"drop one"
         )
     count = len(rows.positions)
-    if rows.t is not None or asked.duration is not None:
+    if rows.t is not None or pacing.duration is not None:
         raise PathError(f"along = '{along}' is for paths at a feed, without times or a duration")
-    if rows.feed is not None and asked.feed is not None and not rows.straight:
+    if rows.feed is not None and pacing.feed is not None and not rows.straight:
         raise PathError("has a column feed, so that feed has no effect; drop one")
-    feeds = rows.feed if asked.feed is None else np.full(count, asked.feed)
+    feeds = rows.feed if pacing.feed is None else np.full(count, pacing.feed)
     if feeds is None:
         raise PathError(f"along = '{along}' needs a feed [m/s]; give it")
     axes = rotations[:, :, 2] if rows.orientation else np.tile([0.0, 0.0, -1.0], (count, 1))
     rapid = np.zeros(count, dtype=bool) if rows.rapid is None else rows.rapid
-    bend = _BEND if asked.corner_angle is None else asked.corner_angle
-    found = stretches_along(rows.positions, axes, rapid, along, (asked.lead, asked.tilt), bend)
-    pieces: list[_Piece] = []
+    bend = _BEND if pacing.corner_angle is None else pacing.corner_angle
+    found = sections_along(rows.positions, axes, rapid, along, (pacing.lead, pacing.tilt), bend)
+    sections: list[_CutSection] = []
     for number, (first, last, turns) in enumerate(found):
         if number:
             before = turning(found[number - 1].rotations[-1], turns[0])
             # Of two cuts: a rapid leaves the part by itself.
-            is_lifted = asked.lift > 0.0 and not rapid[found[number - 1].first] and not rapid[first]
-            away = -asked.lift * axes[first] if is_lifted else np.zeros(3)
-            pieces += _turned(rows.positions[first], np.array(before), float(feeds[first]), away)
+            beside_rapid = rapid[found[number - 1].first] or rapid[first]
+            is_lifted = pacing.lift > 0.0 and not beside_rapid
+            away = -pacing.lift * axes[first] if is_lifted else np.zeros(3)
+            sections += _turned(rows.positions[first], np.array(before), float(feeds[first]), away)
         part = slice(first, last + 1)
-        pieces.append(_Piece(rows.positions[part], turns, feeds[part], bool(rapid[first])))
-    if asked.corners == "round":
-        pieces = _run_together(pieces, [bool(rapid[item.first]) for item in found])
+        sections.append(_CutSection(rows.positions[part], turns, feeds[part], bool(rapid[first])))
+    if pacing.corners == "round":
+        sections = _run_together(sections, [bool(rapid[item.first]) for item in found])
     paths: list[Path] = []
-    for places, turns, own, is_free in pieces:
+    for places, turns, own, is_free in sections:
         if not is_free or np.ptp(places, axis=0).max() > 0.0 or _is_turned(turns):
-            legs = Polyline(places, _quaternions(turns), tolerance=asked.tolerance)
+            legs = Polyline(places, _quaternions(turns), tolerance=pacing.tolerance)
             if is_free:
-                paths.append(Feed(legs, RAPID, required=False, **asked.bounds))
+                paths.append(Feed(legs, RAPID, required=False, **pacing.bounds))
             else:
-                steady = _steady(places, own, asked.tolerance)
-                paths.append(_at_feed(legs, legs.pose_times, steady, asked.bounds))
+                steady = _steady(places, own, pacing.tolerance)
+                paths.append(_at_feed(legs, legs.pose_times, steady, pacing.bounds))
     return paths[0] if len(paths) == 1 else Joined(paths)
 
 
-def _turned(place: Array, turns: Array, feed: float, away: Array) -> list[_Piece]:
+def _turned(place: Array, turns: Array, feed: float, away: Array) -> list[_CutSection]:
     """Return the turn (K, 3, 3) at a corner: on the spot, or away (3,) from it and back."""
-    spot = _Piece(np.tile(place + away, (len(turns), 1)), turns, np.full(len(turns), feed), True)
+    count = len(turns)
+    spot = _CutSection(np.tile(place + away, (count, 1)), turns, np.full(count, feed), True)
     if not away.any() or not _is_turned(turns):
         return [spot]
-    ways = (([place, place + away], turns[0]), ([place + away, place], turns[-1]))
+    sides = (([place, place + away], turns[0]), ([place + away, place], turns[-1]))
     up, down = (
-        _Piece(np.array(ends), np.array([turn, turn]), np.full(2, feed), True)
-        for ends, turn in ways
+        _CutSection(np.array(ends), np.array([turn, turn]), np.full(2, feed), True)
+        for ends, turn in sides
     )
     return [up, spot, down]
 
@@ -356,43 +364,43 @@ def _is_turned(turns: Array) -> bool:
     return bool(np.abs(turns - turns[0]).max() > _REPEATED)
 
 
-def _run_together(pieces: Sequence[_Piece], rapid: Sequence[bool]) -> list[_Piece]:
-    """Return pieces of which those at a feed, and turns between two of them, are one."""
-    found: list[_Piece] = []
-    for number, piece in enumerate(pieces):
+def _run_together(sections: Sequence[_CutSection], rapid: Sequence[bool]) -> list[_CutSection]:
+    """Return sections of which those at a feed, and turns between two of them, are one."""
+    found: list[_CutSection] = []
+    for number, section in enumerate(sections):
         # Turns stand between stretches.
         beside = rapid[number // 2 : number // 2 + 1 + number % 2]
         at_feed = not any(beside)
         if found and at_feed and not found[-1].is_free:
             last = found[-1]
             pairs = (
-                (last.places, piece.places),
-                (last.turns, piece.turns),
-                (last.feeds, piece.feeds),
+                (last.places, section.places),
+                (last.turns, section.turns),
+                (last.feeds, section.feeds),
             )
             joined = [np.concatenate([one, other[1:]]) for one, other in pairs]
-            found[-1] = _Piece(joined[0], joined[1], joined[2], False)
+            found[-1] = _CutSection(joined[0], joined[1], joined[2], False)
         else:
-            found.append(piece._replace(is_free=not at_feed))
+            found.append(section._replace(is_free=not at_feed))
     return found
 
 
-def _rests(positions: Array, turns: Array, asked: Pacing) -> Ints:
+def _rests(positions: Array, turns: Array, pacing: Pacing) -> Ints:
     """Return at which poses a tool rests: both ends, where it goes back on itself, or corners."""
-    kept = merged(positions, turns, asked.tolerance, _TURN_TOLERANCE).kept
-    legs = np.diff(positions[kept], axis=0)
+    apart = merged(positions, turns, pacing.tolerance, _TURN_TOLERANCE).kept
+    legs = np.diff(positions[apart], axis=0)
     lengths = np.linalg.norm(legs, axis=1)
     with np.errstate(invalid="ignore", divide="ignore"):
         cosines = (legs[:-1] * legs[1:]).sum(axis=1) / (lengths[:-1] * lengths[1:])
     least = _BACK - 1.0
-    if asked.corners == "stop":
-        least = np.cos(_BEND if asked.corner_angle is None else asked.corner_angle)
-    inner = kept[1 + np.flatnonzero(cosines < least)]
+    if pacing.corners == "stop":
+        least = np.cos(_BEND if pacing.corner_angle is None else pacing.corner_angle)
+    inner = apart[1 + np.flatnonzero(cosines < least)]
     return np.array([0, *inner.tolist(), len(positions) - 1])
 
 
 def _steady(positions: Array, feeds: Array, tolerance: float) -> Array:
-    """Return feeds (N,) without those that hold for less way than the tolerance."""
+    """Return feeds (N,) without those that hold for less length than the tolerance."""
     found = feeds.copy()
     steps = np.append(np.linalg.norm(np.diff(positions, axis=0), axis=1), 0.0)
     edges = [0, *(1 + np.flatnonzero(np.diff(feeds[:-1]))).tolist(), len(feeds)]
@@ -405,7 +413,7 @@ def _steady(positions: Array, feeds: Array, tolerance: float) -> Array:
     return found
 
 
-def _without_stubs(rows: PoseRows, rotations: Array, asked: Pacing) -> tuple[PoseRows, Array]:
+def _without_stubs(rows: PoseRows, rotations: Array, pacing: Pacing) -> tuple[PoseRows, Array]:
     """Return rows without repeated ones and those of stubs, where the file says no times.
 
     A stub is a step shorter than the tolerance, and than a twentieth of those beside it: a curve
@@ -422,7 +430,7 @@ def _without_stubs(rows: PoseRows, rotations: Array, asked: Pacing) -> tuple[Pos
             for a, b in ((k, k + 1), (chosen[-1] - 1, chosen[-1]))
             if a >= 0 and b < count
         ]
-        short = step <= _REPEATED or (step < asked.tolerance and step < _STUB * min(others))
+        short = step <= _REPEATED or (step < pacing.tolerance and step < _STUB * min(others))
         cosine = 0.5 * (np.sum(rotations[k] * rotations[chosen[-1]]) - 1.0)
         if not (short and np.arccos(np.clip(cosine, -1.0, 1.0)) <= _TURN_TOLERANCE):
             chosen.append(k)
@@ -435,7 +443,7 @@ def _without_stubs(rows: PoseRows, rotations: Array, asked: Pacing) -> tuple[Pos
 
 
 def _at_feed(path: Path, t: Array, feeds: Array, bounds: Mapping[str, Any]) -> Feed:
-    """Return a path at the feeds (N,) that begin at its times (N,); the last one has no way."""
+    """Return a path at the feeds (N,) that begin at its times (N,); the last one has no length."""
     changes = 1 + np.flatnonzero(np.diff(feeds[:-1]))
     stretches = np.stack([t[changes], feeds[changes]], axis=1) if len(changes) else None
     return Feed(path, float(feeds[0]), stretches=stretches, **bounds)
@@ -514,7 +522,7 @@ def _remedy(jump: float, units: str) -> str:
 
 
 def _units(file: FilePath, rows: PoseRows) -> str:
-    """Return what to do where lengths are in another unit than they are taken for."""
+    """Return the remedy, in words, where lengths are in another unit than they are taken for."""
     if file.suffix.lower() == DRAWING:
         return "say in which unit it is drawn if $INSUNITS is wrong (unit = 'mm')"
     if rows.straight:
@@ -554,10 +562,10 @@ def _times(
             + (", not both" if named else "")
         )
     steps = np.linalg.norm(np.diff(rows.positions, axis=0), axis=1)
-    still = np.flatnonzero(steps == 0.0)
-    if still.size and not turns_in_place:
+    standing = np.flatnonzero(steps == 0.0)
+    if standing.size and not turns_in_place:
         raise FileFormatError(
-            f"{file}: {rows.places[int(still[0]) + 1]}: the tool does not move from the pose "
+            f"{file}: {rows.places[int(standing[0]) + 1]}: the tool does not move from the pose "
             f"before, which takes no time by feed or duration; give a column t, or a feed with "
             f"corners round (--corners round), where the tool turns in place"
         )

@@ -1,4 +1,4 @@
-"""When what rows of a table say happens, along the path that they make."""
+"""Times of the events of a table along the path that its rows make."""
 
 import numpy as np
 
@@ -17,14 +17,16 @@ from selfmotion.model.path import (
 )
 from selfmotion.shop.cam.path_rows import PoseRows
 
-# Lengths below this [m] are none.
+# Length that counts as none [m].
 _NOTHING = 1e-9
-# Times at which a path is looked at for when it passes its rows, at least, and for each of them.
-_LOOKS, _EACH = 2000, 20
+# Smallest number of times at which a path is compared with its rows.
+_LOOKS = 2000
+# Number of such times for each row.
+_EACH = 20
 
 
 def times_of_events(path: Path, rows: PoseRows) -> list[tuple[str, float]]:
-    """Return what happens when along a path [s]: as it passes the poses of the rows' events.
+    """Return events and their times along a path [s]: as it passes the poses of their rows.
 
     Where the times of poses are not known, a pose is passed where the path, of about as much of its
     length as the poses before, is nearest.
@@ -36,13 +38,13 @@ def times_of_events(path: Path, rows: PoseRows) -> list[tuple[str, float]]:
         return [(event, float(passed[k])) for k, event in rows.events]
     t = np.linspace(0.0, path.duration, max(_LOOKS, _EACH * len(rows.positions)))
     places = path.samples(t).translation
-    way = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(places, axis=0), axis=1)))
+    length = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(places, axis=0), axis=1)))
     chords = np.linalg.norm(np.diff(rows.positions, axis=0), axis=1)
-    shares = np.append(0.0, np.cumsum(chords)) * (way[-1] / max(float(chords.sum()), _NOTHING))
+    shares = np.append(0.0, np.cumsum(chords)) * (length[-1] / max(float(chords.sum()), _NOTHING))
     found = []
     for k, event in rows.events:
         early, late = shares[max(k - 1, 0)], shares[min(k + 1, len(shares) - 1)]
-        near = np.flatnonzero((way >= early) & (way <= late))
+        near = np.flatnonzero((length >= early) & (length <= late))
         away = np.linalg.norm(places[near] - rows.positions[k], axis=1)
         at = float(t[near[int(away.argmin())]]) if len(near) else 0.0
         ends = {0: 0.0, len(shares) - 1: path.duration}
@@ -70,11 +72,11 @@ def _poses_passed(path: Path) -> Array | None:
             return None if times is None else np.clip(path.when(times), 0.0, path.duration)
         case Joined():
             found, start = [np.zeros(1)], 0.0
-            for piece in path.pieces:
-                times = _poses_passed(piece)
+            for part in path.pieces:
+                times = _poses_passed(part)
                 if times is None:
                     return None
                 found.append(start + times[1:])
-                start += piece.duration
+                start += part.duration
             return np.concatenate(found)
     return None

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path as FilePath
 from typing import Any
 
@@ -16,9 +14,6 @@ from selfmotion.basics import (
     as_flag,
     as_number,
     as_path,
-    is_number,
-    read_values,
-    shown,
 )
 from selfmotion.model.path import Path
 from selfmotion.shop.cam.cldata import read_cldata
@@ -34,214 +29,10 @@ from selfmotion.shop.cam.path_rows import (
     TABLES,
     PoseRows,
     Reading,
-    named,
     no_such_seam,
-    rows_of_table,
 )
-from selfmotion.shop.cam.peers import compas_poses, peer_table
-
-# Poses as configurations of robots hold them: lists and names, of tables or matrices.
-
-# What lists of poses are called, and what parameters of ROS 2 nodes are in.
-_LISTS = ("poses", "waypoints", "points", "frames", "targets", "path")
-_PARAMETERS = "ros__parameters"
-# So many tables are around the poses at most.
-_DEEPEST = 5
-# Numbers in a list → what they are called; of quaternions the order is not known.
-_QUATERNIONS, _ANGLES = ("orientation", "quaternion", "quat"), ("rpy", "euler")
-_ORDERS = {
-    **dict.fromkeys(("position", "pos", "translation", "xyz"), ("x", "y", "z")),
-    **dict.fromkeys(_ANGLES, ("roll", "pitch", "yaw")),
-}
-_TABLES = ("position", "pos", "translation", *_QUATERNIONS, *_ANGLES)
-_WRITTEN = (".yaml", ".yml", ".json")
-# Keys that move nothing, and those that say where or how large poses are, which is not read.
-_NAMES = frozenset(
-    ("name", "label", "id", "index", "header", "stamp", "time_stamp", "frame_id", "child_frame_id")
-) | frozenset(("comment", "comments", "description", "note", "author", "date", "version"))
-_MOVING = re.compile(r"units?|scale|offset|origin|transform|base|tool|tcp|frame|relative")
-
-
-def read_poses(file: FilePath, reading: Reading) -> Mapping[str, PoseRows]:
-    """Return the poses of a message of ROS, or of a list or table of poses; see `read_path`.
-
-    Raises
-    ------
-    FileFormatError
-        The file cannot be read, holds no poses, or a pose lacks something; it is named.
-    """
-    document = read_values(file)
-    peers = compas_poses(file, document)
-    if peers is not None:
-        return peers
-    beside = dict[str, Any]()
-    found = _poses_in(document, beside)
-    if found is None:
-        return READERS[file.suffix.lower()](file, reading)
-    notes = _passed_over(file, "beside the poses", beside)
-    places, items = [place for place, _ in found], [item for _, item in found]
-    if all(_is_matrix(item) for item in items):
-        matrices = np.array([[[_number(file, place, value) for value in row] for row in item]
-                             for place, item in found])  # fmt: skip
-        rows = PoseRows(places, matrices[:, :3, 3], "rotation", matrices[:, :3, :3], None)
-        return {"": replace(rows, notes=notes)}
-    for place, item in found:
-        if not isinstance(item, Mapping):
-            raise FileFormatError(f"{file}: {place}: is a matrix among poses of another form")
-        inner = item.get("pose")
-        unread = [_unread(item), _unread(inner) if isinstance(inner, Mapping) else {}]
-        notes += _passed_over(
-            file, place, {key: item for each in unread for key, item in each.items()}
-        )
-    flat = [dict(_numbers_of(file, place, item)) for place, item in found]
-    for place, row in zip(places, flat, strict=True):
-        if set(row) != set(flat[0]):
-            odd = sorted(set(row) ^ set(flat[0]))[0]
-            raise FileFormatError(
-                f"{file}: {place}: '{odd}' is in some poses only, expected the same of all"
-            )
-    header = list(flat[0])
-    table = np.array([[row[name] for name in header] for row in flat])
-    rows = rows_of_table(file, header, table, places, {})
-    # A note on keys that every pose has names the first pose.
-    told = {note.partition(": ")[2]: note for note in reversed(notes)}
-    return {"": replace(rows, notes=(*rows.notes, *reversed(told.values())))}
-
-
-def _unread(item: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what of a pose is no number or list of one that is read."""
-    return {
-        key: value
-        for key, value in item.items()
-        if key != "pose"
-        and not isinstance(value, list)
-        and not is_number(value)
-        and not (isinstance(value, Mapping) and key in _TABLES)
-    }
-
-
-def _passed_over(file: FilePath, where: str, values: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return a note of keys that are not read.
-
-    Raises
-    ------
-    FileFormatError
-        One of them says where or how large poses are.
-    """
-    for key, value in values.items():
-        if key not in _NAMES and _MOVING.search(str(key).lower()):
-            raise FileFormatError(
-                f"{file}: {where}: '{key}' is {shown(value)}, which may move the poses and is not "
-                f"read: write them in metres and in one frame (columns x_mm, …; --frame), and drop "
-                f"it"
-            )
-    others = [f"'{key}'" for key in values if key not in _NAMES]
-    return (f"{where}: passed over: {', '.join(others[:_LISTED])}",) if others else ()
-
-
-# So many keys that are passed over are named.
-_LISTED = 6
-
-
-READ: Mapping[str, Callable[[FilePath, Reading], Mapping[str, PoseRows]]] = dict.fromkeys(
-    _WRITTEN, read_poses
-)
-
-
-def _poses_in(document: Any, beside: dict[str, Any]) -> list[tuple[str, Any]] | None:
-    """Return poses by what they are called, None where they are messages or there are none.
-
-    What stands beside their list is put into `beside`.
-    """
-    inner, key = document, ""
-    for _ in range(_DEEPEST):
-        if not isinstance(inner, Mapping) or "header" in inner or _are_poses(inner.values()):
-            break
-        keys = [name for name in (_PARAMETERS, *_LISTS) if isinstance(inner.get(name), dict | list)]
-        keys = keys or (list(inner) if len(inner) == 1 else [])
-        if not keys:
-            break
-        beside |= {str(name): value for name, value in inner.items() if name != keys[0]}
-        key, inner = str(keys[0]), inner[keys[0]]
-    if isinstance(inner, Mapping) and _are_poses(inner.values()):
-        return [(f"'{name}'", item) for name, item in inner.items()]
-    is_message = key in ("", "poses") and isinstance(inner, list) and all(map(_is_of_ros, inner))
-    if isinstance(inner, list) and _are_poses(inner) and not is_message:
-        return [(f"{key}[{k}]", item) for k, item in enumerate(inner)]
-    return None
-
-
-def _are_poses(items: Any) -> bool:
-    several = list(items)
-    return bool(several) and all(_is_pose(item) for item in several)
-
-
-def _is_pose(item: Any) -> bool:
-    if not isinstance(item, Mapping):
-        return _is_matrix(item)
-    inner = item.get("pose", item)
-    has_place = isinstance(inner, Mapping) and bool({*_ORDERS, "x", "x_mm"} & set(inner))
-    return has_place and "poses" not in item
-
-
-def _is_of_ros(item: Any) -> bool:
-    """Whether an item is a Pose or PoseStamped, which messages have lists of."""
-    inner = item.get("pose", item) if isinstance(item, Mapping) else None
-    return isinstance(inner, Mapping) and isinstance(inner.get("position"), Mapping)
-
-
-def _is_matrix(item: Any) -> bool:
-    rows = item if isinstance(item, list) and len(item) == 4 else []
-    return bool(rows) and all(
-        isinstance(row, list) and len(row) == 4 and all(map(is_number, row)) for row in rows
-    )
-
-
-def _numbers_of(file: FilePath, place: str, item: Mapping[str, Any]) -> Iterator[tuple[str, float]]:
-    """Yield the numbers of a pose by what columns of a table are called.
-
-    Texts are passed over, and tables of anything else, such as joints, with a note; of two
-    orientations the quaternion is taken.
-    """
-    turned = any(key in item for key in _QUATERNIONS)
-    for key, value in item.items():
-        if key == "pose" and isinstance(value, Mapping):
-            yield from _numbers_of(file, place, value)
-        elif turned and key in _ANGLES:
-            continue
-        elif isinstance(value, Mapping):
-            stem = "" if key in _ANGLES else f"{key}."
-            for name, number in value.items() if key in _TABLES else ():
-                yield named(f"{stem}{name}"), _number(file, f"{place}: {key}.{name}", number)
-        elif isinstance(value, list):
-            yield from _listed(file, f"{place}: {key}", str(key), value)
-        elif is_number(value):
-            yield named(str(key)), _number(file, f"{place}: {key}", value)
-
-
-def _listed(
-    file: FilePath, where: str, key: str, value: Sequence[Any]
-) -> Iterator[tuple[str, float]]:
-    names = _ORDERS.get(key)
-    if names is None or len(value) != len(names):
-        raise FileFormatError(
-            f"{file}: {where} is a list of {len(value)}, whose order is not known; expected "
-            f"numbers by name, such as x, y, z and qw, qx, qy, qz, or lists of 3: position, rpy"
-        )
-    for name, number in zip(names, value, strict=True):
-        yield name, _number(file, f"{where}.{name}", number)
-
-
-def _number(file: FilePath, where: str, value: Any) -> float:
-    try:
-        if is_number(value):
-            return float(value)
-    except OverflowError:
-        pass
-    raise FileFormatError(f"{file}: {where} is {shown(value)}, expected a number")
-
-
-# Tool motions from files: tables, arrays, what ROS writes, programs of machine tools, drawings.
+from selfmotion.shop.cam.peers import peer_table
+from selfmotion.shop.cam.pose_lists import READ
 
 
 def _read_table(file: FilePath, reading: Reading) -> Mapping[str, PoseRows]:
@@ -436,7 +227,7 @@ def read_path(
         A drawing, and the package that reads them is not installed.
     """
     path = as_path(file)
-    asked = _pacing(
+    pacing = _pacing(
         path,
         {
             "feed": feed,
@@ -469,7 +260,7 @@ def read_path(
             "unit": unit,
         },
     )
-    return path_of_rows(path, one_seam(path, seam, reading), asked)
+    return path_of_rows(path, one_seam(path, seam, reading), pacing)
 
 
 def read_seams(file: FilePath, options: Mapping[str, Any]) -> dict[str, tuple[Path, PoseRows]]:
@@ -489,26 +280,26 @@ def read_seams(file: FilePath, options: Mapping[str, Any]) -> dict[str, tuple[Pa
         raise FileFormatError(
             f"{file}: has no column 'seam', expected one that names the seam of each row"
         )
-    asked = _pacing(file, options)
-    return {name: (path_of_rows(file, rows, asked), rows) for name, rows in seams.items()}
+    pacing = _pacing(file, options)
+    return {name: (path_of_rows(file, rows, pacing), rows) for name, rows in seams.items()}
 
 
 def _pacing(path: FilePath, options: Mapping[str, Any]) -> Pacing:
-    asked = Pacing(**options)
-    as_number(asked.jump, f"{path}: jump", above=0.0, error=FileFormatError)
-    as_number(asked.standoff, f"{path}: standoff", error=FileFormatError)
-    for name, angle in (("lead", asked.lead), ("tilt", asked.tilt)):
+    pacing = Pacing(**options)
+    as_number(pacing.jump, f"{path}: jump", above=0.0, error=FileFormatError)
+    as_number(pacing.standoff, f"{path}: standoff", error=FileFormatError)
+    for name, angle in (("lead", pacing.lead), ("tilt", pacing.tilt)):
         lean = as_number(angle, f"{path}: {name}", error=FileFormatError)
         if not abs(lean) < 0.5 * np.pi:
             raise FileFormatError(
                 f"{path}: {name} is {lean:g} rad, expected less than a quarter turn"
             )
-    as_number(asked.lift, f"{path}: lift", least=0.0, error=FileFormatError)
-    as_flag(asked.flip_normals, f"{path}: flip_normals", FileFormatError)
-    for name, value in (("feed", asked.feed), ("duration", asked.duration)):
+    as_number(pacing.lift, f"{path}: lift", least=0.0, error=FileFormatError)
+    as_flag(pacing.flip_normals, f"{path}: flip_normals", FileFormatError)
+    for name, value in (("feed", pacing.feed), ("duration", pacing.duration)):
         if value is not None:
             as_number(value, f"{path}: {name}", above=0.0, error=FileFormatError)
-    return asked
+    return pacing
 
 
 def _read(path: FilePath, seam: str | None, reading: Reading) -> Mapping[str, PoseRows]:
@@ -531,7 +322,7 @@ def _read(path: FilePath, seam: str | None, reading: Reading) -> Mapping[str, Po
 
 
 def events_of(file: FilePath, options: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return what happens along a path of a file, each once; nothing of one that is refused."""
+    """Return the events along a path of a file, each once; none of one that is refused."""
     try:
         rows = one_seam(file, options.get("seam"), Reading.of(file, options))
         return tuple(dict.fromkeys(event for _, event in rows.events))

@@ -46,7 +46,7 @@ _TURN_NOTE = "rx,ry,rz are read as a rotation vector: the axis of a turn, as lon
 _HALF_TURN = 2e-4
 
 
-# What a table without a header may be, by the number of its columns.
+# Columns of a table without a header, by their number.
 _HEADERS = {
     3: "x,y,z",
     4: "t,x,y,z",
@@ -54,25 +54,27 @@ _HEADERS = {
     7: "x,y,z,qw,qx,qy,qz",
     8: "t,x,y,z,qw,qx,qy,qz",
 }
-# What the columns of an array are where nothing else is said.
+# Columns of an array, by their number, unless options name them.
 _ARRAYS = {3: ("x", "y", "z"), 4: ("t", "x", "y", "z")}
 # Units in brackets behind a title → what its name ends in; other names of columns.
 _BRACKETS = {"mm": "_mm", "mm/s": "_mm", "deg": "_deg", "°": "_deg", "degrees": "_deg"}
 _BRACKETS |= {"cm": "_cm", "cm/s": "_cm", "in": "_in", "inch": "_in", "in/s": "_in"}
 _BRACKETS |= dict.fromkeys(("m", "rad", "s", "m/s", "sec", "-", "1"), "")
 _ALSO = {"time": "t", "timestamp": "t"}
-# What other programs call x or qx: pose.position.x, pos_x, px, tx; orientation.x, quat_x.
+# Names of x or qx in other programs: pose.position.x, pos_x, px, tx; orientation.x, quat_x.
 _PLACES = re.compile(r"(?:[a-z]+[._])*(?:position|pos|translation)[._]([xyz])|[pt]([xyz])")
 _TURNS = re.compile(r"(?:[a-z]+[._])*(?:orientation|quaternion|quat|q)[._]([wxyz])")
 # The first word of a program.
 _CODE = re.compile(r"[gmn][0-9]+|%")
 _TITLE = re.compile(r"([^\[(]*?)[\s_]*[\[(]([^\])]*)[\])]")
-# Columns of texts: which seam a row is of, and what happens at it.
-SEAM, EVENT = "seam", "event"
+# Column with the name of a row's seam.
+SEAM = "seam"
+# Column with the events at a row.
+EVENT = "event"
 _KNOWN = {"t", "feed", *_POSITION, *(name for names in _COLUMNS for name in names)}
 
 
-# What makers of controllers call orientations → what they are here.
+# Names of orientations of makers of controllers → their names here.
 _MAKERS = {
     **dict.fromkeys("abc", "A,B,C of KUKA are yaw_deg,pitch_deg,roll_deg here"),
     **dict.fromkeys(("w", "p", "r"), "W,P,R of Fanuc are roll_deg,pitch_deg,yaw_deg here"),
@@ -80,12 +82,13 @@ _MAKERS = {
 }
 
 
-# A frame of KUKA's: what its columns are called here. No arm reaches so many metres.
+# Columns of a frame of KUKA's → their names here.
 _KUKA = {"a": "yaw_deg", "b": "pitch_deg", "c": "roll_deg", "x": "x_mm", "y": "y_mm", "z": "z_mm"}
 _KUKA_NOTE = (
     "columns A,B,C are read as KUKA's: angles about z, y and x in turn in degrees, x,y,z in mm "
     "where they say no unit"
 )
+# Coordinate above which lengths are no metres: no arm reaches so far [m].
 _METRES = 10.0
 
 
@@ -154,7 +157,7 @@ CLDATA = (".apt", ".aptsource", ".cls", ".clsf", ".cl", ".ncl")
 
 @dataclass(frozen=True)
 class Reading:
-    """What a file does not say itself; see `read_path`.
+    """Options of reading a file, which it does not state itself; see `read_path`.
 
     Attributes
     ----------
@@ -172,7 +175,7 @@ class Reading:
 
     @classmethod
     def of(cls, file: FilePath, options: Mapping[str, Any]) -> "Reading":
-        """Return what options say; others are passed over.
+        """Return the reading that options ask for; others are passed over.
 
         Raises
         ------
@@ -203,7 +206,7 @@ class Reading:
         return cls(tuple(name.strip() for name in columns))
 
 
-# So many names of seams are listed.
+# Largest number of seams that a message names.
 _LISTED = 5
 
 
@@ -221,7 +224,7 @@ def read_tables(file: FilePath, reading: Reading | None = None) -> dict[str, Pos
     said = set[str]()
 
     def called(title: str) -> str:
-        """Return what a title is called here, and remember those that say their unit."""
+        """Return the name of a title here, and remember those that state their unit."""
         name = named(title)
         if "[" in title or "(" in title:
             said.add(name)
@@ -324,7 +327,7 @@ def rows_of_table(
     )
 
 
-# What columns are taken for that say no unit: words of it, and what says another one.
+# Columns without a unit → the unit that is taken, and the ending for another one.
 _TAKEN = {
     **dict.fromkeys(_POSITION, ("metres", "x_mm, x_cm, x_in")),
     "feed": ("m/s", "feed_mm"),
@@ -341,10 +344,10 @@ def _unsaid(titles: Sequence[str]) -> tuple[str, ...]:
             bare.setdefault(_TAKEN[named(title)], []).append(named(title))
     if not bare:
         return ()
-    told = "; ".join(
+    columns = "; ".join(
         f"{','.join(names)} for {taken} (else: {others})" for (taken, others), names in bare.items()
     )
-    return (f"columns say no unit and are taken so: {told}",)
+    return (f"columns say no unit and are taken so: {columns}",)
 
 
 def _of_kuka(titles: Sequence[str]) -> list[str]:
@@ -367,7 +370,7 @@ def _check_millimetres(file: FilePath, titles: Sequence[str], table: Array) -> N
 def _check_turns(file: FilePath, turns: Array, places: Sequence[str], angles: str) -> None:
     """Refuse rotation vectors (K, 3) [rad] of more than half a turn, which angles look like."""
     sizes = np.linalg.norm(turns, axis=1)
-    # Degrees that are taken for radians are told as such later on.
+    # Degrees that are taken for radians are reported as such later on.
     over = (sizes > (1.0 + _HALF_TURN) * np.pi) & (np.abs(turns).max(axis=1) <= TURN)
     if over.any():
         k = int(np.argmax(over))
@@ -464,12 +467,12 @@ def _read_array(file: FilePath, reading: Reading) -> PoseRows:
             f"{file}: has shape {array.shape} and {named} are named, expected (N, 4, 4) poses, "
             f"(N, 3) x,y,z, (N, 4) t,x,y,z, or a name in columns for each"
         )
-    kept = [k for k, name in enumerate(columns) if name != LEFT_OUT]
-    numbers = array[:, kept] * 1.0
-    return rows_of_table(file, [columns[k] for k in kept], numbers, places, {})
+    chosen = [k for k, name in enumerate(columns) if name != LEFT_OUT]
+    numbers = array[:, chosen] * 1.0
+    return rows_of_table(file, [columns[k] for k in chosen], numbers, places, {})
 
 
-# What a list of messages may be called.
+# Names of a list of messages.
 _LISTS = ("paths", "rasters", "pose_arrays")
 
 

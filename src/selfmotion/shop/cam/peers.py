@@ -16,9 +16,12 @@ from selfmotion.basics import Array, FileFormatError, is_number, lines_of, shown
 from selfmotion.shop.cam.cuts import Machine, arc_points
 from selfmotion.shop.cam.path_rows import PoseRows
 
+# Millimetre [m].
 _MM = 1e-3
-# A file with more bytes is none of these; titles stand within so many.
-_BYTES, _HEAD = 50_000_000, 10_000
+# Largest size of such a file [bytes].
+_BYTES = 50_000_000
+# Size of its beginning that has the titles [bytes].
+_HEAD = 10_000
 
 
 def peer_table(file: FilePath) -> Mapping[str, PoseRows] | None:
@@ -47,7 +50,7 @@ def peer_table(file: FilePath) -> Mapping[str, PoseRows] | None:
 def _reader_of(
     first: str, titles: Sequence[str]
 ) -> Callable[[FilePath, str, Sequence[str]], PoseRows] | None:
-    """Return what reads a table with this first line, None where it is of no other program."""
+    """Return the reader of a table with this first line, None where no other program has it."""
     if set(_IRBCAM) <= set(titles):
         return _of_irbcam
     if _IGUS.fullmatch(first.strip()):
@@ -101,8 +104,8 @@ def _turning(first: Array, last: Array, count: int) -> Array:
     """Return rotations (count, 3, 3) evenly from one (3, 3) to another, which is the last."""
     from scipy.spatial.transform import Rotation, Slerp
 
-    way = Slerp([0.0, 1.0], Rotation.from_matrix(np.stack([first, last])))
-    return np.asarray(way(np.arange(1, count + 1) / count).as_matrix())
+    turn = Slerp([0.0, 1.0], Rotation.from_matrix(np.stack([first, last])))
+    return np.asarray(turn(np.arange(1, count + 1) / count).as_matrix())
 
 
 # IRBCAM: x, y, z [mm], angles about z, y and z of the frame as it is turned [°], velocity [mm/s].
@@ -156,7 +159,7 @@ def _of_irbcam(file: FilePath, text: str, titles: Sequence[str]) -> PoseRows:
     if middles:
         chosen, positions, turns = _with_arcs(file, lines, middles, positions, turns)
         places, feeds = [places[k] for k in chosen], [feeds[k] for k in chosen]
-    # A velocity is that of the way to its row; -1 is a rapid.
+    # A velocity is that of the step to its row; -1 is a rapid.
     to_next = np.array([*feeds[1:], *feeds[-1:]])
     return _straight(places, positions, "rotation", turns, to_next, note)
 
@@ -167,15 +170,15 @@ def _with_arcs(
     """Return poses with arcs as chords, and which row each is of."""
     chosen, places, found = [0], [positions[:1]], [turns[:1]]
     for k in range(1, len(positions)):
-        ways = [positions[k : k + 1]]
+        steps = [positions[k : k + 1]]
         if k in middles:
-            ways = list(_arc(file, lines[k], *positions[k - 1 : k + 2]))
+            steps = list(_arc(file, lines[k], *positions[k - 1 : k + 2]))
         elif k - 1 in middles:
             continue
-        for row, way in enumerate(ways, k):
-            chosen += [row] * len(way)
-            places.append(way)
-            found.append(_turning(turns[row - 1], turns[row], len(way)))
+        for row, points in enumerate(steps, k):
+            chosen += [row] * len(points)
+            places.append(points)
+            found.append(_turning(turns[row - 1], turns[row], len(points)))
     return chosen, np.concatenate(places), np.concatenate(found)
 
 
@@ -262,9 +265,9 @@ def _of_primitives(file: FilePath, text: str, _: Sequence[str]) -> PoseRows:
         if any(len(values) != 3 for values in given):
             raise FileFormatError(f"{file}: line {where}: expected x, y, z in points")
         ends = _MM * np.array(given)
-        way = ends if expected == 1 else np.concatenate(_arc(file, where, rows[-1], *ends))
-        rows += list(way)
-        places += [f"line {where}"] * len(way)
+        added = ends if expected == 1 else np.concatenate(_arc(file, where, rows[-1], *ends))
+        rows += list(added)
+        places += [f"line {where}"] * len(added)
     note = (
         "motion primitives: points in mm, joined by straight lines (movej too), and by arcs for "
         "movec; q_bp is passed over"

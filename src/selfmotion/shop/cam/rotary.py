@@ -1,4 +1,4 @@
-"""What the words A, B and C of a machine turn: its head, or the table that the part is on."""
+"""Rotary axes of a machine: words A, B and C, which turn its head or the table with the part."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -9,9 +9,14 @@ import numpy as np
 from selfmotion.basics import Array, as_numbers, shown
 
 _AXES = ("A", "B", "C")
-HEAD, TABLE = "head", "table"
-# Chords of lines that a table turns are off by this at most [m], and so many at most.
-_CHORD, _CHORDS = 1e-5, 100_000
+# Kind of axes that turn the head.
+HEAD = "head"
+# Kind of axes that turn the table.
+TABLE = "table"
+# Largest deviation of chords from a line that a table turns [m].
+_CHORD = 1e-5
+# Largest number of such chords.
+_CHORDS = 100_000
 
 
 @dataclass(frozen=True)
@@ -39,7 +44,7 @@ class Rotary:
 
     @classmethod
     def of(cls, options: Mapping[str, Any]) -> "Rotary | None":
-        """Return what options say; ValueError for what makes no sense."""
+        """Return the axes that options state; ValueError for options that contradict each other."""
         kind, axes = options.get("rotary"), options.get("rotary_axes")
         center = options.get("rotary_center")
         if kind is None:
@@ -58,7 +63,7 @@ class Rotary:
         return cls(TABLE, _axes_of(axes), where)
 
     def rotation(self, turns: Mapping[str, float]) -> Array:
-        """Return what turns the machine's directions into the part's (3, 3), at angles [rad]."""
+        """Return the rotation (3, 3) from machine to part directions, by angles [rad]."""
         if not self.axes:
             return _about("C", turns) @ _about("B", turns) @ _about("A", turns)
         found = np.eye(3)

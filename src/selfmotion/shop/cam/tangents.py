@@ -10,7 +10,7 @@ from selfmotion.basics import Array, Flags, PathError
 
 # Which axis of the tool is along the path → the column of its rotation, and its sign.
 AXES = {"x": (0, 1.0), "-x": (0, -1.0), "y": (1, 1.0), "-y": (1, -1.0)}
-# A way that is along the tool's axis up to this [rad] has no direction across it.
+# Angle of a path with the tool's axis below which it has no direction across it [rad].
 _ALONG = 1e-3
 # A tool turns by more than this at once [rad] in two steps about its axis, as the shortest turn
 # would not be known.
@@ -25,12 +25,12 @@ class Stretch(NamedTuple):
     rotations: Array
 
 
-def stretches_along(
+def sections_along(
     positions: Array, axes: Array, rapid: Flags, along: str, lean: tuple[float, float], bend: float
 ) -> list[Stretch]:
-    """Return the stretches of a path between corners, the tool's axis along it on each.
+    """Return the sections of a path between corners, the tool's axis along it on each.
 
-    In bends the direction is half way between that of both legs.
+    In bends the direction is halfway between that of both legs.
 
     Parameters
     ----------
@@ -92,7 +92,7 @@ def _facing(ahead: Array, axes: Array, along: str, lean: tuple[float, float]) ->
 
 
 def turning(first: Array, last: Array) -> Sequence[Array]:
-    """Return rotations on the spot from one (3, 3) to another, in steps whose way is known."""
+    """Return rotations on the spot from one (3, 3) to another, in steps below half a turn."""
     from scipy.spatial.transform import Rotation
 
     own = first.T @ last

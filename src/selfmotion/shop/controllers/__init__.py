@@ -1,23 +1,14 @@
 """Joint motions for controllers and simulators, written, read back and judged."""
 
-from selfmotion.shop.controllers.controller_program import (
-    ControllerProgram as ControllerProgram,
-    check_controller as check_controller,
-    check_signals as check_signals,
-)
+from selfmotion.shop.controllers.controller_program import ControllerProgram as ControllerProgram
 from selfmotion.shop.controllers.judged_programs import (
-    PROGRAMS as PROGRAMS,
-    READ_PROGRAMS as READ_PROGRAMS,
     as_shifted as as_shifted,
     judged_interpolations as judged_interpolations,
     judged_motion as judged_motion,
     judged_program as judged_program,
-    keeps_stated as keeps_stated,
     misswitched as misswitched,
     of_the_controller as of_the_controller,
     part_of as part_of,
-    program_miss as program_miss,
-    read_program as read_program,
     shift_note as shift_note,
     stated_deviation as stated_deviation,
     unlike as unlike,
@@ -37,8 +28,17 @@ from selfmotion.shop.controllers.motions import (
     write_motion as write_motion,
     write_parts as write_parts,
 )
-from selfmotion.shop.controllers.program_facts import (
-    held_in_words as held_in_words,
+from selfmotion.shop.controllers.program_draft import (
+    check_controller as check_controller,
+    check_signals as check_signals,
+)
+from selfmotion.shop.controllers.program_facts import held_in_words as held_in_words
+from selfmotion.shop.controllers.program_files import (
+    PROGRAMS as PROGRAMS,
+    READ_PROGRAMS as READ_PROGRAMS,
+    keeps_stated as keeps_stated,
+    program_miss as program_miss,
+    read_program as read_program,
 )
 from selfmotion.shop.controllers.program_settings import (
     ProgramSettings as ProgramSettings,
@@ -55,6 +55,4 @@ from selfmotion.shop.controllers.thinning import (
     by_targets as by_targets,
     what_lines_keep as what_lines_keep,
 )
-from selfmotion.shop.controllers.tool_frames import (
-    turned_base as turned_base,
-)
+from selfmotion.shop.controllers.tool_frames import turned_base as turned_base

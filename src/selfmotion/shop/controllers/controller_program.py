@@ -1,68 +1,31 @@
-"""A joint motion as programs of robot controllers say it, whichever language they speak."""
+"""A joint motion as a program of a controller has it, whichever its language."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import partial
-from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
 
-from selfmotion.basics import FileFormatError, Flags, ProblemError, Progress, nearest, silent
+from selfmotion.basics import FileFormatError
 from selfmotion.certificate import Tolerance
 from selfmotion.model.motion import Trajectory
 from selfmotion.model.path import Path
-from selfmotion.model.robot import RobotModel
 from selfmotion.model.task import SE3
 from selfmotion.planning.result import Move, Parts, Plan
-from selfmotion.problem.constraints import Constraint
 from selfmotion.shop.controllers.feed_segments import FeedSegment
-from selfmotion.shop.controllers.feed_thinning import FeedSection
-from selfmotion.shop.controllers.program_facts import Load, ProgramFacts, check_load, with_checksum
-from selfmotion.shop.controllers.program_settings import (
-    OF_PATH,
-    Axis,
-    ProgramSettings,
-    Signal,
-    axes_of,
-    in_order,
-    tool_from_flange,
-)
-from selfmotion.shop.controllers.program_texts import (
-    BECAUSE,
-    KEPT,
-    PLANNED,
-    as_word,
-    folded,
-    pin_values,
-    plain,
-    rounded_up,
-    stated,
-)
+from selfmotion.shop.controllers.program_facts import Load, ProgramFacts
+from selfmotion.shop.controllers.program_settings import Axis
 from selfmotion.shop.controllers.segments import (
     NO_MISS,
     Knots,
     Misses,
-    PoseSegment,
     Segment,
     by_interpolation,
     miss_of,
 )
-from selfmotion.shop.controllers.targets import (
-    NotByPosesError,
-    PosedSections,
-    PoseSection,
-    segments_of,
-)
-from selfmotion.shop.controllers.thinning import TIME_DIGITS, Piece, Section, pieces_of
-from selfmotion.shop.controllers.tool_frames import (
-    ROUNDINGS,
-    WORLD,
-    ToolFrames,
-    frame_of_paths,
-    own_joint,
-)
-from selfmotion.work.job import Program, are_opposite
+from selfmotion.shop.controllers.thinning import operations_of
+from selfmotion.shop.controllers.tool_frames import WORLD
+from selfmotion.work.job import Program
 
 
 class Switch(NamedTuple):
@@ -105,7 +68,7 @@ class ControllerProgram:
     carrier : str
         The link that the work object is fixed to, or ``"world"``.
     remark : str
-        Why targets are joints though poses were asked for.
+        Reason why targets are joints in place of poses.
     within : Tolerance or None
         Within what seams at speeds keep what is prescribed, by their certificates; None where none
         is at a speed.
@@ -142,7 +105,7 @@ class ControllerProgram:
     def begins_elsewhere(self) -> str:
         """Reason why the axis target at its begin does not fit its first pose; empty for none.
 
-        Of a shifted work object the way to the shifted begin is to be expected.
+        Of a shifted work object the motion to the shifted begin is to be expected.
         """
         if self.shift is not None or self.approach <= _TAUGHT:
             return ""
@@ -176,7 +139,7 @@ class ControllerProgram:
         return [self._motion(parts) for parts in by_interpolation(self._joined(path))]
 
     def _joined(self, path: Path | None) -> Iterator[Iterator[Knots]]:
-        """Yield of each segment the ways in which a controller may join its targets."""
+        """Yield the motions of each segment, one for each interpolation."""
         begin = 0.0
         for segment in self.segments:
             if path is not None and isinstance(segment, FeedSegment):
@@ -184,7 +147,7 @@ class ControllerProgram:
             elif segment.is_rest:
                 yield iter([Knots(segment.t, segment.q, 0.0 * segment.q)])
             else:
-                yield segment.joined()
+                yield segment.motions()
             begin += segment.duration
 
     def _motion(self, parts: Sequence[Knots]) -> Trajectory:
@@ -204,7 +167,7 @@ class ControllerProgram:
         FileFormatError
             It has other joints, or other segments.
         """
-        pieces = pieces_of(plan)
+        operations = operations_of(plan)
         names = [axis.joint for axis in self.axes]
         known = plan.robot.joint_names
         if sorted(names) != sorted(known):
@@ -219,286 +182,23 @@ class ControllerProgram:
                     f"there"
                 )
             same = segment.in_order(order)
-            piece = pieces[min(k, len(pieces) - 1)]
-            found = miss_of(same, piece.motion, piece.chains, piece.motion.t[0] + at)
-            both = Misses(NO_MISS, found) if piece.is_move else Misses(found, NO_MISS)
+            operation = operations[min(k, len(operations) - 1)]
+            found = miss_of(same, operation.motion, operation.chains, operation.motion.t[0] + at)
+            both = Misses(NO_MISS, found) if operation.is_move else Misses(found, NO_MISS)
             worst = worst.worse(both)
             at += segment.duration
-            if at >= piece.motion.duration - _MOMENT:
+            if at >= operation.motion.duration - _MOMENT:
                 at, k = 0.0, k + 1
-        if k > len(pieces):
+        if k > len(operations):
             raise FileFormatError("goes on when the motion has ended")
-        if k < len(pieces):
-            raise FileFormatError(f"ends {len(pieces) - k} seams or moves before the motion does")
+        if k < len(operations):
+            raise FileFormatError(
+                f"ends {len(operations) - k} seams or moves before the motion does"
+            )
         return worst
 
 
-# A first pose that was taught anew is as near to the axis target before it [rad or m].
+# Largest distance of a first pose that was taught anew from the axis target before [rad or m].
 _TAUGHT = 0.02
-# A piece is over where less of it is left than this [s].
+# Rest of an operation that counts as none [s].
 _MOMENT = 1e-4
-
-
-@dataclass(frozen=True, eq=False)
-class Draft:
-    """All that a writer needs: the program, the arm, what else is said; frames of tool poses."""
-
-    program: ControllerProgram
-    robot: RobotModel
-    tool: SE3
-    settings: ProgramSettings
-    verdict: str
-    facts: ProgramFacts
-    frames: ToolFrames | None = None
-
-    def signal(self, event: str) -> Signal | None:
-        """Return the outputs that an event switches."""
-        return self.settings.signal(event)
-
-
-class Joints(NamedTuple):
-    """Joint targets instead of poses: of free moves only, or of all; with the reason."""
-
-    moves_only: bool
-    why: str
-
-
-def drafted(
-    plan: Plan | Parts | Move | Program,
-    name: str,
-    form: str,
-    settings: ProgramSettings,
-    verdict: str,
-    progress: Progress = silent,
-    otherwise: Joints | None = None,
-) -> Draft:
-    """Return the program of a motion, named as its file is.
-
-    Where poses are asked for, `otherwise` says what has joint targets all the same.
-
-    Raises
-    ------
-    ProblemError
-        The arm has axes that controllers have not, an event has no signal, or the motion does not
-        rest where it should.
-    PlanError
-        A move was not found.
-    """
-    check_controller(plan.robot, form, settings)
-    robot, pieces = plan.robot, pieces_of(plan)
-    axes = axes_of(robot, settings)
-    happens = {event: item.name for item in pieces for _, event in item.events}
-    check_signals(happens, settings)
-    slides = np.array([axis.slides for axis in axes])
-    given = pieces, slides, settings.deviation, settings.move_deviation, progress
-    frames, why = None, ""
-    if settings.by_poses:
-        of_path = settings.work_object == OF_PATH
-        path_frame = frame_of_paths(_paths_of(plan)) if of_path else None
-        frames = ToolFrames.of(robot, axes, settings, path_frame).rounded(ROUNDINGS[form])
-        why = frames.undetermined()
-        if otherwise is not None and not otherwise.moves_only:
-            why = why or otherwise.why
-    if frames is not None and not why:
-        try:
-            spans = PoseSection if settings.targets == "timed-poses" else FeedSection
-            posed: PosedSections = partial(spans.by, frames, ROUNDINGS[form])
-            if otherwise is not None:
-                posed = partial(_but_of_moves, posed, otherwise.why)
-            segments, miss = segments_of(*given, posed)
-        except NotByPosesError as error:
-            why = str(error)
-    if frames is None or why:
-        frames = None
-        segments, miss = segments_of(*given)
-    order = in_order(axes)
-    sorted_ones = tuple(item.in_order(order) for item in segments)
-    ordered = tuple(axes[k] for k in order)
-    stated = Misses(miss.path.stated, miss.moves.stated)
-    at_speeds = any(isinstance(item, FeedSegment) for item in sorted_ones)
-    within = settings.deviation if at_speeds else None
-    program = ControllerProgram(
-        name, ordered, sorted_ones, stated, remark=plain(why), within=within
-    )
-    tool = tool_from_flange(robot, settings)
-    facts = ProgramFacts.of(robot, settings, list(happens), by_poses=frames is not None)
-    if settings.mass is not None:
-        load = Load(settings.mass, np.array(settings.center))
-        check_load(load, robot, constraints_of(plan), facts.flange)
-    return Draft(program, robot, tool, settings, verdict, facts, frames)
-
-
-def constraints_of(plan: Plan | Parts | Move | Program) -> list[Constraint]:
-    """Return all that the parts of a motion had to keep."""
-    match plan:
-        case Plan():
-            return list(plan.problem.constraints)
-        case Move():
-            return list(plan.constraints)
-        case Program():
-            return [item for step in plan.steps for item in constraints_of(step.made)]
-    parts: list[Plan | Move] = [*plan.plans, *plan.moves]
-    return [item for part in parts for item in constraints_of(part)]
-
-
-def _paths_of(plan: Plan | Parts | Move | Program) -> list[Path]:
-    """Return the paths that a motion follows; those of other tools than the first are beside it."""
-    match plan:
-        case Plan():
-            return [plan.problem.path]
-        case Move():
-            return []
-        case Program():
-            return [step.made.problem.path for step in plan.steps if isinstance(step.made, Plan)]
-    return [part.problem.path for part in plan.plans]
-
-
-def _but_of_moves(
-    posed: PosedSections, why: str, piece: Piece, slides: Flags, first: float, last: float
-) -> Section:
-    """Return a span of poses of a seam; NotByPosesError of a free move."""
-    if piece.is_move:
-        raise NotByPosesError(why)
-    return posed(piece, slides, first, last)
-
-
-def check_controller(robot: RobotModel, form: str, settings: ProgramSettings) -> None:
-    """Refuse what a controller has no program for, or what its program has to say and does not.
-
-    Raises
-    ------
-    ProblemError
-        An arm of seven joints as KRL, or no mass for a controller of ABB.
-    """
-    if form == "rapid" and settings.mass is None:
-        raise ProblemError(
-            f"{robot.name}: a tooldata has the mass of what the flange carries, and a controller "
-            f"of ABB moves by it; give export --mass KG, or mass in the file of --settings "
-            f"(ProgramSettings(mass=…))"
-        )
-    joint = own_joint(robot, axes_of(robot, settings)) if form == "krl" else ""
-    if joint:
-        raise ProblemError(
-            f"{robot.name}: joint '{joint}' is in the arm itself: KRL is for arms of six axes with "
-            f"external ones, and KUKA's arms of seven (LBR iiwa) are programmed in Java (Sunrise); "
-            f"write .yaml (ROS 2) or .csv for the driver of such an arm"
-        )
-
-
-def check_signals(seams: Mapping[str, str], settings: ProgramSettings) -> None:
-    """Refuse events (event → seam) of which nothing says what they switch."""
-    spare = [event for event in settings.signals or {} if event not in seams]
-    for event, seam in seams.items():
-        if not settings.knows(event):
-            raise ProblemError(
-                f"seam '{seam}': event '{event}' has no signal{nearest(event, spare)}; say in the "
-                f"file of --settings what it switches, [signals] '{event}' = [output, true], or "
-                f"false for a comment only (ProgramSettings(signals=…))"
-            )
-    for one, other in combinations(seams, 2):
-        first = settings.signal(one)
-        if first is not None and first == settings.signal(other) and are_opposite(one, other):
-            raise ProblemError(
-                f"signals: '{one}' and '{other}' both switch {first[0]!r} to {first[1]}; one of "
-                f"them has to be {not first[1]}, or of another output"
-            )
-
-
-# Texts around the motion: the head of a program, and the comments before a segment.
-
-
-def with_begins(segments: Sequence[Segment]) -> Iterator[tuple[Segment, Segment | None]]:
-    """Yield each segment, and one to whose begin the arm has to go slowly before; else None.
-
-    That is where targets of the other kind follow, poses after joints or joints after poses, rests
-    in between included: where the work object was shifted, the arm is elsewhere by the other ones.
-    A program begins by joints.
-    """
-    by_poses = False
-    for k, segment in enumerate(segments):
-        moving = next((item for item in segments[k:] if not item.is_rest), None)
-        begun = None
-        if moving is not None and by_poses != isinstance(moving, PoseSegment):
-            by_poses, begun = not by_poses, moving
-        yield segment, begun
-
-
-def head(draft: Draft) -> list[str]:
-    """Return the comments at the head of a program, without what marks them as such."""
-    program = draft.program
-    axes = ", ".join(
-        f"{axis.name} = {as_word(axis.joint)} [{'mm' if axis.slides else 'deg'}]"
-        for axis in program.axes
-    )
-    moves = program.miss.moves
-    targets = "target" if program.targets == 1 else "targets"
-    notes = [
-        plain(f"selfmotion: {draft.robot.name}, {program.targets} {targets}"),
-        plain(draft.verdict),
-        plain(f"axes: {axes}"),
-        *draft.facts.notes,
-        *_of_speeds(program),
-        f"deviation: {stated(program.miss.path)}",
-        *([] if moves == NO_MISS else [f"deviation of moves: {stated(moves)}"]),
-        f"(of the tool from the plan, straight {_lines(draft)}, rounded corners or a spline",
-        "through the targets, at the times of the plan; of seams at speeds where the tool has gone",
-        "as far)",
-        *([f"{BECAUSE}{program.remark}"] if program.remark else []),
-        *_of_poses(draft),
-        "Angles are those of the URDF: compare zeros and signs with the controller's.",
-    ]
-    return [line for note in with_checksum(notes) for line in folded(note)]
-
-
-def speeds_of(program: ControllerProgram) -> list[float]:
-    """Return the speeds of its seams, each once [m/s]."""
-    at_speeds = (item for item in program.segments if isinstance(item, FeedSegment))
-    return sorted({float(speed) for item in at_speeds for speed in item.speeds})
-
-
-def goes_round(program: ControllerProgram) -> bool:
-    """Whether it has circular motions."""
-    at_speeds = (item for item in program.segments if isinstance(item, FeedSegment))
-    return any(bool(np.isfinite(item.vias).any()) for item in at_speeds)
-
-
-def before(segment: Segment) -> list[str]:
-    """Return the comments before a segment, without what marks them as such."""
-    planned = isinstance(segment, FeedSegment)
-    return [
-        *([plain(segment.remark)] if segment.remark else []),
-        *([f"{PLANNED}{segment.duration:.{TIME_DIGITS}f} s"] if planned else []),
-    ]
-
-
-def _of_speeds(program: ControllerProgram) -> list[str]:
-    """Return the lines of the head about seams at speeds."""
-    within = program.within
-    if within is None:
-        return []
-    return [
-        f"{KEPT}{rounded_up(1e3 * within.position, 6)} mm, {rounded_up(within.rotation, 9)} rad",
-        "(seams are at their feeds, and keep that of what is prescribed; where the tool may turn,",
-        "and the arm's self-motion, are off the plan by what follows. Run-up and run-down, and so",
-        "when the tool is where, are the controller's)",
-    ]
-
-
-def _lines(draft: Draft) -> str:
-    return "joint lines" if draft.frames is None else "lines of the tool"
-
-
-def _of_poses(draft: Draft) -> list[str]:
-    """Return the lines of the head about the frames of poses, from which the reader takes them."""
-    frames = draft.frames
-    if frames is None:
-        return []
-    place = ", ".join(f"{value:.9f}" for value in pin_values(frames.work))
-    names = (frames.name, frames.carrier, draft.settings.flange or "-")
-    work, carrier, flange = map(as_word, names)
-    return [
-        f"poses: work object {work} of {carrier}, flange {flange}",
-        f"planned work object: {place}",
-        "(m, and quaternion x, y, z, w, in that frame; shift the work object to shift the motion)",
-        "Poses are reached in the arm's configuration at the begin, by axes.",
-    ]

@@ -13,11 +13,11 @@ from typing_extensions import override
 from selfmotion.basics import Array, FileFormatError
 from selfmotion.model.motion import Trajectory
 from selfmotion.model.path import Path, times_when
-from selfmotion.shop.controllers.segments import Knots, PoseSegment, finer, straight
+from selfmotion.shop.controllers.segments import Curve, Knots, PoseSegment, finer, straight
 from selfmotion.shop.controllers.steps import put_on_arcs, step_lengths
 from selfmotion.shop.controllers.tool_frames import ToolFrames
 
-# How far a tool has gone along its path, as a function of time, and back.
+# Length of path that a tool has passed, as a function of time, and its inverse.
 
 # Times at which speeds are evaluated, per interval between two samples.
 _BETWEEN = 4
@@ -157,8 +157,8 @@ class Ramps(NamedTuple):
     def times(self, passed: Array) -> Array:
         """Return when times without ramps (K,) are reached with ramps [s]."""
         ramp, top = self.each, self.whole / (self.seconds - self.each)
-        ways = passed, self.whole - passed
-        up, down = (np.sqrt(2.0 * ramp * np.maximum(x, 0.0) / top) for x in ways)
+        sides = passed, self.whole - passed
+        up, down = (np.sqrt(2.0 * ramp * np.maximum(x, 0.0) / top) for x in sides)
         found = np.where(up < ramp, up, passed / top + 0.5 * ramp)
         return np.asarray(np.where(down < ramp, self.seconds - down, found))
 
@@ -201,7 +201,7 @@ class FeedSegment(PoseSegment):
         """The middles of its steps as targets: via poses of those that go round, (K,)."""
         t = 0.5 * (self.t[1:] + self.t[:-1])
         rows = self._stepped(t)
-        q = self._joints(rows, t)[:, self.order]
+        q = self.joints(rows, t)
         places = np.where(np.isfinite(self.vias), self.vias, rows[:, :3])
         return PoseSegment(
             self.name,
@@ -223,51 +223,50 @@ class FeedSegment(PoseSegment):
         """How far the tool has gone at each target, (K + 1,) [m]."""
         return np.append(0.0, np.cumsum(step_lengths(self.places, self.vias)))
 
-    def looked_at(self) -> Array:
-        """See `Segment.looked_at`: steps may be as long as the segment."""
+    @override
+    def evaluation_times(self) -> Array:
+        # Steps may be as long as the segment.
         count = max(_OF_STEP, ceil(_LOOKS / (len(self.t) - 1)))
         return finer(self.t, np.linspace(0.0, 1.0, count, endpoint=False))
 
-    def ways(self, times: Array) -> list[Array]:
-        """See `Segment.ways`: its steps, with corners rounded in their zones, a smooth curve."""
-        return [self._joints(way(times), times)[:, self.order] for way in self._ways]
-
     @property
-    def _ways(self) -> list[Callable[[Array], Array]]:
-        """Times → rows of poses by each way in which a controller may go, the stated one first."""
-        found: list[Callable[[Array], Array]] = [self._stepped]
+    @override
+    def curves(self) -> list[Curve]:
+        """See `Segment.curves`: its steps, with corners rounded in their zones, a smooth curve.
+
+        The one that the program states is the first.
+        """
+        found: list[Curve] = [self._stepped]
         if len(self.t) > 2:
             found.append(self._rounded)
             if not np.isfinite(self.vias).any():
-                found.append(self._spline)
+                found.append(self.spline)
         return found[::-1] if self.is_spline else found
 
-    def smooth(self) -> tuple[Array, Array, Array]:
-        """See `Segment.smooth`: with its ramps."""
-        times = self.ramps.times(self.looked_at())
+    @override
+    def motions(self) -> Iterator[Knots]:
+        """See `Segment.motions`: with its ramps."""
+        times = self.ramps.times(self.evaluation_times())
         ends = np.linspace(0.0, self.ramps.each, _OF_RAMP)
         times = np.unique(np.concatenate([times, ends, self.seconds - ends]))
         times = times[np.append(np.diff(times) > 1e-9, True)]
         times[-1] = self.seconds
-        return next(self._driven(times, self.ramps.passed(times)))
-
-    def joined(self) -> Iterator[Knots]:
-        """See `Segment.joined`: with its ramps."""
-        times = self.smooth()[0]
         return self._driven(times, self.ramps.passed(times))
 
-    def matched(self, motion: Trajectory, first: float) -> Array:
-        """See `Segment.matched`: where the tool has gone as far."""
+    @override
+    def reference(self, motion: Trajectory, first: float) -> Array:
+        """See `Segment.reference`: where the tool has gone as far."""
         gone = PassedLength.of_motion(self.frames, motion, first, first + self.seconds)
-        return motion(np.clip(gone.when(self._shares * gone.whole), motion.t[0], motion.t[-1]))
+        shares = self._gone(self.evaluation_times()) / self.lengths[-1]
+        return motion(np.clip(gone.when(shares * gone.whole), motion.t[0], motion.t[-1]))
 
     def at_pace(self, gone: PassedLength) -> Iterator[Knots]:
-        """Return the motions of `joined`, at the pace at which something else has gone as far."""
+        """Return the motions of `motions`, at the pace at which something else has gone as far."""
         own = np.interp(gone.at(gone.t) * (self.lengths[-1] / gone.whole), self.lengths, self.t)
         return self._driven(gone.t - gone.t[0], own)
 
     def along(self, path: Path, first: float) -> Iterator[Knots]:
-        """Return the motions of `joined`, at the pace of a path that it begins at `first` [s].
+        """Return the motions of `motions`, at the pace of a path that it begins at `first` [s].
 
         Raises
         ------
@@ -293,13 +292,13 @@ class FeedSegment(PoseSegment):
         at = 0.5 * sum(during)
         # Where less of a step than this is at another feed, its zone is.
         least = min(ZONE, 0.4 * float(np.ptp(gone.at(np.array(during)))))
-        asked = [
+        feeds = [
             (feed, *np.clip(window, *during))
             for feed in path.feeds
             for window in feed.during
             if np.ptp(gone.at(np.clip(window, *during))) > least
         ]
-        for feed, first, last in asked:
+        for feed, first, last in feeds:
             fastest, slowest = feed.asked, (1.0 - feed.within) * feed.asked
             if not slowest <= speed <= (1.0 + _SAME) * fastest:
                 at = 0.5 * (first + last)
@@ -311,23 +310,13 @@ class FeedSegment(PoseSegment):
                 f"the feed"
             )
 
-    @property
-    def _shares(self) -> Array:
-        """How far the tool has gone where it is looked at, of the whole."""
-        return np.asarray(self._gone(self.looked_at()) / self.lengths[-1])
-
     def _driven(self, times: Array, own: Array) -> Iterator[Knots]:
-        from scipy.interpolate import CubicSpline
-
-        for way in self._ways:
-            q = rates = self._joints(way(own), own)[:, self.order]
-            if np.isfinite(q).all():
-                rates = CubicSpline(times, q, bc_type="clamped")(times, 1)
-                rates[[0, -1]] = 0.0
-            yield Knots(times, q, rates)
+        """Yield the motion by each interpolation, at times where it would be at `own` times."""
+        for curve in self.curves:
+            yield Knots.smooth(times, self.joints(curve(own), own))
 
     def _stepped(self, times: Array) -> Array:
-        rows = straight(times, self.t, self._rows())
+        rows = straight(times, self.t, self.rows)
         put_on_arcs(rows, times, self.t, self.places, self.vias)
         return rows
 
@@ -345,13 +334,15 @@ class FeedSegment(PoseSegment):
         return rows
 
     def _gone(self, times: Array) -> Array:
-        """Return how far the tool has gone at times [m]: its way is the same at all speeds."""
+        """Return how far the tool has gone at times [m]: its path is the same at all speeds."""
         return np.interp(times, self.t, self.lengths)
 
-    def _spline(self, times: Array) -> Array:
+    @override
+    def spline(self, times: Array) -> Array:
+        """See `Segment.spline`: over the length of the path."""
         from scipy.interpolate import CubicSpline
 
-        rows: Array = CubicSpline(self.lengths, self._rows())(self._gone(times))
+        rows: Array = CubicSpline(self.lengths, self.rows)(self._gone(times))
         rows[:, 3:7] /= np.linalg.norm(rows[:, 3:7], axis=1, keepdims=True)
         return rows
 

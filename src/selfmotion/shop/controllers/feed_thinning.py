@@ -1,9 +1,8 @@
 """As few tool poses as keep a seam at its feed: straight and circular steps as long as can be.
 
 From each target the next is as far ahead as one step keeps near the motion, where the tool has
-gone as far. Where the tool is, is kept as the settings say. How it turns where that is free, and
-the arm's self-motion, may be off by more: by as much as still keeps all that the seam has to, which
-its certificate judges.
+gone as far. Its position is within the tolerance of the settings. Free rotations and the arm's
+self-motion may be off by more, within all that the certificate of the seam requires.
 """
 
 from collections.abc import Sequence
@@ -16,6 +15,7 @@ from selfmotion.basics import Array, Flags
 from selfmotion.certificate import Tolerance
 from selfmotion.model.motion import Trajectory
 from selfmotion.shop.controllers.feed_segments import FeedSegment, PassedLength, times_at
+from selfmotion.shop.controllers.pose_numbers import Rounding
 from selfmotion.shop.controllers.program_texts import TIMED
 from selfmotion.shop.controllers.segments import (
     SURE,
@@ -35,8 +35,8 @@ from selfmotion.shop.controllers.steps import (
     step_lengths,
 )
 from selfmotion.shop.controllers.targets import NotByPosesError, PoseSection, largest
-from selfmotion.shop.controllers.thinning import Piece, events_within, rests
-from selfmotion.shop.controllers.tool_frames import Rounding, ToolFrames, carrier_in_reference
+from selfmotion.shop.controllers.thinning import Operation, rests
+from selfmotion.shop.controllers.tool_frames import ToolFrames, carrier_in_reference
 
 # Tolerances of turning and self-motion, tried in turn [rad or m]; 0: that of all other joints.
 _FREE = (0.2, 0.02, 0.0)
@@ -66,34 +66,17 @@ _PROMPT = 5e-4
 
 @dataclass(frozen=True, eq=False)
 class FeedSection(PoseSection):
-    """Part of a seam at a feed between two rests, to be written as poses with speeds."""
-
-    @classmethod
-    def by(
-        cls,
-        frames: ToolFrames,
-        rounding: Rounding,
-        piece: Piece,
-        slides: Flags,
-        first: float,
-        last: float,
-    ) -> PoseSection:
-        """Return that of a piece with a feed; of others, what is written with times."""
-        given = frames, rounding, piece, slides, first, last
-        has_feed = len(piece.feeds) == 1 and bool(piece.feeds[0])
-        if not has_feed or piece.keeps is None or not _rides_along(frames):
-            return PoseSection.by(*given)
-        return super().by(*given)
+    """Section of a seam at a feed between two rests, to be written as poses with speeds."""
 
     def segments(self, allowed: Tolerance) -> list[tuple[Segment, Miss]]:
         """See `Section.segments`: one from rest to rest of the tool, the arm's self-motion aside.
 
         With times where speeds do not do, and the segment says why.
         """
-        if rests(self.piece.motion, self.first, self.last):
+        if rests(self.operation.motion, self.first, self.last):
             return super().segments(allowed)
         self.check_regular(allowed)
-        parts = [self._part(*ends) for ends in pairwise(self._stops)]
+        parts = [replace(self, first=a, last=b) for a, b in pairwise(self._stops)]
         gone = [part._gone for part in parts]
         why, stuck = "there is no feed where the tool hardly moves", None
         for free, share in product(_FREE, _OF_PLACES):
@@ -124,8 +107,8 @@ class FeedSection(PoseSection):
 
     def _lost(self, at: float, allowed: Tolerance) -> str:
         """Return in words where no poses at a feed keep the motion, and what would help."""
-        motion = self.piece.motion
-        tool = self.piece.chains[0].place(motion(at)).translation
+        motion = self.operation.motion
+        tool = self.operation.chains[0].place(motion(at)).translation
         place = ", ".join(f"{value:.3f}" for value in tool)
         return (
             f"near t = {at - motion.t[0]:.4g} s, at ({place}) m, no poses at its feed keep it "
@@ -137,36 +120,32 @@ class FeedSection(PoseSection):
     @property
     def _stops(self) -> list[float]:
         """When the tool rests, from the first to the last."""
-        at = self.piece.motion.t[0] + np.array(self.piece.tool_rests)
+        at = self.operation.motion.t[0] + np.array(self.operation.tool_rests)
         inside = at[(at > self.first + _PROMPT) & (at < self.last - _PROMPT)]
         return [self.first, *inside.tolist(), self.last]
 
-    def _part(self, first: float, last: float) -> "FeedSection":
-        events = events_within(self.piece, first, last)
-        return replace(self, first=first, last=last, events=events)
-
     @property
     def _gone(self) -> PassedLength:
-        return PassedLength.of_motion(self.frames, self.piece.motion, self.first, self.last)
+        return PassedLength.of_motion(self.frames, self.operation.motion, self.first, self.last)
 
     def _keeps(
         self, segments: Sequence[FeedSegment], gone: Sequence[PassedLength], allowed: Tolerance
     ) -> bool:
         """Whether the seam keeps all that it has to with segments in place of its motion.
 
-        By each way in which a controller may join their targets.
+        By each interpolation that a controller may use.
         """
-        ways = (segment.at_pace(each) for segment, each in zip(segments, gone, strict=True))
-        return all(self._keeps_by(parts, allowed) for parts in by_interpolation(ways))
+        motions = (segment.at_pace(each) for segment, each in zip(segments, gone, strict=True))
+        return all(self._keeps_by(parts, allowed) for parts in by_interpolation(motions))
 
     def _keeps_by(self, parts: Sequence[Knots], allowed: Tolerance) -> bool:
-        motion, begin = self.piece.motion, self.first
+        motion, begin = self.operation.motion, self.first
         rows: list[tuple[Array, Array, Array]] = []
         for t, q, qd in parts:
             if not np.isfinite(q).all():
                 return False
-            kept = slice(1 if rows else 0, None)
-            rows.append((begin + t[kept], q[kept], qd[kept]))
+            after_first = slice(1 if rows else 0, None)
+            rows.append((begin + t[after_first], q[after_first], qd[after_first]))
             begin += float(t[-1])
         before, after = motion.t < self.first - _PROMPT, motion.t > self.last + _PROMPT
         given = motion.t, motion.q, motion.qd
@@ -175,7 +154,7 @@ class FeedSection(PoseSection):
             for own, each in zip(given, zip(*rows, strict=True), strict=True)
         ]
         judged = Trajectory(whole[0], whole[1], whole[2], motion.joint_names)
-        return self.piece.keeps is not None and self.piece.keeps(judged, allowed)
+        return self.operation.keeps is not None and self.operation.keeps(judged, allowed)
 
     def _is_prompt(self, segment: FeedSegment) -> bool:
         """Whether there is time to run up, and events are on time, ramps being even."""
@@ -193,7 +172,7 @@ class FeedSection(PoseSection):
         along = self._along(gone, fixed)
         marks = [int(np.abs(along.gone - each).argmin()) for each in fixed]
         limits = Allowed(allowed.position, allowed.rotation, free)
-        steps = StepSearch(self.frames, self.piece.turns, along, limits).between(marks)
+        steps = StepSearch(self.frames, self.operation.turns, along, limits).between(marks)
         if not isinstance(steps, Steps):
             return self._when(gone, along.gone[steps])
         for _ in range(_TRIES):
@@ -217,8 +196,8 @@ class FeedSection(PoseSection):
 
     def _fixed(self, gone: PassedLength) -> Array:
         """Return how far the tool is at ends, events, and where feeds change [m]."""
-        start = float(self.piece.motion.t[0])
-        changes = [start + item.during.ravel() for item in self.piece.feeds[0]]
+        start = float(self.operation.motion.t[0])
+        changes = [start + item.during.ravel() for item in self.operation.feeds[0]]
         times = np.concatenate([[at for at, _ in self.events], *changes])
         inside = np.unique(gone.at(times[(times > self.first) & (times < self.last)]))
         inside = inside[(inside > _STEP) & (inside < gone.whole - _STEP)]
@@ -226,7 +205,7 @@ class FeedSection(PoseSection):
         return np.concatenate([[0.0], inside, [gone.whole]])
 
     def _along(self, gone: PassedLength, fixed: Array) -> Places:
-        motion = self.piece.motion
+        motion = self.operation.motion
         inside = motion.t[(motion.t > self.first) & (motion.t < self.last)]
         inside = inside[:: max(1, len(inside) // (_MOST - _FEWEST))]
         even = np.linspace(0.0, gone.whole, _FEWEST + 1)
@@ -241,11 +220,11 @@ class FeedSection(PoseSection):
 
     def _at(self, gone: PassedLength, far: Array) -> Array:
         """Return the motion where the tool has gone so far, (K, n)."""
-        return self.piece.motion(np.minimum(gone.when(far), self.last))
+        return self.operation.motion(np.minimum(gone.when(far), self.last))
 
     def _segment(self, gone: PassedLength, along: Places, steps: Steps) -> FeedSegment:
         """Return targets, as the file has them."""
-        motion, ends = self.piece.motion, steps.ends
+        motion, ends = self.operation.motion, steps.ends
         q = self._in_digits(along.q[ends])
         places, turns = self.rounding(along.rows[ends, :3], along.rows[ends, 3:7])
         vias = np.full((len(ends) - 1, 3), np.nan)
@@ -259,7 +238,7 @@ class FeedSection(PoseSection):
         found, arrived = self.frames.solved(places, turns, self._mixed(along.q[ends], q))
         if not arrived.all():
             at = gone.when(along.gone[[ends[int(np.argmin(arrived))]]])[0] - motion.t[0]
-            raise NotByPosesError(f"'{self.piece.name}': the arm is singular at t = {at:.4g} s")
+            raise NotByPosesError(f"'{self.operation.name}': the arm is singular at t = {at:.4g} s")
         speeds = self._speeds(gone, along.gone[ends])
         times = times_at(places, vias, speeds)
         far = np.append(0.0, np.cumsum(step_lengths(places, vias)))
@@ -273,7 +252,7 @@ class FeedSection(PoseSection):
             for at, name in self.events
         ]
         return FeedSegment(
-            self.piece.name,
+            self.operation.name,
             times,
             found,
             tuple(events),
@@ -289,9 +268,9 @@ class FeedSection(PoseSection):
 
     def _speeds(self, gone: PassedLength, ends: Array) -> Array:
         """Return the feed of each step; beside a feed, what takes as long with its ramps [m/s]."""
-        middles = gone.when(0.5 * (ends[1:] + ends[:-1])) - self.piece.motion.t[0]
+        middles = gone.when(0.5 * (ends[1:] + ends[:-1])) - self.operation.motion.t[0]
         found = np.full(len(middles), gone.whole / ((1.0 - _RAMP) * (self.last - self.first)))
-        for item in self.piece.feeds[0]:
+        for item in self.operation.feeds[0]:
             for begin, end in item.during:
                 found[(middles >= begin) & (middles <= end)] = item.asked
         return np.round(found, _SPEED_DIGITS)
@@ -301,11 +280,11 @@ class FeedSection(PoseSection):
 
         Where joints swing between two looks, as they do near a singular pose, near when [s].
         """
-        times, count = segment.looked_at(), len(segment.t) - 1
-        exact = segment.matched(self.piece.motion, self.first)
+        times, count = segment.evaluation_times(), len(segment.t) - 1
+        exact = segment.reference(self.operation.motion, self.first)
         at, facing = self.frames.places(exact)
         worst = np.zeros(count)
-        for line in segment.ways(times):
+        for line in segment.interpolated(times):
             off = line - exact
             swing = np.abs(np.diff(off, axis=0)).max(axis=1)
             # Written so that NaN does.
@@ -315,11 +294,26 @@ class FeedSection(PoseSection):
             places, turns = self.frames.places(line)
             taken = np.linalg.norm(places - at, axis=1) / allowed.position
             taken = np.maximum(taken, np.abs(off).max(axis=1) / allowed.free)
-            turned = allowed.turned(self.frames, self.piece.turns, turns, facing)
+            turned = allowed.turned(self.frames, self.operation.turns, turns, facing)
             worst = np.maximum(worst, largest(np.maximum(taken, turned), count))
         return SURE * worst
 
 
+def paced_section(
+    operation: Operation,
+    slides: Flags,
+    first: float,
+    last: float,
+    frames: ToolFrames,
+    rounding: Rounding,
+) -> PoseSection:
+    """Return the section of a seam at a feed; of other parts of a motion, one with times."""
+    has_feed = len(operation.feeds) == 1 and bool(operation.feeds[0])
+    is_paced = has_feed and operation.keeps is not None and _rides_along(frames)
+    kind = FeedSection if is_paced else PoseSection
+    return kind(operation, slides, first, last, frames, rounding)
+
+
 def _rides_along(frames: ToolFrames) -> bool:
-    """Whether the path is given in a frame that the work object stands still in."""
+    """Whether the path is given in a frame in which the work object is at rest."""
     return carrier_in_reference(frames.robot, frames.carrier) is not None

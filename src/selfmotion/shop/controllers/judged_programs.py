@@ -1,243 +1,33 @@
-"""Programs of controllers as files, cut into the steps of their job, and judged."""
+"""Programs of controllers, judged by the jobs that they are of."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import combinations, pairwise
 from pathlib import Path as FilePath
-from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
 import numpy as np
 
-from selfmotion.basics import (
-    Array,
-    FileFormatError,
-    ProblemError,
-    Progress,
-    RobotError,
-    silent,
-)
+from selfmotion.basics import Array, FileFormatError, ProblemError, RobotError
 from selfmotion.certificate import Certificate, Tolerance
 from selfmotion.model.motion import Trajectory
 from selfmotion.model.path import Placed
 from selfmotion.model.robot import RobotModel
 from selfmotion.model.task import log3
-from selfmotion.planning.result import CheckedMotion, Move, Parts, Plan, elsewhere, gaps
+from selfmotion.planning.result import CheckedMotion, Move, Plan, elsewhere, gaps
 from selfmotion.problem.constraints import Constraint
 from selfmotion.problem.problem import Problem
-from selfmotion.shop.controllers.controller_program import (
-    ControllerProgram,
-    Draft,
-    Joints,
-    Switch,
-    constraints_of,
-    drafted,
-)
-from selfmotion.shop.controllers.krl import KrlReader, write_krl
+from selfmotion.shop.controllers.controller_program import ControllerProgram, Switch
+from selfmotion.shop.controllers.program_draft import constraints_of
 from selfmotion.shop.controllers.program_facts import check_load
-from selfmotion.shop.controllers.program_lines import ProgramReader
-from selfmotion.shop.controllers.program_settings import ProgramSettings
+from selfmotion.shop.controllers.program_files import program_miss, read_program
+from selfmotion.shop.controllers.program_steps import ProgramParts, parts_of
 from selfmotion.shop.controllers.program_texts import plain
-from selfmotion.shop.controllers.rapid import RapidReader, write_rapid
-from selfmotion.shop.controllers.segments import Misses, PoseSegment, Segment
+from selfmotion.shop.controllers.segments import PoseSegment
 from selfmotion.shop.controllers.thinning import what_lines_keep, what_targets_keep
 from selfmotion.shop.controllers.tool_frames import WORLD, carrier_in_reference
-from selfmotion.shop.controllers.urscript import UrscriptReader, write_urscript
 from selfmotion.work.job import Program, are_opposite
-
-# Programs of controllers as files: which suffix is which language.
-
-_WRITERS: Mapping[str, Callable[[FilePath, Draft], None]] = {
-    "krl": write_krl,
-    "rapid": write_rapid,
-    "urscript": write_urscript,
-}
-_READERS: Mapping[str, type[ProgramReader]] = {
-    ".src": KrlReader,
-    ".mod": RapidReader,
-    ".script": UrscriptReader,
-}
-# Suffixes of programs of targets; those that are read as such, which linear URScript is as well.
-PROGRAMS = {".src": "krl", ".mod": "rapid"}
-READ_PROGRAMS = tuple(_READERS)
-
-
-def write_program(
-    plan: Plan | Parts | Move | Program,
-    file: FilePath,
-    form: str,
-    settings: ProgramSettings,
-    progress: Progress = silent,
-) -> None:
-    """Write a motion as a program of a controller; see `write_motion`.
-
-    Poses are written where the file, read again, keeps what it states: else joint targets, of free
-    moves first.
-    """
-    verdict = plan.certificate.verdict if isinstance(plan, Plan) else plan.verdict
-    given = plan, file.stem, form, settings, verdict, progress
-    draft = drafted(*given)
-    for moves_only in (True, False):
-        if draft.frames is None:
-            break
-        why = _lost(plan, file, form, draft)
-        if not why:
-            break
-        draft = drafted(*given, Joints(moves_only, why))
-    _WRITERS[form](file, draft)
-
-
-def _lost(plan: Plan | Parts | Move | Program, file: FilePath, form: str, draft: Draft) -> str:
-    """Return why a program of poses, read again, is not the motion, in words; empty where it is."""
-    with TemporaryDirectory() as folder:
-        trial = FilePath(folder) / file.name
-        _WRITERS[form](trial, draft)
-        try:
-            _, stated, found = program_miss(plan, trial)
-        except FileFormatError as error:
-            return f"read again, {str(error).removeprefix(f'{trial}: ')}"
-    if keeps_stated(found, stated):
-        return ""
-    return "read again, poses leave the motion: the arm is singular, or nearly so"
-
-
-def keeps_stated(found: Misses, stated: Misses) -> bool:
-    """Whether a program is no farther off its motion than it states, in the digits of files."""
-    pairs = zip((*found.path, *found.moves), (*stated.path, *stated.moves), strict=True)
-    return all(one <= other + 1e-9 for one, other in pairs)
-
-
-def read_program(file: FilePath, robot: RobotModel | None = None) -> ControllerProgram:
-    """Read a program of a controller, by its suffix; tool poses by the robot that moves to them.
-
-    Raises
-    ------
-    FileFormatError
-        The file cannot be read, or says what is not read; the line is named.
-    """
-    return _READERS[file.suffix.lower()](file, robot).program()
-
-
-def program_miss(
-    plan: Plan | Parts | Move | Program, file: FilePath, read: ControllerProgram | None = None
-) -> tuple[int, Misses, Misses]:
-    """Return the contents of a program file: targets, the deviations it states, and its kind.
-
-    The file is read unless it was `read` before.
-
-    Raises
-    ------
-    FileFormatError
-        The file cannot be read, or is of another motion.
-    """
-    found = read or read_program(file, plan.robot)
-    try:
-        return found.targets, found.miss, found.miss_of(plan)
-    except FileFormatError as error:
-        raise FileFormatError(f"{file}: {error}") from error
-
-
-# A controller's program cut into the steps of its job, and slow motions in between judged.
-
-
-class JudgedStep(NamedTuple):
-    """The certificate of the targets of a seam or move.
-
-    Attributes
-    ----------
-    name : str
-    verified : bool
-    verdict : str
-    """
-
-    name: str
-    verified: bool
-    verdict: str
-
-
-class ProgramParts(NamedTuple):
-    """The part of a program that each step of its job is.
-
-    Attributes
-    ----------
-    motions : list of list of Trajectory
-        Of each step, by each way in which a controller may join its targets; of a seam at the pace
-        of its path.
-    slow : sequence of (int, list of Trajectory)
-        Slow motions to where a shifted program goes on: before which step, and what.
-    by_poses : list of bool
-        Whether a step has targets that are poses, or rests.
-    """
-
-    motions: list[list[Trajectory]]
-    slow: Sequence[tuple[int, list[Trajectory]]]
-    by_poses: list[bool]
-
-
-def parts_of(file: FilePath, program: ControllerProgram, job: Program) -> ProgramParts:
-    """Return the part of a program that each step of its job is.
-
-    Raises
-    ------
-    FileFormatError
-        It is of another job.
-    """
-    names = job.robot.joint_names
-    known = [axis.joint for axis in program.axes]
-    if sorted(known) != sorted(names):
-        raise FileFormatError(f"{file}: has joints {', '.join(known)}, expected {', '.join(names)}")
-    left, found = list(program.segments), ProgramParts([], slow := [], [])
-
-    def part(segments: Sequence[Segment]) -> ControllerProgram:
-        return replace(program, segments=tuple(segments))
-
-    for number, step in enumerate(job.steps):
-        taken, seconds = [], 0.0
-        while left and left[0].is_slow:
-            own = part([left.pop(0)])
-            slow.append((number, [motion.of_joints(names) for motion in own.motions()]))
-        while left and seconds < step.motion.duration - _MOMENT:
-            taken.append(left.pop(0))
-            seconds += taken[-1].duration
-        if abs(seconds - step.motion.duration) > _MOMENT:
-            raise FileFormatError(
-                f"{file}: its targets of '{step.name}' take {seconds:.6g} s, the job's "
-                f"{step.motion.duration:.6g} s: it is of another one"
-            )
-        own, made = part(taken), step.made
-        path = None if isinstance(made, Move) else made.problem.path
-        found.motions.append([motion.of_joints(names) for motion in own.motions(path)])
-        # Where the arm rests, it is where the poses around have it.
-        moving = [item for item in taken if not item.is_rest]
-        posed = not moving or any(isinstance(item, PoseSegment) for item in moving)
-        found.by_poses.append(posed)
-    if left:
-        raise FileFormatError(f"{file}: goes on with '{left[0].name}' when the job has ended")
-    return found
-
-
-def slow_steps(
-    parts: ProgramParts, job: Program
-) -> tuple[tuple[JudgedStep, ...], Mapping[int, Sequence[CheckedMotion]]]:
-    """Return failures of slow motions, and these motions by the step that they are before.
-
-    Each has to keep what the nearest free move has to.
-    """
-    moves = [(k, step.made) for k, step in enumerate(job.steps) if isinstance(step.made, Move)]
-    steps, pieces = list[JudgedStep](), dict[int, list[CheckedMotion]]()
-    for number, motions in parts.slow:
-        name = f"slowly to '{job.steps[number].name}'"
-        pieces.setdefault(number, []).append(CheckedMotion(name, motions[0]))
-        if not moves:
-            steps.append(JudgedStep(name, False, "not verified: the job has no free moves"))
-            continue
-        _, near = min(moves, key=lambda move: abs(move[0] - number))
-        steps.append(_judged_move(name, near, motions, what_targets_keep))
-    return tuple(steps), pieces
-
-
-# Programs of controllers, judged by what they were made from.
 
 # Rounding of times in files [s].
 _MOMENT = 1e-4
@@ -255,6 +45,41 @@ _EXPLAINED = 1e-3
 _INSTANT = 1e-9
 
 
+class JudgedStep(NamedTuple):
+    """The certificate of the targets of a seam or move.
+
+    Attributes
+    ----------
+    name : str
+    verified : bool
+    verdict : str
+    """
+
+    name: str
+    verified: bool
+    verdict: str
+
+
+def slow_steps(
+    parts: ProgramParts, job: Program
+) -> tuple[tuple[JudgedStep, ...], Mapping[int, Sequence[CheckedMotion]]]:
+    """Return failures of slow motions, and these motions by the step that they are before.
+
+    Each has to keep what the nearest free move has to.
+    """
+    moves = [(k, step.made) for k, step in enumerate(job.steps) if isinstance(step.made, Move)]
+    steps, checked = list[JudgedStep](), dict[int, list[CheckedMotion]]()
+    for number, motions in parts.slow:
+        name = f"slowly to '{job.steps[number].name}'"
+        checked.setdefault(number, []).append(CheckedMotion(name, motions[0]))
+        if not moves:
+            steps.append(JudgedStep(name, False, "not verified: the job has no free moves"))
+            continue
+        _, near = min(moves, key=lambda move: abs(move[0] - number))
+        steps.append(_judged_move(name, near, motions, what_targets_keep))
+    return tuple(steps), checked
+
+
 def stated_deviation(program: ControllerProgram) -> Tolerance | None:
     """Return how far off its path a program of a controller says it is; None where it does not."""
     if program.within is not None:
@@ -265,7 +90,7 @@ def stated_deviation(program: ControllerProgram) -> Tolerance | None:
 
 
 class JudgedProgram(NamedTuple):
-    """What is known of a controller's program, by the job that it is of.
+    """Verdict on a controller's program, by the job that it is of.
 
     Attributes
     ----------
@@ -296,13 +121,13 @@ class JudgedProgram(NamedTuple):
         """One line: verified, or how many steps are not, and what speaks against the whole."""
         if self.verified:
             own = f"; {self.unjudged}" if self.unjudged else ""
-            return f"verified: each step, and the whole{self._allowed}{self._told}{own}"
+            return f"verified: each step, and the whole{self._allowed}{self._shift_note}{own}"
         count = sum(not step.verified for step in self.steps)
-        told = [*([f"{count} of {len(self.steps)} steps"] if count else []), *self.failures]
-        return f"not verified: {'; '.join(told)}{self._told}"
+        reasons = [*([f"{count} of {len(self.steps)} steps"] if count else []), *self.failures]
+        return f"not verified: {'; '.join(reasons)}{self._shift_note}"
 
     @property
-    def _told(self) -> str:
+    def _shift_note(self) -> str:
         return f"; {self.shifted}" if self.shifted else ""
 
     @property
@@ -319,14 +144,14 @@ def _judged_move(
     name: str,
     made: Move,
     motions: Sequence[Trajectory],
-    kept: Callable[[Sequence[Constraint]], tuple[Constraint, ...]],
+    judged: Callable[[Sequence[Constraint]], tuple[Constraint, ...]],
 ) -> JudgedStep:
     """Return the verdict on a move by each interpolation: the first that fails."""
-    asked, lines = kept(made.constraints), what_lines_keep(kept(made.constraints))
-    ways = [Move(made.robot, lines if k else asked, motion) for k, motion in enumerate(motions)]
-    worst = next((move for move in ways if not move.verified), ways[0])
-    way = "" if worst is ways[0] else _STRAIGHT
-    return JudgedStep(name, worst.verified, f"{worst.verdict}{way}")
+    smooth, lines = judged(made.constraints), what_lines_keep(judged(made.constraints))
+    moves = [Move(made.robot, lines if k else smooth, motion) for k, motion in enumerate(motions)]
+    worst = next((move for move in moves if not move.verified), moves[0])
+    interpolation = "" if worst is moves[0] else _STRAIGHT
+    return JudgedStep(name, worst.verified, f"{worst.verdict}{interpolation}")
 
 
 def judged_interpolations(
@@ -375,15 +200,15 @@ def judged_program(file: FilePath, job: Program, within: Tolerance | None = None
     program = read_program(file, job.robot)
     allowed = within or stated_deviation(program)
     parts = parts_of(file, program, job)
-    steps, pieces = _judged_steps(job, parts.motions, allowed, what_targets_keep, program)
+    steps, checked = _judged_steps(job, parts.motions, allowed, what_targets_keep, program)
     slow, between = slow_steps(parts, job)
-    pieces = [piece for k, own in enumerate(pieces) for piece in (*between.get(k, ()), own)]
+    checked = [item for k, own in enumerate(checked) for item in (*between.get(k, ()), own)]
     # From axis targets to poses there are digits of both, which the arm's kinematics may magnify.
     digits = _OF_POSES if any(isinstance(s, PoseSegment) for s in program.segments) else _DIGITS
     failures = (
         *(f"the job itself: {text}" for text in job.failures),
-        *gaps(job.robot, pieces, digits),
-        *_elsewhere(job, pieces, digits, program),
+        *gaps(job.robot, checked, digits),
+        *_elsewhere(job, checked, digits, program),
         *([program.begins_elsewhere] if program.begins_elsewhere else []),
         *misswitched(program, job),
         *_off_moves(file, program, job, parts),
@@ -400,13 +225,13 @@ def _shifted_moves(program: ControllerProgram, job: Program, parts: ProgramParts
     where a joint target is to where the shifted pose of it is, or back.
     """
     stated = program.miss.moves.joint
-    for step, ways, is_shifted in zip(job.steps, parts.motions, parts.by_poses, strict=True):
+    for step, motions, is_shifted in zip(job.steps, parts.motions, parts.by_poses, strict=True):
         if isinstance(step.made, Plan) or is_shifted:
             continue
         t = np.union1d(step.motion.t, step.motion.t[:-1] + 0.5 * np.diff(step.motion.t))
         here = step.motion(t)
-        for way in ways:
-            off = np.abs(way(np.minimum(t - t[0], way.t[-1])) - here).max()
+        for motion in motions:
+            off = np.abs(motion(np.minimum(t - t[0], motion.t[-1])) - here).max()
             if off > stated + _DIGITS:
                 yield (
                     f"'{step.name}' has joints {off:.4g} rad or m off the move of the job, the "
@@ -417,8 +242,8 @@ def _shifted_moves(program: ControllerProgram, job: Program, parts: ProgramParts
     frame = carrier_in_reference(job.robot, program.carrier)
     if shift is None or frame is None:
         return
-    for number, ways in parts.slow:
-        ends = [job.robot.chain.place(q) for q in ways[0].q[[0, -1]]]
+    for number, motions in parts.slow:
+        ends = [job.robot.chain.place(q) for q in motions[0].q[[0, -1]]]
         first, last = (np.asarray(frame.actInv(end.translation)) for end in ends)
         explained = min(
             np.linalg.norm(np.asarray(shift.act(first)) - last),
@@ -479,11 +304,11 @@ def shift_note(program: ControllerProgram) -> str:
     """Return by how much the work object is elsewhere than planned, in words; empty for not."""
     if program.shift is None:
         return ""
-    way = 1e3 * float(np.linalg.norm(program.shift.translation))
+    distance = 1e3 * float(np.linalg.norm(program.shift.translation))
     turn = float(np.degrees(np.linalg.norm(log3(program.shift.rotation))))
     return (
-        f"the work object is {way:.4g} mm and {turn:.3g}° from where it was planned: judged along "
-        f"the path shifted with it"
+        f"the work object is {distance:.4g} mm and {turn:.3g}° from where it was planned: judged "
+        f"along the path shifted with it"
     )
 
 
@@ -541,15 +366,15 @@ def judged_motion(motion: Trajectory, job: Program) -> JudgedProgram:
     """
     whole = motion.of_joints(job.robot.joint_names)
     if abs(whole.duration - job.duration) > _MOMENT:
-        told = f"it lasts {whole.duration:.6g} s, the job {job.duration:.6g} s"
-        return JudgedProgram((), (told,))
+        failure = f"it lasts {whole.duration:.6g} s, the job {job.duration:.6g} s"
+        return JudgedProgram((), (failure,))
     ends = [*job.begins, job.duration]
     motions = [[part_of(whole, first, last)] for first, last in pairwise(ends)]
-    steps, pieces = _judged_steps(job, motions, None, tuple)
+    steps, checked = _judged_steps(job, motions, None, tuple)
     failures = (
         *(f"the job itself: {text}" for text in job.failures),
-        *gaps(job.robot, pieces),
-        *_elsewhere(job, pieces),
+        *gaps(job.robot, checked),
+        *_elsewhere(job, checked),
     )
     return JudgedProgram(steps, failures)
 
@@ -567,34 +392,34 @@ def _judged_steps(
     job: Program,
     motions: Sequence[Sequence[Trajectory]],
     within: Tolerance | None,
-    kept: Callable[[Sequence[Constraint]], tuple[Constraint, ...]],
+    judged: Callable[[Sequence[Constraint]], tuple[Constraint, ...]],
     program: ControllerProgram | None = None,
 ) -> tuple[tuple[JudgedStep, ...], list[CheckedMotion]]:
-    """Return the certificates of the motions of a job's steps, by the limits that are `kept`."""
-    found, pieces = list[JudgedStep](), list[CheckedMotion]()
-    for step, ways in zip(job.steps, motions, strict=True):
+    """Return the certificates of the motions of a job's steps, by the limits that are `judged`."""
+    found, checked = list[JudgedStep](), list[CheckedMotion]()
+    for step, own in zip(job.steps, motions, strict=True):
         made = step.made
         if isinstance(made, Move):
-            found.append(_judged_move(step.name, made, ways, kept))
+            found.append(_judged_move(step.name, made, own, judged))
         else:
-            problem = replace(made.problem, constraints=kept(made.problem.constraints))
+            problem = replace(made.problem, constraints=judged(made.problem.constraints))
             if program is not None:
-                problem = as_shifted(problem, program, ways[0].q[0])
+                problem = as_shifted(problem, program, own[0].q[0])
             lines = replace(problem, constraints=what_lines_keep(problem.constraints))
             tolerance = within or made.tolerance
             certificate, _ = judged_interpolations(
-                ways,
+                own,
                 partial(problem.certify, tolerance=tolerance),
                 partial(lines.certify, tolerance=tolerance),
             )
             found.append(JudgedStep(step.name, certificate.verified, certificate.verdict))
-        pieces.append(CheckedMotion(f"'{step.name}'", ways[0]))
-    return tuple(found), pieces
+        checked.append(CheckedMotion(f"'{step.name}'", own[0]))
+    return tuple(found), checked
 
 
 def _elsewhere(
     job: Program,
-    pieces: Sequence[CheckedMotion],
+    checked: Sequence[CheckedMotion],
     digits: float = _DIGITS,
     program: ControllerProgram | None = None,
 ) -> Iterator[str]:
@@ -602,27 +427,27 @@ def _elsewhere(
 
     Poses of a shifted work object are elsewhere, joint targets are not.
     """
-    for end in (0, -1) if pieces else ():
+    for end in (0, -1) if checked else ():
         if program is not None and program.shift is not None:
             moving = [item for item in program.segments if not item.is_rest]
             if not moving or isinstance(moving[end], PoseSegment):
                 continue
-        asked = job.steps[end].motion.q[end]
-        yield from elsewhere(job.robot, pieces[end], end, asked, digits)
+        wanted = job.steps[end].motion.q[end]
+        yield from elsewhere(job.robot, checked[end], end, wanted, digits)
 
 
 def _otherwise_switched(job: Program, program: ControllerProgram) -> Iterator[str]:
     """Yield what of a job's events a program does not switch, or switches otherwise."""
-    asked = sorted(job.events, key=lambda event: event[0])
+    events = sorted(job.events, key=lambda event: event[0])
     made = sorted(program.switches, key=lambda switch: switch.at)
     stated = None if program.facts is None else program.facts.outputs
-    if asked and stated is None:
+    if events and stated is None:
         yield "its head does not say which output each event switches: write the program again"
-    if len(asked) != len(made):
-        yield f"it switches {len(made)} times, the job {len(asked)} times"
+    if len(events) != len(made):
+        yield f"it switches {len(made)} times, the job {len(events)} times"
         return
     known: dict[str, Switch] = {}
-    for (at, seam, event), switch in zip(asked, made, strict=True):
+    for (at, seam, event), switch in zip(events, made, strict=True):
         if abs(at - switch.at) > _PROMPT:
             yield (
                 f"event '{event}' of '{seam}' is at {at:.4f} s, but '{switch.output}' is switched "

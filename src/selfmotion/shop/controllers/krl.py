@@ -1,26 +1,28 @@
-"""KUKA Robot Language: spline blocks of targets with times, written, and read line by line."""
+"""KUKA Robot Language: spline blocks of targets with times, or of poses at speeds."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping
 from pathlib import Path as FilePath
 
 import numpy as np
+from typing_extensions import override
 
-from selfmotion.basics import Array, ProblemError, write_text
+from selfmotion.basics import Array
 from selfmotion.model.robot import RobotModel
 from selfmotion.model.task import SE3, Quaternion
-from selfmotion.shop.controllers.controller_program import (
-    ControllerProgram,
-    Draft,
-    before,
-    goes_round,
-    head,
-    speeds_of,
-    with_begins,
-)
+from selfmotion.shop.controllers.configurations import status_and_turn
+from selfmotion.shop.controllers.controller_program import Switch
 from selfmotion.shop.controllers.feed_segments import FeedSegment
-from selfmotion.shop.controllers.program_lines import ProgramReader, switched
-from selfmotion.shop.controllers.program_settings import AXES, written
-from selfmotion.shop.controllers.program_texts import module_name, plain
+from selfmotion.shop.controllers.pose_numbers import krl_numbers, krl_pose
+from selfmotion.shop.controllers.program_draft import Draft
+from selfmotion.shop.controllers.program_reader import ProgramReader, Target
+from selfmotion.shop.controllers.program_settings import AXES
+from selfmotion.shop.controllers.program_texts import module_name
+from selfmotion.shop.controllers.program_writer import (
+    ProgramWriter,
+    WrittenPose,
+    goes_round,
+    speeds_of,
+)
 from selfmotion.shop.controllers.read_segments import Pose, pose_of_values, times_of
 from selfmotion.shop.controllers.segments import (
     PoseSegment,
@@ -29,11 +31,18 @@ from selfmotion.shop.controllers.segments import (
     on_one_side,
     straight,
 )
+from selfmotion.shop.controllers.statements import (
+    NUMBER,
+    Field,
+    Language,
+    Statement,
+    number,
+    seconds,
+    truth,
+    word,
+)
 from selfmotion.shop.controllers.thinning import TIME_DIGITS
-from selfmotion.shop.controllers.tool_frames import krl_numbers, krl_pose, status_and_turn
 
-# KUKA Robot Language: spline blocks of axis targets with their times.
-#
 # After KUKA System Software 8.3, Operating and Programming Instructions for System Integrators
 # (KSS 8.3 SI V4): E6AXIS aggregates, ``PTP_SPLINE`` with ``SPTP`` segments and a ``TIME_BLOCK``,
 # whose parts share its time in proportion, and the path trigger. ``PTP_SPLINE`` passes all
@@ -62,7 +71,7 @@ _WORDS = (
     "WHEN", "WHILE",
 )
 # fmt: on
-# Characters in a name.
+# Largest number of characters in a name.
 NAME = 24
 # Largest speed of the approach [m/s].
 _FASTEST = 0.5
@@ -77,469 +86,538 @@ _WHOLE = 100.0
 # Largest $VEL.CP [m/s].
 _MOST = 3.0
 # Ratio of the speed that is set to the speed that times need.
-_ABOVE_ASKED = 1.02
+_ABOVE_TIMES = 1.02
 # Length of path below which it has no direction [m].
 _SHORT = 1e-3
 # Distance of poses from their line by rounding [m].
 _ON_LINE = 4e-7
+# Difference of a block's time from the sum of its parts below which parts are seconds [s].
+_SAME_TIME = 1e-4
+# Variables of $VEL with the largest rates of turning.
+_TURNINGS = ("ORI1", "ORI2")
 
 
-def write_krl(file: FilePath, draft: Draft) -> None:
-    """Write a program as a module that a KR C4 or C5 selects."""
-    program = draft.program
-    name = module_name(file, NAME, _WORDS)
-    percent = f"{100.0 * draft.settings.approach:g}"
-    first = program.segments[0]
-    lines = [
-        "&ACCESS RVP",
-        "&REL 1",
-        f"DEF {name}()",
-        *(f"  ; {line}" for line in head(draft)),
-        "  BAS(#INITMOV, 0)",
-        f"  $BASE = {_base(draft)}",
-        f"  $TOOL = {_frame(draft.tool)}",
-        *_load(draft),
-        *_slow_and_fast(draft)[0],
-        *(["  $ORI_TYPE = #VAR", "  $CIRC_TYPE = #BASE"] if goes_round(program) else []),
-        f"  BAS(#VEL_PTP, {percent})",
-        f"  BAS(#ACC_PTP, {percent})",
-        f"  PTP {_aggregate(first, 0, program)}",
-        "  BAS(#VEL_PTP, 100)",
-        "  BAS(#ACC_PTP, 100)",
-    ]
-    begins = True
-    for segment, begun in with_begins(program.segments):
-        lines += ["", f"  ; step: {plain(segment.name)}"]
-        lines += [f"  ; {line}" for line in before(segment)]
-        if begun is not None:
-            lines += _slowly(draft, begun, percent, begins=begins)
-            begins = False
-        lines += _block(draft, segment)
-    write_text(file, "\n".join([*lines, "END", ""]))
+# Values in statements: aggregates of axes, poses and frames.
 
 
-def _block(draft: Draft, segment: Segment) -> list[str]:
-    """Return the lines of a motion from rest to rest, or of a rest."""
-    at_begin = [_event(draft, item.name) for item in segment.events if item.target == 0]
-    lines = [f"  {line}" for line in at_begin]
-    if segment.is_rest:
-        t = segment.t
-        for k in range(1, len(t)):
-            lines.append(f"  WAIT SEC {_seconds(t[k] - t[k - 1])}")
-            lines += [
-                f"  {_event(draft, item.name)}" for item in segment.events if item.target == k
-            ]
-        return lines
-    if isinstance(segment, FeedSegment):
-        return [*lines, *_at_speed(draft, segment)]
-    block, command = "PTP_SPLINE", "SPTP"
-    if isinstance(segment, PoseSegment):
-        block, command = "SPLINE", "SLIN" if _is_straight(segment) else "SPL"
-        speed = _unbound(segment)
-        # After a seam at its feed, or where times ask for more.
-        if speeds_of(draft.program) or speed > _UNBOUND:
-            lines.append(f"  $VEL.CP = {speed:g}")
-    lines += [f"  {block}", "    TIME_BLOCK START"]
-    for k in range(1, len(segment.t)):
-        lines += _triggers(draft, segment, k)
-        lines.append(f"    {command} {_target(segment, k, draft.program)}")
-        lines.append(f"    TIME_BLOCK PART = {_seconds(segment.t[k] - segment.t[k - 1])}")
-    lines += [f"    TIME_BLOCK END = {_seconds(segment.t[-1])}", "  ENDSPLINE"]
-    return lines
+def _values(reader: ProgramReader, text: str) -> dict[str, float]:
+    """Return the numbers of an aggregate by their names."""
+    values: dict[str, float] = {}
+    for item in text.strip("{} ").rpartition(":")[2].split(","):
+        name, _, digits = item.strip().partition(" ")
+        name = name.upper()
+        if name in values:
+            raise reader.lines.fault(f"axis {name} is there twice")
+        values[name] = reader.lines.coordinate(digits)
+    return values
+
+
+def _numbers(reader: ProgramReader, values: Mapping[str, float]) -> Array:
+    missing = [name for name in "XYZABC" if name not in values]
+    if missing:
+        raise reader.lines.fault(f"has no {', '.join(missing)}")
+    return np.array([values[name] for name in "XYZABC"])
+
+
+def _read_axes(reader: ProgramReader, text: str) -> list[float]:
+    values = _values(reader, text)
+    names = [name for name in AXES if name in values]
+    reader.check_axes(names)
+    return [values[name] for name in names]
+
+
+def _read_pose(reader: ProgramReader, text: str) -> Pose:
+    # Linear motions keep the status and turn of where they begin.
+    values = _values(reader, text)
+    external = {name: value for name, value in values.items() if name.startswith("E")}
+    place, turn = krl_pose(_numbers(reader, values))
+    return Pose(place, turn, reader.external_axes(external), reader.lines.number)
+
+
+def _read_frame(reader: ProgramReader, text: str) -> SE3:
+    place, turn = krl_pose(_numbers(reader, _values(reader, text)))
+    return pose_of_values([*place.tolist(), *turn.tolist()])
+
+
+def _write_axes(axes: Mapping[str, str]) -> str:
+    return "{" + ", ".join(f"{name} {text}" for name, text in axes.items()) + "}"
+
+
+def _write_pose(pose: WrittenPose) -> str:
+    numbers = zip("XYZABC", krl_numbers(pose.place, pose.turn), strict=True)
+    parts = [f"{name} {value:.5f}" for name, value in numbers]
+    parts += [pose.configuration] if pose.configuration else []
+    parts += [f"{name} {text}" for name, text in pose.axes.items() if name.startswith("E")]
+    return "{" + ", ".join(parts) + "}"
+
+
+def _write_frame(pose: SE3) -> str:
+    turn = np.array(Quaternion(pose.rotation).coeffs())
+    return _write_pose(WrittenPose(np.array(pose.translation), turn, {}))
+
+
+def _read_speed(reader: ProgramReader, text: str) -> float:
+    value = reader.lines.number_of(text)
+    if not value > 0.0:
+        raise reader.lines.fault(f"$VEL.CP is {value:g} m/s, expected a number above 0")
+    return value
+
+
+def _read_percent(reader: ProgramReader, text: str) -> float:
+    value = reader.lines.number_of(text)
+    if not 0.0 < value <= _WHOLE:
+        raise reader.lines.fault(f"axes have {value:g} %, expected above 0 and up to {_WHOLE:g}")
+    return value
+
+
+_AXIS = r"[AE][1-6]\s+[^,{}]+"
+_AXES = rf"\{{\s*(?:E6AXIS\s*:|AXIS\s*:)?\s*{_AXIS}(?:,\s*{_AXIS})*\}}"
+_COORDINATE = r"[A-Z][1-6]?\s+[^,{}]+"
+_POSE = rf"\{{\s*(?:E6POS\s*:|POS\s*:|FRAME\s*:)?\s*{_COORDINATE}(?:,\s*{_COORDINATE})*\}}"
+# States of a reader: before the module, in its head, between motions, in a block, in its times.
+_BEFORE = ("before",)
+_HEAD = ("head",)
+_BODY = ("body",)
+_IN_MODULE = ("head", "body")
+_IN_BLOCK = ("block",)
+_IN_TIMES = ("time",)
+_SEGMENT = ("body", "block", "time")
+_PACED = ("body", "block")
+_TRIGGER = "TRIGGER WHEN PATH = 0 DELAY = 0 DO $OUT[<output>] = <value>"
+KRL = Language(
+    comment=";",
+    last="END",
+    outputs="KUKA's outputs are numbers from 1 on",
+    has_output=lambda output: isinstance(output, int) and output >= 1,
+    fields={
+        "header": word(r"(?:ACCESS|REL|PARAM|COMMENT)\b.*"),
+        "name": word(rf"[A-Z]\w{{0,{NAME - 1}}}"),
+        "percent": Field(NUMBER, _read_percent, lambda value: f"{value:g}"),
+        "speed": Field(NUMBER, _read_speed, lambda value: f"{value:.7g}"),
+        "turning": number("g"),
+        "orientation": word("#VAR"),
+        "circles": word("#BASE"),
+        "mass": number(".4f"),
+        "length": number(".4f"),
+        "seconds": seconds(TIME_DIGITS),
+        "output": Field(r"\d+", lambda _, text: text),
+        "value": truth("FALSE", "TRUE"),
+        "event": word(".*"),
+        "unit": Field(r"\d+", lambda _, text: text),
+        "axes": Field(_AXES, _read_axes, _write_axes),
+        "pose": Field(_POSE, _read_pose, _write_pose),
+        "frame": Field(_POSE, _read_frame, _write_frame),
+    },
+    statements=(
+        Statement("comment", "&<header>", _BEFORE),
+        Statement("begin", "DEF <name>()", _BEFORE, then="head"),
+        Statement("initialise", "BAS(#INITMOV, 0)", _HEAD),
+        Statement("set", "$BASE = <work:frame>", _HEAD),
+        Statement(
+            "set",
+            "$BASE = EK(MACHINE_DEF[<unit>].ROOT, MACHINE_DEF[<unit>].MECH_TYPE, <work:frame>)",
+            _HEAD,
+        ),
+        Statement("set", "$TOOL = <tool:frame>", _HEAD),
+        Statement(
+            "set",
+            "$LOAD = {M <mass>, CM {X <x:length>, Y <y:length>, Z <z:length>, A 0, B 0, C 0}, "
+            "J {X 0, Y 0, Z 0}}",
+            _HEAD,
+        ),
+        Statement("set", "$ORI_TYPE = <orientation>", _HEAD),
+        Statement("set", "$CIRC_TYPE = <circles>", _HEAD),
+        Statement("set", "BAS(#VEL_PTP, <VEL:percent>)", _IN_MODULE),
+        Statement("set", "BAS(#ACC_PTP, <ACC:percent>)", _IN_MODULE),
+        Statement("set", "$VEL.CP = <speed>", _IN_MODULE),
+        Statement("set", "$VEL.ORI1 = <ORI1:turning>", _IN_MODULE),
+        Statement("set", "$VEL.ORI2 = <ORI2:turning>", _IN_MODULE),
+        Statement("joint approach", "PTP <axes>", _IN_MODULE, then="body"),
+        Statement("linear approach", "LIN <pose>", _BODY),
+        Statement("wait", "WAIT SEC <seconds>", _BODY),
+        Statement("output", "$OUT[<output>] = <value>", _IN_MODULE),
+        Statement("event", "; event: <event>", _IN_MODULE),
+        Statement("axis block", "PTP_SPLINE", _BODY, then="block"),
+        Statement("pose block", "SPLINE", _BODY, then="block"),
+        Statement("times", "TIME_BLOCK START", _IN_BLOCK, then="time"),
+        Statement("joint", "SPTP <axes>", _IN_TIMES),
+        Statement("spline", "SPL <pose>", _SEGMENT),
+        Statement("spline", "SPL <pose> WITH $VEL.CP = <speed>", _PACED),
+        Statement("linear", "SLIN <pose>", _SEGMENT),
+        Statement("linear", "SLIN <pose> WITH $VEL.CP = <speed>", _PACED),
+        Statement("circular", "SCIRC <via:pose>, <pose>", _PACED),
+        Statement("circular", "SCIRC <via:pose>, <pose> WITH $VEL.CP = <speed>", _PACED),
+        Statement("part", "TIME_BLOCK PART = <seconds>", _IN_TIMES),
+        Statement("trigger", _TRIGGER, ("time", "block")),
+        Statement("trigger", "; event: <event>", ("time", "block")),
+        Statement("whole", "TIME_BLOCK END = <seconds>", _IN_TIMES, then="ended"),
+        Statement("close", "ENDSPLINE", ("ended", "block"), then="body"),
+        Statement("end", "END", _IN_MODULE, then="after"),
+    ),
+)
+
+
+class KrlWriter(ProgramWriter):
+    """Writer of a module that a KR C4 or C5 selects."""
+
+    language = KRL
+
+    @override
+    def opening(self) -> list[str]:
+        draft, text = self.draft, KRL.text
+        return [
+            text("comment", header="ACCESS RVP"),
+            text("comment", header="REL 1"),
+            text("begin", name=self.name),
+            *self.head(),
+            self.line("initialise"),
+            self._base(),
+            self.line("set", tool=draft.tool),
+            *self._load(),
+            *self._slow(),
+            *(self._arcs() if goes_round(self.program) else []),
+            *self._joint_approach(self.program.segments[0]),
+        ]
+
+    @override
+    def closing(self) -> list[str]:
+        return [KRL.text("end")]
+
+    @override
+    def before_step(self) -> list[str]:
+        return [""]
+
+    @override
+    def approach(self, segment: Segment) -> list[str]:
+        if not isinstance(segment, PoseSegment):
+            return self._joint_approach(segment)
+        configuration = ""
+        notes: list[str] = []
+        if segment is next(x for x in self.program.segments if isinstance(x, PoseSegment)):
+            status, turn = status_and_turn(segment.frames, segment.q[0, np.argsort(segment.order)])
+            configuration = f"T {turn}" if status is None else f"S {status}, T {turn}"
+            notes = _UNKNOWN_STATUS if status is None else []
+        fast = self._fast()
+        return [
+            *map(self.comment, notes),
+            *self._slow(),
+            self.line("linear approach", pose=self.pose(segment, 0, configuration)),
+            # A seam at its feed says it itself.
+            *(fast[1:] if isinstance(segment, FeedSegment) else fast),
+        ]
+
+    @override
+    def motion(self, segment: Segment) -> list[str]:
+        if segment.is_rest:
+            return super().motion(segment)
+        lines, kind = self.events(segment, 0), "joint"
+        if isinstance(segment, FeedSegment):
+            return [*lines, *self._at_speed(segment)]
+        if isinstance(segment, PoseSegment):
+            kind = "linear" if _is_straight(segment) else "spline"
+            speed = _unbound(segment)
+            # After a seam at its feed, or where times ask for more.
+            if speeds_of(self.program) or speed > _UNBOUND:
+                lines.append(self.line("set", speed=speed))
+        block = "axis block" if kind == "joint" else "pose block"
+        lines += [self.line(block), self._inner("times")]
+        for k, interval in enumerate(np.diff(segment.t), 1):
+            lines += [*self._triggers(segment, k), f"  {self.step(segment, k, kind)}"]
+            lines.append(self._inner("part", seconds=interval))
+        return [*lines, self._inner("whole", seconds=segment.t[-1]), self.line("close")]
+
+    def _at_speed(self, segment: FeedSegment) -> list[str]:
+        """Return the lines of a seam at its feed: one segment, or a block of them."""
+        speeds, count = segment.speeds, len(segment.speeds)
+        # Steps that bend, none of them round, are passed smoothly.
+        bends = not (np.isfinite(segment.vias).any() or _is_straight(segment))
+        kind = "spline" if bends and count > 1 else "linear"
+        lines, commands = [self.line("set", speed=speeds[0])], list[str]()
+        for k, speed in enumerate(speeds, 1):
+            commands += self._triggers(segment, k)
+            own = {"speed": speed} if speed != speeds[0] else {}
+            commands.append(f"  {self.step(segment, k, kind, **own)}")
+        if count == 1 and len(commands) == 1:
+            return [*lines, commands[0][2:]]
+        return [*lines, self.line("pose block"), *commands, self.line("close")]
+
+    def _triggers(self, segment: Segment, k: int) -> list[str]:
+        """Return the lines that switch outputs at a target."""
+        # Without ONSTART a trigger is at the end of the motion that follows.
+        return [
+            f"  {line}" if line.strip().startswith(";") else f"    {_AT_TARGET}{line.strip()}"
+            for line in self.events(segment, k)
+        ]
+
+    def _inner(self, kind: str, **values: object) -> str:
+        """Return the line of a statement in a block."""
+        return f"  {self.line(kind, **values)}"
+
+    def _joint_approach(self, segment: Segment) -> list[str]:
+        slow, fast = (
+            [self.line("set", VEL=percent), self.line("set", ACC=percent)]
+            for percent in (_WHOLE * self.draft.settings.approach, _WHOLE)
+        )
+        return [*slow, self.line("joint approach", axes=self.axes(segment, 0)), *fast]
+
+    def _slow(self) -> list[str]:
+        """Return the speeds of slow linear motions."""
+        share = self.draft.settings.approach
+        return self._speeds(share * _FASTEST, share * _TURNING)
+
+    def _fast(self) -> list[str]:
+        """Return the speeds below which times decide."""
+        return self._speeds(_UNBOUND, UNBOUND_TURNING)
+
+    def _speeds(self, speed: float, turning: float) -> list[str]:
+        if self.draft.frames is None:
+            return []
+        return [
+            self.line("set", speed=float(f"{speed:g}")),
+            self.line("set", ORI1=turning),
+            self.line("set", ORI2=turning),
+        ]
+
+    def _arcs(self) -> list[str]:
+        return [self.line("set", orientation="#VAR"), self.line("set", circles="#BASE")]
+
+    def _base(self) -> str:
+        """Return the frame of poses: in the world, or of an external kinematic system."""
+        frames = self.draft.frames
+        if frames is None:
+            return f"{self.indent}$BASE = {{X 0, Y 0, Z 0, A 0, B 0, C 0}}"
+        if not frames.is_carried:
+            return self.line("set", work=frames.work)
+        unit = self.positioner(
+            int,
+            "$BASE names its kinematic system by its number in MACHINE_DEF; say positioner = 2, "
+            "or which it is",
+        )
+        return self.line("set", unit=unit, work=frames.work)
+
+    def _load(self) -> list[str]:
+        settings = self.draft.settings
+        if settings.mass is None:
+            return []
+        x, y, z = (1e3 * value for value in settings.center)
+        return [self.line("set", mass=settings.mass, x=x, y=y, z=z)]
+
+
+_UNKNOWN_STATUS = [
+    "S is not stated: the wrist axes of this arm do not meet in a point, or its zero is",
+    "not that of KUKA's arms. The configuration is that of the begin.",
+]
+# Beginning of a trigger at the next target.
+_AT_TARGET = _TRIGGER.partition("$OUT")[0]
 
 
 def _unbound(segment: PoseSegment) -> float:
-    """Return a speed above what the times of a segment ask for, if $VEL.CP can be it [m/s]."""
+    """Return a speed above what the times of a segment need, if $VEL.CP can be it [m/s]."""
     fast, _ = fastest_between(segment.t, segment.places, segment.turns)
-    return float(min(max(_UNBOUND, np.ceil(1e3 * _ABOVE_ASKED * fast) / 1e3), _MOST))
-
-
-def _at_speed(draft: Draft, segment: FeedSegment) -> list[str]:
-    """Return the lines of a seam at its feed: one segment, or a block of them."""
-    speeds, count = segment.speeds, len(segment.speeds)
-    # Steps that bend, none of them round, are passed smoothly.
-    bends = not (np.isfinite(segment.vias).any() or _is_straight(segment))
-    straight_one = "SPL" if bends and count > 1 else "SLIN"
-    lines, commands = [f"  $VEL.CP = {speeds[0]:.7g}"], []
-    for k in range(1, count + 1):
-        commands += _triggers(draft, segment, k)
-        command = f"{straight_one} {_target(segment, k, draft.program)}"
-        if segment.goes_round(k):
-            via = _target(segment.middles, k - 1, draft.program)
-            command = f"SCIRC {via}, {_target(segment, k, draft.program)}"
-        own = f" WITH $VEL.CP = {speeds[k - 1]:.7g}" if speeds[k - 1] != speeds[0] else ""
-        commands.append(f"    {command}{own}")
-    if count == 1 and len(commands) == 1:
-        return [*lines, commands[0][2:]]
-    return [*lines, "  SPLINE", *commands, "  ENDSPLINE"]
-
-
-def _triggers(draft: Draft, segment: Segment, k: int) -> list[str]:
-    """Return the lines that switch outputs at a target."""
-    lines = []
-    for item in segment.events:
-        if item.target == k:
-            said = _event(draft, item.name)
-            # Without ONSTART it is at the end of the motion that follows.
-            comment = said.startswith(";")
-            lines.append(
-                f"    {said}" if comment else f"    TRIGGER WHEN PATH = 0 DELAY = 0 DO {said}"
-            )
-    return lines
-
-
-def _slowly(draft: Draft, segment: Segment, percent: str, *, begins: bool) -> list[str]:
-    """Return the slow motion to where a segment begins, of another kind than the one before."""
-    if not isinstance(segment, PoseSegment):
-        slow, fast = ([f"  BAS(#VEL_PTP, {x})", f"  BAS(#ACC_PTP, {x})"] for x in (percent, "100"))
-        return [*slow, f"  PTP {_aggregate(segment, 0, draft.program)}", *fast]
-    configuration = ""
-    if begins:
-        status, turn = status_and_turn(segment.frames, segment.q[0, np.argsort(segment.order)])
-        configuration = f", T {turn}" if status is None else f", S {status}, T {turn}"
-    slow, fast = _slow_and_fast(draft)
-    unknown = [
-        "  ; S is not stated: the wrist axes of this arm do not meet in a point, or its zero is",
-        "  ; not that of KUKA's arms. The configuration is that of the begin.",
-    ]
-    return [
-        *(unknown if begins and "S" not in configuration else []),
-        *slow,
-        f"  LIN {_target(segment, 0, draft.program, configuration)}",
-        # A seam at its feed says it itself.
-        *(fast[1:] if isinstance(segment, FeedSegment) else fast),
-    ]
-
-
-def _slow_and_fast(draft: Draft) -> tuple[list[str], list[str]]:
-    """Return the speeds [m/s, °/s] of slow linear motions, and those that times decide below."""
-    if draft.frames is None:
-        return [], []
-    share = draft.settings.approach
-    both = ((share * _FASTEST, share * _TURNING), (_UNBOUND, UNBOUND_TURNING))
-    slow, fast = (
-        [f"  $VEL.CP = {speed:g}", f"  $VEL.ORI1 = {turn:g}", f"  $VEL.ORI2 = {turn:g}"]
-        for speed, turn in both
-    )
-    return slow, fast
+    return float(min(max(_UNBOUND, np.ceil(1e3 * _ABOVE_TIMES * fast) / 1e3), _MOST))
 
 
 def _is_straight(segment: PoseSegment) -> bool:
     """Whether all poses are on one line that turns about one axis, one after the other."""
     rows = np.hstack([segment.places, segment.turns])
-    way = np.linalg.norm(rows[:, :3] - rows[0, :3], axis=1)
-    if way[-1] < _SHORT or (np.diff(way) <= 0.0).any():
+    length = np.linalg.norm(rows[:, :3] - rows[0, :3], axis=1)
+    if length[-1] < _SHORT or (np.diff(length) <= 0.0).any():
         return False
-    return bool(np.abs(straight(way, way[[0, -1]], rows[[0, -1]]) - rows).max() < _ON_LINE)
+    line = straight(length, length[[0, -1]], rows[[0, -1]])
+    return bool(np.abs(line - rows).max() < _ON_LINE)
 
 
-def _base(draft: Draft) -> str:
-    """Return the frame of poses: the world, or an external kinematic system."""
-    frames = draft.frames
-    if frames is None:
-        return "{X 0, Y 0, Z 0, A 0, B 0, C 0}"
-    if not frames.is_carried:
-        return _frame(frames.work)
-    unit = draft.settings.positioner
-    if not isinstance(unit, int):
-        raise ProblemError(
-            f"{draft.robot.name}: an axis carries work object '{frames.name}', and $BASE names its "
-            f"kinematic system by its number in MACHINE_DEF; say positioner = 2, or which it is, "
-            f"in the file of --settings (ProgramSettings(positioner=…))"
-        )
-    machine = f"MACHINE_DEF[{unit}]"
-    return f"EK({machine}.ROOT, {machine}.MECH_TYPE, {_frame(frames.work)})"
-
-
-def _target(segment: Segment, k: int, program: ControllerProgram, configuration: str = "") -> str:
-    """Return a target: axes, or a pose and the external axes."""
-    if not isinstance(segment, PoseSegment):
-        return _aggregate(segment, k, program)
-    numbers = krl_numbers(segment.places[k], segment.turns[k])
-    pose = [f"{name} {value:.5f}" for name, value in zip("XYZABC", numbers, strict=True)]
-    values = zip(program.axes, written(segment.q[k], program.axes), strict=True)
-    outer = [f"{axis.name} {value}" for axis, value in values if axis.name.startswith("E")]
-    return "{" + ", ".join(pose) + configuration + "".join(f", {text}" for text in outer) + "}"
-
-
-def _event(draft: Draft, event: str) -> str:
-    signal = draft.signal(event)
-    if signal is None:
-        return f"; event: {plain(event)}"
-    output, value = signal
-    if not isinstance(output, int) or output < 1:
-        raise ProblemError(
-            f"signals: '{event}' switches {output!r}; KUKA's outputs are numbers from 1 on"
-        )
-    return f"$OUT[{output}] = {str(value).upper()}"
-
-
-def _aggregate(segment: Segment, k: int, program: ControllerProgram) -> str:
-    values = written(segment.q[k], program.axes)
-    named = zip(program.axes, values, strict=True)
-    return "{" + ", ".join(f"{axis.name} {value}" for axis, value in named) + "}"
-
-
-def _frame(pose: SE3) -> str:
-    numbers = krl_numbers(np.array(pose.translation), np.array(Quaternion(pose.rotation).coeffs()))
-    values = zip("XYZABC", numbers, strict=True)
-    return "{" + ", ".join(f"{name} {value:.5f}" for name, value in values) + "}"
-
-
-def _load(draft: Draft) -> list[str]:
-    mass, (x, y, z) = draft.settings.mass, (1e3 * value for value in draft.settings.center)
-    if mass is None:
-        return []
-    return [
-        f"  $LOAD = {{M {mass:.4f}, CM {{X {x:.4f}, Y {y:.4f}, Z {z:.4f}, A 0, B 0, C 0}}, "
-        f"J {{X 0, Y 0, Z 0}}}}"
-    ]
-
-
-def _seconds(value: float) -> str:
-    return f"{value:.{TIME_DIGITS}f}"
-
-
-# KUKA Robot Language, read line by line: what `selfmotion.shop.controllers.krl` writes.
-
-# Parts whose sum is as near to their block's time as this [s] are seconds.
-_ABOVE = 1e-4
-# Variables that set how the tool turns in circular segments.
-_KINDS = 2
+def write_krl(file: FilePath, draft: Draft) -> None:
+    """Write a program as a module that a KR C4 or C5 selects."""
+    KrlWriter(draft, module_name(file, NAME, _WORDS)).write(file)
 
 
 class KrlReader(ProgramReader):
-    """Reads a module: what `write_krl` writes, spaces, names and numbers aside."""
+    """Reader of modules: of what `write_krl` writes, spaces, names and numbers aside."""
 
-    comment, last = ";", "END"
+    language = KRL
 
     def __init__(self, file: FilePath, robot: RobotModel | None = None) -> None:
         super().__init__(file, robot)
-        self._parts: list[float] = []
-        # Of the block that is read: axis targets, or poses.
-        self._targets: list[list[float]] = []
-        self._poses: list[Pose] = []
+        self._is_initialised = False
+        # Of the block that is read: whether it has poses, and which of them are smooth.
         self._by_poses = False
-        # At which target what is switched.
-        self._triggers: list[tuple[int, Sequence[str]]] = []
-        # Of segments at speeds: $VEL.CP [m/s], that of each, and through where they go.
-        self._speed = 0.0
-        self._is_set = False
-        # Share of their speed and acceleration that axes have in motions by axes [%].
-        self._percent: dict[str, float] = {}
-        # How fast the tool turns at most [°/s], and what is said of how it turns.
-        self._turning: dict[str, float] = {}
-        self._turns: set[str] = set()
-        # Which of the segments are smooth.
         self._smooth: list[bool] = []
-        self._speeds: list[float] = []
-        self._vias: list[Pose | None] = []
 
-    def begin(self, given: Sequence[str]) -> None:
-        """Begin the module."""
-        self.name, self.state = given[0], "head"
+    @override
+    def actions(self) -> Mapping[str, Callable[..., None]]:
+        return {
+            **super().actions(),
+            "initialise": self._initialise,
+            "joint approach": self._joint_approach,
+            "linear approach": self._linear_approach,
+            "axis block": self._begin_block,
+            "pose block": lambda: self._begin_block(by_poses=True),
+            "times": self._begin_times,
+            "joint": self._take_axes,
+            "linear": self._take_pose,
+            "spline": lambda **values: self._take_pose(is_smooth=True, **values),
+            "circular": self._take_arc,
+            "part": self._take_part,
+            "trigger": self._take_trigger,
+            "whole": self._end_times,
+            "close": self._end_block,
+        }
 
-    def tool_is(self, given: Sequence[str]) -> None:
-        """Take the tool in the flange."""
-        self.tool = self._frame(given[0])
+    @property
+    @override
+    def is_carried(self) -> bool | None:
+        return "unit" in self.settings if "work" in self.settings else None
 
-    def work_is(self, given: Sequence[str]) -> None:
-        """Take what poses are counted in, where it stands in the world."""
-        self.work, self.is_carried = self._frame(given[0]), False
+    @override
+    def check(self, kind: str) -> None:
+        if self.state == "time" and kind in ("joint", "spline", "linear"):
+            if self._by_poses != (kind != "joint"):
+                raise self.lines.fault("SPLINE has SPL and SLIN, PTP_SPLINE has SPTP")
+            if self.run and not self.run[-1].seconds:
+                raise self.lines.fault("the target before has no TIME_BLOCK PART")
 
-    def carried_work_is(self, given: Sequence[str]) -> None:
-        """Take what poses are counted in, where an external kinematic system carries it."""
-        unit, other, frame = given
-        if unit != other:
-            raise self.lines.fault(f"MACHINE_DEF[{unit}] beside MACHINE_DEF[{other}], expected one")
-        self.work, self.is_carried, self.unit = self._frame(frame), True, unit
-
-    def loaded(self, given: Sequence[str]) -> None:
-        """Take what the flange carries; its inertia is the controller's."""
-        mass, center = given
-        values = self._values(center)
-        self.load_is(mass, [str(values.get(name, 0.0)) for name in "XYZ"], 1e-3)
-
-    def initialise(self, _: Sequence[str]) -> None:
-        """Take that all that is set begins anew, which has to come before anything is set."""
-        if self._is_set or self._percent or self._speed or self.tool or self.work or self.load:
+    def _initialise(self) -> None:
+        """Take that all settings begin anew, which has to come before anything is set."""
+        if self.settings or self._is_initialised:
             raise self.lines.fault(
                 "BAS(#INITMOV, 0) after frames, speeds or the load were set, expected it once and "
                 "first: it may set them back"
             )
-        self._is_set = True
+        self._is_initialised = True
 
-    def axes_are(self, given: Sequence[str]) -> None:
-        """Take at which share of their speed or acceleration the axes move [%]."""
-        percent = self.lines.number_of(given[1])
-        if not 0.0 < percent <= _WHOLE:
-            raise self.lines.fault(f"#{given[0]}_PTP is {percent:g} %, expected up to {_WHOLE:g}")
-        self._percent[given[0].upper()] = percent
-
-    def go(self, given: Sequence[str]) -> None:
+    def _joint_approach(self, axes: list[float]) -> None:
         """Take where the motion begins, or where it slowly goes on by axis targets."""
-        facts = self.lines.facts()
+        facts = self.comments.facts()
         most = _WHOLE if facts is None else _WHOLE * facts.approach
-        fast = [name for name in ("VEL", "ACC") if not 0.0 < self._share(name) <= most + _ABOVE]
+        share = {name: self.settings.get(name, 0.0) for name in ("VEL", "ACC")}
+        fast = [name for name, value in share.items() if not 0.0 < value <= most + _SAME_TIME]
         if fast:
             raise self.lines.fault(
                 f"PTP goes to where the motion goes on at BAS(#{fast[0]}_PTP) of "
-                f"{self._share(fast[0]):g} %, expected up to {most:g}: nothing has judged it"
+                f"{share[fast[0]]:g} %, expected up to {most:g}: nothing has judged it"
             )
-        self.begin_at(self._target(given[0]))
-        self.state = "body"
+        self.approach(axes)
 
-    def go_linear(self, given: Sequence[str]) -> None:
+    def _linear_approach(self, pose: Pose) -> None:
         """Take the pose from which the motion goes on by poses."""
-        turning = max(self._turning.values(), default=0.0)
-        if not (0.0 < self._speed <= _FASTEST and turning <= _TURNING):
+        speed = self.settings.get("speed", 0.0)
+        turning = max(self.settings.get(name, 0.0) for name in _TURNINGS)
+        if not (0.0 < speed <= _FASTEST and turning <= _TURNING):
             raise self.lines.fault(
-                f"LIN goes to where the motion goes on at {self._speed:g} m/s and {turning:g}°/s, "
+                f"LIN goes to where the motion goes on at {speed:g} m/s and {turning:g}°/s, "
                 f"expected at most {_FASTEST:g} m/s and {_TURNING:g}°/s: nothing has judged it"
             )
-        self.slowly(self._pose(given[0]))
+        self.approach(pose)
 
-    def block(self, given: Sequence[str]) -> None:
-        """Begin a spline block."""
-        self.state, self._parts, self._triggers = "block", [], []
-        self._targets, self._poses = [], []
-        self._speeds, self._vias, self._smooth = [], [], []
-        self._by_poses = given[0].upper() == "SPLINE"
+    def _begin_block(self, *, by_poses: bool = False) -> None:
+        self._by_poses, self._smooth = by_poses, []
 
-    def speed_is(self, given: Sequence[str]) -> None:
-        """Take how fast segments are that do not say it themselves."""
-        self._speed = self._speed_of(given[0])
+    def _begin_times(self) -> None:
+        if self.run:
+            raise self.lines.fault("a time block after segments without times")
 
-    def turning_is(self, given: Sequence[str]) -> None:
-        """Take how fast the tool turns at most."""
-        self._turning[given[0].upper()] = self.lines.number_of(given[1])
+    def _take_axes(self, axes: list[float]) -> None:
+        self.run.append(Target(axes))
 
-    def turns(self, given: Sequence[str]) -> None:
-        """Take what is said of how the tool turns."""
-        self._turns.add(given[0].upper())
+    def _take_pose(
+        self, pose: Pose, speed: float | None = None, *, is_smooth: bool = False
+    ) -> None:
+        """Take a straight or smooth segment: with a time in a time block, else at a speed."""
+        if self.state == "time":
+            self.run.append(Target(pose))
+        else:
+            self._take_at_speed(pose, None, speed, is_smooth=is_smooth)
 
-    def command(self, given: Sequence[str]) -> None:
-        """Take a straight or smooth segment at a speed, in a block or alone."""
-        kind, pose, speed = given
-        self._at_speed(self._pose(pose), None, speed, is_smooth=kind.upper() == "SPL")
-
-    def circular_command(self, given: Sequence[str]) -> None:
-        """Take a circular segment at a speed, in a block or alone."""
-        via, pose, speed = given
-        if len(self._turns) < _KINDS:
+    def _take_arc(self, via: Pose, pose: Pose, speed: float | None = None) -> None:
+        """Take a circular segment at a speed."""
+        if not {"orientation", "circles"} <= set(self.settings):
             raise self.lines.fault(
                 "SCIRC needs $ORI_TYPE = #VAR and $CIRC_TYPE = #BASE at the head: else the tool "
                 "turns otherwise"
             )
-        self._at_speed(self._pose(pose), self._pose(via), speed)
+        self._take_at_speed(pose, via, speed)
 
-    def _at_speed(
-        self, pose: Pose, via: Pose | None, speed: str | None, *, is_smooth: bool = False
+    def _take_at_speed(
+        self, pose: Pose, via: Pose | None, speed: float | None, *, is_smooth: bool = False
     ) -> None:
+        """Take a segment at a speed, in a block or alone."""
         alone = self.state == "body"
         if alone:
-            self.block(["SPLINE"])
+            self._begin_block(by_poses=True)
         if not self._by_poses:
             raise self.lines.fault("PTP_SPLINE has SPTP with times")
-        self._poses.append(pose)
-        self._vias.append(via)
-        self._speeds.append(self._speed if speed is None else self._speed_of(speed))
-        if not self._speeds[-1] > 0.0:
+        own = self.settings.get("speed", 0.0) if speed is None else speed
+        if not own > 0.0:
             raise self.lines.fault("a segment without a time, expected $VEL.CP before it")
-        slow = [f"$VEL.{name}" for name, x in self._turning.items() if x < UNBOUND_TURNING]
+        turning = {name: self.settings.get(name, UNBOUND_TURNING) for name in _TURNINGS}
+        slow = [name for name, value in turning.items() if value < UNBOUND_TURNING]
         if slow:
             raise self.lines.fault(
-                f"{slow[0]} is {self._turning[slow[0][5:]]:g}°/s, expected at least "
+                f"$VEL.{slow[0]} is {turning[slow[0]]:g}°/s, expected at least "
                 f"{UNBOUND_TURNING:g}: a slower one holds the tool back from its speed"
             )
+        self.run.append(Target(pose, speed=own, via=via))
         self._smooth.append(is_smooth)
         if alone:
-            self.close([])
+            self.stop(is_spline=is_smooth)
 
-    def _speed_of(self, text: str) -> float:
-        value = self.lines.number_of(text)
-        if not value > 0.0:
-            raise self.lines.fault(f"$VEL.CP is {value:g} m/s, expected a number above 0")
-        return value
-
-    def start(self, _: Sequence[str]) -> None:
-        """Begin its time block."""
-        if self._speeds:
-            raise self.lines.fault("a time block after segments without times")
-        self.state = "time"
-
-    def target(self, given: Sequence[str]) -> None:
-        """Take an axis target."""
-        self._check_kind(poses=False)
-        self._targets.append(self._target(given[0]))
-
-    def pose(self, given: Sequence[str]) -> None:
-        """Take a pose."""
-        self._check_kind(poses=True)
-        self._poses.append(self._pose(given[0]))
-
-    def _check_kind(self, *, poses: bool) -> None:
-        if poses != self._by_poses:
-            raise self.lines.fault("SPLINE has SPL and SLIN, PTP_SPLINE has SPTP")
-        if self._count != len(self._parts):
-            raise self.lines.fault("the target before has no TIME_BLOCK PART")
-
-    @property
-    def _count(self) -> int:
-        return len(self._targets) + len(self._poses)
-
-    def part(self, given: Sequence[str]) -> None:
+    def _take_part(self, seconds: float) -> None:
         """Take the share of time of the target before."""
-        if len(self._parts) >= self._count:
+        if not self.run or self.run[-1].seconds:
             raise self.lines.fault("there is no target before this part")
-        self._parts.append(self.lines.duration(given[0]))
+        self.run[-1].seconds = seconds
 
-    def trigger(self, given: Sequence[str]) -> None:
-        """Take what is switched at the target that follows."""
-        self._triggers.append((self._count + 1, given))
+    def _take_trigger(self, output: str = "", value: bool | None = None, event: str = "") -> None:
+        """Take an output or event at the target that follows."""
+        self.happen(Switch(0.0, output or event.strip(), value), ahead=1)
 
-    def whole(self, given: Sequence[str]) -> None:
-        """Take the time of all of them."""
-        seconds, parts = self.lines.duration(given[0]), self._parts
-        if not parts or len(parts) != self._count:
+    def _end_times(self, seconds: float) -> None:
+        """Take the time of all targets, and end their motion."""
+        if not self.run or not self.run[-1].seconds:
             raise self.lines.fault("each target needs its TIME_BLOCK PART")
-        share = seconds / sum(parts)
+        parts = sum(target.seconds for target in self.run)
+        share = seconds / parts
         # Parts are shares: those that are seconds stay what they are.
-        scale = 1.0 if abs(share - 1.0) * sum(parts) < _ABOVE else share
-        times = [scale * part for part in parts]
-        for number, what in self._triggers:
-            if number > len(parts):
-                raise self.lines.fault("a trigger has no target after it")
-            self.switches.append(switched(self.clock + sum(times[:number]), what))
+        scale = 1.0 if abs(share - 1.0) * parts < _SAME_TIME else share
+        for target in self.run:
+            target.seconds *= scale
+        self._check_triggers()
         if self._by_poses:
-            self._check_in_time(times)
-            self.follow(self._poses, times)
+            self._check_in_time()
         else:
-            slow = [f"#{name}_PTP" for name in ("VEL", "ACC") if self._share(name) < _WHOLE]
-            if slow:
-                share = self._share(slow[0][1:4])
+            self._check_axis_speeds()
+        self.stop()
+
+    def _check_triggers(self) -> None:
+        if any(number > len(self.run) for number, _ in self.happens):
+            raise self.lines.fault("a trigger has no target after it")
+
+    def _check_axis_speeds(self) -> None:
+        """Refuse shares of speeds in force that hold the axes back from the times of a block."""
+        for name in ("VEL", "ACC"):
+            share = self.settings.get(name, 0.0)
+            if share < _WHOLE:
                 raise self.lines.fault(
-                    f"BAS({slow[0]}) before this block is {share:g} %, expected {_WHOLE:g}: less "
+                    f"BAS(#{name}_PTP) before this block is {share:g} %, expected {_WHOLE:g}: less "
                     f"holds the axes back from their times"
                 )
-            self.join(self._targets, times)
-        self.state = "ended"
 
-    def _share(self, name: str) -> float:
-        return self._percent.get(name, 0.0)
-
-    def _check_in_time(self, times: Sequence[float]) -> None:
+    def _check_in_time(self) -> None:
         """Refuse speeds in force that hold the tool back from the times of a block."""
-        if self.pose_at is None:
+        poses = [at for at in (self.here, *(x.at for x in self.run)) if isinstance(at, Pose)]
+        if len(poses) == len(self.run):
+            # It begins at axis targets, which `stop` refuses.
             return
-        every = [self.pose_at, *self._poses]
-        places = np.array([pose.place for pose in every])
-        turns = np.array([pose.turn for pose in every])
-        fast, turning = fastest_between(times_of(times), places, on_one_side(turns))
-        least = min(self._turning.get(name, 0.0) for name in ("ORI1", "ORI2"))
-        if fast > self._speed:
+        places = np.array([pose.place for pose in poses])
+        turns = on_one_side(np.array([pose.turn for pose in poses]))
+        times = times_of([target.seconds for target in self.run])
+        fast, turning = fastest_between(times, places, turns)
+        speed = self.settings.get("speed", 0.0)
+        least = min(self.settings.get(name, 0.0) for name in _TURNINGS)
+        if fast > speed:
             raise self.lines.fault(
-                f"times ask for {fast:.4g} m/s, $VEL.CP is {self._speed:g} m/s: it holds the tool "
+                f"times ask for {fast:.4g} m/s, $VEL.CP is {speed:g} m/s: it holds the tool "
                 f"back from its times"
             )
         if np.degrees(turning) > least:
@@ -548,102 +626,13 @@ class KrlReader(ProgramReader):
                 f"{least:g}°/s: it holds the tool back from its times"
             )
 
-    def close(self, _: Sequence[str]) -> None:
-        """End a spline block."""
-        if self.state == "block":
-            if not self._speeds:
-                raise self.lines.fault("the spline block has no segments")
-            if len(set(self._smooth)) > 1:
-                raise self.lines.fault("SPL beside SLIN or SCIRC is not judged, expected SLIN")
-            if any(number > len(self._speeds) for number, _ in self._triggers):
-                raise self.lines.fault("a trigger has no target after it")
-            given = self._poses, self._speeds, self._vias, self._triggers
-            self.drive(*given, is_spline=all(self._smooth))
-        self.state = "body"
-
-    def _target(self, text: str) -> list[float]:
-        values = self._values(text)
-        present = [name for name in AXES if name in values]
-        self.same_axes(present)
-        return [values[name] for name in present]
-
-    def _values(self, text: str) -> dict[str, float]:
-        values: dict[str, float] = {}
-        for item in text.split(","):
-            name, _, number = item.strip().partition(" ")
-            name = name.upper()
-            if name in values:
-                raise self.lines.fault(f"axis {name} is there twice")
-            values[name] = self.lines.coordinate(number)
-        return values
-
-    def _pose(self, text: str) -> Pose:
-        values = self._values(text)
-        # Linear motions keep the status and turn of where they begin.
-        place = self._numbers({name: x for name, x in values.items() if name not in ("S", "T")})
-        outer = {name: x for name, x in values.items() if name.startswith("E")}
-        return Pose(*krl_pose(place), self.others_of(outer), self.lines.number)
-
-    def _numbers(self, values: dict[str, float]) -> Array:
-        missing = [name for name in "XYZABC" if name not in values]
-        if missing:
-            raise self.lines.fault(f"has no {', '.join(missing)}")
-        return np.array([values[name] for name in "XYZABC"])
-
-    def _frame(self, text: str) -> SE3:
-        place, turn = krl_pose(self._numbers(self._values(text)))
-        return pose_of_values([*place.tolist(), *turn.tolist()])
-
-
-_AXIS = r"[AE][1-6]\s+[^,{}]+"
-_TARGET = rf"\{{\s*(?:E6AXIS\s*:|AXIS\s*:)?\s*({_AXIS}(?:,\s*{_AXIS})*)\}}"
-_IN_BODY = ("head", "body")
-_NUMBER = r"[A-Z][1-6]?\s+[^,{}]+"
-_POSE = rf"\{{\s*(?:E6POS\s*:|POS\s*:|FRAME\s*:)?\s*({_NUMBER}(?:,\s*{_NUMBER})*)\}}"
-_WITH = r"(?: WITH \$VEL\.CP ?= ?([\d.e-]+))?"
-_UNIT = r"MACHINE_DEF ?\[ ?(\d+) ?\]"
-_XYZABC = r"\{((?: ?,? ?[XYZABC] [^,{}]+)+)\}"
-_NO_INERTIA = r"\{ ?X 0(?:\.0*)? ?, ?Y 0(?:\.0*)? ?, ?Z 0(?:\.0*)? ?\}"
-KrlReader.grammar = (
-    (("before",), r"&(?:ACCESS|REL|PARAM|COMMENT)\b.*", KrlReader.skip),
-    (("before",), rf"DEF ([A-Z]\w{{0,{NAME - 1}}}) ?\( ?\)", KrlReader.begin),
-    (("head",), r"BAS ?\( ?#INITMOV ?, ?0 ?\)", KrlReader.initialise),
-    (_IN_BODY, r"BAS ?\( ?#(VEL|ACC)_PTP ?, ?([\d.]+) ?\)", KrlReader.axes_are),
-    (_IN_BODY, r"\$VEL\.CP ?= ?([\d.e-]+)", KrlReader.speed_is),
-    (_IN_BODY, r"\$VEL\.(ORI1|ORI2) ?= ?([\d.]+)", KrlReader.turning_is),
-    (("head",), r"(\$ORI_TYPE) ?= ?#VAR", KrlReader.turns),
-    (("head",), r"(\$CIRC_TYPE) ?= ?#BASE", KrlReader.turns),
-    (("head",), rf"\$TOOL ?= ?{_POSE}", KrlReader.tool_is),
-    (("head",), rf"\$BASE ?= ?{_POSE}", KrlReader.work_is),
-    (
-        ("head",),
-        rf"\$BASE ?= ?EK ?\( ?{_UNIT}\.ROOT ?, ?{_UNIT}\.MECH_TYPE ?, ?{_POSE} ?\)",
-        KrlReader.carried_work_is,
-    ),
-    (
-        ("head",),
-        rf"\$LOAD ?= ?\{{ ?M ([^,{{}}]+), ?CM {_XYZABC} ?, ?J {_NO_INERTIA} ?\}}",
-        KrlReader.loaded,
-    ),
-    (_IN_BODY, rf"PTP {_TARGET}", KrlReader.go),
-    (_IN_BODY[1:], rf"LIN {_POSE}", KrlReader.go_linear),
-    (_IN_BODY[1:], r"WAIT SEC (\S+)", KrlReader.wait),
-    (_IN_BODY, r"\$OUT ?\[ ?(\d+) ?\] ?= ?(TRUE|FALSE)", KrlReader.switch),
-    (_IN_BODY, r"; event: (.*)", KrlReader.switch),
-    (_IN_BODY[1:], r"(PTP_SPLINE|SPLINE)", KrlReader.block),
-    (("block",), r"TIME_BLOCK START", KrlReader.start),
-    (("time",), rf"SPTP {_TARGET}", KrlReader.target),
-    (("time",), rf"(?:SPL|SLIN) {_POSE}", KrlReader.pose),
-    (("block", "body"), rf"(SPL|SLIN) {_POSE}{_WITH}", KrlReader.command),
-    (("block", "body"), rf"SCIRC {_POSE} ?, ?{_POSE}{_WITH}", KrlReader.circular_command),
-    (("time",), r"TIME_BLOCK PART ?= ?(\S+)", KrlReader.part),
-    (
-        ("time", "block"),
-        r"TRIGGER WHEN PATH ?= ?0 DELAY ?= ?0 DO \$OUT ?\[ ?(\d+) ?\] ?= ?(TRUE|FALSE)",
-        KrlReader.trigger,
-    ),
-    (("time", "block"), r"; event: (.*)", KrlReader.trigger),
-    (("time",), r"TIME_BLOCK END ?= ?(\S+)", KrlReader.whole),
-    (("ended", "block"), r"ENDSPLINE", KrlReader.close),
-    (_IN_BODY, r"END", KrlReader.end),
-)
+    def _end_block(self) -> None:
+        """End a spline block: one of segments at speeds stops there."""
+        if self.state == "ended":
+            return
+        if not self.run:
+            raise self.lines.fault("the spline block has no segments")
+        if len(set(self._smooth)) > 1:
+            raise self.lines.fault("SPL beside SLIN or SCIRC is not judged, expected SLIN")
+        self._check_triggers()
+        self.stop(is_spline=self._smooth[0])

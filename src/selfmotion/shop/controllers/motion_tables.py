@@ -26,7 +26,7 @@ from selfmotion.shop.controllers.samples import MotionSamples
 
 # Joints that mimic others, in files of motions: they follow, and are no coordinates of an arm.
 
-# How far a joint may be off what it mimics [rad or m]: rounding of a file, and what encoders see.
+# Largest deviation of a joint from the one that it mimics, by rounding and encoders [rad or m].
 _OFF = 1e-4
 
 
@@ -61,10 +61,10 @@ def without_followers(motion: Trajectory, robot: RobotModel) -> Trajectory:
                 f"'{following[name]}', which it mimics, puts it at t = {motion.t[worst]:.4g} s; "
                 f"leave it out, or mend <mimic> in the URDF"
             )
-    kept = [k for k, name in enumerate(own) if name not in following]
-    faster = None if motion.qdd is None else motion.qdd[:, kept]
-    names = tuple(own[k] for k in kept)
-    return Trajectory(motion.t, motion.q[:, kept], motion.qd[:, kept], names, faster)
+    columns = [k for k, name in enumerate(own) if name not in following]
+    faster = None if motion.qdd is None else motion.qdd[:, columns]
+    names = tuple(own[k] for k in columns)
+    return Trajectory(motion.t, motion.q[:, columns], motion.qd[:, columns], names, faster)
 
 
 # Joint motions as tables: columns, arrays or lists by name.

@@ -25,13 +25,7 @@ from selfmotion.model.motion import Trajectory
 from selfmotion.model.robot import RobotModel
 from selfmotion.planning.result import Move, Parts, Plan
 from selfmotion.shop.controllers import ros
-from selfmotion.shop.controllers.controller_program import ControllerProgram, check_signals
-from selfmotion.shop.controllers.judged_programs import (
-    PROGRAMS,
-    READ_PROGRAMS,
-    read_program,
-    write_program,
-)
+from selfmotion.shop.controllers.controller_program import ControllerProgram
 from selfmotion.shop.controllers.motion_tables import (
     keyframes,
     of_tables,
@@ -39,6 +33,13 @@ from selfmotion.shop.controllers.motion_tables import (
     write_arrays,
     write_columns,
     write_lists,
+)
+from selfmotion.shop.controllers.program_draft import check_signals
+from selfmotion.shop.controllers.program_files import (
+    PROGRAMS,
+    READ_PROGRAMS,
+    read_program,
+    write_program,
 )
 from selfmotion.shop.controllers.program_settings import ProgramSettings
 from selfmotion.shop.controllers.ros import bag, motion_of_bag
@@ -49,7 +50,8 @@ from selfmotion.shop.controllers.samples import (
     for_cubics,
     within_limits_at,
 )
-from selfmotion.shop.controllers.urscript import check_joints, script
+from selfmotion.shop.controllers.urscript import check_joints
+from selfmotion.shop.controllers.urscript_stream import script
 from selfmotion.work.job import Program
 
 
@@ -129,13 +131,13 @@ def write_motion(
         write_program(plan, path, name, settings or ProgramSettings(), progress)
         return
     if name == "urscript":
-        asked = settings or ProgramSettings()
-        if asked != asked.streamed:
+        given = settings or ProgramSettings()
+        if given != given.streamed:
             raise ProblemError(
                 f"{path}: settings: deviation, move_deviation and axes have no effect on URScript, "
                 f"which has all joints in their order at each period; leave them out"
             )
-        _write_stream(path, plan, STREAM if rate is None else rate, asked)
+        _write_stream(path, plan, STREAM if rate is None else rate, given)
         return
     if settings is not None:
         raise ProblemError(f"{path}: settings have no effect: they are of controllers' programs")
@@ -318,7 +320,7 @@ def _write_stream(
     write_text(file, script(plan.robot, joints, q, rate, settings, events))
 
 
-# How tables of what happens when are called.
+# End of the names of timetables.
 _TIMETABLE = ".timetable.csv"
 # Messages of ROS, as texts.
 MESSAGES = ("ros", "moveit")

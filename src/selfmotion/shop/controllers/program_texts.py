@@ -8,7 +8,6 @@ from urllib.parse import quote, unquote
 
 from selfmotion.basics import FileFormatError
 from selfmotion.model.task import SE3, Quaternion
-from selfmotion.shop.controllers.segments import Miss
 
 # Marks in names that stand in comments as they are, besides letters, digits and _ . - ~.
 _MARKS = "/:+#@()[]{}<>|$&=*;!?^"
@@ -28,12 +27,6 @@ def pin_values(pose: SE3) -> list[float]:
     """Return a pose as position [m] and quaternion x, y, z, w."""
     turn = Quaternion(pose.rotation).coeffs()
     return [float(value) + 0.0 for value in (*pose.translation, *turn)]
-
-
-def stated(miss: Miss) -> str:
-    """Return a deviation as files state it."""
-    tool = f"{rounded_up(1e3 * miss.position, 6)} mm, {rounded_up(miss.rotation, 9)} rad"
-    return f"{tool}, joints {rounded_up(miss.joint, 9)}"
 
 
 def rounded_up(value: float, digits: int) -> str:

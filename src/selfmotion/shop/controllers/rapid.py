@@ -1,33 +1,43 @@
-"""ABB RAPID: targets with the time to each, written, and read line by line."""
+"""ABB RAPID: targets with the time to each, or poses at speeds."""
 
-from collections.abc import Sequence
+import re
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path as FilePath
+from typing import Any
 
 import numpy as np
+from typing_extensions import override
 
-from selfmotion.basics import ProblemError, write_text
+from selfmotion.basics import Array, ProblemError
 from selfmotion.model.robot import RobotModel
 from selfmotion.model.task import SE3, Quaternion
-from selfmotion.shop.controllers.controller_program import (
-    ControllerProgram,
-    Draft,
-    before,
-    goes_round,
-    head,
-    speeds_of,
-    with_begins,
-)
+from selfmotion.shop.controllers.configurations import confdata
 from selfmotion.shop.controllers.feed_segments import ZONE, FeedSegment
-from selfmotion.shop.controllers.program_lines import StopReader
-from selfmotion.shop.controllers.program_settings import AXES, written
-from selfmotion.shop.controllers.program_texts import module_name, plain
+from selfmotion.shop.controllers.pose_numbers import rapid_numbers, rapid_pose
+from selfmotion.shop.controllers.program_draft import Draft
+from selfmotion.shop.controllers.program_reader import ProgramReader, Target
+from selfmotion.shop.controllers.program_settings import AXES
+from selfmotion.shop.controllers.program_texts import module_name
+from selfmotion.shop.controllers.program_writer import (
+    ProgramWriter,
+    WrittenPose,
+    goes_round,
+    speeds_of,
+)
 from selfmotion.shop.controllers.read_segments import Pose, pose_of_values
 from selfmotion.shop.controllers.segments import PoseSegment, Segment
+from selfmotion.shop.controllers.statements import (
+    Field,
+    Language,
+    Statement,
+    number,
+    seconds,
+    truth,
+    word,
+)
 from selfmotion.shop.controllers.thinning import TIME_DIGITS
-from selfmotion.shop.controllers.tool_frames import confdata, rapid_numbers, rapid_pose
 
-# ABB RAPID: axis targets with the time to each.
-#
 # After ABB's Technical reference manual, RAPID Instructions, Functions and Data types (RobotWare
 # 6, 3HAC050917-001): ``MoveAbsJ`` of a ``jointtarget``, whose external axes are 9E9 where there
 # are none and whose unit is degrees or mm, with ``\T``, the time in seconds that the motion to it
@@ -40,7 +50,7 @@ from selfmotion.shop.controllers.tool_frames import confdata, rapid_numbers, rap
 # \ObjectFrame``). Outputs are set by ``SetDO``: where the arm rests when it rests, and where it
 # moves when it enters the zone of its target.
 
-# Characters in a name, those of the procedure included.
+# Largest number of characters in a name, those of the procedure included.
 NAME = 32
 # Names that no module may have.
 # fmt: off
@@ -54,457 +64,444 @@ _WORDS = (
     "WITH", "XOR",
 )
 # fmt: on
+# End of the name of the procedure.
 _PROCEDURE = "_run"
+# End of the name of the speed of slow motions.
+SLOW = "_v"
 # Value of an axis that is not there.
 _ABSENT = "9E9"
-# How a time takes the place of a speed.
-_TIME = "\\T:="
+# Value from which on there is no such axis.
+_ABSENT_FROM = 8.9e9
 # Largest speed of the approach [mm/s].
 _FASTEST = 500.0
 # Largest rate of turning of the approach [°/s].
 _TURNING = 100.0
+# Zones of seams at speeds, in which corners are rounded by as much as is judged.
+_ZONES = ("fine", "z0")
+# Rates of turning and speeds of external axes that slow no seam down [°/s, mm/s, °/s].
+TURNING = (500.0, 5000.0, 1000.0)
+
+
+# Values in statements: lists of numbers in brackets.
+
+
+def _texts(reader: ProgramReader, text: str, count: int, what: str) -> list[str]:
+    values = text.strip("[] ").split(",")
+    if len(values) != count:
+        raise reader.lines.fault(f"{what} has {len(values)} numbers, expected {count}")
+    return values
+
+
+def _numbers(reader: ProgramReader, text: str, count: int, what: str) -> list[float]:
+    return [reader.lines.coordinate(item) for item in _texts(reader, text, count, what)]
+
+
+def _read_speeds(reader: ProgramReader, text: str) -> list[float]:
+    texts = _texts(reader, text, 4, "speeddata")
+    values = [reader.lines.number_of(item) for item in texts]
+    if not values[0] > 0.0:
+        raise reader.lines.fault(f"v_tcp is {values[0]:g} mm/s, expected a number above 0")
+    return values
+
+
+def _read_axes(reader: ProgramReader, text: str) -> list[float]:
+    robot, external = re.findall(_LIST, text)
+    own, outer = _texts(reader, robot, 6, "robax"), _texts(reader, external, 6, "extax")
+    every = dict(zip(AXES, [*own, *outer], strict=True))
+    present = [name for name, item in every.items() if not _is_absent(reader, name, item)]
+    reader.check_axes(present)
+    return [reader.lines.coordinate(every[name]) for name in present]
+
+
+def _is_absent(reader: ProgramReader, name: str, text: str) -> bool:
+    return name in AXES[6:] and abs(reader.lines.number_of(text)) > _ABSENT_FROM
+
+
+def _read_pose(reader: ProgramReader, text: str) -> Pose:
+    place, turn, configuration, external = re.findall(_LIST, text)
+    _numbers(reader, configuration, 4, "robconf")
+    position, rotation = rapid_pose(_place_and_turn(reader, place, turn))
+    outer = dict(zip(AXES[6:], _texts(reader, external, 6, "extax"), strict=True))
+    present = {
+        name: reader.lines.coordinate(item)
+        for name, item in outer.items()
+        if not _is_absent(reader, name, item)
+    }
+    return Pose(position, rotation, reader.external_axes(present), reader.lines.number)
+
+
+def _place_and_turn(reader: ProgramReader, place: str, turn: str) -> Array:
+    numbers = [*_numbers(reader, place, 3, "trans"), *_numbers(reader, turn, 4, "rot")]
+    if not any(numbers[3:]):
+        raise reader.lines.fault("the quaternion is zero")
+    return np.array(numbers)
+
+
+def _read_frame(reader: ProgramReader, text: str) -> SE3:
+    x, y, z, *turn = _place_and_turn(reader, *re.findall(_LIST, text)).tolist()
+    return pose_of_values([1e-3 * x, 1e-3 * y, 1e-3 * z, *turn[1:], turn[0]])
+
+
+def _write_lists(*lists: Sequence[str]) -> str:
+    return "[" + ", ".join(f"[{', '.join(each)}]" for each in lists) + "]"
+
+
+def _write_axes(axes: Mapping[str, str]) -> str:
+    # A robot of fewer than six axes has 0 in their place.
+    own = [axes.get(name, "0") for name in AXES[:6]]
+    return _write_lists(own, [axes.get(name, _ABSENT) for name in AXES[6:]])
+
+
+def _write_pose(pose: WrittenPose) -> str:
+    numbers = rapid_numbers(pose.place, pose.turn)
+    return _write_lists(
+        [f"{value:.4f}" for value in numbers[:3]],
+        [f"{value:.8f}" for value in numbers[3:]],
+        [pose.configuration],
+        [pose.axes.get(name, _ABSENT) for name in AXES[6:]],
+    )
+
+
+def _write_frame(pose: SE3 | None) -> str:
+    if pose is None:
+        return _write_lists("000", "1000")
+    x, y, z, w = Quaternion(pose.rotation).coeffs().tolist()
+    return _write_lists(
+        [f"{value + 0.0:.4f}" for value in (1e3 * pose.translation).tolist()],
+        [f"{value + 0.0:.8f}" for value in (w, x, y, z)],
+    )
+
+
+def _write_speeds(speeds: Sequence[float]) -> str:
+    return f"[{', '.join(f'{value:.7g}' for value in speeds)}]"
+
+
+_LIST = r"\[[^\[\]]*\]"
+_LISTS = rf"\[ ?{_LIST} ?, ?{_LIST} ?\]"
+_WORD = word(r"[A-Z]\w{0,31}")
+# States of a reader: before the module, in its data, where a procedure begins, in it, after it.
+_BEFORE = ("before",)
+_DATA = ("data",)
+_START = ("start",)
+_BODY = ("body",)
+_PROGRAM = ("start", "body")
+_TOOLDATA = (
+    "PERS tooldata <tool> := [TRUE, <tool_frame:frame>, [<mass>, "
+    "[<x:length>, <y:length>, <z:length>], [1, 0, 0, 0], 0, 0, 0]];"
+)
+_WOBJDATA = 'PERS wobjdata <work> := [FALSE, <fixed>, "<unit>", <user:frame>, <object:frame>];'
+RAPID = Language(
+    comment="!",
+    last="ENDMODULE",
+    outputs=f"ABB's outputs have names of {NAME} characters at most",
+    has_output=lambda output: isinstance(output, str) and len(output) <= NAME,
+    fields={
+        "name": _WORD,
+        "tool": _WORD,
+        "work": _WORD,
+        "speed": _WORD,
+        "output": _WORD,
+        "unit": word(r"\w*"),
+        "zone": word(r"fine|z[0-9]{1,3}"),
+        "event": word(".*"),
+        "mass": number(".4f"),
+        "length": number(".4f"),
+        "seconds": seconds(TIME_DIGITS),
+        "value": truth("0", "1"),
+        "fixed": truth("FALSE", "TRUE"),
+        "configurations": word("Off"),
+        "circles": word("ObjectFrame"),
+        "speeds": Field(_LIST, _read_speeds, _write_speeds),
+        "axes": Field(_LISTS, _read_axes, _write_axes),
+        "pose": Field(
+            rf"\[ ?{_LIST} ?, ?{_LIST} ?, ?{_LIST} ?, ?{_LIST} ?\]", _read_pose, _write_pose
+        ),
+        "frame": Field(_LISTS, _read_frame, _write_frame),
+    },
+    statements=(
+        Statement("begin", "MODULE <name>", _BEFORE, then="data"),
+        Statement("tool", f"TASK {_TOOLDATA}", _DATA),
+        Statement("tool", _TOOLDATA, _DATA),
+        Statement("work", f"TASK {_WOBJDATA}", _DATA),
+        Statement("work", _WOBJDATA, _DATA),
+        Statement("speed", "CONST speeddata <speed> := <speeds>;", _DATA),
+        Statement("procedure", "PROC <name>()", _DATA, then="start"),
+        Statement("set", "ConfL \\<configurations>;", _START),
+        Statement("set", "CirPathMode \\<circles>;", _PROGRAM),
+        Statement(
+            "joint approach", "MoveAbsJ <axes>\\NoEOffs, <speed>, fine, <tool>;", _PROGRAM, "body"
+        ),
+        Statement(
+            "joint", "MoveAbsJ <axes>\\NoEOffs, <speed>\\T:=<seconds>, <zone>, <tool>;", _BODY
+        ),
+        Statement("linear", "MoveL <pose>, <speed>, <zone>, <tool>\\WObj:=<work>;", _BODY),
+        Statement(
+            "linear", "MoveL <pose>, <speed>\\T:=<seconds>, <zone>, <tool>\\WObj:=<work>;", _BODY
+        ),
+        Statement(
+            "circular", "MoveC <via:pose>, <pose>, <speed>, <zone>, <tool>\\WObj:=<work>;", _BODY
+        ),
+        Statement("wait", "WaitTime <seconds>;", _BODY),
+        Statement("output", "SetDO <output>, <value>;", _BODY),
+        Statement("event", "! event: <event>", _BODY),
+        Statement("leave", "ENDPROC", _BODY, then="left"),
+        Statement("end", "ENDMODULE", ("left",), then="after"),
+    ),
+)
+
+
+class RapidWriter(ProgramWriter):
+    """Writer of a module that an IRC5 or OmniCore loads."""
+
+    language = RAPID
+
+    @override
+    def opening(self) -> list[str]:
+        draft, name = self.draft, self.name
+        if not any(axis.name.startswith("A") for axis in self.program.axes):
+            raise ProblemError(f"{draft.robot.name}: axes: none is A1 to A6, which a robot has")
+        slow = [float(f"{draft.settings.approach * x:g}") for x in (_FASTEST, _TURNING) * 2]
+        data = [
+            RAPID.text("begin", name=name),
+            *self.head(),
+            *map(self.comment, self._unknown()),
+            self._tool(),
+            *self._work(),
+            self.line("speed", speed=f"{name}{SLOW}", speeds=slow),
+            *(
+                self.line("speed", speed=f"{name}_f{k}", speeds=[1e3 * speed, *TURNING])
+                for k, speed in enumerate(speeds_of(self.program), 1)
+            ),
+            "",
+            self.line("procedure", name=f"{name}{_PROCEDURE}"),
+        ]
+        self.indent = "    "
+        return [
+            *data,
+            *([] if draft.frames is None else [self.line("set", configurations="Off")]),
+            *([self.line("set", circles="ObjectFrame")] if goes_round(self.program) else []),
+            *self._joint_approach(self.program.segments[0]),
+        ]
+
+    @override
+    def closing(self) -> list[str]:
+        return [f"  {RAPID.text('leave')}", RAPID.text("end")]
+
+    @override
+    def before_step(self) -> list[str]:
+        return [""]
+
+    @override
+    def approach(self, segment: Segment) -> list[str]:
+        if not isinstance(segment, PoseSegment):
+            return self._joint_approach(segment)
+        values = {**self._frames, "speed": f"{self.name}{SLOW}", "zone": "fine"}
+        return [self.line("linear", pose=self.pose(segment, 0), **values)]
+
+    def _joint_approach(self, segment: Segment) -> list[str]:
+        values = {"speed": f"{self.name}{SLOW}", "tool": f"{self.name}_t"}
+        return [self.line("joint approach", axes=self.axes(segment, 0), **values)]
+
+    @override
+    def pace(self, segment: Segment, k: int) -> dict[str, Any]:
+        stops = k == len(segment.t) - 1
+        if isinstance(segment, FeedSegment):
+            number = speeds_of(self.program).index(segment.speeds[k - 1]) + 1
+            speed = f"{self.name}_f{number}"
+            return {**self._frames, "speed": speed, "zone": "fine" if stops else "z0"}
+        frames = self._frames if isinstance(segment, PoseSegment) else {"tool": f"{self.name}_t"}
+        interval = segment.t[k] - segment.t[k - 1]
+        zone = "fine" if stops else "z1"
+        return {**frames, "speed": "v100", "seconds": interval, "zone": zone}
+
+    @property
+    def _frames(self) -> dict[str, str]:
+        """Names of tool and work object."""
+        return {"tool": f"{self.name}_t", "work": f"{self.name}_w"}
+
+    @override
+    def pose(self, segment: PoseSegment, k: int, configuration: str = "") -> WrittenPose:
+        *quarters, cfx = confdata(segment.frames, segment.q[k, np.argsort(segment.order)])
+        numbers = ", ".join(str(value) for value in (*quarters, cfx or 0))
+        return super().pose(segment, k, configuration or numbers)
+
+    def _unknown(self) -> list[str]:
+        """Return the comment on configurations that are not known."""
+        first = next((x for x in self.program.segments if isinstance(x, PoseSegment)), None)
+        if first is None:
+            return []
+        known = confdata(first.frames, first.q[0, np.argsort(first.order)])[3] is not None
+        return [] if known else _UNKNOWN_CONFIGURATION
+
+    def _tool(self) -> str:
+        x, y, z = (1e3 * value for value in self.draft.settings.center)
+        # A draft has a mass.
+        load = {"mass": self.draft.settings.mass or 0.0, "x": x, "y": y, "z": z}
+        return self.line("tool", tool=f"{self.name}_t", tool_frame=self.draft.tool, **load)
+
+    def _work(self) -> list[str]:
+        """Return the work object: in the world, or on a mechanical unit that carries it."""
+        frames, name = self.draft.frames, f"{self.name}_w"
+        if frames is None:
+            return []
+        values = {"fixed": True, "unit": "", "user": frames.work, "object": None}
+        if frames.is_carried:
+            unit = self.positioner(
+                str,
+                'a wobjdata names its mechanical unit; say positioner = "STN1", or what it is '
+                "called",
+            )
+            values = {"fixed": False, "unit": unit, "user": None, "object": frames.work}
+        return [self.line("work", work=name, **values)]
+
+
+_UNKNOWN_CONFIGURATION = [
+    "cfx is 0 in all targets and means nothing: the wrist axes of this arm do not meet in a",
+    "point, or its zero is not that of ABB's arms. The configuration is that of the begin.",
+]
 
 
 def write_rapid(file: FilePath, draft: Draft) -> None:
     """Write a program as a module that an IRC5 or OmniCore loads."""
-    program = draft.program
-    name = module_name(file, NAME - len(_PROCEDURE), _WORDS)
-    _check_robot_axes(draft)
-    share = draft.settings.approach
-    speed = ", ".join(f"{share * value:g}" for value in (_FASTEST, _TURNING, _FASTEST, _TURNING))
-    lines = [
-        f"MODULE {name}",
-        *(f"  ! {line}" for line in head(draft)),
-        *(f"  ! {line}" for line in _unknown(draft)),
-        f"  TASK PERS tooldata {name}_t := {_tool(draft)};",
-        *_work(draft, name),
-        f"  CONST speeddata {name}_v := [{speed}];",
-        *_speeds(draft, name),
-        "",
-        f"  PROC {name}{_PROCEDURE}()",
-        *([] if draft.frames is None else ["    ConfL \\Off;"]),
-        *(["    CirPathMode \\ObjectFrame;"] if goes_round(program) else []),
-        _slowly(draft, program.segments[0], name, by_axes=True),
-    ]
-    for segment, begun in with_begins(program.segments):
-        lines += ["", f"    ! step: {plain(segment.name)}"]
-        lines += [f"    ! {line}" for line in before(segment)]
-        if begun is not None:
-            by_axes = not isinstance(begun, PoseSegment)
-            lines.append(_slowly(draft, begun, name, by_axes=by_axes))
-        lines += _moves(draft, segment, name)
-    write_text(file, "\n".join([*lines, "  ENDPROC", "ENDMODULE", ""]))
+    RapidWriter(draft, module_name(file, NAME - len(_PROCEDURE), _WORDS)).write(file)
 
 
-def _check_robot_axes(draft: Draft) -> None:
-    if not any(axis.name.startswith("A") for axis in draft.program.axes):
-        raise ProblemError(f"{draft.robot.name}: axes: none is A1 to A6, which a robot has")
+class RapidReader(ProgramReader):
+    """Reader of modules: of what `write_rapid` writes, spaces, names and numbers aside."""
 
-
-def _moves(draft: Draft, segment: Segment, name: str) -> list[str]:
-    last = len(segment.t) - 1
-    lines = []
-    for k in range(last + 1):
-        if k and segment.is_rest:
-            lines.append(f"    WaitTime {_seconds(segment.t[k] - segment.t[k - 1])};")
-        elif k:
-            zone = "fine" if k == last else "z1"
-            seconds = _seconds(segment.t[k] - segment.t[k - 1])
-            speed = f"v100{_TIME}{seconds}"
-            if isinstance(segment, FeedSegment):
-                speed = f"{name}_f{speeds_of(draft.program).index(segment.speeds[k - 1]) + 1}"
-                zone = "fine" if k == last else "z0"
-            lines.append(f"    {_motion(draft, segment, k, name, f'{speed}, {zone}')}")
-        lines += [f"    {_event(draft, item.name)}" for item in segment.events if item.target == k]
-    return lines
-
-
-def _motion(draft: Draft, segment: Segment, k: int, name: str, speed_and_zone: str) -> str:
-    """Return the motion to a target of a segment: linear to a pose, by the axes to joints."""
-    if isinstance(segment, PoseSegment):
-        target, rest = _robtarget(draft, segment, k), f"{speed_and_zone}, {name}_t\\WObj:={name}_w;"
-        if isinstance(segment, FeedSegment) and k and segment.goes_round(k):
-            return f"MoveC {_robtarget(draft, segment.middles, k - 1)}, {target}, {rest}"
-        return f"MoveL {target}, {rest}"
-    target = _target(segment, k, draft.program)
-    return f"MoveAbsJ {target}\\NoEOffs, {speed_and_zone}, {name}_t;"
-
-
-def _speeds(draft: Draft, name: str) -> list[str]:
-    """Return the speeds of seams: how fast the tool turns, and external axes, is as in v100."""
-    return [
-        f"  CONST speeddata {name}_f{k} := [{1e3 * speed:.7g}, 500, 5000, 1000];"
-        for k, speed in enumerate(speeds_of(draft.program), 1)
-    ]
-
-
-def _slowly(draft: Draft, segment: Segment, name: str, *, by_axes: bool) -> str:
-    """Return the slow motion to where a segment begins."""
-    way = Segment(segment.name, segment.t, segment.q) if by_axes else segment
-    return f"    {_motion(draft, way, 0, name, f'{name}_v, fine')}"
-
-
-def _robtarget(draft: Draft, segment: PoseSegment, k: int) -> str:
-    x, y, z, *turn = rapid_numbers(segment.places[k], segment.turns[k])
-    own = segment.q[k, np.argsort(segment.order)]
-    *quarters, cfx = confdata(segment.frames, own)
-    values = written(segment.q[k], draft.program.axes)
-    known = {axis.name: value for axis, value in zip(draft.program.axes, values, strict=True)}
-    parts = (
-        ", ".join(f"{value:.4f}" for value in (x, y, z)),
-        ", ".join(f"{value:.8f}" for value in turn),
-        ", ".join(str(value) for value in (*quarters, cfx or 0)),
-        ", ".join(known.get(name, _ABSENT) for name in AXES[6:]),
-    )
-    return f"[{', '.join(f'[{part}]' for part in parts)}]"
-
-
-def _unknown(draft: Draft) -> list[str]:
-    """Return the comment on configurations that are not known."""
-    first = next((item for item in draft.program.segments if isinstance(item, PoseSegment)), None)
-    if first is None or confdata(first.frames, first.q[0, np.argsort(first.order)])[3] is not None:
-        return []
-    return [
-        "cfx is 0 in all targets and means nothing: the wrist axes of this arm do not meet in a",
-        "point, or its zero is not that of ABB's arms. The configuration is that of the begin.",
-    ]
-
-
-def _work(draft: Draft, name: str) -> list[str]:
-    """Return the work object: in the world, or on a mechanical unit that carries it."""
-    frames = draft.frames
-    if frames is None:
-        return []
-    nowhere, place = "[[0, 0, 0], [1, 0, 0, 0]]", _pose(frames.work)
-    if not frames.is_carried:
-        rows = f'TRUE, "", {place}, {nowhere}'
-    else:
-        unit = draft.settings.positioner
-        if not isinstance(unit, str):
-            raise ProblemError(
-                f"{draft.robot.name}: an axis carries work object '{frames.name}', and a wobjdata "
-                f'names its mechanical unit; say positioner = "STN1", or what it is called, in the '
-                f"file of --settings (ProgramSettings(positioner=…))"
-            )
-        rows = f'FALSE, "{unit}", {nowhere}, {place}'
-    return [f"  TASK PERS wobjdata {name}_w := [FALSE, {rows}];"]
-
-
-def _event(draft: Draft, event: str) -> str:
-    signal = draft.signal(event)
-    if signal is None:
-        return f"! event: {plain(event)}"
-    output, value = signal
-    if not isinstance(output, str) or len(output) > NAME:
-        raise ProblemError(
-            f"signals: '{event}' switches {output!r}; ABB's outputs have names of {NAME} "
-            f"characters at most"
-        )
-    return f"SetDO {output}, {int(value)};"
-
-
-def _target(segment: Segment, k: int, program: ControllerProgram) -> str:
-    values = written(segment.q[k], program.axes)
-    known = {axis.name: value for axis, value in zip(program.axes, values, strict=True)}
-    # A robot of fewer than six axes has 0 in their place.
-    own = ", ".join(known.get(name, "0") for name in AXES[:6])
-    others = ", ".join(known.get(name, _ABSENT) for name in AXES[6:])
-    return f"[[{own}], [{others}]]"
-
-
-def _tool(draft: Draft) -> str:
-    frame, (x, y, z) = _pose(draft.tool), (1e3 * value for value in draft.settings.center)
-    # A draft has one.
-    mass = draft.settings.mass or 0.0
-    return f"[TRUE, {frame}, [{mass:.4f}, [{x:.4f}, {y:.4f}, {z:.4f}], [1, 0, 0, 0], 0, 0, 0]]"
-
-
-def _pose(pose: SE3) -> str:
-    place = ", ".join(f"{value + 0.0:.4f}" for value in (1e3 * pose.translation).tolist())
-    x, y, z, w = Quaternion(pose.rotation).coeffs().tolist()
-    turn = ", ".join(f"{value + 0.0:.8f}" for value in (w, x, y, z))
-    return f"[[{place}], [{turn}]]"
-
-
-def _seconds(value: float) -> str:
-    return f"{value:.{TIME_DIGITS}f}"
-
-
-# ABB RAPID, read line by line: what `selfmotion.shop.controllers.rapid` writes.
-
-# End of the name of the speed of slow motions.
-SLOW = "_v"
-# Zones of seams at speeds, in which corners are rounded by as much as is judged.
-_ZONES = ("fine", "z0")
-# How fast the tool turns at most, and external axes [°/s, mm/s, °/s]: none of it slows a seam down.
-TURNING = (500.0, 5000.0, 1000.0)
-# From where on a number means that there is no such axis.
-_ABSENT_FROM = 8.9e9
-
-
-class RapidReader(StopReader):
-    """Reads a module: what `write_rapid` writes, spaces, names and numbers aside."""
-
-    comment, last = "!", "ENDMODULE"
+    language = RAPID
+    moving = "zone is not fine"
 
     def __init__(self, file: FilePath, robot: RobotModel | None = None) -> None:
         super().__init__(file, robot)
-        # Speeds by the names of their speeddata: of the tool [mm/s], and of what turns.
-        self._known: dict[str, list[float]] = {}
-        # Names of tool and work object of the module, and whether arcs turn as they are judged.
-        self._tool_name, self._work_name, self._turns_evenly = "", "", False
-        # Whether configurations of poses are not asked for.
-        self._goes_on = False
+        # Speeddata by its name: of the tool, and of what turns [mm/s, °/s, mm/s, °/s].
+        self._speeds: dict[str, list[float]] = {}
 
-    def begin(self, given: Sequence[str]) -> None:
-        """Begin the module."""
-        self.name, self.state = given[0], "data"
+    @override
+    def actions(self) -> Mapping[str, Callable[..., None]]:
+        return {
+            **super().actions(),
+            "tool": partial(self._declare, "tool"),
+            "work": partial(self._declare, "work"),
+            "speed": self._take_speed,
+            "procedure": self.no_action,
+            "joint approach": self._joint_approach,
+            "joint": self._take_axes,
+            "linear": self._take_pose,
+            "circular": self._take_pose,
+            "leave": partial(self.check_stopped, "the program ends"),
+        }
 
-    def tool_is(self, given: Sequence[str]) -> None:
-        """Take the tool in the flange."""
-        if self._tool_name:
-            raise self.lines.fault(f"there is a tooldata '{self._tool_name}' already, expected one")
-        self._tool_name = given[0].lower()
-        self.tool = self._frame(given[1], given[2])
-        self.load_is(given[3], self._texts(given[4], 3, "cog"), 1e-3)
+    @property
+    @override
+    def tool(self) -> SE3 | None:
+        return self.settings.get("tool_frame")
 
-    def work_is(self, given: Sequence[str]) -> None:
-        """Take the work object: user frame and object frame, the first one of a unit its own."""
-        if self._work_name:
-            raise self.lines.fault(f"there is a wobjdata '{self._work_name}' already, expected one")
-        self._work_name = given[0].lower()
-        fixed, self.unit, *frames = given[1].upper() == "TRUE", *given[2:]
-        user, object_ = frames[:2], frames[2:]
-        self.is_carried = not fixed
-        own = self._frame(*object_)
-        self.work = self._frame(*user) * own if fixed else own
+    @property
+    @override
+    def work(self) -> SE3 | None:
+        if "object" not in self.settings:
+            return None
+        user, own = self.settings["user"], self.settings["object"]
+        return user * own if self.settings["fixed"] else own
 
-    def procedure(self, _: Sequence[str]) -> None:
-        """Begin its procedure."""
-        self.state = "start"
+    @property
+    @override
+    def is_carried(self) -> bool | None:
+        return None if "fixed" not in self.settings else not self.settings["fixed"]
 
-    def go(self, given: Sequence[str]) -> None:
-        """Take where the motion begins, or where it slowly goes on by axis targets."""
-        self._check_stopped("a slow motion")
-        robot, others, speed, tool = given
-        self._check_slow(speed)
-        self._check_tool(tool)
-        self.begin_at(self._target(robot, others))
-        self.state = "body"
+    def _declare(self, kind: str, **values: object) -> None:
+        """Take the tool or the work object, of which there is one."""
+        if kind in self.settings:
+            what = f"{'tool' if kind == 'tool' else 'wobj'}data '{self.settings[kind]}'"
+            raise self.lines.fault(f"there is a {what} already, expected one")
+        self.settings.update(values)
 
-    def _check_slow(self, speed: str) -> None:
-        """Refuse a motion to where the program goes on that is faster than slow ones are."""
-        known = self._known.get(speed.lower())
-        most = (_FASTEST, _TURNING, _FASTEST, _TURNING)
+    def _take_speed(self, speed: str, speeds: list[float]) -> None:
+        self._speeds[speed.lower()] = speeds
+
+    def _joint_approach(self, axes: list[float], speed: str, tool: str) -> None:
+        self._check_name("tool", tool)
+        self._approach(axes, speed)
+
+    def _approach(self, target: list[float] | Pose, speed: str) -> None:
+        """Take a slow motion; nothing has judged one that is faster than those."""
+        known, most = self._speeds.get(speed.lower()), (_FASTEST, _TURNING) * 2
         if known is None or any(x > least for x, least in zip(known, most, strict=True)):
-            found = "none of the module" if known is None else ", ".join(f"{x:g}" for x in known)
+            found = "none of the module" if known is None else _in_words(known)
             raise self.lines.fault(
                 f"a motion to where the program goes on has speed '{speed}' ({found}), expected a "
-                f"speeddata of the module of at most {', '.join(f'{x:g}' for x in most)}: nothing "
-                f"has judged it"
+                f"speeddata of the module of at most {_in_words(most)}: nothing has judged it"
             )
+        self.approach(target)
 
-    def _check_tool(self, tool: str) -> None:
-        if tool.lower() != self._tool_name:
-            raise self.lines.fault(
-                f"tool is '{tool}', expected '{self._tool_name}', the one that the module has"
-            )
+    def _take_axes(
+        self, axes: list[float], speed: str, seconds: float, zone: str, tool: str
+    ) -> None:
+        self._check_name("tool", tool)
+        self.take(Target(axes, seconds), stops=zone.lower() == "fine")
 
-    def speed_is(self, given: Sequence[str]) -> None:
-        """Take the speed of a speeddata [mm/s]."""
-        values = [self.lines.number_of(item) for item in self._texts(given[1], 4, "speeddata")]
-        if not values[0] > 0.0:
-            raise self.lines.fault(f"v_tcp is {values[0]:g} mm/s, expected a number above 0")
-        self._known[given[0].lower()] = values
-
-    def goes_on(self, _: Sequence[str]) -> None:
-        """Take that linear motions go on in the configuration that the arm is in."""
-        self._goes_on = True
-
-    def arcs_turn_evenly(self, _: Sequence[str]) -> None:
-        """Take how the tool turns in circular motions."""
-        self._turns_evenly = True
-
-    def move_at_speed(self, given: Sequence[str]) -> None:
-        """Take a pose at a speed, straight or round; one that is called …_v is a slow motion."""
-        *poses, speed, zone, tool, work = given
-        self._check_names(tool, work)
-        if not poses[4:] and speed.lower().endswith(SLOW):
-            if zone.lower() != "fine":
-                raise self.lines.fault(f"a slow motion has zone {zone}, expected fine")
-            self._check_slow(speed)
-            self.go_linear(poses)
-            return
-        if self.axes or self.times:
-            raise self.lines.fault(
-                "a motion at a speed after one with a time, expected fine before"
-            )
-        if speed.lower() not in self._known:
-            raise self.lines.fault(f"speed '{speed}' is no speeddata of the module")
-        self._check_judged(speed, zone, is_round=bool(poses[4:]))
-        pose, via = self._pose(poses[-4:]), self._pose(poses[:4]) if poses[4:] else None
-        fast = 1e-3 * self._known[speed.lower()][0]
-        self.take_pose_at_speed(pose, via, fast, stops=zone.lower() == "fine")
-
-    def _check_names(self, tool: str, work: str) -> None:
-        """Refuse a pose of another tool or work object than those of the module."""
-        self._check_tool(tool)
-        if work.lower() != self._work_name:
-            raise self.lines.fault(
-                f"work object is '{work}', expected '{self._work_name}', the one that the module "
-                f"has"
-            )
-        if not self._goes_on:
+    def _take_pose(
+        self,
+        pose: Pose,
+        speed: str,
+        zone: str,
+        tool: str,
+        work: str,
+        seconds: float | None = None,
+        via: Pose | None = None,
+    ) -> None:
+        """Take a pose with a time or a speed; one whose speed is called …_v is a slow motion."""
+        self._check_name("tool", tool)
+        self._check_name("work", work)
+        if "configurations" not in self.settings:
             raise self.lines.fault(
                 "linear motions need ConfL \\Off before them: else the controller may stop where "
                 "the configuration is another one than a target states"
             )
+        stops = zone.lower() == "fine"
+        if seconds is not None:
+            self.take(Target(pose, seconds), stops=stops)
+        elif via is None and speed.lower().endswith(SLOW):
+            if not stops:
+                raise self.lines.fault(f"a slow motion has zone {zone}, expected fine")
+            self._approach(pose, speed)
+        else:
+            self._check_judged(speed, zone, is_round=via is not None)
+            self.take(
+                Target(pose, speed=1e-3 * self._speeds[speed.lower()][0], via=via), stops=stops
+            )
+
+    def _check_name(self, kind: str, name: str) -> None:
+        """Refuse another tool or work object than that of the module."""
+        known = str(self.settings.get(kind, ""))
+        if name.lower() != known.lower():
+            what = "tool" if kind == "tool" else "work object"
+            raise self.lines.fault(
+                f"{what} is '{name}', expected '{known}', the one that the module has"
+            )
 
     def _check_judged(self, speed: str, zone: str, *, is_round: bool) -> None:
         """Refuse what makes another motion of a seam at its speed than the one that is judged."""
+        if speed.lower() not in self._speeds:
+            raise self.lines.fault(f"speed '{speed}' is no speeddata of the module")
         if zone.lower() not in _ZONES:
             raise self.lines.fault(
                 f"zone is {zone}, expected fine or z0: corners of seams at speeds are judged as "
                 f"rounded by {1e3 * ZONE:g} mm at most"
             )
-        turning = self._known[speed.lower()][1:]
+        turning = self._speeds[speed.lower()][1:]
         if any(own < least for own, least in zip(turning, TURNING, strict=True)):
             raise self.lines.fault(
-                f"speeddata '{speed}' has {', '.join(f'{x:g}' for x in turning)} for turning and "
-                f"external axes, expected at least {', '.join(f'{x:g}' for x in TURNING)}: slower "
-                f"ones hold the tool back from its speed"
+                f"speeddata '{speed}' has {_in_words(turning)} for turning and external axes, "
+                f"expected at least {_in_words(TURNING)}: slower ones hold the tool back from its "
+                f"speed"
             )
-        if is_round and not self._turns_evenly:
+        if is_round and "circles" not in self.settings:
             raise self.lines.fault(
                 "MoveC needs CirPathMode \\ObjectFrame before it: else the tool turns otherwise"
             )
 
-    def go_linear(self, given: Sequence[str]) -> None:
-        """Take the pose from which the motion goes on by poses."""
-        self._check_stopped("a slow motion")
-        self.slowly(self._pose(given))
 
-    def wait(self, given: Sequence[str]) -> None:
-        """Take a rest."""
-        self._check_stopped("the arm is to rest")
-        super().wait(given)
-
-    def move(self, given: Sequence[str]) -> None:
-        """Take an axis target."""
-        robot, others, seconds, zone, tool = given
-        self._check_tool(tool)
-        if self.poses:
-            raise self.lines.fault("an axis target after a pose whose zone is not fine")
-        axes, taken = self._target(robot, others), self.lines.duration(seconds)
-        self.take_axes(axes, taken, stops=zone.lower() == "fine")
-
-    def move_linear(self, given: Sequence[str]) -> None:
-        """Take a pose."""
-        *target, seconds, zone, tool, work = given
-        self._check_names(tool, work)
-        if self.axes or self.speeds:
-            raise self.lines.fault("a pose after another kind of target whose zone is not fine")
-        pose, taken = self._pose(target), self.lines.duration(seconds)
-        self.take_pose(pose, taken, stops=zone.lower() == "fine")
-
-    def leave(self, _: Sequence[str]) -> None:
-        """End the procedure."""
-        if self.is_moving:
-            raise self.lines.fault("the last target has a zone, expected fine")
-        self.state = "left"
-
-    def _check_stopped(self, what: str) -> None:
-        if self.is_moving:
-            raise self.lines.fault(f"{what} where it does not stop: zone is not fine")
-
-    def _frame(self, place: str, turn: str) -> SE3:
-        position, rotation = self._list(place, 3, "trans"), self._list(turn, 4, "rot")
-        if not any(rotation):
-            raise self.lines.fault("the quaternion is zero")
-        w, x, y, z = rotation
-        return pose_of_values([*(1e-3 * value for value in position), x, y, z, w])
-
-    def _pose(self, given: Sequence[str]) -> Pose:
-        place, turn, configuration, others = given
-        self._list(configuration, 4, "robconf")
-        numbers = [*self._list(place, 3, "trans"), *self._list(turn, 4, "rot")]
-        if not any(numbers[3:]):
-            raise self.lines.fault("the quaternion is zero")
-        outer = dict(zip(AXES[6:], self._texts(others, 6, "extax"), strict=True))
-        present = {
-            name: self.lines.coordinate(text)
-            for name, text in outer.items()
-            if not self._is_absent(name, text)
-        }
-        position, rotation = rapid_pose(np.array(numbers))
-        return Pose(position, rotation, self.others_of(present), self.lines.number)
-
-    def _list(self, text: str, count: int, what: str) -> list[float]:
-        return [self.lines.coordinate(item) for item in self._texts(text, count, what)]
-
-    def _texts(self, text: str, count: int, what: str) -> list[str]:
-        values = text.split(",")
-        if len(values) != count:
-            raise self.lines.fault(f"{what} has {len(values)} numbers, expected {count}")
-        return values
-
-    def _target(self, robot: str, others: str) -> list[float]:
-        own, outer = self._texts(robot, 6, "robax"), self._texts(others, 6, "extax")
-        every = dict(zip(AXES, [*own, *outer], strict=True))
-        self.same_axes([name for name, text in every.items() if not self._is_absent(name, text)])
-        return [self.lines.coordinate(every[name]) for name in self.present]
-
-    def _is_absent(self, name: str, text: str) -> bool:
-        return name in AXES[6:] and abs(self.lines.number_of(text)) > _ABSENT_FROM
-
-
-_WORD = r"[A-Z]\w{0,31}"
-_LIST = r"\[([^\[\]]*)\]"
-_TARGET = rf"\[ ?{_LIST} ?, ?{_LIST} ?\]"
-_POSE = rf"\[ ?{_LIST} ?, ?{_LIST} ?, ?{_LIST} ?, ?{_LIST} ?\]"
-_FRAME = rf"\[ ?{_LIST} ?, ?{_LIST} ?\]"
-_NO_TURN = r"\[ ?1 ?, ?0 ?, ?0 ?, ?0 ?\]"
-_TIMED = rf"{_WORD} ?\\T ?:= ?([^,]+), ?(fine|z[0-9]{{1,3}})"
-_FRAMES = rf"({_WORD}) ?\\WObj ?:= ?({_WORD}) ?;"
-_AT_SPEED = rf"({_WORD}) ?, ?(fine|z[0-9]{{1,3}}) ?, ?{_FRAMES}"
-RapidReader.grammar = (
-    (("before",), rf"MODULE ({_WORD})", RapidReader.begin),
-    (
-        ("data",),
-        rf"(?:TASK )?PERS tooldata ({_WORD}) ?:= ?\[ ?TRUE ?, ?{_FRAME} ?, ?\[ ?([^,\[\]]+), ?"
-        rf"{_LIST} ?, ?{_NO_TURN} ?, ?0 ?, ?0 ?, ?0 ?\] ?\];",
-        RapidReader.tool_is,
-    ),
-    (
-        ("data",),
-        rf"(?:TASK )?PERS wobjdata ({_WORD}) ?:= ?\[ ?FALSE ?, ?(TRUE|FALSE) ?, ?\"(\w*)\" ?, ?"
-        rf"{_FRAME} ?, ?{_FRAME} ?\];",
-        RapidReader.work_is,
-    ),
-    (("data",), rf"CONST speeddata ({_WORD}) ?:= ?{_LIST};", RapidReader.speed_is),
-    (("data",), rf"PROC {_WORD} ?\( ?\)", RapidReader.procedure),
-    (("start",), r"ConfL ?\\ ?Off ?;", RapidReader.goes_on),
-    (("start", "body"), r"CirPathMode ?\\ ?ObjectFrame ?;", RapidReader.arcs_turn_evenly),
-    (
-        ("start", "body"),
-        rf"MoveAbsJ {_TARGET} ?\\NoEOffs ?, ?({_WORD}) ?, ?fine ?, ?({_WORD}) ?;",
-        RapidReader.go,
-    ),
-    (
-        ("body",),
-        rf"MoveAbsJ {_TARGET} ?\\NoEOffs ?, ?{_TIMED} ?, ?({_WORD}) ?;",
-        RapidReader.move,
-    ),
-    (("body",), rf"MoveL {_POSE} ?, ?{_AT_SPEED}", RapidReader.move_at_speed),
-    (("body",), rf"MoveC {_POSE} ?, ?{_POSE} ?, ?{_AT_SPEED}", RapidReader.move_at_speed),
-    (
-        ("body",),
-        rf"MoveL {_POSE} ?, ?{_TIMED} ?, ?{_FRAMES}",
-        RapidReader.move_linear,
-    ),
-    (("body",), r"WaitTime ([^;\s]+) ?;", RapidReader.wait),
-    (("body",), rf"SetDO ({_WORD}) ?, ?([01]) ?;", RapidReader.switch),
-    (("body",), r"! event: (.*)", RapidReader.switch),
-    (("body",), r"ENDPROC", RapidReader.leave),
-    (("left",), r"ENDMODULE", RapidReader.end),
-)
+def _in_words(values: Sequence[float]) -> str:
+    return ", ".join(f"{value:g}" for value in values)

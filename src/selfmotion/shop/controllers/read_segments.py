@@ -31,18 +31,6 @@ _FINER = 8
 
 
 @dataclass
-class Row:
-    """A segment while it is read: where it begins, its targets [deg or mm], times between [s].
-
-    A row that is nowhere rests where the arm is.
-    """
-
-    name: str
-    q: list[list[float]]
-    seconds: list[float]
-
-
-@dataclass
 class Pose:
     """A tool pose of a file: position [m], quaternion x, y, z, w, external axes [deg or mm]."""
 
@@ -53,27 +41,53 @@ class Pose:
 
 
 @dataclass
-class PoseRow:
-    """A segment of poses while it is read: where it begins, its targets, times between [s].
+class Row:
+    """A motion from rest to rest while it is read, a rest, or a slow motion.
 
-    Of one at speeds the time that was planned for all of it, the speed of each step [m/s], through
-    where it goes round, and whether it goes smoothly through its targets.
+    Attributes
+    ----------
+    name : str
+        Of the seam or move.
+    targets : list
+        Where it begins, and its targets: axes [deg or mm], or poses. None for a rest; of a slow
+        motion where it ends alone.
+    seconds : list of float
+        Times between targets [s]; of a motion at speeds the one that was planned for all of it.
+    speeds : list of float
+        Speed of each step [m/s]; none for times.
+    vias : (K, 3)
+        Point of each circular step [m]; no numbers for straight ones.
+    is_spline : bool
+        Whether it goes smoothly through its targets, not straight between them.
+    is_slow : bool
+        Whether it goes slowly to where the next motion begins.
     """
 
     name: str
-    poses: list[Pose]
+    targets: list[list[float] | Pose]
     seconds: list[float]
     speeds: list[float] = field(default_factory=list)
     vias: Array = field(default_factory=lambda: np.zeros((0, 3)))
     is_spline: bool = False
+    is_slow: bool = False
 
+    @property
+    def poses(self) -> list[Pose]:
+        """Targets that are poses: all of them, or none."""
+        return [target for target in self.targets if isinstance(target, Pose)]
 
-@dataclass
-class SlowRow:
-    """A slow motion to where the next segment begins: an axis target, or a pose."""
+    @property
+    def axes(self) -> list[list[float]]:
+        """Targets that are axes: all of them, or none."""
+        return [target for target in self.targets if not isinstance(target, Pose)]
 
-    target: list[float] | Pose
-    seconds: list[float] = field(default_factory=list)
+    def with_axes(self, columns: Sequence[int]) -> "Row":
+        """Return it with some of the axes of its targets."""
+        targets = [
+            target if isinstance(target, Pose) else [target[k] for k in columns]
+            for target in self.targets
+        ]
+        return replace(self, targets=targets)
 
 
 @dataclass
@@ -97,8 +111,8 @@ class Places:
         if self.planned is None or self.work is None:
             return None
         shift = self.work * self.planned.inverse()
-        still = np.abs(shift.homogeneous - np.eye(4)).max() < _REST
-        return None if still else shift
+        is_same = np.abs(shift.homogeneous - np.eye(4)).max() < _REST
+        return None if is_same else shift
 
     def frames(self, robot: RobotModel, axes: Sequence[Axis], file: object) -> ToolFrames:
         """Return the frames for a robot whose joints the axes are.
@@ -169,7 +183,7 @@ class Follower:
     at: Array | None = None
     approach: float = 0.0
 
-    def take(self, row: Row | PoseRow | SlowRow) -> None:
+    def take(self, row: Row) -> None:
         """Take a row.
 
         Raises
@@ -177,31 +191,30 @@ class Follower:
         FileFormatError
             The arm cannot follow it.
         """
-        if isinstance(row, PoseRow):
-            self._poses(row)
-        elif isinstance(row, SlowRow):
+        if row.is_slow:
             self._slowly(row)
+            return
+        if row.poses:
+            segment: Segment = self._segment(row)
         else:
             t = times_of(row.seconds)
-            at = self.at
-            if row.q:
-                q = self.in_si(np.array(row.q, dtype=np.float64))
-            elif at is not None:
-                q = np.array([at] * len(t))
-            else:
+            if not row.axes and self.at is None:
                 raise FileFormatError(f"{self.file}: rests before it has a target")
-            self.segments.append(Segment(row.name, t, q))
-            self.at = q[-1]
+            given = np.array(row.axes, dtype=np.float64)
+            q = self.in_si(given) if row.axes else np.array([self.at] * len(t))
+            segment = Segment(row.name, t, q)
+        self.segments.append(segment)
+        self.at = segment.q[-1]
 
-    def in_si(self, values: Array, kept: Sequence[int] | None = None) -> Array:
+    def in_si(self, values: Array, columns: Sequence[int] | None = None) -> Array:
         """Return coordinates in rad or m."""
-        axes = self.axes if kept is None else [self.axes[k] for k in kept]
+        axes = self.axes if columns is None else [self.axes[k] for k in columns]
         return np.asarray(values * [1e-3 if axis.slides else np.pi / 180.0 for axis in axes])
 
-    def _slowly(self, row: SlowRow) -> None:
-        before = self.at
-        if not isinstance(row.target, Pose):
-            self.at = self.in_si(np.array(row.target, dtype=np.float64))
+    def _slowly(self, row: Row) -> None:
+        before, (target,) = self.at, row.targets
+        if not isinstance(target, Pose):
+            self.at = self.in_si(np.array(target, dtype=np.float64))
             if before is not None and np.abs(self.at - before).max() > _THERE:
                 seconds = float(np.abs(self.at - before).max()) / _SLOW
                 both = np.array([before, self.at])
@@ -211,13 +224,13 @@ class Follower:
         if before is None:
             raise FileFormatError(f"{self.file}: begins with a pose, expected an axis target")
         place, turn = frames.places(self._by_robot(before[None]))
-        far = float(np.linalg.norm(place[0] - row.target.place))
-        angle = float(np.linalg.norm(frames.turned(turn, row.target.turn[None])))
+        far = float(np.linalg.norm(place[0] - target.place))
+        angle = float(np.linalg.norm(frames.turned(turn, target.turn[None])))
         # Slowly from where the arm is, however far that is.
         seconds = max(far / _SLOW, angle / _SLOW, 0.1)
         moves = bool(self.segments) and max(far, angle) > _THERE
-        here = Pose(place[0], turn[0], self._others(before), row.target.line)
-        found = self._segment(PoseRow(_SLOWLY, [here, row.target], [seconds]))
+        here = Pose(place[0], turn[0], self._others(before), target.line)
+        found = self._segment(Row(_SLOWLY, [here, target], [seconds]))
         segment = replace(found, is_slow=True)
         if not self.segments:
             self.approach = float(np.abs(segment.q[-1] - before).max())
@@ -225,12 +238,7 @@ class Follower:
             self.segments.append(segment)
         self.at = segment.q[-1]
 
-    def _poses(self, row: PoseRow) -> None:
-        segment = self._segment(row)
-        self.segments.append(segment)
-        self.at = segment.q[-1]
-
-    def _segment(self, row: PoseRow) -> PoseSegment:
+    def _segment(self, row: Row) -> PoseSegment:
         """Return the segment of poses, its joints followed from where the arm is."""
         frames, order = self._known()
         places = np.array([pose.place for pose in row.poses])
@@ -255,8 +263,8 @@ class Follower:
         q = self._followed(frames, rows, self._by_robot(self.at[None])[0], row, count)
         every = q[np.arange(0, len(times), count)]
 
-        def near(asked: Array) -> Array:
-            return np.stack([np.interp(asked, times, column) for column in q.T], axis=1)
+        def near(wanted: Array) -> Array:
+            return np.stack([np.interp(wanted, times, column) for column in q.T], axis=1)
 
         segment = PoseSegment(
             row.name,
@@ -280,7 +288,7 @@ class Follower:
         return segment.in_order(order)
 
     def _followed(
-        self, frames: ToolFrames, rows: Array, first: Array, row: PoseRow, count: int
+        self, frames: ToolFrames, rows: Array, first: Array, row: Row, count: int
     ) -> Array:
         """Return the robot's joints along poses: from one target to the next at once, if they join.
 
@@ -305,7 +313,7 @@ class Follower:
         return frames.solved(poses[:, :3], poses[:, 3:7], seeds)
 
     def _one_by_one(
-        self, frames: ToolFrames, poses: Array, at: Array, row: PoseRow, place: tuple[int, int]
+        self, frames: ToolFrames, poses: Array, at: Array, row: Row, place: tuple[int, int]
     ) -> Array:
         found, (first, count) = np.empty((len(poses), len(at))), place
         for k, pose in enumerate(poses, first):

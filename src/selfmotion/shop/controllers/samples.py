@@ -118,10 +118,10 @@ def _misses(plan: Plan, rate: float | None) -> tuple[Array, Array]:
     """Return by how much straight lines between samples leave a motion, (K, 2), and how long."""
     motion, chains = plan.trajectory, [item.chain for item in plan.problem.follows.items]
     samples = MotionSamples.of(motion, rate)
-    spans = np.diff(samples.t)
-    misses = np.zeros((len(spans), 2))
+    intervals = np.diff(samples.t)
+    misses = np.zeros((len(intervals), 2))
     for share in _BETWEEN:
-        t = np.minimum(motion.t[0] + samples.t[:-1] + share * spans, motion.t[-1])
+        t = np.minimum(motion.t[0] + samples.t[:-1] + share * intervals, motion.t[-1])
         straight, exact = samples.q[:-1] + share * np.diff(samples.q, axis=0), motion(t)
         for chain in chains:
             (_, turned, here), (_, facing, there) = chain.along(straight), chain.along(exact)
@@ -130,7 +130,7 @@ def _misses(plan: Plan, rate: float | None) -> tuple[Array, Array]:
             half = np.linalg.norm(turned - facing, axis=(1, 2)) / np.sqrt(8.0)
             angle = 2.0 * np.arcsin(np.minimum(half, 1.0))
             misses = np.maximum(misses, np.stack([far, angle], axis=1))
-    return misses, spans
+    return misses, intervals
 
 
 def _rate_that_keeps(plan: Plan) -> float | None:
@@ -143,10 +143,10 @@ def _rate_that_keeps(plan: Plan) -> float | None:
     lowest = float(np.ceil(1.0 / duration))
 
     def needed(rate: float | None) -> tuple[float, bool]:
-        misses, spans = _misses(plan, rate)
+        misses, intervals = _misses(plan, rate)
         share = (misses / [tolerance.position, tolerance.rotation]).max(axis=1)
         # The miss of a line over a span h is that of a parabola: it grows with h².
-        found = float(np.ceil((np.sqrt(share) / spans).max()))
+        found = float(np.ceil((np.sqrt(share) / intervals).max()))
         return max(found, lowest), bool(share.max() <= 1.0)
 
     # The samples of the plan itself lie too far apart for more than a first guess.
@@ -154,8 +154,8 @@ def _rate_that_keeps(plan: Plan) -> float | None:
     if rate * duration <= MOST_SAMPLES:
         rate = needed(rate)[0]
     while rate * duration <= MOST_SAMPLES:
-        better, kept = needed(rate)
-        if kept:
+        better, suffices = needed(rate)
+        if suffices:
             return rate
         rate = max(better, float(np.ceil(_FASTER * rate)))
     return None
@@ -223,14 +223,14 @@ _REST = 1e-6
 
 
 def moving_ends(plan: Plan | Parts | Move | Program) -> str:
-    """Return in words which joint moves at an end of a motion that nobody asked to; "" for none.
+    """Return in words which joint moves at an end that a problem has at rest; "" for none.
 
     A problem asks for it by `StartVelocity`, `EndVelocity`, `ClosedPath` or ``rest=False``.
     """
     motion = plan.motion if isinstance(plan, Move) else plan.trajectory
-    asked = plan.problem.constraints if isinstance(plan, Plan) else ()
+    constraints = plan.problem.constraints if isinstance(plan, Plan) else ()
     allowed = [
-        any(isinstance(item, kind | ClosedPath) for item in asked)
+        any(isinstance(item, kind | ClosedPath) for item in constraints)
         for kind in (StartVelocity, EndVelocity)
     ]
     if isinstance(plan, Plan) and not plan.problem.rest:

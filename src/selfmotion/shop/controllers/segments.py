@@ -2,7 +2,8 @@
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from functools import partial
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from typing_extensions import override
@@ -17,8 +18,17 @@ from selfmotion.shop.controllers.tool_frames import ToolFrames
 SURE = 1.02
 # Share of the shorter side of a corner within which the velocity changes.
 _CORNER = 1e-3
-# Shares of the interval between two targets at which the error is evaluated.
-_BETWEEN = np.array([0.0, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875])
+# Shares of the interval between two joint targets at which the error is evaluated.
+_BETWEEN = np.linspace(0.0, 1.0, 8, endpoint=False)
+# Shares of the interval between two poses at which joints are evaluated, which bend in between.
+_BETWEEN_POSES = np.linspace(0.0, 1.0, 16, endpoint=False)
+# Share of an interval that is its target alone.
+_AT_TARGET = np.zeros(1)
+# Sine of the angle below which slerp is a straight line.
+_SMALL = 1e-9
+
+# Rows of joints or poses at times (K,), by one interpolation.
+Curve = Callable[[Array], Array]
 
 
 class Event(NamedTuple):
@@ -44,6 +54,18 @@ class Knots(NamedTuple):
     qd: Array
 
     @classmethod
+    def smooth(cls, t: Array, q: Array) -> "Knots":
+        """Return the spline through positions (K, n) from rest to rest."""
+        from scipy.interpolate import CubicSpline
+
+        if not np.isfinite(q).all():
+            return cls(t, q, q)
+        rates: Array = CubicSpline(t, q, bc_type="clamped")(t, 1)
+        # A spline leaves digits of rest.
+        rates[[0, -1]] = 0.0
+        return cls(t, q, rates)
+
+    @classmethod
     def cornered(cls, t: Array, q: Array, each: int) -> "Knots":
         """Return a motion (K, n) that is smooth but for a corner at every `each`-th of its times.
 
@@ -51,6 +73,8 @@ class Knots(NamedTuple):
         """
         from scipy.interpolate import CubicSpline
 
+        if not np.isfinite(q).all():
+            return cls(t, q, q)
         corners = t[::each]
         sides = np.diff(corners)
         reach = _CORNER * np.minimum(np.append(sides, np.inf), np.append(np.inf, sides))
@@ -75,9 +99,9 @@ class Knots(NamedTuple):
 
 
 def by_interpolation(parts: Iterable[Iterable[Knots]]) -> list[list[Knots]]:
-    """Return the parts of a motion by each way in which a controller may make it.
+    """Return the parts of a motion by each interpolation that a controller may use.
 
-    Where a part has fewer ways, its last one stands for the others.
+    Where a part has fewer of them, its last one stands for the others.
     """
     each = [list(own) for own in parts]
     count = max(len(own) for own in each)
@@ -110,6 +134,10 @@ class Segment:
     remark: str = ""
     is_slow: bool = False
 
+    # Shares of an interval at which deviations are evaluated, and at which motions have knots.
+    evaluated: ClassVar[Array] = _BETWEEN
+    knots: ClassVar[Array] = _AT_TARGET
+
     @property
     def duration(self) -> float:
         """How long it takes [s]."""
@@ -124,41 +152,57 @@ class Segment:
         """Return the segment with coordinates in another order."""
         return replace(self, q=self.q[:, order])
 
-    def looked_at(self) -> Array:
+    @property
+    def rows(self) -> Array:
+        """Rows that are interpolated, one a target: joints, (K + 1, n)."""
+        return self.q
+
+    def between(self, times: Array, t: Array, rows: Array) -> Array:
+        """Return rows at times, straight between those at t."""
+        return straight_joints(times, t, rows)
+
+    def spline(self, times: Array) -> Array:
+        """Return rows at times on the cubic spline through all, from rest to rest."""
+        from scipy.interpolate import CubicSpline
+
+        found: Array = CubicSpline(self.t, self.rows, bc_type="clamped")(times)
+        return found
+
+    def joints(self, rows: Array, times: Array) -> Array:
+        """Return the joint positions (K, n) of rows at times; NaN where none are known."""
+        return rows
+
+    @property
+    def curves(self) -> list[Curve]:
+        """Interpolations that a controller may use: straight, with cut corners, smooth."""
+        lines = polygons(self.t, self.rows, self.between)
+        found: list[Curve] = [partial(self.between, t=t, rows=rows) for t, rows in lines]
+        return found if len(self.t) < 3 else [*found, self.spline]
+
+    def evaluation_times(self) -> Array:
         """Return times at targets and between them (K,) [s]."""
-        return finer(self.t, _BETWEEN)
+        return finer(self.t, self.evaluated)
 
-    def ways(self, times: Array) -> list[Array]:
-        """Return joint positions (K, n) at times by each way in which controllers join targets."""
-        return ways(self.t, self.q, times)
+    def interpolated(self, times: Array) -> list[Array]:
+        """Return joint positions (K, n) at times by each interpolation."""
+        return [self.joints(curve(times), times) for curve in self.curves]
 
-    def matched(self, motion: Trajectory, first: float) -> Array:
+    def reference(self, motion: Trajectory, first: float) -> Array:
         """Return a motion begun at `first`, at the times that are evaluated, (K, n)."""
-        return motion(np.clip(first + self.looked_at(), motion.t[0], motion.t[-1]))
+        return motion(np.clip(first + self.evaluation_times(), motion.t[0], motion.t[-1]))
 
-    def smooth(self) -> tuple[Array, Array, Array]:
-        """Return times (K,) [s], positions and velocities (K, n) of a spline through the targets.
+    def motions(self) -> Iterator[Knots]:
+        """Yield the joint motion by each interpolation: smooth, straight, with cut corners.
 
-        It begins and ends at rest.
+        With as few knots as it takes: see `miss_of` for what these are. NaN where no joints are
+        known.
         """
-        from scipy.interpolate import CubicSpline
-
-        times = self.looked_at()
-        spline = CubicSpline(self.t, self.q, bc_type="clamped")
-        return times, spline(times), spline(times, 1)
-
-    def joined(self) -> Iterator[Knots]:
-        """Yield the motion by each way in which controllers join targets: smooth, straight, cut.
-
-        As few knots as it takes: see `miss_of` for what these are.
-        """
-        from scipy.interpolate import CubicSpline
-
-        rates = CubicSpline(self.t, self.q, bc_type="clamped")(self.t, 1)
-        rates[[0, -1]] = 0.0
-        yield Knots(self.t, self.q, rates)
-        for line in polygons(self.t, self.q, _straight):
-            yield Knots.cornered(*line, 1)
+        times = finer(self.t, self.knots)
+        yield Knots.smooth(times, self.joints(self.spline(times), times))
+        for t, rows in polygons(self.t, self.rows, self.between):
+            times = finer(t, self.knots)
+            q = self.joints(self.between(times, t, rows), times)
+            yield Knots.cornered(times, q, len(self.knots))
 
 
 class Miss(NamedTuple):
@@ -209,16 +253,16 @@ NO_MISS = Miss(0.0, 0.0, 0.0)
 def miss_of(
     segment: Segment, motion: Trajectory, chains: Sequence[Chain], first: float = 0.0
 ) -> Miss:
-    """Return how far a controller is off a motion at most, whichever way it joins the targets.
+    """Return how far a controller is off a motion at most, whichever interpolation it uses.
 
     In between it may go straight in joint space, past each corner on the line between the middles
     of the two sides, which is the largest corner that controllers round, or along the cubic spline
     through all targets that begins and ends at rest; at the times of the motion, which holds it to
     its speeds as well. Segments at a speed are held to where it goes alone.
     """
-    times, exact = segment.looked_at(), segment.matched(motion, first)
+    times, exact = segment.evaluation_times(), segment.reference(motion, first)
     worst = NO_MISS
-    for line in segment.ways(times):
+    for line in segment.interpolated(times):
         worst = Miss(*map(max, worst, miss_between(line, exact, chains)))
     return worst
 
@@ -247,16 +291,6 @@ def finer(t: Array, between: Array) -> Array:
     return np.append((t[:-1, None] + between * np.diff(t)[:, None]).ravel(), t[-1])
 
 
-def ways(t: Array, q: Array, times: Array) -> list[Array]:
-    """Return joint positions (K, n) at times by each way of joining targets."""
-    from scipy.interpolate import CubicSpline
-
-    lines = [_straight(times, *line) for line in polygons(t, q, _straight)]
-    if len(t) < 3:
-        return lines
-    return [*lines, CubicSpline(t, q, bc_type="clamped")(times)]
-
-
 def polygons(
     t: Array, rows: Array, between: Callable[[Array, Array, Array], Array]
 ) -> list[tuple[Array, Array]]:
@@ -276,7 +310,8 @@ def polygons(
     return [(t, rows), (knots, between(knots, t, rows))]
 
 
-def _straight(times: Array, t: Array, q: Array) -> Array:
+def straight_joints(times: Array, t: Array, q: Array) -> Array:
+    """Return joints (K, n) at times, linear between those at t."""
     return np.stack([np.interp(times, t, column) for column in q.T], axis=1)
 
 
@@ -287,9 +322,6 @@ def _straight(times: Array, t: Array, q: Array) -> Array:
 # axes are linear; the arm's joints follow by inverse kinematics from where they are. That is what
 # ``MoveL``, ``LIN`` and ``movel`` are documented to do. ``SPLINE`` goes smoothly through all
 # poses.
-
-# Shares of the interval between two poses at which joints are evaluated, which bend in between.
-_BETWEEN_POSES = np.linspace(0.0, 1.0, 16, endpoint=False)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -314,68 +346,36 @@ class PoseSegment(Segment):
     near: Callable[[Array], Array]
     order: Ints
 
+    evaluated: ClassVar[Array] = _BETWEEN_POSES
+    knots: ClassVar[Array] = _BETWEEN_POSES
+
     @override
     def in_order(self, order: Sequence[int]) -> "PoseSegment":
         return replace(self, q=self.q[:, order], order=self.order[list(order)])
 
+    @property
     @override
-    def looked_at(self) -> Array:
-        return finer(self.t, _BETWEEN_POSES)
-
-    def ways(self, times: Array) -> list[Array]:
-        """See `Segment.ways`: straight lines, rounded corners, a smooth curve; in tool poses.
-
-        Where no joints are known they are not numbers.
-        """
-        lines = polygons(self.t, self._rows(), straight)
-        found = [straight(times, *line) for line in lines]
-        if len(self.t) > 2:
-            found.append(self._spline(times))
-        return [self._joints(rows, times)[:, self.order] for rows in found]
-
-    @override
-    def smooth(self) -> tuple[Array, Array, Array]:
-        from scipy.interpolate import CubicSpline
-
-        times = self.looked_at()
-        q = self._joints(self._spline(times), times)[:, self.order]
-        if not np.isfinite(q).all():
-            return times, q, q
-        return times, q, CubicSpline(times, q, bc_type="clamped")(times, 1)
-
-    def joined(self) -> Iterator[Knots]:
-        """See `Segment.joined`; where no joints are known they are not numbers."""
-        yield _at_rest(*self.smooth())
-        for knots, rows in polygons(self.t, self._rows(), straight):
-            times = finer(knots, _BETWEEN_POSES)
-            q = self._joints(straight(times, knots, rows), times)[:, self.order]
-            known = bool(np.isfinite(q).all())
-            yield Knots.cornered(times, q, len(_BETWEEN_POSES)) if known else Knots(times, q, q)
-
-    def _spline(self, times: Array) -> Array:
-        from scipy.interpolate import CubicSpline
-
-        rows: Array = CubicSpline(self.t, self._rows(), bc_type="clamped")(times)
-        rows[:, 3:7] /= np.linalg.norm(rows[:, 3:7], axis=1, keepdims=True)
-        return rows
-
-    def _rows(self) -> Array:
-        """Return positions, quaternions and external axes, (K + 1, 7 + m)."""
+    def rows(self) -> Array:
+        """See `Segment.rows`: positions, quaternions and external axes, (K + 1, 7 + m)."""
         own = self.q[:, np.argsort(self.order)]
         return np.hstack([self.places, self.turns, own[:, self.frames.external]])
 
-    def _joints(self, rows: Array, times: Array) -> Array:
+    @override
+    def between(self, times: Array, t: Array, rows: Array) -> Array:
+        return straight(times, t, rows)
+
+    @override
+    def spline(self, times: Array) -> Array:
+        rows = super().spline(times)
+        rows[:, 3:7] /= np.linalg.norm(rows[:, 3:7], axis=1, keepdims=True)
+        return rows
+
+    @override
+    def joints(self, rows: Array, times: Array) -> Array:
         q = np.array(self.near(times))
         q[:, self.frames.external] = rows[:, 7:]
         found, arrived = self.frames.solved(rows[:, :3], rows[:, 3:7], q)
-        return np.where(arrived[:, None], found, np.nan)
-
-
-def _at_rest(t: Array, q: Array, qd: Array) -> Knots:
-    """Return knots that begin and end at rest, where a spline leaves digits of it."""
-    rates = np.array(qd)
-    rates[[0, -1]] = 0.0
-    return Knots(t, q, rates)
+        return np.where(arrived[:, None], found, np.nan)[:, self.order]
 
 
 def straight(times: Array, t: Array, rows: Array) -> Array:
@@ -396,10 +396,6 @@ def straight(times: Array, t: Array, rows: Array) -> Array:
     turned = np.where(near, found[:, 3:7], one * first + other * last)
     found[:, 3:7] = turned / np.linalg.norm(turned, axis=1, keepdims=True)
     return found
-
-
-# Sine of the angle below which slerp is a straight line.
-_SMALL = 1e-9
 
 
 def fastest_between(t: Array, places: Array, turns: Array) -> tuple[float, float]:

@@ -113,7 +113,7 @@ def put_on_arcs(rows: Array, times: Array, t: Array, places: Array, vias: Array)
 
 # Of what is allowed, steps take this much before corners and digits.
 _OF_ALLOWED = 0.9
-# So often the first arc that is tried is made twice as long, where it is not one.
+# Largest number of doublings of the first arc that is tried, until it is one.
 _DOUBLED = 12
 # Half-turns have two axes [rad].
 _NEARLY_HALF = 3.0

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import ClassVar
 
 import numpy as np
 from typing_extensions import override
@@ -10,6 +11,7 @@ from typing_extensions import override
 from selfmotion.basics import Array, Flags, ProblemError, Progress, silent
 from selfmotion.certificate import Tolerance
 from selfmotion.model.motion import Trajectory
+from selfmotion.shop.controllers.pose_numbers import Rounding
 from selfmotion.shop.controllers.segments import (
     NO_MISS,
     SURE,
@@ -21,18 +23,16 @@ from selfmotion.shop.controllers.segments import (
     finer,
     on_one_side,
 )
-from selfmotion.shop.controllers.thinning import TIME_DIGITS, Piece, Section, events_within, rests
-from selfmotion.shop.controllers.tool_frames import Rounding, ToolFrames
+from selfmotion.shop.controllers.thinning import Operation, Section, rests
+from selfmotion.shop.controllers.tool_frames import ToolFrames
 
 # As few tool poses as keep a controller near a motion.
 #
 # A straight line over a time h is off a motion by h²|a|/8, with a the acceleration of the tool in
 # the work object; the joints then by |J⁻¹a| h²/8. Poses are spread evenly in the root of that, as
-# joint targets are (`controllers/thinning.py`), and doubled where they are still too far apart
+# joint targets are (`controllers/thinning.py`), and doubled where they are too far apart
 # by inverse kinematics of what is in between.
 
-# Smallest density of targets, as a share of the largest one.
-_SPARSE = 0.02
 # Largest number of refinements of the targets.
 _TRIES = 16
 # Shortest time between two targets: controllers do not interpolate in less [s].
@@ -41,7 +41,7 @@ _SHORTEST = 4e-3
 _EVENLY = 5
 # … if no error exceeds this multiple of its tolerance.
 _MUCH = 9.0
-# Times at which the motion is evaluated, per interval between two samples.
+# Times at which the arm's regularity is evaluated, per interval between two samples.
 _FINER = 4
 # Step of the central differences for accelerations [s].
 _AROUND = 2e-3
@@ -56,7 +56,7 @@ class NotByPosesError(ProblemError):
 
 @dataclass(frozen=True, eq=False)
 class PoseSection(Section):
-    """Part of a piece between two rests, to be written as tool poses.
+    """Section of an operation between two rests, to be written as tool poses.
 
     Attributes
     ----------
@@ -68,18 +68,8 @@ class PoseSection(Section):
     frames: ToolFrames
     rounding: Rounding
 
-    @classmethod
-    def by(
-        cls,
-        frames: ToolFrames,
-        rounding: Rounding,
-        piece: Piece,
-        slides: Flags,
-        first: float,
-        last: float,
-    ) -> "PoseSection":
-        """Return that of a piece, with the events that are in it."""
-        return cls(piece, slides, first, last, events_within(piece, first, last), frames, rounding)
+    sparse: ClassVar[float] = 0.02
+    fewest: ClassVar[int] = 2
 
     def segments(self, allowed: Tolerance) -> list[tuple[Segment, Miss]]:
         """See `Section.segments`.
@@ -94,7 +84,7 @@ class PoseSection(Section):
 
     def check_regular(self, allowed: Tolerance) -> None:
         """Raise NotByPosesError where the arm is singular within what is allowed."""
-        motion = self.piece.motion
+        motion = self.operation.motion
         if rests(motion, self.first, self.last):
             return
         inside = motion.t[(motion.t > self.first) & (motion.t < self.last)]
@@ -103,7 +93,7 @@ class PoseSection(Section):
         far = _OF_POSES / np.maximum(self.frames.regularity(motion(t)), 1e-12)
         if far.max() > allowed.rotation:
             at = float(t[int(far.argmax())] - motion.t[0])
-            raise NotByPosesError(f"'{self.piece.name}': the arm is singular at t = {at:.4g} s")
+            raise NotByPosesError(f"'{self.operation.name}': the arm is singular at t = {at:.4g} s")
 
     def thinned(self, allowed: Tolerance) -> tuple[Segment, Miss]:
         """See `Section.thinned`.
@@ -127,7 +117,7 @@ class PoseSection(Section):
         NotByPosesError
             There are no such poses.
         """
-        t, more = self._evenly(fixed, allowed, 1.0), 1.0
+        t, more = self.spread(fixed, allowed, 1.0), 1.0
         for tries in range(_TRIES):
             shares = self._shares(self._passing(t), allowed)
             far, worst = shares > 1.0, float(shares.max())
@@ -135,7 +125,7 @@ class PoseSection(Section):
                 return t
             if tries < _EVENLY and worst < _MUCH:
                 more *= max(1.05, 1.02 * float(np.sqrt(worst)))
-                t = self._evenly(fixed, allowed, more)
+                t = self.spread(fixed, allowed, more)
                 continue
             if np.diff(t)[far].min() < _SHORTEST:
                 break
@@ -145,8 +135,9 @@ class PoseSection(Section):
         raise self._singular(float(t[:-1][far][0]), allowed)
 
     def _singular(self, at: float, allowed: Tolerance) -> NotByPosesError:
+        time = at - self.operation.motion.t[0]
         return NotByPosesError(
-            f"'{self.piece.name}': near t = {at - self.piece.motion.t[0]:.4g} s the joints do not "
+            f"'{self.operation.name}': near t = {time:.4g} s the joints do not "
             f"follow from poses within {1e3 * allowed.position:.3g} mm and "
             f"{np.degrees(allowed.rotation):.3g}°: it is singular there, or turns too fast"
         )
@@ -159,7 +150,7 @@ class PoseSection(Section):
         segment = super()._passing(t, at_rest=at_rest)
         if at_rest:
             return segment
-        motion = self.piece.motion
+        motion = self.operation.motion
         exact = motion(np.minimum(self.first + segment.t, self.last))
         places, turns = self.rounding(*self.frames.places(exact))
         # External axes in their digits, the arm's joints as they follow.
@@ -167,7 +158,7 @@ class PoseSection(Section):
         if not arrived.all():
             at = float(t[int(np.argmin(arrived))])
             raise NotByPosesError(
-                f"'{self.piece.name}': the arm is singular at t = {at - motion.t[0]:.4g} s"
+                f"'{self.operation.name}': the arm is singular at t = {at - motion.t[0]:.4g} s"
             )
         events: tuple[Event, ...] = segment.events
         return PoseSegment(
@@ -189,17 +180,17 @@ class PoseSection(Section):
 
     def _shares(self, segment: Segment, allowed: Tolerance) -> Array:
         """Return how much of what is allowed each step between two targets takes, (K,)."""
-        times, count = segment.looked_at(), len(segment.t) - 1
-        motion = self.piece.motion
+        times, count = segment.evaluation_times(), len(segment.t) - 1
+        motion = self.operation.motion
         exact = motion(np.clip(self.first + times, motion.t[0], motion.t[-1]))
         worst = np.zeros(count)
-        lines = segment.ways(times)
+        lines = segment.interpolated(times)
         for line in lines:
             joints = np.abs(line - exact).max(axis=1) / allowed.rotation
             worst = np.maximum(worst, largest(joints, count))
         # Where joints are near, the tool is nearly so: only these are placed.
         for line in lines if worst.max() <= _JOINTS_FAR else []:
-            for chain in self.piece.chains:
+            for chain in self.operation.chains:
                 _, turned, here = chain.along(line)
                 _, facing, there = chain.along(exact)
                 off = np.linalg.norm(here - there, axis=1) / allowed.position
@@ -209,29 +200,10 @@ class PoseSection(Section):
                 worst = np.maximum(worst, largest(off, count))
         return np.where(np.isfinite(worst), SURE * worst, np.inf)
 
-    def _evenly(self, fixed: Array, allowed: Tolerance, more: float) -> Array:
-        found = [self._spread(*ends, allowed, more) for ends in pairwise(fixed)]
-        return np.concatenate([fixed[:1], *found])
-
-    def _spread(self, begin: float, end: float, allowed: Tolerance, more: float) -> Array:
-        """Return times from one to another, even in the root of how much the poses bend."""
-        motion = self.piece.motion
-        inside = motion.t[(motion.t > begin) & (motion.t < end)]
-        marks = np.concatenate([[begin], inside, [end]])
-        count = _FINER * (len(marks) - 1) + 1
-        t = np.interp(np.linspace(0, len(marks) - 1, count), np.arange(len(marks)), marks)
-        rate = np.sqrt(self._bend(t, allowed) / 8.0)
-        rate = np.maximum(rate, _SPARSE * float(rate.max())) + 1e-3 / max(end - begin, 1e-6)
-        way = np.append(0.0, np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(t)))
-        most = max(1, int((end - begin) * 10**TIME_DIGITS / 2))
-        targets = min(max(2, int(np.ceil(more * way[-1]))), most)
-        found: Array = np.interp(np.linspace(0.0, way[-1], targets + 1)[1:], way, t)
-        found[-1] = end
-        return found
-
-    def _bend(self, t: Array, allowed: Tolerance) -> Array:
+    @override
+    def bend(self, t: Array, allowed: Tolerance) -> Array:
         """Return accelerations of poses and joints as shares of what is allowed, (K,) [1/s²]."""
-        motion = self.piece.motion
+        motion = self.operation.motion
         middle = np.clip(t, motion.t[0] + _AROUND, motion.t[-1] - _AROUND)
         q = [motion(middle + side * _AROUND) for side in (-1.0, 0.0, 1.0)]
         poses = [self.frames.places(each) for each in q]
@@ -269,8 +241,8 @@ def largest(values: Array, count: int) -> Array:
 # happens there happens on time. Which targets there are in between says
 # `selfmotion.shop.controllers.thinning`.
 
-# Makes a span of tool poses of a piece, which joints slide, and when it begins and ends.
-PosedSections = Callable[[Piece, Flags, float, float], Section]
+# Operation, joints that slide, begin and end [s] → the section of tool poses.
+PosedSections = Callable[[Operation, Flags, float, float], Section]
 # Speed below which the arm rests [rad/s or m/s] …
 _REST = 1e-7
 # … if it lasts for at least this time [s].
@@ -282,7 +254,7 @@ _SHARE = 1e-3
 
 
 def segments_of(
-    pieces: Sequence[Piece],
+    operations: Sequence[Operation],
     slides: Flags,
     allowed: Tolerance,
     of_moves: Tolerance | None = None,
@@ -303,28 +275,28 @@ def segments_of(
     """
     found: list[Segment] = []
     worst = Misses(NO_MISS, NO_MISS)
-    for k, piece in enumerate(pieces):
-        progress("targets", k + 1, len(pieces))
-        motion = piece.motion
+    for k, operation in enumerate(operations):
+        progress("targets", k + 1, len(operations))
+        motion = operation.motion
         for when in motion.t[[0, -1]]:
             speed = np.abs(motion(when, 1))
             if speed.max() > _SLOW:
                 raise ProblemError(
-                    f"'{piece.name}' has joint '{motion.joint_names[int(speed.argmax())]}' at "
+                    f"'{operation.name}' has joint '{motion.joint_names[int(speed.argmax())]}' at "
                     f"{speed.max():.3g} rad/s or m/s at t = {when:.6g} s; programs of controllers "
                     f"go from rest to rest: plan it with a ramp, or rest=True"
                 )
-        within = _allowed(piece, allowed, of_moves)
-        for first, last in _moving(motion, [motion.t[0] + at for at, _ in piece.events]):
-            for segment, miss in _thinned(piece, slides, first, last, within, posed):
-                both = Misses(NO_MISS, miss) if piece.is_move else Misses(miss, NO_MISS)
+        within = _allowed(operation, allowed, of_moves)
+        for first, last in _moving(motion, [motion.t[0] + at for at, _ in operation.events]):
+            for segment, miss in _thinned(operation, slides, first, last, within, posed):
+                both = Misses(NO_MISS, miss) if operation.is_move else Misses(miss, NO_MISS)
                 worst = worst.worse(both)
                 found.append(segment)
     return found, worst
 
 
 def _thinned(
-    piece: Piece,
+    operation: Operation,
     slides: Flags,
     first: float,
     last: float,
@@ -333,29 +305,29 @@ def _thinned(
 ) -> list[tuple[Segment, Miss]]:
     if posed is not None:
         try:
-            return posed(piece, slides, first, last).segments(within)
+            return posed(operation, slides, first, last).segments(within)
         except NotByPosesError:
             # A free move goes through singular configurations where it likes.
-            if not piece.is_move:
+            if not operation.is_move:
                 raise
-    return Section.of(piece, slides, first, last).segments(within)
+    return Section(operation, slides, first, last).segments(within)
 
 
-def _allowed(piece: Piece, allowed: Tolerance, of_moves: Tolerance | None) -> Tolerance:
-    """Return how far a controller may be off a piece."""
-    if not piece.is_move:
+def _allowed(operation: Operation, allowed: Tolerance, of_moves: Tolerance | None) -> Tolerance:
+    """Return how far a controller may be off an operation."""
+    if not operation.is_move:
         return allowed
-    if of_moves is not None or piece.room is None:
+    if of_moves is not None or operation.room is None:
         return of_moves or allowed
-    room = piece.room
+    room = operation.room
     return Tolerance(max(allowed.position, room.position), max(allowed.rotation, room.rotation))
 
 
 def _moving(motion: Trajectory, events: Sequence[float]) -> list[tuple[float, float]]:
     """Return when motions from rest to rest, and rests, begin and end, in turn [s]."""
-    still = np.abs(motion.qd).max(axis=1) < _REST
-    still[:-1] &= np.abs(np.diff(motion.q, axis=0)).max(axis=1) < 1e-9
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], still[:-1], [False]]).astype(int)))
+    at_rest = np.abs(motion.qd).max(axis=1) < _REST
+    at_rest[:-1] &= np.abs(np.diff(motion.q, axis=0)).max(axis=1) < 1e-9
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], at_rest[:-1], [False]]).astype(int)))
     marks = [float(motion.t[0])]
     for begin, end in edges.reshape(-1, 2):
         if motion.t[end] - motion.t[begin] >= _WHILE:

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice, pairwise
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
@@ -32,16 +32,16 @@ from selfmotion.shop.controllers.segments import (
 )
 from selfmotion.work.job import Program
 
-# Parts of a motion: seams, and moves through the air with room around them.
+# Operations of a motion: seams, and moves through the air with room around them.
 
 # Largest deviation of a move through the air, however much room there is [m, rad].
 _ROOMY = Tolerance(5e-3, 5e-3)
-# How much of the room that is left between bodies is used: distances are found to a fiftieth.
+# Share of the room between bodies that is used: distances are found to a fiftieth.
 _SURE = 0.9
 
 
-class Piece(NamedTuple):
-    """A part of a motion with a name, events at times from its start, and the tools' chains.
+class Operation(NamedTuple):
+    """A seam or a move of a motion: its name, events at times from its start, the tools' chains.
 
     Of a move through the air also how far a controller may be off it, where there is room; of a
     seam the feeds that its tools keep, one list for each chain. `speeds` (n,) are what joints may
@@ -63,7 +63,7 @@ class Piece(NamedTuple):
     tool_rests: tuple[float, ...] = ()
 
 
-def pieces_of(plan: Plan | Parts | Move | Program) -> list[Piece]:
+def operations_of(plan: Plan | Parts | Move | Program) -> list[Operation]:
     """Return the seams and moves of a plan, parts, a move or a program, in order.
 
     Raises
@@ -85,14 +85,16 @@ def pieces_of(plan: Plan | Parts | Move | Program) -> list[Piece]:
     found = []
     for step in plan.steps:
         made = step.made
-        piece = _of_plan(step.name, made) if isinstance(made, Plan) else _of_move(step.name, made)
-        found.append(piece._replace(events=tuple((at, name) for name, at in step.happenings)))
+        operation = (
+            _of_plan(step.name, made) if isinstance(made, Plan) else _of_move(step.name, made)
+        )
+        found.append(operation._replace(events=tuple((at, name) for name, at in step.happenings)))
     if not found:
         raise PlanError(f"{plan.robot.name}: {plan.verdict}")
     return found
 
 
-def _of_plan(name: str, plan: Plan) -> Piece:
+def _of_plan(name: str, plan: Plan) -> Operation:
     items = plan.problem.follows.items
     chains = tuple(item.chain for item in items)
     feeds = tuple(tuple(feed for feed in item.path.feeds if feed.kept) for item in items)
@@ -103,7 +105,7 @@ def _of_plan(name: str, plan: Plan) -> Piece:
 
     relaxed = {row for item in plan.problem.relaxations for row in item.rows}
     turns = Task.POSITION if relaxed & {"rx", "ry", "rz"} else plan.problem.task
-    return Piece(
+    return Operation(
         name,
         plan.trajectory,
         (),
@@ -119,8 +121,8 @@ def _of_plan(name: str, plan: Plan) -> Piece:
 def _rests_of(path: Path) -> tuple[float, ...]:
     """Return at which of its marks a path is at rest, but for its ends [s]."""
     marks = path.marks[1:-1]
-    still = np.linalg.norm(path.samples(marks).twist, axis=1) < _REST if len(marks) else []
-    return tuple(float(t) for t in marks[still])
+    at_rest = np.linalg.norm(path.samples(marks).twist, axis=1) < _REST if len(marks) else []
+    return tuple(float(t) for t in marks[at_rest])
 
 
 def by_targets(problem: Problem) -> Problem:
@@ -137,7 +139,7 @@ def what_targets_keep(constraints: Sequence[Constraint]) -> tuple[Constraint, ..
 def what_lines_keep(constraints: Sequence[Constraint]) -> tuple[Constraint, ...]:
     """Return the constraints that straight lines can keep: corners have no acceleration.
 
-    Nor torques, then, which are judged along the smooth way.
+    Nor torques, then, which are judged along the smooth curve.
     """
     return tuple(
         replace(item, acceleration=np.inf, turn_acceleration=np.inf)
@@ -148,9 +150,9 @@ def what_lines_keep(constraints: Sequence[Constraint]) -> tuple[Constraint, ...]
     )
 
 
-def _of_move(name: str, move: Move) -> Piece:
+def _of_move(name: str, move: Move) -> Operation:
     room = safe_deviation(move)
-    return Piece(
+    return Operation(
         name,
         move.motion,
         (),
@@ -161,9 +163,11 @@ def _of_move(name: str, move: Move) -> Piece:
     )
 
 
-def _speeds(asked: Sequence[Requirement]) -> Array | None:
+def _speeds(requirements: Sequence[Requirement]) -> Array | None:
     """Return the limits of joint speed (n,) among requirements; None for none."""
-    limits = [item.upper for item in asked if isinstance(item, JointLimits) and item.order == 1]
+    limits = [
+        item.upper for item in requirements if isinstance(item, JointLimits) and item.order == 1
+    ]
     return np.minimum.reduce(limits) if limits else None
 
 
@@ -171,7 +175,7 @@ def safe_deviation(move: Move) -> Tolerance | None:
     """Return how far a controller may be off a move so that it keeps apart; None for not at all.
 
     The distance of a pair of bodies changes by Σ_j l_j |Δq_j| at most, with l its levers: so joints
-    may be off by the room that is left over what is asked, divided by the largest Σ_j l_j.
+    may be off by the room that is left over the required distance, divided by the largest Σ_j l_j.
     """
     joint = _ROOMY.rotation
     for item, finding in zip(move.requirements, move.findings, strict=True):
@@ -199,8 +203,6 @@ TIME_DIGITS = 5
 ANGLE_DIGITS = 5
 # Decimals of lengths in programs [mm].
 LENGTH_DIGITS = 4
-# Smallest density of targets, as a share of the largest one.
-_SPARSE = 0.1
 # Share of a feed's tolerance that targets may use at the times that are evaluated: it is larger in
 # between.
 _OF_FEED = 0.8
@@ -211,8 +213,6 @@ _SHORTEST = 2e-3
 _OF_SPEED = 0.9995
 # Times at which the motion's curvature is evaluated, per interval between two samples.
 _FINER = 4
-# Smallest number of targets between two events or rests.
-_FEWEST = 4
 # Largest number of refinements of the targets.
 _TRIES = 20
 # Largest number of targets that a controller takes.
@@ -221,29 +221,36 @@ _MOST = 100_000
 
 @dataclass(frozen=True, eq=False)
 class Section:
-    """Part of a piece between two rests.
+    """Section of an operation between two rests.
 
     Attributes
     ----------
-    piece : Piece
+    operation : Operation
     slides : (n,)
         Which joints slide.
     first, last : float
         From when to when [s].
-    events : sequence of (float, str)
-        What happens when [s].
     """
 
-    piece: Piece
+    operation: Operation
     slides: Flags
     first: float
     last: float
-    events: Sequence[tuple[float, str]]
+    # Smallest density of targets, as a share of the largest one.
+    sparse: ClassVar[float] = 0.1
+    # Smallest number of targets between two events or rests.
+    fewest: ClassVar[int] = 4
 
-    @classmethod
-    def of(cls, piece: Piece, slides: Flags, first: float, last: float) -> "Section":
-        """Return that of a piece, with the events that are in it."""
-        return cls(piece, slides, first, last, events_within(piece, first, last))
+    @property
+    def events(self) -> list[tuple[float, str]]:
+        """Times of its events [s], and their names."""
+        start, end = float(self.operation.motion.t[0]), float(self.operation.motion.t[-1])
+        return [
+            (start + at, name)
+            for at, name in self.operation.events
+            if (self.first == start or self.first < start + at)
+            and (self.last == end or start + at <= self.last)
+        ]
 
     def segments(self, allowed: Tolerance) -> list[tuple[Segment, Miss]]:
         """Return its segments: one, or several if the tool rests in between.
@@ -264,7 +271,7 @@ class Section:
             Digits are too few for what is allowed, or targets too many.
         """
         fixed = _apart(self.first, self.last, [at for at, _ in self.events])
-        if rests(self.piece.motion, self.first, self.last):
+        if rests(self.operation.motion, self.first, self.last):
             return self._passing(fixed, at_rest=True), NO_MISS
         self._check_digits(allowed)
         t = self._within(allowed, fixed)
@@ -285,33 +292,63 @@ class Section:
         """Return times of targets that keep the tool and the joints near the motion."""
         more = 1.0
         for _ in range(_TRIES):
-            t = _spread(self.piece, fixed, allowed, more)
+            t = self.spread(fixed, allowed, more)
             miss = self._miss(self._passing(t))
             if miss.share(allowed) <= 1.0:
                 return t
             more *= max(1.05, 1.02 * float(np.sqrt(miss.share(allowed))))
         raise ProblemError(
-            f"'{self.piece.name}' is off by {1e3 * miss.position:.3g} mm and "
+            f"'{self.operation.name}' is off by {1e3 * miss.position:.3g} mm and "
             f"{np.degrees(max(miss.rotation, miss.joint)):.3g}° with {len(t)} targets; allow more "
-            f"than {_in_words(self.piece, allowed)}"
+            f"than {_in_words(self.operation, allowed)}"
         )
+
+    def spread(self, fixed: Array, allowed: Tolerance, more: float) -> Array:
+        """Return times between fixed ones, even in the root of how much the motion bends."""
+        found, motion = [fixed[:1]], self.operation.motion
+        for begin, end in pairwise(fixed):
+            inside = motion.t[(motion.t > begin) & (motion.t < end)]
+            marks = np.concatenate([[begin], inside, [end]])
+            count = _FINER * (len(marks) - 1) + 1
+            t = np.interp(np.linspace(0, len(marks) - 1, count), np.arange(len(marks)), marks)
+            rate = np.sqrt(self.bend(t, allowed) / 8.0)
+            # A spline swings where long and short steps meet, and it bends nowhere.
+            rate = np.maximum(rate, self.sparse * float(rate.max())) + 1e-3 / max(end - begin, 1e-6)
+            total = np.append(0.0, np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(t)))
+            targets = max(self.fewest, int(np.ceil(more * total[-1])))
+            # Programs count whole digits of time: targets may not fall on each other.
+            targets = min(targets, max(1, int((end - begin) * 10**TIME_DIGITS / 2)))
+            found.append(np.interp(np.linspace(0.0, total[-1], targets + 1)[1:], total, t))
+            found[-1][-1] = end
+        return np.concatenate(found)
+
+    def bend(self, t: Array, allowed: Tolerance) -> Array:
+        """Return the accelerations of tool and joints as shares of what is allowed, (K,) [1/s²]."""
+        motion = self.operation.motion
+        q, qdd = motion(t), motion(t, 2)
+        found: Array = np.abs(qdd).max(axis=1) / allowed.rotation
+        for chain in self.operation.chains:
+            rates = np.einsum("kij,kj->ki", chain.along(q)[0], qdd)
+            for rows, limit in ((slice(0, 3), allowed.position), (slice(3, 6), allowed.rotation)):
+                found = np.maximum(found, np.linalg.norm(rates[:, rows], axis=1) / limit)
+        return found
 
     def _passing(self, t: Array, *, at_rest: bool = False) -> Segment:
         """Return targets at times, as the file has them."""
         if len(t) > _MOST:
             raise ProblemError(
-                f"'{self.piece.name}' takes more than {_MOST} targets; allow a larger deviation"
+                f"'{self.operation.name}' takes more than {_MOST} targets; allow a larger deviation"
             )
         offset = np.round(t - self.first, TIME_DIGITS)
         # Where the arm is at the times that the file has.
-        q = self._in_digits(self.piece.motion(np.minimum(self.first + offset, self.last)))
+        q = self._in_digits(self.operation.motion(np.minimum(self.first + offset, self.last)))
         if at_rest:
             q[:] = q[0]
         events = (Event(int(np.abs(t - at).argmin()), name) for at, name in self.events)
-        return Segment(self.piece.name, offset, q, tuple(events))
+        return Segment(self.operation.name, offset, q, tuple(events))
 
     def _miss(self, segment: Segment) -> Miss:
-        return miss_of(segment, self.piece.motion, self.piece.chains, self.first)
+        return miss_of(segment, self.operation.motion, self.operation.chains, self.first)
 
     def _in_digits(self, q: Array) -> Array:
         """Return coordinates [rad or m] as they are when their digits in a file are read again."""
@@ -320,13 +357,14 @@ class Section:
 
     def _check_digits(self, allowed: Tolerance) -> None:
         """Refuse what no number of targets keeps, as they have few digits."""
-        q = self.piece.motion.q
-        miss = miss_between(self._in_digits(q), q, self.piece.chains)
+        q = self.operation.motion.q
+        miss = miss_between(self._in_digits(q), q, self.operation.chains)
         if miss.share(allowed) > 1.0:
             raise ProblemError(
-                f"'{self.piece.name}': programs count angles in {10.0**-ANGLE_DIGITS:g}°, which is "
-                f"up to {1e3 * miss.position:.2g} mm and {np.degrees(miss.rotation):.2g}° of the "
-                f"tool; allow more than {_in_words(self.piece, allowed)}"
+                f"'{self.operation.name}': programs count angles in {10.0**-ANGLE_DIGITS:g}°, "
+                f"which is up to {1e3 * miss.position:.2g} mm and "
+                f"{np.degrees(miss.rotation):.2g}° of the tool; allow more than "
+                f"{_in_words(self.operation, allowed)}"
             )
 
     def _missed(self, segment: Segment) -> Flags:
@@ -336,21 +374,23 @@ class Section:
         them. Cut corners are slower than that.
         """
         far = np.zeros(len(segment.t) - 1)
-        for times, q, qd in islice(segment.joined(), 2):
+        for times, q, qd in islice(segment.motions(), 2):
             step = np.clip(np.searchsorted(segment.t, times, side="right") - 1, 0, len(far) - 1)
             np.maximum.at(far, step, self._taken(times, q, qd))
         return np.asarray(far > 1.0)
 
     def _taken(self, times: Array, q: Array, qd: Array) -> Array:
         """Return how much is taken of what feeds and limits of speed leave, at times (K,)."""
-        motion = self.piece.motion
+        motion = self.operation.motion
         t = np.clip(self.first + times, self.first, motion.t[-1])
         exact, rates = motion(t), motion(t, 1)
         taken = np.zeros(len(t))
-        if self.piece.speeds is not None:
-            within = np.abs(rates) <= _OF_SPEED * self.piece.speeds
-            taken = np.where(within, np.abs(qd) / (_OF_SPEED * self.piece.speeds), 0.0).max(axis=1)
-        for chain, feeds in zip(self.piece.chains, self.piece.feeds, strict=False):
+        if self.operation.speeds is not None:
+            within = np.abs(rates) <= _OF_SPEED * self.operation.speeds
+            taken = np.where(within, np.abs(qd) / (_OF_SPEED * self.operation.speeds), 0.0).max(
+                axis=1
+            )
+        for chain, feeds in zip(self.operation.chains, self.operation.feeds, strict=False):
             moved, wanted = (
                 np.einsum("kcn,kn->kc", chain.along(at)[0][:, :3], speeds)
                 for at, speeds in ((q, qd), (exact, rates))
@@ -359,24 +399,14 @@ class Section:
             for feed in feeds:
                 room = _OF_FEED * feed.slowest * feed.left_over
                 for begin, end in feed.during + motion.t[0]:
-                    asked = (t > begin) & (t < end)
-                    taken = np.maximum(taken, np.where(asked, off / max(room, 1e-12), 0.0))
+                    during = (t > begin) & (t < end)
+                    taken = np.maximum(taken, np.where(during, off / max(room, 1e-12), 0.0))
         return taken
 
 
-def events_within(piece: Piece, first: float, last: float) -> list[tuple[float, str]]:
-    """Return the events in a part of a piece, at times of its motion [s]."""
-    start, end = float(piece.motion.t[0]), float(piece.motion.t[-1])
-    return [
-        (start + at, name)
-        for at, name in piece.events
-        if (first == start or first < start + at) and (last == end or start + at <= last)
-    ]
-
-
-def _in_words(piece: Piece, allowed: Tolerance) -> str:
+def _in_words(operation: Operation, allowed: Tolerance) -> str:
     """Return the tolerance as the file of settings has it."""
-    key = "move_deviation" if piece.is_move else "deviation"
+    key = "move_deviation" if operation.is_move else "deviation"
     return (
         f"{key} = {{ position_mm = {1e3 * allowed.position:.3g}, "
         f"rotation_deg = {np.degrees(allowed.rotation):.3g} }}"
@@ -396,37 +426,3 @@ def rests(motion: Trajectory, first: float, last: float) -> bool:
     """Whether nothing moves from one time to another."""
     times = np.linspace(first, last, 33)
     return bool(np.abs(motion(times) - motion(first)).max() < 1e-9)
-
-
-def _spread(piece: Piece, fixed: Array, allowed: Tolerance, more: float) -> Array:
-    """Return times between fixed ones, even in the root of how much the motion bends."""
-    found = [fixed[:1]]
-    motion = piece.motion
-    for begin, end in pairwise(fixed):
-        inside = motion.t[(motion.t > begin) & (motion.t < end)]
-        marks = np.concatenate([[begin], inside, [end]])
-        count = _FINER * (len(marks) - 1) + 1
-        t = np.interp(np.linspace(0, len(marks) - 1, count), np.arange(len(marks)), marks)
-        bend = _bend(piece, t, allowed)
-        rate = np.sqrt(bend / 8.0)
-        # A spline swings where long and short steps meet, and it bends nowhere.
-        rate = np.maximum(rate, _SPARSE * float(rate.max())) + 1e-3 / max(end - begin, 1e-6)
-        way = np.append(0.0, np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(t)))
-        targets = max(_FEWEST, int(np.ceil(more * way[-1])))
-        # Programs count whole digits of time: targets may not fall on each other.
-        targets = min(targets, max(1, int((end - begin) * 10**TIME_DIGITS / 2)))
-        found.append(np.interp(np.linspace(0.0, way[-1], targets + 1)[1:], way, t))
-        found[-1][-1] = end
-    return np.concatenate(found)
-
-
-def _bend(piece: Piece, t: Array, allowed: Tolerance) -> Array:
-    """Return the accelerations of tool and joints as shares of what is allowed, (K,) [1/s²]."""
-    motion = piece.motion
-    q, qdd = motion(t), motion(t, 2)
-    found: Array = np.abs(qdd).max(axis=1) / allowed.rotation
-    for chain in piece.chains:
-        rates = np.einsum("kij,kj->ki", chain.along(q)[0], qdd)
-        for rows, limit in ((slice(0, 3), allowed.position), (slice(3, 6), allowed.rotation)):
-            found = np.maximum(found, np.linalg.norm(rates[:, rows], axis=1) / limit)
-    return found

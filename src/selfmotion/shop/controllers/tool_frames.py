@@ -1,16 +1,16 @@
-"""Tool poses as controllers have them: in numbers, in work objects, with configurations."""
+"""Work objects in which controllers count tool poses, and the joints of such poses."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 
 from selfmotion.basics import Array, Flags, Ints, ProblemError, nearest
 from selfmotion.model.path import Joined, Path, Placed
 from selfmotion.model.robot import Chain, RobotModel
-from selfmotion.model.task import SE3, Quaternion, exp3, log3, rpy, skews
+from selfmotion.model.task import SE3, Quaternion, log3, skews
+from selfmotion.shop.controllers.pose_numbers import Rounding
 from selfmotion.shop.controllers.program_settings import (
     AXES,
     OF_PATH,
@@ -24,94 +24,8 @@ _TURNED = 1e-6
 # Difference of frames that are the same [m, parts of quaternions].
 _SAME = 1e-9
 
-# Tool poses in the numbers that each language has for them.
-#
-# - KRL: X, Y, Z [mm], and A, B, C [deg] with R = R_z(A) R_y(B) R_x(C).
-# - RAPID: position [mm], and the quaternion q1 to q4, the real part first.
-# - URScript: position [m], and the rotation vector [rad].
-
-# Positions (K, 3) [m] and quaternions (K, 4) as they are when a file is read again.
-Rounding = Callable[[Array, Array], tuple[Array, Array]]
-# Decimals of lengths in mm.
-_MM = 4
-# Decimals of angles in degrees.
-_DEGREES = 5
-# Decimals of parts of quaternions.
-_PARTS = 8
-# Decimals of lengths in m and angles in rad.
-_SI = 9
 # Distance of a work object that must be in another unit, as a multiple of the arm's reach.
 _FAR_IN_REACHES = 20.0
-
-
-def krl_numbers(place: Array, turn: Array) -> list[float]:
-    """Return X, Y, Z [mm], A, B, C [deg] of a pose."""
-    c, b, a = np.degrees(rpy.matrixToRpy(_matrix(turn))).tolist()
-    return [*_rounded(1e3 * place, _MM), *_rounded([a, b, c], _DEGREES)]
-
-
-def krl_pose(numbers: Array) -> tuple[Array, Array]:
-    """Return the pose of such numbers: position [m], quaternion x, y, z, w."""
-    a, b, c = np.radians(numbers[3:6]).tolist()
-    return 1e-3 * numbers[:3], _quaternion(rpy.rpyToMatrix(c, b, a))
-
-
-def rapid_numbers(place: Array, turn: Array) -> list[float]:
-    """Return x, y, z [mm], q1, q2, q3, q4 of a pose."""
-    x, y, z, w = (turn if turn[3] >= 0.0 else -turn).tolist()
-    return [*_rounded(1e3 * place, _MM), *_rounded([w, x, y, z], _PARTS)]
-
-
-def rapid_pose(numbers: Array) -> tuple[Array, Array]:
-    """Return the pose of such numbers, whose quaternion need not be of length 1 exactly."""
-    w, x, y, z = (numbers[3:7] / np.linalg.norm(numbers[3:7])).tolist()
-    return 1e-3 * numbers[:3], np.array([x, y, z, w])
-
-
-def urscript_numbers(place: Array, turn: Array) -> list[float]:
-    """Return x, y, z [m], rx, ry, rz [rad] of a pose."""
-    return [*_rounded(place, _SI), *_rounded(log3(_matrix(turn)), _SI)]
-
-
-def urscript_pose(numbers: Array) -> tuple[Array, Array]:
-    """Return the pose of such numbers."""
-    return np.array(numbers[:3]), _quaternion(exp3(numbers[3:6]))
-
-
-_KINDS = {
-    "krl": (krl_numbers, krl_pose),
-    "rapid": (rapid_numbers, rapid_pose),
-    "urscript": (urscript_numbers, urscript_pose),
-}
-
-
-def _rounding(form: str) -> Rounding:
-    written, read = _KINDS[form]
-
-    def rounded(places: Array, turns: Array) -> tuple[Array, Array]:
-        poses = [
-            read(np.array(written(place, turn))) for place, turn in zip(places, turns, strict=True)
-        ]
-        return np.array([place for place, _ in poses]), np.array([turn for _, turn in poses])
-
-    return rounded
-
-
-ROUNDINGS: Mapping[str, Rounding] = {form: _rounding(form) for form in _KINDS}
-
-
-def _matrix(turn: Array) -> Array:
-    x, y, z, w = (turn / np.linalg.norm(turn)).tolist()
-    return np.asarray(Quaternion(w, x, y, z).toRotationMatrix())
-
-
-def _quaternion(rotation: Array) -> Array:
-    return np.array(Quaternion(np.asarray(rotation)).coeffs())
-
-
-def _rounded(values: Array | list[float], digits: int) -> list[float]:
-    return [float(value) + 0.0 for value in np.round(np.asarray(values), digits).tolist()]
-
 
 # Where a controller counts tool poses: in a work object, and its arm's joints from such poses.
 #
@@ -448,100 +362,3 @@ def _turned(rotations: Array, wanted: Array) -> Array:
 
     turns: Array = Rotation.from_matrix(wanted @ rotations.transpose(0, 2, 1)).as_rotvec()
     return turns
-
-
-# Which of the configurations that reach a pose an arm is in, in the makers' numbers.
-#
-# ABB's ``confdata`` (Technical reference manual, RAPID Instructions, Functions and Data types,
-# 3HAC050917-001): cf1, cf4 and cf6 are quarter turns of axes 1, 4 and 6 from their zeros on,
-# rounded down; cfx counts 4 for a wrist behind axis 1, 2 for one behind the lower arm, and 1
-# where axis 5 is negative. KUKA's status and turn (KSS 8.3, Operating and Programming
-# Instructions for System Integrators): S counts 1 for a wrist behind axis 1 (overhead), 2 for
-# axis 3 beyond the angle at which the arm is stretched, 4 where axis 5 is negative; T counts 2^(k
-# - 1) where axis k is negative.
-#
-# S and cfx are of arms whose wrist axes meet in a point, whose axes 2 and 3 are parallel, and
-# whose zero is that of the maker: the wrist is in front, the arm bent (ABB) or stretched (KUKA).
-# Of others, such as those of Universal Robots, they are not known.
-
-# Distance of axes that meet [m].
-_MEET = 1e-4
-# Sine of the angle between axes that are parallel.
-_PARALLEL = 1e-3
-# Distance by which a wrist is in front [m].
-_IN_FRONT = 0.05
-# Sine above which an arm is bent at zero, as ABB's are; KUKA's are stretched but for an offset.
-_BENT = 0.5
-
-
-class Sides(NamedTuple):
-    """How an arm stands: wrist in front of axis 1, bent beyond the stretched arm; and at zero."""
-
-    front: bool
-    bent: bool
-    stands_at_zero: bool
-
-
-def confdata(frames: ToolFrames, q: Array) -> tuple[int, int, int, int | None]:
-    """Return ABB's cf1, cf4, cf6 and cfx at q (n,); None for a cfx that is not known."""
-    angles = q[frames.arm]
-    quarters = [int(np.floor(np.degrees(angles[k]) / 90.0)) for k in (0, 3, 5)]
-    sides = _sides(frames, q)
-    if sides is None or not sides.stands_at_zero:
-        return quarters[0], quarters[1], quarters[2], None
-    cfx = 4 * (not sides.front) + 2 * (not sides.bent) + int(angles[4] < 0.0)
-    return quarters[0], quarters[1], quarters[2], cfx
-
-
-def status_and_turn(frames: ToolFrames, q: Array) -> tuple[int | None, int]:
-    """Return KUKA's S and T at q (n,); None for an S that is not known."""
-    angles = q[frames.arm]
-    turn = sum(1 << k for k in range(6) if angles[k] < 0.0)
-    sides = _sides(frames, q)
-    if sides is None or sides.stands_at_zero:
-        return None, turn
-    return int(not sides.front) + 2 * int(sides.bent) + 4 * int(angles[4] < 0.0), turn
-
-
-def _sides(frames: ToolFrames, q: Array) -> Sides | None:
-    zero = np.array(q)
-    zero[frames.arm] = 0.0
-    at_zero, here = _distances(frames, zero), _distances(frames, q)
-    if at_zero is None or here is None or abs(at_zero[0]) < _IN_FRONT:
-        return None
-    # Axis 3 of some arms turns the other way: at ABB's zero the wrist is in front of the lower arm.
-    stands = abs(at_zero[1]) > _BENT
-    bent = here[1] * at_zero[1] > 0.0 if stands else here[1] > 0.0
-    return Sides(bool(here[0] * at_zero[0] >= 0.0), bool(bent), stands)
-
-
-def _distances(frames: ToolFrames, q: Array) -> tuple[float, float] | None:
-    """Return how far the wrist is ahead of axis 1 [m], and the sine by which the arm is bent."""
-    jacobian, _, tip = frames.robot.chain_to(frames.robot.tool).at(q)
-    axes = jacobian[3:, frames.arm].T
-    # v = a × (tip - p), p the point of the axis that is nearest to the tip.
-    points = tip + np.cross(axes, jacobian[:3, frames.arm].T)
-    wrist = _meeting(axes[3:], points[3:])
-    first, second, third = axes[:3]
-    is_known = (
-        wrist is not None
-        and np.linalg.norm(np.cross(second, third)) < _PARALLEL
-        and abs(first @ second) < _PARALLEL
-    )
-    if wrist is None or not is_known:
-        return None
-    ahead = float((wrist - points[0]) @ np.cross(second, first))
-    # In the plane across axes 2 and 3.
-    lower, fore = (x - third * (x @ third) for x in (points[2] - points[1], wrist - points[2]))
-    size = float(np.linalg.norm(lower) * np.linalg.norm(fore))
-    return (ahead, float(np.cross(lower, fore) @ third) / size) if size > 0.0 else None
-
-
-def _meeting(axes: Array, points: Array) -> Array | None:
-    """Return the point in which lines meet, None where they do not."""
-    across = np.eye(3) - axes[:, :, None] * axes[:, None, :]
-    if np.linalg.cond(across.sum(axis=0)) > 1e6:
-        return None
-    found = np.linalg.solve(across.sum(axis=0), np.einsum("kij,kj->i", across, points))
-    far = np.linalg.norm(np.einsum("kij,kj->ki", across, found - points), axis=1).max()
-    return found if far < _MEET else None

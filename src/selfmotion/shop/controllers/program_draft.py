@@ -1,0 +1,205 @@
+"""Drafts of programs: the targets of a motion, and all that a writer states besides."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import partial
+from itertools import combinations
+from typing import NamedTuple
+
+import numpy as np
+
+from selfmotion.basics import Flags, ProblemError, Progress, nearest, silent
+from selfmotion.model.path import Path
+from selfmotion.model.robot import RobotModel
+from selfmotion.model.task import SE3
+from selfmotion.planning.result import Move, Parts, Plan
+from selfmotion.problem.constraints import Constraint
+from selfmotion.shop.controllers.controller_program import ControllerProgram
+from selfmotion.shop.controllers.feed_segments import FeedSegment
+from selfmotion.shop.controllers.feed_thinning import paced_section
+from selfmotion.shop.controllers.pose_numbers import ROUNDINGS
+from selfmotion.shop.controllers.program_facts import Load, ProgramFacts, check_load
+from selfmotion.shop.controllers.program_settings import (
+    OF_PATH,
+    ProgramSettings,
+    Signal,
+    axes_of,
+    in_order,
+    tool_from_flange,
+)
+from selfmotion.shop.controllers.program_texts import plain
+from selfmotion.shop.controllers.segments import Misses
+from selfmotion.shop.controllers.targets import (
+    NotByPosesError,
+    PosedSections,
+    PoseSection,
+    segments_of,
+)
+from selfmotion.shop.controllers.thinning import Operation, Section, operations_of
+from selfmotion.shop.controllers.tool_frames import ToolFrames, frame_of_paths, own_joint
+from selfmotion.work.job import Program, are_opposite
+
+
+@dataclass(frozen=True, eq=False)
+class Draft:
+    """All that a writer needs: the program, the arm, what else is said; frames of tool poses."""
+
+    program: ControllerProgram
+    robot: RobotModel
+    tool: SE3
+    settings: ProgramSettings
+    verdict: str
+    facts: ProgramFacts
+    frames: ToolFrames | None = None
+
+    def signal(self, event: str) -> Signal | None:
+        """Return the outputs that an event switches."""
+        return self.settings.signal(event)
+
+
+class Joints(NamedTuple):
+    """Joint targets instead of poses: of free moves only, or of all; with the reason."""
+
+    moves_only: bool
+    why: str
+
+
+def drafted(
+    plan: Plan | Parts | Move | Program,
+    name: str,
+    form: str,
+    settings: ProgramSettings,
+    verdict: str,
+    progress: Progress = silent,
+    otherwise: Joints | None = None,
+) -> Draft:
+    """Return the program of a motion, named as its file is.
+
+    With settings for poses, `otherwise` says which operations have joint targets all the same.
+
+    Raises
+    ------
+    ProblemError
+        The arm has axes that controllers have not, an event has no signal, or the motion does not
+        rest where it should.
+    PlanError
+        A move was not found.
+    """
+    check_controller(plan.robot, form, settings)
+    robot, operations = plan.robot, operations_of(plan)
+    axes = axes_of(robot, settings)
+    happens = {event: item.name for item in operations for _, event in item.events}
+    check_signals(happens, settings)
+    slides = np.array([axis.slides for axis in axes])
+    given = operations, slides, settings.deviation, settings.move_deviation, progress
+    frames, why = None, ""
+    if settings.by_poses:
+        of_path = settings.work_object == OF_PATH
+        path_frame = frame_of_paths(_paths_of(plan)) if of_path else None
+        frames = ToolFrames.of(robot, axes, settings, path_frame).rounded(ROUNDINGS[form])
+        why = frames.undetermined()
+        if otherwise is not None and not otherwise.moves_only:
+            why = why or otherwise.why
+    if frames is not None and not why:
+        try:
+            made = PoseSection if settings.targets == "timed-poses" else paced_section
+            posed: PosedSections = partial(made, frames=frames, rounding=ROUNDINGS[form])
+            if otherwise is not None:
+                posed = partial(_but_of_moves, posed, otherwise.why)
+            segments, miss = segments_of(*given, posed)
+        except NotByPosesError as error:
+            why = str(error)
+    if frames is None or why:
+        frames = None
+        segments, miss = segments_of(*given)
+    order = in_order(axes)
+    sorted_ones = tuple(item.in_order(order) for item in segments)
+    ordered = tuple(axes[k] for k in order)
+    stated = Misses(miss.path.stated, miss.moves.stated)
+    at_speeds = any(isinstance(item, FeedSegment) for item in sorted_ones)
+    within = settings.deviation if at_speeds else None
+    program = ControllerProgram(
+        name, ordered, sorted_ones, stated, remark=plain(why), within=within
+    )
+    tool = tool_from_flange(robot, settings)
+    facts = ProgramFacts.of(robot, settings, list(happens), by_poses=frames is not None)
+    if settings.mass is not None:
+        load = Load(settings.mass, np.array(settings.center))
+        check_load(load, robot, constraints_of(plan), facts.flange)
+    return Draft(program, robot, tool, settings, verdict, facts, frames)
+
+
+def constraints_of(plan: Plan | Parts | Move | Program) -> list[Constraint]:
+    """Return all that the parts of a motion had to keep."""
+    match plan:
+        case Plan():
+            return list(plan.problem.constraints)
+        case Move():
+            return list(plan.constraints)
+        case Program():
+            return [item for step in plan.steps for item in constraints_of(step.made)]
+    parts: list[Plan | Move] = [*plan.plans, *plan.moves]
+    return [item for part in parts for item in constraints_of(part)]
+
+
+def _paths_of(plan: Plan | Parts | Move | Program) -> list[Path]:
+    """Return the paths that a motion follows; those of other tools than the first are beside it."""
+    match plan:
+        case Plan():
+            return [plan.problem.path]
+        case Move():
+            return []
+        case Program():
+            return [step.made.problem.path for step in plan.steps if isinstance(step.made, Plan)]
+    return [part.problem.path for part in plan.plans]
+
+
+def _but_of_moves(
+    posed: PosedSections, why: str, operation: Operation, slides: Flags, first: float, last: float
+) -> Section:
+    """Return the section of poses of a seam; NotByPosesError of a free move."""
+    if operation.is_move:
+        raise NotByPosesError(why)
+    return posed(operation, slides, first, last)
+
+
+def check_controller(robot: RobotModel, form: str, settings: ProgramSettings) -> None:
+    """Refuse what a controller has no program for, or what its program has to say and does not.
+
+    Raises
+    ------
+    ProblemError
+        An arm of seven joints as KRL, or no mass for a controller of ABB.
+    """
+    if form == "rapid" and settings.mass is None:
+        raise ProblemError(
+            f"{robot.name}: a tooldata has the mass of what the flange carries, and a controller "
+            f"of ABB moves by it; give export --mass KG, or mass in the file of --settings "
+            f"(ProgramSettings(mass=…))"
+        )
+    joint = own_joint(robot, axes_of(robot, settings)) if form == "krl" else ""
+    if joint:
+        raise ProblemError(
+            f"{robot.name}: joint '{joint}' is in the arm itself: KRL is for arms of six axes with "
+            f"external ones, and KUKA's arms of seven (LBR iiwa) are programmed in Java (Sunrise); "
+            f"write .yaml (ROS 2) or .csv for the driver of such an arm"
+        )
+
+
+def check_signals(seams: Mapping[str, str], settings: ProgramSettings) -> None:
+    """Refuse events (event → seam) of which nothing says what they switch."""
+    spare = [event for event in settings.signals or {} if event not in seams]
+    for event, seam in seams.items():
+        if not settings.knows(event):
+            raise ProblemError(
+                f"seam '{seam}': event '{event}' has no signal{nearest(event, spare)}; say in the "
+                f"file of --settings what it switches, [signals] '{event}' = [output, true], or "
+                f"false for a comment only (ProgramSettings(signals=…))"
+            )
+    for one, other in combinations(seams, 2):
+        first = settings.signal(one)
+        if first is not None and first == settings.signal(other) and are_opposite(one, other):
+            raise ProblemError(
+                f"signals: '{one}' and '{other}' both switch {first[0]!r} to {first[1]}; one of "
+                f"them has to be {not first[1]}, or of another output"
+            )
