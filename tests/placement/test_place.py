@@ -101,6 +101,16 @@ def test_a_map_is_of_plans_on_their_own(found: sm.placement.Placement, tmp_path:
     page = sm.files.write_placement(found, tmp_path / "map.html", drawn).read_text()
     assert page.count("<rect") == 9
     assert "x [m]" in page
+    # Places to choose from: the cheapest first, none near another, each planned as it says.
+    best = found.best()
+    assert best[0].cost == pytest.approx(found.cost, rel=1e-9)
+    assert best[0].cost <= best[1].cost <= best[2].cost
+    assert page.count("<tr>") == 1 + len(best) == 4
+    assert f"<td>{1e3 * found.place['x']:+.1f}</td>" in page
+    for item in best[1:]:
+        frame = pin.SE3(np.eye(3), np.array([*item.place, 0.0]))
+        plan = sm.plan(planar().changed(path=sm.paths.Placed(planar().path, frame)))
+        assert plan.report.cost <= item.cost * (1.0 + 1e-3)
     drawn.figure().savefig(tmp_path / "map.png")
     with pytest.raises(sm.errors.PlanError, match="over two of x, y"):
         found.map(("x", "yaw"))

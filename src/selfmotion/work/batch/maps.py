@@ -176,12 +176,12 @@ def _picture(
 def _legend(scale: _Scale) -> str:
     if scale.best is None:
         return "none is verified"
-    return f"{scale.name}: {scale.least:.4g} (framed) to {scale.most:.4g}"
+    return f"{scale.name}: {scale.least:.3g} (framed) to {scale.most:.3g}"
 
 
 def _cell(left: float, top: float, row: Row, scale: _Scale, links: Mapping[str, str]) -> str:
     fill, ink = scale.colours(row.aim) if row.verified else ("#eee", "#a33")
-    lines = [f"{row.aim:.4g}"] if row.verified else _lines(row.reason)
+    lines = [f"{row.aim:.3g}"] if row.verified else _lines(row.reason)
     edge = 'stroke="#fff"'
     if row is scale.best:
         edge = 'stroke="#d84315" stroke-width="3"'

@@ -26,6 +26,8 @@ _ON_BOUND = 1e-6
 # Distance to either side at which costs are compared, to see whether a coordinate matters [share of
 # the box].
 _ASIDE = 0.1
+# Distance of places to choose from, in some coordinate [share of the box].
+_APART = 0.1
 # Relative difference of costs below which a coordinate does not matter.
 _SAME = 1e-5
 
@@ -187,6 +189,21 @@ class Placement:
         return "\n".join(lines)
 
     __repr__ = __str__
+
+    def best(self, count: int = 3) -> tuple[Tried, ...]:
+        """Return the cheapest of the places that were tried, no two of them near each other.
+
+        `place` first. They are apart by a tenth of the box in some coordinate.
+        """
+        found = list[Tried]()
+        for item in (self._best, *sorted(self.tried, key=lambda item: item.cost)):
+            share = self._box.share(item.place)
+            far = [np.abs(share - self._box.share(other.place)).max() for other in found]
+            if np.isfinite(item.cost) and min(far, default=np.inf) >= _APART:
+                found.append(item)
+            if len(found) == as_whole(count, "count", 1, 100, PlanError):
+                break
+        return tuple(found)
 
     def map(self, names: Sequence[str] | None = None, points: int = 9) -> PlaceMap:
         """Return a map of the costs of places around this one, in two coordinates of the box.
