@@ -1,10 +1,10 @@
-"""Six strokes of a paint gun at one feed from begin to end, in a program as fast as can be."""
+"""Four strokes of a paint gun at one feed from begin to end, in a program as fast as can be."""
 
 import numpy as np
 
 import selfmotion as sm
 
-LENGTH, PITCH, STROKES, MOST = 0.72, 0.06, 6, 0.8  # m, m, -, m/s
+LENGTH, PITCH, STROKES, MOST = 0.72, 0.06, 4, 0.8  # m, m, -, m/s
 
 ur10 = sm.load_robot("ur10")
 limits = [

@@ -17,6 +17,11 @@ from selfmotion.basics import jit
 from selfmotion.planning.nodes import charts
 from selfmotion.planning.nodes.kernels import accelerate, bend_of
 
+pytestmark = pytest.mark.skipif(
+    bool(numba.config.DISABLE_JIT),
+    reason="these laws are of machine code: with NUMBA_DISABLE_JIT=1 there is none",
+)
+
 SOURCE = """
 from selfmotion.basics.jit import kernel
 

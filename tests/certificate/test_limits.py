@@ -50,6 +50,7 @@ def test_shares_of_rates_say_how_much_longer_it_takes(order: int, longer: float)
     assert found.amount == pytest.approx(2.0)
     assert f"{found.amount:.5g} times its limit of " in found.text
     assert f"give it {longer:.5g} times the duration" in found.text
+    assert found.factor == pytest.approx(longer)
     known = ("speeds", "accelerations", "jerks")[order - 1]
     # Not of all joints, so that no more is said to have been checked.
     assert limits.covers == (f"{known} of some joints",)

@@ -13,6 +13,7 @@ from selfmotion.basics import Array
 from selfmotion.certificate.path_error import (
     _FROBENIUS,
     PathCheck,
+    _vector_series,
     bound_errors,
     deviation_from,
     deviation_size,
@@ -295,3 +296,12 @@ def test_what_is_relaxed_is_taken_off_its_rows_in_its_window() -> None:
     expected[1:3, :2] *= 0.9
     expected[4:, :2] = 0.0
     np.testing.assert_allclose(beyond, expected)
+
+
+@pytest.mark.parametrize("angle", [0.3, 1.2, 2.0, 2.9])
+def test_the_rotation_vector_of_a_turn_that_stays_is_as_long_as_its_angle(angle: float) -> None:
+    """Of sin θ there is θ = sin θ g(cos θ), to both sides of a quarter turn."""
+    turned = np.zeros((4, 1))
+    turned[0] = np.sin(angle)
+    found = _vector_series(turned, np.array([np.cos(angle)]))
+    np.testing.assert_allclose(found[:, 0], [angle, 0.0, 0.0, 0.0], rtol=1e-9)

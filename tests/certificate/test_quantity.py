@@ -32,6 +32,8 @@ def test_the_tools_rates_are_told_with_the_time_they_take(column: int) -> None:
             found.text
         )
         assert f"give it {longer:.5g} times the duration" in found.text
+        # A pace of one's own is slowed by the number, not by the words.
+        assert found.factor == pytest.approx(longer)
 
 
 def test_whose_eyes_the_tools_rates_are_seen_with_is_told() -> None:

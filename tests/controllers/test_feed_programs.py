@@ -6,7 +6,9 @@ See `support.played_programs` for the oracle.
 import json
 import re
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 import pytest
@@ -51,6 +53,23 @@ def measured(plan: sm.Plan, file: Path) -> Off:
     return off(plan.robot, read, plan.trajectory, None, "flange", named(plan), (), 400)
 
 
+class Written(Protocol):
+    """What a program is in a file; computed once for all tests that read or change it."""
+
+    def __call__(self, made: sm.Plan | sm.Program, name: str, targets: str = "poses") -> str: ...
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory: pytest.TempPathFactory) -> Written:
+    @cache
+    def text(made: sm.Plan | sm.Program, name: str, targets: str = "poses") -> str:
+        file = tmp_path_factory.mktemp("written") / name
+        sm.files.write_motion(made, file, settings=settings(name, targets=targets))
+        return file.read_text()
+
+    return text
+
+
 @pytest.fixture(scope="module")
 def abb(tmp_path_factory: pytest.TempPathFactory) -> sm.RobotModel:
     return industrial_arm(tmp_path_factory.mktemp("abb"), "abb")
@@ -78,10 +97,10 @@ def ring(tmp_path_factory: pytest.TempPathFactory) -> sm.Plan:
 
 @pytest.mark.parametrize("name", FILES)
 def test_a_straight_seam_is_one_motion_at_its_feed(
-    line: sm.Plan, tmp_path: Path, name: str
+    line: sm.Plan, written: Written, tmp_path: Path, name: str
 ) -> None:
-    file, cell = tmp_path / name, tmp_path / "cell.toml"
-    sm.files.write_motion(line, file, settings=settings(name))
+    file = tmp_path / name
+    file.write_text(written(line, name))
     count, stated, found = program_miss(line, file)
     assert count == 1
     (stretch,) = read_poses(file, SLIDES).stretches
@@ -94,10 +113,15 @@ def test_a_straight_seam_is_one_motion_at_its_feed(
     assert far.joint <= stated.path.joint + ROUNDED
     assert found.path.joint <= stated.path.joint
     # Times are those of who asks for them.
-    sm.files.write_motion(line, file, settings=settings(name, targets="timed-poses"))
+    file.write_text(written(line, name, targets="timed-poses"))
     assert program_miss(line, file)[0] > 20
     assert program_miss(line, file)[1].path.joint <= WITHIN.rotation
-    # And the shell judges it by the problem, and says what it does not judge.
+
+
+def test_the_shell_says_what_of_a_seam_at_its_feed_it_does_not_judge(
+    line: sm.Plan, tmp_path: Path
+) -> None:
+    file, cell = tmp_path / "weld.mod", tmp_path / "cell.toml"
     limits = (sm.constraints.JointPositionLimits(), sm.constraints.JointVelocityLimits())
     sm.files.write_problem(replace(line.problem, constraints=limits), cell)
     line.save(tmp_path / "plan.npz")
@@ -115,9 +139,11 @@ def test_a_straight_seam_is_one_motion_at_its_feed(
 
 
 @pytest.mark.parametrize("name", FILES[:2])
-def test_a_full_turn_is_two_circular_motions(ring: sm.Plan, tmp_path: Path, name: str) -> None:
+def test_a_full_turn_is_two_circular_motions(
+    ring: sm.Plan, written: Written, tmp_path: Path, name: str
+) -> None:
     file = tmp_path / name
-    sm.files.write_motion(ring, file, settings=settings(name))
+    file.write_text(written(ring, name))
     count, stated, found = program_miss(ring, file)
     assert count == file.read_text().count(ROUND[name]) == 2
     far = measured(ring, file)
@@ -154,10 +180,12 @@ def test_a_tool_that_turns_along_goes_round_as_well(ring: sm.Plan, tmp_path: Pat
 
 
 @pytest.mark.parametrize("name", FILES)
-def test_a_seam_that_was_touched_up_is_judged(line: sm.Plan, tmp_path: Path, name: str) -> None:
+def test_a_seam_that_was_touched_up_is_judged(
+    line: sm.Plan, written: Written, tmp_path: Path, name: str
+) -> None:
     """Its end half a millimetre elsewhere, and the file is off by as much."""
     file = tmp_path / name
-    sm.files.write_motion(line, file, settings=settings(name))
+    file.write_text(written(line, name))
     lines = file.read_text().splitlines()
     k = [k for k, text in enumerate(lines) if re.match(r"\s+(MoveL|SLIN|movel)\b", text)][-1]
     x = re.search(r"(MoveL \[\[|\{X |, p\[)(-?[\d.]+)", lines[k])
@@ -179,11 +207,11 @@ def test_a_seam_that_was_touched_up_is_judged(line: sm.Plan, tmp_path: Path, nam
     ],
 )
 def test_another_speed_than_the_feed_is_refused(
-    line: sm.Plan, tmp_path: Path, name: str, old: str, new: str
+    line: sm.Plan, written: Written, tmp_path: Path, name: str, old: str, new: str
 ) -> None:
     file, cell = tmp_path / name, tmp_path / "cell.toml"
     sm.files.write_problem(line.problem, cell)
-    sm.files.write_motion(line, file, settings=settings(name))
+    file.write_text(written(line, name))
     text = file.read_text()
     assert old in text
     file.write_text(text.replace(old, new))
@@ -217,10 +245,17 @@ def test_another_speed_than_the_feed_is_refused(
     ],
 )
 def test_what_makes_another_motion_of_a_file_is_refused(
-    ring: sm.Plan, line: sm.Plan, tmp_path: Path, name: str, old: str, new: str, told: str
+    ring: sm.Plan,
+    line: sm.Plan,
+    written: Written,
+    tmp_path: Path,
+    name: str,
+    old: str,
+    new: str,
+    told: str,
 ) -> None:
     plan, file = line if name == "weld.script" else ring, tmp_path / name
-    sm.files.write_motion(plan, file, settings=settings(name))
+    file.write_text(written(plan, name))
     text = file.read_text()
     assert old in text
     read_program(file, plan.robot)
@@ -231,11 +266,11 @@ def test_what_makes_another_motion_of_a_file_is_refused(
 
 @pytest.mark.parametrize(("share", "is_read"), [(1e-3, False), (0.9, True), (2.0, True)])
 def test_a_feed_that_is_never_reached_is_refused(
-    line: sm.Plan, tmp_path: Path, share: float, is_read: bool
+    line: sm.Plan, written: Written, tmp_path: Path, share: float, is_read: bool
 ) -> None:
     """Ramps are the controller's; but with so little acceleration there is nothing between them."""
     file = tmp_path / "weld.script"
-    sm.files.write_motion(line, file, settings=settings(file.name))
+    file.write_text(written(line, file.name))
     text, slowed = file.read_text(), lambda found: f"a={share * float(found[1]):.6g}{found[2]}"
     changed, count = re.subn(r"a=([\d.e-]+)(, v=[\d.e-]+, r=)", slowed, text)
     assert count > 0
@@ -248,10 +283,10 @@ def test_a_feed_that_is_never_reached_is_refused(
 
 
 def test_the_least_acceleration_that_is_named_is_read_and_less_is_not(
-    line: sm.Plan, tmp_path: Path
+    line: sm.Plan, written: Written, tmp_path: Path
 ) -> None:
     file = tmp_path / "weld.script"
-    sm.files.write_motion(line, file, settings=settings(file.name))
+    file.write_text(written(line, file.name))
     text = file.read_text()
 
     def with_acceleration(value: float) -> None:
@@ -267,10 +302,12 @@ def test_the_least_acceleration_that_is_named_is_read_and_less_is_not(
         with_acceleration(0.97 * least)
 
 
-def test_only_one_work_object_and_one_tool_are_read(line: sm.Plan, tmp_path: Path) -> None:
+def test_only_one_work_object_and_one_tool_are_read(
+    line: sm.Plan, written: Written, tmp_path: Path
+) -> None:
     """Poses of another one than the last would be somewhere else."""
     file = tmp_path / "weld.mod"
-    sm.files.write_motion(line, file, settings=settings("weld.mod"))
+    file.write_text(written(line, "weld.mod"))
     text = file.read_text()
     for kind in ("tooldata", "wobjdata"):
         (one,) = [item for item in text.splitlines() if f"PERS {kind}" in item]
@@ -280,9 +317,11 @@ def test_only_one_work_object_and_one_tool_are_read(line: sm.Plan, tmp_path: Pat
             read_program(file, line.robot)
 
 
-def test_smooth_segments_beside_round_ones_are_refused(ring: sm.Plan, tmp_path: Path) -> None:
+def test_smooth_segments_beside_round_ones_are_refused(
+    ring: sm.Plan, written: Written, tmp_path: Path
+) -> None:
     file = tmp_path / "weld.src"
-    sm.files.write_motion(ring, file, settings=settings("weld.src"))
+    file.write_text(written(ring, "weld.src"))
     text = file.read_text()
     arc = re.findall(r"    SCIRC \{[^}]*\}, (\{[^}]*\})\n", text)[0]
     file.write_text(text.replace("  ENDSPLINE", f"    SPL {arc}\n  ENDSPLINE"))
@@ -310,12 +349,12 @@ def strokes_program() -> sm.Program:
 
 @pytest.mark.parametrize("name", FILES)
 def test_strokes_switch_where_their_feed_begins(
-    strokes_program: sm.Program, tmp_path: Path, name: str
+    strokes_program: sm.Program, written: Written, tmp_path: Path, name: str
 ) -> None:
     """Each in three motions: run-up, the stroke between its events, run-down."""
     ur10, program = robot_named("ur10"), strokes_program
-    file, job = tmp_path / name, tmp_path / "paint.program"
-    sm.files.write_motion(program, file, settings=settings(name))
+    file = tmp_path / name
+    file.write_text(written(program, name))
     strokes = [
         stretch for stretch in read_program(file, ur10).segments if isinstance(stretch, FeedSegment)
     ]
@@ -327,13 +366,19 @@ def test_strokes_switch_where_their_feed_begins(
     far = off(ur10, read, program.trajectory, "base", "tool0", named(program), moves)
     assert far.position <= program_miss(program, file)[1].path.position + ROUNDED
     assert far.axis <= WITHIN.rotation
-    # The arm stands elsewhere, and is judged along the shifted strokes.
-    program.save(job)
-    code, text = invoke("check", file, "--robot", job)
-    assert code == 0, text
-    assert "seams at their feeds are judged with the ramps of the plan" in text
+
+
+def test_the_shell_judges_strokes_as_python_does(
+    strokes_program: sm.Program, written: Written, tmp_path: Path
+) -> None:
+    file, job = tmp_path / "weld.script", tmp_path / "paint.program"
+    file.write_text(written(strokes_program, file.name))
+    strokes_program.save(job)
     code, text = invoke("check", file, "--robot", job, "--json")
-    assert json.loads(text)["verdict"] == found.verdict
+    assert code == 0, text
+    verdict = json.loads(text)["verdict"]
+    assert verdict == judged_program(file, strokes_program).verdict
+    assert "seams at their feeds are judged with the ramps of the plan" in verdict
 
 
 def test_leads_take_their_time_with_ramps(abb: sm.RobotModel, tmp_path: Path) -> None:
@@ -540,13 +585,13 @@ def test_lines_are_judged_as_lines(abb: sm.RobotModel, tmp_path: Path) -> None:
 @pytest.mark.parametrize("targets", ["poses", "timed-poses"])
 @pytest.mark.parametrize("name", FILES)
 def test_a_begin_that_was_changed_is_not_verified(
-    line: sm.Plan, tmp_path: Path, name: str, targets: str
+    line: sm.Plan, written: Written, tmp_path: Path, name: str, targets: str
 ) -> None:
     """From there the arm goes to the first pose on a way that nothing has judged."""
     file, cell = tmp_path / name, tmp_path / "cell.toml"
     limits = (sm.constraints.JointPositionLimits(), sm.constraints.JointVelocityLimits())
     sm.files.write_problem(replace(line.problem, constraints=limits), cell)
-    sm.files.write_motion(line, file, settings=settings(name, targets=targets))
+    file.write_text(written(line, name, targets=targets))
     text = file.read_text()
     first = re.search(r"(MoveAbsJ \[\[|PTP \{A1 |movej\(\[)([-\d.]+)", text)
     assert first is not None

@@ -6,6 +6,7 @@ import re
 import subprocess
 import sys
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -22,23 +23,31 @@ PRINTED = (
     "import json; from selfmotion.shell.documents import json_schema; "
     "print(json.dumps(json_schema()))"
 )
-SCHEMA = json.loads(
-    subprocess.run([sys.executable, "-c", PRINTED], capture_output=True, check=True).stdout
-)
-CHECK = jsonschema.Draft202012Validator(SCHEMA)
 EXAMPLES = sorted((ROOT / "examples").glob("*.toml"))
 # Tables whose keys are names: of joints, parts, arguments, costs, keys of a grid.
 FREE = ("lock", "arguments", "parts", "keep", "grid")
 
 
+@cache
+def schema() -> Any:
+    """Return the schema; made by the first test that asks, not while tests are collected."""
+    done = subprocess.run([sys.executable, "-c", PRINTED], capture_output=True, check=True)
+    return json.loads(done.stdout)
+
+
+@cache
+def judge() -> jsonschema.Draft202012Validator:
+    return jsonschema.Draft202012Validator(schema())
+
+
 def test_the_schema_is_one() -> None:
-    jsonschema.Draft202012Validator.check_schema(SCHEMA)
+    jsonschema.Draft202012Validator.check_schema(schema())
     assert len(EXAMPLES) > 2
 
 
 @pytest.mark.parametrize("file", EXAMPLES, ids=lambda file: file.name)
 def test_examples_are_valid(file: Path) -> None:
-    assert [error.message for error in CHECK.iter_errors(read_document(file))] == []
+    assert [error.message for error in judge().iter_errors(read_document(file))] == []
 
 
 @pytest.mark.parametrize("positioner", [False, True])
@@ -47,7 +56,7 @@ def test_examples_are_valid(file: Path) -> None:
 def test_what_init_writes_is_valid(arm: str, job: bool, positioner: bool, tmp_path: Path) -> None:
     file = tmp_path / "cell.toml"
     file.write_text(example_text(arm, file, job=job, positioner=positioner))
-    assert [error.message for error in CHECK.iter_errors(read_document(file))] == []
+    assert [error.message for error in judge().iter_errors(read_document(file))] == []
 
 
 def tables(value: Any, way: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
@@ -104,13 +113,13 @@ SEAMS: dict[str, Any] = {
 
 def test_a_key_that_is_refused_is_not_valid_and_the_other_way_round(tmp_path: Path) -> None:
     memory: dict[str, Any] = {}
-    assert CHECK.is_valid(FULL)
+    assert judge().is_valid(FULL)
     job_of(FULL, memory=memory)
     ways = list(tables(FULL))
     assert len(ways) > 12
     for way in ways:
         wrong = spoiled(FULL, way)
-        assert not CHECK.is_valid(wrong), way
+        assert not judge().is_valid(wrong), way
         with pytest.raises(sm.SelfmotionError, match="nonsense"):
             job_of(wrong, memory=memory)
 
@@ -122,27 +131,27 @@ def test_and_of_jobs(tmp_path: Path) -> None:
         write_document(tmp_path / "job.json", document)
         return sm.files.read_seam_job(tmp_path / "job.json")
 
-    assert CHECK.is_valid(SEAMS)
+    assert judge().is_valid(SEAMS)
     read(SEAMS)
     for way in tables(SEAMS):
         wrong = spoiled(SEAMS, way)
-        assert not CHECK.is_valid(wrong), way
+        assert not judge().is_valid(wrong), way
         with pytest.raises(sm.SelfmotionError, match="nonsense"):
             read(wrong)
     for wrong in ({**SEAMS, "path": FULL["path"]}, {"robot": {"name": "panda"}, "job": {}}):
-        assert not CHECK.is_valid(wrong)
+        assert not judge().is_valid(wrong)
         with pytest.raises(sm.SelfmotionError):
             read(wrong)
     table = {"file": "a.csv", "feed_mm": 20, "leads": {"length_mm": 20, "duration": 0.5}}
     whole = {**SEAMS, "seams": table}
-    assert CHECK.is_valid(whole)
+    assert judge().is_valid(whole)
     for way in tables(whole):
-        assert not CHECK.is_valid(spoiled(whole, way)), way
+        assert not judge().is_valid(spoiled(whole, way)), way
 
 
 def test_defaults_are_in_the_unit_of_their_key() -> None:
     found = dict[str, tuple[float, float]]()
-    for name, definition in SCHEMA["$defs"].items():
+    for name, definition in schema()["$defs"].items():
         for key, value in definition.get("properties", {}).items():
             for suffix in ("_deg", "_mm"):
                 base = definition["properties"].get(key.removesuffix(suffix), {})
@@ -153,7 +162,7 @@ def test_defaults_are_in_the_unit_of_their_key() -> None:
         scale = 57.29577951308232 if key.endswith("_deg") else 1000.0
         assert other == pytest.approx(plain * scale), key
     # What editors parse has no infinity.
-    json.dumps(SCHEMA, allow_nan=False)
+    json.dumps(schema(), allow_nan=False)
 
 
 def keys_of(node: Any) -> Iterator[tuple[str, str, dict[str, Any]]]:
@@ -171,16 +180,16 @@ def keys_of(node: Any) -> Iterator[tuple[str, str, dict[str, Any]]]:
 
 def test_every_key_says_what_it_is() -> None:
     """Where editors show it, and on the page of all keys."""
-    found = list(keys_of(SCHEMA))
+    found = list(keys_of(schema()))
     assert len(found) > 500
     assert [(table, key) for table, key, value in found if not value.get("description")] == []
 
 
 def test_units_of_descriptions_are_those_of_their_keys() -> None:
-    told = {key: value["description"] for _, key, value in keys_of(SCHEMA)}
+    told = {key: value["description"] for _, key, value in keys_of(schema())}
     assert "[mm]" in told["radius_mm"]
     assert "[mm/s]" in told["feed_mm"]
-    assert SCHEMA["properties"]["start_deg"]["description"].startswith(
+    assert schema()["properties"]["start_deg"]["description"].startswith(
         "The start configuration [° or m]"
     )
     for key, text in told.items():
@@ -199,7 +208,7 @@ def test_names_of_seams_are_lists(key: str, tmp_path: Path) -> None:
         document = {**SEAMS, "seams": [first, {**one, key: names}]}
         if key == "may_meet":
             document["seams"][1][key] = ["a"] if is_read else "a"
-        assert CHECK.is_valid(document) == is_read
+        assert judge().is_valid(document) == is_read
         write_document(file, document)
         if is_read:
             sm.files.read_seam_job(file)
@@ -209,7 +218,7 @@ def test_names_of_seams_are_lists(key: str, tmp_path: Path) -> None:
 
 
 def test_no_pose_is_offered_in_degrees() -> None:
-    keys = SCHEMA["$defs"]["line"]["properties"]
+    keys = schema()["$defs"]["line"]["properties"]
     assert "start" in keys
     assert "start_deg" not in keys
-    assert "start_deg" in SCHEMA["properties"]
+    assert "start_deg" in schema()["properties"]
