@@ -10,8 +10,4 @@ from selfmotion.shell.replay.page import (
     replay_html as replay_html,
     write_replay as write_replay,
 )
-from selfmotion.shell.replay.still import (
-    figure as figure,
-    picture as picture,
-)
-from selfmotion.shell.replay.whole import seam_color as seam_color
+from selfmotion.shell.replay.still import figure as figure
