@@ -16,6 +16,7 @@ from selfmotion.shell.documents import (
     read_seam_job,
     write_problem,
 )
+from selfmotion.shell.sheet import write_sheet
 from selfmotion.shop.cam import read_path
 from selfmotion.shop.controllers import (
     ProgramSettings,
@@ -25,7 +26,6 @@ from selfmotion.shop.controllers import (
     write_motion,
     write_parts,
 )
-from selfmotion.shop.sheet import write_sheet
 from selfmotion.work.job import write_timetable
 from selfmotion.work.placement import write_placement
 

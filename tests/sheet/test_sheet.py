@@ -1,6 +1,7 @@
 """Process sheets: each number is of the certificate, the report or the margins."""
 
 import dataclasses
+import datetime
 import re
 from html.parser import HTMLParser
 from pathlib import Path
@@ -9,8 +10,9 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.shop.sheet.page import sections
+from selfmotion.shell.sheet.tables import plan_sections
 from support.arms import robot_named
+from support.replay_plans import two_seams
 from support.shell import complaint, invoke
 
 
@@ -90,7 +92,7 @@ def test_what_is_not_kept_is_said(plan: sm.Plan, tmp_path: Path) -> None:
     page = sm.files.write_sheet(broken, tmp_path / "sheet.html").read_text()
     assert 'class="refused"' in page
     assert "off the path" in page
-    titles = [section.title for section in sections(broken, None)]
+    titles = [section.title for section in plan_sections(broken, None)]
     assert not any("runs unchanged" in title for title in titles)
 
 
@@ -111,6 +113,8 @@ def test_feeds_are_asked_and_reached(tmp_path: Path) -> None:
 def test_what_is_no_sheet_is_refused(plan: sm.Plan, tmp_path: Path) -> None:
     with pytest.raises(sm.errors.ProblemError, match="expected a Plan"):
         sm.files.write_sheet(None, tmp_path / "a.html")  # type: ignore[arg-type]
+    with pytest.raises(sm.errors.ProblemError, match=r"expected a datetime\.date"):
+        sm.files.write_sheet(plan, tmp_path / "a.html", date="today")  # type: ignore[arg-type]
     with pytest.raises(sm.errors.ProblemError, match=re.escape("ends in .html")):
         sm.files.write_sheet(plan, tmp_path / "a.pdf")
     with pytest.raises(sm.errors.ProblemError, match="expected Margins"):
@@ -129,3 +133,90 @@ def test_sheets_from_the_shell(plan: sm.Plan, tmp_path: Path) -> None:
     assert "<h1>cell 3</h1>" in page.read_text()
     assert "&lt;block&gt;" in page.read_text()
     assert "together" in complaint("sheet", file, "--turn", "0.1")
+
+
+def test_of_a_program_seams_events_and_moves_are_told(tmp_path: Path) -> None:
+    made = two_seams()
+    steps = [
+        dataclasses.replace(step, events=(("arc on", 0.0), ("arc off", step.duration)))
+        if step.is_seam
+        else step
+        for step in made.steps
+    ]
+    program = dataclasses.replace(made, steps=tuple(steps))
+    first = program.order[0]
+    margins = {first: sm.margin(program.plans[first])}
+    page = sm.files.write_sheet(
+        program,
+        tmp_path / "sheet.html",
+        margins,
+        part_number="47<11",
+        order_number="8",
+        date=datetime.date(2026, 1, 2),
+    ).read_text()
+    assert "part 47&lt;11 · order 8 · date 2026-01-02" in page
+    assert page.count("<svg") == 1
+    assert "signature" in page
+    tables = Cells(page).tables
+    seams = tables["Seams, in their order"][1:]
+    assert len(seams) == len(program.order)
+    begins = [at for at, step in zip(program.begins, program.steps, strict=True) if step.is_seam]
+    for row, name, begin in zip(seams, program.order, begins, strict=True):
+        assert row[0].startswith(name)
+        assert float(row[1].split()[0]) == pytest.approx(begin, abs=1e-3)
+    assert [(row[1], row[2]) for row in tables["Events"][1:]] == [
+        (name, event) for _, name, event in program.events
+    ]
+    moved = tables["Moves and waits"][1:]
+    assert [row[0] for row in moved] == [step.name for step in program.steps if not step.is_seam]
+    assert {row[-1] for row in moved} == {"kept"}
+    kept = tables["Requirements, at all times of each seam"][1:]
+    assert {row[0] for row in kept} == set(program.order)
+    wide = tables[f"Seam '{first}': How far it may be off while the program runs unchanged"][1:]
+    assert wide[0][2] == margins[first].part.translation.size
+
+
+def test_margins_of_programs_are_of_their_seams(plan: sm.Plan, tmp_path: Path) -> None:
+    program, page = two_seams(), tmp_path / "a.html"
+    first, second = program.order
+    other = sm.margin(program.plans[second])
+    with pytest.raises(sm.errors.PlanError, match=f"expected one of: {first}, {second}"):
+        sm.files.write_sheet(program, page, {"none": other})
+    with pytest.raises(sm.errors.PlanError, match="of another motion"):
+        sm.files.write_sheet(program, page, {first: other})
+    with pytest.raises(sm.errors.ProblemError, match="of each seam by its name"):
+        sm.files.write_sheet(program, page, other)
+    with pytest.raises(sm.errors.ProblemError, match="expected Margins"):
+        sm.files.write_sheet(program, page, {first: 3})  # type: ignore[dict-item]
+    with pytest.raises(sm.errors.ProblemError, match="expected Margins"):
+        sm.files.write_sheet(plan, page, {first: other})
+    assert not page.exists()
+
+
+def test_a_program_without_a_move_has_a_sheet_that_says_so(tmp_path: Path) -> None:
+    made = two_seams()
+    lost = [
+        step if step.is_seam else dataclasses.replace(step, made=_not_found(step.made))
+        for step in made.steps
+    ]
+    program = dataclasses.replace(made, steps=tuple(lost))
+    page = sm.files.write_sheet(program, tmp_path / "sheet.html").read_text()
+    assert 'class="refused"' in page
+    assert "<svg" not in page
+    moved = Cells(page).tables["Moves and waits"][1:]
+    assert all(row[-1].startswith("NOT KEPT") for row in moved)
+
+
+def _not_found(made: sm.Plan | sm.Move) -> sm.Move:
+    assert isinstance(made, sm.Move)
+    return dataclasses.replace(made, trajectory=None)
+
+
+def test_sheets_of_programs_from_the_shell(tmp_path: Path) -> None:
+    file, page = tmp_path / "two.program", tmp_path / "sheet.html"
+    two_seams().save(file)
+    code, told = invoke("sheet", file, "-o", page, "--part-number", "47", "--order-number", "8")
+    assert code == 0, told
+    text = page.read_text()
+    assert "part 47 · order 8" in text
+    assert "How far it may be off" in text

@@ -21,7 +21,7 @@ MOVED = {
     "path": "model.path",
     "planning": "planning.planner",
     "problem": "problem.problem",
-    "sheet": "shop.sheet",
+    "sheet": "shell.sheet",
     "task": "model.task",
     "transfer": "planning.transfer",
     "warm": "realtime.warm",
@@ -44,6 +44,8 @@ MOVED_MODULES = {
     "shop.controllers.commented_lines": "shop.controllers.program_lines",
     "shop.controllers.read_stretches": "shop.controllers.read_segments",
     "shop.controllers.stretches": "shop.controllers.segments",
+    "shop.sheet": "shell.sheet",
+    "shop.sheet.page": "shell.sheet.page",
 }
 
 

@@ -108,7 +108,8 @@ class Quantity:
         """Return one number that is to stay within a band.
 
         Its `values` are (K,), its `derivatives` (K, n) each, its `series` (K + 1, I). Where one
-        side is free, its end is a number that is never reached.
+        side is free, its end is a number that is just never reached: the room that planned motions
+        leave inside the band is a share of its width.
         """
         ends = (("lower", lower), ("upper", upper))
         lower, upper = (as_number(end, f"quantity '{name}': {which}") for which, end in ends)

@@ -1,1 +1,1 @@
-"""Files of machines: paths in, programs out and back, process sheets."""
+"""Files of machines: paths in, programs out and back."""

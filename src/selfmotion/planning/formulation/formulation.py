@@ -253,7 +253,8 @@ class Formulation:
         pinned = any(item.ends.pins[1] for item in problem.constraints)
         if pinned and given_end(self.robot, problem.constraints) is None:
             ends.append(_on_path_at_end(self.follows))
-        limits, points = (*own.limits, *bands.limits), (*own.points, *bands.points)
+        # Those that are there with `apart` alone come last, so that others keep their places.
+        limits, points = (*own.limits, *bands.limits), (*bands.points, *own.points)
         return BoundConditions(limits, points, tuple(ends))
 
     def bound(self, own: Conditions, start: Array, end: Array) -> BoundConditions:

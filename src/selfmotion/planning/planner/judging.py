@@ -70,6 +70,10 @@ def judge(formulation: Formulation, part: Part, tolerance: Tolerance, progress: 
                 if apart is not None and apart.outcome is not part.solution.outcome:
                     part = replace(part, solution=settle(apart))
                     continue
+                if apart is not None:
+                    # That it was tried, and how that ended, is known from now on.
+                    part = replace(part, solution=apart)
+                    judged = replace(judged, part=part)
             rough = _rough(formulation, judged)
             roughs += rough
             solution = part.solution

@@ -147,7 +147,7 @@ class LocalSearch:
         return self.outcome(best)
 
     def with_more(self, known: NodeOutcome) -> NodeOutcome | None:
-        """Return the best motion near one with fewer conditions, or None."""
+        """Return the best motion near one with fewer conditions, the first of these, or None."""
         motion = self.grid(known.motion.grid.t).at(known.motion.centred)
         more = len(motion.h) - len(known.multipliers)
         found = self.best_near(motion, multipliers=np.append(known.multipliers, np.zeros(more)))

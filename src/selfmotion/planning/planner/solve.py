@@ -56,8 +56,12 @@ def solve_again(solution: Solution, cost_to_beat: float = np.inf) -> Solution:
     outcome = found.outcome
     # One that costs more already is none to take either way.
     is_cheaper = isinstance(outcome, NodeOutcome) and outcome.cost < cost_to_beat
-    if is_cheaper and not outcome.keeps_off_itself:
-        found = kept_off_itself(found) or found
+    try:
+        if is_cheaper and not outcome.keeps_off_itself:
+            found = kept_off_itself(found) or found
+    except KeyboardInterrupt:
+        # There is a motion by now.
+        found = found.ended_by(Status.INTERRUPTED)
     if found.status is Status.GRADIENT:
         # A gradient that is not finite is named with its time.
         require_finite_gradients(guess.formulation.costs, guess.minimum_norm.sampled.arm)

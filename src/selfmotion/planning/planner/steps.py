@@ -1,6 +1,6 @@
-"""The steps of a plan: look, propose and polish, judge; in this order, each with its condition.
+"""The steps of a plan: look, propose and optimise, judge; in this order, each with its condition.
 
-A proposal is one or several initial guesses, cheap ones first. `Planner.polish` optimises each and
+A proposal is one or several initial guesses, cheap ones first. `Planner.take` optimises each and
 keeps the best; a proposal is skipped where the present motion suffices. In the end the best is
 judged, on finer grids until its certificate has no failure, or a part of it is.
 """
@@ -203,6 +203,7 @@ def _judge_on_meshes(planner: Planner) -> bool:
         tried = True
         if judge_as_it_is(planner, solution) and planner.judged is not None:
             planner.incumbent = planner.judged.part.solution
+        if not planner.is_sought:
             break
     return tried
 
@@ -382,7 +383,7 @@ STEPS: tuple[tuple[str, Callable[[Planner], bool]], ...] = (
     # Single poses first: a failure before anything is planned.
     ("look at single poses", _look_first),
     ("part before a pose out of reach", _plan_before_blocked_pose),
-    # Propose and polish until one suffices.
+    # Propose and optimise until one suffices.
     ("motion that is known", _follow_guide),
     ("warm start", _warm_start_at_plan),
     ("posture of a stretch", _keep_to_posture),

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import replace
 
-from selfmotion.planning.planner.judging import judge, refined_both
+from selfmotion.planning.planner.judging import Judged, judge, refined_both
 from selfmotion.planning.planner.largest_part import Part, largest_part, shorter_part
 from selfmotion.planning.planner.planner import Planner
 from selfmotion.planning.planner.solution import Solution
@@ -31,17 +31,24 @@ def judge_incumbent(planner: Planner, incumbent: Solution) -> None:
         # An iterate on the way to an optimum may violate more than earlier motions.
         known += [planner.runner_up, Solution.of(best.guess)]
     for one in filter(None, known):
-        ended = one.ended_by(best.status) if best.cut_short else one
-        if judge_as_it_is(planner, ended):
+        # What was evaluated is told, whichever motion it led to.
+        told = replace(one, history=one.history or best.history)
+        if judge_as_it_is(planner, told.ended_by(best.status) if best.cut_short else told):
             return
 
 
 def judge_as_it_is(planner: Planner, solution: Solution) -> bool:
-    """Let a motion be the plan's if it is verified; return whether it is."""
+    """Let a motion be the plan's if it is verified; return whether it is.
+
+    An interruption while it is judged ends the plan, also where the motion is not taken.
+    """
     own = planner.setup
     judged = judge(own.formulation, Part(own.formulation, solution), own.tolerance, own.progress)
+    ended = judged.part.solution
     if judged.certificate.verified:
         planner.judged = judged
+    elif ended.cut_short and not planner.is_over:
+        planner.end(ended.status)
     return judged.certificate.verified
 
 
@@ -57,23 +64,26 @@ def judge_part(planner: Planner, suspect: float = 0.0) -> bool:
     if found is None:
         return False
 
-    def judged(part: Part) -> None:
+    def judged(part: Part) -> Judged:
         refined, _ = refined_both(part.solution, None, own.progress)
-        one = judge(own.formulation, replace(part, solution=refined), own.tolerance, own.progress)
-        # Besides that it ends, nothing should be wrong with a shorter one.
-        if planner.judged is None or len(one.certificate.failures) < 2:
-            planner.judged = one
+        return judge(own.formulation, replace(part, solution=refined), own.tolerance, own.progress)
 
-    planner.judged = None
-    judged(found)
+    # What was judged before is the plan until then: an interruption finds it.
+    planner.judged = last = judged(found)
     for _ in range(_SHORTER_PARTS):
-        best = planner.judged
-        if best is None or len(best.certificate.failures) < 2 or best.part.solution.cut_short:
+        # Besides that it ends, nothing should be wrong with a part.
+        if len(last.certificate.failures) < 2 or last.part.solution.cut_short:
             break
         if (shorter := shorter_part(own.formulation, found, effort)) is None:
             break
         found = shorter
-        judged(found)
+        last = judged(found)
+        if len(last.certificate.failures) < 2:
+            planner.judged = last
+        elif last.part.solution.cut_short:
+            best = planner.judged.part
+            ended = best.solution.ended_by(last.part.solution.status)
+            planner.judged = replace(planner.judged, part=replace(best, solution=ended))
     return True
 
 

@@ -63,6 +63,7 @@ __all__ = [
     "EndCondition",
     "EndConfiguration",
     "EndVelocity",
+    "Ends",
     "Envelope",
     "JointAccelerationLimits",
     "JointJerkLimits",

@@ -84,7 +84,8 @@ class BoundConstraint(ABC):
     equality : bool
         Whether h = 0 is meant, rather than h ≤ 0.
     depends_on : DependsOn
-        The coordinates that it is a function of: those of samples and tangents.
+        The coordinates that it is a function of: those of samples and tangents. Of conditions at
+        all times the joints, or the tolerances; only ends are of all.
     """
 
     name: str
@@ -103,7 +104,11 @@ class BoundConstraint(ABC):
 
     @abstractmethod
     def tangents(self, samples: Samples, motion: NodeTangents) -> Array:
-        """Return ∂h/∂x for d variables: h's shape with d appended."""
+        """Return ∂h/∂x for d variables: h's shape with d appended.
+
+        Row k of h depends on the motion at sample k alone: conditions between two times have no
+        place here.
+        """
 
     @abstractmethod
     def describe(self, samples: Samples, row: int, column: int) -> str:

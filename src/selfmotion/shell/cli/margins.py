@@ -142,7 +142,7 @@ def calibrate(
     rich_help_panel=LOOK,
 )
 def sheet(
-    file: Annotated[Path, typer.Argument(help="A plan saved as .npz.")],
+    file: Annotated[Path, typer.Argument(help="A plan saved as .npz, or a .program.")],
     out: Annotated[Path, typer.Option("--out", "-o", help="The page to write (.html).")] = Path(
         "sheet.html"
     ),
@@ -150,30 +150,52 @@ def sheet(
     turn: _Turn = None,
     part: _Part = None,
     title: Annotated[str, typer.Option(help="Title; by default arm and task.")] = "",
+    part_number: Annotated[str, typer.Option(help="Number of the part, to print.")] = "",
+    order_number: Annotated[str, typer.Option(help="Number of the order, to print.")] = "",
 ) -> None:
-    """Write a process sheet: motion, limits kept and margins on one A4 page."""
+    """Write a process sheet: motion, limits kept and margins, to print on A4."""
     within = _process(tolerance, turn)
-    plan = sm.load_plan(file)
-    bodies = any(what in plan.certificate.covers for what in ("self-collision", "obstacles"))
-    margins = None
-    if plan.certificate.verified and (bodies or within is not None):
-        with StageDisplay(stages) as display:
-            display.stage("measuring margins", 1, 1)
-            margins = sm.margin(plan, within, part=part or None)
-    written = sm.files.write_sheet(plan, out, margins, title=title)
+    found: sm.margins.Margins | dict[str, sm.margins.Margins] | None = None
+    made: sm.Plan | sm.Program
+    if file.suffix == ".program":
+        made = sm.load_program(file)
+        known = {name: plan for name, plan in made.plans.items() if _has_margins(plan, within)}
+        found = _measured(known, within, {"part": part or None})
+    else:
+        made = sm.load_plan(file)
+        if _has_margins(made, within):
+            with StageDisplay(stages) as display:
+                display.stage("measuring margins", 1, 1)
+                found = sm.margin(made, within, part=part or None)
+    written = sm.files.write_sheet(
+        made, out, found, title=title, part_number=part_number, order_number=order_number
+    )
     terminal.print(f"wrote {written}", markup=False, soft_wrap=True)
+
+
+def _has_margins(plan: sm.Plan, within: sm.Tolerance | None) -> bool:
+    """Whether a plan has margins: it is verified, with bodies or a tolerance of the process."""
+    bodies = any(kind in plan.certificate.covers for kind in ("self-collision", "obstacles"))
+    return plan.certificate.verified and (bodies or within is not None)
+
+
+def _measured(
+    plans: Mapping[str, sm.Plan], within: sm.Tolerance | None, asked: Mapping[str, Any]
+) -> dict[str, sm.margins.Margins]:
+    """Return the margins of plans of seams, by their names."""
+    found = {}
+    with StageDisplay(stages) as display:
+        for number, (name, plan) in enumerate(plans.items(), 1):
+            display.stage(f"measuring margins of seam '{name}'", number, len(plans))
+            found[name] = sm.margin(plan, within, **asked)
+    return found
 
 
 def _margins_of_seams(
     program: sm.Program, within: sm.Tolerance | None, asked: Mapping[str, Any], as_json: bool
 ) -> None:
     """Print the margins of each seam; those of moves are not known."""
-    plans = {step.name: step.made for step in program.steps if isinstance(step.made, sm.Plan)}
-    found = {}
-    with StageDisplay(stages) as display:
-        for number, (name, plan) in enumerate(plans.items(), 1):
-            display.stage(f"measuring margins of seam '{name}'", number, len(plans))
-            found[name] = sm.margin(plan, within, **asked)
+    found = _measured(program.plans, within, asked)
     if as_json:
         print_json({"seams": {name: margins_json(it) for name, it in found.items()}})
         return

@@ -13,6 +13,7 @@ from selfmotion.model.collision import Obstacle, Solid
 from selfmotion.model.motion import Trajectory
 from selfmotion.model.robot import RobotModel
 from selfmotion.planning.result import Plan
+from selfmotion.shell.replay import scene
 from selfmotion.shell.replay.meshes import Json
 from selfmotion.shell.replay.motion import Curves, curves
 from selfmotion.shell.replay.scene import color_of
@@ -96,6 +97,27 @@ def still(
         f'<svg id="still" viewBox="0 0 {_WIDTH:.0f} {height:.0f}" role="img" '
         f'aria-label="The arm at the begin, in the middle and at the end of its motion" '
         f'fill="none" stroke-linecap="round" stroke-linejoin="round">{"".join(parts)}</svg>'
+    )
+
+
+def picture(
+    robot: RobotModel,
+    motion: Trajectory,
+    obstacles: Sequence[Obstacle],
+    seams: Sequence[tuple[float, float, str]] = (),
+) -> str:
+    """Return the same picture of lines alone: what is seen is the arm's joints and its tool's path.
+
+    No mesh of the arm is read. Parameters as in `still`.
+    """
+    chain, times = robot.chain_to(robot.tool), np.linspace(motion.t[0], motion.t[-1], 101)
+    tool = np.array([chain.place(q).translation for q in motion(times)])
+    arms = [_skeleton(robot, q).reshape(-1, 3) for q in motion(times[::25])]
+    seen = np.concatenate([tool, *arms])
+    radius = scene.Extent(seen.min(axis=0), seen.max(axis=0)).radius
+    around = scene.outlines(obstacles, radius)
+    return still(
+        robot, motion, obstacles, scene.camera(np.concatenate([seen, *around]), tool), seams
     )
 
 

@@ -136,6 +136,13 @@ _POINTS, _BRIEF, _MOST_POINTS = 25, 0.5, 6001
 # Colours of seams, by turns: those of the page's plots.
 _COLORS = ((66, 105, 208), (232, 135, 30), (60, 169, 81), (224, 80, 140), (164, 99, 242))
 _MOVE = (138, 145, 156)
+
+
+def seam_color(number: int) -> str:
+    """Return the colour of a seam by its place in the order, for CSS and SVG."""
+    return "rgb({}, {}, {})".format(*_COLORS[number % len(_COLORS)])
+
+
 # Steps that are told to take longest.
 _LONGEST = 3
 
@@ -287,7 +294,7 @@ class Whole:
         for mark in self.marks:
             color = ""
             if mark.is_seam:
-                color = "rgb({}, {}, {})".format(*_COLORS[number % len(_COLORS)])
+                color = seam_color(number)
                 number += 1
             found.append({"begin": mark.begin, "end": mark.end, "name": mark.name, "color": color})
         return found

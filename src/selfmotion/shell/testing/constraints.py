@@ -47,9 +47,9 @@ def check_majorants(
 
     Parameters
     ----------
-    function : Bounded
-        Of which series are known on this stretch.
-    stretch : Stretch
+    function : BoundedFunction
+        Of which series are known on these segments.
+    segments : MotionSegments
     name : str
         What to call it in messages.
 

@@ -1,19 +1,17 @@
-"""A process sheet as one HTML page, which prints on A4."""
+"""The tables of a process sheet: each number is from a certificate, a report or margins."""
 
-import html
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
-from selfmotion.basics import PlanError, ProblemError, as_path, shown, write_text
 from selfmotion.certificate import LIMIT_NAMES, Extreme, Finding
+from selfmotion.model.robot import RobotModel
 from selfmotion.model.task import Task
 from selfmotion.planning.result import Plan
+from selfmotion.shell.replay.whole import seam_color
+from selfmotion.work.job import Program, Step
 from selfmotion.work.margins import Margins
-
-# What a process sheet says: tables, each number from the plan's certificate, report or margins.
 
 
 @dataclass(frozen=True)
@@ -28,32 +26,39 @@ class Section:
     rows : tuple of tuple of str
     note : str
         What is said below it; "" for nothing.
+    colors : tuple of str
+        Of the rows, as in the picture; none by default.
     """
 
     title: str
     head: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
     note: str = ""
+    colors: tuple[str, ...] = ()
 
 
-def sections(plan: Plan, margins: Margins | None) -> tuple[Section, ...]:
+def plan_sections(plan: Plan, margins: Margins | None) -> tuple[Section, ...]:
     """Return the tables of a plan, with margins where they are known."""
     found = [_what(plan)]
     if margins is not None:
         found.append(_margins(margins))
     found += [_path(plan), _kept(plan), _active(plan), _used(plan), _reversals(plan)]
-    found += [_approaches(plan), _feeds(plan), _assumed(plan)]
+    found += [_approaches(plan), _feeds(plan), _assumed(_assumptions(plan))]
+    return tuple(section for section in found if section.rows)
+
+
+def program_sections(program: Program, margins: Mapping[str, Margins]) -> tuple[Section, ...]:
+    """Return the tables of a program, with the margins of seams (by name) that are known."""
+    found = [_what_program(program), _seams(program), _events(program)]
+    found += [_margins(each, f"Seam '{name}': ") for name, each in margins.items()]
+    found += [_kept_by_seams(program), _moves(program), _assumed(_assumptions_of(program))]
     return tuple(section for section in found if section.rows)
 
 
 def _what(plan: Plan) -> Section:
-    problem, robot, report = plan.problem, plan.robot, plan.report
-    arm = robot.name
-    if robot.urdf.is_calibrated:
-        arm += ", joints where they were measured"
+    problem, report = plan.problem, plan.report
     rows = [
-        ("arm", arm),
-        ("tool", f"{robot.tool}{f', path in {robot.reference}' if robot.reference else ''}"),
+        *_arm(plan.robot),
         ("task", " and ".join(Task.of(item.task).value for item in problem.follows.items)),
         ("duration", f"{plan.trajectory.duration:.4g} s"),
         ("cost", f"{report.cost:.6g} (minimum-norm motion: {report.initial_cost:.6g})"),
@@ -64,7 +69,92 @@ def _what(plan: Plan) -> Section:
     return Section("Program", ("", ""), tuple(rows))
 
 
-def _margins(margins: Margins) -> Section:
+def _arm(robot: RobotModel) -> list[tuple[str, str]]:
+    arm = robot.name
+    if robot.urdf.is_calibrated:
+        arm += ", joints where they were measured"
+    path = f", path in {robot.reference}" if robot.reference else ""
+    return [("arm", arm), ("tool", f"{robot.tool}{path}")]
+
+
+def _what_program(program: Program) -> Section:
+    judges = dict.fromkeys(plan.certificate.version for plan in program.plans.values())
+    rows = [
+        *_arm(program.robot),
+        ("seams", str(len(program.order))),
+        ("duration", f"{program.duration:.4g} s, {program.transfer_time:.4g} s of it moves"),
+        ("judged by", ", ".join(f"selfmotion {version}" for version in judges)),
+    ]
+    if not any(step.is_missing for step in program.steps) and program.steps:
+        rows.insert(-1, ("motion", program.trajectory.digest[:16]))
+    return Section("Program", ("", ""), tuple(rows))
+
+
+def _seams(program: Program) -> Section:
+    made = zip(program.begins, program.steps, strict=True)
+    seams = [(begin, step, step.made) for begin, step in made if isinstance(step.made, Plan)]
+    rows = [
+        (
+            step.name + (", from its end" if step.turned else ""),
+            f"{begin:.3f} s",
+            f"{step.duration:.4g} s",
+            plan.task.value,
+            _feed_text(plan),
+            _closest(plan),
+        )
+        for begin, step, plan in seams
+    ]
+    head = ("", "begins at", "takes", "task", "feed", "closest")
+    colors = tuple(seam_color(number) for number in range(len(rows)))
+    return Section("Seams, in their order", head, tuple(rows), colors=colors)
+
+
+def _feed_text(plan: Plan) -> str:
+    feeds = (feed for item in plan.problem.follows.items for feed in item.path.feeds)
+    return ", ".join(
+        f"{feed.reached:.4g} of {feed.asked:.4g} m/s{'' if feed.kept else ' NOT KEPT'}"
+        for feed in feeds
+    )
+
+
+def _closest(plan: Plan) -> str:
+    near = min(plan.approaches.values(), key=lambda each: each.value, default=None)
+    return "" if near is None else f"{near.value * 1e3:.4g} mm, {near.name}"
+
+
+def _events(program: Program) -> Section:
+    rows = [(f"{at:.3f} s", name, event) for at, name, event in program.events]
+    return Section("Events", ("at", "of", ""), tuple(rows))
+
+
+def _kept_by_seams(program: Program) -> Section:
+    rows = [(name, *row) for name, plan in program.plans.items() for row in _kept(plan).rows]
+    return Section(
+        "Requirements, at all times of each seam",
+        ("seam", "", "worst", "at, from its begin", "of", ""),
+        tuple(rows),
+    )
+
+
+def _moves(program: Program) -> Section:
+    rows = [
+        (step.name, f"{begin:.3f} s", f"{step.duration:.4g} s", _kept_by_move(step))
+        for begin, step in zip(program.begins, program.steps, strict=True)
+        if not step.is_seam
+    ]
+    return Section("Moves and waits", ("", "begins at", "takes", ""), tuple(rows))
+
+
+def _kept_by_move(step: Step) -> str:
+    return f"NOT KEPT: {step.trouble}" if step.trouble else "kept"
+
+
+def _assumptions_of(program: Program) -> Iterator[str]:
+    several = (text for plan in program.plans.values() for text in _assumptions(plan))
+    yield from dict.fromkeys([*several, *program.unjudged, *program.notes])
+
+
+def _margins(margins: Margins, of: str = "") -> Section:
     rows = [
         (item.name, kind, found.size, found.reason)
         for item in margins.subjects
@@ -72,7 +162,7 @@ def _margins(margins: Margins) -> Section:
     ]
     about = "; ".join(f"{item.name}: about {item.about}" for item in margins.subjects)
     return Section(
-        "How far it may be off while the program runs unchanged",
+        f"{of}How far it may be off while the program runs unchanged",
         ("", "", "margin", "what stops more"),
         tuple(rows),
         f"Judged: {margins.judged}. Rotations of the {about}.",
@@ -184,8 +274,8 @@ def _feeds(plan: Plan) -> Section:
     return Section("Feeds", ("", "asked", "reached", "slowest", ""), tuple(rows))
 
 
-def _assumed(plan: Plan) -> Section:
-    return Section("Assumed, and not judged", ("",), tuple((text,) for text in _assumptions(plan)))
+def _assumed(assumptions: Iterator[str]) -> Section:
+    return Section("Assumed, and not judged", ("",), tuple((text,) for text in assumptions))
 
 
 def _assumptions(plan: Plan) -> Iterator[str]:
@@ -210,88 +300,3 @@ def _assumptions(plan: Plan) -> Iterator[str]:
 def _extreme(label: str, worst: Extreme, unit: str, form: str) -> tuple[str, ...]:
     time = "" if np.isnan(worst.time) else f"{worst.time:.3f} s"
     return label, f"{worst.value:{form}} {unit}".strip(), time, worst.name
-
-
-# A process sheet as one HTML page, which prints on A4.
-
-_STYLE = """
-@page { size: A4; margin: 14mm }
-body { font: 10pt/1.35 system-ui, sans-serif; color: #222; max-width: 182mm; margin: 8mm auto }
-h1 { font-size: 15pt; margin: 0 0 2mm } h2 { font-size: 11pt; margin: 4mm 0 1mm }
-table { border-collapse: collapse; width: 100% }
-td, th { text-align: left; vertical-align: top; padding: .4mm 3mm .4mm 0 }
-td { border-top: .2mm solid #ccc }
-th { font-weight: 600 } p { margin: 1mm 0 } .note { color: #555; font-size: 9pt }
-.verified { color: #00695c; font-weight: 600 } .refused { color: #b71c1c; font-weight: 600 }
-section { break-inside: avoid }
-@media print { body { margin: 0; max-width: none } }
-"""
-
-
-def write_sheet(
-    plan: Plan, file: str | Path, margins: Margins | None = None, *, title: str = ""
-) -> Path:
-    """Write what a program does, keeps and survives as one HTML page that prints on A4.
-
-    The page needs no network and no other file. Every number is from the plan's certificate or
-    report, or from the margins.
-
-    Parameters
-    ----------
-    plan : Plan
-    file : path
-        Ends in ``.html``.
-    margins : Margins, optional
-        Of this plan (`selfmotion.margin`).
-    title : str
-        By default the arm's name and task.
-
-    Raises
-    ------
-    PlanError
-        The certificate is of another motion, or the margins are of another motion or problem.
-    """
-    if not isinstance(plan, Plan):
-        raise ProblemError(f"write_sheet: plan is {shown(plan)}, expected a Plan")
-    if not isinstance(margins, Margins | None):
-        raise ProblemError(f"write_sheet: margins are {shown(margins)}, expected Margins")
-    if not plan.certificate.motion:
-        raise PlanError(f"{plan.robot.name}: {plan.certificate.verdict}")
-    if margins is not None and margins.robot != plan.robot.name:
-        raise PlanError(f"the margins are of {margins.robot}, the plan is of {plan.robot.name}")
-    own = plan.trajectory.digest, plan.problem.digest
-    if margins is not None and (margins.motion, margins.problem) != own:
-        raise PlanError(
-            f"{plan.robot.name}: the margins are of another motion or problem than the plan; find "
-            f"them anew (selfmotion.margin(plan))"
-        )
-    path = as_path(file)
-    if path.suffix != ".html":
-        raise ProblemError(f"{path}: expected a name that ends in .html")
-    named = title or f"{plan.robot.name}, task {plan.task.value}"
-    check = plan.certificate
-    kind = "verified" if check.verified else "refused"
-    body = [f"<h1>{html.escape(named)}</h1>", f'<p class="{kind}">{html.escape(check.verdict)}</p>']
-    if margins is not None:
-        body.append(f"<p>{html.escape(margins.sentence)}</p>")
-    body += [_drawn(section) for section in sections(plan, margins)]
-    write_text(
-        path,
-        '<!doctype html><html lang="en"><head><meta charset="utf-8">'
-        f"<title>{html.escape(named)}</title><style>{_STYLE}</style></head>"
-        f"<body>{''.join(body)}</body></html>\n",
-    )
-    return path
-
-
-def _drawn(section: Section) -> str:
-    head = ""
-    if any(section.head):
-        head = f"<tr>{''.join(f'<th>{html.escape(name)}</th>' for name in section.head)}</tr>"
-    rows = "".join(
-        f"<tr>{''.join(f'<td>{html.escape(cell)}</td>' for cell in row)}</tr>"
-        for row in section.rows
-    )
-    note = f'<p class="note">{html.escape(section.note)}</p>' if section.note else ""
-    title = html.escape(section.title)
-    return f"<section><h2>{title}</h2><table>{head}{rows}</table>{note}</section>"
