@@ -7,6 +7,7 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.basics import Array
+from selfmotion.problem.constraints import DependsOn
 from support.places import DATA
 
 # How far the last joint may be from the motion that it has to follow [rad].
@@ -87,6 +88,21 @@ def winding() -> sm.Problem:
         costs=[sm.costs.JointVelocity()],
         constraints=[Corridor(known)],
     )
+
+
+def test_a_condition_at_all_times_is_of_the_joints_alone(winding: sm.Problem) -> None:
+    class OfAll(Nodes):
+        depends_on = DependsOn.ALL
+
+    class WithAll(Corridor):
+        def conditions(self, robot: sm.RobotModel) -> sm.constraints.Conditions:
+            return sm.constraints.Conditions(points=(OfAll(self.motion),))
+
+    (known,) = winding.constraints
+    assert isinstance(known, Corridor)
+    wrong = replace(winding, constraints=[WithAll(known.motion)])
+    with pytest.raises(sm.errors.ProblemError, match="'corridor': it is of joints and tolerances"):
+        sm.plan(wrong)
 
 
 def test_what_a_cubic_cannot_meet_the_default_meets_with_more_freedom(winding: sm.Problem) -> None:

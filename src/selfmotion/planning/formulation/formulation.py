@@ -24,6 +24,7 @@ from selfmotion.problem.constraints import (
     BoundLimits,
     Conditions,
     Constraint,
+    DependsOn,
     EndCondition,
     Envelope,
     JointPositionLimits,
@@ -260,7 +261,7 @@ class Formulation:
     def bound(self, own: Conditions, start: Array, end: Array) -> BoundConditions:
         """Return conditions on the arm as those on motions between such ends, (n,) each."""
         for item in own.points:
-            _check_inequality(item)
+            _check_point(item)
         ends = tuple(self._end(item, start, end) for item in own.ends)
         return BoundConditions(own.limits, own.points, ends)
 
@@ -370,8 +371,13 @@ def _on_path_at_end(follows: RelaxedFrames) -> BoundEnd:
     return BoundEnd("end on the path", (0,), np.zeros(follows.dof), null)
 
 
-def _check_inequality(item: BoundConstraint) -> None:
-    """Raise ProblemError for an equality that is none on the ends."""
+def _check_point(item: BoundConstraint) -> None:
+    """Raise ProblemError for an equality that is none on the ends, or one of all coordinates."""
+    if item.depends_on is DependsOn.ALL:
+        raise ProblemError(
+            f"constraint '{item.name}': it is of joints and tolerances, expected a condition of "
+            f"the joints alone at all nodes; those on the ends are of both"
+        )
     if item.equality:
         raise ProblemError(
             f"constraint '{item.name}': it is an equality, expected h ≤ 0 at all nodes; "

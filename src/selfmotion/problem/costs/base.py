@@ -27,7 +27,7 @@ class Partials:
     q, qd, qdd, qddd : (S, n) or None
         ∂G/∂q, ∂G/∂q̇, ∂G/∂q̈ and ∂G/∂q⃛.
     error : (S, 6 F) or None
-        ∂G/∂e, e the pose errors of F tips, one after the other.
+        ∂G/∂e, e the pose errors of F tips, one after the other; of damped motions alone.
     """
 
     q: Array | None = None

@@ -30,7 +30,8 @@ class TipSamples:
     rotation, translation : (S, 3, 3), (S, 3)
         The tip's pose.
     error : (S, 6)
-        Pose error e, from the tip to the path [m, rad]; see `Task.twist_error`.
+        Pose error e, from the tip to the path [m, rad]; see `Task.twist_error`. Of damped motions
+        alone: where tolerances let the tool leave the path, it is 0.
     """
 
     jacobian: Array
@@ -109,7 +110,7 @@ class Samples:
 
     @property
     def error(self) -> Array:
-        """Pose errors e of all tips [m, rad], one after the other, (S, 6 F)."""
+        """Pose errors e of all tips [m, rad], one after the other, (S, 6 F); see `TipSamples`."""
         errors = [tip.error for tip in self.tips]
         return errors[0] if len(errors) == 1 else np.concatenate(errors, axis=1)
 
