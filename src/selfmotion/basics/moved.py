@@ -45,7 +45,6 @@ MOVED_MODULES = {
     "shop.controllers.read_stretches": "shop.controllers.read_segments",
     "shop.controllers.stretches": "shop.controllers.segments",
     "shop.sheet": "shell.sheet",
-    "shop.sheet.page": "shell.sheet.page",
 }
 
 
