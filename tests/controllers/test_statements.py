@@ -8,12 +8,14 @@ import numpy as np
 import pytest
 
 from selfmotion.model.task import SE3, exp3
-from selfmotion.shop.controllers.krl import KRL, KrlReader
+from selfmotion.shop.controllers.krl import KRL
+from selfmotion.shop.controllers.krl_reader import KrlReader
 from selfmotion.shop.controllers.program_comments import COMMENTS, Comments
 from selfmotion.shop.controllers.program_lines import Lines
 from selfmotion.shop.controllers.program_reader import ProgramReader
 from selfmotion.shop.controllers.program_writer import WrittenPose
-from selfmotion.shop.controllers.rapid import RAPID, RapidReader
+from selfmotion.shop.controllers.rapid import RAPID
+from selfmotion.shop.controllers.rapid_reader import RapidReader
 from selfmotion.shop.controllers.read_segments import Pose
 from selfmotion.shop.controllers.statements import Statement, Table, number, word
 from selfmotion.shop.controllers.urscript import URSCRIPT, UrscriptReader

@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from selfmotion.basics import Array, ProblemError, Progress, read_only, silent
-from selfmotion.certificate import Certificate, Requirement, Tolerance, arm_limits, errors_between
+from selfmotion.basics import Array, ProblemError, read_only
+from selfmotion.certificate import Certificate, Tolerance, arm_limits, errors_between
 from selfmotion.model.follow import Coordinates, Follows, RelaxedFrames
 from selfmotion.model.motion import NullMotion, Sampling, Trajectory, fading_window
 from selfmotion.model.path import Path
@@ -333,16 +333,10 @@ class Formulation:
         return epsilon * fading_window(t, self.path.duration, self.rests)[:, None]
 
     def certify(
-        self,
-        trajectory: Trajectory,
-        tolerance: Tolerance | None = None,
-        ending: str = "",
-        besides: Sequence[Requirement] = (),
-        progress: Progress = silent,
+        self, trajectory: Trajectory, tolerance: Tolerance | None = None, ending: str = ""
     ) -> Certificate:
         """See `Problem.certify`, of a motion of all coordinates."""
-        own = self.of_arm(trajectory)
-        return self.problem.certify(own, tolerance, ending, besides, progress)
+        return self.problem.certify(self.of_arm(trajectory), tolerance, ending)
 
     def errors_between(self, trajectory: Trajectory) -> Array:
         """Return the errors of a motion in the middle between samples, (N, 2) [m, rad]."""

@@ -67,7 +67,7 @@ def pace_of(plan: Plan, formulation: Formulation) -> float:
 
 
 def slower(trajectory: Trajectory, pace: float) -> Trajectory:
-    """Return the same motion so many times as fast; `pace` is its duration over the new one."""
+    """Return the same motion, faster by the factor `pace`: its duration over the new one."""
     qdd = None if trajectory.qdd is None else pace**2 * trajectory.qdd
     t, qd = trajectory.t / pace, pace * trajectory.qd
     return Trajectory(t, trajectory.q, qd, trajectory.joint_names, qdd)

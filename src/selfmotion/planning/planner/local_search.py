@@ -218,9 +218,5 @@ class LocalSearch:
 
 
 def _rank(optimum: Optimum, begun: NodeMotion) -> tuple[bool, bool, float]:
-    """Return what sorts optima, the smaller the better.
-
-    What is broken counts as so many times the cost of the motion that all `begun` with, for a unit
-    or for all that this one breaks: where nothing can be kept, not at any price.
-    """
+    """Return the sort key of optima, see `rank_of`."""
     return rank_of(optimum.motion, begun)

@@ -116,7 +116,7 @@ def _finer(search: LocalSearch, known: NodeOutcome) -> Array | None:
 
 
 def _divided(t: Array, parts: Ints) -> Array:
-    """Return times (N + 1,) with each interval in so many equal parts, (N,)."""
+    """Return times (N + 1,) with each interval in a number of equal parts, (N,)."""
     first = np.repeat(np.cumsum(parts) - parts, parts)
     share = (np.arange(parts.sum()) - first) / np.repeat(parts, parts)
     inner = np.repeat(t[:-1], parts) + share * np.repeat(np.diff(t), parts)

@@ -193,14 +193,14 @@ class Whole:
         """Return what a page shows of several steps; PlanError where a move is missing."""
         motion = made.motion if isinstance(made, Move) else made.trajectory
         marks = tuple(_marks(made))
-        left: tuple[Obstacle, ...] = ()
         events: tuple[tuple[float, str], ...] = ()
+        grows = False
         if isinstance(made, Program):
             events = tuple((at, f"{name}: {event}") for at, name, event in made.events)
-            left = tuple(item for step in made.steps for item in step.leaves)
-            moves = [step.made for step in made.steps]
-            constraints = tuple(moves[0].constraints) if isinstance(moves[0], Move) else ()
-            known = [*moves[0].obstacles, *left]
+            grows = any(step.leaves for step in made.steps)
+            first = made.steps[0].made
+            constraints = tuple(first.constraints) if isinstance(first, Move) else ()
+            known = list(made.obstacles)
         elif isinstance(made, Parts):
             constraints, known = tuple(made.problem.constraints), list(made.plans[0].obstacles)
         else:
@@ -208,7 +208,7 @@ class Whole:
         unique = {item.name: item for item in known}
         plan = _stand_in(made.robot, motion, constraints)
         standing = tuple(unique.values())
-        return cls(plan, marks, made.verdict, made.verified, events, standing, bool(left))
+        return cls(plan, marks, made.verdict, made.verified, events, standing, grows)
 
     @property
     def points(self) -> int:

@@ -6,7 +6,6 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from selfmotion.basics import PlanError, ProblemError, as_path, shown, write_text
-from selfmotion.model.collision import Obstacle
 from selfmotion.planning.result import Plan
 from selfmotion.shell.replay.still import picture
 from selfmotion.shell.replay.whole import seam_color
@@ -45,7 +44,7 @@ def write_sheet(
 ) -> Path:
     """Write what a program does, keeps and survives as one HTML page that prints on A4.
 
-    The page has a picture of the arm, its path and what stands there, and room to sign. It needs no
+    The page has a picture of arm, path and obstacles, and room to sign. It needs no
     network and no other file. Every number is from certificates, reports or margins.
 
     Parameters
@@ -174,14 +173,11 @@ def _picture(made: Plan | Program) -> str:
         return _figure(picture(made.robot, made.trajectory, made.obstacles))
     if not made.steps or any(step.is_missing for step in made.steps):
         return ""
-    standing = dict[str, Obstacle]()
-    for step in made.steps:
-        standing |= {item.name: item for item in (*step.made.obstacles, *step.leaves)}
     seams = list[tuple[float, float, str]]()
     for begin, step in zip(made.begins, made.steps, strict=True):
         if step.is_seam:
             seams.append((begin, begin + step.duration, seam_color(len(seams))))
-    return _figure(picture(made.robot, made.trajectory, tuple(standing.values()), seams))
+    return _figure(picture(made.robot, made.trajectory, made.obstacles, seams))
 
 
 def _figure(drawing: str) -> str:

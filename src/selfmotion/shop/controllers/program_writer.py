@@ -1,5 +1,6 @@
 """Programs of controllers, written segment by segment by the table of their language."""
 
+from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path as FilePath
 from typing import Any, ClassVar, NamedTuple
@@ -12,9 +13,7 @@ from selfmotion.shop.controllers.feed_segments import FeedSegment
 from selfmotion.shop.controllers.program_comments import before, head
 from selfmotion.shop.controllers.program_draft import Draft
 from selfmotion.shop.controllers.program_settings import Signal, written
-from selfmotion.shop.controllers.program_texts import (
-    plain,
-)
+from selfmotion.shop.controllers.program_texts import plain
 from selfmotion.shop.controllers.segments import PoseSegment, Segment
 from selfmotion.shop.controllers.statements import Language
 
@@ -38,7 +37,7 @@ class WrittenPose(NamedTuple):
     configuration: str = ""
 
 
-class ProgramWriter:
+class ProgramWriter(ABC):
     """Writer of a language.
 
     Attributes
@@ -66,13 +65,13 @@ class ProgramWriter:
             lines += self.motion(segment)
         write_text(file, "\n".join([*lines, *self.closing(), ""]))
 
+    @abstractmethod
     def opening(self) -> list[str]:
         """Return the lines up to where the motion begins."""
-        raise NotImplementedError
 
+    @abstractmethod
     def closing(self) -> list[str]:
         """Return the lines after the motion."""
-        raise NotImplementedError
 
     def before_step(self) -> list[str]:
         """Return the lines before the comments of a step."""
@@ -80,7 +79,17 @@ class ProgramWriter:
 
     def approach(self, segment: Segment) -> list[str]:
         """Return the slow motion to where a segment begins, of another kind than the one before."""
-        raise NotImplementedError
+        if isinstance(segment, PoseSegment):
+            return self.linear_approach(segment)
+        return self.joint_approach(segment)
+
+    @abstractmethod
+    def joint_approach(self, segment: Segment) -> list[str]:
+        """Return the slow motion of joints to where a segment begins."""
+
+    @abstractmethod
+    def linear_approach(self, segment: PoseSegment) -> list[str]:
+        """Return the slow motion along a line to where a segment of poses begins."""
 
     def motion(self, segment: Segment) -> list[str]:
         """Return the lines of a motion from rest to rest, or of a rest."""
@@ -94,8 +103,8 @@ class ProgramWriter:
         return lines
 
     def pace(self, segment: Segment, k: int) -> dict[str, Any]:
-        """Return the values of the statement of a step besides its target."""
-        raise NotImplementedError
+        """Return the values of the statement of a step besides its target; none by default."""
+        return {}
 
     def step(self, segment: Segment, k: int, linear: str = "linear", **values: Any) -> str:
         """Return the line of a step to a target: by joints, circular, or `linear`."""

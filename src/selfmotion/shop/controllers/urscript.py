@@ -208,7 +208,7 @@ class UrscriptWriter(ProgramWriter):
             self.line("set", tool=draft.tool if frames is None else frames.tool),
             *payload(draft.settings),
             *([] if frames is None else [self.line("set", work=frames.work)]),
-            joint_approach(self.program.segments[0].q[0], draft.settings),
+            *self.joint_approach(self.program.segments[0]),
         ]
 
     @override
@@ -216,10 +216,12 @@ class UrscriptWriter(ProgramWriter):
         return [URSCRIPT.text("leave")]
 
     @override
-    def approach(self, segment: Segment) -> list[str]:
+    def joint_approach(self, segment: Segment) -> list[str]:
+        return [joint_approach(segment.q[0], self.draft.settings)]
+
+    @override
+    def linear_approach(self, segment: PoseSegment) -> list[str]:
         settings = self.draft.settings
-        if not isinstance(segment, PoseSegment):
-            return [joint_approach(segment.q[0], settings)]
         ramp, speed = settings.approach * _ACCELERATION, settings.approach * _FASTEST
         values = {"acceleration": ramp, "speed": _four_digits(speed)}
         return [self.line("linear approach", pose=self.pose(segment, 0), **values)]

@@ -150,6 +150,13 @@ class Program:
         )
 
     @property
+    def obstacles(self) -> tuple[Obstacle, ...]:
+        """All obstacles in the end: those of the first step, and what each step leaves."""
+        first = self.steps[0].made.obstacles if self.steps else ()
+        left = (item for step in self.steps for item in step.leaves)
+        return tuple({item.name: item for item in (*first, *left)}.values())
+
+    @property
     def verified(self) -> bool:
         """Whether every seam is made, and everything is kept at all times."""
         return not self.failures
