@@ -157,6 +157,40 @@ def test_a_positioner_carries_its_work_object(
 
 
 @pytest.mark.parametrize("name", FILES)
+def test_units_of_verdicts_are_words_of_ascii(alone: sm.Plan, tmp_path: Path, name: str) -> None:
+    file = tmp_path / name
+    sm.files.write_motion(alone, file, settings=settings(name))
+    text = file.read_text()
+    assert "?" not in text
+    assert re.search(r"at most [\d.e-]+ um and", text)
+
+
+def test_a_speed_is_declared_once(alone: sm.Plan, tmp_path: Path) -> None:
+    file = tmp_path / "weld.mod"
+    sm.files.write_motion(alone, file, settings=settings(file.name))
+    text = file.read_text()
+    (line,) = re.findall(r"^ *CONST speeddata weld_v :=.*$", text, re.MULTILINE)
+    fast = re.sub(r"\[.*\]", "[5000, 500, 5000, 500]", line)
+    file.write_text(text.replace(line, f"{fast}\n{line}"))
+    with pytest.raises(sm.errors.FileFormatError, match="a speeddata 'weld_v' already"):
+        read_program(file, alone.robot)
+
+
+def test_the_last_base_counts(turned: sm.Plan, tmp_path: Path) -> None:
+    """A controller that sets $BASE again has left the kinematic system that it named before."""
+    file = tmp_path / "weld.src"
+    sm.files.write_motion(turned, file, settings=settings(file.name, positioner=2))
+    text = file.read_text()
+    (carried,) = re.findall(r"^ *\$BASE = EK\(.*\)$", text, re.MULTILINE)
+    alone = f"  $BASE = {carried[carried.rindex('{') : -1]}"
+    file.write_text(text.replace(carried, f"{alone}\n{carried}"))
+    assert read_program(file, turned.robot).segments
+    file.write_text(text.replace(carried, f"{carried}\n{alone}"))
+    with pytest.raises(sm.errors.FileFormatError, match="its work object stands in the world"):
+        read_program(file, turned.robot)
+
+
+@pytest.mark.parametrize("name", FILES)
 def test_a_shifted_work_object_shifts_the_motion(alone: sm.Plan, tmp_path: Path, name: str) -> None:
     """By as much, in the world; and it is judged along the path that is shifted with it."""
     file, cell = tmp_path / name, tmp_path / "cell.toml"

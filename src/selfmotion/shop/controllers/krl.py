@@ -163,9 +163,9 @@ KRL = Language(
         Statement("comment", "&<header>", _BEFORE),
         Statement("begin", "DEF <name>()", _BEFORE, then="head"),
         Statement("initialise", "BAS(#INITMOV, 0)", _HEAD),
-        Statement("set", "$BASE = <work:frame>", _HEAD),
+        Statement("base", "$BASE = <work:frame>", _HEAD),
         Statement(
-            "set",
+            "base",
             "$BASE = EK(MACHINE_DEF[<unit>].ROOT, MACHINE_DEF[<unit>].MECH_TYPE, <work:frame>)",
             _HEAD,
         ),

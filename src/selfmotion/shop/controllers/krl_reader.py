@@ -7,6 +7,7 @@ import numpy as np
 from typing_extensions import override
 
 from selfmotion.model.robot import RobotModel
+from selfmotion.model.task import SE3
 from selfmotion.shop.controllers.controller_program import Switch
 from selfmotion.shop.controllers.krl import FASTEST, KRL, TURNING, UNBOUND_TURNING, WHOLE
 from selfmotion.shop.controllers.program_reader import ProgramReader, Target
@@ -39,6 +40,7 @@ class KrlReader(ProgramReader):
         return {
             **super().actions(),
             "initialise": self._initialise,
+            "base": self._set_base,
             "joint approach": self._joint_approach,
             "linear approach": self._linear_approach,
             "axis block": self._begin_block,
@@ -57,7 +59,7 @@ class KrlReader(ProgramReader):
     @property
     @override
     def is_carried(self) -> bool | None:
-        return "unit" in self.settings if "work" in self.settings else None
+        return bool(self.settings["unit"]) if "work" in self.settings else None
 
     @override
     def check(self, kind: str) -> None:
@@ -75,6 +77,11 @@ class KrlReader(ProgramReader):
                 "first: it may set them back"
             )
         self._is_initialised = True
+
+    def _set_base(self, work: SE3, unit: str = "") -> None:
+        """Take $BASE, all of it: one without a kinematic system stands in the world again."""
+        self.settings["work"] = work
+        self.settings["unit"] = unit
 
     def _joint_approach(self, axes: list[float]) -> None:
         """Take where the motion begins, or where it slowly goes on by axis targets."""

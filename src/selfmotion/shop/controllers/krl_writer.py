@@ -186,13 +186,13 @@ class KrlWriter(ProgramWriter):
         if frames is None:
             return f"{self.indent}$BASE = {{X 0, Y 0, Z 0, A 0, B 0, C 0}}"
         if not frames.is_carried:
-            return self.line("set", work=frames.work)
+            return self.line("base", work=frames.work)
         unit = self.positioner(
             int,
             "$BASE names its kinematic system by its number in MACHINE_DEF; say positioner = 2, "
             "or which it is",
         )
-        return self.line("set", unit=unit, work=frames.work)
+        return self.line("base", unit=unit, work=frames.work)
 
     def _load(self) -> list[str]:
         settings = self.draft.settings

@@ -34,11 +34,13 @@ def rounded_up(value: float, digits: int) -> str:
     return f"{ceil(value * 10**digits) / 10**digits:.{digits}f}"
 
 
+# Signs of verdicts and names, as comments of programs have them.
+_IN_ASCII = str.maketrans({"→": "->", "°": " deg", "µ": "u"})
+
+
 def plain(text: str) -> str:
     """Return a text as a comment may hold it: one line of ASCII."""
-    return " ".join(
-        text.replace("→", "->").replace("°", " deg").encode("ascii", "replace").decode().split()
-    )
+    return " ".join(text.translate(_IN_ASCII).encode("ascii", "replace").decode().split())
 
 
 def as_word(name: str) -> str:

@@ -69,6 +69,8 @@ class RapidReader(ProgramReader):
         self.settings.update(values)
 
     def _take_speed(self, speed: str, speeds: list[float]) -> None:
+        if speed.lower() in self._speeds:
+            raise self.lines.fault(f"there is a speeddata '{speed}' already, expected one")
         self._speeds[speed.lower()] = speeds
 
     def _joint_approach(self, axes: list[float], speed: str, tool: str) -> None:
