@@ -14,8 +14,9 @@ from numba.core import caching
 
 import selfmotion as sm
 from selfmotion.basics import jit
-from selfmotion.planning.nodes import charts
-from selfmotion.planning.nodes.kernels import accelerate, bend_of
+from selfmotion.planning.nodes import local_model
+from selfmotion.planning.nodes.kernels import accelerate
+from selfmotion.planning.nodes.local_model import differences, neighbours
 
 pytestmark = pytest.mark.skipif(
     bool(numba.config.DISABLE_JIT),
@@ -106,9 +107,10 @@ def test_what_is_compiled_meanwhile_is_what_a_plan_needs() -> None:
     arm = sm.load_robot("panda")
     home = sm.NAMED_ARMS["panda"].home
     sm.plan(sm.Problem(arm, sm.paths.Circle.around(arm.pose(home), 0.05, 2.0), "pose", home))
-    before = [kernel.signatures for kernel in (accelerate, bend_of)]
-    charts._call_what_follows()
-    assert [kernel.signatures for kernel in (accelerate, bend_of)] == before
+    kernels = accelerate, neighbours, differences
+    before = [kernel.signatures for kernel in kernels]
+    local_model._call_what_follows()
+    assert [kernel.signatures for kernel in kernels] == before
     assert all(before)
 
 

@@ -6,7 +6,7 @@ import selfmotion as sm
 from selfmotion.basics import Counts
 from selfmotion.planning.formulation import BoundConditions, Formulation
 from selfmotion.planning.nodes import NodeGrid
-from selfmotion.planning.nodes.objective import LocalModel
+from selfmotion.planning.nodes.local_model import LocalModel
 from selfmotion.planning.nodes.spline import AT_CONTROLS
 from support.arms import PANDA_HOME, Case
 from support.nodes import nodes_of, problem_of
@@ -69,10 +69,10 @@ def linear_and_real_jerks(panda: sm.RobotModel, count: int) -> tuple[np.ndarray,
     motion = nodes_of(problem, count)
     grid, place = motion.grid, motion.place
     around = LocalModel.of(
-        motion.charts, motion.nu, motion.alpha, place, np.zeros_like(place.nodes)
+        motion.charts, motion.nu, motion.alpha, place, np.zeros_like(place.nodes), grid.scale
     )
     assert around is not None
-    changes = around.scaled(grid.scale).changes
+    changes = around.changes
     # The self-motion swings to and fro, with the rates that this has to first order.
     z = FAR * np.sin(np.pi * grid.t / path.duration)[:, None] ** 2
     rates = grid.spline.differences(np.einsum("knd,kd->kn", changes[:, 0, :, :1], z))

@@ -7,7 +7,7 @@ from selfmotion.basics import Array, Counts
 from selfmotion.model.motion import Trajectory
 from selfmotion.planning.formulation import BoundConditions, Formulation
 from selfmotion.planning.nodes import NodeGrid, NodeMotion
-from selfmotion.planning.nodes.objective import LocalModel
+from selfmotion.planning.nodes.local_model import LocalModel
 from selfmotion.planning.paper import converged_minimum_norm
 from support.arms import Case
 
@@ -63,7 +63,8 @@ def centred(motion: NodeMotion) -> NodeMotion:
 def around_of(motion: NodeMotion, force: Array | None = None) -> LocalModel:
     """Return how nodes at the reference of their charts move, for λ (N + 1, 3, n) or none."""
     force = np.zeros_like(motion.place.nodes) if force is None else force
-    found = LocalModel.of(motion.charts, motion.nu, motion.alpha, motion.place, force)
+    scale = np.ones(3 * motion.nu.shape[1])
+    found = LocalModel.of(motion.charts, motion.nu, motion.alpha, motion.place, force, scale)
     assert found is not None
     return found
 

@@ -13,8 +13,8 @@ import numpy as np
 
 from selfmotion.basics import Array, Flags, Ints
 from selfmotion.planning.nodes.charts import Centred, Charts, Place
+from selfmotion.planning.nodes.local_model import LocalModel
 from selfmotion.planning.nodes.motion import NodeGrid, NodeMotion
-from selfmotion.planning.nodes.objective import LocalModel
 from selfmotion.planning.nodes.spline import GAUSS
 from selfmotion.planning.optimise import Banded
 
@@ -159,10 +159,11 @@ class Batch:
         slopes = grid.cost.slopes(motion.samples, motion.curve_ends, motion.partials)
         slopes[spline.gaps] = 0.0
         force = spline.scattered(slopes)
-        around = LocalModel.of(motion.charts, motion.nu, motion.alpha, motion.place, force)
+        around = LocalModel.of(
+            motion.charts, motion.nu, motion.alpha, motion.place, force, grid.scale
+        )
         if around is None:
             raise RuntimeError(_LEAVES)
-        around = around.scaled(grid.scale)
         gradient = around.pulled(force)
         gradient.reshape(-1)[grid.held] = 0.0
         both = spline.changes(around.changes)

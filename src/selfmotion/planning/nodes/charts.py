@@ -1,18 +1,16 @@
 """Charts of the self-motion manifolds of all nodes, and eq. 4 there."""
 
-from copy import copy
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
-from selfmotion.basics import Array, meanwhile
-from selfmotion.basics.layout import layout_of
+from selfmotion.basics import Array
 from selfmotion.model import kernels
 from selfmotion.model.follow import Follows
 from selfmotion.model.path import twist_rates
 from selfmotion.model.robot import null_space
-from selfmotion.planning.nodes.kernels import accelerate, bend_of, retract
+from selfmotion.planning.nodes.kernels import accelerate, retract
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,21 +36,6 @@ class Place:
     def nodes(self) -> Array:
         """(q, q̇, q̈), (N + 1, 3, n)."""
         return np.stack([self.q, self.qd, self.qdd], axis=1)
-
-
-class Bases(NamedTuple):
-    """Derivatives of q̇ and q̈ by ν and α at the nodes.
-
-    Attributes
-    ----------
-    by_rate : (N + 1, n, r)
-        B = ∂q̇/∂ν = ∂q̈/∂α.
-    by_both : (N + 1, n, r)
-        D = ∂q̈/∂ν.
-    """
-
-    by_rate: Array
-    by_both: Array
 
 
 class Centred(NamedTuple):
@@ -95,26 +78,7 @@ class Charts:
 
     def at(self, z: Array, nu: Array, alpha: Array) -> Place | None:
         """Return the nodes at z, ν and α, (N + 1, r) each; None where Newton's iteration fails."""
-        found = self._retracted(z, self.spread(nu), self.spread(alpha), centred=False)
-        return None if found is None else found[0]
-
-    def around(self, z: Array, nu: Array, alpha: Array) -> tuple[Place, Bases] | None:
-        """Return the same with its derivatives by ν and α."""
-        given = z, self.spread(nu), self.spread(alpha)
-        found = self._retracted(*given, centred=False, full=True)
-        return None if found is None or found[1] is None else (found[0], found[1])
-
-    def repeated(self, count: int) -> "Charts":
-        """Return `count` copies of the charts, one after the other, for one pass."""
-        if count == 1:
-            return self
-        tiled = np.tile(self.q, (count, 1)), np.tile(self.bases, (count, 1, 1))
-        return Charts(self.manifolds.repeated(count), *tiled)
-
-    def bases_at(self, place: Place) -> Bases:
-        """Return the derivatives of q̇ and q̈ by ν and α at a place at the reference."""
-        other = replace(place, qdd=np.empty_like(place.qdd))
-        return self.manifolds.accelerated(other, np.zeros_like(place.q), self.bases)
+        return self._retracted(z, self.spread(nu), self.spread(alpha), centred=False)
 
     def centred(
         self, z: Array, epsilon: Array, a: Array, *, carried: bool = False
@@ -124,10 +88,9 @@ class Charts:
         Of the bases, only the first need be given where they are `carried` from node to node. None
         where a node cannot be put onto its manifold.
         """
-        found = self._retracted(z, epsilon, a, centred=True, carried=carried)
-        if found is None:
+        place = self._retracted(z, epsilon, a, centred=True, carried=carried)
+        if place is None:
             return None
-        place = found[0]
         around = Charts(self.manifolds, place.q, place.tangents)
         own, turned = self.manifolds.rates(place.table)[1], np.swapaxes(place.tangents, 1, 2)
         nu, alpha = ((turned @ each[:, :, None])[:, :, 0] for each in (own, a))
@@ -155,16 +118,15 @@ class Charts:
         *,
         centred: bool,
         carried: bool = False,
-        full: bool = False,
-    ) -> tuple[Place, Bases | None] | None:
+    ) -> Place | None:
         own, bases = self.manifolds, self.bases
         q, table, tangents = np.empty_like(self.q), own.table(), np.empty_like(bases)
         if not self._retract(q, table, tangents, z, epsilon, centred=centred, carried=carried):
             return None
         qd, _ = own.rates(table)
         place = Place(q, np.array(qd), np.empty_like(q), tangents, table)
-        around = own.accelerated(place, a, bases if full else None)
-        return place, around if full else None
+        own.accelerate(place, a)
+        return place
 
     def _retract(
         self,
@@ -200,6 +162,11 @@ class Manifolds:
         Number of motions that are put one after the other, at times `t` each. A node that cannot be
         put onto its manifold then has q̇ = NaN, and the others are valid. By default there is one
         motion, all of whose nodes have to be.
+
+    Attributes
+    ----------
+    path_accelerations : (N + 1, 6 F)
+        ẍ of the paths.
     """
 
     def __init__(self, follows: Follows, t: Array, copies: int | None = None) -> None:
@@ -215,25 +182,9 @@ class Manifolds:
             accelerations.append(twist_rates(item.path, t))
         self.held = np.tile(follows.held(t), (copies, 1))
         self.targets = np.ascontiguousarray(np.hstack([path[:, :12] for path in self._paths]))
-        # ẍ of the paths, (N + 1, 6 F).
-        self._path_accelerations = np.ascontiguousarray(
+        self.path_accelerations = np.ascontiguousarray(
             np.tile(np.hstack(accelerations), (copies, 1))
         )
-        self._repeated: dict[int, Manifolds] = {}
-
-    def repeated(self, count: int) -> "Manifolds":
-        """Return `count` copies of the manifolds, one after the other."""
-        if count == 1:
-            return self
-        if count not in self._repeated:
-            found = copy(self)
-            found.copies, found.t = count * self.copies, np.tile(self.t, count)
-            for name in ("held", "targets", "_path_accelerations"):
-                setattr(found, name, np.tile(getattr(self, name), (count, 1)))
-            found._paths = [np.tile(path, (count, 1)) for path in self._paths]
-            found._repeated = {}
-            self._repeated[count] = found
-        return self._repeated[count]
 
     def table(self) -> Array:
         """Return a table that holds the paths alone."""
@@ -247,35 +198,11 @@ class Manifolds:
         """Return q̇ and ε of a table, (N + 1, n) each, as views of it."""
         return kernels.rates_of(table, self.follows.dof)
 
-    def accelerated(self, place: Place, a: Array, bases: Array | None) -> Bases:
-        """Set q̈ of a place for a null acceleration a (N + 1, n).
-
-        Returns the derivatives of the motion by ν and α, for `bases`; without, empty arrays.
-        """
-        full = bases is not None
-        by = np.empty(place.tangents.shape if full else (0, 0, 0))
-        found = Bases(by, np.empty_like(by))
-        accelerate(
-            place.table,
-            self.layout,
-            self.follows.every_column(place.q),
-            self._path_accelerations,
-            np.ascontiguousarray(a),
-            np.ascontiguousarray(bases) if full else by,
-            full,
-            place.qdd,
-            *found,
-        )
-        return found
-
-    def bends(self, place: Place, force: Array, directions: Array) -> Array:
-        """Return half the second derivatives of force · q̈ along directions of q̇, (N + 1, d).
-
-        For a force (N + 1, n), and directions (N + 1, n, d).
-        """
+    def accelerate(self, place: Place, a: Array) -> None:
+        """Set q̈ of a place for a null acceleration a (N + 1, n)."""
         every = self.follows.every_column(place.q)
-        given = np.ascontiguousarray(directions), np.ascontiguousarray(force)
-        return np.asarray(bend_of(place.table, self.layout, every, *given))
+        given = self.path_accelerations, np.ascontiguousarray(a)
+        accelerate(place.table, self.layout, every, *given, place.qdd)
 
     def with_held_last(self, q: Array, bases: Array) -> Array:
         """Return bases (N + 1, n, r) at q (N + 1, n) whose last vectors are those of held joints.
@@ -328,17 +255,6 @@ class Manifolds:
         for first in range(0, len(q), len(q) // self.copies):
             bases[first] = self.follows.null_basis(q[first])
         return Charts(self, q, bases).centred(none, epsilon, a, carried=True)
-
-
-@meanwhile
-def _call_what_follows() -> None:
-    """Compile the kernels that are called after the largest one, `retract`: called for no nodes."""
-    layout = layout_of([(np.arange(1), False, np.arange(2))], 2)
-    table, rates = np.zeros((0, kernels.columns(2, 1, 1))), np.zeros((0, 2))
-    bases = np.zeros((0, 2, 1))
-    given = np.zeros((0, 6)), rates, bases, True, rates, bases, bases
-    accelerate(table, layout, None, *given)
-    bend_of(table, layout, None, bases, rates)
 
 
 def orthonormal(tangents: Array) -> Array:

@@ -146,7 +146,7 @@ def retract(
                 at.factor[i, j] = factor[i, j]
         for f in range(tips):
             tip = tip_of(row, f, n, m)
-            _write_tip(tip, rotations[f], positions[f], jacobians[f])
+            write_tip(tip, rotations[f], positions[f], jacobians[f])
             select(layout, f, tip.rotation, tip.command, at.y)
         respond(at.task_jacobian, at.factor, at.y, at.epsilon, at.qd)
         if not finite(at.qd):
@@ -180,7 +180,7 @@ def _centre(tangents: Array, epsilon: Array, rest: Array) -> None:
 
 
 @inlined
-def _write_tip(tip: Tip, turn: Array, place: Array, six: Array) -> None:
+def write_tip(tip: Tip, turn: Array, place: Array, six: Array) -> None:
     """Write a tip's pose and Jacobian into the table; its command is its path's twist."""
     for i in range(3):
         tip.translation[i] = place[i]
@@ -199,82 +199,23 @@ def accelerate(
     every: Every | None,
     accelerations: Array,
     alpha: Array,
-    bases: Array,
-    full: bool,
     qdd: Array,
-    by_rate: Array,
-    by_both: Array,
 ) -> None:
     """Set q̈ (K, n) of nodes whose motion `retract` has evaluated: q̈ = a + J⁺(b - J a).
 
     With a (K, n) = `alpha` the null acceleration, b = S(ẍ - J̇q̇) + Ṡ(ẋ - Jq̇), and
-    ẍ = `accelerations` (K, 6 F). If `full`, also ∂q̇/∂ν = ∂q̈/∂α = B = (I - J⁺J) N0 (K, n, r) =
-    `by_rate`, and ∂q̈/∂ν = J⁺ ∂b/∂q̇ B (K, n, r) = `by_both`: b is quadratic in q̇, so that its
-    central difference is exact.
+    ẍ = `accelerations` (K, 6 F).
     """
-    (count, n), m, r = qdd.shape, rows_of(layout), bases.shape[2]
-    right, other, six = np.empty(m), np.empty(m), np.empty(6)
-    rates, direction = np.empty(n), np.empty(n)
+    (count, n), m = qdd.shape, rows_of(layout)
+    right, six = np.empty(m), np.empty(6)
     for k in range(count):
         at = stage_of(table[k], n, m)
-        _required(table[k], layout, every, k, accelerations[k], at.qd, six, right)
-        _projected(at.task_jacobian, at.factor, right, alpha[k], qdd[k])
-        if not full:
-            continue
-        for x in range(r):
-            for j in range(n):
-                direction[j] = bases[k, j, x]
-            for i in range(m):
-                right[i] = 0.0
-            _projected(at.task_jacobian, at.factor, right, direction, rates)
-            for j in range(n):
-                by_rate[k, j, x], direction[j] = rates[j], at.qd[j] + rates[j]
-            _required(table[k], layout, every, k, accelerations[k], direction, six, right)
-            for j in range(n):
-                direction[j] = at.qd[j] - rates[j]
-            _required(table[k], layout, every, k, accelerations[k], direction, six, other)
-            for i in range(m):
-                right[i] = 0.5 * (right[i] - other[i])
-            for j in range(n):
-                direction[j] = 0.0
-            _projected(at.task_jacobian, at.factor, right, direction, rates)
-            for j in range(n):
-                by_both[k, j, x] = rates[j]
-
-
-@kernel
-def bend_of(
-    table: Array, layout: Layout, every: Every | None, directions: Array, force: Array
-) -> Array:
-    """Return half the second derivatives of λᵀq̈ along directions of q̇, (K, d).
-
-    For λ = `force` (K, n) and u = `directions` (K, n, d): -λᵀJ⁺ Q(u, u), with J̇q̇ = Q(q̇, q̇).
-    """
-    (count, n, size), m = directions.shape, rows_of(layout)
-    out, direction, six = np.zeros((count, size)), np.empty(n), np.empty(6)
-    right, other, by = np.empty(m), np.empty(m), np.empty(m)
-    none = np.zeros(6 * layout.shape[0])
-    for k in range(count):
-        at = stage_of(table[k], n, m)
-        for i in range(m):
-            by[i] = 0.0
-            for j in range(n):
-                by[i] += at.task_jacobian[i, j] * force[k, j]
-        solve_cholesky(at.factor, by)
-        for x in range(size):
-            for j in range(n):
-                direction[j] = directions[k, j, x]
-            _required(table[k], layout, every, k, none, direction, six, right)
-            for j in range(n):
-                direction[j] = -direction[j]
-            _required(table[k], layout, every, k, none, direction, six, other)
-            for i in range(m):
-                out[k, x] += 0.5 * by[i] * (right[i] + other[i])
-    return out
+        required_acceleration(table[k], layout, every, k, accelerations[k], at.qd, six, right)
+        project(at.task_jacobian, at.factor, right, alpha[k], qdd[k])
 
 
 @called
-def _required(
+def required_acceleration(
     row: Array,
     layout: Layout,
     every: Every | None,
@@ -291,15 +232,31 @@ def _required(
     n, m = len(rates), rows_of(layout)
     for f in range(layout.shape[0]):
         tip = tip_of(row, f, n, m)
-        if every is None:
-            spin = _turned(layout, f, tip.jacobian, rates, six)
-        else:
-            spin = _turned_every(every[1], f, every[0][s, f], rates, six)
+        spin = turned(layout, f, tip.jacobian, every, s, rates, six)
         for i in range(6):
             six[i] = accelerations[6 * f + i] - six[i]
         if layout[f, KIND] == POINTING:
             add_angular(six, -1.0, cross(spin, angular_part(tip.target_twist)))
         select(layout, f, tip.rotation, six, out)
+
+
+@inlined
+def turned(
+    layout: Layout,
+    f: int,
+    jacobian: Array,
+    every: Every | None,
+    s: int,
+    rates: Array,
+    out: Array,
+) -> Vector:
+    """Set `out` (6,) to J̇6 q̇ of tip f, and return the tip's angular velocity.
+
+    Where joints share coordinates, from the columns of all joints at sample s of `every`.
+    """
+    if every is None:
+        return _turned(layout, f, jacobian, rates, out)
+    return _turned_every(every[1], f, every[0][s, f], rates, out)
 
 
 @inlined
@@ -344,7 +301,7 @@ def _added(
 
 
 @inlined
-def _projected(jacobian: Array, factor: Array, right: Array, direction: Array, out: Array) -> None:
+def project(jacobian: Array, factor: Array, right: Array, direction: Array, out: Array) -> None:
     """Set `out` (n,) to p + J⁺(b - J p) for p = `direction`; b = `right` (m,) is overwritten."""
     m, n = jacobian.shape
     for i in range(m):

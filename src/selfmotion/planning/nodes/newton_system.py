@@ -10,8 +10,8 @@ import numpy as np
 
 from selfmotion.basics import Array, Flags
 from selfmotion.planning.nodes.ends import Border
+from selfmotion.planning.nodes.local_model import LocalModel
 from selfmotion.planning.nodes.motion import NodeMotion
-from selfmotion.planning.nodes.objective import LocalModel
 from selfmotion.planning.nodes.rows import LinearRows
 from selfmotion.planning.nodes.settings import SETTINGS
 from selfmotion.planning.optimise import Banded
@@ -96,10 +96,11 @@ class Model(NamedTuple):
             force = force + spline.scattered(rows.pulled(multipliers))
         if not wild and len(motion.c):
             force = force + grid.ends.pulled(end_multipliers, len(force))
-        around = LocalModel.of(motion.charts, motion.nu, motion.alpha, motion.place, force)
+        around = LocalModel.of(
+            motion.charts, motion.nu, motion.alpha, motion.place, force, grid.scale
+        )
         if around is None:
             return None
-        around = around.scaled(grid.scale)
         both = spline.changes(around.changes)
         intervals = grid.cost.curvature(motion.samples, motion.partials, both)
         # Sums of squares keep their curvature however far they are violated; those of tolerances

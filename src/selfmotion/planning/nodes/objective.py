@@ -13,7 +13,6 @@ manifold, and of what is linear or quadratic in ν and α.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -21,14 +20,11 @@ import numpy as np
 from selfmotion.basics import Array
 from selfmotion.model.motion import Sampling
 from selfmotion.planning.formulation import Formulation, SampledMotion
-from selfmotion.planning.nodes.charts import Bases, Charts, Place, orthonormal
+from selfmotion.planning.nodes.charts import orthonormal
 from selfmotion.planning.nodes.smoothness import Smoothing
 from selfmotion.planning.nodes.spline import AT_GAUSS, GAUSS, WEIGHTS, Quintic
 from selfmotion.problem.costs import Partials, PlacedLater, Samples
 
-# Step of central differences along a manifold [rad or m]: first derivatives are right to 1e-8,
-# second ones to 1e-6.
-_REACH = 1e-4
 # Step of one-sided differences of costs' gradients [rad, m and their rates]: this matrix need not
 # be exact.
 _NEAR = 1e-6
@@ -267,124 +263,3 @@ def _summed(each: Sequence[Partials]) -> Partials:
         if own:
             parts[name] = own[0] if len(own) == 1 else np.sum(own, axis=0)
     return Partials(**parts)
-
-
-@dataclass(frozen=True, eq=False)
-class LocalModel:
-    """Derivatives of the nodes by their coordinates, to second order.
-
-    Attributes
-    ----------
-    changes : (N + 1, 3, n, 3r)
-        Γ = ∂(q, q̇, q̈)/∂(z, ν, α).
-    curvature : (N + 1, 3r, 3r)
-        ∂(Γᵀλ)/∂w at fixed λ, symmetric.
-    """
-
-    changes: Array
-    curvature: Array
-
-    @classmethod
-    def of(
-        cls, charts: Charts, nu: Array, alpha: Array, place: Place, force: Array
-    ) -> "LocalModel | None":
-        """Return the model at the reference of charts; None where a neighbour cannot be evaluated.
-
-        `place` is that of the nodes there, `force` (N + 1, 3, n) is λ.
-        """
-        count, n, r = charts.bases.shape
-        here = charts.bases_at(place)
-        changes, curvature = np.zeros((count, 3, n, 3 * r)), np.zeros((count, 3 * r, 3 * r))
-        changes[:, 0, :, :r] = charts.bases
-        changes[:, 1, :, r : 2 * r] = changes[:, 2, :, 2 * r :] = here.by_rate
-        changes[:, 2, :, r : 2 * r] = here.by_both
-        middle, axes = _along(force, place.nodes), np.eye(r)
-        sides = _displaced(charts, np.concatenate([axes, -axes]), nu, alpha)
-        if sides is None:
-            return None
-        nodes, bases = sides
-        differences = (nodes[:r] - nodes[r:]) / (2.0 * _REACH)
-        changes[:, 1:, :, :r] = np.moveaxis(differences[:, :, 1:], 0, -1)
-        values = _along(force, nodes)
-        bends = (values[:r] - 2.0 * middle + values[r:]) / _REACH**2
-        curvature[:, np.arange(r), np.arange(r)] = bends.T
-        for first, each in zip((r, 2 * r), _pulled(force, bases), strict=True):
-            mixed = np.moveaxis((each[:r] - each[r:]) / (2.0 * _REACH), 0, 1)
-            curvature[:, :r, first : first + r] = mixed
-            curvature[:, first : first + r, :r] = np.swapaxes(mixed, 1, 2)
-        if r > 1:
-            x, y = np.tril_indices(r, -1)
-            both = axes[x] + axes[y]
-            sides = _displaced(charts, np.concatenate([both, -both]), nu, alpha)
-            if sides is None:
-                return None
-            values = _along(force, sides[0])
-            second = (values[: len(x)] - 2.0 * middle + values[len(x) :]) / _REACH**2
-            own = 0.5 * (second - bends[x] - bends[y])
-            curvature[:, x, y] = curvature[:, y, x] = own.T
-        cls._by_rates(charts, place, here, force, curvature)
-        return cls(changes, curvature)
-
-    def scaled(self, scale: Array) -> "LocalModel":
-        """Return the model in coordinates that are divided by `scale` (3r,)."""
-        return LocalModel(self.changes * scale, self.curvature * scale * scale[:, None])
-
-    def pulled(self, force: Array) -> Array:
-        """Return Γᵀλ of the nodes, (N + 1, 3r), for λ (N + 1, 3, n)."""
-        count, _, n, size = self.changes.shape
-        flat = self.changes.reshape(count, 3 * n, size)
-        return np.asarray((force.reshape(count, 1, 3 * n) @ flat)[:, 0])
-
-    @staticmethod
-    def _by_rates(
-        charts: Charts, place: Place, here: Bases, force: Array, curvature: Array
-    ) -> None:
-        """Add the second derivatives by two of ν: q̈ is quadratic in q̇."""
-        r, by = here.by_rate.shape[2], here.by_rate
-        pairs = [(x, y) for x in range(r) for y in range(x)]
-        directions = [by, *(by[:, :, x : x + 1] + by[:, :, y : y + 1] for x, y in pairs)]
-        half = charts.manifolds.bends(place, force[:, 2], np.concatenate(directions, axis=2))
-        for x in range(r):
-            curvature[:, r + x, r + x] += 2.0 * half[:, x]
-        for number, (x, y) in enumerate(pairs, r):
-            mixed = half[:, number] - half[:, x] - half[:, y]
-            curvature[:, r + x, r + y] += mixed
-            curvature[:, r + y, r + x] += mixed
-
-
-def _displaced(
-    charts: Charts, directions: Array, nu: Array, alpha: Array
-) -> tuple[Array, Bases] | None:
-    """Return all nodes displaced along directions (K, r): (q, q̇, q̈) (K, N + 1, 3, n), and bases.
-
-    None where one cannot be evaluated. Several directions are evaluated in one pass where there are
-    few nodes.
-    """
-    count = len(nu)
-    together = max(1, _TOGETHER // count)
-    found = []
-    for first in range(0, len(directions), together):
-        own = directions[first : first + together]
-        z = np.repeat(_REACH * own, count, axis=0)
-        rates = (np.tile(each, (len(own), 1)) for each in (nu, alpha))
-        there = charts.repeated(len(own)).around(z, *rates)
-        if there is None:
-            return None
-        found.append((there[0].nodes, *there[1]))
-    nodes, by_rate, by_both = (
-        np.concatenate(parts).reshape(len(directions), count, *parts[0].shape[1:])
-        for parts in zip(*found, strict=True)
-    )
-    return nodes, Bases(by_rate, by_both)
-
-
-def _along(force: Array, nodes: Array) -> Array:
-    """Return λᵀ(q, q̇, q̈) of nodes (…, N + 1, 3, n), (…, N + 1)."""
-    return np.asarray(np.sum(force * nodes, axis=(-2, -1)))
-
-
-def _pulled(force: Array, bases: Bases) -> tuple[Array, Array]:
-    """Return λᵀ∂(q̇, q̈)/∂ν and λᵀ∂q̈/∂α, (…, N + 1, r) each."""
-    of_qd, of_qdd = force[:, 1, None, :], force[:, 2, None, :]
-    by_nu = of_qd @ bases.by_rate + of_qdd @ bases.by_both
-    return by_nu[..., 0, :], (of_qdd @ bases.by_rate)[..., 0, :]
