@@ -5,6 +5,7 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.model.robot import has_masses
+from selfmotion.planning.nodes.node_matrix import NodeMatrix
 from selfmotion.planning.optimise import Banded
 from support.arms import Case
 from support.nodes import along, around_of, centred, moved, nodes_of, problem_of, random_step
@@ -37,10 +38,11 @@ def gradient(motion):
 def matrix_of(motion) -> Banded:
     """Return the matrix of second derivatives."""
     around = around_of(motion, force_of(motion))
-    both = motion.grid.spline.changes(around.changes)
-    matrix = Banded(*around.curvature.shape[:2], 1)
+    by = motion.grid.spline.changes(around.changes)
+    curvature = NodeMatrix.zeros(*around.curvature.shape[:2])
+    motion.grid.cost.add_curvature(curvature, by, motion.samples, motion.partials)
+    matrix = curvature.banded()
     matrix.add(0, 0, around.curvature)
-    matrix.add_pairs(0, motion.grid.cost.curvature(motion.samples, motion.partials, both))
     return matrix
 
 
@@ -115,12 +117,3 @@ def test_the_cost_converges_quickly(case: Case) -> None:
     if errors[-1] > 1e-8 * costs[-1]:
         orders = np.log2(errors[:-1] / errors[1:])
         assert orders.min() > 2.5, (errors, orders)
-
-
-def test_in_lots_the_curvature_is_the_same(case: Case, monkeypatch: pytest.MonkeyPatch) -> None:
-    motion = nodes_of(problem_of(case))
-    both = motion.grid.spline.changes(around_of(motion).changes)
-    at_once = motion.grid.cost.curvature(motion.samples, motion.partials, both)
-    monkeypatch.setattr("selfmotion.planning.nodes.objective._CHUNK", 5)
-    found = motion.grid.cost.curvature(motion.samples, motion.partials, both)
-    np.testing.assert_allclose(found, at_once, rtol=1e-12, atol=1e-12 * np.abs(at_once).max())

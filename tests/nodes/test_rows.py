@@ -8,6 +8,7 @@ from selfmotion.basics import Array
 from selfmotion.model.motion import Trajectory
 from selfmotion.model.robot import ToolRates
 from selfmotion.planning.nodes.limit_rows import ControlPointRows
+from selfmotion.planning.nodes.node_matrix import NodeMatrix
 from selfmotion.planning.nodes.spline import AT_CONTROLS, ORDERS, Quintic, unit_bases
 from support.arms import PANDA_HOME
 from support.circles import small_circle
@@ -79,18 +80,13 @@ def test_squares_of_rows_are_the_sums_of_their_products(panda: sm.RobotModel, na
     motion = motion_with(panda, name)
     step, kept = random_step(motion, 2), motion.h > -500.0
     around = around_of(motion)
-    both = motion.grid.spline.changes(around.changes)
+    by = motion.grid.spline.changes(around.changes)
     linear = motion.grid.rows.linearised(motion.checked, kept)
     weights = np.zeros(len(kept))
     weights[kept] = np.random.default_rng(4).uniform(size=kept.sum())
-    pair = np.concatenate([step[:-1], step[1:]], axis=1)
-    found = 0.0
-    of_limits, of_points = linear.squared(weights), linear.squared_points(weights, both)
-    if of_limits is not None:
-        changes = along(motion, around.changes, step)
-        found += float(np.einsum("kan,knab,kbn->", changes, of_limits, changes))
-    if of_points is not None:
-        found += float(np.einsum("kd,kde,ke->", pair, of_points, pair))
+    matrix = NodeMatrix.zeros(*around.curvature.shape[:2])
+    linear.add_squared(matrix, by, weights)
+    found = float(step.ravel() @ matrix.banded().dense() @ step.ravel())
     changes = along(motion, around.changes, step)
     expected = float(weights[kept] @ linear.along(changes) ** 2)
     assert found == pytest.approx(expected, rel=1e-9)

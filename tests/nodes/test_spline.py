@@ -95,8 +95,7 @@ def test_what_is_pulled_back_is_the_adjoint_of_the_ends(copies: int) -> None:
     changes = np.random.default_rng(3).normal(size=(*nodes.shape, 2))
     step = np.random.default_rng(4).normal(size=(len(nodes), 2))
     moved = np.einsum("kond,kd->kon", changes, step)
-    pair = np.concatenate([step[:-1], step[1:]], axis=1)
-    found = np.einsum("knad,kd->kan", spline.changes(changes), pair)
+    found = spline.changes(changes).along(step)
     near(found[inner], spline.ends(moved)[inner])
     assert not found[spline.gaps].any()
 

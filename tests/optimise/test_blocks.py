@@ -15,7 +15,9 @@ def test_a_banded_system_is_the_dense_one(size: int) -> None:
     pairs = pairs @ np.swapaxes(pairs, 1, 2)
     for k, block in enumerate(pairs):
         dense[k * size : (k + 2) * size, k * size : (k + 2) * size] += block
-    matrix.add_pairs(0, pairs)
+    for part, column in ((pairs[:, :size, :size], 0), (pairs[:, size:, size:], 1)):
+        matrix.add(0, column, part)
+    matrix.add(1, 0, pairs[:, :size, size:])
     matrix.add_diagonal(np.full(len(matrix.dense()), 0.5))
     dense += 0.5 * np.eye(len(dense))
     np.testing.assert_allclose(matrix.dense(), dense, atol=1e-12)

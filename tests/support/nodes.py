@@ -71,9 +71,7 @@ def around_of(motion: NodeMotion, force: Array | None = None) -> LocalModel:
 
 def along(motion: NodeMotion, changes: Array, step: Array) -> Array:
     """Return how y of each interval changes along a step w (N + 1, 3r), (N, 6, n)."""
-    both = motion.grid.spline.changes(changes)
-    pair = np.concatenate([step[:-1], step[1:]], axis=1)
-    return np.asarray(np.einsum("knad,kd->kan", both, pair))
+    return motion.grid.spline.changes(changes).along(step)
 
 
 def random_step(motion: NodeMotion, seed: int, size: float = 1.0) -> Array:

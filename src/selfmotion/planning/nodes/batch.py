@@ -15,8 +15,8 @@ from selfmotion.basics import Array, Flags, Ints
 from selfmotion.planning.nodes.charts import Centred, Charts, Place
 from selfmotion.planning.nodes.local_model import LocalModel
 from selfmotion.planning.nodes.motion import NodeGrid, NodeMotion
+from selfmotion.planning.nodes.node_matrix import NodeMatrix
 from selfmotion.planning.nodes.spline import GAUSS
-from selfmotion.planning.optimise import Banded
 
 # A motion is finished when a step predicts less than this share of its cost.
 _ENOUGH = 1e-3
@@ -166,12 +166,11 @@ class Batch:
             raise RuntimeError(_LEAVES)
         gradient = around.pulled(force)
         gradient.reshape(-1)[grid.held] = 0.0
-        both = spline.changes(around.changes)
-        intervals = grid.cost.curvature(motion.samples, motion.partials, both)
-        intervals[spline.gaps] = 0.0
-        matrix = Banded(len(gradient), gradient.shape[1], 1)
+        curvature = NodeMatrix.zeros(*gradient.shape)
+        by = spline.changes(around.changes)
+        grid.cost.add_curvature(curvature, by, motion.samples, motion.partials)
+        matrix = curvature.banded()
         matrix.add(0, 0, around.curvature)
-        matrix.add_pairs(0, intervals)
         matrix.hold(grid.held)
         step, rights = np.zeros((self.count, gradient.size // self.count)), -gradient
         rights = rights.reshape(step.shape)

@@ -12,9 +12,9 @@ from selfmotion.basics import Array, Flags
 from selfmotion.planning.nodes.ends import Border
 from selfmotion.planning.nodes.local_model import LocalModel
 from selfmotion.planning.nodes.motion import NodeMotion
+from selfmotion.planning.nodes.node_matrix import EndChanges, NodeMatrix
 from selfmotion.planning.nodes.rows import LinearRows
 from selfmotion.planning.nodes.settings import SETTINGS
-from selfmotion.planning.optimise import Banded
 
 
 class ElasticRows(NamedTuple):
@@ -62,20 +62,20 @@ class Model(NamedTuple):
     ----------
     gradient : (N + 1, 3r)
         ∂F/∂w.
-    both : (N, n, 6, 6r)
-        ∂y/∂w of both ends of each interval.
+    by : EndChanges
+        ∂y/∂w of all intervals.
     around : LocalModel
         Motion of the nodes by their coordinates; curvature along the forces on them.
-    intervals : (N, 6r, 6r)
-        Second derivatives of costs, and of rows that are sums of squares.
+    curvature : NodeMatrix
+        Second derivatives by y of costs, and of rows that are sums of squares.
     rows : LinearRows
     border : Border
     """
 
     gradient: Array
-    both: Array
+    by: EndChanges
     around: LocalModel
-    intervals: Array
+    curvature: NodeMatrix
     rows: LinearRows
     border: Border
 
@@ -101,37 +101,25 @@ class Model(NamedTuple):
         )
         if around is None:
             return None
-        both = spline.changes(around.changes)
-        intervals = grid.cost.curvature(motion.samples, motion.partials, both)
+        by = spline.changes(around.changes)
+        curvature = NodeMatrix.zeros(*around.curvature.shape[:2])
+        grid.cost.add_curvature(curvature, by, motion.samples, motion.partials)
         # Sums of squares keep their curvature however far they are violated; those of tolerances
         # only while other rows hold.
         without = wild and motion.breaks_hard(SETTINGS.gauss_newton_violation)
-        bending = grid.rows.bending(motion.checked, multipliers, both, without_tolerances=without)
-        if bending is not None:
-            intervals = intervals + bending
+        grid.rows.add_bending(
+            curvature, by, motion.checked, multipliers, without_tolerances=without
+        )
         gradient = around.pulled(by_cost)
         gradient.reshape(-1)[grid.held] = 0.0
         border = grid.ends.border(motion.c, around.changes, grid.held)
-        return cls(gradient, both, around, intervals, rows, border)
+        return cls(gradient, by, around, curvature, rows, border)
 
-    def stiffness(self, weights: Array) -> Array:
-        """Return ∂hᵀ D ∂h on each interval for weights of all rows (R,), (N, 6r, 6r)."""
-        count, n, _, size = self.both.shape
-        found = np.zeros((count, size, size))
-        of_limits = self.rows.squared(weights)
-        if of_limits is not None:
-            flat = self.both.reshape(count, 6 * n, size)
-            turned = (of_limits @ self.both).reshape(count, 6 * n, size)
-            found += np.swapaxes(flat, 1, 2) @ turned
-        of_points = self.rows.squared_points(weights, self.both)
-        return found if of_points is None else found + of_points
-
-    def along(self, step: Array) -> Array:
-        """Return the change of y, (N, 6, n), along a step of the nodes (N + 1, 3r)."""
-        count, n, _, size = self.both.shape
-        pair = np.concatenate([step[:-1], step[1:]], axis=1)
-        changes = self.both.reshape(count, n * 6, size) @ pair[:, :, None]
-        return np.asarray(np.swapaxes(changes.reshape(count, n, 6), 1, 2))
+    def stiffened(self, weights: Array) -> NodeMatrix:
+        """Return the curvature with ∂hᵀ D ∂h added, for weights of all rows (R,)."""
+        found = self.curvature.copy()
+        self.rows.add_squared(found, self.by, weights)
+        return found
 
 
 class Change(NamedTuple):
@@ -175,7 +163,7 @@ class System(NamedTuple):
         `shift` is the δ of the last system.
         """
         grid, multipliers = motion.grid, own.multipliers
-        gradient, intervals = model.gradient, model.intervals
+        gradient, stiffened = model.gradient, model.curvature
         right = np.stack([gradient.ravel(), np.zeros(gradient.size)])
         if multipliers.size:
             stiff = own.stiff
@@ -185,8 +173,8 @@ class System(NamedTuple):
                 pulled = model.around.pulled(grid.spline.scattered(push))
                 pulled.reshape(-1)[grid.held] = 0.0
                 right[k] += pulled.ravel()
-            intervals = intervals + model.stiffness(own.of_all(stiff))
-        found = _solved(motion, model, intervals, right, barrier, shift)
+            stiffened = model.stiffened(own.of_all(stiff))
+        found = _solved(motion, model, stiffened, right, barrier, shift)
         return None if found is None else cls(model, own, right, *found)
 
     def step(self, barrier: float) -> Change:
@@ -198,7 +186,7 @@ class System(NamedTuple):
         promised = float(-(right + model.border.columns @ end_multipliers) @ step)
         nodes = step.reshape(model.gradient.shape)
         off = own.h + barrier / multipliers - barrier / left
-        by_multipliers = own.stiff * (model.rows.along(model.along(nodes)) + off)
+        by_multipliers = own.stiff * (model.rows.along(model.by.along(nodes)) + off)
         by_slacks = barrier / multipliers - slacks - slacks / multipliers * by_multipliers
         by_elastics = barrier / left - elastics + elastics / left * by_multipliers
         return Change(nodes, by_slacks, by_elastics, by_multipliers, end_multipliers, promised)
@@ -213,26 +201,25 @@ def _nodes_of(model: Model, solved: Array, barrier: float) -> tuple[Array, Array
 def _solved(
     motion: NodeMotion,
     model: Model,
-    intervals: Array,
+    stiffened: NodeMatrix,
     right: Array,
     barrier: float,
     last: float,
 ) -> tuple[Array, float] | None:
     """Return the solutions for two right sides (2, …) and the border's columns; and δ.
 
-    `intervals` (N, 6r, 6r) are the model's with the stiffness of its active rows.
+    `stiffened` is the model's curvature with the stiffness of its active rows.
     """
     curved = model.around.curvature
     count, size = model.gradient.shape
-    largest = float(np.abs(curved).max() + np.abs(intervals).max())
-    diagonals = np.abs(np.diagonal(intervals, axis1=1, axis2=2)).ravel()
+    largest = float(np.abs(curved).max() + max(np.abs(part).max() for part in stiffened))
+    diagonals = np.abs(np.diagonal(stiffened.nodes, axis1=1, axis2=2)).ravel()
     usual = float(np.partition(diagonals, len(diagonals) // 2)[len(diagonals) // 2])
     flat, shift, bounds = SETTINGS.flat_share / count**2 * usual, 0.0, np.zeros(0)
     columns = np.column_stack([-right.T, model.border.columns])
     while flat <= SETTINGS.delta_max * largest and shift <= SETTINGS.delta_max:
-        matrix = Banded(count, size, 1)
+        matrix = stiffened.banded()
         matrix.add(0, 0, curved)
-        matrix.add_pairs(0, intervals)
         matrix.add_diagonal(SETTINGS.flat_factor * flat + shift * bounds if shift else flat)
         matrix.hold(motion.grid.held)
         solved = matrix.solve(columns)
@@ -245,27 +232,25 @@ def _solved(
         else:
             # Most matrices are positive definite without.
             if not bounds.size:
-                bounds = _curvature_bounds(model.intervals, curved) + SETTINGS.delta_floor * largest
+                bounds = _curvature_bounds(model.curvature, curved) + SETTINGS.delta_floor * largest
             shift = max(
                 SETTINGS.kappa_plus * shift, SETTINGS.kappa_minus * last, SETTINGS.delta_first
             )
     return None
 
 
-def _curvature_bounds(intervals: Array, nodes: Array) -> Array:
+def _curvature_bounds(curvature: NodeMatrix, curved: Array) -> Array:
     """Return a bound of each coordinate's curvature without rows, (K,).
 
-    For matrices of intervals (N, d, d) by both ends, and of nodes (N + 1, d/2, d/2): the absolute
-    sums of their rows, scaled by the median curvature of each kind of coordinate. With these on the
+    For the model's curvature, and that of the nodes' own motion (N + 1, d, d): the absolute sums of
+    their rows, scaled by the median curvature of each kind of coordinate. With these on the
     diagonal a matrix is positive definite (Gershgorin).
     """
-    count, size = len(intervals), intervals.shape[1] // 2
-    own = np.abs(np.diagonal(intervals, axis1=1, axis2=2)).reshape(2 * count, size)
+    own = np.abs(np.diagonal(curvature.nodes, axis1=1, axis2=2))
     usual = np.maximum(np.median(own, axis=0), np.finfo(float).eps * own.max())
     root = np.sqrt(np.maximum(usual, np.finfo(float).tiny))
-    both = np.tile(root, 2)
-    sums = (np.abs(intervals) / both).sum(axis=2) * both
-    found = (np.abs(nodes) / root).sum(axis=2) * root
-    found[:-1] += sums[:, :size]
-    found[1:] += sums[:, size:]
+    pairs = np.abs(curvature.pairs)
+    found = ((np.abs(curved) + np.abs(curvature.nodes)) / root).sum(axis=2) * root
+    found[:-1] += (pairs / root).sum(axis=2) * root
+    found[1:] += (pairs / root[:, None]).sum(axis=1) * root
     return np.asarray(np.maximum(found, usual).ravel())

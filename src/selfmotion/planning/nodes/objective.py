@@ -21,6 +21,7 @@ from selfmotion.basics import Array
 from selfmotion.model.motion import Sampling
 from selfmotion.planning.formulation import Formulation, SampledMotion
 from selfmotion.planning.nodes.charts import orthonormal
+from selfmotion.planning.nodes.node_matrix import EndChanges, NodeMatrix, Points
 from selfmotion.planning.nodes.smoothness import Smoothing
 from selfmotion.planning.nodes.spline import AT_GAUSS, GAUSS, WEIGHTS, Quintic
 from selfmotion.problem.costs import Partials, PlacedLater, Samples
@@ -30,9 +31,6 @@ from selfmotion.problem.costs import Partials, PlacedLater, Samples
 _NEAR = 1e-6
 # Derivatives of a sample, by order.
 _NAMES = ("q", "qd", "qdd", "qddd")
-# Intervals in one chunk of a matrix product, which bounds memory: factors are larger than the
-# product.
-_CHUNK = 2048
 # Samples, or nodes, that are evaluated in one pass, of several directions.
 _TOGETHER = 4096
 
@@ -61,10 +59,32 @@ class NodeCost:
         self._springs = formulation.springs
         self._bent = tuple(cost for cost in self._costs if not cost.is_quadratic)
         self._dof, self._follows = formulation.robot.dof, formulation.problem.follows
+        self._follows_dof = formulation.follows.dof
         self._smoothing: tuple[Array, Array] | None = None
         if smoothing is not None:
             each = [self._stiffness(order, b) for order, b in smoothing.shares.items()]
             self._smoothing = np.sum(each, axis=0), smoothing.weight
+
+    @cached_property
+    def _joint_forms(self) -> Array:
+        """Second derivatives of all that is quadratic in each coordinate, (N, n, 6, 6) by its y."""
+        n, dof = self._dof, self._follows_dof
+        found = np.zeros((self._spline.count, dof, 6, 6))
+        for stiffness, weight in self._forms:
+            if _is_diagonal(weight):
+                found[:, :n] += np.diagonal(weight)[:, None, None] * stiffness[:, None]
+        if self._springs is not None:
+            found[:, n:] += self._springs[:, None, None] * self._stiffness(0)[:, None]
+        return found
+
+    @cached_property
+    def _coupled_forms(self) -> list[tuple[Array, Array]]:
+        """K and W of what is quadratic in several joints together."""
+        return [
+            (stiffness, np.ascontiguousarray(weight))
+            for stiffness, weight in self._forms
+            if not _is_diagonal(weight)
+        ]
 
     @cached_property
     def _forms(self) -> list[tuple[Array, Array]]:
@@ -132,63 +152,63 @@ class NodeCost:
         both = zip(self._costs, partials, strict=True)
         return _summed([own for cost, own in both if not cost.is_quadratic])
 
-    def curvature(self, samples: Samples, partials: Sequence[Partials], both: Array) -> Array:
-        """Return Γᵀ (∂²F) Γ on each interval, by w of its left, then its right node, (N, d, d).
-
-        `both` (N, n, 6, d) are the changes of y.
-        """
-        count, _, _, size = both.shape
-        found = np.zeros((count, size, size))
-        for first in range(0, count, _CHUNK):
-            part = slice(first, first + _CHUNK)
-            found[part] = _form(self._forms, part, both[part, : self._dof])
-            if self._springs is not None:
-                springs = [(self._stiffness(0), np.diag(self._springs))]
-                found[part] += _form(springs, part, both[part, self._dof :])
+    def add_curvature(
+        self, matrix: NodeMatrix, by: EndChanges, samples: Samples, partials: Sequence[Partials]
+    ) -> None:
+        """Add Γᵀ (∂²F) Γ, by the coordinates of all nodes."""
+        matrix.add_joint_forms(by, self._joint_forms)
+        for stiffness, weight in self._coupled_forms:
+            matrix.add_form(by, stiffness, weight)
         if self._bent:
-            found += self._bending(samples, self._of_bent(partials), both)
-        return found
+            self._add_bending(matrix, by, samples, self._of_bent(partials))
 
-    def _bending(self, samples: Samples, here: Partials, both: Array) -> Array:
-        """Return the contribution of costs that are not quadratic forms, with derivatives `here`.
+    def _add_bending(
+        self, matrix: NodeMatrix, by: EndChanges, samples: Samples, here: Partials
+    ) -> None:
+        """Add the contribution of costs that are not quadratic forms, with derivatives `here`.
 
         By differences along the self-motion, and by one joint's rate after the other.
         """
-        spline, (count, dof, _, size) = self._spline, both.shape
-        r, each, n = size // 6, len(GAUSS), self._dof
-        by = [
-            np.moveaxis(table @ both[:, :n], 1, 2).reshape(-1, n, size)
-            * np.repeat(spline.rates(order), each)[:, None, None]
-            for order, table in enumerate(AT_GAUSS)
-        ]
-        places = np.moveaxis(AT_GAUSS[0] @ both, 1, 2).reshape(-1, dof, size)
-        # Self-motion directions at the samples: interpolated between the nodes.
-        left, right = both[:, None, :, 0, :r], both[:, None, :, 3, 3 * r : 4 * r].copy()
-        right[spline.gaps] = left[spline.gaps]
-        share = GAUSS[:, None, None]
-        along = (left + share * (right - left)).reshape(-1, dof, r)
-        along[np.repeat(np.isin(np.arange(count), spline.gaps), each)] = np.eye(dof)[:, :r]
-        along = orthonormal(along)
-        moved, weights = np.swapaxes(along, 1, 2) @ places, samples.weights[:, None, None]
+        n, weights = self._dof, np.ascontiguousarray(samples.weights)
+        along = self._directions(by)
         own = along[:, :n]
-        directions = [("q", own[:, :, x]) for x in range(r)]
-        changed = self._changes(samples, here, directions)
-        found = np.zeros((count, size, size))
+        moved = self._points(0, along)
+        changed = self._changes(samples, here, [("q", own[:, :, x]) for x in range(own.shape[2])])
         if "q" in changed:
-            turned = np.swapaxes(own, 1, 2) @ changed["q"]
-            found += _squared(count, moved, weights * turned @ moved)
+            turned = along @ (np.swapaxes(own, 1, 2) @ changed["q"])
+            matrix.add_products(by, moved, self._points(0, turned), weights)
         for order, name in enumerate(_NAMES[1:], 1):
             if name in changed:
-                found += 2.0 * _squared(count, by[order], weights * changed[name] @ moved)
+                faster = self._points(order, changed[name])
+                matrix.add_products(by, faster, moved, 2.0 * weights)
         rates = [o for o, name in enumerate(_NAMES) if o and getattr(here, name) is not None]
+        units = np.broadcast_to(np.eye(n), (len(samples.t), n, n))
         for order in rates:
             axes = [(_NAMES[order], axis) for axis in np.eye(n)]
-            faster = self._changes(samples, here, axes)
+            changed = self._changes(samples, here, axes)
             for other in rates:
-                if _NAMES[other] in faster:
-                    turned_by = weights * faster[_NAMES[other]] @ by[order]
-                    found += _squared(count, by[other], turned_by)
-        return np.asarray(0.5 * (found + np.swapaxes(found, 1, 2)))
+                if _NAMES[other] in changed:
+                    turned = np.swapaxes(changed[_NAMES[other]], 1, 2)
+                    pair = self._points(other, units), self._points(order, turned)
+                    matrix.add_products(by, *pair, weights)
+
+    def _points(self, order: int, forms: Array) -> Points:
+        """Return linear forms (S, n, p) of a derivative at the samples."""
+        table = np.ascontiguousarray(AT_GAUSS[order])
+        return Points(table, self._spline.rates(order), np.ascontiguousarray(forms))
+
+    def _directions(self, by: EndChanges) -> Array:
+        """Return orthonormal self-motion directions at the samples, (S, n, r).
+
+        Interpolated between the nodes.
+        """
+        spline, (count, _, n, size) = self._spline, by.nodes.shape
+        each = by.nodes[:, 0, :, : size // 3]
+        left, right = each[:-1, None], each[1:, None]
+        share = GAUSS[:, None, None]
+        found = left + share * (right - left)
+        found[spline.gaps] = np.eye(n)[:, : size // 3]
+        return orthonormal(found.reshape((count - 1) * len(GAUSS), n, -1))
 
     def _changes(
         self, samples: Samples, here: Partials, directions: Sequence[tuple[str, Array]]
@@ -228,31 +248,8 @@ class NodeCost:
         return parts
 
 
-def _squared(count: int, left: Array, right: Array) -> Array:
-    """Return Σ leftᵀ right over the samples of each interval, (N, d, d), of (S, k, d) each."""
-    size = left.shape[2]
-    flat = left.reshape(count, -1, size)
-    return np.asarray(np.swapaxes(flat, 1, 2) @ right.reshape(count, -1, size))
-
-
-def _form(forms: Sequence[tuple[Array, Array]], part: slice, both: Array) -> Array:
-    """Return Γᵀ ∂²F Γ of quadratic forms on some intervals, (N, d, d), for changes of y."""
-    count, n, _, size = both.shape
-    flat = both.reshape(count, 6 * n, size)
-    turned = _bent_by(forms, part, both).reshape(count, 6 * n, size)
-    return np.asarray(np.swapaxes(flat, 1, 2) @ turned)
-
-
-def _bent_by(forms: Sequence[tuple[Array, Array]], part: slice, both: Array) -> Array:
-    """Return ∂²F of quadratic forms on some intervals times changes of y, (N, n, 6, d)."""
-    found, shape = np.zeros_like(both), (both.shape[0], both.shape[1], -1)
-    for stiffness, weight in forms:
-        turned, diagonal = stiffness[part, None] @ both, np.diagonal(weight)
-        if np.array_equal(weight, np.diag(diagonal)):
-            found += diagonal[:, None, None] * turned
-        else:
-            found += (weight @ turned.reshape(shape)).reshape(both.shape)
-    return found
+def _is_diagonal(weight: Array) -> bool:
+    return np.array_equal(weight, np.diag(np.diagonal(weight)))
 
 
 def _summed(each: Sequence[Partials]) -> Partials:

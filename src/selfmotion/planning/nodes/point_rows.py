@@ -8,6 +8,7 @@ from typing_extensions import override
 
 from selfmotion.basics import Array, Flags, Ints, ProblemError
 from selfmotion.planning.formulation import SampledMotion
+from selfmotion.planning.nodes.node_matrix import EndChanges, NodeMatrix
 from selfmotion.planning.nodes.spline import ORDERS, Quintic
 from selfmotion.problem.constraints import (
     BoundConstraint,
@@ -76,19 +77,9 @@ class PointRows:
         np.add.at(found, self.intervals, multipliers[:, None, None] * self.by_ends)
         return found
 
-    def squared(self, weights: Array, both: Array) -> Array:
-        """Return Σ weights ∂h ∂hᵀ by w of both ends of each interval, (N, d, d)."""
-        count, _, _, size = both.shape
-        found = np.zeros((count, size, size))
-        flat = both.reshape(count, -1, size)
-        turned = np.swapaxes(self.by_ends, 1, 2).reshape(len(self.intervals), -1)
-        order = np.argsort(self.intervals, kind="stable")
-        starts = np.searchsorted(self.intervals[order], np.arange(count + 1))
-        for k in np.flatnonzero(np.diff(starts)):
-            own = order[starts[k] : starts[k + 1]]
-            rows = turned[own] @ flat[k]
-            found[k] = rows.T @ (weights[own, None] * rows)
-        return found
+    def add_squared(self, matrix: NodeMatrix, by: EndChanges, weights: Array) -> None:
+        """Add Σ weights ∂h ∂hᵀ by the coordinates of all nodes."""
+        matrix.add_rows(by, self.intervals, self.by_ends, weights)
 
 
 class CollocationRows:
@@ -157,17 +148,19 @@ class CollocationRows:
             found[:, :, self._columns] = np.swapaxes(shares, 1, 2) @ by
         return PointRows(intervals, found)
 
-    def bending(self, motion: SampledMotion, multipliers: Array, both: Array) -> Array | None:
-        """Return Σ multipliers · ∂²h/∂w² of rows that are sums of squares, (N, d, d), or None."""
+    def add_bending(
+        self, matrix: NodeMatrix, by: EndChanges, motion: SampledMotion, multipliers: Array
+    ) -> None:
+        """Add Σ multipliers · ∂²h/∂w² of rows that are sums of squares."""
         slopes = self.item.squares(motion.seen_by(self.item))
         if slopes is None:
-            return None
+            return
         slopes = np.sqrt(np.abs(multipliers))[:, :1, None] * slopes
         points, which = np.nonzero(slopes.any(axis=2))
         intervals, shares = self._spline.point_shares(points)
-        by = np.zeros((len(points), 6, self._dof))
-        by[:, :, self._columns] = shares[:, 0, :, None] * slopes[points, which][:, None, :]
-        return PointRows(intervals, by).squared(np.ones(len(points)), both)
+        rows = np.zeros((len(points), 6, self._dof))
+        rows[:, :, self._columns] = shares[:, 0, :, None] * slopes[points, which][:, None, :]
+        PointRows(intervals, rows).add_squared(matrix, by, np.ones(len(points)))
 
     def multipliers_of(self, multipliers: Array) -> Multipliers:
         """Return the multipliers in the order of time."""

@@ -20,6 +20,7 @@ from selfmotion.basics import Array, Flags, Ints
 from selfmotion.model.motion import Sampling
 from selfmotion.planning.formulation import CurveSamples, Formulation, SampledMotion
 from selfmotion.planning.nodes.limit_rows import ControlPointRows
+from selfmotion.planning.nodes.node_matrix import EndChanges, NodeMatrix
 from selfmotion.planning.nodes.point_rows import CollocationRows, PointRows
 from selfmotion.planning.nodes.spline import Quintic, unit_bases
 from selfmotion.problem.constraints import BoundConstraint, BoundLimits, DependsOn, Multipliers
@@ -122,26 +123,19 @@ class NodeRows:
         pairs = zip(self.points, self.by_kind(active)[1], strict=True)
         return LinearRows(self, active, [rows.linearised(motion, own) for rows, own in pairs])
 
-    def bending(
+    def add_bending(
         self,
+        matrix: NodeMatrix,
+        by: EndChanges,
         motion: SampledMotion,
         multipliers: Array,
-        both: Array,
         *,
         without_tolerances: bool = False,
-    ) -> Array | None:
-        """Return Σ multipliers · ∂²h/∂w² of rows that are sums of squares: their curvature.
-
-        By w of both ends of each interval, (N, d, d); None where there are none.
-        """
-        found = None
+    ) -> None:
+        """Add Σ multipliers · ∂²h/∂w² of rows that are sums of squares: their curvature."""
         for rows, own in zip(self.points, self.by_kind(multipliers)[1], strict=True):
-            if not own.any() or (without_tolerances and is_tolerance(rows.item)):
-                continue
-            one = rows.bending(motion, own, both)
-            if one is not None:
-                found = one if found is None else found + one
-        return found
+            if own.any() and not (without_tolerances and is_tolerance(rows.item)):
+                rows.add_bending(matrix, by, motion, own)
 
     def multipliers_of(self, multipliers: Array, ends: Array) -> list[Multipliers]:
         """Return the multipliers by constraint, in the order of time, for those of all (R,)."""
@@ -263,26 +257,19 @@ class LinearRows:
             found += points.pulled(own[active], count)
         return found
 
-    def squared(self, weights: Array) -> Array | None:
-        """Return Σ weights ∂h ∂hᵀ of limits, by y of each joint: (N, n, 6, 6); None for none."""
-        found = None
-        for limits, own in zip(self.rows.limits, self.rows.by_kind(weights)[0], strict=True):
-            if not own.any():
-                continue
-            if found is None:
-                found = np.zeros((self.rows.spline.count, self.rows.dof, 6, 6))
-            found[:, limits.joints] += limits.squared(own)
-        return found
-
-    def squared_points(self, weights: Array, both: Array) -> Array | None:
-        """Return Σ weights ∂h ∂hᵀ of others, by w of both ends of intervals; None for none."""
-        found = None
-        of_points = self.rows.by_kind(weights)[1]
+    def add_squared(self, matrix: NodeMatrix, by: EndChanges, weights: Array) -> None:
+        """Add Σ weights ∂h ∂hᵀ, for weights of all rows (R,), 0 of inactive ones."""
+        of_limits, of_points = self.rows.by_kind(weights)
+        forms = None
+        for limits, own in zip(self.rows.limits, of_limits, strict=True):
+            if own.any():
+                if forms is None:
+                    forms = np.zeros((self.rows.spline.count, self.rows.dof, 6, 6))
+                forms[:, limits.joints] += limits.squared(own)
+        if forms is not None:
+            matrix.add_joint_forms(by, forms)
         for points, own, active in zip(self.points, of_points, self._active[1], strict=True):
-            if len(points.intervals):
-                one = points.squared(own[active], both)
-                found = one if found is None else found + one
-        return found
+            points.add_squared(matrix, by, own[active])
 
     @cached_property
     def _active(self) -> tuple[list[Flags], list[Flags]]:

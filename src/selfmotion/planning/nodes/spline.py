@@ -16,6 +16,7 @@ import numpy as np
 
 from selfmotion.basics import Array, Ints
 from selfmotion.model.motion import Sampling
+from selfmotion.planning.nodes.node_matrix import EndChanges
 
 # Orders of derivatives: q, q̇, q̈ and the jerk.
 ORDERS = 4
@@ -169,19 +170,15 @@ class Quintic:
         found[1:] += own[:, 3:]
         return found
 
-    def changes(self, changes: Array) -> Array:
-        """Return ∂y/∂w for both ends of each interval, (N, n, 6, 2 d).
+    def changes(self, nodes: Array) -> EndChanges:
+        """Return ∂y/∂w of all intervals; `nodes` (N + 1, 3, n, d) is ∂(q, q̇, q̈)/∂w of the nodes."""
+        return EndChanges(nodes, self._powers_moving)
 
-        `changes` (N + 1, 3, n, d) is ∂(q, q̇, q̈)/∂w of the nodes.
-        """
-        turned = np.swapaxes(changes, 1, 2)
-        count, n, _, size = turned.shape
-        both = np.zeros((count - 1, n, 6, 2 * size))
-        both[:, :, :3, :size], both[:, :, 3:, size:] = turned[:-1], turned[1:]
-        both *= self._powers[:, None, :, None]
-        if self.gaps.size:
-            both[self.gaps] = 0.0
-        return both
+    @cached_property
+    def _powers_moving(self) -> Array:
+        found = np.array(self._powers)
+        found[self.gaps] = 0.0
+        return found
 
     def rates(self, order: int) -> Array:
         """Return h^-o, (N,)."""

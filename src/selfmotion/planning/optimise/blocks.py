@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from selfmotion.basics import Array, Ints
+from selfmotion.basics import Array, Ints, kernel
 
 
 class Banded:
@@ -18,22 +18,16 @@ class Banded:
 
     def __init__(self, count: int, size: int, reach: int) -> None:
         self._size, self._width = size, (reach + 1) * size - 1
-        self._table = np.zeros((self._width + 1, count * size))
+        # LAPACK's columns are contiguous.
+        self._columns = np.zeros((count * size, self._width + 1))
+
+    @property
+    def _table(self) -> Array:
+        return self._columns.T
 
     def add(self, offset: int, first: int, blocks: Array) -> None:
         """Add blocks (L, s, s) in rows `first`, first + 1, …, `offset` columns to the right."""
-        s, u = self._size, self._width
-        begin, end = (first + offset) * s, (first + offset + len(blocks)) * s
-        for i in range(s):
-            for j in range(i if offset == 0 else 0, s):
-                self._table[u + i - j - offset * s, begin + j : end : s] += blocks[:, i, j]
-
-    def add_pairs(self, first: int, blocks: Array) -> None:
-        """Add blocks (L, 2s, 2s) of neighbours, the first of which starts in row `first`."""
-        s = self._size
-        self.add(0, first, blocks[:, :s, :s])
-        self.add(0, first + 1, blocks[:, s:, s:])
-        self.add(1, first, blocks[:, :s, s:])
+        _add_blocks(self._columns, offset, first, np.ascontiguousarray(blocks))
 
     def add_diagonal(self, value: Array | float) -> None:
         """Add to the diagonal, (K s,) or the same everywhere."""
@@ -41,12 +35,7 @@ class Banded:
 
     def hold(self, which: Ints) -> None:
         """Make rows and columns, by their numbers, those of the unit matrix."""
-        u, size = self._width, self._table.shape[1]
-        for row in which:
-            self._table[:, row] = 0.0
-            for j in range(1, min(u, size - 1 - row) + 1):
-                self._table[u - j, row + j] = 0.0
-            self._table[u, row] = 1.0
+        _hold(self._columns, which)
 
     def dense(self) -> Array:
         """Return the matrix, (K s, K s)."""
@@ -95,3 +84,26 @@ class Banded:
                 return np.asarray(solved)
             shift = max(shifts[2] * shift, shifts[1] * float(entries.max()))
         return None
+
+
+@kernel
+def _add_blocks(columns: Array, offset: int, first: int, blocks: Array) -> None:
+    """Add blocks (L, s, s) to the columns (K s, u + 1) of a banded matrix; see `Banded.add`."""
+    (count, s, _), u = blocks.shape, columns.shape[1] - 1
+    for block in range(count):
+        column = (first + block + offset) * s
+        for j in range(s):
+            # Below the diagonal nothing is stored.
+            for i in range(j + 1 if offset == 0 else s):
+                columns[column + j, u + i - j - offset * s] += blocks[block, i, j]
+
+
+@kernel
+def _hold(columns: Array, which: Ints) -> None:
+    size, u = len(columns), columns.shape[1] - 1
+    for row in which:
+        for i in range(u + 1):
+            columns[row, i] = 0.0
+        for j in range(1, min(u, size - 1 - row) + 1):
+            columns[row + j, u - j] = 0.0
+        columns[row, u] = 1.0
