@@ -19,6 +19,8 @@ from selfmotion.model.kernels.algebra import (
     factor_damped as factor_damped,
     finite as finite,
     gram as gram,
+    gram_determinants as gram_determinants,
+    log_determinant_slopes as log_determinant_slopes,
     respond as respond,
     solve_cholesky as solve_cholesky,
     transport as transport,

@@ -130,6 +130,38 @@ def solve_cholesky(factor: Array, b: Array) -> None:
         b[i] = total * factor[i, i]
 
 
+@kernel
+def gram_determinants(jacobians: Array) -> Array:
+    """Return det JJᵀ of matrices J (S, m, n), (S,); 0 where JJᵀ is singular to rounding."""
+    count, m, _ = jacobians.shape
+    found, factor = np.zeros(count), np.empty((m, m))
+    for s in range(count):
+        gram(jacobians[s], factor)
+        if cholesky(factor):
+            root = 1.0
+            for i in range(m):
+                root *= factor[i, i]
+            found[s] = 1.0 / (root * root)
+    return found
+
+
+@kernel
+def log_determinant_slopes(jacobians: Array) -> Array:
+    """Return ∂ log det(JJᵀ)/∂J = 2 (JJᵀ)⁻¹J of matrices J (S, m, n); NaN where it is singular."""
+    count, m, n = jacobians.shape
+    found, factor, column = np.empty((count, m, n)), np.empty((m, m)), np.empty(m)
+    for s in range(count):
+        gram(jacobians[s], factor)
+        regular = cholesky(factor)
+        for k in range(n):
+            for i in range(m):
+                column[i] = 2.0 * jacobians[s, i, k]
+            solve_cholesky(factor, column)
+            for i in range(m):
+                found[s, i, k] = column[i] if regular else np.nan
+    return found
+
+
 @inlined
 def finite(a: Array) -> bool:
     """Whether all numbers are."""

@@ -148,13 +148,12 @@ class Samples:
     @cached_property
     def gram_determinant(self) -> Array:
         """Det JJᵀ = w², the square of Yoshikawa's manipulability, (S,)."""
-        return np.asarray(np.linalg.det(self.gram))
+        return kernels.gram_determinants(self.task_jacobian.copy())
 
     @cached_property
     def log_determinant_gradient(self) -> Array:
         """∂ log det(JJᵀ) / ∂q = 2 ⟨(JJᵀ)⁻¹J, ∂J/∂q⟩, (S, n)."""
-        inverse = np.asarray(np.linalg.solve(self.gram, self.task_jacobian), dtype=np.float64)
-        return self.contract(2.0 * inverse)
+        return self.contract(kernels.log_determinant_slopes(self.task_jacobian.copy()))
 
     def contract(self, weights: Array) -> Array:
         """Return ⟨M, ∂J/∂q_k⟩ for `weights` M (S, m, n) on the task Jacobian, (S, n)."""
