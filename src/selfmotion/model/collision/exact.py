@@ -355,10 +355,9 @@ class CollisionModel:
         within : float or (K, P)
             Pairs farther apart than this need no exact number [m]: theirs is a lower bound of the
             distance that is not below `within`. -inf for exact distances of none.
-            exact_below : float or (K, P)
-                For pairs farther apart than this, the distance of their hulls suffices, a lower
-                bound
-            bound that is not below this [m]: it takes a twentieth of the time.
+        exact_below : float or (K, P)
+            For pairs farther apart than this, the distance of their hulls suffices, a lower bound
+            that is not below this [m]: it takes a twentieth of the time.
 
         Raises
         ------

@@ -168,13 +168,14 @@ class PairDistances:
     def distances(self, q: Array, within: Array, exact_below: Array) -> Array:
         """Return the distances at samples (K, n), (K, P); see `CollisionModel.distances`."""
         values = self.hulls.lower_bounds(q, float(within.max(initial=-math.inf)))
-        for row in range(len(q)):
-            near = np.flatnonzero(values[row] < within[row]).tolist()
-            places = self.hulls.place(q[row]) if near else None
-            for pair in near:
-                hulls = self.hulls.distance(pair, values[row, pair])
-                far = hulls >= exact_below[row, pair]
-                values[row, pair] = hulls if far else self.meshes.refine(places, pair, hulls)
+        rows, pairs = np.nonzero(values < within)
+        placed, places = -1, None
+        for row, pair in zip(rows.tolist(), pairs.tolist(), strict=True):
+            if row != placed:
+                placed, places = row, self.hulls.place(q[row])
+            hulls = self.hulls.distance(pair, values[row, pair])
+            far = hulls >= exact_below[row, pair]
+            values[row, pair] = hulls if far else self.meshes.refine(places, pair, hulls)
         return values
 
     def closer(self, q: Array, margin: float) -> Flags:

@@ -168,6 +168,14 @@ class Spline:
 
     def _turning_points(self, k: Ints) -> Array:
         """Return the joints' turning points in intervals k (K,), sorted, (K, m, n); 0 for none."""
+        return self._turns_in(k) if len(self.t) > _CHUNK else self._turns[k]
+
+    @cached_property
+    def _turns(self) -> Array:
+        """Turning points in all intervals, of a motion with few samples."""
+        return self._turns_in(np.arange(len(self.t) - 1))
+
+    def _turns_in(self, k: Ints) -> Array:
         segments = self.segments(k, 1)
         turns = np.zeros((len(segments) - 1, *segments.shape[1:]))
         some, joints = np.nonzero(may_vanish(segments))

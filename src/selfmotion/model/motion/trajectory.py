@@ -228,6 +228,15 @@ class Trajectory:
             Times and values: the least in the first row, the largest in the second.
         """
         self._check_order(order)
+        if order not in self._extremes:
+            self._extremes[order] = self._extremes_of(order)
+        return self._extremes[order]
+
+    @cached_property
+    def _extremes(self) -> dict[int, tuple[Array, Array]]:
+        return {}
+
+    def _extremes_of(self, order: int) -> tuple[Array, Array]:
         n = len(self.joint_names)
         t = np.full((2, n), self.t[0])
         values = np.tile(self._spline.segments(np.zeros(1, dtype=np.intp), order)[0], (2, 1))
@@ -250,7 +259,7 @@ class Trajectory:
                 times, found = np.concatenate(when), np.concatenate(each)
                 both = [int(np.argmin(found)), int(np.argmax(found))]
                 t[:, joint], values[:, joint] = times[both], found[both]
-        return t, values
+        return read_only(t), read_only(values)
 
     def acceleration_jumps(self) -> tuple[Array, Array]:
         """Return when q̈ of each joint jumps most, and by how much, (n,) each [s], [rad or m/s²].
