@@ -14,7 +14,7 @@ from math import sqrt
 import numpy as np
 
 from selfmotion.basics import Array, Flags, Ints, called, inlined, kernel
-from selfmotion.basics.layout import KIND, ORDER, POINTING, Layout
+from selfmotion.basics.layout import COUNT, FIRST, KIND, ORDER, POINTING, ROWS, Layout
 from selfmotion.model.kernels import (
     Every,
     Tip,
@@ -38,6 +38,7 @@ from selfmotion.model.kernels.algebra import (
     angular,
     angular_part,
     cross,
+    dot,
     linear,
     plus,
 )
@@ -238,6 +239,95 @@ def required_acceleration(
         if layout[f, KIND] == POINTING:
             add_angular(six, -1.0, cross(spin, angular_part(tip.target_twist)))
         select(layout, f, tip.rotation, six, out)
+
+
+@called
+def acceleration_slopes(
+    row: Array,
+    layout: Layout,
+    every: Every | None,
+    s: int,
+    rates: Array,
+    follows: bool,
+    six: Array,
+    out: Array,
+) -> None:
+    """Set `out` (m, n) to ∂b/∂q̇ at q̇ = `rates`; `six` is work space.
+
+    Without the paths' own motion, unless `follows`: then b is -S J̇q̇, and this is linear in q̇. Of
+    joint k of a chain, with v_k and ω_k its columns and sums over the joints before and behind it,
+
+        ∂(J̇q̇)/∂q̇_k = [2 (Σ_{i≤k} q̇_i ω_i × v_k + ω_k × Σ_{i>k} q̇_i v_i);
+                       Σ_{i<k} q̇_i ω_i × ω_k + ω_k × Σ_{i>k} q̇_i ω_i].
+    """
+    n, m = len(rates), rows_of(layout)
+    for i in range(m):
+        for j in range(n):
+            out[i, j] = 0.0
+    for f in range(layout.shape[0]):
+        tip, none = tip_of(row, f, n, m), (0.0, 0.0, 0.0)
+        turns = follows and layout[f, KIND] == POINTING
+        target = angular_part(tip.target_twist) if turns else none
+        if every is None:
+            _add_slopes(
+                layout, f, tip, tip.jacobian, layout[f], ORDER, None, rates, target, six, out
+            )
+        else:
+            members = every[1]
+            own, coordinates = every[0][s, f], members[members.shape[0] - 1]
+            _add_slopes(layout, f, tip, own, members[f], 0, coordinates, rates, target, six, out)
+
+
+@inlined
+def _add_slopes(
+    layout: Layout,
+    f: int,
+    tip: Tip,
+    columns: Array,
+    order: Ints,
+    first: int,
+    coordinates: Ints | None,
+    rates: Array,
+    target: Vector,
+    six: Array,
+    out: Array,
+) -> None:
+    """Add tip f's part of ∂b/∂q̇, of columns (6, W) that come in an order from `first` on.
+
+    Each is of a coordinate (W,), or of that of its number.
+    """
+    before, behind, moves = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    for i in range(columns.shape[1]):
+        k = order[first + i]
+        rate = rates[k] if coordinates is None else rates[coordinates[k]]
+        moves = plus(moves, rate, linear(columns, k))
+        behind = plus(behind, rate, angular(columns, k))
+    for i in range(columns.shape[1]):
+        k = order[first + i]
+        j = k if coordinates is None else coordinates[k]
+        v, w = linear(columns, k), angular(columns, k)
+        moves, behind = plus(moves, -rates[j], v), plus(behind, -rates[j], w)
+        upto = plus(before, rates[j], w)
+        place = plus(cross(upto, v), 1.0, cross(w, moves))
+        turn = plus(cross(before, w), 1.0, cross(w, plus(behind, 1.0, target)))
+        for x in range(3):
+            six[x], six[3 + x] = -2.0 * place[x], -turn[x]
+        _add_selected(layout, f, tip.rotation, six, j, out)
+        before = upto
+
+
+@inlined
+def _add_selected(
+    layout: Layout, f: int, rotation: Array, twist: Array, column: int, out: Array
+) -> None:
+    """Add tip f's rows S·twist (6,) to a column of `out` (m, n)."""
+    first = layout[f, FIRST]
+    for i in range(layout[f, COUNT]):
+        row = layout[f, ROWS + i]
+        if layout[f, KIND] == POINTING and row >= 3:
+            out[first + i, column] += dot(linear(rotation, row - 3), angular_part(twist))
+        else:
+            out[first + i, column] += twist[row]
 
 
 @inlined

@@ -32,11 +32,13 @@ from selfmotion.model.kernels import (
     stage_of,
     task_rows,
     tip_of,
+    view,
 )
 from selfmotion.model.robot import place_tips
 from selfmotion.planning.nodes.charts import Charts, Place
 from selfmotion.planning.nodes.kernels import (
     accelerate,
+    acceleration_slopes,
     project,
     required_acceleration,
     turned,
@@ -95,6 +97,7 @@ class LocalModel:
             np.ascontiguousarray(force),
             scale,
             _REACH,
+            np.zeros(_space_size(table.shape[1], *own.chains.shape[1::-1], n, n - r, r)),
             changes,
             curvature,
         )
@@ -123,7 +126,9 @@ class _Work(NamedTuple):
         A row of the table.
     turns, places : (c + 1, 3, 3), (c + 1, 3)
     rotations, positions, jacobians : (F, 3, 3), (F, 3), (F, 6, n)
-    right, other : (m,)
+    right : (m,)
+    slopes : (m, n)
+        ∂b/∂q̇.
     six : (6,)
     direction, rates, qdd : (n,)
     by_rate, by_both : (r, n)
@@ -137,7 +142,7 @@ class _Work(NamedTuple):
     positions: Array
     jacobians: Array
     right: Array
-    other: Array
+    slopes: Array
     six: Array
     direction: Array
     rates: Array
@@ -147,23 +152,31 @@ class _Work(NamedTuple):
 
 
 @inlined
-def _work(width: int, joints: int, tips: int, n: int, m: int, r: int) -> _Work:
+def _work(space: Array, width: int, joints: int, tips: int, n: int, m: int, r: int) -> _Work:
+    """Return the parts of an array as work space: views, which are not reference-counted."""
+    tip, rest = width + 12 * joints, width + 12 * (joints + tips) + 6 * n * tips
+    last = rest + m + m * n + 6
     return _Work(
-        np.empty(width),
-        np.empty((joints, 3, 3)),
-        np.empty((joints, 3)),
-        np.empty((tips, 3, 3)),
-        np.empty((tips, 3)),
-        np.zeros((tips, 6, n)),
-        np.empty(m),
-        np.empty(m),
-        np.empty(6),
-        np.empty(n),
-        np.empty(n),
-        np.empty(n),
-        np.empty((r, n)),
-        np.empty((r, n)),
+        row=view(space, 0, (width,)),
+        turns=view(space, width, (joints, 3, 3)),
+        places=view(space, width + 9 * joints, (joints, 3)),
+        rotations=view(space, tip, (tips, 3, 3)),
+        positions=view(space, tip + 9 * tips, (tips, 3)),
+        jacobians=view(space, tip + 12 * tips, (tips, 6, n)),
+        right=view(space, rest, (m,)),
+        slopes=view(space, rest + m, (m, n)),
+        six=view(space, rest + m + m * n, (6,)),
+        direction=view(space, last, (n,)),
+        rates=view(space, last + n, (n,)),
+        qdd=view(space, last + 2 * n, (n,)),
+        by_rate=view(space, last + 3 * n, (r, n)),
+        by_both=view(space, last + (3 + r) * n, (r, n)),
     )
+
+
+def _space_size(width: int, joints: int, tips: int, n: int, m: int, r: int) -> int:
+    """Return the length of that array."""
+    return width + 12 * (joints + tips) + 6 * n * tips + m + m * n + 6 + (3 + 2 * r) * n
 
 
 @kernel
@@ -218,6 +231,7 @@ def differences(
     force: Array,
     scale: Array,
     reach: float,
+    space: Array,
     changes: Array,
     curvature: Array,
 ) -> int:
@@ -226,42 +240,47 @@ def differences(
     Returns the first node of which one cannot be evaluated, or -1; all such nodes have NaN.
     """
     (count, n, r), m, failed = bases.shape, rows_of(layout), -1
-    work = _work(table.shape[1], chains.shape[1], layout.shape[0], n, m, r)
+    work = _work(space, table.shape[1], chains.shape[1], layout.shape[0], n, m, r)
     epsilon, a, values = np.empty(n), np.empty(n), np.empty(q.shape[0])
     for k in range(count):
-        gamma, curved = changes[k], curvature[k]
+        gamma, curved = view(changes[k], 0, (3, n, 3 * r)), view(curvature[k], 0, (3 * r, 3 * r))
+        basis, pull = view(bases[k], 0, (n, r)), view(force[k], 0, (3, n))
+        faster = view(accelerations[k], 0, (6 * layout.shape[0],))
         for j in range(n):
             epsilon[j], a[j] = 0.0, 0.0
             for x in range(r):
                 epsilon[j] += bases[k, j, x] * nu[k, x]
                 a[j] += bases[k, j, x] * alpha[k, x]
-        _evaluate(table[k], layout, every_here, k, accelerations[k], a, bases[k], r, work)
-        _set_exact(gamma, bases[k], work)
-        middle = _value(stage_of(table[k], n, m), force[k], work)
+        _evaluate(table[k], layout, every_here, k, faster, a, basis, r, work)
+        _set_exact(gamma, basis, work)
+        middle = _value(stage_of(table[k], n, m), pull, work)
+        # Its paths are those of the neighbours, too.
+        for i in range(table.shape[1]):
+            work.row[i] = table[k, i]
         sound = True
         for d in range(q.shape[0]):
             axis, s = d // 2, d * count + k
-            for i in range(table.shape[1]):
-                work.row[i] = table[k, i]
-            sound = _place(q[d, k], layout, chains, held[k], epsilon, work)
+            sound = _place(view(q[d, k], 0, (n,)), layout, chains, held[k], epsilon, work)
             if not sound:
                 break
             first = r if axis < r else 0
-            _evaluate(work.row, layout, every_there, s, accelerations[k], a, bases[k], first, work)
+            _evaluate(work.row, layout, every_there, s, faster, a, basis, first, work)
             at = stage_of(work.row, n, m)
-            values[d] = _value(at, force[k], work)
+            values[d] = _value(at, pull, work)
             if axis < r:
                 sign = (1.0 if d % 2 == 0 else -1.0) / (2.0 * reach)
                 for j in range(n):
                     gamma[1, j, axis] += sign * at.qd[j]
                     gamma[2, j, axis] += sign * work.qdd[j]
-                _add_mixed(curved, force[k], axis, sign, work)
+                _add_mixed(curved, pull, axis, sign, work)
         if not sound:
             failed = k if failed < 0 else failed
             _set_all(gamma, curved, nan)
             continue
         _set_second(curved, values, middle, reach, r)
-        _add_by_rates(curved, table[k], layout, every_here, k, gamma, force[k, 2], work)
+        _add_by_rates(
+            curved, table[k], layout, every_here, k, gamma, view(force[k], 2 * n, (n,)), work
+        )
         for c in range(3 * r):
             for d in range(3 * r):
                 curved[c, d] *= scale[c] * scale[d]
@@ -275,7 +294,7 @@ def differences(
 def _place(
     q: Array, layout: Layout, chains: Array, held: Flags, epsilon: Array, work: _Work
 ) -> bool:
-    """Evaluate eq. 4 at q with ε in the work space's row, which has the paths; whether it can be."""
+    """Evaluate eq. 4 at q with ε, in the work space's row, which has the paths; False if singular."""
     n, m = len(q), rows_of(layout)
     at = stage_of(work.row, n, m)
     place_tips(q, chains, work.turns, work.places, work.rotations, work.positions, work.jacobians)
@@ -308,13 +327,15 @@ def _evaluate(
 ) -> None:
     """Set q̈ of a row whose motion is known, and its derivatives by `count` coordinates.
 
-    b of q̈ = J⁺(b - J a) + a is quadratic in q̇, so that its central difference is exact.
+    ∂q̇/∂ν = (I - J⁺J) N0 and ∂q̈/∂ν = J⁺ ∂b/∂q̇ ∂q̇/∂ν, with b of q̈ = J⁺(b - J a) + a.
     """
     n, m = len(a), rows_of(layout)
     at = stage_of(row, n, m)
-    right, other, direction, rates = work.right, work.other, work.direction, work.rates
+    right, direction, rates = work.right, work.direction, work.rates
     required_acceleration(row, layout, every, s, accelerations, at.qd, work.six, right)
     project(at.task_jacobian, at.factor, right, a, work.qdd)
+    if count > 0:
+        acceleration_slopes(row, layout, every, s, at.qd, True, work.six, work.slopes)
     for x in range(count):
         for j in range(n):
             direction[j] = bases[j, x]
@@ -322,15 +343,11 @@ def _evaluate(
             right[i] = 0.0
         project(at.task_jacobian, at.factor, right, direction, rates)
         for j in range(n):
-            work.by_rate[x, j], direction[j] = rates[j], at.qd[j] + rates[j]
-        required_acceleration(row, layout, every, s, accelerations, direction, work.six, right)
-        for j in range(n):
-            direction[j] = at.qd[j] - rates[j]
-        required_acceleration(row, layout, every, s, accelerations, direction, work.six, other)
+            work.by_rate[x, j], direction[j] = rates[j], 0.0
         for i in range(m):
-            right[i] = 0.5 * (right[i] - other[i])
-        for j in range(n):
-            direction[j] = 0.0
+            right[i] = 0.0
+            for j in range(n):
+                right[i] += work.slopes[i, j] * rates[j]
         project(at.task_jacobian, at.factor, right, direction, rates)
         for j in range(n):
             work.by_both[x, j] = rates[j]
@@ -401,52 +418,26 @@ def _add_by_rates(
     force: Array,
     work: _Work,
 ) -> None:
-    """Add the second derivatives by two of ν: λᵀq̈ is -λᵀJ⁺ Q(u, u) along u of q̇.
-
-    Of a sum of two directions, with the parts of each taken off, twice the mixed one.
-    """
+    """Add the second derivatives by two of ν: of λᵀq̈ these are λᵀJ⁺ ∂²b/∂q̇² ∂q̇/∂ν ∂q̇/∂ν."""
     (r, n), m = work.by_rate.shape, rows_of(layout)
-    at, pulled, direction = stage_of(row, n, m), work.other, work.direction
+    at, pulled, direction = stage_of(row, n, m), work.right, work.direction
     for i in range(m):
         pulled[i] = 0.0
         for j in range(n):
             pulled[i] += at.task_jacobian[i, j] * force[j]
     solve_cholesky(at.factor, pulled)
     for x in range(r):
+        for j in range(n):
+            direction[j] = gamma[1, j, r + x]
+        acceleration_slopes(row, layout, every, s, direction, False, work.six, work.slopes)
         for y in range(x + 1):
-            # 2 Q(u, v) = ½ (Q(u + v, u + v) - Q(u - v, u - v)).
             total = 0.0
-            for side in range(2):
+            for i in range(m):
                 for j in range(n):
-                    other = gamma[1, j, r + y] if side == 0 else -gamma[1, j, r + y]
-                    direction[j] = gamma[1, j, r + x] + other
-                sign = 0.5 if side == 0 else -0.5
-                total += sign * _bent(row, layout, every, s, direction, pulled, work)
+                    total += pulled[i] * work.slopes[i, j] * gamma[1, j, r + y]
             curved[r + x, r + y] += total
             if x != y:
                 curved[r + y, r + x] += total
-
-
-@inlined
-def _bent(
-    row: Array,
-    layout: Layout,
-    every: Every | None,
-    s: int,
-    rates: Array,
-    pulled: Array,
-    work: _Work,
-) -> float:
-    """Return -pulledᵀ S Q(q̇, q̇) of all rows."""
-    n, m = len(rates), rows_of(layout)
-    for f in range(layout.shape[0]):
-        tip = tip_of(row, f, n, m)
-        turned(layout, f, tip.jacobian, every, s, rates, work.six)
-        select(layout, f, tip.rotation, work.six, work.right)
-    total = 0.0
-    for i in range(m):
-        total -= pulled[i] * work.right[i]
-    return total
 
 
 @meanwhile
@@ -473,6 +464,7 @@ def _call_what_follows() -> None:
         three,
         np.ones(3),
         _REACH,
+        np.zeros(1),
         np.zeros((0, 3, 2, 3)),
         np.zeros((0, 3, 3)),
     )

@@ -210,8 +210,7 @@ def _solved(
 
     `stiffened` is the model's curvature with the stiffness of its active rows.
     """
-    curved = model.around.curvature
-    count, size = model.gradient.shape
+    curved, count = model.around.curvature, len(model.gradient)
     largest = float(np.abs(curved).max() + max(np.abs(part).max() for part in stiffened))
     diagonals = np.abs(np.diagonal(stiffened.nodes, axis1=1, axis2=2)).ravel()
     usual = float(np.partition(diagonals, len(diagonals) // 2)[len(diagonals) // 2])

@@ -103,7 +103,7 @@ class NewtonSettings:
     # Added to the diagonal, as a share of its median entry over the square of the number of nodes:
     # above what differences leave there for a motion that costs nothing, below what slow motions
     # cost.
-    flat_share: float = 2.5e-5
+    flat_share: float = 1.25e-5
     # The same is this many times larger where the matrix is not positive definite.
     flat_factor: float = 16.0
     # Inertia correction [WB algorithm IC]: first δ, as a share of each coordinate's curvature
