@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
-from typing import Any, Self
+from functools import cached_property, partial
+from typing import Any, Self, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -13,10 +13,26 @@ import numpy.typing as npt
 from selfmotion.basics import Array, Flags, Ints, ProblemError, shown
 from selfmotion.basics.layout import Layout, layout_of
 from selfmotion.model.follow.coordinates import Coordinates
-from selfmotion.model.path import Dwell, Path, PathSamples
+from selfmotion.model.path import Dwell, Path, PathSamples, twist_rates
 from selfmotion.model.robot import Chain, RobotModel, null_space
 from selfmotion.model.robot.tree_arrays import JOINT
 from selfmotion.model.task import SE3, Task, as_pose
+
+# Grids of times whose samples of a path are cached.
+_GRIDS = 4
+_Value = TypeVar("_Value")
+_Recent = list[tuple[Array, _Value]]
+
+
+def _recent(known: _Recent[_Value], t: Array, evaluate: Callable[[Array], _Value]) -> _Value:
+    """Return a function's value at times (K,), one of the last few where it is known."""
+    for times, value in known:
+        if np.array_equal(times, t):
+            return value
+    found = evaluate(t)
+    known.insert(0, (np.array(t), found))
+    del known[_GRIDS:]
+    return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,19 +115,19 @@ class BoundTaskFrame:
     chain: Chain
     path: Path
     task: Task
-    _last: list[PathSamples] = field(default_factory=list, init=False, repr=False)
+    _targets: _Recent[PathSamples] = field(default_factory=list, init=False, repr=False)
+    _rates: _Recent[Array] = field(default_factory=list, init=False, repr=False)
 
     def target(self, t: Array) -> PathSamples:
         """Return the prescribed pose and twist of the tip at times t (K,).
 
-        The last times are cached: many motions are evaluated on the same grid.
+        The last few times are cached: many motions are evaluated on the same grids.
         """
-        for kept in self._last:
-            if np.array_equal(kept.t, t):
-                return kept
-        found = self.path.samples(t)
-        self._last[:] = [found]
-        return found
+        return _recent(self._targets, t, self.path.samples)
+
+    def twist_rates(self, t: Array) -> Array:
+        """Return the rates of the path's twists at times t (K,), (K, 6); cached as targets are."""
+        return _recent(self._rates, t, partial(twist_rates, self.path))
 
     def jacobian(self, q: Array) -> Array:
         """Return the prescribed rows of the Jacobian at q (n,), (m, n); q is not checked."""

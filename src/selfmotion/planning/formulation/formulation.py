@@ -239,13 +239,7 @@ class Formulation:
         ends are on the path.
         """
         problem = self.problem
-        given = [*self._own_limits, *(problem.all_constraints if apart else problem.applying)]
-        if all(self.rests):
-            given = [item.at_rest() for item in given]
-        own = Conditions.joined(
-            item.decomposed_conditions(self.robot) if decomposed else item.conditions(self.robot)
-            for item in given
-        )
+        own = self._conditions(apart=apart, decomposed=decomposed)
         bound = self.bound(own, start, end)
         if not isinstance(self.follows, RelaxedFrames):
             return bound
@@ -257,6 +251,25 @@ class Formulation:
         # Those that are there with `apart` alone come last, so that others keep their places.
         limits, points = (*own.limits, *bands.limits), (*bands.points, *own.points)
         return BoundConditions(limits, points, tuple(ends))
+
+    def _conditions(self, *, apart: bool, decomposed: bool) -> Conditions:
+        """Return the conditions on the arm's motion, of all constraints in their order."""
+        known, problem = self._known_conditions, self.problem
+        if (apart, decomposed) not in known:
+            given = [*self._own_limits, *(problem.all_constraints if apart else problem.applying)]
+            if all(self.rests):
+                given = [item.at_rest() for item in given]
+            known[apart, decomposed] = Conditions.joined(
+                item.decomposed_conditions(self.robot)
+                if decomposed
+                else item.conditions(self.robot)
+                for item in given
+            )
+        return known[apart, decomposed]
+
+    @cached_property
+    def _known_conditions(self) -> dict[tuple[bool, bool], Conditions]:
+        return {}
 
     def bound(self, own: Conditions, start: Array, end: Array) -> BoundConditions:
         """Return conditions on the arm as those on motions between such ends, (n,) each."""

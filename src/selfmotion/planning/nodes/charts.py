@@ -8,7 +8,6 @@ import numpy as np
 from selfmotion.basics import Array
 from selfmotion.model import kernels
 from selfmotion.model.follow import Follows
-from selfmotion.model.path import twist_rates
 from selfmotion.model.robot import null_space
 from selfmotion.planning.nodes.kernels import accelerate, retract
 
@@ -179,7 +178,7 @@ class Manifolds:
             own = item.target(t)
             parts = own.translation, own.rotation.reshape(-1, 9), own.twist
             self._paths.append(np.tile(np.hstack(parts), (copies, 1)))
-            accelerations.append(twist_rates(item.path, t))
+            accelerations.append(item.twist_rates(t))
         self.held = np.tile(follows.held(t), (copies, 1))
         self.targets = np.ascontiguousarray(np.hstack([path[:, :12] for path in self._paths]))
         self.path_accelerations = np.ascontiguousarray(

@@ -97,7 +97,7 @@ class LocalModel:
             np.ascontiguousarray(force),
             scale,
             _REACH,
-            np.zeros(_space_size(table.shape[1], *own.chains.shape[1::-1], n, n - r, r)),
+            np.zeros(_space_size(table.shape[1], own.chains, n, n - r, r)),
             changes,
             curvature,
         )
@@ -174,9 +174,10 @@ def _work(space: Array, width: int, joints: int, tips: int, n: int, m: int, r: i
     )
 
 
-def _space_size(width: int, joints: int, tips: int, n: int, m: int, r: int) -> int:
+def _space_size(width: int, chains: Array, n: int, m: int, r: int) -> int:
     """Return the length of that array."""
-    return width + 12 * (joints + tips) + 6 * n * tips + m + m * n + 6 + (3 + 2 * r) * n
+    tips, joints = chains.shape[:2]
+    return int(width + 12 * (joints + tips) + 6 * n * tips + m + m * n + 6 + (3 + 2 * r) * n)
 
 
 @kernel
@@ -294,7 +295,7 @@ def differences(
 def _place(
     q: Array, layout: Layout, chains: Array, held: Flags, epsilon: Array, work: _Work
 ) -> bool:
-    """Evaluate eq. 4 at q with ε, in the work space's row, which has the paths; False if singular."""
+    """Evaluate eq. 4 at q with ε in the work space's row, which has the paths; False if not."""
     n, m = len(q), rows_of(layout)
     at = stage_of(work.row, n, m)
     place_tips(q, chains, work.turns, work.places, work.rotations, work.positions, work.jacobians)

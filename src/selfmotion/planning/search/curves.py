@@ -9,8 +9,15 @@ import numpy.typing as npt
 from selfmotion.basics import Array, Flags, Ints, Progress, inlined, kernel, read_only, silent
 from selfmotion.basics.layout import Layout
 from selfmotion.model.follow import Follows
+from selfmotion.model.kernels import rows_of
 from selfmotion.model.robot import place_tips
-from selfmotion.planning.search.manifold import CONVERGED, LONGEST_CORRECTION, Manifold, correct
+from selfmotion.planning.search.manifold import (
+    CONVERGED,
+    LONGEST_CORRECTION,
+    Manifold,
+    correct,
+    correction_space,
+)
 from selfmotion.planning.search.measures import wrapped
 
 # Largest distance of samples along a curve [rad or m], configuration norm.
@@ -62,6 +69,7 @@ def walk(
         for i in range(3):
             tangents[i, k] = tangent[k]
     state, code = np.array([spacing, 0.0, 1.0, spacing]), GOING
+    space = np.empty(correction_space(n, rows_of(layout)))
     while code == GOING:
         place_tips(q, chains, r, p, rotations, positions, jacobians)
         code = _advance(
@@ -75,6 +83,7 @@ def walk(
             samples,
             tangents,
             state,
+            space,
         )
     return int(state[2]), code == CLOSED
 
@@ -91,16 +100,20 @@ def _advance(
     samples: Array,
     tangents: Array,
     state: Array,
+    space: Array,
 ) -> int:
     """Advance the continuation of a self-motion curve by one evaluation of the Jacobian.
 
     q is the iterate at which the Jacobian was taken, and on return the one to take it at next.
     `samples` (K, n) receives the curve. `tangents` (3, n): at the last sample, at the iterate, at
-    the start. `state`: step, corrections and samples so far, largest step.
+    the start. `state`: step, corrections and samples so far, largest step. `space` is to
+    work in.
     """
     n, count = q.shape[0], int(state[2])
     last = samples[count - 1]
-    length = correct(q, jacobians, rotations, translations, target, layout, tangents[1], state[3])
+    length = correct(
+        q, jacobians, rotations, translations, target, layout, tangents[1], state[3], space
+    )
     state[1] += 1
     if length > CONVERGED and state[1] < _CORRECTIONS:
         return GOING
@@ -335,7 +348,9 @@ class SelfMotion:
     def tangent(self, q: Array, target: Array) -> Array | None:
         """Return a unit null vector of J at q, a solution; None where q is singular."""
         tangent, layout = self._direction.copy(), self._manifold.layout
-        length = correct(q.copy(), *self._tips.at(q), target, layout, tangent, LONGEST_CORRECTION)
+        space = np.empty(correction_space(len(q), rows_of(layout)))
+        tips = self._tips.at(q)
+        length = correct(q.copy(), *tips, target, layout, tangent, LONGEST_CORRECTION, space)
         return tangent if length >= 0.0 and np.all(np.isfinite(tangent)) else None
 
     def trace(self, q: Array, target: Array) -> Curve | None:

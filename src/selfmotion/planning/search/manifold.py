@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from selfmotion.basics import Array, Flags, Ints, RobotError, called, kernel
+from selfmotion.basics import Array, Flags, Ints, RobotError, called, inlined, kernel
 from selfmotion.basics.layout import Layout
 from selfmotion.model.follow import Follows
 from selfmotion.model.kernels import (
@@ -13,6 +13,7 @@ from selfmotion.model.kernels import (
     gram,
     rows_of,
     solve_cholesky,
+    view,
 )
 from selfmotion.model.robot import null_space, place_tips
 
@@ -46,17 +47,20 @@ def correct(
     layout: Layout,
     tangent: Array,
     longest: float,
+    space: Array,
 ) -> float:
     """Add J⁺e to q, no longer than `longest`, and project `tangent` onto the null space of J.
 
-    Of all tips, (F, 6, n), (F, 3, 3) and (F, 3); `target` (12 F,) is as `Follows.targets` has it.
-    Returns the norm of the correction before it was shortened; -1 where J has no full rank.
+    Of all tips, (F, 6, n), (F, 3, 3) and (F, 3); `target` (12 F,) is as `Follows.targets` has it,
+    `space` to work in, see `correction_space`. Returns the norm of the correction before it was
+    shortened; -1 where J has no full rank.
     """
     n, m = jacobians.shape[2], rows_of(layout)
-    z, along = np.empty(m), np.zeros(m)
-    jacobian, factor = np.empty((m, n)), np.empty((m, m))
+    z, along, step = view(space, 0, (m,)), view(space, m, (m,)), view(space, 2 * m, (n,))
+    jacobian, factor = view(space, 2 * m + n, (m, n)), view(space, 2 * m + n + m * n, (m, m))
     errors_and_rows(layout, target, jacobians, rotations, translations, z, jacobian)
     for i in range(m):
+        along[i] = 0.0
         for k in range(n):
             along[i] += jacobian[i, k] * tangent[k]
     gram(jacobian, factor)
@@ -65,8 +69,8 @@ def correct(
     solve_cholesky(factor, z)
     solve_cholesky(factor, along)
     length, norm = 0.0, 0.0
-    step = np.zeros(n)
     for k in range(n):
+        step[k] = 0.0
         for i in range(m):
             step[k] += jacobian[i, k] * z[i]
             tangent[k] -= jacobian[i, k] * along[i]
@@ -78,6 +82,12 @@ def correct(
         q[k] += scale * step[k]
         tangent[k] /= norm
     return float(length)
+
+
+@inlined
+def correction_space(n: int, m: int) -> int:
+    """Return the length of the array that `correct` works in."""
+    return 2 * m + n + m * n + m * m
 
 
 @called
@@ -113,7 +123,7 @@ def project_all(
     r, p = np.empty((chains.shape[1], 3, 3)), np.empty((chains.shape[1], 3))
     rotations, positions = np.empty((tips, 3, 3)), np.empty((tips, 3))
     jacobians, unused = np.zeros((tips, 6, n)), np.empty(n)
-    held = np.zeros(n, dtype=np.bool_)
+    held, space = np.zeros(n, dtype=np.bool_), np.empty(correction_space(n, rows_of(layout)))
     for k in range(len(q)):
         arrived[k] = False
         for j in range(n):
@@ -130,7 +140,7 @@ def project_all(
             unused[:] = 1.0
             clear_held(held, jacobians)
             length = correct(
-                q[k], jacobians, rotations, positions, targets[k], layout, unused, longest
+                q[k], jacobians, rotations, positions, targets[k], layout, unused, longest, space
             )
             # Singular, or not a number.
             if not length >= 0.0:
