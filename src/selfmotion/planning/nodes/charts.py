@@ -1,6 +1,7 @@
 """Charts of the self-motion manifolds of all nodes, and eq. 4 there."""
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -31,7 +32,7 @@ class Place:
     tangents: Array
     table: Array
 
-    @property
+    @cached_property
     def nodes(self) -> Array:
         """(q, q̇, q̈), (N + 1, 3, n)."""
         return np.stack([self.q, self.qd, self.qdd], axis=1)

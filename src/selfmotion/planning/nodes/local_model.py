@@ -10,6 +10,7 @@ second differences, and is within the error of first ones.
 """
 
 from dataclasses import dataclass
+from functools import cache
 from math import nan
 from typing import NamedTuple
 
@@ -110,11 +111,12 @@ class LocalModel:
         return np.asarray((force.reshape(count, 1, 3 * n) @ flat)[:, 0])
 
 
+@cache
 def _directions(r: int) -> Array:
     """Return the directions of differences, (D, r): the axes, then the sums of two of them."""
     axes = np.eye(r)
     x, y = np.tril_indices(r, -1)
-    return np.ascontiguousarray(np.concatenate([axes, axes[x] + axes[y]]))
+    return np.concatenate([axes, axes[x] + axes[y]])
 
 
 class _Work(NamedTuple):

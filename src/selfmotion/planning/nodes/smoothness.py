@@ -81,7 +81,7 @@ def quickness(formulation: Formulation, samples: Samples, cost: float, quick: fl
 
     The present share `quick`, unless its penalty is too large.
     """
-    if _is_smooth(formulation):
+    if _is_smooth(formulation) or not any(formulation.rests):
         return quick
     shares = _of_rest(formulation, samples.sampling.t, quick)
     squares = shares * (samples.qdd**2 @ _weights(formulation))
