@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from selfmotion.basics import Array, Flags
+from selfmotion.basics import Array, Flags, Ints, kernel
 from selfmotion.planning.nodes.spline import AT_CONTROLS, CONTROLS, ORDERS, Quintic, unit_bases
 from selfmotion.problem.constraints import BoundLimits, Multipliers
 
@@ -48,11 +48,9 @@ class ControlPointRows:
     def _at(self, tables: tuple[Array, ...], ends: Array) -> Array:
         """Return h by shares of all intervals, (N, P, 2, j)."""
         item = self.item
-        x = self._spline.at(tables, item.order, ends)[:, :, self.joints]
-        h = np.stack([x - item.upper, item.lower - x], axis=2)
-        h /= item.scale
-        h += item.margin
-        return h
+        limits = item.lower, item.upper, item.scale
+        rates, table = self._spline.rates(item.order), tables[item.order]
+        return _beyond(ends, table, rates, self.joints, *limits, item.margin)
 
     def near(self, h: Array) -> Flags:
         """Return the mask of nearly violated rows: all of a joint and side."""
@@ -61,24 +59,23 @@ class ControlPointRows:
 
     def along(self, changes: Array) -> Array:
         """Return ∂h of all rows along changes of y (N, 6, n)."""
-        order = self.item.order
-        x = self._spline.at(AT_CONTROLS, order, changes)[:, :, self.joints] / self.item.scale
-        return np.stack([x, -x], axis=2)
+        item, none = self.item, np.zeros(len(self.joints))
+        rates, table = self._spline.rates(item.order), AT_CONTROLS[item.order]
+        return _beyond(changes, table, rates, self.joints, none, none, item.scale, 0.0)
 
     def pulled(self, multipliers: Array) -> Array:
         """Return Σ multipliers ∂h/∂y of its joints, (N, 6, j)."""
         order = self.item.order
-        by = (multipliers[:, :, 0] - multipliers[:, :, 1]) / self.item.scale
-        by *= self._spline.rates(order)[:, None, None]
-        return np.asarray(AT_CONTROLS[order].T @ by)
+        rates = self._spline.rates(order)
+        return _pulled(
+            np.ascontiguousarray(multipliers), AT_CONTROLS[order], rates, self.item.scale
+        )
 
     def squared(self, weights: Array) -> Array:
         """Return Σ weights ∂h ∂hᵀ by y of each of its joints, (N, j, 6, 6)."""
-        order, spline = self.item.order, self._spline
-        each = weights.sum(axis=2) / self.item.scale**2 * spline.rates(2 * order)[:, None, None]
-        table = AT_CONTROLS[order]
-        outer = (table[:, :, None] * table[:, None, :]).reshape(len(table), 36)
-        return np.asarray((np.swapaxes(each, 1, 2) @ outer).reshape(spline.count, -1, 6, 6))
+        order = self.item.order
+        rates = self._spline.rates(order)
+        return _squared(np.ascontiguousarray(weights), AT_CONTROLS[order], rates, self.item.scale)
 
     def multipliers_of(self, multipliers: Array, ends: Array) -> Multipliers:
         """Return the multipliers in the order of time."""
@@ -125,3 +122,65 @@ class ControlPointRows:
         place = np.clip(np.rint(share * degree), 0, degree).astype(np.int64)
         density = (spline.steps / old.steps[k])[:, None, None, None]
         return np.asarray(each[k[:, None], place] * density)
+
+
+@kernel
+def _beyond(
+    ends: Array,
+    table: Array,
+    rates: Array,
+    joints: Ints,
+    lower: Array,
+    upper: Array,
+    scale: Array,
+    margin: float,
+) -> Array:
+    """Return (x - upper)/scale + margin and (lower - x)/scale + margin, (N, P, 2, j).
+
+    Of x = rates · table y, for y = `ends` (N, 6, n) and a table (P, 6) of a derivative.
+    """
+    (count, places), size = (len(ends), len(table)), len(joints)
+    found = np.empty((count, places, 2, size))
+    for k in range(count):
+        for p in range(places):
+            for j in range(size):
+                x = 0.0
+                for a in range(6):
+                    x += table[p, a] * ends[k, a, joints[j]]
+                x *= rates[k]
+                found[k, p, 0, j] = (x - upper[j]) / scale[j] + margin
+                found[k, p, 1, j] = (lower[j] - x) / scale[j] + margin
+    return found
+
+
+@kernel
+def _pulled(multipliers: Array, table: Array, rates: Array, scale: Array) -> Array:
+    """Return Σ multipliers (N, P, 2, j) ∂h/∂y, (N, 6, j)."""
+    count, places, _, size = multipliers.shape
+    found = np.zeros((count, 6, size))
+    for k in range(count):
+        for p in range(places):
+            for j in range(size):
+                by = multipliers[k, p, 0, j] - multipliers[k, p, 1, j]
+                if by != 0.0:
+                    by *= rates[k] / scale[j]
+                    for a in range(6):
+                        found[k, a, j] += table[p, a] * by
+    return found
+
+
+@kernel
+def _squared(weights: Array, table: Array, rates: Array, scale: Array) -> Array:
+    """Return Σ weights (N, P, 2, j) ∂h ∂hᵀ by y of each joint, (N, j, 6, 6)."""
+    count, places, _, size = weights.shape
+    found = np.zeros((count, size, 6, 6))
+    for k in range(count):
+        for p in range(places):
+            for j in range(size):
+                by = weights[k, p, 0, j] + weights[k, p, 1, j]
+                if by != 0.0:
+                    by *= (rates[k] / scale[j]) ** 2
+                    for a in range(6):
+                        for b in range(6):
+                            found[k, j, a, b] += by * table[p, a] * table[p, b]
+    return found
