@@ -133,7 +133,8 @@ class ClearanceModel:
         hulls, reach = self._hulls, self._near + self._width
         values = hulls.lower_bounds(q, reach)[:, self._selected]
         rows, columns = np.nonzero(values < reach)
-        contacts = hulls.contacts(q, rows, self._selected[columns], values[rows, columns])
+        given = rows, self._selected[columns], values[rows, columns]
+        contacts = hulls.contacts(q, *given, within=reach)
         values[rows, columns] = contacts.values
         slopes = contacts.slopes * self._sides[columns]
         beyond = np.clip(values - self._near, 0.0, self._width)

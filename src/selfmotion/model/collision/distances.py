@@ -245,7 +245,9 @@ class HullDistances:
                     left.append((row, pair, value))
         return found, left
 
-    def contacts(self, q: Array, rows: Ints, pairs: Ints, bounds: Array) -> "Contacts":
+    def contacts(
+        self, q: Array, rows: Ints, pairs: Ints, bounds: Array, within: float = math.inf
+    ) -> "Contacts":
         """Return distances with derivatives of several pairs at several samples.
 
         Parameters
@@ -256,6 +258,8 @@ class HullDistances:
             Sample and pair of each distance; rows in order.
         bounds : (M,)
             Their lower bounds [m].
+        within : float
+            Of bodies at least this far apart, the distance alone: their normal is 0 [m].
 
         Raises
         ------
@@ -264,7 +268,7 @@ class HullDistances:
         """
         jacobians, coupling = np.empty((len(q), 6, self._robot.dof)), self._robot.coupling
         values, placed = np.empty(len(rows)), -1
-        normals, points = np.empty((len(rows), 3)), np.empty((len(rows), 3))
+        normals, points = np.zeros((len(rows), 3)), np.zeros((len(rows), 3))
         chain, model = self._robot.model, self._model
         data, places = self._own()
         wanted = zip(rows.tolist(), pairs.tolist(), bounds.tolist(), strict=True)
@@ -280,9 +284,10 @@ class HullDistances:
                 answer = self._again(pair, bound)
                 value = answer.min_distance
             values[k] = value
-            # Copies: coal writes the next answer in the same place.
-            normals[k] = answer.normal
-            points[k] = answer.getNearestPoint1()
+            if value < within:
+                # Copies: coal writes the next answer in the same place.
+                normals[k] = answer.normal
+                points[k] = answer.getNearestPoint1()
         # coal's normals point from the first body to the second.
         np.negative(normals, out=normals)
         wrenches = np.hstack([normals, np.cross(points, normals)])

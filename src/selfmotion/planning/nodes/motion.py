@@ -361,7 +361,7 @@ class NodeMotion:
             return None
         rate, bend = grid.spline.differences(q - line[:, 0])
         qd, qdd = grid.rested(line[:, 1] + rate, 1), grid.rested(line[:, 2] + bend, 2)
-        found = self.charts.centred(z, qd, qdd)
+        found = replace(self.charts, q=q).centred(np.zeros_like(z), qd, qdd)
         return None if found is None else grid.at(found)
 
     def subdivisions(self) -> Ints:
