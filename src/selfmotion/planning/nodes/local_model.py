@@ -271,25 +271,15 @@ def differences(
             at = stage_of(work.row, n, m)
             values[d] = _value(at, pull, work)
             if axis < r:
-                sign = (1.0 if d % 2 == 0 else -1.0) / (2.0 * reach)
-                for j in range(n):
-                    gamma[1, j, axis] += sign * at.qd[j]
-                    gamma[2, j, axis] += sign * work.qdd[j]
-                _add_mixed(curved, pull, axis, sign, work)
+                share = (1.0 if d % 2 == 0 else -1.0) / (2.0 * reach)
+                _add_neighbour(gamma, curved, pull, axis, share, at.qd, work)
         if not sound:
             failed = k if failed < 0 else failed
             _set_all(gamma, curved, nan)
             continue
         _set_second(curved, values, middle, reach, r)
-        _add_by_rates(
-            curved, table[k], layout, every_here, k, gamma, view(force[k], 2 * n, (n,)), work
-        )
-        for c in range(3 * r):
-            for d in range(3 * r):
-                curved[c, d] *= scale[c] * scale[d]
-            for o in range(3):
-                for j in range(n):
-                    gamma[o, j, c] *= scale[c]
+        _add_by_rates(curved, table[k], layout, every_here, k, gamma, pull, work)
+        _scale(gamma, curved, scale)
     return failed
 
 
@@ -376,19 +366,35 @@ def _value(at: Stage, force: Array, work: _Work) -> float:
     return total
 
 
-@inlined
-def _add_mixed(curved: Array, force: Array, axis: int, sign: float, work: _Work) -> None:
-    """Add a neighbour's part of the second derivatives by a coordinate of z, and by ν or α."""
+@called
+def _add_neighbour(
+    gamma: Array, curved: Array, force: Array, axis: int, share: float, qd: Array, work: _Work
+) -> None:
+    """Add a neighbour's part of the first derivatives by a coordinate of z, and of mixed ones."""
     r, n = work.by_rate.shape
+    for j in range(n):
+        gamma[1, j, axis] += share * qd[j]
+        gamma[2, j, axis] += share * work.qdd[j]
     for x in range(r):
         by_nu, by_alpha = 0.0, 0.0
         for j in range(n):
             by_nu += force[1, j] * work.by_rate[x, j] + force[2, j] * work.by_both[x, j]
             by_alpha += force[2, j] * work.by_rate[x, j]
-        curved[axis, r + x] += sign * by_nu
-        curved[axis, 2 * r + x] += sign * by_alpha
+        curved[axis, r + x] += share * by_nu
+        curved[axis, 2 * r + x] += share * by_alpha
         curved[r + x, axis] = curved[axis, r + x]
         curved[2 * r + x, axis] = curved[axis, 2 * r + x]
+
+
+@inlined
+def _scale(gamma: Array, curved: Array, scale: Array) -> None:
+    """Change the units of the coordinates."""
+    for c in range(len(scale)):
+        for d in range(len(scale)):
+            curved[c, d] *= scale[c] * scale[d]
+        for o in range(3):
+            for j in range(gamma.shape[1]):
+                gamma[o, j, c] *= scale[c]
 
 
 @inlined
@@ -427,7 +433,7 @@ def _add_by_rates(
     for i in range(m):
         pulled[i] = 0.0
         for j in range(n):
-            pulled[i] += at.task_jacobian[i, j] * force[j]
+            pulled[i] += at.task_jacobian[i, j] * force[2, j]
     solve_cholesky(at.factor, pulled)
     for x in range(r):
         for j in range(n):
