@@ -14,7 +14,8 @@ from selfmotion.basics import FIRST_WORKS, Counts, compile_alone, read_only
 from selfmotion.model.collision.kernels import winding_number
 from selfmotion.model.task import SE3
 from selfmotion.planning.formulation import BoundConditions, Formulation
-from selfmotion.planning.nodes import NodeGrid
+from selfmotion.planning.nodes import NodeGrid, NodeMotion
+from selfmotion.planning.nodes.local_model import LocalModel
 from selfmotion.realtime.loop import warm_up
 from selfmotion.realtime.replanner import Replanner
 from selfmotion.work.job.order import improved
@@ -62,7 +63,7 @@ def small_works() -> Iterator[tuple[str, Callable[[], object]]]:
     t, at_rest = np.linspace(0.0, 4.0, 5), np.zeros((5, 7))
     formulation = Formulation.of(alone)
     nodes = NodeGrid(formulation, t, BoundConditions(), free=False, counts=Counts())
-    yield "nodes", lambda: nodes.near(np.tile(home, (5, 1)), at_rest, at_rest)
+    yield "nodes", lambda: _modelled(nodes.near(np.tile(home, (5, 1)), at_rest, at_rest))
     yield "a given start", plan(alone)
     given = sm.Problem(arm, circle, "position", home)
     free = replace(given, start=None)
@@ -80,6 +81,8 @@ def small_works() -> Iterator[tuple[str, Callable[[], object]]]:
     yield "singular poses", plan(replace(given, costs=[sm.costs.InverseManipulability(0.01)]))
     yield "paces", lambda: sm.retime(sm.plan(given))
     yield "accelerations", plan(replace(given, costs=[sm.costs.JointAcceleration()]))
+    coupled = sm.costs.JointVelocity(np.eye(7) + 0.1)
+    yield "weights of several joints", plan(replace(given, costs=[coupled]))
     yield (
         "relaxed rows",
         plan(replace(given, task="pose", relaxations=[sm.Relaxation(("rx", "ry"), 0.1)])),
@@ -96,6 +99,12 @@ def small_works() -> Iterator[tuple[str, Callable[[], object]]]:
     yield "orders of many seams", lambda: improved(_two_stops())
     yield "moves", lambda: sm.move(arm, home, home + 0.3, clearance=box)
     yield "a replanner", lambda: warm_up(Replanner(arm, "position"))
+
+
+def _modelled(motion: NodeMotion | None) -> None:
+    if motion is not None:
+        scale, force = motion.grid.scale, np.zeros((5, 3, 7))
+        LocalModel.of(motion.charts, motion.nu, motion.alpha, motion.place, force, scale)
 
 
 def _refused(problem: sm.Problem) -> str:

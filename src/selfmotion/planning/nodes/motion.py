@@ -204,7 +204,9 @@ class NodeGrid:
             share = np.append(0.0, 1.0 - left[1:] / left[:-1])
         else:
             share = np.minimum(np.append(0.0, np.diff(self.t)) / time, 1.0)
-        if follow(start, wanted, share, own.targets, own.chains, own.layout, own.held, q) >= 0:
+        # Copies: of read-only arrays numba would compile another kernel.
+        ends = np.array(start), np.array(wanted)
+        if follow(*ends, share, own.targets, own.chains, own.layout, own.held, q) >= 0:
             return None
         qd = np.asarray(np.gradient(q, self.t, axis=0))
         return self.near(q, qd, np.asarray(np.gradient(qd, self.t, axis=0)))

@@ -81,7 +81,7 @@ class NodeCost:
     def _coupled_forms(self) -> list[tuple[Array, Array]]:
         """K and W of what is quadratic in several joints together."""
         return [
-            (stiffness, np.ascontiguousarray(weight))
+            (stiffness, np.array(weight, order="C"))
             for stiffness, weight in self._forms
             if not _is_diagonal(weight)
         ]
@@ -169,7 +169,7 @@ class NodeCost:
 
         By differences along the self-motion, and by one joint's rate after the other.
         """
-        n, weights = self._dof, np.ascontiguousarray(samples.weights)
+        n, weights = self._dof, np.array(samples.weights)
         along = self._directions(by)
         own = along[:, :n]
         moved = self._points(0, along)
