@@ -6,7 +6,7 @@ READY := $(VENV)/.ready
 # What is imported by many processes is compiled to bytecode once.
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: help demo check quick test test-baseline lint format bench short wheel docs errors clean
+.PHONY: help demo check quick test test-site test-baseline lint format bench short wheel docs errors clean
 
 help:  ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## */\t/' | expand -t 16
@@ -14,14 +14,21 @@ help:  ## this list
 demo: $(READY)  ## plan, check and replay the paper's planar arm and a Panda, into out/
 	$(BIN)/selfmotion demo --out out
 
-test: $(READY)  ## the whole test run, on two cores
-	$(BIN)/pytest --numprocesses 2 --dist loadfile --no-loadscope-reorder --keep-durations
+# The site runs every example for minutes: a target of its own.
+SITE := tests/docs/test_site.py
+TWO := --numprocesses 2 --ignore $(SITE)
+
+test: $(READY)  ## all tests but those of the site, on two cores
+	$(BIN)/pytest $(TWO) --dist loadfile --no-loadscope-reorder --keep-durations
+
+test-site: $(READY)  ## the site: built, with every example, and looked at
+	$(BIN)/pytest $(SITE)
 
 check: $(READY)  ## style, types, layers and all tests below 0.1 s, on a few arms: a minute
 	$(MAKE) --jobs 2 --output-sync lint quick
 
 quick: $(READY)
-	$(BIN)/pytest --numprocesses 2 --dist worksteal --below 0.1 --arms few
+	$(BIN)/pytest $(TWO) --dist worksteal --below 0.1 --arms few
 
 # What plans, and what is computed with it: the rest reads and writes files and pages.
 PLANNING := $(addprefix tests/, baselines batch certificate collision constraints costs follow job \
