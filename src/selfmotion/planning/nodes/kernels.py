@@ -88,14 +88,9 @@ def retract(
     for k in range(count):
         # Views: slices are reference-counted, which takes as long as the computation.
         here, off = view(q[k], 0, (n,)), np.inf
-        if carried > 0 and k % carried > 0:
-            for j in range(n):
-                for x in range(r):
-                    bases[k, j, x] = tangents[k - 1, j, x]
-        for j in range(n):
-            here[j] = references[k, j]
-            for x in range(r):
-                here[j] += bases[k, j, x] * coordinates[k, x]
+        basis, reference = view(bases[k], 0, (n, r)), view(references[k], 0, (n,))
+        z = view(coordinates[k], 0, (r,))
+        _begin(here, reference, basis, z, tangents[k - 1], carried > 0 and k % carried > 0)
         for _ in range(_STEPS):
             place_tips(here, chains, turns, places, rotations, positions, jacobians)
             clear_held(held[k], jacobians)
@@ -106,9 +101,9 @@ def retract(
                 positions,
                 view(targets[k], 0, (12 * tips,)),
                 layout,
-                view(bases[k], 0, (n, r)),
-                view(references[k], 0, (n,)),
-                view(coordinates[k], 0, (r,)),
+                basis,
+                reference,
+                z,
                 b,
                 system,
                 factor,
@@ -118,41 +113,76 @@ def retract(
                 break
         if not 0.0 <= off < _THERE:
             failed = k if failed < 0 else failed
-            nowhere = stage_of(table[k], n, m).qd
-            for j in range(n):
-                nowhere[j] = np.nan
-                for x in range(r):
-                    tangents[k, j, x] = np.nan
+            stage_of(table[k], n, m).qd[:] = np.nan
+            tangents[k][:] = np.nan
             continue
-        for x in range(r):
-            for i in range(n):
-                b[i] = 1.0 if i == m + x else 0.0
-            solve_cholesky(factor, b)
-            for j in range(n):
-                total = 0.0
-                for i in range(n):
-                    total += system[i, j] * b[i]
-                tangents[k, j, x] = total
-        row = table[k]
-        at = stage_of(row, n, m)
+        _set_tangents(tangents[k], system, factor, b)
         if centred:
-            _centre(tangents[k], at.epsilon, b)
-        for j in range(n):
-            at.q[j] = q[k, j]
-        # The first rows of B, and of the factor of BBᵀ, are those of J and of JJᵀ.
-        for i in range(m):
-            for j in range(n):
-                at.task_jacobian[i, j] = system[i, j]
-            for j in range(i + 1):
-                at.factor[i, j] = factor[i, j]
-        for f in range(tips):
-            tip = tip_of(row, f, n, m)
-            write_tip(tip, rotations[f], positions[f], jacobians[f])
-            select(layout, f, tip.rotation, tip.command, at.y)
-        respond(at.task_jacobian, at.factor, at.y, at.epsilon, at.qd)
-        if not finite(at.qd):
+            _centre(tangents[k], stage_of(table[k], n, m).epsilon, b)
+        placed = rotations, positions, jacobians
+        if not _follows(here, system, factor, layout, placed, table[k]):
             failed = k if failed < 0 else failed
     return failed
+
+
+@inlined
+def _follows(
+    q: Array,
+    system: Array,
+    factor: Array,
+    layout: Layout,
+    placed: tuple[Array, Array, Array],
+    row: Array,
+) -> bool:
+    """Set the row of a node at q (n,) on its manifold, with its q̇; return whether q̇ is finite.
+
+    The first rows of B, and of the factor of BBᵀ, are those of J and of JJᵀ. `placed` are the
+    rotations, positions and Jacobians of all tips.
+    """
+    n, m = len(q), rows_of(layout)
+    at = stage_of(row, n, m)
+    for j in range(n):
+        at.q[j] = q[j]
+    for i in range(m):
+        for j in range(n):
+            at.task_jacobian[i, j] = system[i, j]
+        for j in range(i + 1):
+            at.factor[i, j] = factor[i, j]
+    for f in range(layout.shape[0]):
+        tip = tip_of(row, f, n, m)
+        write_tip(tip, placed[0][f], placed[1][f], placed[2][f])
+        select(layout, f, tip.rotation, tip.command, at.y)
+    respond(at.task_jacobian, at.factor, at.y, at.epsilon, at.qd)
+    return finite(at.qd)
+
+
+@inlined
+def _begin(
+    q: Array, reference: Array, basis: Array, coordinates: Array, before: Array, carries: bool
+) -> None:
+    """Set q (n,) to the reference displaced along a basis (n, r): `before` it, if it carries."""
+    n, r = basis.shape
+    for j in range(n):
+        q[j] = reference[j]
+        for x in range(r):
+            if carries:
+                basis[j, x] = before[j, x]
+            q[j] += basis[j, x] * coordinates[x]
+
+
+@inlined
+def _set_tangents(tangents: Array, system: Array, factor: Array, b: Array) -> None:
+    """Set T (n, r) = B⁻¹ [0; I], for B (n, n) = `system` and the factor of BBᵀ."""
+    n, r = tangents.shape
+    for x in range(r):
+        for i in range(n):
+            b[i] = 1.0 if i == n - r + x else 0.0
+        solve_cholesky(factor, b)
+        for j in range(n):
+            total = 0.0
+            for i in range(n):
+                total += system[i, j] * b[i]
+            tangents[j, x] = total
 
 
 @inlined
