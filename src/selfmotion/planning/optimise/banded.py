@@ -123,22 +123,8 @@ def interior_optimum(
             matrix, place, dc, slack, price, residuals, ds, dz, centre, 1.0, _TAU
         )
         if min(primal, dual) < _SHORT_STEP:
-            centre = _CENTRING * mu
-            _search_direction(
-                centre,
-                0.0,
-                gradient,
-                free,
-                matrix,
-                place,
-                slack,
-                price,
-                residuals,
-                ds,
-                dz,
-                band,
-                dc,
-            )
+            centre, known = _CENTRING * mu, (gradient, free, matrix, place, slack, price, residuals)
+            _search_direction(centre, 0.0, *known, ds, dz, band, dc)
             primal, dual = _step_lengths(
                 matrix, place, dc, slack, price, residuals, ds, dz, centre, 0.0, _TAU
             )
