@@ -1,5 +1,6 @@
 """The command that writes motions for controllers and simulators."""
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, NoReturn
 
@@ -67,34 +68,9 @@ def export(
 ) -> None:
     """Write a plan's motion for controllers and simulators, and verify the file."""
     asked = outputs.program_settings(settings, targets, wobj, mass)
-    if rate is not None and all(reread.is_program(target, form, asked) for target in out):
-        raise sm.errors.ProblemError(
-            "--rate has no effect on programs, which have the targets that they need"
-        )
-    if parts and all(reread.is_program(target, form, asked) for target in out):
-        raise sm.errors.ProblemError(
-            "--parts has no effect on programs of controllers, which move all joints of a cell; "
-            "leave it out, or give a file of another kind as well"
-        )
-    if settings is not None and not any(reread.is_of_controller(target, form) for target in out):
-        raise sm.errors.ProblemError(
-            "--settings has no effect: it is of controllers' programs (.script, .src, .mod)"
-        )
-    typed = {"targets": targets, "wobj": wobj, "mass": mass}
-    if any(typed.values()) and not any(reread.is_of_controller(target, form) for target in out):
-        names = ", ".join(f"--{name}" for name, value in typed.items() if value)
-        raise sm.errors.ProblemError(
-            f"{names}: of controllers' programs (.script, .src, .mod), of which none is asked for"
-        )
-    made: reread.Made
-    if file.suffix == jobs.PROGRAM:
-        made = sm.load_program(file)
-    elif file.suffix == jobs.PARTS:
-        made = sm.files.load_parts(file)
-    elif is_move(file):
-        made = sm.files.load_move(file)
-    else:
-        made = sm.load_plan(file)
+    files = _Files(tuple(out), form, asked, parts, force, verbose or as_json)
+    files.check(rate, settings, {"targets": targets, "wobj": wobj, "mass": mass})
+    made = _loaded(file)
     if parts and not isinstance(made, sm.Plan):
         raise sm.errors.ProblemError(
             f"{file}: --parts is of a cell's plan, which this is not; leave it out"
@@ -102,51 +78,127 @@ def export(
     _check_verified(made, force, as_json)
     _tell_followers(made.robot, out, form)
     outputs.tell_base(made.robot, asked)
-    if isinstance(made, sm.Plan) and any(reread.is_readable(target, form) for target in out):
+    if isinstance(made, sm.Plan) and files.are_readable:
         made = _slow_enough(made, rate)
-    verdicts: dict[str, str] = {}
-    # Which what is only of these is said for.
-    programs = any(reread.is_program(target, form, asked) for target in out)
-    messages = any(reread.is_message(target, form) for target in out)
     coarsest = None
-    if messages and rate is None and isinstance(made, sm.Plan):
+    if rate is None and files.are_messages and isinstance(made, sm.Plan):
         coarsest = controllers.coarsest_rate(made)
+    verdicts: dict[str, str] = {}
     sound = True
     for target in out:
-        given: dict[str, Any] = {"format": form, "force": force}
-        if not reread.is_program(target, form, asked):
-            given["rate"] = coarsest if rate is None and reread.is_message(target, form) else rate
-        together: dict[str, Path] = {}
-        if parts and isinstance(made, sm.Plan) and not reread.is_program(target, form, asked):
-            together = sm.files.write_parts(made, target, **given)
-        with StageDisplay(stages) as display:
-            own = asked if reread.is_of_controller(target, form) else None
-            if own is not None and not reread.is_program(target, form, asked) and programs:
-                own = own.streamed
-            sm.files.write_motion(made, target, settings=own, progress=display.stage, **given)
-        kept, verdicts[str(target)] = reread.read_back(
-            made, target, form, rate, asked, whole=verbose or as_json
-        )
+        kept, written = files.write(made, target, rate, coarsest)
+        verdicts |= written
         sound &= kept
-        if together:
-            names = ", ".join(map(str, together.values()))
-            verdicts[names] = ""
-            if reread.is_readable(target, form) and isinstance(made, sm.Plan):
-                kept, verdicts[names] = reread.judged(
-                    made, sm.files.read_parts(together), whole=verbose or as_json
-                )
-                sound &= kept
-    streamed = [target for target in out if not reread.is_program(target, form, asked)]
+    streamed = [target for target in out if not files.is_program(target)]
     if all(reread.is_message(target, form) for target in streamed):
         rate = coarsest if rate is None else rate
     if coarsest is not None and not as_json:
-        terminal.print(
-            reread.told_coarsest(coarsest),
-            markup=False,
-            soft_wrap=True,
-        )
+        terminal.print(reread.told_coarsest(coarsest), markup=False, soft_wrap=True)
     _tell_held(made.robot)
     _finish(made, rate, verdicts, sound, as_json, sampled=bool(streamed))
+
+
+def _loaded(file: Path) -> reread.Made:
+    """Return what a file holds: a program, parts, a move or a plan."""
+    if file.suffix == jobs.PROGRAM:
+        return sm.load_program(file)
+    if file.suffix == jobs.PARTS:
+        return sm.files.load_parts(file)
+    return sm.files.load_move(file) if is_move(file) else sm.load_plan(file)
+
+
+@dataclass(frozen=True)
+class _Files:
+    """The files that are asked for.
+
+    Attributes
+    ----------
+    targets : tuple of Path
+    form : str or None
+        Their format, whatever the suffix.
+    asked : ProgramSettings or None
+    parts, force : bool
+        Whether there is a file for each part; and whether all is written that is not verified.
+    whole : bool
+        Whether verdicts are told whole.
+    """
+
+    targets: tuple[Path, ...]
+    form: str | None
+    asked: sm.files.ProgramSettings | None
+    parts: bool
+    force: bool
+    whole: bool
+
+    def check(self, rate: float | None, settings: object, typed: dict[str, object | None]) -> None:
+        """Raise ProblemError for options that are of none of the files."""
+        all_programs = all(map(self.is_program, self.targets))
+        if rate is not None and all_programs:
+            raise sm.errors.ProblemError(
+                "--rate has no effect on programs, which have the targets that they need"
+            )
+        if self.parts and all_programs:
+            raise sm.errors.ProblemError(
+                "--parts has no effect on programs of controllers, which move all joints of a "
+                "cell; leave it out, or give a file of another kind as well"
+            )
+        if any(reread.is_of_controller(target, self.form) for target in self.targets):
+            return
+        if settings is not None:
+            raise sm.errors.ProblemError(
+                "--settings has no effect: it is of controllers' programs (.script, .src, .mod)"
+            )
+        names = ", ".join(f"--{name}" for name, value in typed.items() if value)
+        if names:
+            raise sm.errors.ProblemError(
+                f"{names}: of controllers' programs (.script, .src, .mod), of which none is asked "
+                f"for"
+            )
+
+    def is_program(self, target: Path) -> bool:
+        """Whether a file is a program of targets, which has no rate."""
+        return reread.is_program(target, self.form, self.asked)
+
+    @property
+    def are_messages(self) -> bool:
+        """Whether one of them is a message of ROS."""
+        return any(reread.is_message(target, self.form) for target in self.targets)
+
+    @property
+    def are_readable(self) -> bool:
+        """Whether one of them can be read back as a motion."""
+        return any(reread.is_readable(target, self.form) for target in self.targets)
+
+    def write(
+        self, made: reread.Made, target: Path, rate: float | None, coarsest: float | None
+    ) -> tuple[bool, dict[str, str]]:
+        """Write a file, and one for each part; return whether all is kept, and verdicts by name."""
+        given: dict[str, Any] = {"format": self.form, "force": self.force}
+        sampled = not self.is_program(target)
+        if sampled:
+            is_message = reread.is_message(target, self.form)
+            given["rate"] = coarsest if rate is None and is_message else rate
+        together: dict[str, Path] = {}
+        if self.parts and sampled and isinstance(made, sm.Plan):
+            together = sm.files.write_parts(made, target, **given)
+        own = self.asked if reread.is_of_controller(target, self.form) else None
+        # What only programs of targets are asked for is not of a stream of samples beside them.
+        if own is not None and sampled and any(map(self.is_program, self.targets)):
+            own = own.streamed
+        with StageDisplay(stages) as display:
+            sm.files.write_motion(made, target, settings=own, progress=display.stage, **given)
+        sound, verdict = reread.read_back(
+            made, target, self.form, rate, self.asked, whole=self.whole
+        )
+        verdicts = {str(target): verdict}
+        if together and isinstance(made, sm.Plan):
+            names = ", ".join(map(str, together.values()))
+            verdicts[names] = ""
+            if reread.is_readable(target, self.form):
+                motion = sm.files.read_parts(together)
+                kept, verdicts[names] = reread.judged(made, motion, whole=self.whole)
+                sound &= kept
+        return sound, verdicts
 
 
 def _slow_enough(plan: sm.Plan, rate: float | None) -> sm.Plan:
