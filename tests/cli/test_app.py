@@ -1,6 +1,7 @@
 """The command line as a user types it."""
 
 import io
+import json
 import os
 import re
 import subprocess
@@ -23,10 +24,12 @@ from support.shell import complaint, invoke
 SELFMOTION = Path(sys.executable).with_name("selfmotion")
 
 
-def run(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
+def run(*arguments: str | Path, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
     environment = os.environ | {"COLUMNS": "120"}
     command = [SELFMOTION, *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, env=environment, check=False)
+    return subprocess.run(
+        command, capture_output=True, text=True, env=environment, check=False, cwd=cwd
+    )
 
 
 def test_plan_check_and_replay(tmp_path: Path) -> None:
@@ -296,3 +299,26 @@ def test_where_the_number_is_not_known_it_counts() -> None:
 
 def open_nothing() -> io.StringIO:
     return io.StringIO()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [
+        (("check", "no.npz"), {"class": "FileFormatError", "file": "no.npz", "key": None}),
+        (("plan", "bad.toml"), {"file": "bad.toml", "key": "path", "line": None}),
+        (("plan", "panda", "--path", "bad.csv"), {"file": "bad.csv", "line": 3, "key": None}),
+        (("plan", "nosuch", "--circle", "0.1"), {"class": "RobotError", "file": None}),
+        (("plan", "panda", "--circle", "0.1", "--nosuch"), {"class": "NoSuchOption"}),
+        (("plan", "ur5", "--circle", "0.1"), {"class": "RedundancyError", "dof": 6, "rows": 6}),
+    ],
+)
+def test_of_bad_input_a_program_sees_json(
+    tmp_path: Path, arguments: tuple[str, ...], expected: dict[str, object]
+) -> None:
+    (tmp_path / "bad.toml").write_text('[robot]\nname = "panda"\n[path]\nfle = "x.csv"\n')
+    (tmp_path / "bad.csv").write_text("t,x,y,z\n0,0.3,0,0.5\n1,0.3,zero,0.5\n")
+    result = run(*arguments, "--json", cwd=tmp_path)
+    assert result.returncode == 2, result.stderr
+    error = json.loads(result.stdout)["error"]
+    assert error | expected == error
+    assert error["message"] in result.stderr

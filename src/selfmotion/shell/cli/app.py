@@ -1,6 +1,7 @@
 """The command line: where commands are registered, what shows how far they are, how they end."""
 
 import math
+import re
 import sys
 import threading
 import time
@@ -288,22 +289,62 @@ INTERRUPTED = 130
 def main() -> None:
     """Run the command; exit code 2 and one line for bad input, 3 for a fault of ours.
 
-    130 and a line where it was stopped before there was anything to keep.
+    130 and a line where it was stopped before there was anything to keep. With `--json` what is
+    wrong is on the output as JSON as well, see `error_json`.
     """
+    as_json = "--json" in sys.argv[1:]
     try:
-        app()
+        code = app(standalone_mode=not as_json)
     except SystemExit as end:
-        if end.code == INTERRUPTED:
-            complain("stopped before there was anything to keep")
-        raise
+        code = end.code
     except sm.SelfmotionError as error:
-        complain(f"error: {in_shell(str(error))}")
-        sys.exit(BAD_INPUT)
-    except Exception:
+        _fail(error, in_shell(str(error)), as_json)
+        code = BAD_INPUT
+    except typer.TyperException as error:
+        # Of arguments and options themselves; it says so on its own where nothing is JSON.
+        _fail(error, str(error), as_json)
+        code = BAD_INPUT
+    except Exception as error:
         # Not bad input, and no verdict: whoever reads exit codes must not take it for one.
         traceback.print_exc()
         complain("selfmotion failed; this is a fault of the program, not of what it was given")
-        sys.exit(FAILED)
+        if as_json:
+            print_json(error_json(error, str(error)))
+        code = FAILED
+    if code == INTERRUPTED:
+        complain("stopped before there was anything to keep")
+    sys.exit(code)
+
+
+def _fail(error: Exception, text: str, as_json: bool) -> None:
+    complain(f"error: {text}")
+    if as_json:
+        print_json(error_json(error, text))
+
+
+# How messages begin: with the file, then the key of a document, or a line or row of it.
+_PLACE = re.compile(
+    r"(?P<file>[^\s:]*[^\s:/]\.[A-Za-z]\w*): "
+    r"(?:(?:line|row) (?P<line>\d+)\b|(?P<key>[A-Za-z_][\w.\[\]-]*): )?"
+)
+
+
+def error_json(error: Exception, text: str) -> dict[str, Any]:
+    """Return an error as JSON has it.
+
+    Its class and sentence; the file, key and line that the sentence begins with, null where it does
+    not; and what the class has besides, such as the `time` of a BreakdownError.
+    """
+    found = _PLACE.match(text)
+    place = {"file": None, "key": None, "line": None} | (found.groupdict() if found else {})
+    if place["line"] is not None:
+        place["line"] = int(place["line"])
+    data = {"class": type(error).__name__, "message": text, **place}
+    return {"error": data | {k: v for k, v in vars(error).items() if isinstance(v, _PLAIN)}}
+
+
+# Attributes of errors that JSON has.
+_PLAIN = (str, int, float, bool, type(None))
 
 
 def print_json(data: Any) -> None:
