@@ -20,6 +20,7 @@ from selfmotion.planning.formulation import (
 )
 from selfmotion.planning.formulation.tolerances import RowWithinBand, WithinBand
 from selfmotion.planning.nodes import NodeGrid
+from selfmotion.planning.nodes.node_matrix import NodeMatrix
 from selfmotion.planning.nodes.spline import AT_GAUSS
 from selfmotion.problem.constraints import DependsOn, NodeTangents
 from selfmotion.problem.costs import Samples
@@ -297,10 +298,14 @@ def test_springs_have_exact_slopes_and_curvatures() -> None:
     direction[:, :, 7] = rng.normal(size=(6, 6))
     exact = (value(ends + 1e-4 * direction) - value(ends - 1e-4 * direction)) / 2e-4
     assert float((slopes * direction[:, :, 7:]).sum()) == pytest.approx(exact, rel=1e-6)
-    both = np.swapaxes(direction, 1, 2)[:, :, :, None]
-    bends = cost.curvature(samples.arm, none, both).sum()
+    nodes = np.zeros((7, 3, 8, 1))
+    nodes[:, :, 7] = rng.normal(size=(7, 3, 1))
+    by, matrix, step = spline.changes(nodes), NodeMatrix.zeros(7, 1), np.ones((7, 1))
+    cost.add_curvature(matrix, by, samples.arm, none)
+    bends = float(step.ravel() @ matrix.banded().dense() @ step.ravel())
+    direction = by.along(step)
     sides = value(ends + direction) + value(ends - direction) - 2.0 * value(ends)
-    assert float(bends) == pytest.approx(sides, rel=1e-6)
+    assert bends == pytest.approx(sides, rel=1e-6)
 
 
 @pytest.mark.parametrize("relaxations", [item[2] for item in TOLERANCES[1:5]])

@@ -12,10 +12,9 @@ import numpy as np
 from selfmotion.basics import Array, ProblemError, read_only
 from selfmotion.certificate import Certificate, Tolerance, arm_limits, errors_between
 from selfmotion.model.follow import Coordinates, Follows, RelaxedFrames
-from selfmotion.model.motion import NullMotion, Sampling, Trajectory, fading_window
+from selfmotion.model.motion import Sampling, Trajectory
 from selfmotion.model.path import Path
 from selfmotion.model.robot import RobotModel
-from selfmotion.model.task import DampingLaw
 from selfmotion.planning.formulation.sampled import SampledMotion
 from selfmotion.planning.formulation.tolerances import band_conditions, of_arm, widest_band
 from selfmotion.problem.constraints import (
@@ -140,26 +139,6 @@ class Formulation:
         """Names, limits and weights of z."""
         return self.follows.coordinates
 
-    @property
-    def null_motion(self) -> NullMotion:
-        """The parameterisation of the self-motion."""
-        return self.problem.null_motion
-
-    @property
-    def rest_orders(self) -> tuple[int, int]:
-        """See `Problem.rest_orders`."""
-        return self.problem.rest_orders
-
-    @property
-    def rests(self) -> tuple[bool, bool]:
-        """See `Problem.rests`."""
-        return self.problem.rests
-
-    @property
-    def damping_law(self) -> DampingLaw | None:
-        """See `Problem.damping_law`."""
-        return self.problem.damping_law
-
     @cached_property
     def given_start(self) -> Array | None:
         """The start (n,), with the virtual joints that it needs; None where it is free."""
@@ -257,7 +236,7 @@ class Formulation:
         known, problem = self._known_conditions, self.problem
         if (apart, decomposed) not in known:
             given = [*self._own_limits, *(problem.all_constraints if apart else problem.applying)]
-            if all(self.rests):
+            if all(self.problem.rests):
                 given = [item.at_rest() for item in given]
             known[apart, decomposed] = Conditions.joined(
                 item.decomposed_conditions(self.robot)
@@ -336,14 +315,6 @@ class Formulation:
             own.bodies,
             (*(of_arm(item, n) for item in own.quantities), *several),
         )
-
-    def null_functions(self, t: Array, motion: NullMotion) -> Array:
-        """Return φ of a null motion at times `t` (S,), at rest where the arm has to be, (S, K)."""
-        return motion.resting(t, self.path.duration, self.rest_orders)
-
-    def brought_to_rest(self, t: Array, epsilon: Array) -> Array:
-        """Return a null motion (S, n) that fades to nothing where the arm has to be at rest."""
-        return epsilon * fading_window(t, self.path.duration, self.rests)[:, None]
 
     def certify(
         self, trajectory: Trajectory, tolerance: Tolerance | None = None, ending: str = ""

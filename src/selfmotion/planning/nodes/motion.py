@@ -89,7 +89,7 @@ class NodeGrid:
         first = len(t) * np.arange(copies)
         self._resting: list[Ints] = []
         for order in (1, 2):
-            resting = [rest >= order for rest in formulation.rest_orders]
+            resting = [rest >= order for rest in formulation.problem.rest_orders]
             ends = np.array([0, len(t) - 1])[np.array(resting)]
             self._resting.append((ends + first[:, None]).ravel())
         held: list[Ints] = [] if free else [np.arange(r)]

@@ -9,7 +9,7 @@ import numpy as np
 from selfmotion.basics import Array, BreakdownError
 from selfmotion.model.follow import Follows
 from selfmotion.model.kernels import carried
-from selfmotion.model.motion import Grid, NullMotion, NullMotionTable
+from selfmotion.model.motion import Grid, NullMotion, NullMotionTable, fading_window
 from selfmotion.model.robot import null_space
 from selfmotion.model.task import SE3
 from selfmotion.planning.formulation import Formulation
@@ -180,10 +180,10 @@ class MinimumNormMotion:
         guide: Guide | None = None,
     ) -> "MinimumNormMotion":
         """Integrate from a start configuration (n,) on one grid."""
-        rollout = Rollout(formulation.follows, grid, damping=formulation.damping_law)
+        rollout = Rollout(formulation.follows, grid, damping=formulation.problem.damping_law)
         t = grid.stage_times
         idle = np.zeros((len(t), formulation.follows.dof))
-        own = idle if guide is None else formulation.brought_to_rest(t, guide(t))
+        own = idle if guide is None else _brought_to_rest(formulation, t, guide(t))
         broken = rollout.run(configuration, own)
         samples, drift = rollout.samples(), rollout.drift / _extents(rollout)
         if broken is not None:
@@ -260,12 +260,20 @@ def null_motion_table(
     if around is None:
         guide = minimum_norm.guide
         around = (
-            np.zeros((len(t), n)) if guide is None else formulation.brought_to_rest(t, guide(t))
+            np.zeros((len(t), n)) if guide is None else _brought_to_rest(formulation, t, guide(t))
         )
     # Of an arm without redundancy no null motion acts.
     is_joint = motion.space == "joint" and redundancy > 0
     frame, rows = (None, n) if is_joint else (partial(minimum_norm.frame, t), redundancy)
-    return NullMotionTable(formulation.null_functions(t, motion), frame, rows, around)
+    orders = formulation.problem.rest_orders
+    functions = motion.resting(t, formulation.path.duration, orders)
+    return NullMotionTable(functions, frame, rows, around)
+
+
+def _brought_to_rest(formulation: Formulation, t: Array, epsilon: Array) -> Array:
+    """Return a null motion (S, n) that fades to nothing where the arm has to be at rest."""
+    fading = fading_window(t, formulation.path.duration, formulation.problem.rests)
+    return epsilon * fading[:, None]
 
 
 def _extents(rollout: Rollout) -> Array:
@@ -299,7 +307,7 @@ def converged_minimum_norm(
     BreakdownError
         It runs into a singular pose.
     """
-    steps = max(_FEWEST_STEPS, formulation.null_motion.fewest_steps)
+    steps = max(_FEWEST_STEPS, formulation.problem.null_motion.fewest_steps)
     grid = grid or Grid.aligned(formulation.knots, steps)
     coarse: Array | None = None
     troubles: list[tuple[float, float]] = []

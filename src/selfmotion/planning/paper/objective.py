@@ -211,17 +211,17 @@ class Objective:
             FreeStart(follows, minimum_norm.start) if free else FixedStart(minimum_norm.start)
         )
         found = cls(
-            rollout or Rollout(follows, grid, damping=formulation.damping_law),
+            rollout or Rollout(follows, grid, damping=formulation.problem.damping_law),
             null_motion_table(
-                formulation, t, minimum_norm, null_motion or formulation.null_motion, around
+                formulation, t, minimum_norm, null_motion or formulation.problem.null_motion, around
             ),
             formulation.costs,
             start,
             ends,
             Counts() if counts is None else counts,
         )
-        if formulation.damping_law is None:
-            orders = zip((0, -1), formulation.rest_orders, strict=True)
+        if formulation.problem.damping_law is None:
+            orders = zip((0, -1), formulation.problem.rest_orders, strict=True)
             found._minimum_norm_ends = [end for end, order in orders if order > 1]
         found._is_rolled = rollout is not None and not start.size
         return found

@@ -158,7 +158,7 @@ class Solution:
     @property
     def null_motion(self) -> NullMotion:
         """The parameterisation of the null motion."""
-        return self.method.formulation.null_motion
+        return self.method.formulation.problem.null_motion
 
     @property
     def coefficients(self) -> Array:

@@ -32,8 +32,8 @@ UNKEPT = 10.0
 
 def uses_published_method(formulation: Formulation, effort: Effort) -> bool:
     """Whether the published method is requested: by a null motion, an optimiser, or damping."""
-    own = isinstance(formulation.null_motion, FreeNullMotion) and effort.optimizer is None
-    return not own or formulation.damping_law is not None
+    own = isinstance(formulation.problem.null_motion, FreeNullMotion) and effort.optimizer is None
+    return not own or formulation.problem.damping_law is not None
 
 
 def is_on_nodes(formulation: Formulation, effort: Effort) -> bool:

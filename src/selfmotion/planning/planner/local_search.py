@@ -184,7 +184,9 @@ class LocalSearch:
         """Return the optimum on twice as many nodes, more beside rest, or what there is."""
         t = optimum.motion.grid.t
         ends = t[0] + (t[1] - t[0]) * _BESIDE_REST, t[-1] - (t[-1] - t[-2]) * _BESIDE_REST
-        beside = [own for rest, own in zip(self.formulation.rests, ends, strict=True) if rest]
+        beside = [
+            own for rest, own in zip(self.formulation.problem.rests, ends, strict=True) if rest
+        ]
         finer = np.unique(np.concatenate([Grid(t).halved().nodes, *beside]))
         motion = optimum.motion.on(optimum.motion.grid.on(finer))
         return optimum if motion is None else self.minimise(motion)

@@ -129,7 +129,7 @@ class MinimumNormOutcome:
 
     def facts(self) -> OutcomeFacts:
         """Return what a report says of it: there is no null motion."""
-        return OutcomeFacts(self.formulation.null_motion, np.zeros(0))
+        return OutcomeFacts(self.formulation.problem.null_motion, np.zeros(0))
 
     @cached_property
     def evaluation(self) -> Evaluation:
@@ -138,9 +138,9 @@ class MinimumNormOutcome:
         before = rollout.jacobian_evaluations
         t, q, qd = rollout.polished()
         qdd = own.grid.derivative(qd)
-        if self.formulation.damping_law is None:
+        if self.formulation.problem.damping_law is None:
             # Where the arm comes to rest smoothly that is so by construction; differences are not.
-            orders = zip((0, -1), self.formulation.rest_orders, strict=True)
+            orders = zip((0, -1), self.formulation.problem.rest_orders, strict=True)
             qdd[[end for end, order in orders if order > 1]] = 0.0
         self.counts.jacobians += rollout.jacobian_evaluations - before
         trajectory = Trajectory(t, q, qd, self.formulation.coordinates.names, qdd)

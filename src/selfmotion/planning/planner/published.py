@@ -35,7 +35,7 @@ def solve_as_published(solution: Solution) -> Solution:
 def _first(guess: Guess) -> PublishedOutcome:
     """Return the minimum-norm motion as the start of the published method."""
     effort, formulation, begun = guess.effort, guess.formulation, guess.minimum_norm.motion
-    if isinstance(formulation.null_motion, FreeNullMotion):
+    if isinstance(formulation.problem.null_motion, FreeNullMotion):
         formulation = formulation.changed(null_motion=PolynomialNullMotion())
     ends, most = guess.conditions.ends, effort.max_evaluations
     limit = None if most is None else effort.counts.evaluations + most

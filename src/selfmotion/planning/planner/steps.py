@@ -260,7 +260,7 @@ def _plan_largest_part(planner: Planner) -> bool:
     """
     best, failure = planner.incumbent, planner.failure
     if best is not None:
-        is_damped = planner.formulation.damping_law is not None
+        is_damped = planner.formulation.problem.damping_law is not None
         short = planner.is_sought and _may_meet_more(best) and not is_damped
         if short and planner.reach().reason:
             judge_part(planner)
@@ -307,7 +307,7 @@ def _plan_part_instead(planner: Planner) -> bool:
         return False
     check = judged.certificate
     # With damping the motion goes on off the path, as requested.
-    if best.is_spent or planner.formulation.damping_law is not None:
+    if best.is_spent or planner.formulation.problem.damping_law is not None:
         return False
     out_of_limits = bool(best.violations) and check.limit_margin.value < 0.0
     suspect = check.position_error.time
@@ -348,7 +348,10 @@ def _find_obstruction(planner: Planner) -> bool:
     judged, formulation = planner.judged, planner.formulation
     if judged is None or judged.certificate.verified or judged.part.solution.cut_short:
         return False
-    if uses_published_method(formulation, planner.effort) or formulation.damping_law is not None:
+    if (
+        uses_published_method(formulation, planner.effort)
+        or formulation.problem.damping_law is not None
+    ):
         return False
     if judged.part.ending or judged.fails_at is None:
         return False
@@ -417,7 +420,7 @@ def _looked_at(formulation: Formulation, search: Search) -> Obstruction | None:
     NoSequenceError
         Bodies with a required clearance are met there.
     """
-    if formulation.damping_law is not None:
+    if formulation.problem.damping_law is not None:
         return None
     blocked = obstruction(formulation, np.random.default_rng(search.rng))
     if blocked is None:
