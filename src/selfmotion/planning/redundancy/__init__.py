@@ -6,5 +6,11 @@ from selfmotion.planning.redundancy.map import (
     RedundancyMap as RedundancyMap,
     redundancy_map_of as redundancy_map_of,
 )
+from selfmotion.planning.redundancy.picture import (
+    COST_COLORS as COST_COLORS,
+    LEGEND as LEGEND,
+    excess_cost as excess_cost,
+    shown_scale as shown_scale,
+)
 
 __all__ = ["Reason", "RedundancyMap"]

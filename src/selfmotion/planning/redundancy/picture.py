@@ -28,20 +28,28 @@ LEGEND: dict[Reason, tuple[str, str]] = {
 }
 # Colours of what is allowed, from the lowest cost density to the highest.
 COST_COLORS = ("#f3f8fb", "#a9cbe0", "#4f8db8", "#235a86")
-# Share of pixels whose cost density is beyond the scale's end: near singular poses it has no bound.
-_BEYOND = 0.05
+# Share of pixels by whose cost density the scale ends, times a factor, if not at the largest: near
+# singular poses it has no bound.
+_MOST, _FACTOR = 0.95, 3.0
 # Size of a figure [inches].
 _SIZE = (7.2, 4.8)
 
 
-def cost_range(cost: Array, allowed: Flags) -> tuple[float, float]:
-    """Return the ends of the scale of cost densities (N, M), over what is allowed."""
-    known = cost[allowed & np.isfinite(cost)]
-    if not len(known):
-        return 0.0, 1.0
-    low, high = float(known.min()), float(np.quantile(known, 1.0 - _BEYOND))
+def excess_cost(cost: Array, allowed: Flags) -> tuple[Array, float]:
+    """Return how far cost densities (N, M) are above the least allowed at their time, and a scale.
+
+    (N, M), NaN where nothing is allowed, and the end of the scale. What all configurations of a
+    time cost alike the self-motion cannot choose.
+    """
+    known = np.where(allowed & np.isfinite(cost), cost, np.inf)
+    least = known.min(axis=1, keepdims=True)
+    excess = np.where(np.isfinite(known), known - np.where(np.isfinite(least), least, 0.0), np.nan)
+    some = excess[np.isfinite(excess)]
+    if not len(some):
+        return excess, 1.0
+    high = min(float(some.max()), _FACTOR * float(np.quantile(some, _MOST)))
     # Of costs that are the same everywhere there is nothing to tell apart.
-    return (low, high) if high - low > 1e-9 * max(abs(high), 1e-9) else (low, low + 1.0)
+    return excess, high if high > 0.0 else 1.0
 
 
 def shown_scale(unit: str) -> tuple[float, str]:
@@ -66,14 +74,20 @@ def drawn(shown: RedundancyMap) -> Figure:
         here = np.where(shown.state == reason, 1.0, np.nan)
         colors = ListedColormap([LEGEND[reason][1]])
         axes.pcolormesh(shown.times, up, here.T, cmap=colors, shading="nearest", rasterized=True)
-    allowed = np.where(shown.allowed, shown.cost, np.nan)
-    low, high = cost_range(shown.cost, shown.allowed)
+    excess, high = excess_cost(shown.cost, shown.allowed)
     blues = LinearSegmentedColormap.from_list("cost", COST_COLORS)
     mesh = axes.pcolormesh(
-        shown.times, up, allowed.T, cmap=blues, vmin=low, vmax=high, shading="nearest",
+        shown.times,
+        up,
+        excess.T,
+        cmap=blues,
+        vmin=0.0,
+        vmax=high,
+        shading="nearest",
         rasterized=True,
-    )  # fmt: skip
-    figure.colorbar(mesh, label="cost density", extend="max", pad=0.02)
+    )
+    label = "cost density above the least at that time"
+    figure.colorbar(mesh, label=label, extend="max", pad=0.02)
     _draw_lines(axes, shown, scale)
     axes.set(xlabel="time [s]", ylabel=f"{shown.label} [{unit}]")
     axes.set(xlim=(shown.times[0], shown.times[-1]), ylim=(up[0], up[-1]))
